@@ -1,0 +1,16 @@
+# Everything covol builds on; all of it from Debian packages, listed in tests/install_packages.sh.
+include(CovolOpenVDB)
+find_package(OpenMesh CONFIG REQUIRED)
+find_package(CGAL 5.5 CONFIG REQUIRED)
+find_package(Eigen3 CONFIG REQUIRED)
+find_package(ITK 5.2 CONFIG REQUIRED COMPONENTS
+  ITKCommon ITKIOImageBase ITKIOTIFF ITKIONRRD ITKIONIFTI ITKIOMeta)
+find_package(TIFF REQUIRED)
+find_package(PNG REQUIRED)
+find_package(nlohmann_json CONFIG REQUIRED)
+if(COVOL_BUILD_TOOLS)
+  find_package(CLI11 CONFIG REQUIRED)
+endif()
+if(COVOL_BUILD_TESTS)
+  find_package(Catch2 2.13 CONFIG REQUIRED)
+endif()

@@ -1,0 +1,65 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "covol/domain.h"
+#include "covol/image.h"
+#include "covol/mesh.h"
+#include "covol/run.h"
+
+namespace covol {
+
+/// The width of the clamp on initial values, in voxels: u0 is in [-3h, 3h].
+inline constexpr double kHalfWidthVoxels = 3.0;
+
+struct BandOptions {
+    double tag_distance = 0.0;          ///< D, world units; > 0.
+    std::vector<Vec3> exterior_seeds;   ///< world positions that are outside, in cavities say
+    [[nodiscard]] std::string why_invalid() const;
+};
+
+struct BandReport {
+    double tag_distance = 0;      ///< D
+    double enclosed_volume = 0;   ///< of all that the flood did not reach, world units^3
+    double core_volume = 0;       ///< of the part of it with d > D
+    bool leaks = false;           ///< nothing enclosed, or the enclosed volume jumps just above D
+    double holding_distance = 0;  ///< where it leaks: the smallest D that would hold, 0 when none was found
+    std::int64_t active_voxels = 0;
+};
+
+struct BandResult {
+    FloatGridPtr grid;  ///< "band": u0, active where d <= D + 3h, +-3h outside; signed flood filled
+    BandReport report;
+};
+
+/// The D that the points themselves ask for, and how it was found.
+struct TagDistanceChoice {
+    double tag_distance = 0;
+    std::string reason;  ///< one line for people
+};
+
+/// Chooses D from the cloud: {d > D} falls apart into the exterior and enclosed cores as D grows; each core
+/// appears when its last gap closes (a saddle of d) and vanishes at its inner radius (a peak of d). D is put just
+/// above the saddle that closes the main cores. Without a core that stands out, 1.8 times the mean spacing.
+/// @throws Error InvalidInput.
+[[nodiscard]] TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Domain& domain,
+                                                    const std::vector<Vec3>& exterior_seeds, const RunContext& run = {});
+
+/// Tagging. Exterior is what a flood from the domain's boundary and the exterior seeds reaches through {d > D};
+/// u0 is the signed distance to the tagged surface clamped to [-3h, 3h] (negative inside) on the band {d <= D + 3h}.
+/// Leaks are reported, never thrown.
+/// @param distance  from distance(), with max_distance >= D + 3h.
+/// @throws Error InvalidOptions, InvalidInput (the tube is too narrow; an exterior seed outside the domain or at d <= D).
+[[nodiscard]] BandResult band(const FloatGrid& distance, const BandOptions& options, const RunContext& run = {});
+
+// Other starts: u0 = clamp(signed distance, -3h, 3h), active where |u0| < 3h, named "band".
+// All throw Error InvalidOptions / InvalidInput when no surface lies in the domain.
+[[nodiscard]] FloatGridPtr start_from_sphere(const Domain& domain, const Vec3& center, double radius);
+[[nodiscard]] FloatGridPtr start_from_box(const Domain& domain, const WorldBox& box);
+[[nodiscard]] FloatGridPtr start_from_mesh(const Domain& domain, const TriangleMesh& mesh, const RunContext& run = {});
+/// Voxels of the mask above 0 are inside.
+[[nodiscard]] FloatGridPtr start_from_mask(const Domain& domain, const Image& mask, const RunContext& run = {});
+/// Any level-set-like grid (negative inside), resampled onto the domain.
+[[nodiscard]] FloatGridPtr start_from_grid(const Domain& domain, const FloatGrid& level_set, const RunContext& run = {});
+
+}  // namespace covol

@@ -1,0 +1,31 @@
+#pragma once
+#include <optional>
+
+#include "covol/fwd.h"
+#include "covol/image.h"
+#include "covol/mesh.h"
+#include "covol/run.h"
+
+namespace covol {
+
+/// How alike two solids are. Distances are symmetric (both directions pooled), world units.
+struct CompareReport {
+    double dice = 0, jaccard = 0;
+    double volume_a = 0, volume_b = 0;
+    double hausdorff = 0, hausdorff95 = 0, mean_distance = 0;
+};
+
+/// A solid in one of the forms that covol writes. Masks: label 0 is outside; `label` picks one, 0 any.
+struct Solid {
+    std::optional<Image> mask;
+    int label = 0;
+    std::optional<TriangleMesh> mesh;
+    FloatGridPtr level_set;
+};
+/// By the name's end: images, meshes, .vdb (its level set "surface", else its first float grid).
+[[nodiscard]] Solid read_solid(const std::string& path, int label = 0);
+
+/// Overlap on the finer of both lattices (a mask's own voxels when one is a mask), distances between surfaces.
+[[nodiscard]] CompareReport compare(const Solid& a, const Solid& b, const RunContext& run = {});
+
+}  // namespace covol

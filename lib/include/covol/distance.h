@@ -1,0 +1,34 @@
+#pragma once
+#include <vector>
+
+#include "covol/domain.h"
+#include "covol/run.h"
+
+namespace covol {
+
+struct DistanceOptions {
+    double max_distance = 0.0;  ///< Radius of the tube, world units, > 0.
+    [[nodiscard]] std::string why_invalid() const;
+};
+
+struct DistanceReport {
+    std::int64_t active_voxels = 0;
+    int rounds = 0;  ///< passes over the leaves until nothing changed
+};
+
+struct DistanceResult {
+    FloatGridPtr grid;  ///< "distance"; active where d <= max_distance, background = max_distance
+    DistanceReport report;
+};
+
+/// Unsigned distance from voxel centres to the nearest point, in the tube d <= max_distance within the domain.
+///
+/// Each voxel keeps the index of its nearest known point; the index is swept through the tube in the 8 orderings of
+/// fast sweeping (Zhao 2005), leaf by leaf, so every value is an exact distance to some point and nearly always to the
+/// nearest one. Values do not depend on the number of threads.
+/// @param points  world positions, finite, at least one; points outside the domain count too.
+/// @throws Error InvalidOptions, InvalidInput.
+[[nodiscard]] DistanceResult distance(const std::vector<Vec3>& points, const Domain& domain,
+                                      const DistanceOptions& options, const RunContext& run = {});
+
+}  // namespace covol

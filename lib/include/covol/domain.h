@@ -1,0 +1,54 @@
+#pragma once
+#include <vector>
+
+#include "covol/fwd.h"
+
+namespace covol {
+
+/// An axis-aligned box in world space.
+struct WorldBox {
+    Vec3 min{0, 0, 0};
+    Vec3 max{0, 0, 0};
+};
+
+/// The computational domain: a box of isotropic voxels, aligned with the world's axes.
+///
+/// Voxel (i,j,k) is a cube of edge h whose centre lies at origin + h * (i,j,k);
+/// the domain holds the voxels min <= (i,j,k) <= max, and its boundary is the outer faces of those.
+/// Every grid of one computation carries the transform (h, origin) and the box as metadata.
+struct Domain {
+    double voxel_size = 1.0;  ///< h > 0, world units
+    Vec3 origin{0, 0, 0};     ///< world position of the centre of voxel (0,0,0)
+    Index3 min{0, 0, 0};      ///< first voxel
+    Index3 max{-1, -1, -1};   ///< last voxel, inclusive
+
+    [[nodiscard]] Vec3 index_to_world(const Vec3& index) const;
+    [[nodiscard]] Vec3 world_to_index(const Vec3& world) const;
+    /// From outer face to outer face.
+    [[nodiscard]] WorldBox world_box() const;
+    [[nodiscard]] bool contains(const Vec3& world) const;
+    [[nodiscard]] std::int64_t voxel_count() const;
+    friend bool operator==(const Domain&, const Domain&) = default;
+};
+
+/// The fewest voxels of edge h whose union covers `box`, centred on it.
+/// A box that is a whole number of voxels is matched exactly, so that an isotropic image's
+/// voxels are the domain's voxels.
+/// @throws Error InvalidOptions (h <= 0, not finite), InvalidInput (an empty box, or more than 2^30 voxels along an axis).
+[[nodiscard]] Domain domain_of_box(const WorldBox& box, double voxel_size);
+
+/// Box around the points, `margin` (world units) wider on every side.
+[[nodiscard]] WorldBox bounding_box(const std::vector<Vec3>& points, double margin = 0.0);
+
+/// Sets the grid's transform and stores the box as metadata ("covol_domain_min", "covol_domain_max").
+void set_domain(FloatGrid& grid, const Domain& domain);
+
+/// The domain that set_domain stored. Without the metadata the box is the bounding box of the
+/// active voxels grown by one leaf (8 voxels), so that nothing touches its boundary.
+/// @throws Error InvalidInput when the transform is not a uniform scale and a translation.
+[[nodiscard]] Domain domain_of(const FloatGrid& grid);
+
+/// An empty grid on `domain`: `background` everywhere, no active voxel, the given name.
+[[nodiscard]] FloatGridPtr make_grid(const Domain& domain, float background, const char* name);
+
+}  // namespace covol

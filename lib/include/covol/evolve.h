@@ -1,0 +1,67 @@
+#pragma once
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "covol/fwd.h"
+#include "covol/run.h"
+
+namespace covol {
+
+/// What changes the result of evolve(). Symbols and equation numbers are the paper's; lengths are in world
+/// units, the unit of the voxel size h; the flow's speed is 1 world unit per unit of time.
+struct EvolveOptions {
+    double theta = 1.0;             ///< θ in [0,1]: weight of the pull towards the points, Eq. (3).
+    double rho = 1.0;               ///< ρ in [0,1]: weight of the pull towards image edges, Eq. (3).
+    double delta = -1.0;            ///< δ >= 0: weight of curvature, Eq. (1), world units; < 0 picks 1 voxel.
+    double tau = -1.0;              ///< τ > 0: time step; < 0 picks h (one voxel at unit speed).
+    double epsilon = 1e-3;          ///< ε > 0: regularises |∇u|, Eqs. (13)-(14); dimensionless.
+    double edge_epsilon = 1e-3;     ///< ε in |∇g|_ε, Eq. (20): a slope of g per voxel; below it the pull fades.
+    double attraction_range = 0.0;  ///< r, world units: the points pull fully up to r/2, not at all beyond r; 0: unlimited.
+    double image_yields = 0.0;      ///< in [0,1]: share of ρ that fades close to marks, on the attraction range's taper.
+    bool follow = false;            ///< the band follows the surface (starts other than tagging).
+    int max_steps = 500;            ///< upper bound on time steps, >= 0
+    double tolerance = 1e-3;        ///< steady when the mean of |u^n - u^(n-1)| over |u| < h falls below tolerance * h per τ = h
+    double solver_tolerance = 1e-3; ///< a step's solve ends at this residual, relative to its first
+    int max_sweeps = 200;           ///< upper bound on a step's sweeps
+    [[nodiscard]] std::string why_invalid() const;
+};
+
+/// Why evolve() returned. In every case u holds the last whole step.
+enum class StopReason { NotRun, Steady, MaxSteps, Cancelled, Vanished };
+[[nodiscard]] const char* to_string(StopReason reason);
+
+struct EvolveReport {
+    StopReason stop_reason = StopReason::NotRun;
+    int steps = 0;
+    double last_change = 0;            ///< as in EvolveOptions::tolerance, voxels
+    double sweeps_per_step = 0;
+    std::int64_t leaf_visits = 0;      ///< leaves swept, over all steps and sweeps
+    std::int64_t active_voxels = 0;    ///< at the end
+    std::int64_t leaf_count = 0;
+    double seconds_assembly = 0;
+    double seconds_sweeps = 0;
+};
+
+/// The fields that move the surface. Null where the weight is 0.
+struct EvolveFields {
+    const FloatGrid* distance = nullptr;  ///< d to the points, world units; where inactive the points do not pull
+    const FloatGrid* edge = nullptr;      ///< g in (0,1]; where inactive the image does not pull
+    /// With `follow`: called with u when its band reached voxels where a field is not known yet, so that the caller
+    /// can extend it (and may replace the pointers above through `fields`).
+    std::function<void(const FloatGrid& u, EvolveFields& fields)> extend;
+};
+
+/// Moves the level set u to the boundary of the segment: the semi-implicit co-volume scheme with upwinding,
+/// Eqs. (14)-(22), on u's active voxels.
+///
+/// @param u  in/out, world units; active voxels are the band; u < 0 inside; inactive voxels keep their values.
+/// @pre   all grids share one transform: uniform voxel size and a translation (domain_of()).
+/// @post  without `follow`, u keeps its topology; values do not depend on the number of threads;
+///        min u0 <= u <= max u0.
+/// @throws Error  InvalidOptions, InvalidInput (no active voxel; transforms differ; a value that is not finite; a
+///                needed field is null), Numerical (u is left at the step before).
+EvolveReport evolve(FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options = {},
+                    const RunContext& run = {});
+
+}  // namespace covol

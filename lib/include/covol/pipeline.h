@@ -1,0 +1,64 @@
+#pragma once
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "covol/band.h"
+#include "covol/edge.h"
+#include "covol/evolve.h"
+#include "covol/image.h"
+#include "covol/mesh.h"
+#include "covol/points.h"
+#include "covol/surface.h"
+
+namespace covol {
+
+/// How the level set starts.
+struct Start {
+    enum class Kind { Tag, Sphere, Box, Mesh, Mask, Vdb } kind = Kind::Tag;
+    Vec3 center{0, 0, 0};  ///< Sphere
+    double radius = 0;     ///< Sphere
+    WorldBox box;          ///< Box
+    std::string path;      ///< Mesh, Mask, Vdb
+};
+
+struct SegmentOptions {
+    double voxel_size = 0.0;            ///< h, world units; 0 picks the image's smallest spacing, or for points alone half their spacing
+    std::optional<WorldBox> roi;        ///< the domain, instead of the image's box
+    double margin = 0.0;                ///< points alone: between points and domain boundary; 0 picks D + 6 voxels
+    Start start;
+    double tag_distance = 0.0;          ///< D; 0: automatic
+    std::vector<Vec3> exterior_seeds;
+    EdgeOptions edge;
+    EvolveOptions evolve;
+    ExtractOptions extract;
+    [[nodiscard]] std::string why_invalid() const;
+};
+
+struct SegmentReport {
+    struct Seconds { double read = 0, distance = 0, tag = 0, edge = 0, solve = 0, surface = 0, write = 0, total = 0; } seconds;
+    Domain domain;
+    std::int64_t active_voxels = 0, leaf_count = 0;
+    std::size_t point_count = 0, densified = 0;
+    TagDistanceChoice tag;
+    BandReport band;
+    EdgeReport edge;
+    EvolveReport solve;
+    MeshMeasures surface;
+    FitStatistics fit;
+    std::map<std::string, std::string> automatic;  ///< each automatic choice and its reason
+};
+
+struct SegmentResult {
+    FloatGridPtr u, distance, edge, surface;
+    TriangleMesh mesh;
+    SegmentReport report;
+};
+
+/// The main job: image and points together (either may be absent: null, empty).
+/// @throws Error as the single steps; InvalidInput when there is neither.
+[[nodiscard]] SegmentResult segment(const Image* image, const std::vector<Vec3>& world_points,
+                                    const SegmentOptions& options = {}, const RunContext& run = {});
+
+}  // namespace covol

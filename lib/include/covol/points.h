@@ -1,0 +1,56 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "covol/fwd.h"
+#include "covol/image.h"
+
+namespace covol {
+
+enum class PointSpace { Unstated, World, Index };  ///< Index: voxels of the image, 0-based, centres at integers
+enum class PointOrder { Unstated, XYZ, ZYX };
+
+struct ReadPointsOptions {
+    PointSpace space = PointSpace::Unstated;  ///< Unstated: what the format says, else World.
+    PointOrder order = PointOrder::Unstated;  ///< Unstated: what the format says, else XYZ.
+};
+
+/// Points as a file gives them: x, y, z in `space`.
+struct PointCloud {
+    std::vector<Vec3> points;
+    PointSpace space = PointSpace::World;
+    std::string source;  ///< path, for messages
+    std::string rule;    ///< how coordinates were understood, one line for people
+};
+
+/// Reads XYZ, CSV/TSV (with or without a header; columns x,y,z found by name), PLY (ascii, both binary
+/// byte orders), OBJ or OFF (their vertices).
+/// @throws Error Io, InvalidInput (with path:line: text instead of numbers, NaN, truncated, no point), Unsupported.
+[[nodiscard]] PointCloud read_points(const std::string& path, const ReadPointsOptions& options = {});
+
+/// World positions; index points are mapped by the image's geometry.
+/// @throws Error InvalidInput when points are in index space and `geometry` is null.
+[[nodiscard]] std::vector<Vec3> to_world(const PointCloud& cloud, const ImageGeometry* geometry);
+
+/// @throws Error InvalidInput when a point lies outside the image: how many of how many, both boxes, and the
+///         option (--points-space, --points-order, --spacing) that would bring them inside where one does.
+void check_inside(const std::vector<Vec3>& world_points, const ImageGeometry& geometry, const std::string& source);
+
+/// Exact duplicates, and points closer than `cell` / 2 in the same cell of a lattice of edge `cell`, become one.
+/// The first of each stays; the order stays. cell = 0 removes exact duplicates only.
+[[nodiscard]] std::vector<Vec3> merge_close_points(const std::vector<Vec3>& points, double cell);
+
+/// Spacing of a cloud, from nearest neighbours of a fixed subsample (world units).
+struct SpacingStatistics {
+    double mean = 0;    ///< mean distance to the nearest other point
+    double median = 0;
+    double p95 = 0;
+    double max = 0;
+};
+/// @pre no exact duplicates
+[[nodiscard]] SpacingStatistics nearest_neighbour_spacing(const std::vector<Vec3>& points);
+
+/// Writes .xyz, .csv or binary .ply by the name's end; whole or not at all.
+void write_points(const std::string& path, const std::vector<Vec3>& points, const std::string& comment = {});
+
+}  // namespace covol

@@ -1,0 +1,35 @@
+#pragma once
+#include <atomic>
+#include <functional>
+#include <string>
+
+namespace covol {
+
+enum class LogLevel { Info, Warning };
+
+/// How a computation runs, as opposed to what it computes: nothing in here changes a result.
+struct RunContext {
+    int threads = 0;  ///< Threads to use; 0 takes every core.
+
+    /// Called from the calling thread with a stage's name and its fraction done in [0,1].
+    std::function<void(const std::string& stage, double fraction)> progress;
+
+    /// Called with one line of text; automatic choices come as Info.
+    std::function<void(LogLevel, const std::string& line)> log;
+
+    /// Set from anywhere (a signal handler, say) to make the computation throw Errc::Cancelled
+    /// or, where partial results are useful, return early and say so.
+    const std::atomic<bool>* cancel = nullptr;
+
+    [[nodiscard]] bool cancelled() const noexcept { return cancel != nullptr && cancel->load(std::memory_order_relaxed); }
+    void info(const std::string& line) const;
+    void warn(const std::string& line) const;
+    void report(const std::string& stage, double fraction) const;
+    /// @throws Error Cancelled when cancelled().
+    void check() const;
+};
+
+/// Runs `work` on run.threads threads (every TBB loop inside it, OpenVDB's own included).
+void with_threads(const RunContext& run, const std::function<void()>& work);
+
+}  // namespace covol

@@ -1,0 +1,140 @@
+#include "covol/domain.h"
+
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "covol/error.h"
+
+namespace covol {
+namespace {
+
+constexpr const char* kMinKey = "covol_domain_min";
+constexpr const char* kMaxKey = "covol_domain_max";
+constexpr double kMaxVoxelsPerAxis = 1 << 30;
+
+std::string to_text(const WorldBox& b) {
+    std::ostringstream s;
+    s << "(" << b.min[0] << ", " << b.min[1] << ", " << b.min[2] << ") to (" << b.max[0] << ", " << b.max[1] << ", "
+      << b.max[2] << ")";
+    return s.str();
+}
+
+}  // namespace
+
+Vec3 Domain::index_to_world(const Vec3& index) const {
+    return {origin[0] + voxel_size * index[0], origin[1] + voxel_size * index[1], origin[2] + voxel_size * index[2]};
+}
+
+Vec3 Domain::world_to_index(const Vec3& world) const {
+    return {(world[0] - origin[0]) / voxel_size, (world[1] - origin[1]) / voxel_size,
+            (world[2] - origin[2]) / voxel_size};
+}
+
+WorldBox Domain::world_box() const {
+    WorldBox box;
+    for (int a = 0; a < 3; ++a) {
+        box.min[a] = origin[a] + voxel_size * (min[a] - 0.5);
+        box.max[a] = origin[a] + voxel_size * (max[a] + 0.5);
+    }
+    return box;
+}
+
+bool Domain::contains(const Vec3& world) const {
+    const WorldBox box = world_box();
+    for (int a = 0; a < 3; ++a)
+        if (!(world[a] >= box.min[a] && world[a] <= box.max[a])) return false;
+    return true;
+}
+
+std::int64_t Domain::voxel_count() const {
+    std::int64_t n = 1;
+    for (int a = 0; a < 3; ++a) n *= std::max<std::int64_t>(0, std::int64_t(max[a]) - min[a] + 1);
+    return n;
+}
+
+Domain domain_of_box(const WorldBox& box, double voxel_size) {
+    if (!(voxel_size > 0) || !std::isfinite(voxel_size))
+        throw Error(Errc::InvalidOptions, "domain_of_box: voxel size: expected > 0, got " + std::to_string(voxel_size));
+    Domain domain;
+    domain.voxel_size = voxel_size;
+    for (int a = 0; a < 3; ++a) {
+        const double length = box.max[a] - box.min[a];
+        if (!(length > 0) || !std::isfinite(length))
+            throw Error(Errc::InvalidInput, "domain_of_box: expected a box with a positive extent, got " + to_text(box));
+        // A tolerance keeps a box of exactly n voxels at n in spite of rounding.
+        const double cells = std::max(1.0, std::ceil(length / voxel_size - 1e-6 * std::max(1.0, length / voxel_size)));
+        if (cells > kMaxVoxelsPerAxis)
+            throw Error(Errc::InvalidInput, "domain_of_box: " + to_text(box) + " has more than 2^30 voxels of size " +
+                                                std::to_string(voxel_size) + " along an axis; use a larger voxel size");
+        domain.origin[a] = 0.5 * (box.min[a] + box.max[a]) - 0.5 * (cells - 1) * voxel_size;
+        domain.max[a] = static_cast<std::int32_t>(cells) - 1;
+    }
+    return domain;
+}
+
+WorldBox bounding_box(const std::vector<Vec3>& points, double margin) {
+    if (points.empty()) throw Error(Errc::InvalidInput, "bounding_box: expected at least one point");
+    WorldBox box{points.front(), points.front()};
+    for (const Vec3& p : points)
+        for (int a = 0; a < 3; ++a) {
+            box.min[a] = std::min(box.min[a], p[a]);
+            box.max[a] = std::max(box.max[a], p[a]);
+        }
+    for (int a = 0; a < 3; ++a) {
+        box.min[a] -= margin;
+        box.max[a] += margin;
+    }
+    return box;
+}
+
+void set_domain(FloatGrid& grid, const Domain& d) {
+    auto transform = openvdb::math::Transform::createLinearTransform(d.voxel_size);
+    transform->postTranslate(openvdb::Vec3d(d.origin[0], d.origin[1], d.origin[2]));
+    grid.setTransform(transform);
+    grid.insertMeta(kMinKey, openvdb::Vec3IMetadata(openvdb::Vec3i(d.min[0], d.min[1], d.min[2])));
+    grid.insertMeta(kMaxKey, openvdb::Vec3IMetadata(openvdb::Vec3i(d.max[0], d.max[1], d.max[2])));
+}
+
+Domain domain_of(const FloatGrid& grid) {
+    const auto& transform = grid.transform();
+    const openvdb::Vec3d h = transform.voxelSize();
+    const openvdb::Vec3d origin = transform.indexToWorld(openvdb::Vec3d(0, 0, 0));
+    // A rotation or shear shows when a diagonal step is not (h,h,h).
+    const openvdb::Vec3d diagonal = transform.indexToWorld(openvdb::Vec3d(1, 1, 1)) - origin;
+    const double tolerance = 1e-6 * h[0];
+    if (!transform.isLinear() || (diagonal - openvdb::Vec3d(h[0])).length() > tolerance ||
+        std::abs(h[1] - h[0]) > tolerance || std::abs(h[2] - h[0]) > tolerance)
+        throw Error(Errc::InvalidInput, "domain_of: grid '" + grid.getName() +
+                                            "': expected a transform of one uniform voxel size and a translation");
+    Domain d;
+    d.voxel_size = h[0];
+    d.origin = {origin[0], origin[1], origin[2]};
+    const auto lo = grid.getMetadata<openvdb::Vec3IMetadata>(kMinKey);
+    const auto hi = grid.getMetadata<openvdb::Vec3IMetadata>(kMaxKey);
+    if (lo && hi) {
+        for (int a = 0; a < 3; ++a) {
+            d.min[a] = lo->value()[a];
+            d.max[a] = hi->value()[a];
+        }
+        return d;
+    }
+    const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
+    if (box.empty()) return d;
+    for (int a = 0; a < 3; ++a) {
+        d.min[a] = box.min()[a] - 8;
+        d.max[a] = box.max()[a] + 8;
+    }
+    return d;
+}
+
+FloatGridPtr make_grid(const Domain& domain, float background, const char* name) {
+    auto grid = FloatGrid::create(background);
+    grid->setName(name);
+    set_domain(*grid, domain);
+    return grid;
+}
+
+}  // namespace covol

@@ -1,0 +1,31 @@
+#include "covol/run.h"
+
+#include <tbb/task_arena.h>
+
+#include "covol/error.h"
+
+namespace covol {
+
+void RunContext::info(const std::string& line) const {
+    if (log) log(LogLevel::Info, line);
+}
+void RunContext::warn(const std::string& line) const {
+    if (log) log(LogLevel::Warning, line);
+}
+void RunContext::report(const std::string& stage, double fraction) const {
+    if (progress) progress(stage, fraction);
+}
+void RunContext::check() const {
+    if (cancelled()) throw Error(Errc::Cancelled, "cancelled");
+}
+
+void with_threads(const RunContext& run, const std::function<void()>& work) {
+    if (run.threads <= 0) {
+        work();
+        return;
+    }
+    tbb::task_arena arena(run.threads);
+    arena.execute([&] { work(); });
+}
+
+}  // namespace covol
