@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <string>
-
-#include "detail/leaf_band.h"
+#include <utility>
 
 namespace covol::detail {
 
@@ -21,6 +20,8 @@ extern const SchemeKernels kKernels;
 #endif
 
 namespace {
+
+constexpr int kLeafSize = 512;
 
 const SchemeKernels& choose() {
 #ifdef COVOL_X86

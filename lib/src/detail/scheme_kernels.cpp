@@ -1,7 +1,8 @@
 // The arithmetic of the scheme on one leaf, compiled once for each instruction set (see lib/CMakeLists.txt).
-// No header with inline functions may be included here: the linker would keep one copy of them for the whole
-// program, perhaps the one with instructions that the processor lacks.
+// No header with inline functions of external linkage may be included here: the linker would keep one copy of them for
+// the whole program, perhaps the one with instructions that the processor lacks.
 #include "detail/scheme.h"
+#include "detail/simd.h"
 
 #ifndef COVOL_SIMD_NAME
 #error "set COVOL_SIMD_NAME for each compilation"
@@ -12,33 +13,10 @@ namespace {
 
 constexpr int kI = 10 * kRow;  // stride of i in a padded buffer
 constexpr int kJ = kRow;       // stride of j
+constexpr float kTiny = 1e-30F;
 
-// Inverse sums of a face's four tetrahedra.
-struct FaceSums {
-    float weight[8];  // Σ 1/√(ε²+|∇u_T|²)
-    float norm[8];    // Σ |∇u_T|
-};
-
-// Tetrahedra p, q and one edge of the face between them, 8 faces at once. With u in voxels the derivatives are
-// differences: along pq, along the edge, and from the face's centre to the edge (the mean of p and q is its value there).
-template <typename P, typename Q, typename Z00, typename Z10, typename Z01, typename Z11>
-inline void face_sums(P p, Q q, Z00 z00, Z10 z10, Z01 z01, Z11 z11, float epsilon2, FaceSums& out) {
-    for (int k = 0; k < 8; ++k) {
-        const float up = p(k), uq = q(k), a = z00(k), b = z10(k), c = z01(k), d = z11(k);
-        const float along = (uq - up) * (uq - up);
-        const float middle = up + uq;
-        const float ab = (b - a) * (b - a) + (a + b - middle) * (a + b - middle) + along;
-        const float cd = (d - c) * (d - c) + (c + d - middle) * (c + d - middle) + along;
-        const float ac = (c - a) * (c - a) + (a + c - middle) * (a + c - middle) + along;
-        const float bd = (d - b) * (d - b) + (b + d - middle) * (b + d - middle) + along;
-        out.norm[k] = __builtin_sqrtf(ab) + __builtin_sqrtf(cd) + __builtin_sqrtf(ac) + __builtin_sqrtf(bd);
-        out.weight[k] = 1.0F / __builtin_sqrtf(epsilon2 + ab) + 1.0F / __builtin_sqrtf(epsilon2 + cd) +
-                        1.0F / __builtin_sqrtf(epsilon2 + ac) + 1.0F / __builtin_sqrtf(epsilon2 + bd);
-    }
-}
-
-// Values at the 9^3 vertices: vertex (i,j,k) is the corner between voxels i-1 and i, and so on. Rows of 16.
 constexpr int kVertexI = 9 * kRow;
+/// Values at the 9^3 vertices, rows of 16: vertex (i,j,k) is the corner between voxels i-1 and i, and so on.
 struct Vertices {
     alignas(64) float z[9 * 9 * kRow];
 };
@@ -48,63 +26,89 @@ void vertex_values(const float* u, Vertices& out) {
         for (int j = 0; j < 9; ++j) {
             const float* row = u + padded(i - 1, j - 1, -1);
             float* z = out.z + i * kVertexI + j * kRow;
-            float column[kRow];
-            for (int k = 0; k < 10; ++k) column[k] = (row[k] + row[k + kJ]) + (row[k + kI] + row[k + kI + kJ]);
-            for (int k = 0; k < 9; ++k) z[k] = 0.125F * (column[k] + column[k + 1]);
+            const auto column = [row](int k) {
+                return (load(row + k) + load(row + k + kJ)) + (load(row + k + kI) + load(row + k + kI + kJ));
+            };
+            store(z, 0.125F * (column(0) + column(1)));
+            const auto scalar = [row](int k) { return (row[k] + row[k + kJ]) + (row[k + kI] + row[k + kI + kJ]); };
+            z[8] = 0.125F * (scalar(8) + scalar(9));
         }
 }
 
-// What the faces of a leaf add up to.
-struct Faces {
-    alignas(64) float weight_i[9 * 64];      // face (i,j,k) between voxels i-1 and i
-    alignas(64) float weight_j[8 * 9 * 8];   // (i,j,k), between j-1 and j
-    alignas(64) float weight_k[64 * kRow];   // (i,j,k), between k-1 and k; rows of 16
-    alignas(64) float norm[512];             // Σ_24 |∇u_T| of each voxel
+/// Sums over a face's four tetrahedra, for 8 faces.
+struct FaceSums {
+    Lanes weight;  // Σ 1/√(ε²+|∇u_T|²)
+    Lanes norm;    // Σ |∇u_T|
 };
 
-inline void add(float* to, const float* what) {
-    for (int k = 0; k < 8; ++k) to[k] += what[k];
+// A tetrahedron is p, q and one edge of the face between them. With u in voxels the derivatives are differences: along
+// pq, along the edge, and from the face's centre, whose value is the mean of p and q, to the edge.
+inline FaceSums face_sums(Lanes p, Lanes q, Lanes z00, Lanes z10, Lanes z01, Lanes z11, float epsilon2) {
+    const Lanes along = (q - p) * (q - p);
+    const Lanes middle = p + q;
+    FaceSums sums{};
+    const auto tetrahedron = [&](Lanes a, Lanes b) {
+        const Lanes n = along + (b - a) * (b - a) + (a + b - middle) * (a + b - middle);
+        sums.weight += inverse_sqrt(n + epsilon2);
+        sums.norm += n * inverse_sqrt(n + kTiny);
+    };
+    tetrahedron(z00, z10);
+    tetrahedron(z01, z11);
+    tetrahedron(z00, z01);
+    tetrahedron(z10, z11);
+    return sums;
+}
+
+/// What the faces of a leaf add up to.
+struct Faces {
+    alignas(64) float weight_i[9 * 64];    // face (i,j,k) between voxels i-1 and i
+    alignas(64) float weight_j[8 * 9 * 8]; // (i,j,k), between j-1 and j
+    alignas(64) float weight_k[64 * kRow]; // (i,j,k), between k-1 and k; rows of 16
+    alignas(64) float norm[512];           // Σ_24 |∇u_T| of each voxel
+};
+
+inline void add(float* to, Lanes what) { store(to, load(to) + what); }
+
+// Faces across i or j: `z` is the lower corner's vertex, `edge` the stride to the face's other corner.
+inline FaceSums row_face(const float* q, int across, const float* z, int edge, float epsilon2) {
+    return face_sums(load(q - across), load(q), load(z), load(z + edge), load(z + 1), load(z + edge + 1), epsilon2);
 }
 
 void sum_faces(const float* u, const Vertices& vertices, float epsilon2, Faces& faces) {
-    const float* z = vertices.z;
-    for (float& n : faces.norm) n = 0.0F;
-    FaceSums sums;
-    const auto at = [](const float* row) { return [row](int k) { return row[k]; }; };
+    for (int row = 0; row < 64; ++row) store(faces.norm + row * 8, Lanes{});
+    const auto voxel = [u](int i, int j) { return u + padded(i, j, 0); };
+    const auto vertex = [&vertices](int i, int j) { return vertices.z + i * kVertexI + j * kRow; };
     for (int i = 0; i < 9; ++i)
         for (int j = 0; j < 8; ++j) {
-            const float* q = u + padded(i, j, 0);
-            const float* v = z + i * kVertexI + j * kRow;
-            face_sums(at(q - kI), at(q), at(v), at(v + kRow), at(v + 1), at(v + kRow + 1), epsilon2, sums);
-            for (int k = 0; k < 8; ++k) faces.weight_i[(i * 8 + j) * 8 + k] = sums.weight[k];
+            const FaceSums sums = row_face(voxel(i, j), kI, vertex(i, j), kRow, epsilon2);
+            store(faces.weight_i + (i * 8 + j) * 8, sums.weight);
             if (i > 0) add(faces.norm + ((i - 1) * 8 + j) * 8, sums.norm);
             if (i < 8) add(faces.norm + (i * 8 + j) * 8, sums.norm);
         }
     for (int i = 0; i < 8; ++i)
         for (int j = 0; j < 9; ++j) {
-            const float* q = u + padded(i, j, 0);
-            const float* v = z + i * kVertexI + j * kRow;
-            face_sums(at(q - kJ), at(q), at(v), at(v + kVertexI), at(v + 1), at(v + kVertexI + 1), epsilon2, sums);
-            for (int k = 0; k < 8; ++k) faces.weight_j[(i * 9 + j) * 8 + k] = sums.weight[k];
+            const FaceSums sums = row_face(voxel(i, j), kJ, vertex(i, j), kVertexI, epsilon2);
+            store(faces.weight_j + (i * 9 + j) * 8, sums.weight);
             if (j > 0) add(faces.norm + (i * 8 + j - 1) * 8, sums.norm);
             if (j < 8) add(faces.norm + (i * 8 + j) * 8, sums.norm);
         }
     for (int i = 0; i < 8; ++i) {
         for (int j = 0; j < 8; ++j) {
-            const float* q = u + padded(i, j, 0);
-            const float* v = z + i * kVertexI + j * kRow;
-            face_sums(at(q - 1), at(q), at(v), at(v + kVertexI), at(v + kRow), at(v + kVertexI + kRow), epsilon2, sums);
+            const float* q = voxel(i, j);
+            const float* z = vertex(i, j);
+            const FaceSums sums = face_sums(load(q - 1), load(q), load(z), load(z + kVertexI), load(z + kRow),
+                                            load(z + kVertexI + kRow), epsilon2);
+            store(faces.weight_k + (i * 8 + j) * kRow, sums.weight);
             float* norm = faces.norm + (i * 8 + j) * 8;
-            for (int k = 0; k < 8; ++k) faces.weight_k[(i * 8 + j) * kRow + k] = sums.weight[k];
             add(norm, sums.norm);
             for (int k = 1; k < 8; ++k) norm[k - 1] += sums.norm[k];
         }
-        // The ninth faces of eight rows make one more bundle; here the lanes run along j.
-        const float* q = u + padded(i, 0, 8);
-        const float* v = z + i * kVertexI + 8;
-        const auto lane = [](const float* first) { return [first](int j) { return first[j * kRow]; }; };
-        face_sums(lane(q - 1), lane(q), lane(v), lane(v + kVertexI), lane(v + kRow), lane(v + kVertexI + kRow), epsilon2,
-                  sums);
+        // The ninth faces of eight rows make one more bundle; its lanes run along j.
+        const float* q = voxel(i, 0) + 8;
+        const float* z = vertex(i, 0) + 8;
+        const auto lanes = [](const float* first) { return load_strided(first, kRow); };
+        const FaceSums sums = face_sums(lanes(q - 1), lanes(q), lanes(z), lanes(z + kVertexI), lanes(z + kRow),
+                                        lanes(z + kVertexI + kRow), epsilon2);
         for (int j = 0; j < 8; ++j) {
             faces.weight_k[(i * 8 + j) * kRow + 8] = sums.weight[j];
             faces.norm[(i * 8 + j) * 8 + 7] += sums.norm[j];
@@ -112,38 +116,42 @@ void sum_faces(const float* u, const Vertices& vertices, float epsilon2, Faces& 
     }
 }
 
-// Rows q of a padded field around row (i,j), by Face.
+/// A row of a padded field and its six neighbours, by Face.
 struct Star {
-    const float* p;
-    const float* q[6];
-    Star(const float* field, int i, int j) : p(field + padded(i, j, 0)) {
-        q[kMinusI] = p - kI, q[kPlusI] = p + kI;
-        q[kMinusJ] = p - kJ, q[kPlusJ] = p + kJ;
-        q[kMinusK] = p - 1, q[kPlusK] = p + 1;
+    Lanes p, q[6];
+    Star(const float* field, int i, int j) {
+        const float* row = field + padded(i, j, 0);
+        p = load(row);
+        q[kMinusI] = load(row - kI), q[kPlusI] = load(row + kI);
+        q[kMinusJ] = load(row - kJ), q[kPlusJ] = load(row + kJ);
+        q[kMinusK] = load(row - 1), q[kPlusK] = load(row + 1);
+    }
+    /// q - p, or 0 where either is unknown
+    [[nodiscard]] Lanes difference(int face) const {
+        return (q[face] >= 0.0F) & (p >= 0.0F) ? q[face] - p : Lanes{};
     }
 };
 
-inline float known_difference(float q, float p) { return (q >= 0.0F) & (p >= 0.0F) ? q - p : 0.0F; }
-
-// velocity[f][k] = v_pq / h², Eqs. (17), (20).
-inline void add_point_pull(const Star& phi, float theta, float velocity[6][8]) {
-    for (int f = 0; f < 6; ++f)
-        for (int k = 0; k < 8; ++k) velocity[f][k] -= theta * known_difference(phi.q[f][k], phi.p[k]);
+// velocity[f] = v_pq / h², Eqs. (17), (20).
+inline void add_point_pull(const Star& phi, float theta, Lanes velocity[6]) {
+    for (int f = 0; f < 6; ++f) velocity[f] -= theta * phi.difference(f);
 }
 
-inline void add_image_pull(const Star& g, const float* rho, float rho_all, float epsilon2, float velocity[6][8]) {
-    float difference[6][8];
-    float norm2[8] = {};
-    for (int f = 0; f < 6; ++f)
-        for (int k = 0; k < 8; ++k) {
-            difference[f][k] = known_difference(g.q[f][k], g.p[k]);
-            norm2[k] += 0.5F * difference[f][k] * difference[f][k];
-        }
-    float scale[8];
-    for (int k = 0; k < 8; ++k)
-        scale[k] = rho_all * (rho != nullptr ? rho[k] : 1.0F) / __builtin_sqrtf(epsilon2 + norm2[k]);
-    for (int f = 0; f < 6; ++f)
-        for (int k = 0; k < 8; ++k) velocity[f][k] -= scale[k] * difference[f][k];
+inline void add_image_pull(const Star& g, Lanes rho, float epsilon2, Lanes velocity[6]) {
+    Lanes difference[6];
+    Lanes norm2 = Lanes{};
+    for (int f = 0; f < 6; ++f) {
+        difference[f] = g.difference(f);
+        norm2 += 0.5F * difference[f] * difference[f];
+    }
+    const Lanes scale = rho * inverse_sqrt(norm2 + epsilon2);
+    for (int f = 0; f < 6; ++f) velocity[f] -= scale * difference[f];
+}
+
+/// 1 where the bit of the lane is set, else 0.
+inline Lanes lanes_of(unsigned bits) {
+    constexpr LaneBits kBit = {1, 2, 4, 8, 16, 32, 64, 128};
+    return ((LaneBits{} + int(bits)) & kBit) != 0 ? broadcast(1.0F) : Lanes{};
 }
 
 float assemble(const float* u, const float* phi, const float* g, const float* rho, const unsigned long long* active,
@@ -153,109 +161,74 @@ float assemble(const float* u, const float* phi, const float* g, const float* rh
     Faces faces;
     sum_faces(u, vertices, constants.epsilon2, faces);
 
-    float largest[8] = {};
+    Lanes largest_sum = Lanes{};
     for (int i = 0; i < 8; ++i)
         for (int j = 0; j < 8; ++j) {
             const int row = (i * 8 + j) * 8;
             const unsigned on = static_cast<unsigned>(active[i] >> (8 * j)) & 0xffU;
             if (on == 0) {
-                for (int f = 0; f < 6; ++f)
-                    for (int k = 0; k < 8; ++k) c[f * 512 + row + k] = 0.0F;
+                for (int f = 0; f < 6; ++f) store(c + f * 512 + row, Lanes{});
                 continue;
             }
-            float a[6][8] = {};  // -a_pq >= 0
+            Lanes a[6] = {};  // the velocities, then -a_pq >= 0
             if (phi != nullptr) add_point_pull(Star(phi, i, j), constants.theta, a);
             if (g != nullptr)
-                add_image_pull(Star(g, i, j), rho != nullptr ? rho + row : nullptr, constants.rho,
+                add_image_pull(Star(g, i, j), constants.rho * (rho != nullptr ? load(rho + row) : broadcast(1.0F)),
                                constants.edge_epsilon2, a);
-            const float* weight[6] = {faces.weight_i + (i * 8 + j) * 8,     faces.weight_i + ((i + 1) * 8 + j) * 8,
-                                      faces.weight_j + (i * 9 + j) * 8,     faces.weight_j + (i * 9 + j + 1) * 8,
+            const float* weight[6] = {faces.weight_i + (i * 8 + j) * 8,    faces.weight_i + ((i + 1) * 8 + j) * 8,
+                                      faces.weight_j + (i * 9 + j) * 8,    faces.weight_j + (i * 9 + j + 1) * 8,
                                       faces.weight_k + (i * 8 + j) * kRow, faces.weight_k + (i * 8 + j) * kRow + 1};
-            float m[8], sum[8] = {};
-            for (int k = 0; k < 8; ++k) {
-                const float mean = faces.norm[row + k] * (1.0F / 24.0F);
-                m[k] = 0.25F * constants.curvature * __builtin_sqrtf(constants.epsilon2 + mean * mean);
+            const Lanes mean = load(faces.norm + row) * (1.0F / 24.0F);
+            const Lanes m2 = constants.epsilon2 + mean * mean;
+            const Lanes m = (0.25F * constants.curvature) * (m2 * inverse_sqrt(m2));
+            Lanes row_sum = Lanes{};
+            for (int f = 0; f < 6; ++f) {
+                a[f] = constants.tau * max(-a[f], Lanes{}) + m * load(weight[f]);
+                row_sum += a[f];
             }
-            for (int f = 0; f < 6; ++f)
-                for (int k = 0; k < 8; ++k) {
-                    const float inflow = a[f][k] < 0.0F ? -a[f][k] : 0.0F;
-                    a[f][k] = constants.tau * inflow + m[k] * weight[f][k];
-                    sum[k] += a[f][k];
-                }
-            float scale[8];
-            for (int k = 0; k < 8; ++k) {
-                const float is_active = (on >> k) & 1U ? 1.0F : 0.0F;
-                scale[k] = is_active / (1.0F + sum[k]);
-                sum[k] *= is_active;
-                largest[k] = sum[k] > largest[k] ? sum[k] : largest[k];
-            }
-            for (int f = 0; f < 6; ++f)
-                for (int k = 0; k < 8; ++k) c[f * 512 + row + k] = a[f][k] * scale[k];
+            const Lanes is_active = lanes_of(on);
+            largest_sum = max(largest_sum, is_active * row_sum);
+            const Lanes scale = is_active / (1.0F + row_sum);
+            for (int f = 0; f < 6; ++f) store(c + f * 512 + row, a[f] * scale);
         }
-    float result = 0.0F;
-    for (const float l : largest) result = l > result ? l : result;
-    return result;
+    return largest(largest_sum);
 }
 
-// ω on the voxels of one colour of a row, 0 on the others.
-struct Colours {
-    alignas(32) float omega[2][8];
-    explicit Colours(float w) {
-        for (int k = 0; k < 8; ++k) omega[k & 1][k] = w, omega[~k & 1][k] = 0.0F;
-    }
-};
-
-double relax(float* u, const float* b, const float* c, float omega, int inner) {
-    const Colours colours(omega);
-    float residual[8] = {};
+// Red-black SOR: value(p, offset in the leaf) gives the Gauss-Seidel value of a row.
+template <typename Value>
+inline double red_black(float* u, float omega, int inner, Value value) {
+    // A colour's voxels take every other lane; ω is 0 on the others.
+    const Lanes even = {1, 0, 1, 0, 1, 0, 1, 0};
+    const Lanes on[2] = {even, 1.0F - even};
+    Lanes residual = Lanes{};
     for (int sweep = 0; sweep < inner; ++sweep)
         for (int colour = 0; colour < 2; ++colour)
             for (int i = 0; i < 8; ++i)
                 for (int j = 0; j < 8; ++j) {
                     float* p = u + padded(i, j, 0);
-                    const int row = (i * 8 + j) * 8;
-                    const float* w = colours.omega[(i + j + colour) & 1];
-                    float change[8];
-                    for (int k = 0; k < 8; ++k) {
-                        const float old = b[row + k];
-                        change[k] = (old - p[k]) + c[kMinusI * 512 + row + k] * (p[k - kI] - old) +
-                                    c[kPlusI * 512 + row + k] * (p[k + kI] - old) +
-                                    c[kMinusJ * 512 + row + k] * (p[k - kJ] - old) +
-                                    c[kPlusJ * 512 + row + k] * (p[k + kJ] - old) +
-                                    c[kMinusK * 512 + row + k] * (p[k - 1] - old) +
-                                    c[kPlusK * 512 + row + k] * (p[k + 1] - old);
-                    }
-                    if (sweep == 0)
-                        for (int k = 0; k < 8; ++k) residual[k] += (w[k] != 0.0F ? change[k] * change[k] : 0.0F);
-                    for (int k = 0; k < 8; ++k) p[k] += w[k] * change[k];
+                    const Lanes now = load(p);
+                    const Lanes change = on[(i + j + colour) & 1] * (value(p, (i * 8 + j) * 8) - now);
+                    if (sweep == 0) residual += change * change;
+                    store(p, now + omega * change);
                 }
-    double total = 0.0;
-    for (const float r : residual) total += r;
-    return total;
+    return sum(residual);
+}
+
+double relax(float* u, const float* b, const float* c, float omega, int inner) {
+    return red_black(u, omega, inner, [b, c](const float* p, int row) {
+        const Lanes old = load(b + row);
+        const auto pull = [&](int face, int stride) { return load(c + face * 512 + row) * (load(p + stride) - old); };
+        return old + (((pull(kMinusI, -kI) + pull(kPlusI, kI)) + (pull(kMinusJ, -kJ) + pull(kPlusJ, kJ))) +
+                      (pull(kMinusK, -1) + pull(kPlusK, 1)));
+    });
 }
 
 double heat(float* u, const float* b, float t, float omega, int inner) {
-    const Colours colours(omega);
     const float scale = 1.0F / (1.0F + 6.0F * t);
-    float residual[8] = {};
-    for (int sweep = 0; sweep < inner; ++sweep)
-        for (int colour = 0; colour < 2; ++colour)
-            for (int i = 0; i < 8; ++i)
-                for (int j = 0; j < 8; ++j) {
-                    float* p = u + padded(i, j, 0);
-                    const float* rhs = b + (i * 8 + j) * 8;
-                    const float* w = colours.omega[(i + j + colour) & 1];
-                    float change[8];
-                    for (int k = 0; k < 8; ++k)
-                        change[k] = scale * (rhs[k] + t * ((p[k - kI] + p[k + kI]) + (p[k - kJ] + p[k + kJ]) +
-                                                           (p[k - 1] + p[k + 1]))) - p[k];
-                    if (sweep == 0)
-                        for (int k = 0; k < 8; ++k) residual[k] += (w[k] != 0.0F ? change[k] * change[k] : 0.0F);
-                    for (int k = 0; k < 8; ++k) p[k] += w[k] * change[k];
-                }
-    double total = 0.0;
-    for (const float r : residual) total += r;
-    return total;
+    return red_black(u, omega, inner, [b, t, scale](const float* p, int row) {
+        return scale * (load(b + row) + t * (((load(p - kI) + load(p + kI)) + (load(p - kJ) + load(p + kJ))) +
+                                             (load(p - 1) + load(p + 1))));
+    });
 }
 
 void mean_gradient(const float* u, float* out) {
@@ -263,7 +236,7 @@ void mean_gradient(const float* u, float* out) {
     vertex_values(u, vertices);
     Faces faces;
     sum_faces(u, vertices, 1.0F, faces);
-    for (int n = 0; n < 512; ++n) out[n] = faces.norm[n] * (1.0F / 24.0F);
+    for (int n = 0; n < 512; n += 8) store(out + n, load(faces.norm + n) * (1.0F / 24.0F));
 }
 
 #define COVOL_TEXT_(x) #x
