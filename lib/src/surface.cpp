@@ -1,1 +1,266 @@
+#include "covol/surface.h"
 
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/LevelSetUtil.h>
+#include <openvdb/tools/Prune.h>
+#include <openvdb/tools/SignedFloodFill.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "covol/band.h"
+#include "covol/error.h"
+#include "detail/interface_patches.h"
+#include "detail/leaf_band.h"
+#include "detail/leaf_propagation.h"
+
+namespace covol {
+namespace {
+
+using detail::InterfacePatches;
+using detail::kLeafDim;
+using detail::kLeafSize;
+using detail::LeafArray;
+using detail::LeafBand;
+using detail::LeafMask;
+using openvdb::Coord;
+
+constexpr std::int32_t kNoPatch = -1;
+
+openvdb::CoordBBox box_of(const Domain& d) {
+    return {Coord(d.min[0], d.min[1], d.min[2]), Coord(d.max[0], d.max[1], d.max[2])};
+}
+
+/// Leaves with voxels that may be nearer than the band's half width to a patch.
+std::vector<Coord> band_leaves(const InterfacePatches& interface) {
+    const int reach = static_cast<int>(kHalfWidthVoxels);
+    std::vector<Coord> result;
+    for (std::size_t n = 0; n < interface.leaves.size(); ++n) {
+        openvdb::CoordBBox box;
+        for (std::uint32_t m = interface.first[n]; m < interface.first[n + 1]; ++m)
+            box.expand(interface.patches[m].origin);
+        const Coord lo = box.min().offsetBy(-reach) & ~(kLeafDim - 1);
+        const Coord hi = box.max().offsetBy(1 + reach) & ~(kLeafDim - 1);
+        for (int i = lo[0]; i <= hi[0]; i += kLeafDim)
+            for (int j = lo[1]; j <= hi[1]; j += kLeafDim)
+                for (int k = lo[2]; k <= hi[2]; k += kLeafDim) result.emplace_back(i, j, k);
+    }
+    std::sort(result.begin(), result.end());
+    result.erase(std::unique(result.begin(), result.end()), result.end());
+    return result;
+}
+
+/// Each voxel of the band with the nearest patch that it knows.
+class NearestPatches {
+public:
+    NearestPatches(const InterfacePatches& interface, const LeafBand& band)
+        : interface_(interface),
+          band_(band),
+          squared_(band.size(), static_cast<float>(kHalfWidthVoxels * kHalfWidthVoxels), 0),
+          patch_(band.size(), kNoPatch, 0),
+          changed_(band.size(), LeafMask{}) {}
+
+    void find(const RunContext& run) {
+        tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) { seed(leaf); });
+        detail::propagate(band_, changed_, run, [this](std::size_t leaf, int p, std::size_t other, int q) {
+            return try_patch(leaf, p, patch_.leaf(other)[q]);
+        });
+    }
+
+    [[nodiscard]] const float* squared(std::size_t leaf) const { return squared_.leaf(leaf); }
+    [[nodiscard]] const std::int32_t* patch(std::size_t leaf) const { return patch_.leaf(leaf); }
+
+private:
+    bool try_patch(std::size_t leaf, int p, std::int32_t patch) {
+        std::int32_t& mine = patch_.leaf(leaf)[p];
+        if (patch == mine) return false;
+        float& best = squared_.leaf(leaf)[p];
+        const Coord at = band_.origin(leaf).offsetBy(p >> 6, p >> 3 & 7, p & 7);
+        const float d = interface_.squared_distance(at, static_cast<std::uint32_t>(patch), best);
+        if (!(d < best)) return false;
+        best = d;
+        mine = patch;
+        return true;
+    }
+
+    // The corners of a cell know its patches; those in the leaf belong to cells of the leaf and its lower neighbours.
+    void seed(std::size_t leaf) {
+        const Coord origin = band_.origin(leaf);
+        for (int block = 0; block < 8; ++block) {
+            const Coord from = origin.offsetBy(-kLeafDim * (block >> 2 & 1), -kLeafDim * (block >> 1 & 1), -kLeafDim * (block & 1));
+            const auto at = std::lower_bound(interface_.leaves.begin(), interface_.leaves.end(), from);
+            if (at == interface_.leaves.end() || *at != from) continue;
+            const std::size_t n = static_cast<std::size_t>(at - interface_.leaves.begin());
+            for (std::uint32_t m = interface_.first[n]; m < interface_.first[n + 1]; ++m) seed_corners(leaf, m);
+        }
+    }
+
+    void seed_corners(std::size_t leaf, std::uint32_t patch) {
+        const Coord cell = interface_.patches[patch].origin - band_.origin(leaf);
+        for (int i = std::max(0, cell[0]); i <= std::min(kLeafDim - 1, cell[0] + 1); ++i)
+            for (int j = std::max(0, cell[1]); j <= std::min(kLeafDim - 1, cell[1] + 1); ++j)
+                for (int k = std::max(0, cell[2]); k <= std::min(kLeafDim - 1, cell[2] + 1); ++k)
+                    if (const int p = detail::leaf_offset(i, j, k); try_patch(leaf, p, static_cast<std::int32_t>(patch)))
+                        detail::set_on(changed_[leaf], p);
+    }
+
+    const InterfacePatches& interface_;
+    const LeafBand& band_;
+    LeafArray<float> squared_;
+    LeafArray<std::int32_t> patch_;
+    std::vector<LeafMask> changed_;
+};
+
+/// Bit p: voxel p of the leaf is inside.
+LeafMask inside_mask(const FloatGrid::ConstAccessor& accessor, const Coord& origin, const openvdb::CoordBBox& domain) {
+    LeafMask inside{};
+    if (const auto* leaf = accessor.probeConstLeaf(origin)) {
+        const float* values = leaf->buffer().data();
+        for (int p = 0; p < kLeafSize; ++p) inside[p >> 6] |= std::uint64_t(values[p] < 0) << (p & 63);
+    } else if (accessor.getValue(origin) < 0) {
+        inside.fill(~std::uint64_t(0));
+    }
+    if (!domain.isInside(openvdb::CoordBBox(origin, origin.offsetBy(kLeafDim - 1))))
+        for (int p = 0; p < kLeafSize; ++p)
+            if (!domain.isInside(origin.offsetBy(p >> 6, p >> 3 & 7, p & 7)))
+                inside[p >> 6] &= ~(std::uint64_t(1) << (p & 63));
+    return inside;
+}
+
+FloatGridPtr redistance(const FloatGrid& u, const Domain& domain, const RunContext& run) {
+    if (!(u.background() > 0))
+        throw Error(Errc::InvalidInput, "surface: grid '" + u.getName() + "': expected a background > 0 (outside), got " +
+                                            std::to_string(u.background()));
+    const InterfacePatches interface = detail::find_interface(u, domain, run);
+    if (interface.patches.empty())
+        throw Error(Errc::InvalidInput, "surface: grid '" + u.getName() +
+                                            "' has no zero crossing: nothing in the domain is inside, or nothing outside");
+    LeafBand band(band_leaves(interface));
+    NearestPatches nearest(interface, band);
+    nearest.find(run);
+
+    const float h = static_cast<float>(domain.voxel_size);
+    const float background = static_cast<float>(kHalfWidthVoxels * domain.voxel_size);
+    LeafArray<float> values(band.size(), background, 0);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, band.size(), 16), [&](const auto& range) {
+        const auto accessor = u.getConstAccessor();
+        for (std::size_t leaf = range.begin(); leaf != range.end(); ++leaf) {
+            const LeafMask inside = inside_mask(accessor, band.origin(leaf), box_of(domain));
+            for (int p = 0; p < kLeafSize; ++p) {
+                float d = background;
+                if (nearest.patch(leaf)[p] != kNoPatch) {
+                    detail::set_on(band.active(leaf), p);
+                    d = std::min(background, h * std::sqrt(nearest.squared(leaf)[p]));
+                }
+                values.leaf(leaf)[p] = detail::is_on(inside, p) ? -d : d;
+            }
+        }
+    });
+    FloatGridPtr result = detail::export_grid(band, values, domain, background, "surface");
+    result->setGridClass(openvdb::GRID_LEVEL_SET);
+    openvdb::tools::signedFloodFill(result->tree());
+    openvdb::tools::pruneLevelSet(result->tree());
+    return result;
+}
+
+/// Asks, voxel by voxel along a row of an image, whether a level set is negative there.
+class RowSampler {
+public:
+    explicit RowSampler(const FloatGrid& grid)
+        : accessor_(grid.getConstAccessor()), certain_(1.8F * static_cast<float>(grid.voxelSize()[0])) {}
+
+    /// Sets out[n] to the label for the positions from + n * step (index space), n < count, that are inside.
+    void fill(const openvdb::Vec3d& from, const openvdb::Vec3d& step, int count, std::uint8_t label, std::uint8_t* out) {
+        for (int n = 0; n < count;) {
+            const openvdb::Vec3d at = from + double(n) * step;
+            const Coord base = Coord::floor(at);
+            int run = 1;
+            float value = 0;
+            if (const auto* leaf = accessor_.probeConstLeaf(base)) {
+                value = leaf->getValue(base);
+            } else {
+                value = accessor_.getValue(base);
+                run = std::min(count - n, steps_inside_block(at, base, step));
+            }
+            // Within a cell a distance changes by less than sqrt(3) voxels.
+            if (std::abs(value) < certain_) {
+                run = 1;
+                value = interpolate(at, base);
+            }
+            if (value < 0) std::fill_n(out + n, run, label);
+            n += run;
+        }
+    }
+
+private:
+    /// How many positions from `at` on lie in the tile-sized block of 8^3 around `base`, at least 1.
+    static int steps_inside_block(const openvdb::Vec3d& at, const Coord& base, const openvdb::Vec3d& step) {
+        double steps = std::numeric_limits<std::int32_t>::max();
+        for (int a = 0; a < 3; ++a) {
+            const int low = base[a] & ~(kLeafDim - 1);
+            // A margin keeps rounding from taking a position of the next block along.
+            if (step[a] > 1e-12) steps = std::min(steps, (low + kLeafDim - 1e-6 - at[a]) / step[a]);
+            if (step[a] < -1e-12) steps = std::min(steps, (low + 1e-6 - at[a]) / step[a]);
+        }
+        return steps > 0 ? 1 + static_cast<int>(steps) : 1;
+    }
+
+    float interpolate(const openvdb::Vec3d& at, const Coord& base) {
+        const float x = static_cast<float>(at[0] - base[0]), y = static_cast<float>(at[1] - base[1]),
+                    z = static_cast<float>(at[2] - base[2]);
+        const auto along_z = [&](int i, int j) {
+            const float a = accessor_.getValue(base.offsetBy(i, j, 0)), b = accessor_.getValue(base.offsetBy(i, j, 1));
+            return a + z * (b - a);
+        };
+        const auto along_y = [&](int i) {
+            const float a = along_z(i, 0);
+            return a + y * (along_z(i, 1) - a);
+        };
+        const float a = along_y(0);
+        return a + x * (along_y(1) - a);
+    }
+
+    FloatGrid::ConstAccessor accessor_;
+    float certain_;
+};
+
+}  // namespace
+
+FloatGridPtr surface(const FloatGrid& u, const RunContext& run) {
+    const Domain domain = domain_of(u);
+    FloatGridPtr result;
+    with_threads(run, [&] { result = redistance(u, domain, run); });
+    return result;
+}
+
+FloatGridPtr density(const FloatGrid& surface) {
+    FloatGridPtr fog = surface.deepCopy();
+    openvdb::tools::sdfToFogVolume(*fog);
+    fog->setName("density");
+    return fog;
+}
+
+std::vector<std::uint8_t> rasterize(const FloatGrid& surface, const ImageGeometry& geometry, std::uint8_t label,
+                                    const RunContext& run) {
+    const Domain domain = domain_of(surface);
+    const auto to_index = [&](double i, double j, double k) {
+        const Vec3 at = domain.world_to_index(geometry.index_to_world({i, j, k}));
+        return openvdb::Vec3d(at[0], at[1], at[2]);
+    };
+    const auto [ni, nj, nk] = geometry.size;
+    const openvdb::Vec3d step = to_index(1, 0, 0) - to_index(0, 0, 0);
+    std::vector<std::uint8_t> labels(std::size_t(ni) * std::size_t(nj) * std::size_t(nk), 0);
+    with_threads(run, [&, ni = ni, nj = nj, nk = nk] {
+        tbb::parallel_for(0, nk, [&](int k) {
+            RowSampler sampler(surface);
+            for (int j = 0; j < nj; ++j)
+                sampler.fill(to_index(0, j, k), step, ni, label, labels.data() + (std::size_t(k) * nj + j) * ni);
+        });
+    });
+    return labels;
+}
+
+}  // namespace covol
