@@ -7,6 +7,7 @@
 
 #include <openvdb/openvdb.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <chrono>
@@ -18,6 +19,7 @@
 #include "covol/error.h"
 #include "detail/follow.h"
 #include "detail/halo.h"
+#include "detail/leaf_propagation.h"
 #include "detail/scheme.h"
 
 namespace covol {
@@ -35,7 +37,7 @@ using Clock = std::chrono::steady_clock;
 constexpr int kInnerSweeps = 2;  // the second costs a fifth and saves a third of the visits
 constexpr double kRounding = 5e-7;  // voxels; a residual below this is noise of single precision
 constexpr double kMaxOmega = 1.9;
-constexpr int kStepsBetweenBands = 2;
+constexpr float kNearBorder = 2.5F;  // voxels; a follower's band is made again when |u| falls below it on the band's border
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -108,7 +110,7 @@ public:
                 report_.stop_reason = StopReason::Cancelled;
                 break;
             }
-            if (options_.follow && report_.steps > 0 && report_.steps % kStepsBetweenBands == 0) rebuild_band();
+            if (options_.follow && nears_border()) rebuild_band();
             const Change change = step();
             if (!change.finite) {
                 restore_previous();
@@ -158,6 +160,7 @@ private:
         });
         check_finite(band_, field_, "u");
         gather_fields();
+        if (options_.follow) find_border();
         previous_ = detail::LeafArray<float>(band_.size(), 0.0F, 0);
         rows_.resize(band_.size() * 6 * kLeafSize);
         residuals_.assign(band_.size(), 0.0);
@@ -178,10 +181,45 @@ private:
                                          [&](float d) { return 1.0 - options_.image_yields * taper(d); });
     }
 
-    // The band is the field's new zero crossings, dilated; values move with it.
+    // Active voxels with a neighbour in the domain that is not.
+    void find_border() {
+        border_.assign(band_.size(), detail::LeafMask{});
+        tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
+            const LeafBounds bounds(domain_, band_.origin(leaf));
+            const detail::LeafMask& active = band_.active(leaf);
+            for (int axis = 0; axis < 3; ++axis)
+                for (int sign = -1; sign <= 1; sign += 2) {
+                    int step[3] = {0, 0, 0};
+                    step[axis] = sign;
+                    const std::int32_t next = band_.neighbours(leaf)[detail::neighbour_slot(step[0], step[1], step[2])];
+                    const detail::LeafMask inner = detail::looking_at(
+                        active, next == band_.none() ? detail::LeafMask{} : band_.active(next), axis, sign);
+                    for (int word = 0; word < 8; ++word)
+                        for (std::uint64_t bits = active[word] & ~inner[word]; bits != 0; bits &= bits - 1) {
+                            const int n = word << 6 | __builtin_ctzll(bits);
+                            if (bounds.contains((n >> 6) + step[0], (n >> 3 & 7) + step[1], (n & 7) + step[2]))
+                                detail::set_on(border_[leaf], n);
+                        }
+                }
+        });
+    }
+
+    [[nodiscard]] bool nears_border() const {
+        return tbb::parallel_reduce(
+            tbb::blocked_range<std::size_t>(0, band_.size()), false,
+            [&](const auto& range, bool near) {
+                for (std::size_t leaf = range.begin(); leaf != range.end() && !near; ++leaf)
+                    for (int word = 0; word < 8; ++word)
+                        for (std::uint64_t bits = border_[leaf][word]; bits != 0; bits &= bits - 1)
+                            near |= std::abs(field_.values.leaf(leaf)[word << 6 | __builtin_ctzll(bits)]) < kNearBorder;
+                return near;
+            },
+            std::logical_or<>());
+    }
+
     void rebuild_band() {
         store();
-        detail::follow_surface(u_, domain_);
+        detail::follow_surface(u_, domain_, run_);
         if (fields_.extend) fields_.extend(u_, fields_);
         gather();
     }
@@ -327,6 +365,7 @@ private:
     std::optional<HaloField> phi_, edge_, image_weight_;
     detail::LeafArray<float> previous_;     // u^{n-1}
     std::vector<float, tbb::cache_aligned_allocator<float>> rows_;  // 6 x 512 for each leaf
+    std::vector<detail::LeafMask> border_;  // of the band, with `follow`
     std::vector<double> residuals_;         // scratch, one number for each leaf
     std::int64_t sweeps_ = 0;
     EvolveReport report_;
@@ -375,7 +414,7 @@ EvolveReport evolve(FloatGrid& u, const EvolveFields& fields, const EvolveOption
     EvolveReport report;
     with_threads(run, [&] {
         u.tree().voxelizeActiveTiles();
-        if (options.follow) detail::follow_surface(u, domain_of(u));
+        if (options.follow) detail::follow_surface(u, domain_of(u), run);
         report = Evolver(u, fields, options, run).run();
     });
     return report;

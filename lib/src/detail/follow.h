@@ -1,16 +1,17 @@
 #pragma once
 #include "covol/domain.h"
 #include "covol/fwd.h"
+#include "covol/run.h"
 
 namespace covol::detail {
 
-/// How far the band of a moving surface reaches from its zero crossings, in voxels: the 3 of the clamp and the two
-/// that it may move before the next call.
-inline constexpr int kFollowWidth = 5;
+/// How far the band of a moving surface reaches, in voxels: the 3 of the clamp and about two that the surface may move
+/// before the band is made again. (Each time shifts the surface by about 0.1 h² times its curvature: rarely is better.)
+inline constexpr double kFollowWidth = 5.0;
 
-/// Re-makes u's band around its zero level set: active become the voxels within kFollowWidth steps of a sign change,
-/// inside the domain. Voxels that leave the band are set to +-w by their sign, w = u's background; leaves without an
-/// active voxel become tiles of that value; new voxels keep their tile's value.
-void follow_surface(FloatGrid& u, const Domain& domain);
+/// Re-makes u as the signed distance to its zero level set, in a band of kFollowWidth voxels inside the domain. A
+/// clamped profile would flatten at the clamp and drag the surface: curvature flow of a sphere lost first order by it.
+/// @throws Error InvalidInput when u has no zero level set.
+void follow_surface(FloatGrid& u, const Domain& domain, const RunContext& run);
 
 }  // namespace covol::detail

@@ -35,6 +35,9 @@ struct LeafBounds {
     LeafBounds(const Domain& domain, const Coord& origin);
     /// The leaf or its halo sticks out of the domain.
     [[nodiscard]] bool cuts() const;
+    [[nodiscard]] bool contains(int i, int j, int k) const {
+        return i >= lo[0] && i <= hi[0] && j >= lo[1] && j <= hi[1] && k >= lo[2] && k <= hi[2];
+    }
 };
 
 }  // namespace covol::detail
