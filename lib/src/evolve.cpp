@@ -7,7 +7,6 @@
 
 #include <openvdb/openvdb.h>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <chrono>
@@ -19,7 +18,6 @@
 #include "covol/error.h"
 #include "detail/follow.h"
 #include "detail/halo.h"
-#include "detail/leaf_propagation.h"
 #include "detail/scheme.h"
 
 namespace covol {
@@ -37,7 +35,7 @@ using Clock = std::chrono::steady_clock;
 constexpr int kInnerSweeps = 2;  // the second costs a fifth and saves a third of the visits
 constexpr double kRounding = 5e-7;  // voxels; a residual below this is noise of single precision
 constexpr double kMaxOmega = 1.9;
-constexpr float kNearBorder = 2.5F;  // voxels; a follower's band is made again when |u| falls below it on the band's border
+constexpr double kFollowMove = 0.75;  // voxels that the surface may move before its band is made again
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -82,6 +80,7 @@ void check_finite(const LeafBand& band, const HaloField& field, const char* what
 // The change of one step where the surface is.
 struct Change {
     double mean = 0.0;  // of |u^n - u^{n-1}| over |u| < h, voxels
+    double max = 0.0;   // the same's largest
     bool crosses = false;
     bool finite = true;
 };
@@ -110,7 +109,7 @@ public:
                 report_.stop_reason = StopReason::Cancelled;
                 break;
             }
-            if (options_.follow && nears_border()) rebuild_band();
+            if (options_.follow && moved_ >= kFollowMove) rebuild_band();
             const Change change = step();
             if (!change.finite) {
                 restore_previous();
@@ -120,6 +119,7 @@ public:
             }
             ++report_.steps;
             report_.last_change = change.mean;
+            moved_ += change.max;
             run_.report("evolve", progress());
             if (!change.crosses) {
                 report_.stop_reason = StopReason::Vanished;
@@ -160,7 +160,6 @@ private:
         });
         check_finite(band_, field_, "u");
         gather_fields();
-        if (options_.follow) find_border();
         previous_ = detail::LeafArray<float>(band_.size(), 0.0F, 0);
         rows_.resize(band_.size() * 6 * kLeafSize);
         residuals_.assign(band_.size(), 0.0);
@@ -181,44 +180,9 @@ private:
                                          [&](float d) { return 1.0 - options_.image_yields * taper(d); });
     }
 
-    // Active voxels with a neighbour in the domain that is not.
-    void find_border() {
-        border_.assign(band_.size(), detail::LeafMask{});
-        tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
-            const LeafBounds bounds(domain_, band_.origin(leaf));
-            const detail::LeafMask& active = band_.active(leaf);
-            for (int axis = 0; axis < 3; ++axis)
-                for (int sign = -1; sign <= 1; sign += 2) {
-                    int step[3] = {0, 0, 0};
-                    step[axis] = sign;
-                    const std::int32_t next = band_.neighbours(leaf)[detail::neighbour_slot(step[0], step[1], step[2])];
-                    const detail::LeafMask inner = detail::looking_at(
-                        active, next == band_.none() ? detail::LeafMask{} : band_.active(next), axis, sign);
-                    for (int word = 0; word < 8; ++word)
-                        for (std::uint64_t bits = active[word] & ~inner[word]; bits != 0; bits &= bits - 1) {
-                            const int n = word << 6 | __builtin_ctzll(bits);
-                            if (bounds.contains((n >> 6) + step[0], (n >> 3 & 7) + step[1], (n & 7) + step[2]))
-                                detail::set_on(border_[leaf], n);
-                        }
-                }
-        });
-    }
-
-    [[nodiscard]] bool nears_border() const {
-        return tbb::parallel_reduce(
-            tbb::blocked_range<std::size_t>(0, band_.size()), false,
-            [&](const auto& range, bool near) {
-                for (std::size_t leaf = range.begin(); leaf != range.end() && !near; ++leaf)
-                    for (int word = 0; word < 8; ++word)
-                        for (std::uint64_t bits = border_[leaf][word]; bits != 0; bits &= bits - 1)
-                            near |= std::abs(field_.values.leaf(leaf)[word << 6 | __builtin_ctzll(bits)]) < kNearBorder;
-                return near;
-            },
-            std::logical_or<>());
-    }
-
     void rebuild_band() {
         store();
+        moved_ = 0.0;
         detail::follow_surface(u_, domain_, run_);
         if (fields_.extend) fields_.extend(u_, fields_);
         gather();
@@ -289,7 +253,7 @@ private:
 
     Change measure_change() {
         struct Part {
-            double sum = 0.0;
+            double sum = 0.0, max = 0.0;
             int count = 0;
             bool negative = false, positive = false, finite = true;
         };
@@ -303,7 +267,9 @@ private:
                 part.finite &= std::isfinite(now[n]);
                 (now[n] < 0.0F ? part.negative : part.positive) = true;
                 if (std::abs(now[n]) >= 1.0F) continue;
-                part.sum += std::abs(double(now[n]) - before[n]);
+                const double moved = std::abs(double(now[n]) - before[n]);
+                part.sum += moved;
+                part.max = std::max(part.max, moved);
                 ++part.count;
             }
             parts[leaf] = part;
@@ -314,6 +280,7 @@ private:
         bool negative = false, positive = false;
         for (const Part& part : parts) {
             sum += part.sum;
+            change.max = std::max(change.max, part.max);
             count += part.count;
             negative |= part.negative;
             positive |= part.positive;
@@ -365,9 +332,9 @@ private:
     std::optional<HaloField> phi_, edge_, image_weight_;
     detail::LeafArray<float> previous_;     // u^{n-1}
     std::vector<float, tbb::cache_aligned_allocator<float>> rows_;  // 6 x 512 for each leaf
-    std::vector<detail::LeafMask> border_;  // of the band, with `follow`
     std::vector<double> residuals_;         // scratch, one number for each leaf
     std::int64_t sweeps_ = 0;
+    double moved_ = 0.0;                    // bound on the surface's way since its band was made, voxels
     EvolveReport report_;
 };
 

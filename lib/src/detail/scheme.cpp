@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <string>
+#include <cstring>
 #include <utility>
 
 namespace covol::detail {
@@ -24,19 +24,26 @@ namespace {
 constexpr int kLeafSize = 512;
 
 const SchemeKernels& choose() {
-#ifdef COVOL_X86
+    const std::vector<const SchemeKernels*> available = available_kernels();
     const char* asked = std::getenv("COVOL_SIMD");
-    const std::string name = asked != nullptr ? asked : "";
-    const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-    const bool has_avx512 = has_avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
-                            __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw");
-    if (has_avx512 && (name.empty() || name == "avx512")) return avx512::kKernels;
-    if (has_avx2 && name != "baseline") return avx2::kKernels;
-#endif
-    return baseline::kKernels;
+    for (const SchemeKernels* set : available)
+        if (asked != nullptr && std::strcmp(set->name, asked) == 0) return *set;
+    return *available.back();
 }
 
 }  // namespace
+
+std::vector<const SchemeKernels*> available_kernels() {
+    std::vector<const SchemeKernels*> sets = {&baseline::kKernels};
+#ifdef COVOL_X86
+    const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+    if (has_avx2) sets.push_back(&avx2::kKernels);
+    if (has_avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+        __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw"))
+        sets.push_back(&avx512::kKernels);
+#endif
+    return sets;
+}
 
 const SchemeKernels& kernels() {
     static const SchemeKernels& chosen = choose();

@@ -1,5 +1,5 @@
 #pragma once
-#include <cstddef>
+#include <vector>
 
 // The co-volume scheme on one leaf of 8^3 voxels: plain functions on arrays, no OpenVDB types.
 //
@@ -64,5 +64,8 @@ void close_faces(float* c, const int lo[3], const int hi[3]);
 
 /// The fastest that this processor runs; COVOL_SIMD=baseline|avx2|avx512 in the environment chooses another.
 const SchemeKernels& kernels();
+
+/// Every set that this processor runs, the slowest first.
+std::vector<const SchemeKernels*> available_kernels();
 
 }  // namespace covol::detail
