@@ -38,15 +38,17 @@ struct SchemeKernels {
     /// @param phi    padded (faces), potential of the points' pull; null without
     /// @param g      padded (faces), edge detector; null without
     /// @param rho    512 factors on ρ; null means 1
-    /// @param active 512 bits; rows of other voxels become zero (u_p = b_p)
+    /// @param active 512 bits; other voxels get c = 0 (u_p = b_p); rows of
+    ///               eight without an active voxel are left as they are
     /// @param c      6 x 512, by Face
     /// @return       the largest Σ_q |a_pq| over active rows
     float (*assemble)(const float* u, const float* phi, const float* g, const float* rho,
                       const unsigned long long* active, const SchemeConstants& constants, float* c);
 
-    /// `inner` red-black SOR sweeps in a padded buffer (faces); the halo is not written.
+    /// `inner` red-black SOR sweeps in a padded buffer (faces) over the rows of eight with an active voxel; the halo is
+    /// not written.
     /// @return Σ (Gauss-Seidel value - u)² seen during the first sweep
-    double (*relax)(float* u, const float* b, const float* c, float omega, int inner);
+    double (*relax)(float* u, const float* b, const float* c, const unsigned long long* active, float omega, int inner);
 
     /// As relax, for u_p - t Σ_q (u_q - u_p) = b_p on every voxel: one step of the implicit heat equation.
     double (*heat)(float* u, const float* b, float t, float omega, int inner);

@@ -15,6 +15,17 @@ constexpr int kI = 10 * kRow;  // stride of i in a padded buffer
 constexpr int kJ = kRow;       // stride of j
 constexpr float kTiny = 1e-30F;
 
+/// Bit 8i+j: the row (i,j) of eight voxels.
+using RowMask = unsigned long long;
+
+/// Rows with an active voxel.
+inline RowMask active_rows(const unsigned long long* active) {
+    RowMask rows = 0;
+    for (int i = 0; i < 8; ++i)
+        for (int j = 0; j < 8; ++j) rows |= RowMask((active[i] >> (8 * j) & 0xffU) != 0) << (8 * i + j);
+    return rows;
+}
+
 constexpr int kVertexI = 9 * kRow;
 /// Values at the 9^3 vertices, rows of 16: vertex (i,j,k) is the corner between voxels i-1 and i, and so on.
 struct Vertices {
@@ -33,6 +44,10 @@ void vertex_values(const float* u, Vertices& out) {
             const auto scalar = [row](int k) { return (row[k] + row[k + kJ]) + (row[k + kI] + row[k + kI + kJ]); };
             z[8] = 0.125F * (scalar(8) + scalar(9));
         }
+}
+
+inline bool has_row(RowMask rows, int i, int j) {
+    return ((unsigned(i) | unsigned(j)) & ~7U) == 0 && (rows >> (8 * i + j) & 1U) != 0;
 }
 
 /// Sums over a face's four tetrahedra, for 8 faces.
@@ -74,12 +89,14 @@ inline FaceSums row_face(const float* q, int across, const float* z, int edge, f
     return face_sums(load(q - across), load(q), load(z), load(z + edge), load(z + 1), load(z + edge + 1), epsilon2);
 }
 
-void sum_faces(const float* u, const Vertices& vertices, float epsilon2, Faces& faces) {
+// Only for the voxel rows in `rows`, and the faces that they need.
+void sum_faces(const float* u, const Vertices& vertices, float epsilon2, RowMask rows, Faces& faces) {
     for (int row = 0; row < 64; ++row) store(faces.norm + row * 8, Lanes{});
     const auto voxel = [u](int i, int j) { return u + padded(i, j, 0); };
     const auto vertex = [&vertices](int i, int j) { return vertices.z + i * kVertexI + j * kRow; };
     for (int i = 0; i < 9; ++i)
         for (int j = 0; j < 8; ++j) {
+            if (!has_row(rows, i, j) && !has_row(rows, i - 1, j)) continue;
             const FaceSums sums = row_face(voxel(i, j), kI, vertex(i, j), kRow, epsilon2);
             store(faces.weight_i + (i * 8 + j) * 8, sums.weight);
             if (i > 0) add(faces.norm + ((i - 1) * 8 + j) * 8, sums.norm);
@@ -87,13 +104,16 @@ void sum_faces(const float* u, const Vertices& vertices, float epsilon2, Faces& 
         }
     for (int i = 0; i < 8; ++i)
         for (int j = 0; j < 9; ++j) {
+            if (!has_row(rows, i, j) && !has_row(rows, i, j - 1)) continue;
             const FaceSums sums = row_face(voxel(i, j), kJ, vertex(i, j), kVertexI, epsilon2);
             store(faces.weight_j + (i * 9 + j) * 8, sums.weight);
             if (j > 0) add(faces.norm + (i * 8 + j - 1) * 8, sums.norm);
             if (j < 8) add(faces.norm + (i * 8 + j) * 8, sums.norm);
         }
     for (int i = 0; i < 8; ++i) {
+        if ((rows >> (8 * i) & 0xffU) == 0) continue;
         for (int j = 0; j < 8; ++j) {
+            if (!has_row(rows, i, j)) continue;
             const float* q = voxel(i, j);
             const float* z = vertex(i, j);
             const FaceSums sums = face_sums(load(q - 1), load(q), load(z), load(z + kVertexI), load(z + kRow),
@@ -158,18 +178,16 @@ float assemble(const float* u, const float* phi, const float* g, const float* rh
                const SchemeConstants& constants, float* c) {
     Vertices vertices;
     vertex_values(u, vertices);
+    const RowMask rows = active_rows(active);
     Faces faces;
-    sum_faces(u, vertices, constants.epsilon2, faces);
+    sum_faces(u, vertices, constants.epsilon2, rows, faces);
 
     Lanes largest_sum = Lanes{};
     for (int i = 0; i < 8; ++i)
         for (int j = 0; j < 8; ++j) {
+            if (!has_row(rows, i, j)) continue;
             const int row = (i * 8 + j) * 8;
             const unsigned on = static_cast<unsigned>(active[i] >> (8 * j)) & 0xffU;
-            if (on == 0) {
-                for (int f = 0; f < 6; ++f) store(c + f * 512 + row, Lanes{});
-                continue;
-            }
             Lanes a[6] = {};  // the velocities, then -a_pq >= 0
             if (phi != nullptr) add_point_pull(Star(phi, i, j), constants.theta, a);
             if (g != nullptr)
@@ -196,7 +214,7 @@ float assemble(const float* u, const float* phi, const float* g, const float* rh
 
 // Red-black SOR: value(p, offset in the leaf) gives the Gauss-Seidel value of a row.
 template <typename Value>
-inline double red_black(float* u, float omega, int inner, Value value) {
+inline double red_black(float* u, RowMask rows, float omega, int inner, Value value) {
     // A colour's voxels take every other lane; ω is 0 on the others.
     const Lanes even = {1, 0, 1, 0, 1, 0, 1, 0};
     const Lanes on[2] = {even, 1.0F - even};
@@ -205,6 +223,7 @@ inline double red_black(float* u, float omega, int inner, Value value) {
         for (int colour = 0; colour < 2; ++colour)
             for (int i = 0; i < 8; ++i)
                 for (int j = 0; j < 8; ++j) {
+                    if (!has_row(rows, i, j)) continue;
                     float* p = u + padded(i, j, 0);
                     const Lanes now = load(p);
                     const Lanes change = on[(i + j + colour) & 1] * (value(p, (i * 8 + j) * 8) - now);
@@ -214,8 +233,8 @@ inline double red_black(float* u, float omega, int inner, Value value) {
     return sum(residual);
 }
 
-double relax(float* u, const float* b, const float* c, float omega, int inner) {
-    return red_black(u, omega, inner, [b, c](const float* p, int row) {
+double relax(float* u, const float* b, const float* c, const unsigned long long* active, float omega, int inner) {
+    return red_black(u, active_rows(active), omega, inner, [b, c](const float* p, int row) {
         const Lanes old = load(b + row);
         const auto pull = [&](int face, int stride) { return load(c + face * 512 + row) * (load(p + stride) - old); };
         return old + (((pull(kMinusI, -kI) + pull(kPlusI, kI)) + (pull(kMinusJ, -kJ) + pull(kPlusJ, kJ))) +
@@ -225,7 +244,7 @@ double relax(float* u, const float* b, const float* c, float omega, int inner) {
 
 double heat(float* u, const float* b, float t, float omega, int inner) {
     const float scale = 1.0F / (1.0F + 6.0F * t);
-    return red_black(u, omega, inner, [b, t, scale](const float* p, int row) {
+    return red_black(u, ~RowMask{0}, omega, inner, [b, t, scale](const float* p, int row) {
         return scale * (load(b + row) + t * (((load(p - kI) + load(p + kI)) + (load(p - kJ) + load(p + kJ))) +
                                              (load(p - 1) + load(p + 1))));
     });
@@ -235,7 +254,7 @@ void mean_gradient(const float* u, float* out) {
     Vertices vertices;
     vertex_values(u, vertices);
     Faces faces;
-    sum_faces(u, vertices, 1.0F, faces);
+    sum_faces(u, vertices, 1.0F, ~RowMask{0}, faces);
     for (int n = 0; n < 512; n += 8) store(out + n, load(faces.norm + n) * (1.0F / 24.0F));
 }
 
