@@ -418,10 +418,11 @@ Tap make_tap(double position, std::int32_t size, std::int64_t stride) {
     // Lattices that should coincide differ by the rounding of a file's spacing.
     constexpr double kSame = 1e-4;
     const double clamped = std::clamp(position, 0.0, double(size - 1));
-    const double nearest = std::round(clamped);
-    if (std::abs(clamped - nearest) < kSame) return {static_cast<std::int64_t>(nearest) * stride, 0, 0};
-    const double below = std::floor(clamped);
-    return {static_cast<std::int64_t>(below) * stride, stride, clamped - below};
+    const auto below = static_cast<std::int64_t>(clamped);
+    const double weight = clamped - double(below);
+    if (weight < kSame) return {below * stride, 0, 0};
+    if (weight > 1 - kSame) return {(below + 1) * stride, 0, 0};
+    return {below * stride, stride, weight};
 }
 
 /// What interpolation is computed in: single precision where it holds every value of T.
@@ -476,13 +477,15 @@ template <typename T>
 void sample_affine(const T* data, const Lattice& image, const LatticeMap& map, const Index3& min, const Index3& max,
                    float* out) {
     for (std::int32_t i = min[0]; i <= max[0]; ++i)
-        for (std::int32_t j = min[1]; j <= max[1]; ++j)
+        for (std::int32_t j = min[1]; j <= max[1]; ++j) {
+            const Vec3 row = multiply(map.matrix, {double(i), double(j), 0});
             for (std::int32_t k = min[2]; k <= max[2]; ++k) {
-                const Vec3 at = multiply(map.matrix, {double(i), double(j), double(k)});
                 std::array<Tap, 3> taps;
-                for (int a = 0; a < 3; ++a) taps[a] = make_tap(at[a] + map.offset[a], image.size[a], image.stride[a]);
+                for (int a = 0; a < 3; ++a)
+                    taps[a] = make_tap(row[a] + map.matrix[a][2] * k + map.offset[a], image.size[a], image.stride[a]);
                 *out++ = static_cast<float>(interpolate(data, taps[0], taps[1], taps[2]));
             }
+        }
 }
 
 // ---------------------------------------------------------------------------------------------- values

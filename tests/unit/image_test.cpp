@@ -193,6 +193,28 @@ TEST_CASE("a TIFF keeps spacing and unit") {
     CHECK(image.geometry().spacing_known);
 }
 
+TEST_CASE("a TIFF without known spacing stays one") {
+    const Scratch scratch;
+    ImageGeometry g;
+    g.size = {7, 6, 5};
+    g.spacing_known = false;
+    write_image(scratch.path("a.tif"), g, ramp<std::uint8_t>(g).data());
+    CHECK_FALSE(read_image_geometry(scratch.path("a.tif")).spacing_known);
+}
+
+TEST_CASE("NIfTI's slope and intercept are applied") {
+    const Scratch scratch;
+    const ImageGeometry g = oblique();
+    write_image(scratch.path("a.nii"), g, ramp<std::int32_t>(g).data());
+    std::string bytes = bytes_of(scratch.path("a.nii"));
+    const std::array<float, 2> scale{2.0F, -5.0F};
+    std::memcpy(bytes.data() + 112, scale.data(), sizeof(scale));
+    const Image image = read_image(scratch.write("a.nii", bytes));
+    CHECK(image.pixel_type() == PixelType::Float);
+    CHECK(image.at(0, 0, 0) == -5);
+    CHECK(image.at(3, 2, 1) == 2 * (3 + 20 + 40) - 5);
+}
+
 TEST_CASE("the unit survives where the format has a place for it") {
     const Scratch scratch;
     ImageGeometry g = oblique();

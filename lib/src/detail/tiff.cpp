@@ -422,7 +422,8 @@ void write_tiff(const std::string& path, const ImageGeometry& geometry, PixelTyp
     std::to_chars(depth.data(), depth.data() + depth.size() - 1, geometry.spacing[2]);
     const std::string slices = std::to_string(geometry.size[2]);
     std::string description = "ImageJ=1.53t\nimages=" + slices + "\nslices=" + slices +
-                              "\nhyperstack=true\nmode=grayscale\nspacing=" + depth.data() + "\n";
+                              "\nhyperstack=true\nmode=grayscale\n";
+    if (geometry.spacing_known) description += std::string("spacing=") + depth.data() + "\n";
     if (!geometry.unit.empty()) description += "unit=" + geometry.unit + "\n";
     const int format = with_pixel_type(type, [](auto pixel) {
         using T = decltype(pixel);
