@@ -126,6 +126,12 @@ public:
         return result;
     }
 
+    /// A corner of the cell lies outside the domain.
+    [[nodiscard]] bool sticks_out(int i, int j, int k) const {
+        const float* at = values_.data() + cell_voxel(i, j, k);
+        return std::any_of(kCornerOffset.begin(), kCornerOffset.end(), [at](int c) { return at[c] == kOutside; });
+    }
+
     /// Where edge e of the cell crosses zero, relative to the cell.
     [[nodiscard]] Point crossing(int i, int j, int k, int e) const {
         const float* at = values_.data() + cell_voxel(i, j, k);
@@ -168,11 +174,12 @@ private:
 
 /// Calls visit(i, j, k, case) for the cells with a crossing, in OpenVDB's order.
 template <typename Visit>
-void for_each_cell(const CellValues& values, const Visit& visit) {
+void for_each_cell(const CellValues& values, DomainEnd end, const Visit& visit) {
     for (int i = 0; i < kLeafDim; ++i)
         for (int j = 0; j < kLeafDim; ++j)
             for (int k = 0; k < kLeafDim; ++k)
-                if (const int signs = values.signs(i, j, k); signs != 0 && signs != 255) visit(i, j, k, kCases[signs]);
+                if (const int signs = values.signs(i, j, k); signs != 0 && signs != 255)
+                    if (end == DomainEnd::Closed || !values.sticks_out(i, j, k)) visit(i, j, k, kCases[signs]);
 }
 
 Patch make_patch(const Coord& origin, const Point* points, int count, std::uint32_t first) {
@@ -295,7 +302,7 @@ float InterfacePatches::squared_distance(const Coord& at, std::uint32_t index, f
     return bound;
 }
 
-InterfacePatches find_interface(const FloatGrid& u, const Domain& domain, const RunContext& run) {
+InterfacePatches find_interface(const FloatGrid& u, const Domain& domain, DomainEnd end, const RunContext& run) {
     run.check();
     const std::vector<Coord> leaves = candidates(u, domain);
     struct Counts {
@@ -306,7 +313,7 @@ InterfacePatches find_interface(const FloatGrid& u, const Domain& domain, const 
         CellValues values(u, domain);
         for (std::size_t n = range.begin(); n != range.end(); ++n)
             if (values.load(leaves[n]))
-                for_each_cell(values, [&](int, int, int, const CellCase& cell) {
+                for_each_cell(values, end, [&](int, int, int, const CellCase& cell) {
                     counts[n].patches += cell.loops;
                     counts[n].vertices += cell.points;
                 });
@@ -332,7 +339,7 @@ InterfacePatches find_interface(const FloatGrid& u, const Domain& domain, const 
         for (std::size_t n = range.begin(); n != range.end(); ++n) {
             values.load(result.leaves[n]);
             Counts next = begins[n];
-            for_each_cell(values, [&](int i, int j, int k, const CellCase& cell) {
+            for_each_cell(values, end, [&](int i, int j, int k, const CellCase& cell) {
                 const std::int8_t* edge = cell.edge.data();
                 for (int loop = 0; loop < cell.loops; ++loop) {
                     Point* points = result.vertices.data() + next.vertices;

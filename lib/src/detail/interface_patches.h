@@ -32,8 +32,13 @@ struct InterfacePatches {
     [[nodiscard]] float squared_distance(const Coord& at, std::uint32_t patch, float bound) const;
 };
 
-/// Finds them. Negative is inside; voxels outside the domain are outside, and the surface is closed half a voxel
-/// beyond the domain's last voxel centres.
-[[nodiscard]] InterfacePatches find_interface(const FloatGrid& u, const Domain& domain, const RunContext& run);
+/// What becomes of a surface that reaches the domain's boundary.
+enum class DomainEnd {
+    Closed,  ///< beyond it is outside: the surface is closed half a voxel beyond the last voxel centres
+    Open     ///< it ends there
+};
+
+/// Finds them; negative is inside.
+[[nodiscard]] InterfacePatches find_interface(const FloatGrid& u, const Domain& domain, DomainEnd end, const RunContext& run);
 
 }  // namespace covol::detail

@@ -1,0 +1,195 @@
+// Distance to the zero level set: each voxel of the band finds its nearest patch of the surface.
+#include "detail/redistance.h"
+
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/Prune.h>
+#include <openvdb/tools/SignedFloodFill.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "covol/error.h"
+#include "detail/interface_patches.h"
+#include "detail/leaf_band.h"
+#include "detail/leaf_propagation.h"
+
+namespace covol::detail {
+namespace {
+
+constexpr std::int32_t kNoPatch = -1;
+
+openvdb::CoordBBox box_of(const Domain& d) {
+    return {Coord(d.min[0], d.min[1], d.min[2]), Coord(d.max[0], d.max[1], d.max[2])};
+}
+
+/// Leaves with voxels that may be nearer than the band's half width to a patch.
+std::vector<Coord> band_leaves(const InterfacePatches& interface, double half_width) {
+    const int reach = static_cast<int>(std::ceil(half_width));
+    std::vector<Coord> result;
+    for (std::size_t n = 0; n < interface.leaves.size(); ++n) {
+        openvdb::CoordBBox box;
+        for (std::uint32_t m = interface.first[n]; m < interface.first[n + 1]; ++m)
+            box.expand(interface.patches[m].origin);
+        const Coord lo = box.min().offsetBy(-reach) & ~(kLeafDim - 1);
+        const Coord hi = box.max().offsetBy(1 + reach) & ~(kLeafDim - 1);
+        for (int i = lo[0]; i <= hi[0]; i += kLeafDim)
+            for (int j = lo[1]; j <= hi[1]; j += kLeafDim)
+                for (int k = lo[2]; k <= hi[2]; k += kLeafDim) result.emplace_back(i, j, k);
+    }
+    std::sort(result.begin(), result.end());
+    result.erase(std::unique(result.begin(), result.end()), result.end());
+    return result;
+}
+
+/// Each voxel of the band with the nearest patch that it knows.
+class NearestPatches {
+public:
+    NearestPatches(const InterfacePatches& interface, const LeafBand& band, double half_width)
+        : interface_(interface),
+          band_(band),
+          half_width_(static_cast<float>(half_width)),
+          squared_(band.size(), static_cast<float>(half_width * half_width), 0),
+          patch_(band.size(), kNoPatch, 0),
+          changed_(band.size(), LeafMask{}) {}
+
+    void find(const RunContext& run) {
+        tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) { seed(leaf); });
+        propagate(band_, changed_, run, [this](std::size_t leaf, int p, std::size_t other, int q) {
+            return try_patch(leaf, p, patch_.leaf(other)[q]);
+        });
+    }
+
+    [[nodiscard]] const float* squared(std::size_t leaf) const { return squared_.leaf(leaf); }
+    [[nodiscard]] const std::int32_t* patch(std::size_t leaf) const { return patch_.leaf(leaf); }
+
+private:
+    bool try_patch(std::size_t leaf, int p, std::int32_t patch) {
+        std::int32_t& mine = patch_.leaf(leaf)[p];
+        if (patch == mine) return false;
+        float& best = squared_.leaf(leaf)[p];
+        const Coord at = band_.origin(leaf).offsetBy(p >> 6, p >> 3 & 7, p & 7);
+        const float d = interface_.squared_distance(at, static_cast<std::uint32_t>(patch), best);
+        if (!(d < best)) return false;
+        best = d;
+        mine = patch;
+        return true;
+    }
+
+    // A voxel whose nearest point lies within a patch lies in the cylinder above and below it. Voxels beside a crease
+    // lie in none; they, and those that slack in the patches' normals puts outside, learn from their neighbours.
+    void seed(std::size_t leaf) {
+        const Coord origin = band_.origin(leaf);
+        for (int n = 0; n < 27; ++n) {
+            const Coord from = origin.offsetBy((n / 9 - 1) * kLeafDim, (n / 3 % 3 - 1) * kLeafDim, (n % 3 - 1) * kLeafDim);
+            const auto at = std::lower_bound(interface_.leaves.begin(), interface_.leaves.end(), from);
+            if (at == interface_.leaves.end() || *at != from) continue;
+            const std::size_t m = static_cast<std::size_t>(at - interface_.leaves.begin());
+            for (std::uint32_t patch = interface_.first[m]; patch < interface_.first[m + 1]; ++patch)
+                seed_cylinder(leaf, patch);
+        }
+    }
+
+    void seed_cylinder(std::size_t leaf, std::uint32_t index) {
+        const Patch& patch = interface_.patches[index];
+        const Coord cell = patch.origin - band_.origin(leaf);
+        const int reach = static_cast<int>(half_width_) + 1;
+        for (int a = 0; a < 3; ++a)
+            if (cell[a] < -reach || cell[a] >= kLeafDim - 1 + reach) return;
+        const auto& n = patch.normal;
+        const int m = std::abs(n[0]) >= std::abs(n[1]) ? (std::abs(n[0]) >= std::abs(n[2]) ? 0 : 2)
+                                                       : (std::abs(n[1]) >= std::abs(n[2]) ? 1 : 2);
+        if (n[m] == 0) return;
+        const int u = (m + 1) % 3, v = (m + 2) % 3;
+        const float radius = patch.radius + kSlack;
+        const float half = half_width_ * std::abs(n[m]) + radius * std::sqrt(std::max(0.0F, 1 - n[m] * n[m]));
+        const float slope_u = n[u] / n[m], slope_v = n[v] / n[m];
+        const float half_u = radius * std::sqrt(1 + slope_u * slope_u), half_v = radius * std::sqrt(1 + slope_v * slope_v);
+        const float center_m = patch.center[m] + float(cell[m]);
+        const auto first = [](float x) { return std::max(0, static_cast<int>(std::ceil(x))); };
+        const auto last = [](float x) { return std::min(kLeafDim - 1, static_cast<int>(std::floor(x))); };
+        Coord at;
+        for (at[m] = first(center_m - half); at[m] <= last(center_m + half); ++at[m]) {
+            const float along = float(at[m]) - center_m;
+            const float center_u = patch.center[u] + float(cell[u]) + along * slope_u;
+            const float center_v = patch.center[v] + float(cell[v]) + along * slope_v;
+            for (at[u] = first(center_u - half_u); at[u] <= last(center_u + half_u); ++at[u])
+                for (at[v] = first(center_v - half_v); at[v] <= last(center_v + half_v); ++at[v]) {
+                    const int p = leaf_offset(at[0], at[1], at[2]);
+                    if (try_patch(leaf, p, static_cast<std::int32_t>(index))) set_on(changed_[leaf], p);
+                }
+        }
+    }
+
+    static constexpr float kSlack = 0.25F;  ///< voxels, by which neighbouring patches' cylinders overlap
+    const InterfacePatches& interface_;
+    const LeafBand& band_;
+    float half_width_;
+    LeafArray<float> squared_;
+    LeafArray<std::int32_t> patch_;
+    std::vector<LeafMask> changed_;
+};
+
+/// Bit p: voxel p of the leaf is inside. Beyond an open end of the domain a voxel has the sign of the nearest one within.
+LeafMask inside_mask(const FloatGrid::ConstAccessor& accessor, const Coord& origin, const openvdb::CoordBBox& domain,
+                     DomainEnd end) {
+    LeafMask inside{};
+    if (const auto* leaf = accessor.probeConstLeaf(origin)) {
+        const float* values = leaf->buffer().data();
+        for (int p = 0; p < kLeafSize; ++p) inside[p >> 6] |= std::uint64_t(values[p] < 0) << (p & 63);
+    } else if (accessor.getValue(origin) < 0) {
+        inside.fill(~std::uint64_t(0));
+    }
+    if (domain.isInside(openvdb::CoordBBox(origin, origin.offsetBy(kLeafDim - 1)))) return inside;
+    for (int p = 0; p < kLeafSize; ++p) {
+        const Coord at = origin.offsetBy(p >> 6, p >> 3 & 7, p & 7);
+        if (domain.isInside(at)) continue;
+        const Coord nearest = Coord::minComponent(Coord::maxComponent(at, domain.min()), domain.max());
+        const std::uint64_t bit = std::uint64_t(1) << (p & 63);
+        inside[p >> 6] &= ~bit;
+        if (end == DomainEnd::Open && accessor.getValue(nearest) < 0) inside[p >> 6] |= bit;
+    }
+    return inside;
+}
+
+}  // namespace
+
+FloatGridPtr redistance(const FloatGrid& u, const Domain& domain, double half_width, DomainEnd end, const char* name,
+                        const RunContext& run) {
+    if (!(u.background() > 0))
+        throw Error(Errc::InvalidInput, std::string(name) + ": grid '" + u.getName() + "': expected a background > 0 (outside), got " +
+                                            std::to_string(u.background()));
+    const InterfacePatches interface = find_interface(u, domain, end, run);
+    if (interface.patches.empty())
+        throw Error(Errc::InvalidInput, std::string(name) + ": grid '" + u.getName() +
+                                            "' has no zero crossing: nothing in the domain is inside, or nothing outside");
+    LeafBand band(band_leaves(interface, half_width));
+    NearestPatches nearest(interface, band, half_width);
+    nearest.find(run);
+
+    const float h = static_cast<float>(domain.voxel_size);
+    const float background = static_cast<float>(half_width * domain.voxel_size);
+    LeafArray<float> values(band.size(), background, 0);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, band.size(), 16), [&](const auto& range) {
+        const auto accessor = u.getConstAccessor();
+        for (std::size_t leaf = range.begin(); leaf != range.end(); ++leaf) {
+            const LeafMask inside = inside_mask(accessor, band.origin(leaf), box_of(domain), end);
+            for (int p = 0; p < kLeafSize; ++p) {
+                float d = background;
+                if (nearest.patch(leaf)[p] != kNoPatch) {
+                    set_on(band.active(leaf), p);
+                    d = std::min(background, h * std::sqrt(nearest.squared(leaf)[p]));
+                }
+                values.leaf(leaf)[p] = is_on(inside, p) ? -d : d;
+            }
+        }
+    });
+    FloatGridPtr result = export_grid(band, values, domain, background, name);
+    result->setGridClass(openvdb::GRID_LEVEL_SET);
+    openvdb::tools::signedFloodFill(result->tree());
+    openvdb::tools::pruneLevelSet(result->tree());
+    return result;
+}
+
+}  // namespace covol::detail
