@@ -10,7 +10,7 @@
 
 #include "covol/error.h"
 #include "detail/leaf_columns.h"
-#include "detail/redistance.h"
+#include "detail/signed_distance.h"
 
 namespace covol {
 namespace {

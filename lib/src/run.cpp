@@ -1,5 +1,6 @@
 #include "covol/run.h"
 
+#include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
 #include "covol/error.h"
@@ -24,6 +25,8 @@ void with_threads(const RunContext& run, const std::function<void()>& work) {
         work();
         return;
     }
+    // The arena bounds the work; the control lets it have more threads than there are cores.
+    const tbb::global_control allow(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(run.threads));
     tbb::task_arena arena(run.threads);
     arena.execute([&] { work(); });
 }

@@ -14,6 +14,7 @@
 #include "covol/band.h"
 #include "covol/distance.h"
 #include "covol/error.h"
+#include "covol/points.h"
 #include "detail/leaf_columns.h"
 
 namespace covol {
@@ -54,10 +55,12 @@ double Analysis::cloud_volume(double distance) const {
     return n;
 }
 
+constexpr std::int32_t kExterior = 0;  ///< the first component
+
 /// Components under merging, with what a core is judged by.
 class Components {
 public:
-    explicit Components(std::vector<Core>& cores) : cores_(cores) {}
+    explicit Components(std::vector<Core>& cores) : cores_(cores) { create(std::numeric_limits<double>::max(), true); }
 
     std::int32_t create(double peak, bool exterior) {
         components_.push_back({std::int32_t(components_.size()), exterior, peak, 0, 0});
@@ -177,7 +180,7 @@ void Sweep::enter_runs() {
     for (std::int32_t n = 0; n < std::int32_t(pieces.size()); ++n) {
         if (pieces[n].leaf >= 0) continue;
         const bool has_seed = std::any_of(seeds_.begin(), seeds_.end(), [&](const Coord& s) { return columns_.find(s) == n; });
-        std::int32_t root = components_.create(radius_, columns_.at_border(pieces[n]) || has_seed);
+        std::int32_t root = columns_.at_border(pieces[n]) ? components_.find(kExterior) : components_.create(radius_, has_seed);
         run_label_[n] = root;
         const std::int64_t blocks = pieces[n].end - pieces[n].begin;
         components_.grow(root, blocks * kLeafSize, 0);
@@ -244,16 +247,12 @@ void Sweep::enter_voxel(std::int32_t node) {
     }
     const Coord voxel = band_.origin(leaf).offsetBy(at >> 6, at >> 3 & 7, at & 7);
     const bool at_boundary = !detail::VoxelBox{box_.min.offsetBy(1), box_.max.offsetBy(-1)}.contains(voxel);
-    if (root < 0) root = components_.create(d, at_boundary);
+    if (root < 0) root = at_boundary ? kExterior : components_.create(d, false);
     components_.grow(root, 1, 6 - 2 * known);
     label_.leaf(leaf)[at] = root;
-    if (at_boundary) {
-        // Beyond the boundary is the exterior: this voxel is a gap like any other.
-        const std::int32_t outside = components_.create(radius_, true);
-        components_.merge(root, outside, d, is_beyond);
-    } else if (std::find(seeds_.begin(), seeds_.end(), voxel) != seeds_.end()) {
-        components_.mark_exterior(root);
-    }
+    // Beyond the boundary lies the exterior: a voxel there is a gap like any other. A seed only says what its core is.
+    if (at_boundary) components_.merge(root, components_.find(kExterior), d, is_beyond);
+    if (std::find(seeds_.begin(), seeds_.end(), voxel) != seeds_.end()) components_.mark_exterior(components_.find(root));
 }
 
 /// The grid to analyse on: the points' box, as far as it lies in the domain, and two voxels around it.
@@ -299,8 +298,6 @@ Verdict judge(const Analysis& analysis) {
     return verdict;
 }
 
-double mean_spacing(const std::vector<Vec3>& points);
-
 }  // namespace
 
 TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Domain& domain,
@@ -335,7 +332,7 @@ TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Dom
         radius = std::max(1.3 * choice.tag_distance, 4 * a);
     }
     if (choice.tag_distance == 0) {
-        const double spacing = mean_spacing(points);
+        const double spacing = nearest_neighbour_spacing(merge_close_points(points, 0.0)).mean;
         choice.tag_distance = std::max(1.8 * spacing, 1.5 * h);
         reason << "no closed structure found; 1.8 times the mean spacing " << spacing;
     }

@@ -57,8 +57,8 @@ struct EvolveFields {
 ///
 /// @param u  in/out, world units; active voxels are the band; u < 0 inside; inactive voxels keep their values.
 /// @pre   all grids share one transform: uniform voxel size and a translation (domain_of()).
-/// @post  without `follow`, u keeps its topology; values do not depend on the number of threads;
-///        min u0 <= u <= max u0.
+/// @post  without `follow`, u keeps its topology; with it u gets a new tree (accessors become invalid); values do not depend on the number of threads;
+///        without `follow`, min u0 <= u <= max u0.
 /// @throws Error  InvalidOptions, InvalidInput (no active voxel; transforms differ; a value that is not finite; a
 ///                needed field is null), Numerical (u is left at the step before).
 EvolveReport evolve(FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options = {},

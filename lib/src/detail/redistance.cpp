@@ -1,162 +1,169 @@
+// Distance to the zero level set: each voxel of the band finds its nearest patch of the surface.
 #include "detail/redistance.h"
 
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/Prune.h>
+#include <openvdb/tools/SignedFloodFill.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <optional>
+#include <string>
+
+#include "covol/error.h"
+#include "detail/interface_patches.h"
+#include "detail/leaf_band.h"
+#include "detail/leaf_propagation.h"
 
 namespace covol::detail {
 namespace {
 
-/// Where the interface lies, seen from a voxel beside it.
-struct Foot {
-    Vec3 point;                 // index space
-    std::array<float, 3> normal;  // towards phi > 0
-};
+constexpr std::int32_t kNoPatch = -1;
 
-/// A leaf's voxels and the layer around it; voxels that take no part are marked.
-class Neighbourhood {
-public:
-    Neighbourhood(const LeafBand& band, const LeafArray<float>& phi, const std::vector<LeafMask>& valid, std::size_t leaf)
-        : band_(band), phi_(phi), valid_(valid), leaf_(leaf) {}
-    /// phi of voxel (i,j,k), at most one outside the leaf along one axis.
-    [[nodiscard]] std::optional<float> at(int i, int j, int k) const {
-        const int slot = neighbour_slot(i >> 3, j >> 3, k >> 3);
-        const std::int32_t leaf = slot == 13 ? std::int32_t(leaf_) : band_.neighbours(leaf_)[slot];
-        const int offset = leaf_offset(i & 7, j & 7, k & 7);
-        if (leaf == band_.none() || !is_on(valid_[leaf], offset)) return std::nullopt;
-        return phi_.leaf(leaf)[offset];
-    }
-
-private:
-    const LeafBand& band_;
-    const LeafArray<float>& phi_;
-    const std::vector<LeafMask>& valid_;
-    std::size_t leaf_;
-};
-
-/// The foot of voxel (i,j,k) and its distance to it, where a neighbour has the other sign.
-std::optional<Foot> find_foot(const Neighbourhood& n, const Coord& origin, int i, int j, int k, float& distance) {
-    const float centre = *n.at(i, j, k);
-    float nearest_crossing = std::numeric_limits<float>::max();
-    std::array<float, 3> gradient{};
-    for (int a = 0; a < 3; ++a) {
-        const auto low = n.at(i - (a == 0), j - (a == 1), k - (a == 2));
-        const auto high = n.at(i + (a == 0), j + (a == 1), k + (a == 2));
-        const float down = low ? centre - *low : 0.0F, up = high ? *high - centre : 0.0F;
-        const bool crosses_down = low && (*low < 0) != (centre < 0), crosses_up = high && (*high < 0) != (centre < 0);
-        if (crosses_down || crosses_up) {
-            // The slope across the interface; phi may have another branch on the far side.
-            gradient[a] = crosses_down && (!crosses_up || std::abs(down) > std::abs(up)) ? down : up;
-            nearest_crossing = std::min(nearest_crossing, std::abs(centre / gradient[a]));
-        } else {
-            gradient[a] = low && high ? 0.5F * (down + up) : down + up;
-        }
-    }
-    if (nearest_crossing > 1.0F) return std::nullopt;
-    const float slope = std::hypot(gradient[0], gradient[1], gradient[2]);
-    distance = std::min(std::abs(centre) / slope, nearest_crossing);
-    Foot foot;
-    const float signed_distance = centre < 0 ? -distance : distance;
-    const std::array<int, 3> at{i, j, k};
-    for (int a = 0; a < 3; ++a) {
-        foot.normal[a] = gradient[a] / slope;
-        foot.point[a] = double(origin[a] + at[a]) - double(signed_distance * foot.normal[a]);
-    }
-    return foot;
+openvdb::CoordBBox box_of(const Domain& d) {
+    return {Coord(d.min[0], d.min[1], d.min[2]), Coord(d.max[0], d.max[1], d.max[2])};
 }
 
-/// Feet are about one voxel apart: a lateral offset up to that is the sampling's, not the surface's.
-float distance_to_foot(const Foot& foot, const Coord& voxel) {
-    constexpr float kSampling = 0.75F;
-    float squared = 0, along = 0;
-    for (int a = 0; a < 3; ++a) {
-        const auto r = float(voxel[a] - foot.point[a]);
-        squared += r * r;
-        along += r * foot.normal[a];
+/// Leaves with voxels that may be nearer than the band's half width to a patch.
+std::vector<Coord> band_leaves(const InterfacePatches& interface, double half_width) {
+    const int reach = static_cast<int>(std::ceil(half_width));
+    std::vector<Coord> result;
+    for (std::size_t n = 0; n < interface.leaves.size(); ++n) {
+        openvdb::CoordBBox box;
+        for (std::uint32_t m = interface.first[n]; m < interface.first[n + 1]; ++m)
+            box.expand(interface.patches[m].origin);
+        const Coord lo = box.min().offsetBy(-reach) & ~(kLeafDim - 1);
+        const Coord hi = box.max().offsetBy(1 + reach) & ~(kLeafDim - 1);
+        for (int i = lo[0]; i <= hi[0]; i += kLeafDim)
+            for (int j = lo[1]; j <= hi[1]; j += kLeafDim)
+                for (int k = lo[2]; k <= hi[2]; k += kLeafDim) result.emplace_back(i, j, k);
     }
-    const float lateral = std::max(0.0F, std::sqrt(std::max(0.0F, squared - along * along)) - kSampling);
-    return std::hypot(along, lateral);
+    std::sort(result.begin(), result.end());
+    result.erase(std::unique(result.begin(), result.end()), result.end());
+    return result;
+}
+
+/// Each voxel of the band with the nearest patch that it knows.
+class NearestPatches {
+public:
+    NearestPatches(const InterfacePatches& interface, const LeafBand& band, double half_width)
+        : interface_(interface),
+          band_(band),
+          squared_(band.size(), static_cast<float>(half_width * half_width), 0),
+          patch_(band.size(), kNoPatch, 0),
+          changed_(band.size(), LeafMask{}) {}
+
+    void find(const RunContext& run) {
+        tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) { seed(leaf); });
+        propagate(band_, changed_, run, [this](std::size_t leaf, int p, std::size_t other, int q) {
+            return try_patch(leaf, p, patch_.leaf(other)[q]);
+        });
+    }
+
+    [[nodiscard]] const float* squared(std::size_t leaf) const { return squared_.leaf(leaf); }
+    [[nodiscard]] const std::int32_t* patch(std::size_t leaf) const { return patch_.leaf(leaf); }
+
+private:
+    bool try_patch(std::size_t leaf, int p, std::int32_t patch) {
+        std::int32_t& mine = patch_.leaf(leaf)[p];
+        if (patch == mine) return false;
+        float& best = squared_.leaf(leaf)[p];
+        const Coord at = band_.origin(leaf).offsetBy(p >> 6, p >> 3 & 7, p & 7);
+        const float d = interface_.squared_distance(at, static_cast<std::uint32_t>(patch), best);
+        if (!(d < best)) return false;
+        best = d;
+        mine = patch;
+        return true;
+    }
+
+    // The corners of a cell know its patches; those in the leaf belong to cells of the leaf and its lower neighbours.
+    void seed(std::size_t leaf) {
+        const Coord origin = band_.origin(leaf);
+        for (int block = 0; block < 8; ++block) {
+            const Coord from = origin.offsetBy(-kLeafDim * (block >> 2 & 1), -kLeafDim * (block >> 1 & 1), -kLeafDim * (block & 1));
+            const auto at = std::lower_bound(interface_.leaves.begin(), interface_.leaves.end(), from);
+            if (at == interface_.leaves.end() || *at != from) continue;
+            const std::size_t n = static_cast<std::size_t>(at - interface_.leaves.begin());
+            for (std::uint32_t m = interface_.first[n]; m < interface_.first[n + 1]; ++m) seed_corners(leaf, m);
+        }
+    }
+
+    void seed_corners(std::size_t leaf, std::uint32_t patch) {
+        const Coord cell = interface_.patches[patch].origin - band_.origin(leaf);
+        for (int i = std::max(0, cell[0]); i <= std::min(kLeafDim - 1, cell[0] + 1); ++i)
+            for (int j = std::max(0, cell[1]); j <= std::min(kLeafDim - 1, cell[1] + 1); ++j)
+                for (int k = std::max(0, cell[2]); k <= std::min(kLeafDim - 1, cell[2] + 1); ++k)
+                    if (const int p = leaf_offset(i, j, k); try_patch(leaf, p, static_cast<std::int32_t>(patch)))
+                        set_on(changed_[leaf], p);
+    }
+
+    const InterfacePatches& interface_;
+    const LeafBand& band_;
+    LeafArray<float> squared_;
+    LeafArray<std::int32_t> patch_;
+    std::vector<LeafMask> changed_;
+};
+
+/// Bit p: voxel p of the leaf is inside. Beyond an open end of the domain a voxel has the sign of the nearest one within.
+LeafMask inside_mask(const FloatGrid::ConstAccessor& accessor, const Coord& origin, const openvdb::CoordBBox& domain,
+                     DomainEnd end) {
+    LeafMask inside{};
+    if (const auto* leaf = accessor.probeConstLeaf(origin)) {
+        const float* values = leaf->buffer().data();
+        for (int p = 0; p < kLeafSize; ++p) inside[p >> 6] |= std::uint64_t(values[p] < 0) << (p & 63);
+    } else if (accessor.getValue(origin) < 0) {
+        inside.fill(~std::uint64_t(0));
+    }
+    if (domain.isInside(openvdb::CoordBBox(origin, origin.offsetBy(kLeafDim - 1)))) return inside;
+    for (int p = 0; p < kLeafSize; ++p) {
+        const Coord at = origin.offsetBy(p >> 6, p >> 3 & 7, p & 7);
+        if (domain.isInside(at)) continue;
+        const Coord nearest = Coord::minComponent(Coord::maxComponent(at, domain.min()), domain.max());
+        const std::uint64_t bit = std::uint64_t(1) << (p & 63);
+        inside[p >> 6] &= ~bit;
+        if (end == DomainEnd::Open && accessor.getValue(nearest) < 0) inside[p >> 6] |= bit;
+    }
+    return inside;
 }
 
 }  // namespace
 
-LeafArray<float> signed_distance(const LeafBand& band, const LeafArray<float>& phi,
-                                 const std::vector<LeafMask>& inside_domain, const VoxelBox& box, float width,
-                                 const RunContext& run) {
-    LeafArray<float> result(band.size(), width);
-    std::vector<std::vector<Foot>> feet_of_leaf(band.size());
-    std::vector<LeafMask> beside(band.size(), LeafMask{});
-    tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
-        const Neighbourhood around(band, phi, inside_domain, leaf);
-        for (int at = 0; at < kLeafSize; ++at) {
-            if (!is_on(inside_domain[leaf], at)) continue;
-            float distance = width;
-            if (const auto foot = find_foot(around, band.origin(leaf), at >> 6, at >> 3 & 7, at & 7, distance)) {
-                feet_of_leaf[leaf].push_back(*foot);
-                set_on(beside[leaf], at);
+FloatGridPtr redistance(const FloatGrid& u, const Domain& domain, double half_width, DomainEnd end, const char* name,
+                        const RunContext& run) {
+    if (!(u.background() > 0))
+        throw Error(Errc::InvalidInput, std::string(name) + ": grid '" + u.getName() + "': expected a background > 0 (outside), got " +
+                                            std::to_string(u.background()));
+    const InterfacePatches interface = find_interface(u, domain, end, run);
+    if (interface.patches.empty())
+        throw Error(Errc::InvalidInput, std::string(name) + ": grid '" + u.getName() +
+                                            "' has no zero crossing: nothing in the domain is inside, or nothing outside");
+    LeafBand band(band_leaves(interface, half_width));
+    NearestPatches nearest(interface, band, half_width);
+    nearest.find(run);
+
+    const float h = static_cast<float>(domain.voxel_size);
+    const float background = static_cast<float>(half_width * domain.voxel_size);
+    LeafArray<float> values(band.size(), background, 0);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, band.size(), 16), [&](const auto& range) {
+        const auto accessor = u.getConstAccessor();
+        for (std::size_t leaf = range.begin(); leaf != range.end(); ++leaf) {
+            const LeafMask inside = inside_mask(accessor, band.origin(leaf), box_of(domain), end);
+            for (int p = 0; p < kLeafSize; ++p) {
+                float d = background;
+                if (nearest.patch(leaf)[p] != kNoPatch) {
+                    set_on(band.active(leaf), p);
+                    d = std::min(background, h * std::sqrt(nearest.squared(leaf)[p]));
+                }
+                values.leaf(leaf)[p] = is_on(inside, p) ? -d : d;
             }
-            result.leaf(leaf)[at] = phi.leaf(leaf)[at] < 0 ? -std::min(distance, width) : std::min(distance, width);
         }
     });
-    std::vector<Foot> feet;
-    std::vector<Vec3> points;
-    for (const auto& some : feet_of_leaf)
-        for (const Foot& foot : some) {
-            feet.push_back(foot);
-            points.push_back(foot.point);
-        }
-    if (feet.empty()) return result;
-    const NearestField field = nearest_points(points, box, width + 1.0, "signed_distance", run);
-    tbb::parallel_for(std::size_t(0), field.leaves.size(), [&](std::size_t n) {
-        const NearestLeaf& nearest = field.leaves[n];
-        const std::int32_t leaf = band.find(nearest.origin);
-        if (leaf == band.none()) return;
-        for (int at = 0; at < kLeafSize; ++at) {
-            if (nearest.nearest[at] < 0 || !is_on(inside_domain[leaf], at) || is_on(beside[leaf], at)) continue;
-            const Foot& foot = feet[field.source[nearest.nearest[at]]];
-            const float distance = distance_to_foot(foot, nearest.origin.offsetBy(at >> 6, at >> 3 & 7, at & 7));
-            float& u = result.leaf(leaf)[at];
-            u = std::copysign(std::min(distance, width), u);
-        }
-    });
+    FloatGridPtr result = export_grid(band, values, domain, background, name);
+    result->setGridClass(openvdb::GRID_LEVEL_SET);
+    openvdb::tools::signedFloodFill(result->tree());
+    openvdb::tools::pruneLevelSet(result->tree());
     return result;
 }
 
-FloatGridPtr make_band(const LeafBand& band, const LeafColumns& columns, const LeafArray<float>& values,
-                       const std::vector<LeafMask>& active, const std::vector<bool>& interior, const Domain& domain,
-                       float width) {
-    using Leaf = FloatGrid::TreeType::LeafNodeType;
-    const auto h = float(domain.voxel_size);
-    const float outside = width * h;
-    FloatGridPtr grid = make_grid(domain, outside, "band");
-    for (std::size_t n = 0; n < columns.pieces().size(); ++n) {
-        if (!interior[n]) continue;
-        const VoxelBox box = columns.voxels(columns.pieces()[n]);
-        grid->tree().sparseFill(openvdb::CoordBBox(box.min, box.max), -outside, false);
-    }
-    std::vector<std::unique_ptr<Leaf>> leaves(band.size());
-    tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t n) {
-        const float* u = values.leaf(n);
-        const bool is_uniform = std::all_of(u, u + kLeafSize, [&](float v) { return (v < 0) == (u[0] < 0); });
-        if (!any_on(active[n]) && is_uniform && u[0] >= 0) return;
-        leaves[n] = std::make_unique<Leaf>(band.origin(n), outside, false);
-        if (!any_on(active[n]) && is_uniform) return leaves[n]->fill(-outside);
-        std::transform(u, u + kLeafSize, leaves[n]->buffer().data(), [h](float v) { return h * v; });
-        auto mask = leaves[n]->valueMask();
-        for (int word = 0; word < 8; ++word) mask.getWord<std::uint64_t>(word) = active[n][word];
-        leaves[n]->setValueMask(mask);
-    });
-    for (auto& leaf : leaves) {
-        if (!leaf) continue;
-        if (leaf->isEmpty() && leaf->getFirstValue() == -outside && leaf->getLastValue() == -outside)
-            grid->tree().addTile(1, leaf->origin(), -outside, false);
-        else
-            grid->tree().addLeaf(leaf.release());
-    }
-    return grid;
-}
 
 }  // namespace covol::detail

@@ -1,0 +1,17 @@
+#pragma once
+#include "covol/domain.h"
+#include "covol/fwd.h"
+#include "covol/run.h"
+
+namespace covol::detail {
+
+/// How far the band of a moving surface reaches, in voxels: the 3 of the clamp and about two that the surface may move
+/// before the band is made again. (Each time shifts the surface by about 0.1 h² times its curvature: rarely is better.)
+inline constexpr double kFollowWidth = 5.0;
+
+/// Re-makes u as the signed distance to its zero level set, in a band of kFollowWidth voxels inside the domain. A
+/// clamped profile would flatten at the clamp and drag the surface: curvature flow of a sphere lost first order by it.
+/// @throws Error InvalidInput when u has no zero level set.
+void follow_surface(FloatGrid& u, const Domain& domain, const RunContext& run);
+
+}  // namespace covol::detail

@@ -1,0 +1,363 @@
+#include "detail/interface_patches.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace covol::detail {
+namespace {
+
+using Point = std::array<float, 3>;
+
+Point operator-(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+float dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Point cross(const Point& a, const Point& b) {
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+// Corner c of a cell lies at (c>>2 & 1, c>>1 & 1, c & 1). Edge e = 4*axis + n joins kEdges[e][0] to the corner one
+// step further along the axis.
+constexpr std::array<std::array<int, 2>, 12> kEdges = [] {
+    std::array<std::array<int, 2>, 12> edges{};
+    int e = 0;
+    for (int axis = 0; axis < 3; ++axis)
+        for (int c = 0; c < 8; ++c)
+            if (const int step = 4 >> axis; (c & step) == 0) edges[e++] = {c, c | step};
+    return edges;
+}();
+
+constexpr int edge_between(int a, int b) {
+    for (int e = 0; e < 12; ++e)
+        if ((kEdges[e][0] == a && kEdges[e][1] == b) || (kEdges[e][0] == b && kEdges[e][1] == a)) return e;
+    return -1;
+}
+
+/// The polygons of one pattern of signs: closed walks over the edges with a crossing.
+struct CellCase {
+    int loops = 0;
+    int points = 0;                    ///< over all loops
+    std::array<std::int8_t, 4> size{};  ///< points of each loop
+    std::array<std::int8_t, 12> edge{}; ///< of the loops, one after the other
+};
+
+// Each face of the cell joins its crossings in pairs. A face with four separates its inside corners, a rule that depends
+// on the face alone, so that the polygons of neighbouring cells meet.
+constexpr CellCase make_case(int inside) {
+    std::array<std::array<int, 2>, 12> partner{};
+    for (auto& p : partner) p = {-1, -1};
+    const auto join = [&](int a, int b) {
+        partner[a][partner[a][0] >= 0] = b;
+        partner[b][partner[b][0] >= 0] = a;
+    };
+    for (int axis = 0; axis < 3; ++axis)
+        for (int side = 0; side < 2; ++side) {
+            const int u = 4 >> ((axis + 1) % 3), v = 4 >> ((axis + 2) % 3), base = side * (4 >> axis);
+            const int ring[4] = {base, base | u, base | u | v, base | v};
+            int crossed[4] = {}, count = 0;
+            for (int n = 0; n < 4; ++n)
+                if ((inside >> ring[n] & 1) != (inside >> ring[(n + 1) % 4] & 1))
+                    crossed[count++] = edge_between(ring[n], ring[(n + 1) % 4]);
+            if (count == 2) join(crossed[0], crossed[1]);
+            if (count == 4)
+                for (int n = 0; n < 4; ++n)
+                    if (inside >> ring[n] & 1)
+                        join(edge_between(ring[(n + 3) % 4], ring[n]), edge_between(ring[n], ring[(n + 1) % 4]));
+        }
+    CellCase result;
+    std::array<bool, 12> seen{};
+    for (int start = 0; start < 12; ++start) {
+        if (partner[start][0] < 0 || seen[start]) continue;
+        int size = 0;
+        for (int at = start, last = -1; !seen[at];) {
+            seen[at] = true;
+            result.edge[result.points++] = static_cast<std::int8_t>(at);
+            ++size;
+            const int next = partner[at][0] != last ? partner[at][0] : partner[at][1];
+            last = at;
+            at = next;
+        }
+        result.size[result.loops++] = static_cast<std::int8_t>(size);
+    }
+    return result;
+}
+
+constexpr std::array<CellCase, 256> kCases = [] {
+    std::array<CellCase, 256> cases{};
+    for (int inside = 0; inside < 256; ++inside) cases[inside] = make_case(inside);
+    return cases;
+}();
+
+constexpr int kSide = kLeafDim + 1;                                ///< voxels along an edge of a leaf's cells
+constexpr float kOutside = std::numeric_limits<float>::infinity();  ///< stands for a voxel outside the domain
+
+constexpr int cell_voxel(int i, int j, int k) { return (i * kSide + j) * kSide + k; }
+constexpr std::array<int, 8> kCornerOffset = [] {
+    std::array<int, 8> offset{};
+    for (int c = 0; c < 8; ++c) offset[c] = cell_voxel(c >> 2 & 1, c >> 1 & 1, c & 1);
+    return offset;
+}();
+
+openvdb::CoordBBox box_of(const Domain& d) {
+    return {Coord(d.min[0], d.min[1], d.min[2]), Coord(d.max[0], d.max[1], d.max[2])};
+}
+
+/// The values of u at the 9^3 corners of a leaf's cells.
+class CellValues {
+public:
+    CellValues(const FloatGrid& u, const Domain& domain) : accessor_(u.getConstAccessor()), domain_(box_of(domain)) {}
+
+    /// False when no cell has a crossing.
+    bool load(const Coord& origin) {
+        for (int block = 0; block < 8; ++block) load_block(origin, {block >> 2 & 1, block >> 1 & 1, block & 1});
+        const openvdb::CoordBBox box(origin, origin.offsetBy(kLeafDim));
+        if (!domain_.isInside(box)) clip(origin);
+        int inside = 0;
+        for (const float v : values_) inside += v < 0;
+        return inside != 0 && inside != kSide * kSide * kSide;
+    }
+
+    /// Bit c says that corner c of the cell is inside.
+    [[nodiscard]] int signs(int i, int j, int k) const {
+        const float* at = values_.data() + cell_voxel(i, j, k);
+        int result = 0;
+        for (int c = 0; c < 8; ++c) result |= (at[kCornerOffset[c]] < 0) << c;
+        return result;
+    }
+
+    /// A corner of the cell lies outside the domain.
+    [[nodiscard]] bool sticks_out(int i, int j, int k) const {
+        const float* at = values_.data() + cell_voxel(i, j, k);
+        return std::any_of(kCornerOffset.begin(), kCornerOffset.end(), [at](int c) { return at[c] == kOutside; });
+    }
+
+    /// Where edge e of the cell crosses zero, relative to the cell.
+    [[nodiscard]] Point crossing(int i, int j, int k, int e) const {
+        const float* at = values_.data() + cell_voxel(i, j, k);
+        const auto [a, b] = kEdges[e];
+        const float va = at[kCornerOffset[a]], vb = at[kCornerOffset[b]];
+        Point point = {float(a >> 2 & 1), float(a >> 1 & 1), float(a & 1)};
+        point[e / 4] = std::isinf(va) || std::isinf(vb) ? 0.5F : va / (va - vb);
+        return point;
+    }
+
+private:
+    void load_block(const Coord& origin, const std::array<int, 3>& side) {
+        const Coord from = origin.offsetBy(side[0] * kLeafDim, side[1] * kLeafDim, side[2] * kLeafDim);
+        const auto* leaf = accessor_.probeConstLeaf(from);
+        const float* buffer = leaf ? leaf->buffer().data() : nullptr;
+        const float constant = leaf ? 0.0F : accessor_.getValue(from);
+        const std::array<int, 3> n = {side[0] ? 1 : kLeafDim, side[1] ? 1 : kLeafDim, side[2] ? 1 : kLeafDim};
+        for (int i = 0; i < n[0]; ++i)
+            for (int j = 0; j < n[1]; ++j) {
+                float* to = values_.data() +
+                            cell_voxel(i + side[0] * kLeafDim, j + side[1] * kLeafDim, side[2] * kLeafDim);
+                if (buffer)
+                    std::copy_n(buffer + leaf_offset(i, j, 0), n[2], to);
+                else
+                    std::fill_n(to, n[2], constant);
+            }
+    }
+
+    void clip(const Coord& origin) {
+        for (int i = 0; i < kSide; ++i)
+            for (int j = 0; j < kSide; ++j)
+                for (int k = 0; k < kSide; ++k)
+                    if (!domain_.isInside(origin.offsetBy(i, j, k))) values_[cell_voxel(i, j, k)] = kOutside;
+    }
+
+    FloatGrid::ConstAccessor accessor_;
+    openvdb::CoordBBox domain_;
+    std::array<float, kSide * kSide * kSide> values_;
+};
+
+/// Calls visit(i, j, k, case) for the cells with a crossing, in OpenVDB's order.
+template <typename Visit>
+void for_each_cell(const CellValues& values, DomainEnd end, const Visit& visit) {
+    for (int i = 0; i < kLeafDim; ++i)
+        for (int j = 0; j < kLeafDim; ++j)
+            for (int k = 0; k < kLeafDim; ++k)
+                if (const int signs = values.signs(i, j, k); signs != 0 && signs != 255)
+                    if (end == DomainEnd::Closed || !values.sticks_out(i, j, k)) visit(i, j, k, kCases[signs]);
+}
+
+Patch make_patch(const Coord& origin, const Point* points, int count, std::uint32_t first) {
+    Patch patch{origin, {0, 0, 0}, {0, 0, 0}, 0, 0, first, static_cast<std::uint32_t>(count)};
+    for (int n = 0; n < count; ++n)
+        for (int a = 0; a < 3; ++a) patch.center[a] += points[n][a] / static_cast<float>(count);
+    Point area{};
+    for (int n = 0; n < count; ++n) {
+        const Point c = cross(points[n] - patch.center, points[(n + 1) % count] - patch.center);
+        for (int a = 0; a < 3; ++a) area[a] += c[a];
+    }
+    if (const float length = std::sqrt(dot(area, area)); length > 0)
+        for (int a = 0; a < 3; ++a) patch.normal[a] = area[a] / length;
+    for (int n = 0; n < count; ++n) {
+        const Point arm = points[n] - patch.center;
+        const float along = dot(arm, patch.normal);
+        patch.height = std::max(patch.height, std::abs(along));
+        patch.radius = std::max(patch.radius, std::sqrt(std::max(0.0F, dot(arm, arm) - along * along)));
+    }
+    return patch;
+}
+
+/// Adds `block` and the neighbours whose cells reach into it.
+void add_with_lower_neighbours(const Coord& block, std::vector<Coord>& blocks) {
+    for (int n = 0; n < 8; ++n)
+        blocks.push_back(block.offsetBy(-kLeafDim * (n >> 2 & 1), -kLeafDim * (n >> 1 & 1), -kLeafDim * (n & 1)));
+}
+
+/// Blocks of 8^3 in tiles that are inside, where something outside may be next to them without a leaf between: the
+/// domain's end, or a tile of the other sign.
+void add_tile_blocks(const FloatGrid& u, const openvdb::CoordBBox& domain, std::vector<Coord>& blocks) {
+    const auto accessor = u.getConstAccessor();
+    const auto meets_outside = [&](const Coord& block) {
+        openvdb::CoordBBox box(block, block.offsetBy(kLeafDim - 1));
+        box.expand(1);
+        if (!domain.isInside(box)) return true;
+        for (int axis = 0; axis < 3; ++axis)
+            for (int sign = -1; sign <= 1; sign += 2) {
+                Coord next = block;
+                next[axis] += sign * kLeafDim;
+                if (!accessor.probeConstLeaf(next) && accessor.getValue(next) >= 0) return true;
+            }
+        return false;
+    };
+    auto tile = u.tree().cbeginValueAll();
+    tile.setMaxDepth(FloatGrid::TreeType::ValueAllCIter::LEAF_DEPTH - 1);
+    for (; tile; ++tile) {
+        if (!(*tile < 0)) continue;
+        openvdb::CoordBBox box;
+        tile.getBoundingBox(box);
+        box.intersect(domain);
+        if (box.empty()) continue;
+        const Coord lo = box.min() & ~(kLeafDim - 1), hi = box.max() & ~(kLeafDim - 1);
+        for (int i = lo[0]; i <= hi[0]; i += kLeafDim)
+            for (int j = lo[1]; j <= hi[1]; j += kLeafDim) {
+                const bool shell = i == lo[0] || i == hi[0] || j == lo[1] || j == hi[1];
+                const int step = shell ? kLeafDim : std::max(hi[2] - lo[2], int(kLeafDim));
+                for (int k = lo[2]; k <= hi[2]; k += step)
+                    if (meets_outside(Coord(i, j, k))) add_with_lower_neighbours(Coord(i, j, k), blocks);
+            }
+    }
+}
+
+/// Leaves that may have cells with a crossing, sorted.
+std::vector<Coord> candidates(const FloatGrid& u, const Domain& domain) {
+    const openvdb::CoordBBox box = box_of(domain);
+    std::vector<Coord> result;
+    for (auto leaf = u.tree().cbeginLeaf(); leaf; ++leaf)
+        if (openvdb::CoordBBox(leaf->origin(), leaf->origin().offsetBy(kLeafDim - 1)).hasOverlap(box))
+            add_with_lower_neighbours(leaf->origin(), result);
+    add_tile_blocks(u, box, result);
+    std::sort(result.begin(), result.end());
+    result.erase(std::unique(result.begin(), result.end()), result.end());
+    return result;
+}
+
+/// Squared distance from p to the triangle a, a + ab, a + ac (Ericson, Real-Time Collision Detection, 5.1.5), with
+/// ap = p - a. Sides may have no length.
+float squared_distance_to_triangle(const Point& ap, const Point& ab, const Point& ac) {
+    const auto from = [&](float s, float t) {
+        const Point r = {ap[0] - s * ab[0] - t * ac[0], ap[1] - s * ab[1] - t * ac[1], ap[2] - s * ab[2] - t * ac[2]};
+        return dot(r, r);
+    };
+    const auto ratio = [](float part, float rest) { return part + rest > 0 ? part / (part + rest) : 0.0F; };
+    const float d1 = dot(ab, ap), d2 = dot(ac, ap);
+    if (d1 <= 0 && d2 <= 0) return dot(ap, ap);
+    const float bb = dot(ab, ab), bc = dot(ab, ac), cc = dot(ac, ac);
+    const float d3 = d1 - bb, d4 = d2 - bc;  // from b
+    if (d3 >= 0 && d4 <= d3) return from(1, 0);
+    const float vc = d1 * d4 - d3 * d2;
+    if (vc <= 0 && d1 >= 0 && d3 <= 0) return from(ratio(d1, -d3), 0);
+    const float d5 = d1 - bc, d6 = d2 - cc;  // from c
+    if (d6 >= 0 && d5 <= d6) return from(0, 1);
+    const float vb = d5 * d2 - d1 * d6;
+    if (vb <= 0 && d2 >= 0 && d6 <= 0) return from(0, ratio(d2, -d6));
+    const float va = d3 * d6 - d5 * d4;
+    if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
+        const float w = ratio(d4 - d3, d5 - d6);
+        return from(1 - w, w);
+    }
+    const float sum = va + vb + vc;
+    return from(vb / sum, vc / sum);
+}
+
+}  // namespace
+
+float InterfacePatches::squared_distance(const Coord& at, std::uint32_t index, float bound) const {
+    const Patch& patch = patches[index];
+    const Point p = {float(at[0] - patch.origin[0]), float(at[1] - patch.origin[1]), float(at[2] - patch.origin[2])};
+    const Point arm = p - patch.center;
+    // The patch lies in a cylinder: what is farther from that than `bound` need not be looked at.
+    const float along = dot(arm, patch.normal);
+    const float beyond = std::max(0.0F, std::abs(along) - patch.height);
+    const float beside = std::max(0.0F, std::sqrt(std::max(0.0F, dot(arm, arm) - along * along)) - patch.radius);
+    if (beyond * beyond + beside * beside >= bound) return bound;
+
+    const Point* points = vertices.data() + patch.first;
+    if (patch.count == 3)
+        return std::min(bound, squared_distance_to_triangle(p - points[0], points[1] - points[0], points[2] - points[0]));
+    Point last = points[patch.count - 1] - patch.center;
+    for (std::uint32_t n = 0; n < patch.count; ++n) {
+        const Point next = points[n] - patch.center;
+        bound = std::min(bound, squared_distance_to_triangle(arm, last, next));
+        last = next;
+    }
+    return bound;
+}
+
+InterfacePatches find_interface(const FloatGrid& u, const Domain& domain, DomainEnd end, const RunContext& run) {
+    run.check();
+    const std::vector<Coord> leaves = candidates(u, domain);
+    struct Counts {
+        std::uint32_t patches = 0, vertices = 0;
+    };
+    std::vector<Counts> counts(leaves.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 16), [&](const auto& range) {
+        CellValues values(u, domain);
+        for (std::size_t n = range.begin(); n != range.end(); ++n)
+            if (values.load(leaves[n]))
+                for_each_cell(values, end, [&](int, int, int, const CellCase& cell) {
+                    counts[n].patches += cell.loops;
+                    counts[n].vertices += cell.points;
+                });
+    });
+    run.check();
+
+    InterfacePatches result;
+    std::vector<Counts> begins;
+    Counts total;
+    for (std::size_t n = 0; n < leaves.size(); ++n) {
+        if (counts[n].patches == 0) continue;
+        result.leaves.push_back(leaves[n]);
+        result.first.push_back(total.patches);
+        begins.push_back(total);
+        total.patches += counts[n].patches;
+        total.vertices += counts[n].vertices;
+    }
+    result.first.push_back(total.patches);
+    result.patches.resize(total.patches);
+    result.vertices.resize(total.vertices);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, result.leaves.size(), 16), [&](const auto& range) {
+        CellValues values(u, domain);
+        for (std::size_t n = range.begin(); n != range.end(); ++n) {
+            values.load(result.leaves[n]);
+            Counts next = begins[n];
+            for_each_cell(values, end, [&](int i, int j, int k, const CellCase& cell) {
+                const std::int8_t* edge = cell.edge.data();
+                for (int loop = 0; loop < cell.loops; ++loop) {
+                    Point* points = result.vertices.data() + next.vertices;
+                    for (int m = 0; m < cell.size[loop]; ++m) points[m] = values.crossing(i, j, k, *edge++);
+                    result.patches[next.patches++] =
+                        make_patch(result.leaves[n].offsetBy(i, j, k), points, cell.size[loop], next.vertices);
+                    next.vertices += cell.size[loop];
+                }
+            });
+        }
+    });
+    return result;
+}
+
+}  // namespace covol::detail

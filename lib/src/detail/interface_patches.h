@@ -1,0 +1,44 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "covol/domain.h"
+#include "covol/run.h"
+#include "detail/leaf_band.h"
+
+namespace covol::detail {
+
+/// A polygon of the zero level set in one cell (the cube between eight voxel centres), as a fan of triangles around
+/// its centre. Lengths are voxels, positions are relative to `origin`, the cell's first voxel.
+struct Patch {
+    Coord origin;
+    std::array<float, 3> center;
+    std::array<float, 3> normal;  ///< unit; of the whole polygon
+    float radius;                 ///< no vertex is farther from the axis (center, normal) ...
+    float height;                 ///< ... nor from the plane through the center
+    std::uint32_t first;          ///< vertices [first, first + count)
+    std::uint32_t count;
+};
+
+/// The zero level set of linear interpolation along the voxel edges, cell by cell. Cells of a leaf have their first voxel there.
+struct InterfacePatches {
+    std::vector<Coord> leaves;                     ///< sorted origins of the leaves with patches
+    std::vector<std::uint32_t> first;              ///< leaf i has the patches [first[i], first[i+1])
+    std::vector<Patch> patches;                    ///< ordered by leaf, then by cell
+    std::vector<std::array<float, 3>> vertices;
+
+    /// Squared distance from the centre of voxel `at` to the patch, at most `bound`: where that is not reached, `bound`.
+    [[nodiscard]] float squared_distance(const Coord& at, std::uint32_t patch, float bound) const;
+};
+
+/// What becomes of a surface that reaches the domain's boundary.
+enum class DomainEnd {
+    Closed,  ///< beyond it is outside: the surface is closed half a voxel beyond the last voxel centres
+    Open     ///< it ends there
+};
+
+/// Finds them; negative is inside.
+[[nodiscard]] InterfacePatches find_interface(const FloatGrid& u, const Domain& domain, DomainEnd end, const RunContext& run);
+
+}  // namespace covol::detail

@@ -1,0 +1,81 @@
+#include "detail/scheme.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+#include <utility>
+
+namespace covol::detail {
+
+namespace baseline {
+extern const SchemeKernels kKernels;
+}
+#ifdef COVOL_X86
+namespace avx2 {
+extern const SchemeKernels kKernels;
+}
+namespace avx512 {
+extern const SchemeKernels kKernels;
+}
+#endif
+
+namespace {
+
+constexpr int kLeafSize = 512;
+
+const SchemeKernels& choose() {
+    const std::vector<const SchemeKernels*> available = available_kernels();
+    const char* asked = std::getenv("COVOL_SIMD");
+    for (const SchemeKernels* set : available)
+        if (asked != nullptr && std::strcmp(set->name, asked) == 0) return *set;
+    return *available.back();
+}
+
+}  // namespace
+
+std::vector<const SchemeKernels*> available_kernels() {
+    std::vector<const SchemeKernels*> sets = {&baseline::kKernels};
+#ifdef COVOL_X86
+    const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+    if (has_avx2) sets.push_back(&avx2::kKernels);
+    if (has_avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+        __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw"))
+        sets.push_back(&avx512::kKernels);
+#endif
+    return sets;
+}
+
+const SchemeKernels& kernels() {
+    static const SchemeKernels& chosen = choose();
+    return chosen;
+}
+
+void mirror_outside(float* values, const int lo[3], const int hi[3]) {
+    for (int i = -1; i <= 8; ++i)
+        for (int j = -1; j <= 8; ++j)
+            for (int k = -1; k <= 8; ++k) {
+                const int ci = std::clamp(i, lo[0], hi[0]);
+                const int cj = std::clamp(j, lo[1], hi[1]);
+                const int ck = std::clamp(k, lo[2], hi[2]);
+                if (ci != i || cj != j || ck != k) values[padded(i, j, k)] = values[padded(ci, cj, ck)];
+            }
+}
+
+void close_faces(float* c, const int lo[3], const int hi[3]) {
+    for (int n = 0; n < kLeafSize; ++n) {
+        const int at[3] = {n >> 6, (n >> 3) & 7, n & 7};
+        bool outside = false;
+        float closed = 0.0F;
+        for (int axis = 0; axis < 3; ++axis) {
+            outside |= at[axis] < lo[axis] || at[axis] > hi[axis];
+            if (at[axis] == lo[axis]) closed += std::exchange(c[2 * axis * kLeafSize + n], 0.0F);
+            if (at[axis] == hi[axis]) closed += std::exchange(c[(2 * axis + 1) * kLeafSize + n], 0.0F);
+        }
+        // c = a/(1+S): without the closed share x of S it becomes a/(1+S-x) = c / (1 - closed).
+        const float scale = outside ? 0.0F : 1.0F / (1.0F - closed);
+        if (scale != 1.0F)
+            for (int f = 0; f < 6; ++f) c[f * kLeafSize + n] *= scale;
+    }
+}
+
+}  // namespace covol::detail

@@ -1,0 +1,73 @@
+#pragma once
+#include <vector>
+
+// The co-volume scheme on one leaf of 8^3 voxels: plain functions on arrays, no OpenVDB types.
+//
+// Units: u and d are in voxels, tau in h, delta in h, so that h does not appear. A padded buffer holds a leaf and one
+// layer around it: 10 x 10 rows of 16 floats, the row's voxels -1..8 at 3..12, so that no load of 8 crosses a cache line.
+//
+// scheme_kernels.cpp is compiled once for each instruction set; kernels() picks at run time.
+namespace covol::detail {
+
+inline constexpr int kRow = 16;
+inline constexpr int kPaddedSize = 10 * 10 * kRow;
+/// Index of voxel (i,j,k), each -1..8.
+inline constexpr int padded(int i, int j, int k) { return ((i + 1) * 10 + (j + 1)) * kRow + k + 4; }
+
+/// Neighbours q of a voxel in the order of the coefficient arrays.
+enum Face { kMinusI, kPlusI, kMinusJ, kPlusJ, kMinusK, kPlusK };
+
+/// Marks a value of d or g that is not known; no pull acts across a face with one.
+inline constexpr float kUnknown = -1.0F;
+
+struct SchemeConstants {
+    float tau;           ///< τ/h
+    float theta;         ///< θ
+    float rho;           ///< ρ
+    float curvature;     ///< τδ/h²
+    float epsilon2;      ///< ε² of |∇u|
+    float edge_epsilon2; ///< ε² of |∇g|, per voxel
+};
+
+struct SchemeKernels {
+    const char* name;  ///< "avx2", ...
+
+    /// Coefficients from u^{n-1}: Eqs. (13)-(17), (19)-(22), divided by the row's diagonal, c[q] = -a_pq / a_pp >= 0,
+    /// so that a row reads u_p = b_p + Σ_q c[q] (u_q - b_p), b = u^{n-1}.
+    /// @param u      padded, with edges and corners
+    /// @param phi    padded (faces), potential of the points' pull; null without
+    /// @param g      padded (faces), edge detector; null without
+    /// @param rho    512 factors on ρ; null means 1
+    /// @param active 512 bits; other voxels get c = 0 (u_p = b_p); rows of
+    ///               eight without an active voxel are left as they are
+    /// @param c      6 x 512, by Face
+    /// @return       the largest Σ_q |a_pq| over active rows
+    float (*assemble)(const float* u, const float* phi, const float* g, const float* rho,
+                      const unsigned long long* active, const SchemeConstants& constants, float* c);
+
+    /// `inner` red-black SOR sweeps in a padded buffer (faces) over the rows of eight with an active voxel; the halo is
+    /// not written.
+    /// @return Σ (Gauss-Seidel value - u)² seen during the first sweep
+    double (*relax)(float* u, const float* b, const float* c, const unsigned long long* active, float omega, int inner);
+
+    /// As relax, for u_p - t Σ_q (u_q - u_p) = b_p on every voxel: one step of the implicit heat equation.
+    double (*heat)(float* u, const float* b, float t, float omega, int inner);
+
+    /// Mean over the 24 tetrahedra of |∇u|, per voxel; 512 values. @param u padded, with edges and corners
+    void (*mean_gradient)(const float* u, float* out);
+};
+
+/// Homogeneous Neumann in a padded buffer: voxels outside lo..hi (local, inclusive; beyond -1..8 where the boundary is
+/// elsewhere) take the value of the nearest voxel inside.
+void mirror_outside(float* padded_values, const int lo[3], const int hi[3]);
+
+/// Takes the faces on that boundary out of the rows, and rows outside it altogether.
+void close_faces(float* c, const int lo[3], const int hi[3]);
+
+/// The fastest that this processor runs; COVOL_SIMD=baseline|avx2|avx512 in the environment chooses another.
+const SchemeKernels& kernels();
+
+/// Every set that this processor runs, the slowest first.
+std::vector<const SchemeKernels*> available_kernels();
+
+}  // namespace covol::detail

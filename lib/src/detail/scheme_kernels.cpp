@@ -1,0 +1,268 @@
+// The arithmetic of the scheme on one leaf, compiled once for each instruction set (see lib/CMakeLists.txt).
+// No header with inline functions of external linkage may be included here: the linker would keep one copy of them for
+// the whole program, perhaps the one with instructions that the processor lacks.
+#include "detail/scheme.h"
+#include "detail/simd.h"
+
+#ifndef COVOL_SIMD_NAME
+#error "set COVOL_SIMD_NAME for each compilation"
+#endif
+
+namespace covol::detail::COVOL_SIMD_NAME {
+namespace {
+
+constexpr int kI = 10 * kRow;  // stride of i in a padded buffer
+constexpr int kJ = kRow;       // stride of j
+constexpr float kTiny = 1e-30F;
+
+/// Bit 8i+j: the row (i,j) of eight voxels.
+using RowMask = unsigned long long;
+
+/// Rows with an active voxel.
+inline RowMask active_rows(const unsigned long long* active) {
+    RowMask rows = 0;
+    for (int i = 0; i < 8; ++i)
+        for (int j = 0; j < 8; ++j) rows |= RowMask((active[i] >> (8 * j) & 0xffU) != 0) << (8 * i + j);
+    return rows;
+}
+
+constexpr int kVertexI = 9 * kRow;
+/// Values at the 9^3 vertices, rows of 16: vertex (i,j,k) is the corner between voxels i-1 and i, and so on.
+struct Vertices {
+    alignas(64) float z[9 * 9 * kRow];
+};
+
+void vertex_values(const float* u, Vertices& out) {
+    for (int i = 0; i < 9; ++i)
+        for (int j = 0; j < 9; ++j) {
+            const float* row = u + padded(i - 1, j - 1, -1);
+            float* z = out.z + i * kVertexI + j * kRow;
+            const auto column = [row](int k) {
+                return (load(row + k) + load(row + k + kJ)) + (load(row + k + kI) + load(row + k + kI + kJ));
+            };
+            store(z, 0.125F * (column(0) + column(1)));
+            const auto scalar = [row](int k) { return (row[k] + row[k + kJ]) + (row[k + kI] + row[k + kI + kJ]); };
+            z[8] = 0.125F * (scalar(8) + scalar(9));
+        }
+}
+
+inline bool has_row(RowMask rows, int i, int j) {
+    return ((unsigned(i) | unsigned(j)) & ~7U) == 0 && (rows >> (8 * i + j) & 1U) != 0;
+}
+
+/// Sums over a face's four tetrahedra, for 8 faces.
+struct FaceSums {
+    Lanes weight;  // Σ 1/√(ε²+|∇u_T|²)
+    Lanes norm;    // Σ |∇u_T|
+};
+
+// A tetrahedron is p, q and one edge of the face between them. With u in voxels the derivatives are differences: along
+// pq, along the edge, and from the face's centre, whose value is the mean of p and q, to the edge.
+inline FaceSums face_sums(Lanes p, Lanes q, Lanes z00, Lanes z10, Lanes z01, Lanes z11, float epsilon2) {
+    const Lanes along = (q - p) * (q - p);
+    const Lanes middle = p + q;
+    FaceSums sums{};
+    const auto tetrahedron = [&](Lanes a, Lanes b) {
+        const Lanes n = along + (b - a) * (b - a) + (a + b - middle) * (a + b - middle);
+        sums.weight += inverse_sqrt(n + epsilon2);
+        sums.norm += n * inverse_sqrt(n + kTiny);
+    };
+    tetrahedron(z00, z10);
+    tetrahedron(z01, z11);
+    tetrahedron(z00, z01);
+    tetrahedron(z10, z11);
+    return sums;
+}
+
+/// What the faces of a leaf add up to.
+struct Faces {
+    alignas(64) float weight_i[9 * 64];    // face (i,j,k) between voxels i-1 and i
+    alignas(64) float weight_j[8 * 9 * 8]; // (i,j,k), between j-1 and j
+    alignas(64) float weight_k[64 * kRow]; // (i,j,k), between k-1 and k; rows of 16
+    alignas(64) float norm[512];           // Σ_24 |∇u_T| of each voxel
+};
+
+inline void add(float* to, Lanes what) { store(to, load(to) + what); }
+
+// Faces across i or j: `z` is the lower corner's vertex, `edge` the stride to the face's other corner.
+inline FaceSums row_face(const float* q, int across, const float* z, int edge, float epsilon2) {
+    return face_sums(load(q - across), load(q), load(z), load(z + edge), load(z + 1), load(z + edge + 1), epsilon2);
+}
+
+// Only for the voxel rows in `rows`, and the faces that they need.
+void sum_faces(const float* u, const Vertices& vertices, float epsilon2, RowMask rows, Faces& faces) {
+    for (int row = 0; row < 64; ++row) store(faces.norm + row * 8, Lanes{});
+    const auto voxel = [u](int i, int j) { return u + padded(i, j, 0); };
+    const auto vertex = [&vertices](int i, int j) { return vertices.z + i * kVertexI + j * kRow; };
+    for (int i = 0; i < 9; ++i)
+        for (int j = 0; j < 8; ++j) {
+            if (!has_row(rows, i, j) && !has_row(rows, i - 1, j)) continue;
+            const FaceSums sums = row_face(voxel(i, j), kI, vertex(i, j), kRow, epsilon2);
+            store(faces.weight_i + (i * 8 + j) * 8, sums.weight);
+            if (i > 0) add(faces.norm + ((i - 1) * 8 + j) * 8, sums.norm);
+            if (i < 8) add(faces.norm + (i * 8 + j) * 8, sums.norm);
+        }
+    for (int i = 0; i < 8; ++i)
+        for (int j = 0; j < 9; ++j) {
+            if (!has_row(rows, i, j) && !has_row(rows, i, j - 1)) continue;
+            const FaceSums sums = row_face(voxel(i, j), kJ, vertex(i, j), kVertexI, epsilon2);
+            store(faces.weight_j + (i * 9 + j) * 8, sums.weight);
+            if (j > 0) add(faces.norm + (i * 8 + j - 1) * 8, sums.norm);
+            if (j < 8) add(faces.norm + (i * 8 + j) * 8, sums.norm);
+        }
+    for (int i = 0; i < 8; ++i) {
+        if ((rows >> (8 * i) & 0xffU) == 0) continue;
+        for (int j = 0; j < 8; ++j) {
+            if (!has_row(rows, i, j)) continue;
+            const float* q = voxel(i, j);
+            const float* z = vertex(i, j);
+            const FaceSums sums = face_sums(load(q - 1), load(q), load(z), load(z + kVertexI), load(z + kRow),
+                                            load(z + kVertexI + kRow), epsilon2);
+            store(faces.weight_k + (i * 8 + j) * kRow, sums.weight);
+            float* norm = faces.norm + (i * 8 + j) * 8;
+            add(norm, sums.norm);
+            for (int k = 1; k < 8; ++k) norm[k - 1] += sums.norm[k];
+        }
+        // The ninth faces of eight rows make one more bundle; its lanes run along j.
+        const float* q = voxel(i, 0) + 8;
+        const float* z = vertex(i, 0) + 8;
+        const auto lanes = [](const float* first) { return load_strided(first, kRow); };
+        const FaceSums sums = face_sums(lanes(q - 1), lanes(q), lanes(z), lanes(z + kVertexI), lanes(z + kRow),
+                                        lanes(z + kVertexI + kRow), epsilon2);
+        for (int j = 0; j < 8; ++j) {
+            faces.weight_k[(i * 8 + j) * kRow + 8] = sums.weight[j];
+            faces.norm[(i * 8 + j) * 8 + 7] += sums.norm[j];
+        }
+    }
+}
+
+/// A row of a padded field and its six neighbours, by Face.
+struct Star {
+    Lanes p, q[6];
+    Star(const float* field, int i, int j) {
+        const float* row = field + padded(i, j, 0);
+        p = load(row);
+        q[kMinusI] = load(row - kI), q[kPlusI] = load(row + kI);
+        q[kMinusJ] = load(row - kJ), q[kPlusJ] = load(row + kJ);
+        q[kMinusK] = load(row - 1), q[kPlusK] = load(row + 1);
+    }
+    /// q - p, or 0 where either is unknown
+    [[nodiscard]] Lanes difference(int face) const {
+        return (q[face] >= 0.0F) & (p >= 0.0F) ? q[face] - p : Lanes{};
+    }
+};
+
+// velocity[f] = v_pq / h², Eqs. (17), (20).
+inline void add_point_pull(const Star& phi, float theta, Lanes velocity[6]) {
+    for (int f = 0; f < 6; ++f) velocity[f] -= theta * phi.difference(f);
+}
+
+inline void add_image_pull(const Star& g, Lanes rho, float epsilon2, Lanes velocity[6]) {
+    Lanes difference[6];
+    Lanes norm2 = Lanes{};
+    for (int f = 0; f < 6; ++f) {
+        difference[f] = g.difference(f);
+        norm2 += 0.5F * difference[f] * difference[f];
+    }
+    const Lanes scale = rho * inverse_sqrt(norm2 + epsilon2);
+    for (int f = 0; f < 6; ++f) velocity[f] -= scale * difference[f];
+}
+
+/// 1 where the bit of the lane is set, else 0.
+inline Lanes lanes_of(unsigned bits) {
+    constexpr LaneBits kBit = {1, 2, 4, 8, 16, 32, 64, 128};
+    return ((LaneBits{} + int(bits)) & kBit) != 0 ? broadcast(1.0F) : Lanes{};
+}
+
+float assemble(const float* u, const float* phi, const float* g, const float* rho, const unsigned long long* active,
+               const SchemeConstants& constants, float* c) {
+    Vertices vertices;
+    vertex_values(u, vertices);
+    const RowMask rows = active_rows(active);
+    Faces faces;
+    sum_faces(u, vertices, constants.epsilon2, rows, faces);
+
+    Lanes largest_sum = Lanes{};
+    for (int i = 0; i < 8; ++i)
+        for (int j = 0; j < 8; ++j) {
+            if (!has_row(rows, i, j)) continue;
+            const int row = (i * 8 + j) * 8;
+            const unsigned on = static_cast<unsigned>(active[i] >> (8 * j)) & 0xffU;
+            Lanes a[6] = {};  // the velocities, then -a_pq >= 0
+            if (phi != nullptr) add_point_pull(Star(phi, i, j), constants.theta, a);
+            if (g != nullptr)
+                add_image_pull(Star(g, i, j), constants.rho * (rho != nullptr ? load(rho + row) : broadcast(1.0F)),
+                               constants.edge_epsilon2, a);
+            const float* weight[6] = {faces.weight_i + (i * 8 + j) * 8,    faces.weight_i + ((i + 1) * 8 + j) * 8,
+                                      faces.weight_j + (i * 9 + j) * 8,    faces.weight_j + (i * 9 + j + 1) * 8,
+                                      faces.weight_k + (i * 8 + j) * kRow, faces.weight_k + (i * 8 + j) * kRow + 1};
+            const Lanes mean = load(faces.norm + row) * (1.0F / 24.0F);
+            const Lanes m2 = constants.epsilon2 + mean * mean;
+            const Lanes m = (0.25F * constants.curvature) * (m2 * inverse_sqrt(m2));
+            Lanes row_sum = Lanes{};
+            for (int f = 0; f < 6; ++f) {
+                a[f] = constants.tau * max(-a[f], Lanes{}) + m * load(weight[f]);
+                row_sum += a[f];
+            }
+            const Lanes is_active = lanes_of(on);
+            largest_sum = max(largest_sum, is_active * row_sum);
+            const Lanes scale = is_active / (1.0F + row_sum);
+            for (int f = 0; f < 6; ++f) store(c + f * 512 + row, a[f] * scale);
+        }
+    return largest(largest_sum);
+}
+
+// Red-black SOR: value(p, offset in the leaf) gives the Gauss-Seidel value of a row.
+template <typename Value>
+inline double red_black(float* u, RowMask rows, float omega, int inner, Value value) {
+    // A colour's voxels take every other lane; ω is 0 on the others.
+    const Lanes even = {1, 0, 1, 0, 1, 0, 1, 0};
+    const Lanes on[2] = {even, 1.0F - even};
+    Lanes residual = Lanes{};
+    for (int sweep = 0; sweep < inner; ++sweep)
+        for (int colour = 0; colour < 2; ++colour)
+            for (int i = 0; i < 8; ++i)
+                for (int j = 0; j < 8; ++j) {
+                    if (!has_row(rows, i, j)) continue;
+                    float* p = u + padded(i, j, 0);
+                    const Lanes now = load(p);
+                    const Lanes change = on[(i + j + colour) & 1] * (value(p, (i * 8 + j) * 8) - now);
+                    if (sweep == 0) residual += change * change;
+                    store(p, now + omega * change);
+                }
+    return sum(residual);
+}
+
+double relax(float* u, const float* b, const float* c, const unsigned long long* active, float omega, int inner) {
+    return red_black(u, active_rows(active), omega, inner, [b, c](const float* p, int row) {
+        const Lanes old = load(b + row);
+        const auto pull = [&](int face, int stride) { return load(c + face * 512 + row) * (load(p + stride) - old); };
+        return old + (((pull(kMinusI, -kI) + pull(kPlusI, kI)) + (pull(kMinusJ, -kJ) + pull(kPlusJ, kJ))) +
+                      (pull(kMinusK, -1) + pull(kPlusK, 1)));
+    });
+}
+
+double heat(float* u, const float* b, float t, float omega, int inner) {
+    const float scale = 1.0F / (1.0F + 6.0F * t);
+    return red_black(u, ~RowMask{0}, omega, inner, [b, t, scale](const float* p, int row) {
+        return scale * (load(b + row) + t * (((load(p - kI) + load(p + kI)) + (load(p - kJ) + load(p + kJ))) +
+                                             (load(p - 1) + load(p + 1))));
+    });
+}
+
+void mean_gradient(const float* u, float* out) {
+    Vertices vertices;
+    vertex_values(u, vertices);
+    Faces faces;
+    sum_faces(u, vertices, 1.0F, ~RowMask{0}, faces);
+    for (int n = 0; n < 512; n += 8) store(out + n, load(faces.norm + n) * (1.0F / 24.0F));
+}
+
+#define COVOL_TEXT_(x) #x
+#define COVOL_TEXT(x) COVOL_TEXT_(x)
+}  // namespace
+
+extern const SchemeKernels kKernels;
+const SchemeKernels kKernels = {COVOL_TEXT(COVOL_SIMD_NAME), assemble, relax, heat, mean_gradient};
+
+}  // namespace covol::detail::COVOL_SIMD_NAME

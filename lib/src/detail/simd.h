@@ -1,0 +1,55 @@
+#pragma once
+// Bundles of 8 floats by the compiler's vector extension: one source for SSE2, AVX2, AVX-512 and other processors.
+// Only for files that are compiled for one instruction set each: everything here has internal linkage.
+
+#if defined(__SSE2__)
+#include <immintrin.h>
+#endif
+
+namespace covol::detail {
+namespace {
+
+typedef float Lanes __attribute__((vector_size(32)));                        // 8 floats
+typedef float LooseLanes __attribute__((vector_size(32), aligned(4), may_alias));  // the same at any address
+typedef int LaneBits __attribute__((vector_size(32)));
+
+inline Lanes load(const float* p) { return *reinterpret_cast<const LooseLanes*>(p); }
+inline void store(float* p, Lanes v) { *reinterpret_cast<LooseLanes*>(p) = v; }
+inline Lanes broadcast(float x) { return Lanes{} + x; }
+inline Lanes max(Lanes a, Lanes b) { return a > b ? a : b; }
+/// Every `stride`-th float.
+inline Lanes load_strided(const float* p, int stride) {
+    return Lanes{p[0],          p[stride],     p[2 * stride], p[3 * stride],
+                 p[4 * stride], p[5 * stride], p[6 * stride], p[7 * stride]};
+}
+inline float sum(Lanes v) { return ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7])); }
+inline float largest(Lanes v) {
+    float m = v[0];
+    for (int k = 1; k < 8; ++k) m = v[k] > m ? v[k] : m;
+    return m;
+}
+
+/// 1/√x to about 1e-7, x > 0: the processor's estimate and one step of Newton's method.
+inline Lanes inverse_sqrt(Lanes x) {
+#if defined(__AVX512VL__)
+    const Lanes y = (Lanes)_mm256_rsqrt14_ps((__m256)x);
+#elif defined(__AVX__)
+    const Lanes y = (Lanes)_mm256_rsqrt_ps((__m256)x);
+#elif defined(__SSE2__)
+    union {
+        Lanes whole;
+        __m128 half[2];
+    } in = {x}, out;
+    out.half[0] = _mm_rsqrt_ps(in.half[0]);
+    out.half[1] = _mm_rsqrt_ps(in.half[1]);
+    const Lanes y = out.whole;
+#else
+    Lanes y;
+    for (int k = 0; k < 8; ++k) y[k] = 1.0F / __builtin_sqrtf(x[k]);
+    return y;
+#endif
+    return y * (1.5F - 0.5F * x * y * y);
+}
+
+}  // namespace
+}  // namespace covol::detail

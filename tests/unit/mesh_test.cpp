@@ -1,0 +1,117 @@
+#include "covol/mesh.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+
+using namespace covol;
+
+namespace {
+
+TriangleMesh cube(float edge, float x0 = 0) {
+    TriangleMesh mesh;
+    for (int c = 0; c < 8; ++c)
+        mesh.vertices.push_back({x0 + edge * float(c >> 2), edge * float(c >> 1 & 1), edge * float(c & 1)});
+    mesh.triangles = {{0, 1, 3}, {0, 3, 2}, {4, 6, 7}, {4, 7, 5}, {0, 4, 5}, {0, 5, 1},
+                      {2, 3, 7}, {2, 7, 6}, {0, 2, 6}, {0, 6, 4}, {1, 5, 7}, {1, 7, 3}};
+    return mesh;
+}
+
+TriangleMesh joined(TriangleMesh a, const TriangleMesh& b) {
+    const auto shift = std::uint32_t(a.vertices.size());
+    a.vertices.insert(a.vertices.end(), b.vertices.begin(), b.vertices.end());
+    for (const auto& t : b.triangles) a.triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
+    return a;
+}
+
+/// n x m quads around a torus.
+TriangleMesh torus(int n, int m) {
+    TriangleMesh mesh;
+    const double pi = std::acos(-1.0);
+    for (int i = 0; i < n; ++i)
+        for (int j = 0; j < m; ++j) {
+            const double a = 2 * pi * i / n, b = 2 * pi * j / m, r = 2 + std::cos(b);
+            mesh.vertices.push_back({float(r * std::cos(a)), float(r * std::sin(a)), float(std::sin(b))});
+            const auto at = [&](int p, int q) { return std::uint32_t((i + p) % n * m + (j + q) % m); };
+            mesh.triangles.push_back({at(0, 0), at(1, 0), at(1, 1)});
+            mesh.triangles.push_back({at(0, 0), at(1, 1), at(0, 1)});
+        }
+    return mesh;
+}
+
+}  // namespace
+
+TEST_CASE("a cube has its volume and area, is closed and of genus 0") {
+    const MeshMeasures m = measure(cube(2, 100));
+    CHECK(m.volume == Approx(8));
+    CHECK(m.area == Approx(24));
+    CHECK(m.components == 1);
+    CHECK(m.genus == 0);
+    CHECK(m.closed);
+    CHECK(m.manifold);
+}
+
+TEST_CASE("inside out, the volume is negative") {
+    TriangleMesh mesh = cube(1);
+    for (auto& t : mesh.triangles) std::swap(t[0], t[1]);
+    CHECK(measure(mesh).volume == Approx(-1));
+    CHECK(measure(mesh).closed);
+}
+
+TEST_CASE("a torus has genus 1, with a cube beside it there are two components") {
+    const MeshMeasures m = measure(joined(torus(24, 12), cube(1, 50)));
+    CHECK(m.genus == 1);
+    CHECK(m.components == 2);
+    CHECK(measure(torus(200, 100)).volume == Approx(4 * std::pow(std::acos(-1.0), 2)).epsilon(0.002));
+}
+
+TEST_CASE("holes, flipped triangles, common edges and common corners are noticed") {
+    TriangleMesh open = cube(1);
+    open.triangles.pop_back();
+    CHECK_FALSE(measure(open).closed);
+    CHECK(measure(open).manifold);
+    CHECK(measure(open).genus == -1);
+
+    TriangleMesh flipped = cube(1);
+    std::swap(flipped.triangles[3][0], flipped.triangles[3][1]);
+    CHECK_FALSE(measure(flipped).closed);
+
+    TriangleMesh corner = joined(cube(1), cube(1, 5));
+    for (auto& t : corner.triangles)
+        for (auto& v : t) v = v == 8 ? 7 : v;
+    CHECK(measure(corner).closed);
+    CHECK_FALSE(measure(corner).manifold);
+    CHECK(measure(corner).components == 2);
+    CHECK(measure(corner).genus == 0);
+
+    TriangleMesh edge = corner;
+    for (auto& t : edge.triangles)
+        for (auto& v : t) v = v == 9 ? 6 : v;
+    CHECK_FALSE(measure(edge).closed);
+    CHECK_FALSE(measure(edge).manifold);
+
+    TriangleMesh degenerate = cube(1);
+    degenerate.triangles.push_back({0, 1, 1});
+    CHECK_FALSE(measure(degenerate).manifold);
+    CHECK(measure(TriangleMesh{}).components == 0);
+}
+
+TEST_CASE("normals are unit length, weighted by angle and point outward") {
+    const TriangleMesh mesh = cube(1);
+    const auto normals = vertex_normals(mesh);
+    REQUIRE(normals.size() == 8);
+    for (int c = 0; c < 8; ++c)  // by angle, not by triangle count: exactly along the diagonals
+        for (int a = 0; a < 3; ++a)
+            CHECK(normals[c][a] == Approx((c >> (2 - a) & 1 ? 1 : -1) / std::sqrt(3.0)).epsilon(1e-6));
+}
+
+TEST_CASE("components below a volume and unused vertices go") {
+    TriangleMesh mesh = joined(joined(cube(0.5F, 10), cube(2)), cube(1, 20));
+    mesh.vertices.push_back({9, 9, 9});
+    remove_small_components(mesh, 0.5);
+    CHECK(mesh.vertices.size() == 16);
+    CHECK(measure(mesh).components == 2);
+    CHECK(measure(mesh).volume == Approx(9));
+    remove_small_components(mesh, 1000);
+    CHECK(mesh.empty());
+    CHECK(mesh.vertices.empty());
+}
