@@ -4,7 +4,7 @@ find_package(OpenMesh CONFIG REQUIRED)
 find_package(CGAL 5.5 CONFIG REQUIRED)
 find_package(Eigen3 CONFIG REQUIRED)
 find_package(ITK 5.2 CONFIG REQUIRED COMPONENTS
-  ITKCommon ITKIOImageBase ITKIOTIFF ITKIONRRD ITKIONIFTI ITKIOMeta)
+  ITKCommon ITKIOImageBase ITKIONRRD ITKIONIFTI ITKIOMeta)
 find_package(TIFF REQUIRED)
 find_package(PNG REQUIRED)
 find_package(nlohmann_json CONFIG REQUIRED)

@@ -17,6 +17,7 @@ struct ImageGeometry {
     Vec3 origin{0, 0, 0};         ///< world position of the centre of voxel (0,0,0)
     Matrix3 direction{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};  ///< columns are the axes i, j, k; orthonormal
     std::string unit;             ///< "um", "mm", ... or empty when the file does not say
+    bool spacing_known = true;    ///< false: the file states no spacing, and 1 stands in for what is missing
 
     [[nodiscard]] Vec3 index_to_world(const Vec3& index) const;
     [[nodiscard]] Vec3 world_to_index(const Vec3& world) const;
@@ -30,6 +31,8 @@ enum class PixelType { UInt8, Int8, UInt16, Int16, UInt32, Int32, Float, Double 
 
 struct ReadImageOptions {
     Vec3 spacing{0, 0, 0};  ///< Replaces the file's spacing where > 0.
+    int channel = -1;       ///< Which channel of a hyperstack, from 0; -1: there must be only one.
+    int frame = -1;         ///< Which time point of a series, from 0; -1: there must be only one.
 };
 
 /// A scalar 3D image in memory, in the file's own pixel type (a byte stays a byte).

@@ -34,7 +34,9 @@ struct PointCloud {
 
 /// @throws Error InvalidInput when a point lies outside the image: how many of how many, both boxes, and the
 ///         option (--points-space, --points-order, --spacing) that would bring them inside where one does.
-void check_inside(const std::vector<Vec3>& world_points, const ImageGeometry& geometry, const std::string& source);
+/// @param space  how the file's coordinates were understood (PointCloud::space)
+void check_inside(const std::vector<Vec3>& world_points, const ImageGeometry& geometry, const std::string& source,
+                  PointSpace space = PointSpace::World);
 
 /// Exact duplicates, and points closer than `cell` / 2 in the same cell of a lattice of edge `cell`, become one.
 /// The first of each stays; the order stays. cell = 0 removes exact duplicates only.
