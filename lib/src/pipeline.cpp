@@ -1,1 +1,374 @@
+#include "covol/pipeline.h"
 
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/Morphology.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <sstream>
+
+#include "covol/compare.h"
+#include "covol/distance.h"
+#include "covol/error.h"
+#include "covol/mesh_io.h"
+
+namespace covol {
+namespace {
+
+constexpr double kMergeVoxels = 0.25;         // points closer than this do not move the surface apart
+constexpr double kMarginVoxels = 6.0;         // between D and the domain's boundary, for points alone
+constexpr double kTubeSlackVoxels = 2.0;      // the upwind scheme looks one voxel beyond the band
+constexpr double kAttractionVoxels = 5.0;     // automatic range of the points after starts other than tagging
+constexpr int kEdgeReachVoxels = 12;          // a band that follows moves this far before g is extended
+constexpr double kCoarseFactor = 8.0;         // voxels of the coarse distance field, in h
+
+std::string number(double value) {
+    std::ostringstream text;
+    text << value;
+    return text.str();
+}
+
+/// Adds the wall-clock time of its life to `seconds`.
+class Timed {
+public:
+    explicit Timed(double& seconds) : seconds_(seconds), begin_(std::chrono::steady_clock::now()) {}
+    ~Timed() { seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count(); }
+    Timed(const Timed&) = delete;
+    Timed& operator=(const Timed&) = delete;
+
+private:
+    double& seconds_;
+    std::chrono::steady_clock::time_point begin_;
+};
+
+openvdb::CoordBBox box_of(const Domain& d) {
+    return {openvdb::Coord(d.min[0], d.min[1], d.min[2]), openvdb::Coord(d.max[0], d.max[1], d.max[2])};
+}
+
+/// The active voxels of u and all within `voxels` of them, inside the domain; values mean nothing.
+FloatGridPtr dilated_topology(const FloatGrid& u, int voxels, const Domain& domain) {
+    FloatGridPtr topology = u.deepCopy();
+    openvdb::tools::dilateActiveValues(topology->tree(), voxels, openvdb::tools::NN_FACE,
+                                       openvdb::tools::EXPAND_TILES);
+    topology->clip(box_of(domain));
+    return topology;
+}
+
+/// Every active voxel of u is active in `field`.
+bool covers(const FloatGrid& field, const FloatGrid& u) {
+    for (auto leaf = u.tree().cbeginLeaf(); leaf; ++leaf) {
+        const auto* known = field.tree().probeConstLeaf(leaf->origin());
+        auto missing = leaf->valueMask();
+        if (known != nullptr) missing -= known->valueMask();
+        if (!missing.isOff()) return false;
+    }
+    return true;
+}
+
+FloatGridPtr read_level_set(const std::string& path) {
+    const FloatGridPtr grid = read_solid(path).level_set;
+    if (!grid) throw Error(Errc::InvalidInput, "segment: " + path + ": expected a .vdb file with a level set");
+    return grid;
+}
+
+/// The main job as a sequence of steps over one result.
+class Segmentation {
+public:
+    Segmentation(const Image* image, const std::vector<Vec3>& points, const SegmentOptions& options,
+                 const RunContext& run)
+        : image_(image), points_(points), options_(options), run_(run) {}
+
+    SegmentResult go() {
+        {
+            Timed total(report().seconds.total);
+            check_input();
+            resolve_lengths();
+            if (options_.start.kind == Start::Kind::Tag)
+                start_by_tagging();
+            else
+                start_otherwise();
+            find_edges();
+            solve();
+            make_surface();
+        }
+        report().resolved = options_;
+        return std::move(result_);
+    }
+
+private:
+    SegmentReport& report() { return result_.report; }
+    double h() const { return options_.voxel_size; }
+    bool uses_points() const { return options_.evolve.theta > 0; }
+    bool uses_image() const { return options_.evolve.rho > 0; }
+
+    void choose(const std::string& what, const std::string& value, const std::string& reason) {
+        const std::string line = value + (reason.empty() ? "" : " (" + reason + ")");
+        report().automatic[what] = line;
+        run_.info(what + ": " + line);
+    }
+
+    /// What there is decides which terms of Eq. (3) can act.
+    void check_input() {
+        const std::string why = options_.why_invalid();
+        if (!why.empty()) throw Error(Errc::InvalidOptions, "segment: " + why);
+        if (image_ == nullptr && points_.empty())
+            throw Error(Errc::InvalidInput, "segment: expected an image or points, got neither");
+        if (options_.start.kind == Start::Kind::Tag && points_.empty())
+            throw Error(Errc::InvalidInput, "segment: the start 'tag' expects points, got none; choose another start "
+                                            "(sphere, box, mesh, mask or vdb)");
+        report().point_count = points_.size();
+        EvolveOptions& evolve = options_.evolve;
+        if (points_.empty() && evolve.theta > 0) {
+            evolve.theta = 0;
+            choose("theta", "0", "there are no points");
+        }
+        if (image_ == nullptr && evolve.rho > 0) {
+            evolve.rho = 0;
+            choose("rho", "0", "there is no image");
+        }
+    }
+
+    void resolve_lengths() {
+        if (options_.voxel_size <= 0) {
+            const VoxelSizeChoice choice = choose_voxel_size(image_, points_);
+            options_.voxel_size = choice.voxel_size;
+            choose("voxel_size", number(h()), choice.reason);
+        }
+        points_ = merge_close_points(points_, kMergeVoxels * h());
+        if (points_.size() < report().point_count)
+            run_.info("points: " + std::to_string(points_.size()) + " of " + std::to_string(report().point_count) +
+                      " kept, the others are closer than half of " + number(kMergeVoxels * h()));
+        EvolveOptions& evolve = options_.evolve;
+        if (evolve.delta < 0) choose("delta", number(evolve.delta = h()), "1 voxel");
+        if (evolve.tau < 0) choose("tau", number(evolve.tau = h()), "1 voxel at unit speed");
+        if (options_.edge.sigma < 0 && uses_image())
+            choose("sigma", number(options_.edge.sigma = h()), "1 voxel");
+        if (evolve.attraction_range < 0) choose_attraction_range();
+    }
+
+    void choose_attraction_range() {
+        double& range = options_.evolve.attraction_range;
+        range = 0;
+        if (!uses_points()) return;
+        if (options_.start.kind == Start::Kind::Tag) {
+            choose("attraction_range", "0", "unlimited: the band around the points bounds it");
+        } else {
+            range = kAttractionVoxels * h();
+            choose("attraction_range", number(range), number(kAttractionVoxels) + " voxels");
+        }
+    }
+
+    Domain domain_with_margin(double margin) const {
+        if (options_.roi) return domain_of_box(*options_.roi, h());
+        if (image_ != nullptr) return domain_of_box(image_->geometry().world_box(), h());
+        return domain_of_box(bounding_box(points_, margin), h());
+    }
+
+    // ---- start -------------------------------------------------------------------------------------------------
+
+    void start_by_tagging() {
+        choose_tag();
+        const double D = options_.tag_distance;
+        const double margin = options_.margin > 0 ? options_.margin : D + kMarginVoxels * h();
+        report().domain = domain_with_margin(margin);
+        compute_distance(D + (kHalfWidthVoxels + kTubeSlackVoxels) * h());
+        Timed timed(report().seconds.tag);
+        BandResult tagged = band(*result_.distance, {D, options_.exterior_seeds}, run_);
+        report().band = tagged.report;
+        result_.u = tagged.grid;
+        if (tagged.report.leaks) warn_of_leak(tagged.report);
+        report().tag.tag_distance = D;
+    }
+
+    void choose_tag() {
+        if (options_.tag_distance > 0) return;
+        Timed timed(report().seconds.tag);
+        // Wide enough for any D below a quarter of the cloud: the final domain is made once D is known.
+        const WorldBox box = bounding_box(points_);
+        double extent = 0;
+        for (int a = 0; a < 3; ++a) extent = std::max(extent, box.max[a] - box.min[a]);
+        report().tag = choose_tag_distance(points_, domain_with_margin(0.25 * extent + kMarginVoxels * h()),
+                                           options_.exterior_seeds, run_);
+        options_.tag_distance = report().tag.tag_distance;
+        choose("tag_distance", number(options_.tag_distance), report().tag.reason);
+    }
+
+    void warn_of_leak(const BandReport& tagged) {
+        std::string line = "the points leave gaps wider than the tag distance " + number(tagged.tag_distance);
+        line += tagged.holding_distance > 0 ? "; it would hold at " + number(tagged.holding_distance)
+                                            : "; no tag distance that holds was found";
+        run_.warn(line);
+    }
+
+    void start_otherwise() {
+        options_.evolve.follow = true;
+        const double margin = options_.margin > 0 ? options_.margin : 2 * kMarginVoxels * h();
+        report().domain = domain_with_margin(margin);
+        {
+            Timed timed(report().seconds.tag);
+            result_.u = start_grid();
+        }
+        if (uses_points()) compute_distance(tube_for_start());
+    }
+
+    FloatGridPtr start_grid() const {
+        const Domain& domain = result_.report.domain;
+        const Start& start = options_.start;
+        switch (start.kind) {
+            case Start::Kind::Sphere: return start_from_sphere(domain, start.center, start.radius);
+            case Start::Kind::Box: return start_from_box(domain, start.box);
+            case Start::Kind::Mesh: return start_from_mesh(domain, read_mesh(start.path), run_);
+            case Start::Kind::Mask: return start_from_mask(domain, read_image(start.path, {}, run_), run_);
+            case Start::Kind::Vdb: return start_from_grid(domain, *read_level_set(start.path), run_);
+            case Start::Kind::Tag: break;
+        }
+        throw Error(Errc::InvalidOptions, "segment: this start makes no grid of its own");
+    }
+
+    /// Beyond the attraction range d is not needed. Without one it must reach from the start to the points: the
+    /// surface moves down d, so the largest d on the start bounds what it meets.
+    double tube_for_start() {
+        const double slack = (kHalfWidthVoxels + kTubeSlackVoxels) * h();
+        if (options_.evolve.attraction_range > 0) return options_.evolve.attraction_range + slack;
+        Domain coarse = domain_of_box(report().domain.world_box(), kCoarseFactor * h());
+        const WorldBox box = bounding_box(points_);
+        double diagonal = 0;
+        for (int a = 0; a < 3; ++a) {
+            const WorldBox all = report().domain.world_box();
+            const double side = std::max(all.max[a], box.max[a]) - std::min(all.min[a], box.min[a]);
+            diagonal += side * side;
+        }
+        const FloatGridPtr d = distance(points_, coarse, {std::sqrt(diagonal)}, run_).grid;
+        double largest = 0;
+        const auto d_at = d->getConstAccessor();
+        for (auto leaf = result_.u->tree().cbeginLeaf(); leaf; ++leaf) {
+            const openvdb::Coord center = leaf->origin().offsetBy(4);
+            const openvdb::Vec3d where = d->worldToIndex(result_.u->indexToWorld(center));
+            largest = std::max(largest, double(d_at.getValue(openvdb::Coord::round(where))));
+        }
+        const double radius = largest + kCoarseFactor * h() + slack;
+        choose("distance_tube", number(radius), "the attraction is unlimited: it covers the way from the start");
+        return radius;
+    }
+
+    void compute_distance(double radius) {
+        Timed timed(report().seconds.distance);
+        result_.distance = distance(points_, report().domain, {radius}, run_).grid;
+    }
+
+    // ---- fields and flow ---------------------------------------------------------------------------------------
+
+    void find_edges() {
+        if (!uses_image()) return;
+        Timed timed(report().seconds.edge);
+        const FloatGridPtr reach =
+            options_.evolve.follow ? dilated_topology(*result_.u, kEdgeReachVoxels, report().domain) : result_.u;
+        EdgeResult found = edge(*image_, *reach, options_.edge, run_);
+        report().edge = found.report;
+        result_.edge = found.grid;
+        const EdgeReport& e = found.report;
+        if (options_.edge.edge_k <= 0 && options_.edge.edge_contrast <= 0)
+            choose("edge_k", number(e.edge_k), "g = 1/2 at a gradient of " + number(e.edge_contrast));
+        if (options_.edge.low == options_.edge.high)
+            choose("intensities", number(e.low) + " to " + number(e.high), "mapped to 0 and 1, percentiles");
+        // Fixed from here on: a band that moves must not change the meaning of g.
+        options_.edge.edge_k = e.edge_k;
+        options_.edge.edge_contrast = 0;
+        options_.edge.low = e.low;
+        options_.edge.high = e.high;
+    }
+
+    void extend(const FloatGrid& u, EvolveFields& fields) {
+        if (fields.edge == nullptr || covers(*fields.edge, u)) return;
+        Timed timed(report().seconds.edge);
+        result_.edge = edge(*image_, *dilated_topology(u, kEdgeReachVoxels, report().domain), options_.edge, run_).grid;
+        fields.edge = result_.edge.get();
+    }
+
+    void solve() {
+        EvolveFields fields;
+        fields.distance = uses_points() ? result_.distance.get() : nullptr;
+        fields.edge = result_.edge.get();
+        if (options_.evolve.follow) fields.extend = [this](const FloatGrid& u, EvolveFields& f) { extend(u, f); };
+        {
+            Timed timed(report().seconds.solve);
+            const double edge_before = report().seconds.edge;
+            report().solve = evolve(*result_.u, fields, options_.evolve, run_);
+            report().seconds.solve -= report().seconds.edge - edge_before;
+        }
+        run_.check();
+        const EvolveReport& solved = report().solve;
+        report().active_voxels = solved.active_voxels;
+        report().leaf_count = solved.leaf_count;
+        if (solved.stop_reason == StopReason::Vanished)
+            throw Error(Errc::InvalidInput, "segment: the surface vanished after " + std::to_string(solved.steps) +
+                                                " steps: nothing held it; lower delta, or start closer to the edges");
+        if (solved.stop_reason == StopReason::MaxSteps)
+            run_.warn("not steady after " + std::to_string(solved.steps) + " steps: the last change was " +
+                      number(solved.last_change) + " voxels");
+    }
+
+    void make_surface() {
+        Timed timed(report().seconds.surface);
+        result_.surface = surface(*result_.u, run_);
+        result_.mesh = extract_mesh(*result_.surface, options_.extract, run_);
+        report().surface = measure(result_.mesh);
+        if (!points_.empty()) report().fit = points_to_surface(points_, result_.mesh, run_);
+    }
+
+    const Image* image_;
+    std::vector<Vec3> points_;
+    SegmentOptions options_;
+    const RunContext& run_;
+    SegmentResult result_;
+};
+
+}  // namespace
+
+EvolveOptions SegmentOptions::automatic_evolve() {
+    EvolveOptions options;
+    options.attraction_range = -1;
+    return options;
+}
+
+std::string SegmentOptions::why_invalid() const {
+    std::string why;
+    const auto expect = [&](bool ok, const char* field, const char* expected, double got) {
+        if (!ok) why += std::string(why.empty() ? "" : "\n") + field + ": expected " + expected + ", got " + number(got);
+    };
+    expect(std::isfinite(voxel_size) && voxel_size >= 0, "voxel_size", ">= 0", voxel_size);
+    expect(std::isfinite(margin) && margin >= 0, "margin", ">= 0", margin);
+    expect(std::isfinite(tag_distance) && tag_distance >= 0, "tag_distance", ">= 0", tag_distance);
+    if (start.kind == Start::Kind::Sphere)
+        expect(std::isfinite(start.radius) && start.radius > 0, "start.radius", "> 0", start.radius);
+    if (roi)
+        for (int a = 0; a < 3; ++a)
+            expect(roi->max[a] > roi->min[a], "roi", "min < max along each axis", roi->max[a] - roi->min[a]);
+    EvolveOptions chosen = evolve;
+    if (chosen.attraction_range == -1) chosen.attraction_range = 0;  // automatic
+    for (const std::string& part : {edge.why_invalid(), chosen.why_invalid()})
+        if (!part.empty()) why += (why.empty() ? "" : "\n") + part;
+    return why;
+}
+
+VoxelSizeChoice choose_voxel_size(const Image* image, const std::vector<Vec3>& world_points) {
+    if (image != nullptr) {
+        const Vec3& spacing = image->geometry().spacing;
+        return {*std::min_element(spacing.begin(), spacing.end()), "the image's smallest spacing"};
+    }
+    const std::vector<Vec3> distinct = merge_close_points(world_points, 0);
+    if (distinct.size() < 2)
+        throw Error(Errc::InvalidInput, "choose_voxel_size: expected an image or at least 2 distinct points, got " +
+                                            std::to_string(distinct.size()));
+    return {nearest_neighbour_spacing(distinct).median, "the median distance between neighbouring points"};
+}
+
+SegmentResult segment(const Image* image, const std::vector<Vec3>& world_points, const SegmentOptions& options,
+                      const RunContext& run) {
+    SegmentResult result;
+    with_threads(run, [&] { result = Segmentation(image, world_points, options, run).go(); });
+    return result;
+}
+
+}  // namespace covol

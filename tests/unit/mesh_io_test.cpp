@@ -1,1 +1,223 @@
+#include "covol/mesh_io.h"
+
+#include <unistd.h>
+
 #include <catch2/catch.hpp>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <random>
+
+#include "covol/error.h"
+
+using namespace covol;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// A folder that goes with the test.
+struct Folder {
+    fs::path path = fs::temp_directory_path() / ("covol_mesh_io_test_" + std::to_string(::getpid()));
+    Folder() { fs::create_directories(path); }
+    ~Folder() { fs::remove_all(path); }
+    [[nodiscard]] std::string file(const std::string& name) const { return (path / name).string(); }
+    [[nodiscard]] std::string file(const std::string& name, const std::string& text) const {
+        std::ofstream(path / name, std::ios::binary) << text;
+        return file(name);
+    }
+};
+
+std::string text_of(const std::string& path) {
+    std::ifstream in(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+}
+
+TriangleMesh tetrahedron() {
+    TriangleMesh mesh;
+    mesh.vertices = {{0, 0, 0}, {1.1F, 0, 0}, {0, 2.3F, 0}, {0, 0, 1.0F / 3}};
+    mesh.triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}};
+    return mesh;
+}
+
+void check_refused(const std::string& path, const std::string& part, Errc code = Errc::InvalidInput) {
+    INFO(path);
+    try {
+        static_cast<void>(read_mesh(path));
+        FAIL("was read");
+    } catch (const Error& e) {
+        CHECK_THAT(e.what(), Catch::Contains(part));
+        CHECK(e.code() == code);
+    }
+}
+
+template <typename T>
+std::string big_endian(T value) {
+    std::string bytes(sizeof(T), '\0');
+    std::memcpy(bytes.data(), &value, sizeof(T));
+    return {bytes.rbegin(), bytes.rend()};
+}
+
+}  // namespace
+
+TEST_CASE("what is written is read back, bit for bit, as text and as bytes") {
+    const Folder folder;
+    const TriangleMesh mesh = tetrahedron();
+    WriteMeshOptions options;
+    options.comments = {"covol test", "two\nlines"};
+    for (const char* end : {"ply", "obj", "off"})
+        for (const bool binary : {true, false}) {
+            options.binary = binary;
+            const std::string path = folder.file(std::string("a.") + end);
+            write_mesh(path, mesh, options);
+            INFO(path);
+            const TriangleMesh back = read_mesh(path);
+            CHECK(back.vertices == mesh.vertices);
+            CHECK(back.triangles == mesh.triangles);
+            CHECK_THAT(text_of(path), Catch::Contains("covol test") && Catch::Contains("two lines"));
+        }
+    for (const bool binary : {true, false}) {
+        options.binary = binary;
+        write_mesh(folder.file("a.stl"), mesh, options);
+        const TriangleMesh back = read_mesh(folder.file("a.stl"));
+        CHECK(back.vertices.size() == 4);
+        CHECK(measure(back).closed);
+        CHECK(measure(back).volume == Approx(measure(mesh).volume));
+    }
+}
+
+TEST_CASE("y up and the unit's scale keep the orientation") {
+    const Folder folder;
+    WriteMeshOptions options;
+    options.y_up = true;
+    options.unit_scale = 0.5;
+    write_mesh(folder.file("a.ply"), tetrahedron(), options);
+    const TriangleMesh back = read_mesh(folder.file("a.ply"));
+    CHECK(back.vertices[2] == std::array<float, 3>{0, 0, -1.15F});
+    CHECK(back.vertices[3][1] == Approx(0.5 / 3));
+    CHECK(measure(back).volume == Approx(measure(tetrahedron()).volume / 8));
+}
+
+TEST_CASE("glb has two aligned chunks whose sizes agree with the data") {
+    const Folder folder;
+    WriteMeshOptions options;
+    options.comments = {"delta = 1"};
+    write_mesh(folder.file("a.glb"), tetrahedron(), options);
+    const std::string data = text_of(folder.file("a.glb"));
+    const auto word = [&](std::size_t at) {
+        std::uint32_t value = 0;
+        std::memcpy(&value, data.data() + at, 4);
+        return value;
+    };
+    REQUIRE(data.substr(0, 4) == "glTF");
+    CHECK(word(8) == data.size());
+    const std::uint32_t json = word(12);
+    CHECK(json % 4 == 0);
+    CHECK(data.substr(16, 4) == "JSON");
+    CHECK_THAT(data.substr(20, json), Catch::Contains("delta = 1") && Catch::Contains("\"NORMAL\":1"));
+    CHECK(word(20 + json) == 4 * 12 * 2 + 4 * 12);
+    CHECK(word(24 + json) == 0x004E4942);
+    CHECK(data.size() == 28 + json + 4 * 12 * 3);
+    float x = 0;
+    std::memcpy(&x, data.data() + 28 + json + 12, 4);
+    CHECK(x == 1.1F);
+}
+
+TEST_CASE("PLY of other programs: big-endian bytes, doubles, other properties and elements, polygons") {
+    const Folder folder;
+    std::string text =
+        "ply\r\nformat binary_big_endian 1.0\nobj_info x\nelement camera 1\nproperty float f\nelement vertex 4\n"
+        "property uchar red\nproperty double x\nproperty double y\nproperty double z\n"
+        "element face 1\nproperty list uchar int vertex_index\nproperty list ushort float texcoord\nend_header\n";
+    text += big_endian(1.0F);
+    for (const auto& p : {Vec3{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}) {
+        text += '\xff';
+        for (const double c : p) text += big_endian(c);
+    }
+    text += '\x04';
+    for (const int v : {0, 1, 2, 3}) text += big_endian(v);
+    text += big_endian(std::uint16_t(2)) + big_endian(0.5F) + big_endian(0.5F);
+    const TriangleMesh mesh = read_mesh(folder.file("a.ply", text));
+    CHECK(mesh.triangles.size() == 2);
+    CHECK(measure(mesh).area == Approx(1));
+    text.pop_back();
+    check_refused(folder.file("cut.ply", text), "cut off");
+}
+
+TEST_CASE("OBJ with slashes, negative numbers and groups; OFF with colours and comments") {
+    const Folder folder;
+    const TriangleMesh obj = read_mesh(folder.file("a.obj",
+        "# c\no thing\nv 0 0 0\nv +1 0 0 1.0\nv 1e0 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\ns off\nf 1/1/1 2//1 3/1 # c\nf -4 -2 -1\n"));
+    CHECK(obj.triangles.size() == 2);
+    CHECK(measure(obj).area == Approx(1));
+    const TriangleMesh off = read_mesh(folder.file("a.off", "COFF 4 1 0\n# c\n0 0 0 255 0 0 1\n1 0 0\n\n1 1 0\n0 1 0\n4 0 1 2 3 0.5 0.5 0.5"));
+    CHECK(measure(off).area == Approx(1));
+}
+
+TEST_CASE("broken and hostile files give one clear error") {
+    const Folder folder;
+    const std::string vertex = "property float x\nproperty float y\nproperty float z\n";
+    const std::string face = "property list uchar int vertex_indices\n";
+    const std::string ascii = "ply\nformat ascii 1.0\n", binary = "ply\nformat binary_little_endian 1.0\n";
+    check_refused(folder.file("missing.ply"), "cannot be opened", Errc::Io);
+    check_refused(folder.path.string(), "expected a name", Errc::Unsupported);
+    check_refused(folder.file("a.fbx", "x"), "expected a name", Errc::Unsupported);
+    check_refused(folder.file("a.ply", ""), "end of the file");
+    check_refused(folder.file("a.ply", "plx\n"), "expected 'ply'");
+    for (const std::string& format : {ascii, binary}) {
+        check_refused(folder.file("a.ply", format + "element vertex 1000000000000\n" + vertex + "end_header\n0 0 0\n"), "room for at most");
+        check_refused(folder.file("a.ply", format + "element vertex 18446744073709551615\n" + vertex + "end_header\n0 0 0\n"), "room");
+        check_refused(folder.file("a.ply", format + "element face 99999999\n" + face + "end_header\n0 0 0\n"), "room");
+    }
+    check_refused(folder.file("a.ply", ascii + "element vertex 99999999999999999999999\n" + vertex + "end_header\n"), ":3: expected");
+    check_refused(folder.file("a.ply", ascii + "element vertex 1000000000000\nend_header\n0 0 0\n"), "no property 'x'");
+    check_refused(folder.file("a.ply", ascii + "element x 1000000000000\nend_header\n"), "no triangle");
+    check_refused(folder.file("a.ply", ascii + "element vertex 1\n" + vertex + "end_header\n0 zero 0\n"), ":8: expected a number, got 'zero'");
+    check_refused(folder.file("a.ply", ascii + "element vertex 1\n" + vertex + "end_header\n0 nan 0\n"), "not finite");
+    check_refused(folder.file("a.ply", ascii + "element face 1\n" + face + "end_header\n3 0 1 2\n"), "refers to vertex 0");
+    check_refused(folder.file("a.ply", ascii + "element face 1\n" + face + "end_header\n3 0 1 -2\n"), "number of a vertex");
+    check_refused(folder.file("a.ply", ascii + "element face 1\n" + face + "end_header\n1e18 0 1 2\n"), "a list of");
+    check_refused(folder.file("a.obj", "v 0 0\n"), "a.obj:1: expected a coordinate, got the end of the line");
+    check_refused(folder.file("a.obj", "v 0 0 0\nf 1 2 3\n"), "refers to vertex 1");
+    check_refused(folder.file("a.obj", "v 0 0 0\nf 1 -2 1\n"), "number of a vertex");
+    check_refused(folder.file("a.obj", "v 0 0 0\n"), "no triangle");
+    check_refused(folder.file("a.off", "OFF\n1000000000000 1 0\n0 0 0\n"), "room");
+    check_refused(folder.file("a.off", "OFF\n1 1 0\n0 0 0\n4000000000 0 0 0\n"), "shorter line");
+    check_refused(folder.file("a.off", "OFF\n3 1 0\n0 0 0\n1.5 0 0\n# padding\n"), "end of the file");
+    check_refused(folder.file("a.stl", "abc"), "too short");
+    check_refused(folder.file("a.stl", std::string(80, 'x') + "\xff\xff\xff\xff"), "too short");
+    check_refused(folder.file("a.stl", "solid x\nvertex 1 2\n"), "a.stl:2");
+}
+
+TEST_CASE("files with random damage are read or refused, never worse") {
+    const Folder folder;
+    std::mt19937 random(3);
+    for (const char* end : {"ply", "obj", "off", "stl"})
+        for (const bool binary : {true, false}) {
+            WriteMeshOptions options;
+            options.binary = binary;
+            write_mesh(folder.file(std::string("good.") + end), tetrahedron(), options);
+            const std::string good = text_of(folder.file(std::string("good.") + end));
+            for (int round = 0; round < 100; ++round) {
+                std::string bad = good.substr(0, round % 3 == 0 ? random() % good.size() : good.size());
+                for (int i = 0; i < 1 + round % 5 && !bad.empty(); ++i) bad[random() % bad.size()] = char(random());
+                try {
+                    const TriangleMesh mesh = read_mesh(folder.file(std::string("bad.") + end, bad));
+                    for (const auto& t : mesh.triangles)
+                        for (const std::uint32_t v : t) REQUIRE(v < mesh.vertices.size());
+                } catch (const Error&) {
+                }
+            }
+        }
+}
+
+TEST_CASE("unknown endings and bad meshes are refused before anything is written") {
+    const Folder folder;
+    CHECK_THROWS_AS(write_mesh(folder.file("a.xyz"), tetrahedron()), Error);
+    CHECK_THROWS_AS(check_mesh_extension("a"), Error);
+    CHECK_NOTHROW(check_mesh_extension("A.PLY"));
+    TriangleMesh bad = tetrahedron();
+    bad.triangles[0][0] = 9;
+    CHECK_THROWS_AS(write_mesh(folder.file("a.ply"), bad), Error);
+    CHECK_THROWS_AS(write_mesh(folder.file("no/such/a.ply"), tetrahedron()), Error);
+    CHECK(fs::is_empty(folder.path));
+}

@@ -24,16 +24,21 @@ struct Start {
 };
 
 struct SegmentOptions {
-    double voxel_size = 0.0;            ///< h, world units; 0 picks the image's smallest spacing, or for points alone half their spacing
+    double voxel_size = 0.0;            ///< h, world units; 0: see choose_voxel_size()
     std::optional<WorldBox> roi;        ///< the domain, instead of the image's box
     double margin = 0.0;                ///< points alone: between points and domain boundary; 0 picks D + 6 voxels
     Start start;
     double tag_distance = 0.0;          ///< D; 0: automatic
     std::vector<Vec3> exterior_seeds;
     EdgeOptions edge;
-    EvolveOptions evolve;
+    /// With attraction_range < 0 the pipeline picks: unlimited after tagging (the band bounds the points' reach),
+    /// 5 voxels after the other starts. Their `follow` is set by the pipeline too.
+    EvolveOptions evolve = automatic_evolve();
     ExtractOptions extract;
     [[nodiscard]] std::string why_invalid() const;
+
+    /// EvolveOptions with an automatic attraction range.
+    [[nodiscard]] static EvolveOptions automatic_evolve();
 };
 
 struct SegmentReport {
@@ -47,6 +52,7 @@ struct SegmentReport {
     EvolveReport solve;
     MeshMeasures surface;
     FitStatistics fit;
+    SegmentOptions resolved;  ///< what was used: every automatic choice replaced by its value
     std::map<std::string, std::string> automatic;  ///< each automatic choice and its reason
 };
 
@@ -55,6 +61,14 @@ struct SegmentResult {
     TriangleMesh mesh;
     SegmentReport report;
 };
+
+/// h and how it was found: the image's smallest spacing, or for points alone the median distance to the nearest other
+/// point. @throws Error InvalidInput when there is neither, or fewer than two distinct points.
+struct VoxelSizeChoice {
+    double voxel_size = 0;
+    std::string reason;  ///< one line for people
+};
+[[nodiscard]] VoxelSizeChoice choose_voxel_size(const Image* image, const std::vector<Vec3>& world_points);
 
 /// The main job: image and points together (either may be absent: null, empty).
 /// @throws Error as the single steps; InvalidInput when there is neither.

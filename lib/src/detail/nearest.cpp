@@ -16,6 +16,10 @@ namespace {
 
 constexpr std::int64_t kMaxLeavesPerAxis = 1 << 21;
 
+/// Neighbours across the faces -i, +i, -j, +j, -k, +k.
+constexpr int kFaceSlots[6] = {neighbour_slot(-1, 0, 0), neighbour_slot(1, 0, 0),  neighbour_slot(0, -1, 0),
+                               neighbour_slot(0, 1, 0),  neighbour_slot(0, 0, -1), neighbour_slot(0, 0, 1)};
+
 Coord leaf_origin(const Coord& voxel) { return voxel & ~(kLeafDim - 1); }
 
 Coord voxel_of(const Vec3& p) {
@@ -255,9 +259,15 @@ void Sweeper::visit(NearestLeaf& leaf) {
             }
     leaf.visited = true;
     leaf.wanted = 0;
+    // Neighbours may round a tie differently: only a leaf that has changed speaks up, so that this ends.
+    if (!any_on(changed)) return;
+    const unsigned faces = faces_with_news(block, reach);
+    for (int face = 0; face < 6; ++face) leaf.wanted |= (faces >> face & 1) << kFaceSlots[face];
+    // Neighbours that exist hear of a change through the faces; only the ones to be made need the edges and corners.
     for (int slot = 0; slot < 27; ++slot) {
         std::uint64_t any = 0;
-        for (int word = 0; word < 8; ++word) any |= changed[word] & borders_[slot][word];
+        if (leaf.neighbours[slot] < 0)
+            for (int word = 0; word < 8; ++word) any |= changed[word] & borders_[slot][word];
         leaf.wanted |= std::uint32_t(any != 0) << slot;
     }
 }

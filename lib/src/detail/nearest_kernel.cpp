@@ -99,27 +99,19 @@ COVOL_INLINE void sweep_row(Row& row, const NearestBlock& b, int at) {
     row.offer(moved_down<4>(row.p, above));
 }
 
-#ifndef CANDIDATES
-#define CANDIDATES 9
-#endif
-
 COVOL_INLINE void sweep_slice(NearestBlock& b, int i, int from) {
     for (int j = 0; j < 8; ++j) {
         Row row(b, i, j);
         const int at = NearestBlock::offset(from, j, 0);
         row.offer(load_points(b, at));
-#if CANDIDATES >= 5
         row.offer(load_points(b, at - NearestBlock::kRow));
         row.offer(load_points(b, at + NearestBlock::kRow));
         row.offer(load_points(b, at - 1));
         row.offer(load_points(b, at + 1));
-#endif
-#if CANDIDATES >= 9
         row.offer(load_points(b, at - NearestBlock::kRow - 1));
         row.offer(load_points(b, at - NearestBlock::kRow + 1));
         row.offer(load_points(b, at + NearestBlock::kRow - 1));
         row.offer(load_points(b, at + NearestBlock::kRow + 1));
-#endif
         row.store(b, NearestBlock::offset(i, j, 0));
     }
     Points8 previous = load_points(b, NearestBlock::offset(i, -1, 0));
@@ -136,15 +128,60 @@ COVOL_INLINE void sweep_slice(NearestBlock& b, int i, int from) {
         Row row(b, i, j);
         const int at = NearestBlock::offset(i, j, 0);
         row.offer(previous);
-#ifdef SCAN2
-        sweep_row(row, b, at);
-#endif
         row.store(b, at);
         previous = row.p;
     }
 }
 
+/// Eight voxels of a layer, `stride` apart.
+COVOL_INLINE Points8 load_points(const NearestBlock& b, int at, int stride) {
+    Points8 p;
+    for (int n = 0; n < 8; ++n) {
+        p.x[n] = b.x[at + n * stride];
+        p.y[n] = b.y[at + n * stride];
+        p.z[n] = b.z[at + n * stride];
+        p.index[n] = b.index[at + n * stride];
+    }
+    return p;
+}
+
+/// True where a voxel of the halo layer beyond a face would take a point, within reach, from the face's voxels.
+/// `normal` leads from the face to the halo, `row` along the eight rows, `along` along the eight voxels of a row.
+COVOL_INLINE bool face_has_news(const NearestBlock& b, float reach, const int (&normal)[3], const int (&row)[3],
+                                const int (&along)[3]) {
+    constexpr int kStride[3] = {NearestBlock::kSlice, NearestBlock::kRow, 1};
+    const auto stride = [&](const int (&v)[3]) { return v[0] * kStride[0] + v[1] * kStride[1] + v[2] * kStride[2]; };
+    const int outward = stride(normal), next_row = stride(row), next = stride(along);
+    const Float8 lanes{0, 1, 2, 3, 4, 5, 6, 7};
+    Int8 any{};
+    for (int r = 0; r < 8; ++r) {
+        int at[3];  // the first voxel of the row, in the halo
+        for (int a = 0; a < 3; ++a) at[a] = (normal[a] > 0 ? 8 : normal[a] < 0 ? -1 : 0) + r * row[a];
+        const int offset = NearestBlock::offset(at[0], at[1], at[2]);
+        Row halo(b, 0, 0);
+        halo.i = lanes * float(along[0]) + float(at[0]);
+        halo.j = lanes * float(along[1]) + float(at[1]);
+        halo.k = lanes * float(along[2]) + float(at[2]);
+        const Float8 known = halo.distance_to(load_points(b, offset, next));
+        for (int n = -1; n <= 1; ++n) {
+            const Float8 s = halo.distance_to(load_points(b, offset - outward + n * next_row, next));
+            any |= (s < known) & (s <= reach);
+        }
+    }
+    bool result = false;
+    for (int n = 0; n < 8; ++n) result = result || any[n] != 0;
+    return result;
+}
+
 }  // namespace
+
+COVOL_CLONES unsigned faces_with_news(const NearestBlock& b, float reach) {
+    constexpr int kI[3] = {1, 0, 0}, kJ[3] = {0, 1, 0}, kK[3] = {0, 0, 1};
+    constexpr int kDown[3][3] = {{-1, 0, 0}, {0, -1, 0}, {0, 0, -1}};
+    return unsigned(face_has_news(b, reach, kDown[0], kJ, kK)) | unsigned(face_has_news(b, reach, kI, kJ, kK)) << 1 |
+           unsigned(face_has_news(b, reach, kDown[1], kI, kK)) << 2 | unsigned(face_has_news(b, reach, kJ, kI, kK)) << 3 |
+           unsigned(face_has_news(b, reach, kDown[2], kI, kJ)) << 4 | unsigned(face_has_news(b, reach, kK, kI, kJ)) << 5;
+}
 
 COVOL_CLONES void sweep_nearest(NearestBlock& block) {
     for (int i = 0; i < 8; ++i) sweep_slice(block, i, i - 1);

@@ -15,6 +15,10 @@ struct NearestBlock {
 /// One forward and one backward sweep: each voxel takes a neighbour's point where that is nearer than its own.
 void sweep_nearest(NearestBlock& block);
 
+/// Which of the six layers of the halo (-i, +i, -j, +j, -k, +k: bits 0 to 5) hold a voxel that would take a nearer
+/// point, at a squared distance up to `reach`, from the block's own voxels.
+[[nodiscard]] unsigned faces_with_news(const NearestBlock& block, float reach);
+
 /// Squared distances of the 512 voxels to the points they hold.
 void squared_distances(const NearestBlock& block, float* squared);
 

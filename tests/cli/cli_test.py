@@ -1,0 +1,424 @@
+"""Drives the real binary: exit codes, JSON, files. Standard library only.
+
+    COVOL=build/bin/covol python3 -m unittest tests/cli/cli_test.py
+"""
+import json
+import math
+import os
+import pathlib
+import shutil
+import signal
+import struct
+import subprocess
+import tempfile
+import time
+import unittest
+
+COVOL = os.environ.get("COVOL", "build/bin/covol")
+COMMANDS = ["segment", "reconstruct", "distance", "band", "edge", "evolve", "surface", "mesh", "mask", "compare",
+            "info", "check", "convert", "render", "phantom"]
+
+# The shape of all tests: a bright ball in a dark box.
+SIZE = 40          # voxels along each axis
+H = 0.5            # spacing
+CENTER = (3.0, -2.0, 1.0)
+RADIUS = 12 * H
+VOLUME = 4 / 3 * math.pi * RADIUS**3
+ORIGIN = tuple(c - H * (SIZE - 1) / 2 for c in CENTER)
+
+
+def write_nrrd(path, sizes, data, spacing=H, origin=ORIGIN, kind="uint8"):
+    n = len(sizes)
+    axes = " ".join("(" + ",".join(str(spacing if a == b else 0) for b in range(n)) + ")" for a in range(n))
+    lines = ["NRRD0004", f"type: {kind}", f"dimension: {n}"]
+    if n == 3:
+        lines += ["space: left-posterior-superior"]
+    else:
+        lines += [f"space dimension: {n}"]
+    lines += ["sizes: " + " ".join(map(str, sizes)), f"space directions: {axes}", "endian: little", "encoding: raw",
+              "space origin: (" + ",".join(map(str, origin[:n])) + ")", "", ""]
+    with open(path, "wb") as file:
+        file.write("\n".join(lines).encode() + data)
+
+
+def ball_bytes():
+    """A ball whose edge is blurred over one voxel."""
+    out = bytearray()
+    middle = (SIZE - 1) / 2
+    for k in range(SIZE):
+        for j in range(SIZE):
+            for i in range(SIZE):
+                r = math.dist((i, j, k), (middle,) * 3)
+                out.append(int(20 + 200 * min(1, max(0, RADIUS / H - r + 0.5))))
+    return bytes(out)
+
+
+def sphere_points(count):
+    """A Fibonacci lattice on the ball's surface."""
+    golden = math.pi * (3 - math.sqrt(5))
+    points = []
+    for n in range(count):
+        z = 1 - (2 * n + 1) / count
+        r = math.sqrt(1 - z * z)
+        points.append(tuple(c + RADIUS * v for c, v in
+                            zip(CENTER, (r * math.cos(golden * n), r * math.sin(golden * n), z))))
+    return points
+
+
+def write_xyz(path, points):
+    path.write_text("".join("%.6f %.6f %.6f\n" % p for p in points))
+
+
+class Case(unittest.TestCase):
+    """Inputs made once, an empty folder for each test."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.inputs = pathlib.Path(tempfile.mkdtemp(prefix="covol-in-"))
+        cls.image = cls.inputs / "ball.nrrd"
+        cls.points = cls.inputs / "ball.xyz"
+        write_nrrd(cls.image, (SIZE,) * 3, ball_bytes())
+        write_xyz(cls.points, sphere_points(1500))
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.inputs)
+
+    def setUp(self):
+        self.out = pathlib.Path(tempfile.mkdtemp(prefix="covol-out-"))
+        self.addCleanup(shutil.rmtree, self.out)
+
+    def run_covol(self, *args, code=0, cwd=None):
+        done = subprocess.run([COVOL, *map(str, args)], capture_output=True, text=True, cwd=cwd or self.out, timeout=300)
+        self.assertEqual(done.returncode, code, f"covol {' '.join(map(str, args))}\n{done.stdout}\n{done.stderr}")
+        return done
+
+    def report(self, *args, code=0):
+        return json.loads(self.run_covol(*args, "--quiet", "--json", "-", code=code).stdout)
+
+    def files(self):
+        return sorted(p.name for p in self.out.iterdir())
+
+    def refuse(self, *args, code, says=""):
+        """One clear line, the exit code, and no file."""
+        done = self.run_covol(*args, "--quiet", code=code)
+        lines = done.stderr.strip().splitlines()
+        self.assertEqual(len(lines), 1, done.stderr)
+        self.assertTrue(lines[0].startswith("covol: error: "), lines[0])
+        self.assertIn(says, lines[0])
+        self.assertEqual(done.stdout, "")
+        self.assertEqual(self.files(), [])
+        return lines[0]
+
+    def segment(self, *more, **keywords):
+        return self.run_covol("segment", self.image, "--points", self.points, "-o", "s.vdb", *more, **keywords)
+
+
+class Usage(Case):
+    def test_help_and_version(self):
+        self.assertIn("segment", self.run_covol("--help").stdout)
+        self.assertRegex(self.run_covol("--version").stdout, r"covol \d+\.\d+")
+        for command in COMMANDS:
+            self.assertIn("Usage", self.run_covol(command, "--help").stdout)
+
+    def test_wrong_command_lines(self):
+        self.refuse(code=2)
+        self.refuse("melt", code=2)
+        self.refuse("segment", self.image, code=2, says="--output")
+        self.refuse("segment", self.image, "-o", "s.vdb", "--no-such-flag", code=2, says="--no-such-flag")
+
+    def test_text_instead_of_numbers(self):
+        for flag in ("--theta", "--tau", "--tag-distance", "--exterior-seed", "--roi", "--max-steps"):
+            line = self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", flag, "many", code=2, says=flag)
+            self.assertIn("many", line)
+        self.refuse("segment", self.image, "-o", "s.vdb", "--init", "cube:1,2,3", code=2, says="sphere:x,y,z,r")
+        self.refuse("segment", self.image, "-o", "s.vdb", "--init", "sphere:1,2,3", code=2, says="sphere:x,y,z,r")
+
+
+class BadInput(Case):
+    def test_missing_files(self):
+        self.refuse("segment", "none.nrrd", "--points", self.points, "-o", "s.vdb", code=4, says="none.nrrd")
+        self.refuse("segment", self.image, "--points", "none.xyz", "-o", "s.vdb", code=4, says="none.xyz")
+        self.refuse("reconstruct", "none.ply", "-o", "s.vdb", code=4, says="none.ply")
+        for command in ("surface", "mesh"):
+            self.refuse(command, "none.vdb", "-o", "s.vdb" if command == "surface" else "s.ply", code=4, says="none.vdb")
+
+    def test_bad_points(self):
+        bad = self.inputs / "bad.xyz"
+        bad.write_text("1 2 3\n1 two 3\n")
+        self.refuse("segment", self.image, "--points", bad, "-o", "s.vdb", code=3, says="bad.xyz:2")
+        bad.write_text("1 2 3\n1 nan 3\n")
+        self.refuse("segment", self.image, "--points", bad, "-o", "s.vdb", code=3, says="bad.xyz:2")
+        bad.write_text("")
+        self.refuse("segment", self.image, "--points", bad, "-o", "s.vdb", code=3, says="bad.xyz")
+
+    def test_points_outside_the_image(self):
+        far = self.inputs / "far.xyz"
+        write_xyz(far, [(1000, 0, 0), CENTER])
+        self.refuse("segment", self.image, "--points", far, "-o", "s.vdb", code=3, says="1 of 2")
+
+    def test_bad_images(self):
+        bad = self.inputs / "bad.nrrd"
+        write_nrrd(bad, (8, 8), bytes(64))
+        self.refuse("segment", bad, "--points", self.points, "-o", "s.vdb", code=3)
+        write_nrrd(bad, (8, 0, 8), b"")
+        self.refuse("segment", bad, "--points", self.points, "-o", "s.vdb", code=3)
+        bad.write_bytes(self.image.read_bytes()[:1000])
+        self.refuse("segment", bad, "--points", self.points, "-o", "s.vdb", code=4)
+        bad.write_bytes(b"")
+        done = subprocess.run([COVOL, "segment", bad, "-o", "s.vdb"], capture_output=True, cwd=self.out)
+        self.assertIn(done.returncode, (3, 4))
+        write_nrrd(bad, (8, 8, 8), struct.pack("<512f", *([float("nan")] * 512)), kind="float")
+        self.refuse("segment", bad, "--init", "sphere:3,-2,1,2", "-o", "s.vdb", code=3)
+
+    def test_options_out_of_range(self):
+        for flag, value in [("--theta", "2"), ("--rho", "-0.5"), ("--tau", "0"), ("--delta", "-1"), ("--epsilon", "0"),
+                            ("--voxel-size", "0"), ("--tag-distance", "0"), ("--image-yields", "3"),
+                            ("--max-steps", "-1"), ("--unit-scale", "0"), ("--delta", "nan"), ("--theta", "nan"),
+                            ("--roi", "0,0,0,0,1,1"), ("--init", "sphere:0,0,0,-1"), ("--spacing", "0,1,1")]:
+            with self.subTest(flag=flag, value=value):
+                self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", flag, value, code=3)
+
+    def test_tag_start_without_points(self):
+        self.refuse("segment", self.image, "-o", "s.vdb", code=3, says="points")
+
+    def test_outputs_are_checked_first(self):
+        # The image does not exist either: outputs come first.
+        for flags, code in [(["-o", "s.abc"], 3), (["-o", "no/folder/s.vdb"], 4),
+                            (["-o", "s.vdb", "--mask", "m.jpg"], 3), (["-o", "s.vdb", "--mesh", "m.xyz"], 3),
+                            (["-o", "s.vdb", "--json", "no/folder/r.json"], 4),
+                            (["-o", "s.vdb", "--density", "./s.vdb"], 3)]:
+            with self.subTest(flags=flags):
+                line = self.refuse("segment", "none.nrrd", *flags, code=code)
+                self.assertNotIn("none.nrrd", line)
+
+    def test_output_that_is_a_folder(self):
+        folder = self.inputs / "folder.vdb"
+        folder.mkdir()
+        self.refuse("segment", self.image, "--points", self.points, "-o", folder, code=4, says="folder")
+
+
+class Segment(Case):
+    def test_from_files_to_files(self):
+        self.segment("--mask", "m.nrrd", "--mesh", "m.ply", "--json", "r.json", "--density", "d.vdb")
+        self.assertEqual(self.files(), ["d.vdb", "m.nrrd", "m.ply", "r.json", "s.vdb"])
+        report = json.loads((self.out / "r.json").read_text())
+        self.assertEqual(report["command"], "segment")
+        self.assertEqual(report["input"]["image"]["size"], [SIZE] * 3)
+        self.assertEqual(report["input"]["points"]["count"], 1500)
+        self.assertAlmostEqual(report["grid"]["voxel_size"], H)
+        self.assertGreater(report["grid"]["active_voxels"], 0)
+        self.assertGreater(report["grid"]["leaf_count"], 0)
+        self.assertEqual(report["solve"]["stop_reason"], "steady")
+        for field in ("steps", "last_change", "sweeps_per_step"):
+            self.assertIn(field, report["solve"])
+        surface = report["surface"]
+        self.assertTrue(surface["closed"])
+        self.assertEqual((surface["components"], surface["genus"]), (1, 0))
+        self.assertLess(abs(surface["volume"] / VOLUME - 1), 0.03)
+        self.assertLess(report["fit"]["points_to_surface"]["mean"], 0.5 * H)
+        for stage in ("read", "distance", "tag", "edge", "solve", "surface", "write", "total"):
+            self.assertGreaterEqual(report["seconds"][stage], 0)
+        self.assertGreater(report["peak_rss_bytes"], 1 << 20)
+        self.assertIn("tag_distance", report["automatic"])
+        # The three files are one solid.
+        for other in ("m.nrrd", "m.ply"):
+            alike = self.report("compare", "s.vdb", other)["compare"]
+            self.assertGreater(alike["dice"], 0.97)
+            self.assertLess(alike["mean_distance"], 0.5 * H)
+        self.assertEqual(self.files(), ["d.vdb", "m.nrrd", "m.ply", "r.json", "s.vdb"])
+
+    def test_provenance(self):
+        self.segment("--theta", "0.75", "--mesh", "m.ply")
+        grids = self.report("info", "s.vdb")["grids"]
+        self.assertEqual([g["name"] for g in grids], ["surface"])
+        self.assertEqual(grids[0]["class"], "level set")
+        metadata = grids[0]["metadata"]
+        self.assertRegex(metadata["covol_version"], r"\d+\.\d+")
+        self.assertEqual(json.loads(metadata["covol_options"])["theta"], 0.75)
+        self.assertFalse(metadata.get("creator", "").startswith("Houdini"))
+        self.assertIn(b"covol_options", (self.out / "m.ply").read_bytes()[:4000])
+
+    def test_lengths_in_voxels(self):
+        one = self.report("segment", self.image, "--points", self.points, "-o", "a.vdb", "--delta", "2vx")
+        two = self.report("segment", self.image, "--points", self.points, "-o", "b.vdb", "--delta", str(2 * H))
+        self.assertEqual(one["resolved"]["delta"], 2 * H)
+        self.assertEqual(one["resolved"], two["resolved"])
+        self.assertEqual(one["surface"], two["surface"])
+
+    def test_threads_give_the_same_bits(self):
+        results = []
+        for threads in (1, 2, 8):
+            folder = self.out / str(threads)
+            folder.mkdir()
+            self.segment("--mesh", "m.ply", "--threads", threads, cwd=folder)
+            results.append((folder / "m.ply").read_bytes())
+        self.assertEqual(results[0], results[1])
+        self.assertEqual(results[0], results[2])
+
+    def test_image_alone(self):
+        start = "sphere:%g,%g,%g,%g" % (*CENTER, RADIUS + 1.5 * H)
+        report = self.report("segment", self.image, "--init", start, "-o", "s.vdb", "--delta", "0.2vx")
+        self.assertEqual(report["resolved"]["theta"], 0)
+        self.assertTrue(report["resolved"]["follow"])
+        self.assertLess(abs(report["surface"]["volume"] / VOLUME - 1), 0.05)
+
+    def test_not_steady(self):
+        report = self.report("segment", self.image, "--points", self.points, "-o", "s.vdb", "--max-steps", "1",
+                             "--tolerance", "0")
+        self.assertEqual(report["solve"]["stop_reason"], "max_steps")
+        self.segment("--max-steps", "1", "--tolerance", "0", "--strict", code=5)
+        self.assertEqual(self.files(), ["s.vdb"])
+
+    def test_memory_limit(self):
+        self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", "--memory-limit", "20k", code=3,
+                    says="--memory-limit 20k")
+        self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", "--memory-limit", "1M",
+                    "--max-steps", "1000000", "--tolerance", "0", code=3, says="--memory-limit 1M")
+        self.segment("--memory-limit", "8G")
+
+    def test_one_output_that_fails_takes_the_others_with_it(self):
+        # The name is legal, the writer's temporary name beside it is too long.
+        name = "m" * 248 + ".ply"
+        self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", "--mesh", name, code=4)
+
+    def test_interrupt(self):
+        process = subprocess.Popen([COVOL, "segment", self.image, "--points", self.points, "-o", "s.vdb", "--json",
+                                    "r.json", "--max-steps", "100000000", "--tolerance", "0"], cwd=self.out,
+                                   stderr=subprocess.PIPE, text=True)
+        try:
+            time.sleep(1.5)
+            self.assertIsNone(process.poll(), "ended before the signal")
+            process.send_signal(signal.SIGINT)
+            _, text = process.communicate(timeout=60)
+        finally:
+            process.kill()
+        self.assertEqual(process.returncode, 130, text)
+        self.assertIn("covol: error: interrupted", text)
+        self.assertEqual(self.files(), [])
+
+
+class Configuration(Case):
+    def test_file_and_command_line(self):
+        config = self.inputs / "c.toml"
+        config.write_text('theta = 0.5\ndelta = "2vx"\n')
+        report = self.report("segment", self.image, "--points", self.points, "-o", "s.vdb", "--config", config)
+        self.assertEqual(report["resolved"]["theta"], 0.5)
+        self.assertEqual(report["resolved"]["delta"], 2 * H)
+        report = self.report("segment", self.image, "--points", self.points, "-o", "s.vdb", "--config", config,
+                             "--theta", "0.25")
+        self.assertEqual(report["resolved"]["theta"], 0.25)
+
+    def test_sections(self):
+        config = self.inputs / "c.toml"
+        config.write_text('threads = 1\n[segment]\ntheta = 0.5\n[phantom]\nsize = 7\n')
+        report = self.report("segment", self.image, "--points", self.points, "-o", "s.vdb", "--config", config)
+        self.assertEqual(report["resolved"]["theta"], 0.5)
+
+    def test_unknown_key_and_missing_file(self):
+        config = self.inputs / "c.toml"
+        config.write_text("thta = 0.5\n")
+        self.refuse("segment", self.image, "-o", "s.vdb", "--config", config, code=2, says="thta")
+        self.refuse("segment", self.image, "-o", "s.vdb", "--config", "none.toml", code=2, says="none.toml")
+
+    def test_saved_options_give_the_same_run(self):
+        first = self.report("segment", self.image, "--points", self.points, "-o", "s.vdb", "--theta", "0.5", "--delta",
+                            "2vx", "--save-config", "c.toml")
+        second = self.report("segment", "--config", "c.toml")
+        self.assertEqual(first["resolved"], second["resolved"])
+        self.assertEqual(first["surface"], second["surface"])
+
+
+class Reconstruct(Case):
+    def test_sphere(self):
+        report = self.report("reconstruct", self.points, "-o", "s.vdb", "--mesh", "m.stl", "--voxel-size", H / 2)
+        self.assertTrue(report["surface"]["closed"])
+        self.assertEqual(report["surface"]["genus"], 0)
+        self.assertLess(abs(report["surface"]["volume"] / VOLUME - 1), 0.02)
+        self.assertNotIn("edge_contrast", report.get("edge", {}))
+        self.assertEqual(self.files(), ["m.stl", "s.vdb"])
+
+    def test_no_mask_without_an_image(self):
+        self.refuse("reconstruct", self.points, "-o", "s.vdb", "--mask", "m.nrrd", code=2, says="--mask")
+
+
+class Steps(Case):
+    def test_single_steps_are_segment(self):
+        whole = self.report("segment", self.image, "--points", self.points, "-o", "s.vdb", "--tag-distance", "3vx")
+        # segment() merges close points first; these are apart.
+        self.run_covol("distance", self.points, "--like", self.image, "-o", "d.vdb", "--max-distance", "8vx")
+        self.run_covol("band", "d.vdb", "-o", "b.vdb", "--tag-distance", "3vx")
+        self.run_covol("edge", self.image, "--band", "b.vdb", "-o", "g.vdb")
+        solve = self.report("evolve", "b.vdb", "--distance", "d.vdb", "--edge", "g.vdb", "-o", "u.vdb")["solve"]
+        self.assertEqual(solve["steps"], whole["solve"]["steps"])
+        self.run_covol("surface", "u.vdb", "-o", "surface.vdb", "--density", "density.vdb")
+        mesh = self.report("mesh", "surface.vdb", "-o", "m.ply")["surface"]
+        self.assertAlmostEqual(mesh["volume"], whole["surface"]["volume"], places=3)
+        self.run_covol("mask", "surface.vdb", "--like", self.image, "-o", "m.nii.gz")
+        alike = self.report("compare", "m.nii.gz", "s.vdb")["compare"]
+        self.assertGreater(alike["dice"], 0.98)
+        names = {f: self.report("info", f)["grids"][0]["name"] for f in
+                 ("d.vdb", "b.vdb", "g.vdb", "u.vdb", "surface.vdb", "density.vdb")}
+        self.assertEqual(list(names.values()), ["distance", "band", "edge", "u", "surface", "density"])
+
+    def test_band_needs_a_distance(self):
+        self.run_covol("distance", self.points, "--like", self.image, "-o", "d.vdb")
+        self.run_covol("band", "d.vdb", "-o", "b.vdb", code=2)
+        self.assertEqual(self.files(), ["d.vdb"])
+        self.run_covol("band", "d.vdb", "-o", "b.vdb", "--tag-distance", "9vx", code=3)  # wider than the tube
+
+
+class Tools(Case):
+    def test_phantom(self):
+        report = self.report("phantom", "sphere", "-o", "p.nrrd", "--points", "p.xyz", "--labels", "l.nrrd", "--size", 32,
+                             "--count", 400)
+        self.assertEqual(report["image"]["size"], [32] * 3)
+        self.assertEqual(len((self.out / "p.xyz").read_text().strip().splitlines()[-400:]), 400)
+        self.assertEqual(self.report("check", "p.xyz", "--image", "p.nrrd")["problems"], 0)
+        alike = self.report("compare", "l.nrrd", "l.nrrd")["compare"]
+        self.assertEqual((alike["dice"], alike["hausdorff"]), (1, 0))
+        self.run_covol("phantom", "cube-of-cheese", "-o", "p.nrrd", code=3)
+        self.run_covol("phantom", "sphere", "-o", "p.nrrd", "--size", 2, code=3)
+
+    def test_info_of_each_kind(self):
+        self.assertEqual(self.report("info", self.image)["image"]["size"], [SIZE] * 3)
+        self.assertEqual(self.report("info", self.points)["points"]["count"], 1500)
+        self.run_covol("info", "none.vdb", code=4)
+
+    def test_check(self):
+        self.segment("--mesh", "m.ply")
+        self.assertEqual(self.report("check", "s.vdb")["problems"], 0)
+        self.assertEqual(self.report("check", "m.ply")["problems"], 0)
+        (self.out / "open.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+        report = self.report("check", "open.off", code=3)
+        self.assertTrue(any("not closed" in f["text"] for f in report["findings"]))
+        far = self.inputs / "far.xyz"
+        write_xyz(far, [(1000, 0, 0), *sphere_points(10)])
+        self.assertEqual(self.report("check", far, "--image", self.image, code=3)["problems"], 1)
+
+    def test_convert(self):
+        self.run_covol("convert", self.image, "i.vdb")
+        self.run_covol("convert", "i.vdb", "i.nrrd", "--like", self.image)
+        report = self.report("info", "i.nrrd")["image"]
+        self.assertEqual(report["size"], [SIZE] * 3)
+        for a in range(3):
+            self.assertAlmostEqual(report["origin"][a], ORIGIN[a], places=4)
+        self.assertEqual(report["range"], [20, 220])
+        self.run_covol("convert", self.points, "p.ply")
+        self.assertEqual(self.report("info", "p.ply")["points"]["count"], 1500)
+        (self.out / "t.off").write_text("OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n")
+        self.run_covol("convert", "t.off", "t.ply", "--unit-scale", 2)
+        self.assertAlmostEqual(self.report("info", "t.ply")["mesh"]["volume"], 8 / 6, places=5)
+        self.run_covol("convert", self.points, "p.vdb", code=3)
+
+    def test_render(self):
+        self.segment()
+        self.run_covol("render", "s.vdb", "-o", "s.png", "--image", self.image, "--points", self.points, "--size", "320x200")
+        data = (self.out / "s.png").read_bytes()
+        self.assertEqual(data[:8], b"\x89PNG\r\n\x1a\n")
+        self.assertEqual(struct.unpack(">II", data[16:24]), (320, 200))
+        self.run_covol("render", "s.vdb", "-o", "t.png", "--size", "wide", code=2)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,24 @@
+// Uses the public headers alone: a sphere goes through start, surface, mesh and measure.
+#include <cmath>
+#include <cstdio>
+
+#include "covol/band.h"
+#include "covol/compare.h"
+#include "covol/distance.h"
+#include "covol/edge.h"
+#include "covol/mesh_cleanup.h"
+#include "covol/mesh_io.h"
+#include "covol/phantom.h"
+#include "covol/pipeline.h"
+#include "covol/render.h"
+#include "covol/vdb_io.h"
+
+int main() {
+    const covol::Domain domain = covol::domain_of_box({{-2, -2, -2}, {2, 2, 2}}, 0.1);
+    const covol::FloatGridPtr start = covol::start_from_sphere(domain, {0, 0, 0}, 1.0);
+    const covol::TriangleMesh mesh = covol::extract_mesh(*covol::surface(*start));
+    const covol::MeshMeasures measures = covol::measure(mesh);
+    const double expected = 4.0 / 3.0 * std::acos(-1.0);
+    std::printf("volume %.4f of %.4f, %s\n", measures.volume, expected, measures.closed ? "closed" : "open");
+    return measures.closed && std::abs(measures.volume / expected - 1) < 0.02 ? 0 : 1;
+}

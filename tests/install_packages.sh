@@ -1,0 +1,37 @@
+#!/usr/bin/env bash
+# Installs what covol is built with and tested with: Debian 12 packages only. Does nothing when all are there.
+set -euo pipefail
+
+packages=(
+  # build
+  g++ cmake ninja-build
+  # grids, parallelism
+  libopenvdb-dev libtbb-dev libimath-dev libblosc-dev zlib1g-dev libboost-dev
+  # meshes, geometry
+  libopenmesh-dev libcgal-dev libeigen3-dev libgmp-dev libmpfr-dev
+  # images
+  libinsighttoolkit5-dev libtiff-dev libpng-dev
+  # command line, reports
+  libcli11-dev nlohmann-json3-dev
+  # tests: other programs that read what covol writes
+  catch2 libopenvdb-tools python3 python3-openvdb python3-numpy python3-tifffile
+)
+
+missing=()
+for package in "${packages[@]}"; do
+  state=$(dpkg-query -W -f '${Status}' "$package" 2>/dev/null || true)
+  [[ $state == "install ok installed" ]] || missing+=("$package")
+done
+if (( ${#missing[@]} == 0 )); then
+  echo "covol: all packages are installed"
+  exit 0
+fi
+
+as_root=()
+if (( EUID != 0 )); then
+  command -v sudo >/dev/null || { echo "covol: please install as root: ${missing[*]}" >&2; exit 1; }
+  as_root=(sudo)
+fi
+echo "covol: installing ${missing[*]}"
+"${as_root[@]}" apt-get update -qq
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}"

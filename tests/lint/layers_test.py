@@ -1,0 +1,73 @@
+"""Rules that the compiler does not check: includes go down only, public headers stay light, lib/ keeps quiet.
+
+    python3 tests/lint/layers_test.py SOURCE_DIR
+"""
+import pathlib
+import re
+import sys
+
+# From the bottom up; a file may include headers of its own layer and of those below.
+LAYERS = [
+    ["error", "run", "fwd", "domain"],
+    ["image", "points", "mesh", "vdb_io", "mesh_io"],
+    ["distance", "edge"],
+    ["band", "evolve"],
+    ["surface", "mesh_cleanup", "compare"],
+    ["pipeline", "phantom", "render"],
+]
+LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
+# Files of lib/src whose name is not their header's.
+SOURCE_LEVEL = {"tag_distance": LEVEL["band"], "start": LEVEL["band"], "surface_mesh": LEVEL["surface"],
+                "mesh_distance": LEVEL["surface"]}
+HEAVY = re.compile(r"#\s*include\s*[<\"](openvdb/(?!version\.h)|tbb/|oneapi/|OpenMesh/|CGAL/|itk|CLI/|nlohmann/)")
+LOUD = re.compile(r"\bstd::(cout|cerr|clog)\b|(?<![\w:])(printf|puts|putchar)\s*\(|\bfprintf\s*\(\s*std(out|err)"
+                  r"|(?<![\w.])(std::|::)?(exit|_Exit|quick_exit|abort|terminate)\s*\(")
+GPL_FILES = {"mesh_cleanup.cpp", "mesh_distance.cpp"}
+INCLUDE = re.compile(r"#\s*include\s*\"covol/(\w+)\.h\"")
+
+
+def without_comments(text):
+    return re.sub(r"//[^\n]*|/\*.*?\*/", lambda m: "\n" * m.group().count("\n"), text, flags=re.S)
+
+
+def findings(root):
+    public = sorted((root / "lib/include/covol").glob("*.h"))
+    sources = sorted((root / "lib/src").rglob("*.cpp")) + sorted((root / "lib/src").rglob("*.h"))
+    if len(public) < 10 or len(sources) < 10:
+        yield f"{root}: expected the sources of covol"
+    for path in public:
+        if path.stem not in LEVEL:
+            yield f"{path}: has no layer; add it to LAYERS"
+        if not path.read_text().startswith("#pragma once"):
+            yield f"{path}:1: expected #pragma once"
+    for path in public + sources:
+        level = LEVEL.get(path.stem, SOURCE_LEVEL.get(path.stem)) if path.parent.name != "detail" else None
+        for number, line in enumerate(without_comments(path.read_text()).splitlines(), 1):
+            where = f"{path.relative_to(root)}:{number}"
+            include = INCLUDE.search(line)
+            if include and include.group(1) not in LEVEL:
+                yield f"{where}: unknown header {include.group(1)}.h"
+            elif include and level is not None and LEVEL[include.group(1)] > level:
+                yield f"{where}: includes upward: {line.strip()}"
+            if path in public and HEAVY.search(line):
+                yield f"{where}: a public header includes {line.strip()}"
+            if "CGAL/" in line and "#" in line and path.name not in GPL_FILES:
+                yield f"{where}: CGAL outside the covol_cgal target: {line.strip()}"
+            if LOUD.search(line):
+                yield f"{where}: prints or ends the program: {line.strip()}"
+
+
+def self_test():
+    """The patterns find what they are for."""
+    assert HEAVY.search('#include <openvdb/openvdb.h>') and not HEAVY.search("#include <openvdb/version.h>")
+    for loud in ('std::cout << 1;', 'printf("x");', "std::exit(1);", "fprintf(stderr, 1);", "abort();"):
+        assert LOUD.search(loud), loud
+    for quiet in ('std::snprintf(text, 3, "x");', "run.exit_code(3);", "std::fprintf(file, 1);"):
+        assert not LOUD.search(quiet), quiet
+
+
+if __name__ == "__main__":
+    self_test()
+    found = list(findings(pathlib.Path(sys.argv[1])))
+    print("\n".join(found) if found else "no finding")
+    sys.exit(1 if found else 0)

@@ -1,0 +1,16 @@
+#!/usr/bin/env bash
+# Installs what is needed, builds with warnings as errors, runs every test.
+# Tests on larger data take the folder from COVOL_DATA and say SKIPPED where it is not set.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+bash tests/install_packages.sh
+cmake --preset ci
+cmake --build build-ci --parallel "${COVOL_JOBS:-$(nproc)}"
+if [[ -n ${COVOL_DATA:-} ]]; then
+  echo "covol: tests use the data in $COVOL_DATA"
+else
+  echo "covol: COVOL_DATA is not set: tests on larger data are SKIPPED"
+fi
+ctest --test-dir build-ci --output-on-failure -j2
+echo "covol: all tests passed"

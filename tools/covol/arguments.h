@@ -1,0 +1,42 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+
+#include "covol/domain.h"
+#include "covol/pipeline.h"
+
+namespace covol::tool {
+
+/// The command line cannot be understood: exit code 2.
+struct UsageError : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
+/// A length as people write it: world units, or voxels ("3vx") that become a length once h is known.
+struct Length {
+    double value = 0;
+    bool in_voxels = false;
+    bool given = false;
+
+    /// World units; `fallback` where the option was not given.
+    [[nodiscard]] double resolve(double voxel_size, double fallback) const {
+        if (!given) return fallback;
+        return in_voxels ? value * voxel_size : value;
+    }
+};
+
+// Each takes the option's name for its messages.
+// @throws UsageError for text that is no number, Error InvalidOptions for numbers out of range.
+[[nodiscard]] Length parse_length(const std::string& flag, const std::string& text);
+[[nodiscard]] Vec3 parse_vec3(const std::string& flag, const std::string& text);
+[[nodiscard]] WorldBox parse_box(const std::string& flag, const std::string& text);
+/// tag, sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1, mesh:FILE, mask:FILE, vdb:FILE
+[[nodiscard]] Start parse_start(const std::string& flag, const std::string& text);
+/// "8G", "512M", "100k", bytes without a letter.
+[[nodiscard]] std::uint64_t parse_bytes(const std::string& flag, const std::string& text);
+/// "1200x800"
+[[nodiscard]] std::array<int, 2> parse_size(const std::string& flag, const std::string& text);
+
+}  // namespace covol::tool

@@ -1,0 +1,200 @@
+#include "bindings.h"
+
+#include <cmath>
+#include <map>
+
+#include "covol/error.h"
+#include "covol/vdb_io.h"
+
+namespace covol::tool {
+namespace {
+
+void add_box(CLI::App& command, const std::string& flag, std::optional<WorldBox>& target,
+             const std::string& description) {
+    command.add_option_function<std::string>(
+               flag, [&target, flag](const std::string& text) { target = parse_box(flag, text); }, description)
+        ->type_name("X0,Y0,Z0,X1,Y1,Z1");
+}
+
+std::string to_text(double value) {
+    std::ostringstream text;
+    text << value;
+    return text.str();
+}
+
+}  // namespace
+
+CLI::Option* add_length(CLI::App& command, const std::string& flag, Length& target, const std::string& shown_default,
+                        const std::string& description) {
+    CLI::Option* option = command.add_option_function<std::string>(
+        flag, [&target, flag](const std::string& text) { target = parse_length(flag, text); }, description);
+    return option->type_name("LENGTH")->default_str(shown_default);
+}
+
+void add_vec3(CLI::App& command, const std::string& flag, std::vector<Vec3>& target, const std::string& description) {
+    command.add_option_function<std::vector<std::string>>(
+               flag,
+               [&target, flag](const std::vector<std::string>& texts) {
+                   target.clear();
+                   for (const std::string& text : texts) target.push_back(parse_vec3(flag, text));
+               },
+               description)
+        ->type_name("X,Y,Z")
+        ->allow_extra_args(false);
+}
+
+// ---- images and points ---------------------------------------------------------------------------------------------
+
+void ImageFlags::bind(CLI::App& command) {
+    command.add_option_function<std::string>(
+               "--spacing",
+               [this](const std::string& text) {
+                   options.spacing = parse_vec3("--spacing", text);
+                   for (const double s : options.spacing)
+                       if (!(s > 0)) throw Error(Errc::InvalidOptions, "--spacing: expected three numbers > 0, got " + text);
+               },
+               "voxel spacing, instead of the file's")
+        ->type_name("SX,SY,SZ");
+}
+
+CLI::Option* PointFlags::bind(CLI::App& command, const std::string& flag) {
+    CLI::Option* option = command.add_option(flag, paths, "point clouds: XYZ, CSV, PLY, OBJ, OFF")->type_name("FILE...");
+    bind_options(command);
+    return option;
+}
+
+void PointFlags::bind_options(CLI::App& command) {
+    static const std::map<std::string, PointSpace> spaces{{"world", PointSpace::World}, {"index", PointSpace::Index}};
+    static const std::map<std::string, PointOrder> orders{{"xyz", PointOrder::XYZ}, {"zyx", PointOrder::ZYX}};
+    command.add_option("--points-space", options.space, "coordinates are world units or voxel indices")
+        ->transform(CLI::Transformer(spaces, CLI::ignore_case).description(""))
+        ->check(CLI::IsMember(spaces).description(""))
+        ->type_name("world|index");
+    command.add_option("--points-order", options.order, "order of the coordinates")
+        ->transform(CLI::Transformer(orders, CLI::ignore_case).description(""))
+        ->check(CLI::IsMember(orders).description(""))
+        ->type_name("xyz|zyx");
+}
+
+WorldPoints read_world_points(const PointFlags& flags, const ImageGeometry* geometry, const RunContext& run) {
+    WorldPoints all;
+    for (const std::string& path : flags.paths) {
+        run.check();
+        const PointCloud cloud = read_points(path, flags.options);
+        const std::vector<Vec3> world = to_world(cloud, geometry);
+        if (geometry != nullptr) check_inside(world, *geometry, path);
+        all.points.insert(all.points.end(), world.begin(), world.end());
+        all.rules.push_back(cloud.rule);
+        run.info(path + ": " + std::to_string(world.size()) + " points" + (cloud.rule.empty() ? "" : ", " + cloud.rule));
+    }
+    return all;
+}
+
+// ---- model ---------------------------------------------------------------------------------------------------------
+
+void DomainFlags::bind(CLI::App& command, bool with_margin) {
+    add_length(command, "--voxel-size", voxel_size, "", "edge of the voxels [smallest spacing of image or points]");
+    add_box(command, "--roi", roi, "work in this box of the world only");
+    if (with_margin) add_length(command, "--margin", margin, "", "between the points and the domain's boundary [D + 6vx]");
+}
+
+double DomainFlags::resolve_voxel_size(const Image* image, const std::vector<Vec3>& points, Session& session) const {
+    if (voxel_size.given && !(voxel_size.value > 0))
+        throw Error(Errc::InvalidOptions, "--voxel-size: expected > 0, got " + to_text(voxel_size.value));
+    if (voxel_size.given && !voxel_size.in_voxels) return voxel_size.value;
+    const VoxelSizeChoice choice = choose_voxel_size(image, points);
+    const double h = voxel_size.resolve(choice.voxel_size, choice.voxel_size);
+    const std::string line =
+        to_text(h) + " (" + (voxel_size.given ? to_text(voxel_size.value) + " times " : "") + choice.reason + ")";
+    session.note("voxel_size: " + line);
+    session.report()["automatic"]["voxel_size"] = line;
+    return h;
+}
+
+void TagFlags::bind(CLI::App& command) {
+    add_length(command, "--tag-distance", tag_distance, "", "D: closes gaps between points up to 2D [from the points]");
+    add_vec3(command, "--exterior-seed", exterior_seeds, "a position outside the structure, in a cavity say; repeatable");
+}
+
+void EdgeFlags::bind(CLI::App& command) {
+    add_length(command, "--sigma", sigma, "1vx", "presmoothing of the image");
+    CLI::Option* k = command.add_option("--edge-k", options.edge_k, "K in g = 1/(1 + K s^2) [see --edge-contrast]")
+                         ->check(CLI::PositiveNumber);
+    command.add_option("--edge-contrast", options.edge_contrast,
+                       "gradient at which g = 1/2, of the image scaled to [0,1] per world unit [90 % percentile in the band]")
+        ->check(CLI::PositiveNumber)
+        ->excludes(k);
+}
+
+EdgeOptions EdgeFlags::resolve(double h) const {
+    EdgeOptions resolved = options;
+    resolved.sigma = sigma.resolve(h, h);
+    return resolved;
+}
+
+void EvolveFlags::bind(CLI::App& command, bool with_image) {
+    command.add_option("--theta", options.theta, "weight of the points, 0 to 1")->capture_default_str();
+    if (with_image) command.add_option("--rho", options.rho, "weight of the image, 0 to 1")->capture_default_str();
+    add_length(command, "--delta", delta, "1vx", "weight of curvature");
+    add_length(command, "--tau", tau, "1vx", "time step; the flow's speed is 1 world unit per unit of time");
+    command.add_option("--epsilon", options.epsilon, "regularises the norm of grad u")->capture_default_str();
+    add_length(command, "--attraction-range", attraction_range, "",
+               "points pull fully up to half of it, not at all beyond; 0: unlimited");
+    if (with_image) {
+        command.add_option("--edge-epsilon", options.edge_epsilon, "regularises the norm of grad g")->capture_default_str();
+        command.add_option("--image-yields", options.image_yields,
+                           "share of rho that fades close to points, on the attraction range's taper, 0 to 1")
+            ->capture_default_str();
+    }
+    command.add_option("--max-steps", options.max_steps, "upper bound on time steps")->capture_default_str();
+    command.add_option("--tolerance", options.tolerance, "steady below this mean change, in voxels a step of 1vx")
+        ->capture_default_str();
+    command.add_option("--solver-tolerance", options.solver_tolerance, "a step's solve ends at this relative residual")
+        ->capture_default_str();
+    command.add_flag("--strict", strict, "exit code 5 when the flow is not steady at the end");
+}
+
+EvolveOptions EvolveFlags::resolve(double h, double default_range) const {
+    EvolveOptions resolved = options;
+    resolved.delta = delta.resolve(h, h);
+    resolved.tau = tau.resolve(h, h);
+    resolved.attraction_range = attraction_range.resolve(h, default_range);
+    return resolved;
+}
+
+// ---- results -------------------------------------------------------------------------------------------------------
+
+void MeshFlags::bind(CLI::App& command) {
+    command.add_option_function<std::string>(
+               "--up", [this](const std::string& text) { y_up = text == "y"; }, "the mesh's axis that points up")
+        ->check(CLI::IsMember({"y", "z"}).description(""))
+        ->type_name("y|z")
+        ->default_str("z");
+    command.add_option("--unit-scale", unit_scale, "multiplies the mesh's coordinates, 0.001 for mm to m")
+        ->capture_default_str();
+}
+
+void MeshFlags::check() const {
+    if (!(unit_scale > 0) || !std::isfinite(unit_scale))
+        throw Error(Errc::InvalidOptions, "--unit-scale: expected > 0, got " + to_text(unit_scale));
+}
+
+WriteMeshOptions MeshFlags::options(const Session& session) const {
+    WriteMeshOptions write;
+    write.y_up = y_up;
+    write.unit_scale = unit_scale;
+    write.comments = session.comments();
+    return write;
+}
+
+FloatGridPtr read_level_set(const std::string& path) {
+    std::string first;
+    for (const VdbGridInfo& grid : list_vdb(path)) {
+        if (grid.type != "float") continue;
+        if (grid.name == "surface") return read_vdb(path, "surface");
+        if (first.empty() && grid.grid_class == "level set") first = grid.name;
+    }
+    return read_vdb(path, first);
+}
+
+}  // namespace covol::tool

@@ -1,0 +1,89 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "arguments.h"
+#include "covol/mesh_io.h"
+#include "covol/pipeline.h"
+#include "covol/points.h"
+#include "session.h"
+
+// Groups of flags that several subcommands share. Each binds to its own struct; lengths in voxels are resolved
+// once h is known.
+namespace covol::tool {
+
+/// An option that is a length; `what_else` is shown as its default.
+CLI::Option* add_length(CLI::App& command, const std::string& flag, Length& target, const std::string& shown_default,
+                        const std::string& description);
+
+/// The image's own facts that the user corrects.
+struct ImageFlags {
+    ReadImageOptions options;
+    void bind(CLI::App& command);
+};
+
+struct PointFlags {
+    std::vector<std::string> paths;
+    ReadPointsOptions options;
+    /// `flag` is "--points", or a positional's name.
+    CLI::Option* bind(CLI::App& command, const std::string& flag);
+    /// How files are understood, without the files.
+    void bind_options(CLI::App& command);
+};
+
+/// Clouds read and moved to the world; with an image, points outside it are an error.
+struct WorldPoints {
+    std::vector<Vec3> points;
+    std::vector<std::string> rules;  ///< how each file was understood
+};
+[[nodiscard]] WorldPoints read_world_points(const PointFlags& flags, const ImageGeometry* geometry,
+                                            const RunContext& run);
+
+/// Where the domain lies and how fine it is.
+struct DomainFlags {
+    Length voxel_size, margin;
+    std::optional<WorldBox> roi;
+    void bind(CLI::App& command, bool with_margin);
+    /// h, where --voxel-size may be relative ("2vx") to the automatic one. Says which in `session`.
+    [[nodiscard]] double resolve_voxel_size(const Image* image, const std::vector<Vec3>& points, Session& session) const;
+};
+
+struct TagFlags {
+    Length tag_distance;
+    std::vector<Vec3> exterior_seeds;
+    void bind(CLI::App& command);
+};
+
+struct EdgeFlags {
+    Length sigma;
+    EdgeOptions options;
+    void bind(CLI::App& command);
+    [[nodiscard]] EdgeOptions resolve(double h) const;
+};
+
+struct EvolveFlags {
+    Length delta, tau, attraction_range;
+    EvolveOptions options;
+    bool strict = false;
+    /// Without an image there is no rho.
+    void bind(CLI::App& command, bool with_image);
+    /// `default_range` is the attraction range where none was given.
+    [[nodiscard]] EvolveOptions resolve(double h, double default_range) const;
+};
+
+struct MeshFlags {
+    bool y_up = false;
+    double unit_scale = 1.0;
+    void bind(CLI::App& command);
+    /// Checks before the long work. @throws Error InvalidOptions.
+    void check() const;
+    [[nodiscard]] WriteMeshOptions options(const Session& session) const;
+};
+
+/// The level set of a .vdb file: "surface", else its first level set, else its first float grid.
+[[nodiscard]] FloatGridPtr read_level_set(const std::string& path);
+
+/// A flag that is "x,y,z", once or many times.
+void add_vec3(CLI::App& command, const std::string& flag, std::vector<Vec3>& target, const std::string& description);
+
+}  // namespace covol::tool

@@ -1,0 +1,106 @@
+#include "bindings.h"
+#include "commands.h"
+#include "covol/error.h"
+#include "covol/vdb_io.h"
+#include "file_kind.h"
+#include "image_grid.h"
+#include "report.h"
+
+namespace covol::tool {
+namespace {
+
+OutputKind output_kind(FileKind kind) {
+    switch (kind) {
+        case FileKind::Vdb: return OutputKind::Vdb;
+        case FileKind::Image: return OutputKind::Image;
+        case FileKind::Mesh: return OutputKind::Mesh;
+        case FileKind::Points: break;
+    }
+    return OutputKind::Points;
+}
+
+struct ConvertJob {
+    std::string input, output, like, grid_name;
+    Length voxel_size;
+    ImageFlags image;
+    MeshFlags mesh;
+    PointFlags points;  ///< its options alone
+    bool half = false;
+
+    void image_to_vdb(Session& session) const {
+        const Image pixels = read_image(input, image.options, session.run());
+        const double finest = choose_voxel_size(&pixels, {}).voxel_size;
+        const double h = voxel_size.resolve(finest, finest);
+        const FloatGridPtr grid = to_grid(pixels, h, session.run());
+        session.report()["image"] = to_json(pixels.geometry());
+        session.report()["grid"] = {{"voxel_size", h}, {"domain", to_json(domain_of(*grid))}};
+        session.outputs().add(output, [grid, vdb = WriteVdbOptions{half, session.metadata()}](const std::string& path) {
+            write_vdb(path, {grid}, vdb);
+        });
+    }
+
+    void vdb_to_image(Session& session) const {
+        const FloatGridPtr grid = read_vdb(input, grid_name);
+        const ImageGeometry geometry = like.empty() ? geometry_of(*grid) : read_image_geometry(like, image.options);
+        session.require_memory(4 * std::uint64_t(geometry.size[0]) * geometry.size[1] * geometry.size[2], "the image");
+        const auto values = std::make_shared<std::vector<float>>(sample(*grid, geometry, session.run()));
+        session.report()["image"] = to_json(geometry);
+        session.outputs().add(output, [values, geometry](const std::string& path) {
+            write_image(path, geometry, values->data());
+        });
+    }
+
+    void convert_points(Session& session) const {
+        std::optional<ImageGeometry> geometry;
+        if (!like.empty()) geometry = read_image_geometry(like, image.options);
+        const PointCloud cloud = read_points(input, points.options);
+        const std::vector<Vec3> world = to_world(cloud, geometry ? &*geometry : nullptr);
+        session.report()["points"] = {{"count", world.size()}, {"rule", cloud.rule}};
+        session.outputs().add(output, [world, comment = session.comments().front()](const std::string& path) {
+            write_points(path, world, comment);
+        });
+    }
+
+    void convert_mesh(Session& session) const {
+        const auto triangles = std::make_shared<TriangleMesh>(read_mesh(input));
+        session.report()["mesh"] = to_json(measure(*triangles));
+        session.outputs().add(output, [triangles, write = mesh.options(session)](const std::string& path) {
+            write_mesh(path, *triangles, write);
+        });
+    }
+
+    void run(Session& session) const {
+        const FileKind from = kind_of_file(input);
+        const FileKind to = kind_of_output(output, from);
+        session.outputs().check("OUT", output, output_kind(to));
+        mesh.check();
+        if (from == FileKind::Image && to == FileKind::Vdb) return image_to_vdb(session);
+        if (from == FileKind::Vdb && to == FileKind::Image) return vdb_to_image(session);
+        if (from == FileKind::Points && to == FileKind::Points) return convert_points(session);
+        if (from == FileKind::Mesh && to == FileKind::Mesh) return convert_mesh(session);
+        throw Error(Errc::Unsupported, std::string("convert: ") + input + " holds " + to_string(from) + ", " + output +
+                                           " would hold " + to_string(to) +
+                                           ": expected image and .vdb, points and points, or mesh and mesh; see also "
+                                           "covol mesh, mask and segment --init");
+    }
+};
+
+}  // namespace
+
+void add_convert(Session& session) {
+    const auto job = std::make_shared<ConvertJob>();
+    CLI::App* command = session.add_command("convert", "Image to .vdb and back, points to points, mesh to mesh",
+                                            [job, &session] { job->run(session); });
+    command->add_option("input", job->input, "the file to read")->required()->type_name("IN");
+    command->add_option("output", job->output, "the file to write")->required()->type_name("OUT");
+    command->add_option("--like", job->like, "image whose lattice the result gets, or that index points belong to")
+        ->type_name("IMAGE");
+    command->add_option("--grid", job->grid_name, "grid to take from a .vdb file [the first]")->type_name("NAME");
+    add_length(*command, "--voxel-size", job->voxel_size, "", "edge of the voxels of a .vdb file [smallest spacing]");
+    job->points.bind_options(*command);
+    job->mesh.bind(*command);
+    job->image.bind(*command);
+    command->add_flag("--half", job->half, "store values as 16-bit floats");
+}
+
+}  // namespace covol::tool

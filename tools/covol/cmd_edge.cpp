@@ -1,0 +1,47 @@
+#include "bindings.h"
+#include "commands.h"
+#include "covol/edge.h"
+#include "covol/vdb_io.h"
+#include "report.h"
+
+namespace covol::tool {
+namespace {
+
+struct EdgeJob {
+    std::string image_path, band_path, output;
+    ImageFlags image;
+    EdgeFlags edge_flags;
+    bool half = false;
+
+    void run(Session& session) const {
+        session.outputs().check("-o", output, OutputKind::Vdb);
+        const FloatGridPtr topology = read_vdb(band_path);
+        const Image pixels = read_image(image_path, image.options, session.run());
+        const double h = domain_of(*topology).voxel_size;
+        const Stopwatch watch;
+        const EdgeResult result = edge(pixels, *topology, edge_flags.resolve(h), session.run());
+        session.add_seconds("edge", watch.seconds());
+        session.report()["input"]["image"] = to_json(pixels.geometry());
+        session.report()["edge"] = to_json(result.report);
+        session.note("K = " + std::to_string(result.report.edge_k) + ": g = 1/2 at a gradient of " +
+                     std::to_string(result.report.edge_contrast));
+        session.outputs().add(output, [grid = result.grid, vdb = WriteVdbOptions{half, session.metadata()}](
+                                          const std::string& path) { write_vdb(path, {grid}, vdb); });
+    }
+};
+
+}  // namespace
+
+void add_edge(Session& session) {
+    const auto job = std::make_shared<EdgeJob>();
+    CLI::App* command = session.add_command("edge", "Step 3: the image's edge detector g on the band",
+                                            [job, &session] { job->run(session); });
+    command->add_option("image", job->image_path, "3D image")->required()->type_name("IMAGE");
+    command->add_option("--band", job->band_path, "a grid whose active voxels get g")->required()->type_name("BAND.vdb");
+    command->add_option("-o,--output", job->output, "the grid 'edge', .vdb")->required()->type_name("OUT.vdb");
+    job->edge_flags.bind(*command);
+    job->image.bind(*command);
+    command->add_flag("--half", job->half, "store values as 16-bit floats");
+}
+
+}  // namespace covol::tool

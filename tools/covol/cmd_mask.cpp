@@ -1,0 +1,44 @@
+#include "bindings.h"
+#include "commands.h"
+#include "covol/surface.h"
+#include "report.h"
+
+namespace covol::tool {
+namespace {
+
+struct MaskJob {
+    std::string input, like, output;
+    ImageFlags image;
+    int label = 1;
+
+    void run(Session& session) const {
+        session.outputs().check("-o", output, OutputKind::Image);
+        const FloatGridPtr level_set = read_level_set(input);
+        const ImageGeometry geometry = read_image_geometry(like, image.options);
+        const Stopwatch watch;
+        const auto labels = std::make_shared<std::vector<std::uint8_t>>(
+            rasterize(*level_set, geometry, static_cast<std::uint8_t>(label), session.run()));
+        session.add_seconds("mask", watch.seconds());
+        const auto inside = std::count_if(labels->begin(), labels->end(), [](std::uint8_t v) { return v != 0; });
+        session.report()["mask"] = {{"voxels", inside}, {"image", to_json(geometry)}};
+        session.note(std::to_string(inside) + " voxels inside");
+        session.outputs().add(output, [labels, geometry](const std::string& path) {
+            write_image(path, geometry, labels->data());
+        });
+    }
+};
+
+}  // namespace
+
+void add_mask(Session& session) {
+    const auto job = std::make_shared<MaskJob>();
+    CLI::App* command =
+        session.add_command("mask", "Label image of a level set", [job, &session] { job->run(session); });
+    command->add_option("level_set", job->input, "a level set, .vdb")->required()->type_name("IN.vdb");
+    command->add_option("--like", job->like, "image whose lattice the mask gets")->required()->type_name("IMAGE");
+    command->add_option("-o,--output", job->output, "label image")->required()->type_name("OUT.nrrd|.nii.gz|.tif|.mha");
+    command->add_option("--label", job->label, "value of the inside")->check(CLI::Range(1, 255))->capture_default_str();
+    job->image.bind(*command);
+}
+
+}  // namespace covol::tool

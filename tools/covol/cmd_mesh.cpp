@@ -1,0 +1,72 @@
+#include "bindings.h"
+#include "commands.h"
+#include "covol/mesh_cleanup.h"
+#include "covol/surface.h"
+#include "report.h"
+
+namespace covol::tool {
+namespace {
+
+struct MeshJob {
+    std::string input, output;
+    Length isovalue, min_component, target_edge;
+    int smooth = 0;
+    bool repair = false;
+    MeshFlags flags;
+
+    ExtractOptions extract_options(double h) const {
+        const double edge = min_component.resolve(h, 0);
+        return {isovalue.resolve(h, 0), edge * edge * edge};
+    }
+
+    void clean(TriangleMesh& mesh, double h, Session& session) const {
+        if (!repair && smooth == 0 && !target_edge.given) return;
+        CleanupOptions options;
+        options.target_edge = target_edge.resolve(h, 0);
+        options.smooth_iterations = smooth;
+        options.repair = repair;
+        const Stopwatch watch;
+        const CleanupReport done = clean_mesh(mesh, options, session.run());
+        session.add_seconds("clean", watch.seconds());
+        session.report()["cleanup"] = {{"self_intersections", done.self_intersections},
+                                       {"holes_filled", done.holes_filled},
+                                       {"intersection_free", done.intersection_free}};
+    }
+
+    void run(Session& session) const {
+        session.outputs().check("-o", output, OutputKind::Mesh);
+        flags.check();
+        const FloatGridPtr level_set = read_level_set(input);
+        const double h = domain_of(*level_set).voxel_size;
+        const Stopwatch watch;
+        TriangleMesh mesh = extract_mesh(*level_set, extract_options(h), session.run());
+        session.add_seconds("surface", watch.seconds());
+        clean(mesh, h, session);
+        const MeshMeasures measures = measure(mesh);
+        session.report()["surface"] = to_json(measures);
+        session.note("surface: " + one_line(measures));
+        session.outputs().add(output, [mesh = std::make_shared<TriangleMesh>(std::move(mesh)),
+                                       write = flags.options(session)](const std::string& path) {
+            write_mesh(path, *mesh, write);
+        });
+    }
+};
+
+}  // namespace
+
+void add_mesh(Session& session) {
+    const auto job = std::make_shared<MeshJob>();
+    CLI::App* command =
+        session.add_command("mesh", "Triangles of a level set, and their cleanup", [job, &session] { job->run(session); });
+    command->add_option("level_set", job->input, "a level set, .vdb")->required()->type_name("IN.vdb");
+    command->add_option("-o,--output", job->output, "closed, manifold, outward triangles")
+        ->required()->type_name("OUT.ply|.obj|.stl|.off|.glb");
+    add_length(*command, "--isovalue", job->isovalue, "0", "extract this level outside the surface");
+    add_length(*command, "--min-component", job->min_component, "", "drop pieces smaller than a cube of this edge");
+    add_length(*command, "--target-edge", job->target_edge, "", "decimate to about this edge length");
+    command->add_option("--smooth", job->smooth, "steps of volume-keeping smoothing")->capture_default_str();
+    command->add_flag("--repair", job->repair, "resolve self-intersections, fill holes");
+    job->flags.bind(*command);
+}
+
+}  // namespace covol::tool

@@ -1,0 +1,18 @@
+#pragma once
+#include <string>
+
+namespace covol::tool {
+
+enum class FileKind { Vdb, Image, Mesh, Points };
+
+/// By the name's end; PLY, OBJ and OFF are meshes when they hold a face, else points.
+/// @throws Error Io, InvalidInput when such a file cannot be read.
+[[nodiscard]] FileKind kind_of_file(const std::string& path);
+
+/// By the name alone; PLY, OBJ and OFF are what `like` is when that is points, else meshes.
+[[nodiscard]] FileKind kind_of_output(const std::string& path, FileKind like);
+
+/// "vdb", "image", "mesh", "points"
+[[nodiscard]] const char* to_string(FileKind kind);
+
+}  // namespace covol::tool

@@ -1,0 +1,17 @@
+#pragma once
+#include <vector>
+
+#include "covol/image.h"
+
+namespace covol::tool {
+
+/// The image's values on isotropic voxels of edge h, as a fog volume "density"; voxels outside the image are inactive.
+[[nodiscard]] FloatGridPtr to_grid(const Image& image, double h, const RunContext& run);
+
+/// The grid's own lattice: the box of its active voxels.
+[[nodiscard]] ImageGeometry geometry_of(const FloatGrid& grid);
+
+/// Trilinear samples of the grid at the voxel centres of `geometry`, i fastest.
+[[nodiscard]] std::vector<float> sample(const FloatGrid& grid, const ImageGeometry& geometry, const RunContext& run);
+
+}  // namespace covol::tool

@@ -1,0 +1,40 @@
+#pragma once
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace covol::tool {
+
+enum class OutputKind { Vdb, Image, Mesh, Points, Picture, Text };
+
+/// The files of one run: checked before the long work, written together at its end. Each is whole or absent, and when
+/// one fails those already written in this run are removed.
+class Outputs {
+public:
+    /// Checks the ending, that the folder exists and can be written, and that no two outputs are one file.
+    /// An empty path is an output that was not asked for. @throws Error InvalidOptions, Io.
+    void check(const std::string& flag, const std::string& path, OutputKind kind);
+
+    /// Queues a file; does nothing for an empty path.
+    void add(const std::string& path, std::function<void(const std::string& path)> write);
+
+    /// Writes what is queued. @throws what a writer throws, after rollback().
+    void commit();
+    /// Removes what commit() has written.
+    void rollback();
+    [[nodiscard]] const std::vector<std::string>& written() const noexcept { return written_; }
+
+private:
+    struct Pending {
+        std::string path;
+        std::function<void(const std::string&)> write;
+    };
+    std::vector<std::string> checked_;
+    std::vector<Pending> pending_;
+    std::vector<std::string> written_;
+};
+
+/// Whole or not at all. @throws Error Io.
+void write_text(const std::string& path, const std::string& text);
+
+}  // namespace covol::tool

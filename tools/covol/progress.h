@@ -1,0 +1,35 @@
+#pragma once
+#include <chrono>
+#include <string>
+
+namespace covol::tool {
+
+/// Text for people on stderr: a bar with percentage and time left on a terminal, plain lines elsewhere.
+class Progress {
+public:
+    explicit Progress(bool quiet);
+    ~Progress() { clear(); }
+    Progress(const Progress&) = delete;
+    Progress& operator=(const Progress&) = delete;
+
+    /// RunContext::progress.
+    void update(const std::string& stage, double fraction);
+    /// A line of its own; wipes the bar first.
+    void line(const std::string& text);
+    /// Wipes the bar.
+    void clear();
+
+private:
+    using Clock = std::chrono::steady_clock;
+    void draw(double fraction, double elapsed);
+
+    bool quiet_;
+    bool terminal_;
+    bool drawn_ = false;
+    bool announced_ = false;
+    std::string stage_;
+    Clock::time_point begin_;
+    Clock::time_point shown_;
+};
+
+}  // namespace covol::tool

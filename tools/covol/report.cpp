@@ -1,0 +1,93 @@
+#include "report.h"
+
+#include <sstream>
+
+namespace covol::tool {
+
+Json to_json(const Vec3& v) { return Json::array({v[0], v[1], v[2]}); }
+
+Json to_json(const WorldBox& box) { return {{"min", to_json(box.min)}, {"max", to_json(box.max)}}; }
+
+Json to_json(const ImageGeometry& g) {
+    return {{"size", {g.size[0], g.size[1], g.size[2]}},
+            {"spacing", to_json(g.spacing)},
+            {"origin", to_json(g.origin)},
+            {"direction", {to_json(g.direction[0]), to_json(g.direction[1]), to_json(g.direction[2])}},
+            {"unit", g.unit}};
+}
+
+Json to_json(const Domain& d) {
+    return {{"voxel_size", d.voxel_size},
+            {"origin", to_json(d.origin)},
+            {"min", {d.min[0], d.min[1], d.min[2]}},
+            {"max", {d.max[0], d.max[1], d.max[2]}},
+            {"world", to_json(d.world_box())}};
+}
+
+Json to_json(const BandReport& r) {
+    return {{"tag_distance", r.tag_distance},   {"enclosed_volume", r.enclosed_volume}, {"core_volume", r.core_volume},
+            {"leaks", r.leaks},                 {"holding_distance", r.holding_distance}, {"active_voxels", r.active_voxels}};
+}
+
+Json to_json(const EdgeReport& r) {
+    return {{"sigma", r.sigma}, {"edge_k", r.edge_k}, {"edge_contrast", r.edge_contrast}, {"low", r.low}, {"high", r.high}};
+}
+
+Json to_json(const EvolveReport& r) {
+    return {{"steps", r.steps},
+            {"stop_reason", to_string(r.stop_reason)},
+            {"last_change", r.last_change},
+            {"sweeps_per_step", r.sweeps_per_step},
+            {"leaf_visits", r.leaf_visits},
+            {"seconds_assembly", r.seconds_assembly},
+            {"seconds_sweeps", r.seconds_sweeps}};
+}
+
+Json to_json(const MeshMeasures& m) {
+    return {{"volume", m.volume}, {"area", m.area},     {"components", m.components},
+            {"genus", m.genus},   {"closed", m.closed}, {"manifold", m.manifold}};
+}
+
+Json to_json(const FitStatistics& f) { return {{"mean", f.mean}, {"p95", f.p95}, {"max", f.max}}; }
+
+Json to_json(const CompareReport& r) {
+    return {{"dice", r.dice},
+            {"jaccard", r.jaccard},
+            {"volume_a", r.volume_a},
+            {"volume_b", r.volume_b},
+            {"hausdorff", r.hausdorff},
+            {"hausdorff95", r.hausdorff95},
+            {"mean_distance", r.mean_distance}};
+}
+
+Json to_json(const SegmentOptions& o) {
+    const EvolveOptions& e = o.evolve;
+    return {{"voxel_size", o.voxel_size},
+            {"tag_distance", o.tag_distance},
+            {"theta", e.theta},
+            {"rho", e.rho},
+            {"delta", e.delta},
+            {"tau", e.tau},
+            {"sigma", o.edge.sigma},
+            {"edge_k", o.edge.edge_k},
+            {"intensities", {o.edge.low, o.edge.high}},
+            {"epsilon", e.epsilon},
+            {"edge_epsilon", e.edge_epsilon},
+            {"attraction_range", e.attraction_range},
+            {"image_yields", e.image_yields},
+            {"follow", e.follow},
+            {"max_steps", e.max_steps},
+            {"tolerance", e.tolerance},
+            {"solver_tolerance", e.solver_tolerance}};
+}
+
+std::string one_line(const MeshMeasures& m) {
+    std::ostringstream text;
+    text << "volume " << m.volume << ", area " << m.area << ", " << m.components
+         << (m.components == 1 ? " component" : " components") << ", "
+         << (m.closed ? "closed, genus " + std::to_string(m.genus) : "not closed")
+         << (m.manifold ? "" : ", not manifold");
+    return text.str();
+}
+
+}  // namespace covol::tool

@@ -1,0 +1,30 @@
+#pragma once
+#include "covol/band.h"
+#include "covol/compare.h"
+#include "covol/edge.h"
+#include "covol/evolve.h"
+#include "covol/image.h"
+#include "covol/mesh.h"
+#include "covol/pipeline.h"
+#include "session.h"
+
+// The library's reports as JSON; field names are part of the command line's contract.
+namespace covol::tool {
+
+[[nodiscard]] Json to_json(const Vec3& v);
+[[nodiscard]] Json to_json(const WorldBox& box);
+[[nodiscard]] Json to_json(const ImageGeometry& geometry);
+[[nodiscard]] Json to_json(const Domain& domain);
+[[nodiscard]] Json to_json(const BandReport& report);
+[[nodiscard]] Json to_json(const EdgeReport& report);
+[[nodiscard]] Json to_json(const EvolveReport& report);
+[[nodiscard]] Json to_json(const MeshMeasures& measures);
+[[nodiscard]] Json to_json(const FitStatistics& fit);
+[[nodiscard]] Json to_json(const CompareReport& report);
+/// Every number that segment() used, in world units.
+[[nodiscard]] Json to_json(const SegmentOptions& options);
+
+/// "{ mean, p95, max }" and the like as one line for people.
+[[nodiscard]] std::string one_line(const MeshMeasures& measures);
+
+}  // namespace covol::tool
