@@ -350,8 +350,9 @@ Table read_off(const std::string& path, const std::string& text) {
     table.points.reserve(vertices);
     while (table.points.size() < vertices) {
         if (!next_fields())
-            fail(path, lines.number(), "expected " + std::to_string(vertices) + " vertices, got " +
-                                           std::to_string(table.points.size()) + "; the file is truncated");
+            fail(path, lines.number(),
+                 "expected " + std::to_string(vertices) + " vertices, got " + std::to_string(table.points.size()) +
+                     "; the file is truncated");
         table.points.push_back(first_three(path, lines.number(), fields, 0));
     }
     return table;
@@ -386,11 +387,11 @@ struct PlyHeader {
 
 std::optional<PlyType> ply_type(string_view name) {
     constexpr std::pair<const char*, PlyType> kNames[] = {
-        {"char", PlyType::Int8},     {"int8", PlyType::Int8},      {"uchar", PlyType::UInt8},
-        {"uint8", PlyType::UInt8},   {"short", PlyType::Int16},    {"int16", PlyType::Int16},
-        {"ushort", PlyType::UInt16}, {"uint16", PlyType::UInt16},  {"int", PlyType::Int32},
-        {"int32", PlyType::Int32},   {"uint", PlyType::UInt32},    {"uint32", PlyType::UInt32},
-        {"float", PlyType::Float},   {"float32", PlyType::Float},  {"double", PlyType::Double},
+        {"char", PlyType::Int8},     {"int8", PlyType::Int8},     {"uchar", PlyType::UInt8},
+        {"uint8", PlyType::UInt8},   {"short", PlyType::Int16},   {"int16", PlyType::Int16},
+        {"ushort", PlyType::UInt16}, {"uint16", PlyType::UInt16}, {"int", PlyType::Int32},
+        {"int32", PlyType::Int32},   {"uint", PlyType::UInt32},   {"uint32", PlyType::UInt32},
+        {"float", PlyType::Float},   {"float32", PlyType::Float}, {"double", PlyType::Double},
         {"float64", PlyType::Double}};
     for (const auto& [known, type] : kNames)
         if (name == known) return type;
@@ -525,13 +526,15 @@ std::vector<Vec3> read_ply_ascii(const std::string& path, const PlyHeader& heade
         if (element.properties.empty()) continue;
         // a line takes at least a digit and its end for each property
         if (element.count > lines.rest().size() / 2 + 1)
-            fail(path, lines.number(), "expected " + std::to_string(element.count) + " elements '" + element.name +
-                                           "', the file is too short for them; it is truncated");
+            fail(path, lines.number(),
+                 "expected " + std::to_string(element.count) + " elements '" + element.name +
+                     "', the file is too short for them; it is truncated");
         if (is_vertex) points.reserve(element.count);
         for (std::uint64_t n = 0; n < element.count;) {
             if (!lines.next(line))
-                fail(path, lines.number(), "expected " + std::to_string(element.count) + " elements '" + element.name +
-                                               "', got " + std::to_string(n) + "; the file is truncated");
+                fail(path, lines.number(),
+                     "expected " + std::to_string(element.count) + " elements '" + element.name + "', got " +
+                         std::to_string(n) + "; the file is truncated");
             if (line.empty()) continue;
             ++n;
             if (!is_vertex) continue;
@@ -551,8 +554,9 @@ std::vector<Vec3> read_ply_ascii(const std::string& path, const PlyHeader& heade
             }
             for (std::size_t a = 0; a < 3; ++a) {
                 if (column[a] >= fields.size())
-                    fail(path, lines.number(), "expected " + std::to_string(element.properties.size()) +
-                                                   " numbers, got " + std::to_string(fields.size()));
+                    fail(path, lines.number(),
+                         "expected " + std::to_string(element.properties.size()) + " numbers, got " +
+                             std::to_string(fields.size()));
                 point[a] = to_coordinate(path, lines.number(), fields[column[a]]);
             }
             points.push_back(point);
@@ -563,8 +567,7 @@ std::vector<Vec3> read_ply_ascii(const std::string& path, const PlyHeader& heade
 }
 
 std::vector<Vec3> read_ply_binary(const std::string& path, const PlyHeader& header, string_view data) {
-    const bool swap =
-        (header.format == PlyFormat::BigEndian) != (std::endian::native == std::endian::big);
+    const bool swap = (header.format == PlyFormat::BigEndian) != (std::endian::native == std::endian::big);
     std::vector<Vec3> points;
     for (const PlyElement& element : header.elements) {
         const bool is_vertex = element.name == "vertex";
@@ -615,7 +618,8 @@ Table read_table(const std::string& path) {
     if (!columns && extension != ".ply" && extension != ".obj" && extension != ".off")
         throw Error(Errc::Unsupported, "read_points: " + path +
                                            ": expected a name ending in .xyz, .txt, .pts, .csv, .tsv, .ply, .obj or "
-                                           ".off, got '" + extension + "'");
+                                           ".off, got '" +
+                                           extension + "'");
     const std::string text = read_text(path);
     if (text.empty()) fail(path, "the file is empty");
     if (columns) return read_columns(path, text, blanks);
@@ -658,22 +662,25 @@ std::vector<Remedy> remedies(const ImageGeometry& g, PointSpace space) {
     if (space == PointSpace::Index) {
         list.push_back({"--points-order zyx would bring them inside",
                         [&g](const Vec3& p) { return g.index_to_world(reversed(g.world_to_index(p))); }});
-        list.push_back({"--points-space world would bring them inside",
-                        [&g](const Vec3& p) { return g.world_to_index(p); }});
+        list.push_back(
+            {"--points-space world would bring them inside", [&g](const Vec3& p) { return g.world_to_index(p); }});
         list.push_back({"--points-space world --points-order zyx would bring them inside",
                         [&g](const Vec3& p) { return reversed(g.world_to_index(p)); }});
     } else {
         list.push_back({"--points-order zyx would bring them inside", reversed});
-        list.push_back({"--points-space index would bring them inside",
-                        [&g](const Vec3& p) { return g.index_to_world(p); }});
+        list.push_back(
+            {"--points-space index would bring them inside", [&g](const Vec3& p) { return g.index_to_world(p); }});
         list.push_back({"--points-space index --points-order zyx would bring them inside",
                         [&g](const Vec3& p) { return g.index_to_world(reversed(p)); }});
-        list.push_back({"they fit with x and y negated: they are in RAS, the image is in LPS",
-                        [](const Vec3& p) { return Vec3{-p[0], -p[1], p[2]}; }});
+        list.push_back({"they fit with x and y negated: they are in RAS, the image is in LPS", [](const Vec3& p) {
+                            return Vec3{-p[0], -p[1], p[2]};
+                        }});
         for (const double factor : {1e3, 1e-3})
             list.push_back({std::string("they fit when multiplied by ") + (factor > 1 ? "1000" : "0.001") +
                                 ": their unit is another than the image's",
-                            [factor](const Vec3& p) { return Vec3{factor * p[0], factor * p[1], factor * p[2]}; }});
+                            [factor](const Vec3& p) {
+                                return Vec3{factor * p[0], factor * p[1], factor * p[2]};
+                            }});
     }
     return list;
 }
@@ -850,9 +857,8 @@ std::vector<Vec3> merge_close_points(const std::vector<Vec3>& points, double cel
         if (cell > 0)
             for (double& x : items[n].key) x = std::floor(x / cell);
     }
-    tbb::parallel_sort(items.begin(), items.end(), [](const Item& a, const Item& b) {
-        return a.key != b.key ? a.key < b.key : a.index < b.index;
-    });
+    tbb::parallel_sort(items.begin(), items.end(),
+                       [](const Item& a, const Item& b) { return a.key != b.key ? a.key < b.key : a.index < b.index; });
     std::vector<std::uint8_t> keep(points.size(), 0);
     const double least = 0.25 * cell * cell;
     std::vector<std::size_t> kept;  // in the cell at hand; few, for they are at least cell/2 apart
@@ -905,8 +911,9 @@ void write_points(const std::string& path, const std::vector<Vec3>& points, cons
         text = comment_lines(comment, "# ") + (csv ? "x,y,z\n" : "");
         for (const Vec3& p : points) append_row(text, p, csv ? ',' : ' ');
     } else {
-        throw Error(Errc::InvalidOptions, "write_points: " + path +
-                                              ": expected a name ending in .xyz, .csv or .ply, got '" + extension + "'");
+        throw Error(
+            Errc::InvalidOptions,
+            "write_points: " + path + ": expected a name ending in .xyz, .csv or .ply, got '" + extension + "'");
     }
     detail::write_atomically(path, [&](const std::string& temporary) {
         std::ofstream file(temporary, std::ios::binary);

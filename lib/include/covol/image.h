@@ -70,7 +70,8 @@ private:
 /// Reads a multi-page TIFF (ImageJ and OME spacing understood), NRRD, NIfTI or MetaImage.
 /// @throws Error Io (cannot be opened or read), InvalidInput (not 3D, empty, NaN or infinite values),
 ///               Unsupported (colour or vector pixels, an unknown format).
-[[nodiscard]] Image read_image(const std::string& path, const ReadImageOptions& options = {}, const RunContext& run = {});
+[[nodiscard]] Image read_image(const std::string& path, const ReadImageOptions& options = {},
+                               const RunContext& run = {});
 
 /// Only what the header says. @throws as read_image.
 [[nodiscard]] ImageGeometry read_image_geometry(const std::string& path, const ReadImageOptions& options = {});
