@@ -27,7 +27,7 @@ constexpr double kSignificantRatio = 1.25;   ///< peak / saddle of a core that i
 constexpr double kImportantShare = 0.1;      ///< of the most important core's volume: a core that D has to hold
 constexpr double kStructureShare = 0.25;     ///< of the cloud's area: less is pockets of a cloud without an inside
 constexpr std::int64_t kCoarseVoxels = 200'000;    ///< on the first grid
-constexpr std::int64_t kMaxTubeVoxels = 2'500'000; ///< on the last grid
+constexpr std::int64_t kMaxTubeVoxels = 1'500'000; ///< on the last grid
 constexpr double kBucketsPerVoxel = 16;
 
 /// An enclosed core, at the moment when it merges with the exterior. Lengths in voxels of the analysis grid.
@@ -318,7 +318,6 @@ TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Dom
         if (tube.grid->tree().leafCount() == 0) break;
         const Analysis analysis = Sweep(*tube.grid, radius, exterior_seeds).run();
         const Verdict verdict = judge(analysis);
-        if (std::getenv("COVOL_TRACE")) std::fprintf(stderr, "a %.3f h radius %.2f h voxels %ld cores %zu saddle %.3f h peak %.3f h n %d\n", a/h, radius/h, long(analysis.tube_voxels), analysis.cores.size(), verdict.saddle*a/h, verdict.peak*a/h, verdict.cores);
         if (verdict.cores > 0) {
             choice.tag_distance = std::max(1.05 * verdict.saddle * a + 0.5 * a, 1.5 * h);
             reason.str({});
@@ -327,7 +326,8 @@ TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Dom
         }
         const double finer = std::max(h, 0.5 * a);
         const bool is_resolved = verdict.cores > 0 && verdict.saddle >= 2.5;
-        if (is_resolved || !(finer < a) || 4 * analysis.tube_voxels > kMaxTubeVoxels * 2) break;
+        const double next_voxels = double(analysis.tube_voxels) * (a / finer) * (a / finer);
+        if (is_resolved || !(finer < a) || next_voxels > double(kMaxTubeVoxels)) break;
         a = finer;
         radius = std::max(1.3 * choice.tag_distance, 4 * a);
     }

@@ -5,14 +5,19 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <optional>
+#include <string>
+
+#include "covol/band.h"
+#include "covol/error.h"
 
 namespace covol::detail {
 namespace {
 
 /// Where the interface lies, seen from a voxel beside it.
 struct Foot {
-    Vec3 point;                 // index space
+    Vec3 point;                   // index space
     std::array<float, 3> normal;  // towards phi > 0
 };
 
@@ -125,38 +130,61 @@ LeafArray<float> signed_distance(const LeafBand& band, const LeafArray<float>& p
     return result;
 }
 
-FloatGridPtr make_band(const LeafBand& band, const LeafColumns& columns, const LeafArray<float>& values,
+FloatGridPtr make_band(const LeafBand& band, const LeafColumns& columns, const LeafArray<float>& u,
                        const std::vector<LeafMask>& active, const std::vector<bool>& interior, const Domain& domain,
                        float width) {
     using Leaf = FloatGrid::TreeType::LeafNodeType;
     const auto h = float(domain.voxel_size);
     const float outside = width * h;
+    const VoxelBox limit = box_of(domain);
     FloatGridPtr grid = make_grid(domain, outside, "band");
     for (std::size_t n = 0; n < columns.pieces().size(); ++n) {
         if (!interior[n]) continue;
         const VoxelBox box = columns.voxels(columns.pieces()[n]);
-        grid->tree().sparseFill(openvdb::CoordBBox(box.min, box.max), -outside, false);
+        grid->tree().sparseFill({Coord::maxComponent(box.min, limit.min), Coord::minComponent(box.max, limit.max)},
+                                -outside, false);
     }
     std::vector<std::unique_ptr<Leaf>> leaves(band.size());
+    std::vector<char> is_interior(band.size(), 0);
     tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t n) {
-        const float* u = values.leaf(n);
-        const bool is_uniform = std::all_of(u, u + kLeafSize, [&](float v) { return (v < 0) == (u[0] < 0); });
-        if (!any_on(active[n]) && is_uniform && u[0] >= 0) return;
+        const float* from = u.leaf(n);
+        if (!any_on(active[n])) {
+            const auto is_inside = [](float v) { return v < 0; };
+            if (std::none_of(from, from + kLeafSize, is_inside)) return;
+            is_interior[n] = std::all_of(from, from + kLeafSize, is_inside);
+            if (is_interior[n]) return;
+        }
         leaves[n] = std::make_unique<Leaf>(band.origin(n), outside, false);
-        if (!any_on(active[n]) && is_uniform) return leaves[n]->fill(-outside);
-        std::transform(u, u + kLeafSize, leaves[n]->buffer().data(), [h](float v) { return h * v; });
+        std::transform(from, from + kLeafSize, leaves[n]->buffer().data(),
+                       [&](float v) { return std::clamp(h * v, -outside, outside); });
         auto mask = leaves[n]->valueMask();
         for (int word = 0; word < 8; ++word) mask.getWord<std::uint64_t>(word) = active[n][word];
         leaves[n]->setValueMask(mask);
     });
-    for (auto& leaf : leaves) {
-        if (!leaf) continue;
-        if (leaf->isEmpty() && leaf->getFirstValue() == -outside && leaf->getLastValue() == -outside)
-            grid->tree().addTile(1, leaf->origin(), -outside, false);
-        else
-            grid->tree().addLeaf(leaf.release());
+    for (std::size_t n = 0; n < band.size(); ++n) {
+        if (leaves[n]) grid->tree().addLeaf(leaves[n].release());
+        if (is_interior[n]) grid->tree().addTile(1, band.origin(n), -outside, false);
     }
     return grid;
+}
+
+FloatGridPtr make_start(const LeafBand& band, LeafArray<float>& u, const Domain& domain, const char* where) {
+    constexpr auto kWidth = float(kHalfWidthVoxels);
+    const VoxelBox box = box_of(domain);
+    std::vector<LeafMask> active(band.size(), LeafMask{}), inside(band.size(), LeafMask{});
+    tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
+        const LeafMask in_domain = mask_in_box(band.origin(leaf), box);
+        for (int at = 0; at < kLeafSize; ++at) {
+            float& v = u.leaf(leaf)[at];
+            v = is_on(in_domain, at) ? std::clamp(v, -kWidth, kWidth) : kWidth;
+            if (std::abs(v) < kWidth) set_on(active[leaf], at);
+            if (v < 0) set_on(inside[leaf], at);
+        }
+    });
+    if (std::none_of(active.begin(), active.end(), any_on))
+        throw Error(Errc::InvalidInput, std::string(where) + ": no surface lies in the domain");
+    const LeafColumns columns(band, box, LeafColumns::Extent::Domain);
+    return make_band(band, columns, u, active, inside_runs(columns, inside), domain, kWidth);
 }
 
 }  // namespace covol::detail
