@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <sstream>
 
 #include "covol/error.h"
@@ -112,8 +113,8 @@ void test_for_leaks(const Tube& tube, const Tagging& at_d, double tag_distance, 
     const auto opens_up = [&](double larger) {
         const Tagging there = tag(tube, float(larger), seeds);
         // As if it were one ball: the core's radius, and its volume without the wall of thickness D.
-        const double core_radius = std::cbrt(double(newly_enclosed(tube, at_d, there)) * 3.0 / (4.0 * M_PI)) * h;
-        const double grown = 4.0 / 3.0 * M_PI * std::pow((core_radius + larger) / h, 3);
+        const double core_radius = std::cbrt(double(newly_enclosed(tube, at_d, there)) * 3.0 / (4.0 * std::numbers::pi)) * h;
+        const double grown = 4.0 / 3.0 * std::numbers::pi * std::pow((core_radius + larger) / h, 3);
         return core_radius > kSignificantRadius * larger && grown > kSignificantShare * double(there.enclosed);
     };
     if (at_d.core > 0) {

@@ -23,11 +23,13 @@ namespace {
 using detail::Coord;
 using detail::kLeafSize;
 
-constexpr double kSignificantRatio = 1.25;   ///< peak / saddle of a core that is a structure, not a gap in one
+constexpr double kClearRatio = 2.0;          ///< peak / saddle of a core that is a structure, not a pocket in a wall
+constexpr double kSignificantRatio = 1.25;   ///< the same for a core that takes a large share of the cloud
+constexpr double kLargeShare = 0.1;          ///< of the cloud's area
 constexpr double kImportantShare = 0.1;      ///< of the most important core's volume: a core that D has to hold
 constexpr double kStructureShare = 0.25;     ///< of the cloud's area: less is pockets of a cloud without an inside
-constexpr std::int64_t kCoarseVoxels = 200'000;    ///< on the first grid
-constexpr std::int64_t kMaxTubeVoxels = 1'500'000; ///< on the last grid
+constexpr std::int64_t kCoarseVoxels = 200'000;      ///< on the first grid
+constexpr std::int64_t kMaxTubeVoxels = 1'500'000;  ///< on the last grid
 constexpr double kBucketsPerVoxel = 16;
 
 /// An enclosed core, at the moment when it merges with the exterior. Lengths in voxels of the analysis grid.
@@ -277,9 +279,15 @@ struct Verdict {
 
 Verdict judge(const Analysis& analysis) {
     Verdict verdict;
-    const auto is_significant = [](const Core& c) {
+    const auto cloud_area = [&](double saddle) {
+        const double thickness = std::max(saddle, 1.0);
+        return analysis.cloud_volume(thickness) / (2 * thickness);
+    };
+    const auto is_significant = [&](const Core& c) {
         // Below half a voxel the grid itself closes the gap.
-        return c.peak >= kSignificantRatio * std::max(c.saddle, 0.5) && c.peak >= 1.0;
+        const double ratio = c.peak / std::max(c.saddle, 0.5);
+        return c.peak >= 1.0 && (ratio >= kClearRatio ||
+                                 (ratio >= kSignificantRatio && c.full_area() >= kLargeShare * cloud_area(c.saddle)));
     };
     const Core* primary = nullptr;
     for (const Core& c : analysis.cores)
@@ -293,9 +301,7 @@ Verdict judge(const Analysis& analysis) {
         ++verdict.cores;
     }
     verdict.peak = primary->peak;
-    const double thickness = std::max(verdict.saddle, 1.0);
-    if (area < kStructureShare * analysis.cloud_volume(thickness) / (2 * thickness)) return {};
-    return verdict;
+    return area < kStructureShare * cloud_area(verdict.saddle) ? Verdict{} : verdict;
 }
 
 }  // namespace
