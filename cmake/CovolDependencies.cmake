@@ -6,6 +6,7 @@ find_package(Eigen3 CONFIG REQUIRED)
 find_package(ITK 5.2 CONFIG REQUIRED COMPONENTS
   ITKCommon ITKIOImageBase ITKIONRRD ITKIONIFTI ITKIOMeta)
 find_package(TIFF REQUIRED)
+find_package(ZLIB REQUIRED)
 find_package(PNG REQUIRED)
 find_package(nlohmann_json CONFIG REQUIRED)
 if(COVOL_BUILD_TOOLS)

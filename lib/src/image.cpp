@@ -11,11 +11,13 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
+#include <limits>
+#include <optional>
 #include <vector>
 
 #include "covol/error.h"
@@ -167,16 +169,23 @@ itk::IOComponentEnum component_type(PixelType type) {
 /// The lines of a NRRD's or MetaImage's text header, lower case, for what ITK keeps to itself.
 struct TextHeader {
     std::vector<std::string> lines;
+    fs::path data_file;  ///< as written, of a MetaImage
+    std::uint64_t end = 0;  ///< where the pixels begin
 
     explicit TextHeader(const std::string& path) {
         constexpr std::size_t kMost = 1000;
         std::ifstream file(path, std::ios::binary);
         std::string line;
+        std::string as_written;
         while (lines.size() < kMost && std::getline(file, line) && !line.empty() && line != "\r") {
+            as_written = line;
             std::transform(line.begin(), line.end(), line.begin(), [](unsigned char c) { return std::tolower(c); });
             lines.push_back(line);
             if (line.rfind("elementdatafile", 0) == 0) break;
         }
+        const std::string name = value("elementdatafile");
+        if (!name.empty()) data_file = as_written.substr(lines.back().rfind(name), name.size());
+        if (file) end = static_cast<std::uint64_t>(file.tellg());
     }
     /// What follows "key", one of ":", ":=" or "=", and blanks; empty when there is no such line.
     [[nodiscard]] std::string value(const std::string& key) const {
@@ -185,7 +194,8 @@ struct TextHeader {
             const std::size_t separator = line.find_first_not_of(' ', key.size());
             if (separator == std::string::npos || (line[separator] != ':' && line[separator] != '=')) continue;
             const std::size_t begin = line.find_first_not_of(":= ", separator);
-            return begin == std::string::npos ? "" : line.substr(begin);
+            const std::size_t last = line.find_last_not_of(" \r");
+            return begin == std::string::npos ? "" : line.substr(begin, last + 1 - begin);
         }
         return {};
     }
@@ -209,11 +219,85 @@ void read_text_header(const TextHeader& header, ImageGeometry& geometry) {
         geometry.spacing_known = geometry.spacing_known || !header.value(key).empty();
 }
 
+template <typename T>
+T load(const char* data, bool swap) {
+    T value;
+    std::memcpy(&value, data, sizeof(T));
+    if (swap) detail::swap_bytes(&value, 1, sizeof(T));
+    return value;
+}
+
+/// What follows from the first 348 bytes of a NIfTI-1 file; empty when they are not that.
+std::optional<detail::PixelPlace> nifti_pixels(const std::string& path) {
+    constexpr std::int32_t kHeaderBytes = 348;
+    detail::PixelPlace place;
+    place.path = path;
+    place.packed = detail::extension(path) == ".nii.gz";
+    std::array<char, kHeaderBytes> header{};
+    if (!detail::read_bytes(place, header.size(), header.data())) return std::nullopt;
+    place.swap = load<std::int32_t>(header.data(), false) != kHeaderBytes;
+    if (load<std::int32_t>(header.data(), place.swap) != kHeaderBytes) return std::nullopt;
+    if (std::memcmp(header.data() + 344, "n+1", 4) != 0) return std::nullopt;
+    switch (load<std::int16_t>(header.data() + 70, place.swap)) {
+        case 2: place.type = PixelType::UInt8; break;
+        case 4: place.type = PixelType::Int16; break;
+        case 8: place.type = PixelType::Int32; break;
+        case 16: place.type = PixelType::Float; break;
+        case 64: place.type = PixelType::Double; break;
+        case 256: place.type = PixelType::Int8; break;
+        case 512: place.type = PixelType::UInt16; break;
+        case 768: place.type = PixelType::UInt32; break;
+        default: return std::nullopt;
+    }
+    const float offset = load<float>(header.data() + 108, place.swap);
+    if (!(offset >= 0 && offset < 1e9F)) return std::nullopt;
+    place.skip = std::max<std::uint64_t>(kHeaderBytes + 4, static_cast<std::uint64_t>(offset));
+    const float slope = load<float>(header.data() + 112, place.swap);
+    const float intercept = load<float>(header.data() + 116, place.swap);
+    if (std::isfinite(slope) && std::isfinite(intercept) && slope != 0) {
+        place.slope = slope;
+        place.intercept = intercept;
+    }
+    return place;
+}
+
+/// Empty for the rare kinds that are left to ITK: ascii pixels, one file for each slice, a header to skip.
+std::optional<detail::PixelPlace> meta_pixels(const std::string& path, const TextHeader& header, PixelType type) {
+    const std::string file = header.value("elementdatafile");
+    if (header.value("binarydata").rfind("false", 0) == 0 || !header.value("headersize").empty()) return std::nullopt;
+    if (file.rfind("list", 0) == 0 || file.find('%') != std::string::npos) return std::nullopt;
+    detail::PixelPlace place;
+    place.path = path;
+    place.file_offset = header.end;
+    if (header.detached()) {
+        if (!header.data_file.has_filename()) return std::nullopt;
+        place.path = (fs::path(path).parent_path() / header.data_file).string();
+        place.file_offset = 0;
+    }
+    place.packed = header.value("compresseddata").rfind("true", 0) == 0;
+    const bool big = header.value("binarydatabyteordermsb").rfind("true", 0) == 0 ||
+                     header.value("elementbyteordermsb").rfind("true", 0) == 0;
+    place.swap = big == (std::endian::native == std::endian::little) && detail::pixel_bytes(type) > 1;
+    place.type = type;
+    return place;
+}
+
+/// MetaIO says on std::cerr what a header lacks; such headers do not get that far.
+void require_meta_header(const TextHeader& header, const std::string& unusable) {
+    for (const char* key : {"ndims", "dimsize", "elementtype", "elementdatafile"})
+        if (header.value(key).empty()) throw Error(Errc::InvalidInput, unusable + " (no " + key + " in its header)");
+}
+
 RawImage read_itk(const std::string& path, const ReadImageOptions& options, bool header_only) {
     const std::string extension = detail::extension(path);
     const itk::ImageIOBase::Pointer io = make_io(extension);
     io->SetFileName(path);
     const std::string unusable = "read_image: " + path + ": damaged, truncated, or not a " + extension + " file";
+    const bool is_nifti = extension.rfind(".nii", 0) == 0;
+    const bool is_meta = extension.rfind(".mh", 0) == 0;
+    std::optional<TextHeader> header;
+    if (!is_nifti) header.emplace(path);
+    if (is_meta) require_meta_header(*header, unusable);
     with_itk(Errc::InvalidInput, unusable, [&] {
         if (!io->CanReadFile(path.c_str())) throw Error(Errc::InvalidInput, unusable);
         io->ReadImageInformation();
@@ -247,14 +331,10 @@ RawImage read_itk(const std::string& path, const ReadImageOptions& options, bool
         const std::vector<double> axis = io->GetDirection(a);
         for (unsigned b = 0; b < 3; ++b) geometry.direction[b][a] = b < axis.size() ? axis[b] : 0;
     }
-    bool detached = false;
-    if (extension.rfind(".nii", 0) == 0) {
-        geometry.unit = "mm";  // ITK converts to millimetres
-    } else {
-        const TextHeader header(path);
-        detached = header.detached();
-        read_text_header(header, geometry);
-    }
+    if (header)
+        read_text_header(*header, geometry);
+    else
+        geometry.unit = "mm";  // ITK converts NIfTI to millimetres
     if (header_only) return image;
 
     const std::uint64_t voxels = size[0] * size[1] * size[2];
@@ -262,11 +342,21 @@ RawImage read_itk(const std::string& path, const ReadImageOptions& options, bool
         throw Error(Errc::InvalidInput, "read_image: " + path + ": the header claims " +
                                             detail::size_text(geometry.size) + " voxels");
     const std::shared_ptr<void> data =
-        detail::allocate_pixels(path, voxels * frames, image.type, detached ? 0 : fs::file_size(path));
-    itk::ImageIORegion region(dimensions);
-    for (unsigned a = 0; a < dimensions; ++a) region.SetSize(a, io->GetDimensions(a));
-    io->SetIORegion(region);
-    with_itk(Errc::InvalidInput, unusable, [&] { io->Read(data.get()); });
+        detail::allocate_pixels(path, voxels * frames, image.type, header && header->detached() ? 0 : fs::file_size(path));
+    std::optional<detail::PixelPlace> place;
+    if (is_nifti) place = nifti_pixels(path);
+    if (is_meta) place = meta_pixels(path, *header, image.type);
+    if (place) {
+        if (!detail::read_pixels(*place, voxels * frames, image.type, data.get()))
+            throw Error(Errc::InvalidInput, unusable);
+    } else if (is_nifti) {
+        throw Error(Errc::Unsupported, "read_image: " + path + ": expected a NIfTI-1 file in one piece with grey values");
+    } else {
+        itk::ImageIORegion region(dimensions);
+        for (unsigned a = 0; a < dimensions; ++a) region.SetSize(a, io->GetDimensions(a));
+        io->SetIORegion(region);
+        with_itk(Errc::InvalidInput, unusable, [&] { io->Read(data.get()); });
+    }
     image.data = std::shared_ptr<void>(
         data, static_cast<char*>(data.get()) + frame * voxels * detail::pixel_bytes(image.type));
     return image;

@@ -145,11 +145,12 @@ void smooth_step(TriangleMesh& mesh, double weight) {
             mesh.vertices[v][c] += float(weight * (sums[v][c] / sums[v][3] - mesh.vertices[v][c]));
 }
 
-/// Taubin 1995: a shrinking and an inflating step in turn, so that the volume stays.
+/// Taubin 1995: a shrinking and an inflating step in turn. Weights of nearly the same size keep the gain at low
+/// frequencies, and with it the growth of the volume, below 1e-4 an iteration.
 void smooth(TriangleMesh& mesh, int iterations, const RunContext& run) {
     for (int i = 0; i < iterations; ++i) {
         smooth_step(mesh, 0.5);
-        smooth_step(mesh, -0.53);
+        smooth_step(mesh, -0.51);
         run.check();
     }
 }

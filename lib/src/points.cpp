@@ -86,9 +86,15 @@ public:
     }
     /// The next line, blanks at both ends removed; false at the end of the text.
     bool next(string_view& line) {
+        if (!next_untrimmed(line)) return false;
+        line = trim(line);
+        return true;
+    }
+    /// With its blanks: a leading tab is an empty first column.
+    bool next_untrimmed(string_view& line) {
         if (rest_.empty()) return false;
         const std::size_t end = std::min(rest_.find(end_), rest_.size());
-        line = trim(rest_.substr(0, end));
+        line = rest_.substr(0, end);
         rest_.remove_prefix(std::min(end + 1, rest_.size()));
         ++number_;
         return true;
@@ -237,12 +243,14 @@ Table read_columns(const std::string& path, const std::string& text, bool blanks
     char delimiter = 0;
     Columns columns;
     std::size_t needed = 0;
-    while (lines.next(line)) {
-        if (line.empty() || line.front() == '#' || line.substr(0, 2) == "//") continue;
-        if (const std::size_t comment = line.find('#'); comment != string_view::npos) line = trim(line.substr(0, comment));
+    while (lines.next_untrimmed(line)) {
+        line = line.substr(0, line.find('#'));
+        const string_view trimmed = trim(line);
+        if (trimmed.empty() || trimmed.substr(0, 2) == "//") continue;
         const bool first = delimiter == 0;
-        if (first) delimiter = guess_delimiter(line, blanks_only);
-        split(line, delimiter, fields);
+        if (first) delimiter = guess_delimiter(trimmed, blanks_only);
+        split(delimiter == '\t' ? line : trimmed, delimiter, fields);
+        line = trimmed;
         if (first) {
             std::optional<Columns> found;
             const bool has_number =

@@ -5,7 +5,7 @@
 #include <openvdb/io/GridDescriptor.h>
 #include <openvdb/openvdb.h>
 
-#include <cmath>
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <set>
@@ -44,7 +44,8 @@ std::map<std::string, std::string> to_text(const vdb::MetaMap& metadata) {
 }
 
 /// Reads single grids out of a .vdb file. openvdb::io::File would do, were it not that it goes on reading behind the
-/// end of a damaged file; here the stream throws as soon as that happens.
+/// end of a damaged file, and makes a string of any length that such a file asks for. Here the stream throws at the
+/// file's end, and lengths are walked over before OpenVDB sees them.
 class Reader : public vdb::io::Archive {
 public:
     explicit Reader(const std::string& path) : stream_(path, std::ios::binary) {
@@ -56,11 +57,16 @@ public:
         setFormatVersion(stream_);
         setLibraryVersion(stream_);
         setDataCompression(stream_);
-        metadata_.readMeta(stream_);
+        look_ahead([&] { skip_metadata(); });
+        vdb::MetaMap file_metadata;
+        file_metadata.readMeta(stream_);
         if (!inputHasGridOffsets())
             OPENVDB_THROW(vdb::IoError, "written to a stream, without grid offsets");
         const std::int32_t count = readGridCount(stream_);
         for (std::int32_t n = 0; n < count; ++n) {
+            look_ahead([&] {
+                for (const char* text : {"name", "type", "parent"}) skip_text(text);
+            });
             Entry entry;
             entry.empty_grid = entry.descriptor.read(stream_);
             const std::int64_t end = entry.descriptor.getEndPos();
@@ -80,11 +86,12 @@ public:
     [[nodiscard]] std::size_t size() const { return entries_.size(); }
     [[nodiscard]] std::string name(std::size_t n) const { return entries_[n].descriptor.gridName(); }
     [[nodiscard]] std::string type(std::size_t n) const { return entries_[n].descriptor.gridType(); }
+    [[nodiscard]] bool is_half(std::size_t n) const { return entries_[n].descriptor.saveFloatAsHalf(); }
 
     /// Metadata and transform; the tree stays empty.
     vdb::GridBase::Ptr read_metadata(std::size_t n) {
-        Entry& entry = entries_[n];
-        entry.descriptor.seekToGrid(stream_);
+        const Entry& entry = entries_[n];
+        seek_to_grid(entry);
         readGridCompression(stream_);
         entry.empty_grid->readMeta(stream_);
         entry.empty_grid->readTransform(stream_);
@@ -93,7 +100,7 @@ public:
 
     vdb::GridBase::Ptr read_whole(std::size_t n) {
         const Entry& entry = entries_[n];
-        entry.descriptor.seekToGrid(stream_);
+        seek_to_grid(entry);
         const vdb::GridBase::Ptr grid = entry.empty_grid->copyGridWithNewTree();
         readGrid(grid, entry.descriptor, stream_);
         if (entry.descriptor.isInstance()) {
@@ -113,10 +120,45 @@ private:
         vdb::io::GridDescriptor descriptor;
         vdb::GridBase::Ptr empty_grid;
     };
+
+    void seek_to_grid(const Entry& entry) {
+        const std::int64_t at = entry.descriptor.getGridPos();
+        if (at < 0 || at > file_bytes_) OPENVDB_THROW(vdb::IoError, "truncated");
+        stream_.seekg(at);
+        if (fileVersion() < vdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION) return;
+        look_ahead([&] {
+            stream_.seekg(sizeof(std::uint32_t), std::ios::cur);  // compression flags
+            skip_metadata();
+            skip_text("transform");
+        });
+    }
+
+    template <typename Walk>
+    void look_ahead(Walk&& walk) {
+        const auto here = stream_.tellg();
+        walk();
+        stream_.seekg(here);
+    }
+    std::uint32_t read_length() {
+        std::uint32_t length = 0;
+        stream_.read(reinterpret_cast<char*>(&length), sizeof(length));
+        return length;
+    }
+    void skip_text(const char* what) {
+        const std::uint32_t length = read_length();
+        if (length > file_bytes_ - stream_.tellg())
+            OPENVDB_THROW(vdb::IoError, "a " << what << " of " << length << " bytes does not fit into the file");
+        stream_.seekg(length, std::ios::cur);
+    }
+    void skip_metadata() {
+        const std::uint32_t count = read_length();
+        for (std::uint32_t n = 0; n < count; ++n)
+            for (const char* part : {"metadata name", "metadata type", "metadata value"}) skip_text(part);
+    }
+
     vdb::io::StreamMetadata::Ptr tags_ = std::make_shared<vdb::io::StreamMetadata>();
     std::ifstream stream_;
     std::int64_t file_bytes_ = 0;
-    vdb::MetaMap metadata_;
     std::vector<Entry> entries_;
 };
 
@@ -132,9 +174,7 @@ std::string unusable(const std::string& where, const std::string& path) {
     return where + ": " + path + ": damaged, truncated, or not a .vdb file";
 }
 
-bool is_float(const std::string& type) {
-    return type == FloatGrid::gridType() || type == FloatGrid::gridType() + "_HalfFloat";
-}
+bool is_float(const std::string& type) { return type == FloatGrid::gridType(); }
 
 /// "u (Tree_float_5_4_3), Cd (Tree_vec3s_5_4_3)"
 std::string list_grids(const Reader& reader) {
@@ -172,7 +212,7 @@ VdbGridInfo describe(Reader& reader, std::size_t n) {
         grid->addStatsMetadata();
     }
     info.name = reader.name(n);
-    info.type = reader.type(n);
+    info.type = reader.type(n) + (reader.is_half(n) ? "_HalfFloat" : "");
     info.grid_class = vdb::GridBase::gridClassToString(grid->getGridClass());
     info.voxel_size = grid->voxelSize()[0];
     info.uniform = grid->hasUniformVoxels();

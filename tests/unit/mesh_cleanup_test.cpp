@@ -1,1 +1,172 @@
+#include "covol/mesh_cleanup.h"
+
 #include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+
+#include "covol/error.h"
+
+using namespace covol;
+
+namespace {
+
+const double kPi = std::acos(-1.0);
+
+/// A sphere of n rings of 2 n quads, closed at the poles.
+TriangleMesh sphere(int n, float radius, float x0 = 0) {
+    TriangleMesh mesh;
+    mesh.vertices.push_back({x0, 0, radius});
+    const int m = 2 * n;
+    for (int i = 1; i < n; ++i)
+        for (int j = 0; j < m; ++j) {
+            const double a = kPi * i / n, b = 2 * kPi * j / m;
+            mesh.vertices.push_back({x0 + radius * float(std::sin(a) * std::cos(b)), radius * float(std::sin(a) * std::sin(b)),
+                                     radius * float(std::cos(a))});
+        }
+    mesh.vertices.push_back({x0, 0, -radius});
+    const auto at = [&](int i, int j) {
+        return i == 0 ? 0U : i == n ? std::uint32_t(mesh.vertices.size() - 1) : std::uint32_t(1 + (i - 1) * m + j % m);
+    };
+    for (int i = 0; i < n; ++i)
+        for (int j = 0; j < m; ++j) {
+            if (i + 1 < n) mesh.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
+            if (i > 0) mesh.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
+        }
+    return mesh;
+}
+
+TriangleMesh joined(TriangleMesh a, const TriangleMesh& b) {
+    const auto shift = std::uint32_t(a.vertices.size());
+    a.vertices.insert(a.vertices.end(), b.vertices.begin(), b.vertices.end());
+    for (const auto& t : b.triangles) a.triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
+    return a;
+}
+
+TriangleMesh two_triangles(std::array<float, 3> d, std::array<float, 3> e, std::array<float, 3> f) {
+    TriangleMesh mesh;
+    mesh.vertices = {{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, d, e, f};
+    mesh.triangles = {{0, 1, 2}, {3, 4, 5}};
+    return mesh;
+}
+
+void check_proper(const TriangleMesh& mesh, const CleanupReport& report) {
+    CHECK(report.closed);
+    CHECK(report.manifold);
+    CHECK(report.intersection_free);
+    CHECK(measure(mesh).closed);
+    CHECK(measure(mesh).volume > 0);
+}
+
+}  // namespace
+
+TEST_CASE("self-intersections are counted in pairs, contact in shared corners and sides is none") {
+    CHECK(count_self_intersections(sphere(8, 1)) == 0);
+    CHECK(count_self_intersections(two_triangles({0.5F, 0.5F, -1}, {0.5F, 0.6F, 1}, {0.6F, 0.5F, 1})) == 1);
+    CHECK(count_self_intersections(two_triangles({0.5F, 0.5F, 1}, {0.5F, 0.6F, 2}, {0.6F, 0.5F, 2})) == 0);
+    TriangleMesh corner = two_triangles({0, 0, 0}, {1, 1, 1}, {1, 1, -1});  // goes through the first from its corner 0
+    corner.triangles[1][0] = 0;
+    CHECK(count_self_intersections(corner) == 1);
+    corner.vertices[4] = {-1, 1, 1};
+    corner.vertices[5] = {-1, 1, -1};
+    CHECK(count_self_intersections(corner) == 0);
+    TriangleMesh side = two_triangles({0, 0, 0}, {0, 0, 0}, {1, 1, 0});  // in one plane, on the same side of edge 0-1
+    side.triangles[1] = {1, 0, 5};
+    CHECK(count_self_intersections(side) == 1);
+    side.vertices[5] = {1, -1, 0};
+    CHECK(count_self_intersections(side) == 0);
+    side.triangles[1] = {0, 1, 9};
+    CHECK_THROWS_AS(count_self_intersections(side), Error);
+}
+
+TEST_CASE("a proper mesh stays as it is") {
+    const TriangleMesh before = sphere(10, 1);
+    TriangleMesh mesh = before;
+    const CleanupReport report = clean_mesh(mesh);
+    check_proper(mesh, report);
+    CHECK(report.self_intersections == 0);
+    CHECK(report.holes_filled == 0);
+    CHECK(mesh.vertices == before.vertices);
+    CHECK(mesh.triangles == before.triangles);
+}
+
+TEST_CASE("holes are filled, and an inside-out mesh is turned") {
+    TriangleMesh mesh = sphere(10, 1);
+    mesh.triangles.erase(mesh.triangles.begin() + 70);
+    mesh.triangles.erase(mesh.triangles.begin(), mesh.triangles.begin() + 15);
+    const CleanupReport report = clean_mesh(mesh);
+    check_proper(mesh, report);
+    CHECK(report.holes_filled == 2);
+    CHECK(measure(mesh).genus == 0);
+
+    mesh = sphere(10, 1);
+    const double volume = measure(mesh).volume;
+    for (auto& t : mesh.triangles) std::swap(t[0], t[1]);
+    check_proper(mesh, clean_mesh(mesh));
+    CHECK(measure(mesh).volume == Approx(volume));
+}
+
+TEST_CASE("vertices that two surfaces share are taken apart") {
+    TriangleMesh mesh = joined(sphere(6, 1), sphere(6, 1, 2));
+    // Vertex 0 of the second sphere becomes vertex 0 of the first, moved to the middle.
+    const auto half = std::uint32_t(mesh.vertices.size() / 2);
+    mesh.vertices[0] = {1, 0, 1.5F};
+    for (auto& t : mesh.triangles)
+        for (auto& v : t) v = v == half ? 0 : v;
+    REQUIRE_FALSE(measure(mesh).manifold);
+    const CleanupReport report = clean_mesh(mesh);
+    CHECK(report.closed);
+    CHECK(report.manifold);
+}
+
+TEST_CASE("a local fold is removed") {
+    TriangleMesh mesh = sphere(16, 1);
+    // One vertex is pushed through the opposite side of its neighbourhood.
+    mesh.vertices[200] = {mesh.vertices[203][0] * 1.02F, mesh.vertices[203][1] * 1.02F, mesh.vertices[203][2] * 0.98F};
+    REQUIRE(count_self_intersections(mesh) > 0);
+    const CleanupReport report = clean_mesh(mesh);
+    CHECK(report.self_intersections > 0);
+    check_proper(mesh, report);
+    CHECK(measure(mesh).volume == Approx(4.0 / 3 * kPi).epsilon(0.05));
+}
+
+TEST_CASE("decimation reaches the edge length and keeps the volume") {
+    TriangleMesh mesh = sphere(50, 1);
+    const double volume = measure(mesh).volume;
+    CleanupOptions options;
+    options.target_edge = 0.2;
+    const CleanupReport report = clean_mesh(mesh, options);
+    check_proper(mesh, report);
+    const MeshMeasures m = measure(mesh);
+    CHECK(m.volume == Approx(volume).epsilon(0.01));
+    const double edge = std::sqrt(m.area / double(mesh.triangles.size()) * 4 / std::sqrt(3.0));
+    CHECK(edge == Approx(0.2).epsilon(0.1));
+}
+
+TEST_CASE("smoothing takes noise away and keeps the volume") {
+    TriangleMesh mesh = sphere(24, 1);
+    const double volume = measure(mesh).volume;
+    std::mt19937 random(5);
+    std::uniform_real_distribution<float> noise(-0.005F, 0.005F);
+    for (auto& v : mesh.vertices)
+        for (float& c : v) c += noise(random);
+    const auto roughness = [&] {  // root mean square distance from the sphere
+        double sum = 0;
+        for (const auto& v : mesh.vertices) sum += std::pow(std::hypot(v[0], v[1], v[2]) - 1, 2);
+        return std::sqrt(sum / double(mesh.vertices.size()));
+    };
+    const double before = roughness();
+    CleanupOptions options;
+    options.smooth_iterations = 20;
+    check_proper(mesh, clean_mesh(mesh, options));
+    CHECK(roughness() < 0.7 * before);
+    CHECK(measure(mesh).volume == Approx(volume).epsilon(0.01));
+}
+
+TEST_CASE("options out of range are refused") {
+    TriangleMesh mesh = sphere(4, 1);
+    CleanupOptions options;
+    options.target_edge = -1;
+    options.smooth_iterations = -2;
+    CHECK_THAT(options.why_invalid(), Catch::Contains("target_edge") && Catch::Contains("smooth_iterations"));
+    CHECK_THROWS_AS(clean_mesh(mesh, options), Error);
+}

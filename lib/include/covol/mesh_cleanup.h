@@ -18,7 +18,7 @@ struct CleanupReport {
 /// Makes a mesh closed, manifold, outward and free of self-intersections, in place (CGAL, OpenMesh).
 CleanupReport clean_mesh(TriangleMesh& mesh, const CleanupOptions& options = {}, const RunContext& run = {});
 
-/// Pairs of triangles that intersect without sharing a vertex or edge.
+/// Pairs of triangles that have a point in common beyond the vertices and the edge that they share.
 [[nodiscard]] int count_self_intersections(const TriangleMesh& mesh);
 
 }  // namespace covol

@@ -256,32 +256,12 @@ std::vector<Coord> candidates(const FloatGrid& u, const Domain& domain) {
     return result;
 }
 
-/// Squared distance from p to the triangle a, a + ab, a + ac (Ericson, Real-Time Collision Detection, 5.1.5), with
-/// ap = p - a. Sides may have no length.
-float squared_distance_to_triangle(const Point& ap, const Point& ab, const Point& ac) {
-    const auto from = [&](float s, float t) {
-        const Point r = {ap[0] - s * ab[0] - t * ac[0], ap[1] - s * ab[1] - t * ac[1], ap[2] - s * ab[2] - t * ac[2]};
-        return dot(r, r);
-    };
-    const auto ratio = [](float part, float rest) { return part + rest > 0 ? part / (part + rest) : 0.0F; };
-    const float d1 = dot(ab, ap), d2 = dot(ac, ap);
-    if (d1 <= 0 && d2 <= 0) return dot(ap, ap);
-    const float bb = dot(ab, ab), bc = dot(ab, ac), cc = dot(ac, ac);
-    const float d3 = d1 - bb, d4 = d2 - bc;  // from b
-    if (d3 >= 0 && d4 <= d3) return from(1, 0);
-    const float vc = d1 * d4 - d3 * d2;
-    if (vc <= 0 && d1 >= 0 && d3 <= 0) return from(ratio(d1, -d3), 0);
-    const float d5 = d1 - bc, d6 = d2 - cc;  // from c
-    if (d6 >= 0 && d5 <= d6) return from(0, 1);
-    const float vb = d5 * d2 - d1 * d6;
-    if (vb <= 0 && d2 >= 0 && d6 <= 0) return from(0, ratio(d2, -d6));
-    const float va = d3 * d6 - d5 * d4;
-    if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
-        const float w = ratio(d4 - d3, d5 - d6);
-        return from(1 - w, w);
-    }
-    const float sum = va + vb + vc;
-    return from(vb / sum, vc / sum);
+/// Squared distance from p to the segment a, a + ab, with ap = p - a. The segment may have no length.
+float squared_distance_to_segment(const Point& ap, const Point& ab) {
+    const float length = dot(ab, ab);
+    const float t = length > 0 ? std::clamp(dot(ap, ab) / length, 0.0F, 1.0F) : 0.0F;
+    const Point r = {ap[0] - t * ab[0], ap[1] - t * ab[1], ap[2] - t * ab[2]};
+    return dot(r, r);
 }
 
 }  // namespace
@@ -296,14 +276,28 @@ float InterfacePatches::squared_distance(const Coord& at, std::uint32_t index, f
     const float beside = std::max(0.0F, std::sqrt(std::max(0.0F, dot(arm, arm) - along * along)) - patch.radius);
     if (beyond * beyond + beside * beside >= bound) return bound;
 
+    // The triangle of the fan that faces p: the sector, seen along the normal, that p lies in.
     const Point* points = vertices.data() + patch.first;
-    if (patch.count == 3)
-        return std::min(bound, squared_distance_to_triangle(p - points[0], points[1] - points[0], points[2] - points[0]));
-    Point last = points[patch.count - 1] - patch.center;
+    const Point turned = cross(arm, patch.normal);
+    Point from = points[patch.count - 1] - patch.center;
+    float from_side = dot(turned, from);
     for (std::uint32_t n = 0; n < patch.count; ++n) {
-        const Point next = points[n] - patch.center;
-        bound = std::min(bound, squared_distance_to_triangle(arm, last, next));
-        last = next;
+        const Point to = points[n] - patch.center;
+        const float to_side = dot(turned, to);
+        if (from_side >= 0 && to_side <= 0) {
+            const Point normal = cross(from, to);
+            const Point edge = to - from;
+            const Point from_edge = arm - from;
+            const float area = dot(normal, normal);
+            if (area > 0 && dot(cross(edge, from_edge), normal) >= 0) {
+                const float off = dot(arm, normal);
+                bound = std::min(bound, off * off / area);
+            } else {
+                bound = std::min(bound, squared_distance_to_segment(from_edge, edge));
+            }
+        }
+        from = to;
+        from_side = to_side;
     }
     return bound;
 }

@@ -259,6 +259,8 @@ void Sweeper::visit(NearestLeaf& leaf) {
             }
     leaf.visited = true;
     leaf.wanted = 0;
+    // Neighbours may round a tie differently: only a leaf that has changed speaks up, so that this ends.
+    if (!any_on(changed)) return;
     const unsigned faces = faces_with_news(block, reach);
     for (int face = 0; face < 6; ++face) leaf.wanted |= (faces >> face & 1) << kFaceSlots[face];
     // Neighbours that exist hear of a change through the faces; only the ones to be made need the edges and corners.

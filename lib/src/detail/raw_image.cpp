@@ -1,11 +1,16 @@
 #include "detail/raw_image.h"
 
 #include <unistd.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
 #include <limits>
-#include <new>
+#include <vector>
 
 #include "covol/error.h"
 
@@ -35,7 +40,112 @@ constexpr Spelling kSpellings[] = {
     {"in", "inch"},           {"inches", "inch"},      {"\xC3\x85", "angstrom"}, {"pixel", ""},
     {"pixels", ""},           {"voxel", ""},           {"reference frame", ""}};
 
+/// An unpacked view of a gzip or zlib stream in a file.
+class Inflater {
+public:
+    explicit Inflater(std::ifstream& file) : file_(file) {
+        constexpr int kAnyHeader = 15 + 32;
+        good_ = inflateInit2(&stream_, kAnyHeader) == Z_OK;
+    }
+    ~Inflater() { inflateEnd(&stream_); }
+    Inflater(const Inflater&) = delete;
+    Inflater& operator=(const Inflater&) = delete;
+
+    /// Fills `out`; false when the stream ends before, or is damaged.
+    bool read(char* out, std::uint64_t count) {
+        while (good_ && count > 0) {
+            const std::uint64_t piece = std::min<std::uint64_t>(count, 1U << 30);
+            stream_.next_out = reinterpret_cast<Bytef*>(out);
+            stream_.avail_out = static_cast<uInt>(piece);
+            step();
+            const std::uint64_t done = piece - stream_.avail_out;
+            out += done;
+            count -= done;
+        }
+        return count == 0;
+    }
+    /// True unless the checksum behind the last byte that was read is there and wrong.
+    bool checksum_fits() {
+        char more = 0;
+        stream_.next_out = reinterpret_cast<Bytef*>(&more);
+        stream_.avail_out = 1;
+        if (good_) step();
+        return !damaged_;
+    }
+
+private:
+    void step() {
+        if (stream_.avail_in == 0) {
+            file_.read(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
+            stream_.next_in = reinterpret_cast<Bytef*>(buffer_.data());
+            stream_.avail_in = static_cast<uInt>(file_.gcount());
+            if (stream_.avail_in == 0) good_ = false;
+        }
+        const int status = good_ ? inflate(&stream_, Z_NO_FLUSH) : Z_OK;
+        // a gzip file may be several streams behind each other
+        if (status == Z_STREAM_END)
+            good_ = inflateReset(&stream_) == Z_OK;
+        else if (status != Z_OK && status != Z_BUF_ERROR) {
+            good_ = false;
+            damaged_ = true;
+        }
+    }
+
+    std::ifstream& file_;
+    std::vector<char> buffer_ = std::vector<char>(std::size_t(1) << 18);
+    z_stream stream_{};
+    bool good_ = true;
+    bool damaged_ = false;
+};
+
+/// From the stored type to the wanted one: out = slope * stored + intercept.
+void rescale(const PixelPlace& place, const void* stored, std::uint64_t count, PixelType type, void* out) {
+    with_pixel_type(place.type, [&](auto from) {
+        with_pixel_type(type, [&](auto to) {
+            const auto* source = static_cast<const decltype(from)*>(stored);
+            auto* target = static_cast<decltype(to)*>(out);
+            if constexpr (std::is_floating_point_v<decltype(to)>)
+                for (std::uint64_t n = 0; n < count; ++n)
+                    target[n] = static_cast<decltype(to)>(place.slope * double(source[n]) + place.intercept);
+        });
+    });
+}
+
 }  // namespace
+
+bool read_bytes(const PixelPlace& place, std::uint64_t count, void* out) {
+    std::ifstream file(place.path, std::ios::binary);
+    auto* bytes = static_cast<char*>(out);
+    if (!place.packed) {
+        file.seekg(static_cast<std::streamoff>(place.file_offset + place.skip));
+        return bool(file.read(bytes, static_cast<std::streamsize>(count)));
+    }
+    file.seekg(static_cast<std::streamoff>(place.file_offset));
+    Inflater inflater(file);
+    std::vector<char> before(std::min<std::uint64_t>(place.skip, 1U << 16));
+    for (std::uint64_t left = place.skip; left > 0;) {
+        const std::uint64_t piece = std::min<std::uint64_t>(left, before.size());
+        if (!inflater.read(before.data(), piece)) return false;
+        left -= piece;
+    }
+    return inflater.read(bytes, count) && inflater.checksum_fits();
+}
+
+bool read_pixels(const PixelPlace& place, std::uint64_t count, PixelType type, void* out) {
+    const std::uint64_t width = pixel_bytes(place.type);
+    const bool as_stored = place.type == type && place.slope == 1 && place.intercept == 0;
+    std::vector<char> stored(as_stored ? 0 : count * width);
+    void* target = as_stored ? out : stored.data();
+    if (!read_bytes(place, count * width, target)) return false;
+    if (place.swap) swap_bytes(target, count, width);
+    if (!as_stored) rescale(place, target, count, type, out);
+    return true;
+}
+
+void swap_bytes(void* data, std::uint64_t count, std::uint64_t width) {
+    auto* bytes = static_cast<char*>(data);
+    for (std::uint64_t n = 0; n < count; ++n) std::reverse(bytes + n * width, bytes + (n + 1) * width);
+}
 
 std::string size_text(const Index3& size) {
     return std::to_string(size[0]) + " x " + std::to_string(size[1]) + " x " + std::to_string(size[2]);

@@ -47,6 +47,28 @@ void require_3d(const std::string& path, const std::uint64_t (&size)[3]);
 std::shared_ptr<void> allocate_pixels(const std::string& path, std::uint64_t voxels, PixelType type,
                                       std::uint64_t file_bytes);
 
+/// Where a file keeps its pixels. NIfTI's and MetaImage's are read here and not by ITK, whose readers fill up what a
+/// truncated file lacks without a word; NIfTI's moreover takes a.nii's pixels for a.nii.gz where both exist.
+struct PixelPlace {
+    std::string path;
+    std::uint64_t file_offset = 0;  ///< of the pixels, or of the packed stream
+    std::uint64_t skip = 0;         ///< unpacked bytes before the pixels
+    bool packed = false;            ///< gzip or zlib
+    bool swap = false;              ///< the other byte order
+    PixelType type = PixelType::UInt8;
+    double slope = 1;  ///< pixel = slope * stored + intercept
+    double intercept = 0;
+};
+
+/// Reads `count` bytes; false when there are fewer, or the packed stream is damaged.
+bool read_bytes(const PixelPlace& place, std::uint64_t count, void* out);
+
+/// Reads `count` pixels as `type`; false as above.
+bool read_pixels(const PixelPlace& place, std::uint64_t count, PixelType type, void* out);
+
+/// Reverses the bytes of each of `count` values of `width` bytes.
+void swap_bytes(void* data, std::uint64_t count, std::uint64_t width);
+
 /// "um" for every spelling of the micrometre, "mm", ...; the text itself when it is no unit that we know.
 std::string normal_unit(const std::string& text);
 

@@ -49,6 +49,7 @@ public:
     NearestPatches(const InterfacePatches& interface, const LeafBand& band, double half_width)
         : interface_(interface),
           band_(band),
+          half_width_(static_cast<float>(half_width)),
           squared_(band.size(), static_cast<float>(half_width * half_width), 0),
           patch_(band.size(), kNoPatch, 0),
           changed_(band.size(), LeafMask{}) {}
@@ -76,29 +77,55 @@ private:
         return true;
     }
 
-    // The corners of a cell know its patches; those in the leaf belong to cells of the leaf and its lower neighbours.
+    // A voxel whose nearest point lies within a patch lies in the cylinder above and below it. Voxels beside a crease
+    // lie in none; they, and those that slack in the patches' normals puts outside, learn from their neighbours.
     void seed(std::size_t leaf) {
         const Coord origin = band_.origin(leaf);
-        for (int block = 0; block < 8; ++block) {
-            const Coord from = origin.offsetBy(-kLeafDim * (block >> 2 & 1), -kLeafDim * (block >> 1 & 1), -kLeafDim * (block & 1));
+        for (int n = 0; n < 27; ++n) {
+            const Coord from = origin.offsetBy((n / 9 - 1) * kLeafDim, (n / 3 % 3 - 1) * kLeafDim, (n % 3 - 1) * kLeafDim);
             const auto at = std::lower_bound(interface_.leaves.begin(), interface_.leaves.end(), from);
             if (at == interface_.leaves.end() || *at != from) continue;
-            const std::size_t n = static_cast<std::size_t>(at - interface_.leaves.begin());
-            for (std::uint32_t m = interface_.first[n]; m < interface_.first[n + 1]; ++m) seed_corners(leaf, m);
+            const std::size_t m = static_cast<std::size_t>(at - interface_.leaves.begin());
+            for (std::uint32_t patch = interface_.first[m]; patch < interface_.first[m + 1]; ++patch)
+                seed_cylinder(leaf, patch);
         }
     }
 
-    void seed_corners(std::size_t leaf, std::uint32_t patch) {
-        const Coord cell = interface_.patches[patch].origin - band_.origin(leaf);
-        for (int i = std::max(0, cell[0]); i <= std::min(kLeafDim - 1, cell[0] + 1); ++i)
-            for (int j = std::max(0, cell[1]); j <= std::min(kLeafDim - 1, cell[1] + 1); ++j)
-                for (int k = std::max(0, cell[2]); k <= std::min(kLeafDim - 1, cell[2] + 1); ++k)
-                    if (const int p = leaf_offset(i, j, k); try_patch(leaf, p, static_cast<std::int32_t>(patch)))
-                        set_on(changed_[leaf], p);
+    void seed_cylinder(std::size_t leaf, std::uint32_t index) {
+        const Patch& patch = interface_.patches[index];
+        const Coord cell = patch.origin - band_.origin(leaf);
+        const int reach = static_cast<int>(half_width_) + 1;
+        for (int a = 0; a < 3; ++a)
+            if (cell[a] < -reach || cell[a] >= kLeafDim - 1 + reach) return;
+        const auto& n = patch.normal;
+        const int m = std::abs(n[0]) >= std::abs(n[1]) ? (std::abs(n[0]) >= std::abs(n[2]) ? 0 : 2)
+                                                       : (std::abs(n[1]) >= std::abs(n[2]) ? 1 : 2);
+        if (n[m] == 0) return;
+        const int u = (m + 1) % 3, v = (m + 2) % 3;
+        const float radius = patch.radius + kSlack;
+        const float half = half_width_ * std::abs(n[m]) + radius * std::sqrt(std::max(0.0F, 1 - n[m] * n[m]));
+        const float slope_u = n[u] / n[m], slope_v = n[v] / n[m];
+        const float half_u = radius * std::sqrt(1 + slope_u * slope_u), half_v = radius * std::sqrt(1 + slope_v * slope_v);
+        const float center_m = patch.center[m] + float(cell[m]);
+        const auto first = [](float x) { return std::max(0, static_cast<int>(std::ceil(x))); };
+        const auto last = [](float x) { return std::min(kLeafDim - 1, static_cast<int>(std::floor(x))); };
+        Coord at;
+        for (at[m] = first(center_m - half); at[m] <= last(center_m + half); ++at[m]) {
+            const float along = float(at[m]) - center_m;
+            const float center_u = patch.center[u] + float(cell[u]) + along * slope_u;
+            const float center_v = patch.center[v] + float(cell[v]) + along * slope_v;
+            for (at[u] = first(center_u - half_u); at[u] <= last(center_u + half_u); ++at[u])
+                for (at[v] = first(center_v - half_v); at[v] <= last(center_v + half_v); ++at[v]) {
+                    const int p = leaf_offset(at[0], at[1], at[2]);
+                    if (try_patch(leaf, p, static_cast<std::int32_t>(index))) set_on(changed_[leaf], p);
+                }
+        }
     }
 
+    static constexpr float kSlack = 0.25F;  ///< voxels, by which neighbouring patches' cylinders overlap
     const InterfacePatches& interface_;
     const LeafBand& band_;
+    float half_width_;
     LeafArray<float> squared_;
     LeafArray<std::int32_t> patch_;
     std::vector<LeafMask> changed_;
@@ -164,6 +191,5 @@ FloatGridPtr redistance(const FloatGrid& u, const Domain& domain, double half_wi
     openvdb::tools::pruneLevelSet(result->tree());
     return result;
 }
-
 
 }  // namespace covol::detail

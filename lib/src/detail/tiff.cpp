@@ -321,10 +321,6 @@ bool read_tiles(const Tiff& tiff, const Page& page, std::uint64_t row_bytes, cha
     return true;
 }
 
-void swap_bytes(char* data, std::uint64_t count, std::uint64_t width) {
-    for (std::uint64_t n = 0; n < count; ++n) std::reverse(data + n * width, data + (n + 1) * width);
-}
-
 /// ImageJ writes stacks over 4 GB with a single directory, and the other slices' pixels right behind the first's.
 bool is_contiguous_imagej_stack(const Tiff& tiff, std::uint64_t page_bytes, std::uint64_t pages,
                                 std::uint64_t file_bytes) {

@@ -1,0 +1,294 @@
+#include "covol/points.h"
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <random>
+
+#include "support/scratch.h"
+
+using namespace covol;
+
+namespace {
+
+const std::vector<Vec3> kThree{{1, 2, 3}, {-4.5, 0.25, 1e-3}, {7, 8, 9}};
+
+std::vector<Vec3> random_points(std::size_t count, unsigned seed) {
+    std::mt19937 random(seed);
+    std::vector<Vec3> points(count);
+    for (Vec3& p : points)
+        for (double& x : p) x = double(random()) / 4294967296.0;
+    return points;
+}
+
+template <typename T>
+std::string bytes(T value, bool big_endian) {
+    std::string text(sizeof(T), '\0');
+    std::memcpy(text.data(), &value, sizeof(T));
+    if (big_endian) std::reverse(text.begin(), text.end());
+    return text;
+}
+
+/// Colour before the coordinates, which are z, x, y of mixed types with a list between, behind another element that
+/// holds a list.
+std::string awkward_ply(const std::string& format) {
+    const bool ascii = format == "ascii";
+    const bool big = format == "binary_big_endian";
+    std::string text = "ply\nformat " + format +
+                       " 1.0\ncomment made by hand\n"
+                       "element camera 2\nproperty list uchar int ids\nproperty float f\n"
+                       "element vertex 3\nproperty uchar red\nproperty double z\nproperty list uchar short tags\n"
+                       "property float x\nproperty double y\n"
+                       "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+    if (ascii) {
+        text += "2 10 20 0.5\n0 0.5\n";
+        for (const Vec3& p : kThree)
+            text += "255 " + std::to_string(p[2]) + " 2 7 8 " + std::to_string(p[0]) + " " + std::to_string(p[1]) + "\n";
+        return text + "3 0 1 2\n";
+    }
+    text += bytes<std::uint8_t>(2, big) + bytes<std::int32_t>(10, big) + bytes<std::int32_t>(20, big) +
+            bytes(0.5F, big) + bytes<std::uint8_t>(0, big) + bytes(0.5F, big);
+    for (const Vec3& p : kThree)
+        text += bytes<std::uint8_t>(255, big) + bytes(p[2], big) + bytes<std::uint8_t>(2, big) +
+                bytes<std::int16_t>(7, big) + bytes<std::int16_t>(8, big) + bytes(static_cast<float>(p[0]), big) +
+                bytes(p[1], big);
+    return text + bytes<std::uint8_t>(3, big) + bytes<std::int32_t>(0, big) + bytes<std::int32_t>(1, big) +
+           bytes<std::int32_t>(2, big);
+}
+
+std::string read_error(const Scratch& scratch, const std::string& name, const std::string& content) {
+    const std::string path = scratch.write(name, content);
+    return message_of([&] { (void)read_points(path); });
+}
+
+}  // namespace
+
+TEST_CASE("XYZ and CSV in the forms people save them in") {
+    const Scratch scratch;
+    const struct {
+        const char* name;
+        const char* content;
+    } files[] = {
+        {"a.xyz", "1 2 3\n-4.5 0.25 1e-3\n7 8 9\n"},
+        {"b.xyz", "# marks\n\n  1\t2  3 0 0 1\r\n-4.5 +0.25 1E-3 # seen\r\n7 8 9"},
+        {"c.xyz", "x y z\n1 2 3\n-4.5 .25 0.001\n7 8 9\n"},
+        {"d.pts", "3\n1 2 3\n-4.5 .25 0.001\n7 8 9\n"},
+        {"a.csv", "1,2,3\n-4.5,0.25,0.001\n7,8,9\n"},
+        {"b.csv", "\xEF\xBB\xBFid,Z,Y,X\n0,3,2,1\n1,0.001,0.25,-4.5\n2,9,8,7\n"},
+        {"c.csv", "\"name, short\",\"X (microns)\",\"Y (microns)\",\"Z (microns)\"\n\"a,b\",1,2,3\nb,-4.5,0.25,0.001\nc, 7 , 8 , 9\n"},
+        {"d.csv", "x;y;z\n1;2;3\n-4,5;0,25;0,001\n7;8;9\n"},
+        {"e.tsv", " \tArea\tX\tY\tZ\n\t0\t1\t2\t3\n2\t0\t-4.5\t0.25\t0.001\n3\t0\t7\t8\t9\n"},
+        {"f.csv", "1 2 3\n-4.5 0.25 0.001\n7 8 9\n"},
+        {"mac.xyz", "1 2 3\r-4.5 .25 .001\r7 8 9\r"},
+    };
+    for (const auto& file : files) {
+        INFO(file.name);
+        const PointCloud cloud = read_points(scratch.write(file.name, file.content));
+        CHECK(cloud.points == kThree);
+        CHECK(cloud.space == PointSpace::World);
+    }
+}
+
+TEST_CASE("column names that mean voxels are understood as such") {
+    const Scratch scratch;
+    const std::string napari =
+        scratch.write("napari.csv", "index,axis-0,axis-1,axis-2\n0,3,2,1\n1,0.001,0.25,-4.5\n2,9,8,7\n");
+    PointCloud cloud = read_points(napari);
+    CHECK(cloud.points == kThree);
+    CHECK(cloud.space == PointSpace::Index);
+    CHECK(cloud.rule.find("napari") != std::string::npos);
+    // what the user says wins
+    cloud = read_points(napari, {PointSpace::World, PointOrder::XYZ});
+    CHECK(cloud.space == PointSpace::World);
+    CHECK(cloud.points[0] == Vec3{3, 2, 1});
+
+    cloud = read_points(scratch.write("clicks.csv", "slice,contour,x_px,y_px\n3,0,1,2\n"));
+    CHECK(cloud.points[0] == Vec3{1, 2, 3});
+    CHECK(cloud.space == PointSpace::Index);
+}
+
+TEST_CASE("PLY in ascii and both byte orders, whatever else it holds") {
+    const Scratch scratch;
+    for (const char* format : {"ascii", "binary_little_endian", "binary_big_endian"}) {
+        INFO(format);
+        const PointCloud cloud = read_points(scratch.write("awkward.ply", awkward_ply(format)));
+        REQUIRE(cloud.points.size() == 3);
+        for (std::size_t n = 0; n < 3; ++n)
+            for (int a = 0; a < 3; ++a) CHECK(cloud.points[n][a] == Approx(kThree[n][a]));
+    }
+}
+
+TEST_CASE("OBJ and OFF give their vertices") {
+    const Scratch scratch;
+    const std::string obj = "# cube\nmtllib a.mtl\nv 1 2 3\nvn 0 0 1\nv -4.5 0.25 0.001 0.5 0.5 0.5\nvt 0 0\nv 7 8 9\nf 1 2 3\n";
+    CHECK(read_points(scratch.write("a.obj", obj)).points == kThree);
+    CHECK(read_points(scratch.write("a.off", "OFF\n# c\n3 1 0\n1 2 3\n-4.5 0.25 0.001\n\n7 8 9\n3 0 1 2\n")).points == kThree);
+    CHECK(read_points(scratch.write("b.off", "COFF 3 0 0\n1 2 3 9 9 9 9\n-4.5 0.25 0.001 1 1 1 1\n7 8 9 0 0 0 0\n")).points ==
+          kThree);
+}
+
+TEST_CASE("errors name the file, the line, what was expected and what was found") {
+    const Scratch scratch;
+    const auto says = [](const std::string& message, const std::string& part) {
+        INFO(message);
+        CHECK(message.find(part) != std::string::npos);
+        CHECK(message.find('\n') == std::string::npos);
+    };
+    says(read_error(scratch, "a.xyz", "1 2 3\n1 2\n"), "a.xyz:2: expected 3 numbers, got 2");
+    says(read_error(scratch, "a.xyz", "1 2 3\n1 2 three\n"), "a.xyz:2: expected a number, got 'three'");
+    says(read_error(scratch, "a.xyz", "1 2 3\n\n1 nan 3\n"), "a.xyz:3: expected a finite number, got 'nan'");
+    says(read_error(scratch, "a.xyz", "1 2 inf\n"), "a.xyz:1: expected a finite number");
+    says(read_error(scratch, "a.xyz", "the quick brown fox\n"), "a.xyz:1: expected columns named x, y, z");
+    says(read_error(scratch, "a.xyz", ""), "the file is empty");
+    says(read_error(scratch, "a.xyz", "# nothing\n"), "expected at least one point, got none");
+    says(read_error(scratch, "a.csv", "a,b,c\n1,2,3\n"), "a.csv:1: expected columns named x, y, z");
+    says(read_error(scratch, "a.csv", "x,y,z\n1,2\n"), "a.csv:2: expected 3 numbers, got 2");
+    says(read_error(scratch, "a.csv", "id,x,y,z\n1,2,3\n"), "a.csv:2: expected 4 columns, got 3");
+    says(read_error(scratch, "a.obj", "v 1 2\n"), "a.obj:1: expected 3 numbers, got 2");
+    says(read_error(scratch, "a.obj", "hello\n"), "expected at least one point");
+    says(read_error(scratch, "a.off", "OFF\n2 0 0\n1 2 3\n"), "got 1; the file is truncated");
+    says(read_error(scratch, "a.off", "OFF\n1e15 0 0\n1 2 3\n"), "cannot hold '1e15' vertices");
+    says(read_error(scratch, "a.ply", "plot\n"), "expected 'ply'");
+    says(read_error(scratch, "a.ply", "ply\nformat ascii 1.0\nelement vertex 99999999999\nproperty float x\n"
+                                      "property float y\nproperty float z\nend_header\n0 0 0\n"), "truncated");
+    says(read_error(scratch, "a.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+                                      "end_header\n0 0\n"), "expected a vertex property 'z'");
+    says(read_error(scratch, "a.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+                                      "property float z\nend_header\n0 0 zero\n"), "a.ply:8: expected a number");
+    says(read_error(scratch, "a.doc", "1 2 3\n"), "expected a name ending in");
+    says(message_of([&] { (void)read_points(scratch.path("none.xyz")); }), "no such file");
+    says(message_of([&] { (void)read_points(scratch.path("")); }), "expected a name");
+
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    const std::string header = "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty double x\n"
+                               "property double y\nproperty double z\nend_header\n";
+    says(read_error(scratch, "n.ply", header + bytes(1.0, false) + bytes(nan, false) + bytes(1.0, false)),
+         "vertex 0: expected finite numbers");
+}
+
+TEST_CASE("damaged point files end in an Error, never in a crash") {
+    const Scratch scratch;
+    const auto read = [](const std::string& path) { (void)read_points(path); };
+    for (const char* format : {"ascii", "binary_little_endian", "binary_big_endian"}) {
+        const std::string good = scratch.write("good.ply", awkward_ply(format));
+        fuzz(scratch, good, read);
+    }
+    fuzz(scratch, scratch.write("good.off", "OFF\n3 1 0\n1 2 3\n4 5 6\n7 8 9\n3 0 1 2\n"), read);
+    fuzz(scratch, scratch.write("good.csv", "x,y,z\n1,2,3\n4,5,6\n"), read);
+    fuzz(scratch, scratch.write("good.obj", "v 1 2 3\nv 4 5 6\n"), read);
+
+    const std::string vertices = scratch.path("vertices.ply");
+    write_points(vertices, random_points(50, 1));
+    CHECK(fuzz(scratch, vertices, read).truncated_accepted == 0);
+}
+
+TEST_CASE("points survive writing and reading, to the last bit") {
+    const Scratch scratch;
+    const std::vector<Vec3> points = random_points(200, 2);
+    for (const char* name : {"p.xyz", "p.csv", "p.ply"}) {
+        INFO(name);
+        write_points(scratch.path(name), points, "made by a test\nin two lines");
+        CHECK(read_points(scratch.path(name)).points == points);
+    }
+    CHECK(scratch.file_count() == 3);
+    CHECK_THROWS_AS(write_points(scratch.path("p.stl"), points), Error);
+}
+
+TEST_CASE("index points go through the image's geometry") {
+    ImageGeometry geometry;
+    geometry.size = {10, 10, 10};
+    geometry.spacing = {0.5, 0.5, 2};
+    geometry.origin = {100, 200, 300};
+    PointCloud cloud;
+    cloud.points = {{2, 4, 1}};
+    CHECK(to_world(cloud, nullptr)[0] == Vec3{2, 4, 1});
+    cloud.space = PointSpace::Index;
+    CHECK(to_world(cloud, &geometry)[0] == Vec3{101, 202, 302});
+    CHECK_THROWS_AS(to_world(cloud, nullptr), Error);
+}
+
+TEST_CASE("points outside the image are counted, and the option that fits is named") {
+    ImageGeometry geometry;
+    geometry.size = {100, 80, 20};
+    geometry.spacing = {0.1, 0.1, 1.0};
+    const auto advice = [&](const std::vector<Vec3>& points, PointSpace space = PointSpace::World) {
+        return message_of([&] { check_inside(points, geometry, "cloud.csv", space); });
+    };
+    // 10 x 8 x 20 in world units, half a voxel wider on each side
+    CHECK(advice({{0, 0, 0}, {9.9, 7.9, 19}, {-0.05, -0.05, -0.5}}).empty());
+    const std::string message = advice({{1, 1, 1}, {1, 1, 20.5}, {0, -60, 0}});
+    CHECK(message.find("cloud.csv: 2 of 3 points") != std::string::npos);
+    CHECK(message.find("points from (0, -60, 0) to (1, 1, 20.5)") != std::string::npos);
+    CHECK(message.find("image from (-0.05, -0.05, -0.5) to (9.95, 7.95, 19.5)") != std::string::npos);
+    CHECK(message.find("--points") == std::string::npos);
+    CHECK(advice({{15, 4, 3}}).find("--points-order zyx would") != std::string::npos);
+    CHECK(advice({{90, 70, 15}}).find("--points-space index would") != std::string::npos);
+    CHECK(advice({{15, 70, 90}}).find("--points-space index --points-order zyx would") != std::string::npos);
+    CHECK(advice({{-5, -3, 15}}).find("RAS") != std::string::npos);
+    CHECK(advice({{5000, 3000, 15000}}).find("multiplied by 0.001") != std::string::npos);
+    // read as voxels: world is 9 7 3 -> (90, 70, 3)
+    CHECK(advice({geometry.index_to_world({15, 70, 90})}, PointSpace::Index).find("--points-order zyx would") !=
+          std::string::npos);
+    geometry.spacing = {1, 1, 1};
+    geometry.spacing_known = false;
+    CHECK(advice({{500, 90, 90}, {-3000, 3, 3}}).find("--spacing sx,sy,sz") != std::string::npos);
+}
+
+TEST_CASE("close points become one, the first stays and so does the order") {
+    const std::vector<Vec3> points{{0.9, 0, 0}, {0.1, 0, 0}, {0.9, 0, 0}, {0.12, 0, 0}, {1.1, 0, 0}, {0.6, 0, 0}};
+    CHECK(merge_close_points(points, 0) == std::vector<Vec3>{{0.9, 0, 0}, {0.1, 0, 0}, {0.12, 0, 0}, {1.1, 0, 0}, {0.6, 0, 0}});
+    // 0.12 is too close to 0.1, 0.6 to 0.9; 1.1 is in the next cell
+    CHECK(merge_close_points(points, 1.0) == std::vector<Vec3>{{0.9, 0, 0}, {0.1, 0, 0}, {1.1, 0, 0}});
+    CHECK(merge_close_points({}, 1.0).empty());
+    CHECK_THROWS_AS(merge_close_points(points, -1.0), Error);
+
+    const std::vector<Vec3> many = random_points(5000, 3);
+    const std::vector<Vec3> merged = merge_close_points(many, 0.1);
+    CHECK(merged.size() < many.size());
+    for (std::size_t a = 0; a < merged.size(); ++a)
+        for (std::size_t b = a + 1; b < merged.size(); ++b) {
+            bool same_cell = true;
+            double distance = 0;
+            for (int c = 0; c < 3; ++c) {
+                same_cell = same_cell && std::floor(merged[a][c] / 0.1) == std::floor(merged[b][c] / 0.1);
+                distance += (merged[a][c] - merged[b][c]) * (merged[a][c] - merged[b][c]);
+            }
+            if (same_cell && distance < 0.05 * 0.05) FAIL("two points of one cell are closer than half its edge");
+        }
+}
+
+TEST_CASE("spacing of a lattice, of clusters, and against brute force") {
+    std::vector<Vec3> lattice;
+    for (int i = 0; i < 12; ++i)
+        for (int j = 0; j < 12; ++j)
+            for (int k = 0; k < 12; ++k) lattice.push_back({0.5 * i, 0.5 * j, 0.5 * k});
+    SpacingStatistics s = nearest_neighbour_spacing(lattice);
+    CHECK(s.mean == Approx(0.5));
+    CHECK(s.max == Approx(0.5));
+
+    // clusters of very unequal scale, far from the origin
+    std::vector<Vec3> points = random_points(1000, 4);
+    for (std::size_t n = 0; n < points.size(); ++n) {
+        const double scale = n % 2 == 0 ? 1e-4 : 50.0;
+        for (double& x : points[n]) x = 1e3 + scale * x;
+    }
+    std::vector<double> exact;
+    for (std::size_t a = 0; a < points.size(); ++a) {
+        double best = 1e30;
+        for (std::size_t b = 0; b < points.size(); ++b)
+            if (a != b)
+                best = std::min(best, std::hypot(points[a][0] - points[b][0], points[a][1] - points[b][1],
+                                                 points[a][2] - points[b][2]));
+        exact.push_back(best);
+    }
+    std::sort(exact.begin(), exact.end());
+    s = nearest_neighbour_spacing(points);
+    double sum = 0;
+    for (const double d : exact) sum += d;
+    CHECK(s.mean == Approx(sum / 1000));
+    CHECK(s.max == Approx(exact.back()));
+    CHECK(s.p95 == Approx(exact[949]));
+    CHECK(nearest_neighbour_spacing({{1, 2, 3}}).mean == 0);
+}
