@@ -5,7 +5,9 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <sstream>
 
 #include "covol/error.h"
@@ -27,6 +29,7 @@ constexpr double kHaloSigmas = 3.0;      // beyond it smoothing carries nothing 
 constexpr double kLargestHeatStep = 0.5; // h²; shorter steps make the kernel rounder, more like a Gaussian
 constexpr double kHeatTolerance = 1e-4;  // relative residual
 constexpr int kMaxHeatSweeps = 100;
+constexpr int kInnerSweeps = 2;
 constexpr double kLowPercentile = 0.005, kHighPercentile = 0.995;
 
 // The band's leaves and enough around them, with the normalised image.
@@ -86,6 +89,18 @@ void for_each_leaf(const Window& window, const Domain& domain, Load load, Work w
     tbb::parallel_for(window.band.odd_begin(), window.band.size(), visit);
 }
 
+// One visit of a leaf in an implicit heat step. Where the domain or the window ends in it or next to it, the faces there
+// are closed: mirrored values alone would be relaxed as if they were the image's.
+double relax_heat(float* values, const float* before, float t, float omega, const LeafBounds& bounds) {
+    const detail::SchemeKernels& kernels = detail::kernels();
+    if (!bounds.cuts()) return kernels.heat(values, before, t, omega, kInnerSweeps);
+    static constexpr std::array<unsigned long long, 8> kAll = {~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL};
+    alignas(64) float rows[6 * kLeafSize];
+    std::fill(std::begin(rows), std::end(rows), t / (1.0F + 6.0F * t));
+    detail::close_faces(rows, bounds.lo, bounds.hi);
+    return kernels.relax(values, before, rows, kAll.data(), omega, kInnerSweeps);
+}
+
 // I_t = ΔI over time σ²/2 by implicit steps.
 void smooth(Window& window, const Domain& domain, double sigma, const RunContext& run) {
     const double time = 0.5 * sigma * sigma / (domain.voxel_size * domain.voxel_size);
@@ -94,7 +109,6 @@ void smooth(Window& window, const Domain& domain, double sigma, const RunContext
     const double t = time / steps;
     const double jacobi = 6.0 * t / (1.0 + 6.0 * t);
     const auto omega = static_cast<float>(2.0 / (1.0 + std::sqrt(1.0 - jacobi * jacobi)));
-    const detail::SchemeKernels& kernels = detail::kernels();
     std::vector<double> residuals(window.band.size());
     for (int step = 0; step < steps; ++step) {
         run.check();
@@ -103,7 +117,8 @@ void smooth(Window& window, const Domain& domain, double sigma, const RunContext
         double first = 0.0;
         for (int sweep = 0; sweep < kMaxHeatSweeps; ++sweep) {
             for_each_leaf(window, domain, detail::load_star, [&](std::size_t leaf, float* values) {
-                residuals[leaf] = kernels.heat(values, before.leaf(leaf), static_cast<float>(t), omega, 2);
+                residuals[leaf] = relax_heat(values, before.leaf(leaf), static_cast<float>(t), omega,
+                                             known_bounds(domain, window.band, leaf));
                 detail::store_inner(values, window.image.values.leaf(leaf));
             });
             double sum = 0.0;

@@ -35,6 +35,7 @@ using Clock = std::chrono::steady_clock;
 constexpr int kInnerSweeps = 2;  // the second costs a fifth and saves a third of the visits
 constexpr double kRounding = 5e-7;  // voxels; a residual below this is noise of single precision
 constexpr double kMaxOmega = 1.9;
+constexpr double kDiverged = 10.0;  // growth of the residual at which over-relaxation is given up
 constexpr double kFollowMove = 0.75;  // voxels that the surface may move before its band is made again
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
@@ -176,8 +177,12 @@ private:
             check_finite(band_, *edge_, "edge");
         }
         if (options_.rho > 0 && options_.image_yields > 0 && fields_.distance != nullptr)
-            image_weight_ = gather_field(band_, *fields_.distance,
-                                         [&](float d) { return 1.0 - options_.image_yields * taper(d); });
+            image_weight_ = detail::gather(band_, *fields_.distance, false, [&](const LeafNode* leaf, float, float* block) {
+                for (int n = 0; n < kLeafSize; ++n)  // far from every mark where the distance is not known
+                    block[n] = leaf != nullptr && leaf->isValueOn(n)
+                                   ? static_cast<float>(1.0 - options_.image_yields * taper(leaf->getValue(n)))
+                                   : 1.0F;
+            });
     }
 
     void rebuild_band() {
@@ -198,12 +203,18 @@ private:
         const double regular_row = 4.0 * constants_.curvature + 2.0 * tau_ * (options_.theta + options_.rho);
         const double row = std::min(largest_row, regular_row);
         const double jacobi = row / (1.0 + row);
-        const double omega = std::min(kMaxOmega, 2.0 / (1.0 + std::sqrt(1.0 - jacobi * jacobi)));
+        double omega = std::min(kMaxOmega, 2.0 / (1.0 + std::sqrt(1.0 - jacobi * jacobi)));
         double first = 0.0;
         for (int visit = 0; visit * kInnerSweeps < options_.max_sweeps; ++visit) {
             const double residual = sweep(static_cast<float>(omega));
             ++sweeps_;
             if (visit == 0) first = residual;
+            if (omega > 1.0 && !(residual <= kDiverged * first)) {
+                // Over-relaxation may fail where advection dominates; Gauss-Seidel converges on every M-matrix.
+                omega = 1.0;
+                restore_previous();
+                continue;
+            }
             if (!(residual > std::max(options_.solver_tolerance * first, kRounding))) break;
         }
         report_.seconds_sweeps += seconds_since(solve_start);

@@ -11,10 +11,10 @@ namespace covol::test {
 
 struct Problem {
     Domain domain;
-    DenseField u;              ///< where the step starts; rounded() for a comparison between the two
+    DenseField u;  ///< where the step starts; rounded() for a comparison between the two
     std::vector<char> active;
-    DenseField distance;       ///< empty: none
-    DenseField edge;           ///< empty: none
+    DenseField distance;  ///< empty: none
+    DenseField edge;      ///< empty: none
     DenseOptions options;
 };
 
@@ -63,7 +63,9 @@ inline EvolveOptions evolve_options(const DenseOptions& o, int steps) {
     return e;
 }
 
-inline FloatGridPtr start_of(const Problem& p) { return to_grid(p.domain, p.u, p.active, "u", 0.0F); }
+inline FloatGridPtr start_of(const Problem& p) {
+    return to_grid(p.domain, p.u, p.active, "u", static_cast<float>(3 * p.domain.voxel_size));
+}
 
 inline std::vector<char> known(const DenseField& field) {
     std::vector<char> on = all_active(field);

@@ -57,8 +57,9 @@ struct DenseOptions {
     double edge_epsilon = 1e-3;     ///< slope of g per voxel
     double attraction_range = 0.0;  ///< 0: unlimited
     double image_yields = 0.0;
-    double solver_tolerance = 1e-10;  ///< a solve ends at this residual (max norm), relative to its first
-    int max_sweeps = 20000;
+    double solver_tolerance =
+        1e-10;  ///< a solve ends when no Gauss-Seidel correction exceeds this share of the first sweep's
+    int max_sweeps = 100000;
     PrintedForm printed;
 };
 
@@ -97,8 +98,8 @@ struct DenseSystem {
 [[nodiscard]] DenseSystem assemble(const DenseField& u, const std::vector<char>& active, const DenseFields& fields,
                                    const DenseOptions& options);
 
-/// Successive over-relaxation in lexicographic order. Returns the number of sweeps, max_sweeps + 1 when that was not
-/// enough.
+/// Successive over-relaxation in lexicographic order, options.tau and delta choosing the factor. Returns the number of
+/// sweeps, max_sweeps + 1 when that was not enough.
 int solve(const DenseSystem& system, DenseField& u, const DenseOptions& options);
 
 /// `steps` time steps; returns the mean number of sweeps in a step.

@@ -47,9 +47,7 @@ void for_each_voxel(const Domain& d, const Visit& visit) {
                 visit(i, j, k, d.index_to_world({double(d.min[0] + i), double(d.min[1] + j), double(d.min[2] + k)}));
 }
 
-inline openvdb::Coord coord(const Domain& d, int i, int j, int k) {
-    return {d.min[0] + i, d.min[1] + j, d.min[2] + k};
-}
+inline openvdb::Coord coord(const Domain& d, int i, int j, int k) { return {d.min[0] + i, d.min[1] + j, d.min[2] + k}; }
 
 inline DenseField sample(const Domain& d, const Function& f) {
     const Index3 n = size_of(d);
@@ -66,7 +64,8 @@ inline DenseField rounded(DenseField field) {
 }
 
 /// Not 0 where keep(world) holds, as dense_evolve takes it.
-inline std::vector<char> active_where(const Domain& d, const DenseField& shape, const std::function<bool(const Vec3&)>& keep) {
+inline std::vector<char> active_where(const Domain& d, const DenseField& shape,
+                                      const std::function<bool(const Vec3&)>& keep) {
     std::vector<char> active(shape.size(), 0);
     for_each_voxel(d, [&](int i, int j, int k, const Vec3& x) { active[shape.index(i, j, k)] = keep(x) ? 1 : 0; });
     return active;
@@ -96,7 +95,8 @@ inline DenseField to_dense(const Domain& d, const FloatGrid& grid) {
     const auto accessor = grid.getConstAccessor();
     const Index3 n = size_of(d);
     DenseField field(n[0], n[1], n[2], d.voxel_size);
-    for_each_voxel(d, [&](int i, int j, int k, const Vec3&) { field.at(i, j, k) = accessor.getValue(coord(d, i, j, k)); });
+    for_each_voxel(d,
+                   [&](int i, int j, int k, const Vec3&) { field.at(i, j, k) = accessor.getValue(coord(d, i, j, k)); });
     field.mirror_ghosts();
     return field;
 }
@@ -143,7 +143,9 @@ inline LevelSetDifference zero_level_difference(const Domain& d, const DenseFiel
     LevelSetDifference result;
     for (const Crossing& c : zero_crossings(d, a)) {
         const auto [i, j, k] = c.voxel;
-        const auto next = [&](const DenseField& u) { return u.at(i + (c.axis == 0), j + (c.axis == 1), k + (c.axis == 2)); };
+        const auto next = [&](const DenseField& u) {
+            return u.at(i + (c.axis == 0), j + (c.axis == 1), k + (c.axis == 2));
+        };
         double square = 0;
         for (const auto& f : kFaces) {
             const double difference = a.at(i + f[0], j + f[1], k + f[2]) - a.at(i, j, k);
@@ -181,8 +183,7 @@ struct Symmetry {
                 for (int k = 0; k < result.nz(); ++k) {
                     const Index3 target{i, j, k};
                     Index3 source;
-                    for (int a = 0; a < 3; ++a)
-                        source[axis[a]] = flip[a] ? n[axis[a]] - 1 - target[a] : target[a];
+                    for (int a = 0; a < 3; ++a) source[axis[a]] = flip[a] ? n[axis[a]] - 1 - target[a] : target[a];
                     result.at(i, j, k) = u.at(source[0], source[1], source[2]);
                 }
         result.mirror_ghosts();

@@ -1,0 +1,220 @@
+#include "covol/edge.h"
+
+#include <catch2/catch.hpp>
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "covol/error.h"
+#include "support/dense_reference.h"
+#include "support/shapes.h"
+
+using namespace covol;
+using namespace covol::test;
+
+namespace {
+
+constexpr double kH = 0.5;
+
+/// An image whose voxels are the domain's.
+Image image_on(const Domain& domain, const Function& f) {
+    ImageGeometry geometry;
+    geometry.size = size_of(domain);
+    geometry.spacing = {domain.voxel_size, domain.voxel_size, domain.voxel_size};
+    geometry.origin = domain.index_to_world({double(domain.min[0]), double(domain.min[1]), double(domain.min[2])});
+    std::vector<float> values(domain.voxel_count());
+    for_each_voxel(domain, [&](int i, int j, int k, const Vec3& x) {
+        values[(static_cast<std::size_t>(k) * geometry.size[1] + j) * geometry.size[0] + i] = static_cast<float>(f(x));
+    });
+    return Image::from_values(geometry, values.data());
+}
+
+FloatGridPtr topology_where(const Domain& domain, const std::function<bool(const Vec3&)>& keep) {
+    const Index3 n = size_of(domain);
+    const DenseField zero(n[0], n[1], n[2], domain.voxel_size);
+    return to_grid(domain, zero, active_where(domain, zero, keep), "band", 1.0F);
+}
+
+EdgeOptions options(double sigma, double k) {
+    EdgeOptions o;
+    o.sigma = sigma;
+    o.edge_k = k;
+    o.low = 0;
+    o.high = 1;
+    return o;
+}
+
+DenseField reference(const Domain& domain, const Function& f, double sigma, double k) {
+    DenseField image = rounded(sample(domain, [&](const Vec3& x) { return std::clamp(f(x), 0.0, 1.0); }));
+    const double time = sigma * sigma / 2;
+    const int steps = static_cast<int>(std::ceil(time / (0.5 * kH * kH) - 1e-9));  // none longer than h²/2
+    if (steps > 0) dense_heat(image, time, steps);
+    return dense_edge(image, k);
+}
+
+double largest_difference(const Domain& domain, const FloatGrid& g, const DenseField& expected) {
+    double worst = 0;
+    for (auto v = g.cbeginValueOn(); v; ++v) {
+        const openvdb::Coord at = v.getCoord();
+        worst = std::max(
+            worst, std::abs(*v - expected.at(at.x() - domain.min[0], at.y() - domain.min[1], at.z() - domain.min[2])));
+    }
+    return worst;
+}
+
+bool everywhere(const Vec3&) { return true; }
+
+template <typename Run>
+Errc code_of(const Run& run) {
+    try {
+        run();
+    } catch (const Error& error) {
+        CHECK(std::string(error.what()).rfind("edge: ", 0) == 0);
+        return error.code();
+    }
+    FAIL_CHECK("expected an Error");
+    return Errc::Io;
+}
+
+}  // namespace
+
+TEST_CASE("every edge option says when it is out of range") {
+    CHECK(EdgeOptions{}.why_invalid().empty());
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    const auto rejects = [](const char* field, double EdgeOptions::*member, double value) {
+        EdgeOptions o;
+        o.*member = value;
+        INFO(field << " = " << value << ": " << o.why_invalid());
+        CHECK(o.why_invalid().rfind(std::string(field) + ": expected ", 0) == 0);
+    };
+    rejects("sigma", &EdgeOptions::sigma, nan);
+    for (const double bad : {-1.0, nan}) {
+        rejects("edge_k", &EdgeOptions::edge_k, bad);
+        rejects("edge_contrast", &EdgeOptions::edge_contrast, bad);
+    }
+    for (const double bad : {0.0, 1.0, nan}) rejects("contrast_percentile", &EdgeOptions::contrast_percentile, bad);
+    rejects("low", &EdgeOptions::low, 3.0);  // above high = 0
+    rejects("low", &EdgeOptions::high, nan);
+}
+
+TEST_CASE("on a ramp g is 1/(1 + K s^2), with s per world unit of the normalised image") {
+    const Domain domain = cube_domain(24, kH, -9);
+    // 200 to 440 over the box of 12, normalised by [100, 500]: s = 240/12/400.
+    const Image image = image_on(domain, [](const Vec3& x) { return 320 + 20 * x[1]; });
+    EdgeOptions o;
+    o.sigma = kH;
+    o.edge_k = 400;
+    o.low = 100;
+    o.high = 500;
+    const EdgeResult result = edge(image, *topology_where(domain, [](const Vec3& x) { return std::abs(x[1]) < 2; }), o);
+    REQUIRE(result.grid->activeVoxelCount() > 1000);
+    for (auto v = result.grid->cbeginValueOn(); v; ++v)
+        REQUIRE(*v == Approx(1 / (1 + 400 * 0.05 * 0.05)).epsilon(1e-3));
+    CHECK(result.report.edge_k == Approx(400));
+    CHECK(result.report.edge_contrast == Approx(1 / 20.0));
+    CHECK(result.report.sigma == kH);
+    CHECK(result.report.low == 100);
+    CHECK(result.report.high == 500);
+}
+
+TEST_CASE("the edge detector is the dense reference's") {
+    const Domain domain = cube_domain(21, kH, 2);  // ends inside leaves
+    const Function waves = random_waves(31, 3.0);
+    const Function f = [&](const Vec3& x) { return 0.5 + 0.45 * waves(x); };  // a few values are clamped
+    const Image image = image_on(domain, f);
+    for (const double sigma : {0.0, kH, 2.5 * kH}) {
+        INFO("sigma = " << sigma / kH << " h");
+        const EdgeResult result = edge(image, *topology_where(domain, everywhere), options(sigma, 5));
+        REQUIRE(result.grid->activeVoxelCount() == 21 * 21 * 21);
+        const DenseField expected = reference(domain, f, sigma, 5);
+        CHECK(largest_difference(domain, *result.grid, expected) < 1e-4);
+        double low = 1;
+        for (auto v = result.grid->cbeginValueOn(); v; ++v) low = std::min<double>(low, *v);
+        CHECK(low < 0.9);  // else nothing was compared
+    }
+}
+
+TEST_CASE("a band gets the values of the whole domain, and keeps its topology") {
+    const Domain domain = cube_domain(40, kH, -13);
+    const Function waves = random_waves(32, 3.0);
+    const Image image = image_on(domain, [&](const Vec3& x) { return 0.5 + 0.4 * waves(x); });
+    const FloatGridPtr shell = topology_where(domain, [](const Vec3& x) { return std::abs(length(x) - 6) < 1; });
+    const EdgeResult all = edge(image, *topology_where(domain, everywhere), options(2 * kH, 5));
+    const EdgeResult band = edge(image, *shell, options(2 * kH, 5));
+    CHECK(band.grid->tree().hasSameTopology(shell->tree()));
+    CHECK(band.grid->background() == 1.0F);
+    CHECK(band.grid->getName() == "edge");
+    CHECK(domain_of(*band.grid) == domain);
+    CHECK(largest_difference(domain, *band.grid, to_dense(domain, *all.grid)) < 1e-3);
+}
+
+TEST_CASE("g is 1/2 at the contrast, asked for or chosen") {
+    const Domain domain = cube_domain(24, kH);
+    const Function waves = random_waves(33, 3.0);
+    const Image image = image_on(domain, [&](const Vec3& x) { return 0.5 + 0.4 * waves(x); });
+    const FloatGridPtr topology = topology_where(domain, everywhere);
+    EdgeOptions o = options(kH, 0);
+    o.edge_contrast = 0.2;
+    CHECK(edge(image, *topology, o).report.edge_k == Approx(25));
+    o.edge_contrast = 0;
+    o.contrast_percentile = 0.8;
+    const EdgeResult chosen = edge(image, *topology, o);
+    std::int64_t steeper = 0;
+    for (auto v = chosen.grid->cbeginValueOn(); v; ++v) steeper += *v < 0.5F;
+    CHECK(static_cast<double>(steeper) / static_cast<double>(domain.voxel_count()) == Approx(0.2).margin(0.002));
+    CHECK(chosen.report.edge_k == Approx(1 / (chosen.report.edge_contrast * chosen.report.edge_contrast)));
+}
+
+TEST_CASE("a mirrored or permuted image has a mirrored or permuted edge detector") {
+    const Domain domain = cube_domain(11, kH, -3);
+    const Function waves = random_waves(34, 2.0);
+    const Function f = [&](const Vec3& x) { return 0.5 + 0.4 * waves(x); };
+    const FloatGridPtr topology = topology_where(domain, everywhere);
+    const DenseField values = sample(domain, f);
+    const DenseField expected = to_dense(domain, *edge(image_on(domain, f), *topology, options(kH, 5)).grid);
+    for (const Symmetry& symmetry : all_symmetries()) {
+        const DenseField moved = symmetry(values);
+        const Function at_voxel = [&](const Vec3& x) {
+            const Vec3 index = domain.world_to_index(x);
+            return moved.at(int(std::lround(index[0])) + 3, int(std::lround(index[1])) + 3,
+                            int(std::lround(index[2])) + 3);
+        };
+        const DenseField g = to_dense(domain, *edge(image_on(domain, at_voxel), *topology, options(kH, 5)).grid);
+        CHECK(max_difference(g, symmetry(expected)) < 1e-4);
+    }
+}
+
+TEST_CASE("edge(): the same bits for 1, 2 and 8 threads") {
+    const Domain domain = cube_domain(40, kH);
+    const Function waves = random_waves(35, 2.0);
+    const Image image = image_on(domain, waves);
+    const FloatGridPtr topology = topology_where(domain, [](const Vec3& x) { return std::abs(length(x) - 6) < 1; });
+    const auto run_with = [&](int threads) {
+        RunContext run;
+        run.threads = threads;
+        EdgeOptions o;
+        o.sigma = 2 * kH;
+        return edge(image, *topology, o, run).grid;
+    };
+    const FloatGridPtr one = run_with(1);
+    for (const int threads : {2, 8}) {
+        const FloatGridPtr other = run_with(threads);
+        REQUIRE(other->activeVoxelCount() == one->activeVoxelCount());
+        const auto accessor = other->getConstAccessor();
+        for (auto v = one->cbeginValueOn(); v; ++v) REQUIRE(*v == accessor.getValue(v.getCoord()));
+    }
+}
+
+TEST_CASE("edge() refuses what has no edges") {
+    const Domain domain = cube_domain(10, kH);
+    const Image image = image_on(domain, [](const Vec3& x) { return x[0]; });
+    const Image constant = image_on(domain, [](const Vec3&) { return 7.0; });
+    const FloatGridPtr topology = topology_where(domain, everywhere);
+    EdgeOptions bad;
+    bad.edge_k = -1;
+    CHECK(code_of([&] { (void)edge(image, *topology, bad); }) == Errc::InvalidOptions);
+    CHECK(code_of([&] { (void)edge(constant, *topology); }) == Errc::InvalidInput);
+    CHECK(code_of([&] { (void)edge(image, *make_grid(domain, 1.0F, "band")); }) == Errc::InvalidInput);
+}

@@ -1,0 +1,328 @@
+#include "covol/evolve.h"
+
+#include <catch2/catch.hpp>
+
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "covol/error.h"
+#include "support/both_solvers.h"
+#include "support/shapes.h"
+
+using namespace covol;
+using namespace covol::test;
+
+namespace {
+
+constexpr double kH = 0.5;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Points and image around a lopsided surface, in a band of leaves that the surface cuts anyhow.
+Problem everything_on(int n = 28, int first = -5) {
+    Problem p;
+    p.domain = cube_domain(n, kH, first);
+    const Function surface = [](const Vec3& x) { return length({x[0] - 0.4, 1.2 * x[1], x[2] + 0.3}) - 4.0; };
+    const auto points = sphere_points(150, 3.4);
+    p.u = rounded(sample(p.domain, [&](const Vec3& x) { return clamp_to(surface(x), 3 * kH); }));
+    p.active = active_where(p.domain, p.u, [&](const Vec3& x) { return std::abs(surface(x)) < 3.5 * kH; });
+    set_distance(
+        p, [&](const Vec3& x) { return distance_to(points, x); }, 0.9);
+    set_edge(
+        p, [](const Vec3& x) { return 1 / (1 + 4 * std::exp(-4 * std::pow(length(x) - 3.6, 2))); }, 0.7);
+    p.options.delta = kH;
+    p.options.tau = kH;
+    return p;
+}
+
+template <typename Run>
+Errc code_of(const Run& run) {
+    try {
+        run();
+    } catch (const Error& error) {
+        INFO(error.what());
+        CHECK(std::string(error.what()).rfind("evolve: ", 0) == 0);
+        return error.code();
+    }
+    FAIL("expected an Error");
+    return Errc::Io;
+}
+
+bool same_bits(const FloatGrid& a, const FloatGrid& b) {
+    if (!a.tree().hasSameTopology(b.tree())) return false;
+    auto other = b.getConstAccessor();
+    for (auto v = a.cbeginValueAll(); v; ++v) {
+        const float x = *v, y = other.getValue(v.getCoord());
+        if (!(x == y) && !(std::isnan(x) && std::isnan(y))) return false;
+    }
+    return true;
+}
+
+}  // namespace
+
+TEST_CASE("every option says when it is out of range") {
+    CHECK(EvolveOptions{}.why_invalid().empty());
+    const auto rejects = [](const char* field, auto EvolveOptions::*member, auto value) {
+        EvolveOptions o;
+        o.*member = value;
+        const std::string why = o.why_invalid();
+        INFO(field << " = " << value << ": " << why);
+        CHECK(why.rfind(std::string(field) + ": expected ", 0) == 0);
+        CHECK(why.find('\n') == std::string::npos);
+        CHECK(why.find(", got ") != std::string::npos);
+    };
+    for (const double bad : {-0.1, 1.1, kNaN}) {
+        rejects("theta", &EvolveOptions::theta, bad);
+        rejects("rho", &EvolveOptions::rho, bad);
+        rejects("image_yields", &EvolveOptions::image_yields, bad);
+    }
+    for (const double bad : {kNaN, kInfinity}) {
+        rejects("delta", &EvolveOptions::delta, bad);
+        rejects("tau", &EvolveOptions::tau, bad);
+        rejects("attraction_range", &EvolveOptions::attraction_range, bad);
+        rejects("tolerance", &EvolveOptions::tolerance, bad);
+        rejects("solver_tolerance", &EvolveOptions::solver_tolerance, bad);
+    }
+    for (const double bad : {0.0, -1.0, kNaN, kInfinity}) {
+        rejects("epsilon", &EvolveOptions::epsilon, bad);
+        rejects("edge_epsilon", &EvolveOptions::edge_epsilon, bad);
+    }
+    rejects("tau", &EvolveOptions::tau, 0.0);
+    rejects("attraction_range", &EvolveOptions::attraction_range, -1.0);
+    rejects("tolerance", &EvolveOptions::tolerance, -1.0);
+    rejects("solver_tolerance", &EvolveOptions::solver_tolerance, 0.0);
+    rejects("max_steps", &EvolveOptions::max_steps, -1);
+    rejects("max_sweeps", &EvolveOptions::max_sweeps, 0);
+
+    EvolveOptions two;
+    two.theta = 2;
+    two.max_steps = -3;
+    CHECK(two.why_invalid() == "theta: expected 0 to 1, got 2\nmax_steps: expected >= 0, got -3");
+}
+
+TEST_CASE("unusable options and grids are refused, and u stays as it was") {
+    const Problem p = everything_on(20);
+    const Fields grids(p);
+    const FloatGridPtr u = start_of(p), before = start_of(p);
+    const EvolveOptions good = evolve_options(p.options, 2);
+    SECTION("options") {
+        EvolveOptions bad = good;
+        bad.theta = -1;
+        CHECK(code_of([&] { evolve(*u, grids.get(), bad); }) == Errc::InvalidOptions);
+    }
+    SECTION("no distance") {
+        EvolveFields fields = grids.get();
+        fields.distance = nullptr;
+        CHECK(code_of([&] { evolve(*u, fields, good); }) == Errc::InvalidInput);
+    }
+    SECTION("no edge detector") {
+        EvolveFields fields = grids.get();
+        fields.edge = nullptr;
+        CHECK(code_of([&] { evolve(*u, fields, good); }) == Errc::InvalidInput);
+    }
+    SECTION("another voxel size") {
+        Domain other = p.domain;
+        other.voxel_size *= 1.01;
+        set_domain(*grids.distance, other);
+        CHECK(code_of([&] { evolve(*u, grids.get(), good); }) == Errc::InvalidInput);
+    }
+    SECTION("another origin") {
+        Domain other = p.domain;
+        other.origin[1] += 0.1 * kH;
+        set_domain(*grids.edge, other);
+        CHECK(code_of([&] { evolve(*u, grids.get(), good); }) == Errc::InvalidInput);
+    }
+    CHECK(same_bits(*u, *before));
+}
+
+TEST_CASE("an empty band is refused") {
+    const FloatGridPtr u = make_grid(cube_domain(8, kH), 1.0F, "u");
+    EvolveOptions o;
+    o.theta = o.rho = 0;
+    CHECK(code_of([&] { evolve(*u, {}, o); }) == Errc::InvalidInput);
+}
+
+TEST_CASE("a value that is not finite is named, and u stays as it was") {
+    const Problem p = everything_on(20);
+    for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()})
+        for (const std::string what : {"u", "distance", "edge"}) {
+            const Fields grids(p);
+            const FloatGridPtr u = start_of(p);
+            const openvdb::Coord at = u->cbeginValueOn().getCoord();
+            (what == "u" ? u : what == "edge" ? grids.edge : grids.distance)->tree().setValueOn(at, bad);
+            const FloatGridPtr before = u->deepCopy();
+            INFO(bad << " in " << what);
+            CHECK(code_of([&] { evolve(*u, grids.get(), evolve_options(p.options, 2)); }) == Errc::InvalidInput);
+            CHECK(same_bits(*u, *before));
+        }
+}
+
+TEST_CASE("a frozen value that is not finite leaves u at the step before") {
+    const Problem p = everything_on(20);
+    const FloatGridPtr u = start_of(p);
+    // Next to an active voxel, so that it enters a row.
+    openvdb::Coord at = u->cbeginValueOn().getCoord();
+    while (u->tree().isValueOn(at)) at.x() -= 1;
+    u->tree().setValueOff(at, std::numeric_limits<float>::quiet_NaN());
+    const FloatGridPtr before = u->deepCopy();
+    const Errc code = code_of([&] { evolve(*u, Fields(p).get(), evolve_options(p.options, 2)); });
+    CHECK((code == Errc::Numerical || code == Errc::InvalidInput));
+    CHECK(same_bits(*u, *before));
+}
+
+TEST_CASE("no step leaves every bit") {
+    const Problem p = everything_on(20);
+    const FloatGridPtr u = start_of(p);
+    const EvolveReport report = evolve(*u, Fields(p).get(), evolve_options(p.options, 0));
+    CHECK(report.steps == 0);
+    CHECK(report.stop_reason == StopReason::MaxSteps);
+    CHECK(max_difference(to_dense(p.domain, *u), p.u) == 0);
+}
+
+TEST_CASE("u keeps its topology, and its inactive values") {
+    const Problem p = everything_on();
+    const FloatGridPtr before = start_of(p), u = start_of(p);
+    const EvolveReport report = evolve(*u, Fields(p).get(), evolve_options(p.options, 3));
+    CHECK(report.steps == 3);
+    CHECK(report.active_voxels == static_cast<std::int64_t>(before->activeVoxelCount()));
+    CHECK(report.leaf_count == static_cast<std::int64_t>(before->tree().leafCount()));
+    CHECK(report.sweeps_per_step > 0);
+    CHECK(report.leaf_visits > 0);
+    REQUIRE(u->tree().hasSameTopology(before->tree()));
+    auto old = before->getConstAccessor();
+    for (auto v = u->cbeginValueOff(); v; ++v) REQUIRE(*v == old.getValue(v.getCoord()));
+    CHECK(max_difference(to_dense(p.domain, *u), p.u) > 0.1 * kH);
+}
+
+TEST_CASE("the same bits for 1, 2 and 8 threads") {
+    const Problem p = everything_on(44);
+    EvolveOptions options = evolve_options(p.options, 6);
+    options.solver_tolerance = 1e-3;
+    options.attraction_range = 4 * kH;
+    options.image_yields = 0.5;
+    for (const bool follow : {false, true}) {
+        options.follow = follow;
+        const FloatGridPtr one = run_evolve_grid(p, options, 1);
+        CHECK(same_bits(*one, *run_evolve_grid(p, options, 2)));
+        CHECK(same_bits(*one, *run_evolve_grid(p, options, 8)));
+    }
+}
+
+TEST_CASE("it stops when it is steady, and says so") {
+    Problem p = whole_cube(20, kH, [](const Vec3& x) { return clamp_to(length(x) - 3.5, 3 * kH); });
+    set_distance(p, [](const Vec3& x) { return std::abs(length(x) - 3.0); });
+    EvolveOptions o = evolve_options(p.options, 100);
+    o.tolerance = 1e-2;
+    const FloatGridPtr u = start_of(p);
+    const EvolveReport report = evolve(*u, Fields(p).get(), o);
+    CHECK(report.stop_reason == StopReason::Steady);
+    CHECK(report.steps < 100);
+    CHECK(report.last_change < 1e-2 * p.options.tau / kH);
+    const DenseField end = to_dense(p.domain, *u);
+    for (const Crossing& c : zero_crossings(p.domain, end)) CHECK(length(c.position) == Approx(3.0).margin(0.5 * kH));
+}
+
+TEST_CASE("a surface that shrinks away has vanished") {
+    Problem p = whole_cube(14, kH, [](const Vec3& x) { return clamp_to(length(x) - 1.0, 3 * kH); });
+    p.options.delta = 4 * kH;
+    const FloatGridPtr u = start_of(p);
+    const EvolveReport report = evolve(*u, {}, evolve_options(p.options, 100));
+    CHECK(report.stop_reason == StopReason::Vanished);
+    CHECK(report.steps < 100);
+    CHECK(zero_crossings(p.domain, to_dense(p.domain, *u)).empty());
+}
+
+TEST_CASE("cancelled between steps, u holds the last whole one") {
+    const Problem p = everything_on(20);
+    std::atomic<bool> cancel{false};
+    RunContext run;
+    run.cancel = &cancel;
+    int reports = 0;
+    run.progress = [&](const std::string&, double fraction) {
+        CHECK(fraction >= 0);
+        CHECK(fraction <= 1);
+        if (++reports == 3) cancel = true;
+    };
+    const FloatGridPtr u = start_of(p);
+    const EvolveReport report = evolve(*u, Fields(p).get(), evolve_options(p.options, 50), run);
+    CHECK(report.stop_reason == StopReason::Cancelled);
+    REQUIRE(report.steps == 3);
+    CHECK(max_difference(to_dense(p.domain, *u), run_evolve(p, 3)) == 0);
+}
+
+TEST_CASE("Neumann: a plane that meets the boundary stays a plane") {
+    for (int axis = 0; axis < 3; ++axis) {
+        // 13 voxels: the domain ends inside leaves.
+        Problem p = whole_cube(
+            13, kH, [&](const Vec3& x) { return clamp_to(x[axis] - 0.3, 3 * kH); }, 3);
+        set_distance(p, [&](const Vec3& x) { return std::abs(x[axis] - 1.1); });
+        p.options.delta = kH;
+        const DenseField u = run_evolve(p, 4);
+        CHECK(max_difference(u, run_dense(p, 4)) < 1e-4 * kH);
+        double bent = 0;
+        for_each_voxel(p.domain, [&](int i, int j, int k, const Vec3&) {
+            Index3 on_axis{0, 0, 0};
+            on_axis[axis] = Index3{i, j, k}[axis];
+            bent = std::max(bent, std::abs(u.at(i, j, k) - u.at(on_axis[0], on_axis[1], on_axis[2])));
+        });
+        CHECK(bent < 1e-5 * kH);
+    }
+}
+
+TEST_CASE("Neumann: a domain and its mirror image side by side give the same values") {
+    const Function waves = random_waves(21, 4.0), slopes = random_waves(22, 5.0);
+    for (int axis = 0; axis < 3; ++axis) {
+        const int n = 11;
+        Problem p = whole_cube(
+            n, kH, [&](const Vec3& x) { return clamp_to(2 * waves(x), 3 * kH); }, -4);
+        set_distance(p, [](const Vec3& x) { return distance(x, {0.9, -2.0, 1.5}); });
+        set_edge(p, [&](const Vec3& x) { return 0.5 + 0.2 * slopes(x); });
+        p.options.delta = kH;
+
+        const auto doubled = [&](const DenseField& field) {
+            Index3 size{n, n, n};
+            size[axis] *= 2;
+            DenseField result(size[0], size[1], size[2], kH);
+            for (int i = 0; i < size[0]; ++i)
+                for (int j = 0; j < size[1]; ++j)
+                    for (int k = 0; k < size[2]; ++k) {
+                        Index3 from{i, j, k};
+                        if (from[axis] >= n) from[axis] = 2 * n - 1 - from[axis];
+                        result.at(i, j, k) = field.at(from[0], from[1], from[2]);
+                    }
+            result.mirror_ghosts();
+            return result;
+        };
+        Problem twice = p;
+        twice.domain.max[axis] += n;
+        twice.u = doubled(p.u);
+        twice.active = all_active(twice.u);
+        twice.distance = doubled(p.distance);
+        twice.edge = doubled(p.edge);
+        CHECK(max_difference(doubled(run_dense(p, 3)), run_dense(twice, 3)) < 1e-8);
+        CHECK(max_difference(doubled(run_evolve(p, 3)), run_evolve(twice, 3)) < 1e-4 * kH);
+    }
+}
+
+TEST_CASE("beyond the attraction range the points do not pull") {
+    Problem p = whole_cube(16, kH, [](const Vec3& x) { return clamp_to(x[0], 3 * kH); });
+    set_distance(p, [](const Vec3& x) { return 10 - x[0]; });
+    p.options.attraction_range = 4.0;
+    CHECK(max_difference(run_evolve(p, 3), p.u) < 1e-6);
+    p.options.attraction_range = 0;
+    CHECK(max_difference(run_evolve(p, 3), p.u) > kH);
+}
+
+TEST_CASE("where the distance is not known the image keeps its full weight") {
+    Problem p = whole_cube(16, kH, [](const Vec3& x) { return clamp_to(x[1], 3 * kH); });
+    p.distance = sample(p.domain, [](const Vec3& x) { return x[0] > 0 ? NAN : 0.1; });
+    set_edge(p, [](const Vec3& x) { return 0.5 + 0.05 * x[1]; });
+    p.options.attraction_range = 2.0;
+    p.options.image_yields = 1.0;
+    const DenseField u = run_evolve(p, 2);
+    CHECK(max_difference(u, run_dense(p, 2)) < 1e-4 * kH);
+    CHECK(u.at(2, 8, 8) == Approx(p.u.at(2, 8, 8)).margin(1e-5));
+    CHECK(u.at(12, 8, 8) > p.u.at(12, 8, 8) + kH);
+}
