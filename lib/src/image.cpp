@@ -114,7 +114,8 @@ void with_itk(Errc code, const std::string& what, Call&& call) {
         ~Quiet() { itk::Object::SetGlobalWarningDisplay(before); }
     } quiet;
     const auto one_line = [](std::string text) {
-        std::replace_if(text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
+        std::replace_if(
+            text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
         constexpr std::size_t kLongest = 300;
         return text.substr(0, kLongest);
     };
@@ -132,8 +133,9 @@ void with_itk(Errc code, const std::string& what, Call&& call) {
 PixelType pixel_type(const std::string& path, const itk::ImageIOBase& io) {
     using Component = itk::IOComponentEnum;
     const auto unsupported = [&](const std::string& what) {
-        return Error(Errc::Unsupported, "read_image: " + path + ": expected grey values of 8, 16 or 32 bits, float or " +
-                                            "double, got " + what);
+        return Error(
+            Errc::Unsupported,
+            "read_image: " + path + ": expected grey values of 8, 16 or 32 bits, float or " + "double, got " + what);
     };
     if (io.GetNumberOfComponents() != 1)
         throw unsupported(itk::ImageIOBase::GetPixelTypeAsString(io.GetPixelType()) + " pixels of " +
@@ -147,7 +149,8 @@ PixelType pixel_type(const std::string& path, const itk::ImageIOBase& io) {
         case Component::INT: return PixelType::Int32;
         case Component::FLOAT: return PixelType::Float;
         case Component::DOUBLE: return PixelType::Double;
-        default: throw unsupported("pixels of type " + itk::ImageIOBase::GetComponentTypeAsString(io.GetComponentType()));
+        default:
+            throw unsupported("pixels of type " + itk::ImageIOBase::GetComponentTypeAsString(io.GetComponentType()));
     }
 }
 
@@ -169,7 +172,7 @@ itk::IOComponentEnum component_type(PixelType type) {
 /// The lines of a NRRD's or MetaImage's text header, lower case, for what ITK keeps to itself.
 struct TextHeader {
     std::vector<std::string> lines;
-    fs::path data_file;  ///< as written, of a MetaImage
+    fs::path data_file;     ///< as written, of a MetaImage
     std::uint64_t end = 0;  ///< where the pixels begin
 
     explicit TextHeader(const std::string& path) {
@@ -202,7 +205,8 @@ struct TextHeader {
     /// The data lie in another file.
     [[nodiscard]] bool detached() const {
         const std::string meta = value("elementdatafile");
-        return !value("data file").empty() || !value("datafile").empty() || (!meta.empty() && meta.rfind("local", 0) != 0);
+        return !value("data file").empty() || !value("datafile").empty() ||
+               (!meta.empty() && meta.rfind("local", 0) != 0);
     }
 };
 
@@ -339,10 +343,10 @@ RawImage read_itk(const std::string& path, const ReadImageOptions& options, bool
 
     const std::uint64_t voxels = size[0] * size[1] * size[2];
     if (voxels / size[0] / size[1] != size[2] || voxels > (std::uint64_t(1) << 50) / frames)
-        throw Error(Errc::InvalidInput, "read_image: " + path + ": the header claims " +
-                                            detail::size_text(geometry.size) + " voxels");
-    const std::shared_ptr<void> data =
-        detail::allocate_pixels(path, voxels * frames, image.type, header && header->detached() ? 0 : fs::file_size(path));
+        throw Error(Errc::InvalidInput,
+                    "read_image: " + path + ": the header claims " + detail::size_text(geometry.size) + " voxels");
+    const std::shared_ptr<void> data = detail::allocate_pixels(path, voxels * frames, image.type,
+                                                               header && header->detached() ? 0 : fs::file_size(path));
     std::optional<detail::PixelPlace> place;
     if (is_nifti) place = nifti_pixels(path);
     if (is_meta) place = meta_pixels(path, *header, image.type);
@@ -350,15 +354,16 @@ RawImage read_itk(const std::string& path, const ReadImageOptions& options, bool
         if (!detail::read_pixels(*place, voxels * frames, image.type, data.get()))
             throw Error(Errc::InvalidInput, unusable);
     } else if (is_nifti) {
-        throw Error(Errc::Unsupported, "read_image: " + path + ": expected a NIfTI-1 file in one piece with grey values");
+        throw Error(Errc::Unsupported,
+                    "read_image: " + path + ": expected a NIfTI-1 file in one piece with grey values");
     } else {
         itk::ImageIORegion region(dimensions);
         for (unsigned a = 0; a < dimensions; ++a) region.SetSize(a, io->GetDimensions(a));
         io->SetIORegion(region);
         with_itk(Errc::InvalidInput, unusable, [&] { io->Read(data.get()); });
     }
-    image.data = std::shared_ptr<void>(
-        data, static_cast<char*>(data.get()) + frame * voxels * detail::pixel_bytes(image.type));
+    image.data =
+        std::shared_ptr<void>(data, static_cast<char*>(data.get()) + frame * voxels * detail::pixel_bytes(image.type));
     return image;
 }
 
@@ -369,8 +374,8 @@ RawImage read_raw(const std::string& path, const ReadImageOptions& options, bool
     if (!fs::is_regular_file(path, status) || !std::ifstream(path).good())
         throw Error(Errc::Io, "read_image: " + path + ": cannot be opened");
     if (!is_tiff(extension) && make_io(extension).IsNull())
-        throw Error(Errc::Unsupported, "read_image: " + path + ": expected a name ending in " + kReadable + ", got '" +
-                                           extension + "'");
+        throw Error(Errc::Unsupported,
+                    "read_image: " + path + ": expected a name ending in " + kReadable + ", got '" + extension + "'");
     if (fs::file_size(path) == 0) throw Error(Errc::InvalidInput, "read_image: " + path + ": the file is empty");
     RawImage image =
         is_tiff(extension) ? detail::read_tiff(path, options, header_only, run) : read_itk(path, options, header_only);
@@ -418,10 +423,11 @@ Tap make_tap(double position, std::int32_t size, std::int64_t stride) {
     // Lattices that should coincide differ by the rounding of a file's spacing.
     constexpr double kSame = 1e-4;
     const double clamped = std::clamp(position, 0.0, double(size - 1));
-    const double nearest = std::round(clamped);
-    if (std::abs(clamped - nearest) < kSame) return {static_cast<std::int64_t>(nearest) * stride, 0, 0};
-    const double below = std::floor(clamped);
-    return {static_cast<std::int64_t>(below) * stride, stride, clamped - below};
+    const auto below = static_cast<std::int64_t>(clamped);
+    const double weight = clamped - double(below);
+    if (weight < kSame) return {below * stride, 0, 0};
+    if (weight > 1 - kSame) return {(below + 1) * stride, 0, 0};
+    return {below * stride, stride, weight};
 }
 
 /// What interpolation is computed in: single precision where it holds every value of T.
@@ -476,13 +482,15 @@ template <typename T>
 void sample_affine(const T* data, const Lattice& image, const LatticeMap& map, const Index3& min, const Index3& max,
                    float* out) {
     for (std::int32_t i = min[0]; i <= max[0]; ++i)
-        for (std::int32_t j = min[1]; j <= max[1]; ++j)
+        for (std::int32_t j = min[1]; j <= max[1]; ++j) {
+            const Vec3 row = multiply(map.matrix, {double(i), double(j), 0});
             for (std::int32_t k = min[2]; k <= max[2]; ++k) {
-                const Vec3 at = multiply(map.matrix, {double(i), double(j), double(k)});
-                std::array<Tap, 3> taps;
-                for (int a = 0; a < 3; ++a) taps[a] = make_tap(at[a] + map.offset[a], image.size[a], image.stride[a]);
-                *out++ = static_cast<float>(interpolate(data, taps[0], taps[1], taps[2]));
+                const auto tap = [&](int a) {
+                    return make_tap(row[a] + map.matrix[a][2] * k + map.offset[a], image.size[a], image.stride[a]);
+                };
+                *out++ = static_cast<float>(interpolate(data, tap(0), tap(1), tap(2)));
             }
+        }
 }
 
 // ---------------------------------------------------------------------------------------------- values
@@ -530,10 +538,10 @@ void require_finite(const std::string& path, const RawImage& image) {
                 std::find_if(data, data + count, [](T v) { return !std::isfinite(v); }) - data);
             const auto nx = std::size_t(image.geometry.size[0]);
             const auto ny = std::size_t(image.geometry.size[1]);
-            throw Error(Errc::InvalidInput, "read_image: " + path + ": expected finite values, got NaN or infinity at " +
-                                                "voxel (" + std::to_string(first % nx) + ", " +
-                                                std::to_string(first / nx % ny) + ", " +
-                                                std::to_string(first / nx / ny) + ")");
+            throw Error(Errc::InvalidInput, "read_image: " + path +
+                                                ": expected finite values, got NaN or infinity at " + "voxel (" +
+                                                std::to_string(first % nx) + ", " + std::to_string(first / nx % ny) +
+                                                ", " + std::to_string(first / nx / ny) + ")");
         }
     });
 }
@@ -596,8 +604,7 @@ Vec3 ImageGeometry::index_to_world(const Vec3& index) const {
 }
 
 Vec3 ImageGeometry::world_to_index(const Vec3& world) const {
-    const Vec3 moved =
-        multiply(inverse(direction), {world[0] - origin[0], world[1] - origin[1], world[2] - origin[2]});
+    const Vec3 moved = multiply(inverse(direction), {world[0] - origin[0], world[1] - origin[1], world[2] - origin[2]});
     return {moved[0] / spacing[0], moved[1] / spacing[1], moved[2] / spacing[2]};
 }
 
@@ -628,8 +635,8 @@ double Image::at(int i, int j, int k) const {
 
 void Image::sample(const Domain& frame, const Index3& min, const Index3& max, float* out) const {
     const LatticeMap map = map_lattice(geometry_, frame);
-    const Lattice lattice{
-        geometry_.size, {1, geometry_.size[0], std::int64_t(geometry_.size[0]) * std::int64_t(geometry_.size[1])}};
+    const Lattice lattice{geometry_.size,
+                          {1, geometry_.size[0], std::int64_t(geometry_.size[0]) * std::int64_t(geometry_.size[1])}};
     detail::with_pixel_type(type_, [&](auto pixel) {
         const auto* data = static_cast<const decltype(pixel)*>(data_.get());
         if (map.separable)
@@ -718,8 +725,8 @@ void check_image_extension(const std::string& path) {
     const std::string extension = detail::extension(path);
     for (const char* known : {".nrrd", ".nii", ".nii.gz", ".mha", ".tif", ".tiff"})
         if (extension == known) return;
-    throw Error(Errc::InvalidOptions, "write_image: " + path + ": expected a name ending in " + kWritable + ", got '" +
-                                          extension + "'");
+    throw Error(Errc::InvalidOptions,
+                "write_image: " + path + ": expected a name ending in " + kWritable + ", got '" + extension + "'");
 }
 
 }  // namespace covol

@@ -60,8 +60,7 @@ public:
         look_ahead([&] { skip_metadata(); });
         vdb::MetaMap file_metadata;
         file_metadata.readMeta(stream_);
-        if (!inputHasGridOffsets())
-            OPENVDB_THROW(vdb::IoError, "written to a stream, without grid offsets");
+        if (!inputHasGridOffsets()) OPENVDB_THROW(vdb::IoError, "written to a stream, without grid offsets");
         const std::int32_t count = readGridCount(stream_);
         for (std::int32_t n = 0; n < count; ++n) {
             look_ahead([&] {

@@ -61,8 +61,9 @@ struct FuzzCounts {
 };
 
 /// Reads truncated and bit-flipped versions of a good file; whatever is not a covol::Error goes through to the test.
-inline FuzzCounts fuzz(const Scratch& scratch, const std::string& good, const std::function<void(const std::string&)>& read,
-                       int tries = 60, std::size_t header_bytes = 400) {
+inline FuzzCounts fuzz(const Scratch& scratch, const std::string& good,
+                       const std::function<void(const std::string&)>& read, int tries = 60,
+                       std::size_t header_bytes = 400) {
     const std::string bytes = bytes_of(good);
     const std::string bad = scratch.path("bad-" + std::filesystem::path(good).filename().string());
     const auto accepted = [&](const std::string& content) {

@@ -77,8 +77,7 @@ std::string make_tiff(const std::string& path, const TiffFormat& f, T (*value)(i
             TIFFSetField(tiff, TIFFTAG_YRESOLUTION, f.resolution);
             TIFFSetField(tiff, TIFFTAG_RESOLUTIONUNIT, RESUNIT_NONE);
         }
-        if (page == 0 && !f.description.empty())
-            TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, f.description.c_str());
+        if (page == 0 && !f.description.empty()) TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, f.description.c_str());
         if (f.tiled) {
             TIFFSetField(tiff, TIFFTAG_TILEWIDTH, 16);
             TIFFSetField(tiff, TIFFTAG_TILELENGTH, 16);
@@ -88,7 +87,8 @@ std::string make_tiff(const std::string& path, const TiffFormat& f, T (*value)(i
                     for (int y = y0; y < std::min(y0 + 16, kHeight); ++y)
                         for (int x = x0; x < std::min(x0 + 16, kWidth); ++x)
                             tile[static_cast<std::size_t>((y - y0) * 16 + x - x0)] = value(page, x, y);
-                    TIFFWriteTile(tiff, tile.data(), static_cast<std::uint32_t>(x0), static_cast<std::uint32_t>(y0), 0, 0);
+                    TIFFWriteTile(tiff, tile.data(), static_cast<std::uint32_t>(x0), static_cast<std::uint32_t>(y0), 0,
+                                  0);
                 }
         } else {
             TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, 5);  // the last strip is short
@@ -193,6 +193,28 @@ TEST_CASE("a TIFF keeps spacing and unit") {
     CHECK(image.geometry().spacing_known);
 }
 
+TEST_CASE("a TIFF without known spacing stays one") {
+    const Scratch scratch;
+    ImageGeometry g;
+    g.size = {7, 6, 5};
+    g.spacing_known = false;
+    write_image(scratch.path("a.tif"), g, ramp<std::uint8_t>(g).data());
+    CHECK_FALSE(read_image_geometry(scratch.path("a.tif")).spacing_known);
+}
+
+TEST_CASE("NIfTI's slope and intercept are applied") {
+    const Scratch scratch;
+    const ImageGeometry g = oblique();
+    write_image(scratch.path("a.nii"), g, ramp<std::int32_t>(g).data());
+    std::string bytes = bytes_of(scratch.path("a.nii"));
+    const std::array<float, 2> scale{2.0F, -5.0F};
+    std::memcpy(bytes.data() + 112, scale.data(), sizeof(scale));
+    const Image image = read_image(scratch.write("a.nii", bytes));
+    CHECK(image.pixel_type() == PixelType::Float);
+    CHECK(image.at(0, 0, 0) == -5);
+    CHECK(image.at(3, 2, 1) == 2 * (3 + 20 + 40) - 5);
+}
+
 TEST_CASE("the unit survives where the format has a place for it") {
     const Scratch scratch;
     ImageGeometry g = oblique();
@@ -247,9 +269,11 @@ TEST_CASE("ImageJ's and OME's spacing and unit are read") {
     g = geometry("", 72.0F);  // a scanner's dots per inch
     CHECK(g.spacing == Vec3{1, 1, 1});
     CHECK_FALSE(g.spacing_known);
-    g = geometry("<?xml version=\"1.0\"?><OME><Image><Pixels DimensionOrder=\"XYZCT\" SizeC=\"1\" SizeT=\"1\" SizeX=\"20\" "
-                 "SizeY=\"17\" SizeZ=\"3\" PhysicalSizeX=\"0.2\" PhysicalSizeXUnit=\"\xC2\xB5m\" PhysicalSizeY=\"0.2\" "
-                 "PhysicalSizeYUnit=\"\xC2\xB5m\" PhysicalSizeZ=\"700\" PhysicalSizeZUnit=\"nm\" Type=\"uint8\"/></Image></OME>", 0);
+    g = geometry(
+        "<?xml version=\"1.0\"?><OME><Image><Pixels DimensionOrder=\"XYZCT\" SizeC=\"1\" SizeT=\"1\" SizeX=\"20\" "
+        "SizeY=\"17\" SizeZ=\"3\" PhysicalSizeX=\"0.2\" PhysicalSizeXUnit=\"\xC2\xB5m\" PhysicalSizeY=\"0.2\" "
+        "PhysicalSizeYUnit=\"\xC2\xB5m\" PhysicalSizeZ=\"700\" PhysicalSizeZUnit=\"nm\" Type=\"uint8\"/></Image></OME>",
+        0);
     CHECK(g.spacing[0] == Approx(0.2));
     CHECK(g.spacing[2] == Approx(0.7));
     CHECK(g.unit == "um");
@@ -347,8 +371,9 @@ TEST_CASE("unusable images end in one line that says why") {
     says(read_error(scratch.path("flat.nrrd")), "expected a 3D image, got 5 x 4 x 1");
     const std::string header = "NRRD0004\ntype: uint8\nencoding: raw\nendian: little\n";
     says(read_error(scratch.write("2d.nrrd", header + "dimension: 2\nsizes: 3 2\n\nabcdef")), "got 3 x 2 x 1");
-    says(read_error(scratch.write("rgb.nrrd", header + "dimension: 4\nsizes: 3 2 2 2\nkinds: RGB-color domain domain domain\n\n" +
-                                                  std::string(24, 'a'))),
+    says(read_error(scratch.write("rgb.nrrd",
+                                  header + "dimension: 4\nsizes: 3 2 2 2\nkinds: RGB-color domain domain domain\n\n" +
+                                      std::string(24, 'a'))),
          "colour");
     says(read_error(scratch.write("4d.nrrd", header + "dimension: 4\nsizes: 2 2 2 3\n\n" + std::string(24, 'a'))),
          "got 3 frames");
@@ -397,8 +422,8 @@ TEST_CASE("damaged image files end in an Error, never in a crash") {
         // a checksum at the end may be all that is missing
         CHECK(counts.truncated_accepted <= counts.truncated / 20);
     }
-    const std::string tiled = make_tiff<float>(
-        scratch.path("tiled.tif"), {32, SAMPLEFORMAT_IEEEFP, 1, COMPRESSION_LZW, true, "w8"}, number);
+    const std::string tiled =
+        make_tiff<float>(scratch.path("tiled.tif"), {32, SAMPLEFORMAT_IEEEFP, 1, COMPRESSION_LZW, true, "w8"}, number);
     fuzz(scratch, tiled, read);
 }
 

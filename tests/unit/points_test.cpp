@@ -45,7 +45,8 @@ std::string awkward_ply(const std::string& format) {
     if (ascii) {
         text += "2 10 20 0.5\n0 0.5\n";
         for (const Vec3& p : kThree)
-            text += "255 " + std::to_string(p[2]) + " 2 7 8 " + std::to_string(p[0]) + " " + std::to_string(p[1]) + "\n";
+            text +=
+                "255 " + std::to_string(p[2]) + " 2 7 8 " + std::to_string(p[0]) + " " + std::to_string(p[1]) + "\n";
         return text + "3 0 1 2\n";
     }
     text += bytes<std::uint8_t>(2, big) + bytes<std::int32_t>(10, big) + bytes<std::int32_t>(20, big) +
@@ -77,7 +78,9 @@ TEST_CASE("XYZ and CSV in the forms people save them in") {
         {"d.pts", "3\n1 2 3\n-4.5 .25 0.001\n7 8 9\n"},
         {"a.csv", "1,2,3\n-4.5,0.25,0.001\n7,8,9\n"},
         {"b.csv", "\xEF\xBB\xBFid,Z,Y,X\n0,3,2,1\n1,0.001,0.25,-4.5\n2,9,8,7\n"},
-        {"c.csv", "\"name, short\",\"X (microns)\",\"Y (microns)\",\"Z (microns)\"\n\"a,b\",1,2,3\nb,-4.5,0.25,0.001\nc, 7 , 8 , 9\n"},
+        {"c.csv",
+         "\"name, short\",\"X (microns)\",\"Y (microns)\",\"Z (microns)\"\n\"a,b\",1,2,3\nb,-4.5,0.25,0.001\nc, 7 , 8 "
+         ", 9\n"},
         {"d.csv", "x;y;z\n1;2;3\n-4,5;0,25;0,001\n7;8;9\n"},
         {"e.tsv", " \tArea\tX\tY\tZ\n\t0\t1\t2\t3\n2\t0\t-4.5\t0.25\t0.001\n3\t0\t7\t8\t9\n"},
         {"f.csv", "1 2 3\n-4.5 0.25 0.001\n7 8 9\n"},
@@ -122,11 +125,13 @@ TEST_CASE("PLY in ascii and both byte orders, whatever else it holds") {
 
 TEST_CASE("OBJ and OFF give their vertices") {
     const Scratch scratch;
-    const std::string obj = "# cube\nmtllib a.mtl\nv 1 2 3\nvn 0 0 1\nv -4.5 0.25 0.001 0.5 0.5 0.5\nvt 0 0\nv 7 8 9\nf 1 2 3\n";
+    const std::string obj =
+        "# cube\nmtllib a.mtl\nv 1 2 3\nvn 0 0 1\nv -4.5 0.25 0.001 0.5 0.5 0.5\nvt 0 0\nv 7 8 9\nf 1 2 3\n";
     CHECK(read_points(scratch.write("a.obj", obj)).points == kThree);
-    CHECK(read_points(scratch.write("a.off", "OFF\n# c\n3 1 0\n1 2 3\n-4.5 0.25 0.001\n\n7 8 9\n3 0 1 2\n")).points == kThree);
-    CHECK(read_points(scratch.write("b.off", "COFF 3 0 0\n1 2 3 9 9 9 9\n-4.5 0.25 0.001 1 1 1 1\n7 8 9 0 0 0 0\n")).points ==
+    CHECK(read_points(scratch.write("a.off", "OFF\n# c\n3 1 0\n1 2 3\n-4.5 0.25 0.001\n\n7 8 9\n3 0 1 2\n")).points ==
           kThree);
+    CHECK(read_points(scratch.write("b.off", "COFF 3 0 0\n1 2 3 9 9 9 9\n-4.5 0.25 0.001 1 1 1 1\n7 8 9 0 0 0 0\n"))
+              .points == kThree);
 }
 
 TEST_CASE("errors name the file, the line, what was expected and what was found") {
@@ -151,19 +156,26 @@ TEST_CASE("errors name the file, the line, what was expected and what was found"
     says(read_error(scratch, "a.off", "OFF\n2 0 0\n1 2 3\n"), "got 1; the file is truncated");
     says(read_error(scratch, "a.off", "OFF\n1e15 0 0\n1 2 3\n"), "cannot hold '1e15' vertices");
     says(read_error(scratch, "a.ply", "plot\n"), "expected 'ply'");
-    says(read_error(scratch, "a.ply", "ply\nformat ascii 1.0\nelement vertex 99999999999\nproperty float x\n"
-                                      "property float y\nproperty float z\nend_header\n0 0 0\n"), "truncated");
-    says(read_error(scratch, "a.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
-                                      "end_header\n0 0\n"), "expected a vertex property 'z'");
-    says(read_error(scratch, "a.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
-                                      "property float z\nend_header\n0 0 zero\n"), "a.ply:8: expected a number");
+    says(read_error(scratch, "a.ply",
+                    "ply\nformat ascii 1.0\nelement vertex 99999999999\nproperty float x\n"
+                    "property float y\nproperty float z\nend_header\n0 0 0\n"),
+         "truncated");
+    says(read_error(scratch, "a.ply",
+                    "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+                    "end_header\n0 0\n"),
+         "expected a vertex property 'z'");
+    says(read_error(scratch, "a.ply",
+                    "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+                    "property float z\nend_header\n0 0 zero\n"),
+         "a.ply:8: expected a number");
     says(read_error(scratch, "a.doc", "1 2 3\n"), "expected a name ending in");
     says(message_of([&] { (void)read_points(scratch.path("none.xyz")); }), "no such file");
     says(message_of([&] { (void)read_points(scratch.path("")); }), "expected a name");
 
     const double nan = std::numeric_limits<double>::quiet_NaN();
-    const std::string header = "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty double x\n"
-                               "property double y\nproperty double z\nend_header\n";
+    const std::string header =
+        "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty double x\n"
+        "property double y\nproperty double z\nend_header\n";
     says(read_error(scratch, "n.ply", header + bytes(1.0, false) + bytes(nan, false) + bytes(1.0, false)),
          "vertex 0: expected finite numbers");
 }
@@ -238,7 +250,8 @@ TEST_CASE("points outside the image are counted, and the option that fits is nam
 
 TEST_CASE("close points become one, the first stays and so does the order") {
     const std::vector<Vec3> points{{0.9, 0, 0}, {0.1, 0, 0}, {0.9, 0, 0}, {0.12, 0, 0}, {1.1, 0, 0}, {0.6, 0, 0}};
-    CHECK(merge_close_points(points, 0) == std::vector<Vec3>{{0.9, 0, 0}, {0.1, 0, 0}, {0.12, 0, 0}, {1.1, 0, 0}, {0.6, 0, 0}});
+    CHECK(merge_close_points(points, 0) ==
+          std::vector<Vec3>{{0.9, 0, 0}, {0.1, 0, 0}, {0.12, 0, 0}, {1.1, 0, 0}, {0.6, 0, 0}});
     // 0.12 is too close to 0.1, 0.6 to 0.9; 1.1 is in the next cell
     CHECK(merge_close_points(points, 1.0) == std::vector<Vec3>{{0.9, 0, 0}, {0.1, 0, 0}, {1.1, 0, 0}});
     CHECK(merge_close_points({}, 1.0).empty());

@@ -19,8 +19,7 @@ FloatGridPtr sphere(const char* name, float radius = 1.0F) {
 
 bool same_tree(const FloatGrid& a, const FloatGrid& b) {
     bool same = a.activeVoxelCount() == b.activeVoxelCount() && a.tree().hasSameTopology(b.tree());
-    for (auto voxel = a.cbeginValueAll(); voxel && same; ++voxel)
-        same = *voxel == b.tree().getValue(voxel.getCoord());
+    for (auto voxel = a.cbeginValueAll(); voxel && same; ++voxel) same = *voxel == b.tree().getValue(voxel.getCoord());
     return same;
 }
 

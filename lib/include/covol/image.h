@@ -70,12 +70,15 @@ private:
 /// Reads a multi-page TIFF (ImageJ and OME spacing understood), NRRD, NIfTI or MetaImage.
 /// @throws Error Io (cannot be opened or read), InvalidInput (not 3D, empty, NaN or infinite values),
 ///               Unsupported (colour or vector pixels, an unknown format).
-[[nodiscard]] Image read_image(const std::string& path, const ReadImageOptions& options = {}, const RunContext& run = {});
+[[nodiscard]] Image read_image(const std::string& path, const ReadImageOptions& options = {},
+                               const RunContext& run = {});
 
 /// Only what the header says. @throws as read_image.
 [[nodiscard]] ImageGeometry read_image_geometry(const std::string& path, const ReadImageOptions& options = {});
 
-/// Writes values (i fastest) in the geometry's frame: .nrrd, .nii, .nii.gz, .mha, .tif by the name's end.
+/// Writes values (i fastest) in the geometry's frame: .nrrd, .nii, .nii.gz, .mha, .tif by the name's end; packed,
+/// except .nii. A TIFF has spacing and unit (Fiji's way) but no place for an origin or a direction; NIfTI has no unit
+/// but the millimetre, the numbers are written as they are.
 /// Whole or not at all: to a temporary name beside the target, then renamed.
 void write_image(const std::string& path, const ImageGeometry& geometry, const std::int32_t* labels);
 void write_image(const std::string& path, const ImageGeometry& geometry, const std::uint8_t* values);

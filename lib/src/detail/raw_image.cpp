@@ -24,7 +24,7 @@ struct Unit {
     const char* name;
     double metres;
 };
-constexpr Unit kUnits[] = {{"nm", 1e-9}, {"um", 1e-6},     {"mm", 1e-3},     {"cm", 1e-2},
+constexpr Unit kUnits[] = {{"nm", 1e-9}, {"um", 1e-6},     {"mm", 1e-3},        {"cm", 1e-2},
                            {"m", 1.0},   {"inch", 0.0254}, {"angstrom", 1e-10}, {"pm", 1e-12}};
 
 struct Spelling {
@@ -32,13 +32,13 @@ struct Spelling {
     const char* unit;
 };
 constexpr Spelling kSpellings[] = {
-    {"\xC2\xB5m", "um"},      {"\xCE\xBCm", "um"},     {"\xB5m", "um"},         {"\\u00b5m", "um"},
-    {"micron", "um"},         {"microns", "um"},       {"micrometer", "um"},    {"micrometre", "um"},
-    {"micrometers", "um"},    {"micrometres", "um"},   {"nanometer", "nm"},     {"nanometre", "nm"},
-    {"nanometers", "nm"},     {"millimeter", "mm"},    {"millimetre", "mm"},    {"millimeters", "mm"},
-    {"centimeter", "cm"},     {"centimetre", "cm"},    {"meter", "m"},          {"metre", "m"},
-    {"in", "inch"},           {"inches", "inch"},      {"\xC3\x85", "angstrom"}, {"pixel", ""},
-    {"pixels", ""},           {"voxel", ""},           {"reference frame", ""}};
+    {"\xC2\xB5m", "um"},   {"\xCE\xBCm", "um"},   {"\xB5m", "um"},          {"\\u00b5m", "um"},
+    {"micron", "um"},      {"microns", "um"},     {"micrometer", "um"},     {"micrometre", "um"},
+    {"micrometers", "um"}, {"micrometres", "um"}, {"nanometer", "nm"},      {"nanometre", "nm"},
+    {"nanometers", "nm"},  {"millimeter", "mm"},  {"millimetre", "mm"},     {"millimeters", "mm"},
+    {"centimeter", "cm"},  {"centimetre", "cm"},  {"meter", "m"},           {"metre", "m"},
+    {"in", "inch"},        {"inches", "inch"},    {"\xC3\x85", "angstrom"}, {"pixel", ""},
+    {"pixels", ""},        {"voxel", ""},         {"reference frame", ""}};
 
 /// An unpacked view of a gzip or zlib stream in a file.
 class Inflater {

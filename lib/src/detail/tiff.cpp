@@ -95,8 +95,9 @@ Page current_page(const Tiff& tiff) {
 
 PixelType pixel_type(const std::string& path, const Page& page) {
     const auto unsupported = [&](const std::string& what) {
-        return Error(Errc::Unsupported, "read_image: " + path + ": expected grey values of 8, 16 or 32 bits, float or " +
-                                            "double, got " + what);
+        return Error(
+            Errc::Unsupported,
+            "read_image: " + path + ": expected grey values of 8, 16 or 32 bits, float or " + "double, got " + what);
     };
     if (page.samples != 1) throw unsupported("colour (" + std::to_string(page.samples) + " samples per pixel)");
     if (page.format == SAMPLEFORMAT_UINT) {
@@ -289,8 +290,7 @@ bool read_strips(const Tiff& tiff, const Page& page, std::uint64_t row_bytes, ch
     if (strip_bytes == 0) return false;
     for (std::uint64_t done = 0, strip = 0; done < page_bytes; ++strip) {
         const auto want = static_cast<tmsize_t>(std::min(strip_bytes, page_bytes - done));
-        if (TIFFReadEncodedStrip(tiff.get(), static_cast<std::uint32_t>(strip), out + done, want) != want)
-            return false;
+        if (TIFFReadEncodedStrip(tiff.get(), static_cast<std::uint32_t>(strip), out + done, want) != want) return false;
         done += static_cast<std::uint64_t>(want);
     }
     return true;
@@ -421,13 +421,15 @@ void write_tiff(const std::string& path, const ImageGeometry& geometry, PixelTyp
     std::array<char, 32> depth{};
     std::to_chars(depth.data(), depth.data() + depth.size() - 1, geometry.spacing[2]);
     const std::string slices = std::to_string(geometry.size[2]);
-    std::string description = "ImageJ=1.53t\nimages=" + slices + "\nslices=" + slices +
-                              "\nhyperstack=true\nmode=grayscale\nspacing=" + depth.data() + "\n";
+    std::string description =
+        "ImageJ=1.53t\nimages=" + slices + "\nslices=" + slices + "\nhyperstack=true\nmode=grayscale\n";
+    if (geometry.spacing_known) description += std::string("spacing=") + depth.data() + "\n";
     if (!geometry.unit.empty()) description += "unit=" + geometry.unit + "\n";
     const int format = with_pixel_type(type, [](auto pixel) {
         using T = decltype(pixel);
         return std::is_floating_point_v<T> ? SAMPLEFORMAT_IEEEFP
-                                           : std::is_signed_v<T> ? SAMPLEFORMAT_INT : SAMPLEFORMAT_UINT;
+               : std::is_signed_v<T>       ? SAMPLEFORMAT_INT
+                                           : SAMPLEFORMAT_UINT;
     });
     std::vector<char> page(page_bytes);  // libtiff wants it writable
     for (std::int32_t z = 0; z < geometry.size[2]; ++z) {
