@@ -4,13 +4,15 @@
 #
 #     bash houdini_free_examples/00_quickstart.sh
 #
-# The image is a C. elegans embryo with stained membranes (data/README.md): its far side has faded, no edge is left
+# The image is a C. elegans embryo with stained membranes (houdini_free_examples/data/README.md): its far side has faded, no edge is left
 # there, and the marks carry the surface across.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 image=houdini_free_examples/data/celegans_embryo.tif
-points=houdini_free_examples/data/celegans_embryo_marks.csv
+# Marks for the program, and others that it never sees, to measure the result with.
+points=houdini_free_examples/data/celegans_marks.csv
+check=houdini_free_examples/data/celegans_check.csv
 out=out/quickstart
 covol=build/bin/covol
 
@@ -23,6 +25,7 @@ echo "== segmenting"
 mkdir -p "$out"
 "$covol" segment "$image" --points "$points" -o "$out/embryo.vdb" \
   --mesh "$out/embryo.ply" --mask "$out/embryo_mask.tif" --json "$out/report.json"
+"$covol" compare "$out/embryo.vdb" "$check" --json "$out/check.json"
 "$covol" render "$out/embryo.vdb" --image "$image" --points "$points" -o "$out/embryo.png"
 
 echo "== results"
@@ -32,7 +35,9 @@ out = sys.argv[1]
 r = json.load(open(out + "/report.json"))
 fit, surface, unit = r["fit"]["points_to_surface"], r["surface"], r["input"]["image"]["unit"] or "units"
 h = r["grid"]["voxel_size"]
+held_out = json.load(open(out + "/check.json"))["fit"]["points_to_surface"]
 print(f"marks to surface   mean {fit['mean'] / h:.2f}, 95 % {fit['p95'] / h:.2f} voxels of {h:g} {unit}")
+print(f"marks held out     mean {held_out['mean'] / h:.2f}, 95 % {held_out['p95'] / h:.2f} voxels")
 print(f"surface            {'closed' if surface['closed'] else 'NOT CLOSED'}, genus {surface['genus']}, "
       f"{surface['components']} component(s), volume {surface['volume']:.5g} {unit}^3")
 print(f"solve              {r['solve']['steps']} steps, {r['solve']['stop_reason']}")
