@@ -298,6 +298,7 @@ private:
             report().seconds.solve -= report().seconds.edge - edge_before;
         }
         run_.check();
+        result_.u->setName("u");
         const EvolveReport& solved = report().solve;
         report().active_voxels = solved.active_voxels;
         report().leaf_count = solved.leaf_count;

@@ -22,6 +22,18 @@ std::string to_text(double value) {
     return text.str();
 }
 
+CLI::Option* add_positive(CLI::App& command, const std::string& flag, double& target, const std::string& description) {
+    CLI::Option* option = command.add_option_function<double>(
+        flag,
+        [&target, flag](const double& value) {
+            if (!(value > 0) || !std::isfinite(value))
+                throw Error(Errc::InvalidOptions, flag + ": expected > 0, got " + to_text(value));
+            target = value;
+        },
+        description);
+    return option->type_name("NUMBER");
+}
+
 }  // namespace
 
 CLI::Option* add_length(CLI::App& command, const std::string& flag, Length& target, const std::string& shown_default,
@@ -118,11 +130,9 @@ void TagFlags::bind(CLI::App& command) {
 
 void EdgeFlags::bind(CLI::App& command) {
     add_length(command, "--sigma", sigma, "1vx", "presmoothing of the image");
-    CLI::Option* k = command.add_option("--edge-k", options.edge_k, "K in g = 1/(1 + K s^2) [see --edge-contrast]")
-                         ->check(CLI::PositiveNumber);
-    command.add_option("--edge-contrast", options.edge_contrast,
-                       "gradient at which g = 1/2, of the image scaled to [0,1] per world unit [90 % percentile in the band]")
-        ->check(CLI::PositiveNumber)
+    CLI::Option* k = add_positive(command, "--edge-k", options.edge_k, "K in g = 1/(1 + K s^2) [see --edge-contrast]");
+    add_positive(command, "--edge-contrast", options.edge_contrast,
+                 "gradient at which g = 1/2, of the image scaled to [0,1], per world unit [90 % percentile in the band]")
         ->excludes(k);
 }
 

@@ -1,7 +1,12 @@
 #include <iomanip>
+#include <sstream>
 
+#include "bindings.h"
 #include "commands.h"
 #include "covol/compare.h"
+#include "covol/error.h"
+#include "covol/surface.h"
+#include "file_kind.h"
 #include "report.h"
 
 namespace covol::tool {
@@ -12,6 +17,15 @@ struct CompareJob {
     int label = 0, label_b = -1;
 
     void run(Session& session) const {
+        const bool points_a = kind_of_file(a) == FileKind::Points;
+        const bool points_b = kind_of_file(b) == FileKind::Points;
+        if (points_a && points_b) throw Error(Errc::Unsupported, "compare: " + a + " and " + b + " are both points");
+        if (points_a) return measure_points(a, b, session);
+        if (points_b) return measure_points(b, a, session);
+        compare_solids(session);
+    }
+
+    void compare_solids(Session& session) const {
         const Stopwatch reading;
         const Solid first = read_solid(a, label);
         const Solid second = read_solid(b, label_b >= 0 ? label_b : label);
@@ -26,16 +40,36 @@ struct CompareJob {
              << r.hausdorff95 << ", max " << r.hausdorff;
         session.say(text.str());
     }
+
+    static TriangleMesh surface_of(const std::string& path, const RunContext& run) {
+        switch (kind_of_file(path)) {
+            case FileKind::Vdb: return extract_mesh(*read_level_set(path), {}, run);
+            case FileKind::Mesh: return read_mesh(path);
+            default: break;
+        }
+        throw Error(Errc::Unsupported, "compare: " + path + ": points can be compared with a .vdb or a mesh");
+    }
+
+    /// Points are no solid: how far they lie from the other's surface.
+    static void measure_points(const std::string& points_path, const std::string& solid_path, Session& session) {
+        const std::vector<Vec3> points = to_world(read_points(points_path), nullptr);
+        const FitStatistics fit = points_to_surface(points, surface_of(solid_path, session.run()), session.run());
+        session.report()["fit"]["points_to_surface"] = to_json(fit);
+        std::ostringstream text;
+        text << std::setprecision(6) << "points to surface: mean " << fit.mean << ", 95 % " << fit.p95 << ", max " << fit.max;
+        session.say(text.str());
+    }
 };
 
 }  // namespace
 
 void add_compare(Session& session) {
     const auto job = std::make_shared<CompareJob>();
-    CLI::App* command = session.add_command("compare", "Overlap and distances of two solids: masks, meshes, .vdb, in any mix",
-                                            [job, &session] { job->run(session); });
-    command->add_option("a", job->a, "label image, mesh or .vdb")->required()->type_name("A");
-    command->add_option("b", job->b, "label image, mesh or .vdb")->required()->type_name("B");
+    CLI::App* command = session.add_command(
+        "compare", "Overlap and distances of two solids: masks, meshes, .vdb, in any mix; or points and a surface",
+        [job, &session] { job->run(session); });
+    command->add_option("a", job->a, "label image, mesh, .vdb or points")->required()->type_name("A");
+    command->add_option("b", job->b, "label image, mesh, .vdb or points")->required()->type_name("B");
     command->add_option("--label", job->label, "label of the masks, 0: any")->capture_default_str();
     command->add_option("--label-b", job->label_b, "label of B, where it differs");
 }

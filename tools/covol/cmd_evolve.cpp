@@ -1,3 +1,5 @@
+#include <openvdb/openvdb.h>
+
 #include "bindings.h"
 #include "commands.h"
 #include "covol/error.h"
@@ -39,6 +41,7 @@ struct EvolveJob {
         const Stopwatch watch;
         const EvolveReport result = evolve(*u, fields, options, session.run());
         session.run().check();
+        u->setName("u");
         session.add_seconds("solve", watch.seconds());
         session.report()["grid"] = {{"voxel_size", domain_of(*u).voxel_size},
                                     {"active_voxels", result.active_voxels},

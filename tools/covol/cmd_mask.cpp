@@ -1,5 +1,8 @@
+#include <algorithm>
+
 #include "bindings.h"
 #include "commands.h"
+#include "covol/error.h"
 #include "covol/surface.h"
 #include "report.h"
 
@@ -13,6 +16,8 @@ struct MaskJob {
 
     void run(Session& session) const {
         session.outputs().check("-o", output, OutputKind::Image);
+        if (label < 1 || label > 255)
+            throw Error(Errc::InvalidOptions, "--label: expected 1 to 255, got " + std::to_string(label));
         const FloatGridPtr level_set = read_level_set(input);
         const ImageGeometry geometry = read_image_geometry(like, image.options);
         const Stopwatch watch;
@@ -37,7 +42,7 @@ void add_mask(Session& session) {
     command->add_option("level_set", job->input, "a level set, .vdb")->required()->type_name("IN.vdb");
     command->add_option("--like", job->like, "image whose lattice the mask gets")->required()->type_name("IMAGE");
     command->add_option("-o,--output", job->output, "label image")->required()->type_name("OUT.nrrd|.nii.gz|.tif|.mha");
-    command->add_option("--label", job->label, "value of the inside")->check(CLI::Range(1, 255))->capture_default_str();
+    command->add_option("--label", job->label, "value of the inside, 1 to 255")->capture_default_str();
     job->image.bind(*command);
 }
 

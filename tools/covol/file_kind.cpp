@@ -5,7 +5,9 @@
 #include <filesystem>
 #include <string_view>
 
+#include "covol/error.h"
 #include "covol/mesh_io.h"
+#include "covol/points.h"
 
 namespace covol::tool {
 namespace {
@@ -25,6 +27,21 @@ constexpr std::array<std::string_view, 4> kPointEndings{".xyz", ".csv", ".tsv", 
 constexpr std::array<std::string_view, 2> kMeshEndings{".stl", ".glb"};
 constexpr std::array<std::string_view, 3> kSharedEndings{".ply", ".obj", ".off"};
 
+/// A file that is neither a mesh nor points is told as a broken mesh.
+bool holds_triangles(const std::string& path) {
+    try {
+        return !read_mesh(path).empty();
+    } catch (const Error& error) {
+        if (error.code() != Errc::InvalidInput) throw;
+        try {
+            (void)read_points(path);
+        } catch (const Error&) {
+            throw error;
+        }
+        return false;
+    }
+}
+
 }  // namespace
 
 FileKind kind_of_file(const std::string& path) {
@@ -32,7 +49,7 @@ FileKind kind_of_file(const std::string& path) {
     if (end == ".vdb") return FileKind::Vdb;
     if (is_one_of(end, kPointEndings)) return FileKind::Points;
     if (is_one_of(end, kMeshEndings)) return FileKind::Mesh;
-    if (is_one_of(end, kSharedEndings)) return read_mesh(path).empty() ? FileKind::Points : FileKind::Mesh;
+    if (is_one_of(end, kSharedEndings)) return holds_triangles(path) ? FileKind::Mesh : FileKind::Points;
     return FileKind::Image;
 }
 

@@ -108,7 +108,7 @@ Session::Session() : app_("covol: segment 3D images with the help of a point clo
 }
 
 void Session::add_common_flags() {
-    app_.add_option("--threads", threads_, "threads to use, 0 takes every core")->check(CLI::Range(0, 4096));
+    app_.add_option("--threads", threads_, "threads to use, 0 takes every core");
     app_.add_flag("--quiet", quiet_, "print nothing but results, warnings and errors");
     app_.add_option("--json", json_path_, "write the report to this file, - is standard output")->type_name("FILE|-");
     app_.add_option("--memory-limit", memory_limit_text_, "stop when more memory is needed, 8G for example")
@@ -151,10 +151,14 @@ int Session::execute() {
     std::unique_ptr<MemoryGuard> guard;
     try {
         progress_ = std::make_unique<Progress>(quiet_);
+        if (threads_ < 0)
+            throw Error(Errc::InvalidOptions, "--threads: expected >= 0, got " + std::to_string(threads_));
         run_.threads = threads_;
         run_.cancel = &cancel_requested;
         run_.progress = [this](const std::string& stage, double fraction) { progress_->update(stage, fraction); };
-        run_.log = [this](LogLevel level, const std::string& line) { level == LogLevel::Warning ? warn(line) : note(line); };
+        run_.log = [this](LogLevel level, const std::string& line) {
+            level == LogLevel::Warning ? warn(line) : note(line);
+        };
         if (!memory_limit_text_.empty()) memory_limit_ = parse_bytes("--memory-limit", memory_limit_text_);
         guard = std::make_unique<MemoryGuard>(memory_limit_, cancel_requested);
         if (json_path_ != "-") outputs_.check("--json", json_path_, OutputKind::Text);
@@ -170,7 +174,8 @@ int Session::execute() {
         if (error.code() == Errc::Cancelled && guard && guard->tripped() && !interrupted)
             return fail(kBadInput, "more memory is needed than --memory-limit " + memory_limit_text_ +
                                        "; use a larger --voxel-size or a --roi");
-        return fail(exit_code_of(error.code()), error.code() == Errc::Cancelled ? "interrupted, nothing was written" : error.what());
+        return fail(exit_code_of(error.code()),
+                    error.code() == Errc::Cancelled ? "interrupted, nothing was written" : error.what());
     } catch (const std::bad_alloc&) {
         return fail(kBadInput, "out of memory; use a larger --voxel-size or a --roi");
     } catch (const std::exception& error) {
@@ -182,6 +187,7 @@ void Session::start_report() {
     report_["covol"] = COVOL_VERSION;
     report_["command"] = command_->get_name();
     report_["options"] = options_of(*command_);
+    report_["seconds"] = Json::object();
 }
 
 void Session::finish() {

@@ -1,0 +1,48 @@
+#!/usr/bin/env bash
+# Installs what is needed, builds covol, segments a real image with the help of marked points, and says where the
+# results are and how good they are.
+#
+#     bash houdini_free_examples/00_quickstart.sh
+#
+# The image is a C. elegans embryo with stained membranes (houdini_free_examples/data/README.md): its far side has faded, no edge is left
+# there, and the marks carry the surface across.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+image=houdini_free_examples/data/celegans_embryo.tif
+# Marks for the program, and others that it never sees, to measure the result with.
+points=houdini_free_examples/data/celegans_marks.csv
+check=houdini_free_examples/data/celegans_check.csv
+out=out/quickstart
+covol=build/bin/covol
+
+echo "== installing and building (the first time takes minutes)"
+bash tests/install_packages.sh
+cmake --preset default -DCOVOL_BUILD_TESTS=OFF >/dev/null
+cmake --build build --parallel "${COVOL_JOBS:-$(nproc)}" --target covol_tool
+
+echo "== segmenting"
+mkdir -p "$out"
+"$covol" segment "$image" --points "$points" -o "$out/embryo.vdb" \
+  --mesh "$out/embryo.ply" --mask "$out/embryo_mask.tif" --json "$out/report.json"
+"$covol" compare "$out/embryo.vdb" "$check" --json "$out/check.json"
+"$covol" render "$out/embryo.vdb" --image "$image" --points "$points" -o "$out/embryo.png"
+
+echo "== results"
+python3 - "$out" <<'PYTHON'
+import json, sys
+out = sys.argv[1]
+r = json.load(open(out + "/report.json"))
+fit, surface, unit = r["fit"]["points_to_surface"], r["surface"], r["input"]["image"]["unit"] or "units"
+h = r["grid"]["voxel_size"]
+held_out = json.load(open(out + "/check.json"))["fit"]["points_to_surface"]
+print(f"marks to surface   mean {fit['mean'] / h:.2f}, 95 % {fit['p95'] / h:.2f} voxels of {h:g} {unit}")
+print(f"marks held out     mean {held_out['mean'] / h:.2f}, 95 % {held_out['p95'] / h:.2f} voxels")
+print(f"surface            {'closed' if surface['closed'] else 'NOT CLOSED'}, genus {surface['genus']}, "
+      f"{surface['components']} component(s), volume {surface['volume']:.5g} {unit}^3")
+print(f"solve              {r['solve']['steps']} steps, {r['solve']['stop_reason']}")
+print(f"time and memory    {r['seconds']['total']:.1f} s, {r['peak_rss_bytes'] / 2**20:.0f} MiB")
+for name, what in [("embryo.vdb", "level set"), ("embryo.ply", "mesh"), ("embryo_mask.tif", "label image"),
+                   ("report.json", "report"), ("embryo.png", "picture: look at this one first")]:
+    print(f"{out}/{name:18} {what}")
+PYTHON

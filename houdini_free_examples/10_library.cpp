@@ -1,0 +1,74 @@
+// The library's steps, one by one: image and points in, level set, mesh and label image out.
+//
+//     10_library IMAGE POINTS OUT_PREFIX        writes OUT_PREFIX.vdb, OUT_PREFIX.ply and OUT_PREFIX.nrrd
+//
+// `covol segment` and covol::segment() do the same with more care; this shows what happens inside.
+#include <algorithm>
+#include <cstdio>
+#include <string>
+
+#include "covol/band.h"
+#include "covol/distance.h"
+#include "covol/edge.h"
+#include "covol/error.h"
+#include "covol/evolve.h"
+#include "covol/image.h"
+#include "covol/mesh_io.h"
+#include "covol/points.h"
+#include "covol/surface.h"
+#include "covol/vdb_io.h"
+
+int main(int argc, char** argv) {
+    if (argc != 4) {
+        std::fprintf(stderr, "usage: 10_library IMAGE POINTS OUT_PREFIX\n");
+        return 2;
+    }
+    try {
+        // Files. Points become world positions; those outside the image are an error that says what would help.
+        const covol::Image image = covol::read_image(argv[1]);
+        std::vector<covol::Vec3> points = covol::to_world(covol::read_points(argv[2]), &image.geometry());
+        covol::check_inside(points, image.geometry(), argv[2]);
+
+        // The domain: isotropic voxels over the image's box. Every grid below shares its transform.
+        const auto& spacing = image.geometry().spacing;
+        const double h = *std::min_element(spacing.begin(), spacing.end());
+        const covol::Domain domain = covol::domain_of_box(image.geometry().world_box(), h);
+        points = covol::merge_close_points(points, h / 4);
+
+        // 1. Distance to the points, in a tube around them. D closes the gaps that the points leave.
+        const covol::TagDistanceChoice choice = covol::choose_tag_distance(points, domain, {});
+        const double D = choice.tag_distance;
+        const covol::DistanceResult d = covol::distance(points, domain, {D + 5 * h});
+        std::printf("D = %g (%s)\n", D, choice.reason.c_str());
+
+        // 2. Tagging: what a flood from outside cannot reach is inside. u starts as a clamped signed distance.
+        covol::BandResult tagged = covol::band(*d.grid, {D, {}});
+        if (tagged.report.leaks) std::printf("the points leave gaps; D = %g would hold\n", tagged.report.holding_distance);
+
+        // 3. The edge detector, only where the band is.
+        const covol::EdgeResult g = covol::edge(image, *tagged.grid);
+
+        // 4. The flow: points, image edges and curvature move u until it is steady.
+        covol::FloatGridPtr u = tagged.grid;
+        covol::EvolveFields fields;
+        fields.distance = d.grid.get();
+        fields.edge = g.grid.get();
+        const covol::EvolveReport solved = covol::evolve(*u, fields);
+        std::printf("%d steps, %s\n", solved.steps, covol::to_string(solved.stop_reason));
+
+        // 5. A true signed distance, and what comes from it.
+        const covol::FloatGridPtr surface = covol::surface(*u);
+        const covol::TriangleMesh mesh = covol::extract_mesh(*surface);
+        const covol::MeshMeasures measures = covol::measure(mesh);
+        std::printf("volume %g, area %g, genus %d\n", measures.volume, measures.area, measures.genus);
+
+        const std::string prefix = argv[3];
+        covol::write_vdb(prefix + ".vdb", {surface});
+        covol::write_mesh(prefix + ".ply", mesh);
+        covol::write_image(prefix + ".nrrd", image.geometry(), covol::rasterize(*surface, image.geometry()).data());
+        return 0;
+    } catch (const covol::Error& error) {
+        std::fprintf(stderr, "10_library: %s\n", error.what());
+        return 1;
+    }
+}

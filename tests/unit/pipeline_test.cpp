@@ -1,0 +1,141 @@
+#include "covol/pipeline.h"
+
+#include <algorithm>
+#include <atomic>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <functional>
+
+#include "covol/error.h"
+
+using namespace covol;
+
+namespace {
+
+constexpr double kRadius = 8.0;
+
+std::vector<Vec3> sphere_points(int count) {
+    std::vector<Vec3> points;
+    const double golden = std::acos(-1.0) * (3 - std::sqrt(5.0));
+    for (int n = 0; n < count; ++n) {
+        const double z = 1 - (2.0 * n + 1) / count, r = std::sqrt(1 - z * z);
+        points.push_back({kRadius * r * std::cos(golden * n), kRadius * r * std::sin(golden * n), kRadius * z});
+    }
+    return points;
+}
+
+Image ball_image(double spacing) {
+    ImageGeometry geometry;
+    const int n = static_cast<int>(28 / spacing);
+    geometry.size = {n, n, n};
+    geometry.spacing = {spacing, spacing, spacing};
+    geometry.origin = {-0.5 * spacing * (n - 1), -0.5 * spacing * (n - 1), -0.5 * spacing * (n - 1)};
+    std::vector<float> values;
+    for (int k = 0; k < n; ++k)
+        for (int j = 0; j < n; ++j)
+            for (int i = 0; i < n; ++i) {
+                const Vec3 w = geometry.index_to_world({double(i), double(j), double(k)});
+                const double r = std::sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+                values.push_back(static_cast<float>(std::clamp((kRadius - r) / spacing + 0.5, 0.0, 1.0)));
+            }
+    return Image::from_values(geometry, values.data());
+}
+
+double mean_radius(const TriangleMesh& mesh) {
+    double sum = 0;
+    for (const auto& v : mesh.vertices) sum += std::sqrt(double(v[0]) * v[0] + double(v[1]) * v[1] + double(v[2]) * v[2]);
+    return sum / static_cast<double>(mesh.vertices.size());
+}
+
+Errc code_of(const std::function<void()>& work) {
+    try {
+        work();
+    } catch (const Error& error) {
+        return error.code();
+    }
+    FAIL("expected an error");
+    return Errc::Numerical;
+}
+
+}  // namespace
+
+TEST_CASE("segment: points alone give a closed sphere and record what was chosen") {
+    SegmentOptions options;
+    options.voxel_size = 0.8;
+    const SegmentResult result = segment(nullptr, sphere_points(1200), options);
+    CHECK(result.report.surface.closed);
+    CHECK(result.report.surface.genus == 0);
+    CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.2 * options.voxel_size);
+    CHECK(result.report.fit.mean < 0.25 * options.voxel_size);
+    CHECK(result.report.resolved.evolve.rho == 0);
+    CHECK(result.report.resolved.evolve.delta == options.voxel_size);
+    CHECK(result.report.automatic.count("rho") == 1);
+    CHECK(result.report.automatic.count("tag_distance") == 1);
+    CHECK(result.report.band.leaks == false);
+    CHECK(result.edge == nullptr);
+    CHECK(result.report.point_count == 1200);
+}
+
+TEST_CASE("segment: image and points agree on the ball") {
+    const Image image = ball_image(1.0);
+    const SegmentResult result = segment(&image, sphere_points(800));
+    CHECK(result.report.domain.voxel_size == 1.0);
+    CHECK(result.report.surface.closed);
+    CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.25);
+    CHECK(result.edge != nullptr);
+    CHECK(result.report.resolved.edge.edge_k > 0);
+}
+
+TEST_CASE("segment: a sphere as start follows the image edge, without points") {
+    const Image image = ball_image(1.0);
+    SegmentOptions options;
+    options.start.kind = Start::Kind::Sphere;
+    options.start.radius = kRadius + 2;
+    options.evolve.delta = 0.2;
+    const SegmentResult result = segment(&image, {}, options);
+    CHECK(result.report.resolved.evolve.follow);
+    CHECK(result.report.resolved.evolve.theta == 0);
+    CHECK(result.distance == nullptr);
+    CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.4);
+}
+
+TEST_CASE("segment: an unlimited attraction reaches from a far start to the points") {
+    SegmentOptions options;
+    options.voxel_size = 0.8;
+    options.start.kind = Start::Kind::Sphere;
+    options.start.radius = kRadius + 4;
+    options.margin = 8;
+    options.evolve.attraction_range = 0;
+    const SegmentResult result = segment(nullptr, sphere_points(1200), options);
+    CHECK(result.report.automatic.count("distance_tube") == 1);
+    CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.3 * options.voxel_size);
+}
+
+TEST_CASE("segment: what is missing is an error that says so") {
+    CHECK(code_of([] { (void)segment(nullptr, {}); }) == Errc::InvalidInput);
+    const Image image = ball_image(2.0);
+    CHECK(code_of([&] { (void)segment(&image, {}); }) == Errc::InvalidInput);  // tagging without points
+    SegmentOptions options;
+    options.evolve.theta = 2;
+    CHECK(code_of([&] { (void)segment(nullptr, sphere_points(100), options); }) == Errc::InvalidOptions);
+    options = {};
+    options.start.kind = Start::Kind::Sphere;  // radius 0
+    CHECK(code_of([&] { (void)segment(&image, {}, options); }) == Errc::InvalidOptions);
+    options = {};
+    options.roi = WorldBox{{0, 0, 0}, {1, 0, 1}};
+    CHECK(code_of([&] { (void)segment(&image, sphere_points(100), options); }) == Errc::InvalidOptions);
+}
+
+TEST_CASE("segment: a set cancel flag ends it with Cancelled") {
+    const std::atomic<bool> cancel = true;
+    RunContext run;
+    run.cancel = &cancel;
+    CHECK(code_of([&] { (void)segment(nullptr, sphere_points(1200), {}, run); }) == Errc::Cancelled);
+}
+
+TEST_CASE("choose_voxel_size: image before points, median spacing of distinct points") {
+    const Image image = ball_image(2.0);
+    CHECK(choose_voxel_size(&image, {{0, 0, 0}}).voxel_size == 2.0);
+    CHECK(choose_voxel_size(nullptr, {{0, 0, 0}, {3, 0, 0}, {0, 0, 0}, {6, 0, 0}}).voxel_size == Approx(3));
+    CHECK(code_of([] { (void)choose_voxel_size(nullptr, {{1, 1, 1}, {1, 1, 1}}); }) == Errc::InvalidInput);
+}
