@@ -14,6 +14,7 @@
 #include <optional>
 #include <sstream>
 
+#include "covol/band.h"
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "detail/follow.h"
@@ -81,6 +82,10 @@ void check_finite(const LeafBand& band, const HaloField& field, const char* what
                      << " at voxel (" << at.x() << ", " << at.y() << ", " << at.z() << ")";
                 throw Error(Errc::InvalidInput, text.str());
             }
+}
+
+double follow_clamp(const EvolveOptions& options) {
+    return options.theta > 0 || options.rho > 0 ? kHalfWidthVoxels : detail::kFollowWidth;
 }
 
 // What one step did to the surface.
@@ -208,7 +213,7 @@ private:
 
     void rebuild_band() {
         store();
-        detail::follow_surface(u_, domain_, run_);
+        detail::follow_surface(u_, domain_, follow_clamp(options_), run_);
         if (fields_.extend) fields_.extend(u_, fields_);
         gather();
     }
@@ -465,7 +470,7 @@ EvolveReport evolve(FloatGrid& u, const EvolveFields& fields, const EvolveOption
     EvolveReport report;
     with_threads(run, [&] {
         u.tree().voxelizeActiveTiles();
-        if (options.follow) detail::follow_surface(u, domain_of(u), run);
+        if (options.follow) detail::follow_surface(u, domain_of(u), follow_clamp(options), run);
         report = Evolver(u, fields, options, run).run();
     });
     return report;

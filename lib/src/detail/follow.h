@@ -9,9 +9,13 @@ namespace covol::detail {
 /// before the band is made again. (Each time shifts the surface by about 0.1 h² times its curvature: rarely is better.)
 inline constexpr double kFollowWidth = 5.0;
 
-/// Re-makes u as the signed distance to its zero level set, in a band of kFollowWidth voxels inside the domain. A
-/// clamped profile would flatten at the clamp and drag the surface: curvature flow of a sphere lost first order by it.
+/// Re-makes u as the signed distance to its zero level set, clamped to `clamp` voxels (at most kFollowWidth), in a band
+/// of kFollowWidth voxels inside the domain.
+///
+/// Under curvature alone a profile flattens at its clamp and that drags the surface (a sphere then lost first order),
+/// so it wants the whole width. Under advection it grows into a step as high as the clamp, and a higher step creeps
+/// faster off an image edge.
 /// @throws Error InvalidInput when u has no zero level set.
-void follow_surface(FloatGrid& u, const Domain& domain, const RunContext& run);
+void follow_surface(FloatGrid& u, const Domain& domain, double clamp, const RunContext& run);
 
 }  // namespace covol::detail
