@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <sstream>
 
 #include "covol/error.h"
@@ -20,7 +21,8 @@ using detail::kLeafSize;
 using detail::LeafMask;
 
 constexpr auto kWidth = float(kHalfWidthVoxels);
-constexpr double kSignificantShare = 0.1;  ///< of the enclosed volume; a smaller core that appears is a pocket, no leak
+constexpr double kSignificantShare = 0.1;   ///< of the enclosed volume: a core that is less, grown by D, is a pocket
+constexpr double kSignificantRadius = 0.25;  ///< of D: a core that is thinner is a pocket
 
 /// The tube of a distance grid, flooded for any number of D.
 class Tube {
@@ -110,7 +112,10 @@ void test_for_leaks(const Tube& tube, const Tagging& at_d, double tag_distance, 
     const double h = tube.domain.voxel_size;
     const auto opens_up = [&](double larger) {
         const Tagging there = tag(tube, float(larger), seeds);
-        return double(newly_enclosed(tube, at_d, there)) > kSignificantShare * double(there.enclosed);
+        // As if it were one ball: the core's radius, and its volume without the wall of thickness D.
+        const double core_radius = std::cbrt(double(newly_enclosed(tube, at_d, there)) * 3.0 / (4.0 * std::numbers::pi)) * h;
+        const double grown = 4.0 / 3.0 * std::numbers::pi * std::pow((core_radius + larger) / h, 3);
+        return core_radius > kSignificantRadius * larger && grown > kSignificantShare * double(there.enclosed);
     };
     if (at_d.core > 0) {
         report.leaks = opens_up(tag_distance + h);

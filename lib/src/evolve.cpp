@@ -18,6 +18,7 @@
 #include "covol/error.h"
 #include "detail/follow.h"
 #include "detail/halo.h"
+#include "detail/leaf_propagation.h"
 #include "detail/scheme.h"
 
 namespace covol {
@@ -29,6 +30,7 @@ using detail::kLeafSize;
 using detail::kPaddedSize;
 using detail::LeafBand;
 using detail::LeafBounds;
+using detail::LeafMask;
 using LeafNode = FloatGrid::TreeType::LeafNodeType;
 using Clock = std::chrono::steady_clock;
 
@@ -36,7 +38,10 @@ constexpr int kInnerSweeps = 2;  // the second costs a fifth and saves a third o
 constexpr double kRounding = 5e-7;  // voxels; a residual below this is noise of single precision
 constexpr double kMaxOmega = 1.9;
 constexpr double kDiverged = 10.0;  // growth of the residual at which over-relaxation is given up
-constexpr double kFollowMove = 0.75;  // voxels that the surface may move before its band is made again
+// When a follower's band is made again, voxels.
+constexpr double kFollowMove = 0.75;
+constexpr float kFollowDeep = 2.0F;
+constexpr double kCrossingsPerVoxel = 1.5;  // edges crossed for each voxel of a surface that faces any way
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -78,13 +83,29 @@ void check_finite(const LeafBand& band, const HaloField& field, const char* what
             }
 }
 
-// The change of one step where the surface is.
+// What one step did to the surface.
 struct Change {
-    double mean = 0.0;  // of |u^n - u^{n-1}| over |u| < h, voxels
-    double max = 0.0;   // the same's largest
+    double mean = 0.0;  // motion of the zero crossings along voxel edges, voxels
     bool crosses = false;
     bool finite = true;
 };
+
+LeafMask negative_mask(const float* values) {
+    LeafMask mask{};
+    for (int n = 0; n < kLeafSize; ++n) mask[n >> 6] |= std::uint64_t(values[n] < 0.0F) << (n & 63);
+    return mask;
+}
+
+// Voxels whose next voxel along an axis, in the same leaf, has the other sign.
+LeafMask sign_changes(const LeafMask& negative, int axis) {
+    static constexpr LeafMask kRest{};
+    LeafMask changes = detail::looking_at(negative, kRest, axis, 1);
+    for (int word = 0; word < 8; ++word) changes[word] ^= negative[word];
+    // The last voxels along the axis have no next one here.
+    if (axis == 0) changes[7] = 0;
+    for (std::uint64_t& word : changes) word &= axis == 1 ? ~std::uint64_t(0) >> 8 : axis == 2 ? 0x7f7f7f7f7f7f7f7fULL : ~0ULL;
+    return changes;
+}
 
 class Evolver {
 public:
@@ -110,7 +131,7 @@ public:
                 report_.stop_reason = StopReason::Cancelled;
                 break;
             }
-            if (options_.follow && moved_ >= kFollowMove) rebuild_band();
+            if (options_.follow && has_moved()) rebuild_band();
             const Change change = step();
             if (!change.finite) {
                 restore_previous();
@@ -120,7 +141,6 @@ public:
             }
             ++report_.steps;
             report_.last_change = change.mean;
-            moved_ += change.max;
             run_.report("evolve", progress());
             if (!change.crosses) {
                 report_.stop_reason = StopReason::Vanished;
@@ -161,6 +181,7 @@ private:
         });
         check_finite(band_, field_, "u");
         gather_fields();
+        if (options_.follow) remember_surface();
         previous_ = detail::LeafArray<float>(band_.size(), 0.0F, 0);
         rows_.resize(band_.size() * 6 * kLeafSize);
         residuals_.assign(band_.size(), 0.0);
@@ -187,7 +208,6 @@ private:
 
     void rebuild_band() {
         store();
-        moved_ = 0.0;
         detail::follow_surface(u_, domain_, run_);
         if (fields_.extend) fields_.extend(u_, fields_);
         gather();
@@ -262,44 +282,90 @@ private:
         return std::sqrt(sum / static_cast<double>(active_count_));
     }
 
+    // Where an edge is crossed before and after, the crossing's way; where only once, half an edge. Unlike the change of
+    // u this does not see a profile that grows steeper in its place.
     Change measure_change() {
         struct Part {
-            double sum = 0.0, max = 0.0;
-            int count = 0;
+            double way = 0.0;
+            int edges = 0;
             bool negative = false, positive = false, finite = true;
         };
         std::vector<Part> parts(band_.size());
         tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
             const float* now = field_.values.leaf(leaf);
             const float* before = previous_.leaf(leaf);
-            Part part;
-            for (int n = 0; n < kLeafSize; ++n) {
-                if (!detail::is_on(band_.active(leaf), n)) continue;
-                part.finite &= std::isfinite(now[n]);
-                (now[n] < 0.0F ? part.negative : part.positive) = true;
-                if (std::abs(now[n]) >= 1.0F) continue;
-                const double moved = std::abs(double(now[n]) - before[n]);
-                part.sum += moved;
-                part.max = std::max(part.max, moved);
-                ++part.count;
+            Part& part = parts[leaf];
+            // A sum is finite when every value is, and takes no branches.
+            float sum = 0.0F;
+            for (int n = 0; n < kLeafSize; ++n) sum += now[n];
+            part.finite = std::isfinite(sum);
+            const LeafMask negative = negative_mask(now), was_negative = negative_mask(before);
+            for (int word = 0; word < 8; ++word) {
+                part.negative |= negative[word] != 0;
+                part.positive |= ~negative[word] != 0;
             }
-            parts[leaf] = part;
+            if (!detail::any_on(band_.active(leaf)) || (negative == was_negative && !(part.negative && part.positive))) return;
+            for (int axis = 0; axis < 3; ++axis) {
+                const LeafMask after = sign_changes(negative, axis), first = sign_changes(was_negative, axis);
+                const int step = 64 >> (3 * axis);
+                for (int word = 0; word < 8; ++word)
+                    for (std::uint64_t bits = after[word] | first[word]; bits != 0; bits &= bits - 1) {
+                        const int n = word << 6 | __builtin_ctzll(bits);
+                        ++part.edges;
+                        part.way += detail::is_on(after, n) && detail::is_on(first, n)
+                                        ? std::abs(crossing(now[n], now[n + step]) - crossing(before[n], before[n + step]))
+                                        : 0.5;
+                    }
+            }
         });
         Change change;
-        double sum = 0.0;
-        std::int64_t count = 0;
+        double way = 0.0;
+        std::int64_t edges = 0;
         bool negative = false, positive = false;
         for (const Part& part : parts) {
-            sum += part.sum;
-            change.max = std::max(change.max, part.max);
-            count += part.count;
+            way += part.way;
+            edges += part.edges;
             negative |= part.negative;
             positive |= part.positive;
             change.finite &= part.finite;
         }
         change.crosses = negative && positive;
-        change.mean = count > 0 ? sum / static_cast<double>(count) : 0.0;
+        change.mean = edges > 0 ? way / static_cast<double>(edges) : 0.0;
         return change;
+    }
+
+    static double crossing(float a, float b) { return double(a) / (double(a) - b); }
+
+    // What the band was made for, as signs; see has_moved().
+    void remember_surface() {
+        made_for_.resize(band_.size());
+        tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
+            const float* values = field_.values.leaf(leaf);
+            MadeFor& made = made_for_[leaf];
+            made.negative = negative_mask(values);
+            made.near = {};
+            for (int n = 0; n < kLeafSize; ++n)
+                made.near[n >> 6] |= std::uint64_t(std::abs(values[n]) < kFollowDeep) << (n & 63);
+            made.crossed = 0;
+            for (int axis = 0; axis < 3; ++axis) made.crossed += detail::count_on(sign_changes(made.negative, axis));
+        });
+    }
+
+    // The surface has left what its band was made for: on the average by kFollowMove voxels, counted by the voxels that
+    // changed sign, or somewhere past voxels that were kFollowDeep away.
+    [[nodiscard]] bool has_moved() const {
+        std::int64_t flipped = 0, crossed = 0;
+        for (std::size_t leaf = 0; leaf < band_.size(); ++leaf) {
+            const MadeFor& made = made_for_[leaf];
+            const LeafMask negative = negative_mask(field_.values.leaf(leaf));
+            for (int word = 0; word < 8; ++word) {
+                const std::uint64_t flips = negative[word] ^ made.negative[word];
+                if ((flips & ~made.near[word]) != 0) return true;
+                flipped += __builtin_popcountll(flips);
+            }
+            crossed += made.crossed;
+        }
+        return static_cast<double>(flipped) >= kFollowMove * static_cast<double>(crossed) / kCrossingsPerVoxel;
     }
 
     void restore_previous() {
@@ -346,9 +412,13 @@ private:
     std::optional<HaloField> phi_, edge_, image_weight_;
     detail::LeafArray<float> previous_;     // u^{n-1}
     std::vector<float, tbb::cache_aligned_allocator<float>> rows_;  // 6 x 512 for each leaf
+    struct MadeFor {
+        LeafMask negative, near;
+        int crossed;
+    };
+    std::vector<MadeFor> made_for_;         // for each leaf, with `follow`
     std::vector<double> residuals_;         // scratch, one number for each leaf
     std::int64_t sweeps_ = 0;
-    double moved_ = 0.0;                    // bound on the surface's way since its band was made, voxels
     EvolveReport report_;
 };
 

@@ -23,11 +23,13 @@ namespace {
 using detail::Coord;
 using detail::kLeafSize;
 
-constexpr double kSignificantRatio = 1.25;   ///< peak / saddle of a core that is a structure, not a gap in one
+constexpr double kClearRatio = 2.0;          ///< peak / saddle of a core that is a structure, not a pocket in a wall
+constexpr double kSignificantRatio = 1.25;   ///< the same for a core that takes a large share of the cloud
+constexpr double kLargeShare = 0.1;          ///< of the cloud's area
 constexpr double kImportantShare = 0.1;      ///< of the most important core's volume: a core that D has to hold
 constexpr double kStructureShare = 0.25;     ///< of the cloud's area: less is pockets of a cloud without an inside
-constexpr std::int64_t kCoarseVoxels = 200'000;    ///< on the first grid
-constexpr std::int64_t kMaxTubeVoxels = 2'500'000; ///< on the last grid
+constexpr std::int64_t kCoarseVoxels = 200'000;      ///< on the first grid
+constexpr std::int64_t kMaxTubeVoxels = 1'500'000;  ///< on the last grid
 constexpr double kBucketsPerVoxel = 16;
 
 /// An enclosed core, at the moment when it merges with the exterior. Lengths in voxels of the analysis grid.
@@ -277,9 +279,15 @@ struct Verdict {
 
 Verdict judge(const Analysis& analysis) {
     Verdict verdict;
-    const auto is_significant = [](const Core& c) {
+    const auto cloud_area = [&](double saddle) {
+        const double thickness = std::max(saddle, 1.0);
+        return analysis.cloud_volume(thickness) / (2 * thickness);
+    };
+    const auto is_significant = [&](const Core& c) {
         // Below half a voxel the grid itself closes the gap.
-        return c.peak >= kSignificantRatio * std::max(c.saddle, 0.5) && c.peak >= 1.0;
+        const double ratio = c.peak / std::max(c.saddle, 0.5);
+        return c.peak >= 1.0 && (ratio >= kClearRatio ||
+                                 (ratio >= kSignificantRatio && c.full_area() >= kLargeShare * cloud_area(c.saddle)));
     };
     const Core* primary = nullptr;
     for (const Core& c : analysis.cores)
@@ -293,9 +301,7 @@ Verdict judge(const Analysis& analysis) {
         ++verdict.cores;
     }
     verdict.peak = primary->peak;
-    const double thickness = std::max(verdict.saddle, 1.0);
-    if (area < kStructureShare * analysis.cloud_volume(thickness) / (2 * thickness)) return {};
-    return verdict;
+    return area < kStructureShare * cloud_area(verdict.saddle) ? Verdict{} : verdict;
 }
 
 }  // namespace
@@ -318,7 +324,6 @@ TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Dom
         if (tube.grid->tree().leafCount() == 0) break;
         const Analysis analysis = Sweep(*tube.grid, radius, exterior_seeds).run();
         const Verdict verdict = judge(analysis);
-        if (std::getenv("COVOL_TRACE")) std::fprintf(stderr, "a %.3f h radius %.2f h voxels %ld cores %zu saddle %.3f h peak %.3f h n %d\n", a/h, radius/h, long(analysis.tube_voxels), analysis.cores.size(), verdict.saddle*a/h, verdict.peak*a/h, verdict.cores);
         if (verdict.cores > 0) {
             choice.tag_distance = std::max(1.05 * verdict.saddle * a + 0.5 * a, 1.5 * h);
             reason.str({});
@@ -327,7 +332,8 @@ TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Dom
         }
         const double finer = std::max(h, 0.5 * a);
         const bool is_resolved = verdict.cores > 0 && verdict.saddle >= 2.5;
-        if (is_resolved || !(finer < a) || 4 * analysis.tube_voxels > kMaxTubeVoxels * 2) break;
+        const double next_voxels = double(analysis.tube_voxels) * (a / finer) * (a / finer);
+        if (is_resolved || !(finer < a) || next_voxels > double(kMaxTubeVoxels)) break;
         a = finer;
         radius = std::max(1.3 * choice.tag_distance, 4 * a);
     }

@@ -21,7 +21,7 @@ struct EvolveOptions {
     double image_yields = 0.0;      ///< in [0,1]: share of ρ that fades close to marks, on the attraction range's taper.
     bool follow = false;            ///< the band follows the surface (starts other than tagging).
     int max_steps = 500;            ///< upper bound on time steps, >= 0
-    double tolerance = 1e-3;        ///< steady when the mean of |u^n - u^(n-1)| over |u| < h falls below tolerance * h per τ = h
+    double tolerance = 1e-3;        ///< steady when the zero crossings move less than tolerance * τ on the average in a step
     double solver_tolerance = 1e-3; ///< a step's solve ends at this residual, relative to its first
     int max_sweeps = 200;           ///< upper bound on a step's sweeps
     [[nodiscard]] std::string why_invalid() const;

@@ -68,7 +68,7 @@ LeafMask boundary_layer(const Coord& origin, const VoxelBox& domain) {
 
 }  // namespace
 
-LeafColumns::LeafColumns(const LeafBand& band, const VoxelBox& domain) {
+LeafColumns::LeafColumns(const LeafBand& band, const VoxelBox& domain, Extent extent) {
     const auto block = [](const Coord& voxel) { return Coord(voxel.x() >> 3, voxel.y() >> 3, voxel.z() >> 3); };
     std::vector<std::size_t> order(band.size());
     std::iota(order.begin(), order.end(), std::size_t(0));
@@ -78,8 +78,9 @@ LeafColumns::LeafColumns(const LeafBand& band, const VoxelBox& domain) {
         lo_ = Coord::minComponent(lo_, block(band.origin(leaf)));
         hi_ = Coord::maxComponent(hi_, block(band.origin(leaf)));
     }
-    lo_ = Coord::maxComponent(lo_.offsetBy(-1), block(domain.min));
-    hi_ = Coord::minComponent(hi_.offsetBy(1), block(domain.max));
+    const bool whole = extent == Extent::Domain;
+    lo_ = whole ? block(domain.min) : Coord::maxComponent(lo_.offsetBy(-1), block(domain.min));
+    hi_ = whole ? block(domain.max) : Coord::minComponent(hi_.offsetBy(1), block(domain.max));
     piece_of_leaf_.resize(band.size());
     std::size_t next = 0;
     for (int i = lo_.x(); i <= hi_.x(); ++i)
@@ -124,6 +125,27 @@ bool LeafColumns::at_border(const Piece& piece) const {
     const int width = hi_.y() - lo_.y() + 1, i = piece.column / width, j = piece.column % width;
     return i == 0 || i == hi_.x() - lo_.x() || j == 0 || j == width - 1 || piece.begin == lo_.z() ||
            piece.end == hi_.z() + 1;
+}
+
+std::vector<bool> inside_runs(const LeafColumns& columns, const std::vector<LeafMask>& inside) {
+    const auto& pieces = columns.pieces();
+    std::vector<bool> result(pieces.size(), false);
+    std::vector<std::int32_t> work;
+    const auto enter = [&](std::int32_t number) {
+        if (pieces[number].leaf >= 0 || result[number]) return;
+        result[number] = true;
+        work.push_back(number);
+    };
+    for (std::size_t leaf = 0; leaf < inside.size(); ++leaf)
+        columns.for_each_neighbour(columns.piece_of_leaf(leaf), [&](std::int32_t other, int di, int dj, int dk) {
+            if (any_on(across(inside[leaf], di, dj, dk))) enter(other);
+        });
+    while (!work.empty()) {
+        const std::int32_t number = work.back();
+        work.pop_back();
+        columns.for_each_neighbour(number, [&](std::int32_t other, int, int, int) { enter(other); });
+    }
+    return result;
 }
 
 Flood flood(const LeafColumns& columns, const LeafBand& band, const std::vector<LeafMask>& open,

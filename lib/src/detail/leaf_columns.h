@@ -7,7 +7,7 @@ namespace covol::detail {
 
 /// A band's leaves and the gaps between them, column by column along k: the whole space in O(leaves + columns) pieces.
 ///
-/// The columns span the leaves' box, one leaf wider on every side that does not lie at the domain's boundary.
+/// The columns span the whole domain, or the leaves' box, one leaf wider where it does not end at the domain's boundary.
 class LeafColumns {
 public:
     /// A leaf, or a run of leaf-sized blocks without a leaf. k in leaf units, half-open.
@@ -18,7 +18,8 @@ public:
     };
 
     /// @pre at least one leaf; each meets the box.
-    LeafColumns(const LeafBand& band, const VoxelBox& domain);
+    enum class Extent { Leaves, Domain };
+    LeafColumns(const LeafBand& band, const VoxelBox& domain, Extent extent = Extent::Leaves);
 
     [[nodiscard]] const std::vector<Piece>& pieces() const noexcept { return pieces_; }
     [[nodiscard]] std::int32_t piece_of_leaf(std::size_t leaf) const { return piece_of_leaf_[leaf]; }
@@ -52,6 +53,10 @@ private:
     std::vector<Piece> pieces_;
     std::vector<std::int32_t> piece_of_leaf_;
 };
+
+/// The runs that are inside, given the inside voxels of the leaves: a run is where a leaf's voxel next to it is.
+/// @pre no interface passes between a leaf and a run.
+[[nodiscard]] std::vector<bool> inside_runs(const LeafColumns& columns, const std::vector<LeafMask>& inside);
 
 /// What a flood has reached.
 struct Flood {

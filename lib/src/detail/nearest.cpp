@@ -22,9 +22,13 @@ constexpr int kFaceSlots[6] = {neighbour_slot(-1, 0, 0), neighbour_slot(1, 0, 0)
 
 Coord leaf_origin(const Coord& voxel) { return voxel & ~(kLeafDim - 1); }
 
-Coord voxel_of(const Vec3& p) {
-    return {int(std::floor(p[0] + 0.5)), int(std::floor(p[1] + 0.5)), int(std::floor(p[2] + 0.5))};
+/// floor() is a call where the instruction set has no rounding.
+int round_down(double x) {
+    const int i = int(x);
+    return i - (double(i) > x);
 }
+
+Coord voxel_of(const Vec3& p) { return {round_down(p[0] + 0.5), round_down(p[1] + 0.5), round_down(p[2] + 0.5)}; }
 
 Coord step_of(int slot) { return {slot / 9 - 1, slot / 3 % 3 - 1, slot % 3 - 1}; }
 

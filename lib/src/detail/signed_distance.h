@@ -13,11 +13,18 @@ namespace covol::detail {
                                                const std::vector<LeafMask>& inside_domain, const VoxelBox& box,
                                                float width, const RunContext& run);
 
-/// The grid "band" of u = h * values: leaves without active voxels become tiles, outside +width h, interior -width h.
-/// @param active   by leaf.
-/// @param interior pieces of `columns` that are runs and lie inside.
-[[nodiscard]] FloatGridPtr make_band(const LeafBand& band, const LeafColumns& columns, const LeafArray<float>& values,
+/// The grid "band": h * u on the leaves, clamped to [-width h, width h], and tiles of -width h where the inside has no
+/// leaf; the background is width h.
+/// @param u         voxels, by leaf; voxels outside the domain must be +width.
+/// @param active    by leaf.
+/// @param interior  by piece of `columns`: the runs that lie inside.
+[[nodiscard]] FloatGridPtr make_band(const LeafBand& band, const LeafColumns& columns, const LeafArray<float>& u,
                                      const std::vector<LeafMask>& active, const std::vector<bool>& interior,
                                      const Domain& domain, float width);
+
+/// The start of an evolution from a signed distance u in voxels: make_band, active where |u| < kHalfWidthVoxels.
+/// @param u  by leaf; changed: clamped, and outside of the domain set to the outside value.
+/// @throws Error InvalidInput when no voxel is active; `where` is the caller's name.
+[[nodiscard]] FloatGridPtr make_start(const LeafBand& band, LeafArray<float>& u, const Domain& domain, const char* where);
 
 }  // namespace covol::detail
