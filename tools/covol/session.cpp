@@ -253,6 +253,12 @@ std::vector<std::string> Session::comments() const {
     return lines;
 }
 
+std::string Session::comment() const {
+    std::string text;
+    for (const std::string& line : comments()) text += (text.empty() ? "" : "\n") + line;
+    return text;
+}
+
 void Session::require_memory(std::uint64_t bytes, const std::string& what) const {
     if (memory_limit_ > 0 && bytes > memory_limit_)
         throw Error(Errc::InvalidOptions, "--memory-limit " + memory_limit_text_ + ": " + what + " alone needs " +

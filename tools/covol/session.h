@@ -54,6 +54,7 @@ public:
     [[nodiscard]] std::map<std::string, std::string> metadata() const;
     /// The same as comment lines for meshes and points.
     [[nodiscard]] std::vector<std::string> comments() const;
+    [[nodiscard]] std::string comment() const;
     /// Refuses early what cannot fit into --memory-limit: `bytes` for `what` are needed at least.
     void require_memory(std::uint64_t bytes, const std::string& what) const;
     /// Adds to seconds.<name> of the report.
