@@ -6,7 +6,7 @@ cd "$(dirname "$0")/.."
 
 bash tests/install_packages.sh
 cmake --preset ci
-cmake --build build-ci --parallel "${COVOL_JOBS:-$(nproc)}"
+cmake --build build-ci --parallel "${COVOL_JOBS:-$(nproc)}" --target all all_verify_interface_header_sets
 if [[ -n ${COVOL_DATA:-} ]]; then
   echo "covol: tests use the data in $COVOL_DATA"
 else

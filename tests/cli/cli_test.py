@@ -240,6 +240,7 @@ class Segment(Case):
         metadata = grids[0]["metadata"]
         self.assertRegex(metadata["covol_version"], r"\d+\.\d+")
         self.assertEqual(json.loads(metadata["covol_options"])["theta"], 0.75)
+        self.assertEqual(json.loads(metadata["covol_resolved"])["delta"], H)
         self.assertFalse(metadata.get("creator", "").startswith("Houdini"))
         self.assertIn(b"covol_options", (self.out / "m.ply").read_bytes()[:4000])
 
@@ -384,6 +385,13 @@ class Tools(Case):
         self.assertLess(alike["hausdorff"], 1e-9)
         self.run_covol("phantom", "cube-of-cheese", "-o", "p.nrrd", code=3)
         self.run_covol("phantom", "sphere", "-o", "p.nrrd", "--size", 2, code=3)
+
+    def test_compare_takes_a_spacing_for_masks(self):
+        self.segment("--mask", "m.nrrd")
+        bare = self.inputs / "bare.nrrd"
+        write_nrrd(bare, (SIZE,) * 3, bytes(255 * (v > 120) for v in ball_bytes()), spacing=1)
+        self.assertLess(self.report("compare", "m.nrrd", bare)["compare"]["dice"], 0.5)
+        self.assertGreater(self.report("compare", "m.nrrd", bare, "--spacing", f"{H},{H},{H}")["compare"]["dice"], 0.95)
 
     def test_info_of_each_kind(self):
         self.assertEqual(self.report("info", self.image)["image"]["size"], [SIZE] * 3)

@@ -4,7 +4,6 @@
 #include <map>
 
 #include "covol/error.h"
-#include "covol/vdb_io.h"
 
 namespace covol::tool {
 namespace {
@@ -197,10 +196,12 @@ WriteMeshOptions MeshFlags::options(const Session& session) const {
     return write;
 }
 
+bool is_float_grid(const VdbGridInfo& grid) { return grid.type == "Tree_float_5_4_3"; }
+
 FloatGridPtr read_level_set(const std::string& path) {
     std::string first;
     for (const VdbGridInfo& grid : list_vdb(path)) {
-        if (grid.type != "float") continue;
+        if (!is_float_grid(grid)) continue;
         if (grid.name == "surface") return read_vdb(path, "surface");
         if (first.empty() && grid.grid_class == "level set") first = grid.name;
     }

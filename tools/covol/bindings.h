@@ -6,6 +6,7 @@
 #include "covol/mesh_io.h"
 #include "covol/pipeline.h"
 #include "covol/points.h"
+#include "covol/vdb_io.h"
 #include "session.h"
 
 // Groups of flags that several subcommands share. Each binds to its own struct; lengths in voxels are resolved
@@ -79,6 +80,8 @@ struct MeshFlags {
     void check() const;
     [[nodiscard]] WriteMeshOptions options(const Session& session) const;
 };
+
+[[nodiscard]] bool is_float_grid(const VdbGridInfo& grid);
 
 /// The level set of a .vdb file: "surface", else its first level set, else its first float grid.
 [[nodiscard]] FloatGridPtr read_level_set(const std::string& path);

@@ -60,7 +60,7 @@ bool is_identifier(const std::string& name) {
 
 void check_level_set(const std::string& path, const VdbGridInfo& info, const RunContext& run, Findings& findings) {
     findings.remark("grid '" + info.name + "' is a level set: to render it as a volume, write a fog volume "
-                    "(--density), for signed distances draw nothing useful there");
+                    "(--density) and give the renderer that");
     const FloatGridPtr grid = read_vdb(path, info.name);
     try {
         check_measures(extract_mesh(*grid, {}, run), "the surface of grid '" + info.name + "'", findings);
@@ -74,7 +74,7 @@ void check_grid(const std::string& path, const VdbGridInfo& g, const RunContext&
     const std::string what = "grid '" + g.name + "'";
     if (!is_identifier(g.name))
         findings.remark(what + ": the name is no identifier: expressions in Houdini and Blender cannot address it");
-    if (g.type != "float") findings.remark(what + " holds " + g.type + ": covol and mesh tools read float grids only");
+    if (!is_float_grid(g)) findings.remark(what + " holds " + g.type + ": covol and mesh tools read float grids only");
     if (g.active_voxels == 0) {
         findings.problem(what + " has no active voxel: nothing is drawn");
         return;
@@ -88,7 +88,7 @@ void check_grid(const std::string& path, const VdbGridInfo& g, const RunContext&
     double extent = 0;
     for (int a = 0; a < 3; ++a) extent = std::max(extent, (double(g.max[a]) - g.min[a] + 1) * g.voxel_size);
     check_extent(extent, what, findings);
-    if (g.type == "float" && g.uniform && g.grid_class == "level set") check_level_set(path, g, run, findings);
+    if (is_float_grid(g) && g.uniform && g.grid_class == "level set") check_level_set(path, g, run, findings);
 }
 
 void check_vdb(const std::string& path, const RunContext& run, Findings& findings) {

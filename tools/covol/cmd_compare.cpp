@@ -15,6 +15,16 @@ namespace {
 struct CompareJob {
     std::string a, b;
     int label = 0, label_b = -1;
+    ImageFlags image;
+
+    /// Masks may need a spacing that their file does not know.
+    Solid read(const std::string& path, int wanted, const RunContext& run) const {
+        if (kind_of_file(path) != FileKind::Image) return read_solid(path, wanted);
+        Solid solid;
+        solid.mask = read_image(path, image.options, run);
+        solid.label = wanted;
+        return solid;
+    }
 
     void run(Session& session) const {
         const bool points_a = kind_of_file(a) == FileKind::Points;
@@ -27,8 +37,8 @@ struct CompareJob {
 
     void compare_solids(Session& session) const {
         const Stopwatch reading;
-        const Solid first = read_solid(a, label);
-        const Solid second = read_solid(b, label_b >= 0 ? label_b : label);
+        const Solid first = read(a, label, session.run());
+        const Solid second = read(b, label_b >= 0 ? label_b : label, session.run());
         session.add_seconds("read", reading.seconds());
         const Stopwatch watch;
         const CompareReport r = compare(first, second, session.run());
@@ -72,6 +82,7 @@ void add_compare(Session& session) {
     command->add_option("b", job->b, "label image, mesh, .vdb or points")->required()->type_name("B");
     command->add_option("--label", job->label, "label of the masks, 0: any")->capture_default_str();
     command->add_option("--label-b", job->label_b, "label of B, where it differs");
+    job->image.bind(*command);
 }
 
 }  // namespace covol::tool

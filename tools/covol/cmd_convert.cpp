@@ -56,7 +56,7 @@ struct ConvertJob {
         const PointCloud cloud = read_points(input, points.options);
         const std::vector<Vec3> world = to_world(cloud, geometry ? &*geometry : nullptr);
         session.report()["points"] = {{"count", world.size()}, {"rule", cloud.rule}};
-        session.outputs().add(output, [world, comment = session.comments().front()](const std::string& path) {
+        session.outputs().add(output, [world, comment = session.comment()](const std::string& path) {
             write_points(path, world, comment);
         });
     }

@@ -34,7 +34,7 @@ struct PhantomJob {
         session.outputs().add(output, [made](const std::string& path) {
             write_image(path, made->image.geometry(), bytes_of(made->image).data());
         });
-        session.outputs().add(points_path, [made, comment = session.comments().front()](const std::string& path) {
+        session.outputs().add(points_path, [made, comment = session.comment()](const std::string& path) {
             write_points(path, made->points, comment);
         });
         session.outputs().add(labels_path, [made](const std::string& path) {

@@ -241,13 +241,22 @@ void Session::warn(const std::string& line) {
 std::map<std::string, std::string> Session::metadata() const {
     Json options = report_.at("options");
     options["command"] = report_.at("command");
-    return {{"covol_version", COVOL_VERSION},
-            {"covol_options", options.dump(-1, ' ', false, Json::error_handler_t::replace)}};
+    const auto text = [](const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); };
+    std::map<std::string, std::string> facts{{"covol_version", COVOL_VERSION}, {"covol_options", text(options)}};
+    if (report_.contains("resolved")) facts["covol_resolved"] = text(report_.at("resolved"));
+    return facts;
 }
 
 std::vector<std::string> Session::comments() const {
-    const auto facts = metadata();
-    return {"covol " + facts.at("covol_version"), "covol_options " + facts.at("covol_options")};
+    std::vector<std::string> lines;
+    for (const auto& [key, value] : metadata()) lines.push_back(key + " " + value);
+    return lines;
+}
+
+std::string Session::comment() const {
+    std::string text;
+    for (const std::string& line : comments()) text += (text.empty() ? "" : "\n") + line;
+    return text;
 }
 
 void Session::require_memory(std::uint64_t bytes, const std::string& what) const {

@@ -50,10 +50,11 @@ public:
     /// The result that was asked for (info, compare, check): never silent.
     void say(const std::string& line);
     void warn(const std::string& line);
-    /// Provenance for the metadata of .vdb files.
+    /// Provenance for the metadata of .vdb files: version, options, and the numbers that were used once they are known.
     [[nodiscard]] std::map<std::string, std::string> metadata() const;
     /// The same as comment lines for meshes and points.
     [[nodiscard]] std::vector<std::string> comments() const;
+    [[nodiscard]] std::string comment() const;
     /// Refuses early what cannot fit into --memory-limit: `bytes` for `what` are needed at least.
     void require_memory(std::uint64_t bytes, const std::string& what) const;
     /// Adds to seconds.<name> of the report.
