@@ -128,7 +128,7 @@ BandResult make(const FloatGrid& distance, const BandOptions& options, const Run
 
 std::string BandOptions::why_invalid() const {
     if (tag_distance > 0 && std::isfinite(tag_distance)) return {};
-    return "tag_distance: expected > 0, got " + std::to_string(tag_distance) + "\n";
+    return "tag_distance: expected > 0, got " + std::to_string(tag_distance);
 }
 
 BandResult band(const FloatGrid& distance, const BandOptions& options, const RunContext& run) {
