@@ -6,127 +6,42 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <sstream>
 
 #include "covol/error.h"
-#include "detail/leaf_columns.h"
 #include "detail/signed_distance.h"
+#include "detail/tagging.h"
 
 namespace covol {
 namespace {
 
 using detail::Coord;
 using detail::kLeafSize;
+using detail::LeafArray;
 using detail::LeafMask;
+using detail::Tagging;
+using detail::Tube;
 
 constexpr auto kWidth = float(kHalfWidthVoxels);
-constexpr double kSignificantShare = 0.1;   ///< of the enclosed volume: a core that is less, grown by D, is a pocket
-constexpr double kSignificantRadius = 0.25;  ///< of D: a core that is thinner is a pocket
-
-/// The tube of a distance grid, flooded for any number of D.
-class Tube {
-public:
-    explicit Tube(const FloatGrid& distance)
-        : domain(domain_of(distance)),
-          box(detail::box_of(domain)),
-          band(distance),
-          columns(band, box),
-          d(band.size(), 0.0F),
-          inside_domain(band.size()) {
-        detail::import_values(distance, band, d);
-        tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
-            inside_domain[leaf] = detail::mask_in_box(band.origin(leaf), box);
-        });
-    }
-
-    /// Voxels of the tube with d <= limit.
-    [[nodiscard]] std::vector<LeafMask> near(float limit) const {
-        std::vector<LeafMask> masks(band.size(), LeafMask{});
-        tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
-            for (int at = 0; at < kLeafSize; ++at)
-                masks[leaf][at >> 6] |= std::uint64_t(d.leaf(leaf)[at] <= limit) << (at & 63);
-            for (int word = 0; word < 8; ++word) masks[leaf][word] &= band.active(leaf)[word];
-        });
-        return masks;
-    }
-
-    const Domain domain;
-    const detail::VoxelBox box;
-    const detail::LeafBand band;
-    const detail::LeafColumns columns;
-    detail::LeafArray<float> d;
-    std::vector<LeafMask> inside_domain;
-};
-
-/// What is outside at one D, and what is enclosed.
-struct Tagging {
-    std::vector<LeafMask> open;  ///< d > D, in the domain
-    detail::Flood exterior;
-    std::int64_t enclosed = 0;  ///< voxels that the flood did not reach
-    std::int64_t core = 0;      ///< those of them with d > D
-};
-
-std::int64_t voxels_of_run(const Tube& tube, std::size_t piece) {
-    const auto& run = tube.columns.pieces()[piece];
-    return std::int64_t(run.end - run.begin) * kLeafSize;
-}
-
-Tagging tag(const Tube& tube, float tag_distance, const std::vector<Coord>& seeds) {
-    Tagging result;
-    result.open = tube.near(tag_distance);
-    for (std::size_t leaf = 0; leaf < tube.band.size(); ++leaf)
-        for (int word = 0; word < 8; ++word)
-            result.open[leaf][word] = tube.inside_domain[leaf][word] & ~result.open[leaf][word];
-    result.exterior = detail::flood(tube.columns, tube.band, result.open, tube.box, seeds);
-    for (std::size_t leaf = 0; leaf < tube.band.size(); ++leaf)
-        for (int word = 0; word < 8; ++word) {
-            const std::uint64_t exterior = result.exterior.leaves[leaf][word];
-            result.enclosed += __builtin_popcountll(tube.inside_domain[leaf][word] & ~exterior);
-            result.core += __builtin_popcountll(result.open[leaf][word] & ~exterior);
-        }
-    // A run that the flood did not reach does not touch the domain's boundary, so all of its voxels count.
-    for (std::size_t n = 0; n < tube.columns.pieces().size(); ++n) {
-        if (tube.columns.pieces()[n].leaf >= 0 || result.exterior.pieces[n]) continue;
-        result.enclosed += voxels_of_run(tube, n);
-        result.core += voxels_of_run(tube, n);
-    }
-    return result;
-}
-
-/// Voxels of the cores of `larger` (tagged with a larger D) that were still exterior in `smaller`.
-std::int64_t newly_enclosed(const Tube& tube, const Tagging& smaller, const Tagging& larger) {
-    std::int64_t n = 0;
-    for (std::size_t leaf = 0; leaf < tube.band.size(); ++leaf)
-        for (int word = 0; word < 8; ++word)
-            n += __builtin_popcountll(smaller.exterior.leaves[leaf][word] & larger.open[leaf][word] &
-                                      ~larger.exterior.leaves[leaf][word]);
-    for (std::size_t piece = 0; piece < tube.columns.pieces().size(); ++piece)
-        if (smaller.exterior.pieces[piece] && !larger.exterior.pieces[piece]) n += voxels_of_run(tube, piece);
-    return n;
-}
-
 /// A core appears where the last gap around it closes: one that appears just above D leaks at D.
-void test_for_leaks(const Tube& tube, const Tagging& at_d, double tag_distance, double limit,
-                    const std::vector<Coord>& seeds, BandReport& report) {
-    const double h = tube.domain.voxel_size;
-    const auto opens_up = [&](double larger) {
-        const Tagging there = tag(tube, float(larger), seeds);
-        // As if it were one ball: the core's radius, and its volume without the wall of thickness D.
-        const double core_radius = std::cbrt(double(newly_enclosed(tube, at_d, there)) * 3.0 / (4.0 * std::numbers::pi)) * h;
-        const double grown = 4.0 / 3.0 * std::numbers::pi * std::pow((core_radius + larger) / h, 3);
-        return core_radius > kSignificantRadius * larger && grown > kSignificantShare * double(there.enclosed);
+void test_for_leaks(const Tube& tube, const Tagging& tagging, double limit, const std::vector<Coord>& seeds,
+                    const RunContext& run, BandReport& report) {
+    const double h = tube.domain.voxel_size, tag_distance = tagging.distance;
+    const auto closes_at = [&](double larger) {
+        return detail::closes_a_core(tube, tagging, detail::tag(tube, float(larger), seeds));
     };
-    if (at_d.core > 0) {
-        report.leaks = opens_up(tag_distance + h);
+    if (tagging.has_core(h)) {
+        report.leaks = closes_at(tag_distance + h);
     } else {
-        // Nothing left inside: a thin body whose core a smaller D still finds is solid, not leaking.
-        const auto is_closed_at = [&](double share) { return tag(tube, float(share * tag_distance), seeds).core > 0; };
-        report.leaks = !is_closed_at(0.85) && !is_closed_at(0.7) && !is_closed_at(0.55);
+        // A thin body whose core a smaller D still finds is closed; without one there are only walls.
+        const auto has_core_at = [&](double share) { return detail::tag(tube, float(share * tag_distance), seeds).has_core(h); };
+        report.leaks = !has_core_at(0.85) && !has_core_at(0.7) && !has_core_at(0.55);
     }
     if (!report.leaks) return;
-    for (double larger = tag_distance + 0.5 * h; larger <= limit && report.holding_distance == 0; larger += 0.5 * h)
-        if (opens_up(larger)) report.holding_distance = larger;
+    for (double larger = tag_distance + 0.5 * h; larger <= limit && report.holding_distance == 0; larger += 0.5 * h) {
+        run.check();
+        if (closes_at(larger)) report.holding_distance = larger;
+    }
 }
 
 std::string to_text(const Vec3& p) {
@@ -160,32 +75,15 @@ std::vector<Coord> seed_voxels(const FloatGrid& distance, const Domain& domain, 
     return voxels;
 }
 
-/// Negative where the flood did not come; beside the tagged surface d - D says where it lies.
-detail::LeafArray<float> signed_level(const Tube& tube, const Tagging& tagging, float tag_distance) {
-    detail::LeafArray<float> phi(tube.band.size(), 0.0F);
-    const auto h = float(tube.domain.voxel_size);
-    tbb::parallel_for(std::size_t(0), tube.band.size(), [&](std::size_t leaf) {
-        for (int at = 0; at < kLeafSize; ++at) {
-            const float level = (tube.d.leaf(leaf)[at] - tag_distance) / h;
-            phi.leaf(leaf)[at] = detail::is_on(tagging.exterior.leaves[leaf], at)
-                                     ? std::max(level, 0.0F)
-                                     : -std::max(std::abs(level), 1e-6F);
-        }
-    });
-    return phi;
-}
-
 /// u0 in voxels. On the exterior's side d - D is the distance to the tagged surface; inside it has to be measured, since
 /// there the other side of a wall, and the cores, have the same d.
-detail::LeafArray<float> initial_values(const Tube& tube, const Tagging& tagging, float tag_distance,
-                                        const RunContext& run) {
-    const detail::LeafArray<float> phi = signed_level(tube, tagging, tag_distance);
-    detail::LeafArray<float> u =
-        detail::signed_distance(tube.band, phi, tube.inside_domain, tube.box, kWidth, run);
+LeafArray<float> initial_values(const Tube& tube, const Tagging& tagging, const LeafArray<float>& level,
+                                const RunContext& run) {
+    LeafArray<float> u = detail::signed_distance(tube.band, level, tube.inside_domain, tube.box, kWidth, run);
     tbb::parallel_for(std::size_t(0), tube.band.size(), [&](std::size_t leaf) {
         for (int at = 0; at < kLeafSize; ++at)
             if (detail::is_on(tagging.exterior.leaves[leaf], at))
-                u.leaf(leaf)[at] = std::min(phi.leaf(leaf)[at], kWidth);
+                u.leaf(leaf)[at] = std::min(level.leaf(leaf)[at], kWidth);
     });
     return u;
 }
@@ -202,8 +100,9 @@ BandResult make(const FloatGrid& distance, const BandOptions& options, const Run
     }
     const std::vector<Coord> seeds = seed_voxels(distance, tube.domain, options);
     run.check();
-    const Tagging tagging = tag(tube, float(tag_distance), seeds);
-    const detail::LeafArray<float> u = initial_values(tube, tagging, float(tag_distance), run);
+    const Tagging tagging = detail::tag(tube, float(tag_distance), seeds);
+    const LeafArray<float> level = detail::signed_level(tube, tagging);
+    const LeafArray<float> u = initial_values(tube, tagging, level, run);
     run.check();
 
     BandResult result;
@@ -221,7 +120,7 @@ BandResult make(const FloatGrid& distance, const BandOptions& options, const Run
     result.report.tag_distance = tag_distance;
     result.report.enclosed_volume = double(tagging.enclosed) * h * h * h;
     result.report.core_volume = double(tagging.core) * h * h * h;
-    test_for_leaks(tube, tagging, tag_distance, distance.background(), seeds, result.report);
+    test_for_leaks(tube, tagging, distance.background(), seeds, run, result.report);
     return result;
 }
 
@@ -229,7 +128,7 @@ BandResult make(const FloatGrid& distance, const BandOptions& options, const Run
 
 std::string BandOptions::why_invalid() const {
     if (tag_distance > 0 && std::isfinite(tag_distance)) return {};
-    return "tag_distance: expected > 0, got " + std::to_string(tag_distance) + "\n";
+    return "tag_distance: expected > 0, got " + std::to_string(tag_distance);
 }
 
 BandResult band(const FloatGrid& distance, const BandOptions& options, const RunContext& run) {

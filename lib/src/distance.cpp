@@ -51,7 +51,7 @@ std::unique_ptr<Leaf> make_leaf(const detail::NearestField& field, const detail:
 
 std::string DistanceOptions::why_invalid() const {
     if (max_distance > 0 && std::isfinite(max_distance)) return {};
-    return "max_distance: expected > 0, got " + std::to_string(max_distance) + "\n";
+    return "max_distance: expected > 0, got " + std::to_string(max_distance);
 }
 
 DistanceResult distance(const std::vector<Vec3>& points, const Domain& domain, const DistanceOptions& options,

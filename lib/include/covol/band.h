@@ -22,7 +22,7 @@ struct BandReport {
     double tag_distance = 0;      ///< D
     double enclosed_volume = 0;   ///< of all that the flood did not reach, world units^3
     double core_volume = 0;       ///< of the part of it with d > D
-    bool leaks = false;           ///< nothing enclosed, or the enclosed volume jumps just above D
+    bool leaks = false;           ///< no core enclosed at D or a little below, or one appears just above D
     double holding_distance = 0;  ///< where it leaks: the smallest D that would hold, 0 when none was found
     std::int64_t active_voxels = 0;
 };

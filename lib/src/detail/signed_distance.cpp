@@ -56,6 +56,13 @@ LeafMask beside_interface(const Field& field, std::size_t leaf) {
     return result;
 }
 
+/// visit(offset) for each bit that is on.
+template <typename Visit>
+void for_each_on(const LeafMask& mask, const Visit& visit) {
+    for (int word = 0; word < 8; ++word)
+        for (std::uint64_t bits = mask[word]; bits != 0; bits &= bits - 1) visit(word << 6 | __builtin_ctzll(bits));
+}
+
 /// The foot of voxel (i,j,k), which lies beside the interface, and its distance to it.
 Foot find_foot(const Field& field, std::size_t leaf, int i, int j, int k, float& distance) {
     const float centre = *field.at(leaf, i, j, k);
@@ -99,47 +106,72 @@ float distance_to_foot(const Foot& foot, const Coord& voxel) {
     return std::sqrt(along * along + lateral * lateral);
 }
 
-}  // namespace
+/// The interface, seen from the voxels beside it.
+struct Interface {
+    std::vector<LeafMask> inside;  ///< by leaf: phi < 0
+    std::vector<LeafMask> beside;  ///< by leaf: voxels with a foot
+    std::vector<Foot> feet;        ///< by leaf, then by voxel
+    std::vector<float> distances;  ///< of those voxels
+    std::vector<std::size_t> first;  ///< foot of each leaf
 
-LeafArray<float> signed_distance(const LeafBand& band, const LeafArray<float>& phi,
-                                 const std::vector<LeafMask>& inside_domain, const VoxelBox& box, float width,
-                                 const RunContext& run) {
-    LeafArray<float> result(band.size(), width);
+    [[nodiscard]] std::vector<Vec3> points() const {
+        std::vector<Vec3> result(feet.size());
+        std::transform(feet.begin(), feet.end(), result.begin(), [](const Foot& foot) { return foot.point; });
+        return result;
+    }
+};
+
+Interface find_interface(const LeafBand& band, const LeafArray<float>& phi, const std::vector<LeafMask>& inside_domain) {
     Field field{band, phi, inside_domain, std::vector<LeafMask>(band.size(), LeafMask{})};
     tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
         for (int at = 0; at < kLeafSize; ++at)
             field.inside[leaf][at >> 6] |= std::uint64_t(phi.leaf(leaf)[at] < 0) << (at & 63);
         for (int word = 0; word < 8; ++word) field.inside[leaf][word] &= inside_domain[leaf][word];
-        for (int at = 0; at < kLeafSize; ++at) result.leaf(leaf)[at] = is_on(field.inside[leaf], at) ? -width : width;
     });
-    std::vector<std::vector<Foot>> feet_of_leaf(band.size());
-    std::vector<LeafMask> beside(band.size());
+    Interface result;
+    result.beside.resize(band.size());
+    tbb::parallel_for(std::size_t(0), band.size(),
+                      [&](std::size_t leaf) { result.beside[leaf] = beside_interface(field, leaf); });
+    result.first.assign(band.size() + 1, 0);
+    for (std::size_t leaf = 0; leaf < band.size(); ++leaf)
+        result.first[leaf + 1] = result.first[leaf] + std::size_t(count_on(result.beside[leaf]));
+    result.feet.resize(result.first.back());
+    result.distances.resize(result.first.back());
     tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
-        beside[leaf] = beside_interface(field, leaf);
-        for (int word = 0; word < 8; ++word)
-            for (std::uint64_t bits = beside[leaf][word]; bits != 0; bits &= bits - 1) {
-                const int at = word << 6 | __builtin_ctzll(bits);
-                float distance = width;
-                feet_of_leaf[leaf].push_back(find_foot(field, leaf, at >> 6, at >> 3 & 7, at & 7, distance));
-                result.leaf(leaf)[at] = std::copysign(std::min(distance, width), result.leaf(leaf)[at]);
-            }
+        std::size_t n = result.first[leaf];
+        for_each_on(result.beside[leaf], [&](int at) {
+            result.feet[n] = find_foot(field, leaf, at >> 6, at >> 3 & 7, at & 7, result.distances[n]);
+            ++n;
+        });
     });
-    std::vector<Foot> feet;
-    std::vector<Vec3> points;
-    for (const auto& some : feet_of_leaf)
-        for (const Foot& foot : some) {
-            feet.push_back(foot);
-            points.push_back(foot.point);
-        }
-    if (feet.empty()) return result;
+    result.inside = std::move(field.inside);
+    return result;
+}
+
+}  // namespace
+
+LeafArray<float> signed_distance(const LeafBand& band, const LeafArray<float>& phi,
+                                 const std::vector<LeafMask>& inside_domain, const VoxelBox& box, float width,
+                                 const RunContext& run) {
+    const Interface interface = find_interface(band, phi, inside_domain);
+    LeafArray<float> result(band.size(), width);
+    tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
+        float* u = result.leaf(leaf);
+        for (int at = 0; at < kLeafSize; ++at) u[at] = is_on(interface.inside[leaf], at) ? -width : width;
+        std::size_t n = interface.first[leaf];
+        for_each_on(interface.beside[leaf],
+                    [&](int at) { u[at] = std::copysign(std::min(interface.distances[n++], width), u[at]); });
+    });
+    if (interface.feet.empty()) return result;
+    const std::vector<Vec3> points = interface.points();
     const NearestField tube = nearest_points(points, box, width + 1.0, "signed_distance", run);
     tbb::parallel_for(std::size_t(0), tube.leaves.size(), [&](std::size_t n) {
         const NearestLeaf& nearest = tube.leaves[n];
         const std::int32_t leaf = band.find(nearest.origin);
         if (leaf == band.none()) return;
         for (int at = 0; at < kLeafSize; ++at) {
-            if (nearest.nearest[at] < 0 || !is_on(inside_domain[leaf], at) || is_on(beside[leaf], at)) continue;
-            const Foot& foot = feet[tube.source[nearest.nearest[at]]];
+            if (nearest.nearest[at] < 0 || !is_on(inside_domain[leaf], at) || is_on(interface.beside[leaf], at)) continue;
+            const Foot& foot = interface.feet[tube.source[nearest.nearest[at]]];
             const float distance = distance_to_foot(foot, nearest.origin.offsetBy(at >> 6, at >> 3 & 7, at & 7));
             float& u = result.leaf(leaf)[at];
             u = std::copysign(std::min(distance, width), u);

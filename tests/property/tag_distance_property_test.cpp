@@ -1,0 +1,64 @@
+// The choice of D on real clouds, and the leak test at that D. Needs the folder of COVOL_DATA.
+#include <openvdb/openvdb.h>
+
+#include <catch2/catch.hpp>
+#include <cstdlib>
+#include <iostream>
+
+#include "covol/band.h"
+#include "covol/distance.h"
+#include "covol/points.h"
+
+using namespace covol;
+
+namespace {
+
+struct RealCloud {
+    const char* path;
+    double voxel_size;
+    std::vector<Vec3> exterior_seeds;
+    double low, high;  ///< D, voxels
+};
+
+}  // namespace
+
+TEST_CASE("D is chosen so that real scans are closed") {
+    const char* data = std::getenv("COVOL_DATA");
+    if (!data) {
+        std::cout << "SKIPPED: COVOL_DATA does not name the folder of test data\n";
+        return;
+    }
+    const std::vector<RealCloud> clouds = {
+        // The ball's missing cap is a hole of radius 21 to 23 mm.
+        {"clouds/apc_rawlings_baseball.ply", 0.001, {}, 21.0, 24.5},
+        {"clouds/apc_fitness_gear_3lb_dumbbell.ply", 0.001, {}, 10.0, 15.0},
+        // Nuclei 4.1 apart: 1.8 spacings are 3.7 voxels.
+        {"clouds/drosophila_embryo_nuclei.xyz", 2.0, {}, 2.3, 3.7},
+        {"phantoms/embryo_ve_points.ply", 0.35, {{89.6, 89.6, 28.5}}, 2.0, 3.2},
+        {"phantoms/embryo_exe_points.ply", 0.35, {}, 1.8, 3.2},
+    };
+    for (const RealCloud& cloud : clouds) {
+        INFO(cloud.path);
+        const std::vector<Vec3> points = read_points(std::string(data) + "/" + cloud.path).points;
+        const double h = cloud.voxel_size;
+        const Domain domain = domain_of_box(bounding_box(points, 30 * h), h);
+        const double chosen = choose_tag_distance(points, domain, cloud.exterior_seeds).tag_distance;
+        CHECK(chosen >= cloud.low * h);
+        CHECK(chosen <= cloud.high * h);
+        const DistanceResult tube = distance(points, domain, {chosen + 4 * h});
+        const BandReport report = band(*tube.grid, {chosen, cloud.exterior_seeds}).report;
+        CHECK_FALSE(report.leaks);
+        CHECK(report.core_volume > 0);
+    }
+}
+
+TEST_CASE("a cloud without an inside says so") {
+    const char* data = std::getenv("COVOL_DATA");
+    if (!data) {
+        std::cout << "SKIPPED: COVOL_DATA does not name the folder of test data\n";
+        return;
+    }
+    const std::vector<Vec3> points = read_points(std::string(data) + "/clouds/autzen_stadium.ply").points;
+    const Domain domain = domain_of_box(bounding_box(points, 30), 4.0);
+    CHECK(choose_tag_distance(points, domain, {}).reason.find("no closed structure") != std::string::npos);
+}
