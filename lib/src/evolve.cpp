@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <sstream>
 
@@ -39,6 +40,8 @@ constexpr int kInnerSweeps = 2;  // the second costs a fifth and saves a third o
 constexpr double kRounding = 5e-7;  // voxels; a residual below this is noise of single precision
 constexpr double kMaxOmega = 1.9;
 constexpr double kDiverged = 10.0;  // growth of the residual at which over-relaxation is given up
+constexpr int kWindow = 10;  // steps
+
 // When a follower's band is made again, voxels.
 constexpr double kFollowMove = 0.75;
 constexpr float kFollowDeep = 2.0F;
@@ -151,7 +154,7 @@ public:
                 report_.stop_reason = StopReason::Vanished;
                 break;
             }
-            if (change.mean < options_.tolerance * tau_) {
+            if (std::min(change.mean, net_motion()) < options_.tolerance * tau_) {
                 report_.stop_reason = StopReason::Steady;
                 break;
             }
@@ -187,6 +190,7 @@ private:
         check_finite(band_, field_, "u");
         gather_fields();
         if (options_.follow) remember_surface();
+        window_.clear();
         previous_ = detail::LeafArray<float>(band_.size(), 0.0F, 0);
         rows_.resize(band_.size() * 6 * kLeafSize);
         residuals_.assign(band_.size(), 0.0);
@@ -339,6 +343,24 @@ private:
         return change;
     }
 
+    // Mean motion per step over the last kWindow steps, by the voxels that changed sign for good. Next to an edge of the
+    // image the crossings tremble by a few hundredths of a voxel; that ends no run, and moves nothing.
+    double net_motion() {
+        if (++window_age_ < kWindow && !window_.empty()) return std::numeric_limits<double>::infinity();
+        const bool is_first = window_.size() != band_.size();
+        window_.resize(band_.size());
+        std::int64_t flipped = 0, crossed = 0;
+        for (std::size_t leaf = 0; leaf < band_.size(); ++leaf) {
+            const LeafMask negative = negative_mask(field_.values.leaf(leaf));
+            for (int word = 0; word < 8; ++word) flipped += __builtin_popcountll(negative[word] ^ window_[leaf][word]);
+            for (int axis = 0; axis < 3; ++axis) crossed += detail::count_on(sign_changes(negative, axis));
+            window_[leaf] = negative;
+        }
+        window_age_ = 0;
+        if (is_first || crossed == 0) return std::numeric_limits<double>::infinity();
+        return kCrossingsPerVoxel * double(flipped) / double(crossed) / kWindow;
+    }
+
     static double crossing(float a, float b) { return double(a) / (double(a) - b); }
 
     // What the band was made for, as signs; see has_moved().
@@ -422,6 +444,8 @@ private:
         int crossed;
     };
     std::vector<MadeFor> made_for_;         // for each leaf, with `follow`
+    std::vector<LeafMask> window_;          // signs kWindow steps ago or less
+    int window_age_ = 0;
     std::vector<double> residuals_;         // scratch, one number for each leaf
     std::int64_t sweeps_ = 0;
     EvolveReport report_;

@@ -128,32 +128,33 @@ void TagFlags::bind(CLI::App& command) {
 }
 
 void EdgeFlags::bind(CLI::App& command) {
-    add_length(command, "--sigma", sigma, "1vx", "presmoothing of the image");
+    add_length(command, "--sigma", sigma, "", "presmoothing of the image [2vx after tagging, else 1vx]");
     CLI::Option* k = add_positive(command, "--edge-k", options.edge_k, "K in g = 1/(1 + K s^2) [see --edge-contrast]");
     add_positive(command, "--edge-contrast", options.edge_contrast,
                  "gradient at which g = 1/2, of the image scaled to [0,1], per world unit [90 % percentile in the band]")
         ->excludes(k);
 }
 
-EdgeOptions EdgeFlags::resolve(double h) const {
+EdgeOptions EdgeFlags::resolve(double h, double otherwise) const {
     EdgeOptions resolved = options;
-    resolved.sigma = sigma.resolve(h, h);
+    resolved.sigma = sigma.resolve(h, otherwise);
     return resolved;
 }
 
 void EvolveFlags::bind(CLI::App& command, bool with_image) {
     command.add_option("--theta", options.theta, "weight of the points, 0 to 1")->capture_default_str();
     if (with_image) command.add_option("--rho", options.rho, "weight of the image, 0 to 1")->capture_default_str();
-    add_length(command, "--delta", delta, "1vx", "weight of curvature");
+    add_length(command, "--delta", delta, "", "weight of curvature [0.5vx after tagging, else 1vx]");
     add_length(command, "--tau", tau, "1vx", "time step; the flow's speed is 1 world unit per unit of time");
     command.add_option("--epsilon", options.epsilon, "regularises the norm of grad u")->capture_default_str();
     add_length(command, "--attraction-range", attraction_range, "",
-               "points pull fully up to half of it, not at all beyond; 0: unlimited");
+               "points pull fully up to half of it, not at all beyond; 0: unlimited "
+               "[8vx with an image, 5vx after starts other than tagging, else 0]");
     if (with_image) {
         command.add_option("--edge-epsilon", options.edge_epsilon, "regularises the norm of grad g")->capture_default_str();
-        command.add_option("--image-yields", options.image_yields,
-                           "share of rho that fades close to points, on the attraction range's taper, 0 to 1")
-            ->capture_default_str();
+        command.add_option("--image-yields", image_yields,
+                           "share of rho that fades close to points, on the attraction range's taper, 0 to 1 "
+                           "[1 after tagging, else 0]");
     }
     command.add_option("--max-steps", options.max_steps, "upper bound on time steps")->capture_default_str();
     command.add_option("--tolerance", options.tolerance, "steady below this mean change, in voxels a step of 1vx")
@@ -163,11 +164,12 @@ void EvolveFlags::bind(CLI::App& command, bool with_image) {
     command.add_flag("--strict", strict, "exit code 5 when the flow is not steady at the end");
 }
 
-EvolveOptions EvolveFlags::resolve(double h, double default_range) const {
+EvolveOptions EvolveFlags::resolve(double h, const EvolveOptions& otherwise) const {
     EvolveOptions resolved = options;
-    resolved.delta = delta.resolve(h, h);
+    resolved.delta = delta.resolve(h, otherwise.delta);
     resolved.tau = tau.resolve(h, h);
-    resolved.attraction_range = attraction_range.resolve(h, default_range);
+    resolved.attraction_range = attraction_range.resolve(h, otherwise.attraction_range);
+    resolved.image_yields = image_yields.value_or(otherwise.image_yields);
     return resolved;
 }
 

@@ -59,17 +59,19 @@ struct EdgeFlags {
     Length sigma;
     EdgeOptions options;
     void bind(CLI::App& command);
-    [[nodiscard]] EdgeOptions resolve(double h) const;
+    /// `otherwise` is sigma where none was given.
+    [[nodiscard]] EdgeOptions resolve(double h, double otherwise) const;
 };
 
 struct EvolveFlags {
     Length delta, tau, attraction_range;
+    std::optional<double> image_yields;
     EvolveOptions options;
     bool strict = false;
     /// Without an image there is no rho.
     void bind(CLI::App& command, bool with_image);
-    /// `default_range` is the attraction range where none was given.
-    [[nodiscard]] EvolveOptions resolve(double h, double default_range) const;
+    /// What was not given is as in `otherwise`.
+    [[nodiscard]] EvolveOptions resolve(double h, const EvolveOptions& otherwise) const;
 };
 
 struct MeshFlags {

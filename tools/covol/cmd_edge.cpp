@@ -19,7 +19,7 @@ struct EdgeJob {
         const Image pixels = read_image(image_path, image.options, session.run());
         const double h = domain_of(*topology).voxel_size;
         const Stopwatch watch;
-        const EdgeResult result = edge(pixels, *topology, edge_flags.resolve(h), session.run());
+        const EdgeResult result = edge(pixels, *topology, edge_flags.resolve(h, h), session.run());
         session.add_seconds("edge", watch.seconds());
         session.report()["input"]["image"] = to_json(pixels.geometry());
         session.report()["edge"] = to_json(result.report);

@@ -30,8 +30,8 @@ SegmentOptions resolve(const SegmentJob& job, double h) {
     if (job.tag.tag_distance.given && !(options.tag_distance > 0))
         throw Error(Errc::InvalidOptions, "--tag-distance: expected > 0, got 0");
     options.exterior_seeds = job.tag.exterior_seeds;
-    options.edge = job.edge.resolve(h);
-    options.evolve = job.evolve.resolve(h, SegmentOptions::automatic_evolve().attraction_range);
+    options.edge = job.edge.resolve(h, -1);
+    options.evolve = job.evolve.resolve(h, SegmentOptions::automatic_evolve());
     const double edge = job.min_component.resolve(h, 0);
     options.extract.min_component_volume = edge * edge * edge;
     return options;

@@ -52,6 +52,11 @@ struct TagDistanceChoice {
 /// @throws Error InvalidOptions, InvalidInput (the tube is too narrow; an exterior seed outside the domain or at d <= D).
 [[nodiscard]] BandResult band(const FloatGrid& distance, const BandOptions& options, const RunContext& run = {});
 
+/// The closing of a tagged body by a ball: what a ball of radius D that rolls outside the tagged surface of `band` cannot
+/// reach with its far side, that is, the exterior grown back by D. Its surface touches the points; a signed distance
+/// clamped to 5 voxels. Null where nothing would be left.
+[[nodiscard]] FloatGridPtr closing(const FloatGrid& band, double tag_distance, const RunContext& run = {});
+
 // Other starts: u0 = clamp(signed distance, -3h, 3h), active where |u0| < 3h, named "band".
 // All throw Error InvalidOptions / InvalidInput when no surface lies in the domain.
 [[nodiscard]] FloatGridPtr start_from_sphere(const Domain& domain, const Vec3& center, double radius);

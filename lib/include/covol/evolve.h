@@ -15,13 +15,14 @@ struct EvolveOptions {
     double rho = 1.0;               ///< ρ in [0,1]: weight of the pull towards image edges, Eq. (3).
     double delta = -1.0;            ///< δ >= 0: weight of curvature, Eq. (1), world units; < 0 picks 1 voxel.
     double tau = -1.0;              ///< τ > 0: time step; < 0 picks h (one voxel at unit speed).
-    double epsilon = 1e-3;          ///< ε > 0: regularises |∇u|, Eqs. (13)-(14); dimensionless.
-    double edge_epsilon = 1e-3;     ///< ε in |∇g|_ε, Eq. (20): a slope of g per voxel; below it the pull fades.
+    double epsilon = 1e-2;          ///< ε > 0: regularises |∇u|, Eqs. (13)-(14); dimensionless.
+    double edge_epsilon = 0.02;     ///< ε in |∇g|_ε, Eq. (20): a slope of g per voxel; below it the pull fades.
     double attraction_range = 0.0;  ///< r, world units: the points pull fully up to r/2, not at all beyond r; 0: unlimited.
     double image_yields = 0.0;      ///< in [0,1]: share of ρ that fades close to marks, on the attraction range's taper.
     bool follow = false;            ///< the band follows the surface (starts other than tagging).
     int max_steps = 500;            ///< upper bound on time steps, >= 0
-    double tolerance = 1e-3;        ///< steady when the zero crossings move less than tolerance * τ on the average in a step
+    double tolerance = 2e-3;        ///< steady when the zero crossings move less than tolerance * τ a step on the average,
+                                    ///< or when over 10 steps fewer voxels than that changed sign
     double solver_tolerance = 1e-3; ///< a step's solve ends at this residual, relative to its first
     int max_sweeps = 200;           ///< upper bound on a step's sweeps
     [[nodiscard]] std::string why_invalid() const;
