@@ -197,7 +197,7 @@ private:
         report().band = tagged.report;
         result_.u = tagged.grid;
         if (tagged.report.leaks) warn_of_leak(tagged.report);
-        if (D > kCloseFromVoxels * h() && !tagged.report.leaks) start_from_closing(D);
+        if (D > kCloseFromVoxels * h()) start_from_closing(D);
         report().tag.tag_distance = D;
     }
 
@@ -344,8 +344,7 @@ private:
 
     // Edges of other structures lie between the tagged surface and the points: with an image the points pull alone first.
     EvolveReport approach(EvolveFields fields) {
-        const bool both = uses_points() && uses_image();
-        if (options_.start.kind != Start::Kind::Tag || !(both || options_.evolve.follow)) return {};
+        if (options_.start.kind != Start::Kind::Tag || !uses_points() || !uses_image()) return {};
         EvolveOptions alone = options_.evolve;
         alone.rho = 0;
         alone.attraction_range = 0;
