@@ -88,7 +88,7 @@ void check_finite(const LeafBand& band, const HaloField& field, const char* what
 }
 
 double follow_clamp(const EvolveOptions& options) {
-    return options.theta > 0 || options.rho > 0 ? kHalfWidthVoxels : detail::kFollowWidth;
+    return options.rho > 0 ? kHalfWidthVoxels : detail::kFollowWidth;
 }
 
 // What one step did to the surface.

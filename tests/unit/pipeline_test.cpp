@@ -69,7 +69,7 @@ TEST_CASE("segment: points alone give a closed sphere and record what was chosen
     CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.35 * options.voxel_size);
     CHECK(result.report.fit.mean < 0.35 * options.voxel_size);
     CHECK(result.report.resolved.evolve.rho == 0);
-    CHECK(result.report.resolved.evolve.delta == options.voxel_size);
+    CHECK(result.report.resolved.evolve.delta == Approx(0.5 * options.voxel_size));
     CHECK(result.report.automatic.count("rho") == 1);
     CHECK(result.report.automatic.count("tag_distance") == 1);
     CHECK(result.report.band.leaks == false);
