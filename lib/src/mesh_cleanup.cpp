@@ -10,8 +10,6 @@
 #include <CGAL/Polygon_mesh_processing/stitch_borders.h>
 #include <CGAL/Polygon_mesh_processing/triangulate_hole.h>
 #include <CGAL/Surface_mesh.h>
-#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Count_stop_predicate.h>
-#include <CGAL/Surface_mesh_simplification/edge_collapse.h>
 #include <CGAL/box_intersection_d.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
@@ -22,6 +20,7 @@
 #include <vector>
 
 #include "covol/error.h"
+#include "detail/mesh_decimate.h"
 
 namespace covol {
 namespace {
@@ -122,13 +121,21 @@ int repair(SurfaceMesh& mesh) {
     return holes;
 }
 
-/// Collapses edges (Lindstrom and Turk 1998, which keeps the volume) until triangles have about this edge length.
-void decimate(SurfaceMesh& mesh, double target_edge, double area) {
-    const double triangles = std::max(4.0, area / (std::sqrt(3.0) / 4 * target_edge * target_edge));
-    const double edges = 1.5 * triangles;
-    if (edges >= double(mesh.number_of_edges())) return;
-    namespace sms = CGAL::Surface_mesh_simplification;
-    sms::edge_collapse(mesh, sms::Count_stop_predicate<SurfaceMesh>(std::size_t(edges)));
+/// Equilateral triangles of this edge length that cover `area`.
+std::size_t triangles_of(double edge, double area) {
+    return std::size_t(std::max(4.0, area / (std::sqrt(3.0) / 4 * edge * edge)));
+}
+
+/// Decimation leaves a subset of the vertices, so that a round solid loses volume; an even offset along the normals
+/// brings it back.
+void decimate_keeping_volume(TriangleMesh& mesh, double target_edge, const MeshMeasures& before) {
+    detail::decimate(mesh, triangles_of(target_edge, before.area));
+    const MeshMeasures after = measure(mesh);
+    if (!before.closed || !after.closed || !(after.area > 0)) return;
+    const auto offset = static_cast<float>((before.volume - after.volume) / after.area);
+    const auto normals = vertex_normals(mesh);
+    for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
+        for (int a = 0; a < 3; ++a) mesh.vertices[v][a] += offset * normals[v][a];
 }
 
 /// One step of Laplacian smoothing with this weight.
@@ -235,11 +242,7 @@ CleanupReport clean_mesh(TriangleMesh& mesh, const CleanupOptions& options, cons
         run.report("clean", 0.4);
         run.check();
         if (options.target_edge > 0)
-            guarded([&] {
-                SurfaceMesh work = to_surface_mesh(mesh);
-                decimate(work, options.target_edge, facts.area);
-                mesh = from_surface_mesh(work);
-            });
+            decimate_keeping_volume(mesh, options.target_edge, facts);
         smooth(mesh, options.smooth_iterations, run);
         run.report("clean", 0.8);
         if (options.target_edge > 0 || options.smooth_iterations > 0) {
