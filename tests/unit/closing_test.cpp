@@ -1,0 +1,61 @@
+#include <openvdb/openvdb.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "covol/band.h"
+#include "covol/distance.h"
+#include "covol/surface.h"
+
+using namespace covol;
+
+namespace {
+
+// Points on a sphere of radius 1, spread evenly (Fibonacci lattice), about 3.5/sqrt(n) apart.
+std::vector<Vec3> sphere_points(int n) {
+    std::vector<Vec3> points;
+    for (int i = 0; i < n; ++i) {
+        const double z = 1.0 - (2.0 * i + 1.0) / n, r = std::sqrt(1.0 - z * z), a = 2.39996322972865332 * i;
+        points.push_back({r * std::cos(a), r * std::sin(a), z});
+    }
+    return points;
+}
+
+}  // namespace
+
+TEST_CASE("the closing of a tagged cloud touches its points and stays near the body they bound") {
+    const double h = 0.05, D = 0.45;
+    const std::vector<Vec3> points = sphere_points(120);
+    const Domain domain = domain_of_box({{-2, -2, -2}, {2, 2, 2}}, h);
+    const FloatGridPtr d = distance(points, domain, {D + 5 * h}).grid;
+    const BandResult tagged = band(*d, {D, {}});
+    REQUIRE_FALSE(tagged.report.leaks);
+
+    const FloatGridPtr closed = closing(*tagged.grid, D);
+    REQUIRE(closed);
+    const FloatGridPtr solid = surface(*closed);
+    const TriangleMesh mesh = extract_mesh(*solid);
+    CHECK(measure(mesh).genus == 0);
+    CHECK(measure(mesh).closed);
+    // The closing has a cusp at each point, which a grid rounds off by less than a voxel.
+    const FitStatistics fit = points_to_surface(points, mesh);
+    CHECK(fit.max < h);
+    CHECK(fit.mean < 0.5 * h);
+    // Between its contacts the ball dips in by at most its own sagitta over the gap, D - sqrt(D^2 - gap^2).
+    const double gap = 0.5 * 3.545 / std::sqrt(120.0) * std::sqrt(2.0), dip = D - std::sqrt(D * D - gap * gap);
+    for (const auto& v : mesh.vertices) {
+        const double r = std::hypot(v[0], v[1], v[2]);
+        REQUIRE(r < 1.0 + 0.5 * h);
+        REQUIRE(r > 1.0 - dip - gap * gap / 2 - h);
+    }
+}
+
+TEST_CASE("a ball too large for the body leaves no closing") {
+    const double h = 0.05;
+    const Domain domain = domain_of_box({{-2, -2, -2}, {2, 2, 2}}, h);
+    // One point: the tagged body is the ball of radius D around it, its closing the point itself.
+    const FloatGridPtr d = distance({{0.01, 0.02, 0.015}}, domain, {0.5 + 5 * h}).grid;
+    const BandResult tagged = band(*d, {0.5, {}});
+    const FloatGridPtr closed = closing(*tagged.grid, 0.5 + h);
+    CHECK_FALSE(closed);
+}
