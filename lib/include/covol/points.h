@@ -1,4 +1,5 @@
 #pragma once
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -15,9 +16,17 @@ struct ReadPointsOptions {
     PointOrder order = PointOrder::Unstated;  ///< Unstated: what the format says, else XYZ.
 };
 
+/// An ordered line of marks: the points [begin, end) of a cloud, as a person clicked them along a border.
+struct MarkLine {
+    std::size_t begin = 0, end = 0;
+    bool closed = true;  ///< the last mark joins the first
+    std::string name;    ///< the file's own name for it, or empty
+};
+
 /// Points as a file gives them: x, y, z in `space`.
 struct PointCloud {
     std::vector<Vec3> points;
+    std::vector<MarkLine> lines;  ///< what the file says of their order; empty for loose points
     PointSpace space = PointSpace::World;
     std::string source;  ///< path, for messages
     std::string rule;    ///< how coordinates were understood, one line for people
