@@ -362,6 +362,7 @@ private:
         total.steps += before.steps;
         total.sweeps_per_step = total.steps > 0 ? sweeps / total.steps : 0.0;
         total.leaf_visits += before.leaf_visits;
+        total.leaf_visits_saved += before.leaf_visits_saved;
         total.seconds_assembly += before.seconds_assembly;
         total.seconds_sweeps += before.seconds_sweeps;
     }
