@@ -24,6 +24,10 @@ namespace {
 // A leaf rests when a step moves it by less than this share of the motion that counts as steady.
 constexpr double kRestShare = 0.05;
 
+// An automatic time step grows while the surface moves by little, up to kLargestTau, and shrinks when it moves by much.
+constexpr double kSlowMotion = 0.1, kFastMotion = 0.4;  // voxels a step
+constexpr double kTauGrowth = 1.5, kLargestTau = 10.0;  // h
+
 double follow_clamp(const EvolveOptions& options) {
     return options.rho > 0 ? kHalfWidthVoxels : detail::kFollowWidth;
 }
@@ -46,7 +50,7 @@ public:
                 report_.stop_reason = StopReason::Cancelled;
                 break;
             }
-            if (options_.follow && departure_.has_left(solver_->u())) rebuild_band();
+            if (options_.follow) follow();
             const detail::Motion motion = solver_->step(tau_, kRestShare * options_.tolerance * tau_, counts_);
             if (!motion.finite) {
                 solver_->restore_previous();
@@ -56,6 +60,7 @@ public:
             }
             ++report_.steps;
             report_.last_change = motion.mean;
+            if (getenv("DBG")) fprintf(stderr, "%d tau %.2f mean %.5f passes %ld visits %ld saved %ld n %zu\n", report_.steps, tau_, motion.mean, (long)counts_.passes, (long)counts_.visits, (long)counts_.visits_saved, solver_->band().size());
             run_.report("evolve", progress());
             if (!motion.crosses) {
                 report_.stop_reason = StopReason::Vanished;
@@ -65,6 +70,7 @@ public:
                 report_.stop_reason = StopReason::Steady;
                 break;
             }
+            if (options_.tau < 0 && options_.rho == 0) adapt_tau(motion.mean);
         }
         solver_->store(u_);
         report_.sweeps_per_step = report_.steps > 0 ? double(counts_.passes) / report_.steps : 0.0;
@@ -91,17 +97,30 @@ private:
     }
 
     void make_solver() {
-        solver_.reset();  // its memory first
         solver_ = std::make_unique<detail::BandSolver>(u_, fields_, options_, domain_);
         if (options_.follow) departure_.remember(solver_->u(), solver_->band().size());
-        net_motion_.clear();
     }
 
-    void rebuild_band() {
+    // Makes the band again where the surface has left it.
+    void follow() {
+        const std::vector<std::size_t> left = departure_.left(solver_->u());
+        if (left.empty()) return;
+        std::vector<detail::Coord> stale;
+        for (const std::size_t leaf : left) stale.push_back(solver_->band().origin(leaf));
         solver_->store(u_);
-        detail::follow_surface(u_, domain_, follow_clamp(options_), run_);
+        const std::vector<detail::Coord> changed = detail::follow_surface_near(stale, u_, domain_, follow_clamp(options_));
         if (fields_.extend) fields_.extend(u_, fields_);
-        make_solver();
+        const detail::BandSolver::Rest rest = solver_->take_rest();
+        solver_.reset();  // its memory first
+        solver_ = std::make_unique<detail::BandSolver>(u_, fields_, options_, domain_);
+        const std::vector<std::int32_t> old_leaf = solver_->sleep_on(rest, changed);
+        departure_.remake(old_leaf, solver_->u());
+        net_motion_.remake(old_leaf, solver_->u());
+    }
+
+    void adapt_tau(double motion) {
+        if (motion < kSlowMotion) tau_ = std::min(tau_ * kTauGrowth, kLargestTau);
+        if (motion > kFastMotion) tau_ = std::max(tau_ / kTauGrowth, 1.0);
     }
 
     // Steps and the fall of the change, whichever is further.

@@ -121,6 +121,27 @@ BandSolver::BandSolver(const FloatGrid& u, const EvolveFields& fields, const Evo
     residuals_.assign(band_.size(), 0.0);
 }
 
+BandSolver::Rest BandSolver::take_rest() {
+    return {std::move(band_), std::move(awake_), std::move(unannounced_), std::move(motions_)};
+}
+
+std::vector<std::int32_t> BandSolver::sleep_on(const Rest& old, const std::vector<Coord>& changed) {
+    std::vector<std::int32_t> old_leaf(band_.size());
+    tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
+        const Coord& origin = band_.origin(leaf);
+        const std::int32_t at = old.band.find(origin);
+        if (at == old.band.none() || std::binary_search(changed.begin(), changed.end(), origin)) {
+            old_leaf[leaf] = -1;
+            return;
+        }
+        old_leaf[leaf] = at;
+        awake_[leaf] = old.awake[at];
+        unannounced_[leaf] = old.unannounced[at];
+        motions_[leaf] = old.motions[at];
+    });
+    return old_leaf;
+}
+
 void BandSolver::gather_fields(const EvolveFields& fields) {
     const Taper taper{options_.attraction_range};
     if (options_.theta > 0) {

@@ -32,6 +32,20 @@ public:
     /// @throws Error InvalidInput (no active voxel; a value that is not finite).
     BandSolver(const FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options, const Domain& domain);
 
+    /// Who sleeps, and what the next step has to know of the steps before.
+    struct Rest {
+        LeafBand band;
+        std::vector<unsigned char> awake;
+        std::vector<float> unannounced;  ///< motion that the neighbours have not been woken for, voxels
+        std::vector<LeafMotion> motions;
+    };
+    /// The solver is of no use afterwards.
+    [[nodiscard]] Rest take_rest();
+    /// Leaves that slept in a band before sleep on.
+    /// @param changed  sorted origins of leaves with other values than there
+    /// @return for each leaf its number in the old band, or -1 where it is new or changed
+    std::vector<std::int32_t> sleep_on(const Rest& old, const std::vector<Coord>& changed);
+
     /// One time step of length τ = tau * h; `rest` in voxels.
     Motion step(double tau, double rest, Counts& counts);
     /// Takes the last step back.
@@ -68,9 +82,9 @@ private:
     // One for each leaf:
     std::vector<int> active_counts_;
     std::vector<unsigned char> awake_;
-    std::vector<float> unannounced_;   // motion that the neighbours have not been woken for, voxels
-    std::vector<double> residuals_;    // squared, as seen by the last visit; during assembly the largest row
+    std::vector<float> unannounced_;
     std::vector<LeafMotion> motions_;
+    std::vector<double> residuals_;  // squared, as seen by the last visit
 };
 
 }  // namespace covol::detail

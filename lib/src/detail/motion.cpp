@@ -13,8 +13,10 @@
 namespace covol::detail {
 namespace {
 
-constexpr double kLeft = 0.75;   // voxels, on the average
-constexpr float kDeep = 2.0F;    // voxels, anywhere
+constexpr double kLeftBy = 0.75, kLeavingBy = 0.4;  // voxels, on the average over a leaf
+constexpr double kShareLeft = 0.1;  // of the leaves with the surface in them; before that it is not worth while
+constexpr int kFewCrossings = 32;   // a leaf's average over fewer says little
+constexpr float kDeep = 2.0F;       // voxels, anywhere
 
 double crossing(float a, float b) { return double(a) / (double(a) - b); }
 
@@ -26,8 +28,7 @@ int crossed_edges(const LeafMask& negative) {
 
 struct Flips {
     std::int64_t flipped = 0, crossed = 0;
-    bool deep = false;
-    Flips operator+(const Flips& o) const { return {flipped + o.flipped, crossed + o.crossed, deep || o.deep}; }
+    Flips operator+(const Flips& o) const { return {flipped + o.flipped, crossed + o.crossed}; }
 };
 
 template <typename Count>
@@ -99,7 +100,7 @@ double NetMotion::per_step(const LeafArray<float>& u, std::size_t leaves) {
     signs_.resize(leaves);
     const Flips flips = sum_over_leaves(leaves, [&](std::size_t leaf) {
         const LeafMask negative = negative_mask(u.leaf(leaf));
-        Flips here{0, crossed_edges(negative), false};
+        Flips here{0, crossed_edges(negative)};
         for (int word = 0; word < 8; ++word) here.flipped += __builtin_popcountll(negative[word] ^ signs_[leaf][word]);
         signs_[leaf] = negative;
         return here;
@@ -109,31 +110,58 @@ double NetMotion::per_step(const LeafArray<float>& u, std::size_t leaves) {
     return kCrossingsPerVoxel * double(flips.flipped) / double(flips.crossed) / kWindow;
 }
 
-void Departure::remember(const LeafArray<float>& u, std::size_t leaves) {
-    made_for_.resize(leaves);
-    tbb::parallel_for(std::size_t(0), leaves, [&](std::size_t leaf) {
-        const float* values = u.leaf(leaf);
-        MadeFor& made = made_for_[leaf];
-        made.negative = negative_mask(values);
-        made.near = {};
-        for (int n = 0; n < kLeafSize; ++n) made.near[n >> 6] |= std::uint64_t(std::abs(values[n]) < kDeep) << (n & 63);
-        made.crossed = crossed_edges(made.negative);
-    });
+void NetMotion::remake(const std::vector<std::int32_t>& old_leaf, const LeafArray<float>& u) {
+    if (signs_.empty()) return;
+    std::vector<LeafMask> signs(old_leaf.size());
+    for (std::size_t leaf = 0; leaf < old_leaf.size(); ++leaf)
+        signs[leaf] = old_leaf[leaf] >= 0 ? signs_[old_leaf[leaf]] : negative_mask(u.leaf(leaf));
+    signs_ = std::move(signs);
 }
 
-bool Departure::has_left(const LeafArray<float>& u) const {
-    const Flips flips = sum_over_leaves(made_for_.size(), [&](std::size_t leaf) {
+Departure::MadeFor::MadeFor(const float* values) : negative(negative_mask(values)), crossed(crossed_edges(negative)) {
+    for (int n = 0; n < kLeafSize; ++n) near[n >> 6] |= std::uint64_t(std::abs(values[n]) < kDeep) << (n & 63);
+}
+
+void Departure::remember(const LeafArray<float>& u, std::size_t leaves) {
+    made_for_.resize(leaves);
+    tbb::parallel_for(std::size_t(0), leaves, [&](std::size_t leaf) { made_for_[leaf] = MadeFor(u.leaf(leaf)); });
+}
+
+void Departure::remake(const std::vector<std::int32_t>& old_leaf, const LeafArray<float>& u) {
+    std::vector<MadeFor> made_for(old_leaf.size());
+    tbb::parallel_for(std::size_t(0), old_leaf.size(), [&](std::size_t leaf) {
+        made_for[leaf] = old_leaf[leaf] >= 0 ? made_for_[old_leaf[leaf]] : MadeFor(u.leaf(leaf));
+    });
+    made_for_ = std::move(made_for);
+}
+
+std::vector<std::size_t> Departure::left(const LeafArray<float>& u) const {
+    enum State : unsigned char { kStays, kLeaving, kLeft, kDeepDown };
+    std::vector<State> states(made_for_.size());
+    tbb::parallel_for(std::size_t(0), made_for_.size(), [&](std::size_t leaf) {
         const MadeFor& made = made_for_[leaf];
         const LeafMask negative = negative_mask(u.leaf(leaf));
-        Flips here{0, made.crossed, false};
+        int flips = 0;
+        bool deep = false;
         for (int word = 0; word < 8; ++word) {
             const std::uint64_t flipped = negative[word] ^ made.negative[word];
-            here.deep |= (flipped & ~made.near[word]) != 0;
-            here.flipped += __builtin_popcountll(flipped);
+            deep |= (flipped & ~made.near[word]) != 0;
+            flips += __builtin_popcountll(flipped);
         }
-        return here;
+        const double moved = flips > 0 ? kCrossingsPerVoxel * flips / std::max(made.crossed, kFewCrossings) : 0.0;
+        states[leaf] = deep ? kDeepDown : moved >= kLeftBy ? kLeft : moved >= kLeavingBy ? kLeaving : kStays;
     });
-    return flips.deep || double(flips.flipped) >= kLeft * double(flips.crossed) / kCrossingsPerVoxel;
+    std::vector<std::size_t> leaving;
+    std::size_t crossed = 0, left = 0;
+    bool deep = false;
+    for (std::size_t leaf = 0; leaf < states.size(); ++leaf) {
+        crossed += made_for_[leaf].crossed > 0;
+        left += states[leaf] >= kLeft;
+        deep |= states[leaf] == kDeepDown;
+        if (states[leaf] >= kLeaving) leaving.push_back(leaf);
+    }
+    if (!deep && double(left) < kShareLeft * double(crossed)) leaving.clear();
+    return leaving;
 }
 
 }  // namespace covol::detail

@@ -45,24 +45,30 @@ public:
     static constexpr int kWindow = 10;  ///< steps
     /// To be called once a step. @return mean motion per step over the last window, voxels; infinity within one
     double per_step(const LeafArray<float>& u, std::size_t leaves);
-    void clear() { signs_.clear(); }
+    /// The band was made again. @param old_leaf  for each new leaf the old one with the same values, or -1
+    void remake(const std::vector<std::int32_t>& old_leaf, const LeafArray<float>& u);
 
 private:
     std::vector<LeafMask> signs_;  // at the window's begin
     int age_ = 0;
 };
 
-/// Tells when the surface has left what its band was made for: on the average by three quarters of a voxel, counted by
-/// the voxels that changed sign, or somewhere past voxels that were 2 voxels deep.
+/// Tells where the surface has left what its band was made for: by three quarters of a voxel, counted by the leaf's voxels
+/// that changed sign, or past voxels that were 2 voxels deep.
 class Departure {
 public:
     void remember(const LeafArray<float>& u, std::size_t leaves);
-    [[nodiscard]] bool has_left(const LeafArray<float>& u) const;
+    /// As in NetMotion.
+    void remake(const std::vector<std::int32_t>& old_leaf, const LeafArray<float>& u);
+    /// The leaves that the surface has left or is leaving; empty while there is no need to make the band again.
+    [[nodiscard]] std::vector<std::size_t> left(const LeafArray<float>& u) const;
 
 private:
     struct MadeFor {
         LeafMask negative{}, near{};
         int crossed = 0;
+        explicit MadeFor(const float* values);
+        MadeFor() = default;
     };
     std::vector<MadeFor> made_for_;
 };
