@@ -5,6 +5,7 @@
 #include "covol/evolve.h"
 
 #include <openvdb/openvdb.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -22,7 +23,8 @@ namespace covol {
 namespace {
 
 // A leaf rests when a step moves it by less than this share of the motion that counts as steady.
-constexpr double kRestShare = 0.05;
+constexpr double kRestShare = 0.5;
+constexpr int kCycle = 3;  // steps between two redistancings of a follower
 
 // An automatic time step grows while the surface moves by little, up to kLargestTau, and shrinks when it moves by much.
 constexpr double kSlowMotion = 0.1, kFastMotion = 0.4;  // voxels a step
@@ -50,8 +52,7 @@ public:
                 report_.stop_reason = StopReason::Cancelled;
                 break;
             }
-            if (options_.follow) follow();
-            const detail::Motion motion = solver_->step(tau_, kRestShare * options_.tolerance * tau_, counts_);
+            const detail::Motion motion = solver_->step(tau_, counts_);
             if (!motion.finite) {
                 solver_->restore_previous();
                 solver_->store(u_);
@@ -60,17 +61,18 @@ public:
             }
             ++report_.steps;
             report_.last_change = motion.mean;
-            if (getenv("DBG")) fprintf(stderr, "%d tau %.2f mean %.5f passes %ld visits %ld saved %ld n %zu\n", report_.steps, tau_, motion.mean, (long)counts_.passes, (long)counts_.visits, (long)counts_.visits_saved, solver_->band().size());
+            if (getenv("DBG")) fprintf(stderr, "%d tau %.2f mean %.5f passes %ld visits %ld saved %ld n %zu settled %.5f\n", report_.steps, tau_, motion.mean, (long)counts_.passes, (long)counts_.visits, (long)counts_.visits_saved, solver_->band().size(), settled_);
             run_.report("evolve", progress());
             if (!motion.crosses) {
                 report_.stop_reason = StopReason::Vanished;
                 break;
             }
-            if (std::min(motion.mean, net_motion_.per_step(solver_->u(), solver_->band().size())) < options_.tolerance * tau_) {
+            const double settled = options_.follow ? follow(motion.mean) : stay(motion.mean);
+            if (settled < options_.tolerance * tau_) {
                 report_.stop_reason = StopReason::Steady;
                 break;
             }
-            if (options_.tau < 0 && options_.rho == 0) adapt_tau(motion.mean);
+            if (options_.tau < 0 && (options_.rho == 0 || getenv("ADAPT"))) adapt_tau(motion.mean);
         }
         solver_->store(u_);
         report_.sweeps_per_step = report_.steps > 0 ? double(counts_.passes) / report_.steps : 0.0;
@@ -98,13 +100,52 @@ private:
 
     void make_solver() {
         solver_ = std::make_unique<detail::BandSolver>(u_, fields_, options_, domain_);
-        if (options_.follow) departure_.remember(solver_->u(), solver_->band().size());
+        if (!options_.follow) return;
+        departure_.remember(solver_->u(), solver_->band().size());
+        marks_.resize(solver_->band().size());
     }
 
-    // Makes the band again where the surface has left it.
-    void follow() {
+    [[nodiscard]] double rest() const { return kRestShare * options_.tolerance * tau_; }
+
+    // A fixed band. @return how much the surface still moves, voxels a step
+    double stay(double motion) {
+        solver_->doze(solver_->largest_changes(), rest());
+        return std::min(motion, net_motion_.per_step(solver_->u(), solver_->band().size()));
+    }
+
+    // A band that follows. Advection turns the profile of u into a step, which creeps over the lattice: every few steps it is
+    // made a distance again. How far the surface has come is asked just before, from time to time at the same phase.
+    double follow(double motion) {
+        if (report_.steps % kCycle != 0) return motion;
+        const double moved = doze_by_marks();
         const std::vector<std::size_t> left = departure_.left(solver_->u());
-        if (left.empty()) return;
+        if (left.empty())
+            solver_->redistance(follow_clamp(options_));
+        else
+            remake_band(left);
+        settled_ = moved / kCycle;
+        return std::min(motion, moved / kCycle);
+    }
+
+    // @return the mean way of the surface since the last marks, voxels
+    double doze_by_marks() {
+        const std::size_t leaves = solver_->band().size();
+        std::vector<float> motion(leaves, 0.0F);
+        tbb::parallel_for(std::size_t(0), leaves, [&](std::size_t leaf) {
+            if (solver_->is_awake(leaf)) motion[leaf] = static_cast<float>(marks_.renew(leaf, solver_->u().leaf(leaf)));
+        });
+        solver_->doze(motion, kCycle * rest());
+        if (getenv("DBG2")) { std::vector<float> a; int aw = 0; for (std::size_t l = 0; l < leaves; ++l) { aw += solver_->is_awake(l); if (marks_.count(l)) a.push_back(motion[l]); } std::sort(a.begin(), a.end()); fprintf(stderr, "awake %d of %zu motion:", aw, leaves); for (int i = 0; i < 10; ++i) fprintf(stderr, " %.4f", a[a.size() * i / 10]); fprintf(stderr, "\n"); }
+        double way = 0.0, crossings = 0.0;
+        for (std::size_t leaf = 0; leaf < leaves; ++leaf) {
+            const auto count = static_cast<double>(marks_.count(leaf));
+            if (count > 0) way += motion[leaf] * count;
+            crossings += count;
+        }
+        return crossings > 0 ? way / crossings : 0.0;
+    }
+
+    void remake_band(const std::vector<std::size_t>& left) {
         std::vector<detail::Coord> stale;
         for (const std::size_t leaf : left) stale.push_back(solver_->band().origin(leaf));
         solver_->store(u_);
@@ -113,9 +154,17 @@ private:
         const detail::BandSolver::Rest rest = solver_->take_rest();
         solver_.reset();  // its memory first
         solver_ = std::make_unique<detail::BandSolver>(u_, fields_, options_, domain_);
-        const std::vector<std::int32_t> old_leaf = solver_->sleep_on(rest, changed);
-        departure_.remake(old_leaf, solver_->u());
-        net_motion_.remake(old_leaf, solver_->u());
+        solver_->sleep_on(rest, changed);
+        const detail::LeafBand& band = solver_->band();
+        std::vector<std::int32_t> place(band.size()), same(band.size());
+        for (std::size_t leaf = 0; leaf < band.size(); ++leaf) {
+            const std::int32_t at = rest.band.find(band.origin(leaf));
+            place[leaf] = at == rest.band.none() ? -1 : at;
+            same[leaf] = std::binary_search(changed.begin(), changed.end(), band.origin(leaf)) ? -1 : place[leaf];
+        }
+        departure_.remake(same, solver_->u());
+        marks_.remake(place);
+        solver_->redistance(follow_clamp(options_));
     }
 
     void adapt_tau(double motion) {
@@ -141,6 +190,8 @@ private:
     detail::BandSolver::Counts counts_;
     detail::NetMotion net_motion_;
     detail::Departure departure_;
+    detail::CrossingMarks marks_;
+    double settled_ = 0;
     EvolveReport report_;
 };
 

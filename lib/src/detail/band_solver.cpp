@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "covol/error.h"
+#include "detail/local_distance.h"
 
 namespace covol::detail {
 namespace {
@@ -93,9 +94,6 @@ SchemeConstants constants_for(const EvolveOptions& options, double h, double tau
     return constants;
 }
 
-constexpr int kFaceSlots[6] = {neighbour_slot(-1, 0, 0), neighbour_slot(1, 0, 0),  neighbour_slot(0, -1, 0),
-                               neighbour_slot(0, 1, 0),  neighbour_slot(0, 0, -1), neighbour_slot(0, 0, 1)};
-
 }  // namespace
 
 BandSolver::BandSolver(const FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options, const Domain& domain)
@@ -116,7 +114,8 @@ BandSolver::BandSolver(const FloatGrid& u, const EvolveFields& fields, const Evo
     rows_.resize(band_.size() * 6 * kLeafSize);
     active_counts_.resize(band_.size());
     for (std::size_t leaf = 0; leaf < band_.size(); ++leaf) active_counts_[leaf] = count_on(band_.active(leaf));
-    awake_.assign(band_.size(), 1);
+    awake_.resize(band_.size());
+    for (std::size_t leaf = 0; leaf < band_.size(); ++leaf) awake_[leaf] = active_counts_[leaf] > 0;
     unannounced_.assign(band_.size(), std::numeric_limits<float>::infinity());
     residuals_.assign(band_.size(), 0.0);
 }
@@ -125,21 +124,15 @@ BandSolver::Rest BandSolver::take_rest() {
     return {std::move(band_), std::move(awake_), std::move(unannounced_), std::move(motions_)};
 }
 
-std::vector<std::int32_t> BandSolver::sleep_on(const Rest& old, const std::vector<Coord>& changed) {
-    std::vector<std::int32_t> old_leaf(band_.size());
+void BandSolver::sleep_on(const Rest& old, const std::vector<Coord>& changed) {
     tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
         const Coord& origin = band_.origin(leaf);
         const std::int32_t at = old.band.find(origin);
-        if (at == old.band.none() || std::binary_search(changed.begin(), changed.end(), origin)) {
-            old_leaf[leaf] = -1;
-            return;
-        }
-        old_leaf[leaf] = at;
+        if (at == old.band.none() || std::binary_search(changed.begin(), changed.end(), origin)) return;
         awake_[leaf] = old.awake[at];
         unannounced_[leaf] = old.unannounced[at];
         motions_[leaf] = old.motions[at];
     });
-    return old_leaf;
 }
 
 void BandSolver::gather_fields(const EvolveFields& fields) {
@@ -162,10 +155,9 @@ void BandSolver::gather_fields(const EvolveFields& fields) {
         });
 }
 
-Motion BandSolver::step(double tau, double rest, Counts& counts) {
+Motion BandSolver::step(double tau, Counts& counts) {
     const SchemeConstants constants = constants_for(options_, domain_.voxel_size, tau);
     const auto start = Clock::now();
-    wake(rest);
     const double largest_row = assemble(constants);
     counts.seconds_assembly += seconds_since(start);
     const auto solve_start = Clock::now();
@@ -199,21 +191,40 @@ void BandSolver::solve(double omega, Counts& counts) {
     }
 }
 
-// Motion is announced to the neighbours once it has added up to `rest`.
-void BandSolver::wake(double rest) {
+void BandSolver::doze(const std::vector<float>& motion, double rest) {
     std::vector<unsigned char> moved(band_.size() + 1, 0);
-    for (std::size_t leaf = 0; leaf < band_.size(); ++leaf)
-        if (!(unannounced_[leaf] < rest)) {
-            moved[leaf] = 1;
-            unannounced_[leaf] = 0.0F;
-        }
+    for (std::size_t leaf = 0; leaf < band_.size(); ++leaf) {
+        unannounced_[leaf] += motion[leaf];
+        if (unannounced_[leaf] < rest) continue;
+        moved[leaf] = 1;
+        unannounced_[leaf] = 0.0F;
+    }
     tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
-        unsigned char awake = 0;
-        for (const std::int32_t next : band_.neighbours(leaf)) awake |= moved[next];
-        // From now on at rest.
-        if (awake_[leaf] && !awake) std::copy_n(field_.values.leaf(leaf), kLeafSize, previous_.leaf(leaf));
+        unsigned char awake = moved[leaf];
+        for (const int slot : kFaceSlots) awake |= moved[band_.neighbours(leaf)[slot]];
+        // What sleeps does not change.
+        if (!awake) std::copy_n(field_.values.leaf(leaf), kLeafSize, previous_.leaf(leaf));
         awake_[leaf] = awake && active_counts_[leaf] > 0;
-        residuals_[leaf] = 0.0;
+    });
+}
+
+std::vector<float> BandSolver::largest_changes() const {
+    std::vector<float> largest(band_.size());
+    for (std::size_t leaf = 0; leaf < band_.size(); ++leaf) largest[leaf] = motions_[leaf].largest;
+    return largest;
+}
+
+void BandSolver::redistance(double clamp) {
+    static_assert(LocalDistance::kScratch <= 6 * kLeafSize);
+    const auto limit = static_cast<float>(clamp);
+    LocalDistance local(band_, field_, awake_, domain_, limit, limit, {rows_.data(), 6 * kLeafSize});
+    local.compute();
+    tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
+        if (!awake_[leaf]) return;
+        float* u = field_.values.leaf(leaf);
+        const float* d = local.settled(leaf);
+        for (int n = 0; n < kLeafSize; ++n)
+            if (is_on(band_.active(leaf), n)) u[n] = u[n] < 0.0F ? -std::min(d[n], limit) : std::min(d[n], limit);
     });
 }
 
@@ -221,6 +232,7 @@ double BandSolver::assemble(const SchemeConstants& constants) {
     const SchemeKernels& kernel = kernels();
     std::vector<float> largest(band_.size(), 0.0F);
     tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
+        residuals_[leaf] = 0.0;
         if (!awake_[leaf]) return;
         alignas(64) float u[kPaddedSize], phi[kPaddedSize], edge[kPaddedSize];
         std::copy_n(field_.values.leaf(leaf), kLeafSize, previous_.leaf(leaf));
@@ -290,7 +302,6 @@ Motion BandSolver::measure() {
             return;
         }
         motion = motion_of(field_.values.leaf(leaf), previous_.leaf(leaf), true);
-        unannounced_[leaf] += motion.largest;
     });
     return total(motions_);
 }

@@ -17,8 +17,8 @@ namespace covol::detail {
 /// Eqs. (14)-(22). One step assembles the rows of every leaf from u^{n-1}, then visits the leaves in two colours until
 /// the residual has fallen. Values are in voxels, not world units.
 ///
-/// Work is done only where something happens. A leaf sleeps from a step in which neither it nor a leaf next to it moved by
-/// more than `rest` until one of those has; a leaf whose residual is down, with neighbours whose is, is not visited again in a solve.
+/// Work is done only where something happens. A leaf sleeps from when neither it nor a leaf next to it has moved by more than
+/// `rest` until one of those has; a leaf whose residual is down, with neighbours whose is, is not visited again in a solve.
 class BandSolver {
 public:
     struct Counts {
@@ -43,11 +43,18 @@ public:
     [[nodiscard]] Rest take_rest();
     /// Leaves that slept in a band before sleep on.
     /// @param changed  sorted origins of leaves with other values than there
-    /// @return for each leaf its number in the old band, or -1 where it is new or changed
-    std::vector<std::int32_t> sleep_on(const Rest& old, const std::vector<Coord>& changed);
+    void sleep_on(const Rest& old, const std::vector<Coord>& changed);
 
-    /// One time step of length τ = tau * h; `rest` in voxels.
-    Motion step(double tau, double rest, Counts& counts);
+    /// One time step of length τ = tau * h on the leaves that are awake.
+    Motion step(double tau, Counts& counts);
+    /// Decides who sleeps from here on: motion is announced to the neighbours once it has added up to `rest` voxels.
+    /// @param motion  of each leaf since the last call, voxels
+    void doze(const std::vector<float>& motion, double rest);
+    /// max |u^n - u^{n-1}| of each leaf in the last step, voxels
+    [[nodiscard]] std::vector<float> largest_changes() const;
+    [[nodiscard]] bool is_awake(std::size_t leaf) const { return awake_[leaf] != 0; }
+    /// Makes u on the leaves that are awake a distance again, clamped to `clamp` voxels; see LocalDistance.
+    void redistance(double clamp);
     /// Takes the last step back.
     void restore_previous();
     /// Active voxels into the grid that u came from; inactive ones keep their bits.
@@ -59,7 +66,6 @@ public:
 
 private:
     void gather_fields(const EvolveFields& fields);
-    void wake(double rest);
     double assemble(const SchemeConstants& constants);
     void solve(double omega, Counts& counts);
     double sweep(float omega, double goal, Counts& counts);
@@ -78,7 +84,7 @@ private:
     HaloField field_;  // u
     std::optional<HaloField> phi_, edge_, image_weight_;
     LeafArray<float> previous_;  // u^{n-1}
-    std::vector<float, tbb::cache_aligned_allocator<float>> rows_;  // 6 x 512 for each leaf
+    std::vector<float, tbb::cache_aligned_allocator<float>> rows_;  // 6 x 512 for each leaf; scratch between steps
     // One for each leaf:
     std::vector<int> active_counts_;
     std::vector<unsigned char> awake_;

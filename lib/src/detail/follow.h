@@ -5,12 +5,9 @@
 #include "covol/fwd.h"
 #include "covol/run.h"
 #include "detail/leaf_band.h"
+#include "detail/local_distance.h"
 
 namespace covol::detail {
-
-/// How far the band of a moving surface reaches, in voxels: the 3 of the clamp and about two that the surface may move
-/// before the band is made again. (Each time shifts the surface by about 0.1 h² times its curvature: rarely is better.)
-inline constexpr double kFollowWidth = 5.0;
 
 /// Re-makes u as the signed distance to its zero level set, clamped to `clamp` voxels (at most kFollowWidth), in a band
 /// of kFollowWidth voxels inside the domain.

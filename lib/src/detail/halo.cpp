@@ -9,7 +9,7 @@
 namespace covol::detail {
 namespace {
 
-bool is_face(int slot) { return slot == 4 || slot == 10 || slot == 12 || slot == 14 || slot == 16 || slot == 22; }
+bool is_face(int slot) { return std::find(std::begin(kFaceSlots), std::end(kFaceSlots), slot) != std::end(kFaceSlots); }
 
 Coord neighbour_origin(const Coord& origin, int slot) {
     return origin.offsetBy((slot / 9 - 1) * kLeafDim, (slot / 3 % 3 - 1) * kLeafDim, (slot % 3 - 1) * kLeafDim);
@@ -89,24 +89,26 @@ void load_padded(const HaloField& field, std::size_t leaf, float* out) {
 }
 
 void load_star(const HaloField& field, std::size_t leaf, float* out) {
-    const auto& blocks = field.blocks[leaf];
-    const float* inner = field.values.leaf(leaf);
-    const float* minus_k = field.values.leaf(blocks[neighbour_slot(0, 0, -1)]);
-    const float* plus_k = field.values.leaf(blocks[neighbour_slot(0, 0, 1)]);
+    const float* across[6];
+    for (int face = 0; face < 6; ++face) across[face] = field.values.leaf(field.blocks[leaf][kFaceSlots[face]]);
+    load_star_from(field.values.leaf(leaf), across, out);
+}
+
+void load_star_from(const float* inner, const float* const across[6], float* out) {
+    const float* minus_k = across[kMinusK];
+    const float* plus_k = across[kPlusK];
     for (int row = 0; row < 64; ++row) {
         float* to = out + padded(row >> 3, row & 7, 0);
         to[-1] = minus_k[row * 8 + 7];
         std::memcpy(to, inner + row * 8, 8 * sizeof(float));
         to[8] = plus_k[row * 8];
     }
-    const auto copy_row = [&](int i, int j) {
-        const RowSource si(i), sj(j);
-        const float* block = field.values.leaf(blocks[neighbour_slot(si.d, sj.d, 0)]);
-        std::memcpy(out + padded(i, j, 0), block + leaf_offset(si.local, sj.local, 0), 8 * sizeof(float));
+    const auto copy_row = [out](int i, int j, const float* block) {
+        std::memcpy(out + padded(i, j, 0), block + leaf_offset(i & 7, j & 7, 0), 8 * sizeof(float));
     };
     for (int n = 0; n < 8; ++n) {
-        copy_row(-1, n), copy_row(8, n);
-        copy_row(n, -1), copy_row(n, 8);
+        copy_row(-1, n, across[kMinusI]), copy_row(8, n, across[kPlusI]);
+        copy_row(n, -1, across[kMinusJ]), copy_row(n, 8, across[kPlusJ]);
     }
 }
 

@@ -26,6 +26,8 @@ using ConvertBlock = std::function<void(const FloatGrid::TreeType::LeafNodeType*
 void load_padded(const HaloField& field, std::size_t leaf, float* out);
 /// The same without edges and corners, which keep what they hold.
 void load_star(const HaloField& field, std::size_t leaf, float* out);
+/// The same from seven blocks of 512: the leaf's own and those across its faces, by Face.
+void load_star_from(const float* inner, const float* const across[6], float* out);
 /// Writes a padded buffer's inner 8^3 voxels back.
 void store_inner(const float* in, float* leaf);
 

@@ -35,6 +35,9 @@ inline bool any_on(const LeafMask& mask) {
 
 /// Index of the neighbour at leaf offset (di,dj,dk), each -1..1, among 27; 13 is the leaf itself.
 inline constexpr int neighbour_slot(int di, int dj, int dk) { return (di + 1) * 9 + (dj + 1) * 3 + (dk + 1); }
+/// The slots across the faces, in the order -i, +i, -j, +j, -k, +k.
+inline constexpr int kFaceSlots[6] = {neighbour_slot(-1, 0, 0), neighbour_slot(1, 0, 0),  neighbour_slot(0, -1, 0),
+                                      neighbour_slot(0, 1, 0),  neighbour_slot(0, 0, -1), neighbour_slot(0, 0, 1)};
 
 /// The leaves of a band as flat arrays: where they are, who is next to whom, which voxels are active.
 ///

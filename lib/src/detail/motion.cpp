@@ -110,12 +110,41 @@ double NetMotion::per_step(const LeafArray<float>& u, std::size_t leaves) {
     return kCrossingsPerVoxel * double(flips.flipped) / double(flips.crossed) / kWindow;
 }
 
-void NetMotion::remake(const std::vector<std::int32_t>& old_leaf, const LeafArray<float>& u) {
-    if (signs_.empty()) return;
-    std::vector<LeafMask> signs(old_leaf.size());
-    for (std::size_t leaf = 0; leaf < old_leaf.size(); ++leaf)
-        signs[leaf] = old_leaf[leaf] >= 0 ? signs_[old_leaf[leaf]] : negative_mask(u.leaf(leaf));
-    signs_ = std::move(signs);
+double CrossingMarks::renew(std::size_t leaf, const float* u) {
+    std::vector<Crossing> now;
+    const LeafMask negative = negative_mask(u);
+    for (int axis = 0; axis < 3; ++axis) {
+        const LeafMask changes = sign_changes(negative, axis);
+        const int step = 64 >> (3 * axis);
+        for (int word = 0; word < 8; ++word)
+            for (std::uint64_t bits = changes[word]; bits != 0; bits &= bits - 1) {
+                const int n = word << 6 | __builtin_ctzll(bits);
+                now.push_back({std::uint16_t(axis * kLeafSize + n), float(crossing(u[n], u[n + step]))});
+            }
+    }
+    Leaf& mark = leaves_[leaf];
+    double way = 0.0;
+    int edges = 0;
+    auto before = mark.crossings.begin();
+    const auto end = mark.crossings.end();
+    for (const Crossing& c : now) {
+        for (; before != end && before->edge < c.edge; ++before, ++edges) way += 0.5;
+        const bool same = before != end && before->edge == c.edge;
+        way += same ? std::abs(c.at - before->at) : 0.5;
+        before += same;
+        ++edges;
+    }
+    for (; before != end; ++before, ++edges) way += 0.5;
+    const bool is_first = !mark.is_marked;
+    mark = {std::move(now), true};
+    return is_first ? std::numeric_limits<double>::infinity() : edges > 0 ? way / edges : 0.0;
+}
+
+void CrossingMarks::remake(const std::vector<std::int32_t>& old_leaf) {
+    std::vector<Leaf> leaves(old_leaf.size());
+    for (std::size_t leaf = 0; leaf < leaves.size(); ++leaf)
+        if (old_leaf[leaf] >= 0) leaves[leaf] = std::move(leaves_[old_leaf[leaf]]);
+    leaves_ = std::move(leaves);
 }
 
 Departure::MadeFor::MadeFor(const float* values) : negative(negative_mask(values)), crossed(crossed_edges(negative)) {

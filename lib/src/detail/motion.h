@@ -45,12 +45,33 @@ public:
     static constexpr int kWindow = 10;  ///< steps
     /// To be called once a step. @return mean motion per step over the last window, voxels; infinity within one
     double per_step(const LeafArray<float>& u, std::size_t leaves);
-    /// The band was made again. @param old_leaf  for each new leaf the old one with the same values, or -1
-    void remake(const std::vector<std::int32_t>& old_leaf, const LeafArray<float>& u);
 
 private:
     std::vector<LeafMask> signs_;  // at the window's begin
     int age_ = 0;
+};
+
+/// Where the surface crosses the edges of voxels, leaf by leaf, to tell how far it has come since.
+class CrossingMarks {
+public:
+    /// Marks what is there now. @return how far the crossings have come since the leaf's last mark, on the average, voxels;
+    ///         infinity at the first
+    double renew(std::size_t leaf, const float* u);
+    void resize(std::size_t leaves) { leaves_.resize(leaves); }
+    /// The band was made again. @param old_leaf  for each new leaf the old one at the same place, or -1
+    void remake(const std::vector<std::int32_t>& old_leaf);
+    [[nodiscard]] std::size_t count(std::size_t leaf) const { return leaves_[leaf].crossings.size(); }
+
+private:
+    struct Crossing {
+        std::uint16_t edge;  ///< 512 * axis + voxel
+        float at;            ///< along it
+    };
+    struct Leaf {
+        std::vector<Crossing> crossings;
+        bool is_marked = false;
+    };
+    std::vector<Leaf> leaves_;
 };
 
 /// Tells where the surface has left what its band was made for: by three quarters of a voxel, counted by the leaf's voxels
@@ -58,7 +79,7 @@ private:
 class Departure {
 public:
     void remember(const LeafArray<float>& u, std::size_t leaves);
-    /// As in NetMotion.
+    /// The band was made again. @param old_leaf  for each new leaf the old one with the same values, or -1
     void remake(const std::vector<std::int32_t>& old_leaf, const LeafArray<float>& u);
     /// The leaves that the surface has left or is leaving; empty while there is no need to make the band again.
     [[nodiscard]] std::vector<std::size_t> left(const LeafArray<float>& u) const;

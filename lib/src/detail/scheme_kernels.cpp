@@ -308,14 +308,16 @@ bool eikonal(float* d, const float* cut, float tolerance) {
                 return Arrival{at > 0.0F ? Lanes{} : least, at > 0.0F ? at : one};
             };
             const Lanes now = load(row);
-            const Lanes fall = now - arrive(along(0, kI), along(1, kJ), along(2, 1));
+            const Arrival ai = along(0, kI), aj = along(1, kJ), ak = along(2, 1);
+            // Nothing comes from where the values are no lower.
+            if (!(largest(now + max(-ai.v, max(-aj.v, -ak.v))) > 0.0F)) continue;
+            const Lanes fall = now - arrive(ai, aj, ak);
             largest_fall = max(largest_fall, fall);
             store(row, now - max(fall, Lanes{}));
         }
-        const bool again = largest(largest_fall) > tolerance;
-        fell |= again;
-        // Every order once more after the last one that changed something would be the exact test; the next leaf visit is one.
-        if (!again && order >= 3) return fell;
+        // A pass that changes nothing says that every voxel fits its neighbours.
+        if (!(largest(largest_fall) > tolerance)) return fell;
+        fell = true;
     }
 }
 

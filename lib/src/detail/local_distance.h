@@ -1,0 +1,56 @@
+#pragma once
+#include <vector>
+
+#include "covol/domain.h"
+#include "detail/halo.h"
+#include "detail/leaf_band.h"
+
+namespace covol::detail {
+
+/// How far the band of a moving surface reaches, in voxels: the 3 of the clamp and about two that the surface may move
+/// before the band is made again.
+inline constexpr double kFollowWidth = 5.0;
+
+/// Distances to the zero level set of a field on some leaves of a band, up to a width, in voxels: Godunov's scheme with the
+/// surface's cuts through voxel edges as boundary. First order, a twentieth of the cost of looking for nearest points.
+class LocalDistance {
+public:
+    static constexpr std::size_t kScratch = 4 * kLeafSize;  ///< floats for each leaf
+    struct Scratch {
+        float* data;
+        std::size_t stride = kScratch;  ///< from leaf to leaf
+    };
+
+    /// @param u        in voxels; blocks beyond the band say nothing of distances
+    /// @param zone     one flag for each leaf: those to compute; the others give what their |u| says
+    /// @param clamp    |u| from there on says nothing
+    /// @param width    how far to go, voxels
+    /// @param scratch  kScratch for each leaf; nothing in it is read
+    LocalDistance(const LeafBand& band, const HaloField& u, const std::vector<unsigned char>& zone, const Domain& domain,
+                  float clamp, float width, Scratch scratch);
+    void compute();
+
+    /// The width where the surface is farther.
+    [[nodiscard]] const float* distance(std::size_t leaf) const { return scratch_.data + leaf * scratch_.stride + 3 * kLeafSize; }
+    /// The same, but next to the surface |u| is only scaled: by one factor for a voxel and those across the edges that the
+    /// surface cuts, so that it hardly moves (D. Hartmann, M. Meinke, W. Schroeder 2010, scheme CR-1).
+    [[nodiscard]] const float* settled(std::size_t leaf) const { return scratch_.data + leaf * scratch_.stride; }
+
+private:
+    [[nodiscard]] float* cut(std::size_t leaf) { return scratch_.data + leaf * scratch_.stride; }
+    [[nodiscard]] float* distances(std::size_t leaf) { return scratch_.data + leaf * scratch_.stride + 3 * kLeafSize; }
+    void start(std::size_t leaf);
+    void load_distance(std::size_t leaf, float* out) const;
+    void spread();
+    void settle(std::size_t leaf);
+
+    const LeafBand& band_;
+    const HaloField& u_;
+    const std::vector<unsigned char>& zone_;
+    const Domain& domain_;
+    float clamp_, width_;
+    LeafArray<float> far_;
+    Scratch scratch_;  // for each leaf 3 x 512 cuts, which become the settled values, and 512 distances
+};
+
+}  // namespace covol::detail
