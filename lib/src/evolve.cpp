@@ -61,7 +61,6 @@ public:
             }
             ++report_.steps;
             report_.last_change = motion.mean;
-            if (getenv("DBG")) fprintf(stderr, "%d tau %.2f mean %.5f passes %ld visits %ld saved %ld n %zu settled %.5f\n", report_.steps, tau_, motion.mean, (long)counts_.passes, (long)counts_.visits, (long)counts_.visits_saved, solver_->band().size(), settled_);
             run_.report("evolve", progress());
             if (!motion.crosses) {
                 report_.stop_reason = StopReason::Vanished;
@@ -72,7 +71,7 @@ public:
                 report_.stop_reason = StopReason::Steady;
                 break;
             }
-            if (options_.tau < 0 && (options_.rho == 0 || getenv("ADAPT"))) adapt_tau(motion.mean);
+            if (options_.tau < 0 && options_.rho == 0) adapt_tau(motion.mean);
         }
         solver_->store(u_);
         report_.sweeps_per_step = report_.steps > 0 ? double(counts_.passes) / report_.steps : 0.0;
@@ -123,7 +122,6 @@ private:
             solver_->redistance(follow_clamp(options_));
         else
             remake_band(left);
-        settled_ = moved / kCycle;
         return std::min(motion, moved / kCycle);
     }
 
@@ -135,7 +133,6 @@ private:
             if (solver_->is_awake(leaf)) motion[leaf] = static_cast<float>(marks_.renew(leaf, solver_->u().leaf(leaf)));
         });
         solver_->doze(motion, kCycle * rest());
-        if (getenv("DBG2")) { std::vector<float> a; int aw = 0; for (std::size_t l = 0; l < leaves; ++l) { aw += solver_->is_awake(l); if (marks_.count(l)) a.push_back(motion[l]); } std::sort(a.begin(), a.end()); fprintf(stderr, "awake %d of %zu motion:", aw, leaves); for (int i = 0; i < 10; ++i) fprintf(stderr, " %.4f", a[a.size() * i / 10]); fprintf(stderr, "\n"); }
         double way = 0.0, crossings = 0.0;
         for (std::size_t leaf = 0; leaf < leaves; ++leaf) {
             const auto count = static_cast<double>(marks_.count(leaf));
@@ -191,7 +188,6 @@ private:
     detail::NetMotion net_motion_;
     detail::Departure departure_;
     detail::CrossingMarks marks_;
-    double settled_ = 0;
     EvolveReport report_;
 };
 

@@ -28,6 +28,13 @@ constexpr int kApproachSteps = 40;
 constexpr double kApproachTolerance = 0.01;
 constexpr int kEdgeReachVoxels = 12;          // a band that follows moves this far before g is extended
 constexpr double kCoarseFactor = 8.0;         // voxels of the coarse distance field, in h
+// Coarse to fine, voxels of the coarse level.
+constexpr double kRefinement = 2.0;
+constexpr double kLeastCoarseSigma = 0.5;
+constexpr double kLeastCoarseAttraction = 3.0;
+constexpr double kCoarseTolerance = 5e-3;
+constexpr double kStepBack = 2.0;
+constexpr int kRefinedReachVoxels = 4;        // of h: after a coarse level the surface does not move far
 
 std::string number(double value) {
     std::ostringstream text;
@@ -94,6 +101,7 @@ public:
                 start_by_tagging();
             else
                 start_otherwise();
+            start_from_coarse();
             find_edges();
             solve();
             make_surface();
@@ -287,13 +295,78 @@ private:
         result_.distance = distance(points_, report().domain, {radius}, run_).grid;
     }
 
+    // ---- coarse to fine ----------------------------------------------------------------------------------------
+
+    // The way from the start is long in voxels of h. In voxels of 2h a step costs an eighth and goes twice as far; what is
+    // left to do at h is near the surface that the coarse level finds.
+    void start_from_coarse() {
+        if (options_.coarse_levels <= 0) return;
+        SegmentOptions options = options_;
+        options.voxel_size = kRefinement * h();
+        options.coarse_levels = options_.coarse_levels - 1;
+        const double coarse_h = options.voxel_size;
+        options.edge.sigma = std::max(options.edge.sigma, kLeastCoarseSigma * coarse_h);
+        EvolveOptions& evolve = options.evolve;
+        evolve.follow = true;
+        evolve.tolerance = std::max(evolve.tolerance, kCoarseTolerance);
+        if (evolve.tau > 0) evolve.tau *= kRefinement;
+        if (evolve.attraction_range > 0)
+            evolve.attraction_range = std::max(evolve.attraction_range, kLeastCoarseAttraction * coarse_h);
+        Segmentation coarse(image_, points_, options, run_);
+        const std::string why_not = coarse.run_coarse(*result_.u, report().domain);
+        report().seconds.coarse += coarse.report().seconds.total;
+        report().coarse = coarse.report().coarse;
+        report().coarse.push_back({coarse_h, coarse.report().solve.steps, coarse.report().active_voxels, why_not});
+        if (!why_not.empty()) {
+            run_.info("coarse level " + number(coarse_h) + " left out: " + why_not);
+            return;
+        }
+        result_.u = start_from_grid(report().domain, *coarse.result_.u, run_);
+        options_.evolve.follow = true;
+        is_refined_ = true;
+    }
+
+    /// The flow from `start`, a level set on a finer lattice. @return empty, or why its result is of no use
+    std::string run_coarse(const FloatGrid& start, const Domain& fine) {
+        Timed total(report().seconds.total);
+        report().domain = domain_of_box(fine.world_box(), h());
+        try {
+            result_.u = start_from_grid(report().domain, start, run_);
+        } catch (const Error& error) {
+            if (error.code() != Errc::InvalidInput) throw;
+            return "nothing of the start is left on so coarse a lattice";
+        }
+        const FloatGridPtr before = result_.u->deepCopy();
+        if (uses_points()) compute_distance(tube_for_coarse());
+        start_from_coarse();
+        find_edges();
+        flow();
+        if (report().solve.stop_reason == StopReason::Vanished) return "the surface vanished there";
+        if (options_.start.kind != Start::Kind::Tag) step_back(*before);
+        return {};
+    }
+
+    double tube_for_coarse() {
+        const double slack = (kHalfWidthVoxels + kTubeSlackVoxels) * h();
+        if (options_.start.kind == Start::Kind::Tag) return options_.tag_distance + slack;
+        return tube_for_start();
+    }
+
+    // Two edges closer than a few coarse voxels are one there: the fine level comes from the same side as the start would.
+    void step_back(const FloatGrid& start) {
+        const auto back = static_cast<float>(kStepBack * h());
+        const auto start_at = start.getConstAccessor();
+        for (auto v = result_.u->beginValueOn(); v; ++v)
+            v.setValue(std::clamp(start_at.getValue(v.getCoord()), *v - back, *v + back));
+    }
+
     // ---- fields and flow ---------------------------------------------------------------------------------------
 
     void find_edges() {
         if (!uses_image()) return;
         Timed timed(report().seconds.edge);
         const FloatGridPtr reach =
-            options_.evolve.follow ? dilated_topology(*result_.u, kEdgeReachVoxels, report().domain) : result_.u;
+            options_.evolve.follow ? dilated_topology(*result_.u, edge_reach(), report().domain) : result_.u;
         EdgeResult found = edge(*image_, *reach, options_.edge, run_);
         report().edge = found.report;
         result_.edge = found.grid;
@@ -309,14 +382,29 @@ private:
         options_.edge.high = e.high;
     }
 
+    [[nodiscard]] int edge_reach() const { return is_refined_ ? kRefinedReachVoxels : kEdgeReachVoxels; }
+
     void extend(const FloatGrid& u, EvolveFields& fields) {
         if (fields.edge == nullptr || covers(*fields.edge, u)) return;
         Timed timed(report().seconds.edge);
-        result_.edge = edge(*image_, *dilated_topology(u, kEdgeReachVoxels, report().domain), options_.edge, run_).grid;
+        result_.edge = edge(*image_, *dilated_topology(u, edge_reach(), report().domain), options_.edge, run_).grid;
         fields.edge = result_.edge.get();
     }
 
     void solve() {
+        flow();
+        run_.check();
+        result_.u->setName("u");
+        const EvolveReport& solved = report().solve;
+        if (solved.stop_reason == StopReason::Vanished)
+            throw Error(Errc::InvalidInput, "segment: the surface vanished after " + std::to_string(solved.steps) +
+                                                " steps: nothing held it; lower delta, or start closer to the edges");
+        if (solved.stop_reason == StopReason::MaxSteps)
+            run_.warn("not steady after " + std::to_string(solved.steps) + " steps: the last change was " +
+                      number(solved.last_change) + " voxels");
+    }
+
+    void flow() {
         EvolveFields fields;
         fields.distance = uses_points() ? result_.distance.get() : nullptr;
         fields.edge = result_.edge.get();
@@ -329,22 +417,13 @@ private:
             add(before, report().solve);
             report().seconds.solve -= report().seconds.edge - edge_before;
         }
-        run_.check();
-        result_.u->setName("u");
-        const EvolveReport& solved = report().solve;
-        report().active_voxels = solved.active_voxels;
-        report().leaf_count = solved.leaf_count;
-        if (solved.stop_reason == StopReason::Vanished)
-            throw Error(Errc::InvalidInput, "segment: the surface vanished after " + std::to_string(solved.steps) +
-                                                " steps: nothing held it; lower delta, or start closer to the edges");
-        if (solved.stop_reason == StopReason::MaxSteps)
-            run_.warn("not steady after " + std::to_string(solved.steps) + " steps: the last change was " +
-                      number(solved.last_change) + " voxels");
+        report().active_voxels = report().solve.active_voxels;
+        report().leaf_count = report().solve.leaf_count;
     }
 
     // Edges of other structures lie between the tagged surface and the points: with an image the points pull alone first.
     EvolveReport approach(EvolveFields fields) {
-        if (options_.start.kind != Start::Kind::Tag || !uses_points() || !uses_image()) return {};
+        if (options_.start.kind != Start::Kind::Tag || is_refined_ || !uses_points() || !uses_image()) return {};
         EvolveOptions alone = options_.evolve;
         alone.rho = 0;
         alone.attraction_range = 0;
@@ -380,6 +459,7 @@ private:
     SegmentOptions options_;
     const RunContext& run_;
     SegmentResult result_;
+    bool is_refined_ = false;  // u comes from a coarse level
 };
 
 }  // namespace

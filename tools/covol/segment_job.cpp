@@ -32,6 +32,7 @@ SegmentOptions resolve(const SegmentJob& job, double h) {
     options.exterior_seeds = job.tag.exterior_seeds;
     options.edge = job.edge.resolve(h, -1);
     options.evolve = job.evolve.resolve(h, SegmentOptions::automatic_evolve());
+    options.coarse_levels = job.coarse_levels;
     const double edge = job.min_component.resolve(h, 0);
     options.extract.min_component_volume = edge * edge * edge;
     return options;
@@ -58,6 +59,7 @@ void fill_report(Session& session, const SegmentReport& r) {
     if (r.point_count > 0) report["fit"]["points_to_surface"] = to_json(r.fit);
     session.add_seconds("distance", r.seconds.distance);
     session.add_seconds("tag", r.seconds.tag);
+    session.add_seconds("coarse", r.seconds.coarse);
     session.add_seconds("edge", r.seconds.edge);
     session.add_seconds("solve", r.seconds.solve);
     session.add_seconds("surface", r.seconds.surface);
@@ -95,6 +97,10 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
         ->type_name("START")
         ->default_str("tag");
     domain.bind(command, !with_image);
+    command.add_option("--coarse-levels", coarse_levels, "levels of twice the voxel size, and so on, that the flow passes first; 0: none")
+        ->check(CLI::Range(0, 4).description(""))
+        ->type_name("N")
+        ->capture_default_str();
     add_length(command, "--min-component", min_component, "", "drop pieces of the mesh smaller than a cube of this edge");
     command.add_flag("--half", half, "store values in .vdb files as 16-bit floats");
     mesh.bind(command);

@@ -17,6 +17,7 @@ struct SegmentJob {
     EvolveFlags evolve;
     MeshFlags mesh;
     Start start;
+    int coarse_levels = SegmentOptions{}.coarse_levels;
     Length min_component;  ///< edge of a cube of the smallest volume that is kept
     std::string output, mask_path, mesh_path, density_path, fields_path;
     bool half = false;

@@ -35,6 +35,7 @@ struct SegmentOptions {
     /// 5 voxels after the other starts. Their `follow` is set by the pipeline too.
     EvolveOptions evolve = automatic_evolve();
     ExtractOptions extract;
+    int coarse_levels = 1;  ///< levels of voxel size 2h, 4h, ... that the flow passes first; >= 0
     [[nodiscard]] std::string why_invalid() const;
 
     /// EvolveOptions with an automatic attraction range.
@@ -42,7 +43,14 @@ struct SegmentOptions {
 };
 
 struct SegmentReport {
-    struct Seconds { double read = 0, distance = 0, tag = 0, edge = 0, solve = 0, surface = 0, write = 0, total = 0; } seconds;
+    struct Seconds { double read = 0, distance = 0, tag = 0, coarse = 0, edge = 0, solve = 0, surface = 0, write = 0, total = 0; } seconds;
+    struct CoarseLevel {
+        double voxel_size = 0;
+        int steps = 0;
+        std::int64_t active_voxels = 0;
+        std::string why_not;  ///< why its result was not used; empty where it was
+    };
+    std::vector<CoarseLevel> coarse;  ///< the coarsest first
     Domain domain;
     std::int64_t active_voxels = 0, leaf_count = 0;
     std::size_t point_count = 0, densified = 0;
