@@ -11,6 +11,7 @@
 #include <map>
 #include <sstream>
 
+#include "detail/dicom_check.h"
 #include "detail/image_formats.h"
 #include "detail/itk_call.h"
 
@@ -45,6 +46,7 @@ Slice read_header(const std::string& path) {
     Slice slice;
     slice.path = path;
     const std::string unusable = "read_image: " + path + ": damaged, truncated, or not a DICOM image";
+    if (!is_sound_dicom(path)) throw Error(Errc::InvalidInput, unusable);
     const auto io = itk::GDCMImageIO::New();
     io->SetFileName(path);
     with_itk(Errc::InvalidInput, unusable, [&] {

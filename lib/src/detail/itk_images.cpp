@@ -13,6 +13,7 @@
 #include <filesystem>
 #include <fstream>
 #include <optional>
+#include <sstream>
 #include <vector>
 
 #include "detail/file.h"
@@ -139,56 +140,72 @@ std::optional<PixelType> nifti_type(int code) {
     }
 }
 
-/// Where a NIfTI file of version 1 or 2 keeps its pixels, from its header's bytes; empty when it is neither, or not in
-/// one piece. Adds the fields to `info`.
-std::optional<PixelPlace> nifti_pixels(const std::string& path, ImageInfo& info) {
-    constexpr std::int32_t kBytes1 = 348, kBytes2 = 540;
-    PixelPlace place;
-    place.path = path;
-    place.packed = extension(path) == ".nii.gz";
-    std::array<char, kBytes2> header{};
-    if (!read_bytes(place, kBytes1, header.data())) return std::nullopt;
-    std::int32_t bytes = load<std::int32_t>(header.data(), false);
-    place.swap = bytes != kBytes1 && bytes != kBytes2;
-    bytes = load<std::int32_t>(header.data(), place.swap);
-    const bool two = bytes == kBytes2;
-    if ((!two && bytes != kBytes1) || (two && !read_bytes(place, kBytes2, header.data()))) return std::nullopt;
-    if (std::memcmp(header.data() + (two ? 4 : 344), two ? "n+2" : "n+1", 4) != 0) return std::nullopt;
-    const auto at = [&](int one, int other) { return header.data() + (two ? other : one); };
-    const auto number = [&](int one, int other) {
-        return two ? load<double>(at(one, other), place.swap) : double(load<float>(at(one, other), place.swap));
-    };
-    const auto integer = [&](int one, int other) {
-        return two ? load<std::int32_t>(at(one, other), place.swap) : load<std::int16_t>(at(one, other), place.swap);
-    };
-    const auto type = nifti_type(load<std::int16_t>(at(70, 12), place.swap));
-    if (!type) return std::nullopt;
+/// The 348 bytes that a NIfTI-1 file begins with.
+class NiftiHeader {
+public:
+    /// @throws Error InvalidInput, Unsupported (NIfTI-2).
+    NiftiHeader(const PixelPlace& begin, const std::string& unusable) {
+        if (!read_bytes(begin, bytes_.size(), bytes_.data())) throw Error(Errc::InvalidInput, unusable);
+        const auto size = load<std::int32_t>(bytes_.data(), false), swapped = load<std::int32_t>(bytes_.data(), true);
+        constexpr std::int32_t kVersion2 = 540;
+        if (size == kVersion2 || swapped == kVersion2)
+            throw Error(Errc::Unsupported, "read_image: " + begin.path + ": NIfTI-2 is not read; convert it to NIfTI-1");
+        swap_ = size != std::int32_t(bytes_.size());
+        if (swap_ && swapped != std::int32_t(bytes_.size())) throw Error(Errc::InvalidInput, unusable);
+    }
+    [[nodiscard]] bool swap() const { return swap_; }
+    [[nodiscard]] double number(std::size_t at) const { return double(load<float>(bytes_.data() + at, swap_)); }
+    [[nodiscard]] int integer(std::size_t at) const { return load<std::int16_t>(bytes_.data() + at, swap_); }
+    [[nodiscard]] bool in_one_piece() const { return std::memcmp(bytes_.data() + 344, "n+1", 4) == 0; }
+    /// 0: not stated, 1: m, 2: mm, 3: um
+    [[nodiscard]] int unit() const { return bytes_[123] & 7; }
+
+private:
+    std::array<char, 348> bytes_{};
+    bool swap_ = false;
+};
+
+/// Empty when the file is not in one piece or holds no grey values. Adds the fields to `info`.
+std::optional<PixelPlace> nifti_pixels(const NiftiHeader& header, PixelPlace place, ImageInfo& info) {
+    const auto type = nifti_type(header.integer(70));
+    const double offset = header.number(108), slope = header.number(112), intercept = header.number(116);
+    constexpr double kLeastOffset = 352;
+    if (!type || !header.in_one_piece() || !(offset >= 0 && offset < 1e9)) return std::nullopt;
+    place.swap = header.swap() && pixel_bytes(*type) > 1;
     place.type = *type;
-    const double offset = two ? double(load<std::int64_t>(at(0, 168), place.swap)) : number(108, 0);
-    if (!(offset >= 0 && offset < 1e9)) return std::nullopt;
-    place.skip = std::max<std::uint64_t>(std::uint64_t(bytes) + 4, static_cast<std::uint64_t>(offset));
-    const double slope = number(112, 176), intercept = number(116, 184);
+    place.skip = static_cast<std::uint64_t>(std::max(kLeastOffset, offset));
     if (std::isfinite(slope) && std::isfinite(intercept) && slope != 0) {
         place.slope = slope;
         place.intercept = intercept;
     }
-    info.format = two ? "NIfTI-2" : "NIfTI-1";
-    const int units = two ? load<std::int32_t>(at(0, 500), place.swap) : int(header[123]);
-    std::string pixdim;
-    for (int a = 1; a <= 3; ++a) {
-        const double spacing = number(76 + 4 * a, 104 + 8 * a);
-        info.spacing_known[std::size_t(a) - 1] = std::abs(spacing) > 0;
-        char text[32];
-        std::snprintf(text, sizeof(text), "%s%g", a == 1 ? "" : " ", spacing);
-        pixdim += text;
+    std::ostringstream pixdim;
+    for (std::size_t a = 0; a < 3; ++a) {
+        const double spacing = header.number(80 + 4 * a);
+        info.spacing_known[a] = std::abs(spacing) > 0;
+        pixdim << (a == 0 ? "" : " ") << spacing;
     }
     static constexpr const char* kUnits[] = {"not stated, taken as mm", "m", "mm", "um"};
-    info.fields = {{"pixdim", pixdim},
-                   {"xyzt_units", kUnits[(units & 7) <= 3 ? units & 7 : 0]},
-                   {"qform_code", std::to_string(integer(252, 344))},
-                   {"sform_code", std::to_string(integer(254, 348))},
+    info.format = "NIfTI-1";
+    info.fields = {{"pixdim", pixdim.str()},
+                   {"xyzt_units", kUnits[header.unit() <= 3 ? header.unit() : 0]},
+                   {"qform_code", std::to_string(header.integer(252))},
+                   {"sform_code", std::to_string(header.integer(254))},
                    {"space", "RAS in the file, turned to LPS"}};
     return place;
+}
+
+/// ITK 5.2 turns the spacing of files in um or m into mm, and forgets the origin.
+void scale_nifti_origin(const NiftiHeader& header, ImageGeometry& geometry) {
+    const double scale = header.unit() == 1 ? 1e3 : header.unit() == 3 ? 1e-3 : 1;
+    const auto is_as_stored = [&](std::size_t first, std::size_t step) {
+        bool same = true;
+        for (std::size_t a = 0; a < 3; ++a)
+            same = same && std::abs(geometry.origin[a]) == std::abs(header.number(first + a * step));
+        return same;
+    };
+    constexpr std::size_t kQoffset = 268, kSrowEnd = 292, kSrow = 16;
+    if (is_as_stored(kQoffset, 4) || is_as_stored(kSrowEnd, kSrow))
+        for (double& o : geometry.origin) o *= scale;
 }
 
 /// Empty for the rare kinds that are left to ITK: ascii pixels, one file for each slice, a header to skip.
@@ -318,6 +335,11 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path) {
     std::optional<TextHeader> header;
     if (is_nrrd || is_meta) header.emplace(path);
     if (is_meta) require_meta_header(*header, unusable);
+    PixelPlace begin;
+    begin.path = path;
+    begin.packed = end == ".nii.gz";
+    std::optional<NiftiHeader> nifti;
+    if (is_nifti) nifti.emplace(begin, unusable);
     const itk::ImageIOBase::Pointer io = make_io(end);
     io->SetFileName(path);
     with_itk(Errc::InvalidInput, unusable, [&] {
@@ -340,7 +362,8 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path) {
 
     std::optional<PixelPlace> place;
     if (is_nifti) {
-        place = nifti_pixels(path, info);
+        place = nifti_pixels(*nifti, begin, info);
+        scale_nifti_origin(*nifti, info.geometry);
         info.geometry.unit = "mm";  // ITK converts NIfTI to millimetres
         const bool integers = info.type != PixelType::Float && info.type != PixelType::Double;
         if (!place || info.channels > 1 || (integers && info.type != place->type))
