@@ -57,12 +57,23 @@ const T* Image::row(int j, int k) const {
     return static_cast<const T*>(data_.get()) + stride_[1] * (j - held_.min[1]) + stride_[2] * (k - held_.min[2]);
 }
 
+std::uint64_t Image::slice_bytes() const {
+    // from the first held pixel to the last
+    const Index3 n = held_.size();
+    return (std::uint64_t(stride_[1]) * std::uint64_t(n[1] - 1) + std::uint64_t(stride_[0]) * std::uint64_t(n[0] - 1) + 1) *
+           detail::pixel_bytes(type_);
+}
+
+void Image::expect_slice(int k) const {
+    if (!mapped_) return;
+    detail::with_pixel_type(
+        type_, [&](auto pixel) { detail::expect_pages(row<decltype(pixel)>(held_.min[1], k), slice_bytes()); });
+}
+
 void Image::forget_slice(int k) const {
     if (!mapped_) return;
-    detail::with_pixel_type(type_, [&](auto pixel) {
-        detail::release_pages(row<decltype(pixel)>(held_.min[1], k),
-                              std::uint64_t(stride_[1]) * std::uint64_t(held_.size()[1]) * sizeof(pixel));
-    });
+    detail::with_pixel_type(
+        type_, [&](auto pixel) { detail::release_pages(row<decltype(pixel)>(held_.min[1], k), slice_bytes()); });
 }
 
 std::array<double, 2> Image::percentiles(double low, double high) const {
@@ -95,6 +106,7 @@ std::array<double, 2> Image::range() const {
     return detail::with_pixel_type(type_, [&](auto pixel) {
         const MinMax all = scan_slices(held_, [&](int k) {
             MinMax slice;
+            expect_slice(k);
             for (int j = held_.min[1]; j <= held_.max[1]; ++j)
                 slice.add(scan_row(row<decltype(pixel)>(j, k), held_.size()[0], stride_[0]));
             forget_slice(k);
@@ -110,6 +122,7 @@ void Image::require_finite() const {
         if constexpr (std::is_floating_point_v<T>) {
             const auto slice_is_finite = [&](int k) {
                 MinMax slice;
+                expect_slice(k);
                 for (int j = held_.min[1]; j <= held_.max[1]; ++j)
                     slice.add(scan_row(row<T>(j, k), held_.size()[0], stride_[0]));
                 forget_slice(k);

@@ -94,7 +94,9 @@ private:
     template <typename T>
     static Image copy_of(const ImageGeometry& geometry, PixelType type, const T* values);
     void require_finite() const;
+    void expect_slice(int k) const;
     void forget_slice(int k) const;
+    [[nodiscard]] std::uint64_t slice_bytes() const;
 
     ImageGeometry geometry_;
     PixelType type_ = PixelType::Float;

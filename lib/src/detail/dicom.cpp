@@ -1,7 +1,7 @@
-// DICOM through ITK's GDCM reader, slice by slice. Series are put together here: ITK's own helper neither says what
-// lies in a folder nor finds a missing slice.
+// DICOM slice by slice: plain pixels are read here, compressed ones and files of several frames through ITK's GDCM reader.
+// Series are put together here too: ITK's own helper neither says what lies in a folder nor finds a missing slice.
+#include <gdcmTrace.h>
 #include <itkGDCMImageIO.h>
-#include <itkMetaDataObject.h>
 
 #include <algorithm>
 #include <cmath>
@@ -9,9 +9,10 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <optional>
 #include <sstream>
 
-#include "detail/dicom_check.h"
+#include "detail/dicom_header.h"
 #include "detail/image_formats.h"
 #include "detail/itk_call.h"
 
@@ -20,9 +21,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kSeriesUid = "0020|000e";
-constexpr const char* kSeriesDescription = "0008|103e";
-constexpr const char* kModality = "0008|0060";
+constexpr std::uint32_t kModality = 0x00080060, kSeriesDescription = 0x0008103E, kThickness = 0x00180050;
+constexpr std::uint32_t kImagerSpacing = 0x00181164, kSeriesUid = 0x0020000E, kPosition = 0x00200032;
+constexpr std::uint32_t kOrientation = 0x00200037, kSamples = 0x00280002, kPlanar = 0x00280006, kFrames = 0x00280008;
+constexpr std::uint32_t kRows = 0x00280010, kColumns = 0x00280011, kPixelSpacing = 0x00280030, kAllocated = 0x00280100;
+constexpr std::uint32_t kStored = 0x00280101, kSigned = 0x00280103, kIntercept = 0x00281052, kSlope = 0x00281053;
 
 struct Slice {
     std::string path, series, description;
@@ -31,29 +34,87 @@ struct Slice {
     Vec3 spacing{}, origin{};
     Matrix3 direction{};
     unsigned components = 1;
+    bool spacing_known = true;
+    bool plain = false;           ///< read here: the fields below
+    PixelPlace place;             ///< slope and intercept are the rescaling
+    int unused_bits = 0;          ///< of each stored number, the upper ones
     double position = 0;  ///< along the series' normal
 };
 
-std::string text_of(const itk::ImageIOBase& io, const char* tag) {
-    std::string text;
-    itk::ExposeMetaData<std::string>(io.GetMetaDataDictionary(), tag, text);
-    while (!text.empty() && (text.back() == ' ' || text.back() == '\0')) text.pop_back();
-    return text;
+/// GDCM's own messages, which it would print, are off while this lives.
+class QuietGdcm {
+public:
+    QuietGdcm() : warning_(gdcm::Trace::GetWarningFlag()), error_(gdcm::Trace::GetErrorFlag()) { set(false, false); }
+    ~QuietGdcm() { set(warning_, error_); }
+    QuietGdcm(const QuietGdcm&) = delete;
+    QuietGdcm& operator=(const QuietGdcm&) = delete;
+
+private:
+    static void set(bool warning, bool error) {
+        gdcm::Trace::SetWarning(warning);
+        gdcm::Trace::SetError(error);
+    }
+    bool warning_, error_;
+};
+
+/// The smallest type that holds every rescaled value.
+PixelType rescaled_type(const PixelPlace& place, int stored_bits) {
+    if (place.slope == 1 && place.intercept == 0) return place.type;
+    const bool integral = place.slope == std::floor(place.slope) && place.intercept == std::floor(place.intercept);
+    const double largest = std::abs(place.slope) * std::ldexp(1.0, stored_bits) + std::abs(place.intercept);
+    if (!integral || largest >= std::ldexp(1.0, 31)) return PixelType::Float;
+    return largest < std::ldexp(1.0, 15) ? PixelType::Int16 : PixelType::Int32;
 }
 
-/// The header of one file.
-Slice read_header(const std::string& path) {
-    Slice slice;
-    slice.path = path;
-    const std::string unusable = "read_image: " + path + ": damaged, truncated, or not a DICOM image";
-    if (!is_sound_dicom(path)) throw Error(Errc::InvalidInput, unusable);
+/// A file with plain pixels and one frame. Without orientation and position it lies at 0.
+void fill_plain(const DicomHeader& header, const std::string& unusable, Slice& slice) {
+    const int allocated = int(header.integer(kAllocated).value_or(0)), stored = int(header.integer(kStored).value_or(0));
+    const bool is_signed = header.integer(kSigned).value_or(0) == 1;
+    slice.plain = true;
+    slice.components = header.integer(kSamples).value_or(1);
+    slice.size = {std::int32_t(header.integer(kColumns).value_or(0)), std::int32_t(header.integer(kRows).value_or(0)), 1};
+    slice.unused_bits = allocated - stored;
+    PixelPlace& place = slice.place;
+    place.path = slice.path;
+    place.file_offset = header.pixel_offset;
+    place.type = allocated == 8    ? (is_signed ? PixelType::Int8 : PixelType::UInt8)
+                 : allocated == 16 ? (is_signed ? PixelType::Int16 : PixelType::UInt16)
+                                   : (is_signed ? PixelType::Int32 : PixelType::UInt32);
+    place.swap = header.big_endian && allocated > 8;
+    const std::vector<double> slope = header.numbers(kSlope), intercept = header.numbers(kIntercept);
+    if (slope.size() == 1 && slope[0] != 0) place.slope = slope[0];
+    if (intercept.size() == 1) place.intercept = intercept[0];
+    slice.type = rescaled_type(place, stored);
+    const std::uint64_t bytes = voxel_count(slice.size) * slice.components * std::uint64_t(allocated / 8);
+    if (header.pixel_bytes < bytes || header.pixel_bytes > bytes + 1) throw Error(Errc::InvalidInput, unusable);
+    if (slice.components > 1 && header.integer(kPlanar).value_or(0) != 0)
+        throw Error(Errc::Unsupported, "read_image: " + slice.path + ": colour planes behind each other");
+
+    std::vector<double> spacing = header.numbers(kPixelSpacing);
+    if (spacing.size() != 2) spacing = header.numbers(kImagerSpacing);
+    slice.spacing_known = spacing.size() == 2 && spacing[0] > 0 && spacing[1] > 0;
+    const std::vector<double> thickness = header.numbers(kThickness);
+    slice.spacing = {slice.spacing_known ? spacing[1] : 1, slice.spacing_known ? spacing[0] : 1,
+                     thickness.size() == 1 ? thickness[0] : 1};
+    if (const std::vector<double> position = header.numbers(kPosition); position.size() == 3)
+        slice.origin = {position[0], position[1], position[2]};
+    std::vector<double> cosines = header.numbers(kOrientation);
+    if (cosines.size() != 6) cosines = {1, 0, 0, 0, 1, 0};
+    for (std::size_t a = 0; a < 3; ++a) {
+        const std::size_t b = (a + 1) % 3, c = (a + 2) % 3;
+        slice.direction[a] = {cosines[a], cosines[3 + a], cosines[b] * cosines[3 + c] - cosines[c] * cosines[3 + b]};
+    }
+}
+
+void fill_through_gdcm(const std::string& unusable, Slice& slice) {
+    const QuietGdcm quiet;
     const auto io = itk::GDCMImageIO::New();
-    io->SetFileName(path);
+    io->SetFileName(slice.path);
     with_itk(Errc::InvalidInput, unusable, [&] {
-        if (!io->CanReadFile(path.c_str())) throw Error(Errc::InvalidInput, unusable);
+        if (!io->CanReadFile(slice.path.c_str())) throw Error(Errc::InvalidInput, unusable);
         io->ReadImageInformation();
     });
-    slice.type = itk_pixel_type(path, *io);
+    slice.type = itk_pixel_type(slice.path, *io);
     slice.components = io->GetNumberOfComponents();
     for (unsigned a = 0; a < 3; ++a) {
         const bool there = a < io->GetNumberOfDimensions();
@@ -65,8 +126,22 @@ Slice read_header(const std::string& path) {
         const std::vector<double> axis = io->GetDirection(a);
         for (unsigned b = 0; b < 3; ++b) slice.direction[b][a] = b < axis.size() ? axis[b] : (a == b ? 1 : 0);
     }
-    slice.series = text_of(*io, kSeriesUid);
-    slice.description = text_of(*io, kModality) + " " + text_of(*io, kSeriesDescription);
+}
+
+/// The header of one file.
+Slice read_header(const std::string& path) {
+    const std::string unusable = "read_image: " + path + ": damaged, truncated, or not a DICOM image";
+    const std::optional<DicomHeader> header = read_dicom_header(path);
+    if (!header) throw Error(Errc::InvalidInput, unusable);
+    Slice slice;
+    slice.path = path;
+    slice.series = header->text(kSeriesUid);
+    slice.description = header->text(kModality) + " " + header->text(kSeriesDescription);
+    const std::vector<double> frames = header->numbers(kFrames);
+    if (header->encapsulated || (frames.size() == 1 && frames[0] > 1))
+        fill_through_gdcm(unusable, slice);
+    else
+        fill_plain(*header, unusable, slice);
     return slice;
 }
 
@@ -105,13 +180,13 @@ public:
         info_.geometry.unit = "mm";
         info_.fields = {{"PixelSpacing (0028,0030)", "the spacing along x and y"},
                         {"ImageOrientationPatient (0020,0037)", "the direction"}};
+        info_.spacing_known[0] = info_.spacing_known[1] = first.spacing_known;
         if (slices_.size() == 1)
             set_single(first);
         else
             stack();
-        std::string what = first.description;
         info_.fields.emplace_back("SeriesInstanceUID (0020,000e)", first.series);
-        info_.fields.emplace_back("Modality, SeriesDescription", what);
+        info_.fields.emplace_back("Modality, SeriesDescription", first.description);
     }
 
     Pixels read(const PixelRequest& request, const RunContext& run) override {
@@ -205,22 +280,49 @@ private:
         }
     }
 
-    /// All pixels of one file, as GDCM gives them (rescaled).
+    /// All pixels of one file, rescaled.
     [[nodiscard]] std::vector<char> decode(const Slice& slice) const {
         const std::string unusable = "read_image: " + slice.path + ": damaged or truncated";
+        const std::uint64_t pixels = voxel_count(slice.size) * slice.components;
+        allocate_pixels(slice.path, pixels, slice.type, fs::file_size(slice.path));  // refuses absurd sizes
+        std::vector<char> values(pixels * pixel_bytes(slice.type));
+        if (slice.plain) {
+            decode_plain(slice, unusable, pixels, values.data());
+            return values;
+        }
+        const QuietGdcm quiet;
         const auto io = itk::GDCMImageIO::New();
         io->SetFileName(slice.path);
-        std::vector<char> stored;
         with_itk(Errc::InvalidInput, unusable, [&] {
             io->ReadImageInformation();
-            const std::uint64_t pixels = voxel_count(slice.size) * slice.components;
-            if (io->GetImageSizeInBytes() < 0 || std::uint64_t(io->GetImageSizeInBytes()) != pixels * pixel_bytes(slice.type))
+            if (io->GetImageSizeInBytes() < 0 || std::uint64_t(io->GetImageSizeInBytes()) != values.size())
                 throw Error(Errc::InvalidInput, unusable);
-            allocate_pixels(slice.path, pixels, slice.type, fs::file_size(slice.path));  // refuses absurd sizes
-            stored.resize(pixels * pixel_bytes(slice.type));
-            io->Read(stored.data());
+            io->Read(values.data());
         });
-        return stored;
+        return values;
+    }
+
+    static void decode_plain(const Slice& slice, const std::string& unusable, std::uint64_t pixels, char* out) {
+        const PixelPlace& place = slice.place;
+        std::vector<char> stored(pixels * place.stored_bytes());
+        if (!read_bytes(place, stored.size(), stored.data())) throw Error(Errc::InvalidInput, unusable);
+        if (place.swap) swap_bytes(stored.data(), pixels, place.stored_bytes());
+        with_pixel_type(place.type, [&](auto from) {
+            with_pixel_type(slice.type, [&](auto to) {
+                using From = decltype(from);
+                using To = decltype(to);
+                if constexpr (std::is_integral_v<From>) {
+                    const auto* source = reinterpret_cast<const From*>(stored.data());
+                    auto* target = reinterpret_cast<To*>(out);
+                    const int unused = slice.unused_bits;
+                    for (std::uint64_t n = 0; n < pixels; ++n) {
+                        // what lies in the unused bits is no part of the number
+                        const From value = From(From(std::make_unsigned_t<From>(source[n]) << unused) >> unused);
+                        target[n] = static_cast<To>(place.slope * double(value) + place.intercept);
+                    }
+                }
+            });
+        });
     }
 
     char* copy(const Slice& slice, const char* stored, std::uint64_t first, const PixelRequest& request, char* out) const {

@@ -32,6 +32,8 @@ void with_itk(Errc code, const std::string& what, Call&& call) {
         throw Error(code, what + " (" + one_line(e.GetDescription()) + ")");
     } catch (const std::exception& e) {
         throw Error(code, what + " (" + one_line(e.what()) + ")");
+    } catch (...) {  // HDF5's own exceptions have no base
+        throw Error(code, what);
     }
 }
 

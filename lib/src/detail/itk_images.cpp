@@ -1,4 +1,5 @@
 // Formats whose headers ITK reads: NRRD, NIfTI, MetaImage, HDF5.
+#include <hdf5.h>
 #include <itkHDF5ImageIO.h>
 #include <itkMetaDataObject.h>
 #include <itkMetaImageIO.h>
@@ -24,6 +25,22 @@ namespace covol::detail {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// HDF5's own messages, which it would print, are off while this lives.
+class QuietHdf5 {
+public:
+    QuietHdf5() {
+        H5Eget_auto2(H5E_DEFAULT, &print_, &data_);
+        H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+    }
+    ~QuietHdf5() { H5Eset_auto2(H5E_DEFAULT, print_, data_); }
+    QuietHdf5(const QuietHdf5&) = delete;
+    QuietHdf5& operator=(const QuietHdf5&) = delete;
+
+private:
+    H5E_auto2_t print_ = nullptr;
+    void* data_ = nullptr;
+};
 
 /// ITK's reader and writer for files of this ending. Made directly: a static library has no registered factories.
 itk::ImageIOBase::Pointer make_io(const std::string& extension) {
@@ -274,6 +291,7 @@ public:
         const std::uint64_t frame = voxel_count(box.size()) * channels;
         const std::shared_ptr<void> data = allocate_pixels(path_, frame * std::uint64_t(info_.frames), info_.type, file_bytes_);
         io_->SetIORegion(region);
+        const QuietHdf5 quiet;
         with_itk(Errc::InvalidInput, unusable_, [&] { io_->Read(data.get()); });
         Pixels pixels;
         pixels.stride = dense_strides(box.size());
@@ -340,6 +358,7 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path) {
     begin.packed = end == ".nii.gz";
     std::optional<NiftiHeader> nifti;
     if (is_nifti) nifti.emplace(begin, unusable);
+    const QuietHdf5 quiet;
     const itk::ImageIOBase::Pointer io = make_io(end);
     io->SetFileName(path);
     with_itk(Errc::InvalidInput, unusable, [&] {

@@ -290,6 +290,12 @@ std::shared_ptr<const void> map_file(const std::string& path, std::uint64_t offs
     return {static_cast<const char*>(begin) + before, unmap};
 }
 
+void expect_pages(const void* begin, std::uint64_t bytes) {
+    const auto page = std::uintptr_t(::sysconf(_SC_PAGESIZE));
+    const std::uintptr_t first = reinterpret_cast<std::uintptr_t>(begin) / page * page;
+    ::madvise(reinterpret_cast<void*>(first), reinterpret_cast<std::uintptr_t>(begin) + bytes - first, MADV_WILLNEED);
+}
+
 void release_pages(const void* begin, std::uint64_t bytes) {
     const auto page = std::uintptr_t(::sysconf(_SC_PAGESIZE));
     const std::uintptr_t first = (reinterpret_cast<std::uintptr_t>(begin) + page - 1) / page * page;

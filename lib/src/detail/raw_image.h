@@ -116,6 +116,9 @@ std::shared_ptr<const void> map_file(const std::string& path, std::uint64_t offs
 /// Whether so many bytes are worth a mapping.
 bool is_worth_mapping(std::uint64_t bytes);
 
+/// Says that mapped pages will be read from begin to end.
+void expect_pages(const void* begin, std::uint64_t bytes);
+
 /// Gives mapped pages back to the system; they come again when touched.
 void release_pages(const void* begin, std::uint64_t bytes);
 

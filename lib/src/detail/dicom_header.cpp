@@ -1,9 +1,13 @@
-#include "detail/dicom_check.h"
+#include "detail/dicom_header.h"
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <map>
+#include <string>
 #include <string_view>
 
 namespace covol::detail {
@@ -11,6 +15,8 @@ namespace {
 
 constexpr std::uint32_t kUndefined = 0xFFFFFFFF;
 constexpr std::uint32_t kItem = 0xFFFEE000, kItemEnd = 0xFFFEE00D, kSequenceEnd = 0xFFFEE0DD;
+constexpr std::uint32_t kSamples = 0x00280002, kRows = 0x00280010, kColumns = 0x00280011, kBitsAllocated = 0x00280100;
+constexpr std::uint32_t kBitsStored = 0x00280101, kHighBit = 0x00280102, kRepresentation = 0x00280103;
 constexpr std::uint32_t kTransferSyntax = 0x00020010, kPixelData = 0x7FE00010;
 constexpr int kDeepest = 16;
 
@@ -18,7 +24,11 @@ constexpr std::string_view kShort[] = {"AE", "AS", "AT", "CS", "DA", "DS", "DT",
                                        "LT", "PN", "SH", "SL", "SS", "ST", "TM", "UI", "UL", "US"};
 constexpr std::string_view kLong[] = {"OB", "OD", "OF", "OL", "OW", "SQ", "UC", "UN", "UR", "UT"};
 
-bool is_one_of(const std::string& vr, const auto& list) { return std::find(std::begin(list), std::end(list), vr) != std::end(list); }
+constexpr std::uint64_t kLongestValue = 1 << 12;
+
+bool is_one_of(const auto& value, const auto& list) {
+    return std::find(std::begin(list), std::end(list), value) != std::end(list);
+}
 
 struct Element {
     std::uint32_t tag = 0, length = 0;
@@ -28,6 +38,8 @@ struct Element {
 class Walker {
 public:
     explicit Walker(const std::string& path) : file_(path, std::ios::binary), size_(std::filesystem::file_size(path)) {}
+
+    [[nodiscard]] const DicomHeader& header() const { return header_; }
 
     bool is_sound() {
         constexpr std::uint64_t kMeta = 132;
@@ -51,7 +63,11 @@ public:
         if (syntax.rfind("1.2.840.10008.1.2", 0) != 0 || syntax == kDeflated) return false;
         explicit_ = syntax != "1.2.840.10008.1.2";
         big_ = syntax == "1.2.840.10008.1.2.2";
-        return at_ < size_ && walk(size_, false, 0);
+        // Compressed syntaxes, and only they, have their pixels in pieces.
+        const bool plain = syntax == "1.2.840.10008.1.2" || syntax == "1.2.840.10008.1.2.1" || big_;
+        header_.big_endian = big_;
+        return at_ < size_ && walk(size_, false, 0) && describes_pixels() && header_.encapsulated != plain &&
+               (header_.encapsulated || header_.pixel_bytes > 0);
     }
 
 private:
@@ -86,6 +102,14 @@ private:
         if (is_one_of(e.vr, kLong)) return read_number(2, reserved) && reserved == 0 && read_number(4, e.length);
         return is_one_of(e.vr, kShort) && read_number(2, e.length);
     }
+    /// The numbers of the image pixel module fit each other.
+    [[nodiscard]] bool describes_pixels() const {
+        const auto number = [&](std::uint32_t tag) { return header_.integer(tag).value_or(kUndefined); };
+        const std::uint32_t allocated = number(kBitsAllocated), stored = number(kBitsStored), samples = number(kSamples);
+        return (samples == 1 || samples == 3 || samples == 4) && (allocated == 8 || allocated == 16 || allocated == 32) &&
+               stored > 0 && stored <= allocated && number(kHighBit) + 1 == stored && number(kRepresentation) <= 1 &&
+               number(kRows) > 0 && number(kRows) < kUndefined && number(kColumns) > 0 && number(kColumns) < kUndefined;
+    }
     /// The elements up to `end`, or up to an item's end.
     bool walk(std::uint64_t end, bool in_item, int depth) {
         if (depth > kDeepest) return false;
@@ -101,8 +125,19 @@ private:
     }
     bool walk_value(const Element& e, std::uint64_t end, int depth) {
         const bool sequence = e.vr == "SQ" || (e.length == kUndefined && e.tag != kPixelData);
+        if (depth == 0 && e.tag == kPixelData && e.length == kUndefined) header_.encapsulated = true;
         if (e.length == kUndefined) return walk_items(end, true, sequence, depth + 1);
         if (e.length > end - at_ || e.length % 2 != 0) return false;
+        if (depth == 0 && e.tag == kPixelData) {
+            header_.pixel_offset = at_;
+            header_.pixel_bytes = e.length;
+        } else if (depth == 0 && e.length <= kLongestValue && !sequence) {
+            const std::uint64_t begin = at_;
+            std::string& value = header_.values[e.tag];
+            value.resize(e.length);
+            if (!file_.read(value.data(), e.length)) return false;
+            go_to(begin);
+        }
         if (sequence) return walk_items(at_ + e.length, false, true, depth + 1);
         go_to(at_ + e.length);
         return true;
@@ -129,10 +164,46 @@ private:
     std::ifstream file_;
     std::uint64_t size_, at_ = 0;
     bool explicit_ = true, big_ = false;
+    DicomHeader header_;
 };
 
 }  // namespace
 
-bool is_sound_dicom(const std::string& path) { return Walker(path).is_sound(); }
+std::string DicomHeader::text(std::uint32_t tag) const {
+    const auto found = values.find(tag);
+    if (found == values.end()) return {};
+    const std::string padding(" \0", 2);
+    const std::size_t begin = found->second.find_first_not_of(padding), end = found->second.find_last_not_of(padding);
+    return begin == std::string::npos ? "" : found->second.substr(begin, end + 1 - begin);
+}
+
+std::vector<double> DicomHeader::numbers(std::uint32_t tag) const {
+    std::vector<double> list;
+    std::string rest = text(tag);
+    while (!rest.empty()) {
+        const std::string one = rest.substr(0, rest.find('\\'));
+        rest = one.size() == rest.size() ? "" : rest.substr(one.size() + 1);
+        const std::size_t begin = one.find_first_not_of(" +");
+        double value = 0;
+        if (begin == std::string::npos) return {};
+        const auto status = std::from_chars(one.data() + begin, one.data() + one.size(), value).ec;
+        if (status != std::errc() || !std::isfinite(value)) return {};
+        list.push_back(value);
+    }
+    return list;
+}
+
+std::optional<std::uint32_t> DicomHeader::integer(std::uint32_t tag) const {
+    const auto found = values.find(tag);
+    if (found == values.end() || found->second.size() != 2) return std::nullopt;
+    const auto first = static_cast<unsigned char>(found->second[0]), second = static_cast<unsigned char>(found->second[1]);
+    return big_endian ? std::uint32_t(first) << 8 | second : std::uint32_t(second) << 8 | first;
+}
+
+std::optional<DicomHeader> read_dicom_header(const std::string& path) {
+    Walker walker(path);
+    if (!walker.is_sound()) return std::nullopt;
+    return walker.header();
+}
 
 }  // namespace covol::detail
