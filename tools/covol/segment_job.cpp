@@ -1,5 +1,6 @@
 #include "segment_job.h"
 
+#include <algorithm>
 #include <iomanip>
 #include <sstream>
 
@@ -104,7 +105,7 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
     add_length(command, "--min-component", min_component, "", "drop pieces of the mesh smaller than a cube of this edge");
     command.add_flag("--half", half, "store values in .vdb files as 16-bit floats");
     mesh.bind(command);
-    if (with_image) image.bind(command);
+    if (with_image) image.bind(command, false);
 }
 
 void SegmentJob::run(Session& session) {
@@ -115,9 +116,14 @@ void SegmentJob::run(Session& session) {
     std::optional<Image> pixels;
     Json& input = session.report()["input"];
     if (!image_path.empty()) {
-        const ImageGeometry geometry = read_image_geometry(image_path, image.options);
-        session.require_memory(std::uint64_t(geometry.size[0]) * geometry.size[1] * geometry.size[2], "the image");
-        pixels = read_image(image_path, image.options, session.run());
+        ReadImageOptions reading = image.options;
+        if (domain.roi) {
+            const Vec3 spacing = read_image_geometry(image_path, reading, session.run()).spacing;
+            const double finest = *std::min_element(spacing.begin(), spacing.end());
+            reading.roi = sampled_box(*domain.roi, domain.voxel_size.resolve(finest, finest));
+        }
+        session.require_memory(read_image_info(image_path, reading, session.run()).bytes_to_hold, "the image");
+        pixels = read_image(image_path, reading, session.run());
         input["image"] = to_json(pixels->geometry());
         input["image"]["path"] = image_path;
     }
