@@ -16,7 +16,8 @@ namespace covol {
 namespace {
 
 constexpr double kThinShare = 0.35;  // voxels, of the mean distance to the local plane
-constexpr double kPlaneVoxels = 2.5, kGrowth = 1.25, kMaxCoarsening = 5.0;
+constexpr double kPlaneVoxels = 2.5, kGrowth = 1.25;
+constexpr int kCoarsest = 7;
 constexpr std::size_t kSamples = 3000, kLeastNeighbours = 6;
 constexpr int kPasses = 2;
 
@@ -129,9 +130,11 @@ double layer_thickness(const std::vector<Vec3>& points, double radius, const Run
 ScanVoxelSize scan_voxel_size(const std::vector<Vec3>& points, double spacing, const RunContext& run) {
     ScanVoxelSize choice{spacing, 0};
     if (!(spacing > 0)) return choice;
-    for (double h = spacing; h <= kMaxCoarsening * spacing; h *= kGrowth) {
-        choice = {h, layer_thickness(points, kPlaneVoxels * h, run)};
-        if (choice.thickness <= kThinShare * h) break;
+    // From the coarsest down: in a ball of a few spacings even points that fill space are few enough for a plane.
+    for (double h = spacing * std::pow(kGrowth, kCoarsest); h > 0.999 * spacing; h /= kGrowth) {
+        const ScanVoxelSize finer{h, layer_thickness(points, kPlaneVoxels * h, run)};
+        if (finer.thickness > kThinShare * h && choice.thickness > 0) break;
+        choice = finer;
     }
     return choice;
 }

@@ -24,9 +24,16 @@ constexpr double kCarryRadius = 2.0;   // what lies behind a point: room for a b
 constexpr double kCarryReach = 3.5;    // with its centre no farther than this
 constexpr double kCarriedShare = 0.95;
 constexpr double kFirstRadius = 4.0, kRadiusGrowth = 1.12, kLargestRadius = 0.6 * kLongestSide;
-constexpr int kRim = 2;                // around the points' box
+constexpr double kDeeperGrowth = 1.3, kLargestDeeper = 1.2 * kLongestSide;  // of the balls that fill in deeper
+constexpr int kRim = 4;                // around the points' box
 constexpr double kBasinDepth = 1.4;    // a basin's inner radius over that of its widest way out, where it is one of its own
 constexpr double kLeastBasin = 4.0;    // inner radius of a hollow that may be opened
+constexpr double kBuried = 2.5;        // a point deeper than this no longer lies on the surface
+constexpr double kSkin = 1.5;          // of a filling, left out so that fillings of different gaps do not touch
+constexpr std::size_t kLeastPiece = 30;  // voxels
+constexpr double kThinnest = 1.5;        // radius of the ball that opens the solid in the end: thinner skins would not last
+constexpr double kTunnel = 2.0;          // and of the one that closes it
+constexpr double kLeastPart = 0.01;      // of the largest part's volume
 constexpr double kMayLose = 0.03;      // share of the points at a basin that may lose what is behind them
 
 class Solid {
@@ -66,7 +73,12 @@ public:
         }
         result.ball_radius = radius * voxel_;
         if (radius > kLargestRadius) return result;
+        for (double larger = radius * kDeeperGrowth; larger <= kLargestDeeper; larger *= kDeeperGrowth) {
+            run_.check();
+            fill_deeper(closing(larger));
+        }
         result.carved = open_hollows();
+        smooth();
         result.carried = share(carried_);
         result.level_set = level_set();
         return result;
@@ -113,6 +125,51 @@ private:
         std::vector<std::uint8_t> is_carried(sites_.size());
         for (std::size_t s = 0; s < sites_.size(); ++s) is_carried[s] = way.values[sites_[s]] < kCarryReach * kCarryReach;
         return is_carried;
+    }
+
+    std::vector<std::uint8_t> buried(const DenseMask& body) const {
+        const DenseVolume<float> depth = detail::squared_distance(body, false);
+        std::vector<std::uint8_t> is_buried(sites_.size());
+        for (std::size_t s = 0; s < sites_.size(); ++s) is_buried[s] = depth.values[sites_[s]] > kBuried * kBuried;
+        return is_buried;
+    }
+
+    /// A larger ball dips less into wide gaps, and bridges what should stay open: each piece that it adds is taken when it
+    /// comes to lie behind more points than it buries.
+    void fill_deeper(const DenseMask& larger) {
+        const DenseVolume<float> depth = detail::squared_distance(larger, false);
+        DenseMask rest(size_, 0);
+        for (std::size_t n = 0; n < rest.values.size(); ++n)
+            rest.values[n] = !body_.values[n] && depth.values[n] > kSkin * kSkin;
+        std::vector<std::uint8_t> was_buried = buried(body_);
+        for (std::size_t seed = 0; seed < rest.values.size(); ++seed) {
+            if (!rest.values[seed]) continue;
+            const std::vector<std::size_t> piece = take_piece(rest, seed);
+            if (piece.size() < kLeastPiece) continue;
+            DenseMask filled = body_;
+            for (const std::size_t n : piece) filled.values[n] = 1;
+            std::vector<std::uint8_t> now = carried(filled), now_buried = buried(filled);
+            std::ptrdiff_t gain = 0;
+            for (std::size_t s = 0; s < sites_.size(); ++s)
+                gain += (now[s] - carried_[s]) - (now_buried[s] - was_buried[s]);
+            if (gain <= 0) continue;
+            body_ = std::move(filled);
+            carried_ = std::move(now);
+            was_buried = std::move(now_buried);
+        }
+    }
+
+    /// Moves the connected piece with `seed` out of `mask`.
+    static std::vector<std::size_t> take_piece(DenseMask& mask, std::size_t seed) {
+        std::vector<std::size_t> piece{seed};
+        mask.values[seed] = 0;
+        for (std::size_t next = 0; next < piece.size(); ++next)
+            mask.neighbours(piece[next], [&](std::size_t other) {
+                if (!mask.values[other]) return;
+                mask.values[other] = 0;
+                piece.push_back(other);
+            });
+        return piece;
     }
 
     static double share(const std::vector<std::uint8_t>& flags) {
@@ -206,6 +263,37 @@ private:
             if (open) return true;
         }
         return false;
+    }
+
+    /// Takes away skins, then tunnels through what is left and parts of no size.
+    void smooth() {
+        body_ = dilated(eroded(body_, kThinnest), kThinnest);
+        body_ = eroded(dilated(body_, kTunnel), kTunnel);
+        carried_ = carried(body_);
+        DenseMask rest = body_;
+        std::vector<std::vector<std::size_t>> parts;
+        std::size_t largest = 0;
+        for (std::size_t seed = 0; seed < rest.values.size(); ++seed) {
+            if (!rest.values[seed]) continue;
+            parts.push_back(take_piece(rest, seed));
+            largest = std::max(largest, parts.back().size());
+        }
+        for (const std::vector<std::size_t>& part : parts)
+            if (double(part.size()) < kLeastPart * double(largest))
+                for (const std::size_t n : part) body_.values[n] = 0;
+    }
+
+    static DenseMask eroded(const DenseMask& body, double radius) {
+        const DenseVolume<float> depth = detail::squared_distance(body, false);
+        DenseMask result(body.size, 0);
+        for (std::size_t n = 0; n < result.values.size(); ++n) result.values[n] = depth.values[n] > radius * radius;
+        return result;
+    }
+    static DenseMask dilated(const DenseMask& body, double radius) {
+        const DenseVolume<float> way = detail::squared_distance(body, true);
+        DenseMask result(body.size, 0);
+        for (std::size_t n = 0; n < result.values.size(); ++n) result.values[n] = way.values[n] <= radius * radius;
+        return result;
     }
 
     FloatGridPtr level_set() const {

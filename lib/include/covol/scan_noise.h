@@ -13,9 +13,8 @@ namespace covol {
 /// @throws Error InvalidOptions (radius <= 0, not finite).
 [[nodiscard]] double layer_thickness(const std::vector<Vec3>& points, double radius, const RunContext& run = {});
 
-/// The voxel size that a scan supports, and how it was found: `spacing` where the layer of points is thin, else the first
-/// of spacing * 1.25^k at which points lie within 0.35 voxels, on the mean, of the plane through what is within
-/// 2.5 voxels of them; at most 5 times the spacing.
+/// The voxel size that a scan supports, and how it was found: the first of spacing * 1.25^k, k = 0..7, from which on points
+/// lie within 0.35 voxels, on the mean, of the plane through what is within 2.5 voxels of them. Where none does, the last.
 struct ScanVoxelSize {
     double voxel_size = 0;
     double thickness = 0;  ///< layer_thickness() at it

@@ -1,0 +1,2 @@
+#include "covol/scan_noise.h"
+#include <catch2/catch.hpp>

@@ -1,0 +1,2 @@
+#include "covol/scan_solid.h"
+#include <catch2/catch.hpp>
