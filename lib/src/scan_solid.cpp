@@ -5,6 +5,8 @@
 #include <openvdb/openvdb.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <numeric>
 
@@ -19,7 +21,7 @@ using detail::DenseMask;
 using detail::DenseVolume;
 
 // Lengths are in voxels of the analysis.
-constexpr double kLongestSide = 80;
+constexpr double kLongestSide = 110;
 constexpr double kCarryRadius = 2.0;   // what lies behind a point: room for a ball of this radius,
 constexpr double kCarryReach = 3.5;    // with its centre no farther than this
 constexpr double kCarriedShare = 0.95;
@@ -28,6 +30,7 @@ constexpr double kDeeperGrowth = 1.3, kLargestDeeper = 1.2 * kLongestSide;  // o
 constexpr int kRim = 4;                // around the points' box
 constexpr double kBasinDepth = 1.4;    // a basin's inner radius over that of its widest way out, where it is one of its own
 constexpr double kLeastBasin = 4.0;    // inner radius of a hollow that may be opened
+constexpr double kFinest = 3.0;        // radius of the finest ball that opens dents again
 constexpr double kBuried = 2.5;        // a point deeper than this no longer lies on the surface
 constexpr double kSkin = 1.5;          // of a filling, left out so that fillings of different gaps do not touch
 constexpr std::size_t kLeastPiece = 30;  // voxels
@@ -78,6 +81,10 @@ public:
             fill_deeper(closing(larger));
         }
         result.carved = open_hollows();
+        for (double finer = radius / kDeeperGrowth; finer >= kFinest; finer /= kDeeperGrowth) {
+            run_.check();
+            result.carved += open_finer(closing(finer));
+        }
         smooth();
         result.carried = share(carried_);
         result.level_set = level_set();
@@ -127,10 +134,10 @@ private:
         return is_carried;
     }
 
-    std::vector<std::uint8_t> buried(const DenseMask& body) const {
+    std::vector<std::uint8_t> buried(const DenseMask& body, double deep = kBuried) const {
         const DenseVolume<float> depth = detail::squared_distance(body, false);
         std::vector<std::uint8_t> is_buried(sites_.size());
-        for (std::size_t s = 0; s < sites_.size(); ++s) is_buried[s] = depth.values[sites_[s]] > kBuried * kBuried;
+        for (std::size_t s = 0; s < sites_.size(); ++s) is_buried[s] = depth.values[sites_[s]] > deep * deep;
         return is_buried;
     }
 
@@ -157,6 +164,62 @@ private:
             carried_ = std::move(now);
             was_buried = std::move(now_buried);
         }
+    }
+
+    /// A smaller ball dips deeper: into dents that have points at their bottom, and into what should stay filled. Each piece
+    /// that it takes is given up when that brings more points to the surface than lose what is behind them,
+    /// and leaves the body's topology as it was.
+    int open_finer(const DenseMask& smaller) {
+        DenseMask dips(size_, 0);
+        for (std::size_t n = 0; n < dips.values.size(); ++n) dips.values[n] = body_.values[n] && !smaller.values[n];
+        // Without their skin, dips beside each other do not touch.
+        DenseMask rest = eroded(dips, 1.0);
+        std::vector<std::uint8_t> was_buried = buried(body_, kSkin);
+        const std::int64_t euler = euler_characteristic(body_);
+        int opened = 0;
+        for (std::size_t seed = 0; seed < rest.values.size(); ++seed) {
+            if (!rest.values[seed]) continue;
+            const std::vector<std::size_t> piece = take_piece(rest, seed);
+            if (piece.size() < kLeastPiece) continue;
+            DenseMask dip(size_, 0);
+            for (const std::size_t n : piece) dip.values[n] = 1;
+            dip = dilated(dip, kSkin);
+            DenseMask opening = body_;
+            for (std::size_t n = 0; n < dip.values.size(); ++n)
+                if (dip.values[n] && dips.values[n]) opening.values[n] = 0;
+            std::vector<std::uint8_t> now = carried(opening), now_buried = buried(opening, kSkin);
+            std::ptrdiff_t gain = 0;
+            for (std::size_t s = 0; s < sites_.size(); ++s)
+                gain += (was_buried[s] - now_buried[s]) - 2 * (carried_[s] - now[s]);
+            if (gain <= 0 || euler_characteristic(opening) != euler) continue;
+            body_ = std::move(opening);
+            carried_ = std::move(now);
+            was_buried = std::move(now_buried);
+            ++opened;
+        }
+        return opened;
+    }
+
+    /// Of the union of the body's closed voxels: vertices - edges + faces - cells.
+    static std::int64_t euler_characteristic(const DenseMask& body) {
+        // A vertex, edge or face belongs to the union when one of the voxels around it does: those one lower along some axes.
+        std::int64_t sum = 0;
+        for (int i = 0; i <= body.size[0]; ++i)
+            for (int j = 0; j <= body.size[1]; ++j)
+                for (int k = 0; k <= body.size[2]; ++k) {
+                    std::array<bool, 8> set{};
+                    for (int c = 0; c < 8; ++c) {
+                        const int x = i - (c >> 2), y = j - (c >> 1 & 1), z = k - (c & 1);
+                        set[c] = body.contains(x, y, z) && body.values[body.at(x, y, z)];
+                    }
+                    // All axes: the vertex; two: an edge; one: a face; none: the voxel itself.
+                    for (int axes = 0; axes < 8; ++axes) {
+                        bool any = false;
+                        for (int c = 0; c < 8; ++c) any |= set[c] && (c & ~axes) == 0;
+                        if (any) sum += std::popcount(unsigned(axes)) % 2 == 1 ? 1 : -1;
+                    }
+                }
+        return sum;
     }
 
     /// Moves the connected piece with `seed` out of `mask`.

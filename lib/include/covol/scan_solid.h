@@ -22,8 +22,9 @@ struct ScanSolid {
 /// that body is a solid and no longer a skin: 95 % of the voxels with points have room for a ball of two voxels behind them. What so
 /// large a ball has bridged as well is then opened again where that costs no point what is behind it: the body falls into
 /// the basins of the distance to the points and to its own surface, and a basin that lies at the surface is cut out when the
-/// points around it lose nothing.
-/// @param voxel_size  of the result's user: the analysis is no finer, and at most 80 voxels along the longest side.
+/// points around it lose nothing. Larger balls fill wide gaps less deeply, smaller ones open dents, piece by piece, each
+/// where more points gain than lose by it.
+/// @param voxel_size  of the result's user: the analysis is no finer, and at most 110 voxels along the longest side.
 /// @throws Error InvalidOptions (voxel_size), InvalidInput (no point).
 [[nodiscard]] ScanSolid solid_from_scan(const std::vector<Vec3>& points, double voxel_size, const RunContext& run = {});
 
