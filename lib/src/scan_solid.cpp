@@ -25,8 +25,8 @@ constexpr double kLongestSide = 110;
 constexpr double kCarryRadius = 2.0;   // what lies behind a point: room for a ball of this radius,
 constexpr double kCarryReach = 3.5;    // with its centre no farther than this
 constexpr double kCarriedShare = 0.95;
-constexpr double kFirstRadius = 4.0, kRadiusGrowth = 1.12, kLargestRadius = 0.6 * kLongestSide;
-constexpr double kDeeperGrowth = 1.3, kLargestDeeper = 1.2 * kLongestSide;  // of the balls that fill in deeper
+constexpr double kFirstRadius = 4.0, kRadiusGrowth = 1.12, kLargestRadius = 1.0;  // the largest: in longest sides
+constexpr double kDeeperGrowth = 1.3, kLargestDeeper = 1.0;  // of the balls that fill in deeper
 constexpr int kRim = 4;                // around the points' box
 constexpr double kBasinDepth = 1.4;    // a basin's inner radius over that of its widest way out, where it is one of its own
 constexpr double kLeastBasin = 4.0;    // inner radius of a hollow that may be opened
@@ -46,6 +46,7 @@ public:
         double longest = 0;
         for (int a = 0; a < 3; ++a) longest = std::max(longest, box.max[a] - box.min[a]);
         voxel_ = std::max(voxel_size, longest / kLongestSide);
+        side_ = longest / voxel_;
         for (int a = 0; a < 3; ++a) {
             origin_[a] = box.min[a] - kRim * voxel_;
             size_[a] = int(std::lround((box.max[a] - box.min[a]) / voxel_)) + 1 + 2 * kRim;
@@ -67,7 +68,7 @@ public:
         ScanSolid result;
         result.voxel_size = voxel_;
         double radius = kFirstRadius;
-        for (; radius <= kLargestRadius; radius *= kRadiusGrowth) {
+        for (; radius <= kLargestRadius * side_; radius *= kRadiusGrowth) {
             run_.check();
             body_ = closing(radius);
             carried_ = carried(body_);
@@ -75,8 +76,8 @@ public:
             if (result.carried >= kCarriedShare) break;
         }
         result.ball_radius = radius * voxel_;
-        if (radius > kLargestRadius) return result;
-        for (double larger = radius * kDeeperGrowth; larger <= kLargestDeeper; larger *= kDeeperGrowth) {
+        if (result.carried < kCarriedShare) return result;
+        for (double larger = radius * kDeeperGrowth; larger <= kLargestDeeper * side_; larger *= kDeeperGrowth) {
             run_.check();
             fill_deeper(closing(larger));
         }
@@ -373,7 +374,7 @@ private:
     }
 
     const RunContext& run_;
-    double voxel_ = 0;
+    double voxel_ = 0, side_ = 0;  ///< the longest side in voxels
     Vec3 origin_{};
     Index3 size_{};
     DenseMask occupied_, body_;

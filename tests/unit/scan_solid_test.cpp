@@ -92,7 +92,9 @@ TEST_CASE("points in a plane carry nothing") {
 
 TEST_CASE("share_without_points: the lid of a bowl, nothing of a sphere") {
     const std::vector<Vec3> points = bowl(4000, 1);
-    const TriangleMesh mesh = mesh_of(solid_from_scan(points, 0.05));
+    const ScanSolid solid = solid_from_scan(points, 0.05);
+    REQUIRE(solid.level_set);
+    const TriangleMesh mesh = mesh_of(solid);
     // A flat lid would be a third of the area; its rim is near the points.
     const double share = share_without_points(mesh, points, 0.15);
     CHECK(share > 0.15);
