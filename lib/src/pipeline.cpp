@@ -12,6 +12,8 @@
 #include "covol/distance.h"
 #include "covol/error.h"
 #include "covol/mesh_io.h"
+#include "covol/scan_noise.h"
+#include "covol/scan_solid.h"
 
 namespace covol {
 namespace {
@@ -26,6 +28,14 @@ constexpr double kCloseFromVoxels = 5.0;      // a tag distance beyond this star
 constexpr double kApproachTau = 3.0;          // time steps of the points' own approach, in tau
 constexpr int kApproachSteps = 40;
 constexpr double kApproachTolerance = 0.01;
+constexpr double kScanRadiusVoxels = 2.5;     // layers of a scan within it are averaged
+constexpr double kNoisyShare = 0.3;           // of a voxel: a layer of points thicker than this is averaged
+constexpr double kSolidReach = 3.0;           // voxels of the solid's own grid that its start may lie off the points
+constexpr double kHoldDepth = 0.75;           // voxels that the surface may sink below such a start
+constexpr int kHoldSteps = 2;
+constexpr double kHoldTolerance = 0.01;      // voxels a step
+constexpr double kFarFromPoints = 3.0;        // voxels and spacings: no point holds the surface there
+constexpr double kWarnWithoutPoints = 0.02;   // share of the area
 constexpr int kEdgeReachVoxels = 12;          // a band that follows moves this far before g is extended
 constexpr double kCoarseFactor = 8.0;         // voxels of the coarse distance field, in h
 // Coarse to fine, voxels of the coarse level.
@@ -153,6 +163,8 @@ private:
         if (points_.size() < report().point_count)
             run_.info("points: " + std::to_string(points_.size()) + " of " + std::to_string(report().point_count) +
                       " kept, the others are closer than half of " + number(kMergeVoxels * h()));
+        marks_ = points_;
+        if (image_ == nullptr) average_noise();
         EvolveOptions& evolve = options_.evolve;
         const bool tags = options_.start.kind == Start::Kind::Tag;
         if (evolve.delta < 0) {
@@ -171,7 +183,17 @@ private:
         }
     }
 
+    // A thick layer of points, or several beside each other, has its surface in the middle.
+    void average_noise() {
+        const double radius = kScanRadiusVoxels * h(), thickness = layer_thickness(points_, radius, run_);
+        if (!(thickness > kNoisyShare * h())) return;
+        points_ = average_layers(points_, radius, run_);
+        choose("points_averaged", "within " + number(radius),
+               "they lie " + number(thickness) + " from their local plane on the mean, more than " + number(kNoisyShare) + " voxels");
+    }
+
     void choose_attraction_range() {
+        has_automatic_range_ = true;
         double& range = options_.evolve.attraction_range;
         range = 0;
         if (!uses_points()) return;
@@ -196,6 +218,7 @@ private:
 
     void start_by_tagging() {
         choose_tag();
+        if (image_ == nullptr && has_chosen_tag_ && !report().tag.encloses && start_from_solid()) return;
         const double D = options_.tag_distance;
         const double margin = options_.margin > 0 ? options_.margin : D + kMarginVoxels * h();
         report().domain = domain_with_margin(margin);
@@ -207,6 +230,28 @@ private:
         if (tagged.report.leaks) warn_of_leak(tagged.report);
         if (D > kCloseFromVoxels * h()) start_from_closing(D);
         report().tag.tag_distance = D;
+    }
+
+    // Nothing is enclosed at any D, as where one side was seen only: the surface of a solid that carries the points.
+    bool start_from_solid() {
+        Timed timed(report().seconds.tag);
+        const ScanSolid solid = solid_from_scan(points_, h(), run_);
+        if (!solid.level_set) return false;
+        if (has_automatic_range_ && uses_points()) {
+            double& range = options_.evolve.attraction_range;
+            range = kSolidReach * solid.voxel_size;
+            choose("attraction_range", number(range), "the start touches the points, and where there are none nothing should pull");
+        }
+        const double range = options_.evolve.attraction_range;
+        report().domain = domain_with_margin(options_.margin > 0 ? options_.margin : range + kMarginVoxels * h());
+        result_.u = start_from_grid(report().domain, *solid.level_set, run_);
+        hold_ = result_.u->deepCopy();
+        options_.evolve.follow = true;
+        choose("start", "solid", "the points enclose nothing; a ball of radius " + number(solid.ball_radius) +
+                                     " rolled around them leaves a solid behind " + number(100 * solid.carried) + " % of them, with " +
+                                     std::to_string(solid.carved) + " of its hollows opened again");
+        if (uses_points()) compute_distance(tube_for_start());
+        return true;
     }
 
     // The tagged surface lies D outside the points, as far as the widest gap is large. Its closing by a ball of radius D
@@ -229,6 +274,7 @@ private:
         report().tag = choose_tag_distance(points_, domain_with_margin(0.25 * extent + kMarginVoxels * h()),
                                            options_.exterior_seeds, run_);
         options_.tag_distance = report().tag.tag_distance;
+        has_chosen_tag_ = true;
         choose("tag_distance", number(options_.tag_distance), report().tag.reason);
     }
 
@@ -413,12 +459,55 @@ private:
             Timed timed(report().seconds.solve);
             const double edge_before = report().seconds.edge;
             const EvolveReport before = approach(fields);
-            report().solve = evolve(*result_.u, fields, options_.evolve, run_);
+            report().solve = hold_ ? evolve_held(fields) : evolve(*result_.u, fields, options_.evolve, run_);
             add(before, report().solve);
             report().seconds.solve -= report().seconds.edge - edge_before;
         }
         report().active_voxels = report().solve.active_voxels;
         report().leaf_count = report().solve.leaf_count;
+    }
+
+    // Where a scan has no points its surface rests on nothing, and would slide along the walls that have some: it may not sink
+    // deeper below the solid that it started from than a share of a voxel.
+    EvolveReport evolve_held(const EvolveFields& fields) {
+        EvolveReport total;
+        EvolveOptions few = options_.evolve;
+        for (int left = options_.evolve.max_steps; left > 0 && total.stop_reason != StopReason::Vanished; left -= kHoldSteps) {
+            const FloatGridPtr before = result_.u->deepCopy();
+            few.max_steps = std::min(left, kHoldSteps);
+            EvolveReport round = evolve(*result_.u, fields, few, run_);
+            hold_up(*result_.u);
+            add(total, round);
+            total = round;
+            total.last_change = mean_motion(*before, *result_.u) / few.max_steps;
+            if (total.stop_reason != StopReason::Vanished && total.last_change < kHoldTolerance) {
+                total.stop_reason = StopReason::Steady;
+                break;
+            }
+        }
+        return total;
+    }
+
+    void hold_up(FloatGrid& u) const {
+        const auto start = hold_->getConstAccessor();
+        const auto depth = static_cast<float>(kHoldDepth * h());
+        for (auto leaf = u.tree().beginLeaf(); leaf; ++leaf)
+            for (auto value = leaf->beginValueOn(); value; ++value)
+                value.setValue(std::min(*value, start.getValue(value.getCoord()) + depth));
+    }
+
+    /// Of u, over the voxels beside the surface, voxels.
+    double mean_motion(const FloatGrid& before, const FloatGrid& after) const {
+        const auto old = before.getConstAccessor();
+        double sum = 0;
+        std::int64_t count = 0;
+        for (auto leaf = after.tree().cbeginLeaf(); leaf; ++leaf)
+            for (auto value = leaf->cbeginValueOn(); value; ++value)
+                if (std::abs(*value) < h()) {
+                    sum += std::abs(*value - old.getValue(value.getCoord()));
+                    ++count;
+                }
+        return count > 0 ? sum / (double(count) * h()) : 0.0;
     }
 
     // Edges of other structures lie between the tagged surface and the points: with an image the points pull alone first.
@@ -451,11 +540,25 @@ private:
         result_.surface = surface(*result_.u, run_);
         result_.mesh = extract_mesh(*result_.surface, options_.extract, run_);
         report().surface = measure(result_.mesh);
-        if (!points_.empty()) report().fit = points_to_surface(points_, result_.mesh, run_);
+        if (points_.empty()) return;
+        report().fit = points_to_surface(marks_, result_.mesh, run_);
+        if (image_ == nullptr) find_bare_surface();
+    }
+
+    void find_bare_surface() {
+        const double reach = kFarFromPoints * std::max(h(), nearest_neighbour_spacing(points_).median);
+        const double share = share_without_points(result_.mesh, points_, reach, run_);
+        report().share_without_points = share;
+        if (share > kWarnWithoutPoints)
+            run_.warn(number(std::round(1000 * share) / 10) + " % of the surface lie farther than " + number(reach) +
+                      " from every point: there curvature alone closes it");
     }
 
     const Image* image_;
-    std::vector<Vec3> points_;
+    std::vector<Vec3> points_;  ///< what pulls
+    std::vector<Vec3> marks_;   ///< the same as they were given, for the fit
+    FloatGridPtr hold_;         ///< the start that the surface may not leave, or null
+    bool has_automatic_range_ = false, has_chosen_tag_ = false;
     SegmentOptions options_;
     const RunContext& run_;
     SegmentResult result_;
@@ -501,7 +604,11 @@ VoxelSizeChoice choose_voxel_size(const Image* image, const std::vector<Vec3>& w
     if (distinct.size() < 2)
         throw Error(Errc::InvalidInput, "choose_voxel_size: expected an image or at least 2 distinct points, got " +
                                             std::to_string(distinct.size()));
-    return {nearest_neighbour_spacing(distinct).median, "the median distance between neighbouring points"};
+    const double spacing = nearest_neighbour_spacing(distinct).median;
+    const ScanVoxelSize scan = scan_voxel_size(distinct, spacing);
+    if (scan.voxel_size <= spacing) return {spacing, "the median distance between neighbouring points"};
+    return {scan.voxel_size, "points lie " + number(scan.thickness) + " from their local plane on the mean, noise wider than their median distance " +
+                                 number(spacing)};
 }
 
 SegmentResult segment(const Image* image, const std::vector<Vec3>& world_points, const SegmentOptions& options,

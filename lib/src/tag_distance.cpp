@@ -326,6 +326,7 @@ TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Dom
         const Verdict verdict = judge(analysis);
         if (verdict.cores > 0) {
             choice.tag_distance = std::max(1.05 * verdict.saddle * a + 0.5 * a, 1.5 * h);
+            choice.encloses = true;
             reason.str({});
             reason << "closes " << verdict.cores << (verdict.cores == 1 ? " core" : " cores") << " whose largest gap has radius "
                    << verdict.saddle * a << " (inner radius " << verdict.peak * a << "), seen on a grid of " << a;

@@ -10,8 +10,8 @@ import sys
 LAYERS = [
     ["error", "run", "fwd", "domain"],
     ["image", "points", "mesh", "vdb_io", "mesh_io"],
-    ["distance", "edge"],
-    ["band", "evolve"],
+    ["distance", "edge", "scan_noise"],
+    ["band", "evolve", "scan_solid"],
     ["surface", "mesh_cleanup", "compare"],
     ["pipeline", "phantom", "render"],
 ]

@@ -58,6 +58,7 @@ void fill_report(Session& session, const SegmentReport& r) {
     report["solve"] = to_json(r.solve);
     report["surface"] = to_json(r.surface);
     if (r.point_count > 0) report["fit"]["points_to_surface"] = to_json(r.fit);
+    if (r.share_without_points > 0) report["fit"]["surface_without_points"] = r.share_without_points;
     session.add_seconds("distance", r.seconds.distance);
     session.add_seconds("tag", r.seconds.tag);
     session.add_seconds("coarse", r.seconds.coarse);

@@ -35,7 +35,8 @@ struct BandResult {
 /// The D that the points themselves ask for, and how it was found.
 struct TagDistanceChoice {
     double tag_distance = 0;
-    std::string reason;  ///< one line for people
+    bool encloses = false;  ///< whether a core that stands out was found
+    std::string reason;     ///< one line for people
 };
 
 /// Chooses D from the cloud: {d > D} falls apart into the exterior and enclosed cores as D grows; each core

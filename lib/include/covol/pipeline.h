@@ -60,6 +60,7 @@ struct SegmentReport {
     EvolveReport solve;
     MeshMeasures surface;
     FitStatistics fit;
+    double share_without_points = 0;  ///< of the surface's area: farther than 3 voxels and 3 spacings from every point
     SegmentOptions resolved;  ///< what was used: every automatic choice replaced by its value
     std::map<std::string, std::string> automatic;  ///< each automatic choice and its reason
 };
@@ -71,7 +72,7 @@ struct SegmentResult {
 };
 
 /// h and how it was found: the image's smallest spacing, or for points alone the median distance to the nearest other
-/// point. @throws Error InvalidInput when there is neither, or fewer than two distinct points.
+/// point, coarser where the scan is noisy (scan_voxel_size). @throws Error InvalidInput when there is neither, or fewer than two distinct points.
 struct VoxelSizeChoice {
     double voxel_size = 0;
     std::string reason;  ///< one line for people

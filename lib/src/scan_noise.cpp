@@ -1,0 +1,162 @@
+// Planes fitted to neighbourhoods of a scan (principal components; Hoppe et al. 1992): how far points lie from them, and
+// their projection (a moving average of order one).
+#include "covol/scan_noise.h"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "covol/error.h"
+
+namespace covol {
+namespace {
+
+constexpr double kThinShare = 0.35;  // voxels, of the mean distance to the local plane
+constexpr double kPlaneVoxels = 2.5, kGrowth = 1.25;
+constexpr int kCoarsest = 7;
+constexpr std::size_t kSamples = 3000, kLeastNeighbours = 6;
+constexpr int kPasses = 2;
+
+Eigen::Vector3d vector(const Vec3& p) { return {p[0], p[1], p[2]}; }
+
+/// The points by cells of edge `radius`: all within it of a place lie in 27 of them.
+class Neighbourhoods {
+public:
+    Neighbourhoods(const std::vector<Vec3>& points, double radius) : points_(points), radius_(radius) {
+        lowest_ = bounding_box(points).min;
+        cells_.resize(points.size());
+        tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) { cells_[n] = {key(cell(points[n])), n}; });
+        std::sort(cells_.begin(), cells_.end());
+    }
+
+    /// visit(point, squared distance) for all within the radius of x, x itself among them.
+    template <typename Visit>
+    void around(const Vec3& x, Visit visit) const {
+        const Index3 c = cell(x);
+        for (int i = -1; i <= 1; ++i)
+            for (int j = -1; j <= 1; ++j) {
+                // Three cells along k are neighbours in the order, too.
+                const std::uint64_t first = key({c[0] + i, c[1] + j, c[2] - 1}), last = first + 2;
+                auto at = std::lower_bound(cells_.begin(), cells_.end(), std::pair{first, std::size_t(0)});
+                for (; at != cells_.end() && at->first <= last; ++at) {
+                    const Vec3& p = points_[at->second];
+                    const double dx = p[0] - x[0], dy = p[1] - x[1], dz = p[2] - x[2], d2 = dx * dx + dy * dy + dz * dz;
+                    if (d2 <= radius_ * radius_) visit(p, d2);
+                }
+            }
+    }
+
+private:
+    [[nodiscard]] Index3 cell(const Vec3& p) const {
+        Index3 c;
+        for (int a = 0; a < 3; ++a)  // coarser than asked at a distance of 2^20 radii: slow, never wrong
+            c[a] = static_cast<int>(std::min((p[a] - lowest_[a]) / radius_, double(1 << 20)));
+        return c;
+    }
+    // One is added so that the cells below the lowest have keys as well.
+    [[nodiscard]] static std::uint64_t key(const Index3& c) {
+        return (std::uint64_t(c[0] + 1) << 42) + (std::uint64_t(c[1] + 1) << 21) + std::uint64_t(c[2] + 1);
+    }
+
+    const std::vector<Vec3>& points_;
+    double radius_;
+    Vec3 lowest_;
+    std::vector<std::pair<std::uint64_t, std::size_t>> cells_;
+};
+
+struct Plane {
+    Eigen::Vector3d center{0, 0, 0}, normal{0, 0, 0};
+    std::size_t points = 0;
+    [[nodiscard]] double height(const Vec3& p) const { return normal.dot(vector(p) - center); }
+};
+
+/// @param weight  of a neighbour, from its squared distance.
+template <typename Weight>
+Plane fit_plane(const Neighbourhoods& cloud, const Vec3& x, Weight weight) {
+    Plane plane;
+    const Eigen::Vector3d origin = vector(x);
+    Eigen::Vector3d sum(0, 0, 0);
+    Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+    double total = 0;
+    cloud.around(x, [&](const Vec3& p, double d2) {
+        const double w = weight(d2);
+        const Eigen::Vector3d v = vector(p) - origin;
+        total += w;
+        sum += w * v;
+        squares += w * v * v.transpose();
+        ++plane.points;
+    });
+    if (plane.points <= kLeastNeighbours || !(total > 0)) return {};
+    sum /= total;
+    const Eigen::Matrix3d covariance = squares / total - sum * sum.transpose();
+    plane.center = origin + sum;
+    plane.normal = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvectors().col(0);
+    return plane;
+}
+
+void expect_radius(double radius, const char* where) {
+    if (!(radius > 0) || !std::isfinite(radius))
+        throw Error(Errc::InvalidOptions, std::string(where) + ": radius: expected > 0, got " + std::to_string(radius));
+}
+
+}  // namespace
+
+double layer_thickness(const std::vector<Vec3>& points, double radius, const RunContext& run) {
+    expect_radius(radius, "layer_thickness");
+    if (points.empty()) return 0;
+    const Neighbourhoods cloud(points, radius);
+    const std::size_t step = (points.size() + kSamples - 1) / kSamples;
+    std::vector<double> distance((points.size() + step - 1) / step, -1.0);
+    run.check();
+    tbb::parallel_for(std::size_t(0), distance.size(), [&](std::size_t n) {
+        const Vec3& x = points[n * step];
+        const Plane plane = fit_plane(cloud, x, [](double) { return 1.0; });
+        if (plane.points == 0) return;
+        double sum = 0;
+        cloud.around(x, [&](const Vec3& p, double) { sum += std::abs(plane.height(p)); });
+        distance[n] = sum / double(plane.points);
+    });
+    double sum = 0;
+    std::size_t count = 0;
+    for (const double d : distance)
+        if (d >= 0) sum += d, ++count;
+    return count > 0 ? sum / double(count) : 0.0;
+}
+
+ScanVoxelSize scan_voxel_size(const std::vector<Vec3>& points, double spacing, const RunContext& run) {
+    ScanVoxelSize choice{spacing, 0};
+    if (!(spacing > 0)) return choice;
+    // From the coarsest down: in a ball of a few spacings even points that fill space are few enough for a plane.
+    for (double h = spacing * std::pow(kGrowth, kCoarsest); h > 0.999 * spacing; h /= kGrowth) {
+        const ScanVoxelSize finer{h, layer_thickness(points, kPlaneVoxels * h, run)};
+        if (finer.thickness > kThinShare * h && choice.thickness > 0) break;
+        choice = finer;
+    }
+    return choice;
+}
+
+std::vector<Vec3> average_layers(const std::vector<Vec3>& points, double radius, const RunContext& run) {
+    expect_radius(radius, "average_layers");
+    std::vector<Vec3> moved = points;
+    for (int pass = 0; pass < kPasses && !points.empty(); ++pass) {
+        run.check();
+        const std::vector<Vec3> before = moved;
+        const Neighbourhoods cloud(before, radius);
+        tbb::parallel_for(std::size_t(0), before.size(), [&](std::size_t n) {
+            const Plane plane = fit_plane(cloud, before[n], [&](double d2) {
+                const double t = 1.0 - d2 / (radius * radius);
+                return t * t;
+            });
+            if (plane.points == 0) return;
+            const double height = plane.height(before[n]);
+            for (int a = 0; a < 3; ++a) moved[n][a] -= height * plane.normal[a];
+        });
+    }
+    return moved;
+}
+
+}  // namespace covol

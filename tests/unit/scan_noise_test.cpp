@@ -1,0 +1,69 @@
+#include "covol/scan_noise.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+
+#include "covol/error.h"
+#include "support/clouds.h"
+
+using namespace covol;
+
+namespace {
+
+double mean_off_sphere(const std::vector<Vec3>& points, double radius) {
+    double sum = 0;
+    for (const Vec3& p : points) sum += std::abs(std::hypot(p[0], p[1], p[2]) - radius);
+    return sum / double(points.size());
+}
+
+}  // namespace
+
+TEST_CASE("layer_thickness: 0 in a plane, 3/8 of the radius where points fill space") {
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> x(0, 1);
+    std::vector<Vec3> plane(2000);
+    for (Vec3& p : plane) p = {x(random), x(random), 0};
+    CHECK(layer_thickness(plane, 0.1) < 1e-9);
+    const std::vector<Vec3> block = test::box_cloud(40000, {{0, 0, 0}, {1, 1, 1}}, 5);
+    // The plane of least squares is the best of all, and balls stick out of the block: less than 3/8, not by far.
+    CHECK(layer_thickness(block, 0.1) < 0.0375);
+    CHECK(layer_thickness(block, 0.1) > 0.75 * 0.0375);
+    CHECK(layer_thickness({{0, 0, 0}, {1, 0, 0}}, 10) == 0);
+    CHECK_THROWS_AS(layer_thickness(block, 0), Error);
+    CHECK_THROWS_AS(average_layers(block, -1), Error);
+}
+
+TEST_CASE("average_layers brings two layers of one sphere together between them, and keeps a thin one") {
+    // 0.98 and 1.02: 0.04 apart, four times the spacing.
+    std::vector<Vec3> points = test::sphere_cloud(40000, 0.98, 1);
+    const std::vector<Vec3> outer = test::sphere_cloud(40000, 1.02, 2);
+    points.insert(points.end(), outer.begin(), outer.end());
+    const std::vector<Vec3> averaged = average_layers(points, 0.15);
+    REQUIRE(averaged.size() == points.size());
+    CHECK(mean_off_sphere(points, 1) == Approx(0.02));
+    // A plane lies below the cap that it is fitted to: by radius^2 / 8 with these weights, in each of two passes.
+    const double sag = 0.15 * 0.15 / 4;
+    CHECK(mean_off_sphere(averaged, 1) < 1.15 * sag);
+    const std::vector<Vec3> thin = test::sphere_cloud(40000, 1, 3);
+    CHECK(mean_off_sphere(average_layers(thin, 0.15), 1) == Approx(sag).epsilon(0.15));
+}
+
+TEST_CASE("scan_voxel_size: the spacing for a clean scan, coarser than the noise for a noisy one") {
+    const std::vector<Vec3> clean = test::sphere_cloud(20000, 1, 1);
+    const double spacing = 0.0125;
+    CHECK(scan_voxel_size(clean, spacing).voxel_size == Approx(spacing));
+    std::mt19937 random(7);
+    std::normal_distribution<double> noise(0, 0.02);
+    std::vector<Vec3> noisy = clean;
+    for (Vec3& p : noisy) {
+        const double r = 1 + noise(random);
+        for (double& c : p) c *= r;
+    }
+    const ScanVoxelSize choice = scan_voxel_size(noisy, spacing);
+    CHECK(choice.voxel_size > 2 * spacing);
+    CHECK(choice.voxel_size < 5 * spacing);
+    // The mean distance of a normal distribution, 0.8 sigma, and what the plane swallowed.
+    CHECK(choice.thickness == Approx(0.8 * 0.02).epsilon(0.25));
+    CHECK(choice.thickness <= 0.35 * choice.voxel_size);
+}

@@ -1,0 +1,136 @@
+#include "covol/scan_solid.h"
+
+#include <openvdb/openvdb.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+
+#include "covol/error.h"
+#include "covol/pipeline.h"
+#include "covol/surface.h"
+#include "detail/dense_volume.h"
+#include "support/clouds.h"
+
+using namespace covol;
+
+namespace {
+
+const double kPi = std::acos(-1.0);
+
+// The lower half of a sphere of radius 1: a bowl.
+std::vector<Vec3> bowl(int count, unsigned seed) {
+    std::vector<Vec3> points;
+    for (const Vec3& p : test::sphere_cloud(2 * count, 1, seed))
+        if (p[2] < 0) points.push_back(p);
+    return points;
+}
+
+// A torus whose tube (radius 0.35 around a circle of radius 1) was seen from outside only on half of its way, from inside on
+// the other half: it encloses nothing.
+std::vector<Vec3> half_seen_torus(int count, double noise, unsigned seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> angle(-kPi, kPi);
+    std::normal_distribution<double> off(0, noise);
+    std::vector<Vec3> points;
+    while (int(points.size()) < count) {
+        const double around = angle(random), tube = angle(random);
+        const bool faces_out = std::abs(tube) < 0.62 * kPi, faces_in = std::abs(tube) > 0.38 * kPi;
+        if (around > 0 ? !faces_out : !faces_in) continue;
+        const double r = 0.35 + off(random), away = 1 + r * std::cos(tube);
+        points.push_back({away * std::cos(around), away * std::sin(around), r * std::sin(tube)});
+    }
+    return points;
+}
+
+double off_torus(const Vec3& p) { return std::abs(std::hypot(std::hypot(p[0], p[1]) - 1, p[2]) - 0.35); }
+
+TriangleMesh mesh_of(const ScanSolid& solid) { return extract_mesh(*solid.level_set); }
+
+}  // namespace
+
+TEST_CASE("squared_distance equals brute force") {
+    std::mt19937 random(11);
+    detail::DenseMask mask({9, 7, 12}, 0);
+    for (auto& v : mask.values) v = random() % 40 == 0;
+    const detail::DenseVolume<float> d = detail::squared_distance(mask, true);
+    for (std::size_t n = 0; n < mask.values.size(); ++n) {
+        const Index3 a = mask.voxel(n);
+        double best = 1e30;
+        for (std::size_t m = 0; m < mask.values.size(); ++m) {
+            if (!mask.values[m]) continue;
+            const Index3 b = mask.voxel(m);
+            best = std::min(best, std::pow(a[0] - b[0], 2) + std::pow(a[1] - b[1], 2) + std::pow(a[2] - b[2], 2));
+        }
+        REQUIRE(d.values[n] == float(best));
+    }
+    CHECK(detail::squared_distance(detail::DenseMask({2, 2, 2}, 0), true).values[0] >= detail::kNowhere);
+}
+
+TEST_CASE("a bowl becomes a solid with a lid, not a skin") {
+    const std::vector<Vec3> points = bowl(4000, 1);
+    const ScanSolid solid = solid_from_scan(points, 0.05);
+    REQUIRE(solid.level_set);
+    CHECK(solid.carried >= 0.95);
+    const MeshMeasures m = measure(mesh_of(solid));
+    CHECK(m.closed);
+    CHECK(m.components == 1);
+    CHECK(m.genus == 0);
+    // Half a ball; the lid sags into it.
+    CHECK(m.volume < 2.0 / 3 * kPi * 1.1);
+    CHECK(m.volume > 2.0 / 3 * kPi * 0.6);
+}
+
+TEST_CASE("points in a plane carry nothing") {
+    std::vector<Vec3> plane;
+    for (int i = 0; i < 40; ++i)
+        for (int j = 0; j < 40; ++j) plane.push_back({0.1 * i, 0.1 * j, 0});
+    CHECK_FALSE(solid_from_scan(plane, 0.1).level_set);
+    CHECK_THROWS_AS(solid_from_scan({}, 0.1), Error);
+    CHECK_THROWS_AS(solid_from_scan(plane, 0), Error);
+}
+
+TEST_CASE("share_without_points: the lid of a bowl, nothing of a sphere") {
+    const std::vector<Vec3> points = bowl(4000, 1);
+    const ScanSolid solid = solid_from_scan(points, 0.05);
+    REQUIRE(solid.level_set);
+    const TriangleMesh mesh = mesh_of(solid);
+    // A flat lid would be a third of the area; its rim is near the points.
+    const double share = share_without_points(mesh, points, 0.15);
+    CHECK(share > 0.15);
+    CHECK(share < 0.45);
+    CHECK(share_without_points(mesh, points, 3.0) == 0);
+}
+
+TEST_CASE("segment: a bowl is closed by a lid, on the points elsewhere") {
+    const std::vector<Vec3> points = bowl(6000, 2);
+    SegmentOptions options;
+    options.voxel_size = 0.04;
+    const SegmentResult result = segment(nullptr, points, options);
+    CHECK(result.report.automatic.count("start") == 1);
+    CHECK(result.report.surface.closed);
+    CHECK(result.report.surface.genus == 0);
+    CHECK(result.report.surface.components == 1);
+    CHECK(result.report.fit.mean < 0.5 * 0.04);
+    CHECK(result.report.share_without_points > 0.1);
+}
+
+TEST_CASE("segment: a noisy torus of which each part was seen from one side has genus 1") {
+    const std::vector<Vec3> points = half_seen_torus(12000, 0.01, 3);
+    SegmentOptions options;
+    options.voxel_size = 0.05;
+    const SegmentResult result = segment(nullptr, points, options);
+    CHECK(result.report.surface.closed);
+    CHECK(result.report.surface.components == 1);
+    CHECK(result.report.surface.genus == 1);
+    CHECK(result.report.fit.mean < 0.5 * 0.05);
+    // Where points are, the surface is the torus.
+    double sum = 0, count = 0;
+    for (const auto& v : result.mesh.vertices) {
+        const Vec3 p{v[0], v[1], v[2]};
+        if (test::brute_force_distance(points, p) > 0.05) continue;
+        sum += off_torus(p);
+        ++count;
+    }
+    CHECK(sum / count < 0.5 * 0.05);
+}
