@@ -3,7 +3,7 @@
 #
 #   bash tests/bench/run.sh [--quick] [--only PART,PART...] [--update-readme] ...     (--help lists the parts)
 #
-# The whole of it takes about a quarter of an hour on two idle cores; --quick about two minutes, for a look at the
+# The whole of it takes about a quarter of an hour on two idle cores; --quick about three minutes, for a look at the
 # machinery. Set COVOL_DATA to also run the jobs on larger data.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
