@@ -7,6 +7,7 @@ speed.png are made from all the .csv files that are there.
 import argparse
 import csv
 import datetime
+import functools
 import json
 import os
 import pathlib
@@ -14,6 +15,7 @@ import platform
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 
 import numpy as np
@@ -37,7 +39,11 @@ class Run:
         with tempfile.TemporaryFile() as out:
             child = subprocess.Popen([str(c) for c in command], stdout=out, stderr=subprocess.DEVNULL,
                                      env=os.environ | environment)
+            self.peak = 0
+            watcher = threading.Thread(target=self._watch_memory, args=(child.pid,))
+            watcher.start()
             _, status, usage = os.wait4(child.pid, 0)
+            watcher.join()
             child.returncode = os.waitstatus_to_exitcode(status)
             self.wall = time.perf_counter() - begin
             out.seek(0)
@@ -45,7 +51,19 @@ class Run:
         if child.returncode != 0:
             raise RuntimeError(f"exit code {child.returncode}: {' '.join(map(str, command))}")
         self.cpu = usage.ru_utime + usage.ru_stime
-        self.peak = usage.ru_maxrss * 1024
+
+    def _watch_memory(self, pid):
+        """The kernel's high-water mark. Not ru_maxrss: that one begins with the size of this process."""
+        try:
+            while True:
+                status = pathlib.Path(f"/proc/{pid}/status").read_text()
+                if "VmHWM:" not in status:
+                    return  # ended
+                if os.readlink(f"/proc/{pid}/exe") != os.readlink("/proc/self/exe"):
+                    self.peak = int(status.split("VmHWM:")[1].split()[0]) * 1024
+                time.sleep(0.01)
+        except (OSError, IndexError):
+            return
 
     def json(self):
         return json.loads(self.stdout)
@@ -87,6 +105,7 @@ class Bench:
         return image, points
 
 
+@functools.cache
 def provenance():
     model = platform.processor()
     with open("/proc/cpuinfo") as file:
@@ -94,7 +113,7 @@ def provenance():
     commit = subprocess.run(["git", "-C", HERE, "describe", "--always", "--dirty", "--exclude", "*"],
                             capture_output=True, text=True).stdout.strip()
     cores = len(os.sched_getaffinity(0))
-    return f"{datetime.date.today()}, {model}, {cores} cores, covol {commit or 'of unknown version'}"
+    return f"{datetime.date.today()}, {model}, {cores} cores (load before: {os.getloadavg()[0]:.1f}), covol {commit or 'of unknown version'}"
 
 
 # ---- parts -------------------------------------------------------------------------------------------------------
@@ -402,7 +421,7 @@ def short(text):
         value = float(text)
     except ValueError:
         return text
-    return f"{int(value)}" if value == int(value) and abs(value) < 1e15 else f"{value:.3g}"
+    return f"{value:.0f}" if value == int(value) or abs(value) >= 100 else f"{value:.3g}"
 
 
 def markdown(rows, columns=None):
@@ -469,6 +488,7 @@ def main():
     options = parser.parse_args()
     if options.results is None:
         options.results = pathlib.Path(options.build) / "quick" if options.quick else HERE / "results"
+    provenance()  # with the load before the first part
     chosen = [part for part in options.only.split(",") if part]
     for part in chosen:
         if part not in PARTS:

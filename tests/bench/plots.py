@@ -17,7 +17,7 @@ def draw_sphere(axes, rows):
     names = [f"{r['solver']}, {r['threads']} thread{'s' if r['threads'] != '1' else ''}" for r in shown]
     axes.barh(names, seconds, color=[OURS if r["solver"].startswith("covol") else OTHERS for r in shown])
     for at, row in enumerate(shown):
-        note = f" {float(row['seconds']):.3g} s"
+        note = f" {seconds[at]:.{0 if seconds[at] >= 100 else 1}f} s"
         if row["error_shell"]:
             note += f", error {float(row['error_shell']):.2f} / {float(row['error_holes']):.2f}"
         if row["extrapolated"] not in ("no", ""):
