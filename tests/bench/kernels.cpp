@@ -1,0 +1,179 @@
+// The kernels on leaves, on every instruction set of this processor: in cache (8 leaves) and out of it (24^3 leaves, 7
+// million voxels), with the copying into padded buffers that a step does. Names are kernel/set/where/threads.
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <array>
+#include <cmath>
+#include <string>
+
+#include "counters.h"
+#include "detail/halo.h"
+#include "detail/leaf_band.h"
+#include "detail/motion.h"
+#include "detail/scheme.h"
+#include "stream.h"
+
+namespace covol::bench {
+namespace {
+
+using namespace covol::detail;
+using Leaves = LeafArray<float>;
+
+constexpr int kSmallSide = 2, kLargeSide = 24;  // leaves
+constexpr unsigned long long kAll = ~0ULL;
+constexpr std::array<unsigned long long, 8> kEveryVoxel = {kAll, kAll, kAll, kAll, kAll, kAll, kAll, kAll};
+
+/// A cube of leaves with every field of a step: u is a distance with ripples.
+struct Cube {
+    LeafBand band;
+    HaloField u, phi, edge;
+    Leaves previous, rows, out;
+
+    explicit Cube(int side) {
+        std::vector<Coord> origins;
+        for (int i = 0; i < side; ++i)
+            for (int j = 0; j < side; ++j)
+                for (int k = 0; k < side; ++k) origins.emplace_back(8 * i, 8 * j, 8 * k);
+        band = LeafBand(origins);
+        const double middle = 4.0 * side;
+        const auto radius = [=](const Coord& x) {
+            return std::sqrt((x.x() - middle) * (x.x() - middle) + (x.y() - middle) * (x.y() - middle) +
+                             (x.z() - middle) * (x.z() - middle));
+        };
+        u = field([=](const Coord& x) { return radius(x) - 0.7 * middle + 0.3 * std::sin(0.9 * x.x() + 0.7 * x.y()); });
+        phi = field([=](const Coord& x) { return std::abs(radius(x) - 0.6 * middle); });
+        edge = field([](const Coord& x) { return 0.5 + 0.4 * std::sin(0.3 * (x.x() + x.y() - x.z())); });
+        previous = u.values;
+        rows = Leaves(6 * band.size(), 0.1F, 0);
+        out = Leaves(band.size(), 0.0F, 0);
+    }
+
+    template <typename Value>
+    HaloField field(Value value) const {
+        HaloField f{Leaves(band.size(), 0.0F, 1), {}};
+        f.blocks.resize(band.size());
+        tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
+            f.blocks[leaf] = band.neighbours(leaf);
+            for (int n = 0; n < kLeafSize; ++n)
+                f.values.leaf(leaf)[n] =
+                    static_cast<float>(value(band.origin(leaf).offsetBy(n >> 6, n >> 3 & 7, n & 7)));
+        });
+        return f;
+    }
+    [[nodiscard]] float* rows_of(std::size_t leaf) { return rows.leaf(6 * leaf); }
+};
+
+/// Made once: what a kernel takes does not depend on the values that others left.
+Cube& cube_of(int side) {
+    static Cube small(kSmallSide), large(kLargeSide);
+    return side == kSmallSide ? small : large;
+}
+
+SchemeConstants constants() {
+    SchemeConstants c{};
+    c.tau = c.theta = c.rho = 1;
+    c.curvature = 5;  // delta = 5 h, tau = h
+    c.epsilon2 = 1e-4F;
+    c.edge_epsilon2 = 4e-4F;
+    return c;
+}
+
+void assemble(const SchemeKernels& kernels, Cube& cube, std::size_t leaf) {
+    alignas(64) float u[kPaddedSize], phi[kPaddedSize], edge[kPaddedSize];
+    std::copy_n(cube.u.values.leaf(leaf), kLeafSize, cube.previous.leaf(leaf));
+    load_padded(cube.u, leaf, u);
+    load_star(cube.phi, leaf, phi);
+    load_star(cube.edge, leaf, edge);
+    benchmark::DoNotOptimize(
+        kernels.assemble(u, phi, edge, nullptr, kEveryVoxel.data(), constants(), cube.rows_of(leaf)));
+}
+
+template <int inner>
+void relax(const SchemeKernels& kernels, Cube& cube, std::size_t leaf) {
+    alignas(64) float u[kPaddedSize];
+    load_star(cube.u, leaf, u);
+    // also returns the residual that the first sweep saw
+    benchmark::DoNotOptimize(
+        kernels.relax(u, cube.previous.leaf(leaf), cube.rows_of(leaf), kEveryVoxel.data(), 1.5F, inner));
+    store_inner(u, cube.u.values.leaf(leaf));
+}
+
+void heat(const SchemeKernels& kernels, Cube& cube, std::size_t leaf) {
+    alignas(64) float u[kPaddedSize];
+    load_star(cube.u, leaf, u);
+    benchmark::DoNotOptimize(kernels.heat(u, cube.previous.leaf(leaf), 0.5F, 1.3F, 2));
+    store_inner(u, cube.u.values.leaf(leaf));
+}
+
+void mean_gradient(const SchemeKernels& kernels, Cube& cube, std::size_t leaf) {
+    alignas(64) float u[kPaddedSize];
+    load_padded(cube.u, leaf, u);
+    kernels.mean_gradient(u, cube.out.leaf(leaf));
+}
+
+void motion(const SchemeKernels&, Cube& cube, std::size_t leaf) {
+    benchmark::DoNotOptimize(motion_of(cube.u.values.leaf(leaf), cube.previous.leaf(leaf), true));
+}
+
+struct Kernel {
+    const char* name;
+    void (*run)(const SchemeKernels&, Cube&, std::size_t leaf);
+    double bytes;  // read and written for a voxel, once each
+};
+
+constexpr double kFloat = sizeof(float), kRows = 6 * kFloat;
+constexpr Kernel kKernels[] = {
+    {"assemble", assemble, 3 * kFloat + kFloat + kRows},  // u, phi, edge; u before; rows
+    {"relax_1", relax<1>, 2 * kFloat + kRows + kFloat},   // u, u before, rows; u
+    {"relax_2", relax<2>, 2 * kFloat + kRows + kFloat},
+    {"heat_2", heat, 3 * kFloat},
+    {"mean_gradient", mean_gradient, 2 * kFloat},
+    {"motion", motion, 2 * kFloat},
+};
+
+/// Two colours as in a step, so that no leaf reads what another thread writes.
+void run_on(benchmark::State& state, const Kernel& kernel, const SchemeKernels& set, int side, int threads) {
+    Cube& cube = cube_of(side);
+    tbb::task_arena arena(threads);
+    const auto visit = [&](std::size_t leaf) { kernel.run(set, cube, leaf); };
+    const std::size_t odd = cube.band.odd_begin(), end = cube.band.size();
+    for (auto _ : state) {
+        if (threads == 1) {
+            for (std::size_t leaf = 0; leaf < end; ++leaf) visit(leaf);
+        } else {
+            arena.execute([&] {
+                tbb::parallel_for(std::size_t(0), odd, visit);
+                tbb::parallel_for(odd, end, visit);
+            });
+        }
+    }
+    count_voxels(state, double(end) * kLeafSize, kernel.bytes);
+}
+
+bool register_all() {
+    for (const Kernel& kernel : kKernels)
+        for (const SchemeKernels* set : available_kernels())
+            for (const auto& [where, side, threads] :
+                 {std::tuple{"cache", kSmallSide, 1}, {"memory", kLargeSide, 1}, {"memory", kLargeSide, 2}}) {
+                const std::string name =
+                    std::string("kernel/") + kernel.name + '/' + set->name + '/' + where + '/' + std::to_string(threads);
+                benchmark::RegisterBenchmark(
+                    name.c_str(), [&kernel, set, side = side, threads = threads](benchmark::State& state) {
+                        run_on(state, kernel, *set, side, threads);
+                    })
+                    ->UseRealTime()
+                    ->MeasureProcessCPUTime();
+            }
+    for (const int threads : {1, 2})
+        benchmark::RegisterBenchmark(("stream/triad/" + std::to_string(threads)).c_str(),
+                                     [threads](benchmark::State& state) { triad(state, threads); })
+            ->UseRealTime()
+            ->MeasureProcessCPUTime();
+    return true;
+}
+
+const bool registered = register_all();
+
+}  // namespace
+}  // namespace covol::bench

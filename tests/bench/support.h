@@ -1,0 +1,53 @@
+#pragma once
+#include <map>
+#include <stdexcept>
+#include <string>
+
+#include "covol/domain.h"
+#include "covol/mesh_io.h"
+#include "covol/surface.h"
+#include "stopwatch.h"
+#include "support/shapes.h"
+
+// What the programs of tests/bench share: "--key value" arguments, and one way to a mesh for every solver.
+namespace covol::bench {
+
+class Arguments {
+public:
+    Arguments(int argc, char** argv) {
+        for (int i = 1; i + 1 < argc; i += 2) {
+            const std::string key = argv[i];
+            if (key.rfind("--", 0) != 0) throw std::invalid_argument("expected --key value, got " + key);
+            values_[key.substr(2)] = argv[i + 1];
+        }
+        if (argc % 2 == 0) throw std::invalid_argument(std::string("expected a value after ") + argv[argc - 1]);
+    }
+    /// @throws std::invalid_argument where it is not given.
+    [[nodiscard]] const std::string& text(const std::string& key) const {
+        const auto at = values_.find(key);
+        if (at == values_.end()) throw std::invalid_argument("expected --" + key);
+        return at->second;
+    }
+    [[nodiscard]] std::string text(const std::string& key, const std::string& fallback) const {
+        return values_.count(key) != 0 ? text(key) : fallback;
+    }
+    [[nodiscard]] double number(const std::string& key) const { return std::stod(text(key)); }
+    [[nodiscard]] double number(const std::string& key, double fallback) const {
+        return values_.count(key) != 0 ? number(key) : fallback;
+    }
+
+private:
+    std::map<std::string, std::string> values_;
+};
+
+/// The zero level set of values on the whole domain, as triangles: by covol's own way for every solver, so that
+/// quality is measured alike. @param half_width  |u| from there on says nothing, world units
+inline void write_zero_level(const std::string& path, const Domain& domain, const test::DenseField& u,
+                             double half_width) {
+    std::vector<char> active(u.size(), 0);
+    for (std::size_t p = 0; p < u.size(); ++p) active[p] = std::abs(u[p]) < half_width;
+    const FloatGridPtr grid = test::to_grid(domain, u, active, "u", static_cast<float>(half_width));
+    write_mesh(path, extract_mesh(*surface(*grid)));
+}
+
+}  // namespace covol::bench
