@@ -23,6 +23,52 @@
 namespace covol {
 namespace {
 
+// ---------------------------------------------------------------------------------------------- reading
+
+template <typename T>
+T first_stated(T options, T file, T otherwise) {
+    if (options != T::Unstated) return options;
+    return file != T::Unstated ? file : otherwise;
+}
+
+PointSpace space_after(PointSpace read_as) {
+    if (read_as == PointSpace::Ras) return PointSpace::World;
+    return read_as == PointSpace::IndexOne ? PointSpace::Index : read_as;
+}
+
+/// A file's coordinates in space_after(reading.space).
+Vec3 read_as(const ReadPointsOptions& reading, Vec3 p) {
+    if (reading.order == PointOrder::ZYX) std::swap(p[0], p[2]);
+    switch (reading.space) {
+        case PointSpace::Ras: return {-reading.scale * p[0], -reading.scale * p[1], reading.scale * p[2]};
+        case PointSpace::IndexOne: return {p[0] - 1, p[1] - 1, p[2] - 1};
+        case PointSpace::Index: return p;
+        case PointSpace::Slices: return {reading.scale * p[0], reading.scale * p[1], p[2]};
+        default: return {reading.scale * p[0], reading.scale * p[1], reading.scale * p[2]};
+    }
+}
+
+std::string describe(const ReadPointsOptions& reading) {
+    std::ostringstream text;
+    text << (reading.order == PointOrder::ZYX ? "z, y, x" : "x, y, z") << " in ";
+    switch (reading.space) {
+        case PointSpace::Ras: text << "world units, RAS turned to LPS"; break;
+        case PointSpace::Index: text << "voxels"; break;
+        case PointSpace::IndexOne: text << "voxels counted from 1"; break;
+        case PointSpace::Slices: text << "world units and slices"; break;
+        default: text << "world units";
+    }
+    if (reading.scale != 1) text << ", times " << reading.scale;
+    return text.str();
+}
+
+Vec3 to_world(PointSpace space, const Vec3& p, const ImageGeometry& geometry) {
+    if (space == PointSpace::World) return p;
+    if (space == PointSpace::Slices)
+        return geometry.index_to_world({p[0] / geometry.spacing[0], p[1] / geometry.spacing[1], p[2]});
+    return geometry.index_to_world(p);
+}
+
 // ---------------------------------------------------------------------------------------------- check_inside
 
 Vec3 reversed(const Vec3& p) { return {p[2], p[1], p[0]}; }
@@ -198,32 +244,34 @@ std::string to_ply(const std::vector<Vec3>& points, const std::string& comment) 
 }  // namespace
 
 PointCloud read_points(const std::string& path, const ReadPointsOptions& options) {
+    if (!(options.scale > 0) || !std::isfinite(options.scale))
+        throw Error(Errc::InvalidOptions, "read_points: scale: expected > 0, got " + std::to_string(options.scale));
     detail::PointTable table = detail::read_point_table(path);
     if (table.points.empty())
         throw Error(Errc::InvalidInput, "read_points: " + path + ": expected at least one point, got none");
     PointCloud cloud;
     cloud.source = path;
-    cloud.space = options.space != PointSpace::Unstated ? options.space
-                  : table.space != PointSpace::Unstated ? table.space
-                                                        : PointSpace::World;
-    const PointOrder order = options.order != PointOrder::Unstated ? options.order : table.order;
+    cloud.stated = (options.space != PointSpace::Unstated || table.space != PointSpace::Unstated) &&
+                   (options.order != PointOrder::Unstated || table.order != PointOrder::Unstated);
+    cloud.reading = {first_stated(options.space, table.space, PointSpace::World),
+                     first_stated(options.order, table.order, PointOrder::XYZ), options.scale};
+    cloud.space = space_after(cloud.reading.space);
     cloud.points = std::move(table.points);
-    if (order == PointOrder::ZYX)
-        for (Vec3& p : cloud.points) std::swap(p[0], p[2]);
-    cloud.rule = table.rule + ", as " + (order == PointOrder::ZYX ? "z, y, x" : "x, y, z") + " in " +
-                 (cloud.space == PointSpace::Index ? "voxels" : "world units");
+    for (Vec3& p : cloud.points) p = read_as(cloud.reading, p);
+    cloud.lines = std::move(table.lines);
+    cloud.rule = table.rule + ", as " + describe(cloud.reading);
     return cloud;
 }
 
 std::vector<Vec3> to_world(const PointCloud& cloud, const ImageGeometry* geometry) {
-    if (cloud.space != PointSpace::Index) return cloud.points;
+    if (cloud.space == PointSpace::World) return cloud.points;
     if (geometry == nullptr)
         throw Error(Errc::InvalidInput, "to_world: " + cloud.source +
                                             ": the points are in voxels of an image, and there is no image; give one, "
                                             "or --points-space world");
     std::vector<Vec3> world;
     world.reserve(cloud.points.size());
-    for (const Vec3& p : cloud.points) world.push_back(geometry->index_to_world(p));
+    for (const Vec3& p : cloud.points) world.push_back(to_world(cloud.space, p, *geometry));
     return world;
 }
 

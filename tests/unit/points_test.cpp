@@ -112,6 +112,54 @@ TEST_CASE("column names that mean voxels are understood as such") {
     CHECK(cloud.space == PointSpace::Index);
 }
 
+TEST_CASE("contours of slices are ordered, closed lines") {
+    const Scratch scratch;
+    // contour 0 of slices 3 and 4, contour 1 of slice 3; the last row comes late
+    const PointCloud cloud = read_points(scratch.write(
+        "contours.csv", "slice,contour,x_px,y_px\n3,0,1,2\n3,0,4,2.5\n3,1,9,9\n4,0,7,7\n4,0,8,7\n3,0,4,6\n"));
+    CHECK(cloud.space == PointSpace::Index);
+    CHECK(cloud.points == std::vector<Vec3>{{1, 2, 3}, {4, 2.5, 3}, {4, 6, 3}, {9, 9, 3}, {7, 7, 4}, {8, 7, 4}});
+    REQUIRE(cloud.lines.size() == 3);
+    const std::size_t ends[] = {3, 4, 6};
+    for (std::size_t n = 0; n < 3; ++n) {
+        CHECK(cloud.lines[n].begin == (n == 0 ? 0 : ends[n - 1]));
+        CHECK(cloud.lines[n].end == ends[n]);
+        CHECK(cloud.lines[n].closed);
+    }
+    CHECK(cloud.lines[1].name == "1");
+    CHECK(cloud.rule.find("lines by slice and contour") != std::string::npos);
+}
+
+TEST_CASE("napari shapes are lines, closed or open by their type") {
+    const Scratch scratch;
+    const PointCloud cloud = read_points(scratch.write(
+        "shapes.csv", "index,shape-type,vertex-index,axis-0,axis-1,axis-2\n"
+                      "0.0,polygon,0.0,5.0,2.0,1.0\n0.0,polygon,2.0,5.0,6.0,4.0\n0.0,polygon,1.0,5.0,2.0,4.0\n"
+                      "1.0,path,0.0,6.0,2.0,1.0\n1.0,path,1.0,6.0,2.0,4.0\n1.0,path,2.0,6.0,9.0,4.0\n"
+                      "2.0,line,0.0,7.0,2.0,1.0\n2.0,line,1.0,7.0,2.0,4.0\n"
+                      "3.0,rectangle,0.0,8.0,2.0,1.0\n3.0,rectangle,1.0,8.0,2.0,4.0\n3.0,rectangle,2.0,8.0,9.0,4.0\n"
+                      "3.0,rectangle,3.0,8.0,9.0,1.0\n"
+                      "4.0,ellipse,0.0,9.0,10.0,20.0\n4.0,ellipse,1.0,9.0,10.0,40.0\n"
+                      "4.0,ellipse,2.0,9.0,16.0,40.0\n4.0,ellipse,3.0,9.0,16.0,20.0\n"));
+    CHECK(cloud.space == PointSpace::Index);
+    REQUIRE(cloud.lines.size() == 5);
+    CHECK(cloud.points[0] == Vec3{1, 2, 5});
+    CHECK(cloud.points[1] == Vec3{4, 2, 5});  // by vertex-index
+    CHECK(cloud.points[2] == Vec3{4, 6, 5});
+    const bool closed[] = {true, false, false, true, true};
+    for (std::size_t n = 0; n < 5; ++n) CHECK(cloud.lines[n].closed == closed[n]);
+    // x = 30 +- 10, y = 13 +- 3
+    const MarkLine& ellipse = cloud.lines[4];
+    CHECK(ellipse.end - ellipse.begin >= 40);
+    for (std::size_t n = ellipse.begin; n < ellipse.end; ++n) {
+        const Vec3& p = cloud.points[n];
+        CHECK(p[2] == 9);
+        CHECK(std::pow((p[0] - 30) / 10, 2) + std::pow((p[1] - 13) / 3, 2) == Approx(1));
+    }
+    CHECK(read_error(scratch, "bad.csv", "index,shape-type,vertex-index,axis-0,axis-1,axis-2\n0,ellipse,0,1,2,3\n")
+              .find("expected the 4 corners of an ellipse") != std::string::npos);
+}
+
 TEST_CASE("PLY in ascii and both byte orders, whatever else it holds") {
     const Scratch scratch;
     for (const char* format : {"ascii", "binary_little_endian", "binary_big_endian"}) {

@@ -8,12 +8,20 @@
 
 namespace covol {
 
-enum class PointSpace { Unstated, World, Index };  ///< Index: voxels of the image, 0-based, centres at integers
+enum class PointSpace {
+    Unstated,
+    World,    ///< the image's physical space, LPS where it is anatomical
+    Index,    ///< voxels of the image, from 0, centres at integers
+    Ras,      ///< world, with x and y towards right and anterior: both signs are turned on reading
+    IndexOne, ///< voxels counted from 1: 1 is taken away on reading
+    Slices    ///< x, y lengths along the image's axes from the centre of voxel 0; z a slice, from 0 (Fiji's Results)
+};
 enum class PointOrder { Unstated, XYZ, ZYX };
 
 struct ReadPointsOptions {
     PointSpace space = PointSpace::Unstated;  ///< Unstated: what the format says, else World.
     PointOrder order = PointOrder::Unstated;  ///< Unstated: what the format says, else XYZ.
+    double scale = 1;                         ///< Multiplies lengths (not voxels): 0.001 for micrometres to mm.
 };
 
 /// An ordered line of marks: the points [begin, end) of a cloud, as a person clicked them along a border.
@@ -27,7 +35,9 @@ struct MarkLine {
 struct PointCloud {
     std::vector<Vec3> points;
     std::vector<MarkLine> lines;  ///< what the file says of their order; empty for loose points
-    PointSpace space = PointSpace::World;
+    PointSpace space = PointSpace::World;  ///< World, Index or Slices
+    ReadPointsOptions reading;             ///< how the file's coordinates became these
+    bool stated = false;                   ///< the format or the caller said so; else `reading` is a guess
     std::string source;  ///< path, for messages
     std::string rule;    ///< how coordinates were understood, one line for people
 };
@@ -37,8 +47,8 @@ struct PointCloud {
 /// @throws Error Io, InvalidInput (with path:line: text instead of numbers, NaN, truncated, no point), Unsupported.
 [[nodiscard]] PointCloud read_points(const std::string& path, const ReadPointsOptions& options = {});
 
-/// World positions; index points are mapped by the image's geometry.
-/// @throws Error InvalidInput when points are in index space and `geometry` is null.
+/// World positions; points in voxels or on slices are mapped by the image's geometry.
+/// @throws Error InvalidInput when points need the image and `geometry` is null.
 [[nodiscard]] std::vector<Vec3> to_world(const PointCloud& cloud, const ImageGeometry* geometry);
 
 /// @throws Error InvalidInput when a point lies outside the image: how many of how many, both boxes, and the
