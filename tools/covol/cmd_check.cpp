@@ -129,7 +129,7 @@ void check_mesh_file(const std::string& path, Findings& findings) {
     check_extent(extent, "the mesh", findings);
 }
 
-void check_points(const std::string& path, const std::string& image_path, Findings& findings) {
+void check_points(const std::string& path, const std::string& image_path, const RunContext& run, Findings& findings) {
     const PointCloud cloud = read_points(path);
     const std::vector<Vec3> distinct = merge_close_points(cloud.points, 0);
     if (distinct.size() < cloud.points.size())
@@ -145,7 +145,7 @@ void check_points(const std::string& path, const std::string& image_path, Findin
     if (image_path.empty()) return;
     const ImageGeometry geometry = read_image_geometry(image_path);
     try {
-        check_inside(to_world(cloud, &geometry), geometry, path);
+        check_inside(cloud, geometry, run);
     } catch (const Error& error) {
         findings.problem(error.what());
     }
@@ -159,7 +159,7 @@ void check(const std::string& path, const std::string& image_path, Session& sess
         case FileKind::Vdb: check_vdb(path, session.run(), findings); break;
         case FileKind::Image: check_image(path, session.run(), findings); break;
         case FileKind::Mesh: check_mesh_file(path, findings); break;
-        case FileKind::Points: check_points(path, image_path, findings); break;
+        case FileKind::Points: check_points(path, image_path, session.run(), findings); break;
     }
     session.report()["problems"] = findings.problems();
     session.say(path + ": " + (findings.problems() == 0 ? "no problem" : std::to_string(findings.problems()) + " problem(s)"));

@@ -1,9 +1,7 @@
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstring>
 #include <map>
-#include <numbers>
 #include <numeric>
 #include <optional>
 
@@ -169,25 +167,15 @@ void sort_by_place(Line& line) {
     line.points = std::move(sorted);
 }
 
-/// The ellipse inside a box that is given by its four corners, as points about a voxel apart.
-std::vector<Vec3> ellipse(const std::vector<Vec3>& corners) {
-    Vec3 centre{0, 0, 0}, u, v;
-    double longest = 0;
+/// The ellipse inside a box that is given by its four corners.
+std::vector<Vec3> ellipse_in(const std::vector<Vec3>& corners) {
+    Vec3 centre, u, v;
     for (int a = 0; a < 3; ++a) {
         centre[a] = 0.25 * (corners[0][a] + corners[1][a] + corners[2][a] + corners[3][a]);
         u[a] = 0.5 * (corners[1][a] - corners[0][a]);
         v[a] = 0.5 * (corners[3][a] - corners[0][a]);
-        longest = std::max({longest, std::abs(u[a]), std::abs(v[a])});
     }
-    constexpr double kFewest = 16, kMost = 4096;
-    const int count = static_cast<int>(std::clamp(std::ceil(2 * std::numbers::pi * longest), kFewest, kMost));
-    std::vector<Vec3> points(static_cast<std::size_t>(count));
-    for (int n = 0; n < count; ++n) {
-        const double angle = 2 * std::numbers::pi * n / count;
-        for (int a = 0; a < 3; ++a)
-            points[static_cast<std::size_t>(n)][a] = centre[a] + std::cos(angle) * u[a] + std::sin(angle) * v[a];
-    }
-    return points;
+    return ellipse(centre, u, v);
 }
 
 void append(PointTable& table, const std::string& path, Line& line, const Columns& columns) {
@@ -197,7 +185,7 @@ void append(PointTable& table, const std::string& path, Line& line, const Column
         if (line.points.size() != 4)
             fail(path, "shape " + quote(line.name) + ": expected the 4 corners of an ellipse's box, got " +
                            std::to_string(line.points.size()));
-        line.points = ellipse(line.points);
+        line.points = ellipse_in(line.points);
     } else if (!line.shape.empty()) {
         closed = line.shape != "path" && line.shape != "line";
     }

@@ -21,4 +21,7 @@ PointTable read_point_table(const std::string& path);
 /// Appends an ordered line of marks to a table.
 void add_line(PointTable& table, const std::vector<Vec3>& points, bool closed, const std::string& name);
 
+/// centre + cos u + sin v, as points about a voxel apart (all in voxels).
+[[nodiscard]] std::vector<Vec3> ellipse(const Vec3& centre, const Vec3& u, const Vec3& v);
+
 }  // namespace covol::detail
