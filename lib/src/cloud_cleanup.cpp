@@ -85,9 +85,16 @@ public:
     void smooth_by_wlop(CloudCleanupReport& report) {
         if (entries_.size() < kFewest) return;
         run_.check();
+        // Two rings of new neighbours; CGAL's own 8 spacings of the old points flatten what is curved.
+        constexpr double kRings = 2.5;
+        constexpr unsigned kRing = 6;
+        double radius = options_.wlop_radius;
+        if (radius == 0)
+            radius = kRings * CGAL::compute_average_spacing<Tag>(entries_, kRing, parameters()) / std::sqrt(options_.wlop_share);
+        run_.check();
         std::vector<Point> points;
         CGAL::wlop_simplify_and_regularize_point_set<Tag>(entries_, std::back_inserter(points),
-                                                          parameters().select_percentage(100.0));
+                                                          parameters().select_percentage(100 * options_.wlop_share).neighbor_radius(radius));
         run_.check();
         std::erase_if(points, [](const Point& p) { return !is_finite(p); });
         entries_.clear();
@@ -143,6 +150,8 @@ std::string CloudCleanupOptions::why_invalid() const {
     expect(outlier_factor == 0 || (outlier_factor >= 1 && std::isfinite(outlier_factor)), "outlier_factor", "0 or >= 1",
            outlier_factor);
     expect(simplify >= 0 && std::isfinite(simplify), "simplify", ">= 0", simplify);
+    expect(wlop_share > 0 && wlop_share <= 1, "wlop_share", "in (0,1]", wlop_share);
+    expect(wlop_radius >= 0 && std::isfinite(wlop_radius), "wlop_radius", ">= 0", wlop_radius);
     expect(neighbours >= 6, "neighbours", ">= 6", neighbours);
     return why;
 }

@@ -61,11 +61,18 @@ public:
         return "points from " + text_of(bounding_box(world_)) + ", image from " + text_of(geometry_.world_box());
     }
 
-    /// The readings with the fewest changes that put every point inside.
+    /// The readings with the fewest changes that put every point inside. Another unit is the last thing to think of:
+    /// whatever is made small enough fits.
     [[nodiscard]] std::vector<Reading> remedies() const {
         std::vector<Reading> found;
-        for (const Reading& reading : others())
-            if ((found.empty() || reading.changes == found.front().changes) && fits(reading)) found.push_back(reading);
+        const auto rank = [&](const Reading& r) { return std::pair(r.options.scale != now_.scale && !in_voxels(r.options), r.changes); };
+        std::vector<Reading> candidates = others();
+        std::stable_sort(candidates.begin(), candidates.end(), [&](const Reading& a, const Reading& b) { return rank(a) < rank(b); });
+        for (const Reading& reading : candidates) {
+            if (!found.empty() && rank(reading) > rank(found.front())) break;
+            if (rank(reading).first && is_speck(reading)) continue;
+            if (fits(reading)) found.push_back(reading);
+        }
         // Voxels counted from 1 are told only where counting from 0 does not do.
         const auto has = [&](PointSpace space, PointOrder order) {
             return std::any_of(found.begin(), found.end(), [&](const Reading& r) {
@@ -118,6 +125,17 @@ private:
                            [&](const Vec3& p) { return is_inside(place(reading.options, p)); });
     }
 
+    /// Made so small that fitting says nothing.
+    [[nodiscard]] bool is_speck(const Reading& reading) const {
+        constexpr double kLeast = 0.02;  // of the image's edge
+        std::vector<Vec3> index;
+        for (const Vec3& p : cloud_.points) index.push_back(geometry_.world_to_index(place(reading.options, p)));
+        const WorldBox box = bounding_box(index);
+        for (int a = 0; a < 3; ++a)
+            if (box.max[a] - box.min[a] >= kLeast * geometry_.size[a]) return false;
+        return true;
+    }
+
     [[nodiscard]] int axes_on_centres(const ReadPointsOptions& reading) const {
         constexpr double kTolerance = 0.01;  // voxels
         std::array<bool, 3> on{true, true, true};
@@ -128,20 +146,24 @@ private:
         return int(on[0]) + int(on[1]) + int(on[2]);
     }
 
+    static bool in_voxels(const ReadPointsOptions& reading) {
+        return reading.space == PointSpace::Index || reading.space == PointSpace::IndexOne;
+    }
+
     /// All other readings, fewest changes first.
     [[nodiscard]] std::vector<Reading> others() const {
         std::vector<Reading> list;
         if (now_.channels != 1) return list;  // a slice cannot be undone
-        const bool lengths = now_.space != PointSpace::Index && now_.space != PointSpace::IndexOne;
+        const bool lengths = !in_voxels(now_);
         const bool shifted = geometry_.origin != Vec3{0, 0, 0} || !geometry_.is_axis_aligned();
         for (const PointSpace space : {PointSpace::World, PointSpace::Index, PointSpace::IndexOne, PointSpace::Ras, PointSpace::Local,
                                        PointSpace::Slices}) {
             if ((space == PointSpace::Slices && now_.space != space) || (space == PointSpace::Local && !shifted)) continue;
-            const bool in_voxels = space == PointSpace::Index || space == PointSpace::IndexOne;
+            const bool voxels = in_voxels({space});
             for (const PointOrder order : {PointOrder::XYZ, PointOrder::ZYX})
                 for (const double scale : {1.0, 1e3, 1e-3}) {
-                    if (in_voxels && scale != 1) continue;
-                    add(list, {space, order, in_voxels && lengths ? 1.0 : now_.scale * scale, 1});
+                    if (voxels && scale != 1) continue;
+                    add(list, {space, order, voxels && lengths ? 1.0 : now_.scale * scale, 1});
                 }
         }
         constexpr int kMostChannels = 6;
@@ -161,8 +183,7 @@ private:
         if (options.space != now_.space) change(flag_of(options.space));
         if (options.order != now_.order) change(options.order == PointOrder::ZYX ? "--points-order zyx" : "--points-order xyz");
         if (options.channels != now_.channels) change("--points-channels " + std::to_string(options.channels));
-        const bool in_voxels = options.space == PointSpace::Index || options.space == PointSpace::IndexOne;
-        if (options.scale != now_.scale && !in_voxels) {
+        if (options.scale != now_.scale && !in_voxels(options)) {
             std::ostringstream flag;
             flag << "--points-scale " << options.scale;
             change(flag.str());

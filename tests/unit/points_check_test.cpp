@@ -73,13 +73,11 @@ TEST_CASE("each usual mistake is named with the option that mends it") {
     says(advice({{90, 70, 15}}), "; --points-space index would bring them inside (they are voxels, not world units)");
     says(advice({{15, 70, 90}}), "; --points-space index --points-order zyx would");
     says(advice({{-5, -3, 15}}), "; --points-space ras would bring them inside (they are in RAS, the image is in LPS)");
-    says(advice({{5000, 3000, 15000}}), "; --points-scale 0.001 would bring them inside (their unit");
-    says(advice({{-5000, -3000, 15000}}), "; --points-space ras --points-scale 0.001 would");
+    says(advice({{5000, 3000, 15000}, {2000, 1000, 3000}}), "; --points-scale 0.001 would bring them inside (their unit");
+    says(advice({{-5000, -3000, 15000}, {-2000, -1000, 3000}}), "; --points-space ras --points-scale 0.001 would");
     says(advice({{100, 80, 20}}), "; --points-space index1 would bring them inside (they are voxels counted from 1)");
-    says(advice({{15, 70, 3}}, PointSpace::Index), "would");
     says(advice({{3, 70, 90}}, PointSpace::Index), "; --points-order zyx would bring");
     says(advice({{100, 80, 20}}, PointSpace::Index), "; --points-space index1 would bring");
-    says(advice({{100, 79, 20}}, PointSpace::Index).substr(0, 12), "check_inside");
     // the positions of a multi-point in a hyperstack of two channels
     says(advice({{15, 70, 39}}, PointSpace::Index), "--points-channels 2 would bring them inside (their slices count the channels");
     geometry.origin = {500, 600, 700};
@@ -90,8 +88,8 @@ TEST_CASE("readings that fit equally well are all told") {
     const ImageGeometry geometry = small_image();
     // as voxels, or in world units with the axes reversed
     const std::string message = verdict(cloud_of({{15, 4, 3}, {12, 3, 2}}), geometry);
-    says(message, "--points-space index would");
-    says(message, "or --points-order zyx would");
+    says(message, "; --points-order zyx would");
+    says(message, "or --points-space index would");
     says(message, "more than one reading fits");
 }
 
@@ -106,7 +104,7 @@ TEST_CASE("an image without spacing is asked for it where points are lengths") {
 
 TEST_CASE("points that lie inside by accident are told by their slices") {
     ImageGeometry geometry;
-    geometry.size = {200, 200, 200};  // all readings fit into it
+    geometry.size = {400, 400, 400};  // all readings fit into it
     geometry.spacing = {0.35, 0.4, 0.7};
     geometry.origin = {-1.11, -2.33, -3.77};
     std::vector<Vec3> voxels, world, reversed;

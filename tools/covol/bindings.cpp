@@ -1,7 +1,6 @@
 #include "bindings.h"
 
 #include <cmath>
-#include <map>
 
 #include "covol/error.h"
 
@@ -75,21 +74,16 @@ CLI::Option* PointFlags::bind(CLI::App& command, const std::string& flag) {
 }
 
 void PointFlags::bind_options(CLI::App& command) {
-    static const std::map<std::string, PointSpace> spaces{{"world", PointSpace::World},
-                                                          {"ras", PointSpace::Ras},
-                                                          {"index", PointSpace::Index},
-                                                          {"index1", PointSpace::IndexOne},
-                                                          {"local", PointSpace::Local}};
-    static const std::map<std::string, PointOrder> orders{{"xyz", PointOrder::XYZ}, {"zyx", PointOrder::ZYX}};
-    command.add_option("--points-space", options.space, "coordinates are world units (LPS), the same in RAS, voxels from 0, voxels from 1, "
-                       "or lengths from the first voxel [what the format says, else world]")
-        ->transform(CLI::Transformer(spaces, CLI::ignore_case).description(""))
-        ->check(CLI::IsMember(spaces).description(""))
-        ->type_name("world|ras|index|index1|local");
-    command.add_option("--points-order", options.order, "order of the coordinates [what the format says, else xyz]")
-        ->transform(CLI::Transformer(orders, CLI::ignore_case).description(""))
-        ->check(CLI::IsMember(orders).description(""))
-        ->type_name("xyz|zyx");
+    add_choice(command, "--points-space", options.space,
+               {{"world", PointSpace::World},
+                {"ras", PointSpace::Ras},
+                {"index", PointSpace::Index},
+                {"index1", PointSpace::IndexOne},
+                {"local", PointSpace::Local}},
+               "coordinates are world units (LPS), the same in RAS, voxels from 0, voxels from 1, or lengths from the "
+               "first voxel [what the format says, else world]");
+    add_choice(command, "--points-order", options.order, {{"xyz", PointOrder::XYZ}, {"zyx", PointOrder::ZYX}},
+               "order of the coordinates [what the format says, else xyz]");
     add_positive(command, "--points-scale", options.scale, "multiplies the points' lengths, 0.001 for micrometres to mm");
     command.add_option("--points-channels", options.channels,
                        "channels of the hyperstack that a Fiji multi-point was clicked in")

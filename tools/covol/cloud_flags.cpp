@@ -1,6 +1,5 @@
 #include "cloud_flags.h"
 
-#include <map>
 #include <sstream>
 
 #include "bindings.h"
@@ -30,20 +29,16 @@ std::string one_line(const CloudCleanupReport& r, const CloudCleanupOptions& opt
 
 void CloudFlags::bind(CLI::App& command) {
     command.add_flag("--remove-outliers{3}", outlier_factor,
-                     "drop points whose distance to their 24 neighbours is more than 3 (or =FACTOR) times the cloud's mean")
-        ->type_name("[=FACTOR]");
+                     "drop points whose distance to their 24 neighbours is more than 3 (or =FACTOR) times the cloud's mean");
     add_length(command, "--simplify", simplify, "", "keep one point in each cell of this edge, 1vx for example");
-    static const std::map<std::string, CloudSmoothing> kinds{
-        {"none", CloudSmoothing::None}, {"jets", CloudSmoothing::Jets}, {"wlop", CloudSmoothing::Wlop}};
-    command.add_option("--smooth", smooth, "smooth the points: fitted quadrics, or projection that evens out their density too")
-        ->transform(CLI::Transformer(kinds, CLI::ignore_case).description(""))
-        ->check(CLI::IsMember(kinds).description(""))
-        ->type_name("none|jets|wlop");
+    add_choice(command, "--smooth", smooth,
+               {{"none", CloudSmoothing::None}, {"jets", CloudSmoothing::Jets}, {"wlop", CloudSmoothing::Wlop}},
+               "move the points to fitted quadrics, or make a quarter as many by projection, evenly spread");
 }
 
 CloudCleanupOptions CloudFlags::resolve(double h) const {
     CloudCleanupOptions options;
-    options.outlier_factor = outlier_factor;
+    if (!outlier_factor.empty()) options.outlier_factor = parse_number("--remove-outliers", outlier_factor);
     options.simplify = simplify.resolve(h, 0);
     options.smooth = smooth;
     return options;

@@ -1,4 +1,5 @@
 #pragma once
+#include <string>
 #include <vector>
 
 #include "arguments.h"
@@ -9,7 +10,7 @@ namespace covol::tool {
 
 /// What is done to a cloud before it is used.
 struct CloudFlags {
-    double outlier_factor = 0;
+    std::string outlier_factor;  ///< a number; empty: outliers stay
     Length simplify;
     CloudSmoothing smooth = CloudSmoothing::None;
 

@@ -21,6 +21,8 @@ struct CloudCleanupOptions {
                                   ///< many times the cloud's mean distance to them go, until none is left; >= 1.
     double simplify = 0;          ///< > 0: one point stays in each cell of a lattice of this edge, world units.
     CloudSmoothing smooth = CloudSmoothing::None;
+    double wlop_share = 0.25;     ///< Of the points, that WLOP makes anew, in (0,1].
+    double wlop_radius = 0;       ///< Of WLOP's neighbourhoods, world units; 0: 2.5 mean spacings of the new points.
     int neighbours = 24;          ///< For outliers and jets, >= 6.
 
     /// Whether anything but duplicates is asked for.
