@@ -343,10 +343,10 @@ private:
 
     // ---- coarse to fine ----------------------------------------------------------------------------------------
 
-    // The way from the start is long in voxels of h. In voxels of 2h a step costs an eighth and goes twice as far; what is
+    // The way from the start is long in voxels of h. In voxels of 2h a step costs a quarter and goes twice as far; what is
     // left to do at h is near the surface that the coarse level finds.
     void start_from_coarse() {
-        if (options_.coarse_levels <= 0) return;
+        if (options_.coarse_levels <= 0 || hold_) return;
         SegmentOptions options = options_;
         options.voxel_size = kRefinement * h();
         options.coarse_levels = options_.coarse_levels - 1;

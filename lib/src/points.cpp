@@ -11,7 +11,6 @@
 #include <charconv>
 #include <cmath>
 #include <fstream>
-#include <functional>
 #include <limits>
 #include <numeric>
 #include <sstream>
@@ -19,66 +18,17 @@
 #include "covol/error.h"
 #include "detail/file.h"
 #include "detail/point_files.h"
+#include "detail/point_reading.h"
 
 namespace covol {
 namespace {
 
-// ---------------------------------------------------------------------------------------------- check_inside
+// ---------------------------------------------------------------------------------------------- reading
 
-Vec3 reversed(const Vec3& p) { return {p[2], p[1], p[0]}; }
-
-std::size_t count_outside(const std::vector<Vec3>& points, const ImageGeometry& geometry,
-                          const std::function<Vec3(const Vec3&)>& change) {
-    constexpr double kTolerance = 1e-3;  // voxels
-    std::size_t outside = 0;
-    for (const Vec3& point : points) {
-        const Vec3 index = geometry.world_to_index(change(point));
-        bool inside = true;
-        for (int a = 0; a < 3; ++a)
-            inside = inside && index[a] >= -0.5 - kTolerance && index[a] <= geometry.size[a] - 0.5 + kTolerance;
-        outside += inside ? 0 : 1;
-    }
-    return outside;
-}
-
-std::string box_text(const WorldBox& box) {
-    std::ostringstream s;
-    s << "(" << box.min[0] << ", " << box.min[1] << ", " << box.min[2] << ") to (" << box.max[0] << ", " << box.max[1]
-      << ", " << box.max[2] << ")";
-    return s.str();
-}
-
-struct Remedy {
-    std::string advice;
-    std::function<Vec3(const Vec3&)> change;  ///< the world position with that advice taken
-};
-
-std::vector<Remedy> remedies(const ImageGeometry& g, PointSpace space) {
-    std::vector<Remedy> list;
-    if (space == PointSpace::Index) {
-        list.push_back({"--points-order zyx would bring them inside",
-                        [&g](const Vec3& p) { return g.index_to_world(reversed(g.world_to_index(p))); }});
-        list.push_back(
-            {"--points-space world would bring them inside", [&g](const Vec3& p) { return g.world_to_index(p); }});
-        list.push_back({"--points-space world --points-order zyx would bring them inside",
-                        [&g](const Vec3& p) { return reversed(g.world_to_index(p)); }});
-    } else {
-        list.push_back({"--points-order zyx would bring them inside", reversed});
-        list.push_back(
-            {"--points-space index would bring them inside", [&g](const Vec3& p) { return g.index_to_world(p); }});
-        list.push_back({"--points-space index --points-order zyx would bring them inside",
-                        [&g](const Vec3& p) { return g.index_to_world(reversed(p)); }});
-        list.push_back({"they fit with x and y negated: they are in RAS, the image is in LPS", [](const Vec3& p) {
-                            return Vec3{-p[0], -p[1], p[2]};
-                        }});
-        for (const double factor : {1e3, 1e-3})
-            list.push_back({std::string("they fit when multiplied by ") + (factor > 1 ? "1000" : "0.001") +
-                                ": their unit is another than the image's",
-                            [factor](const Vec3& p) {
-                                return Vec3{factor * p[0], factor * p[1], factor * p[2]};
-                            }});
-    }
-    return list;
+template <typename T>
+T first_stated(T options, T file, T otherwise) {
+    if (options != T::Unstated) return options;
+    return file != T::Unstated ? file : otherwise;
 }
 
 // ---------------------------------------------------------------------------------------------- neighbours
@@ -198,47 +148,39 @@ std::string to_ply(const std::vector<Vec3>& points, const std::string& comment) 
 }  // namespace
 
 PointCloud read_points(const std::string& path, const ReadPointsOptions& options) {
+    if (!(options.scale > 0) || !std::isfinite(options.scale))
+        throw Error(Errc::InvalidOptions, "read_points: scale: expected > 0, got " + std::to_string(options.scale));
+    if (options.channels < 1)
+        throw Error(Errc::InvalidOptions,
+                    "read_points: channels: expected >= 1, got " + std::to_string(options.channels));
     detail::PointTable table = detail::read_point_table(path);
     if (table.points.empty())
         throw Error(Errc::InvalidInput, "read_points: " + path + ": expected at least one point, got none");
     PointCloud cloud;
     cloud.source = path;
-    cloud.space = options.space != PointSpace::Unstated ? options.space
-                  : table.space != PointSpace::Unstated ? table.space
-                                                        : PointSpace::World;
-    const PointOrder order = options.order != PointOrder::Unstated ? options.order : table.order;
+    cloud.stated = (options.space != PointSpace::Unstated || table.space != PointSpace::Unstated) &&
+                   (options.order != PointOrder::Unstated || table.order != PointOrder::Unstated);
+    cloud.reading = {first_stated(options.space, table.space, PointSpace::World),
+                     first_stated(options.order, table.order, PointOrder::XYZ), options.scale,
+                     options.channels};
+    cloud.space = detail::space_after(cloud.reading.space);
     cloud.points = std::move(table.points);
-    if (order == PointOrder::ZYX)
-        for (Vec3& p : cloud.points) std::swap(p[0], p[2]);
-    cloud.rule = table.rule + ", as " + (order == PointOrder::ZYX ? "z, y, x" : "x, y, z") + " in " +
-                 (cloud.space == PointSpace::Index ? "voxels" : "world units");
+    for (Vec3& p : cloud.points) p = detail::read_as(cloud.reading, p);
+    cloud.lines = std::move(table.lines);
+    cloud.rule = table.rule + ", as " + detail::describe(cloud.reading);
     return cloud;
 }
 
 std::vector<Vec3> to_world(const PointCloud& cloud, const ImageGeometry* geometry) {
-    if (cloud.space != PointSpace::Index) return cloud.points;
+    if (cloud.space == PointSpace::World) return cloud.points;
     if (geometry == nullptr)
         throw Error(Errc::InvalidInput, "to_world: " + cloud.source +
-                                            ": the points are in voxels of an image, and there is no image; give one, "
-                                            "or --points-space world");
+                                            ": the points are in an image's own frame, and there is no image; give one, "
+                                            "or --points-space world for points in lengths");
     std::vector<Vec3> world;
     world.reserve(cloud.points.size());
-    for (const Vec3& p : cloud.points) world.push_back(geometry->index_to_world(p));
+    for (const Vec3& p : cloud.points) world.push_back(detail::to_world(cloud.space, p, *geometry));
     return world;
-}
-
-void check_inside(const std::vector<Vec3>& world_points, const ImageGeometry& geometry, const std::string& source,
-                  PointSpace space) {
-    const std::size_t outside = count_outside(world_points, geometry, [](const Vec3& p) { return p; });
-    if (outside == 0) return;
-    std::string message = "check_inside: " + source + ": " + std::to_string(outside) + " of " +
-                          std::to_string(world_points.size()) + " points lie outside the image: points from " +
-                          box_text(bounding_box(world_points)) + ", image from " + box_text(geometry.world_box());
-    for (const Remedy& remedy : remedies(geometry, space))
-        if (count_outside(world_points, geometry, remedy.change) == 0)
-            throw Error(Errc::InvalidInput, message + "; " + remedy.advice);
-    if (!geometry.spacing_known) message += "; the image states no spacing, --spacing sx,sy,sz gives it";
-    throw Error(Errc::InvalidInput, message);
 }
 
 std::vector<Vec3> merge_close_points(const std::vector<Vec3>& points, double cell) {

@@ -12,18 +12,18 @@ LAYERS = [
     ["image", "points", "mesh", "vdb_io", "mesh_io"],
     ["distance", "edge", "scan_noise"],
     ["band", "evolve", "scan_solid"],
-    ["surface", "mesh_cleanup", "compare"],
+    ["surface", "mesh_cleanup", "cloud_cleanup", "compare"],
     ["pipeline", "phantom", "render"],
 ]
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 # Files of lib/src whose name is not their header's.
-SOURCE_LEVEL = {"image_sampling": LEVEL["image"], "image_statistics": LEVEL["image"], "image_write": LEVEL["image"],
+SOURCE_LEVEL = {"points_check": LEVEL["points"], "image_sampling": LEVEL["image"], "image_statistics": LEVEL["image"], "image_write": LEVEL["image"],
                 "tag_distance": LEVEL["band"], "start": LEVEL["band"], "surface_mesh": LEVEL["surface"],
                 "mesh_distance": LEVEL["surface"]}
 HEAVY = re.compile(r"#\s*include\s*[<\"](openvdb/(?!version\.h)|tbb/|oneapi/|OpenMesh/|CGAL/|itk|CLI/|nlohmann/)")
 LOUD = re.compile(r"\bstd::(cout|cerr|clog)\b|(?<![\w:])(printf|puts|putchar)\s*\(|\bfprintf\s*\(\s*std(out|err)"
                   r"|(?<![\w.])(std::|::)?(exit|_Exit|quick_exit|abort|terminate)\s*\(")
-GPL_FILES = {"mesh_cleanup.cpp", "mesh_distance.cpp"}
+GPL_FILES = {"cloud_cleanup.cpp", "mesh_cleanup.cpp", "mesh_distance.cpp"}
 INCLUDE = re.compile(r"#\s*include\s*\"covol/(\w+)\.h\"")
 
 

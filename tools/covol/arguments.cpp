@@ -63,6 +63,14 @@ Length parse_length(const std::string& flag, const std::string& text) {
     return length;
 }
 
+double parse_number(const std::string& flag, const std::string& text) {
+    const std::string expected = "a number";
+    std::string rest;
+    const double value = leading_number(flag, expected, text, rest);
+    if (!rest.empty()) bad_text(flag, expected, text);
+    return value;
+}
+
 Vec3 parse_vec3(const std::string& flag, const std::string& text) {
     const std::vector<double> v = numbers(flag, "x,y,z", text, 3);
     return {v[0], v[1], v[2]};

@@ -30,6 +30,7 @@ struct Length {
 // Each takes the option's name for its messages.
 // @throws UsageError for text that is no number, Error InvalidOptions for numbers out of range.
 [[nodiscard]] Length parse_length(const std::string& flag, const std::string& text);
+[[nodiscard]] double parse_number(const std::string& flag, const std::string& text);
 [[nodiscard]] Vec3 parse_vec3(const std::string& flag, const std::string& text);
 [[nodiscard]] WorldBox parse_box(const std::string& flag, const std::string& text);
 /// tag, sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1, mesh:FILE, mask:FILE, vdb:FILE

@@ -1,7 +1,6 @@
 #include "bindings.h"
 
 #include <cmath>
-#include <map>
 
 #include "covol/error.h"
 
@@ -95,22 +94,27 @@ WorldBox sampled_box(const WorldBox& box, double h) {
 }
 
 CLI::Option* PointFlags::bind(CLI::App& command, const std::string& flag) {
-    CLI::Option* option = command.add_option(flag, paths, "point clouds: XYZ, CSV, PLY, OBJ, OFF")->type_name("FILE...");
+    CLI::Option* option = command.add_option(flag, paths, "points: XYZ, CSV, PLY, OBJ, OFF, PCD, LAS; marks of Fiji, napari, 3D Slicer, ITK-SNAP")->type_name("FILE...");
     bind_options(command);
     return option;
 }
 
 void PointFlags::bind_options(CLI::App& command) {
-    static const std::map<std::string, PointSpace> spaces{{"world", PointSpace::World}, {"index", PointSpace::Index}};
-    static const std::map<std::string, PointOrder> orders{{"xyz", PointOrder::XYZ}, {"zyx", PointOrder::ZYX}};
-    command.add_option("--points-space", options.space, "coordinates are world units or voxel indices")
-        ->transform(CLI::Transformer(spaces, CLI::ignore_case).description(""))
-        ->check(CLI::IsMember(spaces).description(""))
-        ->type_name("world|index");
-    command.add_option("--points-order", options.order, "order of the coordinates")
-        ->transform(CLI::Transformer(orders, CLI::ignore_case).description(""))
-        ->check(CLI::IsMember(orders).description(""))
-        ->type_name("xyz|zyx");
+    add_choice(command, "--points-space", options.space,
+               {{"world", PointSpace::World},
+                {"ras", PointSpace::Ras},
+                {"index", PointSpace::Index},
+                {"index1", PointSpace::IndexOne},
+                {"local", PointSpace::Local}},
+               "coordinates are world units (LPS), the same in RAS, voxels from 0, voxels from 1, or lengths from the "
+               "first voxel [what the format says, else world]");
+    add_choice(command, "--points-order", options.order, {{"xyz", PointOrder::XYZ}, {"zyx", PointOrder::ZYX}},
+               "order of the coordinates [what the format says, else xyz]");
+    add_positive(command, "--points-scale", options.scale, "multiplies the points' lengths, 0.001 for micrometres to mm");
+    command.add_option("--points-channels", options.channels,
+                       "channels of the hyperstack that a Fiji multi-point was clicked in")
+        ->check(CLI::Range(1, 1000).description(""))
+        ->type_name("N");
 }
 
 WorldPoints read_world_points(const PointFlags& flags, const ImageGeometry* geometry, const RunContext& run) {
@@ -119,7 +123,7 @@ WorldPoints read_world_points(const PointFlags& flags, const ImageGeometry* geom
         run.check();
         const PointCloud cloud = read_points(path, flags.options);
         const std::vector<Vec3> world = to_world(cloud, geometry);
-        if (geometry != nullptr) check_inside(world, *geometry, path);
+        if (geometry != nullptr) check_inside(cloud, *geometry, run);
         all.points.insert(all.points.end(), world.begin(), world.end());
         all.rules.push_back(cloud.rule);
         run.info(path + ": " + std::to_string(world.size()) + " points" + (cloud.rule.empty() ? "" : ", " + cloud.rule));

@@ -1,4 +1,5 @@
 #pragma once
+#include <map>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,19 @@ namespace covol::tool {
 /// An option that is a length; `what_else` is shown as its default.
 CLI::Option* add_length(CLI::App& command, const std::string& flag, Length& target, const std::string& shown_default,
                         const std::string& description);
+
+/// An option that is one of several words, which configuration files keep as such.
+template <typename T>
+CLI::Option* add_choice(CLI::App& command, const std::string& flag, T& target, const std::map<std::string, T>& choices,
+                        const std::string& description) {
+    std::string names;
+    for (const auto& [name, value] : choices) names += (names.empty() ? "" : "|") + name;
+    return command
+        .add_option_function<std::string>(
+            flag, [&target, choices](const std::string& text) { target = choices.at(CLI::detail::to_lower(text)); }, description)
+        ->check(CLI::IsMember(choices, CLI::ignore_case).description(""))
+        ->type_name(names);
+}
 
 /// The image's own facts that the user corrects.
 struct ImageFlags {

@@ -149,7 +149,7 @@ void check_points(const std::string& path, const std::string& image_path, const 
     if (image_path.empty()) return;
     const ImageGeometry geometry = read_image_geometry(image_path, flags.options, run);
     try {
-        check_inside(to_world(cloud, &geometry), geometry, path);
+        check_inside(cloud, geometry, run);
     } catch (const Error& error) {
         findings.problem(error.what());
     }

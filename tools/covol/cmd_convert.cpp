@@ -1,4 +1,7 @@
+#include <algorithm>
+
 #include "bindings.h"
+#include "cloud_flags.h"
 #include "commands.h"
 #include "covol/error.h"
 #include "covol/vdb_io.h"
@@ -25,6 +28,7 @@ struct ConvertJob {
     ImageFlags image;
     MeshFlags mesh;
     PointFlags points;  ///< its options alone
+    CloudFlags cloud_flags;
     bool half = false;
 
     void image_to_vdb(Session& session) const {
@@ -54,8 +58,15 @@ struct ConvertJob {
         std::optional<ImageGeometry> geometry;
         if (!like.empty()) geometry = read_image_geometry(like, image.options, session.run());
         const PointCloud cloud = read_points(input, points.options);
-        const std::vector<Vec3> world = to_world(cloud, geometry ? &*geometry : nullptr);
-        session.report()["points"] = {{"count", world.size()}, {"rule", cloud.rule}};
+        std::vector<Vec3> world = to_world(cloud, geometry ? &*geometry : nullptr);
+        if (geometry) check_inside(cloud, *geometry, session.run());
+        session.note(input + ": " + std::to_string(world.size()) + " points, " + cloud.rule);
+        Json& report = session.report()["points"];
+        report = {{"count", world.size()}, {"rule", cloud.rule}};
+        if (cloud_flags.simplify.given && cloud_flags.simplify.in_voxels && !geometry)
+            throw UsageError("--simplify: a length in voxels needs --like IMAGE");
+        const double h = geometry ? *std::min_element(geometry->spacing.begin(), geometry->spacing.end()) : 1;
+        world = cloud_flags.clean(world, h, session, report);
         session.outputs().add(output, [world, comment = session.comment()](const std::string& path) {
             write_points(path, world, comment);
         });
@@ -74,6 +85,7 @@ struct ConvertJob {
         const FileKind to = kind_of_output(output, from);
         session.outputs().check("OUT", output, output_kind(to));
         mesh.check();
+        cloud_flags.check();
         if (from == FileKind::Image && to == FileKind::Vdb) return image_to_vdb(session);
         if (from == FileKind::Vdb && to == FileKind::Image) return vdb_to_image(session);
         if (from == FileKind::Points && to == FileKind::Points) return convert_points(session);
@@ -98,6 +110,7 @@ void add_convert(Session& session) {
     command->add_option("--grid", job->grid_name, "grid to take from a .vdb file [the first]")->type_name("NAME");
     add_length(*command, "--voxel-size", job->voxel_size, "", "edge of the voxels of a .vdb file [smallest spacing]");
     job->points.bind_options(*command);
+    job->cloud_flags.bind(*command);
     job->mesh.bind(*command);
     job->image.bind(*command);
     command->add_flag("--half", job->half, "store values as 16-bit floats");

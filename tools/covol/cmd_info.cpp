@@ -18,6 +18,15 @@ std::string triple(const auto& v) {
     return text.str();
 }
 
+const char* name_of(PointSpace space) {
+    switch (space) {
+        case PointSpace::Index: return "index";
+        case PointSpace::Local: return "local";
+        case PointSpace::Slices: return "slices";
+        default: return "world";
+    }
+}
+
 void describe_vdb(const std::string& path, Session& session) {
     Json& grids = session.report()["grids"] = Json::array();
     for (const VdbGridInfo& g : list_vdb(path)) {
@@ -102,18 +111,21 @@ void describe_mesh(const std::string& path, Session& session) {
     session.report()["mesh"]["triangles"] = mesh.triangles.size();
 }
 
-void describe_points(const std::string& path, Session& session) {
-    const PointCloud cloud = read_points(path);
+void describe_points(const std::string& path, const PointFlags& flags, Session& session) {
+    const PointCloud cloud = read_points(path, flags.options);
     const WorldBox box = bounding_box(cloud.points);
     const std::vector<Vec3> distinct = merge_close_points(cloud.points, 0);
     std::ostringstream text;
-    text << cloud.points.size() << " points, " << distinct.size() << " distinct" << (cloud.rule.empty() ? "" : ", ")
-         << cloud.rule << "\nfrom " << triple(box.min) << " to " << triple(box.max);
+    const auto closed = std::count_if(cloud.lines.begin(), cloud.lines.end(), [](const MarkLine& l) { return l.closed; });
+    text << cloud.points.size() << " points, " << distinct.size() << " distinct, " << cloud.rule;
+    if (!cloud.lines.empty()) text << "\n" << cloud.lines.size() << " lines, " << closed << " of them closed";
+    text << "\nfrom " << triple(box.min) << " to " << triple(box.max);
     Json& report = session.report()["points"];
     report = {{"count", cloud.points.size()},
               {"distinct", distinct.size()},
               {"rule", cloud.rule},
-              {"space", cloud.space == PointSpace::Index ? "index" : "world"},
+              {"lines", {{"count", cloud.lines.size()}, {"closed", closed}}},
+              {"space", name_of(cloud.space)},
               {"box", to_json(box)}};
     if (distinct.size() > 1) {
         const SpacingStatistics s = nearest_neighbour_spacing(distinct);
@@ -124,14 +136,14 @@ void describe_points(const std::string& path, Session& session) {
     session.say(text.str());
 }
 
-void describe(const std::string& path, const ImageFlags& flags, Session& session) {
+void describe(const std::string& path, const ImageFlags& flags, const PointFlags& points, Session& session) {
     const FileKind kind = kind_of_file(path);
     session.report()["kind"] = to_string(kind);
     switch (kind) {
         case FileKind::Vdb: return describe_vdb(path, session);
         case FileKind::Image: return describe_image(path, flags, session);
         case FileKind::Mesh: return describe_mesh(path, session);
-        case FileKind::Points: return describe_points(path, session);
+        case FileKind::Points: return describe_points(path, points, session);
     }
 }
 
@@ -140,10 +152,12 @@ void describe(const std::string& path, const ImageFlags& flags, Session& session
 void add_info(Session& session) {
     const auto path = std::make_shared<std::string>();
     const auto flags = std::make_shared<ImageFlags>();
+    const auto points = std::make_shared<PointFlags>();
     CLI::App* command = session.add_command("info", "What is in a file: .vdb, image, mesh or points",
-                                            [path, flags, &session] { describe(*path, *flags, session); });
+                                            [path, flags, points, &session] { describe(*path, *flags, *points, session); });
     command->add_option("file", *path, "the file")->required()->type_name("FILE");
     flags->bind(*command);
+    points->bind_options(*command);
 }
 
 }  // namespace covol::tool

@@ -43,6 +43,7 @@ SegmentOptions resolve(const SegmentJob& job, double h) {
 void check_options(const SegmentJob& job) {
     const std::string why = resolve(job, 1.0).why_invalid();
     if (!why.empty()) throw Error(Errc::InvalidOptions, why);
+    job.cloud.check();
 }
 
 void fill_report(Session& session, const SegmentReport& r) {
@@ -90,6 +91,7 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
     command.add_option("--mesh", mesh_path, "triangles")->type_name("OUT.ply|.obj|.stl|.off|.glb");
     command.add_option("--density", density_path, "the solid as a fog volume in [0,1]")->type_name("OUT.vdb");
     command.add_option("--fields", fields_path, "u, distance and edge, for a look inside")->type_name("OUT.vdb");
+    cloud.bind(command);
     evolve.bind(command, with_image);
     if (with_image) edge.bind(command);
     tag.bind(command);
@@ -128,17 +130,18 @@ void SegmentJob::run(Session& session) {
         input["image"] = to_json(pixels->geometry());
         input["image"]["path"] = image_path;
     }
-    const WorldPoints cloud = read_world_points(points, pixels ? &pixels->geometry() : nullptr, session.run());
-    input["points"] = {{"count", cloud.points.size()}, {"densified", 0}, {"paths", points.paths}, {"rules", cloud.rules}};
+    WorldPoints marks = read_world_points(points, pixels ? &pixels->geometry() : nullptr, session.run());
+    input["points"] = {{"count", marks.points.size()}, {"densified", 0}, {"paths", points.paths}, {"rules", marks.rules}};
     session.add_seconds("read", reading.seconds());
     session.add_seconds("total", reading.seconds());
 
     const Image* pointer = pixels ? &*pixels : nullptr;
-    if (pointer == nullptr && cloud.points.empty()) throw UsageError("expected an image or points, got neither");
-    const double h = domain.resolve_voxel_size(pointer, cloud.points, session);
+    if (pointer == nullptr && marks.points.empty()) throw UsageError("expected an image or points, got neither");
+    const double h = domain.resolve_voxel_size(pointer, marks.points, session);
+    marks.points = cloud.clean(marks.points, h, session, input["points"]);
     // Shared by the writers that run at the end.
     const auto result =
-        std::make_shared<SegmentResult>(segment(pointer, cloud.points, resolve(*this, h), session.run()));
+        std::make_shared<SegmentResult>(segment(pointer, marks.points, resolve(*this, h), session.run()));
     fill_report(session, result->report);
     summarise(session, result->report);
 

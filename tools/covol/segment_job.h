@@ -3,6 +3,7 @@
 #include <string>
 
 #include "bindings.h"
+#include "cloud_flags.h"
 
 namespace covol::tool {
 
@@ -11,6 +12,7 @@ struct SegmentJob {
     std::string image_path;  ///< empty: points alone
     ImageFlags image;
     PointFlags points;
+    CloudFlags cloud;
     DomainFlags domain;
     TagFlags tag;
     EdgeFlags edge;

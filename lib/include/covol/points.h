@@ -5,15 +5,27 @@
 
 #include "covol/fwd.h"
 #include "covol/image.h"
+#include "covol/run.h"
 
 namespace covol {
 
-enum class PointSpace { Unstated, World, Index };  ///< Index: voxels of the image, 0-based, centres at integers
+enum class PointSpace {
+    Unstated,
+    World,    ///< the image's physical space, LPS where it is anatomical
+    Index,    ///< voxels of the image, from 0, centres at integers
+    Ras,      ///< world, with x and y towards right and anterior: both signs are turned on reading
+    IndexOne, ///< voxels counted from 1: 1 is taken away on reading
+    Local,    ///< lengths along the image's axes from the centre of voxel 0: the origin is left out, as Fiji does
+    Slices    ///< x and y as in Local, z a slice from 0 (Fiji's Results)
+};
 enum class PointOrder { Unstated, XYZ, ZYX };
 
 struct ReadPointsOptions {
     PointSpace space = PointSpace::Unstated;  ///< Unstated: what the format says, else World.
     PointOrder order = PointOrder::Unstated;  ///< Unstated: what the format says, else XYZ.
+    double scale = 1;                         ///< Multiplies lengths (not voxels): 0.001 for micrometres to mm.
+    int channels = 1;                         ///< z / channels is the slice: Fiji counts a multi-point's positions
+                                              ///< through a hyperstack's channels too. Points in voxels alone.
 };
 
 /// An ordered line of marks: the points [begin, end) of a cloud, as a person clicked them along a border.
@@ -27,25 +39,33 @@ struct MarkLine {
 struct PointCloud {
     std::vector<Vec3> points;
     std::vector<MarkLine> lines;  ///< what the file says of their order; empty for loose points
-    PointSpace space = PointSpace::World;
+    PointSpace space = PointSpace::World;  ///< World, Index, Local or Slices
+    ReadPointsOptions reading;             ///< how the file's coordinates became these
+    bool stated = false;                   ///< the format or the caller said so; else `reading` is a guess
     std::string source;  ///< path, for messages
     std::string rule;    ///< how coordinates were understood, one line for people
 };
 
-/// Reads XYZ, CSV/TSV (with or without a header; columns x,y,z found by name), PLY (ascii, both binary
-/// byte orders), OBJ or OFF (their vertices).
+/// Reads, by the name's end:
+/// - .xyz .txt .pts .asc .csv .tsv: columns, by name where there is a header: x, y, z; slice, contour, x_px, y_px;
+///   napari's points and shapes; Fiji's Results (X, Y, Slice)
+/// - .roi, .zip: Fiji's selections. .mrk.json, .fcsv: 3D Slicer. .annot: ITK-SNAP. .landmarks, .lmk: Convert3D
+/// - .ply (ascii, both binary byte orders), .obj, .off: their vertices. .pcd, .las: scans
+///
+/// Each format's own coordinate rule is applied and told in `rule`; the options go before it.
 /// @throws Error Io, InvalidInput (with path:line: text instead of numbers, NaN, truncated, no point), Unsupported.
 [[nodiscard]] PointCloud read_points(const std::string& path, const ReadPointsOptions& options = {});
 
-/// World positions; index points are mapped by the image's geometry.
-/// @throws Error InvalidInput when points are in index space and `geometry` is null.
+/// World positions; points in voxels or on slices are mapped by the image's geometry.
+/// @throws Error InvalidInput when points need the image and `geometry` is null.
 [[nodiscard]] std::vector<Vec3> to_world(const PointCloud& cloud, const ImageGeometry* geometry);
 
-/// @throws Error InvalidInput when a point lies outside the image: how many of how many, both boxes, and the
-///         option (--points-space, --points-order, --spacing) that would bring them inside where one does.
-/// @param space  how the file's coordinates were understood (PointCloud::space)
-void check_inside(const std::vector<Vec3>& world_points, const ImageGeometry& geometry, const std::string& source,
-                  PointSpace space = PointSpace::World);
+/// Tries the usual mistakes where a point lies outside the image: order of the axes, voxels for world units and the
+/// reverse, voxels counted from 1, RAS for LPS, an origin left out, micrometres for millimetres, and two of them.
+/// Where all lie inside, warns through `run` when another reading is far more plausible, or the image has no spacing.
+/// @throws Error InvalidInput when a point lies outside: how many of how many, both boxes, and the options
+///         (--points-space, --points-order, --points-scale, --points-channels, --spacing) that would mend it.
+void check_inside(const PointCloud& cloud, const ImageGeometry& geometry, const RunContext& run = {});
 
 /// Exact duplicates, and points closer than `cell` / 2 in the same cell of a lattice of edge `cell`, become one.
 /// The first of each stays; the order stays. cell = 0 removes exact duplicates only.

@@ -1,132 +1,21 @@
 #include "detail/point_files.h"
 
 #include <algorithm>
-#include <array>
-#include <bit>
-#include <charconv>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <optional>
-#include <string_view>
+#include <functional>
+#include <numbers>
 
 #include "covol/error.h"
 #include "detail/file.h"
+#include "detail/point_formats.h"
+#include "detail/point_text.h"
 
 namespace covol::detail {
 namespace {
 
 namespace fs = std::filesystem;
-using std::string_view;
-
-// ---------------------------------------------------------------------------------------------- text
-
-[[noreturn]] void fail(const std::string& path, std::size_t line, const std::string& what) {
-    throw Error(Errc::InvalidInput, "read_points: " + path + ":" + std::to_string(line) + ": " + what);
-}
-
-[[noreturn]] void fail(const std::string& path, const std::string& what) {
-    throw Error(Errc::InvalidInput, "read_points: " + path + ": " + what);
-}
-
-bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f'; }
-
-string_view trim(string_view text) {
-    while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
-    while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
-    return text;
-}
-
-std::string lower(string_view text) {
-    std::string result(text);
-    for (char& c : result)
-        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-    return result;
-}
-
-/// What a message may quote of a file: short, and no control characters.
-std::string quote(string_view text) {
-    constexpr std::size_t kLongest = 40;
-    std::string result = "'";
-    for (const char c : text.substr(0, kLongest)) result += static_cast<unsigned char>(c) < 32 ? '?' : c;
-    return result + (text.size() > kLongest ? "...'" : "'");
-}
-
-std::optional<double> to_number(string_view text) {
-    if (!text.empty() && text.front() == '+') text.remove_prefix(1);
-    double value = 0;
-    const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (status != std::errc() || end != text.data() + text.size()) return std::nullopt;
-    return value;
-}
-
-/// A coordinate: a finite number. @throws Error with path:line.
-double to_coordinate(const std::string& path, std::size_t line, string_view field) {
-    const std::optional<double> value = to_number(field);
-    if (!value) fail(path, line, "expected a number, got " + quote(field));
-    if (!std::isfinite(*value)) fail(path, line, "expected a finite number, got " + quote(field));
-    return *value;
-}
-
-/// The lines of a text, counted from 1. Unix, DOS and old Macintosh line ends.
-class Lines {
-public:
-    explicit Lines(string_view text) : rest_(text) {
-        if (rest_.substr(0, 3) == "\xEF\xBB\xBF") rest_.remove_prefix(3);
-        if (rest_.find('\n') == string_view::npos && rest_.find('\r') != string_view::npos) end_ = '\r';
-    }
-    /// The next line, blanks at both ends removed; false at the end of the text.
-    bool next(string_view& line) {
-        if (!next_untrimmed(line)) return false;
-        line = trim(line);
-        return true;
-    }
-    /// With its blanks: a leading tab is an empty first column.
-    bool next_untrimmed(string_view& line) {
-        if (rest_.empty()) return false;
-        const std::size_t end = std::min(rest_.find(end_), rest_.size());
-        line = rest_.substr(0, end);
-        rest_.remove_prefix(std::min(end + 1, rest_.size()));
-        ++number_;
-        return true;
-    }
-    [[nodiscard]] std::size_t number() const { return number_; }
-    [[nodiscard]] string_view rest() const { return rest_; }
-
-private:
-    string_view rest_;
-    char end_ = '\n';
-    std::size_t number_ = 0;
-};
-
-/// Cuts a line at `delimiter`, outside double quotes; ' ' stands for any run of blanks.
-void split(string_view line, char delimiter, std::vector<string_view>& fields) {
-    fields.clear();
-    if (delimiter == ' ') {
-        for (std::size_t at = 0; at < line.size();) {
-            while (at < line.size() && is_blank(line[at])) ++at;
-            const std::size_t begin = at;
-            while (at < line.size() && !is_blank(line[at])) ++at;
-            if (at > begin) fields.push_back(line.substr(begin, at - begin));
-        }
-        return;
-    }
-    bool quoted = false;
-    std::size_t begin = 0;
-    const auto add = [&](std::size_t end) {
-        string_view field = trim(line.substr(begin, end - begin));
-        if (field.size() >= 2 && field.front() == '"' && field.back() == '"')
-            field = trim(field.substr(1, field.size() - 2));
-        fields.push_back(field);
-        begin = end + 1;
-    };
-    for (std::size_t at = 0; at < line.size(); ++at) {
-        if (line[at] == '"') quoted = !quoted;
-        if (line[at] == delimiter && !quoted) add(at);
-    }
-    add(line.size());
-}
 
 std::string read_text(const std::string& path) {
     std::error_code status;
@@ -140,477 +29,69 @@ std::string read_text(const std::string& path) {
     return text;
 }
 
-// ---------------------------------------------------------------------------------------------- columns
+using Parser = std::function<PointTable(const std::string& path, const std::string& content)>;
 
-/// Which three columns hold a point.
-struct Columns {
-    std::array<std::size_t, 3> at{0, 1, 2};
-    PointSpace space = PointSpace::Unstated;
-    PointOrder order = PointOrder::Unstated;
-    std::string rule;
+struct Format {
+    const char* ending;
+    Parser parse;
 };
 
-/// A column's name and what is said of its unit: "X (microns)" is {"x", "microns"}, "x_px" is {"x", "px"}.
-struct ColumnName {
-    std::string name;
-    std::string unit;
-};
+PointTable parse_table(const std::string& path, const std::string& text) { return parse_columns(path, text, false); }
+PointTable parse_blanks(const std::string& path, const std::string& text) { return parse_columns(path, text, true); }
 
-ColumnName parse_name(string_view text) {
-    std::string name = lower(trim(text));
-    for (const char* prefix : {"position ", "position_", "pos ", "pos_", "coord_", "point_", "//"})
-        if (name.rfind(prefix, 0) == 0) name.erase(0, std::strlen(prefix));
-    const std::size_t cut = name.find_first_of(" ([_");
-    if (cut == std::string::npos || cut == 0) return {name, ""};
-    std::string unit = name.substr(cut + 1);
-    std::erase_if(unit, [](char c) { return c == '(' || c == ')' || c == '[' || c == ']' || c == ' '; });
-    return {name.substr(0, cut), unit};
+PointTable parse_one_roi(const std::string& path, const std::string& bytes) {
+    return parse_roi(path, bytes, fs::path(path).stem().string());
 }
 
-bool means_voxels(const std::string& unit) {
-    for (const char* word : {"px", "pixel", "pixels", "vx", "voxel", "voxels", "index"})
-        if (unit == word) return true;
-    return false;
+PointTable refuse_laz(const std::string& path, const std::string&) {
+    throw Error(Errc::Unsupported,
+                "read_points: " + path + ": LAZ is not read; unpack it to .las with laszip or pdal translate");
 }
 
-std::optional<Columns> find_columns(const std::vector<string_view>& header) {
-    std::array<std::optional<std::size_t>, 3> named, axes;
-    std::optional<std::size_t> slice;
-    std::array<std::string, 3> units;
-    for (std::size_t n = 0; n < header.size(); ++n) {
-        const ColumnName column = parse_name(header[n]);
-        if (column.name.size() == 1 && column.name[0] >= 'x' && column.name[0] <= 'z') {
-            const auto axis = static_cast<std::size_t>(column.name[0] - 'x');
-            if (!named[axis]) {
-                named[axis] = n;
-                units[axis] = column.unit;
-            }
-        }
-        for (std::size_t axis = 0; axis < 3; ++axis)
-            if (column.name == "axis-" + std::to_string(axis)) axes[axis] = n;
-        if (column.name == "slice") slice = n;
-    }
-    Columns columns;
-    if (axes[0] && axes[1] && axes[2]) {
-        columns.at = {*axes[0], *axes[1], *axes[2]};
-        columns.space = PointSpace::Index;
-        columns.order = PointOrder::ZYX;
-        columns.rule = "columns axis-0, axis-1, axis-2 (napari)";
-        return columns;
-    }
-    const bool in_voxels = means_voxels(units[0]) && means_voxels(units[1]);
-    if (!named[2] && in_voxels && slice) named[2] = slice;
-    if (!named[0] || !named[1] || !named[2]) return std::nullopt;
-    columns.at = {*named[0], *named[1], *named[2]};
-    if (in_voxels) columns.space = PointSpace::Index;
-    columns.rule = "columns";
-    for (std::size_t axis = 0; axis < 3; ++axis)
-        columns.rule += (axis == 0 ? " " : ", ") + std::string(header[columns.at[axis]]);
-    return columns;
-}
-
-char guess_delimiter(string_view line, bool blanks_only) {
-    if (line.find(';') != string_view::npos) return ';';
-    if (!blanks_only && line.find('\t') != string_view::npos) return '\t';
-    return line.find(',') != string_view::npos ? ',' : ' ';
-}
-
-/// XYZ, CSV, TSV: one point a line.
-/// @param blanks_only  columns are cut at runs of blanks and tabs, unless there are commas or semicolons
-PointTable read_columns(const std::string& path, const std::string& text, bool blanks_only) {
-    PointTable table;
-    table.points.reserve(text.size() / 24);
-    Lines lines(text);
-    string_view line;
-    std::vector<string_view> fields;
-    std::string decimal;  // a field whose decimal comma became a point
-    char delimiter = 0;
-    Columns columns;
-    std::size_t needed = 0;
-    while (lines.next_untrimmed(line)) {
-        line = line.substr(0, line.find('#'));
-        const string_view trimmed = trim(line);
-        if (trimmed.empty() || trimmed.substr(0, 2) == "//") continue;
-        const bool first = delimiter == 0;
-        if (first) delimiter = guess_delimiter(trimmed, blanks_only);
-        split(delimiter == '\t' ? line : trimmed, delimiter, fields);
-        line = trimmed;
-        if (first) {
-            std::optional<Columns> found;
-            const bool has_number =
-                std::any_of(fields.begin(), fields.end(), [](string_view f) { return to_number(f).has_value(); });
-            if (!has_number) found = find_columns(fields);
-            if (found) columns = *found;
-            needed = *std::max_element(columns.at.begin(), columns.at.end()) + 1;
-            if (found) continue;
-            // .pts begins with the number of points
-            if (blanks_only && fields.size() == 1 && has_number) {
-                delimiter = 0;
-                continue;
-            }
-            if (!has_number && fields.size() >= 3)
-                fail(path, lines.number(), "expected columns named x, y, z or three numbers, got " + quote(line));
-            columns.rule = fields.size() > 3
-                               ? "the first three of " + std::to_string(fields.size()) + " columns without names"
-                               : "three columns without names";
-        }
-        if (fields.size() < needed)
-            fail(path, lines.number(),
-                 "expected " + std::to_string(needed) + (needed == 3 ? " numbers" : " columns") + ", got " +
-                     std::to_string(fields.size()) + " in " + quote(line));
-        Vec3 point;
-        for (std::size_t a = 0; a < 3; ++a) {
-            string_view field = fields[columns.at[a]];
-            if (delimiter == ';' && field.find(',') != string_view::npos) {
-                decimal = field;
-                std::replace(decimal.begin(), decimal.end(), ',', '.');
-                field = decimal;
-            }
-            point[a] = to_coordinate(path, lines.number(), field);
-        }
-        table.points.push_back(point);
-    }
-    table.space = columns.space;
-    table.order = columns.order;
-    table.rule = columns.rule;
-    return table;
-}
-
-// ---------------------------------------------------------------------------------------------- OBJ, OFF
-
-Vec3 first_three(const std::string& path, std::size_t line, const std::vector<string_view>& fields, std::size_t from) {
-    if (fields.size() < from + 3)
-        fail(path, line, "expected 3 numbers, got " + std::to_string(fields.size() - std::min(from, fields.size())));
-    Vec3 point;
-    for (std::size_t a = 0; a < 3; ++a) point[a] = to_coordinate(path, line, fields[from + a]);
-    return point;
-}
-
-PointTable read_obj(const std::string& path, const std::string& text) {
-    PointTable table;
-    table.rule = "vertices of an OBJ";
-    Lines lines(text);
-    string_view line;
-    std::vector<string_view> fields;
-    while (lines.next(line)) {
-        if (line.size() < 2 || line[0] != 'v' || !is_blank(line[1])) continue;
-        split(line, ' ', fields);
-        table.points.push_back(first_three(path, lines.number(), fields, 1));
-    }
-    return table;
-}
-
-PointTable read_off(const std::string& path, const std::string& text) {
-    PointTable table;
-    table.rule = "vertices of an OFF";
-    Lines lines(text);
-    string_view line;
-    std::vector<string_view> fields;
-    const auto next_fields = [&] {
-        while (lines.next(line)) {
-            line = trim(line.substr(0, line.find('#')));
-            if (line.empty()) continue;
-            split(line, ' ', fields);
-            return true;
-        }
-        return false;
-    };
-    if (!next_fields()) fail(path, "expected a point, got none");
-    // OFF, COFF, NOFF, STOFF, ...; the counts may follow on the same line
-    const std::string magic = lower(fields[0]);
-    if (magic.size() < 3 || magic.substr(magic.size() - 3) != "off")
-        fail(path, lines.number(), "expected OFF, got " + quote(line));
-    if (magic.find('4') != std::string::npos || magic.find("noff") == 1)
-        throw Error(Errc::Unsupported, "read_points: " + path + ": expected three coordinates, got " + quote(line));
-    fields.erase(fields.begin());
-    if (!fields.empty() && lower(fields[0]) == "binary")
-        throw Error(Errc::Unsupported, "read_points: " + path + ": expected an ascii OFF, got a binary one");
-    if (fields.empty() && !next_fields()) fail(path, lines.number(), "expected the number of vertices, got the end");
-    const double count = to_coordinate(path, lines.number(), fields[0]);
-    constexpr double kFewestBytes = 6;  // "0 0 0\n"
-    if (!(count >= 0) || count != std::floor(count) || count * kFewestBytes > double(text.size()) + kFewestBytes)
-        fail(path, lines.number(), "a file of this size cannot hold " + quote(fields[0]) + " vertices");
-    const auto vertices = static_cast<std::size_t>(count);
-    table.points.reserve(vertices);
-    while (table.points.size() < vertices) {
-        if (!next_fields())
-            fail(path, lines.number(),
-                 "expected " + std::to_string(vertices) + " vertices, got " + std::to_string(table.points.size()) +
-                     "; the file is truncated");
-        table.points.push_back(first_three(path, lines.number(), fields, 0));
-    }
-    return table;
-}
-
-// ---------------------------------------------------------------------------------------------- PLY
-
-enum class PlyFormat { Ascii, LittleEndian, BigEndian };
-enum class PlyType { Int8, UInt8, Int16, UInt16, Int32, UInt32, Float, Double };
-
-struct PlyProperty {
-    std::string name;
-    PlyType type = PlyType::Float;
-    bool is_list = false;
-    PlyType count_type = PlyType::UInt8;
-};
-
-struct PlyElement {
-    std::string name;
-    std::uint64_t count = 0;
-    std::vector<PlyProperty> properties;
-
-    [[nodiscard]] bool has_list() const {
-        return std::any_of(properties.begin(), properties.end(), [](const PlyProperty& p) { return p.is_list; });
-    }
-};
-
-struct PlyHeader {
-    PlyFormat format = PlyFormat::Ascii;
-    std::vector<PlyElement> elements;
-};
-
-std::optional<PlyType> ply_type(string_view name) {
-    constexpr std::pair<const char*, PlyType> kNames[] = {
-        {"char", PlyType::Int8},     {"int8", PlyType::Int8},     {"uchar", PlyType::UInt8},
-        {"uint8", PlyType::UInt8},   {"short", PlyType::Int16},   {"int16", PlyType::Int16},
-        {"ushort", PlyType::UInt16}, {"uint16", PlyType::UInt16}, {"int", PlyType::Int32},
-        {"int32", PlyType::Int32},   {"uint", PlyType::UInt32},   {"uint32", PlyType::UInt32},
-        {"float", PlyType::Float},   {"float32", PlyType::Float}, {"double", PlyType::Double},
-        {"float64", PlyType::Double}};
-    for (const auto& [known, type] : kNames)
-        if (name == known) return type;
-    return std::nullopt;
-}
-
-std::uint64_t ply_bytes(PlyType type) {
-    switch (type) {
-        case PlyType::Int8:
-        case PlyType::UInt8: return 1;
-        case PlyType::Int16:
-        case PlyType::UInt16: return 2;
-        case PlyType::Double: return 8;
-        default: return 4;
-    }
-}
-
-template <typename T>
-double load(const char* data, bool swap) {
-    std::array<char, sizeof(T)> bytes;
-    std::memcpy(bytes.data(), data, sizeof(T));
-    if (swap) std::reverse(bytes.begin(), bytes.end());
-    return static_cast<double>(std::bit_cast<T>(bytes));
-}
-
-double ply_value(const char* data, PlyType type, bool swap) {
-    switch (type) {
-        case PlyType::Int8: return load<std::int8_t>(data, swap);
-        case PlyType::UInt8: return load<std::uint8_t>(data, swap);
-        case PlyType::Int16: return load<std::int16_t>(data, swap);
-        case PlyType::UInt16: return load<std::uint16_t>(data, swap);
-        case PlyType::Int32: return load<std::int32_t>(data, swap);
-        case PlyType::UInt32: return load<std::uint32_t>(data, swap);
-        case PlyType::Float: return load<float>(data, swap);
-        case PlyType::Double: break;
-    }
-    return load<double>(data, swap);
-}
-
-PlyHeader read_ply_header(const std::string& path, Lines& lines) {
-    PlyHeader header;
-    string_view line;
-    if (!lines.next(line) || line != "ply") fail(path, 1, "expected 'ply', got " + quote(line));
-    std::vector<string_view> fields;
-    bool has_format = false;
-    while (lines.next(line)) {
-        split(line, ' ', fields);
-        const auto malformed = [&] { fail(path, lines.number(), "not a PLY header line: " + quote(line)); };
-        if (fields.empty() || fields[0] == "comment" || fields[0] == "obj_info") continue;
-        if (fields[0] == "end_header") {
-            if (!has_format) fail(path, lines.number(), "the header states no format");
-            return header;
-        }
-        if (fields[0] == "format" && fields.size() >= 2) {
-            has_format = true;
-            if (fields[1] == "ascii")
-                header.format = PlyFormat::Ascii;
-            else if (fields[1] == "binary_little_endian")
-                header.format = PlyFormat::LittleEndian;
-            else if (fields[1] == "binary_big_endian")
-                header.format = PlyFormat::BigEndian;
-            else
-                malformed();
-        } else if (fields[0] == "element" && fields.size() == 3) {
-            PlyElement element;
-            element.name = fields[1];
-            const auto [end, status] =
-                std::from_chars(fields[2].data(), fields[2].data() + fields[2].size(), element.count);
-            if (status != std::errc() || end != fields[2].data() + fields[2].size()) malformed();
-            header.elements.push_back(element);
-        } else if (fields[0] == "property" && !header.elements.empty()) {
-            PlyProperty property;
-            property.is_list = fields.size() == 5 && fields[1] == "list";
-            if (!property.is_list && fields.size() != 3) malformed();
-            const auto type = ply_type(fields[fields.size() - 2]);
-            const auto count_type = property.is_list ? ply_type(fields[2]) : PlyType::UInt8;
-            if (!type || !count_type) malformed();
-            property.name = lower(fields.back());
-            property.type = *type;
-            property.count_type = *count_type;
-            header.elements.back().properties.push_back(property);
-        } else {
-            malformed();
-        }
-    }
-    fail(path, lines.number(), "the header has no end_header; the file is truncated");
-}
-
-/// Walks over the values of one binary element. Returns how many bytes they take; 0 when they go beyond `size`
-/// (an element without properties is never asked for). place[p] is where property p begins.
-std::uint64_t measure_ply(const PlyElement& element, const char* data, std::uint64_t size, bool swap,
-                          std::vector<std::uint64_t>& place) {
-    std::uint64_t at = 0;
-    for (std::size_t p = 0; p < element.properties.size(); ++p) {
-        const PlyProperty& property = element.properties[p];
-        place[p] = at;
-        std::uint64_t bytes = ply_bytes(property.type);
-        if (property.is_list) {
-            const std::uint64_t count_bytes = ply_bytes(property.count_type);
-            if (count_bytes > size - at) return 0;
-            const double count = ply_value(data + at, property.count_type, swap);
-            at += count_bytes;
-            if (!(count >= 0) || count * double(bytes) > double(size - at)) return 0;
-            bytes *= static_cast<std::uint64_t>(count);
-        }
-        if (bytes > size - at) return 0;
-        at += bytes;
-    }
-    return at;
-}
-
-/// The places of x, y, z among the properties.
-std::array<std::size_t, 3> ply_coordinates(const std::string& path, const PlyElement& vertex) {
-    std::array<std::size_t, 3> at{};
-    for (std::size_t a = 0; a < 3; ++a) {
-        const std::string name(1, "xyz"[a]);
-        const auto found = std::find_if(vertex.properties.begin(), vertex.properties.end(),
-                                        [&](const PlyProperty& p) { return p.name == name && !p.is_list; });
-        if (found == vertex.properties.end()) fail(path, "expected a vertex property '" + name + "', got none");
-        at[a] = static_cast<std::size_t>(found - vertex.properties.begin());
-    }
-    return at;
-}
-
-std::vector<Vec3> read_ply_ascii(const std::string& path, const PlyHeader& header, Lines& lines) {
-    std::vector<Vec3> points;
-    string_view line;
-    std::vector<string_view> fields;
-    for (const PlyElement& element : header.elements) {
-        const bool is_vertex = element.name == "vertex";
-        const auto at = is_vertex ? ply_coordinates(path, element) : std::array<std::size_t, 3>{};
-        if (element.properties.empty()) continue;
-        // a line takes at least a digit and its end for each property
-        if (element.count > lines.rest().size() / 2 + 1)
-            fail(path, lines.number(),
-                 "expected " + std::to_string(element.count) + " elements '" + element.name +
-                     "', the file is too short for them; it is truncated");
-        if (is_vertex) points.reserve(element.count);
-        for (std::uint64_t n = 0; n < element.count;) {
-            if (!lines.next(line))
-                fail(path, lines.number(),
-                     "expected " + std::to_string(element.count) + " elements '" + element.name + "', got " +
-                         std::to_string(n) + "; the file is truncated");
-            if (line.empty()) continue;
-            ++n;
-            if (!is_vertex) continue;
-            split(line, ' ', fields);
-            Vec3 point;
-            std::array<std::size_t, 3> column = at;
-            if (element.has_list()) {
-                // lists before a coordinate shift it
-                std::size_t field = 0;
-                for (std::size_t p = 0; p < element.properties.size() && field < fields.size(); ++p) {
-                    for (std::size_t a = 0; a < 3; ++a)
-                        if (at[a] == p) column[a] = field;
-                    const double length =
-                        element.properties[p].is_list ? to_coordinate(path, lines.number(), fields[field]) : 0;
-                    field += 1 + static_cast<std::size_t>(std::clamp(length, 0.0, double(fields.size())));
-                }
-            }
-            for (std::size_t a = 0; a < 3; ++a) {
-                if (column[a] >= fields.size())
-                    fail(path, lines.number(),
-                         "expected " + std::to_string(element.properties.size()) + " numbers, got " +
-                             std::to_string(fields.size()));
-                point[a] = to_coordinate(path, lines.number(), fields[column[a]]);
-            }
-            points.push_back(point);
-        }
-        if (is_vertex) return points;
-    }
-    return points;
-}
-
-std::vector<Vec3> read_ply_binary(const std::string& path, const PlyHeader& header, string_view data) {
-    const bool swap = (header.format == PlyFormat::BigEndian) != (std::endian::native == std::endian::big);
-    std::vector<Vec3> points;
-    for (const PlyElement& element : header.elements) {
-        const bool is_vertex = element.name == "vertex";
-        const auto at = is_vertex ? ply_coordinates(path, element) : std::array<std::size_t, 3>{};
-        if (element.properties.empty()) continue;
-        if (element.count > data.size())
-            fail(path, "expected " + std::to_string(element.count) + " elements '" + element.name + "', the file has " +
-                           std::to_string(data.size()) + " bytes left for them; it is truncated");
-        if (is_vertex) points.reserve(element.count);
-        std::vector<std::uint64_t> place(element.properties.size());
-        for (std::uint64_t n = 0; n < element.count; ++n) {
-            const std::uint64_t bytes = measure_ply(element, data.data(), data.size(), swap, place);
-            if (bytes == 0)
-                fail(path, "expected " + std::to_string(element.count) + " elements '" + element.name + "', got " +
-                               std::to_string(n) + "; the file is truncated");
-            if (is_vertex) {
-                Vec3 point;
-                for (std::size_t a = 0; a < 3; ++a)
-                    point[a] = ply_value(data.data() + place[at[a]], element.properties[at[a]].type, swap);
-                if (!std::isfinite(point[0] + point[1] + point[2]))
-                    fail(path, "vertex " + std::to_string(n) + ": expected finite numbers, got NaN or infinity");
-                points.push_back(point);
-            }
-            data.remove_prefix(bytes);
-        }
-        if (is_vertex) return points;
-    }
-    return points;
-}
-
-PointTable read_ply(const std::string& path, const std::string& text) {
-    Lines lines(text);
-    const PlyHeader header = read_ply_header(path, lines);
-    if (std::none_of(header.elements.begin(), header.elements.end(),
-                     [](const PlyElement& e) { return e.name == "vertex"; }))
-        fail(path, "expected an element 'vertex', got none");
-    PointTable table;
-    table.rule = "vertices of a PLY";
-    table.points = header.format == PlyFormat::Ascii ? read_ply_ascii(path, header, lines)
-                                                     : read_ply_binary(path, header, lines.rest());
-    return table;
+const std::vector<Format>& formats() {
+    static const std::vector<Format> list{
+        {".xyz", parse_blanks},      {".txt", parse_blanks},      {".pts", parse_blanks},  {".asc", parse_blanks},
+        {".csv", parse_table},       {".tsv", parse_table},       {".ply", parse_ply},     {".obj", parse_obj},
+        {".off", parse_off},         {".roi", parse_one_roi},     {".zip", parse_roi_zip}, {".json", parse_markups},
+        {".fcsv", parse_fcsv},       {".landmarks", parse_landmarks}, {".lmk", parse_landmarks},
+        {".annot", parse_annotations}, {".pcd", parse_pcd},       {".las", parse_las},     {".laz", refuse_laz}};
+    return list;
 }
 
 }  // namespace
 
+std::vector<Vec3> ellipse(const Vec3& centre, const Vec3& u, const Vec3& v) {
+    double longest = 0;
+    for (int a = 0; a < 3; ++a) longest = std::max({longest, std::abs(u[a]), std::abs(v[a])});
+    constexpr double kFewest = 16, kMost = 4096;
+    const int count = static_cast<int>(std::clamp(std::ceil(2 * std::numbers::pi * longest), kFewest, kMost));
+    std::vector<Vec3> points;
+    for (int n = 0; n < count; ++n) {
+        const double angle = 2 * std::numbers::pi * n / count, c = std::cos(angle), s = std::sin(angle);
+        points.push_back({centre[0] + c * u[0] + s * v[0], centre[1] + c * u[1] + s * v[1], centre[2] + c * u[2] + s * v[2]});
+    }
+    return points;
+}
+
+void add_line(PointTable& table, const std::vector<Vec3>& points, bool closed, const std::string& name) {
+    const std::size_t begin = table.points.size();
+    table.points.insert(table.points.end(), points.begin(), points.end());
+    table.lines.push_back({begin, table.points.size(), closed, name});
+}
+
 PointTable read_point_table(const std::string& path) {
     const std::string extension = detail::extension(path);
-    const bool blanks = extension == ".xyz" || extension == ".txt" || extension == ".pts" || extension == ".asc";
-    const bool columns = blanks || extension == ".csv" || extension == ".tsv";
-    if (!columns && extension != ".ply" && extension != ".obj" && extension != ".off")
-        throw Error(Errc::Unsupported, "read_points: " + path +
-                                           ": expected a name ending in .xyz, .txt, .pts, .csv, .tsv, .ply, .obj or "
-                                           ".off, got '" +
-                                           extension + "'");
-    const std::string text = read_text(path);
-    if (text.empty()) fail(path, "the file is empty");
-    if (columns) return read_columns(path, text, blanks);
-    if (extension == ".ply") return read_ply(path, text);
-    return extension == ".obj" ? read_obj(path, text) : read_off(path, text);
+    const auto& list = formats();
+    const auto format = std::find_if(list.begin(), list.end(), [&](const Format& f) { return f.ending == extension; });
+    if (format == list.end()) {
+        std::string known;
+        for (const Format& f : list) known += (known.empty() ? "" : ", ") + std::string(f.ending);
+        throw Error(Errc::Unsupported,
+                    "read_points: " + path + ": expected a name ending in one of " + known + ", got '" + extension + "'");
+    }
+    const std::string content = read_text(path);
+    if (content.empty()) fail(path, "the file is empty");
+    return format->parse(path, content);
 }
 
 }  // namespace covol::detail

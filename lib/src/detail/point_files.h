@@ -6,15 +6,22 @@
 
 namespace covol::detail {
 
-/// What a point file says: coordinates in the file's own order.
+/// What a point file says: coordinates in the file's own order and space.
 struct PointTable {
     std::vector<Vec3> points;
+    std::vector<MarkLine> lines;
     PointSpace space = PointSpace::Unstated;
     PointOrder order = PointOrder::Unstated;
     std::string rule;  ///< which columns or elements, for people
 };
 
-/// Reads XYZ, CSV, TSV, PLY, OBJ or OFF by the name's end. @throws as read_points(), which it serves.
+/// Picks the reader by the name's end. @throws as read_points(), which it serves.
 PointTable read_point_table(const std::string& path);
+
+/// Appends an ordered line of marks to a table.
+void add_line(PointTable& table, const std::vector<Vec3>& points, bool closed, const std::string& name);
+
+/// centre + cos u + sin v, as points about a voxel apart (all in voxels).
+[[nodiscard]] std::vector<Vec3> ellipse(const Vec3& centre, const Vec3& u, const Vec3& v);
 
 }  // namespace covol::detail

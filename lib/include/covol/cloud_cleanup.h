@@ -1,0 +1,53 @@
+#pragma once
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "covol/fwd.h"
+#include "covol/run.h"
+
+namespace covol {
+
+enum class CloudSmoothing {
+    None,
+    Jets,  ///< each point moves to a quadric fitted to its neighbours (Cazals and Pouget 2005)
+    Wlop   ///< weighted locally optimal projection (Huang et al. 2009): evens out the density too, outliers matter little
+};
+
+/// What clean_cloud() does, in this order; every step is off unless asked for.
+struct CloudCleanupOptions {
+    bool duplicates = true;       ///< Exact duplicates become one.
+    double outlier_factor = 0;    ///< > 0: points whose root mean square distance to `neighbours` others exceeds this
+                                  ///< many times the cloud's mean distance to them go, until none is left; >= 1.
+    double simplify = 0;          ///< > 0: one point stays in each cell of a lattice of this edge, world units.
+    CloudSmoothing smooth = CloudSmoothing::None;
+    double wlop_share = 0.25;     ///< Of the points, that WLOP makes anew, in (0,1].
+    double wlop_radius = 0;       ///< Of WLOP's neighbourhoods, world units; 0: 2.5 mean spacings of the new points.
+    int neighbours = 24;          ///< For outliers and jets, >= 6.
+
+    /// Whether anything but duplicates is asked for.
+    [[nodiscard]] bool any() const { return outlier_factor > 0 || simplify > 0 || smooth != CloudSmoothing::None; }
+    /// Empty when usable, else one line for each bad field.
+    [[nodiscard]] std::string why_invalid() const;
+};
+
+struct CloudCleanupReport {
+    std::size_t given = 0;
+    std::size_t duplicates = 0;  ///< removed
+    std::size_t outliers = 0;    ///< removed
+    int outlier_passes = 0;
+    std::size_t simplified = 0;  ///< removed
+    std::size_t smoothed = 0;    ///< moved
+    double mean_shift = 0;       ///< of the jets, world units
+    double max_shift = 0;
+    std::size_t kept = 0;
+};
+
+/// Cleans a cloud with CGAL's point-set processing. The order of the points that stay is kept, up to WLOP, which makes
+/// new ones. The same bits for any number of threads.
+/// @param report  may be null
+/// @throws Error InvalidOptions, InvalidInput (a value that is not finite), Numerical (CGAL refuses), Cancelled.
+[[nodiscard]] std::vector<Vec3> clean_cloud(const std::vector<Vec3>& points, const CloudCleanupOptions& options,
+                                            const RunContext& run = {}, CloudCleanupReport* report = nullptr);
+
+}  // namespace covol

@@ -1,0 +1,179 @@
+#include "covol/cloud_cleanup.h"
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/compute_average_spacing.h>
+#include <CGAL/grid_simplify_point_set.h>
+#include <CGAL/jet_smooth_point_set.h>
+#include <CGAL/property_map.h>
+#include <CGAL/remove_outliers.h>
+#include <CGAL/wlop_simplify_and_regularize_point_set.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <utility>
+
+#include "covol/error.h"
+#include "covol/points.h"
+
+namespace covol {
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Point = Kernel::Point_3;
+/// A point and its place in the input: CGAL's tools shuffle.
+using Entry = std::pair<Point, std::size_t>;
+using PointMap = CGAL::First_of_pair_property_map<Entry>;
+using Tag = CGAL::Parallel_tag;
+
+constexpr std::size_t kFewest = 7;  // points that say anything about a neighbourhood
+
+class Cleaner {
+    /// Called by CGAL, possibly from a thread of its own: false stops it.
+    [[nodiscard]] auto parameters() const {
+        return CGAL::parameters::point_map(PointMap()).callback(
+            std::function<bool(double)>([this](double) { return !run_.cancelled(); }));
+    }
+
+public:
+    Cleaner(const std::vector<Vec3>& points, const CloudCleanupOptions& options, const RunContext& run)
+        : options_(options), run_(run) {
+        entries_.reserve(points.size());
+        for (const Vec3& p : points) entries_.emplace_back(Point(p[0], p[1], p[2]), entries_.size());
+    }
+
+    void remove_outliers(CloudCleanupReport& report) {
+        // Each pass lowers the mean distance that the far points have raised.
+        constexpr int kMostPasses = 10;
+        while (report.outlier_passes < kMostPasses && entries_.size() >= kFewest) {
+            run_.check();
+            const double mean = CGAL::compute_average_spacing<Tag>(entries_, neighbours(), parameters());
+            run_.check();
+            const auto end = CGAL::remove_outliers<Tag>(
+                entries_, neighbours(),
+                parameters().threshold_percent(100.0).threshold_distance(options_.outlier_factor * mean));
+            const std::size_t removed = keep_until(end);
+            ++report.outlier_passes;
+            report.outliers += removed;
+            if (removed == 0) return;
+        }
+    }
+
+    void simplify(CloudCleanupReport& report) {
+        run_.check();
+        report.simplified = keep_until(CGAL::grid_simplify_point_set(entries_, options_.simplify, parameters()));
+    }
+
+    void smooth_by_jets(CloudCleanupReport& report) {
+        if (entries_.size() < kFewest) return;
+        run_.check();
+        const std::vector<Entry> before = entries_;
+        CGAL::jet_smooth_point_set<Tag>(entries_, neighbours(), parameters());
+        run_.check();
+        double sum = 0;
+        for (std::size_t n = 0; n < entries_.size(); ++n) {
+            // No quadric fits points on a line.
+            if (!is_finite(entries_[n].first)) entries_[n] = before[n];
+            const double shift = std::sqrt(CGAL::squared_distance(entries_[n].first, before[n].first));
+            sum += shift;
+            report.max_shift = std::max(report.max_shift, shift);
+            report.smoothed += shift > 0 ? 1 : 0;
+        }
+        report.mean_shift = sum / double(entries_.size());
+    }
+
+    void smooth_by_wlop(CloudCleanupReport& report) {
+        if (entries_.size() < kFewest) return;
+        run_.check();
+        // Two rings of new neighbours; CGAL's own 8 spacings of the old points flatten what is curved.
+        constexpr double kRings = 2.5;
+        constexpr unsigned kRing = 6;
+        double radius = options_.wlop_radius;
+        if (radius == 0)
+            radius = kRings * CGAL::compute_average_spacing<Tag>(entries_, kRing, parameters()) / std::sqrt(options_.wlop_share);
+        run_.check();
+        std::vector<Point> points;
+        CGAL::wlop_simplify_and_regularize_point_set<Tag>(entries_, std::back_inserter(points),
+                                                          parameters().select_percentage(100 * options_.wlop_share).neighbor_radius(radius));
+        run_.check();
+        std::erase_if(points, [](const Point& p) { return !is_finite(p); });
+        entries_.clear();
+        for (const Point& p : points) entries_.emplace_back(p, entries_.size());
+        report.smoothed = entries_.size();
+    }
+
+    [[nodiscard]] std::vector<Vec3> points() const {
+        std::vector<Vec3> result;
+        for (const auto& [p, index] : entries_) result.push_back({p.x(), p.y(), p.z()});
+        return result;
+    }
+
+private:
+    [[nodiscard]] unsigned neighbours() const {
+        return static_cast<unsigned>(std::min<std::size_t>(std::size_t(options_.neighbours), entries_.size() - 1));
+    }
+    /// Drops what CGAL has put behind `end`; the input's order again. Returns how many.
+    std::size_t keep_until(std::vector<Entry>::iterator end) {
+        run_.check();
+        const auto removed = static_cast<std::size_t>(entries_.end() - end);
+        entries_.erase(end, entries_.end());
+        std::sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) { return a.second < b.second; });
+        return removed;
+    }
+    static bool is_finite(const Point& p) { return std::isfinite(p.x()) && std::isfinite(p.y()) && std::isfinite(p.z()); }
+
+    const CloudCleanupOptions& options_;
+    const RunContext& run_;
+    std::vector<Entry> entries_;
+};
+
+std::vector<Vec3> clean(const std::vector<Vec3>& points, const CloudCleanupOptions& options, const RunContext& run,
+                        CloudCleanupReport& report) {
+    const std::vector<Vec3> distinct = options.duplicates ? merge_close_points(points, 0) : points;
+    report.duplicates = points.size() - distinct.size();
+    if (distinct.empty() || !options.any()) return distinct;
+    Cleaner cleaner(distinct, options, run);
+    if (options.outlier_factor > 0) cleaner.remove_outliers(report);
+    if (options.simplify > 0) cleaner.simplify(report);
+    if (options.smooth == CloudSmoothing::Jets) cleaner.smooth_by_jets(report);
+    if (options.smooth == CloudSmoothing::Wlop) cleaner.smooth_by_wlop(report);
+    return cleaner.points();
+}
+
+}  // namespace
+
+std::string CloudCleanupOptions::why_invalid() const {
+    std::string why;
+    const auto expect = [&](bool good, const std::string& field, const std::string& range, double got) {
+        if (!good) why += (why.empty() ? "" : "\n") + field + ": expected " + range + ", got " + std::to_string(got);
+    };
+    expect(outlier_factor == 0 || (outlier_factor >= 1 && std::isfinite(outlier_factor)), "outlier_factor", "0 or >= 1",
+           outlier_factor);
+    expect(simplify >= 0 && std::isfinite(simplify), "simplify", ">= 0", simplify);
+    expect(wlop_share > 0 && wlop_share <= 1, "wlop_share", "in (0,1]", wlop_share);
+    expect(wlop_radius >= 0 && std::isfinite(wlop_radius), "wlop_radius", ">= 0", wlop_radius);
+    expect(neighbours >= 6, "neighbours", ">= 6", neighbours);
+    return why;
+}
+
+std::vector<Vec3> clean_cloud(const std::vector<Vec3>& points, const CloudCleanupOptions& options, const RunContext& run,
+                              CloudCleanupReport* report) {
+    if (const std::string why = options.why_invalid(); !why.empty())
+        throw Error(Errc::InvalidOptions, "clean_cloud: " + why);
+    for (const Vec3& p : points)
+        if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2]))
+            throw Error(Errc::InvalidInput, "clean_cloud: expected finite points");
+    CloudCleanupReport own;
+    own.given = points.size();
+    std::vector<Vec3> result;
+    try {
+        with_threads(run, [&] { result = clean(points, options, run, own); });
+    } catch (const CGAL::Failure_exception& e) {
+        throw Error(Errc::Numerical, std::string("clean_cloud: CGAL: ") + e.what());
+    }
+    own.kept = result.size();
+    if (report != nullptr) *report = own;
+    return result;
+}
+
+}  // namespace covol

@@ -1,0 +1,145 @@
+#include <catch2/catch.hpp>
+#include <atomic>
+#include <cmath>
+#include <random>
+
+#include "covol/cloud_cleanup.h"
+#include "covol/error.h"
+
+using namespace covol;
+
+namespace {
+
+/// Random points of a sphere of radius 1, moved along the normal by up to `noise`.
+std::vector<Vec3> sphere(std::size_t count, double noise, unsigned seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    std::uniform_real_distribution<double> uniform(-noise, noise);
+    std::vector<Vec3> points;
+    for (std::size_t n = 0; n < count; ++n) {
+        Vec3 p{normal(random), normal(random), normal(random)};
+        const double r = std::hypot(p[0], p[1], p[2]) / (1 + uniform(random));
+        points.push_back({p[0] / r, p[1] / r, p[2] / r});
+    }
+    return points;
+}
+
+double radius(const Vec3& p) { return std::hypot(p[0], p[1], p[2]); }
+
+double mean_error(const std::vector<Vec3>& points) {
+    double sum = 0;
+    for (const Vec3& p : points) sum += std::abs(radius(p) - 1);
+    return sum / double(points.size());
+}
+
+CloudCleanupOptions with_outliers(double factor) {
+    CloudCleanupOptions options;
+    options.outlier_factor = factor;
+    return options;
+}
+
+CloudCleanupOptions with_smoothing(CloudSmoothing smooth) {
+    CloudCleanupOptions options;
+    options.smooth = smooth;
+    return options;
+}
+
+}  // namespace
+
+TEST_CASE("far points go, points of the surface stay in their order") {
+    const std::vector<Vec3> good = sphere(2000, 0, 1);
+    std::vector<Vec3> points = good;
+    std::mt19937 random(2);
+    std::uniform_real_distribution<double> uniform(2, 40);
+    for (int n = 0; n < 25; ++n) points.insert(points.begin() + n * 70, {uniform(random), uniform(random), -uniform(random)});
+    CloudCleanupReport report;
+    const std::vector<Vec3> cleaned = clean_cloud(points, with_outliers(3), {}, &report);
+    CHECK(cleaned == good);
+    CHECK(report.given == 2025);
+    CHECK(report.outliers == 25);
+    CHECK(report.kept == 2000);
+    CHECK(report.outlier_passes >= 2);
+    CHECK(clean_cloud(good, with_outliers(3)) == good);
+}
+
+TEST_CASE("one point stays in each cell") {
+    std::vector<Vec3> points;
+    for (int n = 0; n < 3000; ++n) points.push_back({0.01 * (n % 30) + 0.005, 0.01 * (n / 30 % 10) + 0.005, 0.01 * (n / 300) + 0.005});
+    CloudCleanupOptions options;
+    options.simplify = 0.1;
+    CloudCleanupReport report;
+    const std::vector<Vec3> cleaned = clean_cloud(points, options, {}, &report);
+    CHECK(cleaned.size() == 3);
+    CHECK(report.simplified == 2997);
+}
+
+TEST_CASE("exact duplicates become one, alone or before the rest") {
+    std::vector<Vec3> points = sphere(100, 0, 3);
+    const std::vector<Vec3> once = points;
+    points.insert(points.end(), once.begin(), once.begin() + 40);
+    CloudCleanupReport report;
+    CHECK(clean_cloud(points, {}, {}, &report) == once);
+    CHECK(report.duplicates == 40);
+    CloudCleanupOptions none;
+    none.duplicates = false;
+    CHECK(clean_cloud(points, none).size() == 140);
+}
+
+TEST_CASE("jets and WLOP bring noisy points closer to the sphere") {
+    const std::vector<Vec3> noisy = sphere(2000, 0.05, 4);
+    const double before = mean_error(noisy);
+    CHECK(before == Approx(0.025).epsilon(0.1));
+    CloudCleanupReport report;
+    const std::vector<Vec3> jets = clean_cloud(noisy, with_smoothing(CloudSmoothing::Jets), {}, &report);
+    CHECK(jets.size() == noisy.size());
+    CHECK(mean_error(jets) < 0.5 * before);
+    CHECK(report.smoothed == noisy.size());
+    CHECK(report.mean_shift > 0.5 * before);
+    CHECK(report.max_shift < 0.15);
+    const std::vector<Vec3> wlop = clean_cloud(noisy, with_smoothing(CloudSmoothing::Wlop), {}, &report);
+    CHECK(wlop.size() == noisy.size() / 4);
+    CHECK(report.smoothed == wlop.size());
+    CHECK(mean_error(wlop) < 0.5 * before);
+}
+
+TEST_CASE("cleaning gives the same bits on any number of threads") {
+    const std::vector<Vec3> noisy = sphere(600, 0.1, 5);
+    for (const CloudSmoothing smooth : {CloudSmoothing::Jets, CloudSmoothing::Wlop}) {
+        CloudCleanupOptions options = with_outliers(1.5);
+        options.simplify = 0.01;
+        options.smooth = smooth;
+        RunContext one, many;
+        one.threads = 1;
+        many.threads = 8;
+        CHECK(clean_cloud(noisy, options, one) == clean_cloud(noisy, options, many));
+    }
+}
+
+TEST_CASE("clouds too small or flat for a step pass through it") {
+    CloudCleanupOptions all = with_outliers(3);
+    all.simplify = 1e-3;
+    for (const CloudSmoothing smooth : {CloudSmoothing::Jets, CloudSmoothing::Wlop}) {
+        all.smooth = smooth;
+        CHECK(clean_cloud({}, all).empty());
+        CHECK(clean_cloud({{1, 2, 3}}, all).size() == 1);
+        std::vector<Vec3> line;
+        for (int n = 0; n < 40; ++n) line.push_back({0.1 * n, 0, 0});
+        for (const Vec3& p : clean_cloud(line, all)) CHECK(std::isfinite(p[0] + p[1] + p[2]));
+    }
+}
+
+TEST_CASE("bad options and values are refused, a cancelled run ends") {
+    const std::vector<Vec3> points = sphere(100, 0, 6);
+    CHECK_THROWS_AS(clean_cloud(points, with_outliers(0.5)), Error);
+    CloudCleanupOptions options;
+    options.simplify = -1;
+    CHECK_THROWS_AS(clean_cloud(points, options), Error);
+    options.simplify = 0;
+    options.neighbours = 2;
+    CHECK(options.why_invalid() == "neighbours: expected >= 6, got 2.000000");
+    CHECK_THROWS_AS(clean_cloud({{0, 0, std::nan("")}}, with_outliers(3)), Error);
+    const std::atomic<bool> cancel = true;
+    RunContext run;
+    run.cancel = &cancel;
+    CHECK_THROWS_AS(clean_cloud(points, with_outliers(3), run), Error);
+}

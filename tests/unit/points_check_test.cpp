@@ -1,0 +1,159 @@
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "covol/points.h"
+#include "support/scratch.h"
+
+using namespace covol;
+
+namespace {
+
+ImageGeometry small_image() {
+    ImageGeometry geometry;
+    geometry.size = {100, 80, 20};
+    geometry.spacing = {0.1, 0.1, 1.0};
+    return geometry;
+}
+
+PointCloud cloud_of(const std::vector<Vec3>& points, PointSpace space = PointSpace::World) {
+    PointCloud cloud;
+    cloud.points = points;
+    cloud.space = space;
+    cloud.reading = {space, PointOrder::XYZ};
+    cloud.source = "cloud.csv";
+    return cloud;
+}
+
+/// What a check says: the error, or the warnings in brackets.
+std::string verdict(const PointCloud& cloud, const ImageGeometry& geometry) {
+    std::string warnings;
+    RunContext run;
+    run.log = [&](LogLevel level, const std::string& line) {
+        if (level == LogLevel::Warning) warnings += "[" + line + "]";
+    };
+    const std::string error = message_of([&] { check_inside(cloud, geometry, run); });
+    return error.empty() ? warnings : error;
+}
+
+bool says(const std::string& message, const std::string& part) {
+    INFO(message);
+    INFO(part);
+    CHECK(message.find(part) != std::string::npos);
+    return message.find(part) != std::string::npos;
+}
+
+/// Marks on a slanted closed line through an image whose voxels and place are all different, in voxels.
+std::vector<Vec3> marks() {
+    std::vector<Vec3> points;
+    for (int slice = 4; slice < 16; slice += 2)
+        for (int n = 0; n < 24; ++n)
+            points.push_back({60.3 + 30.2 * std::cos(0.2618 * n), 45.1 + 25.3 * std::sin(0.2618 * n) + 0.37 * slice, double(slice)});
+    return points;
+}
+
+}  // namespace
+
+TEST_CASE("points outside the image are counted, and both boxes told") {
+    const ImageGeometry geometry = small_image();
+    // 10 x 8 x 20 in world units, half a voxel wider on each side
+    CHECK(verdict(cloud_of({{0, 0, 0}, {9.9, 7.9, 19}, {-0.05, -0.05, -0.5}}), geometry).empty());
+    const std::string message = verdict(cloud_of({{1, 1, 1}, {1, 1, 20.5}, {0, -60, 0}}), geometry);
+    says(message, "cloud.csv: 2 of 3 points");
+    says(message, "points from (0, -60, 0) to (1, 1, 20.5)");
+    says(message, "image from (-0.05, -0.05, -0.5) to (9.95, 7.95, 19.5)");
+    CHECK(message.find("--points") == std::string::npos);
+}
+
+TEST_CASE("each usual mistake is named with the option that mends it") {
+    ImageGeometry geometry = small_image();
+    const auto advice = [&](const std::vector<Vec3>& points, PointSpace space = PointSpace::World) {
+        return verdict(cloud_of(points, space), geometry);
+    };
+    says(advice({{15, 4, 3}}), "--points-order zyx would bring them inside (the order of the axes is reversed)");
+    says(advice({{90, 70, 15}}), "; --points-space index would bring them inside (they are voxels, not world units)");
+    says(advice({{15, 70, 90}}), "; --points-space index --points-order zyx would");
+    says(advice({{-5, -3, 15}}), "; --points-space ras would bring them inside (they are in RAS, the image is in LPS)");
+    says(advice({{5000, 3000, 15000}, {2000, 1000, 3000}}), "; --points-scale 0.001 would bring them inside (their unit");
+    says(advice({{-5000, -3000, 15000}, {-2000, -1000, 3000}}), "; --points-space ras --points-scale 0.001 would");
+    says(advice({{100, 80, 20}}), "; --points-space index1 would bring them inside (they are voxels counted from 1)");
+    says(advice({{3, 70, 90}}, PointSpace::Index), "; --points-order zyx would bring");
+    says(advice({{100, 80, 20}}, PointSpace::Index), "; --points-space index1 would bring");
+    // the positions of a multi-point in a hyperstack of two channels
+    says(advice({{15, 70, 39}}, PointSpace::Index), "--points-channels 2 would bring them inside (their slices count the channels");
+    geometry.origin = {500, 600, 700};
+    says(advice({{5, 4, 10}, {1, 1, 1}}), "--points-space local would bring them inside (they leave out the image's origin)");
+}
+
+TEST_CASE("readings that fit equally well are all told") {
+    const ImageGeometry geometry = small_image();
+    // as voxels, or in world units with the axes reversed
+    const std::string message = verdict(cloud_of({{15, 4, 3}, {12, 3, 2}}), geometry);
+    says(message, "; --points-order zyx would");
+    says(message, "or --points-space index would");
+    says(message, "more than one reading fits");
+}
+
+TEST_CASE("an image without spacing is asked for it where points are lengths") {
+    ImageGeometry geometry = small_image();
+    geometry.spacing = {1, 1, 1};
+    geometry.spacing_known = false;
+    says(verdict(cloud_of({{500, 90, 90}, {-3000, 3, 3}}), geometry), "--spacing sx,sy,sz");
+    says(verdict(cloud_of({{5, 9, 9}}), geometry), "[cloud.csv: the points are in world units, and the image states no spacing");
+    CHECK(verdict(cloud_of({{5, 9, 9}}, PointSpace::Index), geometry).empty());
+}
+
+TEST_CASE("points that lie inside by accident are told by their slices") {
+    ImageGeometry geometry;
+    geometry.size = {400, 400, 400};  // all readings fit into it
+    geometry.spacing = {0.35, 0.4, 0.7};
+    geometry.origin = {-1.11, -2.33, -3.77};
+    std::vector<Vec3> voxels, world, reversed;
+    for (const Vec3& p : marks()) {
+        voxels.push_back({std::round(p[0]), std::round(p[1]), p[2]});
+        world.push_back(geometry.index_to_world(p));
+        reversed.push_back({world.back()[2], world.back()[1], world.back()[0]});
+    }
+    says(verdict(cloud_of(voxels), geometry), "--points-space index would put them on voxel centres");
+    says(verdict(cloud_of(reversed), geometry), "--points-order zyx would put them on voxel centres");
+    CHECK(verdict(cloud_of(world), geometry).empty());
+    // who says it is not asked again
+    PointCloud stated = cloud_of(voxels);
+    stated.stated = true;
+    CHECK(verdict(stated, geometry).empty());
+}
+
+TEST_CASE("what the advice asks for, reads the file rightly") {
+    const Scratch scratch;
+    ImageGeometry geometry;
+    geometry.size = {128, 96, 20};
+    geometry.spacing = {0.5, 0.25, 2};
+    geometry.origin = {-7, 11, 130};
+    std::vector<Vec3> world;
+    for (const Vec3& p : marks()) world.push_back(geometry.index_to_world(p));
+
+    const auto check = [&](const ReadPointsOptions& options, const std::string& advice, auto&& as_written) {
+        INFO(advice);
+        std::vector<Vec3> written;
+        for (const Vec3& p : world) written.push_back(as_written(p));
+        const std::string path = scratch.path("marks.xyz");
+        write_points(path, written);
+        says(verdict(read_points(path), geometry), "; " + advice + " would bring them inside");
+        const PointCloud mended = read_points(path, options);
+        CHECK(verdict(mended, geometry).empty());
+        const std::vector<Vec3> back = to_world(mended, &geometry);
+        for (std::size_t n = 0; n < world.size(); ++n)
+            for (int a = 0; a < 3; ++a) REQUIRE(back[n][a] == Approx(world[n][a]));
+    };
+    check({PointSpace::Unstated, PointOrder::ZYX}, "--points-order zyx", [](const Vec3& p) { return Vec3{p[2], p[1], p[0]}; });
+    check({PointSpace::Index}, "--points-space index", [&](const Vec3& p) { return geometry.world_to_index(p); });
+    check({PointSpace::Ras}, "--points-space ras", [](const Vec3& p) { return Vec3{-p[0], -p[1], p[2]}; });
+    check({PointSpace::Local}, "--points-space local", [&](const Vec3& p) {
+        return Vec3{p[0] - geometry.origin[0], p[1] - geometry.origin[1], p[2] - geometry.origin[2]};
+    });
+    check({PointSpace::Unstated, PointOrder::Unstated, 1e-3}, "--points-scale 0.001",
+          [](const Vec3& p) { return Vec3{1e3 * p[0], 1e3 * p[1], 1e3 * p[2]}; });
+    check({PointSpace::Index, PointOrder::ZYX}, "--points-space index --points-order zyx", [&](const Vec3& p) {
+        const Vec3 i = geometry.world_to_index(p);
+        return Vec3{i[2], i[1], i[0]};
+    });
+}

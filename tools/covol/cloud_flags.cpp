@@ -1,0 +1,64 @@
+#include "cloud_flags.h"
+
+#include <sstream>
+
+#include "bindings.h"
+#include "covol/error.h"
+
+namespace covol::tool {
+namespace {
+
+Json to_json(const CloudCleanupReport& r) {
+    return {{"given", r.given},         {"duplicates", r.duplicates}, {"outliers", r.outliers},     {"outlier_passes", r.outlier_passes},
+            {"simplified", r.simplified}, {"smoothed", r.smoothed},   {"mean_shift", r.mean_shift}, {"max_shift", r.max_shift},
+            {"kept", r.kept}};
+}
+
+std::string one_line(const CloudCleanupReport& r, const CloudCleanupOptions& options) {
+    std::ostringstream text;
+    text << "cloud: " << r.kept << " of " << r.given << " points kept; " << r.duplicates << " duplicates";
+    if (options.outlier_factor > 0) text << ", " << r.outliers << " outliers in " << r.outlier_passes << " passes";
+    if (options.simplify > 0) text << ", " << r.simplified << " by cells of " << options.simplify;
+    if (options.smooth == CloudSmoothing::Jets)
+        text << "; jets moved " << r.smoothed << " by " << r.mean_shift << " on average, " << r.max_shift << " at most";
+    if (options.smooth == CloudSmoothing::Wlop) text << "; WLOP made " << r.smoothed;
+    return text.str();
+}
+
+}  // namespace
+
+void CloudFlags::bind(CLI::App& command) {
+    command.add_flag("--remove-outliers{3}", outlier_factor,
+                     "drop points whose distance to their 24 neighbours is more than 3 (or =FACTOR) times the cloud's mean");
+    add_length(command, "--simplify", simplify, "", "keep one point in each cell of this edge, 1vx for example");
+    add_choice(command, "--smooth", smooth,
+               {{"none", CloudSmoothing::None}, {"jets", CloudSmoothing::Jets}, {"wlop", CloudSmoothing::Wlop}},
+               "move the points to fitted quadrics, or make a quarter as many by projection, evenly spread");
+}
+
+CloudCleanupOptions CloudFlags::resolve(double h) const {
+    CloudCleanupOptions options;
+    if (!outlier_factor.empty()) options.outlier_factor = parse_number("--remove-outliers", outlier_factor);
+    options.simplify = simplify.resolve(h, 0);
+    options.smooth = smooth;
+    return options;
+}
+
+void CloudFlags::check() const {
+    const std::string why = resolve(1).why_invalid();
+    if (!why.empty()) throw Error(Errc::InvalidOptions, why);
+}
+
+std::vector<Vec3> CloudFlags::clean(const std::vector<Vec3>& points, double h, Session& session, Json& report) const {
+    const CloudCleanupOptions options = resolve(h);
+    if (!options.any()) return points;
+    CloudCleanupReport done;
+    std::vector<Vec3> cleaned = clean_cloud(points, options, session.run(), &done);
+    if (cleaned.empty() && !points.empty())
+        throw Error(Errc::InvalidInput, "clean_cloud: no point is left of " + std::to_string(points.size()));
+    report["cleanup"] = to_json(done);
+    session.note(one_line(done, options));
+    return cleaned;
+}
+
+}  // namespace covol::tool
