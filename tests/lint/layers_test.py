@@ -13,6 +13,7 @@ LAYERS = [
     ["distance", "edge"],
     ["band", "evolve"],
     ["surface", "mesh_cleanup", "compare"],
+    ["structures", "evidence"],
     ["pipeline", "phantom", "render"],
 ]
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}

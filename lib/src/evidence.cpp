@@ -1,0 +1,1 @@
+#include "covol/evidence.h"
