@@ -555,7 +555,9 @@ std::shared_ptr<const void> copy_of(const T* values, std::size_t count) {
 
 // ---------------------------------------------------------------------------------------------- writing
 
-void write_itk(const std::string& path, const ImageGeometry& g, PixelType type, const void* values) {
+using Metadata = std::vector<std::pair<std::string, std::string>>;
+
+void write_itk(const std::string& path, const ImageGeometry& g, PixelType type, const void* values, const Metadata& metadata) {
     const itk::ImageIOBase::Pointer io = make_io(detail::extension(path));
     with_itk(Errc::Io, "write_image: " + path + ": cannot write", [&] {
         io->SetFileName(path);
@@ -575,12 +577,16 @@ void write_itk(const std::string& path, const ImageGeometry& g, PixelType type, 
         io->SetUseCompression(true);
         // ITK has no field for the unit; as a key of our own the file keeps it, and read_image finds it again.
         if (!g.unit.empty()) itk::EncapsulateMetaData<std::string>(io->GetMetaDataDictionary(), "unit", g.unit);
+        if (detail::extension(path) == ".nrrd")
+            for (const auto& [key, value] : metadata)
+                itk::EncapsulateMetaData<std::string>(io->GetMetaDataDictionary(), key, value);
         io->WriteImageInformation();
         io->Write(values);
     });
 }
 
-void write_values(const std::string& path, const ImageGeometry& geometry, PixelType type, const void* values) {
+void write_values(const std::string& path, const ImageGeometry& geometry, PixelType type, const void* values,
+                  const Metadata& metadata = {}) {
     check_image_extension(path);
     for (int a = 0; a < 3; ++a)
         if (geometry.size[a] < 1 || !(geometry.spacing[a] > 0))
@@ -590,7 +596,7 @@ void write_values(const std::string& path, const ImageGeometry& geometry, PixelT
         if (is_tiff(detail::extension(path)))
             detail::write_tiff(temporary, geometry, type, values);
         else
-            write_itk(temporary, geometry, type, values);
+            write_itk(temporary, geometry, type, values, metadata);
     });
 }
 
@@ -711,6 +717,11 @@ ImageGeometry read_image_geometry(const std::string& path, const ReadImageOption
 
 void write_image(const std::string& path, const ImageGeometry& geometry, const std::int32_t* labels) {
     write_values(path, geometry, PixelType::Int32, labels);
+}
+
+void write_image(const std::string& path, const ImageGeometry& geometry, const std::uint8_t* values,
+                 const std::vector<std::pair<std::string, std::string>>& metadata) {
+    write_values(path, geometry, PixelType::UInt8, values, metadata);
 }
 
 void write_image(const std::string& path, const ImageGeometry& geometry, const std::uint8_t* values) {

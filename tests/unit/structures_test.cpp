@@ -79,9 +79,8 @@ TEST_CASE("Overlapping balls of one size part at the plane between them") {
     CHECK(report.overlaps[0].volume == Approx(2 * cap_volume(5, 2)).epsilon(0.02));
     CHECK_FALSE(report.overlaps[0].inner);
     CHECK(common_voxels(*surfaces[0], *surfaces[1]) == 0);
-    const double expected = 4.0 / 3 * M_PI * 125 - cap_volume(5, 2);
-    CHECK(volume(*surfaces[0]) == Approx(expected).epsilon(0.01));
-    CHECK(volume(*surfaces[1]) == Approx(expected).epsilon(0.01));
+    CHECK(volume(*surfaces[0]) == Approx(volume(*ball(a)) - cap_volume(5, 2)).epsilon(0.005));
+    CHECK(volume(*surfaces[1]) == Approx(volume(*ball(b)) - cap_volume(5, 2)).epsilon(0.005));
     check_vertices(*surfaces[0], a, b);
     check_vertices(*surfaces[1], b, a);
 }
@@ -93,7 +92,7 @@ TEST_CASE("A deep overlap parts in its middle too") {
     CHECK(common_voxels(*surfaces[0], *surfaces[1]) == 0);
     check_vertices(*surfaces[0], a, b);
     check_vertices(*surfaces[1], b, a);
-    CHECK(volume(*surfaces[0]) == Approx(4.0 / 3 * M_PI * 1000 - cap_volume(10, 10 - std::hypot(3, 0.2))).epsilon(0.01));
+    CHECK(volume(*surfaces[0]) == Approx(volume(*ball(a)) - cap_volume(10, 10 - std::hypot(3, 0.2))).epsilon(0.005));
 }
 
 TEST_CASE("Balls of different sizes part at the hyperboloid between them") {
@@ -135,10 +134,12 @@ TEST_CASE("Walls beside each other close no more than the gap between them") {
     const FloatGridPtr a = surface(*start_from_box(space(), {{-6, -6, -6}, {0, 6, 4}}));
     const FloatGridPtr b = surface(*start_from_box(space(), {{0.6 * kH, -6, -6}, {6, 6, 4}}));
     const auto [surfaces, report] = separate({{"a", a}, {"b", b}});
-    // Each grows by half the slit, measured against what the grid makes of the slabs themselves.
-    const double half = 0.3 * kH * 12 * 10;
-    CHECK(volume(*surfaces[0]) - volume(*a) == Approx(half).epsilon(0.1));
-    CHECK(volume(*surfaces[1]) - volume(*b) == Approx(half).epsilon(0.1));
+    // Each grows by half the slit, but for a strip along the rim, less than a voxel wide, that rounds off.
+    const double most = 0.3 * kH * 12 * 10, least = most - 0.3 * kH * 2 * (12 + 10) * kH;
+    for (const double growth : {volume(*surfaces[0]) - volume(*a), volume(*surfaces[1]) - volume(*b)}) {
+        CHECK(growth < most);
+        CHECK(growth > least);
+    }
     for (const FloatGridPtr& grid : surfaces)
         for (const auto& v : extract_mesh(*grid).vertices) CHECK(v[2] < 4 + 0.15 * kH);
     CHECK(common_voxels(*surfaces[0], *surfaces[1]) == 0);
@@ -209,8 +210,8 @@ TEST_CASE("A solid in another's cavity stays, and the slit between them closes")
     const auto [surfaces, report] = separate({{"shell", shell}, {"ball", ball({{0, 0, 0}, r})}});
     CHECK(report.overlaps.empty());
     const double middle = volume(*ball({{0, 0, 0}, 5 - 0.2 * kH}));
-    CHECK(volume(*surfaces[1]) == Approx(middle).epsilon(0.003));
-    CHECK(volume(*surfaces[0]) == Approx(volume(*ball({{0, 0, 0}, 8})) - middle).epsilon(0.003));
+    CHECK(volume(*surfaces[1]) == Approx(middle).epsilon(0.006));
+    CHECK(volume(*surfaces[0]) == Approx(volume(*ball({{0, 0, 0}, 8})) - middle).epsilon(0.006));
     CHECK(common_voxels(*surfaces[0], *surfaces[1]) == 0);
 }
 

@@ -2,6 +2,8 @@
 #include <cstddef>
 #include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "covol/domain.h"
 #include "covol/fwd.h"
@@ -83,6 +85,9 @@ private:
 void write_image(const std::string& path, const ImageGeometry& geometry, const std::int32_t* labels);
 void write_image(const std::string& path, const ImageGeometry& geometry, const std::uint8_t* values);
 void write_image(const std::string& path, const ImageGeometry& geometry, const float* values);
+/// The same with key/value pairs, which NRRD keeps and the other formats drop.
+void write_image(const std::string& path, const ImageGeometry& geometry, const std::uint8_t* values,
+                 const std::vector<std::pair<std::string, std::string>>& metadata);
 
 /// What `write_image` can write, judged by the name alone. @throws Error InvalidOptions with the list.
 void check_image_extension(const std::string& path);
