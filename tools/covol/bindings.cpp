@@ -122,9 +122,26 @@ double DomainFlags::resolve_voxel_size(const Image* image, const std::vector<Vec
     return h;
 }
 
-void TagFlags::bind(CLI::App& command) {
+void TagFlags::bind(CLI::App& command, bool names) {
     add_length(command, "--tag-distance", tag_distance, "", "D: closes gaps between points up to 2D [from the points]");
-    add_vec3(command, "--exterior-seed", exterior_seeds, "a position outside the structure, in a cavity say; repeatable");
+    const std::string flag = "--exterior-seed", what = "a position outside the structure, in a cavity say; repeatable";
+    if (!names) return add_vec3(command, flag, exterior_seeds, what);
+    command.add_option_function<std::vector<std::string>>(
+               flag,
+               [this, flag](const std::vector<std::string>& texts) {
+                   exterior_seeds.clear();
+                   named_seeds.clear();
+                   for (const std::string& text : texts) {
+                       const std::size_t colon = text.find(':');
+                       if (colon == std::string::npos)
+                           exterior_seeds.push_back(parse_vec3(flag, text));
+                       else
+                           named_seeds.emplace_back(text.substr(0, colon), parse_vec3(flag, text.substr(colon + 1)));
+                   }
+               },
+               what + "; with NAME: of that structure alone")
+        ->type_name("[NAME:]X,Y,Z")
+        ->allow_extra_args(false);
 }
 
 void EdgeFlags::bind(CLI::App& command) {

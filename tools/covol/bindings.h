@@ -52,7 +52,9 @@ struct DomainFlags {
 struct TagFlags {
     Length tag_distance;
     std::vector<Vec3> exterior_seeds;
-    void bind(CLI::App& command);
+    std::vector<std::pair<std::string, Vec3>> named_seeds;  ///< of one structure among several
+    /// With `names`, seeds may be written name:x,y,z.
+    void bind(CLI::App& command, bool names = false);
 };
 
 struct EdgeFlags {
