@@ -184,24 +184,24 @@ std::vector<StructureInput> structures_of(const SegmentJob& job) {
     return inputs;
 }
 
-std::vector<Start> starts_of(const SegmentJob& job, const std::vector<StructureInput>& inputs) {
-    std::vector<Start> starts(inputs.size(), job.start);
+std::vector<StructureStart> starts_of(const SegmentJob& job, const std::vector<StructureInput>& inputs) {
+    std::vector<StructureStart> starts(inputs.size(), {job.start});
     if (inputs.size() == 1 || job.start.kind == Start::Kind::Tag) return starts;
     if (job.start.kind != Start::Kind::Vdb)
         throw UsageError("--init: several structures cannot start from one shape; expected tag, or vdb:FILE with a grid for each");
     std::vector<std::string> names;
     for (const StructureInput& input : inputs) names.push_back(input.name);
     const std::vector<std::string> grids = grid_names(names);
-    for (std::size_t n = 0; n < starts.size(); ++n) starts[n].level_set = read_vdb(job.start.path, grids[n]);
+    for (std::size_t n = 0; n < starts.size(); ++n) starts[n].start.level_set = read_vdb(job.start.path, grids[n]);
     return starts;
 }
 
 StructuresOutput segment_structures(const SegmentJob& job, const std::vector<StructureInput>& inputs, const Image& image,
-                                    const std::vector<Start>& starts, Session& session, const RunContext& run) {
+                                    const std::vector<StructureStart>& starts, Session& session, const RunContext& run) {
     StructuresOutput output;
     output.geometry = image.geometry();
     const double h = job.domain.resolve_voxel_size(&image, {}, session);
-    SegmentOptions options = job.resolve(h);
+    const SegmentOptions given = job.resolve(h);
     std::vector<std::string> names;
     for (const StructureInput& input : inputs) names.push_back(input.name);
     const std::vector<std::string> grids = grid_names(names);
@@ -214,8 +214,10 @@ StructuresOutput segment_structures(const SegmentJob& job, const std::vector<Str
         s.marks = cloud.points;
         s.rules = cloud.rules;
         s.paths = inputs[n].points.paths;
+        SegmentOptions options = given;
         options.exterior_seeds = inputs[n].exterior_seeds;
-        options.start = starts[n];
+        options.start = starts[n].start;
+        if (options.evolve.delta < 0) options.evolve.delta = starts[n].delta;
         try {
             s.result = segment(&image, s.marks, options, own);
         } catch (const Error& error) {
@@ -226,7 +228,7 @@ StructuresOutput segment_structures(const SegmentJob& job, const std::vector<Str
         output.structures.push_back(std::move(s));
     }
     const Stopwatch separating;
-    separate_all(output, options, run);
+    separate_all(output, given, run);
     session.add_seconds("separate", separating.seconds());
     for (StructureOutput& s : output.structures) {
         s.result.surface->setName(s.grid);
@@ -314,7 +316,7 @@ void run_structures(const SegmentJob& job, Session& session) {
     outputs.check("--table", job.table_path, OutputKind::Table);
     job.check_options();
 
-    const std::vector<Start> starts = starts_of(job, inputs);
+    const std::vector<StructureStart> starts = starts_of(job, inputs);
     ReadImageOptions reading = job.image.options;
     if (job.frames.given) reading.frame = job.frames.first;
     const Image image = job.read(job.images.front(), reading, session);

@@ -41,13 +41,20 @@ struct StructuresOutput {
     [[nodiscard]] std::vector<std::string> names() const;
 };
 
-/// Segments each structure and separates them. The starts, where there are any, are in the structures' order.
+/// How a structure starts. The curvature's weight that an earlier frame found automatically goes on where the command
+/// line gives none: a surface that changed its stiffness between frames would seem to move.
+struct StructureStart {
+    Start start;
+    double delta = -1;  ///< world units; < 0: automatic
+};
+
+/// Segments each structure and separates them. The starts are in the structures' order.
 [[nodiscard]] StructuresOutput segment_structures(const SegmentJob& job, const std::vector<StructureInput>& inputs,
-                                                  const Image& image, const std::vector<Start>& starts, Session& session,
+                                                  const Image& image, const std::vector<StructureStart>& starts, Session& session,
                                                   const RunContext& run);
 
 /// The starts that --init asks for, one for each structure.
-[[nodiscard]] std::vector<Start> starts_of(const SegmentJob& job, const std::vector<StructureInput>& inputs);
+[[nodiscard]] std::vector<StructureStart> starts_of(const SegmentJob& job, const std::vector<StructureInput>& inputs);
 
 /// One file for each output that was asked for, `tag` ("_t003", say) in front of their endings.
 using Sink = std::function<void(const std::string& path, std::function<void(const std::string& path)> write)>;

@@ -175,9 +175,10 @@ private:
                 const StructureOutput& s = output->structures[n];
                 add_result(table_.row() << frame.number, s.name.empty() ? s.grid : s.name, ++label, s.result.report);
                 table_ << "ok";
-                starts_[n] = Start{};
-                starts_[n].kind = Start::Kind::Vdb;
-                starts_[n].level_set = s.result.surface;
+                starts_[n].start = Start{};
+                starts_[n].start.kind = Start::Kind::Vdb;
+                starts_[n].start.level_set = s.result.surface;
+                starts_[n].delta = s.result.report.resolved.evolve.delta;
             }
             started_ = true;
         } catch (const Error& error) {
@@ -214,7 +215,7 @@ private:
     Session& session_;
     std::vector<StructureInput> inputs_;
     std::vector<Frame> frames_;
-    std::vector<Start> starts_;
+    std::vector<StructureStart> starts_;
     bool started_ = false;  ///< a frame has succeeded
     Json reports_ = Json::array();
     Table table_;
