@@ -151,7 +151,7 @@ private:
             const double voxels = tags ? kTagDeltaVoxels : 1.0;
             choose("delta", number(evolve.delta = voxels * h()), number(voxels) + " voxels");
         }
-        if (evolve.tau < 0) choose("tau", number(evolve.tau = h()), "1 voxel at unit speed");
+        if (evolve.tau < 0) choose("tau", number(h()), "1 voxel at unit speed; longer while the surface moves slowly");
         if (options_.edge.sigma < 0 && uses_image()) {
             const double voxels = tags ? kTagSigmaVoxels : 1.0;
             choose("sigma", number(options_.edge.sigma = voxels * h()), number(voxels) + " voxels");
@@ -349,7 +349,7 @@ private:
         alone.rho = 0;
         alone.attraction_range = 0;
         alone.image_yields = 0;
-        if (options_.evolve.follow) alone.tau *= kApproachTau;
+        if (options_.evolve.follow) alone.tau = kApproachTau * (alone.tau < 0 ? h() : alone.tau);
         alone.max_steps = std::min(alone.max_steps, kApproachSteps);
         alone.tolerance = std::max(alone.tolerance, kApproachTolerance);
         fields.edge = nullptr;
@@ -362,6 +362,7 @@ private:
         total.steps += before.steps;
         total.sweeps_per_step = total.steps > 0 ? sweeps / total.steps : 0.0;
         total.leaf_visits += before.leaf_visits;
+        total.leaf_visits_saved += before.leaf_visits_saved;
         total.seconds_assembly += before.seconds_assembly;
         total.seconds_sweeps += before.seconds_sweeps;
     }

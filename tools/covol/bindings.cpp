@@ -162,7 +162,7 @@ void EvolveFlags::bind(CLI::App& command, bool with_image) {
     command.add_option("--theta", options.theta, "weight of the points, 0 to 1")->capture_default_str();
     if (with_image) command.add_option("--rho", options.rho, "weight of the image, 0 to 1")->capture_default_str();
     add_length(command, "--delta", delta, "", "weight of curvature [0.5vx after tagging, else 1vx]");
-    add_length(command, "--tau", tau, "1vx", "time step; the flow's speed is 1 world unit per unit of time");
+    add_length(command, "--tau", tau, "1vx and more", "time step; the flow's speed is 1 world unit per unit of time");
     command.add_option("--epsilon", options.epsilon, "regularises the norm of grad u")->capture_default_str();
     add_length(command, "--attraction-range", attraction_range, "",
                "points pull fully up to half of it, not at all beyond; 0: unlimited "
@@ -184,7 +184,7 @@ void EvolveFlags::bind(CLI::App& command, bool with_image) {
 EvolveOptions EvolveFlags::resolve(double h, const EvolveOptions& otherwise) const {
     EvolveOptions resolved = options;
     resolved.delta = delta.resolve(h, otherwise.delta);
-    resolved.tau = tau.resolve(h, h);
+    resolved.tau = tau.resolve(h, otherwise.tau);
     resolved.attraction_range = attraction_range.resolve(h, otherwise.attraction_range);
     resolved.image_yields = image_yields.value_or(otherwise.image_yields);
     return resolved;

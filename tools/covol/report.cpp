@@ -40,6 +40,7 @@ Json to_json(const EvolveReport& r) {
             {"last_change", r.last_change},
             {"sweeps_per_step", r.sweeps_per_step},
             {"leaf_visits", r.leaf_visits},
+            {"leaf_visits_saved", r.leaf_visits_saved},
             {"seconds_assembly", r.seconds_assembly},
             {"seconds_sweeps", r.seconds_sweeps}};
 }

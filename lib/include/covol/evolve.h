@@ -1,4 +1,5 @@
 #pragma once
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
@@ -38,6 +39,7 @@ struct EvolveReport {
     double last_change = 0;            ///< as in EvolveOptions::tolerance, voxels
     double sweeps_per_step = 0;
     std::int64_t leaf_visits = 0;      ///< leaves swept, over all steps and sweeps
+    std::int64_t leaf_visits_saved = 0;  ///< visits to leaves where nothing happened, that were left out
     std::int64_t active_voxels = 0;    ///< at the end
     std::int64_t leaf_count = 0;
     double seconds_assembly = 0;

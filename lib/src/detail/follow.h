@@ -1,7 +1,10 @@
 #pragma once
+#include <vector>
+
 #include "covol/domain.h"
 #include "covol/fwd.h"
 #include "covol/run.h"
+#include "detail/leaf_band.h"
 
 namespace covol::detail {
 
@@ -17,5 +20,10 @@ inline constexpr double kFollowWidth = 5.0;
 /// faster off an image edge.
 /// @throws Error InvalidInput when u has no zero level set.
 void follow_surface(FloatGrid& u, const Domain& domain, double clamp, const RunContext& run);
+
+/// The same near the leaves `stale` only, where the surface has left what the band was made for: the band and the values
+/// of these leaves and of the 26 around each are made again, to first order by Godunov's scheme; all else keeps its bits.
+/// @return the leaves that may have changed, sorted; some may be gone from u
+std::vector<Coord> follow_surface_near(const std::vector<Coord>& stale, FloatGrid& u, const Domain& domain, double clamp);
 
 }  // namespace covol::detail

@@ -80,6 +80,8 @@ public:
     [[nodiscard]] T* leaf(std::size_t i) { return values_.data() + i * kLeafSize; }
     [[nodiscard]] const T* leaf(std::size_t i) const { return values_.data() + i * kLeafSize; }
     [[nodiscard]] std::size_t leaves() const noexcept { return leaves_; }
+    /// Leaves and extra blocks.
+    [[nodiscard]] std::size_t blocks() const noexcept { return values_.size() / kLeafSize; }
     void fill_block(std::size_t block, T value) {
         std::fill_n(values_.data() + block * kLeafSize, kLeafSize, value);
     }

@@ -55,6 +55,13 @@ struct SchemeKernels {
 
     /// Mean over the 24 tetrahedra of |∇u|, per voxel; 512 values. @param u padded, with edges and corners
     void (*mean_gradient)(const float* u, float* out);
+
+    /// Godunov's upwind scheme for |∇d| = 1 in a leaf, in voxels: Gauss-Seidel in four orders of the rows until no value
+    /// falls by more than `tolerance` (R. Zhao 2005, with a surface that cuts voxel edges as boundary).
+    /// @param d    padded (faces), >= 0; values only fall; the halo is not written
+    /// @param cut  3 x 512, by axis: 1/s where the surface cuts an edge of the voxel along it, s in (0,1] away; else 0
+    /// @return     whether a value fell by more than `tolerance`
+    bool (*eikonal)(float* d, const float* cut, float tolerance);
 };
 
 /// Homogeneous Neumann in a padded buffer: voxels outside lo..hi (local, inclusive; beyond -1..8 where the boundary is

@@ -258,11 +258,72 @@ void mean_gradient(const float* u, float* out) {
     for (int n = 0; n < 512; n += 8) store(out + n, load(faces.norm + n) * (1.0F / 24.0F));
 }
 
+/// Where the front comes from along one axis: from the value v at the distance 1/q.
+struct Arrival {
+    Lanes v, q;
+};
+
+inline void order(Arrival& a, Arrival& b) {
+    const auto swap = a.v > b.v;
+    const Arrival first = {swap ? b.v : a.v, swap ? b.q : a.q};
+    b = {swap ? a.v : b.v, swap ? a.q : b.q};
+    a = first;
+}
+
+/// The root x >= v of Σ q² (x - v)² = 1 over the axes whose v lies below it.
+inline Lanes arrive(Arrival a, Arrival b, Arrival c) {
+    order(a, b), order(b, c), order(a, b);
+    const Lanes one = broadcast(1.0F);
+    Lanes x = a.v + one / a.q;
+    Lanes qq = a.q * a.q, qv = qq * a.v, vv = qv * a.v;
+    const auto add_axis = [&](const Arrival& next) {
+        const Lanes w = next.q * next.q;
+        qq += w, qv += w * next.v, vv += w * next.v * next.v;
+        const Lanes root = qv * qv - qq * (vv - one);
+        const Lanes safe = max(root, Lanes{} + kTiny);
+        const Lanes both = (qv + safe * inverse_sqrt(safe)) / qq;
+        x = x > next.v ? both : x;
+    };
+    add_axis(b);
+    // Where the second axis does not count the third does not either.
+    const Lanes limit = x;
+    add_axis(c);
+    x = limit > c.v ? x : limit;
+    return x;
+}
+
+bool eikonal(float* d, const float* cut, float tolerance) {
+    const Lanes one = broadcast(1.0F);
+    bool fell = false;
+    for (int order = 0;; ++order) {
+        Lanes largest_fall = Lanes{};
+        const bool up_i = (order & 1) == 0, up_j = (order & 2) == 0;
+        for (int n = 0; n < 64; ++n) {
+            const int i = up_i ? n >> 3 : 7 - (n >> 3), j = up_j ? n & 7 : 7 - (n & 7);
+            float* row = d + padded(i, j, 0);
+            const float* q = cut + (i * 8 + j) * 8;
+            const auto along = [&](int axis, int stride) {
+                const Lanes least = -max(-load(row - stride), -load(row + stride));
+                const Lanes at = load(q + axis * 512);
+                return Arrival{at > 0.0F ? Lanes{} : least, at > 0.0F ? at : one};
+            };
+            const Lanes now = load(row);
+            const Lanes fall = now - arrive(along(0, kI), along(1, kJ), along(2, 1));
+            largest_fall = max(largest_fall, fall);
+            store(row, now - max(fall, Lanes{}));
+        }
+        const bool again = largest(largest_fall) > tolerance;
+        fell |= again;
+        // Every order once more after the last one that changed something would be the exact test; the next leaf visit is one.
+        if (!again && order >= 3) return fell;
+    }
+}
+
 #define COVOL_TEXT_(x) #x
 #define COVOL_TEXT(x) COVOL_TEXT_(x)
 }  // namespace
 
 extern const SchemeKernels kKernels;
-const SchemeKernels kKernels = {COVOL_TEXT(COVOL_SIMD_NAME), assemble, relax, heat, mean_gradient};
+const SchemeKernels kKernels = {COVOL_TEXT(COVOL_SIMD_NAME), assemble, relax, heat, mean_gradient, eikonal};
 
 }  // namespace covol::detail::COVOL_SIMD_NAME

@@ -1,0 +1,90 @@
+#pragma once
+#include <optional>
+#include <vector>
+
+#include <tbb/cache_aligned_allocator.h>
+
+#include "covol/domain.h"
+#include "covol/evolve.h"
+#include "detail/halo.h"
+#include "detail/leaf_band.h"
+#include "detail/motion.h"
+#include "detail/scheme.h"
+
+namespace covol::detail {
+
+/// What is fixed for one band: u_p + Σ_q a_pq (u_q - u_p) = u_p^{n-1}, a_pq = (τ/h³) min(v_pq, 0) - (τδ/h²) M_p W_pq <= 0,
+/// Eqs. (14)-(22). One step assembles the rows of every leaf from u^{n-1}, then visits the leaves in two colours until
+/// the residual has fallen. Values are in voxels, not world units.
+///
+/// Work is done only where something happens. A leaf sleeps from a step in which neither it nor a leaf next to it moved by
+/// more than `rest` until one of those has; a leaf whose residual is down, with neighbours whose is, is not visited again in a solve.
+class BandSolver {
+public:
+    struct Counts {
+        std::int64_t passes = 0;        ///< over the leaves
+        std::int64_t visits = 0;        ///< of leaves
+        std::int64_t visits_saved = 0;  ///< that passes over all leaves would have had
+        double seconds_assembly = 0, seconds_sweeps = 0;
+    };
+
+    /// Gathers u and the fields that have a weight.
+    /// @throws Error InvalidInput (no active voxel; a value that is not finite).
+    BandSolver(const FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options, const Domain& domain);
+
+    /// Who sleeps, and what the next step has to know of the steps before.
+    struct Rest {
+        LeafBand band;
+        std::vector<unsigned char> awake;
+        std::vector<float> unannounced;  ///< motion that the neighbours have not been woken for, voxels
+        std::vector<LeafMotion> motions;
+    };
+    /// The solver is of no use afterwards.
+    [[nodiscard]] Rest take_rest();
+    /// Leaves that slept in a band before sleep on.
+    /// @param changed  sorted origins of leaves with other values than there
+    /// @return for each leaf its number in the old band, or -1 where it is new or changed
+    std::vector<std::int32_t> sleep_on(const Rest& old, const std::vector<Coord>& changed);
+
+    /// One time step of length τ = tau * h; `rest` in voxels.
+    Motion step(double tau, double rest, Counts& counts);
+    /// Takes the last step back.
+    void restore_previous();
+    /// Active voxels into the grid that u came from; inactive ones keep their bits.
+    void store(FloatGrid& u) const;
+
+    [[nodiscard]] const LeafBand& band() const noexcept { return band_; }
+    [[nodiscard]] const LeafArray<float>& u() const noexcept { return field_.values; }
+    [[nodiscard]] std::int64_t active_count() const noexcept { return active_count_; }
+
+private:
+    void gather_fields(const EvolveFields& fields);
+    void wake(double rest);
+    double assemble(const SchemeConstants& constants);
+    void solve(double omega, Counts& counts);
+    double sweep(float omega, double goal, Counts& counts);
+    [[nodiscard]] bool is_hot(std::size_t leaf, double goal) const;
+    Motion measure();
+
+    [[nodiscard]] const unsigned long long* active(std::size_t leaf) const {
+        return reinterpret_cast<const unsigned long long*>(band_.active(leaf).data());
+    }
+    [[nodiscard]] float* rows(std::size_t leaf) { return rows_.data() + leaf * 6 * kLeafSize; }
+
+    const EvolveOptions& options_;
+    const Domain domain_;
+    LeafBand band_;
+    std::int64_t active_count_ = 0;
+    HaloField field_;  // u
+    std::optional<HaloField> phi_, edge_, image_weight_;
+    LeafArray<float> previous_;  // u^{n-1}
+    std::vector<float, tbb::cache_aligned_allocator<float>> rows_;  // 6 x 512 for each leaf
+    // One for each leaf:
+    std::vector<int> active_counts_;
+    std::vector<unsigned char> awake_;
+    std::vector<float> unannounced_;
+    std::vector<LeafMotion> motions_;
+    std::vector<double> residuals_;  // squared, as seen by the last visit
+};
+
+}  // namespace covol::detail
