@@ -15,6 +15,7 @@ packages=(
   libcli11-dev nlohmann-json3-dev
   # tests: other programs that read what covol writes
   catch2 libopenvdb-tools python3 python3-openvdb python3-numpy python3-tifffile
+  python3-nibabel python3-pydicom
 )
 
 missing=()

@@ -452,7 +452,7 @@ void compare_surfaces(const TriangleMesh& a, const TriangleMesh& b, double spaci
 
 }  // namespace
 
-Solid read_solid(const std::string& path, int label) {
+Solid read_solid(const std::string& path, int label, const RunContext& run) {
     const std::string end = detail::extension(path);
     Solid solid;
     solid.label = label;
@@ -466,7 +466,7 @@ Solid read_solid(const std::string& path, int label) {
     } else if (end == ".ply" || end == ".obj" || end == ".stl" || end == ".off") {
         solid.mesh = read_mesh(path);
     } else {
-        solid.mask = read_image(path);
+        solid.mask = read_image(path, {}, run);
     }
     return solid;
 }

@@ -360,7 +360,8 @@ TEST_CASE("unusable images end in one line that says why") {
         says(read_error(scratch.write(name, "this is just text\nnothing else\n")), name);
     }
     says(read_error(scratch.write("a.jpg", "x")), "expected a name ending in");
-    says(read_error(make_tiff<std::uint8_t>(scratch.path("rgb.tif"), {8, SAMPLEFORMAT_UINT, 3}, number)), "colour");
+    says(read_error(make_tiff<std::uint8_t>(scratch.path("rgb.tif"), {8, SAMPLEFORMAT_UINT, 3}, number)),
+         "expected one channel, got 3; choose 0 (red), 1 (green), 2 (blue) with --channel");
     TiffFormat one_page;
     one_page.pages = 1;
     says(read_error(make_tiff<std::uint8_t>(scratch.path("flat.tif"), one_page, number)),
@@ -374,9 +375,9 @@ TEST_CASE("unusable images end in one line that says why") {
     says(read_error(scratch.write("rgb.nrrd",
                                   header + "dimension: 4\nsizes: 3 2 2 2\nkinds: RGB-color domain domain domain\n\n" +
                                       std::string(24, 'a'))),
-         "colour");
+         "expected one channel, got 3");
     says(read_error(scratch.write("4d.nrrd", header + "dimension: 4\nsizes: 2 2 2 3\n\n" + std::string(24, 'a'))),
-         "got 3 frames");
+         "expected one frame, got 3; choose 0 to 2 with --frame");
     says(read_error(scratch.write("huge.nrrd", header + "dimension: 3\nsizes: 100000 100000 100000\n\nabc")),
          "cannot hold");
     says(read_error(scratch.write("shear.nrrd", header + "dimension: 3\nsizes: 2 2 2\nspace dimension: 3\n"

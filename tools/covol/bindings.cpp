@@ -56,7 +56,7 @@ void add_vec3(CLI::App& command, const std::string& flag, std::vector<Vec3>& tar
 
 // ---- images and points ---------------------------------------------------------------------------------------------
 
-void ImageFlags::bind(CLI::App& command) {
+void ImageFlags::bind(CLI::App& command, bool with_roi, bool with_frame) {
     command.add_option_function<std::string>(
                "--spacing",
                [this](const std::string& text) {
@@ -66,6 +66,32 @@ void ImageFlags::bind(CLI::App& command) {
                },
                "voxel spacing, instead of the file's")
         ->type_name("SX,SY,SZ");
+    const auto add_index = [&](const char* flag, int& target, const char* description) {
+        command.add_option(flag, target, description)->check(CLI::NonNegativeNumber.description(""))->type_name("N");
+    };
+    add_index("--channel", options.channel, "channel of an image that has several, from 0");
+    if (with_frame) add_index("--frame", options.frame, "time point of an image that has several, from 0");
+    if (with_roi) add_box(command, "--roi", options.roi, "take this box of the world only");
+}
+
+Image ImageFlags::read(const std::string& path, const RunContext& run) const {
+    const Image image = read_image(path, options, run);
+    return options.roi ? image.cropped() : image;
+}
+
+ImageGeometry ImageFlags::read_geometry(const std::string& path, const RunContext& run) const {
+    const ImageGeometry geometry = read_image_geometry(path, options, run);
+    return options.roi ? cropped(geometry, voxels_around(geometry, *options.roi)) : geometry;
+}
+
+WorldBox sampled_box(const WorldBox& box, double h) {
+    constexpr double kReach = 9;  // a leaf's 7 voxels, one for rounding the box up to voxels, one to spare
+    WorldBox grown = box;
+    for (int a = 0; a < 3; ++a) {
+        grown.min[a] -= kReach * h;
+        grown.max[a] += kReach * h;
+    }
+    return grown;
 }
 
 CLI::Option* PointFlags::bind(CLI::App& command, const std::string& flag) {

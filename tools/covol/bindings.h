@@ -20,8 +20,17 @@ CLI::Option* add_length(CLI::App& command, const std::string& flag, Length& targ
 /// The image's own facts that the user corrects.
 struct ImageFlags {
     ReadImageOptions options;
-    void bind(CLI::App& command);
+    /// @param with_roi    --roi crops the image; commands with a domain have their own
+    /// @param with_frame  --frame takes one time point; commands that take several have their own
+    void bind(CLI::App& command, bool with_roi = true, bool with_frame = true);
+    /// The image, or the part of it that --roi names.
+    [[nodiscard]] Image read(const std::string& path, const RunContext& run) const;
+    /// The lattice of read()'s image.
+    [[nodiscard]] ImageGeometry read_geometry(const std::string& path, const RunContext& run) const;
 };
+
+/// `box` and what voxels of edge h around it may sample: leaves reach beyond a domain.
+[[nodiscard]] WorldBox sampled_box(const WorldBox& box, double h);
 
 struct PointFlags {
     std::vector<std::string> paths;

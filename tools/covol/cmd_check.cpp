@@ -101,8 +101,8 @@ void check_vdb(const std::string& path, const RunContext& run, Findings& finding
     }
 }
 
-void check_image(const std::string& path, const RunContext& run, Findings& findings) {
-    const Image image = read_image(path, {}, run);
+void check_image(const std::string& path, const ImageFlags& flags, const RunContext& run, Findings& findings) {
+    const Image image = flags.read(path, run);
     const ImageGeometry& g = image.geometry();
     const auto range = image.range();
     if (range[0] == range[1]) findings.problem("all voxels are " + std::to_string(range[0]) + ": there is no edge");
@@ -111,7 +111,10 @@ void check_image(const std::string& path, const RunContext& run, Findings& findi
     if (*most > kFlatVoxels * *least)
         findings.remark("voxels are " + std::to_string(*most / *least) + " times longer along one axis: between the "
                         "slices the surface is interpolated");
-    if (g.spacing == Vec3{1, 1, 1}) findings.remark("spacing is 1, 1, 1: the file may not know its own; see --spacing");
+    if (!g.spacing_known)
+        findings.remark("the file does not know its spacing: 1 stands in for what is missing; see --spacing");
+    else if (g.spacing == Vec3{1, 1, 1})
+        findings.remark("spacing is 1, 1, 1: the file may not know its own; see --spacing");
     if (!g.is_axis_aligned())
         findings.remark("the image is rotated: TIFF cannot keep that, NRRD, NIfTI and MetaImage can");
 }
@@ -129,7 +132,8 @@ void check_mesh_file(const std::string& path, Findings& findings) {
     check_extent(extent, "the mesh", findings);
 }
 
-void check_points(const std::string& path, const std::string& image_path, Findings& findings) {
+void check_points(const std::string& path, const std::string& image_path, const ImageFlags& flags, const RunContext& run,
+                  Findings& findings) {
     const PointCloud cloud = read_points(path);
     const std::vector<Vec3> distinct = merge_close_points(cloud.points, 0);
     if (distinct.size() < cloud.points.size())
@@ -143,7 +147,7 @@ void check_points(const std::string& path, const std::string& image_path, Findin
                             std::to_string(s.median) + ": it may be an outlier");
     }
     if (image_path.empty()) return;
-    const ImageGeometry geometry = read_image_geometry(image_path);
+    const ImageGeometry geometry = read_image_geometry(image_path, flags.options, run);
     try {
         check_inside(to_world(cloud, &geometry), geometry, path);
     } catch (const Error& error) {
@@ -151,15 +155,15 @@ void check_points(const std::string& path, const std::string& image_path, Findin
     }
 }
 
-void check(const std::string& path, const std::string& image_path, Session& session) {
+void check(const std::string& path, const std::string& image_path, const ImageFlags& flags, Session& session) {
     Findings findings(session);
     const FileKind kind = kind_of_file(path);
     session.report()["kind"] = to_string(kind);
     switch (kind) {
         case FileKind::Vdb: check_vdb(path, session.run(), findings); break;
-        case FileKind::Image: check_image(path, session.run(), findings); break;
+        case FileKind::Image: check_image(path, flags, session.run(), findings); break;
         case FileKind::Mesh: check_mesh_file(path, findings); break;
-        case FileKind::Points: check_points(path, image_path, findings); break;
+        case FileKind::Points: check_points(path, image_path, flags, session.run(), findings); break;
     }
     session.report()["problems"] = findings.problems();
     session.say(path + ": " + (findings.problems() == 0 ? "no problem" : std::to_string(findings.problems()) + " problem(s)"));
@@ -171,11 +175,13 @@ void check(const std::string& path, const std::string& image_path, Session& sess
 void add_check(Session& session) {
     const auto path = std::make_shared<std::string>();
     const auto image = std::make_shared<std::string>();
+    const auto flags = std::make_shared<ImageFlags>();
     CLI::App* command = session.add_command("check", "What would go wrong with a file in Blender, Houdini, Slicer or covol",
-                                            [path, image, &session] { check(*path, *image, session); });
+                                            [path, image, flags, &session] { check(*path, *image, *flags, session); });
     command->add_option("file", *path, ".vdb, image, mesh or points; exit code 3 when there is a problem")
         ->required()->type_name("FILE");
     command->add_option("--image", *image, "points: the image that they belong to")->type_name("IMAGE");
+    flags->bind(*command);
 }
 
 }  // namespace covol::tool

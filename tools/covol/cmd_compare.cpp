@@ -19,9 +19,13 @@ struct CompareJob {
 
     /// Masks may need a spacing that their file does not know.
     Solid read(const std::string& path, int wanted, const RunContext& run) const {
-        if (kind_of_file(path) != FileKind::Image) return read_solid(path, wanted);
+        if (kind_of_file(path) != FileKind::Image) {
+            if (image.options.roi)
+                throw Error(Errc::InvalidOptions, "--roi: expected two label images to crop, got " + path);
+            return read_solid(path, wanted, run);
+        }
         Solid solid;
-        solid.mask = read_image(path, image.options, run);
+        solid.mask = image.read(path, run);
         solid.label = wanted;
         return solid;
     }

@@ -28,7 +28,7 @@ struct ConvertJob {
     bool half = false;
 
     void image_to_vdb(Session& session) const {
-        const Image pixels = read_image(input, image.options, session.run());
+        const Image pixels = image.read(input, session.run());
         const double finest = choose_voxel_size(&pixels, {}).voxel_size;
         const double h = voxel_size.resolve(finest, finest);
         const FloatGridPtr grid = to_grid(pixels, h, session.run());
@@ -41,7 +41,7 @@ struct ConvertJob {
 
     void vdb_to_image(Session& session) const {
         const FloatGridPtr grid = read_vdb(input, grid_name);
-        const ImageGeometry geometry = like.empty() ? geometry_of(*grid) : read_image_geometry(like, image.options);
+        const ImageGeometry geometry = like.empty() ? geometry_of(*grid) : image.read_geometry(like, session.run());
         session.require_memory(4 * std::uint64_t(geometry.size[0]) * geometry.size[1] * geometry.size[2], "the image");
         const auto values = std::make_shared<std::vector<float>>(sample(*grid, geometry, session.run()));
         session.report()["image"] = to_json(geometry);
@@ -52,7 +52,7 @@ struct ConvertJob {
 
     void convert_points(Session& session) const {
         std::optional<ImageGeometry> geometry;
-        if (!like.empty()) geometry = read_image_geometry(like, image.options);
+        if (!like.empty()) geometry = read_image_geometry(like, image.options, session.run());
         const PointCloud cloud = read_points(input, points.options);
         const std::vector<Vec3> world = to_world(cloud, geometry ? &*geometry : nullptr);
         session.report()["points"] = {{"count", world.size()}, {"rule", cloud.rule}};

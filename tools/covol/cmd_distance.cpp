@@ -32,7 +32,7 @@ struct DistanceJob {
     void run(Session& session) const {
         session.outputs().check("-o", output, OutputKind::Vdb);
         std::optional<ImageGeometry> geometry;
-        if (!like.empty()) geometry = read_image_geometry(like, image.options);
+        if (!like.empty()) geometry = read_image_geometry(like, image.options, session.run());
         const ImageGeometry* pointer = geometry ? &*geometry : nullptr;
         const std::vector<Vec3> cloud = read_world_points(points, pointer, session.run()).points;
         const double h = voxel_size(pointer, cloud, session);
@@ -63,7 +63,7 @@ void add_distance(Session& session) {
     add_length(*command, "--max-distance", job->max_distance, "10vx", "radius of the tube");
     command->add_option("--like", job->like, "image whose box is the domain [the points' box]")->type_name("IMAGE");
     job->domain.bind(*command, true);
-    job->image.bind(*command);
+    job->image.bind(*command, false);
     command->add_flag("--half", job->half, "store values as 16-bit floats");
 }
 

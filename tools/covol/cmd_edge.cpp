@@ -16,8 +16,11 @@ struct EdgeJob {
     void run(Session& session) const {
         session.outputs().check("-o", output, OutputKind::Vdb);
         const FloatGridPtr topology = read_vdb(band_path);
-        const Image pixels = read_image(image_path, image.options, session.run());
-        const double h = domain_of(*topology).voxel_size;
+        const Domain domain = domain_of(*topology);
+        const double h = domain.voxel_size;
+        ReadImageOptions reading = image.options;
+        reading.roi = sampled_box(domain.world_box(), h);
+        const Image pixels = read_image(image_path, reading, session.run());
         const Stopwatch watch;
         const EdgeResult result = edge(pixels, *topology, edge_flags.resolve(h, h), session.run());
         session.add_seconds("edge", watch.seconds());
@@ -40,7 +43,7 @@ void add_edge(Session& session) {
     command->add_option("--band", job->band_path, "a grid whose active voxels get g")->required()->type_name("BAND.vdb");
     command->add_option("-o,--output", job->output, "the grid 'edge', .vdb")->required()->type_name("OUT.vdb");
     job->edge_flags.bind(*command);
-    job->image.bind(*command);
+    job->image.bind(*command, false);
     command->add_flag("--half", job->half, "store values as 16-bit floats");
 }
 

@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <cmath>
 #include <iomanip>
 #include <sstream>
 
@@ -14,20 +16,6 @@ std::string triple(const auto& v) {
     std::ostringstream text;
     text << v[0] << " x " << v[1] << " x " << v[2];
     return text.str();
-}
-
-const char* name_of(PixelType type) {
-    switch (type) {
-        case PixelType::UInt8: return "uint8";
-        case PixelType::Int8: return "int8";
-        case PixelType::UInt16: return "uint16";
-        case PixelType::Int16: return "int16";
-        case PixelType::UInt32: return "uint32";
-        case PixelType::Int32: return "int32";
-        case PixelType::Float: return "float";
-        case PixelType::Double: break;
-    }
-    return "double";
 }
 
 void describe_vdb(const std::string& path, Session& session) {
@@ -48,18 +36,60 @@ void describe_vdb(const std::string& path, Session& session) {
     }
 }
 
-void describe_image(const std::string& path, Session& session) {
-    const Image image = read_image(path, {}, session.run());
-    const ImageGeometry& g = image.geometry();
-    const auto range = image.range();
+/// Which way an axis of the image runs in the world: "+x", or its cosines.
+std::string axis_text(const ImageGeometry& g, int axis) {
+    for (int w = 0; w < 3; ++w)
+        if (std::abs(g.direction[w][axis]) > 1 - 1e-6) return std::string(g.direction[w][axis] > 0 ? "+" : "-") + "xyz"[w];
     std::ostringstream text;
-    text << triple(g.size) << " voxels, " << name_of(image.pixel_type()) << ", " << range[0] << " to " << range[1]
-         << "\nspacing " << triple(g.spacing) << " " << (g.unit.empty() ? "(no unit)" : g.unit) << ", origin "
-         << triple(g.origin) << (g.is_axis_aligned() ? "" : ", rotated");
+    text << std::setprecision(3) << "(" << g.direction[0][axis] << ", " << g.direction[1][axis] << ", "
+         << g.direction[2][axis] << ")";
+    return text.str();
+}
+
+/// Smallest and largest value of one channel.
+Json range_of(const std::string& path, ReadImageOptions options, int channel, const ImageInfo& info, Session& session) {
+    options.channel = channel;
+    if (info.frames > 1) options.frame = std::max(options.frame, 0);
+    const auto range = read_image(path, options, session.run()).range();
+    const bool named = std::size_t(channel) < info.channel_names.size();
+    std::ostringstream text;
+    text << (info.channels > 1 ? "channel " + std::to_string(channel) + (named ? " " + info.channel_names[channel] : "") + ": "
+                               : "values: ")
+         << range[0] << " to " << range[1] << (info.frames > 1 ? ", frame " + std::to_string(options.frame) : "");
     session.say(text.str());
-    session.report()["image"] = to_json(g);
-    session.report()["image"]["type"] = name_of(image.pixel_type());
-    session.report()["image"]["range"] = {range[0], range[1]};
+    return {range[0], range[1]};
+}
+
+void describe_image(const std::string& path, const ImageFlags& flags, Session& session) {
+    constexpr int kMostChannels = 16;  // for which the pixels are read
+    const ImageInfo info = read_image_info(path, flags.options, session.run());
+    const ImageGeometry& g = info.geometry;
+    std::ostringstream text;
+    text << info.format << ", " << triple(g.size) << " voxels, " << to_string(info.type) << ", " << info.channels
+         << " channel(s), " << info.frames << " frame(s), stored as " << info.axis_order << "\nspacing " << triple(g.spacing)
+         << " " << (g.unit.empty() ? "(no unit)" : g.unit) << (g.spacing_known ? "" : " (not known)") << ", origin "
+         << triple(g.origin) << "\naxes: i runs along " << axis_text(g, 0) << ", j along " << axis_text(g, 1) << ", k along "
+         << axis_text(g, 2) << " of the world (LPS), which goes from " << triple(g.world_box().min) << " to "
+         << triple(g.world_box().max);
+    for (const auto& [field, value] : info.fields) text << "\n  " << field << ": " << value;
+    session.say(text.str());
+
+    Json& report = session.report()["image"] = to_json(g);
+    report["format"] = info.format;
+    report["type"] = to_string(info.type);
+    report["axis_order"] = info.axis_order;
+    report["channels"] = info.channels;
+    report["channel_names"] = info.channel_names;
+    report["frames"] = info.frames;
+    report["spacing_known"] = {info.spacing_known[0], info.spacing_known[1], info.spacing_known[2]};
+    for (const auto& [field, value] : info.fields) report["fields"][field] = value;
+    const int first = std::max(flags.options.channel, 0);
+    const int last = flags.options.channel >= 0 ? first : std::min(info.channels, kMostChannels) - 1;
+    for (int channel = first; channel <= last; ++channel) {
+        const Json range = range_of(path, flags.options, channel, info, session);
+        if (channel == first) report["range"] = range;
+        report["ranges"].push_back(range);
+    }
 }
 
 void describe_mesh(const std::string& path, Session& session) {
@@ -94,12 +124,12 @@ void describe_points(const std::string& path, Session& session) {
     session.say(text.str());
 }
 
-void describe(const std::string& path, Session& session) {
+void describe(const std::string& path, const ImageFlags& flags, Session& session) {
     const FileKind kind = kind_of_file(path);
     session.report()["kind"] = to_string(kind);
     switch (kind) {
         case FileKind::Vdb: return describe_vdb(path, session);
-        case FileKind::Image: return describe_image(path, session);
+        case FileKind::Image: return describe_image(path, flags, session);
         case FileKind::Mesh: return describe_mesh(path, session);
         case FileKind::Points: return describe_points(path, session);
     }
@@ -109,9 +139,11 @@ void describe(const std::string& path, Session& session) {
 
 void add_info(Session& session) {
     const auto path = std::make_shared<std::string>();
+    const auto flags = std::make_shared<ImageFlags>();
     CLI::App* command = session.add_command("info", "What is in a file: .vdb, image, mesh or points",
-                                            [path, &session] { describe(*path, session); });
+                                            [path, flags, &session] { describe(*path, *flags, session); });
     command->add_option("file", *path, "the file")->required()->type_name("FILE");
+    flags->bind(*command);
 }
 
 }  // namespace covol::tool

@@ -19,7 +19,7 @@ struct MaskJob {
         if (label < 1 || label > 255)
             throw Error(Errc::InvalidOptions, "--label: expected 1 to 255, got " + std::to_string(label));
         const FloatGridPtr level_set = read_level_set(input);
-        const ImageGeometry geometry = read_image_geometry(like, image.options);
+        const ImageGeometry geometry = image.read_geometry(like, session.run());
         const Stopwatch watch;
         const auto labels = std::make_shared<std::vector<std::uint8_t>>(
             rasterize(*level_set, geometry, static_cast<std::uint8_t>(label), session.run()));

@@ -17,7 +17,7 @@ struct RenderJob {
         if (const std::string why = options.why_invalid(); !why.empty()) throw Error(Errc::InvalidOptions, "render: " + why);
         const FloatGridPtr level_set = read_level_set(input);
         std::optional<Image> pixels;
-        if (!image_path.empty()) pixels = read_image(image_path, image.options, session.run());
+        if (!image_path.empty()) pixels = image.read(image_path, session.run());
         const WorldPoints cloud = read_world_points(points, pixels ? &pixels->geometry() : nullptr, session.run());
         const Stopwatch watch;
         const auto picture = std::make_shared<Picture>(

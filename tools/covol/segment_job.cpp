@@ -73,14 +73,19 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
     add_length(command, "--min-component", min_component, "", "drop pieces of the mesh smaller than a cube of this edge");
     command.add_flag("--half", half, "store values in .vdb files as 16-bit floats");
     mesh.bind(command);
-    if (with_image) image.bind(command);
+    if (with_image) image.bind(command, false, false);
 }
 
 Image SegmentJob::read(const std::string& path, const ReadImageOptions& options, Session& session) const {
     const Stopwatch reading;
-    const ImageGeometry geometry = read_image_geometry(path, options);
-    session.require_memory(std::uint64_t(geometry.size[0]) * geometry.size[1] * geometry.size[2], "the image");
-    Image pixels = read_image(path, options, session.run());
+    ReadImageOptions needed = options;
+    if (domain.roi) {
+        const Vec3 spacing = read_image_geometry(path, options, session.run()).spacing;
+        const double finest = *std::min_element(spacing.begin(), spacing.end());
+        needed.roi = sampled_box(*domain.roi, domain.voxel_size.resolve(finest, finest));
+    }
+    session.require_memory(read_image_info(path, needed, session.run()).bytes_to_hold, "the image");
+    Image pixels = read_image(path, needed, session.run());
     Json& input = session.report()["input"]["image"];
     input = to_json(pixels.geometry());
     input["path"] = path;

@@ -238,6 +238,9 @@ void Session::note(const std::string& line) {
 void Session::say(const std::string& line) { progress_->line(line); }
 
 void Session::warn(const std::string& line) {
+    // A file that is opened twice says the same twice.
+    for (const Json& said : report_["warnings"])
+        if (said == line) return;
     progress_->line("covol: warning: " + line);
     report_["warnings"].push_back(line);
 }

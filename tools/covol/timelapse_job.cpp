@@ -50,32 +50,6 @@ struct Frame {
     int number = 0;
 };
 
-// The header of a frame beyond the last is refused.
-bool has_frame(const std::string& path, ReadImageOptions options, int frame) {
-    options.frame = frame;
-    try {
-        static_cast<void>(read_image_geometry(path, options));
-        return true;
-    } catch (const Error& error) {
-        if (error.code() != Errc::InvalidOptions) throw;
-        return false;
-    }
-}
-
-int count_frames(const std::string& path, const ReadImageOptions& options) {
-    if (!has_frame(path, options, 0)) return 0;
-    int known = 0, beyond = 1;
-    while (has_frame(path, options, beyond)) {
-        known = beyond;
-        beyond *= 2;
-    }
-    while (beyond - known > 1) {
-        const int middle = (known + beyond) / 2;
-        (has_frame(path, options, middle) ? known : beyond) = middle;
-    }
-    return beyond;
-}
-
 std::vector<Frame> frames_of(const SegmentJob& job) {
     std::vector<Frame> frames;
     if (job.images.size() > 1) {
@@ -86,7 +60,7 @@ std::vector<Frame> frames_of(const SegmentJob& job) {
         for (const std::string& path : job.images) frames.push_back({path, options, int(frames.size())});
         return frames;
     }
-    const int count = count_frames(job.images.front(), job.image.options);
+    const int count = read_image_info(job.images.front(), job.image.options).frames;
     const int first = job.frames.all ? 0 : job.frames.first, last = job.frames.all ? count - 1 : job.frames.last;
     if (last >= count)
         throw Error(Errc::InvalidOptions, "--frame: frame " + std::to_string(last) + " does not exist: " + job.images.front() +

@@ -23,7 +23,7 @@ struct Solid {
     FloatGridPtr level_set;
 };
 /// By the name's end: images, meshes, .vdb (its level set "surface", else its first float grid).
-[[nodiscard]] Solid read_solid(const std::string& path, int label = 0);
+[[nodiscard]] Solid read_solid(const std::string& path, int label = 0, const RunContext& run = {});
 
 /// Overlap on the finer of both lattices (a mask's own voxels when one is a mask), distances between surfaces.
 [[nodiscard]] CompareReport compare(const Solid& a, const Solid& b, const RunContext& run = {});

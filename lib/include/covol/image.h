@@ -1,6 +1,8 @@
 #pragma once
+#include <array>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,31 +33,55 @@ struct ImageGeometry {
 
 enum class PixelType { UInt8, Int8, UInt16, Int16, UInt32, Int32, Float, Double };
 
+/// "uint8", ..., "float", "double"
+[[nodiscard]] const char* to_string(PixelType type);
+
+/// The voxels min..max of an image, inclusive.
+struct VoxelBox {
+    Index3 min{0, 0, 0};
+    Index3 max{-1, -1, -1};
+
+    [[nodiscard]] Index3 size() const { return {max[0] - min[0] + 1, max[1] - min[1] + 1, max[2] - min[2] + 1}; }
+    [[nodiscard]] bool contains(const Index3& voxel) const;
+    friend bool operator==(const VoxelBox&, const VoxelBox&) = default;
+};
+
 struct ReadImageOptions {
     Vec3 spacing{0, 0, 0};  ///< Replaces the file's spacing where > 0.
     int channel = -1;       ///< Which channel of a hyperstack, from 0; -1: there must be only one.
     int frame = -1;         ///< Which time point of a series, from 0; -1: there must be only one.
+    /// Read only what samples within this box need: the voxels in it and one more on every side.
+    std::optional<WorldBox> roi = {};
 };
 
-/// A scalar 3D image in memory, in the file's own pixel type (a byte stays a byte).
+/// A scalar 3D image in the file's own pixel type (a byte stays a byte).
+///
+/// Its geometry is always the whole image's; with ReadImageOptions::roi only a box of voxels is held. Large files that
+/// keep their pixels as they are in memory are mapped, not read: only what is touched takes memory. Such a file must not
+/// be made shorter while the image lives.
 class Image {
 public:
     [[nodiscard]] const ImageGeometry& geometry() const noexcept { return geometry_; }
     [[nodiscard]] PixelType pixel_type() const noexcept { return type_; }
     [[nodiscard]] const std::string& path() const noexcept { return path_; }
-    /// The value of voxel (i,j,k); @pre inside.
+    /// The voxels that can be asked for.
+    [[nodiscard]] const VoxelBox& held() const noexcept { return held_; }
+    /// The value of voxel (i,j,k); @pre held.
     [[nodiscard]] double at(int i, int j, int k) const;
 
     /// Trilinear samples at the centres of the voxels min..max (inclusive) of `frame`'s lattice;
     /// positions outside the image take the nearest voxel's value.
     /// @param out  (max-min+1) values, k fastest (OpenVDB's leaf order).
+    /// @throws Error InvalidInput when they need voxels of the image that are not held.
     void sample(const Domain& frame, const Index3& min, const Index3& max, float* out) const;
 
-    /// Intensities below which the fractions `low` and `high` of the voxels lie (deterministic;
+    /// Intensities below which the fractions `low` and `high` of the held voxels lie (deterministic;
     /// large images are subsampled on a regular lattice).
     [[nodiscard]] std::array<double, 2> percentiles(double low, double high) const;
-    /// Smallest and largest value.
+    /// Smallest and largest value of the held voxels.
     [[nodiscard]] std::array<double, 2> range() const;
+    /// The held voxels as an image of their own; shares their memory.
+    [[nodiscard]] Image cropped() const;
 
     /// Takes a copy of `values` (i fastest, size[0]*size[1]*size[2]).
     static Image from_values(const ImageGeometry& geometry, const float* values);
@@ -63,24 +89,64 @@ public:
 
 private:
     friend Image read_image(const std::string&, const ReadImageOptions&, const RunContext&);
+    template <typename T>
+    [[nodiscard]] const T* row(int j, int k) const;
+    template <typename T>
+    static Image copy_of(const ImageGeometry& geometry, PixelType type, const T* values);
+    void require_finite() const;
+    void expect_slice(int k) const;
+    void forget_slice(int k) const;
+    [[nodiscard]] std::uint64_t slice_bytes() const;
+
     ImageGeometry geometry_;
     PixelType type_ = PixelType::Float;
     std::string path_;
-    std::shared_ptr<const void> data_;  // i fastest
+    VoxelBox held_;
+    std::shared_ptr<const void> data_;           // voxel held_.min
+    std::array<std::int64_t, 3> stride_{1, 0, 0};  // pixels from a voxel to the next along i, j, k
+    bool mapped_ = false;
 };
 
-/// Reads a multi-page TIFF (ImageJ and OME spacing understood), NRRD, NIfTI or MetaImage.
-/// @throws Error Io (cannot be opened or read), InvalidInput (not 3D, empty, NaN or infinite values),
-///               Unsupported (colour or vector pixels, an unknown format).
+/// What a file's header says, and where it says so.
+struct ImageInfo {
+    ImageGeometry geometry;
+    PixelType type = PixelType::Float;
+    std::string format;                             ///< "ImageJ TIFF", "NIfTI-1", ...
+    std::string axis_order;                         ///< the file's, fastest first: "XYCZT"
+    int channels = 1;                               ///< chosen from by ReadImageOptions::channel
+    int frames = 1;                                 ///< chosen from by ReadImageOptions::frame
+    std::vector<std::string> channel_names;         ///< empty, or one for each channel
+    std::array<bool, 3> spacing_known{true, true, true};
+    /// Header fields that were used, and their values as they stand there.
+    std::vector<std::pair<std::string, std::string>> fields;
+    std::uint64_t bytes_to_hold = 0;                ///< memory that read_image() takes; 0 where it maps the file
+};
+
+/// Reads a 3D image: TIFF (ImageJ, OME and tifffile descriptions understood; BigTIFF, tiles, several files), NRRD,
+/// NIfTI, MetaImage, MRC, ITK's HDF5, a DICOM series (its folder, or one of its files), a float grid of a .vdb file
+/// ("FILE.vdb:name", or its first one; the box of its active voxels). A file that states no spacing is a warning.
+/// @throws Error Io (cannot be opened or read), InvalidInput (not 3D, empty, NaN or infinite values; an roi outside),
+///               Unsupported (several channels, frames or series and none chosen: lists them; an unknown format).
 [[nodiscard]] Image read_image(const std::string& path, const ReadImageOptions& options = {},
                                const RunContext& run = {});
 
-/// Only what the header says. @throws as read_image.
-[[nodiscard]] ImageGeometry read_image_geometry(const std::string& path, const ReadImageOptions& options = {});
+/// Only what the header says; of options.roi nothing. @throws as read_image.
+[[nodiscard]] ImageGeometry read_image_geometry(const std::string& path, const ReadImageOptions& options = {},
+                                                const RunContext& run = {});
+
+/// All that the header says. @throws as read_image, but channel and frame need not be chosen.
+[[nodiscard]] ImageInfo read_image_info(const std::string& path, const ReadImageOptions& options = {},
+                                        const RunContext& run = {});
+
+/// The voxels that read_image() holds for `roi`. @throws Error InvalidInput when it misses the image.
+[[nodiscard]] VoxelBox voxels_around(const ImageGeometry& geometry, const WorldBox& roi);
+
+/// The lattice of `box` alone.
+[[nodiscard]] ImageGeometry cropped(const ImageGeometry& geometry, const VoxelBox& box);
 
 /// Writes values (i fastest) in the geometry's frame: .nrrd, .nii, .nii.gz, .mha, .tif by the name's end; packed,
-/// except .nii. A TIFF has spacing and unit (Fiji's way) but no place for an origin or a direction; NIfTI has no unit
-/// but the millimetre, the numbers are written as they are.
+/// except .nii. A TIFF has spacing, unit and origin (Fiji's way) but no place for a direction; NIfTI has no unit but
+/// the millimetre, the numbers are written as they are.
 /// Whole or not at all: to a temporary name beside the target, then renamed.
 void write_image(const std::string& path, const ImageGeometry& geometry, const std::int32_t* labels);
 void write_image(const std::string& path, const ImageGeometry& geometry, const std::uint8_t* values);

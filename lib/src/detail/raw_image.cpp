@@ -1,5 +1,8 @@
 #include "detail/raw_image.h"
 
+#include <fcntl.h>
+#include <openvdb/math/Half.h>
+#include <sys/mman.h>
 #include <unistd.h>
 #include <zlib.h>
 
@@ -8,17 +11,18 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <vector>
-
-#include "covol/error.h"
 
 namespace covol::detail {
 namespace {
 
 // Deflate packs at most 1032 : 1 and LZW about 2700 : 1; the newer TIFF codecs go higher on constant slices.
 constexpr std::uint64_t kMaxCompression = 20000;
+// Smaller files are read: a mapping of theirs saves nothing, and reading finds errors of the disk here.
+constexpr std::uint64_t kMapFrom = std::uint64_t(256) << 20;
 
 struct Unit {
     const char* name;
@@ -98,48 +102,210 @@ private:
     bool damaged_ = false;
 };
 
-/// From the stored type to the wanted one: out = slope * stored + intercept.
-void rescale(const PixelPlace& place, const void* stored, std::uint64_t count, PixelType type, void* out) {
+/// The bytes of a PixelPlace, forwards only.
+class PixelStream {
+public:
+    explicit PixelStream(const PixelPlace& place) : packed_(place.packed), file_(place.path, std::ios::binary) {
+        file_.seekg(static_cast<std::streamoff>(place.file_offset));
+        if (packed_) inflater_ = std::make_unique<Inflater>(file_);
+    }
+    /// Passes `count` bytes over.
+    bool skip(std::uint64_t count) {
+        if (!packed_) return bool(file_.seekg(static_cast<std::streamoff>(count), std::ios::cur));
+        std::vector<char> dropped(std::min<std::uint64_t>(count, 1U << 16));
+        while (count > 0) {
+            const std::uint64_t piece = std::min<std::uint64_t>(count, dropped.size());
+            if (!inflater_->read(dropped.data(), piece)) return false;
+            count -= piece;
+        }
+        return true;
+    }
+    bool read(std::uint64_t count, char* out) {
+        return packed_ ? inflater_->read(out, count) : bool(file_.read(out, static_cast<std::streamsize>(count)));
+    }
+    /// True unless the checksum behind the last byte that was read is there and wrong.
+    bool checksum_fits() { return !packed_ || inflater_->checksum_fits(); }
+
+private:
+    bool packed_;
+    std::ifstream file_;
+    std::unique_ptr<Inflater> inflater_;
+};
+
+/// Every `step`th of the stored values, as pixels: slope * stored + intercept.
+void convert(const PixelPlace& place, const void* stored, std::uint64_t step, std::uint64_t count, PixelType type,
+             void* out) {
+    if (place.half) {
+        const auto* source = static_cast<const std::uint16_t*>(stored);
+        auto* target = static_cast<float*>(out);
+        for (std::uint64_t n = 0; n < count; ++n) {
+            openvdb::math::internal::half value;
+            value.setBits(source[n * step]);
+            target[n] = float(value);
+        }
+        return;
+    }
+    const bool scaled = place.slope != 1 || place.intercept != 0;
     with_pixel_type(place.type, [&](auto from) {
         with_pixel_type(type, [&](auto to) {
+            using To = decltype(to);
             const auto* source = static_cast<const decltype(from)*>(stored);
-            auto* target = static_cast<decltype(to)*>(out);
-            if constexpr (std::is_floating_point_v<decltype(to)>)
-                for (std::uint64_t n = 0; n < count; ++n)
-                    target[n] = static_cast<decltype(to)>(place.slope * double(source[n]) + place.intercept);
+            auto* target = static_cast<To*>(out);
+            if constexpr (std::is_same_v<decltype(from), To>) {
+                if (!scaled)
+                    for (std::uint64_t n = 0; n < count; ++n) target[n] = source[n * step];
+            }
+            if constexpr (std::is_floating_point_v<To>) {
+                if (scaled || !std::is_same_v<decltype(from), To>)
+                    for (std::uint64_t n = 0; n < count; ++n)
+                        target[n] = static_cast<To>(place.slope * double(source[n * step]) + place.intercept);
+            }
         });
     });
 }
 
+class PlacedFile : public ImageFile {
+public:
+    PlacedFile(std::string path, const ImageInfo& info, PixelPlace place) : path_(std::move(path)), place_(std::move(place)) {
+        info_ = info;
+        const Index3& size = info_.geometry.size;
+        components_ = std::uint64_t(info_.channels);
+        row_bytes_ = std::uint64_t(size[0]) * components_ * place_.stored_bytes();
+        slice_bytes_ = row_bytes_ * std::uint64_t(size[1]);
+        frame_bytes_ = slice_bytes_ * std::uint64_t(size[2]) + place_.frame_gap;
+        check_file_size();
+    }
+
+    std::uint64_t bytes_to_hold(const PixelRequest& request) const override {
+        return is_mapped(request) ? 0 : ImageFile::bytes_to_hold(request);
+    }
+
+    Pixels read(const PixelRequest& request, const RunContext& run) override {
+        return is_mapped(request) ? map(request) : copy(request, run);
+    }
+
+private:
+    [[nodiscard]] Error damaged() const {
+        return read_error(Errc::InvalidInput, path_, "damaged or truncated" +
+                          (place_.path == path_ ? std::string() : ", or its data file " + place_.path + " is"));
+    }
+
+    void check_file_size() const {
+        std::error_code status;
+        const std::uint64_t file_bytes = std::filesystem::file_size(place_.path, status);
+        if (status) throw read_error(Errc::Io, path_, "its data file " + place_.path + " cannot be opened");
+        const Index3& size = info_.geometry.size;
+        // in floating point: sizes of a damaged header may overflow
+        const double wanted = double(size[0]) * size[1] * size[2] * double(components_) * info_.frames *
+                              double(place_.stored_bytes());
+        const double there = place_.packed ? double(file_bytes) * kMaxCompression
+                                           : double(file_bytes) - double(place_.file_offset) - double(place_.skip);
+        if (wanted > there)
+            throw read_error(Errc::InvalidInput, path_,
+                             "the header claims " + size_text(size) + " voxels" +
+                                 (info_.channels * info_.frames > 1 ? " of several channels or frames" : "") +
+                                 ", which a file of " + std::to_string(file_bytes) +
+                                 " bytes cannot hold; it is damaged or truncated");
+    }
+
+    [[nodiscard]] std::uint64_t frame_begin(const PixelRequest& request) const {
+        return place_.skip + request.frame * frame_bytes_;
+    }
+
+    /// Only a box that spans much of the file is worth it; one with few slices is read.
+    [[nodiscard]] bool is_mapped(const PixelRequest& request) const {
+        const std::uint64_t slices = std::uint64_t(request.box.size()[2]);
+        const bool aligned = (place_.file_offset + frame_begin(request)) % place_.stored_bytes() == 0;
+        return !place_.packed && place_.as_stored() && aligned && info_.type == place_.type &&
+               is_worth_mapping(slices * slice_bytes_);
+    }
+
+    [[nodiscard]] Pixels map(const PixelRequest& request) const {
+        const VoxelBox& box = request.box;
+        const std::uint64_t begin = place_.file_offset + frame_begin(request) + std::uint64_t(box.min[2]) * slice_bytes_;
+        const auto slab = map_file(place_.path, begin, std::uint64_t(box.size()[2]) * slice_bytes_);
+        const char* first = static_cast<const char*>(slab.get()) + std::uint64_t(box.min[1]) * row_bytes_ +
+                            (std::uint64_t(box.min[0]) * components_ + request.channel) * place_.stored_bytes();
+        const auto step = std::int64_t(components_);
+        const Index3& size = info_.geometry.size;
+        return {{slab, first}, {step, step * size[0], step * size[0] * size[1]}, true};
+    }
+
+    [[nodiscard]] Pixels copy(const PixelRequest& request, const RunContext& run) const {
+        const VoxelBox& box = request.box;
+        const Index3 n = box.size();
+        const std::shared_ptr<void> data = allocate_pixels(path_, voxel_count(n), info_.type, 0);
+        auto* out = static_cast<char*>(data.get());
+        const std::uint64_t out_row = std::uint64_t(n[0]) * pixel_bytes(info_.type);
+        const std::uint64_t rows_bytes = std::uint64_t(n[1]) * row_bytes_;
+        const std::uint64_t before = std::uint64_t(box.min[1]) * row_bytes_;
+        std::vector<char> rows(rows_bytes);
+        PixelStream stream(place_);
+        if (!stream.skip(frame_begin(request) + std::uint64_t(box.min[2]) * slice_bytes_)) throw damaged();
+        for (std::int32_t k = 0; k < n[2]; ++k) {
+            run.check();
+            const bool last = k + 1 == n[2];
+            if (!stream.skip(before) || !stream.read(rows_bytes, rows.data())) throw damaged();
+            if (!last && !stream.skip(slice_bytes_ - before - rows_bytes)) throw damaged();
+            if (place_.swap) swap_bytes(rows.data(), rows_bytes / place_.stored_bytes(), place_.stored_bytes());
+            const std::uint64_t first =
+                (std::uint64_t(box.min[0]) * components_ + request.channel) * place_.stored_bytes();
+            for (std::int32_t j = 0; j < n[1]; ++j, out += out_row)
+                convert(place_, rows.data() + std::uint64_t(j) * row_bytes_ + first, components_, std::uint64_t(n[0]),
+                        info_.type, out);
+        }
+        const bool to_the_end = box == whole_box(info_.geometry.size) && request.frame + 1 == std::uint64_t(info_.frames);
+        if (to_the_end && !stream.checksum_fits()) throw damaged();
+        return {data, dense_strides(n), false};
+    }
+
+    std::string path_;
+    PixelPlace place_;
+    std::uint64_t components_ = 1, row_bytes_ = 0, slice_bytes_ = 0, frame_bytes_ = 0;
+};
+
 }  // namespace
 
-bool read_bytes(const PixelPlace& place, std::uint64_t count, void* out) {
-    std::ifstream file(place.path, std::ios::binary);
-    auto* bytes = static_cast<char*>(out);
-    if (!place.packed) {
-        file.seekg(static_cast<std::streamoff>(place.file_offset + place.skip));
-        return bool(file.read(bytes, static_cast<std::streamsize>(count)));
-    }
-    file.seekg(static_cast<std::streamoff>(place.file_offset));
-    Inflater inflater(file);
-    std::vector<char> before(std::min<std::uint64_t>(place.skip, 1U << 16));
-    for (std::uint64_t left = place.skip; left > 0;) {
-        const std::uint64_t piece = std::min<std::uint64_t>(left, before.size());
-        if (!inflater.read(before.data(), piece)) return false;
-        left -= piece;
-    }
-    return inflater.read(bytes, count) && inflater.checksum_fits();
+std::uint64_t ImageFile::bytes_to_hold(const PixelRequest& request) const {
+    return voxel_count(request.box.size()) * pixel_bytes(info_.type);
 }
 
-bool read_pixels(const PixelPlace& place, std::uint64_t count, PixelType type, void* out) {
-    const std::uint64_t width = pixel_bytes(place.type);
-    const bool as_stored = place.type == type && place.slope == 1 && place.intercept == 0;
-    std::vector<char> stored(as_stored ? 0 : count * width);
-    void* target = as_stored ? out : stored.data();
-    if (!read_bytes(place, count * width, target)) return false;
-    if (place.swap) swap_bytes(target, count, width);
-    if (!as_stored) rescale(place, target, count, type, out);
-    return true;
+std::unique_ptr<ImageFile> open_placed(const std::string& path, const ImageInfo& info, const PixelPlace& place) {
+    return std::make_unique<PlacedFile>(path, info, place);
+}
+
+bool is_worth_mapping(std::uint64_t bytes) { return bytes >= kMapFrom; }
+
+std::shared_ptr<const void> map_file(const std::string& path, std::uint64_t offset, std::uint64_t bytes) {
+    const auto page = std::uint64_t(::sysconf(_SC_PAGESIZE));
+    const std::uint64_t before = offset % page;
+    const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    void* begin = file < 0 ? MAP_FAILED
+                           : ::mmap(nullptr, bytes + before, PROT_READ, MAP_PRIVATE, file,
+                                    static_cast<off_t>(offset - before));
+    if (file >= 0) ::close(file);
+    if (begin == MAP_FAILED) throw read_error(Errc::Io, path, "cannot be mapped into memory");
+    ::madvise(begin, bytes + before, MADV_RANDOM);  // what lies around a touched row is not wanted
+    const auto unmap = [begin, length = bytes + before](const void*) { ::munmap(begin, length); };
+    return {static_cast<const char*>(begin) + before, unmap};
+}
+
+void expect_pages(const void* begin, std::uint64_t bytes) {
+    const auto page = std::uintptr_t(::sysconf(_SC_PAGESIZE));
+    const std::uintptr_t first = reinterpret_cast<std::uintptr_t>(begin) / page * page;
+    ::madvise(reinterpret_cast<void*>(first), reinterpret_cast<std::uintptr_t>(begin) + bytes - first, MADV_WILLNEED);
+}
+
+void release_pages(const void* begin, std::uint64_t bytes) {
+    const auto page = std::uintptr_t(::sysconf(_SC_PAGESIZE));
+    const std::uintptr_t first = (reinterpret_cast<std::uintptr_t>(begin) + page - 1) / page * page;
+    const std::uintptr_t last = (reinterpret_cast<std::uintptr_t>(begin) + bytes) / page * page;
+    if (first < last) ::madvise(reinterpret_cast<void*>(first), last - first, MADV_DONTNEED);
+}
+
+bool read_bytes(const PixelPlace& place, std::uint64_t count, void* out) {
+    PixelStream stream(place);
+    return stream.skip(place.skip) && stream.read(count, static_cast<char*>(out));
 }
 
 void swap_bytes(void* data, std::uint64_t count, std::uint64_t width) {
@@ -151,28 +317,45 @@ std::string size_text(const Index3& size) {
     return std::to_string(size[0]) + " x " + std::to_string(size[1]) + " x " + std::to_string(size[2]);
 }
 
-void require_3d(const std::string& path, const std::uint64_t (&size)[3]) {
+std::uint64_t voxel_count(const Index3& size) {
+    return std::uint64_t(size[0]) * std::uint64_t(size[1]) * std::uint64_t(size[2]);
+}
+
+VoxelBox whole_box(const Index3& size) { return {{0, 0, 0}, {size[0] - 1, size[1] - 1, size[2] - 1}}; }
+
+std::array<std::int64_t, 3> dense_strides(const Index3& size) {
+    return {1, size[0], std::int64_t(size[0]) * std::int64_t(size[1])};
+}
+
+Error read_error(Errc code, const std::string& path, const std::string& what) {
+    return {code, "read_image: " + path + ": " + what};
+}
+
+Index3 require_3d(const std::string& path, const std::uint64_t (&size)[3]) {
     const std::string text =
         std::to_string(size[0]) + " x " + std::to_string(size[1]) + " x " + std::to_string(size[2]);
     if (std::min({size[0], size[1], size[2]}) < 2)
-        throw Error(Errc::InvalidInput, "read_image: " + path + ": expected a 3D image, got " + text);
-    if (std::max({size[0], size[1], size[2]}) > std::uint64_t(std::numeric_limits<std::int32_t>::max()) / 2)
-        throw Error(Errc::InvalidInput, "read_image: " + path + ": the header claims " + text + " voxels");
+        throw read_error(Errc::InvalidInput, path, "expected a 3D image, got " + text);
+    constexpr std::uint64_t kMostVoxels = std::uint64_t(1) << 52;
+    if (std::max({size[0], size[1], size[2]}) > std::uint64_t(std::numeric_limits<std::int32_t>::max()) / 2 ||
+        size[0] * size[1] > kMostVoxels / size[2])
+        throw read_error(Errc::InvalidInput, path, "the header claims " + text + " voxels");
+    return {static_cast<std::int32_t>(size[0]), static_cast<std::int32_t>(size[1]), static_cast<std::int32_t>(size[2])};
 }
 
-std::shared_ptr<void> allocate_pixels(const std::string& path, std::uint64_t voxels, PixelType type,
+std::shared_ptr<void> allocate_pixels(const std::string& path, std::uint64_t pixels, PixelType type,
                                       std::uint64_t file_bytes) {
-    const std::uint64_t bytes = voxels * pixel_bytes(type);
-    const bool overflow = voxels > std::numeric_limits<std::uint64_t>::max() / 8;
+    const std::uint64_t bytes = pixels * pixel_bytes(type);
+    const bool overflow = pixels > std::numeric_limits<std::uint64_t>::max() / 8;
     if (overflow || (file_bytes > 0 && bytes / kMaxCompression > file_bytes))
-        throw Error(Errc::InvalidInput, "read_image: " + path + ": the header claims " + std::to_string(voxels) +
-                                            " voxels, which a file of " + std::to_string(file_bytes) +
-                                            " bytes cannot hold; it is damaged or truncated");
+        throw read_error(Errc::InvalidInput, path, "the header claims " + std::to_string(pixels) +
+                                                       " voxels, which a file of " + std::to_string(file_bytes) +
+                                                       " bytes cannot hold; it is damaged or truncated");
     const std::uint64_t memory = std::uint64_t(::sysconf(_SC_PHYS_PAGES)) * std::uint64_t(::sysconf(_SC_PAGESIZE));
     const auto refuse = [&] {
-        return Error(Errc::Unsupported, "read_image: " + path + ": the image needs " + std::to_string(bytes >> 20) +
-                                            " MiB, this machine has " + std::to_string(memory >> 20) +
-                                            " MiB; crop or downsample it");
+        return read_error(Errc::Unsupported, path, "the image needs " + std::to_string(bytes >> 20) +
+                                                       " MiB, this machine has " + std::to_string(memory >> 20) +
+                                                       " MiB; choose a part with --roi, or downsample it");
     };
     if (bytes > memory) throw refuse();
     // malloc leaves the pages untouched until the reader fills them.

@@ -4,15 +4,41 @@
 #include <string>
 #include <type_traits>
 
+#include "covol/error.h"
 #include "covol/image.h"
 
 namespace covol::detail {
 
-/// What the readers of the single file formats hand to read_image().
-struct RawImage {
-    ImageGeometry geometry;
-    PixelType type = PixelType::Float;
-    std::shared_ptr<void> data;  ///< i fastest; null when only the header was asked for
+/// Voxels of an open file: `data` points to the first voxel of the box that was asked for.
+struct Pixels {
+    std::shared_ptr<const void> data;
+    std::array<std::int64_t, 3> stride{1, 0, 0};  ///< in pixels
+    bool mapped = false;
+};
+
+/// What to read of a file; everything exists.
+struct PixelRequest {
+    VoxelBox box;
+    std::uint64_t channel = 0;
+    std::uint64_t frame = 0;
+};
+
+/// An image file whose header has been read and checked. One class for each family of formats.
+class ImageFile {
+public:
+    ImageFile() = default;
+    ImageFile(const ImageFile&) = delete;
+    ImageFile& operator=(const ImageFile&) = delete;
+    virtual ~ImageFile() = default;
+
+    [[nodiscard]] const ImageInfo& info() const noexcept { return info_; }
+    /// Reads (or maps) the voxels. @throws Error InvalidInput (damaged, truncated), Unsupported (too large), Io.
+    [[nodiscard]] virtual Pixels read(const PixelRequest& request, const RunContext& run) = 0;
+    /// Memory that read() takes: all of the box, unless a format knows better.
+    [[nodiscard]] virtual std::uint64_t bytes_to_hold(const PixelRequest& request) const;
+
+protected:
+    ImageInfo info_;
 };
 
 /// Calls visit(T{}) with the C++ type of `type`.
@@ -38,33 +64,63 @@ inline std::uint64_t pixel_bytes(PixelType type) {
 /// "512 x 512 x 58"
 std::string size_text(const Index3& size);
 
-/// @throws Error InvalidInput unless the image has at least two voxels along each axis.
-void require_3d(const std::string& path, const std::uint64_t (&size)[3]);
+std::uint64_t voxel_count(const Index3& size);
 
-/// Memory for size voxels, after a check that a file of `file_bytes` can hold that many at all (0: unknown, the data
+/// All voxels of an image of this size.
+VoxelBox whole_box(const Index3& size);
+
+/// Strides of voxels that lie behind each other, i fastest.
+std::array<std::int64_t, 3> dense_strides(const Index3& size);
+
+/// An Error whose text begins with "read_image: PATH: ".
+Error read_error(Errc code, const std::string& path, const std::string& what);
+
+/// @throws Error InvalidInput unless the image has at least two voxels along each axis.
+Index3 require_3d(const std::string& path, const std::uint64_t (&size)[3]);
+
+/// Memory for so many pixels, after a check that a file of `file_bytes` can hold that many at all (0: unknown, the data
 /// lies in another file) and that the machine can.
 /// @throws Error InvalidInput, Unsupported.
-std::shared_ptr<void> allocate_pixels(const std::string& path, std::uint64_t voxels, PixelType type,
+std::shared_ptr<void> allocate_pixels(const std::string& path, std::uint64_t pixels, PixelType type,
                                       std::uint64_t file_bytes);
 
-/// Where a file keeps its pixels. NIfTI's and MetaImage's are read here and not by ITK, whose readers fill up what a
-/// truncated file lacks without a word; NIfTI's moreover takes a.nii's pixels for a.nii.gz where both exist.
+/// Where a file keeps its pixels, frame behind frame, i fastest. Read here and not by ITK, whose readers fill up what a
+/// truncated file lacks without a word, and read all of it; ITK's for NIfTI moreover takes a.nii's pixels for a.nii.gz
+/// where both exist.
 struct PixelPlace {
     std::string path;
     std::uint64_t file_offset = 0;  ///< of the pixels, or of the packed stream
     std::uint64_t skip = 0;         ///< unpacked bytes before the pixels
     bool packed = false;            ///< gzip or zlib
     bool swap = false;              ///< the other byte order
+    bool half = false;              ///< 16-bit floats, told as Float
     PixelType type = PixelType::UInt8;
-    double slope = 1;  ///< pixel = slope * stored + intercept
+    double slope = 1;               ///< pixel = slope * stored + intercept
     double intercept = 0;
+    std::uint64_t frame_gap = 0;    ///< unpacked bytes between frames
+
+    [[nodiscard]] std::uint64_t stored_bytes() const { return half ? 2 : pixel_bytes(type); }
+    [[nodiscard]] bool as_stored() const { return !swap && !half && slope == 1 && intercept == 0; }
 };
 
-/// Reads `count` bytes; false when there are fewer, or the packed stream is damaged.
+/// Reads `count` bytes at the pixels' begin; false when there are fewer, or the packed stream is damaged.
 bool read_bytes(const PixelPlace& place, std::uint64_t count, void* out);
 
-/// Reads `count` pixels as `type`; false as above.
-bool read_pixels(const PixelPlace& place, std::uint64_t count, PixelType type, void* out);
+/// An image whose pixels lie as `place` says; info.channels interleaved, info.frames behind each other.
+/// @throws Error InvalidInput when the file is too short.
+std::unique_ptr<ImageFile> open_placed(const std::string& path, const ImageInfo& info, const PixelPlace& place);
+
+/// Maps `bytes` of a file at `offset`, which are there. @throws Error Io.
+std::shared_ptr<const void> map_file(const std::string& path, std::uint64_t offset, std::uint64_t bytes);
+
+/// Whether so many bytes are worth a mapping.
+bool is_worth_mapping(std::uint64_t bytes);
+
+/// Says that mapped pages will be read from begin to end.
+void expect_pages(const void* begin, std::uint64_t bytes);
+
+/// Gives mapped pages back to the system; they come again when touched.
+void release_pages(const void* begin, std::uint64_t bytes);
 
 /// Reverses the bytes of each of `count` values of `width` bytes.
 void swap_bytes(void* data, std::uint64_t count, std::uint64_t width);

@@ -1,71 +1,18 @@
 #include "detail/tiff.h"
 
-#include <tiffio.h>
-
 #include <algorithm>
-#include <array>
 #include <bit>
-#include <charconv>
-#include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <vector>
 
-#include "covol/error.h"
+#include "detail/tiff_handle.h"
+#include "detail/tiff_stack.h"
 
 namespace covol::detail {
 namespace {
-
-/// A libtiff handle that keeps the first error message instead of printing it.
-class Tiff {
-public:
-    Tiff(const std::string& path, const char* mode, tmsize_t largest_allocation) : path_(path) {
-        TIFFOpenOptions* options = TIFFOpenOptionsAlloc();
-        TIFFOpenOptionsSetErrorHandlerExtR(options, &Tiff::keep_message, this);
-        TIFFOpenOptionsSetWarningHandlerExtR(options, &Tiff::drop_message, this);
-        if (largest_allocation > 0) TIFFOpenOptionsSetMaxSingleMemAlloc(options, largest_allocation);
-        handle_ = TIFFOpenExt(path.c_str(), mode, options);
-        TIFFOpenOptionsFree(options);
-    }
-    ~Tiff() { close(); }
-    Tiff(const Tiff&) = delete;
-    Tiff& operator=(const Tiff&) = delete;
-
-    void close() {
-        if (handle_ != nullptr) TIFFClose(handle_);
-        handle_ = nullptr;
-    }
-    [[nodiscard]] TIFF* get() const { return handle_; }
-    [[nodiscard]] const std::string& message() const { return message_; }
-    [[nodiscard]] Error error(Errc code, const std::string& what) const {
-        return {code, what + (message_.empty() ? "" : " (" + message_ + ")")};
-    }
-    template <typename T>
-    [[nodiscard]] T tag(ttag_t name, T fallback) const {
-        T value = fallback;
-        return TIFFGetFieldDefaulted(handle_, name, &value) == 1 ? value : fallback;
-    }
-    [[nodiscard]] std::string text(ttag_t name) const {
-        const char* value = nullptr;
-        return TIFFGetField(handle_, name, &value) == 1 && value != nullptr ? value : "";
-    }
-
-private:
-    static int keep_message(TIFF*, void* self, const char*, const char* format, va_list arguments) {
-        auto* tiff = static_cast<Tiff*>(self);
-        std::array<char, 512> line{};
-        std::vsnprintf(line.data(), line.size(), format, arguments);
-        if (tiff->message_.empty()) tiff->message_ = line.data();
-        return 1;
-    }
-    static int drop_message(TIFF*, void*, const char*, const char*, va_list) { return 1; }
-
-    std::string path_;
-    std::string message_;
-    TIFF* handle_ = nullptr;
-};
 
 struct Page {
     std::uint64_t offset = 0;  ///< of the directory in the file
@@ -79,6 +26,8 @@ struct Page {
         return std::to_string(width) + " x " + std::to_string(height) + " with " + std::to_string(samples) +
                " sample(s) of " + std::to_string(bits) + " bits";
     }
+    [[nodiscard]] std::uint64_t row_bytes() const { return std::uint64_t(width) * samples * (bits / 8); }
+    [[nodiscard]] std::uint64_t bytes() const { return row_bytes() * height; }
 };
 
 Page current_page(const Tiff& tiff) {
@@ -94,12 +43,6 @@ Page current_page(const Tiff& tiff) {
 }
 
 PixelType pixel_type(const std::string& path, const Page& page) {
-    const auto unsupported = [&](const std::string& what) {
-        return Error(
-            Errc::Unsupported,
-            "read_image: " + path + ": expected grey values of 8, 16 or 32 bits, float or " + "double, got " + what);
-    };
-    if (page.samples != 1) throw unsupported("colour (" + std::to_string(page.samples) + " samples per pixel)");
     if (page.format == SAMPLEFORMAT_UINT) {
         if (page.bits == 8) return PixelType::UInt8;
         if (page.bits == 16) return PixelType::UInt16;
@@ -112,7 +55,20 @@ PixelType pixel_type(const std::string& path, const Page& page) {
         if (page.bits == 32) return PixelType::Float;
         if (page.bits == 64) return PixelType::Double;
     }
-    throw unsupported(std::to_string(page.bits) + " bits in sample format " + std::to_string(page.format));
+    throw read_error(Errc::Unsupported, path,
+                     "expected values of 8, 16 or 32 bits, float or double, got " + std::to_string(page.bits) +
+                         " bits in sample format " + std::to_string(page.format));
+}
+
+/// Opens a file for reading; libtiff's own allocations are bound by the file's size.
+std::unique_ptr<Tiff> open_for_reading(const std::string& path) {
+    constexpr std::uint64_t kLeastLimit = std::uint64_t(1) << 28;
+    std::error_code status;
+    const std::uint64_t bytes = std::filesystem::file_size(path, status);
+    if (status) throw read_error(Errc::Io, path, "no such file");
+    auto tiff = std::make_unique<Tiff>(path, "r", std::max(kLeastLimit, 4 * bytes));
+    if (tiff->get() == nullptr) throw tiff->error(Errc::InvalidInput, "read_image: " + path + ": not a usable TIFF file");
+    return tiff;
 }
 
 /// All full-resolution pages, which must be of one kind.
@@ -123,9 +79,9 @@ std::vector<Page> list_pages(const std::string& path, const Tiff& tiff) {
         if ((tiff.tag<std::uint32_t>(TIFFTAG_SUBFILETYPE, 0) & kReduced) == 0 || pages.empty()) {
             const Page page = current_page(tiff);
             if (!pages.empty() && !page.same_kind(pages.front()))
-                throw Error(Errc::Unsupported, "read_image: " + path + ": expected pages of one kind, got page 0 of " +
-                                                   pages.front().to_text() + " and page " +
-                                                   std::to_string(pages.size()) + " of " + page.to_text());
+                throw read_error(Errc::Unsupported, path,
+                                 "expected pages of one kind, got page 0 of " + pages.front().to_text() + " and page " +
+                                     std::to_string(pages.size()) + " of " + page.to_text());
             pages.push_back(page);
         }
         if (TIFFLastDirectory(tiff.get()) != 0) break;
@@ -137,323 +93,268 @@ std::vector<Page> list_pages(const std::string& path, const Tiff& tiff) {
     return pages;
 }
 
-/// What a page of the stack is, and how far apart voxels are (0: the file does not say).
-struct Stack {
-    std::uint64_t slices = 0, channels = 1, frames = 1;
-    std::string order = "CZT";  ///< fastest first
-    Vec3 spacing{0, 0, 0};
-    std::string unit;
+/// Where the pixels of an unpacked page lie when they lie in one piece.
+std::optional<std::uint64_t> pixels_in_one_piece(const Tiff& tiff, const Page& page) {
+    if (tiff.tag<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE) != COMPRESSION_NONE) return std::nullopt;
+    if (tiff.tag<std::uint16_t>(TIFFTAG_FILLORDER, FILLORDER_MSB2LSB) != FILLORDER_MSB2LSB) return std::nullopt;
+    if (TIFFIsTiled(tiff.get()) != 0 || page.samples != 1) return std::nullopt;
+    const std::uint64_t rows = std::min<std::uint64_t>(tiff.tag<std::uint32_t>(TIFFTAG_ROWSPERSTRIP, page.height), page.height);
+    const std::uint64_t first = TIFFGetStrileOffset(tiff.get(), 0);
+    for (std::uint64_t strip = 1; rows > 0 && strip * rows < page.height; ++strip)
+        if (TIFFGetStrileOffset(tiff.get(), static_cast<std::uint32_t>(strip)) != first + strip * rows * page.row_bytes())
+            return std::nullopt;
+    return rows > 0 && first > 0 ? std::optional(first) : std::nullopt;
+}
 
-    [[nodiscard]] std::uint64_t page(std::uint64_t z, std::uint64_t c, std::uint64_t t) const {
-        std::uint64_t page = 0;
-        std::uint64_t stride = 1;
-        for (const char axis : order) {
-            page += stride * (axis == 'Z' ? z : axis == 'C' ? c : t);
-            stride *= axis == 'Z' ? slices : axis == 'C' ? channels : frames;
-        }
-        return page;
+/// One plane's part: the columns and rows of `box`, one sample of each pixel.
+class PageReader {
+public:
+    PageReader(const Tiff& tiff, const Page& page, const VoxelBox& box, std::uint64_t sample)
+        : tiff_(tiff), page_(page), box_(box), bytes_(page.bits / 8) {
+        const bool planar = tiff.tag<std::uint16_t>(TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG) == PLANARCONFIG_SEPARATE;
+        samples_ = planar ? 1 : page.samples;
+        plane_ = planar ? sample : 0;
+        sample_ = planar ? 0 : sample;
+        tiled_ = TIFFIsTiled(tiff.get()) != 0;
+        width_ = tiled_ ? tiff.tag<std::uint32_t>(TIFFTAG_TILEWIDTH, 0) : page.width;
+        height_ = tiled_ ? tiff.tag<std::uint32_t>(TIFFTAG_TILELENGTH, 0)
+                         : std::min(tiff.tag<std::uint32_t>(TIFFTAG_ROWSPERSTRIP, page.height), page.height);
     }
+
+    /// False when the page is damaged or truncated.
+    bool read(char* out) {
+        // A tile may be larger than the page, but not absurdly so.
+        constexpr std::uint64_t kSlack = 65536;
+        if (width_ == 0 || height_ == 0 || width_ > page_.width + kSlack || height_ > page_.height + kSlack) return false;
+        const std::uint64_t block_bytes = width_ * height_ * samples_ * bytes_;
+        const tmsize_t told = tiled_ ? TIFFTileSize(tiff_.get()) : TIFFStripSize(tiff_.get());
+        if (told < 0 || std::uint64_t(told) != block_bytes) return false;
+        block_.resize(block_bytes);
+        const auto first_x = std::uint64_t(box_.min[0]), first_y = std::uint64_t(box_.min[1]);
+        for (std::uint64_t y = first_y / height_ * height_; y <= std::uint64_t(box_.max[1]); y += height_)
+            for (std::uint64_t x = first_x / width_ * width_; x <= std::uint64_t(box_.max[0]); x += width_) {
+                if (!decode(x, y)) return false;
+                copy(x, y, out);
+            }
+        return true;
+    }
+
+private:
+    bool decode(std::uint64_t x, std::uint64_t y) {
+        const auto column = static_cast<std::uint32_t>(x), row = static_cast<std::uint32_t>(y);
+        const auto plane = static_cast<std::uint16_t>(plane_);
+        if (tiled_) {
+            const std::uint32_t tile = TIFFComputeTile(tiff_.get(), column, row, 0, plane);
+            const auto want = static_cast<tmsize_t>(block_.size());
+            return TIFFReadEncodedTile(tiff_.get(), tile, block_.data(), want) == want;
+        }
+        const std::uint64_t rows = std::min<std::uint64_t>(height_, page_.height - y);
+        const auto want = static_cast<tmsize_t>(rows * width_ * samples_ * bytes_);
+        return TIFFReadEncodedStrip(tiff_.get(), TIFFComputeStrip(tiff_.get(), row, plane), block_.data(), want) == want;
+    }
+
+    /// The part of the block at (x, y) that lies in the box.
+    void copy(std::uint64_t x, std::uint64_t y, char* out) const {
+        const std::uint64_t x0 = std::max<std::uint64_t>(x, std::uint64_t(box_.min[0]));
+        const std::uint64_t x1 = std::min<std::uint64_t>(x + width_, std::uint64_t(box_.max[0]) + 1);
+        const std::uint64_t y0 = std::max<std::uint64_t>(y, std::uint64_t(box_.min[1]));
+        const std::uint64_t y1 = std::min<std::uint64_t>(y + height_, std::uint64_t(box_.max[1]) + 1);
+        const auto columns = std::uint64_t(box_.size()[0]);
+        for (std::uint64_t row = y0; row < y1; ++row) {
+            const char* from = block_.data() + (((row - y) * width_ + x0 - x) * samples_ + sample_) * bytes_;
+            char* to = out + ((row - std::uint64_t(box_.min[1])) * columns + x0 - std::uint64_t(box_.min[0])) * bytes_;
+            if (samples_ == 1)
+                std::memcpy(to, from, (x1 - x0) * bytes_);
+            else
+                for (std::uint64_t n = 0; n < x1 - x0; ++n) std::memcpy(to + n * bytes_, from + n * samples_ * bytes_, bytes_);
+        }
+    }
+
+    const Tiff& tiff_;
+    const Page& page_;
+    const VoxelBox& box_;
+    std::uint64_t bytes_, samples_ = 1, plane_ = 0, sample_ = 0, width_ = 0, height_ = 0;
+    bool tiled_ = false;
+    std::vector<char> block_;
 };
 
-double to_number(const std::string& text) {
-    double value = 0;
-    const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), value);
-    return status == std::errc() && std::isfinite(value) && value > 0 ? value : 0;
-}
-
-std::uint64_t to_count(const std::string& text) {
-    const double value = to_number(text);
-    return value >= 1 && value < 1e9 ? static_cast<std::uint64_t>(value) : 1;
-}
-
-/// The value of `key=` in ImageJ's description, one key a line.
-std::string imagej_value(const std::string& description, const std::string& key) {
-    for (std::size_t begin = 0; begin < description.size();) {
-        const std::size_t end = std::min(description.find('\n', begin), description.size());
-        if (description.compare(begin, key.size() + 1, key + "=") == 0)
-            return description.substr(begin + key.size() + 1, end - begin - key.size() - 1);
-        begin = end + 1;
+class TiffFile : public ImageFile {
+public:
+    TiffFile(const std::string& path, const RunContext& run) : path_(path), tiff_(open_for_reading(path)) {
+        TiffFacts facts;
+        facts.path = path;
+        facts.description = tiff_->text(TIFFTAG_IMAGEDESCRIPTION);
+        facts.resolution = {tiff_->tag(TIFFTAG_XRESOLUTION, 0.0F), tiff_->tag(TIFFTAG_YRESOLUTION, 0.0F)};
+        facts.resolution_unit = tiff_->tag<std::uint16_t>(TIFFTAG_RESOLUTIONUNIT, RESUNIT_NONE);
+        facts.count_pages = [](const std::string& other) { return list_pages(other, *open_for_reading(other)).size(); };
+        kind_ = current_page(*tiff_);
+        info_.type = pixel_type(path, kind_);
+        if (kind_.samples < 1 || kind_.bytes() > std::uint64_t(1) << 40)
+            throw read_error(Errc::InvalidInput, path, "the header claims pages of " + kind_.to_text());
+        run.check();
+        find_single_directory(facts.description);
+        if (contiguous_ == 0) pages_ = list_pages(path, *tiff_);
+        facts.pages = contiguous_ > 0 ? imagej_images(facts.description) : pages_.size();
+        stack_ = describe_tiff(facts);
+        fill_info();
     }
-    return {};
-}
 
-/// The value of an attribute of the element <Pixels ...> in OME-XML.
-std::string ome_value(const std::string& pixels, const std::string& key) {
-    for (std::size_t at = pixels.find(key); at != std::string::npos; at = pixels.find(key, at + 1)) {
-        const std::size_t equals = at + key.size();
-        if (at == 0 || std::isspace(static_cast<unsigned char>(pixels[at - 1])) == 0) continue;
-        if (equals + 1 >= pixels.size() || pixels[equals] != '=') continue;
-        const char quote = pixels[equals + 1];
-        const std::size_t end = pixels.find(quote, equals + 2);
-        if ((quote == '"' || quote == '\'') && end != std::string::npos)
-            return pixels.substr(equals + 2, end - equals - 2);
+    std::uint64_t bytes_to_hold(const PixelRequest& request) const override {
+        return may_map(request) ? 0 : ImageFile::bytes_to_hold(request);
     }
-    return {};
-}
 
-/// Expresses the lengths along j and k in the unit of i where both units are known.
-void unify_units(Stack& stack, const std::array<std::string, 3>& units) {
-    stack.unit = units[0];
-    const double first = unit_in_metres(units[0]);
-    for (int a = 1; a < 3; ++a) {
-        const double own = unit_in_metres(units[a]);
-        if (own > 0 && first > 0 && own != first) stack.spacing[a] *= own / first;
-    }
-}
-
-Stack imagej_stack(const Tiff& tiff, const std::string& description, std::uint64_t pages) {
-    Stack stack;
-    stack.channels = to_count(imagej_value(description, "channels"));
-    stack.frames = to_count(imagej_value(description, "frames"));
-    const std::string slices = imagej_value(description, "slices");
-    stack.slices = to_count(slices);
-    if (slices.empty() && stack.channels * stack.frames == 1) stack.slices = pages;
-
-    std::array<std::string, 3> units;
-    units[0] = normal_unit(imagej_value(description, "unit"));
-    units[1] = normal_unit(imagej_value(description, "yunit"));
-    units[2] = normal_unit(imagej_value(description, "zunit"));
-    const auto resolution_unit = tiff.tag<std::uint16_t>(TIFFTAG_RESOLUTIONUNIT, RESUNIT_NONE);
-    if (units[0].empty() && resolution_unit == RESUNIT_INCH) units[0] = "inch";
-    if (units[0].empty() && resolution_unit == RESUNIT_CENTIMETER) units[0] = "cm";
-    const std::array<float, 2> resolution{tiff.tag(TIFFTAG_XRESOLUTION, 0.0F), tiff.tag(TIFFTAG_YRESOLUTION, 0.0F)};
-    // One pixel per nothing is what writers leave when they know no spacing.
-    const bool known = !units[0].empty() || resolution[0] != 1.0F || !imagej_value(description, "spacing").empty();
-    if (!known) return stack;
-    for (int a = 0; a < 2; ++a) {
-        const float spacing = 1.0F / resolution[a];
-        if (!std::isfinite(spacing) || !(spacing > 0)) continue;
-        // libtiff hands out single precision; the shortest text that means this float is what was meant (0.35).
-        std::array<char, 32> text{};
-        const auto end = std::to_chars(text.data(), text.data() + text.size(), spacing).ptr;
-        std::from_chars(text.data(), end, stack.spacing[a]);
-    }
-    stack.spacing[2] = to_number(imagej_value(description, "spacing"));
-    // ImageJ leaves a depth of 1 out.
-    if (stack.spacing[2] == 0 && stack.spacing[0] > 0) stack.spacing[2] = 1;
-    unify_units(stack, units);
-    return stack;
-}
-
-Stack ome_stack(const std::string& description, std::uint64_t pages) {
-    Stack stack;
-    stack.slices = pages;
-    const std::size_t begin = description.find("<Pixels");
-    if (begin == std::string::npos) return stack;
-    const std::string pixels = description.substr(begin, description.find('>', begin) - begin);
-    stack.slices = to_count(ome_value(pixels, "SizeZ"));
-    stack.channels = to_count(ome_value(pixels, "SizeC"));
-    stack.frames = to_count(ome_value(pixels, "SizeT"));
-    const std::string order = ome_value(pixels, "DimensionOrder");
-    if (order.size() == 5) stack.order = order.substr(2);
-    std::string sorted = stack.order;
-    std::sort(sorted.begin(), sorted.end());
-    if (sorted != "CTZ") stack.order = "CZT";
-    std::array<std::string, 3> units;
-    for (int a = 0; a < 3; ++a) {
-        const std::string key = std::string("PhysicalSize") + "XYZ"[a];
-        stack.spacing[a] = to_number(ome_value(pixels, key));
-        const std::string unit = ome_value(pixels, key + "Unit");
-        units[a] = unit.empty() ? "um" : normal_unit(unit);  // the OME schema's default
-    }
-    if (stack.spacing[0] > 0) unify_units(stack, units);
-    return stack;
-}
-
-Stack describe(const Tiff& tiff, std::uint64_t pages) {
-    const std::string description = tiff.text(TIFFTAG_IMAGEDESCRIPTION);
-    Stack stack;
-    stack.slices = pages;
-    if (description.rfind("ImageJ=", 0) == 0)
-        stack = imagej_stack(tiff, description, pages);
-    else if (description.find("<OME") != std::string::npos)
-        stack = ome_stack(description, pages);
-    return stack;
-}
-
-/// The index along channels or frames that the caller chose, or the only one there is.
-std::uint64_t choose(const std::string& path, const char* what, int wanted, std::uint64_t count) {
-    if (wanted < 0 && count == 1) return 0;
-    if (wanted >= 0 && std::uint64_t(wanted) < count) return std::uint64_t(wanted);
-    const std::string range = "0 to " + std::to_string(count - 1) + " with --" + what;
-    if (wanted < 0)
-        throw Error(Errc::Unsupported, "read_image: " + path + ": expected one " + what + ", got " +
-                                           std::to_string(count) + "; choose " + range);
-    throw Error(Errc::InvalidOptions, "read_image: " + path + ": " + what + " " + std::to_string(wanted) +
-                                          " does not exist; choose " + range);
-}
-
-bool read_strips(const Tiff& tiff, const Page& page, std::uint64_t row_bytes, char* out) {
-    const std::uint64_t page_bytes = row_bytes * page.height;
-    const std::uint64_t rows = tiff.tag<std::uint32_t>(TIFFTAG_ROWSPERSTRIP, page.height);
-    const std::uint64_t strip_bytes = std::min(rows, std::uint64_t(page.height)) * row_bytes;
-    if (strip_bytes == 0) return false;
-    for (std::uint64_t done = 0, strip = 0; done < page_bytes; ++strip) {
-        const auto want = static_cast<tmsize_t>(std::min(strip_bytes, page_bytes - done));
-        if (TIFFReadEncodedStrip(tiff.get(), static_cast<std::uint32_t>(strip), out + done, want) != want) return false;
-        done += static_cast<std::uint64_t>(want);
-    }
-    return true;
-}
-
-bool read_tiles(const Tiff& tiff, const Page& page, std::uint64_t row_bytes, char* out) {
-    const std::uint64_t bytes = page.bits / 8;
-    const std::uint64_t width = tiff.tag<std::uint32_t>(TIFFTAG_TILEWIDTH, 0);
-    const std::uint64_t height = tiff.tag<std::uint32_t>(TIFFTAG_TILELENGTH, 0);
-    const auto tile_bytes = static_cast<std::uint64_t>(std::max<tmsize_t>(0, TIFFTileSize(tiff.get())));
-    // A tile may be larger than the page, but not absurdly so.
-    if (width == 0 || height == 0 || width > page.width + 65536U || height > page.height + 65536U ||
-        tile_bytes != width * height * bytes)
-        return false;
-    std::vector<char> tile(tile_bytes);
-    for (std::uint64_t y = 0; y < page.height; y += height)
-        for (std::uint64_t x = 0; x < page.width; x += width) {
-            const std::uint32_t index =
-                TIFFComputeTile(tiff.get(), static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), 0, 0);
-            if (TIFFReadEncodedTile(tiff.get(), index, tile.data(), static_cast<tmsize_t>(tile_bytes)) !=
-                static_cast<tmsize_t>(tile_bytes))
-                return false;
-            const std::uint64_t columns = std::min(width, page.width - x);
-            for (std::uint64_t row = 0; row < std::min(height, page.height - y); ++row)
-                std::memcpy(out + (y + row) * row_bytes + x * bytes, tile.data() + row * width * bytes,
-                            columns * bytes);
+    Pixels read(const PixelRequest& request, const RunContext& run) override {
+        if (may_map(request))
+            if (std::optional<Pixels> mapped = map(request)) return *mapped;
+        const Index3 n = request.box.size();
+        const std::uint64_t page_bytes = std::uint64_t(n[0]) * std::uint64_t(n[1]) * pixel_bytes(info_.type);
+        std::uint64_t file_bytes = 0;
+        for (const std::string& file : stack_.files) {
+            std::error_code status;
+            const std::uint64_t bytes = std::filesystem::file_size(file, status);
+            if (!status) file_bytes += bytes;
         }
-    return true;
-}
+        const std::shared_ptr<void> data = allocate_pixels(path_, voxel_count(n), info_.type, file_bytes);
+        auto* out = static_cast<char*>(data.get());
+        for (std::int32_t k = request.box.min[2]; k <= request.box.max[2]; ++k, out += page_bytes) {
+            run.check();
+            if (contiguous_ > 0)
+                read_contiguous(plane(request, k).page, request, out);
+            else
+                read_page(plane(request, k), request, out);
+        }
+        return {data, dense_strides(n), false};
+    }
 
-/// ImageJ writes stacks over 4 GB with a single directory, and the other slices' pixels right behind the first's.
-bool is_contiguous_imagej_stack(const Tiff& tiff, std::uint64_t page_bytes, std::uint64_t pages,
-                                std::uint64_t file_bytes) {
-    if (tiff.tag<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE) != COMPRESSION_NONE) return false;
-    if (TIFFIsTiled(tiff.get()) != 0) return false;
-    const std::uint64_t begin = TIFFGetStrileOffset(tiff.get(), 0);
-    return begin <= file_bytes && page_bytes > 0 && pages <= (file_bytes - begin) / page_bytes;
-}
+private:
+    /// ImageJ writes stacks over 4 GB with a single directory, and the other slices' pixels right behind the first's.
+    void find_single_directory(const std::string& description) {
+        const std::uint64_t images = imagej_images(description);
+        if (images < 2 || TIFFLastDirectory(tiff_->get()) == 0) return;
+        const auto begin = pixels_in_one_piece(*tiff_, kind_);
+        const std::uint64_t file_bytes = std::filesystem::file_size(path_);
+        if (!begin || kind_.bytes() == 0) return;
+        if (*begin > file_bytes || images > (file_bytes - *begin) / kind_.bytes())
+            throw read_error(Errc::InvalidInput, path_,
+                             "its description claims " + std::to_string(images) + " slices, which a file of " +
+                                 std::to_string(file_bytes) + " bytes cannot hold; it is truncated");
+        contiguous_ = *begin;
+    }
+
+    void fill_info() {
+        const bool colour = kind_.samples > 1;
+        // Colour: the samples are the channels; OME counts them in SizeC too.
+        if (colour && stack_.channels > 1 && stack_.channels != kind_.samples)
+            throw read_error(Errc::Unsupported, path_, "channels of several samples each");
+        if (colour && stack_.channels == kind_.samples && stack_.slices * stack_.frames != pages_.size())
+            throw read_error(Errc::Unsupported, path_, "channels of several samples each");
+        info_.channels = static_cast<int>(colour ? kind_.samples : stack_.channels);
+        if (colour) stack_.channels = 1;
+        if (colour && kind_.samples == 3) stack_.channel_names = {"red", "green", "blue"};
+        info_.frames = static_cast<int>(stack_.frames);
+        info_.format = stack_.format;
+        info_.axis_order = (colour ? "SXY" : "XY") + stack_.order;
+        info_.channel_names = stack_.channel_names;
+        info_.fields = stack_.fields;
+        ImageGeometry& geometry = info_.geometry;
+        geometry.size = require_3d(path_, {kind_.width, kind_.height, stack_.slices});
+        geometry.unit = stack_.unit;
+        geometry.origin = stack_.origin;
+        for (std::size_t a = 0; a < 3; ++a) {
+            info_.spacing_known[a] = stack_.spacing[a] > 0;
+            if (info_.spacing_known[a]) geometry.spacing[a] = stack_.spacing[a];
+        }
+    }
+
+    [[nodiscard]] TiffStack::Plane plane(const PixelRequest& request, std::int32_t k) const {
+        const std::uint64_t channel = kind_.samples > 1 ? 0 : request.channel;
+        const TiffStack::Plane plane = stack_.plane(std::uint64_t(k), channel, request.frame);
+        if (plane.page == TiffStack::Plane::kNone)
+            throw read_error(Errc::InvalidInput, path_, "its OME-XML names no page for slice " + std::to_string(k));
+        return plane;
+    }
+
+    [[nodiscard]] Error damaged(const TiffStack::Plane& plane) const {
+        return tiff_->error(Errc::InvalidInput, "read_image: " + stack_.files[plane.file] +
+                                                    ": damaged or truncated at page " + std::to_string(plane.page));
+    }
+
+    /// Makes `file` the open one.
+    void turn_to(std::uint32_t file) {
+        if (file == open_) return;
+        tiff_ = open_for_reading(stack_.files[file]);
+        pages_ = list_pages(stack_.files[file], *tiff_);
+        open_ = file;
+    }
+
+    void read_page(const TiffStack::Plane& plane, const PixelRequest& request, char* out) {
+        turn_to(plane.file);
+        if (plane.page >= pages_.size() || !pages_[plane.page].same_kind(kind_)) throw damaged(plane);
+        const Page& page = pages_[plane.page];
+        if (TIFFSetSubDirectory(tiff_->get(), page.offset) != 1 || !current_page(*tiff_).same_kind(page)) throw damaged(plane);
+        if (!PageReader(*tiff_, page, request.box, kind_.samples > 1 ? request.channel : 0).read(out)) throw damaged(plane);
+    }
+
+    void read_contiguous(std::uint64_t number, const PixelRequest& request, char* out) const {
+        const VoxelBox& box = request.box;
+        const std::uint64_t width = pixel_bytes(info_.type), row = std::uint64_t(box.size()[0]) * width;
+        std::ifstream raw(path_, std::ios::binary);
+        for (std::int32_t j = box.min[1]; j <= box.max[1]; ++j, out += row) {
+            raw.seekg(static_cast<std::streamoff>(contiguous_ + number * kind_.bytes() + std::uint64_t(j) * kind_.row_bytes() +
+                                                  std::uint64_t(box.min[0]) * width));
+            if (!raw.read(out, static_cast<std::streamsize>(row)))
+                throw damaged({0, static_cast<std::uint32_t>(number)});
+            if (TIFFIsByteSwapped(tiff_->get()) != 0) swap_bytes(out, row / width, width);
+        }
+    }
+
+    /// Large, in one file, and unpacked as far as the first page tells.
+    [[nodiscard]] bool may_map(const PixelRequest& request) const {
+        return is_worth_mapping(std::uint64_t(request.box.size()[2]) * kind_.bytes()) && stack_.files.size() == 1 &&
+               kind_.samples == 1 && TIFFIsByteSwapped(tiff_->get()) == 0 &&
+               (contiguous_ > 0 || tiff_->tag<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE) == COMPRESSION_NONE);
+    }
+
+    [[nodiscard]] std::optional<std::uint64_t> pixels_of(const TiffStack::Plane& plane) const {
+        if (contiguous_ > 0) return contiguous_ + plane.page * kind_.bytes();
+        if (plane.page >= pages_.size() || TIFFSetSubDirectory(tiff_->get(), pages_[plane.page].offset) != 1) throw damaged(plane);
+        return pixels_in_one_piece(*tiff_, kind_);
+    }
+
+    /// Only where the slices lie at even distances in the file.
+    [[nodiscard]] std::optional<Pixels> map(const PixelRequest& request) const {
+        const VoxelBox& box = request.box;
+        const std::uint64_t width = pixel_bytes(info_.type);
+        std::vector<std::uint64_t> begins;
+        for (std::int32_t k = box.min[2]; k <= box.max[2]; ++k) {
+            const auto begin = pixels_of(plane(request, k));
+            if (!begin || *begin % width != 0) return std::nullopt;
+            begins.push_back(*begin);
+        }
+        const std::uint64_t step = begins.size() > 1 ? begins[1] - begins[0] : kind_.bytes();
+        for (std::size_t n = 1; n < begins.size(); ++n)
+            if (begins[n] < begins[n - 1] || begins[n] - begins[n - 1] != step) return std::nullopt;
+        const std::uint64_t bytes = begins.back() + kind_.bytes() - begins.front();
+        if (begins.back() + kind_.bytes() > std::filesystem::file_size(path_)) return std::nullopt;  // read() says where
+        const auto slab = map_file(path_, begins.front(), bytes);
+        const char* first = static_cast<const char*>(slab.get()) + std::uint64_t(box.min[1]) * kind_.row_bytes() +
+                            std::uint64_t(box.min[0]) * width;
+        return Pixels{{slab, first}, {1, std::int64_t(kind_.width), std::int64_t(step / width)}, true};
+    }
+
+    std::string path_;
+    std::unique_ptr<Tiff> tiff_;
+    std::uint32_t open_ = 0;     ///< which of stack_.files tiff_ is
+    Page kind_;                  ///< the first page; all others are alike
+    std::vector<Page> pages_;    ///< of the open file; empty for a single directory
+    std::uint64_t contiguous_ = 0;  ///< where the pixels begin of a stack with a single directory
+    TiffStack stack_;
+};
 
 }  // namespace
 
-RawImage read_tiff(const std::string& path, const ReadImageOptions& options, bool header_only, const RunContext& run) {
-    const std::uint64_t file_bytes = std::filesystem::file_size(path);
-    constexpr std::uint64_t kLeastLimit = std::uint64_t(1) << 28;
-    Tiff tiff(path, "r", static_cast<tmsize_t>(std::max(kLeastLimit, 4 * file_bytes)));
-    if (tiff.get() == nullptr) throw tiff.error(Errc::InvalidInput, "read_image: " + path + ": not a usable TIFF file");
-    const std::string description = tiff.text(TIFFTAG_IMAGEDESCRIPTION);
-
-    RawImage image;
-    const Page first = current_page(tiff);
-    image.type = pixel_type(path, first);
-    const std::uint64_t row_bytes = std::uint64_t(first.width) * pixel_bytes(image.type);
-    const std::uint64_t page_bytes = row_bytes * first.height;
-
-    std::vector<Page> pages;
-    std::uint64_t contiguous = 0;  // where the pixels of such a stack begin
-    const std::uint64_t claimed =
-        description.rfind("ImageJ=", 0) == 0 ? to_count(imagej_value(description, "images")) : 1;
-    if (claimed > 1 && TIFFLastDirectory(tiff.get()) != 0 &&
-        is_contiguous_imagej_stack(tiff, page_bytes, claimed, file_bytes)) {
-        contiguous = TIFFGetStrileOffset(tiff.get(), 0);
-        pages.assign(claimed, first);
-    } else {
-        pages = list_pages(path, tiff);
-        TIFFSetSubDirectory(tiff.get(), pages.front().offset);
-    }
-
-    Stack stack = describe(tiff, pages.size());
-    if (stack.slices * stack.channels * stack.frames != pages.size()) {
-        // The description is stale (a tool that kept it while it changed the pages): the pages are right.
-        stack.slices = pages.size();
-        stack.channels = stack.frames = 1;
-    }
-    const std::uint64_t channel = choose(path, "channel", options.channel, stack.channels);
-    const std::uint64_t frame = choose(path, "frame", options.frame, stack.frames);
-    require_3d(path, {first.width, first.height, stack.slices});
-    ImageGeometry& geometry = image.geometry;
-    geometry.size = {static_cast<std::int32_t>(first.width), static_cast<std::int32_t>(first.height),
-                     static_cast<std::int32_t>(stack.slices)};
-    geometry.unit = stack.unit;
-    geometry.spacing_known = true;
-    for (int a = 0; a < 3; ++a) {
-        if (stack.spacing[a] > 0)
-            geometry.spacing[a] = stack.spacing[a];
-        else
-            geometry.spacing_known = false;
-    }
-    if (header_only) return image;
-
-    if (page_bytes > std::uint64_t(1) << 40)
-        throw Error(Errc::InvalidInput, "read_image: " + path + ": the header claims pages of " + first.to_text());
-    image.data = allocate_pixels(path, page_bytes / pixel_bytes(image.type) * stack.slices, image.type, file_bytes);
-    std::ifstream raw;
-    if (contiguous > 0) raw.open(path, std::ios::binary);
-    for (std::uint64_t z = 0; z < stack.slices; ++z) {
-        run.check();
-        char* out = static_cast<char*>(image.data.get()) + z * page_bytes;
-        const std::uint64_t number = stack.page(z, channel, frame);
-        const auto failure = [&] {
-            return tiff.error(Errc::InvalidInput,
-                              "read_image: " + path + ": damaged or truncated at page " + std::to_string(number));
-        };
-        if (contiguous > 0) {
-            raw.seekg(static_cast<std::streamoff>(contiguous + number * page_bytes));
-            if (!raw.read(out, static_cast<std::streamsize>(page_bytes))) throw failure();
-            if (TIFFIsByteSwapped(tiff.get()) != 0)
-                swap_bytes(out, page_bytes / pixel_bytes(image.type), pixel_bytes(image.type));
-            continue;
-        }
-        const Page& page = pages[number];
-        if (TIFFSetSubDirectory(tiff.get(), page.offset) != 1 || !current_page(tiff).same_kind(page)) throw failure();
-        const bool whole = TIFFIsTiled(tiff.get()) != 0 ? read_tiles(tiff, page, row_bytes, out)
-                                                        : read_strips(tiff, page, row_bytes, out);
-        if (!whole) throw failure();
-    }
-    return image;
-}
-
-void write_tiff(const std::string& path, const ImageGeometry& geometry, PixelType type, const void* values) {
-    const auto width = static_cast<std::uint32_t>(geometry.size[0]);
-    const auto height = static_cast<std::uint32_t>(geometry.size[1]);
-    const std::uint64_t page_bytes = std::uint64_t(width) * height * pixel_bytes(type);
-    constexpr std::uint64_t kClassicLimit = std::uint64_t(4000) << 20;
-    const bool big = page_bytes * std::uint64_t(geometry.size[2]) > kClassicLimit;
-    Tiff tiff(path, big ? "w8" : "w", 0);
-    if (tiff.get() == nullptr) throw tiff.error(Errc::Io, "write_image: " + path + ": cannot write");
-
-    std::array<char, 32> depth{};
-    std::to_chars(depth.data(), depth.data() + depth.size() - 1, geometry.spacing[2]);
-    const std::string slices = std::to_string(geometry.size[2]);
-    std::string description =
-        "ImageJ=1.53t\nimages=" + slices + "\nslices=" + slices + "\nhyperstack=true\nmode=grayscale\n";
-    if (geometry.spacing_known) description += std::string("spacing=") + depth.data() + "\n";
-    if (!geometry.unit.empty()) description += "unit=" + geometry.unit + "\n";
-    const int format = with_pixel_type(type, [](auto pixel) {
-        using T = decltype(pixel);
-        return std::is_floating_point_v<T> ? SAMPLEFORMAT_IEEEFP
-               : std::is_signed_v<T>       ? SAMPLEFORMAT_INT
-                                           : SAMPLEFORMAT_UINT;
-    });
-    std::vector<char> page(page_bytes);  // libtiff wants it writable
-    for (std::int32_t z = 0; z < geometry.size[2]; ++z) {
-        TIFF* t = tiff.get();
-        TIFFSetField(t, TIFFTAG_IMAGEWIDTH, width);
-        TIFFSetField(t, TIFFTAG_IMAGELENGTH, height);
-        TIFFSetField(t, TIFFTAG_BITSPERSAMPLE, int(8 * pixel_bytes(type)));
-        TIFFSetField(t, TIFFTAG_SAMPLEFORMAT, format);
-        TIFFSetField(t, TIFFTAG_SAMPLESPERPIXEL, 1);
-        TIFFSetField(t, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
-        TIFFSetField(t, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
-        TIFFSetField(t, TIFFTAG_COMPRESSION, COMPRESSION_ADOBE_DEFLATE);
-        TIFFSetField(t, TIFFTAG_ROWSPERSTRIP, height);
-        TIFFSetField(t, TIFFTAG_RESOLUTIONUNIT, RESUNIT_NONE);
-        TIFFSetField(t, TIFFTAG_XRESOLUTION, 1.0 / geometry.spacing[0]);
-        TIFFSetField(t, TIFFTAG_YRESOLUTION, 1.0 / geometry.spacing[1]);
-        if (z == 0) TIFFSetField(t, TIFFTAG_IMAGEDESCRIPTION, description.c_str());
-        std::memcpy(page.data(), static_cast<const char*>(values) + std::uint64_t(z) * page_bytes, page_bytes);
-        if (TIFFWriteEncodedStrip(t, 0, page.data(), static_cast<tmsize_t>(page_bytes)) < 0 ||
-            TIFFWriteDirectory(t) != 1)
-            throw tiff.error(Errc::Io, "write_image: " + path + ": cannot write");
-    }
-    tiff.close();
-    if (!tiff.message().empty()) throw tiff.error(Errc::Io, "write_image: " + path + ": cannot write");
+std::unique_ptr<ImageFile> open_tiff(const std::string& path, const RunContext& run) {
+    return std::make_unique<TiffFile>(path, run);
 }
 
 }  // namespace covol::detail

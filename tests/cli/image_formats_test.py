@@ -1,0 +1,464 @@
+"""One structure in every image format: the same surface in world space.
+
+    COVOL=build/bin/covol python3 -m unittest tests/cli/image_formats_test.py
+
+Files are made by each format's own library (tifffile, nibabel, pydicom, pyopenvdb), else byte by byte.
+"""
+import gzip
+import json
+import math
+import os
+import pathlib
+import shutil
+import struct
+import subprocess
+import tempfile
+import unittest
+import zlib
+
+COVOL = os.environ.get("COVOL", "build/bin/covol")
+
+try:
+    import nibabel
+    import numpy as np
+    import pydicom
+    import pydicom.uid
+    import pyopenvdb
+    import tifffile
+    MISSING = ""
+except ImportError as error:
+    MISSING = f"SKIPPED: {error}; see tests/install_packages.sh"
+
+SIZE = (30, 26, 14)           # voxels along x, y, z
+SPACING = (0.5, 0.625, 1.25)  # exact in single precision and in DICOM's decimals
+ORIGIN = (10.0, -20.0, 5.5)
+CENTRE = (16.0, -12.5, 12.0)  # of an ellipsoid, off the image's middle: flips and swaps show
+RADII = (3.5, 4.5, 3.0)
+
+
+def voxels():
+    """The image as an array [z, y, x] of bytes: bright ellipsoid, edge blurred over about a voxel."""
+    z, y, x = np.meshgrid(*(np.arange(n) for n in SIZE[::-1]), indexing="ij")
+    world = [ORIGIN[a] + SPACING[a] * i for a, i in enumerate((x, y, z))]
+    r = np.sqrt(sum(((world[a] - CENTRE[a]) / RADII[a]) ** 2 for a in range(3)))
+    return np.clip(30 + 200 * np.clip((1 - r) * 4 + 0.5, 0, 1), 0, 255).astype(np.uint8)
+
+
+def marks(count, shift=(0, 0, 0)):
+    """A Fibonacci lattice on the ellipsoid."""
+    golden = math.pi * (3 - math.sqrt(5))
+    lines = []
+    for n in range(count):
+        z = 1 - (2 * n + 1) / count
+        r = math.sqrt(1 - z * z)
+        unit = (r * math.cos(golden * n), r * math.sin(golden * n), z)
+        lines.append(" ".join(f"{CENTRE[a] + RADII[a] * unit[a] - shift[a]:.6f}" for a in range(3)))
+    return "\n".join(lines) + "\n"
+
+
+def nrrd_header(**more):
+    lines = ["NRRD0005", "type: uint8", "dimension: 3", "space: left-posterior-superior", "sizes: %d %d %d" % SIZE,
+             "space directions: (%r,0,0) (0,%r,0) (0,0,%r)" % SPACING, "space origin: (%r,%r,%r)" % ORIGIN,
+             "endian: little", "encoding: " + more.pop("encoding", "raw"), 'space units: "um" "um" "um"']
+    return "\n".join(lines + [f"{key.replace('_', ' ')}: {value}" for key, value in more.items()]) + "\n"
+
+
+def write_mrc(path, data, mode, big=False, **words):
+    """MRC2014, word by word."""
+    order = ">" if big else "<"
+    header = bytearray(1024)
+    def put(at, kind, *values):
+        struct.pack_into(order + kind, header, at, *values)
+    put(0, "4i", *SIZE, mode)
+    put(28, "3i", *SIZE)
+    put(40, "6f", *(n * s for n, s in zip(SIZE, SPACING)), 90, 90, 90)
+    put(64, "3i", 1, 2, 3)
+    put(76, "3f", float(data.min()), float(data.max()), float(data.mean()))
+    put(196, "3f", *words.get("origin", ORIGIN))
+    put(16, "3i", *words.get("start", (0, 0, 0)))
+    header[208:212] = b"MAP "
+    header[212:216] = b"\x11\x11\0\0" if big else b"\x44\x44\0\0"
+    path.write_bytes(bytes(header) + data.astype(data.dtype.newbyteorder(order)).tobytes())
+
+
+def write_dicom_series(folder, data, series="1.2.3.4.5", description="ball"):
+    """One file for each slice; names in another order than the slices."""
+    folder.mkdir(exist_ok=True)
+    for k in range(data.shape[0]):
+        meta = pydicom.dataset.FileMetaDataset()
+        meta.MediaStorageSOPClassUID = pydicom.uid.CTImageStorage
+        meta.MediaStorageSOPInstanceUID = f"{series}.{k + 1}"
+        meta.TransferSyntaxUID = pydicom.uid.ExplicitVRLittleEndian
+        path = folder / f"{series}-{(k * 3) % data.shape[0]:03d}.dcm"
+        ds = pydicom.dataset.FileDataset(str(path), {}, file_meta=meta, preamble=b"\0" * 128)
+        ds.is_little_endian, ds.is_implicit_VR = True, False
+        ds.SOPClassUID, ds.SOPInstanceUID = meta.MediaStorageSOPClassUID, meta.MediaStorageSOPInstanceUID
+        ds.StudyInstanceUID, ds.SeriesInstanceUID = "1.2.3", series
+        ds.Modality, ds.SeriesDescription, ds.PatientName = "CT", description, "phantom"
+        ds.InstanceNumber = data.shape[0] - k
+        ds.ImageOrientationPatient = [1, 0, 0, 0, 1, 0]
+        ds.ImagePositionPatient = [ORIGIN[0], ORIGIN[1], ORIGIN[2] + SPACING[2] * k]
+        ds.PixelSpacing = [SPACING[1], SPACING[0]]  # rows first
+        ds.SliceThickness = 0.7                     # thinner than the distance: must not be taken for it
+        ds.Rows, ds.Columns = data.shape[1:]
+        ds.SamplesPerPixel, ds.PhotometricInterpretation, ds.PixelRepresentation = 1, "MONOCHROME2", 0
+        ds.BitsAllocated = ds.BitsStored = 16
+        ds.HighBit = 15
+        ds.PixelData = data[k].astype("<u2").tobytes()
+        ds.save_as(str(path), write_like_original=False)
+    return folder
+
+
+def ome_xml(files=None, order="XYZCT", channels=1, pages=None):
+    tiff_data = "<TiffData/>" if files is None else "".join(
+        f'<TiffData IFD="{ifd}" FirstZ="{z}" PlaneCount="1"><UUID FileName="{name}">urn:uuid:{name}</UUID></TiffData>'
+        for z, (name, ifd) in enumerate(files))
+    sizes = "".join(f' Size{a}="{n}"' for a, n in zip("XYZ", SIZE))
+    physical = (f' PhysicalSizeX="{SPACING[0]}" PhysicalSizeY="{SPACING[1]}" PhysicalSizeZ="{SPACING[2] * 1000}"'
+                ' PhysicalSizeZUnit="nm"')
+    names = "".join(f'<Channel ID="Channel:0:{c}" Name="c{c}" SamplesPerPixel="1"/>' for c in range(channels))
+    return ('<?xml version="1.0" encoding="UTF-8"?><OME xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06">'
+            f'<Image ID="Image:0"><Pixels ID="Pixels:0" DimensionOrder="{order}" Type="uint8"{sizes} SizeC="{channels}"'
+            f' SizeT="1"{physical}>{names}{tiff_data}</Pixels></Image></OME>')
+
+
+@unittest.skipIf(MISSING, MISSING)
+class Case(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="covol-formats-"))
+        cls.data = voxels()
+        cls.world_marks, cls.shifted_marks = cls.folder / "marks.xyz", cls.folder / "shifted.xyz"
+        cls.world_marks.write_text(marks(600))
+        cls.shifted_marks.write_text(marks(600, ORIGIN))
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.folder)
+
+    def run_covol(self, *args, code=0):
+        done = subprocess.run([COVOL, *map(str, args)], capture_output=True, text=True, cwd=self.folder, timeout=300)
+        self.assertEqual(done.returncode, code, f"covol {' '.join(map(str, args))}\n{done.stdout}\n{done.stderr}")
+        return done
+
+    def report(self, *args):
+        path = self.folder / "report.json"
+        path.unlink(missing_ok=True)
+        self.run_covol(*args, "--quiet", "--json", path)
+        return json.loads(path.read_text())
+
+    def write_nrrd(self, name="ball.nrrd", data=None):
+        path = self.folder / name
+        path.write_bytes(nrrd_header().encode() + b"\n" + (self.data if data is None else data).tobytes())
+        return path
+
+    def surface(self, image, *options, points=None):
+        out = self.folder / "surface.vdb"
+        self.run_covol("segment", image, "--points", points or self.world_marks, "-o", out, "--quiet", *options)
+        return out
+
+
+class SameSurface(Case):
+    """Every format against a raw NRRD."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        self = cls()
+        nrrd = self.write_nrrd()
+        cls.reference = self.surface(nrrd).rename(cls.folder / "reference.vdb")
+        self.assert_ellipsoid(cls.reference)
+        at_zero = cls.folder / "zero.nrrd"
+        at_zero.write_bytes(nrrd.read_bytes().replace(b"origin: (%r,%r,%r)" % ORIGIN, b"origin: (0,0,0)"))
+        cls.shifted = self.surface(at_zero, points=cls.shifted_marks).rename(cls.folder / "reference0.vdb")
+
+    def assert_ellipsoid(self, path):
+        """The reference itself is right: the marks lie on it."""
+        fit = self.report("compare", self.world_marks, path)["fit"]["points_to_surface"]
+        self.assertLess(fit["mean"], 0.5 * SPACING[0])
+
+    def check(self, image, *options, origin=True, unit=None):
+        info = self.report("info", image, *options)["image"]
+        self.assertEqual(tuple(info["size"]), SIZE)
+        for a in range(3):
+            self.assertAlmostEqual(info["spacing"][a], SPACING[a], places=5)
+            self.assertAlmostEqual(info["origin"][a], ORIGIN[a] if origin else 0, places=4)
+        self.assertEqual(info["spacing_known"], [True] * 3)
+        if unit is not None:
+            self.assertEqual(info["unit"], unit)
+        points = self.world_marks if origin else self.shifted_marks
+        compare = self.report("compare", self.reference if origin else self.shifted,
+                              self.surface(image, *options, points=points))["compare"]
+        self.assertGreater(compare["dice"], 0.9999)
+        self.assertLess(compare["hausdorff"], 1e-3 * SPACING[0])
+        return info
+
+    def test_nrrd(self):
+        raw = self.data.tobytes()
+        (self.folder / "packed.nrrd").write_bytes(nrrd_header(encoding="gzip").encode() + b"\n" + gzip.compress(raw))
+        self.check("packed.nrrd", unit="um")
+        (self.folder / "pixels.raw").write_bytes(raw)
+        (self.folder / "detached.nhdr").write_text(nrrd_header(data_file="pixels.raw"))
+        self.check("detached.nhdr", unit="um")
+        (self.folder / "Pixels.raw.gz").write_bytes(gzip.compress(raw))
+        (self.folder / "packed.nhdr").write_text(nrrd_header(encoding="gz", data_file="./Pixels.raw.gz"))
+        self.check("packed.nhdr", unit="um")
+        ras = nrrd_header().replace("left-posterior-superior", "right-anterior-superior")
+        ras = ras.replace("(0.5,0,0) (0,0.625,0)", "(-0.5,0,0) (0,-0.625,0)").replace("(10.0,-20.0,5.5)", "(-10,20,5.5)")
+        (self.folder / "ras.nrrd").write_bytes(ras.encode() + b"\n" + raw)
+        self.check("ras.nrrd", unit="um")
+
+    def test_metaimage(self):
+        header = ("ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n{}"
+                  "TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = %r %r %r\nElementSpacing = %r %r %r\n"
+                  "DimSize = %d %d %d\nElementType = MET_UCHAR\nElementDataFile = {}\n" % (*ORIGIN, *SPACING, *SIZE))
+        raw = self.data.tobytes()
+        (self.folder / "one.mha").write_bytes(header.format("", "LOCAL").encode() + raw)
+        self.check("one.mha")
+        packed = zlib.compress(raw)
+        (self.folder / "two.zraw").write_bytes(packed)
+        (self.folder / "two.mhd").write_text(
+            header.format(f"CompressedData = True\nCompressedDataSize = {len(packed)}\n", "two.zraw"))
+        self.check("two.mhd")
+
+    def test_nifti(self):
+        ras = np.diag([-SPACING[0], -SPACING[1], SPACING[2], 1.0])
+        ras[:3, 3] = (-ORIGIN[0], -ORIGIN[1], ORIGIN[2])
+        nibabel.save(nibabel.Nifti2Image(self.data.transpose(2, 1, 0), ras), str(self.folder / "two.nii"))
+        self.assertIn("NIfTI-2", self.run_covol("info", "two.nii", code=3).stderr)
+        for name, forms in [("s.nii", "s"), ("q.nii.gz", "q")]:
+            with self.subTest(name):
+                image = nibabel.Nifti1Image(self.data.transpose(2, 1, 0), ras)
+                image.header.set_xyzt_units("mm")
+                image.set_sform(ras, code=1 if forms == "s" else 0)
+                image.set_qform(ras, code=1 if forms == "q" else 0)
+                nibabel.save(image, str(self.folder / name))
+                self.check(name, unit="mm")
+
+    def test_nifti_with_flipped_and_swapped_axes(self):
+        ras = np.zeros((4, 4))
+        ras[3, 3] = 1
+        # stored z fastest, y backwards: the affine says so
+        stored = self.data[:, ::-1, :].transpose(0, 1, 2)
+        lps = np.zeros((3, 4))
+        lps[2, 0] = SPACING[2]
+        lps[1, 1] = -SPACING[1]
+        lps[0, 2] = SPACING[0]
+        lps[:, 3] = (ORIGIN[0], ORIGIN[1] + SPACING[1] * (SIZE[1] - 1), ORIGIN[2])
+        ras[:3] = np.diag([-1, -1, 1]) @ lps
+        image = nibabel.Nifti1Image(stored, ras)
+        image.header.set_xyzt_units("mm")
+        nibabel.save(image, str(self.folder / "swapped.nii"))
+        compare = self.report("compare", self.reference, self.surface("swapped.nii"))["compare"]
+        self.assertGreater(compare["dice"], 0.9999)
+
+    def test_nifti_in_micrometres(self):
+        scaled = np.diag([-SPACING[0] * 1000, -SPACING[1] * 1000, SPACING[2] * 1000, 1.0])
+        scaled[:3, 3] = (-ORIGIN[0] * 1000, -ORIGIN[1] * 1000, ORIGIN[2] * 1000)
+        for forms in "sq":
+            with self.subTest(forms):
+                image = nibabel.Nifti1Image(self.data.transpose(2, 1, 0), scaled)
+                image.header.set_xyzt_units("micron")
+                image.set_sform(scaled, code=1 if forms == "s" else 0)
+                image.set_qform(scaled, code=1 if forms == "q" else 0)
+                nibabel.save(image, str(self.folder / "um.nii"))
+                self.check("um.nii", unit="mm")
+
+    def test_mrc(self):
+        for name, mode, kind, big in [("b.mrc", 0, "i1", False), ("i.mrc", 1, "i2", True), ("f.map", 2, "f4", False),
+                                      ("u.mrc", 6, "u2", True), ("h.mrc", 12, "f2", False)]:
+            with self.subTest(name):
+                data = self.data.astype(np.int16)
+                if kind == "i1":
+                    data = data - 128
+                write_mrc(self.folder / name, data.astype(kind), mode, big)
+                self.check(name, unit="angstrom")
+
+    def test_mrc_start_instead_of_origin(self):
+        start = [round(o / s) for o, s in zip(ORIGIN, SPACING)]
+        write_mrc(self.folder / "start.mrc", self.data.astype("f4"), 2, origin=(0, 0, 0), start=start)
+        info = self.report("info", "start.mrc")["image"]
+        for a in range(3):
+            self.assertAlmostEqual(info["origin"][a], start[a] * SPACING[a])
+
+    def test_dicom_series(self):
+        folder = write_dicom_series(self.folder / "series", self.data)
+        self.check(folder, unit="mm")
+        self.check(sorted(folder.iterdir())[3], unit="mm")
+
+    def test_vdb_grid(self):
+        grid = pyopenvdb.FloatGrid()
+        grid.copyFromArray(self.data.transpose(2, 1, 0).astype(np.float32), tolerance=-1)
+        matrix = np.diag([*SPACING, 1.0])
+        matrix[3, :3] = ORIGIN  # rows: OpenVDB multiplies from the left
+        grid.transform = pyopenvdb.createLinearTransform(matrix.tolist())
+        grid.name = "density"
+        other = pyopenvdb.BoolGrid()
+        other.name = "flags"
+        pyopenvdb.write(str(self.folder / "grids.vdb"), [other, grid])
+        self.check("grids.vdb:density")
+        self.assertIn("density", self.run_covol("segment", "grids.vdb:nothing", "--points", self.world_marks, "-o", "x.vdb",
+                                                code=3).stderr)
+
+    def test_imagej_tiff(self):
+        for name, more in [("plain.tif", {}), ("lzw.tif", {"compression": "lzw"}), ("one.tif", {"contiguous": True, "truncate": True})]:
+            with self.subTest(name):
+                if name == "lzw.tif":
+                    try:
+                        tifffile.imwrite(str(self.folder / "try.tif"), self.data[:2], compression="lzw")
+                    except Exception:  # imagecodecs is no Debian package
+                        continue
+                tifffile.imwrite(str(self.folder / name), self.data, imagej=True,
+                                 resolution=(1 / SPACING[0], 1 / SPACING[1]),
+                                 metadata={"axes": "ZYX", "spacing": SPACING[2], "unit": "um"}, **more)
+                self.check(name, origin=False, unit="um")
+        with tifffile.TiffFile(str(self.folder / "one.tif")) as one:
+            self.assertEqual(len(list(one.pages.pages)), 1)  # this is the form of stacks over 4 GB
+
+    def test_imagej_origin(self):
+        text = ("ImageJ=1.53t\nimages=%d\nslices=%d\nunit=um\nspacing=%r\nxorigin=%r\nyorigin=%r\nzorigin=%r\n"
+                % (SIZE[2], SIZE[2], SPACING[2], *(-o / s for o, s in zip(ORIGIN, SPACING))))
+        with tifffile.TiffWriter(str(self.folder / "origin.tif")) as tiff:
+            for k in range(SIZE[2]):
+                tiff.write(self.data[k], contiguous=False, metadata=None, description=text if k == 0 else None,
+                           resolution=(1 / SPACING[0], 1 / SPACING[1]))
+        self.check("origin.tif", unit="um")
+        # and what covol writes as TIFF lies where the image lies
+        self.run_covol("mask", self.reference, "--like", "ball.nrrd", "-o", "m.tif")
+        self.run_covol("mask", self.reference, "--like", "ball.nrrd", "-o", "m.nrrd")
+        self.assertEqual(self.report("compare", "m.tif", "m.nrrd")["compare"]["dice"], 1)
+
+    def test_hyperstack(self):
+        stack = np.zeros((3, SIZE[2], 2, SIZE[1], SIZE[0]), np.uint8)  # TZCYX
+        stack[1, :, 1] = self.data
+        tifffile.imwrite(str(self.folder / "hyper.tif"), stack, imagej=True, resolution=(1 / SPACING[0], 1 / SPACING[1]),
+                         metadata={"axes": "TZCYX", "spacing": SPACING[2], "unit": "um"})
+        info = self.check("hyper.tif", "--channel", 1, "--frame", 1, origin=False, unit="um")
+        self.assertEqual((info["channels"], info["frames"], info["axis_order"]), (2, 3, "XYCZT"))
+        error = self.run_covol("segment", "hyper.tif", "--points", self.world_marks, "-o", "x.vdb", code=3).stderr
+        self.assertIn("expected one channel, got 2; choose 0 to 1 with --channel", error)
+
+    def test_ome_tiff(self):
+        path = self.folder / "own.ome.tif"
+        tifffile.imwrite(str(path), self.data, bigtiff=True, tile=(16, 16), compression="zlib", metadata={
+            "axes": "ZYX", "PhysicalSizeX": SPACING[0], "PhysicalSizeXUnit": "\u00b5m", "PhysicalSizeY": SPACING[1],
+            "PhysicalSizeYUnit": "\u00b5m", "PhysicalSizeZ": SPACING[2] * 1000, "PhysicalSizeZUnit": "nm"})
+        self.check(path, origin=False, unit="um")
+
+    def test_ome_tiff_channels(self):
+        stack = np.stack([self.data, 0 * self.data])  # CZYX: channels outermost, DimensionOrder XYZCT
+        path = self.folder / "two.ome.tif"
+        tifffile.imwrite(str(path), stack, metadata={
+            "axes": "CZYX", "Channel": {"Name": ["membrane", "nuclei"]}, "PhysicalSizeX": SPACING[0],
+            "PhysicalSizeY": SPACING[1], "PhysicalSizeZ": SPACING[2]})
+        info = self.check(path, "--channel", 0, origin=False, unit="um")
+        self.assertEqual(info["channel_names"], ["membrane", "nuclei"])
+        error = self.run_covol("segment", path, "--points", self.world_marks, "-o", "x.vdb", code=3).stderr
+        self.assertIn("choose 0 (membrane), 1 (nuclei) with --channel", error)
+
+    def test_ome_tiff_in_several_files(self):
+        """Slices dealt to two files, in each backwards; each file names all."""
+        names = ["part0.ome.tif", "part1.ome.tif"]
+        places = {k: (names[k % 2], (SIZE[2] - 1 - k) // 2) for k in range(SIZE[2])}
+        xml = ome_xml([places[k] for k in range(SIZE[2])])
+        for name in names:
+            slices = sorted((ifd, k) for k, (where, ifd) in places.items() if where == name)
+            with tifffile.TiffWriter(str(self.folder / name)) as tiff:
+                for ifd, k in slices:
+                    tiff.write(self.data[k], contiguous=False, metadata=None, description=xml if ifd == 0 else None)
+        for name in names:
+            self.check(name, origin=False, unit="um")
+        (self.folder / names[1]).unlink()
+        error = self.run_covol("segment", names[0], "--points", self.shifted_marks, "-o", "x.vdb", code=4).stderr
+        self.assertIn(names[1], error)
+
+
+class Options(Case):
+    def test_roi_gives_the_surface_of_the_whole(self):
+        """In the box nothing changes but the intensities' percentiles; the mask keeps the whole lattice."""
+        image = self.write_nrrd()
+        # faces on the whole domain's lattice: h = 0.5, centred on the image's box
+        h, corners = SPACING[0], []
+        for side in (-1, 1):
+            for a in range(3):
+                middle = ORIGIN[a] + SPACING[a] * (SIZE[a] - 1) / 2
+                first = middle - h * math.ceil(SIZE[a] * SPACING[a] / h) / 2
+                corners.append(first + h * round((CENTRE[a] + side * (RADII[a] + 2) - first) / h))
+        box = ",".join(map(str, corners))
+        options = ("--edge-contrast", "0.5")
+        whole = self.surface(image, *options).rename(self.folder / "whole.vdb")
+        part = self.surface(image, *options, "--roi", box, "--mask", "part.nrrd")
+        self.assertGreater(self.report("compare", whole, part)["compare"]["dice"], 0.999)
+        self.assertEqual(self.report("info", "part.nrrd")["image"]["size"], list(SIZE))
+
+    def test_roi_crops_elsewhere(self):
+        image = self.write_nrrd()
+        info = self.report("info", image)["image"]
+        self.run_covol("convert", image, "whole.vdb")
+        self.run_covol("convert", image, "part.vdb", "--roi", "14,-14,10,18,-11,14")
+        size = {name: self.report("info", name)["grids"][0] for name in ("whole.vdb", "part.vdb")}
+        self.assertLess(size["part.vdb"]["active_voxels"], size["whole.vdb"]["active_voxels"] / 4)
+        part = self.report("info", image, "--roi", "15.5,-13,11.9,16.5,-12,12.1")["image"]
+        self.assertGreater(part["range"][0], 100)  # the ellipsoid's inside alone
+        self.assertEqual(info["range"][0], 30)
+        error = self.run_covol("info", image, "--roi", "0,0,0,1,1,1", code=3).stderr
+        self.assertIn("outside the image", error)
+
+    def test_missing_spacing_is_loud_everywhere(self):
+        tifffile.imwrite(str(self.folder / "bare.tif"), self.data)
+        tifffile.imwrite(str(self.folder / "labels.tif"), (self.data > 100).astype(np.uint8),
+                         metadata={"axes": "ZYX", "spacing": SPACING[2], "unit": "um"})
+        self.run_covol("segment", "bare.tif", "--init", "sphere:12,12,7,4", "--theta", 0, "-o", "s.vdb", "--max-steps", 1)
+        for args in (["info", "bare.tif"], ["mask", "s.vdb", "--like", "bare.tif", "-o", "m.nrrd"],
+                     ["check", "bare.tif"], ["convert", "bare.tif", "b.vdb"],
+                     ["segment", "bare.tif", "--init", "sphere:12,12,7,4", "--theta", 0, "-o", "s.vdb", "--max-steps", 1]):
+            with self.subTest(args[0]):
+                errors = self.run_covol(*args, "--quiet").stderr
+                self.assertIn("states no spacing along x, y, z", errors)
+                self.assertIn("--spacing sx,sy,sz", errors)
+                self.assertEqual(errors.count("states no spacing"), 1, errors)
+                self.assertNotIn("states no spacing", self.run_covol(*args, "--spacing", "1,1,2").stderr)
+        errors = self.run_covol("compare", "labels.tif", "m.nrrd", "--quiet").stderr
+        self.assertIn("labels.tif: the file states no spacing along x, y:", errors)
+
+    def test_several_series_are_listed(self):
+        folder = write_dicom_series(self.folder / "two", self.data, "1.2.3.4.6", "bone")
+        write_dicom_series(folder, self.data[:5], "1.2.3.4.7", "scout")
+        error = self.run_covol("info", folder, code=3).stderr
+        for part in ("got 2", "14 slices of CT bone", "5 slices of CT scout"):
+            self.assertIn(part, error)
+        self.assertEqual(self.report("info", folder / "1.2.3.4.7-000.dcm")["image"]["size"][2], 5)
+
+    def test_a_missing_slice_is_an_error(self):
+        folder = write_dicom_series(self.folder / "gap", self.data)
+        next(p for p in folder.iterdir() if pydicom.dcmread(str(p)).ImagePositionPatient[2] == ORIGIN[2] + 6 * SPACING[2]).unlink()
+        self.assertIn("a slice is missing", self.run_covol("info", folder, code=3).stderr)
+
+    def test_a_huge_image_takes_little_memory(self):
+        """2048^3 bytes on disk (a sparse file), a small ball in it; whole and with --roi."""
+        n, centre, radius = 2048, 1000, 12
+        header = (f"NRRD0005\ntype: uint8\ndimension: 3\nsizes: {n} {n} {n}\nspacings: 1 1 1\nendian: little\n"
+                  "encoding: raw\n\n").encode()
+        path = self.folder / "huge.nrrd"
+        with open(path, "wb") as file:
+            file.write(header)
+            for k in range(centre - 20, centre + 20):
+                for j in range(centre - 20, centre + 20):
+                    i = np.arange(centre - 20, centre + 20)
+                    r = np.sqrt((i - centre) ** 2 + (j - centre) ** 2 + (k - centre) ** 2)
+                    file.seek(len(header) + (k * n + j) * n + centre - 20)
+                    file.write((100 * np.clip(radius - r + 0.5, 0, 1)).astype(np.uint8).tobytes())
+            file.truncate(len(header) + n ** 3)
+        init = ["--init", f"sphere:{centre},{centre},{centre},{radius + 2}", "--theta", "0", "--max-steps", "20"]
+        box = ",".join(str(centre + s * 30) for s in (-1, -1, -1, 1, 1, 1))
+        reports = {}
+        for name, more in (("whole", []), ("roi", ["--roi", box])):
+            with self.subTest(name):
+                reports[name] = self.report("segment", path, "-o", "huge.vdb", *init, *more)
+                self.assertLess(reports[name]["peak_rss_bytes"], 1 << 30)
+        volume = reports["roi"]["surface"]["volume"]
+        self.assertAlmostEqual(volume / (4 / 3 * math.pi * radius ** 3), 1, delta=0.1)
+
+
+if __name__ == "__main__":
+    unittest.main()

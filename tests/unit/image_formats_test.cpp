@@ -1,0 +1,242 @@
+// Files of the formats that have no writer in Debian's Python, and damaged files of every format.
+#include <itkHDF5ImageIO.h>
+#include <itkImageIOBase.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+
+#include "covol/image.h"
+#include "covol/vdb_io.h"
+#include "support/scratch.h"
+
+using namespace covol;
+
+namespace {
+
+constexpr Index3 kSize{7, 6, 5};
+constexpr Vec3 kSpacing{0.5, 0.75, 2.0}, kOrigin{10, -20, 30};
+
+int value(int i, int j, int k) { return i + 10 * j + 30 * k; }
+
+void check_ramp(const Image& image) {
+    REQUIRE(image.geometry().size == kSize);
+    for (int a = 0; a < 3; ++a) {
+        CHECK(image.geometry().spacing[a] == Approx(kSpacing[a]));
+        CHECK(image.geometry().origin[a] == Approx(kOrigin[a]));
+    }
+    bool same = true;
+    for (int k = 0; k < kSize[2]; ++k)
+        for (int j = 0; j < kSize[1]; ++j)
+            for (int i = 0; i < kSize[0]; ++i) same = same && image.at(i, j, k) == value(i, j, k);
+    CHECK(same);
+}
+
+/// Bytes in little endian.
+template <typename T>
+void put(std::string& bytes, std::size_t at, T number) {
+    if (bytes.size() < at + sizeof(T)) bytes.resize(at + sizeof(T));
+    std::memcpy(bytes.data() + at, &number, sizeof(T));
+}
+
+std::string mrc(std::int32_t mode) {
+    std::string bytes(1024, '\0');
+    for (std::size_t a = 0; a < 3; ++a) {
+        put(bytes, 4 * a, kSize[a]);
+        put(bytes, 28 + 4 * a, kSize[a]);
+        put(bytes, 40 + 4 * a, float(kSize[a] * kSpacing[a]));
+        put(bytes, 52 + 4 * a, 90.0F);
+        put(bytes, 64 + 4 * a, std::int32_t(a) + 1);
+        put(bytes, 196 + 4 * a, float(kOrigin[a]));
+    }
+    put(bytes, 12, mode);
+    bytes.replace(208, 4, "MAP ");
+    for (int k = 0; k < kSize[2]; ++k)
+        for (int j = 0; j < kSize[1]; ++j)
+            for (int i = 0; i < kSize[0]; ++i) put(bytes, bytes.size(), std::int16_t(value(i, j, k)));
+    return bytes;
+}
+
+/// An element of explicit VR, little endian.
+void element(std::string& bytes, std::uint16_t group, std::uint16_t number, const std::string& vr, std::string data) {
+    if (data.size() % 2 != 0) data += vr == "UI" ? '\0' : ' ';
+    put(bytes, bytes.size(), group);
+    put(bytes, bytes.size(), number);
+    bytes += vr;
+    if (vr == "OW" || vr == "OB") {
+        put(bytes, bytes.size(), std::uint16_t(0));
+        put(bytes, bytes.size(), std::uint32_t(data.size()));
+    } else {
+        put(bytes, bytes.size(), std::uint16_t(data.size()));
+    }
+    bytes += data;
+}
+
+std::string word(std::uint16_t n) { return {static_cast<char>(n & 255), static_cast<char>(n >> 8)}; }
+
+/// Slice k of the ramp as a DICOM file, PS3.10 and PS3.5.
+std::string dicom(int k) {
+    std::string meta;
+    element(meta, 2, 1, "OB", std::string("\0\1", 2));
+    element(meta, 2, 2, "UI", "1.2.840.10008.5.1.4.1.1.2");
+    element(meta, 2, 3, "UI", "1.2.3." + std::to_string(k + 1));
+    element(meta, 2, 0x10, "UI", "1.2.840.10008.1.2.1");
+    std::string bytes = std::string(128, '\0') + "DICM", length;
+    put(length, 0, std::uint32_t(meta.size()));
+    element(bytes, 2, 0, "UL", length);
+    bytes += meta;
+    element(bytes, 8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2");
+    element(bytes, 8, 0x18, "UI", "1.2.3." + std::to_string(k + 1));
+    element(bytes, 8, 0x60, "CS", "CT");
+    element(bytes, 0x20, 0xD, "UI", "1.2.3");
+    element(bytes, 0x20, 0xE, "UI", "1.2.3.9");
+    element(bytes, 0x20, 0x32, "DS", "10\\-20\\" + std::to_string(30 + 2 * k));
+    element(bytes, 0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0");
+    element(bytes, 0x28, 2, "US", word(1));
+    element(bytes, 0x28, 4, "CS", "MONOCHROME2");
+    element(bytes, 0x28, 0x10, "US", word(6));
+    element(bytes, 0x28, 0x11, "US", word(7));
+    element(bytes, 0x28, 0x30, "DS", "0.75\\0.5");
+    element(bytes, 0x28, 0x100, "US", word(16));
+    element(bytes, 0x28, 0x101, "US", word(16));
+    element(bytes, 0x28, 0x102, "US", word(15));
+    element(bytes, 0x28, 0x103, "US", word(0));
+    std::string pixels;
+    for (int j = 0; j < kSize[1]; ++j)
+        for (int i = 0; i < kSize[0]; ++i) pixels += word(static_cast<std::uint16_t>(value(i, j, k)));
+    element(bytes, 0x7FE0, 0x10, "OW", pixels);
+    return bytes;
+}
+
+void write_series(const std::string& folder) {
+    std::filesystem::create_directories(folder);
+    for (int k = 0; k < kSize[2]; ++k)
+        std::ofstream(folder + "/" + std::to_string(9 - k) + ".dcm", std::ios::binary) << dicom(k);
+}
+
+void write_hdf5(const std::string& path) {
+    const auto io = itk::HDF5ImageIO::New();
+    io->SetFileName(path);
+    io->SetNumberOfDimensions(3);
+    itk::ImageIORegion region(3);
+    for (unsigned a = 0; a < 3; ++a) {
+        io->SetDimensions(a, itk::SizeValueType(kSize[a]));
+        io->SetSpacing(a, kSpacing[a]);
+        io->SetOrigin(a, kOrigin[a]);
+        std::vector<double> axis(3, 0.0);
+        axis[a] = 1;
+        io->SetDirection(a, axis);
+        region.SetSize(a, itk::SizeValueType(kSize[a]));
+    }
+    io->SetIORegion(region);
+    io->SetNumberOfComponents(1);
+    io->SetPixelType(itk::IOPixelEnum::SCALAR);
+    io->SetComponentType(itk::IOComponentEnum::SHORT);
+    std::vector<std::int16_t> values;
+    for (int k = 0; k < kSize[2]; ++k)
+        for (int j = 0; j < kSize[1]; ++j)
+            for (int i = 0; i < kSize[0]; ++i) values.push_back(std::int16_t(value(i, j, k)));
+    io->WriteImageInformation();
+    io->Write(values.data());
+}
+
+/// Files that are damaged must neither crash nor be read beyond what they hold.
+void fuzz_image(const Scratch& scratch, const std::string& path) {
+    INFO(path);
+    const auto read = [](const std::string& bad) {
+        ReadImageOptions options;
+        options.channel = options.frame = 0;
+        const Image image = read_image(bad, options);
+        (void)image.range();
+    };
+    const FuzzCounts counts = fuzz(scratch, path, read, 80, 1024);
+    CHECK(counts.truncated_accepted <= counts.truncated / 20);
+}
+
+}  // namespace
+
+TEST_CASE("MRC: pixels, spacing and origin") {
+    const Scratch scratch;
+    const Image image = read_image(scratch.write("a.mrc", mrc(1)));
+    check_ramp(image);
+    CHECK(image.pixel_type() == PixelType::Int16);
+    CHECK(image.geometry().unit == "angstrom");
+    std::string permuted = mrc(1);  // columns along z, rows along x, sections along y
+    put(permuted, 64, std::int32_t(3));
+    put(permuted, 68, std::int32_t(1));
+    put(permuted, 72, std::int32_t(2));
+    const ImageGeometry g = read_image_geometry(scratch.write("p.mrc", permuted));
+    // one step along the columns goes along the world's z, by the cell's z over its samples
+    const Vec3 step = g.index_to_world({1, 0, 0});
+    CHECK(step[0] == Approx(kOrigin[0]));
+    CHECK(step[2] == Approx(kOrigin[2] + kSpacing[2]));
+    std::string complex = mrc(4);
+    CHECK(message_of([&] { (void)read_image(scratch.write("c.mrc", complex)); }).find("mode 4") != std::string::npos);
+    std::string no_cell = mrc(1);
+    put(no_cell, 40, 0.0F);
+    CHECK_FALSE(read_image_geometry(scratch.write("n.mrc", no_cell)).spacing_known);
+    // an extended header lies before the pixels
+    std::string extended = mrc(1);
+    put(extended, 92, std::int32_t(80));
+    extended.insert(1024, 80, 'x');
+    check_ramp(read_image(scratch.write("e.mrc", extended)));
+}
+
+TEST_CASE("ITK's HDF5 images, whole and in part") {
+    const Scratch scratch;
+    write_hdf5(scratch.path("a.h5"));
+    check_ramp(read_image(scratch.path("a.h5")));
+    ReadImageOptions options;
+    options.roi = WorldBox{{11, -18.5, 34}, {11.5, -18, 34}};
+    const Image part = read_image(scratch.path("a.h5"), options);
+    CHECK(part.held() == VoxelBox{{1, 1, 1}, {4, 4, 3}});
+    CHECK(part.at(3, 2, 2) == value(3, 2, 2));
+}
+
+TEST_CASE("a DICOM series is sorted by position, given as a folder or as one of its files") {
+    const Scratch scratch;
+    const std::string folder = scratch.path("series");
+    write_series(folder);
+    check_ramp(read_image(folder));
+    check_ramp(read_image(folder + "/7.dcm"));
+    CHECK(read_image_geometry(folder).unit == "mm");
+    std::ofstream(folder + "/notes.txt") << "not an image";
+    check_ramp(read_image(folder));
+    std::filesystem::remove(folder + "/7.dcm");
+    CHECK(message_of([&] { (void)read_image(folder); }).find("a slice is missing") != std::string::npos);
+    std::filesystem::create_directories(scratch.path("empty"));
+    CHECK(message_of([&] { (void)read_image(scratch.path("empty")); }).find("no DICOM image") != std::string::npos);
+}
+
+TEST_CASE("a float grid of a .vdb file is an image on the box of its active voxels") {
+    const Scratch scratch;
+    Domain domain;
+    domain.voxel_size = 0.5;
+    domain.origin = {1, 2, 3};
+    domain.max = {3, 3, 3};
+    const FloatGridPtr a = make_grid(domain, 7.0F, "a"), b = make_grid(domain, 0.0F, "b");
+    write_vdb(scratch.path("empty.vdb"), {a});
+    CHECK(message_of([&] { (void)read_image(scratch.path("empty.vdb")); }).find("no active voxel") != std::string::npos);
+    CHECK(message_of([&] { (void)read_image(scratch.path("empty.vdb") + ":x"); }).find("x") != std::string::npos);
+}
+
+TEST_CASE("damaged MRC and DICOM files end in an Error, never in a crash") {
+    const Scratch scratch;
+    fuzz_image(scratch, scratch.write("f.mrc", mrc(1)));
+    const std::string slice = dicom(0);
+    // a file of its own: its series has one slice, which is an Error; what counts is that reading ends
+    fuzz(scratch, scratch.write("d.dcm", slice), [](const std::string& bad) { (void)read_image(bad); }, 200, slice.size());
+    const std::string folder = scratch.path("series");
+    write_series(folder);
+    fuzz(scratch, folder + "/9.dcm", [&](const std::string& bad) {
+        std::filesystem::copy_file(bad, folder + "/9.dcm", std::filesystem::copy_options::overwrite_existing);
+        (void)read_image(folder);
+    }, 60, slice.size() - 84);
+}
+
+TEST_CASE("damaged HDF5 files end in an Error, never in a crash", "[hdf5]") {
+    const Scratch scratch;
+    write_hdf5(scratch.path("f.h5"));
+    fuzz_image(scratch, scratch.path("f.h5"));
+}
