@@ -1,6 +1,5 @@
 #!/usr/bin/env bash
-# Two cells that touch, from one image in one run: they share an interface, no voxel belongs to both. Then: where would
-# more marks help?
+# Two cells that touch, from one image in one run: they share an interface, no voxel belongs to both.
 #
 #     bash houdini_free_examples/20_several_structures.sh
 #
@@ -33,7 +32,7 @@ PYTHON
 echo "== segmenting both"
 "$covol" segment "$out/cells.tif" --points "left=$out/left.csv" "right=$out/right.csv" -o "$out/cells.vdb" \
   --mask "$out/cells.seg.nrrd" --mesh "$out/cells.glb" --table "$out/cells.csv" --evidence "$out/evidence.csv" \
-  --suggest 2 --json "$out/report.json"
+  --json "$out/report.json"
 "$covol" render "$out/cells.vdb" --image "$out/cells.tif" -o "$out/cells.png"
 
 echo "== results"
