@@ -129,6 +129,7 @@ private:
 
     // The middle of an overlap is where both distances are equal: both must be known as deep as that.
     void deepen() {
+        if (report_.overlaps.empty()) return;
         const double margin = 2 * h_;
         for (double width = kHalfWidthVoxels * h_;; width *= 2) {
             std::vector<Mask> cores;
