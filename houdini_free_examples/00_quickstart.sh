@@ -14,12 +14,7 @@ image=houdini_free_examples/data/celegans_embryo.tif
 points=houdini_free_examples/data/celegans_marks.csv
 check=houdini_free_examples/data/celegans_check.csv
 out=out/quickstart
-covol=build/bin/covol
-
-echo "== installing and building (the first time takes minutes)"
-bash tests/install_packages.sh
-cmake --preset default -DCOVOL_BUILD_TESTS=OFF >/dev/null
-cmake --build build --parallel "${COVOL_JOBS:-$(nproc)}" --target covol_tool
+source houdini_free_examples/build.sh
 
 echo "== segmenting"
 mkdir -p "$out"

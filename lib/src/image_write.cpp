@@ -17,7 +17,8 @@ bool is_tiff(const std::string& path) {
     return extension == ".tif" || extension == ".tiff";
 }
 
-void write_values(const std::string& path, const ImageGeometry& geometry, PixelType type, const void* values) {
+void write_values(const std::string& path, const ImageGeometry& geometry, PixelType type, const void* values,
+                  const detail::ImageMetadata& metadata = {}) {
     check_image_extension(path);
     for (int a = 0; a < 3; ++a)
         if (geometry.size[a] < 1 || !(geometry.spacing[a] > 0))
@@ -27,7 +28,7 @@ void write_values(const std::string& path, const ImageGeometry& geometry, PixelT
         if (is_tiff(path))
             detail::write_tiff(temporary, geometry, type, values);
         else
-            detail::write_itk(temporary, geometry, type, values);
+            detail::write_itk(temporary, geometry, type, values, metadata);
     });
 }
 
@@ -39,6 +40,11 @@ void write_image(const std::string& path, const ImageGeometry& geometry, const s
 
 void write_image(const std::string& path, const ImageGeometry& geometry, const std::uint8_t* values) {
     write_values(path, geometry, PixelType::UInt8, values);
+}
+
+void write_image(const std::string& path, const ImageGeometry& geometry, const std::uint8_t* values,
+                 const std::vector<std::pair<std::string, std::string>>& metadata) {
+    write_values(path, geometry, PixelType::UInt8, values, metadata);
 }
 
 void write_image(const std::string& path, const ImageGeometry& geometry, const float* values) {

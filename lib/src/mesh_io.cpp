@@ -485,11 +485,33 @@ struct Prepared {
     TriangleMesh mesh;
     std::vector<std::array<float, 3>> normals;
     std::vector<std::string> comments;
+    std::vector<VertexAttribute> attributes;
     bool binary;
 };
 
+void check_references(const TriangleMesh& mesh) {
+    for (const Face& t : mesh.triangles)
+        for (const std::uint32_t v : t)
+            if (v >= mesh.vertices.size())
+                throw Error(Errc::InvalidInput, "write_mesh: a triangle refers to vertex " + std::to_string(v) + " of " +
+                                                    std::to_string(mesh.vertices.size()));
+}
+
+void check_attribute(const VertexAttribute& attribute, const TriangleMesh& mesh) {
+    const std::string& name = attribute.name;
+    if (name.empty() || std::any_of(name.begin(), name.end(), [](unsigned char c) { return c <= ' '; }))
+        throw Error(Errc::InvalidInput, "write_mesh: expected an attribute's name of one word, got '" + name + "'");
+    if (attribute.values.size() != mesh.vertices.size())
+        throw Error(Errc::InvalidInput, "write_mesh: attribute " + name + ": expected " + std::to_string(mesh.vertices.size()) +
+                                            " values, one for each vertex, got " + std::to_string(attribute.values.size()));
+}
+
 Prepared prepare(const TriangleMesh& mesh, const WriteMeshOptions& options) {
-    Prepared result{mesh, {}, one_line_each(options.comments), options.binary};
+    if (!(options.unit_scale > 0) || !std::isfinite(options.unit_scale))
+        throw Error(Errc::InvalidOptions, "write_mesh: unit_scale: expected > 0, got " + std::to_string(options.unit_scale));
+    check_references(mesh);
+    for (const VertexAttribute& attribute : options.attributes) check_attribute(attribute, mesh);
+    Prepared result{mesh, {}, one_line_each(options.comments), options.attributes, options.binary};
     for (auto& p : result.mesh.vertices) {
         for (float& c : p) c = float(c * options.unit_scale);
         if (options.y_up) p = {p[0], p[2], -p[1]};
@@ -503,13 +525,17 @@ void write_ply(Output& out, const Prepared& in) {
     for (const std::string& comment : in.comments) out << "comment " << comment << "\n";
     out << "element vertex " << std::uint64_t(in.mesh.vertices.size()) << "\n";
     for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) out << "property float " << name << "\n";
+    for (const VertexAttribute& attribute : in.attributes) out << "property float " << attribute.name << "\n";
     out << "element face " << std::uint64_t(in.mesh.triangles.size()) << "\nproperty list uchar uint vertex_indices\nend_header\n";
     for (std::size_t v = 0; v < in.mesh.vertices.size(); ++v) {
         if (in.binary) {
             out.raw(in.mesh.vertices[v]);
             out.raw(in.normals[v]);
+            for (const VertexAttribute& attribute : in.attributes) out.raw(attribute.values[v]);
         } else {
-            out << in.mesh.vertices[v] << " " << in.normals[v] << "\n";
+            out << in.mesh.vertices[v] << " " << in.normals[v];
+            for (const VertexAttribute& attribute : in.attributes) out << " " << attribute.values[v];
+            out << "\n";
         }
     }
     for (const Face& t : in.mesh.triangles) {
@@ -522,15 +548,20 @@ void write_ply(Output& out, const Prepared& in) {
     }
 }
 
-void write_obj(Output& out, const Prepared& in) {
-    for (const std::string& comment : in.comments) out << "# " << comment << "\n";
+/// `first` is the number of the mesh's first vertex in the file, from 1.
+void write_obj_object(Output& out, const Prepared& in, std::uint64_t first) {
     for (const auto& p : in.mesh.vertices) out << "v " << p << "\n";
     for (const auto& n : in.normals) out << "vn " << n << "\n";
     for (const Face& t : in.mesh.triangles) {
         out << "f";
-        for (const std::uint32_t v : t) out << " " << std::uint64_t(v) + 1 << "//" << std::uint64_t(v) + 1;
+        for (const std::uint32_t v : t) out << " " << first + v << "//" << first + v;
         out << "\n";
     }
+}
+
+void write_obj(Output& out, const Prepared& in) {
+    for (const std::string& comment : in.comments) out << "# " << comment << "\n";
+    write_obj_object(out, in, 1);
 }
 
 void write_off(Output& out, const Prepared& in) {
@@ -582,36 +613,67 @@ void write_stl(Output& out, const Prepared& in) {
     if (!in.binary) out << "endsolid covol\n";
 }
 
-/// glTF 2.0 in one file: a JSON chunk that describes the binary chunk (positions, normals, indices).
-void write_glb(Output& out, const Prepared& in) {
+/// One mesh of a .glb file; without a name it has no material either.
+struct GlbPart {
+    const Prepared* in;
+    const NamedMesh* named;
+};
+
+nlohmann::json glb_material(const NamedMesh& named) {
+    const auto linear = [](std::uint8_t c) { return std::pow(c / 255.0, 2.2); };  // glTF's factors are linear, not sRGB
+    return {{"name", named.name},
+            {"pbrMetallicRoughness",
+             {{"baseColorFactor", {linear(named.color[0]), linear(named.color[1]), linear(named.color[2]), 1.0}},
+              {"metallicFactor", 0.0}}}};
+}
+
+/// Describes each mesh in the binary chunk: positions, normals, indices. @returns the chunk's length.
+std::uint64_t describe_glb(const std::vector<GlbPart>& parts, nlohmann::json& json) {
     constexpr int kFloat = 5126, kUInt32 = 5125, kVertexData = 34962, kIndexData = 34963;
-    const std::uint64_t vertex_bytes = 12 * std::uint64_t(in.mesh.vertices.size());
-    const std::uint64_t index_bytes = 12 * std::uint64_t(in.mesh.triangles.size());
-    const std::uint64_t binary_bytes = 2 * vertex_bytes + index_bytes;
-    std::array<float, 3> low{}, high{};
-    if (!in.mesh.vertices.empty()) low = high = in.mesh.vertices.front();
-    for (const auto& p : in.mesh.vertices)
-        for (int a = 0; a < 3; ++a) {
-            low[a] = std::min(low[a], p[a]);
-            high[a] = std::max(high[a], p[a]);
-        }
-    const auto view = [](std::uint64_t offset, std::uint64_t length, int target) {
-        return nlohmann::json{{"buffer", 0}, {"byteOffset", offset}, {"byteLength", length}, {"target", target}};
+    std::uint64_t offset = 0;
+    const auto add_view = [&](std::uint64_t length, int target) {
+        json["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", offset}, {"byteLength", length}, {"target", target}});
+        offset += length;
+        return json["bufferViews"].size() - 1;
     };
-    const nlohmann::json json{
-        {"asset", {{"version", "2.0"}, {"generator", "covol " COVOL_VERSION}, {"extras", {{"comments", in.comments}}}}},
-        {"scene", 0},
-        {"scenes", {{{"nodes", {0}}}}},
-        {"nodes", {{{"mesh", 0}}}},
-        {"meshes", {{{"primitives", {{{"attributes", {{"POSITION", 0}, {"NORMAL", 1}}}, {"indices", 2}}}}}}},
-        {"accessors",
-         {{{"bufferView", 0}, {"componentType", kFloat}, {"count", in.mesh.vertices.size()}, {"type", "VEC3"}, {"min", low}, {"max", high}},
-          {{"bufferView", 1}, {"componentType", kFloat}, {"count", in.mesh.vertices.size()}, {"type", "VEC3"}},
-          {{"bufferView", 2}, {"componentType", kUInt32}, {"count", 3 * in.mesh.triangles.size()}, {"type", "SCALAR"}}}},
-        {"bufferViews",
-         {view(0, vertex_bytes, kVertexData), view(vertex_bytes, vertex_bytes, kVertexData),
-          view(2 * vertex_bytes, index_bytes, kIndexData)}},
-        {"buffers", {{{"byteLength", binary_bytes}}}}};
+    for (std::size_t n = 0; n < parts.size(); ++n) {
+        const TriangleMesh& mesh = parts[n].in->mesh;
+        std::array<float, 3> low{}, high{};
+        if (!mesh.vertices.empty()) low = high = mesh.vertices.front();
+        for (const auto& p : mesh.vertices)
+            for (int a = 0; a < 3; ++a) {
+                low[a] = std::min(low[a], p[a]);
+                high[a] = std::max(high[a], p[a]);
+            }
+        const std::uint64_t bytes = 12 * std::uint64_t(mesh.vertices.size());
+        nlohmann::json& accessors = json["accessors"];
+        const std::size_t first = 3 * n;
+        accessors.push_back({{"bufferView", add_view(bytes, kVertexData)}, {"componentType", kFloat},
+                             {"count", mesh.vertices.size()}, {"type", "VEC3"}, {"min", low}, {"max", high}});
+        accessors.push_back({{"bufferView", add_view(bytes, kVertexData)}, {"componentType", kFloat},
+                             {"count", mesh.vertices.size()}, {"type", "VEC3"}});
+        accessors.push_back({{"bufferView", add_view(12 * std::uint64_t(mesh.triangles.size()), kIndexData)},
+                             {"componentType", kUInt32}, {"count", 3 * mesh.triangles.size()}, {"type", "SCALAR"}});
+        nlohmann::json primitive{{"attributes", {{"POSITION", first}, {"NORMAL", first + 1}}}, {"indices", first + 2}};
+        nlohmann::json node{{"mesh", n}};
+        if (parts[n].named != nullptr) {
+            node["name"] = parts[n].named->name;
+            primitive["material"] = n;
+            json["materials"].push_back(glb_material(*parts[n].named));
+        }
+        json["meshes"].push_back({{"primitives", nlohmann::json::array({primitive})}});
+        json["nodes"].push_back(node);
+        json["scenes"][0]["nodes"].push_back(n);
+    }
+    return offset;
+}
+
+/// glTF 2.0 in one file: a JSON chunk that describes the binary chunk.
+void write_glb_parts(Output& out, const std::vector<GlbPart>& parts, const std::vector<std::string>& comments) {
+    nlohmann::json json{{"asset", {{"version", "2.0"}, {"generator", "covol " COVOL_VERSION}, {"extras", {{"comments", comments}}}}},
+                        {"scene", 0}};
+    const std::uint64_t binary_bytes = describe_glb(parts, json);
+    json["buffers"] = {{{"byteLength", binary_bytes}}};
     Output text;
     text << json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
     text.pad(4, ' ');
@@ -625,10 +687,14 @@ void write_glb(Output& out, const Prepared& in) {
     out << "JSON" << text.data();
     out.raw(std::uint32_t(binary_bytes));
     out << std::string_view("BIN\0", 4);
-    for (const auto& p : in.mesh.vertices) out.raw(p);
-    for (const auto& n : in.normals) out.raw(n);
-    for (const Face& t : in.mesh.triangles) out.raw(t);
+    for (const GlbPart& part : parts) {
+        for (const auto& p : part.in->mesh.vertices) out.raw(p);
+        for (const auto& n : part.in->normals) out.raw(n);
+        for (const Face& t : part.in->mesh.triangles) out.raw(t);
+    }
 }
+
+void write_glb(Output& out, const Prepared& in) { write_glb_parts(out, {{&in, nullptr}}, in.comments); }
 
 using Writer = void (*)(Output&, const Prepared&);
 
@@ -644,26 +710,54 @@ Writer writer_of(const std::string& path) {
                 "write_mesh: " + path + ": expected a name that ends in .ply, .obj, .stl, .off or .glb, got '" + end + "'");
 }
 
+void save(const std::string& path, const Output& out) {
+    detail::write_atomically(path, [&](const std::string& temporary) {
+        std::ofstream file(temporary, std::ios::binary);
+        if (!file.write(out.data().data(), std::streamsize(out.data().size())) || !file.flush())
+            throw Error(Errc::Io, "write_mesh: " + path + ": cannot be written");
+    });
+}
+
 }  // namespace
 
 void check_mesh_extension(const std::string& path) { static_cast<void>(writer_of(path)); }
 
 void write_mesh(const std::string& path, const TriangleMesh& mesh, const WriteMeshOptions& options) {
     const Writer writer = writer_of(path);
-    if (!(options.unit_scale > 0) || !std::isfinite(options.unit_scale))
-        throw Error(Errc::InvalidOptions, "write_mesh: unit_scale: expected > 0, got " + std::to_string(options.unit_scale));
-    for (const Face& t : mesh.triangles)
-        for (const std::uint32_t v : t)
-            if (v >= mesh.vertices.size())
-                throw Error(Errc::InvalidInput, "write_mesh: a triangle refers to vertex " + std::to_string(v) + " of " +
-                                                    std::to_string(mesh.vertices.size()));
     Output out;
     writer(out, prepare(mesh, options));
-    detail::write_atomically(path, [&](const std::string& temporary) {
-        std::ofstream file(temporary, std::ios::binary);
-        if (!file.write(out.data().data(), std::streamsize(out.data().size())) || !file.flush())
-            throw Error(Errc::Io, "write_mesh: " + path + ": cannot be written");
-    });
+    save(path, out);
+}
+
+bool holds_several_meshes(const std::string& path) {
+    const std::string end = detail::extension(path);
+    return end == ".obj" || end == ".glb";
+}
+
+void write_meshes(const std::string& path, const std::vector<NamedMesh>& meshes, const WriteMeshOptions& options) {
+    if (!holds_several_meshes(path))
+        throw Error(Errc::InvalidOptions, "write_meshes: " + path + ": expected a name that ends in .obj or .glb");
+    if (meshes.empty()) throw Error(Errc::InvalidInput, "write_meshes: " + path + ": expected a mesh, got none");
+    WriteMeshOptions bare = options;
+    bare.attributes.clear();
+    std::vector<Prepared> prepared;
+    for (const NamedMesh& named : meshes) prepared.push_back(prepare(named.mesh, bare));
+    const std::vector<std::string>& comments = prepared.front().comments;
+    Output out;
+    if (detail::extension(path) == ".glb") {
+        std::vector<GlbPart> parts;
+        for (std::size_t n = 0; n < meshes.size(); ++n) parts.push_back({&prepared[n], &meshes[n]});
+        write_glb_parts(out, parts, comments);
+    } else {
+        for (const std::string& comment : comments) out << "# " << comment << "\n";
+        std::uint64_t first = 1;
+        for (std::size_t n = 0; n < meshes.size(); ++n) {
+            out << "o " << one_line_each({meshes[n].name}).front() << "\n";
+            write_obj_object(out, prepared[n], first);
+            first += prepared[n].mesh.vertices.size();
+        }
+    }
+    save(path, out);
 }
 
 TriangleMesh read_mesh(const std::string& path) {

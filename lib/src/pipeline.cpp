@@ -304,7 +304,7 @@ private:
             case Start::Kind::Box: return start_from_box(domain, start.box);
             case Start::Kind::Mesh: return start_from_mesh(domain, read_mesh(start.path), run_);
             case Start::Kind::Mask: return start_from_mask(domain, read_image(start.path, {}, run_), run_);
-            case Start::Kind::Vdb: return start_from_grid(domain, *read_level_set(start.path), run_);
+            case Start::Kind::Vdb: return start_from_grid(domain, start.level_set ? *start.level_set : *read_level_set(start.path), run_);
             case Start::Kind::Tag: break;
         }
         throw Error(Errc::InvalidOptions, "segment: this start makes no grid of its own");

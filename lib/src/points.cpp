@@ -2,7 +2,6 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
@@ -17,11 +16,14 @@
 
 #include "covol/error.h"
 #include "detail/file.h"
+#include "detail/kd_tree.h"
 #include "detail/point_files.h"
 #include "detail/point_reading.h"
 
 namespace covol {
 namespace {
+
+using detail::squared_distance;
 
 // ---------------------------------------------------------------------------------------------- reading
 
@@ -32,84 +34,6 @@ T first_stated(T options, T file, T otherwise) {
 }
 
 // ---------------------------------------------------------------------------------------------- neighbours
-
-double squared_distance(const Vec3& a, const Vec3& b) {
-    const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
-    return x * x + y * y + z * z;
-}
-
-/// A balanced kd-tree in an array: the median of a range splits it, recursively, so that clusters cost nothing.
-class KdTree {
-public:
-    explicit KdTree(const std::vector<Vec3>& points) : points_(points), axis_(points.size()) {
-        build(0, points_.size());
-    }
-    /// Squared distance from points()[n] to the nearest other point.
-    [[nodiscard]] double nearest_other(const Vec3& query) const {
-        Search search{query, std::numeric_limits<double>::infinity(), true};
-        descend(0, points_.size(), search);
-        return search.best;
-    }
-
-private:
-    static constexpr std::size_t kLeaf = 12;
-    static constexpr std::size_t kParallel = 20000;
-
-    struct Search {
-        Vec3 query;
-        double best;
-        bool skip_self;  ///< the query itself is in the tree and has not been met yet
-    };
-
-    void build(std::size_t begin, std::size_t end) {
-        if (end - begin <= kLeaf) return;
-        Vec3 lo = points_[begin], hi = points_[begin];
-        for (std::size_t n = begin; n < end; ++n)
-            for (int a = 0; a < 3; ++a) {
-                lo[a] = std::min(lo[a], points_[n][a]);
-                hi[a] = std::max(hi[a], points_[n][a]);
-            }
-        int axis = 0;
-        for (int a = 1; a < 3; ++a)
-            if (hi[a] - lo[a] > hi[axis] - lo[axis]) axis = a;
-        const std::size_t middle = begin + (end - begin) / 2;
-        const auto first = points_.begin();
-        std::nth_element(first + std::ptrdiff_t(begin), first + std::ptrdiff_t(middle), first + std::ptrdiff_t(end),
-                         [axis](const Vec3& p, const Vec3& q) { return p[axis] < q[axis]; });
-        axis_[middle] = static_cast<std::uint8_t>(axis);
-        if (end - begin > kParallel)
-            tbb::parallel_invoke([&] { build(begin, middle); }, [&] { build(middle + 1, end); });
-        else {
-            build(begin, middle);
-            build(middle + 1, end);
-        }
-    }
-
-    void visit(const Vec3& point, Search& search) const {
-        const double distance = squared_distance(point, search.query);
-        if (distance == 0 && search.skip_self)
-            search.skip_self = false;
-        else
-            search.best = std::min(search.best, distance);
-    }
-
-    void descend(std::size_t begin, std::size_t end, Search& search) const {
-        if (end - begin <= kLeaf) {
-            for (std::size_t n = begin; n < end; ++n) visit(points_[n], search);
-            return;
-        }
-        const std::size_t middle = begin + (end - begin) / 2;
-        const int axis = axis_[middle];
-        const double to_plane = search.query[axis] - points_[middle][axis];
-        visit(points_[middle], search);
-        const bool left = to_plane < 0;
-        descend(left ? begin : middle + 1, left ? middle : end, search);
-        if (to_plane * to_plane <= search.best) descend(left ? middle + 1 : begin, left ? end : middle, search);
-    }
-
-    std::vector<Vec3> points_;
-    std::vector<std::uint8_t> axis_;
-};
 
 // ---------------------------------------------------------------------------------------------- writing
 
@@ -222,7 +146,7 @@ SpacingStatistics nearest_neighbour_spacing(const std::vector<Vec3>& points) {
     if (points.size() < 2) return {};
     constexpr std::size_t kQueries = 50000;
     const std::size_t step = (points.size() + kQueries - 1) / kQueries;
-    const KdTree tree(points);
+    const detail::KdTree tree(points);
     std::vector<double> distances((points.size() + step - 1) / step);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, distances.size(), 256), [&](const auto& range) {
         for (std::size_t n = range.begin(); n != range.end(); ++n)

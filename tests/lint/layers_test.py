@@ -13,6 +13,7 @@ LAYERS = [
     ["distance", "edge", "scan_noise"],
     ["band", "evolve", "scan_solid"],
     ["surface", "mesh_cleanup", "cloud_cleanup", "compare"],
+    ["structures", "evidence"],
     ["pipeline", "phantom", "render"],
 ]
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}

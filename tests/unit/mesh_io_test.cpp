@@ -221,3 +221,66 @@ TEST_CASE("unknown endings and bad meshes are refused before anything is written
     CHECK_THROWS_AS(write_mesh(folder.file("no/such/a.ply"), tetrahedron()), Error);
     CHECK(fs::is_empty(folder.path));
 }
+
+TEST_CASE("Attributes are float properties of a PLY's vertices") {
+    const Folder folder;
+    WriteMeshOptions options;
+    options.attributes = {{"distance_to_marks", {0.5F, 1, 2, 3}}, {"edge_strength", {0, 0.25F, 0.5F, 1}}};
+    for (const bool binary : {true, false}) {
+        options.binary = binary;
+        const std::string path = folder.file(binary ? "b.ply" : "a.ply");
+        write_mesh(path, tetrahedron(), options);
+        const std::string text = text_of(path);
+        CHECK_THAT(text, Catch::Contains("property float nz\nproperty float distance_to_marks\nproperty float edge_strength\n"));
+        const TriangleMesh back = read_mesh(path);
+        CHECK(back.vertices == tetrahedron().vertices);
+        CHECK(back.triangles == tetrahedron().triangles);
+        if (!binary) continue;
+        const std::size_t body = text.find("end_header\n") + 11;
+        float value = 0;
+        std::memcpy(&value, text.data() + body + 2 * 32 + 24, 4);
+        CHECK(value == 2);
+        std::memcpy(&value, text.data() + body + 1 * 32 + 28, 4);
+        CHECK(value == 0.25F);
+    }
+    options.attributes[1].values.pop_back();
+    CHECK_THROWS_WITH(write_mesh(folder.file("c.ply"), tetrahedron(), options), Catch::Contains("edge_strength"));
+    options.attributes = {{"two words", {0, 0, 0, 0}}};
+    CHECK_THROWS_AS(write_mesh(folder.file("c.ply"), tetrahedron(), options), Error);
+    CHECK_FALSE(fs::exists(folder.file("c.ply")));
+}
+
+TEST_CASE("Several meshes share an OBJ or a GLB file, each with its name") {
+    const Folder folder;
+    TriangleMesh second = tetrahedron();
+    for (auto& v : second.vertices) v[0] += 10;
+    const std::vector<NamedMesh> meshes{{"ve", tetrahedron(), {255, 0, 0}}, {"ex e", second, {0, 255, 0}}};
+
+    const std::string obj = folder.file("s.obj");
+    write_meshes(obj, meshes);
+    CHECK_THAT(text_of(obj), Catch::Contains("o ve\n") && Catch::Contains("o ex e\n"));
+    const TriangleMesh both = read_mesh(obj);
+    REQUIRE(both.vertices.size() == 8);
+    REQUIRE(both.triangles.size() == 8);
+    CHECK(both.vertices[5] == second.vertices[1]);
+    CHECK(both.triangles[4] == std::array<std::uint32_t, 3>{4, 6, 5});
+
+    const std::string glb = folder.file("s.glb");
+    write_meshes(glb, meshes);
+    const std::string text = text_of(glb);
+    std::uint32_t json_bytes = 0;
+    std::memcpy(&json_bytes, text.data() + 12, 4);
+    const std::string json = text.substr(20, json_bytes);
+    CHECK_THAT(json, Catch::Contains(R"("name":"ve")") && Catch::Contains(R"("name":"ex e")"));
+    CHECK_THAT(json, Catch::Contains(R"("nodes":[0,1])") && Catch::Contains(R"("baseColorFactor":[1.0,0.0,0.0,1.0])"));
+    // Positions, normals and indices of both: 4 vertices and 4 triangles each.
+    CHECK(text.size() == 20 + json_bytes + 8 + 2 * (2 * 4 * 12 + 4 * 12));
+    float x = 0;
+    std::memcpy(&x, text.data() + 20 + json_bytes + 8 + (2 * 4 * 12 + 4 * 12), 4);
+    CHECK(x == 10);
+
+    CHECK(holds_several_meshes("A.OBJ"));
+    CHECK_FALSE(holds_several_meshes("a.ply"));
+    CHECK_THROWS_AS(write_meshes(folder.file("s.ply"), meshes), Error);
+    CHECK_THROWS_AS(write_meshes(obj, {}), Error);
+}

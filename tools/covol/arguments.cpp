@@ -2,6 +2,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <vector>
 
@@ -106,6 +107,33 @@ Start parse_start(const std::string& flag, const std::string& text) {
         return start;
     }
     bad_text(flag, "tag, sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1, mesh:FILE, mask:FILE or vdb:FILE", text);
+}
+
+FrameChoice parse_frames(const std::string& flag, const std::string& text) {
+    FrameChoice choice;
+    choice.given = true;
+    choice.all = text == "all";
+    if (choice.all) return choice;
+    const auto number = [&](std::string_view digits) {
+        int value = -1;
+        const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+        const bool whole = error == std::errc() && end == digits.data() + digits.size();
+        if (!whole || value < 0) bad_text(flag, "all, a number from 0, or a range such as 0-9", text);
+        return value;
+    };
+    const std::size_t dash = text.find('-');
+    choice.first = number(std::string_view(text).substr(0, dash));
+    choice.last = dash == std::string::npos ? choice.first : number(std::string_view(text).substr(dash + 1));
+    if (choice.last < choice.first) bad_text(flag, "a range that ascends", text);
+    return choice;
+}
+
+Named split_name(const std::string& text) {
+    const std::size_t at = text.find('=');
+    // A folder's name may hold '=' too; names of structures hold no slash.
+    std::error_code status;
+    const bool has_name = at != std::string::npos && at > 0 && text.find('/') >= at && !std::filesystem::exists(text, status);
+    return has_name ? Named{text.substr(0, at), text.substr(at + 1)} : Named{"", text};
 }
 
 std::uint64_t parse_bytes(const std::string& flag, const std::string& text) {

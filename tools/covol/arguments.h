@@ -35,6 +35,21 @@ struct Length {
 [[nodiscard]] WorldBox parse_box(const std::string& flag, const std::string& text);
 /// tag, sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1, mesh:FILE, mask:FILE, vdb:FILE
 [[nodiscard]] Start parse_start(const std::string& flag, const std::string& text);
+/// `--frame`: one time point, several, or all.
+struct FrameChoice {
+    bool given = false, all = false;
+    int first = 0, last = 0;
+    [[nodiscard]] bool is_one() const { return given && !all && first == last; }
+};
+/// "all", "3", "0-9"
+[[nodiscard]] FrameChoice parse_frames(const std::string& flag, const std::string& text);
+
+/// "name=value"; without a name where there is no '=', and where a file of the whole name exists.
+struct Named {
+    std::string name, value;
+};
+[[nodiscard]] Named split_name(const std::string& text);
+
 /// "8G", "512M", "100k", bytes without a letter.
 [[nodiscard]] std::uint64_t parse_bytes(const std::string& flag, const std::string& text);
 /// "1200x800"

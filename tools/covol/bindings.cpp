@@ -55,7 +55,7 @@ void add_vec3(CLI::App& command, const std::string& flag, std::vector<Vec3>& tar
 
 // ---- images and points ---------------------------------------------------------------------------------------------
 
-void ImageFlags::bind(CLI::App& command, bool with_roi) {
+void ImageFlags::bind(CLI::App& command, bool with_roi, bool with_frame) {
     command.add_option_function<std::string>(
                "--spacing",
                [this](const std::string& text) {
@@ -69,7 +69,7 @@ void ImageFlags::bind(CLI::App& command, bool with_roi) {
         command.add_option(flag, target, description)->check(CLI::NonNegativeNumber.description(""))->type_name("N");
     };
     add_index("--channel", options.channel, "channel of an image that has several, from 0");
-    add_index("--frame", options.frame, "time point of an image that has several, from 0");
+    if (with_frame) add_index("--frame", options.frame, "time point of an image that has several, from 0");
     if (with_roi) add_box(command, "--roi", options.roi, "take this box of the world only");
 }
 
@@ -152,9 +152,26 @@ double DomainFlags::resolve_voxel_size(const Image* image, const std::vector<Vec
     return h;
 }
 
-void TagFlags::bind(CLI::App& command) {
+void TagFlags::bind(CLI::App& command, bool names) {
     add_length(command, "--tag-distance", tag_distance, "", "D: closes gaps between points up to 2D [from the points]");
-    add_vec3(command, "--exterior-seed", exterior_seeds, "a position outside the structure, in a cavity say; repeatable");
+    const std::string flag = "--exterior-seed", what = "a position outside the structure, in a cavity say; repeatable";
+    if (!names) return add_vec3(command, flag, exterior_seeds, what);
+    command.add_option_function<std::vector<std::string>>(
+               flag,
+               [this, flag](const std::vector<std::string>& texts) {
+                   exterior_seeds.clear();
+                   named_seeds.clear();
+                   for (const std::string& text : texts) {
+                       const std::size_t colon = text.find(':');
+                       if (colon == std::string::npos)
+                           exterior_seeds.push_back(parse_vec3(flag, text));
+                       else
+                           named_seeds.emplace_back(text.substr(0, colon), parse_vec3(flag, text.substr(colon + 1)));
+                   }
+               },
+               what + "; with NAME: of that structure alone")
+        ->type_name("[NAME:]X,Y,Z")
+        ->allow_extra_args(false);
 }
 
 void EdgeFlags::bind(CLI::App& command) {

@@ -34,8 +34,9 @@ CLI::Option* add_choice(CLI::App& command, const std::string& flag, T& target, c
 /// The image's own facts that the user corrects.
 struct ImageFlags {
     ReadImageOptions options;
-    /// @param with_roi  --roi crops the image; commands with a domain have their own
-    void bind(CLI::App& command, bool with_roi = true);
+    /// @param with_roi    --roi crops the image; commands with a domain have their own
+    /// @param with_frame  --frame takes one time point; commands that take several have their own
+    void bind(CLI::App& command, bool with_roi = true, bool with_frame = true);
     /// The image, or the part of it that --roi names.
     [[nodiscard]] Image read(const std::string& path, const RunContext& run) const;
     /// The lattice of read()'s image.
@@ -74,7 +75,9 @@ struct DomainFlags {
 struct TagFlags {
     Length tag_distance;
     std::vector<Vec3> exterior_seeds;
-    void bind(CLI::App& command);
+    std::vector<std::pair<std::string, Vec3>> named_seeds;  ///< of one structure among several
+    /// With `names`, seeds may be written name:x,y,z.
+    void bind(CLI::App& command, bool names = false);
 };
 
 struct EdgeFlags {

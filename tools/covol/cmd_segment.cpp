@@ -7,8 +7,12 @@ void add_segment(Session& session) {
     const auto job = std::make_shared<SegmentJob>();
     CLI::App* command = session.add_command("segment", "Image and points together: the surface of a structure",
                                             [job, &session] { job->run(session); });
-    command->add_option("image", job->image_path, "3D image: TIFF, NRRD, NIfTI, MetaImage")->required()->type_name("IMAGE");
-    job->points.bind(*command, "--points");
+    command->add_option("image", job->images, "3D image: TIFF, NRRD, NIfTI, MetaImage; several are the frames of a time-lapse")
+        ->required()
+        ->type_name("IMAGE...");
+    job->points.bind(*command, "--points")
+        ->description("point clouds: XYZ, CSV, PLY, OBJ, OFF; with names, ve=FILE exe=FILE, several structures")
+        ->type_name("[NAME=]FILE...");
     job->bind(*command, true);
 }
 

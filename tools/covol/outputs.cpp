@@ -35,6 +35,7 @@ void check_ending(const std::string& path, OutputKind kind) {
         case OutputKind::Mesh: return check_mesh_extension(path);
         case OutputKind::Points: return check_extension(path, {".xyz", ".csv", ".ply"});
         case OutputKind::Picture: return check_extension(path, {".png"});
+        case OutputKind::Table: return check_extension(path, {".csv"});
         case OutputKind::Text: return;
     }
 }
@@ -63,6 +64,13 @@ void Outputs::check(const std::string& flag, const std::string& path, OutputKind
 
 void Outputs::add(const std::string& path, std::function<void(const std::string&)> write) {
     if (!path.empty()) pending_.push_back({path, std::move(write)});
+}
+
+bool Outputs::write(const std::string& path, const std::function<void(const std::string&)>& write) {
+    if (path.empty()) return false;
+    write(path);
+    kept_.push_back(path);
+    return true;
 }
 
 void Outputs::commit() {

@@ -5,7 +5,7 @@
 
 namespace covol::tool {
 
-enum class OutputKind { Vdb, Image, Mesh, Points, Picture, Text };
+enum class OutputKind { Vdb, Image, Mesh, Points, Picture, Table, Text };
 
 /// The files of one run: checked before the long work, written together at its end. Each is whole or absent, and when
 /// one fails those already written in this run are removed.
@@ -17,6 +17,10 @@ public:
 
     /// Queues a file; does nothing for an empty path.
     void add(const std::string& path, std::function<void(const std::string& path)> write);
+
+    /// Writes a file at once, to stay whatever comes after it. @returns false for an empty path.
+    bool write(const std::string& path, const std::function<void(const std::string& path)>& write);
+    [[nodiscard]] const std::vector<std::string>& kept() const noexcept { return kept_; }
 
     /// Writes what is queued. @throws what a writer throws, after rollback().
     void commit();
@@ -32,6 +36,7 @@ private:
     std::vector<std::string> checked_;
     std::vector<Pending> pending_;
     std::vector<std::string> written_;
+    std::vector<std::string> kept_;
 };
 
 /// Whole or not at all. @throws Error Io.

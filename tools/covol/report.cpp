@@ -1,5 +1,6 @@
 #include "report.h"
 
+#include <iomanip>
 #include <sstream>
 
 namespace covol::tool {
@@ -80,6 +81,45 @@ Json to_json(const SegmentOptions& o) {
             {"max_steps", e.max_steps},
             {"tolerance", e.tolerance},
             {"solver_tolerance", e.solver_tolerance}};
+}
+
+Json to_json(const SegmentReport& r) {
+    Json json;
+    json["resolved"] = to_json(r.resolved);
+    for (const auto& [what, line] : r.automatic) json["automatic"][what] = line;
+    json["grid"] = {{"voxel_size", r.domain.voxel_size},
+                    {"active_voxels", r.active_voxels},
+                    {"leaf_count", r.leaf_count},
+                    {"domain", to_json(r.domain)}};
+    if (r.band.tag_distance > 0) json["band"] = to_json(r.band);
+    if (r.edge.edge_k > 0) json["edge"] = to_json(r.edge);
+    json["solve"] = to_json(r.solve);
+    json["surface"] = to_json(r.surface);
+    if (r.point_count > 0) json["fit"]["points_to_surface"] = to_json(r.fit);
+    if (r.share_without_points > 0) json["fit"]["surface_without_points"] = r.share_without_points;
+    return json;
+}
+
+void add_seconds(Session& session, const SegmentReport::Seconds& seconds) {
+    session.add_seconds("distance", seconds.distance);
+    session.add_seconds("tag", seconds.tag);
+    session.add_seconds("coarse", seconds.coarse);
+    session.add_seconds("edge", seconds.edge);
+    session.add_seconds("solve", seconds.solve);
+    session.add_seconds("surface", seconds.surface);
+    session.add_seconds("total", seconds.total);
+}
+
+std::vector<std::string> summary(const SegmentReport& r) {
+    std::ostringstream text;
+    text << std::setprecision(4) << r.active_voxels << " active voxels of " << r.domain.voxel_size << ", " << r.solve.steps
+         << " steps (" << to_string(r.solve.stop_reason) << "), " << r.seconds.total << " s";
+    std::vector<std::string> lines{text.str(), "surface: " + one_line(r.surface)};
+    if (r.point_count == 0) return lines;
+    text.str("");
+    text << "points to surface: mean " << r.fit.mean << ", 95 % " << r.fit.p95 << ", max " << r.fit.max;
+    lines.push_back(text.str());
+    return lines;
 }
 
 std::string one_line(const MeshMeasures& m) {

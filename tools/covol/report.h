@@ -24,6 +24,12 @@ namespace covol::tool {
 /// Every number that segment() used, in world units.
 [[nodiscard]] Json to_json(const SegmentOptions& options);
 
+/// Everything but the input and the seconds.
+[[nodiscard]] Json to_json(const SegmentReport& report);
+void add_seconds(Session& session, const SegmentReport::Seconds& seconds);
+/// The result in a few lines for people.
+[[nodiscard]] std::vector<std::string> summary(const SegmentReport& report);
+
 /// "{ mean, p95, max }" and the like as one line for people.
 [[nodiscard]] std::string one_line(const MeshMeasures& measures);
 

@@ -1,100 +1,72 @@
 #include "segment_job.h"
 
 #include <algorithm>
-#include <iomanip>
-#include <sstream>
+#include <memory>
+#include <optional>
 
 #include "covol/error.h"
 #include "covol/surface.h"
 #include "covol/vdb_io.h"
 #include "report.h"
+#include "structures_job.h"
+#include "timelapse_job.h"
 
 namespace covol::tool {
-namespace {
 
-void check_outputs(const SegmentJob& job, Outputs& outputs) {
-    outputs.check("-o", job.output, OutputKind::Vdb);
-    outputs.check("--mask", job.mask_path, OutputKind::Image);
-    outputs.check("--mesh", job.mesh_path, OutputKind::Mesh);
-    outputs.check("--density", job.density_path, OutputKind::Vdb);
-    outputs.check("--fields", job.fields_path, OutputKind::Vdb);
-    job.mesh.check();
-}
-
-SegmentOptions resolve(const SegmentJob& job, double h) {
+SegmentOptions SegmentJob::resolve(double h) const {
     SegmentOptions options;
     options.voxel_size = h;
-    options.roi = job.domain.roi;
-    options.margin = job.domain.margin.resolve(h, 0);
-    options.start = job.start;
-    options.tag_distance = job.tag.tag_distance.resolve(h, 0);
-    if (job.tag.tag_distance.given && !(options.tag_distance > 0))
+    options.roi = domain.roi;
+    options.margin = domain.margin.resolve(h, 0);
+    options.start = start;
+    options.tag_distance = tag.tag_distance.resolve(h, 0);
+    if (tag.tag_distance.given && !(options.tag_distance > 0))
         throw Error(Errc::InvalidOptions, "--tag-distance: expected > 0, got 0");
-    options.exterior_seeds = job.tag.exterior_seeds;
-    options.edge = job.edge.resolve(h, -1);
-    options.evolve = job.evolve.resolve(h, SegmentOptions::automatic_evolve());
-    options.coarse_levels = job.coarse_levels;
-    const double edge = job.min_component.resolve(h, 0);
-    options.extract.min_component_volume = edge * edge * edge;
+    options.exterior_seeds = tag.exterior_seeds;
+    options.edge = edge.resolve(h, -1);
+    options.evolve = evolve.resolve(h, SegmentOptions::automatic_evolve());
+    options.coarse_levels = coarse_levels;
+    const double side = min_component.resolve(h, 0);
+    options.extract.min_component_volume = side * side * side;
     return options;
 }
 
-/// Options that are wrong whatever h is are found before anything is read.
-void check_options(const SegmentJob& job) {
-    const std::string why = resolve(job, 1.0).why_invalid();
+void SegmentJob::check_options() const {
+    const std::string why = resolve(1.0).why_invalid();
     if (!why.empty()) throw Error(Errc::InvalidOptions, why);
-    job.cloud.check();
+    cloud.check();
 }
 
-void fill_report(Session& session, const SegmentReport& r) {
-    Json& report = session.report();
-    report["resolved"] = to_json(r.resolved);
-    for (const auto& [what, line] : r.automatic) report["automatic"][what] = line;
-    report["grid"] = {{"voxel_size", r.domain.voxel_size},
-                      {"active_voxels", r.active_voxels},
-                      {"leaf_count", r.leaf_count},
-                      {"domain", to_json(r.domain)}};
-    if (r.band.tag_distance > 0) report["band"] = to_json(r.band);
-    if (r.edge.edge_k > 0) report["edge"] = to_json(r.edge);
-    report["solve"] = to_json(r.solve);
-    report["surface"] = to_json(r.surface);
-    if (r.point_count > 0) report["fit"]["points_to_surface"] = to_json(r.fit);
-    if (r.share_without_points > 0) report["fit"]["surface_without_points"] = r.share_without_points;
-    session.add_seconds("distance", r.seconds.distance);
-    session.add_seconds("tag", r.seconds.tag);
-    session.add_seconds("coarse", r.seconds.coarse);
-    session.add_seconds("edge", r.seconds.edge);
-    session.add_seconds("solve", r.seconds.solve);
-    session.add_seconds("surface", r.seconds.surface);
-    session.add_seconds("total", r.seconds.total);
+void SegmentJob::check_outputs(Outputs& outputs) const {
+    outputs.check("-o", output, OutputKind::Vdb);
+    outputs.check("--mask", mask_path, OutputKind::Image);
+    outputs.check("--mesh", mesh_path, OutputKind::Mesh);
+    outputs.check("--density", density_path, OutputKind::Vdb);
+    outputs.check("--fields", fields_path, OutputKind::Vdb);
+    outputs.check("--table", table_path, OutputKind::Table);
+    evidence.check(outputs, evidence.path);
+    mesh.check();
 }
-
-void summarise(Session& session, const SegmentReport& r) {
-    std::ostringstream text;
-    text << std::setprecision(4) << r.active_voxels << " active voxels of " << r.domain.voxel_size << ", " << r.solve.steps
-         << " steps (" << to_string(r.solve.stop_reason) << "), " << r.seconds.total << " s";
-    session.note(text.str());
-    session.note("surface: " + one_line(r.surface));
-    if (r.point_count == 0) return;
-    text.str("");
-    text << "points to surface: mean " << r.fit.mean << ", 95 % " << r.fit.p95 << ", max " << r.fit.max;
-    session.note(text.str());
-}
-
-}  // namespace
 
 void SegmentJob::bind(CLI::App& command, bool with_image) {
     command.add_option("-o,--output", output, "the surface as a level set, .vdb")->required()->type_name("OUT.vdb");
-    if (with_image)
-        command.add_option("--mask", mask_path, "label image in the image's own geometry")
+    if (with_image) {
+        command.add_option("--mask", mask_path, "label image in the image's own geometry; .seg.nrrd for 3D Slicer")
             ->type_name("OUT.nrrd|.nii.gz|.tif|.mha");
+        command.add_option("--table", table_path, "volume, area and fit of each structure and frame")->type_name("OUT.csv");
+        evidence.bind(command);
+        command.add_option_function<std::string>(
+                   "--frame", [this](const std::string& text) { frames = parse_frames("--frame", text); },
+                   "time points of the image, from 0; with several each starts from the one before")
+            ->type_name("all|N|A-B");
+    }
     command.add_option("--mesh", mesh_path, "triangles")->type_name("OUT.ply|.obj|.stl|.off|.glb");
     command.add_option("--density", density_path, "the solid as a fog volume in [0,1]")->type_name("OUT.vdb");
     command.add_option("--fields", fields_path, "u, distance and edge, for a look inside")->type_name("OUT.vdb");
     cloud.bind(command);
     evolve.bind(command, with_image);
     if (with_image) edge.bind(command);
-    tag.bind(command);
+    tag.bind(command, with_image);
     command.add_option_function<std::string>(
                "--init", [this](const std::string& text) { start = parse_start("--init", text); },
                "how the level set starts: tag, sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1, mesh:F, mask:F or vdb:F")
@@ -108,28 +80,47 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
     add_length(command, "--min-component", min_component, "", "drop pieces of the mesh smaller than a cube of this edge");
     command.add_flag("--half", half, "store values in .vdb files as 16-bit floats");
     mesh.bind(command);
-    if (with_image) image.bind(command, false);
+    if (with_image) image.bind(command, false, false);
 }
 
-void SegmentJob::run(Session& session) {
-    check_outputs(*this, session.outputs());
-    check_options(*this);
-
+Image SegmentJob::read(const std::string& path, const ReadImageOptions& options, Session& session) const {
     const Stopwatch reading;
-    std::optional<Image> pixels;
-    Json& input = session.report()["input"];
-    if (!image_path.empty()) {
-        ReadImageOptions reading = image.options;
-        if (domain.roi) {
-            const Vec3 spacing = read_image_geometry(image_path, reading, session.run()).spacing;
-            const double finest = *std::min_element(spacing.begin(), spacing.end());
-            reading.roi = sampled_box(*domain.roi, domain.voxel_size.resolve(finest, finest));
-        }
-        session.require_memory(read_image_info(image_path, reading, session.run()).bytes_to_hold, "the image");
-        pixels = read_image(image_path, reading, session.run());
-        input["image"] = to_json(pixels->geometry());
-        input["image"]["path"] = image_path;
+    ReadImageOptions needed = options;
+    if (domain.roi) {
+        const Vec3 spacing = read_image_geometry(path, options, session.run()).spacing;
+        const double finest = *std::min_element(spacing.begin(), spacing.end());
+        needed.roi = sampled_box(*domain.roi, domain.voxel_size.resolve(finest, finest));
     }
+    session.require_memory(read_image_info(path, needed, session.run()).bytes_to_hold, "the image");
+    Image pixels = read_image(path, needed, session.run());
+    Json& input = session.report()["input"]["image"];
+    input = to_json(pixels.geometry());
+    input["path"] = path;
+    session.add_seconds("read", reading.seconds());
+    session.add_seconds("total", reading.seconds());
+    return pixels;
+}
+
+void SegmentJob::run(Session& session) const {
+    if (is_timelapse(*this)) return run_timelapse(*this, session);
+    const bool names = std::any_of(points.paths.begin(), points.paths.end(),
+                                   [](const std::string& text) { return !split_name(text).name.empty(); });
+    if (names || !tag.named_seeds.empty()) return run_structures(*this, session);
+    run_one(session);
+}
+
+void SegmentJob::run_one(Session& session) const {
+    check_outputs(session.outputs());
+    check_options();
+
+    std::optional<Image> pixels;
+    if (!images.empty()) {
+        ReadImageOptions options = image.options;
+        if (frames.given) options.frame = frames.first;
+        pixels = read(images.front(), options, session);
+    }
+    Json& input = session.report()["input"];
+    const Stopwatch reading;
     WorldPoints marks = read_world_points(points, pixels ? &pixels->geometry() : nullptr, session.run());
     input["points"] = {{"count", marks.points.size()}, {"densified", 0}, {"paths", points.paths}, {"rules", marks.rules}};
     session.add_seconds("read", reading.seconds());
@@ -140,10 +131,16 @@ void SegmentJob::run(Session& session) {
     const double h = domain.resolve_voxel_size(pointer, marks.points, session);
     marks.points = cloud.clean(marks.points, h, session, input["points"]);
     // Shared by the writers that run at the end.
-    const auto result =
-        std::make_shared<SegmentResult>(segment(pointer, marks.points, resolve(*this, h), session.run()));
-    fill_report(session, result->report);
-    summarise(session, result->report);
+    const auto result = std::make_shared<SegmentResult>(segment(pointer, marks.points, resolve(h), session.run()));
+    session.report().update(to_json(result->report), true);
+    add_seconds(session, result->report.seconds);
+    for (const std::string& line : summary(result->report)) session.note(line);
+    std::optional<Evidence> judged;
+    if (pixels && evidence.wanted()) {
+        judged = evidence.judge(*result, marks.points, *pixels, session.run());
+        session.report()["evidence"] = to_json(*judged);
+        tell(session, *judged);
+    }
 
     const WriteVdbOptions vdb{half, session.metadata()};
     Outputs& outputs = session.outputs();
@@ -155,8 +152,14 @@ void SegmentJob::run(Session& session) {
             if (field) grids.push_back(field);
         write_vdb(path, grids, vdb);
     });
-    outputs.add(mesh_path, [=, write = mesh.options(session)](const std::string& path) {
-        write_mesh(path, result->mesh, write);
+    WriteMeshOptions write = mesh.options(session);
+    write.attributes = vertex_attributes(judged);
+    outputs.add(mesh_path, [=](const std::string& path) { write_mesh(path, result->mesh, write); });
+    outputs.add(evidence.path, [=](const std::string& path) { write_text(path, evidence_csv({{"surface", &*judged}})); });
+    outputs.add(table_path, [=](const std::string& path) {
+        Table table(result_columns());
+        add_result(table.row(), "surface", 1, result->report);
+        write_text(path, table.text());
     });
     if (!mask_path.empty())
         outputs.add(mask_path, [=, geometry = pixels->geometry(), &session](const std::string& path) {

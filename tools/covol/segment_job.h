@@ -1,15 +1,16 @@
 #pragma once
-#include <memory>
 #include <string>
+#include <vector>
 
 #include "bindings.h"
 #include "cloud_flags.h"
+#include "evidence_flags.h"
 
 namespace covol::tool {
 
 /// What `segment` and `reconstruct` share: they differ in the image alone.
 struct SegmentJob {
-    std::string image_path;  ///< empty: points alone
+    std::vector<std::string> images;  ///< none: points alone; several: the frames of a time-lapse
     ImageFlags image;
     PointFlags points;
     CloudFlags cloud;
@@ -21,11 +22,25 @@ struct SegmentJob {
     Start start;
     int coarse_levels = SegmentOptions{}.coarse_levels;
     Length min_component;  ///< edge of a cube of the smallest volume that is kept
-    std::string output, mask_path, mesh_path, density_path, fields_path;
+    EvidenceFlags evidence;
+    FrameChoice frames;
+    std::string output, mask_path, mesh_path, density_path, fields_path, table_path;
     bool half = false;
 
     void bind(CLI::App& command, bool with_image);
-    void run(Session& session);
+    /// One structure in one image here; several structures and time-lapses in files of their own.
+    void run(Session& session) const;
+
+    // For those.
+    [[nodiscard]] SegmentOptions resolve(double h) const;
+    /// Options that are wrong whatever h is are found before anything is read.
+    void check_options() const;
+    /// The image; the report tells of it.
+    [[nodiscard]] Image read(const std::string& path, const ReadImageOptions& options, Session& session) const;
+
+private:
+    void run_one(Session& session) const;
+    void check_outputs(Outputs& outputs) const;
 };
 
 }  // namespace covol::tool

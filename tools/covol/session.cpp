@@ -21,18 +21,6 @@ extern "C" void on_signal(int signal) {
     std::signal(signal, SIG_DFL);  // a second one ends the program at once
 }
 
-int exit_code_of(Errc code) {
-    switch (code) {
-        case Errc::InvalidOptions:
-        case Errc::InvalidInput:
-        case Errc::Unsupported: return kBadInput;
-        case Errc::Io: return kIo;
-        case Errc::Numerical: return kNumerical;
-        case Errc::Cancelled: return kInterrupted;
-    }
-    return kDefect;
-}
-
 /// One line: messages that list several problems are joined.
 std::string one_line(std::string text) {
     while (!text.empty() && text.back() == '\n') text.pop_back();
@@ -99,6 +87,18 @@ Json options_of(const CLI::App& command) {
 }
 
 }  // namespace
+
+int exit_code_of(Errc code) {
+    switch (code) {
+        case Errc::InvalidOptions:
+        case Errc::InvalidInput:
+        case Errc::Unsupported: return kBadInput;
+        case Errc::Io: return kIo;
+        case Errc::Numerical: return kNumerical;
+        case Errc::Cancelled: return kInterrupted;
+    }
+    return kDefect;
+}
 
 Session::Session() : app_("covol: segment 3D images with the help of a point cloud, on sparse OpenVDB grids") {
     app_.name("covol");
@@ -175,7 +175,7 @@ int Session::execute() {
             return fail(kBadInput, "more memory is needed than --memory-limit " + memory_limit_text_ +
                                        "; use a larger --voxel-size or a --roi");
         return fail(exit_code_of(error.code()),
-                    error.code() == Errc::Cancelled ? "interrupted, nothing was written" : error.what());
+                    error.code() == Errc::Cancelled ? interrupted_text() : error.what());
     } catch (const std::bad_alloc&) {
         return fail(kBadInput, "out of memory; use a larger --voxel-size or a --roi");
     } catch (const std::exception& error) {
@@ -219,6 +219,10 @@ void Session::write_report(const std::string& path) const {
         return;
     }
     write_text(path, text);
+}
+
+std::string Session::interrupted_text() const {
+    return outputs_.kept().empty() ? "interrupted, nothing was written" : "interrupted; what was finished before stays";
 }
 
 int Session::fail(int code, const std::string& message) {

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "covol/error.h"
 #include "covol/image.h"
 #include "covol/run.h"
 #include "memory.h"
@@ -28,6 +29,8 @@ enum ExitCode {
     kNumerical = 6,
     kInterrupted = 130
 };
+
+[[nodiscard]] int exit_code_of(Errc code);
 
 /// What all subcommands share: the flags that every one takes, the run context, the outputs and the report.
 class Session {
@@ -70,6 +73,7 @@ private:
     void finish();
     void write_report(const std::string& path) const;
     int fail(int code, const std::string& message);
+    [[nodiscard]] std::string interrupted_text() const;
 
     CLI::App app_;
     std::map<const CLI::App*, std::function<void()>> bodies_;

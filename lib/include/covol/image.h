@@ -151,6 +151,9 @@ struct ImageInfo {
 void write_image(const std::string& path, const ImageGeometry& geometry, const std::int32_t* labels);
 void write_image(const std::string& path, const ImageGeometry& geometry, const std::uint8_t* values);
 void write_image(const std::string& path, const ImageGeometry& geometry, const float* values);
+/// The same with key/value pairs, which NRRD keeps and the other formats drop.
+void write_image(const std::string& path, const ImageGeometry& geometry, const std::uint8_t* values,
+                 const std::vector<std::pair<std::string, std::string>>& metadata);
 
 /// What `write_image` can write, judged by the name alone. @throws Error InvalidOptions with the list.
 void check_image_extension(const std::string& path);

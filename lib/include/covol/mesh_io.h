@@ -1,4 +1,6 @@
 #pragma once
+#include <array>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -6,16 +8,37 @@
 
 namespace covol {
 
+/// A number at each vertex: a float property in PLY; the other formats have no place for it.
+struct VertexAttribute {
+    std::string name;  ///< one word
+    std::vector<float> values;
+};
+
 struct WriteMeshOptions {
     bool binary = true;                 ///< PLY, STL
     bool y_up = false;                  ///< rotates z-up to y-up: (x,y,z) -> (x,z,-y)
     double unit_scale = 1.0;            ///< multiplies coordinates; 0.001 for mm to m
     std::vector<std::string> comments;  ///< provenance lines, where the format has comments
+    std::vector<VertexAttribute> attributes;
 };
 
 /// PLY, OBJ, STL, OFF or binary glTF (.glb), by the name's end; with normals where the format has them.
 /// Whole or not at all. @throws Error Io, InvalidOptions (unknown ending).
 void write_mesh(const std::string& path, const TriangleMesh& mesh, const WriteMeshOptions& options = {});
+
+/// One of several meshes in a file.
+struct NamedMesh {
+    std::string name;
+    TriangleMesh mesh;
+    std::array<std::uint8_t, 3> color{187, 187, 187};  ///< red, green, blue; in .glb
+};
+
+/// Several meshes in one file: .obj (an object each) or .glb (a node with a material each); attributes are not kept.
+/// Whole or not at all. @throws Error Io, InvalidOptions (another ending), InvalidInput (no mesh).
+void write_meshes(const std::string& path, const std::vector<NamedMesh>& meshes, const WriteMeshOptions& options = {});
+
+/// What write_meshes() can write, by the name alone.
+[[nodiscard]] bool holds_several_meshes(const std::string& path);
 
 /// PLY, OBJ, STL, OFF; polygons are split into triangles. Sizes are checked before memory is taken.
 /// @throws Error Io, InvalidInput, Unsupported.

@@ -21,6 +21,7 @@ struct Start {
     double radius = 0;     ///< Sphere
     WorldBox box;          ///< Box
     std::string path;      ///< Mesh, Mask, Vdb
+    FloatGridPtr level_set;  ///< Vdb: one in memory, instead of the file
 };
 
 struct SegmentOptions {

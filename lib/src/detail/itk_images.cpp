@@ -405,7 +405,8 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path) {
     return std::make_unique<ItkFile>(path, unusable, info, io, is_hdf5, detached ? 0 : fs::file_size(path));
 }
 
-void write_itk(const std::string& path, const ImageGeometry& g, PixelType type, const void* values) {
+void write_itk(const std::string& path, const ImageGeometry& g, PixelType type, const void* values,
+               const ImageMetadata& metadata) {
     const itk::ImageIOBase::Pointer io = make_io(extension(path));
     with_itk(Errc::Io, "write_image: " + path + ": cannot write", [&] {
         io->SetFileName(path);
@@ -425,6 +426,9 @@ void write_itk(const std::string& path, const ImageGeometry& g, PixelType type, 
         io->SetUseCompression(true);
         // ITK has no field for the unit; as a key of our own the file keeps it, and read_image finds it again.
         if (!g.unit.empty()) itk::EncapsulateMetaData<std::string>(io->GetMetaDataDictionary(), "unit", g.unit);
+        if (extension(path) == ".nrrd")
+            for (const auto& [key, value] : metadata)
+                itk::EncapsulateMetaData<std::string>(io->GetMetaDataDictionary(), key, value);
         io->WriteImageInformation();
         io->Write(values);
     });

@@ -1,0 +1,60 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "covol/fwd.h"
+#include "covol/image.h"
+#include "covol/mesh.h"
+#include "covol/run.h"
+
+namespace covol {
+
+/// What a surface rests on, and where new marks would help most.
+struct EvidenceOptions {
+    double reach = 0.0;      ///< world units, > 0: the surface within this of a mark rests on the marks
+    double weak_edge = 0.25; ///< in (0,1): where the edge strength 1 − g is below this the image does not hold the surface
+    int suggestions = 0;     ///< how many slices to name, >= 0
+    [[nodiscard]] std::string why_invalid() const;
+};
+
+/// The surface and the marks in one slice of the image (along its third axis, half a slice to either side).
+struct SliceEvidence {
+    int slice = 0;                               ///< index, from 0
+    double area = 0;                             ///< of the surface, world units^2
+    double unsupported_area = 0;                 ///< of it, farther from all marks than the reach and on a weak edge
+    double to_marks_mean = 0, to_marks_max = 0;  ///< from the surface to the nearest mark anywhere; 0 without marks
+    double edge_strength = 0;                    ///< mean of 1 − g on the surface; 0 without an image
+    int marks = 0;                               ///< that lie in the slice
+    double marks_mean = 0, marks_max = 0;        ///< from those to the surface
+};
+
+/// A slice where marks would help, and the place in it where they would help most.
+struct Suggestion {
+    int slice = 0;
+    double area = 0;       ///< unsupported surface that marks along the outline there would reach, beyond earlier suggestions
+    Vec3 index{0, 0, 0};   ///< voxels of the image
+    Vec3 world{0, 0, 0};
+};
+
+struct Evidence {
+    double reach = 0, weak_edge = 0;        ///< as used
+    double area = 0, unsupported_area = 0;  ///< of the whole surface
+    std::vector<SliceEvidence> slices;      ///< those that the surface or a mark meets, ascending
+    std::vector<Suggestion> suggestions;    ///< best first; fewer than asked for when nothing is left to support
+    std::vector<float> distance_to_marks;   ///< at the mesh's vertices; empty without marks
+    std::vector<float> edge_strength;       ///< 1 − g there; empty without an edge grid
+};
+
+/// Judges a surface by its marks and the image's edges.
+///
+/// Triangles are split between the slices; one is unsupported when the means over its vertices say so. Slices are
+/// suggested greedily: the one whose outline would, with marks along it, support the most surface (within `reach` of
+/// the outline), then the next without what that one supports.
+/// @param mesh   world units
+/// @param marks  world positions, may be empty
+/// @param edge   g from edge(), or null; background 1
+/// @throws Error InvalidOptions; InvalidInput (an empty mesh).
+[[nodiscard]] Evidence evidence(const TriangleMesh& mesh, const std::vector<Vec3>& marks, const FloatGrid* edge,
+                                const ImageGeometry& geometry, const EvidenceOptions& options, const RunContext& run = {});
+
+}  // namespace covol

@@ -1,0 +1,79 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "covol/fwd.h"
+#include "covol/image.h"
+#include "covol/run.h"
+
+namespace covol {
+
+/// One of several solids.
+struct Structure {
+    std::string name;      ///< what people call it; not empty, unique
+    FloatGridPtr surface;  ///< as surface() makes it: a signed distance, negative inside
+};
+
+struct SeparateOptions {
+    double gap = -1.0;          ///< gaps narrower than this close, world units; 0: none; < 0 picks 1 voxel
+    double nested_share = 0.9;  ///< in (0.5,1]: a solid that lies in a larger one with this share is carved out of it
+    [[nodiscard]] std::string why_invalid() const;
+};
+
+/// Two structures that overlapped.
+struct StructureOverlap {
+    std::size_t a = 0, b = 0;          ///< a < b
+    double volume = 0;                 ///< that both claimed, world units^3
+    std::optional<std::size_t> inner;  ///< the one that was carved out of the other
+};
+
+struct SeparateReport {
+    std::vector<StructureOverlap> overlaps;
+    std::vector<bool> changed;  ///< for each structure
+};
+
+struct SeparateResult {
+    std::vector<FloatGridPtr> surfaces;  ///< in the structures' order; those that did not change are the same grids
+    SeparateReport report;
+};
+
+/// Makes solids disjoint, and closes the gaps between them that are narrower than a voxel.
+///
+/// With φ_i the signed distances and m = min over j≠i of φ_j, a voxel where φ_i + m is below 0 (an overlap), or below
+/// the gap's width and between the two (∇φ_i·∇φ_j < 0), gets φ_i' = (φ_i − m)/2: the new interface is the middle
+/// surface φ_i = φ_j, and φ_i' = −φ_j' beside it. Where overlaps are deep the distances are computed as deep. A solid
+/// inside another one is carved out instead: φ' = max(φ_outer, −φ_inner). Changed surfaces are redistanced by surface().
+/// The result does not depend on the structures' order or on the number of threads.
+///
+/// @throws Error InvalidOptions; InvalidInput (names empty or not unique; grids whose transforms differ; two that are the
+///               same solid; one of which nothing is left).
+[[nodiscard]] SeparateResult separate(const std::vector<Structure>& structures, const SeparateOptions& options = {},
+                                      const RunContext& run = {});
+
+/// Label image in the given geometry (i fastest): n + 1 where the voxel's centre lies in structures[n], else 0.
+/// A centre that rounding puts into two solids, or into none where two touch, belongs to the nearer one (of equals, to
+/// the one whose name comes first).
+/// @throws Error InvalidInput (more than 254 structures).
+[[nodiscard]] std::vector<std::uint8_t> label_image(const std::vector<Structure>& structures,
+                                                    const ImageGeometry& geometry, const RunContext& run = {});
+
+/// Identifiers for grids, [A-Za-z_][A-Za-z0-9_]*, unique. One structure is called "surface", as everywhere in covol.
+[[nodiscard]] std::vector<std::string> grid_names(const std::vector<std::string>& names);
+
+/// A colour for structure n, red, green and blue in [0,255]; the first twelve differ clearly.
+[[nodiscard]] std::array<std::uint8_t, 3> structure_color(std::size_t n);
+
+/// Key/value pairs that make an NRRD label image a segmentation of 3D Slicer (.seg.nrrd): names, colours, label values
+/// 1, 2, ... and extents.
+[[nodiscard]] std::vector<std::pair<std::string, std::string>> slicer_segments(const std::vector<std::string>& names,
+                                                                               const std::vector<std::uint8_t>& labels,
+                                                                               const Index3& size);
+
+/// ITK-SNAP's label description file for labels 1, 2, ...
+[[nodiscard]] std::string itksnap_labels(const std::vector<std::string>& names);
+
+}  // namespace covol

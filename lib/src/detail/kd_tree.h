@@ -1,0 +1,35 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "covol/fwd.h"
+
+namespace covol::detail {
+
+inline double squared_distance(const Vec3& a, const Vec3& b) {
+    const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+    return x * x + y * y + z * z;
+}
+
+/// A balanced kd-tree in an array: the median of a range splits it, recursively, so that clusters cost nothing.
+/// Queries may run in parallel.
+class KdTree {
+public:
+    explicit KdTree(std::vector<Vec3> points);
+    /// Squared distance to the nearest point; infinite when there is none.
+    [[nodiscard]] double nearest(const Vec3& query) const;
+    /// Squared distance from one of the points to the nearest other one.
+    [[nodiscard]] double nearest_other(const Vec3& query) const;
+
+private:
+    struct Search;
+    void build(std::size_t begin, std::size_t end);
+    void visit(const Vec3& point, Search& search) const;
+    void descend(std::size_t begin, std::size_t end, Search& search) const;
+
+    std::vector<Vec3> points_;
+    std::vector<std::uint8_t> axis_;
+};
+
+}  // namespace covol::detail

@@ -1,0 +1,452 @@
+"""Several structures, time-lapse and evidence, with the real binary.
+
+    COVOL=build/bin/covol python3 -m unittest tests/cli/structures_test.py
+"""
+import csv
+import json
+import math
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import time
+import unittest
+
+import numpy as np
+import tifffile
+
+from cli_test import COVOL, Case, write_nrrd
+
+SIZE = 48
+H = 0.5
+ORIGIN = (-H * (SIZE - 1) / 2,) * 3
+DATA = os.environ.get("COVOL_DATA")
+
+
+def fibonacci(count):
+    golden = math.pi * (3 - math.sqrt(5))
+    z = 1 - (2 * np.arange(count) + 1) / count
+    r = np.sqrt(1 - z * z)
+    turn = golden * np.arange(count)
+    return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)
+
+
+def ball_points(center, radius, count=1500):
+    return np.asarray(center) + radius * fibonacci(count)
+
+
+def write_points(path, points):
+    path.write_text("".join("%.6f %.6f %.6f\n" % tuple(p) for p in points))
+
+
+def lattice(size=SIZE, h=H, origin=ORIGIN):
+    """World coordinates of the voxel centres, indexed [z][y][x]."""
+    axes = [o + h * np.arange(size) for o in origin]
+    z, y, x = np.meshgrid(axes[2], axes[1], axes[0], indexing="ij")
+    return x, y, z
+
+
+def ball_image(center, radius, size=SIZE, h=H, origin=ORIGIN):
+    x, y, z = lattice(size, h, origin)
+    r = np.sqrt((x - center[0]) ** 2 + (y - center[1]) ** 2 + (z - center[2]) ** 2)
+    return (20 + 200 * np.clip((radius - r) / h + 0.5, 0, 1)).astype(np.uint8)
+
+
+def rows_of(path):
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def nrrd_keys(path):
+    header = path.read_bytes().split(b"\n\n", 1)[0].decode()
+    return dict(line.split(":=", 1) for line in header.splitlines() if ":=" in line)
+
+
+class Structures(Case):
+    LEFT, RIGHT, RADIUS = (-3.0, 0.2, 0.0), (3.0, -0.1, 0.1), 4.5  # the balls overlap by 3 units
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.scene = cls.inputs / "two.nrrd"
+        both = np.maximum(ball_image(cls.LEFT, cls.RADIUS), ball_image(cls.RIGHT, cls.RADIUS))
+        write_nrrd(cls.scene, (SIZE,) * 3, both.tobytes(), spacing=H, origin=ORIGIN)
+        cls.left, cls.right = cls.inputs / "left.xyz", cls.inputs / "right.xyz"
+        write_points(cls.left, ball_points(cls.LEFT, cls.RADIUS))
+        write_points(cls.right, ball_points(cls.RIGHT, cls.RADIUS))
+
+    def two(self, *more):
+        return ("segment", self.scene, "--points", f"left={self.left}", f"right={self.right}", "--rho", 0,
+                "--delta", "0.2vx", "-o", "s.vdb", *more)
+
+    def expected_volume(self):
+        """A ball without the cap beyond the middle plane."""
+        half = math.dist(self.LEFT, self.RIGHT) / 2
+        t = self.RADIUS - half
+        return 4 / 3 * math.pi * self.RADIUS ** 3 - math.pi * t * t * (3 * self.RADIUS - t) / 3
+
+    def test_from_files_to_files(self):
+        report = self.report(*self.two("--mask", "m.seg.nrrd", "--mesh", "m.ply", "--table", "t.csv", "--density", "d.vdb"))
+        self.assertEqual(self.files(), ["d.vdb", "m.seg.nrrd", "m_left.ply", "m_right.ply", "s.vdb", "t.csv"])
+        self.assertEqual([g["name"] for g in self.report("info", "s.vdb")["grids"]], ["left", "right"])
+        self.assertEqual([g["name"] for g in self.report("info", "d.vdb")["grids"]], ["density_left", "density_right"])
+        structures = report["structures"]
+        self.assertEqual([s["name"] for s in structures], ["left", "right"])
+        self.assertEqual([s["label"] for s in structures], [1, 2])
+        for s, name in zip(structures, ("left", "right")):
+            self.assertEqual(s["input"]["points"]["count"], 1500)
+            self.assertEqual(s["vdb_grid"], name)
+            self.assertEqual(s["solve"]["stop_reason"], "steady")
+            self.assertTrue(s["surface"]["closed"])
+            self.assertEqual((s["surface"]["components"], s["surface"]["genus"]), (1, 0))
+            self.assertLess(abs(s["surface"]["volume"] / self.expected_volume() - 1), 0.05)
+            for field in ("resolved", "automatic", "grid", "fit", "band"):
+                self.assertIn(field, s)
+        overlap, = report["overlaps"]
+        self.assertEqual(overlap["structures"], ["left", "right"])
+        self.assertNotIn("inner", overlap)
+        rows = rows_of(self.out / "t.csv")
+        self.assertEqual([r["structure"] for r in rows], ["left", "right"])
+        for row, s in zip(rows, structures):
+            self.assertAlmostEqual(float(row["volume"]), s["surface"]["volume"], places=3)
+            self.assertAlmostEqual(float(row["area"]), s["surface"]["area"], places=3)
+            self.assertEqual(row["genus"], "0")
+
+    def test_labels_meet_without_overlap_or_slit(self):
+        self.run_covol(*self.two("--mask", "m.tif"))
+        self.assertEqual(self.files(), ["m.tif", "m_labels.txt", "s.vdb"])
+        labels = tifffile.imread(self.out / "m.tif")
+        self.assertEqual(sorted(np.unique(labels)), [0, 1, 2])
+        x, y, z = lattice()
+        a = np.sqrt(sum((c - m) ** 2 for c, m in zip((x, y, z), self.LEFT))) - self.RADIUS
+        b = np.sqrt(sum((c - m) ** 2 for c, m in zip((x, y, z), self.RIGHT))) - self.RADIUS
+        # More than a voxel from all that is decided here.
+        self.assertTrue(np.all(labels[(a < -H) & (a < b - 2 * H)] == 1))
+        self.assertTrue(np.all(labels[(b < -H) & (b < a - 2 * H)] == 2))
+        self.assertTrue(np.all(labels[np.minimum(a, b) < -H] != 0))
+        self.assertTrue(np.all(labels[np.minimum(a, b) > H] == 0))
+        text = (self.out / "m_labels.txt").read_text()
+        self.assertRegex(text, r'(?m)^ +1 +\d+ +\d+ +\d+ +1 +1 +1 +"left"$')
+        self.assertRegex(text, r'(?m)^ +2 +\d+ +\d+ +\d+ +1 +1 +1 +"right"$')
+
+    def test_segmentation_for_slicer(self):
+        self.run_covol(*self.two("--mask", "m.seg.nrrd"))
+        keys = nrrd_keys(self.out / "m.seg.nrrd")
+        self.assertEqual((keys["Segment0_Name"], keys["Segment1_Name"]), ("left", "right"))
+        self.assertEqual((keys["Segment0_LabelValue"], keys["Segment1_LabelValue"]), ("1", "2"))
+        self.assertNotEqual(keys["Segment0_Color"], keys["Segment1_Color"])
+        extent = list(map(int, keys["Segment0_Extent"].split()))
+        for axis in range(3):
+            low = (self.LEFT[axis] - self.RADIUS - ORIGIN[axis]) / H
+            self.assertLess(abs(extent[2 * axis] - low), 1.6)
+        self.assertEqual(keys["Segmentation_MasterRepresentation"], "Binary labelmap")
+
+    def test_one_mesh_file_with_two_objects(self):
+        self.run_covol(*self.two("--mesh", "m.obj"))
+        self.assertEqual(self.files(), ["m.obj", "s.vdb"])
+        text = (self.out / "m.obj").read_text()
+        self.assertEqual(re.findall(r"(?m)^o (.*)$", text), ["left", "right"])
+        self.assertEqual(self.report("info", "m.obj")["command"], "info")
+        self.run_covol(*self.two("--mesh", "m.glb"))
+        data = (self.out / "m.glb").read_bytes()
+        header = json.loads(data[20:20 + int.from_bytes(data[12:16], "little")])
+        self.assertEqual([n["name"] for n in header["nodes"]], ["left", "right"])
+
+    def test_order_and_threads_do_not_matter(self):
+        first = self.report(*self.two("--threads", 1))["structures"]
+        turned = self.report("segment", self.scene, "--points", f"right={self.right}", f"left={self.left}", "--rho", 0,
+                             "--delta", "0.2vx", "-o", "t.vdb", "--threads", 2)["structures"]
+        self.assertEqual([s["name"] for s in turned], ["right", "left"])
+        self.assertEqual(first[0]["surface"], turned[1]["surface"])
+        self.assertEqual(first[1]["surface"], turned[0]["surface"])
+
+    def test_nested_with_a_seed_of_one_structure(self):
+        # A shell with a cavity, and a ball in it whose surface is the cavity's.
+        points = np.concatenate([ball_points((0, 0, 0), 9, 4000), ball_points((0, 0, 0), 5)])
+        shell, core = self.inputs / "shell.xyz", self.inputs / "core.xyz"
+        write_points(shell, points)
+        write_points(core, ball_points((0, 0, 0), 5))
+        marks = ("--points", f"shell={shell}", f"core={core}", "--rho", 0, "-o", "s.vdb")
+        report = self.report("segment", self.scene, *marks, "--exterior-seed", "shell:0,0,0")
+        by_name = {s["name"]: s["surface"]["volume"] for s in report["structures"]}
+        whole = 4 / 3 * math.pi
+        self.assertLess(abs(by_name["core"] / (whole * 125) - 1), 0.05)
+        self.assertLess(abs(by_name["shell"] / (whole * (729 - 125)) - 1), 0.05)
+        # Without the seed the shell is a ball; the core is carved out of it.
+        report = self.report("segment", self.scene, "--points", f"shell={self.outer()}", f"core={core}", "--rho", 0, "-o", "t.vdb")
+        self.assertEqual(report["overlaps"][0]["inner"], "core")
+        again = {s["name"]: s["surface"]["volume"] for s in report["structures"]}
+        self.assertLess(abs(again["shell"] / by_name["shell"] - 1), 0.02)
+        (self.out / "s.vdb").unlink()
+        (self.out / "t.vdb").unlink()
+        self.refuse("segment", self.scene, *marks, "--exterior-seed", "shel:0,0,0", code=2, says="shel")
+        self.refuse("segment", self.scene, *marks, "--exterior-seed", "shell:0,0", code=2, says="--exterior-seed")
+
+    def outer(self):
+        path = self.inputs / "outer.xyz"
+        write_points(path, ball_points((0, 0, 0), 9, 4000))
+        return path
+
+    def test_names(self):
+        self.refuse("segment", self.scene, "--points", f"left={self.left}", self.right, "-o", "s.vdb", code=2, says="name")
+        self.refuse("segment", self.scene, "--points", f"a={self.left}", f"b={self.left}", "--rho", 0, "-o", "s.vdb", code=3,
+                    says="same solid")
+        self.refuse("segment", self.scene, "--points", "a=none.xyz", "-o", "s.vdb", code=4, says="none.xyz")
+        self.refuse("segment", self.scene, "--points", f"left={self.left}", f"right={self.right}", "--init", "sphere:0,0,0,5",
+                    "-o", "s.vdb", code=2, says="--init")
+        # A file whose own name has the sign.
+        odd = self.inputs / "left=1.xyz"
+        odd.write_bytes(self.left.read_bytes())
+        report = self.report("segment", self.scene, "--points", odd, "-o", "s.vdb", "--rho", 0)
+        self.assertNotIn("structures", report)
+        self.assertEqual(report["input"]["points"]["count"], 1500)
+        done = self.run_covol("segment", self.scene, "--points", "left=1.xyz", "-o", self.out / "s.vdb", "--rho", 0, cwd=self.inputs)
+        self.assertNotIn("left: ", done.stderr)
+
+    def test_one_named_structure(self):
+        report = self.report("segment", self.scene, "--points", f"the left={self.left}", "-o", "s.vdb", "--rho", 0, "--mesh",
+                             "m.ply", "--mask", "m.nrrd")
+        self.assertEqual(report["structures"][0]["name"], "the left")
+        self.assertEqual([g["name"] for g in self.report("info", "s.vdb")["grids"]], ["surface"])
+        self.assertEqual(self.files(), ["m.nrrd", "m.ply", "s.vdb"])
+        self.assertEqual(nrrd_keys(self.out / "m.nrrd")["Segment0_Name"], "the left")
+
+    def test_start_from_the_run_before(self):
+        before = self.report(*self.two())["structures"]
+        after = self.report("segment", self.scene, "--points", f"left={self.left}", f"right={self.right}", "--rho", 0,
+                            "--delta", "0.2vx", "-o", "t.vdb", "--init", "vdb:s.vdb")["structures"]
+        for a, b in zip(before, after):
+            self.assertLess(abs(a["surface"]["volume"] / b["surface"]["volume"] - 1), 0.03)
+
+    @unittest.skipUnless(DATA, "SKIPPED: COVOL_DATA is not set")
+    def test_embryo(self):
+        folder = pathlib.Path(DATA) / "phantoms"
+        self.run_covol("segment", folder / "embryo.tif", "--points", f"ve={folder}/embryo_ve_points.ply",
+                       f"exe={folder}/embryo_exe_points.ply", "--exterior-seed", "ve:89.6,89.6,28.5", "--rho", 0,
+                       "-o", "e.vdb", "--mask", "e.seg.nrrd")
+        for label, least in ((1, 0.98), (2, 0.985)):
+            alike = self.report("compare", "e.seg.nrrd", folder / "embryo_labels.tif", "--label", label, "--spacing",
+                                "0.35,0.35,1")["compare"]
+            self.assertGreaterEqual(alike["dice"], least)
+
+
+class TimeLapse(Case):
+    FRAMES, N = 6, 40
+
+    @staticmethod
+    def ball_at(t):
+        return (-2.0 + 0.5 * t, 0.3 * t, 0.2 * t), 4.0 + 0.3 * t
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.origin = (0.0, 0.0, 0.0)
+        cls.middle = H * (cls.N - 1) / 2
+        frames = []
+        for t in range(cls.FRAMES):
+            (x, y, z), r = cls.ball_at(t)
+            m = cls.middle
+            frames.append(ball_image((x + m, y + m, z + m), r, cls.N, H, cls.origin))
+        cls.movie = cls.inputs / "movie.tif"
+        tifffile.imwrite(cls.movie, np.stack(frames), imagej=True, resolution=(1 / H, 1 / H),
+                         metadata={"axes": "TZYX", "spacing": H, "unit": "um"})
+        cls.singles = []
+        for t, frame in enumerate(frames):
+            cls.singles.append(cls.inputs / f"single{t}.tif")
+            tifffile.imwrite(cls.singles[-1], frame, imagej=True, resolution=(1 / H, 1 / H),
+                             metadata={"axes": "ZYX", "spacing": H, "unit": "um"})
+            write_points(cls.inputs / f"marks_{t:03d}.xyz", cls.marks(t))
+        cls.first = cls.inputs / "marks_000.xyz"
+
+    @classmethod
+    def marks(cls, t):
+        center, r = cls.ball_at(t)
+        return ball_points(np.asarray(center) + cls.middle, r)
+
+    def check_radius(self, volume, t):
+        r = (3 * volume / (4 * math.pi)) ** (1 / 3)
+        self.assertLess(abs(r - self.ball_at(t)[1]), 0.35 * H, f"frame {t}")
+
+    def test_each_frame_starts_from_the_one_before(self):
+        report = self.report("segment", self.movie, "--points", self.first, "--frame", "all", "-o", "s.vdb", "--table", "t.csv",
+                             "--mesh", "m.ply", "--mask", "m.nrrd")
+        names = [f"{stem}_t{t:03d}.{end}" for stem, end in (("m", "nrrd"), ("m", "ply"), ("s", "vdb")) for t in range(self.FRAMES)]
+        self.assertEqual(self.files(), sorted(names + ["t.csv"]))
+        self.assertEqual([f["frame"] for f in report["frames"]], list(range(self.FRAMES)))
+        rows = rows_of(self.out / "t.csv")
+        self.assertEqual([r["frame"] for r in rows], [str(t) for t in range(self.FRAMES)])
+        for t, (frame, row) in enumerate(zip(report["frames"], rows)):
+            self.assertEqual((frame["status"], row["status"]), ("ok", "ok"))
+            self.assertEqual(row["structure"], "surface")
+            self.assertEqual(frame["input"]["points"]["count"], 1500 if t == 0 else 0)
+            self.assertEqual(frame["resolved"]["delta"], 0.5 * H)
+            self.check_radius(frame["surface"]["volume"], t)
+            self.assertAlmostEqual(float(row["volume"]), frame["surface"]["volume"], places=3)
+        # Where it is, too: the mask's centre of gravity.
+        for t in (0, self.FRAMES - 1):
+            self.run_covol("mask", f"s_t{t:03d}.vdb", "--like", self.singles[0], "-o", "c.tif")
+            where = np.argwhere(tifffile.imread(self.out / "c.tif") > 0).mean(axis=0)[::-1] * H
+            np.testing.assert_allclose(where, np.asarray(self.ball_at(t)[0]) + self.middle, atol=0.3 * H)
+
+    def test_a_range_and_one_frame(self):
+        report = self.report("segment", self.movie, "--points", self.inputs / "marks_002.xyz", "--frame", "2-3", "-o", "s.vdb",
+                             "--delta", "0.3vx")
+        self.assertEqual(self.files(), ["s_t002.vdb", "s_t003.vdb"])
+        self.check_radius(report["frames"][1]["surface"]["volume"], 3)
+        report = self.report("segment", self.movie, "--points", self.inputs / "marks_004.xyz", "--frame", "4", "-o", "one.vdb",
+                             "--delta", "0.3vx")
+        self.assertIn("one.vdb", self.files())
+        self.check_radius(report["surface"]["volume"], 4)
+        for wrong in ("some", "3-1", "-1", "1-", ""):
+            self.run_covol("segment", self.movie, "--points", self.first, "-o", "x.vdb", f"--frame={wrong}", code=2)
+        self.run_covol("segment", self.movie, "--points", self.first, "-o", "x.vdb", "--frame", "4-6", code=3)
+        self.assertNotIn("x.vdb", self.files())
+
+    def test_marks_of_each_frame(self):
+        pattern = self.inputs / "marks_{frame:03d}.xyz"
+        report = self.report("segment", self.movie, "--points", pattern, "--frame", "0-2", "-o", "s.vdb", "--rho", 0)
+        for t, frame in enumerate(report["frames"]):
+            self.assertEqual(frame["input"]["points"]["count"], 1500)
+            self.check_radius(frame["surface"]["volume"], t)
+        self.run_covol("segment", self.movie, "--points", self.inputs / "marks_{frame:x}.xyz", "--frame", "0-2", "-o", "s.vdb", code=2)
+
+    def test_a_frame_that_fails_does_not_lose_the_others(self):
+        broken = self.inputs / "broken.tif"
+        broken.write_bytes(self.singles[1].read_bytes()[:3000])
+        images = [self.singles[0], broken, self.singles[1], self.singles[2]]
+        done = self.run_covol("segment", *images, "--points", self.first, "-o", "s.vdb", "--table", "t.csv", "--json", "r.json",
+                              "--delta", "0.3vx", code=3)
+        self.assertIn("frame 1 failed", done.stderr)
+        self.assertEqual(self.files(), ["r.json", "s_t000.vdb", "s_t002.vdb", "s_t003.vdb", "t.csv"])
+        report = json.loads((self.out / "r.json").read_text())
+        self.assertTrue(report["frames"][1]["status"].startswith("failed: "))
+        rows = rows_of(self.out / "t.csv")
+        self.assertEqual([r["status"] == "ok" for r in rows], [True, False, True, True])
+        self.check_radius(report["frames"][2]["surface"]["volume"], 1)
+        self.check_radius(report["frames"][3]["surface"]["volume"], 2)
+
+    def test_nothing_but_failures(self):
+        done = self.run_covol("segment", "none0.tif", "none1.tif", "--points", self.first, "-o", "s.vdb", code=4)
+        self.assertIn("none0.tif", done.stderr.splitlines()[-1])
+        self.assertEqual(self.files(), [])
+
+    def test_outputs_are_checked_first(self):
+        self.refuse("segment", self.movie, "--points", self.first, "--frame", "all", "-o", "no/folder/s.vdb", code=4)
+        self.refuse("segment", self.movie, "--points", self.first, "--frame", "all", "-o", "s.vdb", "--table", "t.txt", code=3, says="--table")
+
+    def test_an_interrupt_leaves_the_frames_that_are_done(self):
+        process = subprocess.Popen([COVOL, "segment", *[self.singles[0]] * 2000, "--points", self.first, "-o", "s.vdb",
+                                    "--table", "t.csv"], cwd=self.out, stderr=subprocess.DEVNULL)
+        try:
+            deadline = time.time() + 60
+            while len(self.files()) < 3 and time.time() < deadline:
+                time.sleep(0.05)
+            process.send_signal(signal.SIGINT)
+            process.wait(timeout=60)
+        finally:
+            process.kill()
+        self.assertEqual(process.returncode, 130)
+        done = self.files()
+        self.assertLess(len(done), 2000)
+        self.assertEqual(done, [f"s_t{t:04d}.vdb" for t in range(len(done))])
+        self.assertEqual(self.report("info", done[-1])["grids"][0]["name"], "surface")
+
+    def test_several_structures(self):
+        # Two halves of the ball, each with its flat side marked.
+        shell = fibonacci(1500)
+        for t in range(2):
+            center, r = self.ball_at(t)
+            steps = np.arange(-r, r, H)
+            disc = np.array([(x, y, 0) for x in steps for y in steps if x * x + y * y < r * r])
+            for name, side in (("low", shell[:, 2] < 0), ("up", shell[:, 2] > 0)):
+                write_points(self.inputs / f"{name}_{t}.xyz",
+                             np.asarray(center) + self.middle + np.concatenate([r * shell[side], disc]))
+        report = self.report("segment", self.movie, "--points", f"low={self.inputs}/low_{{frame}}.xyz",
+                             f"up={self.inputs}/up_{{frame}}.xyz", "--frame", "0-1", "-o", "s.vdb", "--mesh", "m.ply",
+                             "--table", "t.csv", "--rho", 0, "--delta", "0.2vx")
+        self.assertEqual(self.files(), ["m_t000_low.ply", "m_t000_up.ply", "m_t001_low.ply", "m_t001_up.ply", "s_t000.vdb",
+                                        "s_t001.vdb", "t.csv"])
+        before, after = ([s["surface"]["volume"] for s in frame["structures"]] for frame in report["frames"])
+        for t, volumes in enumerate((before, after)):
+            half = 2 / 3 * math.pi * self.ball_at(t)[1] ** 3
+            for volume in volumes:  # the sharp rims round off
+                self.assertTrue(0.75 < volume / half < 1.05, (t, volume / half))
+        for old, new in zip(before, after):
+            self.assertGreater(new, 1.05 * old)
+        self.assertEqual([(row["frame"], row["structure"]) for row in rows_of(self.out / "t.csv")],
+                         [("0", "low"), ("0", "up"), ("1", "low"), ("1", "up")])
+
+    @unittest.skipUnless(DATA, "SKIPPED: COVOL_DATA is not set")
+    def test_droplet(self):
+        folder = pathlib.Path(DATA) / "images"
+        report = self.report("segment", folder / "droplet_t21.tif", "--frame", "all", "--init", "sphere:17.5,16,7,8", "-o", "d.vdb",
+                             "--table", "t.csv", "--delta", "0.3vx")
+        volumes = [f["surface"]["volume"] for f in report["frames"]]
+        self.assertEqual(len(volumes), 21)
+        # A droplet is incompressible; half maximum of the first frame encloses about 16 x 17 x 7 voxels.
+        for v in volumes:
+            self.assertLess(abs(v / np.median(volumes) - 1), 0.35)
+
+
+class Evidence(Case):
+    CENTER, RADIUS = (0.0, 0.0, 0.0), 7.0
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.scene = cls.inputs / "half.nrrd"
+        image = ball_image(cls.CENTER, cls.RADIUS)
+        x, _, z = lattice()
+        image[z > 0] = 20  # the upper half has faded
+        write_nrrd(cls.scene, (SIZE,) * 3, image.tobytes(), spacing=H, origin=ORIGIN)
+        points = ball_points(cls.CENTER, cls.RADIUS, 6000)
+        cls.marks = cls.inputs / "lower.xyz"
+        write_points(cls.marks, points[points[:, 2] < 0])
+
+    def judge(self, *more):
+        # No step: the surface is the start, a sphere.
+        return ("segment", self.scene, "--points", self.marks, "--init", "sphere:0,0,0,%g" % self.RADIUS, "--max-steps", 0,
+                "-o", "s.vdb", *more)
+
+    def test_suggestions_lie_on_the_bare_half(self):
+        done = self.run_covol(*self.judge("--suggest", 3, "--json", "r.json"))
+        lines = [l for l in done.stderr.splitlines() if "marks would help in slice" in l]
+        report = json.loads((self.out / "r.json").read_text())["evidence"]
+        self.assertEqual(len(lines), len(report["suggestions"]))
+        self.assertGreaterEqual(len(lines), 2)
+        self.assertEqual(report["reach"], 5 * H)
+        for s in report["suggestions"]:
+            self.assertGreater(s["world"][2], 0)
+            self.assertAlmostEqual(s["index"][2], s["slice"], places=2)
+            self.assertLess(abs(math.dist(s["world"], self.CENTER) - self.RADIUS), 0.3 * H)
+            for axis in range(3):
+                self.assertAlmostEqual(s["world"][axis], ORIGIN[axis] + H * s["index"][axis], places=4)
+        # The chord of the reach, from the equator up.
+        angle = 2 * math.asin(report["reach"] / (2 * self.RADIUS))
+        self.assertAlmostEqual(report["unsupported_area"] / report["area"], (1 - math.sin(angle)) / 2, delta=0.02)
+
+    def test_table_and_attributes(self):
+        report = self.report(*self.judge("--evidence", "e.csv", "--mesh", "m.ply"))
+        rows = rows_of(self.out / "e.csv")
+        self.assertEqual(len(rows), len(report["evidence"]["slices"]))
+        for row in rows:
+            z = ORIGIN[2] + H * int(row["slice"])
+            self.assertEqual(row["structure"], "surface")
+            if -6 < z < -1:
+                self.assertEqual(float(row["unsupported_share"]), 0)
+                self.assertLess(float(row["surface_to_marks_mean"]), H)
+                self.assertGreater(float(row["edge_strength"]), 0.25)
+                self.assertGreater(int(row["marks"]), 0)
+            if 4 < z < 6:
+                self.assertGreater(float(row["unsupported_share"]), 0.99)
+        head = (self.out / "m.ply").read_bytes()[:4000]
+        self.assertIn(b"property float distance_to_marks\nproperty float edge_strength\n", head)
+
+    def test_wrong_numbers(self):
+        self.refuse(*self.judge("--suggest", -1), code=3, says="--suggest")
+        self.refuse(*self.judge("--evidence", "e.txt"), code=3, says="--evidence")
+
+
+if __name__ == "__main__":
+    unittest.main()
