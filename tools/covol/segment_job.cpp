@@ -87,6 +87,7 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
     command.add_option("--mesh", mesh_path, "triangles")->type_name("OUT.ply|.obj|.stl|.off|.glb");
     command.add_option("--density", density_path, "the solid as a fog volume in [0,1]")->type_name("OUT.vdb");
     command.add_option("--fields", fields_path, "u, distance and edge, for a look inside")->type_name("OUT.vdb");
+    contours.bind(command);
     cloud.bind(command);
     evolve.bind(command, with_image);
     if (with_image) edge.bind(command);
@@ -117,18 +118,27 @@ void SegmentJob::run(Session& session) {
         input["image"] = to_json(pixels->geometry());
         input["image"]["path"] = image_path;
     }
-    WorldPoints marks = read_world_points(points, pixels ? &pixels->geometry() : nullptr, session.run());
-    input["points"] = {{"count", marks.points.size()}, {"densified", 0}, {"paths", points.paths}, {"rules", marks.rules}};
+    const ImageGeometry* geometry = pixels ? &pixels->geometry() : nullptr;
+    WorldPoints marks = read_world_points(points, geometry, session.run());
+    const std::vector<PointCloud> drawn = contours.read(points.options, geometry, session.run());
+    std::vector<Vec3> given = marks.points;
+    for (const PointCloud& cloud : drawn) {
+        const std::vector<Vec3> world = to_world(cloud, geometry);
+        given.insert(given.end(), world.begin(), world.end());
+    }
+    input["points"] = {{"count", given.size()}, {"densified", 0}, {"paths", points.paths}, {"rules", marks.rules}};
     session.add_seconds("read", reading.seconds());
     session.add_seconds("total", reading.seconds());
 
     const Image* pointer = pixels ? &*pixels : nullptr;
-    if (pointer == nullptr && marks.points.empty()) throw UsageError("expected an image or points, got neither");
-    const double h = domain.resolve_voxel_size(pointer, marks.points, session);
+    if (pointer == nullptr && given.empty()) throw UsageError("expected an image, points or contours, got none");
+    const double h = domain.resolve_voxel_size(pointer, given, session);
     marks.points = cloud.clean(marks.points, h, session, input["points"]);
+    SegmentOptions options = resolve(*this, h);
+    options.contours = contours.densify(drawn, geometry, h, session);
     // Shared by the writers that run at the end.
-    const auto result =
-        std::make_shared<SegmentResult>(segment(pointer, marks.points, resolve(*this, h), session.run()));
+    const auto result = std::make_shared<SegmentResult>(segment(pointer, marks.points, options, session.run()));
+    input["points"]["densified"] = result->report.densified;
     fill_report(session, result->report);
     summarise(session, result->report);
 

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "bindings.h"
+#include "contour_flags.h"
 #include "cloud_flags.h"
 
 namespace covol::tool {
@@ -12,6 +13,7 @@ struct SegmentJob {
     std::string image_path;  ///< empty: points alone
     ImageFlags image;
     PointFlags points;
+    ContourFlags contours;
     CloudFlags cloud;
     DomainFlags domain;
     TagFlags tag;
