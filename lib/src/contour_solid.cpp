@@ -19,10 +19,23 @@ using detail::Vec2;
 
 namespace {
 
-constexpr double kFullestCap = 0.5;  // of the gap, for a section that does not shrink
+/// The dome's profile: how far inside the last contour the body ends at the fraction t of the dome's height. A
+/// paraboloid, whose area falls linearly.
+double dome(double radius, double t) { return t < 1 ? radius * (1 - std::sqrt(1 - t)) : radius; }
 
-/// The dome's profile: how far inside the last contour the body ends at the fraction t of the dome's height.
-double dome(double radius, double t) { return t < 1 ? radius * (1 - std::sqrt(1 - t * t)) : radius; }
+/// The slope at a node from the secants on both sides, which span `left` and `right`: their weighted harmonic mean, 0
+/// where they differ in sign (Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5, 1984), so that cubics do not overshoot.
+double monotone_slope(double secant_left, double left, double secant_right, double right) {
+    if (!(secant_left * secant_right > 0)) return 0;
+    const double a = 2 * right + left, b = right + 2 * left;
+    return (a + b) / (a / secant_left + b / secant_right);
+}
+
+/// Cubic from 0 to 1 by Hermite's basis; slopes times the interval's length.
+double hermite(double v0, double v1, double m0, double m1, double t) {
+    const double s = 1 - t;
+    return s * s * ((1 + 2 * t) * v0 + t * m0) + t * t * ((1 + 2 * s) * v1 - s * m1);
+}
 
 /// One stretch of the body along the slices' normal, with the level inside it.
 class Interval {
@@ -37,8 +50,14 @@ public:
     double level(double x, double y, double w) const {
         if (kind_ != Kind::Between) return slice().at(data_.grid, x, y) + beyond(std::abs(w - slice().w));
         const SolidSlice& next = data_.slices[n_ + 1];
-        const double t = (w - slice().w) / (next.w - slice().w);
+        const double length = next.w - slice().w, t = (w - slice().w) / length;
         const Vec2& s = slice().shift;
+        if (s == Vec2{0, 0}) {
+            const double here = slice().at(data_.grid, x, y), there = next.at(data_.grid, x, y);
+            const double secant = (there - here) / length;
+            return hermite(here, there, slope_below(x, y, here, secant, length) * length,
+                           slope_above(x, y, there, secant, length) * length, t);
+        }
         return (1 - t) * slice().at(data_.grid, x - t * s[0], y - t * s[1]) +
                t * next.at(data_.grid, x + (1 - t) * s[0], y + (1 - t) * s[1]);
     }
@@ -55,6 +74,20 @@ public:
     void append_surface(double step, std::vector<Vec3>& points) const;
 
 private:
+    /// Slopes of the level along w at the interval's two slices; beyond an end slice the dome goes on.
+    double slope_below(double x, double y, double here, double secant, double length) const {
+        if (n_ == 0) return monotone_slope(-slice().depth / slice().cap, slice().cap, secant, length);
+        const SolidSlice& before = data_.slices[n_ - 1];
+        const double left = slice().w - before.w;
+        return monotone_slope((here - before.at(data_.grid, x, y)) / left, left, secant, length);
+    }
+    double slope_above(double x, double y, double there, double secant, double length) const {
+        const SolidSlice& next = data_.slices[n_ + 1];
+        if (n_ + 2 == data_.slices.size()) return monotone_slope(secant, length, next.depth / next.cap, next.cap);
+        const SolidSlice& after = data_.slices[n_ + 2];
+        const double right = after.w - next.w;
+        return monotone_slope(secant, length, (after.at(data_.grid, x, y) - there) / right, right);
+    }
     const SolidSlice& slice() const { return data_.slices[n_]; }
     double beyond(double height) const {
         const double cap = slice().cap;
@@ -164,9 +197,7 @@ std::vector<Vec2> deepest_in_holes(const std::vector<float>& level, const SliceG
 }  // namespace
 
 double cap_height(double area, double before, double distance, double gap) {
-    if (!(before > area)) return kFullestCap * gap;
-    const double pole = distance * area / (before - area);
-    return pole < gap ? pole : kFullestCap * gap;
+    return before > area ? std::min(gap, distance * area / (before - area)) : gap;
 }
 
 ContourSolid::ContourSolid(std::shared_ptr<const Data> data) : data_(std::move(data)) {}

@@ -27,6 +27,7 @@ constexpr double kApproachTau = 3.0;          // time steps of the points' own a
 constexpr int kApproachSteps = 40;
 constexpr double kApproachTolerance = 0.01;
 constexpr int kEdgeReachVoxels = 12;          // a band that follows moves this far before g is extended
+constexpr int kBodyReachVoxels = 5;           // the same for a start from contours, which lies close to the end
 constexpr double kCoarseFactor = 8.0;         // voxels of the coarse distance field, in h
 
 std::string number(double value) {
@@ -365,7 +366,7 @@ private:
         if (!uses_image()) return;
         Timed timed(report().seconds.edge);
         const FloatGridPtr reach =
-            options_.evolve.follow ? dilated_topology(*result_.u, kEdgeReachVoxels, report().domain) : result_.u;
+            options_.evolve.follow ? dilated_topology(*result_.u, from_body_ ? kBodyReachVoxels : kEdgeReachVoxels, report().domain) : result_.u;
         EdgeResult found = edge(*image_, *reach, options_.edge, run_);
         report().edge = found.report;
         result_.edge = found.grid;

@@ -26,9 +26,10 @@ struct ContourOptions {
 ///
 /// On each slice the even-odd rule over all of its closed contours says what is inside (an inner contour makes a hole),
 /// and the slice carries the signed distance to its contours within the plane. Between two slices these fields are
-/// interpolated linearly (Raya and Udupa, IEEE TMI 9, 1990), so a hole or a part that the next slice lacks ends in
-/// between. Where two single contours do not overlap at all, they are carried along the line between their centroids.
-/// Beyond the first and the last slice the body ends in an elliptic dome; see cap_height().
+/// interpolated (Raya and Udupa, IEEE TMI 9, 1990) by cubics (Herman, Zheng and Bucholtz, IEEE CG&A 12, 1992) that do
+/// not overshoot, so a hole or a part that the next slice lacks ends in between. Where two single contours do not
+/// overlap at all, they are carried along the line between their centroids. Beyond the first and the last slice the
+/// body ends in a dome, a paraboloid over a disc; see cap_height().
 class ContourSolid {
 public:
     struct Data;
@@ -51,8 +52,8 @@ private:
 };
 
 /// The height of the dome beyond the last slice: where a cross-section that goes on to shrink as between the last two
-/// slices (in area, which is linear near the pole of an ellipsoid) would vanish, but within the next slice that could
-/// have been marked; half the distance to that one where the section does not shrink.
+/// slices would vanish (in area, which is linear near the pole of an ellipsoid), but not beyond the next slice that
+/// could have been marked. Where the section does not shrink the dome reaches that one: it holds half a slice.
 /// @param area, before  of the last slice and of the one before it, 0 when there is none
 /// @param distance      between those two
 /// @param gap           usual distance between marked slices
