@@ -211,6 +211,7 @@ std::string EvolveOptions::why_invalid() const {
     expect(lines, edge_epsilon > 0 && std::isfinite(edge_epsilon), "edge_epsilon", "> 0", edge_epsilon);
     expect(lines, attraction_range >= 0 && std::isfinite(attraction_range), "attraction_range", ">= 0", attraction_range);
     expect(lines, unit(image_yields), "image_yields", "0 to 1", image_yields);
+    expect(lines, unit(guess_weight), "guess_weight", "0 to 1", guess_weight);
     expect(lines, max_steps >= 0, "max_steps", ">= 0", max_steps);
     expect(lines, tolerance >= 0 && std::isfinite(tolerance), "tolerance", ">= 0", tolerance);
     expect(lines, solver_tolerance > 0 && solver_tolerance < 1, "solver_tolerance", "between 0 and 1", solver_tolerance);

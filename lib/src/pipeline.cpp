@@ -37,6 +37,7 @@ constexpr double kHoldTolerance = 0.01;      // voxels a step
 constexpr double kFarFromPoints = 3.0;        // voxels and spacings: no point holds the surface there
 constexpr double kWarnWithoutPoints = 0.02;   // share of the area
 constexpr int kEdgeReachVoxels = 12;          // a band that follows moves this far before g is extended
+constexpr int kBodyReachVoxels = 5;           // the same for a start from contours, which lies close to the end
 constexpr double kCoarseFactor = 8.0;         // voxels of the coarse distance field, in h
 // Coarse to fine, voxels of the coarse level.
 constexpr double kRefinement = 2.0;
@@ -100,19 +101,24 @@ class Segmentation {
 public:
     Segmentation(const Image* image, const std::vector<Vec3>& points, const SegmentOptions& options,
                  const RunContext& run)
-        : image_(image), points_(points), options_(options), run_(run) {}
+        : image_(image), points_(points), sure_(points), given_(points), options_(options), run_(run) {
+        if (options.contours) take_contours(*options.contours);
+    }
 
     SegmentResult go() {
         {
             Timed total(report().seconds.total);
             check_input();
             resolve_lengths();
-            if (options_.start.kind == Start::Kind::Tag)
+            if (starts_from_contours())
+                start_from_body();
+            else if (options_.start.kind == Start::Kind::Tag)
                 start_by_tagging();
             else
                 start_otherwise();
             start_from_coarse();
             find_edges();
+            find_sure_distance();
             solve();
             make_surface();
         }
@@ -132,6 +138,14 @@ private:
         run_.info(what + ": " + line);
     }
 
+    void take_contours(const Contours& contours) {
+        given_.insert(given_.end(), contours.marks.begin(), contours.marks.end());
+        sure_.insert(sure_.end(), contours.along.begin(), contours.along.end());
+        points_ = sure_;
+        points_.insert(points_.end(), contours.between.begin(), contours.between.end());
+        report().densified = contours.along.size() + contours.between.size();
+    }
+
     /// What there is decides which terms of Eq. (3) can act.
     void check_input() {
         const std::string why = options_.why_invalid();
@@ -141,7 +155,7 @@ private:
         if (options_.start.kind == Start::Kind::Tag && points_.empty())
             throw Error(Errc::InvalidInput, "segment: the start 'tag' expects points, got none; choose another start "
                                             "(sphere, box, mesh, mask or vdb)");
-        report().point_count = points_.size();
+        report().point_count = given_.size();
         EvolveOptions& evolve = options_.evolve;
         if (points_.empty() && evolve.theta > 0) {
             evolve.theta = 0;
@@ -159,9 +173,10 @@ private:
             options_.voxel_size = choice.voxel_size;
             choose("voxel_size", number(h()), choice.reason);
         }
+        const std::size_t all = points_.size();
         points_ = merge_close_points(points_, kMergeVoxels * h());
-        if (points_.size() < report().point_count)
-            run_.info("points: " + std::to_string(points_.size()) + " of " + std::to_string(report().point_count) +
+        if (points_.size() < all)
+            run_.info("points: " + std::to_string(points_.size()) + " of " + std::to_string(all) +
                       " kept, the others are closer than half of " + number(kMergeVoxels * h()));
         marks_ = points_;
         if (image_ == nullptr) average_noise();
@@ -214,6 +229,47 @@ private:
         return domain_of_box(bounding_box(points_, margin), h());
     }
 
+    // ---- contours ----------------------------------------------------------------------------------------------
+
+    const ContourSolid* body() const { return options_.contours ? options_.contours->solid.get() : nullptr; }
+
+    /// Tagging where the body cannot be all that there is to start from.
+    bool starts_from_contours() {
+        if (body() == nullptr || options_.start.kind != Start::Kind::Tag) return false;
+        for (const Vec3& seed : options_.exterior_seeds)
+            if (body()->level(seed) < 0) return tag_after_all("an exterior seed lies inside the contours");
+        const double far = kTagAttractionVoxels * h();
+        const std::size_t loose = sure_.size() - options_.contours->along.size();
+        for (std::size_t n = 0; n < loose; ++n)
+            if (std::abs(body()->level(sure_[n])) > far) return tag_after_all("points lie far from the contours' body");
+        choose("start", "contours", "the body between the contours; what inner contours enclose is outside");
+        return true;
+    }
+
+    bool tag_after_all(const char* reason) {
+        choose("start", "tag", reason);
+        hole_seeds_ = body()->hole_seeds();
+        return false;
+    }
+
+    void start_from_body() {
+        from_body_ = true;
+        options_.evolve.follow = true;
+        report().domain = domain_with_margin(options_.margin > 0 ? options_.margin : 2 * kMarginVoxels * h());
+        {
+            Timed timed(report().seconds.tag);
+            result_.u = start_from_contours(report().domain, *body(), run_);
+        }
+        if (uses_points()) compute_distance(std::max(options_.evolve.attraction_range, kMarginVoxels * h()) + (kHalfWidthVoxels + kTubeSlackVoxels) * h());
+    }
+
+    /// Where the image acts, marks outweigh what lies between the slices.
+    void find_sure_distance() {
+        if (!options_.contours || !uses_points() || !uses_image() || options_.evolve.attraction_range <= 0) return;
+        Timed timed(report().seconds.distance);
+        sure_distance_ = distance(sure_, report().domain, {options_.evolve.attraction_range + kTubeSlackVoxels * h()}, run_).grid;
+    }
+
     // ---- start -------------------------------------------------------------------------------------------------
 
     void start_by_tagging() {
@@ -224,7 +280,7 @@ private:
         report().domain = domain_with_margin(margin);
         compute_distance(D + (kHalfWidthVoxels + kTubeSlackVoxels) * h());
         Timed timed(report().seconds.tag);
-        BandResult tagged = band(*result_.distance, {D, options_.exterior_seeds}, run_);
+        BandResult tagged = band(*result_.distance, {D, seeds_beyond(D)}, run_);
         report().band = tagged.report;
         result_.u = tagged.grid;
         if (tagged.report.leaks) warn_of_leak(tagged.report);
@@ -272,10 +328,27 @@ private:
         double extent = 0;
         for (int a = 0; a < 3; ++a) extent = std::max(extent, box.max[a] - box.min[a]);
         report().tag = choose_tag_distance(points_, domain_with_margin(0.25 * extent + kMarginVoxels * h()),
-                                           options_.exterior_seeds, run_);
+                                           all_seeds(), run_);
         options_.tag_distance = report().tag.tag_distance;
         has_chosen_tag_ = true;
         choose("tag_distance", number(options_.tag_distance), report().tag.reason);
+    }
+
+    std::vector<Vec3> all_seeds() const {
+        std::vector<Vec3> seeds = options_.exterior_seeds;
+        seeds.insert(seeds.end(), hole_seeds_.begin(), hole_seeds_.end());
+        return seeds;
+    }
+
+    /// Holes narrower than D are no exterior; a seed that the user gave is band()'s to judge.
+    std::vector<Vec3> seeds_beyond(double D) const {
+        std::vector<Vec3> seeds = options_.exterior_seeds;
+        const auto d_at = result_.distance->getConstAccessor();
+        for (const Vec3& seed : hole_seeds_) {
+            const Vec3 at = result_.report.domain.world_to_index(seed);
+            if (d_at.getValue(openvdb::Coord::round(openvdb::Vec3d(at[0], at[1], at[2]))) > D) seeds.push_back(seed);
+        }
+        return seeds;
     }
 
     void warn_of_leak(const BandReport& tagged) {
@@ -346,10 +419,11 @@ private:
     // The way from the start is long in voxels of h. In voxels of 2h a step costs a quarter and goes twice as far; what is
     // left to do at h is near the surface that the coarse level finds.
     void start_from_coarse() {
-        if (options_.coarse_levels <= 0 || hold_) return;
+        if (options_.coarse_levels <= 0 || hold_ || from_body_) return;
         SegmentOptions options = options_;
         options.voxel_size = kRefinement * h();
         options.coarse_levels = options_.coarse_levels - 1;
+        options.contours = nullptr;  // their points are among the others
         const double coarse_h = options.voxel_size;
         options.edge.sigma = std::max(options.edge.sigma, kLeastCoarseSigma * coarse_h);
         EvolveOptions& evolve = options.evolve;
@@ -428,7 +502,7 @@ private:
         options_.edge.high = e.high;
     }
 
-    [[nodiscard]] int edge_reach() const { return is_refined_ ? kRefinedReachVoxels : kEdgeReachVoxels; }
+    [[nodiscard]] int edge_reach() const { return is_refined_ ? kRefinedReachVoxels : from_body_ ? kBodyReachVoxels : kEdgeReachVoxels; }
 
     void extend(const FloatGrid& u, EvolveFields& fields) {
         if (fields.edge == nullptr || covers(*fields.edge, u)) return;
@@ -454,6 +528,7 @@ private:
         EvolveFields fields;
         fields.distance = uses_points() ? result_.distance.get() : nullptr;
         fields.edge = result_.edge.get();
+        fields.sure = sure_distance_.get();
         if (options_.evolve.follow) fields.extend = [this](const FloatGrid& u, EvolveFields& f) { extend(u, f); };
         {
             Timed timed(report().seconds.solve);
@@ -512,7 +587,7 @@ private:
 
     // Edges of other structures lie between the tagged surface and the points: with an image the points pull alone first.
     EvolveReport approach(EvolveFields fields) {
-        if (options_.start.kind != Start::Kind::Tag || is_refined_ || !uses_points() || !uses_image()) return {};
+        if (from_body_ || options_.start.kind != Start::Kind::Tag || is_refined_ || !uses_points() || !uses_image()) return {};
         EvolveOptions alone = options_.evolve;
         alone.rho = 0;
         alone.attraction_range = 0;
@@ -541,7 +616,7 @@ private:
         result_.mesh = extract_mesh(*result_.surface, options_.extract, run_);
         report().surface = measure(result_.mesh);
         if (points_.empty()) return;
-        report().fit = points_to_surface(marks_, result_.mesh, run_);
+        report().fit = points_to_surface(options_.contours ? given_ : marks_, result_.mesh, run_);
         if (image_ == nullptr) find_bare_surface();
     }
 
@@ -555,8 +630,13 @@ private:
     }
 
     const Image* image_;
-    std::vector<Vec3> points_;  ///< what pulls
-    std::vector<Vec3> marks_;   ///< the same as they were given, for the fit
+    std::vector<Vec3> points_;  ///< all that attract
+    std::vector<Vec3> sure_;    ///< those of them that are no guess between slices
+    std::vector<Vec3> given_;   ///< as the caller has them
+    std::vector<Vec3> marks_;   ///< without contours: the same without duplicates, for the fit
+    std::vector<Vec3> hole_seeds_;
+    bool from_body_ = false;
+    FloatGridPtr sure_distance_;
     FloatGridPtr hold_;         ///< the start that the surface may not leave, or null
     bool has_automatic_range_ = false, has_chosen_tag_ = false;
     SegmentOptions options_;

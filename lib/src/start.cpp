@@ -190,6 +190,24 @@ FloatGridPtr start_from_mask(const Domain& domain, const Image& mask, const RunC
     return result;
 }
 
+FloatGridPtr start_from_contours(const Domain& domain, const ContourSolid& solid, const RunContext& run) {
+    constexpr double kLeafRadius = 4.5 * 1.7320508;  // voxels, from the middle of a leaf and its next layer to a corner
+    FloatGridPtr result;
+    with_threads(run, [&] {
+        const std::vector<Coord> near = filter(leaves_in(domain, solid.box()), [&](const Coord& o) {
+            return solid.may_meet(domain.index_to_world({o.x() + 4.0, o.y() + 4.0, o.z() + 4.0}), kLeafRadius * domain.voxel_size);
+        });
+        const Sampler sample = [&](const Coord& lo, const Coord& hi, float* values) {
+            for (int i = lo.x(); i <= hi.x(); ++i)
+                for (int j = lo.y(); j <= hi.y(); ++j)
+                    for (int k = lo.z(); k <= hi.z(); ++k)
+                        *values++ = float(solid.level(domain.index_to_world({double(i), double(j), double(k)})));
+        };
+        result = start_from_field(domain, near, sample, "start_from_contours", run);
+    });
+    return result;
+}
+
 FloatGridPtr start_from_grid(const Domain& domain, const FloatGrid& level_set, const RunContext& run) {
     FloatGridPtr result;
     with_threads(run, [&] {

@@ -10,6 +10,7 @@ import sys
 LAYERS = [
     ["error", "run", "fwd", "domain"],
     ["image", "points", "mesh", "vdb_io", "mesh_io"],
+    ["contours"],
     ["distance", "edge", "scan_noise"],
     ["band", "evolve", "scan_solid"],
     ["surface", "mesh_cleanup", "cloud_cleanup", "compare"],
@@ -18,7 +19,7 @@ LAYERS = [
 ]
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 # Files of lib/src whose name is not their header's.
-SOURCE_LEVEL = {"points_check": LEVEL["points"], "image_sampling": LEVEL["image"], "image_statistics": LEVEL["image"], "image_write": LEVEL["image"],
+SOURCE_LEVEL = {"contour_solid": LEVEL["contours"], "points_check": LEVEL["points"], "image_sampling": LEVEL["image"], "image_statistics": LEVEL["image"], "image_write": LEVEL["image"],
                 "tag_distance": LEVEL["band"], "start": LEVEL["band"], "surface_mesh": LEVEL["surface"],
                 "mesh_distance": LEVEL["surface"]}
 HEAVY = re.compile(r"#\s*include\s*[<\"](openvdb/(?!version\.h)|tbb/|oneapi/|OpenMesh/|CGAL/|itk|CLI/|nlohmann/)")

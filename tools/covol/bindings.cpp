@@ -202,6 +202,8 @@ void EvolveFlags::bind(CLI::App& command, bool with_image) {
         command.add_option("--image-yields", image_yields,
                            "share of rho that fades close to points, on the attraction range's taper, 0 to 1 "
                            "[1 after tagging, else 0]");
+        command.add_option("--guess-weight", guess_weight,
+                           "share of theta that is left to what lies between marked slices, far from every mark, 0 to 1");
     }
     command.add_option("--max-steps", options.max_steps, "upper bound on time steps")->capture_default_str();
     command.add_option("--tolerance", options.tolerance, "steady below this mean change, in voxels a step of 1vx")
@@ -217,6 +219,7 @@ EvolveOptions EvolveFlags::resolve(double h, const EvolveOptions& otherwise) con
     resolved.tau = tau.resolve(h, otherwise.tau);
     resolved.attraction_range = attraction_range.resolve(h, otherwise.attraction_range);
     resolved.image_yields = image_yields.value_or(otherwise.image_yields);
+    resolved.guess_weight = guess_weight.value_or(otherwise.guess_weight);
     return resolved;
 }
 

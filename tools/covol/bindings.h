@@ -90,7 +90,7 @@ struct EdgeFlags {
 
 struct EvolveFlags {
     Length delta, tau, attraction_range;
-    std::optional<double> image_yields;
+    std::optional<double> image_yields, guess_weight;
     EvolveOptions options;
     bool strict = false;
     /// Without an image there is no rho.

@@ -8,7 +8,7 @@ void add_reconstruct(Session& session) {
     job->evolve.options.rho = 0;
     CLI::App* command = session.add_command("reconstruct", "Points alone: the surface behind a point cloud",
                                             [job, &session] { job->run(session); });
-    job->points.bind(*command, "points")->required();
+    job->points.bind(*command, "points");
     job->bind(*command, false);
 }
 

@@ -77,6 +77,7 @@ Json to_json(const SegmentOptions& o) {
             {"edge_epsilon", e.edge_epsilon},
             {"attraction_range", e.attraction_range},
             {"image_yields", e.image_yields},
+            {"guess_weight", e.guess_weight},
             {"follow", e.follow},
             {"max_steps", e.max_steps},
             {"tolerance", e.tolerance},

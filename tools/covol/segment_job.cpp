@@ -63,6 +63,7 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
     command.add_option("--mesh", mesh_path, "triangles")->type_name("OUT.ply|.obj|.stl|.off|.glb");
     command.add_option("--density", density_path, "the solid as a fog volume in [0,1]")->type_name("OUT.vdb");
     command.add_option("--fields", fields_path, "u, distance and edge, for a look inside")->type_name("OUT.vdb");
+    contours.bind(command);
     cloud.bind(command);
     evolve.bind(command, with_image);
     if (with_image) edge.bind(command);
@@ -102,10 +103,14 @@ Image SegmentJob::read(const std::string& path, const ReadImageOptions& options,
 }
 
 void SegmentJob::run(Session& session) const {
-    if (is_timelapse(*this)) return run_timelapse(*this, session);
     const bool names = std::any_of(points.paths.begin(), points.paths.end(),
                                    [](const std::string& text) { return !split_name(text).name.empty(); });
-    if (names || !tag.named_seeds.empty()) return run_structures(*this, session);
+    const bool several = names || !tag.named_seeds.empty();
+    if (!contours.paths.empty() && (several || is_timelapse(*this)))
+        throw UsageError("--contours: expected one structure in one image; give the contours of several structures, or of several "
+                         "frames, in runs of their own");
+    if (is_timelapse(*this)) return run_timelapse(*this, session);
+    if (several) return run_structures(*this, session);
     run_one(session);
 }
 
@@ -121,23 +126,33 @@ void SegmentJob::run_one(Session& session) const {
     }
     Json& input = session.report()["input"];
     const Stopwatch reading;
-    WorldPoints marks = read_world_points(points, pixels ? &pixels->geometry() : nullptr, session.run());
-    input["points"] = {{"count", marks.points.size()}, {"densified", 0}, {"paths", points.paths}, {"rules", marks.rules}};
+    const ImageGeometry* geometry = pixels ? &pixels->geometry() : nullptr;
+    WorldPoints marks = read_world_points(points, geometry, session.run());
+    const std::vector<PointCloud> drawn = contours.read(points.options, geometry, session.run());
+    std::vector<Vec3> given = marks.points;
+    for (const PointCloud& cloud : drawn) {
+        const std::vector<Vec3> world = to_world(cloud, geometry);
+        given.insert(given.end(), world.begin(), world.end());
+    }
+    input["points"] = {{"count", given.size()}, {"densified", 0}, {"paths", points.paths}, {"rules", marks.rules}};
     session.add_seconds("read", reading.seconds());
     session.add_seconds("total", reading.seconds());
 
     const Image* pointer = pixels ? &*pixels : nullptr;
-    if (pointer == nullptr && marks.points.empty()) throw UsageError("expected an image or points, got neither");
-    const double h = domain.resolve_voxel_size(pointer, marks.points, session);
+    if (pointer == nullptr && given.empty()) throw UsageError("expected an image, points or contours, got none");
+    const double h = domain.resolve_voxel_size(pointer, given, session);
     marks.points = cloud.clean(marks.points, h, session, input["points"]);
+    SegmentOptions options = resolve(h);
+    options.contours = contours.densify(drawn, geometry, h, session);
     // Shared by the writers that run at the end.
-    const auto result = std::make_shared<SegmentResult>(segment(pointer, marks.points, resolve(h), session.run()));
+    const auto result = std::make_shared<SegmentResult>(segment(pointer, marks.points, options, session.run()));
+    input["points"]["densified"] = result->report.densified;
     session.report().update(to_json(result->report), true);
     add_seconds(session, result->report.seconds);
     for (const std::string& line : summary(result->report)) session.note(line);
     std::optional<Evidence> judged;
     if (pixels && evidence.wanted()) {
-        judged = evidence.judge(*result, marks.points, *pixels, session.run());
+        judged = evidence.judge(*result, given, *pixels, session.run());
         session.report()["evidence"] = to_json(*judged);
         tell(session, *judged);
     }

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "bindings.h"
+#include "contour_flags.h"
 #include "cloud_flags.h"
 #include "evidence_flags.h"
 
@@ -13,6 +14,7 @@ struct SegmentJob {
     std::vector<std::string> images;  ///< none: points alone; several: the frames of a time-lapse
     ImageFlags image;
     PointFlags points;
+    ContourFlags contours;
     CloudFlags cloud;
     DomainFlags domain;
     TagFlags tag;

@@ -2,6 +2,7 @@
 #include <string>
 #include <vector>
 
+#include "covol/contours.h"
 #include "covol/domain.h"
 #include "covol/image.h"
 #include "covol/mesh.h"
@@ -65,6 +66,8 @@ struct TagDistanceChoice {
 [[nodiscard]] FloatGridPtr start_from_mesh(const Domain& domain, const TriangleMesh& mesh, const RunContext& run = {});
 /// Voxels of the mask above 0 are inside.
 [[nodiscard]] FloatGridPtr start_from_mask(const Domain& domain, const Image& mask, const RunContext& run = {});
+/// The body between closed contours.
+[[nodiscard]] FloatGridPtr start_from_contours(const Domain& domain, const ContourSolid& solid, const RunContext& run = {});
 /// Any level-set-like grid (negative inside), resampled onto the domain.
 [[nodiscard]] FloatGridPtr start_from_grid(const Domain& domain, const FloatGrid& level_set, const RunContext& run = {});
 

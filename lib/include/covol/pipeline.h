@@ -1,10 +1,12 @@
 #pragma once
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "covol/band.h"
+#include "covol/contours.h"
 #include "covol/edge.h"
 #include "covol/evolve.h"
 #include "covol/image.h"
@@ -29,6 +31,10 @@ struct SegmentOptions {
     std::optional<WorldBox> roi;        ///< the domain, instead of the image's box
     double margin = 0.0;                ///< points alone: between points and domain boundary; 0 picks D + 6 voxels
     Start start;
+    /// Marks on slices, densified with step h: their points join the others, those between the slices as guesses. With
+    /// closed contours the start `Tag` is the body that they enclose, unless other points lie far from it or an exterior
+    /// seed lies inside it: then all points are tagged, and each hole that inner contours leave is an exterior seed.
+    std::shared_ptr<const Contours> contours;
     double tag_distance = 0.0;          ///< D; 0: automatic
     std::vector<Vec3> exterior_seeds;
     EdgeOptions edge;
@@ -54,7 +60,8 @@ struct SegmentReport {
     std::vector<CoarseLevel> coarse;  ///< the coarsest first
     Domain domain;
     std::int64_t active_voxels = 0, leaf_count = 0;
-    std::size_t point_count = 0, densified = 0;
+    std::size_t point_count = 0;        ///< given, marks of contours included
+    std::size_t densified = 0;          ///< points made from contours
     TagDistanceChoice tag;
     BandReport band;
     EdgeReport edge;

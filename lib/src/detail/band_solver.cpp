@@ -53,6 +53,22 @@ HaloField gather_field(const LeafBand& band, const FloatGrid& grid, Convert conv
     });
 }
 
+// The points' potential in voxels, weakened where no sure point is near. It is the potential that takes the weight, not
+// its slope: beside the points, where d is small, the two are alike.
+HaloField gather_potential(const LeafBand& band, const EvolveFields& fields, const Taper& taper, double guess_weight, double h) {
+    const FloatGrid* sure = guess_weight < 1.0 ? fields.sure : nullptr;
+    if (sure == nullptr) return gather_field(band, *fields.distance, [&](float d) { return taper.potential(d) / h; });
+    return gather(band, *fields.distance, false, [&](const LeafNode* leaf, float, float* block) {
+        const LeafNode* near = leaf != nullptr ? sure->tree().probeConstLeaf(leaf->origin()) : nullptr;
+        for (int n = 0; n < kLeafSize; ++n) {
+            const double closeness = near != nullptr && near->isValueOn(n) ? taper(near->getValue(n)) : 0.0;
+            const double weight = guess_weight + (1.0 - guess_weight) * closeness;
+            block[n] = leaf != nullptr && leaf->isValueOn(n) ? static_cast<float>(weight * taper.potential(leaf->getValue(n)) / h)
+                                                             : kUnknown;
+        }
+    });
+}
+
 void check_finite(const LeafBand& band, const HaloField& field, const char* what) {
     const std::size_t none = band.size();
     const std::size_t first = tbb::parallel_reduce(
@@ -139,15 +155,16 @@ void BandSolver::gather_fields(const EvolveFields& fields) {
     const Taper taper{options_.attraction_range};
     if (options_.theta > 0) {
         const double h = domain_.voxel_size;
-        phi_ = gather_field(band_, *fields.distance, [&](float d) { return taper.potential(d) / h; });
+        phi_ = gather_potential(band_, fields, taper, options_.guess_weight, h);
         check_finite(band_, *phi_, "distance");
     }
     if (options_.rho > 0) {
         edge_ = gather_field(band_, *fields.edge, [](float g) { return g; });
         check_finite(band_, *edge_, "edge");
     }
-    if (options_.rho > 0 && options_.image_yields > 0 && fields.distance != nullptr)
-        image_weight_ = gather(band_, *fields.distance, false, [&](const LeafNode* leaf, float, float* block) {
+    const FloatGrid* sure = fields.sure != nullptr ? fields.sure : fields.distance;
+    if (options_.rho > 0 && options_.image_yields > 0 && sure != nullptr)
+        image_weight_ = gather(band_, *sure, false, [&](const LeafNode* leaf, float, float* block) {
             for (int n = 0; n < kLeafSize; ++n)  // far from every mark where the distance is not known
                 block[n] = leaf != nullptr && leaf->isValueOn(n)
                                ? static_cast<float>(1.0 - options_.image_yields * taper(leaf->getValue(n)))

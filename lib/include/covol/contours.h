@@ -1,0 +1,86 @@
+#pragma once
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "covol/domain.h"
+#include "covol/image.h"
+#include "covol/points.h"
+#include "covol/run.h"
+
+namespace covol {
+
+enum class ContourCurve {
+    Lines,  ///< neighbouring marks are joined by straight lines
+    Spline  ///< by a centripetal Catmull-Rom curve through them (Yuksel, Schaefer, Keyser 2011)
+};
+
+struct ContourOptions {
+    double step = 0.0;  ///< largest distance between neighbouring points, world units, > 0; the voxel size h
+    ContourCurve curve = ContourCurve::Lines;
+    [[nodiscard]] std::string why_invalid() const;
+};
+
+/// The body that closed contours on parallel slices enclose: shape-based interpolation.
+///
+/// On each slice the even-odd rule over all of its closed contours says what is inside (an inner contour makes a hole),
+/// and the slice carries the signed distance to its contours within the plane. Between two slices these fields are
+/// interpolated (Raya and Udupa, IEEE TMI 9, 1990) by cubics (Herman, Zheng and Bucholtz, IEEE CG&A 12, 1992) that do
+/// not overshoot, so a hole or a part that the next slice lacks ends in between. Where two single contours do not
+/// overlap at all, they are carried along the line between their centroids. Beyond the first and the last slice the
+/// body ends in a dome, a paraboloid over a disc; see cap_height().
+class ContourSolid {
+public:
+    struct Data;
+    explicit ContourSolid(std::shared_ptr<const Data> data);
+
+    /// Negative inside; a signed distance within the plane on a slice, of the same order elsewhere (world units).
+    [[nodiscard]] double level(const Vec3& world) const;
+    /// False only where the surface does not meet the ball.
+    [[nodiscard]] bool may_meet(const Vec3& center, double radius) const;
+    /// Holds the body.
+    [[nodiscard]] WorldBox box() const;
+    /// Points of the surface between the slices and on the domes, in world units; one for each lattice line of the
+    /// slices' grid that crosses the surface along the axis which its normal is closest to.
+    [[nodiscard]] std::vector<Vec3> surface_points(double step, const RunContext& run = {}) const;
+    /// One position deep inside each hole of each slice.
+    [[nodiscard]] std::vector<Vec3> hole_seeds() const;
+
+private:
+    std::shared_ptr<const Data> data_;
+};
+
+/// The height of the dome beyond the last slice: where a cross-section that goes on to shrink as between the last two
+/// slices would vanish (in area, which is linear near the pole of an ellipsoid), but not beyond the next slice that
+/// could have been marked. Where the section does not shrink the dome reaches that one: it holds half a slice.
+/// @param area, before  of the last slice and of the one before it, 0 when there is none
+/// @param distance      between those two
+/// @param gap           usual distance between marked slices
+[[nodiscard]] double cap_height(double area, double before, double distance, double gap);
+
+/// Marks on slices, made dense enough to hold a level set.
+struct Contours {
+    std::vector<Vec3> marks;    ///< as they were clicked, world units
+    std::vector<Vec3> along;    ///< on the lines through them, the marks included
+    std::vector<Vec3> between;  ///< on the interpolated surface between slices and on the caps: a guess
+    std::shared_ptr<const ContourSolid> solid;  ///< null without a closed contour
+    std::size_t closed = 0, open = 0;           ///< lines
+    std::size_t slices = 0;     ///< with closed contours
+    double slice_distance = 0;  ///< between neighbouring ones of them, the median; world units
+    std::string summary;        ///< one line for people
+};
+
+/// Joins and densifies the lines of one or several clouds (several belong to one structure), and closes what lies
+/// between the slices.
+///
+/// The plane of a line is found from its marks: an index coordinate that is constant along it. The body is built from
+/// the plane with the most marks; lines in other planes, and open lines, are joined along themselves only. Points that
+/// belong to no line count as marks. A closed line of fewer than three distinct marks is taken as open.
+/// @param geometry  of the image; null: the clouds are in world units and the slices lie across a world axis.
+/// @throws Error InvalidOptions; InvalidInput (no line; a line in none of the planes; a line outside the image: both
+///         name it).
+[[nodiscard]] Contours densify(const std::vector<PointCloud>& clouds, const ImageGeometry* geometry,
+                               const ContourOptions& options, const RunContext& run = {});
+
+}  // namespace covol

@@ -1,0 +1,31 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <vector>
+
+namespace covol::detail {
+
+using Vec2 = std::array<double, 2>;
+using Polygon = std::vector<Vec2>;  ///< closed: the last vertex joins the first
+
+/// A lattice in a plane: node (i,j) at origin + cell * (i,j).
+struct SliceGrid {
+    Vec2 origin{0, 0};
+    double cell = 1;
+    int nx = 0, ny = 0;
+    [[nodiscard]] std::size_t size() const { return std::size_t(nx) * std::size_t(ny); }
+};
+
+/// Signed distance to the polygons at the grid's nodes (i fastest), negative where the even-odd rule over all of them
+/// says inside. Exact beside the polygons; elsewhere the distance to the nearest edge that two sweeps over the grid
+/// found, which is the nearest one nearly everywhere.
+[[nodiscard]] std::vector<float> signed_distance_of_polygons(const std::vector<Polygon>& polygons, const SliceGrid& grid);
+
+/// Bilinear; beyond the grid the value at its border plus the distance to it.
+[[nodiscard]] double sample_slice(const std::vector<float>& values, const SliceGrid& grid, double x, double y);
+
+/// Area by the shoelace formula, and the centroid; a polygon without area has its vertices' mean.
+struct PolygonMoments { double area = 0; Vec2 centroid{0, 0}; };
+[[nodiscard]] PolygonMoments moments(const Polygon& polygon);
+
+}  // namespace covol::detail
