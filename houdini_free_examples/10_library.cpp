@@ -26,8 +26,9 @@ int main(int argc, char** argv) {
     try {
         // Files. Points become world positions; those outside the image are an error that says what would help.
         const covol::Image image = covol::read_image(argv[1]);
-        std::vector<covol::Vec3> points = covol::to_world(covol::read_points(argv[2]), &image.geometry());
-        covol::check_inside(points, image.geometry(), argv[2]);
+        const covol::PointCloud cloud = covol::read_points(argv[2]);
+        covol::check_inside(cloud, image.geometry());
+        std::vector<covol::Vec3> points = covol::to_world(cloud, &image.geometry());
 
         // The domain: isotropic voxels over the image's box. Every grid below shares its transform.
         const auto& spacing = image.geometry().spacing;
