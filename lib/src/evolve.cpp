@@ -34,6 +34,12 @@ double follow_clamp(const EvolveOptions& options) {
     return options.rho > 0 ? kHalfWidthVoxels : detail::kFollowWidth;
 }
 
+bool has_active(const FloatGrid& u) {
+    for (auto leaf = u.tree().cbeginLeaf(); leaf; ++leaf)
+        if (!leaf->isEmpty()) return true;
+    return false;
+}
+
 class Evolver {
 public:
     Evolver(FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options, const RunContext& run)
@@ -67,6 +73,10 @@ public:
                 break;
             }
             const double settled = options_.follow ? follow(motion.mean) : stay(motion.mean);
+            if (!solver_) {
+                report_.stop_reason = StopReason::Vanished;
+                return report_;
+            }
             if (settled < options_.tolerance * tau_) {
                 report_.stop_reason = StopReason::Steady;
                 break;
@@ -142,14 +152,16 @@ private:
         return crossings > 0 ? way / crossings : 0.0;
     }
 
+    // Leaves no solver where no surface is left.
     void remake_band(const std::vector<std::size_t>& left) {
         std::vector<detail::Coord> stale;
         for (const std::size_t leaf : left) stale.push_back(solver_->band().origin(leaf));
         solver_->store(u_);
         const std::vector<detail::Coord> changed = detail::follow_surface_near(stale, u_, domain_, follow_clamp(options_));
-        if (fields_.extend) fields_.extend(u_, fields_);
+        if (fields_.extend && has_active(u_)) fields_.extend(u_, fields_);
         const detail::BandSolver::Rest rest = solver_->take_rest();
         solver_.reset();  // its memory first
+        if (!has_active(u_)) return;
         solver_ = std::make_unique<detail::BandSolver>(u_, fields_, options_, domain_);
         solver_->sleep_on(rest, changed);
         const detail::LeafBand& band = solver_->band();

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <sstream>
+#include <utility>
 
 #include "covol/compare.h"
 #include "covol/distance.h"
@@ -45,6 +46,7 @@ constexpr double kLeastCoarseSigma = 0.5;
 constexpr double kLeastCoarseAttraction = 3.0;
 constexpr double kCoarseTolerance = 5e-3;
 constexpr double kStepBack = 2.0;
+constexpr int kLeastCoarsened = 64;           // of h: a smaller domain has little to gain, and thin things to lose
 constexpr int kRefinedReachVoxels = 4;        // of h: after a coarse level the surface does not move far
 
 std::string number(double value) {
@@ -89,6 +91,9 @@ bool covers(const FloatGrid& field, const FloatGrid& u) {
     }
     return true;
 }
+
+/// Where the way to the surface may be long: tagging and a result of another run end beside it.
+bool knows_nothing(Start::Kind kind) { return kind == Start::Kind::Sphere || kind == Start::Kind::Box; }
 
 FloatGridPtr read_level_set(const std::string& path) {
     const FloatGridPtr grid = read_solid(path).level_set;
@@ -419,7 +424,8 @@ private:
     // The way from the start is long in voxels of h. In voxels of 2h a step costs a quarter and goes twice as far; what is
     // left to do at h is near the surface that the coarse level finds.
     void start_from_coarse() {
-        if (options_.coarse_levels <= 0 || hold_ || from_body_) return;
+        if (options_.coarse_levels < 0) options_.coarse_levels = knows_nothing(options_.start.kind) && is_large() ? 1 : 0;
+        if (options_.coarse_levels == 0 || hold_ || from_body_) return;
         SegmentOptions options = options_;
         options.voxel_size = kRefinement * h();
         options.coarse_levels = options_.coarse_levels - 1;
@@ -441,9 +447,17 @@ private:
             run_.info("coarse level " + number(coarse_h) + " left out: " + why_not);
             return;
         }
+        uncoarsened_ = result_.u;
+        uncoarsened_edge_ = options_.edge;
         result_.u = start_from_grid(report().domain, *coarse.result_.u, run_);
         options_.evolve.follow = true;
-        is_refined_ = true;
+    }
+
+    [[nodiscard]] bool is_large() const {
+        const Domain& d = result_.report.domain;
+        int least = d.max[0] - d.min[0];
+        for (int a = 1; a < 3; ++a) least = std::min(least, d.max[a] - d.min[a]);
+        return least >= kLeastCoarsened;
     }
 
     /// The flow from `start`, a level set on a finer lattice. @return empty, or why its result is of no use
@@ -502,7 +516,7 @@ private:
         options_.edge.high = e.high;
     }
 
-    [[nodiscard]] int edge_reach() const { return is_refined_ ? kRefinedReachVoxels : from_body_ ? kBodyReachVoxels : kEdgeReachVoxels; }
+    [[nodiscard]] int edge_reach() const { return uncoarsened_ ? kRefinedReachVoxels : from_body_ ? kBodyReachVoxels : kEdgeReachVoxels; }
 
     void extend(const FloatGrid& u, EvolveFields& fields) {
         if (fields.edge == nullptr || covers(*fields.edge, u)) return;
@@ -513,6 +527,14 @@ private:
 
     void solve() {
         flow();
+        if (uncoarsened_ && report().solve.stop_reason == StopReason::Vanished) {
+            report().coarse.back().why_not = "the surface vanished after it";
+            run_.info("coarse level left out: " + report().coarse.back().why_not);
+            result_.u = std::exchange(uncoarsened_, nullptr);
+            options_.edge = uncoarsened_edge_;
+            find_edges();
+            flow();
+        }
         run_.check();
         result_.u->setName("u");
         const EvolveReport& solved = report().solve;
@@ -533,9 +555,14 @@ private:
         {
             Timed timed(report().seconds.solve);
             const double edge_before = report().seconds.edge;
+            EvolveReport& solved = report().solve;
             const EvolveReport before = approach(fields);
-            report().solve = hold_ ? evolve_held(fields) : evolve(*result_.u, fields, options_.evolve, run_);
-            add(before, report().solve);
+            if (before.stop_reason == StopReason::Vanished) {
+                solved = before;
+            } else {
+                solved = hold_ ? evolve_held(fields) : evolve(*result_.u, fields, options_.evolve, run_);
+                add(before, solved);
+            }
             report().seconds.solve -= report().seconds.edge - edge_before;
         }
         report().active_voxels = report().solve.active_voxels;
@@ -587,7 +614,7 @@ private:
 
     // Edges of other structures lie between the tagged surface and the points: with an image the points pull alone first.
     EvolveReport approach(EvolveFields fields) {
-        if (from_body_ || options_.start.kind != Start::Kind::Tag || is_refined_ || !uses_points() || !uses_image()) return {};
+        if (from_body_ || options_.start.kind != Start::Kind::Tag || uncoarsened_ || !uses_points() || !uses_image()) return {};
         EvolveOptions alone = options_.evolve;
         alone.rho = 0;
         alone.attraction_range = 0;
@@ -642,7 +669,8 @@ private:
     SegmentOptions options_;
     const RunContext& run_;
     SegmentResult result_;
-    bool is_refined_ = false;  // u comes from a coarse level
+    FloatGridPtr uncoarsened_;  ///< the start, where u comes from a coarse level instead
+    EdgeOptions uncoarsened_edge_;
 };
 
 }  // namespace

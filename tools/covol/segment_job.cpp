@@ -74,10 +74,10 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
         ->type_name("START")
         ->default_str("tag");
     domain.bind(command, !with_image);
-    command.add_option("--coarse-levels", coarse_levels, "levels of twice the voxel size, and so on, that the flow passes first; 0: none")
+    command.add_option("--coarse-levels", coarse_levels, "levels of twice the voxel size, and so on, that the flow passes first; auto: 1 for a sphere or a box, else 0")
         ->check(CLI::Range(0, 4).description(""))
         ->type_name("N")
-        ->capture_default_str();
+        ->default_str("auto");
     add_length(command, "--min-component", min_component, "", "drop pieces of the mesh smaller than a cube of this edge");
     command.add_flag("--half", half, "store values in .vdb files as 16-bit floats");
     mesh.bind(command);

@@ -42,7 +42,7 @@ struct SegmentOptions {
     /// 5 voxels after the other starts. Their `follow` is set by the pipeline too.
     EvolveOptions evolve = automatic_evolve();
     ExtractOptions extract;
-    int coarse_levels = 1;  ///< levels of voxel size 2h, 4h, ... that the flow passes first; >= 0
+    int coarse_levels = -1;  ///< levels of voxel size 2h, 4h, ... that the flow passes first; -1: 1 for a sphere or a box, else 0
     [[nodiscard]] std::string why_invalid() const;
 
     /// EvolveOptions with an automatic attraction range.
