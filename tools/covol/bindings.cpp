@@ -250,14 +250,4 @@ WriteMeshOptions MeshFlags::options(const Session& session) const {
 
 bool is_float_grid(const VdbGridInfo& grid) { return grid.type == "Tree_float_5_4_3"; }
 
-FloatGridPtr read_level_set(const std::string& path) {
-    std::string first;
-    for (const VdbGridInfo& grid : list_vdb(path)) {
-        if (!is_float_grid(grid)) continue;
-        if (grid.name == "surface") return read_vdb(path, "surface");
-        if (first.empty() && grid.grid_class == "level set") first = grid.name;
-    }
-    return read_vdb(path, first);
-}
-
 }  // namespace covol::tool
