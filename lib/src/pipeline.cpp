@@ -448,6 +448,7 @@ private:
             run_.info("coarse level " + number(coarse_h) + " left out: " + why_not);
             return;
         }
+        Timed timed(report().seconds.coarse);
         uncoarsened_ = result_.u;
         uncoarsened_edge_ = options_.edge;
         result_.u = start_from_grid(report().domain, *coarse.result_.u, run_);
