@@ -1,4 +1,5 @@
 #pragma once
+#include <cstdint>
 #include <vector>
 
 #include "covol/domain.h"
@@ -17,8 +18,9 @@ class LocalDistance {
 public:
     static constexpr std::size_t kCuts = 3 * kLeafSize;  ///< floats for each leaf
     struct Scratch {
-        float* cuts;       ///< kCuts for each leaf
+        float* cuts;       ///< kCuts for each leaf to compute
         float* distances;  ///< kLeafSize for each leaf
+        const std::uint32_t* place = nullptr;  ///< of a leaf among `cuts`; null: the leaf's own number
     };
 
     /// @param u        in voxels; blocks beyond the band say nothing of distances
@@ -34,10 +36,12 @@ public:
     [[nodiscard]] const float* distance(std::size_t leaf) const { return scratch_.distances + leaf * kLeafSize; }
     /// The same, but next to the surface |u| is only scaled: by one factor for a voxel and those across the edges that the
     /// surface cuts, so that it hardly moves (D. Hartmann, M. Meinke, W. Schroeder 2010, scheme CR-1).
-    [[nodiscard]] const float* settled(std::size_t leaf) const { return scratch_.cuts + leaf * kCuts; }
+    [[nodiscard]] const float* settled(std::size_t leaf) const { return cut(leaf); }
 
 private:
-    [[nodiscard]] float* cut(std::size_t leaf) { return scratch_.cuts + leaf * kCuts; }
+    [[nodiscard]] float* cut(std::size_t leaf) const {
+        return scratch_.cuts + (scratch_.place != nullptr ? scratch_.place[leaf] : leaf) * kCuts;
+    }
     [[nodiscard]] float* distances(std::size_t leaf) { return scratch_.distances + leaf * kLeafSize; }
     void start(std::size_t leaf);
     void load_distance(std::size_t leaf, float* out) const;
