@@ -157,11 +157,11 @@ private:
         std::vector<detail::Coord> stale;
         for (const std::size_t leaf : left) stale.push_back(solver_->band().origin(leaf));
         solver_->store(u_);
-        const std::vector<detail::Coord> changed = detail::follow_surface_near(stale, u_, domain_, follow_clamp(options_));
-        if (fields_.extend && has_active(u_)) fields_.extend(u_, fields_);
         const detail::BandSolver::Rest rest = solver_->take_rest();
         solver_.reset();  // its memory first
+        const std::vector<detail::Coord> changed = detail::follow_surface_near(stale, u_, domain_, follow_clamp(options_));
         if (!has_active(u_)) return;
+        if (fields_.extend) fields_.extend(u_, fields_);
         solver_ = std::make_unique<detail::BandSolver>(u_, fields_, options_, domain_);
         solver_->sleep_on(rest, changed);
         const detail::LeafBand& band = solver_->band();

@@ -2,6 +2,7 @@
 
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Morphology.h>
+#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <chrono>
@@ -447,6 +448,7 @@ private:
             run_.info("coarse level " + number(coarse_h) + " left out: " + why_not);
             return;
         }
+        Timed timed(report().seconds.coarse);
         uncoarsened_ = result_.u;
         uncoarsened_edge_ = options_.edge;
         result_.u = start_from_grid(report().domain, *coarse.result_.u, run_);
@@ -643,17 +645,23 @@ private:
         result_.mesh = extract_mesh(*result_.surface, options_.extract, run_);
         report().surface = measure(result_.mesh);
         if (points_.empty()) return;
-        report().fit = points_to_surface(options_.contours ? given_ : marks_, result_.mesh, run_);
-        if (image_ == nullptr) find_bare_surface();
+        // Most of the fit is the making of a search tree, on one thread.
+        double reach = 0;
+        tbb::parallel_invoke([&] { report().fit = points_to_surface(options_.contours ? given_ : marks_, result_.mesh, run_); },
+                             [&] { if (image_ == nullptr) reach = find_bare_surface(); });
+        if (report().share_without_points > kWarnWithoutPoints)
+            run_.warn(number(std::round(1000 * report().share_without_points) / 10) + " % of the surface lie farther than " +
+                      number(reach) + " from every point: there curvature alone closes it");
     }
 
-    void find_bare_surface() {
+    /// @return what counts as far
+    double find_bare_surface() {
+        RunContext quiet;  // beside another task nothing may be reported
+        quiet.threads = run_.threads;
+        quiet.cancel = run_.cancel;
         const double reach = kFarFromPoints * std::max(h(), nearest_neighbour_spacing(points_).median);
-        const double share = share_without_points(result_.mesh, points_, reach, run_);
-        report().share_without_points = share;
-        if (share > kWarnWithoutPoints)
-            run_.warn(number(std::round(1000 * share) / 10) + " % of the surface lie farther than " + number(reach) +
-                      " from every point: there curvature alone closes it");
+        report().share_without_points = share_without_points(result_.mesh, points_, reach, quiet);
+        return reach;
     }
 
     const Image* image_;

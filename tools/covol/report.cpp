@@ -45,6 +45,12 @@ Json to_json(const EvolveReport& r) {
             {"seconds_sweeps", r.seconds_sweeps}};
 }
 
+Json to_json(const SegmentReport::CoarseLevel& level) {
+    Json json{{"voxel_size", level.voxel_size}, {"steps", level.steps}, {"active_voxels", level.active_voxels}};
+    if (!level.why_not.empty()) json["left_out"] = level.why_not;
+    return json;
+}
+
 Json to_json(const MeshMeasures& m) {
     return {{"volume", m.volume}, {"area", m.area},     {"components", m.components},
             {"genus", m.genus},   {"closed", m.closed}, {"manifold", m.manifold}};
@@ -94,6 +100,7 @@ Json to_json(const SegmentReport& r) {
                     {"domain", to_json(r.domain)}};
     if (r.band.tag_distance > 0) json["band"] = to_json(r.band);
     if (r.edge.edge_k > 0) json["edge"] = to_json(r.edge);
+    for (const auto& level : r.coarse) json["coarse"].push_back(to_json(level));
     json["solve"] = to_json(r.solve);
     json["surface"] = to_json(r.surface);
     if (r.point_count > 0) json["fit"]["points_to_surface"] = to_json(r.fit);

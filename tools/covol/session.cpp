@@ -6,6 +6,7 @@
 
 #include "arguments.h"
 #include "covol/error.h"
+#include "profile.h"
 
 namespace covol::tool {
 namespace {
@@ -109,6 +110,7 @@ Session::Session() : app_("covol: segment 3D images with the help of a point clo
 
 void Session::add_common_flags() {
     app_.add_option("--threads", threads_, "threads to use, 0 takes every core");
+    app_.add_flag("--profile", profile_, "print at the end where time and memory went");
     app_.add_flag("--quiet", quiet_, "print nothing but results, warnings and errors");
     app_.add_option("--json", json_path_, "write the report to this file, - is standard output")->type_name("FILE|-");
     app_.add_option("--memory-limit", memory_limit_text_, "stop when more memory is needed, 8G for example")
@@ -208,6 +210,8 @@ void Session::finish() {
         throw;
     }
     for (const std::string& path : outputs_.written()) note("wrote " + path);
+    if (profile_)
+        for (const std::string& line : profile_lines(report_)) progress_->line(line);
     progress_->clear();
 }
 

@@ -80,7 +80,7 @@ private:
     const CLI::App* command_ = nullptr;
 
     int threads_ = 0;
-    bool quiet_ = false;
+    bool quiet_ = false, profile_ = false;
     std::string json_path_, save_config_path_, memory_limit_text_;
     std::uint64_t memory_limit_ = 0;
 

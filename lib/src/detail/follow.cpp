@@ -35,13 +35,18 @@ std::vector<Coord> follow_surface_near(const std::vector<Coord>& stale, FloatGri
     const std::vector<Coord> changed = dilate_leaves(stale, 1, domain);
     const LeafBand region(dilate_leaves(stale, 2, domain));
     std::vector<unsigned char> zone(region.size());
-    for (std::size_t leaf = 0; leaf < region.size(); ++leaf)
+    std::vector<std::uint32_t> place(region.size());
+    std::uint32_t zone_size = 0;
+    for (std::size_t leaf = 0; leaf < region.size(); ++leaf) {
         zone[leaf] = std::binary_search(changed.begin(), changed.end(), region.origin(leaf));
+        place[leaf] = zone_size;
+        zone_size += zone[leaf];
+    }
     const HaloField values = gather(region, u, false, [h](const LeafNode* leaf, float tile, float* block) {
         for (int n = 0; n < kLeafSize; ++n) block[n] = (leaf != nullptr ? leaf->getValue(n) : tile) / h;
     });
-    std::vector<float> scratch(region.size() * LocalDistance::kScratch);
-    LocalDistance local(region, values, zone, domain, limit, kWidth, {scratch.data()});
+    std::vector<float> cuts(zone_size * LocalDistance::kCuts), distances(region.size() * kLeafSize);
+    LocalDistance local(region, values, zone, domain, limit, kWidth, {cuts.data(), distances.data(), place.data()});
     local.compute();
 
     std::vector<LeafNode*> nodes(region.size(), nullptr);

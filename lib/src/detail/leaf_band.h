@@ -1,6 +1,6 @@
 #pragma once
 #include <openvdb/openvdb.h>
-#include <tbb/cache_aligned_allocator.h>
+#include <tbb/parallel_for.h>
 
 #include <array>
 #include <cstddef>
@@ -9,6 +9,7 @@
 
 #include "covol/domain.h"
 #include "covol/fwd.h"
+#include "detail/large_allocator.h"
 
 namespace covol::detail {
 
@@ -79,7 +80,9 @@ class LeafArray {
 public:
     LeafArray() = default;
     LeafArray(std::size_t leaves, T fill, std::size_t extra = 1)
-        : leaves_(leaves), values_((leaves + extra) * kLeafSize, fill) {}
+        : leaves_(leaves), values_((leaves + extra) * kLeafSize) {
+        tbb::parallel_for(std::size_t(0), blocks(), [&](std::size_t block) { fill_block(block, fill); });
+    }
     [[nodiscard]] T* leaf(std::size_t i) { return values_.data() + i * kLeafSize; }
     [[nodiscard]] const T* leaf(std::size_t i) const { return values_.data() + i * kLeafSize; }
     [[nodiscard]] std::size_t leaves() const noexcept { return leaves_; }
@@ -91,7 +94,7 @@ public:
 
 private:
     std::size_t leaves_ = 0;
-    std::vector<T, tbb::cache_aligned_allocator<T>> values_;
+    std::vector<T, LargeAllocator<T>> values_;
 };
 
 /// Copies grid values (active and inactive) of every leaf; leaves that the grid lacks get the tile's value there.
