@@ -95,10 +95,10 @@ double relax_heat(float* values, const float* before, float t, float omega, cons
     const detail::SchemeKernels& kernels = detail::kernels();
     if (!bounds.cuts()) return kernels.heat(values, before, t, omega, kInnerSweeps);
     static constexpr std::array<unsigned long long, 8> kAll = {~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL};
-    alignas(64) float rows[6 * kLeafSize];
-    std::fill(std::begin(rows), std::end(rows), t / (1.0F + 6.0F * t));
+    alignas(64) detail::Share rows[6 * kLeafSize];
+    std::fill(std::begin(rows), std::end(rows), static_cast<detail::Share>(detail::kShareUnit * t / (1.0F + 6.0F * t) + 0.5F));
     detail::close_faces(rows, bounds.lo, bounds.hi);
-    return kernels.relax(values, before, rows, kAll.data(), omega, kInnerSweeps);
+    return kernels.relax(values, before, rows, kAll.data(), omega, kInnerSweeps, {});
 }
 
 // I_t = ΔI over time σ²/2 by implicit steps.

@@ -28,7 +28,8 @@ constexpr std::array<unsigned long long, 8> kEveryVoxel = {kAll, kAll, kAll, kAl
 struct Cube {
     LeafBand band;
     HaloField u, phi, edge;
-    Leaves previous, rows, out;
+    Leaves previous, out;
+    LeafArray<Share> rows;
 
     explicit Cube(int side) {
         std::vector<Coord> origins;
@@ -45,7 +46,7 @@ struct Cube {
         phi = field([=](const Coord& x) { return std::abs(radius(x) - 0.6 * middle); });
         edge = field([](const Coord& x) { return 0.5 + 0.4 * std::sin(0.3 * (x.x() + x.y() - x.z())); });
         previous = u.values;
-        rows = Leaves(6 * band.size(), 0.1F, 0);
+        rows = LeafArray<Share>(6 * band.size(), Share(kShareUnit / 10), 0);
         out = Leaves(band.size(), 0.0F, 0);
     }
 
@@ -61,7 +62,7 @@ struct Cube {
         });
         return f;
     }
-    [[nodiscard]] float* rows_of(std::size_t leaf) { return rows.leaf(6 * leaf); }
+    [[nodiscard]] Share* rows_of(std::size_t leaf) { return rows.leaf(6 * leaf); }
 };
 
 /// Made once: what a kernel takes does not depend on the values that others left.
@@ -95,7 +96,7 @@ void relax(const SchemeKernels& kernels, Cube& cube, std::size_t leaf) {
     load_star(cube.u, leaf, u);
     // also returns the residual that the first sweep saw
     benchmark::DoNotOptimize(
-        kernels.relax(u, cube.previous.leaf(leaf), cube.rows_of(leaf), kEveryVoxel.data(), 1.5F, inner));
+        kernels.relax(u, cube.previous.leaf(leaf), cube.rows_of(leaf), kEveryVoxel.data(), 1.5F, inner, {}));
     store_inner(u, cube.u.values.leaf(leaf));
 }
 
@@ -122,7 +123,7 @@ struct Kernel {
     double bytes;  // read and written for a voxel, once each
 };
 
-constexpr double kFloat = sizeof(float), kRows = 6 * kFloat;
+constexpr double kFloat = sizeof(float), kRows = 6 * sizeof(Share);
 constexpr Kernel kKernels[] = {
     {"assemble", assemble, 3 * kFloat + kFloat + kRows},  // u, phi, edge; u before; rows
     {"relax_1", relax<1>, 2 * kFloat + kRows + kFloat},   // u, u before, rows; u

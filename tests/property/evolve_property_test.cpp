@@ -58,6 +58,9 @@ TEST_CASE("min u0 <= u <= max u0 for every time step") {
         }
 }
 
+// Sums in another order may round a coefficient (16 bits) to the next unit.
+constexpr double kRounding = 4e-4;  // h
+
 TEST_CASE("evolve() is the dense reference on random fields") {
     double worst = 0;
     for (std::uint32_t seed = 1; seed <= 8; ++seed) {
@@ -91,7 +94,7 @@ TEST_CASE("mirrored and axis-permuted fields give mirrored and permuted results"
         const double difference = max_difference(run_evolve(moved, 3), symmetry(expected)) / kH;
         INFO("seed " << seed << ", axes " << symmetry.axis[0] << symmetry.axis[1] << symmetry.axis[2] << ", flips "
                      << symmetry.flip[0] << symmetry.flip[1] << symmetry.flip[2]);
-        CHECK(difference < 2e-4);
+        CHECK(difference < kRounding);
     }
 }
 
@@ -106,7 +109,7 @@ TEST_CASE("a shift by whole voxels shifts the result, wherever the leaves begin"
             moved.domain.max[a] += shift * (a + 1);
         }
         INFO("seed " << seed << ", shift " << shift);
-        CHECK(max_difference(run_evolve(moved, 3), expected) / kH < 2e-4);
+        CHECK(max_difference(run_evolve(moved, 3), expected) / kH < kRounding);
     }
 }
 

@@ -267,7 +267,7 @@ TEST_CASE("Neumann: a plane that meets the boundary stays a plane") {
             on_axis[axis] = Index3{i, j, k}[axis];
             bent = std::max(bent, std::abs(u.at(i, j, k) - u.at(on_axis[0], on_axis[1], on_axis[2])));
         });
-        CHECK(bent < 1e-5 * kH);
+        CHECK(bent < 1e-4 * kH);  // coefficients are rounded to 16 bits
     }
 }
 

@@ -83,6 +83,13 @@ Rows plain_row(const Padded& u, const Padded* phi, const Padded* g, const Scheme
     return row;
 }
 
+/// A leaf's rows from the kernel, and as fractions.
+struct LeafRows {
+    std::vector<Share> shares = std::vector<Share>(6 * 512);
+    [[nodiscard]] double operator()(int f, int n) const { return double(shares[share_at(f, n)]) / kShareUnit; }
+    [[nodiscard]] Share* data() { return shares.data(); }
+};
+
 constexpr std::array<unsigned long long, 8> kAllActive = {~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL};
 const SchemeConstants kConstants{1.0F, 0.9F, 0.7F, 5.0F, 1e-4F, 1e-4F};
 
@@ -92,15 +99,15 @@ TEST_CASE("coefficients are those of the scheme, on every instruction set") {
     const Padded u = random_field(1, -3, 3), phi = random_field(2, 0, 6), g = random_field(3, 0.1, 1);
     for (const SchemeKernels* set : available_kernels()) {
         INFO(set->name);
-        std::vector<float> c(6 * 512);
+        LeafRows c;
         const float largest = set->assemble(u.data(), phi.data(), g.data(), nullptr, kAllActive.data(), kConstants, c.data());
         double worst = 0.0, largest_plain = 0.0;
         for (int n = 0; n < 512; ++n) {
             const Rows row = plain_row(u, &phi, &g, kConstants, n >> 6, n >> 3 & 7, n & 7);
             largest_plain = std::max(largest_plain, row.sum);
-            for (int f = 0; f < 6; ++f) worst = std::max(worst, std::abs(row.c[f] - c[f * 512 + n]));
+            for (int f = 0; f < 6; ++f) worst = std::max(worst, std::abs(row.c[f] - c(f, n)));
         }
-        CHECK(worst < 2e-6);
+        CHECK(worst < 0.5 / kShareUnit + 2e-6);
         CHECK(largest == Approx(largest_plain).epsilon(1e-5));
     }
 }
@@ -111,13 +118,13 @@ TEST_CASE("coefficients are never negative and a row adds up to less than one") 
         for (const float tau : {1e-3F, 1.0F, 100.0F}) {
             SchemeConstants constants = kConstants;
             constants.tau = tau, constants.curvature = 5.0F * tau;
-            std::vector<float> c(6 * 512);
+            LeafRows c;
             set->assemble(u.data(), phi.data(), g.data(), nullptr, kAllActive.data(), constants, c.data());
             for (int n = 0; n < 512; ++n) {
                 double sum = 0.0;
                 for (int f = 0; f < 6; ++f) {
-                    REQUIRE(c[f * 512 + n] >= 0.0F);
-                    sum += c[f * 512 + n];
+                    REQUIRE(c(f, n) >= 0.0);
+                    sum += c(f, n);
                 }
                 REQUIRE(sum < 1.0);
             }
@@ -140,10 +147,10 @@ TEST_CASE("no pull acts where a field is unknown") {
         for (int k = -1; k <= 8; ++k) phi[padded(4, j, k)] = kUnknown;
     SchemeConstants constants = kConstants;
     constants.curvature = 0.0F;
-    std::vector<float> c(6 * 512);
+    LeafRows c;
     for (const SchemeKernels* set : available_kernels()) {
         set->assemble(u.data(), phi.data(), nullptr, nullptr, kAllActive.data(), constants, c.data());
-        const auto at = [&](int face, int i) { return c[face * 512 + (i * 8 + 3) * 8 + 3]; };
+        const auto at = [&](int face, int i) { return c(face, (i * 8 + 3) * 8 + 3); };
         CHECK(at(kMinusI, 2) > 0.4F);  // the pull comes from -i
         for (int f = 0; f < 6; ++f) CHECK(at(f, 4) == 0.0F);
         CHECK(at(kMinusI, 5) == 0.0F);
@@ -156,7 +163,7 @@ TEST_CASE("inactive voxels and closed faces stay out of the system") {
     std::array<unsigned long long, 8> active = kAllActive;
     active[2] = 0xff00ff00ff00ff00ULL;
     const int lo[3] = {0, -5, -5}, hi[3] = {100, 6, 100};
-    std::vector<float> open(6 * 512), closed(6 * 512);
+    LeafRows open, closed;
     kernels().assemble(u.data(), nullptr, nullptr, nullptr, active.data(), kConstants, open.data());
     closed = open;
     close_faces(closed.data(), lo, hi);
@@ -166,33 +173,34 @@ TEST_CASE("inactive voxels and closed faces stay out of the system") {
         double sum_open = 0.0, sum_closed = 0.0, kept = 0.0;
         for (int f = 0; f < 6; ++f) {
             const bool is_closed = (i == 0 && f == kMinusI) || (j == 6 && f == kPlusJ) || j > 6;
-            sum_open += open[f * 512 + n];
-            sum_closed += closed[f * 512 + n];
-            if (!is_closed) kept += open[f * 512 + n];
-            if (is_closed || !on) REQUIRE(closed[f * 512 + n] == 0.0F);
+            sum_open += open(f, n);
+            sum_closed += closed(f, n);
+            if (!is_closed) kept += open(f, n);
+            if (is_closed || !on) REQUIRE(closed(f, n) == 0.0F);
         }
         // undo the division by the diagonal 1 + S: S = c/(1-Σc), and what is kept of S is the same in both
-        if (on && j <= 6) REQUIRE(sum_closed / (1 - sum_closed) == Approx(kept / (1 - sum_open)).epsilon(1e-4).margin(1e-6));
+        if (on && j <= 6) REQUIRE(sum_closed / (1 - sum_closed) == Approx(kept / (1 - sum_open)).epsilon(1e-3).margin(1e-6));
     }
 }
 
 TEST_CASE("relaxation converges to the solution of the rows") {
     const Padded u = random_field(8, -3, 3);
     for (const SchemeKernels* set : available_kernels()) {
-        std::vector<float> c(6 * 512), b(512);
+        LeafRows c;
+        std::vector<float> b(512);
         set->assemble(u.data(), nullptr, nullptr, nullptr, kAllActive.data(), kConstants, c.data());
         for (int n = 0; n < 512; ++n) b[n] = u[padded(n >> 6, n >> 3 & 7, n & 7)];
         Padded x = u;
-        const double first = set->relax(x.data(), b.data(), c.data(), kAllActive.data(), 1.5F, 2);
+        const double first = set->relax(x.data(), b.data(), c.data(), kAllActive.data(), 1.5F, 2, {});
         double last = first;
-        for (int sweep = 0; sweep < 100; ++sweep) last = set->relax(x.data(), b.data(), c.data(), kAllActive.data(), 1.5F, 2);
+        for (int sweep = 0; sweep < 100; ++sweep) last = set->relax(x.data(), b.data(), c.data(), kAllActive.data(), 1.5F, 2, {});
         CHECK(last < 1e-10 * first);
         double worst = 0.0;
         for (int n = 0; n < 512; ++n) {
             const int i = n >> 6, j = n >> 3 & 7, k = n & 7;
             double value = b[n];
             for (int f = 0; f < 6; ++f)
-                value += c[f * 512 + n] *
+                value += c(f, n) *
                          (double(x[padded(i + kSteps[f][0], j + kSteps[f][1], k + kSteps[f][2])]) - b[n]);
             worst = std::max(worst, std::abs(value - x[padded(i, j, k)]));
         }

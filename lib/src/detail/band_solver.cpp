@@ -127,7 +127,7 @@ BandSolver::BandSolver(const FloatGrid& u, const EvolveFields& fields, const Evo
         std::copy_n(field_.values.leaf(leaf), kLeafSize, previous_.leaf(leaf));
         motions_[leaf] = motion_of(previous_.leaf(leaf), previous_.leaf(leaf), false);
     });
-    rows_.resize(band_.size() * 6 * kLeafSize);
+    rows_.resize(band_.size() * kRowBytes);
     active_counts_.resize(band_.size());
     for (std::size_t leaf = 0; leaf < band_.size(); ++leaf) active_counts_[leaf] = count_on(band_.active(leaf));
     awake_.resize(band_.size());
@@ -232,9 +232,9 @@ std::vector<float> BandSolver::largest_changes() const {
 }
 
 void BandSolver::redistance(double clamp) {
-    static_assert(LocalDistance::kScratch <= 6 * kLeafSize);
+    static_assert(LocalDistance::kCuts * sizeof(float) <= kRowBytes);
     const auto limit = static_cast<float>(clamp);
-    LocalDistance local(band_, field_, awake_, domain_, limit, limit, {rows_.data(), 6 * kLeafSize});
+    LocalDistance local(band_, field_, awake_, domain_, limit, limit, {reinterpret_cast<float*>(rows_.data()), previous_.leaf(0)});
     local.compute();
     tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
         if (!awake_[leaf]) return;
@@ -292,9 +292,12 @@ double BandSolver::sweep(float omega, double goal, Counts& counts) {
             [&](const tbb::blocked_range<std::size_t>& range, std::int64_t visits) {
                 for (std::size_t leaf = range.begin(); leaf != range.end(); ++leaf) {
                     if (!awake_[leaf] || !is_hot(leaf, goal)) continue;
+                    const std::size_t next = std::min(leaf + 1, end - 1);
+                    prefetch_star(field_, next);
                     alignas(64) float u[kPaddedSize];
                     load_star(field_, leaf, u);
-                    residuals_[leaf] = kernel.relax(u, previous_.leaf(leaf), rows(leaf), active(leaf), omega, kInnerSweeps);
+                    residuals_[leaf] = kernel.relax(u, previous_.leaf(leaf), rows(leaf), active(leaf), omega, kInnerSweeps,
+                                                    {previous_.leaf(next), rows(next)});
                     store_inner(u, field_.values.leaf(leaf));
                     ++visits;
                 }

@@ -1,12 +1,12 @@
 #pragma once
+#include <cstddef>
 #include <optional>
 #include <vector>
-
-#include <tbb/cache_aligned_allocator.h>
 
 #include "covol/domain.h"
 #include "covol/evolve.h"
 #include "detail/halo.h"
+#include "detail/large_allocator.h"
 #include "detail/leaf_band.h"
 #include "detail/motion.h"
 #include "detail/scheme.h"
@@ -75,7 +75,7 @@ private:
     [[nodiscard]] const unsigned long long* active(std::size_t leaf) const {
         return reinterpret_cast<const unsigned long long*>(band_.active(leaf).data());
     }
-    [[nodiscard]] float* rows(std::size_t leaf) { return rows_.data() + leaf * 6 * kLeafSize; }
+    [[nodiscard]] Share* rows(std::size_t leaf) { return reinterpret_cast<Share*>(rows_.data() + leaf * kRowBytes); }
 
     const EvolveOptions& options_;
     const Domain domain_;
@@ -83,8 +83,9 @@ private:
     std::int64_t active_count_ = 0;
     HaloField field_;  // u
     std::optional<HaloField> phi_, edge_, image_weight_;
-    LeafArray<float> previous_;  // u^{n-1}
-    std::vector<float, tbb::cache_aligned_allocator<float>> rows_;  // 6 x 512 for each leaf; scratch between steps
+    LeafArray<float> previous_;  // u^{n-1}; scratch between steps
+    static constexpr std::size_t kRowBytes = 6 * kLeafSize * sizeof(Share);
+    std::vector<std::byte, LargeAllocator<std::byte>> rows_;  // of each leaf; scratch between steps
     // One for each leaf:
     std::vector<int> active_counts_;
     std::vector<unsigned char> awake_;

@@ -40,8 +40,8 @@ std::vector<Coord> follow_surface_near(const std::vector<Coord>& stale, FloatGri
     const HaloField values = gather(region, u, false, [h](const LeafNode* leaf, float tile, float* block) {
         for (int n = 0; n < kLeafSize; ++n) block[n] = (leaf != nullptr ? leaf->getValue(n) : tile) / h;
     });
-    std::vector<float> scratch(region.size() * LocalDistance::kScratch);
-    LocalDistance local(region, values, zone, domain, limit, kWidth, {scratch.data()});
+    std::vector<float> cuts(region.size() * LocalDistance::kCuts), distances(region.size() * kLeafSize);
+    LocalDistance local(region, values, zone, domain, limit, kWidth, {cuts.data(), distances.data()});
     local.compute();
 
     std::vector<LeafNode*> nodes(region.size(), nullptr);

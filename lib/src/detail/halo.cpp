@@ -112,6 +112,27 @@ void load_star_from(const float* inner, const float* const across[6], float* out
     }
 }
 
+void prefetch_star(const HaloField& field, std::size_t leaf) {
+    constexpr int kLine = 16;  // floats
+    const auto block = [&](int face) { return field.values.leaf(field.blocks[leaf][kFaceSlots[face]]); };
+    const float* inner = field.values.leaf(leaf);
+    const float* minus_k = block(kMinusK);
+    const float* plus_k = block(kPlusK);
+    for (int n = 0; n < kLeafSize; n += kLine) {
+        __builtin_prefetch(inner + n);
+        __builtin_prefetch(minus_k + n);
+        __builtin_prefetch(plus_k + n);
+    }
+    for (int n = 0; n < 64; n += kLine) {
+        __builtin_prefetch(block(kMinusI) + leaf_offset(7, 0, n));
+        __builtin_prefetch(block(kPlusI) + n);
+    }
+    for (int i = 0; i < kLeafDim; ++i) {
+        __builtin_prefetch(block(kMinusJ) + leaf_offset(i, 7, 0));
+        __builtin_prefetch(block(kPlusJ) + leaf_offset(i, 0, 0));
+    }
+}
+
 void store_inner(const float* in, float* leaf) {
     for (int row = 0; row < 64; ++row)
         std::memcpy(leaf + row * 8, in + padded(row >> 3, row & 7, 0), 8 * sizeof(float));

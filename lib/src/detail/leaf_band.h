@@ -1,6 +1,5 @@
 #pragma once
 #include <openvdb/openvdb.h>
-#include <tbb/cache_aligned_allocator.h>
 
 #include <array>
 #include <cstddef>
@@ -9,6 +8,7 @@
 
 #include "covol/domain.h"
 #include "covol/fwd.h"
+#include "detail/large_allocator.h"
 
 namespace covol::detail {
 
@@ -91,7 +91,7 @@ public:
 
 private:
     std::size_t leaves_ = 0;
-    std::vector<T, tbb::cache_aligned_allocator<T>> values_;
+    std::vector<T, LargeAllocator<T>> values_;
 };
 
 /// Copies grid values (active and inactive) of every leaf; leaves that the grid lacks get the tile's value there.

@@ -15,30 +15,30 @@ inline constexpr double kFollowWidth = 5.0;
 /// surface's cuts through voxel edges as boundary. First order, a twentieth of the cost of looking for nearest points.
 class LocalDistance {
 public:
-    static constexpr std::size_t kScratch = 4 * kLeafSize;  ///< floats for each leaf
+    static constexpr std::size_t kCuts = 3 * kLeafSize;  ///< floats for each leaf
     struct Scratch {
-        float* data;
-        std::size_t stride = kScratch;  ///< from leaf to leaf
+        float* cuts;       ///< kCuts for each leaf
+        float* distances;  ///< kLeafSize for each leaf
     };
 
     /// @param u        in voxels; blocks beyond the band say nothing of distances
     /// @param zone     one flag for each leaf: those to compute; the others give what their |u| says
     /// @param clamp    |u| from there on says nothing
     /// @param width    how far to go, voxels
-    /// @param scratch  kScratch for each leaf; nothing in it is read
+    /// @param scratch  nothing in it is read
     LocalDistance(const LeafBand& band, const HaloField& u, const std::vector<unsigned char>& zone, const Domain& domain,
                   float clamp, float width, Scratch scratch);
     void compute();
 
     /// The width where the surface is farther.
-    [[nodiscard]] const float* distance(std::size_t leaf) const { return scratch_.data + leaf * scratch_.stride + 3 * kLeafSize; }
+    [[nodiscard]] const float* distance(std::size_t leaf) const { return scratch_.distances + leaf * kLeafSize; }
     /// The same, but next to the surface |u| is only scaled: by one factor for a voxel and those across the edges that the
     /// surface cuts, so that it hardly moves (D. Hartmann, M. Meinke, W. Schroeder 2010, scheme CR-1).
-    [[nodiscard]] const float* settled(std::size_t leaf) const { return scratch_.data + leaf * scratch_.stride; }
+    [[nodiscard]] const float* settled(std::size_t leaf) const { return scratch_.cuts + leaf * kCuts; }
 
 private:
-    [[nodiscard]] float* cut(std::size_t leaf) { return scratch_.data + leaf * scratch_.stride; }
-    [[nodiscard]] float* distances(std::size_t leaf) { return scratch_.data + leaf * scratch_.stride + 3 * kLeafSize; }
+    [[nodiscard]] float* cut(std::size_t leaf) { return scratch_.cuts + leaf * kCuts; }
+    [[nodiscard]] float* distances(std::size_t leaf) { return scratch_.distances + leaf * kLeafSize; }
     void start(std::size_t leaf);
     void load_distance(std::size_t leaf, float* out) const;
     void spread();
@@ -50,7 +50,7 @@ private:
     const Domain& domain_;
     float clamp_, width_;
     LeafArray<float> far_;
-    Scratch scratch_;  // for each leaf 3 x 512 cuts, which become the settled values, and 512 distances
+    Scratch scratch_;  // the cuts become the settled values
 };
 
 }  // namespace covol::detail

@@ -61,20 +61,23 @@ void mirror_outside(float* values, const int lo[3], const int hi[3]) {
             }
 }
 
-void close_faces(float* c, const int lo[3], const int hi[3]) {
+void close_faces(Share* c, const int lo[3], const int hi[3]) {
     for (int n = 0; n < kLeafSize; ++n) {
         const int at[3] = {n >> 6, (n >> 3) & 7, n & 7};
         bool outside = false;
-        float closed = 0.0F;
+        int closed = 0;
         for (int axis = 0; axis < 3; ++axis) {
             outside |= at[axis] < lo[axis] || at[axis] > hi[axis];
-            if (at[axis] == lo[axis]) closed += std::exchange(c[2 * axis * kLeafSize + n], 0.0F);
-            if (at[axis] == hi[axis]) closed += std::exchange(c[(2 * axis + 1) * kLeafSize + n], 0.0F);
+            if (at[axis] == lo[axis]) closed += std::exchange(c[share_at(2 * axis, n)], Share{0});
+            if (at[axis] == hi[axis]) closed += std::exchange(c[share_at(2 * axis + 1, n)], Share{0});
         }
         // c = a/(1+S): without the closed share x of S it becomes a/(1+S-x) = c / (1 - closed).
-        const float scale = outside ? 0.0F : 1.0F / (1.0F - closed);
-        if (scale != 1.0F)
-            for (int f = 0; f < 6; ++f) c[f * kLeafSize + n] *= scale;
+        const double scale = outside ? 0.0 : closed < kShareUnit ? 1.0 / (1.0 - double(closed) / kShareUnit) : 1.0;
+        if (scale != 1.0)
+            for (int f = 0; f < 6; ++f) {
+                Share& share = c[share_at(f, n)];
+                share = static_cast<Share>(std::min(share * scale + 0.5, double(kShareUnit)));
+            }
     }
 }
 

@@ -20,6 +20,18 @@ enum Face { kMinusI, kPlusI, kMinusJ, kPlusJ, kMinusK, kPlusK };
 /// Marks a value of d or g that is not known; no pull acts across a face with one.
 inline constexpr float kUnknown = -1.0F;
 
+/// A coefficient of a row, 0 to 1, in units of 1/kShareUnit: in half a float's memory, for that is what a sweep waits for.
+using Share = unsigned short;
+inline constexpr int kShareUnit = 65535;
+/// Where a leaf's rows have the share of face f of voxel n: eight voxels along k side by side, face after face, so that a
+/// sweep reads one stream.
+inline constexpr int share_at(int f, int n) { return (n >> 3) * 48 + f * 8 + (n & 7); }
+
+struct NextRows {
+    const float* b = nullptr;
+    const Share* c = nullptr;
+};
+
 struct SchemeConstants {
     float tau;           ///< τ/h
     float theta;         ///< θ
@@ -33,22 +45,24 @@ struct SchemeKernels {
     const char* name;  ///< "avx2", ...
 
     /// Coefficients from u^{n-1}: Eqs. (13)-(17), (19)-(22), divided by the row's diagonal, c[q] = -a_pq / a_pp >= 0,
-    /// so that a row reads u_p = b_p + Σ_q c[q] (u_q - b_p), b = u^{n-1}.
+    /// so that a row reads u_p = b_p + Σ_q c[q] (u_q - b_p), b = u^{n-1}. Each is right to half a unit, and their sum is less than 1.
     /// @param u      padded, with edges and corners
     /// @param phi    padded (faces), potential of the points' pull; null without
     /// @param g      padded (faces), edge detector; null without
     /// @param rho    512 factors on ρ; null means 1
     /// @param active 512 bits; other voxels get c = 0 (u_p = b_p); rows of
     ///               eight without an active voxel are left as they are
-    /// @param c      6 x 512, by Face
+    /// @param c      6 x 512, see share_at()
     /// @return       the largest Σ_q |a_pq| over active rows
     float (*assemble)(const float* u, const float* phi, const float* g, const float* rho,
-                      const unsigned long long* active, const SchemeConstants& constants, float* c);
+                      const unsigned long long* active, const SchemeConstants& constants, Share* c);
 
-    /// `inner` red-black SOR sweeps in a padded buffer (faces) over the rows of eight with an active voxel; the halo is
+    /// `inner` SOR sweeps in four colours in a padded buffer (faces) over the rows of eight with an active voxel; the halo is
     /// not written.
+    /// @param next  b and c of the leaf that comes next, to be asked from memory meanwhile
     /// @return Σ (Gauss-Seidel value - u)² seen during the first sweep
-    double (*relax)(float* u, const float* b, const float* c, const unsigned long long* active, float omega, int inner);
+    double (*relax)(float* u, const float* b, const Share* c, const unsigned long long* active, float omega, int inner,
+                    const NextRows& next);
 
     /// As relax, for u_p - t Σ_q (u_q - u_p) = b_p on every voxel: one step of the implicit heat equation.
     double (*heat)(float* u, const float* b, float t, float omega, int inner);
@@ -69,7 +83,7 @@ struct SchemeKernels {
 void mirror_outside(float* padded_values, const int lo[3], const int hi[3]);
 
 /// Takes the faces on that boundary out of the rows, and rows outside it altogether.
-void close_faces(float* c, const int lo[3], const int hi[3]);
+void close_faces(Share* c, const int lo[3], const int hi[3]);
 
 /// The fastest that this processor runs; COVOL_SIMD=baseline|avx2|avx512 in the environment chooses another.
 const SchemeKernels& kernels();

@@ -11,10 +11,25 @@ namespace {
 
 typedef float Lanes __attribute__((vector_size(32)));                        // 8 floats
 typedef float LooseLanes __attribute__((vector_size(32), aligned(4), may_alias));  // the same at any address
+typedef unsigned short LooseShorts __attribute__((vector_size(16), aligned(2), may_alias));
 typedef int LaneBits __attribute__((vector_size(32)));
 
 inline Lanes load(const float* p) { return *reinterpret_cast<const LooseLanes*>(p); }
 inline void store(float* p, Lanes v) { *reinterpret_cast<LooseLanes*>(p) = v; }
+/// Eight whole numbers of 16 bits, 0 to 65535.
+inline Lanes load_shares(const unsigned short* p) {
+#if defined(__AVX2__)
+    const LaneBits whole = (LaneBits)_mm256_cvtepu16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)));
+#else
+    const LaneBits whole = __builtin_convertvector(*reinterpret_cast<const LooseShorts*>(p), LaneBits);
+#endif
+    return __builtin_convertvector(whole, Lanes);
+}
+inline void store(unsigned short* p, LaneBits v) { *reinterpret_cast<LooseShorts*>(p) = __builtin_convertvector(v, LooseShorts); }
+/// v[k-1], and at k = 0 of `edge`.
+inline Lanes shifted_up(Lanes v, Lanes edge) { return __builtin_shufflevector(v, edge, 8, 0, 1, 2, 3, 4, 5, 6); }
+/// v[k+1], and at k = 7 of `edge`.
+inline Lanes shifted_down(Lanes v, Lanes edge) { return __builtin_shufflevector(v, edge, 1, 2, 3, 4, 5, 6, 7, 15); }
 inline Lanes broadcast(float x) { return Lanes{} + x; }
 inline Lanes max(Lanes a, Lanes b) { return a > b ? a : b; }
 /// Every `stride`-th float.

@@ -1,0 +1,43 @@
+#pragma once
+#include <cstddef>
+#include <cstdlib>
+#include <limits>
+#include <new>
+
+#ifdef __linux__
+#include <sys/mman.h>
+#endif
+
+namespace covol::detail {
+
+/// Memory for arrays that are walked leaf by leaf: aligned to cache lines, and from some megabytes on to huge pages, which
+/// the kernel is asked for. A sweep then rarely waits for address translation, and the first touch costs one fault in 2 MiB.
+template <typename T>
+struct LargeAllocator {
+    using value_type = T;
+
+    LargeAllocator() = default;
+    template <typename U>
+    LargeAllocator(const LargeAllocator<U>&) noexcept {}  // NOLINT: an allocator converts
+
+    [[nodiscard]] T* allocate(std::size_t count) {
+        if (count > std::numeric_limits<std::size_t>::max() / 2 / sizeof(T)) throw std::bad_alloc();
+        const bool is_large = count * sizeof(T) >= kLarge;
+        const std::size_t unit = is_large ? kHugePage : kCacheLine;
+        const std::size_t bytes = (count * sizeof(T) + unit - 1) / unit * unit;
+        void* memory = std::aligned_alloc(unit, bytes);
+        if (memory == nullptr) throw std::bad_alloc();
+#ifdef MADV_HUGEPAGE
+        if (is_large) madvise(memory, bytes, MADV_HUGEPAGE);  // a wish: without it all works, slower
+#endif
+        return static_cast<T*>(memory);
+    }
+    void deallocate(T* memory, std::size_t) noexcept { std::free(memory); }
+
+    bool operator==(const LargeAllocator&) const noexcept { return true; }
+
+private:
+    static constexpr std::size_t kCacheLine = 64, kHugePage = std::size_t(1) << 21, kLarge = 2 * kHugePage;
+};
+
+}  // namespace covol::detail
