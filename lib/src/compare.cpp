@@ -419,12 +419,8 @@ Samples sample_surface(const TriangleMesh& mesh, double spacing) {
 void append_distances(const TriangleMesh& from, const TriangleMesh& to, double spacing,
                       std::vector<std::pair<double, double>>& distances) {
     const Samples samples = sample_surface(from, spacing);
-    const detail::MeshDistance distance(to);
-    const std::size_t first = distances.size();
-    distances.resize(first + samples.points.size());
-    tbb::parallel_for(std::size_t(0), samples.points.size(), [&](std::size_t i) {
-        distances[first + i] = {distance(samples.points[i]), samples.areas[i]};
-    });
+    const std::vector<double> away = detail::distances_to(to, samples.points);
+    for (std::size_t i = 0; i < away.size(); ++i) distances.emplace_back(away[i], samples.areas[i]);
 }
 
 void compare_surfaces(const TriangleMesh& a, const TriangleMesh& b, double spacing, const RunContext& run, CompareReport& report) {

@@ -158,11 +158,7 @@ private:
 
     void add_marks() {
         if (marks_.empty()) return;
-        const detail::MeshDistance to_surface(mesh_);
-        std::vector<double> distances(marks_.size());
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, marks_.size(), 256), [&](const auto& range) {
-            for (std::size_t n = range.begin(); n != range.end(); ++n) distances[n] = to_surface(marks_[n]);
-        });
+        const std::vector<double> distances = detail::distances_to(mesh_, marks_);
         for (std::size_t n = 0; n < marks_.size(); ++n) {
             SliceEvidence& s = slice(slice_of(geometry_.world_to_index(marks_[n])[2]));
             ++s.marks;

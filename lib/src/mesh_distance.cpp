@@ -5,9 +5,12 @@
 #include <CGAL/AABB_triangle_primitive.h>
 #include <CGAL/Simple_cartesian.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <numeric>
 
 #include "covol/error.h"
@@ -21,29 +24,55 @@ using Kernel = CGAL::Simple_cartesian<double>;
 using Triangles = std::vector<Kernel::Triangle_3>;
 using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
 
-}  // namespace
-
-struct MeshDistance::Tree {
-    Triangles triangles;
-    CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>> tree;
-};
-
-MeshDistance::MeshDistance(const TriangleMesh& mesh) : tree_(std::make_unique<Tree>()) {
-    const auto corner = [&](std::uint32_t v) {
-        return Kernel::Point_3(mesh.vertices[v][0], mesh.vertices[v][1], mesh.vertices[v][2]);
-    };
-    tree_->triangles.reserve(mesh.triangles.size());
-    for (const auto& t : mesh.triangles) tree_->triangles.emplace_back(corner(t[0]), corner(t[1]), corner(t[2]));
-    tree_->tree.insert(tree_->triangles.begin(), tree_->triangles.end());
-    // Now, for queries from many threads must find the tree finished.
-    tree_->tree.build();
-    tree_->tree.accelerate_distance_queries();
+template <typename Real>
+Kernel::Point_3 to_cgal(const std::array<Real, 3>& p) {
+    return {p[0], p[1], p[2]};
 }
 
-MeshDistance::~MeshDistance() = default;
+/// Indices of the points along a Z curve through 1024^3 cells of their box: those that follow each other lie close.
+std::vector<std::uint32_t> along_z_curve(const std::vector<Vec3>& points) {
+    constexpr int kBits = 10;
+    const WorldBox box = bounding_box(points, 0);
+    double longest = 0;
+    for (int a = 0; a < 3; ++a) longest = std::max(longest, box.max[a] - box.min[a]);
+    const double scale = longest > 0 ? ((1 << kBits) - 1) / longest : 0.0;
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> keyed(points.size());
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
+        std::uint32_t key = 0;
+        for (int a = 0; a < 3; ++a) {
+            const auto cell = static_cast<std::uint32_t>((points[n][a] - box.min[a]) * scale);
+            for (int bit = 0; bit < kBits; ++bit) key |= (cell >> bit & 1U) << (3 * bit + a);
+        }
+        keyed[n] = {key, static_cast<std::uint32_t>(n)};
+    });
+    tbb::parallel_sort(keyed.begin(), keyed.end());
+    std::vector<std::uint32_t> order(points.size());
+    std::transform(keyed.begin(), keyed.end(), order.begin(), [](const auto& k) { return k.second; });
+    return order;
+}
 
-double MeshDistance::operator()(const Vec3& point) const {
-    return std::sqrt(tree_->tree.squared_distance(Kernel::Point_3(point[0], point[1], point[2])));
+}  // namespace
+
+std::vector<double> distances_to(const TriangleMesh& mesh, const std::vector<Vec3>& points) {
+    Triangles triangles;
+    triangles.reserve(mesh.triangles.size());
+    for (const auto& t : mesh.triangles)
+        triangles.emplace_back(to_cgal(mesh.vertices[t[0]]), to_cgal(mesh.vertices[t[1]]), to_cgal(mesh.vertices[t[2]]));
+    CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>> tree(triangles.begin(), triangles.end());
+    // A tree of the vertices, for first guesses, would cost as much as all queries: the point before has a better one.
+    tree.do_not_accelerate_distance_queries();
+    tree.build();  // now, for queries from many threads must find it finished
+    const std::vector<std::uint32_t> order = along_z_curve(points);
+    std::vector<double> distances(points.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, order.size(), 256), [&](const auto& range) {
+        Kernel::Point_3 guess = triangles.front().vertex(0);
+        for (std::size_t n = range.begin(); n != range.end(); ++n) {
+            const Kernel::Point_3 query = to_cgal(points[order[n]]);
+            guess = tree.closest_point(query, guess);
+            distances[order[n]] = std::sqrt(CGAL::squared_distance(query, guess));
+        }
+    });
+    return distances;
 }
 
 }  // namespace detail
@@ -51,11 +80,8 @@ double MeshDistance::operator()(const Vec3& point) const {
 FitStatistics points_to_surface(const std::vector<Vec3>& points, const TriangleMesh& mesh, const RunContext& run) {
     if (points.empty()) throw Error(Errc::InvalidInput, "points_to_surface: expected at least one point, got none");
     if (mesh.empty()) throw Error(Errc::InvalidInput, "points_to_surface: the surface has no triangle");
-    std::vector<double> distances(points.size());
-    with_threads(run, [&] {
-        const detail::MeshDistance distance(mesh);
-        tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) { distances[i] = distance(points[i]); });
-    });
+    std::vector<double> distances;
+    with_threads(run, [&] { distances = detail::distances_to(mesh, points); });
     FitStatistics fit;
     fit.mean = std::accumulate(distances.begin(), distances.end(), 0.0) / double(distances.size());
     const auto rank = std::size_t(std::ceil(0.95 * double(distances.size()))) - 1;

@@ -2,6 +2,7 @@
 
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Morphology.h>
+#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <chrono>
@@ -643,17 +644,23 @@ private:
         result_.mesh = extract_mesh(*result_.surface, options_.extract, run_);
         report().surface = measure(result_.mesh);
         if (points_.empty()) return;
-        report().fit = points_to_surface(options_.contours ? given_ : marks_, result_.mesh, run_);
-        if (image_ == nullptr) find_bare_surface();
+        // Most of the fit is the making of a search tree, on one thread.
+        double reach = 0;
+        tbb::parallel_invoke([&] { report().fit = points_to_surface(options_.contours ? given_ : marks_, result_.mesh, run_); },
+                             [&] { if (image_ == nullptr) reach = find_bare_surface(); });
+        if (report().share_without_points > kWarnWithoutPoints)
+            run_.warn(number(std::round(1000 * report().share_without_points) / 10) + " % of the surface lie farther than " +
+                      number(reach) + " from every point: there curvature alone closes it");
     }
 
-    void find_bare_surface() {
+    /// @return what counts as far
+    double find_bare_surface() {
+        RunContext quiet;  // beside another task nothing may be reported
+        quiet.threads = run_.threads;
+        quiet.cancel = run_.cancel;
         const double reach = kFarFromPoints * std::max(h(), nearest_neighbour_spacing(points_).median);
-        const double share = share_without_points(result_.mesh, points_, reach, run_);
-        report().share_without_points = share;
-        if (share > kWarnWithoutPoints)
-            run_.warn(number(std::round(1000 * share) / 10) + " % of the surface lie farther than " + number(reach) +
-                      " from every point: there curvature alone closes it");
+        report().share_without_points = share_without_points(result_.mesh, points_, reach, quiet);
+        return reach;
     }
 
     const Image* image_;

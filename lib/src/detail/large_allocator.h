@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <limits>
 #include <new>
+#include <utility>
 
 #ifdef __linux__
 #include <sys/mman.h>
@@ -31,6 +32,15 @@ struct LargeAllocator {
         if (is_large) madvise(memory, bytes, MADV_HUGEPAGE);  // a wish: without it all works, slower
 #endif
         return static_cast<T*>(memory);
+    }
+    /// Values without a constructor stay unset: who fills them does it in parallel.
+    template <typename U>
+    void construct(U* at) noexcept {
+        ::new (static_cast<void*>(at)) U;
+    }
+    template <typename U, typename... Arguments>
+    void construct(U* at, Arguments&&... arguments) {
+        ::new (static_cast<void*>(at)) U(std::forward<Arguments>(arguments)...);
     }
     void deallocate(T* memory, std::size_t) noexcept { std::free(memory); }
 

@@ -1,5 +1,6 @@
 #pragma once
 #include <openvdb/openvdb.h>
+#include <tbb/parallel_for.h>
 
 #include <array>
 #include <cstddef>
@@ -79,7 +80,9 @@ class LeafArray {
 public:
     LeafArray() = default;
     LeafArray(std::size_t leaves, T fill, std::size_t extra = 1)
-        : leaves_(leaves), values_((leaves + extra) * kLeafSize, fill) {}
+        : leaves_(leaves), values_((leaves + extra) * kLeafSize) {
+        tbb::parallel_for(std::size_t(0), blocks(), [&](std::size_t block) { fill_block(block, fill); });
+    }
     [[nodiscard]] T* leaf(std::size_t i) { return values_.data() + i * kLeafSize; }
     [[nodiscard]] const T* leaf(std::size_t i) const { return values_.data() + i * kLeafSize; }
     [[nodiscard]] std::size_t leaves() const noexcept { return leaves_; }

@@ -1,21 +1,12 @@
 #pragma once
-#include <memory>
+#include <vector>
 
 #include "covol/mesh.h"
 
 namespace covol::detail {
 
-/// Distances from points to a mesh, exact to its triangles; safe to query from many threads.
-class MeshDistance {
-public:
-    /// @pre mesh.triangles is not empty
-    explicit MeshDistance(const TriangleMesh& mesh);
-    ~MeshDistance();
-    [[nodiscard]] double operator()(const Vec3& point) const;
-
-private:
-    struct Tree;
-    std::unique_ptr<Tree> tree_;
-};
+/// The distance of each point to a mesh, exact to its triangles; in parallel.
+/// @pre mesh.triangles is not empty
+[[nodiscard]] std::vector<double> distances_to(const TriangleMesh& mesh, const std::vector<Vec3>& points);
 
 }  // namespace covol::detail
