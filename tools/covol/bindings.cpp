@@ -32,6 +32,19 @@ CLI::Option* add_positive(CLI::App& command, const std::string& flag, double& ta
     return option->type_name("NUMBER");
 }
 
+/// An optional weight; the library's own mark of "automatic", a negative number, is not for the command line.
+void add_share(CLI::App& command, const std::string& flag, std::optional<double>& target, const std::string& description) {
+    command.add_option_function<double>(
+               flag,
+               [&target, flag](const double& value) {
+                   if (!(value >= 0 && value <= 1))
+                       throw Error(Errc::InvalidOptions, flag + ": expected 0 to 1, got " + to_text(value));
+                   target = value;
+               },
+               description)
+        ->type_name("FLOAT");
+}
+
 }  // namespace
 
 CLI::Option* add_length(CLI::App& command, const std::string& flag, Length& target, const std::string& shown_default,
@@ -199,11 +212,11 @@ void EvolveFlags::bind(CLI::App& command, bool with_image) {
                "[8vx with an image, 5vx after starts other than tagging, else 0]");
     if (with_image) {
         command.add_option("--edge-epsilon", options.edge_epsilon, "regularises the norm of grad g")->capture_default_str();
-        command.add_option("--image-yields", image_yields,
-                           "share of rho that fades close to points, on the attraction range's taper, 0 to 1 "
-                           "[1 after tagging, else 0]");
-        command.add_option("--guess-weight", guess_weight,
-                           "share of theta that is left to what lies between marked slices, far from every mark, 0 to 1");
+        add_share(command, "--image-yields", image_yields,
+                  "share of rho that fades close to points, on the attraction range's taper, 0 to 1 "
+                  "[1 after tagging, else 0]");
+        add_share(command, "--guess-weight", guess_weight,
+                  "share of theta that is left to what lies between marked slices, far from every mark, 0 to 1");
     }
     command.add_option("--max-steps", options.max_steps, "upper bound on time steps")->capture_default_str();
     command.add_option("--tolerance", options.tolerance, "steady below this mean change, in voxels a step of 1vx")
@@ -251,13 +264,18 @@ WriteMeshOptions MeshFlags::options(const Session& session) const {
 bool is_float_grid(const VdbGridInfo& grid) { return grid.type == "Tree_float_5_4_3"; }
 
 FloatGridPtr read_level_set(const std::string& path) {
-    std::string first;
-    for (const VdbGridInfo& grid : list_vdb(path)) {
-        if (!is_float_grid(grid)) continue;
-        if (grid.name == "surface") return read_vdb(path, "surface");
-        if (first.empty() && grid.grid_class == "level set") first = grid.name;
-    }
-    return read_vdb(path, first);
+    const VdbGridInfo* best = nullptr;
+    const std::vector<VdbGridInfo> grids = list_vdb(path);
+    const auto rank = [](const VdbGridInfo& grid) {
+        const bool level_set = grid.grid_class == "level set", fog = grid.grid_class == "fog volume";
+        return fog ? 0 : grid.name == "surface" ? 3 : level_set ? 2 : 1;
+    };
+    for (const VdbGridInfo& grid : grids)
+        if (is_float_grid(grid) && (best == nullptr || rank(grid) > rank(*best))) best = &grid;
+    if (best == nullptr) return read_vdb(path);  // which says what it got instead
+    if (rank(*best) == 0)
+        throw Error(Errc::InvalidInput, path + ": grid '" + best->name + "': expected a level set, got a fog volume");
+    return read_vdb(path, best->name);
 }
 
 }  // namespace covol::tool
