@@ -7,7 +7,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 source houdini_free_examples/build.sh
-out=out/several_structures
+out=$results/several_structures
 mkdir -p "$out"
 
 echo "== making the image and the marks"

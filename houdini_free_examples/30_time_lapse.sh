@@ -6,7 +6,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 source houdini_free_examples/build.sh
-out=out/time_lapse
+out=$results/time_lapse
 mkdir -p "$out"
 
 echo "== making the movie and the marks of its first frame"
@@ -32,10 +32,10 @@ PYTHON
 echo "== segmenting all frames"
 "$covol" segment "$out/movie.tif" --frame all --points "$out/marks.csv" -o "$out/cell.vdb" --mesh "$out/cell.ply" \
   --table "$out/cell.csv" --json "$out/report.json"
-"$covol" render "$out/cell_t007.vdb" -o "$out/cell_t007.png"
+"$covol" render "$out/cell_t007.vdb" --image "$out/movie.tif" --frame 7 -o "$out/cell_t007.png"
 
 echo "== results: volume and area over time; the true radius grows from 6 to 7.75 um"
-python3 - "$out/cell.csv" <<'PYTHON'
+/usr/bin/python3 - "$out/cell.csv" <<'PYTHON'
 import csv, math, sys
 for row in csv.DictReader(open(sys.argv[1])):
     radius = (3 * float(row["volume"]) / (4 * math.pi)) ** (1 / 3)

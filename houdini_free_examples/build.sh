@@ -1,9 +1,13 @@
 #!/usr/bin/env bash
 # What the numbered scripts begin with: installs what is needed and builds covol. Sourced from the repository's root;
-# sets $covol.
-covol=build/bin/covol
+# sets $covol, and $results, the folder for what they make. With COVOL set to a built binary nothing is installed or
+# built; COVOL_OUT is another folder for the results.
+covol=${COVOL:-build/bin/covol}
+results=${COVOL_OUT:-out}
 
-echo "== installing and building (the first time takes minutes)"
-bash tests/install_packages.sh
-cmake --preset default -DCOVOL_BUILD_TESTS=OFF >/dev/null
-cmake --build build --parallel "${COVOL_JOBS:-$(nproc)}" --target covol_tool
+if [[ -z ${COVOL:-} ]]; then
+  echo "== installing and building (the first time takes minutes)"
+  bash tests/install_packages.sh
+  cmake --preset default -DCOVOL_BUILD_TESTS=OFF >/dev/null
+  cmake --build build --parallel "${COVOL_JOBS:-$(nproc)}" --target covol_tool
+fi

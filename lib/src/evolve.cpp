@@ -138,15 +138,18 @@ private:
     // @return the mean way of the surface since the last marks, voxels
     double doze_by_marks() {
         const std::size_t leaves = solver_->band().size();
-        std::vector<float> motion(leaves, 0.0F);
+        std::vector<float> largest(leaves, 0.0F), mean(leaves, 0.0F);
         tbb::parallel_for(std::size_t(0), leaves, [&](std::size_t leaf) {
-            if (solver_->is_awake(leaf)) motion[leaf] = static_cast<float>(marks_.renew(leaf, solver_->u().leaf(leaf)));
+            if (!solver_->is_awake(leaf)) return;
+            const detail::CrossingMarks::Way moved = marks_.renew(leaf, solver_->u().leaf(leaf));
+            largest[leaf] = static_cast<float>(moved.largest);
+            mean[leaf] = static_cast<float>(moved.mean);
         });
-        solver_->doze(motion, kCycle * rest());
+        solver_->doze(largest, kCycle * rest());
         double way = 0.0, crossings = 0.0;
         for (std::size_t leaf = 0; leaf < leaves; ++leaf) {
             const auto count = static_cast<double>(marks_.count(leaf));
-            if (count > 0) way += motion[leaf] * count;
+            if (count > 0) way += mean[leaf] * count;
             crossings += count;
         }
         return crossings > 0 ? way / crossings : 0.0;

@@ -16,6 +16,7 @@ namespace covol {
 namespace {
 
 constexpr double kThinShare = 0.35;  // voxels, of the mean distance to the local plane
+constexpr double kCleanShare = 0.25;  // where larger ones bend; scans as thick as their spacing are wide have 0.3 to 0.45
 constexpr double kPlaneVoxels = 2.5, kGrowth = 1.25;
 constexpr int kCoarsest = 7;
 constexpr std::size_t kSamples = 3000, kLeastNeighbours = 6;
@@ -98,6 +99,13 @@ Plane fit_plane(const Neighbourhoods& cloud, const Vec3& x, Weight weight) {
     return plane;
 }
 
+double second_longest_edge(const WorldBox& box) {
+    Vec3 edges;
+    for (int a = 0; a < 3; ++a) edges[a] = box.max[a] - box.min[a];
+    std::sort(edges.begin(), edges.end());
+    return edges[1];
+}
+
 void expect_radius(double radius, const char* where) {
     if (!(radius > 0) || !std::isfinite(radius))
         throw Error(Errc::InvalidOptions, std::string(where) + ": radius: expected > 0, got " + std::to_string(radius));
@@ -129,12 +137,19 @@ double layer_thickness(const std::vector<Vec3>& points, double radius, const Run
 
 ScanVoxelSize scan_voxel_size(const std::vector<Vec3>& points, double spacing, const RunContext& run) {
     ScanVoxelSize choice{spacing, 0};
-    if (!(spacing > 0)) return choice;
+    if (!(spacing > 0) || points.empty()) return choice;
+    const double widest = second_longest_edge(bounding_box(points)) / 2;
+    bool any = false, thin = false, thick = false;
     // From the coarsest down: in a ball of a few spacings even points that fill space are few enough for a plane.
-    for (double h = spacing * std::pow(kGrowth, kCoarsest); h > 0.999 * spacing; h /= kGrowth) {
+    for (int k = kCoarsest; k >= 0; --k) {
+        const double h = spacing * std::pow(kGrowth, k);
+        if (k > 0 && kPlaneVoxels * h > widest) continue;
         const ScanVoxelSize finer{h, layer_thickness(points, kPlaneVoxels * h, run)};
-        if (finer.thickness > kThinShare * h && choice.thickness > 0) break;
-        choice = finer;
+        const bool holds = finer.thickness <= (thick && !thin ? kCleanShare : kThinShare) * h;
+        if (thin && !holds) break;
+        if (holds || !any) choice = finer;
+        any = true;
+        (holds ? thin : thick) = true;
     }
     return choice;
 }

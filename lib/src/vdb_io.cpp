@@ -286,10 +286,13 @@ FloatGridPtr read_vdb(const std::string& given, const std::string& wanted_name) 
 FloatGridPtr read_vdb_level_set(const std::string& path, const RunContext& run) {
     std::string chosen = split_grid_name(path).grid;
     if (chosen.empty()) {
-        std::vector<std::string> level_sets;
-        for (const VdbGridInfo& grid : list_vdb(path))
-            if (grid.grid_class == "level set" && grid.type.starts_with(FloatGrid::gridType())) level_sets.push_back(grid.name);
+        std::vector<std::string> level_sets, others;
+        for (const VdbGridInfo& grid : list_vdb(path)) {
+            if (!grid.type.starts_with(FloatGrid::gridType()) || grid.grid_class == "fog volume") continue;
+            (grid.grid_class == "level set" ? level_sets : others).push_back(grid.name);
+        }
         const bool has_surface = std::find(level_sets.begin(), level_sets.end(), "surface") != level_sets.end();
+        if (level_sets.empty()) std::swap(level_sets, others);
         if (!level_sets.empty()) chosen = has_surface ? "surface" : level_sets.front();
         if (level_sets.size() > 1) {
             std::string list;

@@ -181,6 +181,87 @@ class BadInput(Case):
             with self.subTest(flag=flag, value=value):
                 self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", flag, value, code=3)
 
+    def test_empty_values(self):
+        for flag in ("--theta", "--rho", "--delta", "--tolerance", "--guess-weight", "--mask", "--init"):
+            with self.subTest(flag=flag):
+                self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", flag, "", code=2, says=flag)
+        self.refuse("segment", self.image, "--points", self.points, "-o", "", code=2, says="--output")
+
+    def test_numbers_far_out_of_range(self):
+        for flag, value, code in [("--image-yields", "-1", 3), ("--guess-weight", "-1", 3), ("--threads", "100000", 3),
+                                  ("--tag-distance", "1e308", 3), ("--tag-distance", "1000vx", 3), ("--tau", "inf", 3),
+                                  ("--max-steps", "99999999999999", 2), ("--memory-limit", "0", 3),
+                                  ("--voxel-size", "1e-300", 3), ("--roi", "100,100,100,200,200,200", 3)]:
+            with self.subTest(flag=flag, value=value):
+                self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", flag, value, code=code)
+
+    def test_inputs_are_not_outputs(self):
+        image, points = self.inputs / "keep.nrrd", self.inputs / "keep.xyz"
+        shutil.copy(self.image, image)
+        shutil.copy(self.points, points)
+        level_set = self.inputs / "keep.vdb"
+        self.run_covol("segment", image, "--points", points, "-o", level_set)
+        link = self.inputs / "link.nrrd"
+        link.symlink_to(image)
+        before = {p: p.read_bytes() for p in (image, points, level_set)}
+        for args in [("segment", image, "--points", points, "-o", "s.vdb", "--mask", image),
+                     ("segment", image, "--points", points, "-o", "s.vdb", "--mask", link),
+                     ("segment", image, "--points", f"a={points}", "-o", "s.vdb", "--json", points),
+                     ("segment", image, "--points", points, "-o", "s.vdb", "--save-config", points),
+                     ("segment", image, "--init", f"vdb:{level_set}", "-o", level_set),
+                     ("reconstruct", points, "-o", "s.vdb", "--json", points),
+                     ("mask", level_set, "--like", image, "-o", image),
+                     ("surface", level_set, "-o", level_set),
+                     ("convert", points, points)]:
+            with self.subTest(args=args):
+                self.refuse(*args, code=3, says="is an input of this run")
+        for path, data in before.items():
+            self.assertEqual(path.read_bytes(), data)
+
+    def test_outputs_that_are_no_files(self):
+        pipe = self.inputs / "pipe.vdb"
+        os.mkfifo(pipe)
+        self.refuse("segment", self.image, "--points", self.points, "-o", pipe, code=4, says="not a regular file")
+        # Reports go to devices and pipes as they are.
+        done = self.segment("--quiet", "--json", "/dev/stdout")
+        self.assertEqual(json.loads(done.stdout)["command"], "segment")
+        (self.out / "s.vdb").unlink()
+        if os.path.exists("/dev/full"):
+            self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", "--json", "/dev/full", code=4,
+                        says="/dev/full")
+
+    def test_files_that_are_not_what_they_should_be(self):
+        folder, empty = self.inputs / "folder.nrrd", self.inputs / "empty.vdb"
+        folder.mkdir(exist_ok=True)
+        empty.write_bytes(b"")
+        cut = self.inputs / "cut.vdb"
+        self.run_covol("segment", self.image, "--points", self.points, "-o", cut)
+        cut.write_bytes(cut.read_bytes()[:-100])
+        self.assertIn(self.refused("segment", folder, "--points", self.points, "-o", "s.vdb"), (3, 4))
+        self.assertIn(self.refused("segment", self.points, "--points", self.image, "-o", "s.vdb"), (3,))
+        for vdb in (empty, cut, self.points):
+            for args in [("mesh", vdb, "-o", "m.ply"), ("mask", vdb, "--like", self.image, "-o", "m.nrrd"),
+                         ("render", vdb, "-o", "p.png"), ("info", vdb) if vdb != self.points else ("surface", vdb, "-o", "s.vdb"),
+                         ("segment", self.image, "--init", f"vdb:{vdb}", "-o", "s.vdb")]:
+                with self.subTest(args=args):
+                    self.assertIn(self.refused(*args), (3, 4))
+
+    def refused(self, *args):
+        """The exit code of a run that has to fail with one line and no file."""
+        done = subprocess.run([COVOL, *map(str, args), "--quiet"], capture_output=True, text=True, cwd=self.out, timeout=60)
+        self.assertRegex(done.stderr, r"^covol: error: [^\n]+\n$")
+        self.assertEqual(self.files(), [])
+        return done.returncode
+
+    def test_fog_is_no_level_set(self):
+        solid = self.inputs / "solid.vdb"
+        fog = self.inputs / "fog.vdb"
+        self.run_covol("segment", self.image, "--points", self.points, "-o", solid, "--density", fog)
+        for args in [("mesh", fog, "-o", "m.ply"), ("mask", fog, "--like", self.image, "-o", "m.nrrd"),
+                     ("render", fog, "-o", "p.png")]:
+            self.refuse(*args, code=3, says="got a fog volume")
+        self.refuse("mesh", solid, "-o", "m.ply", "--min-component", "1000vx", code=3, says="nothing to mesh")
+
     def test_tag_start_without_points(self):
         self.refuse("segment", self.image, "-o", "s.vdb", code=3, says="points")
 

@@ -94,7 +94,7 @@ TEST_CASE("every edge option says when it is out of range") {
         rejects("edge_k", &EdgeOptions::edge_k, bad);
         rejects("edge_contrast", &EdgeOptions::edge_contrast, bad);
     }
-    for (const double bad : {0.0, 1.0, nan}) rejects("contrast_percentile", &EdgeOptions::contrast_percentile, bad);
+    for (const double bad : {-0.1, 1.0, nan}) rejects("contrast_percentile", &EdgeOptions::contrast_percentile, bad);
     rejects("low", &EdgeOptions::low, 3.0);  // above high = 0
     rejects("low", &EdgeOptions::high, nan);
 }

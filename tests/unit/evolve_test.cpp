@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <string>
 
@@ -222,6 +223,41 @@ TEST_CASE("it stops when it is steady, and says so") {
     CHECK(report.last_change < 1e-2 * p.options.tau / kH);
     const DenseField end = to_dense(p.domain, *u);
     for (const Crossing& c : zero_crossings(p.domain, end)) CHECK(length(c.position) == Approx(3.0).margin(0.5 * kH));
+}
+
+TEST_CASE("leaves that sleep leave the surface where it would be") {
+    // The points' sphere touches the start on one side: there it rests long before the other side arrives.
+    const Vec3 target{1.5, 0, 0};
+    Problem p = whole_cube(48, kH, [](const Vec3& x) { return clamp_to(length(x) - 7.5, 3 * kH); });
+    set_distance(p, [&](const Vec3& x) { return std::abs(length({x[0] - target[0], x[1], x[2]}) - 6.0); });
+    p.options.delta = 0.1 * kH;
+    for (const bool follow : {false, true}) {
+        INFO((follow ? "a band that follows" : "a fixed band"));
+        EvolveOptions o = evolve_options(p.options, 200);
+        o.follow = follow;
+        o.solver_tolerance = EvolveOptions{}.solver_tolerance;
+        o.tolerance = EvolveOptions{}.tolerance;
+        const FloatGridPtr asleep = start_of(p), awake = start_of(p);
+        const EvolveReport some = evolve(*asleep, Fields(p).get(), o);
+        CHECK(some.stop_reason == StopReason::Steady);
+        o.tolerance = 0;  // nothing ever rests
+        o.max_steps = some.steps;
+        const EvolveReport all = evolve(*awake, Fields(p).get(), o);
+        CHECK(some.leaf_visits < 0.9 * double(all.leaf_visits));
+        const auto here = zero_crossings(p.domain, to_dense(p.domain, *asleep));
+        const auto there = zero_crossings(p.domain, to_dense(p.domain, *awake));
+        REQUIRE(here.size() > 1000);
+        double worst = 0;
+        for (const Crossing& c : here) {
+            double nearest = 1;
+            for (const Crossing& d : there)
+                nearest = std::min(nearest, length({c.position[0] - d.position[0], c.position[1] - d.position[1], c.position[2] - d.position[2]}));
+            worst = std::max(worst, nearest);
+        }
+        CHECK(worst < 0.01 * kH);
+        std::printf("sleeping leaves, %s: %.0f %% of the visits, surface apart by at most %.1e h\n",
+                    follow ? "following band" : "fixed band", 100.0 * double(some.leaf_visits) / double(all.leaf_visits), worst / kH);
+    }
 }
 
 TEST_CASE("a surface that shrinks away has vanished") {

@@ -7,6 +7,7 @@
 #include <functional>
 
 #include "covol/error.h"
+#include "covol/surface.h"
 
 using namespace covol;
 
@@ -111,6 +112,62 @@ TEST_CASE("segment: an unlimited attraction reaches from a far start to the poin
     const SegmentResult result = segment(nullptr, sphere_points(1200), options);
     CHECK(result.report.automatic.count("distance_tube") == 1);
     CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.1 * options.voxel_size);
+}
+
+namespace {
+
+/// 80^3 voxels of 1: an ellipsoid, bright inside.
+Image ellipsoid_image(const Vec3& semi_axes) {
+    ImageGeometry geometry;
+    geometry.size = {80, 80, 80};
+    geometry.origin = {-39.5, -39.5, -39.5};
+    std::vector<float> values;
+    for (int k = 0; k < 80; ++k)
+        for (int j = 0; j < 80; ++j)
+            for (int i = 0; i < 80; ++i) {
+                const Vec3 w = geometry.index_to_world({double(i), double(j), double(k)});
+                double r2 = 0, slope2 = 0;
+                for (int a = 0; a < 3; ++a) {
+                    r2 += w[a] * w[a] / (semi_axes[a] * semi_axes[a]);
+                    slope2 += w[a] * w[a] / std::pow(semi_axes[a], 4);
+                }
+                const double depth = slope2 > 0 ? (1 - r2) / (2 * std::sqrt(slope2)) : 1;  // first order in voxels
+                values.push_back(static_cast<float>(std::clamp(depth + 0.5, 0.0, 1.0)));
+            }
+    return Image::from_values(geometry, values.data());
+}
+
+SegmentResult from_sphere(const Image& image, double radius, int coarse_levels) {
+    SegmentOptions options;
+    options.start.kind = Start::Kind::Sphere;
+    options.start.radius = radius;
+    options.evolve.delta = 0.2;
+    options.coarse_levels = coarse_levels;
+    return segment(&image, {}, options);
+}
+
+}  // namespace
+
+TEST_CASE("segment: a coarse level first gives the same surface in fewer steps") {
+    const Image image = ellipsoid_image({26, 18, 22});
+    const SegmentResult fine = from_sphere(image, 32, 0), both = from_sphere(image, 32, -1);
+    REQUIRE(both.report.coarse.size() == 1);
+    CHECK(both.report.coarse[0].why_not.empty());
+    CHECK(fine.report.coarse.empty());
+    CHECK(both.report.solve.steps < fine.report.solve.steps / 2);
+    std::vector<Vec3> vertices;
+    for (const auto& v : both.mesh.vertices) vertices.push_back({v[0], v[1], v[2]});
+    const FitStatistics fit = points_to_surface(vertices, fine.mesh);
+    CHECK(fit.mean < 0.1);
+    CHECK(fit.p95 < 0.2);
+}
+
+TEST_CASE("segment: what a coarse level cannot hold is not lost") {
+    // A plate of three voxels: a voxel and a half at twice the size.
+    const Image image = ellipsoid_image({24, 24, 2});
+    const SegmentResult fine = from_sphere(image, 28, 0), both = from_sphere(image, 28, -1);
+    CHECK(both.report.surface.closed);
+    CHECK(both.report.surface.volume == Approx(fine.report.surface.volume).epsilon(0.05));
 }
 
 TEST_CASE("segment: what is missing is an error that says so") {

@@ -49,6 +49,26 @@ TEST_CASE("average_layers brings two layers of one sphere together between them,
     CHECK(mean_off_sphere(average_layers(thin, 0.15), 1) == Approx(sag).epsilon(0.15));
 }
 
+TEST_CASE("scan_voxel_size: a bend is no noise, however few the points are") {
+    // 2.5 voxels of 4.8 spacings reach around the sphere, or around a good part of it.
+    for (const int count : {50, 100, 300, 1000}) {
+        const std::vector<Vec3> few = test::sphere_cloud(count, 6, 1);
+        const double spacing = 6 * std::sqrt(M_PI / count);
+        INFO(count << " points");
+        CHECK(scan_voxel_size(few, spacing).voxel_size == Approx(spacing));
+    }
+}
+
+TEST_CASE("scan_voxel_size: two sides of a plate are no noise, points that fill it are") {
+    std::vector<Vec3> plate = test::box_cloud(8000, {{0, 0, 0}, {100, 100, 0}}, 5);
+    const std::vector<Vec3> above = test::box_cloud(8000, {{0, 0, 5}, {100, 100, 5}}, 6);
+    plate.insert(plate.end(), above.begin(), above.end());
+    CHECK(scan_voxel_size(plate, 1).voxel_size == Approx(1));
+    // Filled, points lie 5/4 from the plane on the mean: 1.25^6 is the first with 0.35 voxels above that.
+    const std::vector<Vec3> filled = test::box_cloud(50000, {{0, 0, 0}, {100, 100, 5}}, 7);
+    CHECK(scan_voxel_size(filled, 1).voxel_size == Approx(std::pow(1.25, 6)));
+}
+
 TEST_CASE("scan_voxel_size: the spacing for a clean scan, coarser than the noise for a noisy one") {
     const std::vector<Vec3> clean = test::sphere_cloud(20000, 1, 1);
     const double spacing = 0.0125;

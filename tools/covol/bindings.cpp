@@ -32,6 +32,19 @@ CLI::Option* add_positive(CLI::App& command, const std::string& flag, double& ta
     return option->type_name("NUMBER");
 }
 
+/// An optional weight; the library's own mark of "automatic", a negative number, is not for the command line.
+void add_share(CLI::App& command, const std::string& flag, std::optional<double>& target, const std::string& description) {
+    command.add_option_function<double>(
+               flag,
+               [&target, flag](const double& value) {
+                   if (!(value >= 0 && value <= 1))
+                       throw Error(Errc::InvalidOptions, flag + ": expected 0 to 1, got " + to_text(value));
+                   target = value;
+               },
+               description)
+        ->type_name("FLOAT");
+}
+
 }  // namespace
 
 CLI::Option* add_length(CLI::App& command, const std::string& flag, Length& target, const std::string& shown_default,
@@ -176,9 +189,15 @@ void TagFlags::bind(CLI::App& command, bool names) {
 
 void EdgeFlags::bind(CLI::App& command) {
     add_length(command, "--sigma", sigma, "", "presmoothing of the image [2vx after tagging, else 1vx]");
+    add_choice(command, "--edge-feature", options.feature,
+               {{"auto", EdgeFeature::Automatic}, {"slope", EdgeFeature::Slope}, {"bright-line", EdgeFeature::BrightLine},
+                {"dark-line", EdgeFeature::DarkLine}},
+               "what edges are: borders between darker and brighter, or bright or dark sheets such as membranes "
+               "[what the marks of contours lie on, else slope]");
     CLI::Option* k = add_positive(command, "--edge-k", options.edge_k, "K in g = 1/(1 + K s^2) [see --edge-contrast]");
     add_positive(command, "--edge-contrast", options.edge_contrast,
-                 "gradient at which g = 1/2, of the image scaled to [0,1], per world unit [90 % percentile in the band]")
+                 "gradient, per world unit, or brightness of lines at which g = 1/2, of the image scaled to [0,1] "
+                 "[90 % percentile in the band, 50 % for lines]")
         ->excludes(k);
 }
 
@@ -199,11 +218,11 @@ void EvolveFlags::bind(CLI::App& command, bool with_image) {
                "[8vx with an image, 5vx after starts other than tagging, else 0]");
     if (with_image) {
         command.add_option("--edge-epsilon", options.edge_epsilon, "regularises the norm of grad g")->capture_default_str();
-        command.add_option("--image-yields", image_yields,
-                           "share of rho that fades close to points, on the attraction range's taper, 0 to 1 "
-                           "[1 after tagging, else 0]");
-        command.add_option("--guess-weight", guess_weight,
-                           "share of theta that is left to what lies between marked slices, far from every mark, 0 to 1");
+        add_share(command, "--image-yields", image_yields,
+                  "share of rho that fades close to points, on the attraction range's taper, 0 to 1 "
+                  "[1 after tagging, else 0]");
+        add_share(command, "--guess-weight", guess_weight,
+                  "share of theta that is left to what lies between marked slices, far from every mark, 0 to 1");
     }
     command.add_option("--max-steps", options.max_steps, "upper bound on time steps")->capture_default_str();
     command.add_option("--tolerance", options.tolerance, "steady below this mean change, in voxels a step of 1vx")

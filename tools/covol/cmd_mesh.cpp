@@ -41,6 +41,8 @@ struct MeshJob {
         const Stopwatch watch;
         TriangleMesh mesh = extract_mesh(*level_set, extract_options(h), session.run());
         session.add_seconds("surface", watch.seconds());
+        if (mesh.triangles.empty())
+            throw Error(Errc::InvalidInput, input + ": nothing to mesh: no surface at this level, or all of it dropped");
         clean(mesh, h, session);
         const MeshMeasures measures = measure(mesh);
         session.report()["surface"] = to_json(measures);

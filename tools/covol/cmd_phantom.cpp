@@ -51,7 +51,7 @@ void add_phantom(Session& session) {
     std::string kinds;
     for (const std::string& kind : phantom_kinds()) kinds += (kinds.empty() ? "" : ", ") + kind;
     command->add_option("kind", job->options.kind, kinds)->required()->type_name("KIND");
-    command->add_option("-o,--output", job->output, "the image")->required()->type_name("IMAGE");
+    command->add_option("-o,--output", job->output, "the image")->required()->type_name("OUT.nrrd|.nii.gz|.tif|.mha");
     command->add_option("--points", job->points_path, "points on the true surface")->type_name("OUT.xyz|.csv|.ply");
     command->add_option("--labels", job->labels_path, "the true solid as a label image")->type_name("OUT");
     command->add_option("--size", job->options.size, "voxels along each axis")->capture_default_str();

@@ -34,7 +34,7 @@ void add_render(Session& session) {
     CLI::App* command = session.add_command("render", "A picture: the shaded surface, slices with its outline and the points",
                                             [job, &session] { job->run(session); });
     command->add_option("level_set", job->input, "a level set; of several in a file, :NAME picks one")->required()->type_name("IN.vdb[:NAME]");
-    command->add_option("-o,--output", job->output, "the picture")->required()->type_name("PICTURE.png");
+    command->add_option("-o,--output", job->output, "the picture")->required()->type_name("OUT.png");
     command->add_option("--image", job->image_path, "image for the slices")->type_name("IMAGE");
     job->points.bind(*command, "--points");
     command->add_option_function<std::string>(

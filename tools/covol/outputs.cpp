@@ -40,6 +40,12 @@ void check_ending(const std::string& path, OutputKind kind) {
     }
 }
 
+/// Something else than a file lies there, a device or a pipe: a file must not take its place.
+bool is_special(const fs::path& path) {
+    std::error_code status;
+    return fs::exists(path, status) && !fs::is_regular_file(path, status) && !fs::is_directory(path, status);
+}
+
 }  // namespace
 
 void Outputs::check(const std::string& flag, const std::string& path, OutputKind kind) {
@@ -53,6 +59,13 @@ void Outputs::check(const std::string& flag, const std::string& path, OutputKind
     const fs::path folder = target.parent_path();
     std::error_code status;
     if (fs::is_directory(target, status)) throw Error(Errc::Io, flag + ": " + path + ": cannot write: it is a folder");
+    if (is_special(target)) {
+        if (kind == OutputKind::Text || kind == OutputKind::Table) return;
+        throw Error(Errc::Io, flag + ": " + path + ": cannot write: it is not a regular file");
+    }
+    for (const std::string& input : inputs_)
+        if (fs::equivalent(target, input, status))
+            throw Error(Errc::InvalidOptions, flag + ": " + path + ": is an input of this run; choose another name");
     if (!fs::is_directory(folder, status))
         throw Error(Errc::Io, flag + ": " + path + ": cannot write: the folder " + folder.string() + " does not exist");
     if (::access(folder.c_str(), W_OK) != 0)
@@ -93,10 +106,13 @@ void Outputs::rollback() {
 }
 
 void write_text(const std::string& path, const std::string& text) {
-    const std::string temporary = path + ".part";
+    const bool special = is_special(path);
+    const std::string temporary = special ? path : path + ".part";
     std::ofstream file(temporary, std::ios::binary);
     file << text;
     file.close();
+    if (special && file) return;
+    if (special) throw Error(Errc::Io, path + ": cannot write");
     if (file && std::rename(temporary.c_str(), path.c_str()) == 0) return;
     std::remove(temporary.c_str());
     throw Error(Errc::Io, path + ": cannot write");

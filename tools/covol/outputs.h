@@ -11,7 +11,11 @@ enum class OutputKind { Vdb, Image, Mesh, Points, Picture, Table, Text };
 /// one fails those already written in this run are removed.
 class Outputs {
 public:
-    /// Checks the ending, that the folder exists and can be written, and that no two outputs are one file.
+    /// Names the files that this run reads: no output may replace one of them.
+    void protect(std::vector<std::string> inputs) { inputs_ = std::move(inputs); }
+
+    /// Checks the ending, that the folder exists and can be written, and that no output is an input, another output, or
+    /// something that is not a file (a device; texts may go to one).
     /// An empty path is an output that was not asked for. @throws Error InvalidOptions, Io.
     void check(const std::string& flag, const std::string& path, OutputKind kind);
 
@@ -33,13 +37,14 @@ private:
         std::string path;
         std::function<void(const std::string&)> write;
     };
+    std::vector<std::string> inputs_;
     std::vector<std::string> checked_;
     std::vector<Pending> pending_;
     std::vector<std::string> written_;
     std::vector<std::string> kept_;
 };
 
-/// Whole or not at all. @throws Error Io.
+/// Whole or not at all; straight to what is not a regular file, such as /dev/stdout or a pipe. @throws Error Io.
 void write_text(const std::string& path, const std::string& text);
 
 }  // namespace covol::tool

@@ -1,8 +1,10 @@
 #include "segment_job.h"
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
+#include <sstream>
 
 #include "covol/error.h"
 #include "covol/surface.h"
@@ -13,6 +15,21 @@
 #include "timelapse_job.h"
 
 namespace covol::tool {
+namespace {
+
+/// A core that the points enclose is farther than D from all of them, and lies in their box.
+void check_tag_distance(double tag_distance, const std::vector<Vec3>& points) {
+    if (points.empty()) return;
+    const WorldBox box = bounding_box(points);
+    const double diagonal = std::hypot(box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]);
+    if (tag_distance <= diagonal) return;
+    std::ostringstream text;
+    text << "--tag-distance: " << tag_distance << " is more than the points' whole box measures, " << diagonal
+         << ": nothing that they enclose is that far from them";
+    throw Error(Errc::InvalidOptions, text.str());
+}
+
+}  // namespace
 
 SegmentOptions SegmentJob::resolve(double h) const {
     SegmentOptions options;
@@ -136,6 +153,7 @@ void SegmentJob::run_one(Session& session) const {
     prepare(marks, cloud, contours, geometry, h, session, session.run());
     input.update(marks.report);
     SegmentOptions options = resolve(h);
+    check_tag_distance(options.tag_distance, marks.given);
     options.contours = marks.contours;
     // Shared by the writers that run at the end.
     const auto result = std::make_shared<SegmentResult>(segment(pointer, marks.points, options, session.run()));

@@ -2,6 +2,7 @@
 
 #include <csignal>
 #include <cmath>
+#include <filesystem>
 #include <iostream>
 
 #include "arguments.h"
@@ -87,6 +88,33 @@ Json options_of(const CLI::App& command) {
     return options;
 }
 
+/// Files that the command line names to be read: whatever exists under the value of an option that is no output. Values
+/// may begin with a structure's name or a kind of start, NAME=FILE and mesh:FILE.
+std::vector<std::string> inputs_of(const CLI::App& command) {
+    std::vector<std::string> inputs;
+    for (const CLI::Option* option : command.get_options()) {
+        if (option->get_type_name().starts_with("OUT")) continue;
+        for (const std::string& text : option->results())
+            for (const std::size_t begin : {std::size_t(0), text.find('=') + 1, text.find(':') + 1}) {
+                std::error_code status;
+                const std::string path = text.substr(begin);
+                if (std::filesystem::is_regular_file(path, status)) inputs.push_back(path);
+            }
+    }
+    return inputs;
+}
+
+/// A value that is empty, as from a shell's unset variable, is never meant.
+void expect_values(const CLI::App& app) {
+    for (const CLI::Option* option : app.get_options()) {
+        const std::vector<std::string>& given = option->results();
+        if (option->get_expected_min() > 0 && std::find(given.begin(), given.end(), "") != given.end())
+            throw UsageError(option->get_name() + ": expected a value, got ''");
+    }
+}
+
+constexpr int kMostThreads = 1024;  // TBB runs out of stacks long after
+
 }  // namespace
 
 int exit_code_of(Errc code) {
@@ -135,6 +163,8 @@ CLI::App* Session::add_command(const std::string& name, const std::string& descr
 int Session::main(int argc, char** argv) {
     try {
         app_.parse(argc, argv);
+        expect_values(app_);
+        expect_values(*app_.get_subcommands().front());
     } catch (const CLI::ParseError& error) {
         if (error.get_exit_code() == 0) return app_.exit(error);  // help and version
         return fail(kUsage, error.what() + std::string("; see covol --help"));
@@ -153,8 +183,9 @@ int Session::execute() {
     std::unique_ptr<MemoryGuard> guard;
     try {
         progress_ = std::make_unique<Progress>(quiet_);
-        if (threads_ < 0)
-            throw Error(Errc::InvalidOptions, "--threads: expected >= 0, got " + std::to_string(threads_));
+        if (threads_ < 0 || threads_ > kMostThreads)
+            throw Error(Errc::InvalidOptions, "--threads: expected 0 to " + std::to_string(kMostThreads) + ", got " +
+                                                  std::to_string(threads_));
         run_.threads = threads_;
         run_.cancel = &cancel_requested;
         run_.progress = [this](const std::string& stage, double fraction) { progress_->update(stage, fraction); };
@@ -163,6 +194,7 @@ int Session::execute() {
         };
         if (!memory_limit_text_.empty()) memory_limit_ = parse_bytes("--memory-limit", memory_limit_text_);
         guard = std::make_unique<MemoryGuard>(memory_limit_, cancel_requested);
+        outputs_.protect(inputs_of(*command_));
         if (json_path_ != "-") outputs_.check("--json", json_path_, OutputKind::Text);
         outputs_.check("--save-config", save_config_path_, OutputKind::Text);
         start_report();
@@ -273,7 +305,7 @@ std::string Session::comment() const {
 void Session::require_memory(std::uint64_t bytes, const std::string& what) const {
     if (memory_limit_ > 0 && bytes > memory_limit_)
         throw Error(Errc::InvalidOptions, "--memory-limit " + memory_limit_text_ + ": " + what + " alone needs " +
-                                              std::to_string(bytes >> 20) + " MiB");
+                                              std::to_string(bytes) + " bytes");
 }
 
 void Session::add_seconds(const std::string& name, double seconds) {

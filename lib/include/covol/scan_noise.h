@@ -13,8 +13,11 @@ namespace covol {
 /// @throws Error InvalidOptions (radius <= 0, not finite).
 [[nodiscard]] double layer_thickness(const std::vector<Vec3>& points, double radius, const RunContext& run = {});
 
-/// The voxel size that a scan supports, and how it was found: the first of spacing * 1.25^k, k = 0..7, from which on points
-/// lie within 0.35 voxels, on the mean, of the plane through what is within 2.5 voxels of them. Where none does, the last.
+/// The voxel size that a scan supports, and how it was found: the smallest of spacing * 1.25^k, k = 0..7, from which on, up
+/// to some larger one, points lie within 0.35 voxels, on the mean, of the plane through what is within 2.5 voxels of them.
+/// Larger ones may fail where smaller ones hold with a quarter of a voxel, which noise never does: there the surface itself
+/// bends. Only those count whose 2.5 voxels are at most half the second longest edge of the points' box: beyond, a plane
+/// goes through the whole shape. Where none holds, the largest that counts.
 struct ScanVoxelSize {
     double voxel_size = 0;
     double thickness = 0;  ///< layer_thickness() at it

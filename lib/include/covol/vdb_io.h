@@ -28,7 +28,7 @@ struct VdbGridName {
 [[nodiscard]] FloatGridPtr read_vdb(const std::string& path, const std::string& name = {});
 
 /// The level set that the path names ("FILE.vdb:name"); else "surface", else the file's first level set, else its first
-/// float grid. A file with several level sets to choose from is a warning that names them.
+/// float grid that is no fog volume. A file with several of them to choose from is a warning that names them.
 /// @throws Error as read_vdb; Unsupported (a fog volume).
 [[nodiscard]] FloatGridPtr read_vdb_level_set(const std::string& path, const RunContext& run = {});
 

@@ -218,7 +218,7 @@ void BandSolver::doze(const std::vector<float>& motion, double rest) {
     }
     tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
         unsigned char awake = moved[leaf];
-        for (const int slot : kFaceSlots) awake |= moved[band_.neighbours(leaf)[slot]];
+        for (const std::int32_t next : band_.neighbours(leaf)) awake |= moved[next];
         // What sleeps does not change.
         if (!awake) std::copy_n(field_.values.leaf(leaf), kLeafSize, previous_.leaf(leaf));
         awake_[leaf] = awake && active_counts_[leaf] > 0;

@@ -28,6 +28,8 @@ void write_atomically(const std::string& path, const std::function<void(const st
     if (!fs::is_directory(folder, status))
         throw Error(Errc::Io, path + ": cannot write: the folder " + folder.string() + " does not exist");
     if (fs::is_directory(target, status)) throw Error(Errc::Io, path + ": cannot write: it is a folder");
+    if (fs::exists(target, status) && !fs::is_regular_file(target, status))
+        throw Error(Errc::Io, path + ": cannot write: it is not a regular file");
     const std::string temporary =
         (folder / (".covol-" + std::to_string(::getpid()) + "-" + target.filename().string())).string();
     struct Remover {

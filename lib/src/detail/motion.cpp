@@ -110,7 +110,7 @@ double NetMotion::per_step(const LeafArray<float>& u, std::size_t leaves) {
     return kCrossingsPerVoxel * double(flips.flipped) / double(flips.crossed) / kWindow;
 }
 
-double CrossingMarks::renew(std::size_t leaf, const float* u) {
+CrossingMarks::Way CrossingMarks::renew(std::size_t leaf, const float* u) {
     std::vector<Crossing> now;
     const LeafMask negative = negative_mask(u);
     for (int axis = 0; axis < 3; ++axis) {
@@ -123,21 +123,26 @@ double CrossingMarks::renew(std::size_t leaf, const float* u) {
             }
     }
     Leaf& mark = leaves_[leaf];
-    double way = 0.0;
+    double sum = 0.0, largest = 0.0;
     int edges = 0;
+    const auto add = [&](double way) {
+        sum += way;
+        largest = std::max(largest, way);
+        ++edges;
+    };
     auto before = mark.crossings.begin();
     const auto end = mark.crossings.end();
     for (const Crossing& c : now) {
-        for (; before != end && before->edge < c.edge; ++before, ++edges) way += 0.5;
+        for (; before != end && before->edge < c.edge; ++before) add(0.5);
         const bool same = before != end && before->edge == c.edge;
-        way += same ? std::abs(c.at - before->at) : 0.5;
+        add(same ? std::abs(c.at - before->at) : 0.5);
         before += same;
-        ++edges;
     }
-    for (; before != end; ++before, ++edges) way += 0.5;
+    for (; before != end; ++before) add(0.5);
     const bool is_first = !mark.is_marked;
     mark = {std::move(now), true};
-    return is_first ? std::numeric_limits<double>::infinity() : edges > 0 ? way / edges : 0.0;
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    return is_first ? Way{kInfinity, kInfinity} : Way{edges > 0 ? sum / edges : 0.0, largest};
 }
 
 void CrossingMarks::remake(const std::vector<std::int32_t>& old_leaf) {

@@ -54,9 +54,11 @@ private:
 /// Where the surface crosses the edges of voxels, leaf by leaf, to tell how far it has come since.
 class CrossingMarks {
 public:
-    /// Marks what is there now. @return how far the crossings have come since the leaf's last mark, on the average, voxels;
-    ///         infinity at the first
-    double renew(std::size_t leaf, const float* u);
+    struct Way {
+        double mean = 0.0, largest = 0.0;  ///< of the crossings of one leaf, voxels
+    };
+    /// Marks what is there now. @return how far the crossings have come since the leaf's last mark; infinity at the first
+    Way renew(std::size_t leaf, const float* u);
     void resize(std::size_t leaves) { leaves_.resize(leaves); }
     /// The band was made again. @param old_leaf  for each new leaf the old one at the same place, or -1
     void remake(const std::vector<std::int32_t>& old_leaf);
