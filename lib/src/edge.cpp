@@ -30,7 +30,8 @@ constexpr double kLargestHeatStep = 0.5; // h²; shorter steps make the kernel r
 constexpr double kHeatTolerance = 1e-4;  // relative residual
 constexpr int kMaxHeatSweeps = 100;
 constexpr int kInnerSweeps = 2;
-constexpr double kSlopePercentile = 0.9, kLinePercentile = 0.5;
+constexpr double kSlopePercentile = 0.9;
+constexpr double kLinePercentile = 0.5, kLineShare = 1.0 / 3.0;
 constexpr double kStandardErrors = 3.0;  // a line weaker than that may be noise
 constexpr double kLowPercentile = 0.005, kHighPercentile = 0.995;
 
@@ -143,6 +144,11 @@ double contrast_of(const FloatGrid& slopes, double percentile) {
     return 0.5 * *std::max_element(values.begin(), values.end());
 }
 
+double automatic_contrast(const FloatGrid& s, const EdgeOptions& options, bool is_line) {
+    if (options.contrast_percentile > 0) return contrast_of(s, options.contrast_percentile);
+    return is_line ? kLineShare * contrast_of(s, kLinePercentile) : contrast_of(s, kSlopePercentile);
+}
+
 }  // namespace
 
 const char* to_string(EdgeFeature feature) {
@@ -214,9 +220,7 @@ EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions
         });
         report.edge_contrast = options.edge_contrast;
         if (options.edge_k > 0) report.edge_contrast = 1.0 / std::sqrt(options.edge_k);
-        double percentile = options.contrast_percentile;
-        if (!(percentile > 0)) percentile = is_line ? kLinePercentile : kSlopePercentile;
-        if (!(report.edge_contrast > 0)) report.edge_contrast = contrast_of(*result.grid, percentile);
+        if (!(report.edge_contrast > 0)) report.edge_contrast = automatic_contrast(*result.grid, options, is_line);
         if (!(report.edge_contrast > 0))
             throw Error(Errc::InvalidInput, "edge: " + image.path() +
                                                 ": constant wherever the band lies, there is no edge to find; check that the "

@@ -25,7 +25,8 @@ struct EdgeOptions {
     double sigma = -1.0;              ///< σ >= 0, world units: presmoothing; < 0 picks 1 voxel.
     double edge_k = 0.0;              ///< K > 0 in g = 1/(1+K s^2), 0: see edge_contrast.
     double edge_contrast = 0.0;       ///< s at which g = 1/2, i.e. K = 1/s^2; 0 picks a percentile of s in the band.
-    double contrast_percentile = 0.0; ///< that percentile, in (0,1); 0 picks 0.9 for slopes, 0.5 for lines
+    double contrast_percentile = 0.0; ///< that percentile, in (0,1); 0 picks 0.9 for slopes, and for lines a third
+                                      ///< of the median: g then goes by relative brightness, as contrast that varies needs
     double low = 0.0, high = 0.0;     ///< intensities mapped to 0 and 1; equal: the image's 0.5 % and 99.5 % percentiles.
     [[nodiscard]] std::string why_invalid() const;
 };
