@@ -100,7 +100,8 @@ class Structures(Case):
             self.assertEqual(s["solve"]["stop_reason"], "steady")
             self.assertTrue(s["surface"]["closed"])
             self.assertEqual((s["surface"]["components"], s["surface"]["genus"]), (1, 0))
-            self.assertLess(abs(s["surface"]["volume"] / self.expected_volume() - 1), 0.05)
+            # The surface comes to rest 0.1 voxel inside the points; the radius is 9 voxels.
+            self.assertLess(abs(s["surface"]["volume"] / self.expected_volume() - 1), 0.045)
             for field in ("resolved", "automatic", "grid", "fit", "band"):
                 self.assertIn(field, s)
         overlap, = report["overlaps"]
@@ -112,6 +113,10 @@ class Structures(Case):
             self.assertAlmostEqual(float(row["volume"]), s["surface"]["volume"], places=3)
             self.assertAlmostEqual(float(row["area"]), s["surface"]["area"], places=3)
             self.assertEqual(row["genus"], "0")
+
+    def test_finer_voxels_come_closer(self):
+        for s in self.report(*self.two("--voxel-size", H / 2))["structures"]:
+            self.assertLess(abs(s["surface"]["volume"] / self.expected_volume() - 1), 0.02)
 
     def test_labels_meet_without_overlap_or_slit(self):
         self.run_covol(*self.two("--mask", "m.tif"))
@@ -364,16 +369,18 @@ class TimeLapse(Case):
                              np.asarray(center) + self.middle + np.concatenate([r * shell[side], disc]))
         report = self.report("segment", self.movie, "--points", f"low={self.inputs}/low_{{frame}}.xyz",
                              f"up={self.inputs}/up_{{frame}}.xyz", "--frame", "0-1", "-o", "s.vdb", "--mesh", "m.ply",
-                             "--table", "t.csv", "--rho", 0, "--delta", "0.2vx")
+                             "--table", "t.csv", "--rho", 0, "--delta", "0.2vx", "--voxel-size", H / 2)
         self.assertEqual(self.files(), ["m_t000_low.ply", "m_t000_up.ply", "m_t001_low.ply", "m_t001_up.ply", "s_t000.vdb",
                                         "s_t001.vdb", "t.csv"])
         before, after = ([s["surface"]["volume"] for s in frame["structures"]] for frame in report["frames"])
         for t, volumes in enumerate((before, after)):
             half = 2 / 3 * math.pi * self.ball_at(t)[1] ** 3
-            for volume in volumes:  # the sharp rims round off
-                self.assertTrue(0.75 < volume / half < 1.05, (t, volume / half))
+            # The radius is 16 voxels: 3 % are lost where the surface rests 0.1 voxel inside the points, and 1 % where it
+            # rounds the sharp rim by two voxels.
+            for volume in volumes:
+                self.assertTrue(0.95 < volume / half < 1, (t, volume / half))
         for old, new in zip(before, after):
-            self.assertGreater(new, 1.05 * old)
+            self.assertAlmostEqual(new / old, (self.ball_at(1)[1] / self.ball_at(0)[1]) ** 3, delta=0.03)
         self.assertEqual([(row["frame"], row["structure"]) for row in rows_of(self.out / "t.csv")],
                          [("0", "low"), ("0", "up"), ("1", "low"), ("1", "up")])
 
