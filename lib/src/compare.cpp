@@ -449,16 +449,11 @@ void compare_surfaces(const TriangleMesh& a, const TriangleMesh& b, double spaci
 }  // namespace
 
 Solid read_solid(const std::string& path, int label, const RunContext& run) {
-    const std::string end = detail::extension(path);
+    const std::string end = detail::extension(split_grid_name(path).path);
     Solid solid;
     solid.label = label;
     if (end == ".vdb") {
-        const auto grids = list_vdb(path);
-        const bool has_surface = std::any_of(grids.begin(), grids.end(), [](const VdbGridInfo& g) { return g.name == "surface"; });
-        solid.level_set = read_vdb(path, has_surface ? "surface" : "");
-        if (solid.level_set->getGridClass() == openvdb::GRID_FOG_VOLUME)
-            throw Error(Errc::Unsupported, "read_solid: " + path + ": grid '" + solid.level_set->getName() +
-                                               "': expected a level set, got a fog volume");
+        solid.level_set = read_vdb_level_set(path, run);
     } else if (end == ".ply" || end == ".obj" || end == ".stl" || end == ".off") {
         solid.mesh = read_mesh(path);
     } else {

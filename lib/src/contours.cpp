@@ -73,6 +73,7 @@ private:
     void choose_plane();
     void join_lines();
     void make_solid();
+    void drop_repeated_loops();
     void fill_slices(ContourSolid::Data& data, const std::vector<std::vector<Polygon>>& polygons);
     void link_slices(ContourSolid::Data& data, const std::vector<std::vector<Polygon>>& polygons);
     void cap_ends(ContourSolid::Data& data);
@@ -179,9 +180,18 @@ void Densifier::join_lines() {
     }
 }
 
+/// The even-odd rule would take a contour that is there twice for none.
+void Densifier::drop_repeated_loops() {
+    std::sort(loops_.begin(), loops_.end());
+    const auto last = std::unique(loops_.begin(), loops_.end());
+    const auto repeated = loops_.end() - last;
+    loops_.erase(last, loops_.end());
+    if (repeated > 0) run_.warn("contours: " + std::to_string(repeated) + " contours are there twice, with the same marks; they count once");
+}
+
 void Densifier::make_solid() {
     if (loops_.empty()) return;
-    std::stable_sort(loops_.begin(), loops_.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    drop_repeated_loops();
     auto data = std::make_shared<ContourSolid::Data>();
     data->frame = frame_;
     std::vector<std::vector<Polygon>> polygons;

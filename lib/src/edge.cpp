@@ -1,4 +1,4 @@
-// The edge detector g(s) = 1/(1 + K s²), s = |∇G_σ * I|, Eq. (2), where the band needs it.
+// The edge detector g(s) = 1/(1 + K s²), Eq. (2), where the band needs it: s = |∇G_σ * I|, or the brightness of lines.
 #include "covol/edge.h"
 
 #include <openvdb/openvdb.h>
@@ -30,6 +30,8 @@ constexpr double kLargestHeatStep = 0.5; // h²; shorter steps make the kernel r
 constexpr double kHeatTolerance = 1e-4;  // relative residual
 constexpr int kMaxHeatSweeps = 100;
 constexpr int kInnerSweeps = 2;
+constexpr double kSlopePercentile = 0.9, kLinePercentile = 0.5;
+constexpr double kStandardErrors = 3.0;  // a line weaker than that may be noise
 constexpr double kLowPercentile = 0.005, kHighPercentile = 0.995;
 
 // The band's leaves and enough around them, with the normalised image.
@@ -143,6 +145,16 @@ double contrast_of(const FloatGrid& slopes, double percentile) {
 
 }  // namespace
 
+const char* to_string(EdgeFeature feature) {
+    switch (feature) {
+        case EdgeFeature::Automatic: return "auto";
+        case EdgeFeature::Slope: return "slope";
+        case EdgeFeature::BrightLine: return "bright-line";
+        case EdgeFeature::DarkLine: break;
+    }
+    return "dark-line";
+}
+
 std::string EdgeOptions::why_invalid() const {
     std::ostringstream lines;
     const auto expect = [&](bool ok, const char* field, const char* expected, double got) {
@@ -151,7 +163,7 @@ std::string EdgeOptions::why_invalid() const {
     expect(std::isfinite(sigma), "sigma", "a finite number", sigma);
     expect(edge_k >= 0 && std::isfinite(edge_k), "edge_k", ">= 0", edge_k);
     expect(edge_contrast >= 0 && std::isfinite(edge_contrast), "edge_contrast", ">= 0", edge_contrast);
-    expect(contrast_percentile > 0 && contrast_percentile < 1, "contrast_percentile", "between 0 and 1", contrast_percentile);
+    expect(contrast_percentile >= 0 && contrast_percentile < 1, "contrast_percentile", "between 0 and 1", contrast_percentile);
     expect(std::isfinite(low) && std::isfinite(high) && low <= high, "low", "<= high", low);
     return lines.str();
 }
@@ -183,18 +195,28 @@ EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions
         result.grid->topologyUnion(topology);
         result.grid->tree().voxelizeActiveTiles();
         const detail::SchemeKernels& kernels = detail::kernels();
+        const bool is_line = options.feature == EdgeFeature::BrightLine || options.feature == EdgeFeature::DarkLine;
         const auto per_length = static_cast<float>(1.0 / domain.voxel_size);
         for_each_leaf(window, domain, detail::load_padded, [&](std::size_t leaf, float* values) {
             auto* node = result.grid->tree().probeLeaf(window.band.origin(leaf));
             if (node == nullptr) return;
             float slope[kLeafSize];
-            kernels.mean_gradient(values, slope);
+            if (is_line) {
+                detail::store_inner(values, slope);
+                if (options.feature == EdgeFeature::DarkLine)
+                    for (float& s : slope) s = 1.0F - s;
+            } else {
+                kernels.mean_gradient(values, slope);
+                for (float& s : slope) s *= per_length;
+            }
             for (int n = 0; n < kLeafSize; ++n)
-                if (node->isValueOn(n)) node->setValueOnly(n, slope[n] * per_length);
+                if (node->isValueOn(n)) node->setValueOnly(n, slope[n]);
         });
         report.edge_contrast = options.edge_contrast;
         if (options.edge_k > 0) report.edge_contrast = 1.0 / std::sqrt(options.edge_k);
-        if (!(report.edge_contrast > 0)) report.edge_contrast = contrast_of(*result.grid, options.contrast_percentile);
+        double percentile = options.contrast_percentile;
+        if (!(percentile > 0)) percentile = is_line ? kLinePercentile : kSlopePercentile;
+        if (!(report.edge_contrast > 0)) report.edge_contrast = contrast_of(*result.grid, percentile);
         if (!(report.edge_contrast > 0))
             throw Error(Errc::InvalidInput, "edge: " + image.path() +
                                                 ": constant wherever the band lies, there is no edge to find; check that the "
@@ -205,6 +227,38 @@ EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions
             for (auto v = leaf->beginValueOn(); v; ++v) v.setValue(1.0F / (1.0F + k * *v * *v));
     });
     return result;
+}
+
+MarkedFeature feature_at(const Image& image, const std::vector<Vec3>& places, const std::vector<Vec3>& normals, double reach) {
+    const auto value_at = [&](const Vec3& x) {
+        Domain one;
+        one.origin = x;
+        float value = 0;
+        image.sample(one, {0, 0, 0}, {0, 0, 0}, &value);
+        return double(value);
+    };
+    double line = 0, squares = 0, step = 0;
+    for (std::size_t n = 0; n < places.size(); ++n) {
+        Vec3 inner = places[n], outer = places[n];
+        for (int a = 0; a < 3; ++a) {
+            inner[a] -= reach * normals[n][a];
+            outer[a] += reach * normals[n][a];
+        }
+        const double inside = value_at(inner), outside = value_at(outer);
+        const double here = value_at(places[n]) - 0.5 * (inside + outside);
+        line += here;
+        squares += here * here;
+        step += 0.5 * (outside - inside);
+    }
+    MarkedFeature found;
+    const auto count = double(places.size());
+    if (count < 2) return found;
+    found.line = line / count;
+    found.step = step / count;
+    const double error = std::sqrt(std::max(0.0, squares / count - found.line * found.line) / (count - 1));
+    if (std::abs(found.line) > std::abs(found.step) && std::abs(found.line) > kStandardErrors * error)
+        found.feature = found.line > 0 ? EdgeFeature::BrightLine : EdgeFeature::DarkLine;
+    return found;
 }
 
 }  // namespace covol

@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "covol/error.h"
+#include "covol/vdb_io.h"
 #include "detail/file.h"
 #include "detail/image_formats.h"
 #include "detail/matrix.h"
@@ -44,13 +45,6 @@ void check_geometry(const std::string& path, const ImageGeometry& g) {
                                                    "resample the image");
         }
     }
-}
-
-/// "FILE.vdb:name" in two; the name is empty where there is none.
-std::pair<std::string, std::string> split_grid_name(const std::string& path) {
-    const std::size_t colon = path.find(".vdb:");
-    if (colon == std::string::npos || fs::exists(path)) return {path, ""};
-    return {path.substr(0, colon + 4), path.substr(colon + 5)};
 }
 
 std::unique_ptr<ImageFile> open_image(const std::string& given, const RunContext& run) {

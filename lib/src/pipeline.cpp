@@ -44,6 +44,8 @@ constexpr double kCoarseFactor = 8.0;         // voxels of the coarse distance f
 // Coarse to fine, voxels of the coarse level.
 constexpr double kRefinement = 2.0;
 constexpr double kLeastCoarseSigma = 0.5;
+constexpr double kSidesSigmas = 3.0;          // beside a mark, to tell lines from borders
+constexpr std::size_t kFeatureMarks = 4000;   // this many are looked at
 constexpr double kLeastCoarseAttraction = 3.0;
 constexpr double kCoarseTolerance = 5e-3;
 constexpr double kStepBack = 2.0;
@@ -122,6 +124,7 @@ public:
                 start_by_tagging();
             else
                 start_otherwise();
+            if (uses_image()) choose_edge_feature();
             start_from_coarse();
             find_edges();
             find_sure_distance();
@@ -498,6 +501,36 @@ private:
 
     // ---- fields and flow ---------------------------------------------------------------------------------------
 
+    // The marks of contours tell what the border looks like in this image.
+    void choose_edge_feature() {
+        EdgeOptions& edge = options_.edge;
+        if (edge.feature != EdgeFeature::Automatic || body() == nullptr) return;
+        std::vector<Vec3> places, normals;
+        const std::vector<Vec3>& along = options_.contours->along;
+        const std::size_t stride = 1 + along.size() / kFeatureMarks;
+        for (std::size_t n = 0; n < along.size(); n += stride) {
+            Vec3 normal;
+            for (int a = 0; a < 3; ++a) {
+                Vec3 low = along[n], high = along[n];
+                low[a] -= 0.5 * h();
+                high[a] += 0.5 * h();
+                normal[a] = body()->level(high) - body()->level(low);
+            }
+            const double length = std::hypot(normal[0], normal[1], normal[2]);
+            if (!(length > 0)) continue;
+            for (double& component : normal) component /= length;
+            places.push_back(along[n]);
+            normals.push_back(normal);
+        }
+        const MarkedFeature found = feature_at(*image_, places, normals, kSidesSigmas * std::max(edge.sigma, h()));
+        edge.feature = found.feature;
+        const bool is_line = found.feature != EdgeFeature::Slope;
+        choose("edge_feature", to_string(found.feature),
+               is_line ? "at the marks the image is " + number(std::abs(found.line)) + (found.line > 0 ? " brighter" : " darker") +
+                             " than on both sides, which differ by " + number(2 * std::abs(found.step))
+                       : "no line runs along the marks");
+    }
+
     void find_edges() {
         if (!uses_image()) return;
         Timed timed(report().seconds.edge);
@@ -508,7 +541,7 @@ private:
         result_.edge = found.grid;
         const EdgeReport& e = found.report;
         if (options_.edge.edge_k <= 0 && options_.edge.edge_contrast <= 0)
-            choose("edge_k", number(e.edge_k), "g = 1/2 at a gradient of " + number(e.edge_contrast));
+            choose("edge_k", number(e.edge_k), std::string("g = 1/2 at a ") + (options_.edge.feature <= EdgeFeature::Slope ? "gradient" : "brightness") + " of " + number(e.edge_contrast));
         if (options_.edge.low == options_.edge.high)
             choose("intensities", number(e.low) + " to " + number(e.high), "mapped to 0 and 1, percentiles");
         // Fixed from here on: a band that moves must not change the meaning of g.

@@ -254,7 +254,16 @@ void write_vdb(const std::string& path, const std::vector<FloatGridPtr>& grids, 
     });
 }
 
-FloatGridPtr read_vdb(const std::string& path, const std::string& name) {
+VdbGridName split_grid_name(const std::string& text) {
+    const std::size_t colon = text.find(".vdb:");
+    std::error_code status;
+    if (colon == std::string::npos || fs::exists(text, status)) return {text, ""};
+    return {text.substr(0, colon + 4), text.substr(colon + 5)};
+}
+
+FloatGridPtr read_vdb(const std::string& given, const std::string& wanted_name) {
+    const auto [path, named] = split_grid_name(given);
+    const std::string& name = wanted_name.empty() ? named : wanted_name;
     require_readable("read_vdb", path);
     return with_openvdb(Errc::InvalidInput, unusable("read_vdb", path), [&] {
         Reader reader(path);
@@ -274,12 +283,40 @@ FloatGridPtr read_vdb(const std::string& path, const std::string& name) {
     });
 }
 
-std::vector<VdbGridInfo> list_vdb(const std::string& path) {
+FloatGridPtr read_vdb_level_set(const std::string& path, const RunContext& run) {
+    std::string chosen = split_grid_name(path).grid;
+    if (chosen.empty()) {
+        std::vector<std::string> level_sets, others;
+        for (const VdbGridInfo& grid : list_vdb(path)) {
+            if (!grid.type.starts_with(FloatGrid::gridType()) || grid.grid_class == "fog volume") continue;
+            (grid.grid_class == "level set" ? level_sets : others).push_back(grid.name);
+        }
+        const bool has_surface = std::find(level_sets.begin(), level_sets.end(), "surface") != level_sets.end();
+        if (level_sets.empty()) std::swap(level_sets, others);
+        if (!level_sets.empty()) chosen = has_surface ? "surface" : level_sets.front();
+        if (level_sets.size() > 1) {
+            std::string list;
+            for (const std::string& name : level_sets) list += (list.empty() ? "" : ", ") + name;
+            run.warn(path + ": '" + chosen + "' is taken of the level sets " + list + "; name one: " + path + ":" + level_sets.back());
+        }
+    }
+    const FloatGridPtr grid = read_vdb(path, chosen);
+    if (grid->getGridClass() == vdb::GRID_FOG_VOLUME)
+        throw Error(Errc::Unsupported, "read_vdb_level_set: " + path + ": grid '" + grid->getName() +
+                                           "': expected a level set, got a fog volume");
+    return grid;
+}
+
+std::vector<VdbGridInfo> list_vdb(const std::string& given) {
+    const auto [path, name] = split_grid_name(given);
     require_readable("list_vdb", path);
     return with_openvdb(Errc::InvalidInput, unusable("list_vdb", path), [&] {
         Reader reader(path);
         std::vector<VdbGridInfo> list;
-        for (std::size_t n = 0; n < reader.size(); ++n) list.push_back(describe(reader, n));
+        for (std::size_t n = 0; n < reader.size(); ++n)
+            if (name.empty() || reader.name(n) == name) list.push_back(describe(reader, n));
+        if (list.empty() && !name.empty())
+            throw Error(Errc::InvalidInput, "list_vdb: " + path + ": expected a grid named '" + name + "', got " + list_grids(reader));
         return list;
     });
 }

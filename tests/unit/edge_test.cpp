@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -94,7 +95,7 @@ TEST_CASE("every edge option says when it is out of range") {
         rejects("edge_k", &EdgeOptions::edge_k, bad);
         rejects("edge_contrast", &EdgeOptions::edge_contrast, bad);
     }
-    for (const double bad : {0.0, 1.0, nan}) rejects("contrast_percentile", &EdgeOptions::contrast_percentile, bad);
+    for (const double bad : {-0.1, 1.0, nan}) rejects("contrast_percentile", &EdgeOptions::contrast_percentile, bad);
     rejects("low", &EdgeOptions::low, 3.0);  // above high = 0
     rejects("low", &EdgeOptions::high, nan);
 }
@@ -217,4 +218,88 @@ TEST_CASE("edge() refuses what has no edges") {
     CHECK(code_of([&] { (void)edge(image, *topology, bad); }) == Errc::InvalidOptions);
     CHECK(code_of([&] { (void)edge(constant, *topology); }) == Errc::InvalidInput);
     CHECK(code_of([&] { (void)edge(image, *make_grid(domain, 1.0F, "band")); }) == Errc::InvalidInput);
+}
+
+// ---- lines ----------------------------------------------------------------------------------------------------------
+
+namespace {
+
+constexpr double kSheetAt = 0.4;  // off the voxels' centres
+
+/// A bright sheet across x, 1.2 wide, on a floor.
+double sheet(const Vec3& x) { return 0.2 + 0.6 * std::exp(-0.5 * (x[0] - kSheetAt) * (x[0] - kSheetAt) / 0.36); }
+
+/// Places on the sheet, and their normals.
+MarkedFeature feature_on_sheet(const Image& image) {
+    std::vector<Vec3> places, normals;
+    for (double y = -4; y <= 4; y += 0.5)
+        for (double z = -4; z <= 4; z += 0.5) {
+            places.push_back({kSheetAt, y, z});
+            normals.push_back({1, 0, 0});
+        }
+    return feature_at(image, places, normals, 2.5);
+}
+
+}  // namespace
+
+TEST_CASE("g of a line is least in its middle, g of a slope on its sides") {
+    const Domain domain = cube_domain(40, kH);
+    const Image bright = image_on(domain, sheet), dark = image_on(domain, [](const Vec3& x) { return 1 - sheet(x); });
+    const FloatGridPtr where = topology_where(domain, [](const Vec3& x) { return std::abs(x[0]) < 4 && std::abs(x[1]) < 2 && std::abs(x[2]) < 2; });
+    EdgeOptions o = options(0.5, 4);
+    const auto least = [&](const Image& image, EdgeFeature feature) {
+        o.feature = feature;
+        const EdgeResult r = edge(image, *where, o);
+        double at = 0, value = 2;
+        for (auto v = r.grid->cbeginValueOn(); v; ++v)
+            if (*v < value) value = *v, at = r.grid->indexToWorld(v.getCoord())[0];
+        return at;
+    };
+    CHECK(std::abs(least(bright, EdgeFeature::BrightLine) - kSheetAt) <= kH / 2);
+    CHECK(std::abs(least(dark, EdgeFeature::DarkLine) - kSheetAt) <= kH / 2);
+    CHECK(std::abs(least(bright, EdgeFeature::Slope) - kSheetAt) > kH / 2);
+    CHECK(least(bright, EdgeFeature::Automatic) == least(bright, EdgeFeature::Slope));
+    // s is the brightness itself.
+    o.feature = EdgeFeature::BrightLine;
+    o.sigma = 0;
+    const EdgeResult exact = edge(bright, *where, o);
+    for (auto v = exact.grid->cbeginValueOn(); v; ++v) {
+        const openvdb::Vec3d x = exact.grid->indexToWorld(v.getCoord());
+        const double s = sheet({x[0], x[1], x[2]});
+        REQUIRE(*v == Approx(1 / (1 + 4 * s * s)).epsilon(1e-5));
+    }
+}
+
+TEST_CASE("lines take their contrast from the median") {
+    const Domain domain = cube_domain(40, kH);
+    const FloatGridPtr where = topology_where(domain, [](const Vec3& x) { return length(x) < 5; });
+    EdgeOptions o;
+    o.low = 0, o.high = 1, o.sigma = 0.5;
+    o.feature = EdgeFeature::BrightLine;
+    const EdgeResult r = edge(image_on(domain, sheet), *where, o);
+    std::int64_t above = 0;
+    for (auto v = r.grid->cbeginValueOn(); v; ++v) above += *v < 0.5;
+    CHECK(double(above) / double(r.grid->activeVoxelCount()) == Approx(0.5).margin(0.01));
+}
+
+TEST_CASE("marks tell lines from borders, and both from noise") {
+    const Domain domain = cube_domain(40, kH);
+    const MarkedFeature bright = feature_on_sheet(image_on(domain, sheet));
+    CHECK(bright.feature == EdgeFeature::BrightLine);
+    CHECK(bright.line == Approx(0.6).margin(0.05));
+    CHECK(std::abs(bright.step) < 0.02);
+    CHECK(feature_on_sheet(image_on(domain, [](const Vec3& x) { return 1 - sheet(x); })).feature == EdgeFeature::DarkLine);
+    const MarkedFeature border = feature_on_sheet(image_on(domain, [](const Vec3& x) { return x[0] > kSheetAt ? 0.2 : 0.9; }));
+    CHECK(border.feature == EdgeFeature::Slope);
+    CHECK(border.step == Approx(-0.35).margin(0.02));
+    // A line on a border is a line where it stands out from both sides.
+    const auto both = [](double step) {
+        return [step](const Vec3& x) { return sheet(x) + (x[0] > kSheetAt ? step : 0.0); };
+    };
+    CHECK(feature_on_sheet(image_on(domain, both(-0.2))).feature == EdgeFeature::BrightLine);
+    CHECK(feature_on_sheet(image_on(domain, both(1.8))).feature == EdgeFeature::Slope);
+    std::mt19937 random(4);
+    std::uniform_real_distribution<double> grey(0, 1);
+    CHECK(feature_on_sheet(image_on(domain, [&](const Vec3&) { return grey(random); })).feature == EdgeFeature::Slope);
+    CHECK(feature_at(image_on(domain, sheet), {}, {}, 1).feature == EdgeFeature::Slope);
 }

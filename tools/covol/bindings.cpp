@@ -189,9 +189,15 @@ void TagFlags::bind(CLI::App& command, bool names) {
 
 void EdgeFlags::bind(CLI::App& command) {
     add_length(command, "--sigma", sigma, "", "presmoothing of the image [2vx after tagging, else 1vx]");
+    add_choice(command, "--edge-feature", options.feature,
+               {{"auto", EdgeFeature::Automatic}, {"slope", EdgeFeature::Slope}, {"bright-line", EdgeFeature::BrightLine},
+                {"dark-line", EdgeFeature::DarkLine}},
+               "what edges are: borders between darker and brighter, or bright or dark sheets such as membranes "
+               "[what the marks of contours lie on, else slope]");
     CLI::Option* k = add_positive(command, "--edge-k", options.edge_k, "K in g = 1/(1 + K s^2) [see --edge-contrast]");
     add_positive(command, "--edge-contrast", options.edge_contrast,
-                 "gradient at which g = 1/2, of the image scaled to [0,1], per world unit [90 % percentile in the band]")
+                 "gradient, per world unit, or brightness of lines at which g = 1/2, of the image scaled to [0,1] "
+                 "[90 % percentile in the band, 50 % for lines]")
         ->excludes(k);
 }
 
@@ -262,20 +268,5 @@ WriteMeshOptions MeshFlags::options(const Session& session) const {
 }
 
 bool is_float_grid(const VdbGridInfo& grid) { return grid.type == "Tree_float_5_4_3"; }
-
-FloatGridPtr read_level_set(const std::string& path) {
-    const VdbGridInfo* best = nullptr;
-    const std::vector<VdbGridInfo> grids = list_vdb(path);
-    const auto rank = [](const VdbGridInfo& grid) {
-        const bool level_set = grid.grid_class == "level set", fog = grid.grid_class == "fog volume";
-        return fog ? 0 : grid.name == "surface" ? 3 : level_set ? 2 : 1;
-    };
-    for (const VdbGridInfo& grid : grids)
-        if (is_float_grid(grid) && (best == nullptr || rank(grid) > rank(*best))) best = &grid;
-    if (best == nullptr) return read_vdb(path);  // which says what it got instead
-    if (rank(*best) == 0)
-        throw Error(Errc::InvalidInput, path + ": grid '" + best->name + "': expected a level set, got a fog volume");
-    return read_vdb(path, best->name);
-}
 
 }  // namespace covol::tool

@@ -110,10 +110,6 @@ struct MeshFlags {
 
 [[nodiscard]] bool is_float_grid(const VdbGridInfo& grid);
 
-/// The level set of a .vdb file: "surface", else its first level set, else its first float grid that is no fog volume.
-/// @throws Error InvalidInput (there is none), Io.
-[[nodiscard]] FloatGridPtr read_level_set(const std::string& path);
-
 /// A flag that is "x,y,z", once or many times.
 void add_vec3(CLI::App& command, const std::string& flag, std::vector<Vec3>& target, const std::string& description);
 

@@ -49,15 +49,15 @@ void CloudFlags::check() const {
     if (!why.empty()) throw Error(Errc::InvalidOptions, why);
 }
 
-std::vector<Vec3> CloudFlags::clean(const std::vector<Vec3>& points, double h, Session& session, Json& report) const {
+std::vector<Vec3> CloudFlags::clean(const std::vector<Vec3>& points, double h, const RunContext& run, Json& report) const {
     const CloudCleanupOptions options = resolve(h);
     if (!options.any()) return points;
     CloudCleanupReport done;
-    std::vector<Vec3> cleaned = clean_cloud(points, options, session.run(), &done);
+    std::vector<Vec3> cleaned = clean_cloud(points, options, run, &done);
     if (cleaned.empty() && !points.empty())
         throw Error(Errc::InvalidInput, "clean_cloud: no point is left of " + std::to_string(points.size()));
     report["cleanup"] = to_json(done);
-    session.note(one_line(done, options));
+    run.info(one_line(done, options));
     return cleaned;
 }
 

@@ -18,7 +18,7 @@ struct CloudFlags {
     /// @throws Error InvalidOptions for what is wrong whatever h is.
     void check() const;
     /// The cloud as asked for; says what was done, and puts it into `report` as "cleanup".
-    [[nodiscard]] std::vector<Vec3> clean(const std::vector<Vec3>& points, double h, Session& session, Json& report) const;
+    [[nodiscard]] std::vector<Vec3> clean(const std::vector<Vec3>& points, double h, const RunContext& run, Json& report) const;
 
 private:
     [[nodiscard]] CloudCleanupOptions resolve(double h) const;

@@ -57,7 +57,7 @@ struct CompareJob {
 
     static TriangleMesh surface_of(const std::string& path, const RunContext& run) {
         switch (kind_of_file(path)) {
-            case FileKind::Vdb: return extract_mesh(*read_level_set(path), {}, run);
+            case FileKind::Vdb: return extract_mesh(*read_vdb_level_set(path, run), {}, run);
             case FileKind::Mesh: return read_mesh(path);
             default: break;
         }
@@ -82,8 +82,8 @@ void add_compare(Session& session) {
     CLI::App* command = session.add_command(
         "compare", "Overlap and distances of two solids: masks, meshes, .vdb, in any mix; or points and a surface",
         [job, &session] { job->run(session); });
-    command->add_option("a", job->a, "label image, mesh, .vdb or points")->required()->type_name("A");
-    command->add_option("b", job->b, "label image, mesh, .vdb or points")->required()->type_name("B");
+    command->add_option("a", job->a, "label image, mesh, .vdb (:NAME picks a grid) or points")->required()->type_name("A");
+    command->add_option("b", job->b, "label image, mesh, .vdb (:NAME picks a grid) or points")->required()->type_name("B");
     command->add_option("--label", job->label, "label of the masks, 0: any")->capture_default_str();
     command->add_option("--label-b", job->label_b, "label of B, where it differs");
     job->image.bind(*command);

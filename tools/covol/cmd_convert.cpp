@@ -66,7 +66,7 @@ struct ConvertJob {
         if (cloud_flags.simplify.given && cloud_flags.simplify.in_voxels && !geometry)
             throw UsageError("--simplify: a length in voxels needs --like IMAGE");
         const double h = geometry ? *std::min_element(geometry->spacing.begin(), geometry->spacing.end()) : 1;
-        world = cloud_flags.clean(world, h, session, report);
+        world = cloud_flags.clean(world, h, session.run(), report);
         session.outputs().add(output, [world, comment = session.comment()](const std::string& path) {
             write_points(path, world, comment);
         });

@@ -137,7 +137,8 @@ void describe_points(const std::string& path, const PointFlags& flags, Session& 
 }
 
 void describe(const std::string& path, const ImageFlags& flags, const PointFlags& points, Session& session) {
-    const FileKind kind = kind_of_file(path);
+    // A grid that is named is shown as the image that --image and the others would read.
+    const FileKind kind = split_grid_name(path).grid.empty() ? kind_of_file(path) : FileKind::Image;
     session.report()["kind"] = to_string(kind);
     switch (kind) {
         case FileKind::Vdb: return describe_vdb(path, session);

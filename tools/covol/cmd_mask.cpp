@@ -18,7 +18,7 @@ struct MaskJob {
         session.outputs().check("-o", output, OutputKind::Image);
         if (label < 1 || label > 255)
             throw Error(Errc::InvalidOptions, "--label: expected 1 to 255, got " + std::to_string(label));
-        const FloatGridPtr level_set = read_level_set(input);
+        const FloatGridPtr level_set = read_vdb_level_set(input, session.run());
         const ImageGeometry geometry = image.read_geometry(like, session.run());
         const Stopwatch watch;
         const auto labels = std::make_shared<std::vector<std::uint8_t>>(
@@ -39,7 +39,7 @@ void add_mask(Session& session) {
     const auto job = std::make_shared<MaskJob>();
     CLI::App* command =
         session.add_command("mask", "Label image of a level set", [job, &session] { job->run(session); });
-    command->add_option("level_set", job->input, "a level set, .vdb")->required()->type_name("IN.vdb");
+    command->add_option("level_set", job->input, "a level set; of several in a file, :NAME picks one")->required()->type_name("IN.vdb[:NAME]");
     command->add_option("--like", job->like, "image whose lattice the mask gets")->required()->type_name("IMAGE");
     command->add_option("-o,--output", job->output, "label image")->required()->type_name("OUT.nrrd|.nii.gz|.tif|.mha");
     command->add_option("--label", job->label, "value of the inside, 1 to 255")->capture_default_str();

@@ -36,7 +36,7 @@ struct MeshJob {
     void run(Session& session) const {
         session.outputs().check("-o", output, OutputKind::Mesh);
         flags.check();
-        const FloatGridPtr level_set = read_level_set(input);
+        const FloatGridPtr level_set = read_vdb_level_set(input, session.run());
         const double h = domain_of(*level_set).voxel_size;
         const Stopwatch watch;
         TriangleMesh mesh = extract_mesh(*level_set, extract_options(h), session.run());
@@ -60,7 +60,7 @@ void add_mesh(Session& session) {
     const auto job = std::make_shared<MeshJob>();
     CLI::App* command =
         session.add_command("mesh", "Triangles of a level set, and their cleanup", [job, &session] { job->run(session); });
-    command->add_option("level_set", job->input, "a level set, .vdb")->required()->type_name("IN.vdb");
+    command->add_option("level_set", job->input, "a level set; of several in a file, :NAME picks one")->required()->type_name("IN.vdb[:NAME]");
     command->add_option("-o,--output", job->output, "closed, manifold, outward triangles")
         ->required()->type_name("OUT.ply|.obj|.stl|.off|.glb");
     add_length(*command, "--isovalue", job->isovalue, "0", "extract this level outside the surface");

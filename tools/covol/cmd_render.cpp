@@ -15,7 +15,7 @@ struct RenderJob {
     void run(Session& session) const {
         session.outputs().check("-o", output, OutputKind::Picture);
         if (const std::string why = options.why_invalid(); !why.empty()) throw Error(Errc::InvalidOptions, "render: " + why);
-        const FloatGridPtr level_set = read_level_set(input);
+        const FloatGridPtr level_set = read_vdb_level_set(input, session.run());
         std::optional<Image> pixels;
         if (!image_path.empty()) pixels = image.read(image_path, session.run());
         const WorldPoints cloud = read_world_points(points, pixels ? &pixels->geometry() : nullptr, session.run());
@@ -33,7 +33,7 @@ void add_render(Session& session) {
     const auto job = std::make_shared<RenderJob>();
     CLI::App* command = session.add_command("render", "A picture: the shaded surface, slices with its outline and the points",
                                             [job, &session] { job->run(session); });
-    command->add_option("level_set", job->input, "a level set, .vdb")->required()->type_name("IN.vdb");
+    command->add_option("level_set", job->input, "a level set; of several in a file, :NAME picks one")->required()->type_name("IN.vdb[:NAME]");
     command->add_option("-o,--output", job->output, "the picture")->required()->type_name("OUT.png");
     command->add_option("--image", job->image_path, "image for the slices")->type_name("IMAGE");
     job->points.bind(*command, "--points");

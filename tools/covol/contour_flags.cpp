@@ -2,11 +2,12 @@
 
 namespace covol::tool {
 
-void ContourFlags::bind(CLI::App& command) {
+void ContourFlags::bind(CLI::App& command, bool names) {
     command.add_option("--contours", paths,
-                       "ordered marks on slices (CSV slice,contour,x_px,y_px; napari shapes; Fiji selections): joined, "
-                       "densified, and closed between the slices and beyond the last")
-        ->type_name("FILE...");
+                       std::string("ordered marks on slices (CSV slice,contour,x_px,y_px; napari shapes; Fiji selections): "
+                                   "joined, densified, and closed between the slices and beyond the last") +
+                           (names ? "; with names, ve=FILE exe=FILE, several structures" : ""))
+        ->type_name(names ? "[NAME=]FILE..." : "FILE...");
     add_choice(command, "--contour-curve", curve, {{"lines", ContourCurve::Lines}, {"spline", ContourCurve::Spline}},
                "how neighbouring marks are joined [lines]");
 }
@@ -23,23 +24,19 @@ std::vector<PointCloud> ContourFlags::read(const ReadPointsOptions& reading, con
 }
 
 std::shared_ptr<const Contours> ContourFlags::densify(const std::vector<PointCloud>& clouds, const ImageGeometry* geometry,
-                                                      double h, Session& session) const {
-    if (clouds.empty()) return nullptr;
-    const Stopwatch watch;
-    const auto contours = std::make_shared<Contours>(covol::densify(clouds, geometry, {h, curve}, session.run()));
-    session.note("contours: " + contours->summary);
+                                                      double h, const RunContext& run, Json& report) const {
+    const auto contours = std::make_shared<Contours>(covol::densify(clouds, geometry, {h, curve}, run));
+    run.info("contours: " + contours->summary);
     Json rules = Json::array();
     for (const PointCloud& cloud : clouds) rules.push_back(cloud.rule);
-    session.report()["input"]["contours"] = {{"paths", paths},
-                                             {"rules", rules},
-                                             {"closed", contours->closed},
-                                             {"open", contours->open},
-                                             {"slices", contours->slices},
-                                             {"slice_distance", contours->slice_distance},
-                                             {"along", contours->along.size()},
-                                             {"between", contours->between.size()}};
-    session.add_seconds("contours", watch.seconds());
-    session.add_seconds("total", watch.seconds());
+    report = {{"paths", paths},
+              {"rules", rules},
+              {"closed", contours->closed},
+              {"open", contours->open},
+              {"slices", contours->slices},
+              {"slice_distance", contours->slice_distance},
+              {"along", contours->along.size()},
+              {"between", contours->between.size()}};
     return contours;
 }
 

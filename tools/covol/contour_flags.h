@@ -14,13 +14,14 @@ struct ContourFlags {
     std::vector<std::string> paths;
     ContourCurve curve = ContourCurve::Lines;
 
-    void bind(CLI::App& command);
+    /// @param names  files may be NAME=FILE: of one structure among several
+    void bind(CLI::App& command, bool names);
     /// @param reading  how coordinates are understood, as for points
     [[nodiscard]] std::vector<PointCloud> read(const ReadPointsOptions& reading, const ImageGeometry* geometry,
                                                const RunContext& run) const;
-    /// Null without a file. Fills input.contours of the report.
+    /// With step h. Says what came of it, and fills the report's input.contours.
     [[nodiscard]] std::shared_ptr<const Contours> densify(const std::vector<PointCloud>& clouds, const ImageGeometry* geometry,
-                                                          double h, Session& session) const;
+                                                          double h, const RunContext& run, Json& report) const;
 };
 
 }  // namespace covol::tool

@@ -8,6 +8,7 @@
 #include "covol/error.h"
 #include "covol/mesh_io.h"
 #include "covol/points.h"
+#include "covol/vdb_io.h"
 
 namespace covol::tool {
 namespace {
@@ -47,7 +48,7 @@ bool holds_triangles(const std::string& path) {
 }  // namespace
 
 FileKind kind_of_file(const std::string& path) {
-    const std::string end = ending_of(path);
+    const std::string end = ending_of(split_grid_name(path).path);
     if (end == ".vdb") return FileKind::Vdb;
     if (is_one_of(end, kPointEndings) || end == ".laz") return FileKind::Points;  // that LAZ is not read, its reader says
     if (is_one_of(end, kMeshEndings)) return FileKind::Mesh;

@@ -5,7 +5,7 @@ namespace covol::tool {
 
 enum class FileKind { Vdb, Image, Mesh, Points };
 
-/// By the name's end; PLY, OBJ and OFF are meshes when they hold a face, else points.
+/// By the name's end ("FILE.vdb:name" is Vdb); PLY, OBJ and OFF are meshes when they hold a face, else points.
 /// @throws Error Io, InvalidInput when such a file cannot be read.
 [[nodiscard]] FileKind kind_of_file(const std::string& path);
 

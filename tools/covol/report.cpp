@@ -77,6 +77,7 @@ Json to_json(const SegmentOptions& o) {
             {"delta", e.delta},
             {"tau", e.tau},
             {"sigma", o.edge.sigma},
+            {"edge_feature", to_string(o.edge.feature)},
             {"edge_k", o.edge.edge_k},
             {"intensities", {o.edge.low, o.edge.high}},
             {"epsilon", e.epsilon},

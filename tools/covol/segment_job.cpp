@@ -9,6 +9,7 @@
 #include "covol/error.h"
 #include "covol/surface.h"
 #include "covol/vdb_io.h"
+#include "marks.h"
 #include "report.h"
 #include "structures_job.h"
 #include "timelapse_job.h"
@@ -80,7 +81,7 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
     command.add_option("--mesh", mesh_path, "triangles")->type_name("OUT.ply|.obj|.stl|.off|.glb");
     command.add_option("--density", density_path, "the solid as a fog volume in [0,1]")->type_name("OUT.vdb");
     command.add_option("--fields", fields_path, "u, distance and edge, for a look inside")->type_name("OUT.vdb");
-    contours.bind(command);
+    contours.bind(command, with_image);
     cloud.bind(command);
     evolve.bind(command, with_image);
     if (with_image) edge.bind(command);
@@ -120,14 +121,12 @@ Image SegmentJob::read(const std::string& path, const ReadImageOptions& options,
 }
 
 void SegmentJob::run(Session& session) const {
-    const bool names = std::any_of(points.paths.begin(), points.paths.end(),
-                                   [](const std::string& text) { return !split_name(text).name.empty(); });
-    const bool several = names || !tag.named_seeds.empty();
-    if (!contours.paths.empty() && (several || is_timelapse(*this)))
-        throw UsageError("--contours: expected one structure in one image; give the contours of several structures, or of several "
-                         "frames, in runs of their own");
+    const auto has_name = [](const std::string& text) { return !split_name(text).name.empty(); };
+    const bool names = std::any_of(points.paths.begin(), points.paths.end(), has_name) ||
+                       std::any_of(contours.paths.begin(), contours.paths.end(), has_name);
+    if (names && images.empty()) throw UsageError("expected files without names: several structures need an image, see covol segment");
     if (is_timelapse(*this)) return run_timelapse(*this, session);
-    if (several) return run_structures(*this, session);
+    if (names || !tag.named_seeds.empty()) return run_structures(*this, session);
     run_one(session);
 }
 
@@ -144,24 +143,18 @@ void SegmentJob::run_one(Session& session) const {
     Json& input = session.report()["input"];
     const Stopwatch reading;
     const ImageGeometry* geometry = pixels ? &pixels->geometry() : nullptr;
-    WorldPoints marks = read_world_points(points, geometry, session.run());
-    const std::vector<PointCloud> drawn = contours.read(points.options, geometry, session.run());
-    std::vector<Vec3> given = marks.points;
-    for (const PointCloud& cloud : drawn) {
-        const std::vector<Vec3> world = to_world(cloud, geometry);
-        given.insert(given.end(), world.begin(), world.end());
-    }
-    input["points"] = {{"count", given.size()}, {"densified", 0}, {"paths", points.paths}, {"rules", marks.rules}};
+    Marks marks = read_marks(points, contours, geometry, session.run());
     session.add_seconds("read", reading.seconds());
     session.add_seconds("total", reading.seconds());
 
     const Image* pointer = pixels ? &*pixels : nullptr;
-    if (pointer == nullptr && given.empty()) throw UsageError("expected an image, points or contours, got none");
-    const double h = domain.resolve_voxel_size(pointer, given, session);
-    marks.points = cloud.clean(marks.points, h, session, input["points"]);
+    if (pointer == nullptr && marks.given.empty()) throw UsageError("expected an image, points or contours, got none");
+    const double h = domain.resolve_voxel_size(pointer, marks.given, session);
+    prepare(marks, cloud, contours, geometry, h, session, session.run());
+    input.update(marks.report);
     SegmentOptions options = resolve(h);
-    check_tag_distance(options.tag_distance, given);
-    options.contours = contours.densify(drawn, geometry, h, session);
+    check_tag_distance(options.tag_distance, marks.given);
+    options.contours = marks.contours;
     // Shared by the writers that run at the end.
     const auto result = std::make_shared<SegmentResult>(segment(pointer, marks.points, options, session.run()));
     input["points"]["densified"] = result->report.densified;
@@ -170,7 +163,7 @@ void SegmentJob::run_one(Session& session) const {
     for (const std::string& line : summary(result->report)) session.note(line);
     std::optional<Evidence> judged;
     if (pixels && evidence.wanted()) {
-        judged = evidence.judge(*result, given, *pixels, session.run());
+        judged = evidence.judge(*result, marks.given, *pixels, session.run());
         session.report()["evidence"] = to_json(*judged);
         tell(session, *judged);
     }

@@ -8,18 +8,21 @@
 #include "covol/error.h"
 #include "covol/surface.h"
 #include "covol/vdb_io.h"
+#include "marks.h"
 #include "report.h"
 
 namespace covol::tool {
 namespace {
 
-StructureInput& find_or_add(std::vector<StructureInput>& inputs, const std::string& name, const PointFlags& flags) {
+StructureInput& find_or_add(std::vector<StructureInput>& inputs, const std::string& name, const SegmentJob& job) {
     for (StructureInput& input : inputs)
         if (input.name == name) return input;
     StructureInput added;
     added.name = name;
-    added.points = flags;
+    added.points = job.points;
     added.points.paths.clear();
+    added.contours = job.contours;
+    added.contours.paths.clear();
     inputs.push_back(added);
     return inputs.back();
 }
@@ -140,7 +143,7 @@ void hand_over_labels(const std::shared_ptr<const StructuresOutput>& output, con
 }
 
 Json report_of(const StructureOutput& s) {
-    Json json{{"input", {{"points", {{"count", s.marks.size()}, {"densified", 0}, {"paths", s.paths}, {"rules", s.rules}}}}}};
+    Json json{{"input", s.input}};
     json.update(to_json(s.result.report));
     if (s.evidence) json["evidence"] = to_json(*s.evidence);
     return json;
@@ -168,13 +171,17 @@ std::vector<StructureInput> structures_of(const SegmentJob& job) {
     std::vector<StructureInput> inputs;
     for (const std::string& text : job.points.paths) {
         const Named file = split_name(text);
-        find_or_add(inputs, file.name, job.points).points.paths.push_back(file.value);
+        find_or_add(inputs, file.name, job).points.paths.push_back(file.value);
     }
-    if (inputs.empty()) find_or_add(inputs, "", job.points);
+    for (const std::string& text : job.contours.paths) {
+        const Named file = split_name(text);
+        find_or_add(inputs, file.name, job).contours.paths.push_back(file.value);
+    }
+    if (inputs.empty()) find_or_add(inputs, "", job);
     for (const StructureInput& input : inputs)
         if (inputs.size() > 1 && input.name.empty())
-            throw UsageError("--points: expected a name for every file when one has a name (ve=FILE), got none for " +
-                             input.points.paths.front());
+            throw UsageError("--points, --contours: expected a name for every file when one has a name (ve=FILE), got none for " +
+                             (input.points.paths.empty() ? input.contours.paths : input.points.paths).front());
     for (StructureInput& input : inputs) input.exterior_seeds = job.tag.exterior_seeds;
     for (const auto& [name, seed] : job.tag.named_seeds) {
         const auto at = std::find_if(inputs.begin(), inputs.end(), [&, &who = name](const auto& i) { return i.name == who; });
@@ -210,20 +217,22 @@ StructuresOutput segment_structures(const SegmentJob& job, const std::vector<Str
         StructureOutput s;
         s.name = inputs[n].name;
         s.grid = grids[n];
-        const WorldPoints cloud = read_world_points(inputs[n].points, &image.geometry(), own);
-        s.marks = cloud.points;
-        s.rules = cloud.rules;
-        s.paths = inputs[n].points.paths;
+        Marks marks = read_marks(inputs[n].points, inputs[n].contours, &image.geometry(), own);
+        prepare(marks, job.cloud, inputs[n].contours, &image.geometry(), h, session, own);
+        s.marks = marks.given;
+        s.input = marks.report;
         SegmentOptions options = given;
+        options.contours = marks.contours;
         options.exterior_seeds = inputs[n].exterior_seeds;
         options.start = starts[n].start;
         if (options.evolve.delta < 0) options.evolve.delta = starts[n].delta;
         try {
-            s.result = segment(&image, s.marks, options, own);
+            s.result = segment(&image, marks.points, options, own);
         } catch (const Error& error) {
             if (s.name.empty()) throw;
             throw Error(error.code(), s.name + ": " + error.what());
         }
+        s.input["points"]["densified"] = s.result.report.densified;
         add_seconds(session, s.result.report.seconds);
         output.structures.push_back(std::move(s));
     }

@@ -10,25 +10,26 @@
 #include "segment_job.h"
 #include "table.h"
 
-// One image, one or several structures: `--points NAME=FILE`.
+// One image, one or several structures: `--points NAME=FILE`, `--contours NAME=FILE`.
 namespace covol::tool {
 
 /// A structure as the command line gives it.
 struct StructureInput {
     std::string name;  ///< empty: the only one, and it was not named
     PointFlags points;
+    ContourFlags contours;
     std::vector<Vec3> exterior_seeds;
 };
 
-/// The structures of a run, in the order in which their names come first.
+/// The structures of a run, in the order in which their names come first, those of --points before those of --contours.
 /// @throws UsageError when some marks have names and others have none, or a seed names nobody.
 [[nodiscard]] std::vector<StructureInput> structures_of(const SegmentJob& job);
 
 /// What came out for one.
 struct StructureOutput {
     std::string name, grid;
-    std::vector<Vec3> marks;
-    std::vector<std::string> paths, rules;
+    std::vector<Vec3> marks;  ///< as they were clicked
+    Json input;               ///< of the report
     SegmentResult result;
     std::optional<Evidence> evidence;
 };

@@ -118,19 +118,24 @@ private:
     [[nodiscard]] std::vector<StructureInput> inputs_at(const Frame& frame) const {
         std::vector<StructureInput> inputs = inputs_;
         for (StructureInput& input : inputs) {
-            std::vector<std::string> paths;
-            for (const std::string& path : input.points.paths) {
-                if (!has_frame_pattern(path)) {
-                    if (!started_) paths.push_back(path);
-                    continue;
-                }
-                const std::string own = with_frame(path, frame.number);
-                // Marks may be missing once there is a surface to start from.
-                if (!started_ || std::filesystem::exists(own)) paths.push_back(own);
-            }
-            input.points.paths = paths;
+            input.points.paths = paths_at(frame, input.points.paths);
+            input.contours.paths = paths_at(frame, input.contours.paths);
         }
         return inputs;
+    }
+
+    [[nodiscard]] std::vector<std::string> paths_at(const Frame& frame, const std::vector<std::string>& patterns) const {
+        std::vector<std::string> paths;
+        for (const std::string& path : patterns) {
+            if (!has_frame_pattern(path)) {
+                if (!started_) paths.push_back(path);
+                continue;
+            }
+            const std::string own = with_frame(path, frame.number);
+            // Marks may be missing once there is a surface to start from.
+            if (!started_ || std::filesystem::exists(own)) paths.push_back(own);
+        }
+        return paths;
     }
 
     void go(const Frame& frame) {

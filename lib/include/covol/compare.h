@@ -22,7 +22,7 @@ struct Solid {
     std::optional<TriangleMesh> mesh;
     FloatGridPtr level_set;
 };
-/// By the name's end: images, meshes, .vdb (its level set "surface", else its first float grid).
+/// By the name's end: images, meshes, .vdb (as read_vdb_level_set chooses).
 [[nodiscard]] Solid read_solid(const std::string& path, int label = 0, const RunContext& run = {});
 
 /// Overlap on the finer of both lattices (a mask's own voxels when one is a mask), distances between surfaces.

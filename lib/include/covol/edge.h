@@ -1,5 +1,7 @@
 #pragma once
+#include <cstddef>
 #include <string>
+#include <vector>
 
 #include "covol/domain.h"
 #include "covol/image.h"
@@ -7,11 +9,23 @@
 
 namespace covol {
 
+/// What an edge is: s in g(s), Eq. (2), of the image normalised to [0,1].
+enum class EdgeFeature {
+    Automatic,   ///< edge() takes Slope; segment() asks the marks of contours, see feature_at()
+    Slope,       ///< s = |∇G_σ * I| per world unit: borders between darker and brighter, the paper's
+    BrightLine,  ///< s = G_σ * I: bright sheets such as stained membranes, whose middle has no slope and its sides have two
+    DarkLine     ///< s = 1 - G_σ * I
+};
+
+/// "auto", "slope", "bright-line", "dark-line"
+[[nodiscard]] const char* to_string(EdgeFeature feature);
+
 struct EdgeOptions {
+    EdgeFeature feature = EdgeFeature::Automatic;
     double sigma = -1.0;              ///< σ >= 0, world units: presmoothing; < 0 picks 1 voxel.
-    double edge_k = 0.0;              ///< K > 0 in g = 1/(1+K s^2), s per world unit of the normalised image; 0: see edge_contrast.
-    double edge_contrast = 0.0;       ///< s at which g = 1/2, i.e. K = 1/s^2; 0 picks a high percentile of s in the band.
-    double contrast_percentile = 0.9; ///< that percentile, in (0,1)
+    double edge_k = 0.0;              ///< K > 0 in g = 1/(1+K s^2), 0: see edge_contrast.
+    double edge_contrast = 0.0;       ///< s at which g = 1/2, i.e. K = 1/s^2; 0 picks a percentile of s in the band.
+    double contrast_percentile = 0.0; ///< that percentile, in (0,1); 0 picks 0.9 for slopes, 0.5 for lines
     double low = 0.0, high = 0.0;     ///< intensities mapped to 0 and 1; equal: the image's 0.5 % and 99.5 % percentiles.
     [[nodiscard]] std::string why_invalid() const;
 };
@@ -28,11 +42,26 @@ struct EdgeResult {
     EdgeReport report;
 };
 
-/// Edge detector g = 1/(1 + K |∇G_σ * I|^2), Eq. (2), on the active voxels of `topology`.
+/// Edge detector g = 1/(1 + K s^2), Eq. (2), on the active voxels of `topology`.
 /// The image is sampled there and in a halo, normalised, smoothed by the implicit heat equation over time σ²/2, and
 /// |∇I| is the mean over the 24 tetrahedra of each voxel.
 /// @throws Error InvalidOptions, InvalidInput (no active voxel; the image is constant).
 [[nodiscard]] EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions& options = {},
                               const RunContext& run = {});
+
+/// What the image has where people mark a border, on the average over many places.
+struct MarkedFeature {
+    EdgeFeature feature = EdgeFeature::Slope;
+    double line = 0;  ///< brightness there, less that of both sides; intensities
+    double step = 0;  ///< half the difference between outside and inside
+};
+
+/// A line where the marked places differ from both of their sides by more than the sides differ, and by more than
+/// three standard errors; else a slope.
+/// @param places   world units
+/// @param normals  outward unit vectors; as many
+/// @param reach    how far beside a place its sides are looked at, world units
+[[nodiscard]] MarkedFeature feature_at(const Image& image, const std::vector<Vec3>& places, const std::vector<Vec3>& normals,
+                                       double reach);
 
 }  // namespace covol

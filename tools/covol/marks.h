@@ -1,0 +1,30 @@
+#pragma once
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bindings.h"
+#include "cloud_flags.h"
+#include "contour_flags.h"
+#include "covol/contours.h"
+
+namespace covol::tool {
+
+/// The marks of one structure: what its files hold, and what segment() takes once h is known.
+struct Marks {
+    std::vector<Vec3> given;          ///< all of them as they were clicked, world units; cleaned by prepare()
+    std::vector<Vec3> points;         ///< those that are no contours
+    std::vector<PointCloud> drawn;    ///< contours
+    std::shared_ptr<const Contours> contours;  ///< null before densify(), and without a file
+    Json report;                      ///< {"points": {...}, "contours": {...}}
+};
+
+/// Reads both kinds of files. With an image, marks outside it are an error.
+[[nodiscard]] Marks read_marks(const PointFlags& points, const ContourFlags& contours, const ImageGeometry* geometry,
+                               const RunContext& run);
+
+/// Cleans the points, and densifies the contours with step h.
+void prepare(Marks& marks, const CloudFlags& cloud, const ContourFlags& contours, const ImageGeometry* geometry, double h,
+             Session& session, const RunContext& run);
+
+}  // namespace covol::tool
