@@ -374,12 +374,13 @@ class Several(ContoursCase):
             image = self.inputs / f"frame{t}.nrrd"
             write_nrrd(image, 30 + 180 * np.clip((7 + t - r) / 0.5 + 0.5, 0, 1))
             frames.append(image)
-            write_table(self.inputs / f"marks_{t}.csv", [outline(math.sqrt((7 + t) ** 2 - ((k - 11) * 1.5) ** 2), k) for k in range(7, 16)])
+            radii = {k: math.sqrt(max(0, (7 + t) ** 2 - ((k - 11) * 1.5) ** 2)) for k in range(SIZES[2])}
+            write_table(self.inputs / f"marks_{t}.csv", [outline(r, k) for k, r in radii.items() if r > 2.5])
         report = self.report("segment", *frames, "--contours", f"cell={self.inputs}/marks_{{frame}}.csv", "-o", "s.vdb", "--rho", 0)
         self.assertEqual(self.files(), ["s_t000.vdb", "s_t001.vdb", "s_t002.vdb"])
         for t, frame in enumerate(report["frames"]):
             cell, = frame["structures"]
-            self.assertEqual(cell["input"]["contours"]["slices"], 9)
+            self.assertEqual(cell["input"]["contours"]["slices"], 9 if t == 0 else 11)
             self.assertAlmostEqual(cell["surface"]["volume"] / (4 / 3 * math.pi * (7 + t) ** 3), 1, delta=0.06)
 
 

@@ -12,6 +12,7 @@ namespace covol::tool {
 namespace {
 
 constexpr double kReachVoxels = 5.0;  // of marks whose attraction is unlimited
+constexpr double kWeakLine = 0.6;  // 1 - g where the image is 1.2 times as bright as the band's median
 
 std::string text_of(const Vec3& v, int decimals) {
     std::ostringstream text;
@@ -40,6 +41,8 @@ Evidence EvidenceFlags::judge(const SegmentResult& result, const std::vector<Vec
     EvidenceOptions options;
     options.reach = used.evolve.attraction_range > 0 ? used.evolve.attraction_range : kReachVoxels * used.voxel_size;
     options.suggestions = suggestions;
+    // Brightness is nowhere 0 as slopes are: g = 1/2 at its median, which is no line yet.
+    if (used.edge.feature > EdgeFeature::Slope) options.weak_edge = kWeakLine;
     // Where the image had no weight its edges are looked up now.
     const FloatGridPtr g = result.edge ? result.edge : edge(image, *result.surface, used.edge, run).grid;
     return evidence(result.mesh, marks, g.get(), image.geometry(), options, run);
