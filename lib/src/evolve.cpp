@@ -9,8 +9,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <sstream>
+#include <utility>
 
 #include "covol/band.h"
 #include "covol/domain.h"
@@ -23,7 +25,7 @@ namespace covol {
 namespace {
 
 // A leaf rests when a step moves it by less than this share of the motion that counts as steady.
-constexpr double kRestShare = 0.5;
+constexpr double kRestShare = 0.2;
 constexpr int kCycle = 3;  // steps between two redistancings of a follower
 
 // An automatic time step grows while the surface moves by little, up to kLargestTau, and shrinks when it moves by much.
@@ -81,7 +83,7 @@ public:
                 report_.stop_reason = StopReason::Steady;
                 break;
             }
-            if (options_.tau < 0 && options_.rho == 0) adapt_tau(motion.mean);
+            if (options_.tau < 0 && (options_.rho == 0 || options_.image_yields > 0)) adapt_tau(motion.mean);
         }
         solver_->store(u_);
         report_.sweeps_per_step = report_.steps > 0 ? double(counts_.passes) / report_.steps : 0.0;
@@ -126,26 +128,30 @@ private:
     // made a distance again. How far the surface has come is asked just before, from time to time at the same phase.
     double follow(double motion) {
         if (report_.steps % kCycle != 0) return motion;
-        const double moved = doze_by_marks();
+        std::vector<float> largest;
+        const double moved = ask_marks(largest);
         const std::vector<std::size_t> left = departure_.left(solver_->u());
         if (left.empty())
             solver_->redistance(follow_clamp(options_));
         else
-            remake_band(left);
+            remake_band(left, largest);
+        // Only now, so that a leaf sleeps in the same phase as the others are in at the end.
+        if (solver_) solver_->doze(largest, kCycle * rest());
         return std::min(motion, moved / kCycle);
     }
 
-    // @return the mean way of the surface since the last marks, voxels
-    double doze_by_marks() {
+    // @param largest  out: of each leaf, the way of the crossing that moved most since the last marks, voxels
+    // @return the surface's mean way since then
+    double ask_marks(std::vector<float>& largest) {
         const std::size_t leaves = solver_->band().size();
-        std::vector<float> largest(leaves, 0.0F), mean(leaves, 0.0F);
+        std::vector<float> mean(leaves, 0.0F);
+        largest.assign(leaves, 0.0F);
         tbb::parallel_for(std::size_t(0), leaves, [&](std::size_t leaf) {
             if (!solver_->is_awake(leaf)) return;
             const detail::CrossingMarks::Way moved = marks_.renew(leaf, solver_->u().leaf(leaf));
             largest[leaf] = static_cast<float>(moved.largest);
             mean[leaf] = static_cast<float>(moved.mean);
         });
-        solver_->doze(largest, kCycle * rest());
         double way = 0.0, crossings = 0.0;
         for (std::size_t leaf = 0; leaf < leaves; ++leaf) {
             const auto count = static_cast<double>(marks_.count(leaf));
@@ -155,8 +161,8 @@ private:
         return crossings > 0 ? way / crossings : 0.0;
     }
 
-    // Leaves no solver where no surface is left.
-    void remake_band(const std::vector<std::size_t>& left) {
+    // Leaves no solver where no surface is left. @param largest  in: of each leaf before; out: of each leaf now
+    void remake_band(const std::vector<std::size_t>& left, std::vector<float>& largest) {
         std::vector<detail::Coord> stale;
         for (const std::size_t leaf : left) stale.push_back(solver_->band().origin(leaf));
         solver_->store(u_);
@@ -174,6 +180,10 @@ private:
             place[leaf] = at == rest.band.none() ? -1 : at;
             same[leaf] = std::binary_search(changed.begin(), changed.end(), band.origin(leaf)) ? -1 : place[leaf];
         }
+        std::vector<float> moved(band.size(), std::numeric_limits<float>::infinity());
+        for (std::size_t leaf = 0; leaf < band.size(); ++leaf)
+            if (place[leaf] >= 0) moved[leaf] = largest[place[leaf]];
+        largest = std::move(moved);
         departure_.remake(same, solver_->u());
         marks_.remake(place);
         solver_->redistance(follow_clamp(options_));

@@ -15,7 +15,8 @@ struct EvolveOptions {
     double theta = 1.0;             ///< θ in [0,1]: weight of the pull towards the points, Eq. (3).
     double rho = 1.0;               ///< ρ in [0,1]: weight of the pull towards image edges, Eq. (3).
     double delta = -1.0;            ///< δ >= 0: weight of curvature, Eq. (1), world units; < 0 picks 1 voxel.
-    double tau = -1.0;              ///< τ > 0: time step; < 0 picks h (one voxel at unit speed), and without an image more while the surface moves slowly.
+    double tau = -1.0;              ///< τ > 0: time step; < 0 picks h (one voxel at unit speed), and more while the surface moves slowly, unless an image
+                                  ///< alone decides.
     double epsilon = 1e-2;          ///< ε > 0: regularises |∇u|, Eqs. (13)-(14); dimensionless.
     double edge_epsilon = 0.02;     ///< ε in |∇g|_ε, Eq. (20): a slope of g per voxel; below it the pull fades.
     double attraction_range = 0.0;  ///< r, world units: the points pull fully up to r/2, not at all beyond r; 0: unlimited.
