@@ -33,7 +33,7 @@ echo "== segmenting both"
 "$covol" segment "$out/cells.tif" --points "left=$out/left.csv" "right=$out/right.csv" -o "$out/cells.vdb" \
   --mask "$out/cells.seg.nrrd" --mesh "$out/cells.glb" --table "$out/cells.csv" --evidence "$out/evidence.csv" \
   --json "$out/report.json"
-"$covol" render "$out/cells.vdb" --image "$out/cells.tif" -o "$out/cells.png"
+"$covol" render "$out/cells.vdb:left" --image "$out/cells.tif" -o "$out/cells.png"
 
 echo "== results"
 cat "$out/cells.csv"
