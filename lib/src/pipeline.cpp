@@ -16,11 +16,13 @@
 #include "covol/mesh_io.h"
 #include "covol/scan_noise.h"
 #include "covol/scan_solid.h"
+#include "detail/vanished.h"
 
 namespace covol {
 namespace {
 
 constexpr double kMergeVoxels = 0.25;         // points closer than this do not move the surface apart
+constexpr double kFewPoints = 1000;           // fewer get a voxel size at which their surface has as many voxels as this many would
 constexpr double kMarginVoxels = 6.0;         // between D and the domain's boundary, for points alone
 constexpr double kTubeSlackVoxels = 2.0;      // the upwind scheme looks one voxel beyond the band
 constexpr double kAttractionVoxels = 5.0;     // automatic range of the points after starts other than tagging
@@ -137,6 +139,7 @@ public:
 
 private:
     SegmentReport& report() { return result_.report; }
+    const SegmentReport& report() const { return result_.report; }
     double h() const { return options_.voxel_size; }
     bool uses_points() const { return options_.evolve.theta > 0; }
     bool uses_image() const { return options_.evolve.rho > 0; }
@@ -574,11 +577,17 @@ private:
         result_.u->setName("u");
         const EvolveReport& solved = report().solve;
         if (solved.stop_reason == StopReason::Vanished)
-            throw Error(Errc::InvalidInput, "segment: the surface vanished after " + std::to_string(solved.steps) +
-                                                " steps: nothing held it; lower delta, or start closer to the edges");
+            throw Error(Errc::InvalidInput, "segment: the surface vanished after " + std::to_string(solved.steps) + " steps: " +
+                                                why_vanished());
         if (solved.stop_reason == StopReason::MaxSteps)
             run_.warn("not steady after " + std::to_string(solved.steps) + " steps: the last change was " +
                       number(solved.last_change) + " voxels");
+    }
+
+    std::string why_vanished() const {
+        if (image_ == nullptr && options_.start.kind == Start::Kind::Tag && !from_body_)
+            return detail::why_nothing_held(points_, options_.tag_distance, has_chosen_tag_ ? report().tag.encloses : !report().band.leaks);
+        return "nothing held it; lower --delta, or start closer to the edges (--init)";
     }
 
     void flow() {
@@ -755,7 +764,12 @@ VoxelSizeChoice choose_voxel_size(const Image* image, const std::vector<Vec3>& w
                                             std::to_string(distinct.size()));
     const double spacing = nearest_neighbour_spacing(distinct).median;
     const ScanVoxelSize scan = scan_voxel_size(distinct, spacing);
-    if (scan.voxel_size <= spacing) return {spacing, "the median distance between neighbouring points"};
+    if (scan.voxel_size <= spacing) {
+        // A surface of few points is so few spacings wide that in voxels as large as they are curvature would outweigh them.
+        const double finer = std::sqrt(double(distinct.size()) / kFewPoints);
+        if (finer >= 1) return {spacing, "the median distance between neighbouring points"};
+        return {finer * spacing, "finer than the median distance between neighbouring points, " + number(spacing) + ", for there are few"};
+    }
     return {scan.voxel_size, "points lie " + number(scan.thickness) + " from their local plane on the mean, noise wider than their median distance " +
                                  number(spacing)};
 }

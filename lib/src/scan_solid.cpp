@@ -25,6 +25,7 @@ constexpr double kLongestSide = 110;
 constexpr double kCarryRadius = 2.0;   // what lies behind a point: room for a ball of this radius,
 constexpr double kCarryReach = 3.5;    // with its centre no farther than this
 constexpr double kCarriedShare = 0.95;
+constexpr double kKeptShare = 0.5;     // of the voxels with points, once skins are taken away
 constexpr double kFirstRadius = 4.0, kRadiusGrowth = 1.12, kLargestRadius = 1.0;  // the largest: in longest sides
 constexpr double kDeeperGrowth = 1.3, kLargestDeeper = 1.0;  // of the balls that fill in deeper
 constexpr int kRim = 4;                // around the points' box
@@ -88,7 +89,8 @@ public:
         }
         smooth();
         result.carried = share(carried_);
-        result.level_set = level_set();
+        // Of points that fill space nothing but skins may have been left.
+        if (result.carried >= kKeptShare) result.level_set = level_set();
         return result;
     }
 

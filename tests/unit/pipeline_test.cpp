@@ -195,6 +195,11 @@ TEST_CASE("segment: a set cancel flag ends it with Cancelled") {
 TEST_CASE("choose_voxel_size: image before points, median spacing of distinct points") {
     const Image image = ball_image(2.0);
     CHECK(choose_voxel_size(&image, {{0, 0, 0}}).voxel_size == 2.0);
-    CHECK(choose_voxel_size(nullptr, {{0, 0, 0}, {3, 0, 0}, {0, 0, 0}, {6, 0, 0}}).voxel_size == Approx(3));
+    // Three distinct points: as many voxels as a thousand would have.
+    CHECK(choose_voxel_size(nullptr, {{0, 0, 0}, {3, 0, 0}, {0, 0, 0}, {6, 0, 0}}).voxel_size == Approx(3 * std::sqrt(3.0 / 1000)));
+    std::vector<Vec3> plate;
+    for (int i = 0; i < 40; ++i)
+        for (int j = 0; j < 25; ++j) plate.push_back({3.0 * i, 3.0 * j, 0});
+    CHECK(choose_voxel_size(nullptr, plate).voxel_size == Approx(3));
     CHECK(code_of([] { (void)choose_voxel_size(nullptr, {{1, 1, 1}, {1, 1, 1}}); }) == Errc::InvalidInput);
 }

@@ -80,7 +80,7 @@ struct SegmentResult {
 };
 
 /// h and how it was found: the image's smallest spacing, or for points alone the median distance to the nearest other
-/// point, coarser where the scan is noisy (scan_voxel_size). @throws Error InvalidInput when there is neither, or fewer than two distinct points.
+/// point, coarser where the scan is noisy (scan_voxel_size), finer by sqrt(n / 1000) for n < 1000 points. @throws Error InvalidInput when there is neither, or fewer than two distinct points.
 struct VoxelSizeChoice {
     double voxel_size = 0;
     std::string reason;  ///< one line for people

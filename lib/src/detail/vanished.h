@@ -1,0 +1,14 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "covol/fwd.h"
+
+namespace covol::detail {
+
+/// Why a surface that started from tagged points alone vanished, and what helps: one line for people.
+/// @param tag_distance  D, world units
+/// @param encloses  whether the points enclose something at D
+[[nodiscard]] std::string why_nothing_held(const std::vector<Vec3>& points, double tag_distance, bool encloses);
+
+}  // namespace covol::detail

@@ -1,0 +1,102 @@
+"""Clouds of few points, and clouds that enclose nothing: what comes out, and whether the advice in the error works.
+
+    COVOL=build/bin/covol python3 -m unittest tests/cli/clouds_test.py
+"""
+import json
+import math
+import pathlib
+import random
+import re
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+from cli_test import COVOL, write_xyz
+
+RADIUS = 10.0
+
+
+def random_sphere(count, seed):
+    draw = random.Random(seed)
+    points = []
+    for _ in range(count):
+        v = [draw.gauss(0, 1) for _ in range(3)]
+        length = math.hypot(*v)
+        points.append(tuple(RADIUS * x / length for x in v))
+    return points
+
+
+class Clouds(unittest.TestCase):
+    def setUp(self):
+        self.out = pathlib.Path(tempfile.mkdtemp(prefix="covol-out-"))
+        self.addCleanup(shutil.rmtree, self.out)
+
+    def reconstruct(self, points, *more):
+        write_xyz(self.out / "cloud.xyz", points)
+        return subprocess.run([COVOL, "reconstruct", "cloud.xyz", "-o", "s.vdb", "--quiet", "--json", "-", *more], cwd=self.out,
+                              capture_output=True, text=True, timeout=300)
+
+    def surface(self, points, *more):
+        done = self.reconstruct(points, *more)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        surface = json.loads(done.stdout)["surface"]
+        self.assertTrue(surface["closed"])
+        return surface
+
+    def advice(self, points, says, *more):
+        done = self.reconstruct(points, *more)
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertIn(says, done.stderr)
+        return done.stderr
+
+
+class Few(Clouds):
+    def test_spheres(self):
+        # A polyhedron with random corners on a sphere is smaller than the sphere; curvature takes little beyond that.
+        for count, least in ((50, 0.65), (100, 0.8), (200, 0.88), (300, 0.91)):
+            for seed in range(3):
+                with self.subTest(count=count, seed=seed):
+                    surface = self.surface(random_sphere(count, seed))
+                    self.assertEqual((surface["components"], surface["genus"]), (1, 0))
+                    share = surface["volume"] / (4 / 3 * math.pi * RADIUS ** 3)
+                    self.assertGreater(share, least)
+                    self.assertLess(share, 1)
+
+    def test_from_a_thousand_on_the_spacing_is_the_voxel_size(self):
+        done = self.reconstruct(random_sphere(1200, 1))
+        self.assertIn("(the median distance between neighbouring points)", json.loads(done.stdout)["automatic"]["voxel_size"])
+
+    def test_so_few_that_the_tag_distance_has_to_be_given(self):
+        for seed in (3, 5, 6):  # others hold as they are
+            points = random_sphere(24, seed)
+            advice = re.search(r"try (--tag-distance) ([0-9.]+)", self.advice(points, "the points enclose nothing"))
+            surface = self.surface(points, *advice.groups())
+            self.assertEqual((surface["components"], surface["genus"]), (1, 0))
+
+
+class Open(Clouds):
+    def check_layer(self, points, says):
+        advice = re.search(r"(--max-steps 0) (--tag-distance [0-9.e-]+) (--voxel-size [0-9.e-]+)", self.advice(points, says))
+        surface = self.surface(points, *" ".join(advice.groups()).split())
+        self.assertEqual((surface["components"], surface["genus"]), (1, 0))
+
+    def test_plane(self):
+        draw = random.Random(1)
+        self.check_layer([(draw.uniform(0, 10), draw.uniform(0, 10), 0.0) for _ in range(2000)], "lie in a plane")
+
+    def test_line(self):
+        self.check_layer([(0.02 * n, 0.0, 0.0) for n in range(500)], "lie on a line")
+
+    def test_half_a_sphere(self):
+        self.check_layer([p for p in random_sphere(400, 1) if p[2] > 0], "enclose nothing")
+
+    def test_points_that_fill_space(self):
+        draw = random.Random(1)
+        self.advice([tuple(draw.gauss(0, 1) for _ in range(3)) for _ in range(500)], "enclose nothing")
+
+
+del Clouds  # has no tests
+
+if __name__ == "__main__":
+    unittest.main()
