@@ -228,6 +228,27 @@ TEST_CASE("errors name the file, the line, what was expected and what was found"
          "vertex 0: expected finite numbers");
 }
 
+TEST_CASE("a PLY whose faces are cut off is truncated, though all its vertices are there") {
+    const Scratch scratch;
+    const auto is_cut_off = [&](const std::string& whole, std::size_t missing) {
+        return read_error(scratch, "a.ply", whole.substr(0, whole.size() - missing)).find("truncated") != std::string::npos;
+    };
+    const std::string ascii =
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 2 1 0\n";
+    CHECK(read_points(scratch.write("whole.ply", ascii)).points.size() == 3);
+    for (const std::size_t missing : {3, 5, 8, 10, 16})
+        CHECK(is_cut_off(ascii, missing));
+    std::string binary =
+        "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 2\nproperty list uchar int vertex_indices\nend_header\n";
+    binary += bytes(1.0F, false) + bytes(2.0F, false) + bytes(3.0F, false);
+    for (int face = 0; face < 2; ++face) binary += '\3' + std::string(12, '\0');
+    CHECK(read_points(scratch.write("whole.ply", binary)).points.size() == 1);
+    for (std::size_t missing = 1; missing <= 26; ++missing)
+        CHECK(is_cut_off(binary, missing));
+}
+
 TEST_CASE("damaged point files end in an Error, never in a crash") {
     const Scratch scratch;
     const auto read = [](const std::string& path) { (void)read_points(path); };

@@ -193,7 +193,6 @@ std::vector<Vec3> read_ply_ascii(const std::string& path, const PlyHeader& heade
                          std::to_string(n) + "; the file is truncated");
             if (line.empty()) continue;
             ++n;
-            if (!is_vertex) continue;
             split(line, ' ', fields);
             Vec3 point;
             std::array<std::size_t, 3> column = at;
@@ -201,13 +200,17 @@ std::vector<Vec3> read_ply_ascii(const std::string& path, const PlyHeader& heade
                 // lists before a coordinate shift it
                 std::size_t field = 0;
                 for (std::size_t p = 0; p < element.properties.size() && field < fields.size(); ++p) {
-                    for (std::size_t a = 0; a < 3; ++a)
+                    for (std::size_t a = 0; is_vertex && a < 3; ++a)
                         if (at[a] == p) column[a] = field;
                     const double length =
                         element.properties[p].is_list ? to_coordinate(path, lines.number(), fields[field]) : 0;
                     field += 1 + static_cast<std::size_t>(std::clamp(length, 0.0, double(fields.size())));
                 }
+                if (field > fields.size() && n == element.count)
+                    fail(path, lines.number(), "the last of " + std::to_string(element.count) + " elements '" + element.name +
+                                                   "' ends early; the file is truncated");
             }
+            if (!is_vertex) continue;
             for (std::size_t a = 0; a < 3; ++a) {
                 if (column[a] >= fields.size())
                     fail(path, lines.number(),
@@ -217,7 +220,6 @@ std::vector<Vec3> read_ply_ascii(const std::string& path, const PlyHeader& heade
             }
             points.push_back(point);
         }
-        if (is_vertex) return points;
     }
     return points;
 }
@@ -249,7 +251,6 @@ std::vector<Vec3> read_ply_binary(const std::string& path, const PlyHeader& head
             }
             data.remove_prefix(bytes);
         }
-        if (is_vertex) return points;
     }
     return points;
 }
