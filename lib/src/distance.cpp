@@ -8,6 +8,7 @@
 
 #include "covol/error.h"
 #include "detail/leaf_band.h"
+#include "detail/memory_need.h"
 #include "detail/nearest.h"
 
 namespace covol {
@@ -60,6 +61,7 @@ DistanceResult distance(const std::vector<Vec3>& points, const Domain& domain, c
         throw Error(Errc::InvalidOptions, "distance: " + why);
     if (domain.voxel_count() == 0) throw Error(Errc::InvalidInput, "distance: the domain is empty");
     const std::vector<Vec3> positions = to_index_space(points, domain);
+    detail::require_tube_memory(points, domain, {options.max_distance, 0, false}, "distance", run);
     const detail::VoxelBox box = detail::box_of(domain);
     const auto h = float(domain.voxel_size), background = float(options.max_distance);
     DistanceResult result;

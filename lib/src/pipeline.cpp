@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numbers>
 #include <sstream>
 #include <utility>
 
@@ -16,6 +17,7 @@
 #include "covol/mesh_io.h"
 #include "covol/scan_noise.h"
 #include "covol/scan_solid.h"
+#include "detail/memory_need.h"
 #include "detail/vanished.h"
 
 namespace covol {
@@ -290,7 +292,7 @@ private:
         const double D = options_.tag_distance;
         const double margin = options_.margin > 0 ? options_.margin : D + kMarginVoxels * h();
         report().domain = domain_with_margin(margin);
-        compute_distance(D + (kHalfWidthVoxels + kTubeSlackVoxels) * h());
+        compute_distance(D + (kHalfWidthVoxels + kTubeSlackVoxels) * h(), D);
         Timed timed(report().seconds.tag);
         BandResult tagged = band(*result_.distance, {D, seeds_beyond(D)}, run_);
         report().band = tagged.report;
@@ -374,11 +376,21 @@ private:
         options_.evolve.follow = true;
         const double margin = options_.margin > 0 ? options_.margin : 2 * kMarginVoxels * h();
         report().domain = domain_with_margin(margin);
+        detail::require_band_memory(known_area(), h(), "segment", run_);
         {
             Timed timed(report().seconds.tag);
             result_.u = start_grid();
         }
         if (uses_points()) compute_distance(tube_for_start());
+    }
+
+    /// Of the start, where it is known before it is made; else 0.
+    double known_area() const {
+        const Start& start = options_.start;
+        Vec3 side;
+        for (int a = 0; a < 3; ++a) side[a] = start.box.max[a] - start.box.min[a];
+        if (start.kind == Start::Kind::Sphere) return 4 * std::numbers::pi * start.radius * start.radius;
+        return start.kind == Start::Kind::Box ? 2 * (side[0] * side[1] + side[1] * side[2] + side[2] * side[0]) : 0.0;
     }
 
     FloatGridPtr start_grid() const {
@@ -421,8 +433,10 @@ private:
         return radius;
     }
 
-    void compute_distance(double radius) {
+    /// @param reach  the part of the radius that does not depend on h
+    void compute_distance(double radius, double reach = 0) {
         Timed timed(report().seconds.distance);
+        detail::require_tube_memory(points_, report().domain, {reach, (radius - reach) / h(), true}, "segment", run_);
         result_.distance = distance(points_, report().domain, {radius}, run_).grid;
     }
 

@@ -6,12 +6,12 @@ import json
 import math
 import os
 import pathlib
+import re
 import shutil
 import signal
 import struct
 import subprocess
 import tempfile
-import time
 import unittest
 
 COVOL = os.environ.get("COVOL", "build/bin/covol")
@@ -363,6 +363,21 @@ class Segment(Case):
                     "--max-steps", "1000000", "--tolerance", "0", code=3, says="--memory-limit 1M")
         self.segment("--memory-limit", "8G")
 
+    def test_too_fine_a_voxel_size(self):
+        for more in (["--voxel-size", "1e-5"], ["--voxel-size", "0.03", "--memory-limit", "200M"],
+                     ["--voxel-size", "0.02", "--memory-limit", "200M", "--init", "sphere:3,-2,1,7"]):
+            with self.subTest(more):
+                line = self.refuse("reconstruct", self.points, "-o", "s.vdb", *more, code=3, says="GiB of memory")
+                fits = re.search(r"such as ([0-9.e-]+) ", line).group(1)
+        # The last of them, with the size that it was told.
+        report = self.report("reconstruct", self.points, "-o", "s.vdb", "--voxel-size", fits, *more[2:])
+        self.assertTrue(report["surface"]["closed"])
+        self.refuse_distance()
+
+    def refuse_distance(self):
+        (self.out / "s.vdb").unlink()
+        self.refuse("distance", self.points, "-o", "d.vdb", "--voxel-size", "0.001", "--max-distance", "2", code=3, says="such as")
+
     def test_one_output_that_fails_takes_the_others_with_it(self):
         # The name is legal, the writer's temporary name beside it is too long.
         name = "m" * 248 + ".ply"
@@ -373,8 +388,9 @@ class Segment(Case):
                                     "r.json", "--max-steps", "100000000", "--tolerance", "0"], cwd=self.out,
                                    stderr=subprocess.PIPE, text=True)
         try:
-            time.sleep(1.5)
-            self.assertIsNone(process.poll(), "ended before the signal")
+            # It says this once the run has begun; it would go on for hours.
+            while not process.stderr.readline().startswith("covol: tag_distance"):
+                self.assertIsNone(process.poll(), "ended before the signal")
             process.send_signal(signal.SIGINT)
             _, text = process.communicate(timeout=60)
         finally:

@@ -1,15 +1,21 @@
 #pragma once
 #include <atomic>
+#include <condition_variable>
 #include <cstdint>
+#include <mutex>
 #include <thread>
 
 namespace covol::tool {
 
 /// Resident memory of this process, bytes.
-[[nodiscard]] std::uint64_t current_rss();
+[[nodiscard]] std::uint64_t held_memory();  ///< without mapped files
 [[nodiscard]] std::uint64_t peak_rss();
 
-/// Watches the resident memory and sets `cancel` when it passes the limit.
+/// Memory that this process can still take, bytes: of the machine and of its control group; 0 where nobody says.
+[[nodiscard]] std::uint64_t available_memory();
+
+/// Watches the memory that this process holds (without mapped files, which the system takes back) and sets `cancel` when it
+/// passes the limit.
 class MemoryGuard {
 public:
     /// limit = 0: no guard.
@@ -22,7 +28,9 @@ public:
 
 private:
     std::atomic<bool> tripped_ = false;
-    std::atomic<bool> done_ = false;
+    bool done_ = false;
+    std::mutex mutex_;
+    std::condition_variable wake_;
     std::thread watcher_;
 };
 

@@ -113,6 +113,7 @@ void expect_values(const CLI::App& app) {
     }
 }
 
+constexpr std::uint64_t kUsablePercent = 95;  // of the free memory: beyond it the system would end us without a word
 constexpr int kMostThreads = 1024;  // TBB runs out of stacks long after
 
 }  // namespace
@@ -141,7 +142,7 @@ void Session::add_common_flags() {
     app_.add_flag("--profile", profile_, "print at the end where time and memory went");
     app_.add_flag("--quiet", quiet_, "print nothing but results, warnings and errors");
     app_.add_option("--json", json_path_, "write the report to this file, - is standard output")->type_name("FILE|-");
-    app_.add_option("--memory-limit", memory_limit_text_, "stop when more memory is needed, 8G for example")
+    app_.add_option("--memory-limit", memory_limit_text_, "stop when more memory is needed, 8G for example [what is free]")
         ->type_name("SIZE");
     app_.add_option("--save-config", save_config_path_, "write the options of this run to a TOML file")
         ->type_name("FILE")->configurable(false);
@@ -193,6 +194,8 @@ int Session::execute() {
             level == LogLevel::Warning ? warn(line) : note(line);
         };
         if (!memory_limit_text_.empty()) memory_limit_ = parse_bytes("--memory-limit", memory_limit_text_);
+        if (memory_limit_ == 0) memory_limit_ = available_memory() / 100 * kUsablePercent;
+        run_.memory_budget = memory_limit_;
         guard = std::make_unique<MemoryGuard>(memory_limit_, cancel_requested);
         outputs_.protect(inputs_of(*command_));
         if (json_path_ != "-") outputs_.check("--json", json_path_, OutputKind::Text);
@@ -206,8 +209,7 @@ int Session::execute() {
         return fail(kUsage, error.what());
     } catch (const Error& error) {
         if (error.code() == Errc::Cancelled && guard && guard->tripped() && !interrupted)
-            return fail(kBadInput, "more memory is needed than --memory-limit " + memory_limit_text_ +
-                                       "; use a larger --voxel-size or a --roi");
+            return fail(kBadInput, "more memory is needed than " + memory_limit_name() + "; use a larger --voxel-size or a --roi");
         return fail(exit_code_of(error.code()),
                     error.code() == Errc::Cancelled ? interrupted_text() : error.what());
     } catch (const std::bad_alloc&) {
@@ -304,8 +306,12 @@ std::string Session::comment() const {
 
 void Session::require_memory(std::uint64_t bytes, const std::string& what) const {
     if (memory_limit_ > 0 && bytes > memory_limit_)
-        throw Error(Errc::InvalidOptions, "--memory-limit " + memory_limit_text_ + ": " + what + " alone needs " +
-                                              std::to_string(bytes) + " bytes");
+        throw Error(Errc::InvalidOptions, what + " alone needs " + std::to_string(bytes) + " bytes, more than " + memory_limit_name());
+}
+
+std::string Session::memory_limit_name() const {
+    return memory_limit_text_.empty() ? "this machine has free, " + std::to_string(memory_limit_ >> 20) + " MiB (--memory-limit sets another bound)"
+                                      : "--memory-limit " + memory_limit_text_;
 }
 
 void Session::add_seconds(const std::string& name, double seconds) {

@@ -58,7 +58,7 @@ public:
     /// The same as comment lines for meshes and points.
     [[nodiscard]] std::vector<std::string> comments() const;
     [[nodiscard]] std::string comment() const;
-    /// Refuses early what cannot fit into --memory-limit: `bytes` for `what` are needed at least.
+    /// Refuses early what cannot fit into --memory-limit, or into what is free: `bytes` for `what` are needed at least.
     void require_memory(std::uint64_t bytes, const std::string& what) const;
     /// Adds to seconds.<name> of the report.
     void add_seconds(const std::string& name, double seconds);
@@ -74,6 +74,7 @@ private:
     void write_report(const std::string& path) const;
     int fail(int code, const std::string& message);
     [[nodiscard]] std::string interrupted_text() const;
+    [[nodiscard]] std::string memory_limit_name() const;
 
     CLI::App app_;
     std::map<const CLI::App*, std::function<void()>> bodies_;
@@ -82,7 +83,7 @@ private:
     int threads_ = 0;
     bool quiet_ = false, profile_ = false;
     std::string json_path_, save_config_path_, memory_limit_text_;
-    std::uint64_t memory_limit_ = 0;
+    std::uint64_t memory_limit_ = 0;  ///< bytes: as given, else what the machine has free
 
     RunContext run_;
     std::unique_ptr<Progress> progress_;

@@ -1,5 +1,6 @@
 #pragma once
 #include <atomic>
+#include <cstdint>
 #include <functional>
 #include <string>
 
@@ -20,6 +21,9 @@ struct RunContext {
     /// Set from anywhere (a signal handler, say) to make the computation throw Errc::Cancelled
     /// or, where partial results are useful, return early and say so.
     const std::atomic<bool>* cancel = nullptr;
+
+    /// Bytes that may be taken; 0: no bound. What is sure to need more is refused before it takes any (Errc::InvalidOptions).
+    std::uint64_t memory_budget = 0;
 
     [[nodiscard]] bool cancelled() const noexcept { return cancel != nullptr && cancel->load(std::memory_order_relaxed); }
     void info(const std::string& line) const;
