@@ -454,7 +454,7 @@ Solid read_solid(const std::string& path, int label, const RunContext& run) {
     solid.label = label;
     if (end == ".vdb") {
         solid.level_set = read_vdb_level_set(path, run);
-    } else if (end == ".ply" || end == ".obj" || end == ".stl" || end == ".off") {
+    } else if (end == ".ply" || end == ".obj" || end == ".stl" || end == ".off" || end == ".glb") {
         solid.mesh = read_mesh(path);
     } else {
         solid.mask = read_image(path, {}, run);

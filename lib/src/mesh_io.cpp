@@ -63,6 +63,7 @@ class Source {
 public:
     Source(const std::string& path, std::string_view text) : path_(path), rest_(text) {}
 
+    [[nodiscard]] const std::string& path() const { return path_; }
     [[nodiscard]] bool at_end() const { return rest_.empty(); }
     [[nodiscard]] std::size_t bytes_left() const { return rest_.size(); }
 
@@ -440,6 +441,166 @@ TriangleMesh read_stl(Source& source, std::string_view text) {
     return mesh.finish();
 }
 
+/// glTF 2.0 in one file: the triangles of all meshes, as their nodes hold them.
+class GlbReader {
+    static constexpr std::uint64_t kShared = 8;  // times that data may be used
+
+public:
+    GlbReader(Source& source, std::string_view text) : source_(source), builder_(source), text_(text) {}
+
+    TriangleMesh read() {
+        read_chunks();
+        const Json required = member(json_, "extensionsRequired", Json::array());
+        if (!required.empty()) unsupported("the extension " + required.dump().substr(0, 60));
+        check_nodes();
+        for (const Json& mesh : list("meshes"))
+            for (const Json& primitive : member(mesh, "primitives", Json::array())) add(primitive);
+        return builder_.finish();
+    }
+
+private:
+    using Json = nlohmann::json;
+    struct Accessor {
+        std::uint64_t count = 0, stride = 0;
+        std::string_view bytes;
+        std::uint64_t component = 0;
+    };
+
+    [[noreturn]] void unsupported(const std::string& what) const {
+        throw Error(Errc::Unsupported, "read_mesh: " + source_.path() + ": " + what + " is not read; export plain triangles without compression, "
+                                       "or .ply, .obj or .stl");
+    }
+
+    void read_chunks() {
+        const auto word = [&](std::string_view bytes) {
+            std::uint32_t value = 0;
+            std::memcpy(&value, bytes.data(), sizeof(value));
+            return value;
+        };
+        if (source_.bytes(4) != "glTF") source_.fail("expected 'glTF' in the first bytes");
+        const std::uint32_t version = word(source_.bytes(4)), total = word(source_.bytes(4));
+        if (version != 2) unsupported("version " + std::to_string(version) + " of glTF");
+        if (total != text_.size())
+            source_.fail("the header promises " + std::to_string(total) + " bytes, the file has " + std::to_string(text_.size()));
+        const std::uint32_t json_bytes = word(source_.bytes(4));
+        if (source_.bytes(4) != "JSON") source_.fail("expected a chunk of JSON first");
+        json_ = Json::parse(source_.bytes(json_bytes), nullptr, false);
+        if (!json_.is_object()) source_.fail("its JSON cannot be parsed");
+        if (source_.at_end()) return;
+        const std::uint32_t binary_bytes = word(source_.bytes(4));
+        if (source_.bytes(4) != std::string_view("BIN\0", 4)) source_.fail("expected a binary chunk second");
+        binary_ = source_.bytes(binary_bytes);
+        unread_ = kShared * binary_.size();
+    }
+
+    static Json member(const Json& object, const char* key, Json otherwise) {
+        return object.is_object() && object.contains(key) ? object.at(key) : std::move(otherwise);
+    }
+    const Json& list(const char* key) const {
+        static const Json kNone = Json::array();
+        return json_.contains(key) && json_.at(key).is_array() ? json_.at(key) : kNone;
+    }
+    const Json& item(const char* key, const Json& number) const {
+        const Json& all = list(key);
+        if (!number.is_number_unsigned() || number.get<std::uint64_t>() >= all.size() || !all[number.get<std::uint64_t>()].is_object())
+            source_.fail("there is no " + number.dump().substr(0, 40) + " among its " + key);
+        return all[number.get<std::uint64_t>()];
+    }
+    /// A length or a place in the binary chunk: no larger than that, so that sums of a few cannot overflow.
+    std::uint64_t size(const Json& object, const char* key, std::uint64_t otherwise) const {
+        const Json value = member(object, key, otherwise);
+        if (!value.is_number_unsigned() || value.get<std::uint64_t>() > std::max<std::uint64_t>(binary_.size(), 1 << 16))
+            source_.fail(std::string(key) + ": expected at most the " + std::to_string(binary_.size()) + " bytes there are, got " +
+                         value.dump().substr(0, 40));
+        return value.get<std::uint64_t>();
+    }
+
+    void check_nodes() const {
+        for (const Json& node : list("nodes"))
+            for (const char* key : {"matrix", "translation", "rotation", "scale"})
+                if (node.is_object() && node.contains(key))
+                    throw Error(Errc::Unsupported, "read_mesh: " + source_.path() + ": a node with a " + key +
+                                                       " is not read; apply the objects' transforms before the export");
+    }
+
+    Accessor accessor(const Json& number, const char* type, std::uint64_t components) const {
+        const Json& json = item("accessors", number);
+        if (json.contains("sparse") || !json.contains("bufferView")) unsupported("an accessor without data of its own");
+        if (member(json, "type", nullptr) != type) source_.fail(std::string("expected an accessor of type ") + type);
+        const Json& view = item("bufferViews", json.at("bufferView"));
+        if (size(view, "buffer", 0) != 0 || item("buffers", 0U).contains("uri")) unsupported("a buffer in another file");
+        Accessor result;
+        result.component = size(json, "componentType", 0);
+        const std::uint64_t width = components * (result.component == 5121 ? 1 : result.component == 5123 ? 2 : 4);
+        result.count = size(json, "count", 0);
+        result.stride = size(view, "byteStride", width);
+        const std::uint64_t begin = size(view, "byteOffset", 0), length = size(view, "byteLength", 0), offset = size(json, "byteOffset", 0);
+        if (begin + length > binary_.size() || offset > length || result.stride < width ||
+            (result.count > 0 && (length - offset < width || (length - offset - width) / result.stride < result.count - 1)))
+            source_.fail("an accessor reaches beyond its data; the file is damaged");
+        result.bytes = binary_.substr(begin + offset, length - offset);
+        return result;
+    }
+
+    /// Meshes may share data; used again and again it would make a small file a large mesh.
+    void take(const Accessor& data, std::uint64_t width) {
+        if (data.count * width > unread_) source_.fail("its meshes use the same data over and over");
+        unread_ -= data.count * width;
+    }
+
+    /// @return the number of the accessor's first vertex; primitives may share one
+    std::pair<std::uint64_t, std::uint64_t> vertices(const Json& number) {
+        const Accessor data = accessor(number, "VEC3", 3);
+        if (data.component != 5126) unsupported("positions that are not floats");
+        const auto [known, is_new] = first_vertex_.try_emplace(number.get<std::uint64_t>(), builder_.vertex_count());
+        if (is_new) {
+            take(data, 12);
+            for (std::uint64_t n = 0; n < data.count; ++n) {
+                std::array<float, 3> p{};
+                std::memcpy(p.data(), data.bytes.data() + n * data.stride, sizeof(p));
+                builder_.vertex(p[0], p[1], p[2]);
+            }
+        }
+        return {known->second, data.count};
+    }
+
+    void add(const Json& primitive) {
+        constexpr unsigned kTriangles = 4;
+        if (member(primitive, "mode", kTriangles) != kTriangles) unsupported("a mesh that is not of triangles");
+        const auto [first, count] = vertices(member(member(primitive, "attributes", nullptr), "POSITION", nullptr));
+        std::vector<std::uint32_t> corners;
+        const auto corner = [&](std::uint64_t vertex) {
+            if (vertex >= count)
+                source_.fail("a triangle refers to vertex " + std::to_string(vertex) + " of " + std::to_string(count));
+            corners.push_back(std::uint32_t(first + vertex));
+            if (corners.size() < 3) return;
+            builder_.polygon(corners);
+            corners.clear();
+        };
+        if (!primitive.contains("indices")) {
+            for (std::uint64_t n = 0; n < count; ++n) corner(n);
+            return;
+        }
+        const Accessor data = accessor(primitive.at("indices"), "SCALAR", 1);
+        const bool is_known = data.component == 5121 || data.component == 5123 || data.component == 5125;
+        if (!is_known) source_.fail("expected indices of type 5121, 5123 or 5125, got " + std::to_string(data.component));
+        const std::size_t width = data.component == 5121 ? 1 : data.component == 5123 ? 2 : 4;
+        take(data, width);
+        for (std::uint64_t n = 0; n < data.count; ++n) {
+            std::uint32_t vertex = 0;  // the machine is little-endian
+            std::memcpy(&vertex, data.bytes.data() + n * data.stride, width);
+            corner(vertex);
+        }
+    }
+
+    Source& source_;
+    MeshBuilder builder_;
+    std::string_view text_, binary_;
+    Json json_;
+    std::uint64_t unread_ = 0;
+    std::unordered_map<std::uint64_t, std::uint64_t> first_vertex_;
+};
+
 // ---------------------------------------------------------------------------------------------------------------- writing
 
 /// A text or binary file that is put together in memory.
@@ -762,14 +923,15 @@ void write_meshes(const std::string& path, const std::vector<NamedMesh>& meshes,
 
 TriangleMesh read_mesh(const std::string& path) {
     const std::string end = detail::extension(path);
-    const bool known = end == ".ply" || end == ".obj" || end == ".stl" || end == ".off";
+    const bool known = end == ".ply" || end == ".obj" || end == ".stl" || end == ".off" || end == ".glb";
     if (!known)
-        throw Error(Errc::Unsupported, "read_mesh: " + path + ": expected a name that ends in .ply, .obj, .stl or .off, got '" + end + "'");
+        throw Error(Errc::Unsupported, "read_mesh: " + path + ": expected a name that ends in .ply, .obj, .stl, .off or .glb, got '" + end + "'");
     const std::string text = read_file(path);
     Source source(path, text);
     TriangleMesh mesh = end == ".ply"   ? PlyReader(source).read()
                         : end == ".obj" ? read_obj(source)
                         : end == ".stl" ? read_stl(source, text)
+                        : end == ".glb" ? GlbReader(source, text).read()
                                         : read_off(source);
     if (mesh.empty()) throw Error(Errc::InvalidInput, "read_mesh: " + path + ": the file has no triangle");
     return mesh;

@@ -9,6 +9,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <sstream>
 
 #include "covol/domain.h"
 #include "covol/error.h"
@@ -383,7 +384,16 @@ TriangleMesh extract_mesh(const FloatGrid& surface, const ExtractOptions& option
                                               std::to_string(options.min_component_volume));
     TriangleMesh mesh;
     with_threads(run, [&] { mesh = MarchingCubes(surface, options.isovalue, run).extract(); });
-    if (options.min_component_volume > 0) remove_small_components(mesh, options.min_component_volume);
+    if (options.min_component_volume > 0 && !mesh.empty()) {
+        const double whole = std::abs(measure(mesh).volume);
+        remove_small_components(mesh, options.min_component_volume);
+        if (mesh.empty()) {
+            std::ostringstream text;
+            text << "extract_mesh: every piece of the surface is smaller than min_component_volume, " << options.min_component_volume
+                 << "; all of it has " << whole << ", as a cube of edge " << std::cbrt(whole) << "; use a smaller --min-component";
+            throw Error(Errc::InvalidInput, text.str());
+        }
+    }
     return mesh;
 }
 

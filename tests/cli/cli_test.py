@@ -509,6 +509,20 @@ class Tools(Case):
         write_xyz(far, [(1000, 0, 0), *sphere_points(10)])
         self.assertEqual(self.report("check", far, "--image", self.image, code=3)["problems"], 1)
 
+    def test_glb_is_read_again(self):
+        self.run_covol("reconstruct", self.points, "-o", "s.vdb", "--mesh", "m.glb")
+        self.assertLess(self.report("compare", "m.glb", "s.vdb")["compare"]["hausdorff"], 0.1 * H)
+        self.assertEqual(self.report("check", "m.glb")["findings"], [])
+        self.assertTrue(self.report("info", "m.glb"))
+
+    def test_no_piece_is_large_enough(self):
+        self.run_covol("reconstruct", self.points, "-o", "s.vdb")
+        for size in ("1e308", "100"):
+            self.run_covol("mesh", "s.vdb", "-o", "m.ply", "--min-component", size, code=3)
+        done = self.run_covol("reconstruct", self.points, "-o", "t.vdb", "--min-component", "1e308", code=3)
+        self.assertIn("use a smaller --min-component", done.stderr)
+        self.assertEqual(self.files(), ["s.vdb"])
+
     def test_convert(self):
         self.run_covol("convert", self.image, "i.vdb")
         self.run_covol("convert", "i.vdb", "i.nrrd", "--like", self.image)

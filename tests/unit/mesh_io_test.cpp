@@ -279,8 +279,91 @@ TEST_CASE("Several meshes share an OBJ or a GLB file, each with its name") {
     std::memcpy(&x, text.data() + 20 + json_bytes + 8 + (2 * 4 * 12 + 4 * 12), 4);
     CHECK(x == 10);
 
+    const TriangleMesh again = read_mesh(glb);
+    CHECK(again.vertices == both.vertices);
+    CHECK(again.triangles == both.triangles);
+
     CHECK(holds_several_meshes("A.OBJ"));
     CHECK_FALSE(holds_several_meshes("a.ply"));
     CHECK_THROWS_AS(write_meshes(folder.file("s.ply"), meshes), Error);
     CHECK_THROWS_AS(write_meshes(obj, {}), Error);
+}
+
+namespace {
+
+/// A .glb file of this JSON and these bytes.
+std::string glb_of(std::string json, std::string binary) {
+    json.resize((json.size() + 3) / 4 * 4, ' ');
+    binary.resize((binary.size() + 3) / 4 * 4, '\0');
+    const auto word = [](std::size_t value) {
+        const auto number = std::uint32_t(value);
+        return std::string(reinterpret_cast<const char*>(&number), 4);
+    };
+    return "glTF" + word(2) + word(28 + json.size() + binary.size()) + word(json.size()) + "JSON" + json + word(binary.size()) +
+           std::string("BIN\0", 4) + binary;
+}
+
+template <typename T>
+std::string raw(const std::vector<T>& values) {
+    return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)};
+}
+
+std::string replaced(std::string text, const std::string& what, const std::string& with) {
+    REQUIRE(text.find(what) != std::string::npos);
+    return text.replace(text.find(what), what.size(), with);
+}
+
+}  // namespace
+
+TEST_CASE("glb of other programs: interleaved vertices, short indices, shared positions; what is not read is named") {
+    const Folder folder;
+    // Positions with a stride of 16, then two primitives of 16-bit indices that share them, and one without indices.
+    const std::string binary = raw(std::vector<float>{0, 0, 0, 9, 1, 0, 0, 9, 0, 1, 0, 9, 0, 0, 1, 9}) +
+                               raw(std::vector<std::uint16_t>{0, 2, 1, 0, 1, 3});
+    const std::string json =
+        R"({"asset":{"version":"2.0"},"buffers":[{"byteLength":76}],)"
+        R"("bufferViews":[{"buffer":0,"byteLength":64,"byteStride":16},{"buffer":0,"byteOffset":64,"byteLength":12}],)"
+        R"("accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"},)"
+        R"({"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"},)"
+        R"({"bufferView":1,"byteOffset":6,"componentType":5123,"count":3,"type":"SCALAR"},)"
+        R"({"bufferView":0,"byteOffset":16,"componentType":5126,"count":3,"type":"VEC3"}],)"
+        R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1},{"attributes":{"POSITION":0},"indices":2,"mode":4}]}],)"
+        R"("nodes":[{"mesh":0}]})";
+    const TriangleMesh mesh = read_mesh(folder.file("a.glb", glb_of(json, binary)));
+    CHECK(mesh.vertices == std::vector<std::array<float, 3>>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}});
+    CHECK(mesh.triangles == std::vector<std::array<std::uint32_t, 3>>{{0, 2, 1}, {0, 1, 3}});
+    const TriangleMesh bare = read_mesh(folder.file("b.glb", glb_of(replaced(json, R"("POSITION":0},"indices":2)", R"("POSITION":3})"), binary)));
+    REQUIRE(bare.vertices.size() == 7);
+    CHECK(bare.triangles[1] == std::array<std::uint32_t, 3>{4, 5, 6});
+    CHECK(bare.vertices[4] == std::array<float, 3>{1, 0, 0});
+
+    const auto refused = [&](const std::string& what, const std::string& with, const std::string& says, Errc code = Errc::InvalidInput) {
+        check_refused(folder.file("c.glb", glb_of(replaced(json, what, with), binary)), says, code);
+    };
+    refused(R"("count":4)", R"("count":5)", "beyond its data");
+    refused(R"("count":4)", R"("count":18446744073709551615)", "count: expected at most");
+    refused(R"("byteOffset":64)", R"("byteOffset":-1)", "byteOffset: expected at most");
+    refused(R"("byteStride":16)", R"("byteStride":0)", "beyond its data");
+    refused(R"("count":4)", R"("count":2)", "refers to vertex 2 of 2");
+    refused(R"("POSITION":0)", R"("POSITION":9)", "there is no 9 among its accessors");
+    refused(R"("mode":4)", R"("mode":1)", "not of triangles", Errc::Unsupported);
+    refused(R"("mesh":0)", R"("mesh":0,"scale":[2,2,2])", "a node with a scale", Errc::Unsupported);
+    refused(R"("nodes")", R"("extensionsRequired":["KHR_draco_mesh_compression"],"nodes")", "KHR_draco", Errc::Unsupported);
+    refused(R"("byteLength":76)", R"("byteLength":76,"uri":"a.bin")", "another file", Errc::Unsupported);
+    // The same indices over and over.
+    std::string many;
+    for (int n = 0; n < 200; ++n) many += R"({"attributes":{"POSITION":0},"indices":1},)";
+    refused(R"("primitives":[)", R"("primitives":[)" + many, "over and over");
+    const std::string whole = glb_of(json, binary);
+    for (std::size_t size = 0; size < whole.size(); ++size)
+        CHECK_THROWS_AS(read_mesh(folder.file("d.glb", whole.substr(0, size))), Error);
+    for (std::size_t at = 0; at < whole.size(); ++at)
+        for (const int bit : {0, 3, 7}) {
+            std::string flipped = whole;
+            flipped[at] = char(flipped[at] ^ (1 << bit));
+            try {
+                (void)read_mesh(folder.file("d.glb", flipped));
+            } catch (const Error&) {
+            }
+        }
 }
