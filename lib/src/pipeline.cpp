@@ -599,8 +599,13 @@ private:
     }
 
     std::string why_vanished() const {
-        if (image_ == nullptr && options_.start.kind == Start::Kind::Tag && !from_body_)
-            return detail::why_nothing_held(points_, options_.tag_distance, has_chosen_tag_ ? report().tag.encloses : !report().band.leaks);
+        if (options_.start.kind == Start::Kind::Tag && !from_body_) {
+            const bool encloses = has_chosen_tag_ ? report().tag.encloses : !report().band.leaks;
+            if (image_ == nullptr) return detail::why_nothing_held(points_, options_.tag_distance, encloses);
+            if (!encloses)
+                return "the points enclose nothing and nothing held it; where the structure is cut off by the image's end mark the cut "
+                       "too, or give a --tag-distance beyond its radius; or draw --contours, or choose another start (--init)";
+        }
         return "nothing held it; lower --delta, or start closer to the edges (--init)";
     }
 

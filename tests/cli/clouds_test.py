@@ -12,7 +12,7 @@ import subprocess
 import tempfile
 import unittest
 
-from cli_test import COVOL, write_xyz
+from cli_test import COVOL, write_nrrd, write_xyz
 
 RADIUS = 10.0
 
@@ -94,6 +94,26 @@ class Open(Clouds):
     def test_points_that_fill_space(self):
         draw = random.Random(1)
         self.advice([tuple(draw.gauss(0, 1) for _ in range(3)) for _ in range(500)], "enclose nothing")
+
+    def test_structure_cut_off_by_both_ends_of_the_image(self):
+        # A bright tube along z, with rings of marks: its ends are open.
+        n, radius, slices = 40, 8, 20
+        tube = bytes(200 if math.hypot(i - 19.5, j - 19.5) < radius else 20
+                     for _ in range(slices) for j in range(n) for i in range(n))
+        write_nrrd(self.out / "tube.nrrd", (n, n, slices), tube, spacing=1, origin=(0, 0, 0))
+        ring = [(19.5 + radius * math.cos(a / 4), 19.5 + radius * math.sin(a / 4)) for a in range(25)]
+        rings = [(x, y, float(z)) for z in range(0, slices, 2) for x, y in ring] + [(x, y, slices - 1.0) for x, y in ring]
+        cut = [(19.5 + x, 19.5 + y, float(z)) for z in (0, slices - 1) for x in range(-7, 8) for y in range(-7, 8) if x * x + y * y < 49]
+        write_xyz(self.out / "rings.xyz", rings)
+        write_xyz(self.out / "all.xyz", rings + cut)
+        command = [COVOL, "segment", "tube.nrrd", "-o", "s.vdb", "--quiet", "--json", "-", "--points"]
+        run = lambda *more: subprocess.run([*command, *more], cwd=self.out, capture_output=True, text=True, timeout=300)
+        self.assertIn("mark the cut", run("rings.xyz").stderr)
+        truth = math.pi * radius ** 2 * slices
+        for way in (["all.xyz"], ["rings.xyz", "--tag-distance", "10"]):
+            done = run(*way)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertAlmostEqual(json.loads(done.stdout)["surface"]["volume"] / truth, 1, delta=0.1)
 
 
 del Clouds  # has no tests
