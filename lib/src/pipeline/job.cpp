@@ -1,7 +1,5 @@
 #include "pipeline/job.h"
 
-#include <sstream>
-
 namespace covol::pipeline {
 
 Job::Job(const Image* image_or_null, const std::vector<Vec3>& world_points, const SegmentOptions& segment_options,
@@ -35,12 +33,6 @@ Domain Job::domain_with_margin(double margin) const {
 
 Domain Job::domain_with_chosen_margin(double automatic) const {
     return domain_with_margin(options.margin > 0 ? options.margin : automatic);
-}
-
-std::string number(double value) {
-    std::ostringstream text;
-    text << value;
-    return text.str();
 }
 
 }  // namespace covol::pipeline

@@ -5,8 +5,11 @@
 #include <vector>
 
 #include "covol/pipeline.h"
+#include "detail/number.h"
 
 namespace covol::pipeline {
+
+using detail::number;
 
 inline constexpr double kMarginVoxels = 6.0;  // between D and the domain's boundary, for points alone
 
@@ -53,8 +56,6 @@ struct Job {
     /// The same with the margin of the options where they have one.
     [[nodiscard]] Domain domain_with_chosen_margin(double automatic) const;
 };
-
-[[nodiscard]] std::string number(double value);
 
 /// Adds the wall-clock time of its life to `seconds`.
 class Timed {

@@ -1,7 +1,8 @@
 // What SegmentOptions says about itself.
 #include <cmath>
 
-#include "pipeline/job.h"
+#include "covol/pipeline.h"
+#include "detail/number.h"
 
 namespace covol {
 
@@ -16,8 +17,7 @@ std::string SegmentOptions::why_invalid() const {
     std::string why;
     const auto expect = [&](bool ok, const char* field, const char* expected, double got) {
         if (ok) return;
-        why += std::string(why.empty() ? "" : "\n") + field + ": expected " + expected + ", got " +
-               pipeline::number(got);
+        why += std::string(why.empty() ? "" : "\n") + field + ": expected " + expected + ", got " + detail::number(got);
     };
     expect(std::isfinite(voxel_size) && voxel_size >= 0, "voxel_size", ">= 0", voxel_size);
     expect(std::isfinite(margin) && margin >= 0, "margin", ">= 0", margin);
