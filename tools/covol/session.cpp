@@ -162,7 +162,8 @@ CLI::App* Session::add_command(const std::string& name, const std::string& descr
 }
 
 void Session::add_grid(const std::string& path, const FloatGridPtr& grid, bool half) {
-    outputs_.add(path, [grid, vdb = WriteVdbOptions{half, metadata()}](const std::string& to) { write_vdb(to, {grid}, vdb); });
+    const WriteVdbOptions options{half, metadata()};
+    outputs_.add(path, [grid, options](const std::string& to) { write_vdb(to, {grid}, options); });
 }
 
 int Session::main(int argc, char** argv) {
