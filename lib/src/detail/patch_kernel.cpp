@@ -21,38 +21,41 @@ struct Hit {
     decltype(Real{} < Real{}) is_interior;
 };
 
-// The nearest point lies in the triangle whose sector, seen along the axis, holds the point that asks: within it, or on its
-// side of the outline. One source for a float and for eight.
+template <typename Real>
+COVOL_INLINE Real unit(Real x) {
+    x = x > 0.0F ? x : Real{};
+    return x < 1.0F ? x : Real{} + 1.0F;
+}
+
+// The nearest point lies in a triangle, on a spoke between two, or on the outline. One source for a float and for eight.
 template <typename Real>
 COVOL_INLINE Hit<Real> nearest_of(const PatchFan& fan, const Real (&arm)[3]) {
-    constexpr bool kIsOne = std::is_same_v<Real, float>;
-    const auto& axis = fan.axis;
-    const Real turned[3] = {arm[1] * axis[2] - arm[2] * axis[1], arm[2] * axis[0] - arm[0] * axis[2],
-                            arm[0] * axis[1] - arm[1] * axis[0]};
-    Hit<Real> best{Real{} + std::numeric_limits<float>::infinity(), {}};
-    Real from_side = dot(turned, fan.triangles[0].from);
+    Real within = Real{} + std::numeric_limits<float>::infinity(), outline = within;
+    const auto keep_least = [](Real& least, Real squared) __attribute__((always_inline)) {
+        least = squared < least ? squared : least;
+    };
+    const Real first = dot(arm, fan.triangles[0].from);
+    Real from = first;
     for (int n = 0; n < fan.count; ++n) {
         const PatchFan::Triangle& t = fan.triangles[n];
-        const Real to_side = from_side + dot(turned, t.edge);
-        const auto in_sector = (from_side >= 0.0F) & (to_side <= 0.0F);
-        from_side = to_side;
-        if constexpr (kIsOne)
-            if (!in_sector) continue;
-        const Real from_edge[3] = {arm[0] - t.from[0], arm[1] - t.from[1], arm[2] - t.from[2]};
-        const auto is_interior = dot(from_edge, t.inward) > 0.0F;
+        const Real to = n + 1 < fan.count ? dot(arm, fan.triangles[n + 1].from) : first;
+        const Real beside_to = t.to_to * from - t.from_to * to, beside_from = t.from_from * to - t.from_to * from;
+        const auto inside = (beside_to >= 0.0F) & (beside_from >= 0.0F) & (beside_to + beside_from <= t.area);
         const Real off = dot(arm, t.normal);
-        Real along = dot(from_edge, t.edge) * t.inverse_length;
-        along = along > 0.0F ? along : Real{};
-        along = along < 1.0F ? along : Real{} + 1.0F;
-        const Real rest[3] = {from_edge[0] - along * t.edge[0], from_edge[1] - along * t.edge[1],
-                              from_edge[2] - along * t.edge[2]};
-        const Real to_edge = rest[0] * rest[0] + rest[1] * rest[1] + rest[2] * rest[2];
-        const Real squared = is_interior ? off * off * t.inverse_area : to_edge;
-        const auto nearer = in_sector & (squared < best.squared);
-        best.squared = nearer ? squared : best.squared;
-        best.is_interior = nearer ? is_interior : best.is_interior;
+        const Real plane = off * off * t.inverse_area;
+        within = inside & (plane < within) ? plane : within;
+
+        const Real along = unit(from * t.inverse_from);
+        const Real spoke[3] = {arm[0] - along * t.from[0], arm[1] - along * t.from[1], arm[2] - along * t.from[2]};
+        keep_least(within, spoke[0] * spoke[0] + spoke[1] * spoke[1] + spoke[2] * spoke[2]);
+
+        const Real side[3] = {arm[0] - t.from[0], arm[1] - t.from[1], arm[2] - t.from[2]};
+        const Real on_edge = unit(dot(side, t.edge) * t.inverse_edge);
+        const Real rest[3] = {side[0] - on_edge * t.edge[0], side[1] - on_edge * t.edge[1], side[2] - on_edge * t.edge[2]};
+        keep_least(outline, rest[0] * rest[0] + rest[1] * rest[1] + rest[2] * rest[2]);
+        from = to;
     }
-    return best;
+    return {within < outline ? within : outline, within < outline};
 }
 
 COVOL_INLINE Float8 ceil_of(Float8 x) {
@@ -74,23 +77,24 @@ struct Positions {
 
 PatchFan::PatchFan(const float* axis_of, const float* center, const std::array<float, 3>* vertices, int vertex_count)
     : count(vertex_count) {
-    const auto cross = [](const float* a, const float* b, float* out) {
-        for (int k = 0; k < 3; ++k) out[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
-    };
-    const auto square = [](const float* a) { return a[0] * a[0] + a[1] * a[1] + a[2] * a[2]; };
+    const auto product = [](const float* a, const float* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; };
     std::memcpy(axis, axis_of, sizeof axis);
     for (int n = 0; n < count; ++n) {
         Triangle& t = triangles[n];
         const auto& next = vertices[n + 1 < count ? n + 1 : 0];
+        float to[3];
         for (int k = 0; k < 3; ++k) {
             t.from[k] = vertices[n][k] - center[k];
+            to[k] = next[k] - center[k];
             t.edge[k] = next[k] - vertices[n][k];
         }
-        cross(t.from, t.edge, t.normal);
-        cross(t.normal, t.edge, t.inward);
-        const float area = square(t.normal), length = square(t.edge);
-        t.inverse_area = area > 0 ? 1 / area : 0.0F;
-        t.inverse_length = length > 0 ? 1 / length : 0.0F;
+        for (int k = 0; k < 3; ++k) t.normal[k] = t.from[(k + 1) % 3] * to[(k + 2) % 3] - t.from[(k + 2) % 3] * to[(k + 1) % 3];
+        t.from_from = product(t.from, t.from), t.from_to = product(t.from, to), t.to_to = product(to, to);
+        t.area = product(t.normal, t.normal);
+        const auto inverse = [](float square) { return square > 0 ? 1 / square : 0.0F; };
+        t.inverse_from = inverse(t.from_from);
+        t.inverse_edge = inverse(product(t.edge, t.edge));
+        t.inverse_area = 1 / t.area;  // without one nothing is within
     }
 }
 

@@ -10,12 +10,13 @@ struct PatchFan {
     static constexpr int kMaxTriangles = 12;  ///< a cell has twelve edges
     /// Of the centre and two vertices that follow each other.
     struct Triangle {
-        float from[3];    ///< the first vertex, from the centre
-        float edge[3];    ///< from the first to the second vertex
+        float from[3];  ///< the first vertex, from the centre
+        float edge[3];  ///< from the first to the second vertex
         float normal[3];
-        float inward[3];  ///< in the plane, normal to the edge; 0 where the triangle has no area
-        float inverse_area;
-        float inverse_length;
+        float from_from, from_to, to_to;    ///< products of the vertices' arms
+        float area;                        ///< the normal's square; 0 where there is none
+        float inverse_area;                ///< infinite where there is none
+        float inverse_from, inverse_edge;  ///< of squared lengths; 0 where there is none
     };
     float axis[3];  ///< unit normal of the whole polygon
     int count;
