@@ -186,50 +186,19 @@ std::vector<Coord> candidates(const FloatGrid& u, const Domain& domain) {
     return result;
 }
 
-/// Squared distance from p to the segment a, a + ab, with ap = p - a. The segment may have no length.
-float squared_distance_to_segment(const Point& ap, const Point& ab) {
-    const float length = dot(ab, ab);
-    const float t = length > 0 ? std::clamp(dot(ap, ab) / length, 0.0F, 1.0F) : 0.0F;
-    const Point r = {ap[0] - t * ab[0], ap[1] - t * ab[1], ap[2] - t * ab[2]};
-    return dot(r, r);
-}
-
 }  // namespace
 
-float InterfacePatches::squared_distance(const Coord& at, std::uint32_t index, float bound) const {
-    const Patch& patch = patches[index];
+PatchHit InterfacePatches::nearest(const Coord& at, const Patch& patch, float bound) const {
     const Point p = {float(at[0] - patch.origin[0]), float(at[1] - patch.origin[1]), float(at[2] - patch.origin[2])};
     const Point arm = p - patch.center;
     // The patch lies in a cylinder: what is farther from that than `bound` need not be looked at.
     const float along = dot(arm, patch.normal);
     const float beyond = std::max(0.0F, std::abs(along) - patch.height);
     const float beside = std::max(0.0F, std::sqrt(std::max(0.0F, dot(arm, arm) - along * along)) - patch.radius);
-    if (beyond * beyond + beside * beside >= bound) return bound;
-
-    // The triangle of the fan that faces p: the sector, seen along the normal, that p lies in.
-    const Point* points = vertices.data() + patch.first;
-    const Point turned = cross(arm, patch.normal);
-    Point from = points[patch.count - 1] - patch.center;
-    float from_side = dot(turned, from);
-    for (std::uint32_t n = 0; n < patch.count; ++n) {
-        const Point to = points[n] - patch.center;
-        const float to_side = dot(turned, to);
-        if (from_side >= 0 && to_side <= 0) {
-            const Point normal = cross(from, to);
-            const Point edge = to - from;
-            const Point from_edge = arm - from;
-            const float area = dot(normal, normal);
-            if (area > 0 && dot(cross(edge, from_edge), normal) >= 0) {
-                const float off = dot(arm, normal);
-                bound = std::min(bound, off * off / area);
-            } else {
-                bound = std::min(bound, squared_distance_to_segment(from_edge, edge));
-            }
-        }
-        from = to;
-        from_side = to_side;
-    }
-    return bound;
+    const PatchHit none{std::numeric_limits<float>::infinity(), false};
+    if (beyond * beyond + beside * beside >= bound) return none;
+    const PatchHit hit = nearest_on(fan(patch), arm.data());
+    return hit.squared < bound ? hit : none;
 }
 
 InterfacePatches find_interface(const FloatGrid& u, const Domain& domain, DomainEnd end, const RunContext& run) {
