@@ -9,6 +9,7 @@
 #include "covol/error.h"
 #include "detail/contour_curve.h"
 #include "detail/contour_solid.h"
+#include "detail/number.h"
 
 namespace covol {
 namespace {
@@ -31,12 +32,6 @@ struct Line {
     std::string name;         ///< for messages: file, and the line's own name
     std::array<bool, 3> constant{false, false, false};
 };
-
-std::string to_text(double value) {
-    std::ostringstream text;
-    text << value;
-    return text.str();
-}
 
 /// Without neighbours that are the same mark twice.
 std::vector<Vec3> without_repeats(const std::vector<Vec3>& marks, bool closed) {
@@ -231,7 +226,7 @@ void Densifier::fill_slices(ContourSolid::Data& data, const std::vector<std::vec
     const double nodes = (high[0] - low[0]) * (high[1] - low[1]) / (options_.step * options_.step) * double(polygons.size());
     const double cell = options_.step * std::max(1.0, std::sqrt(nodes / double(kMaxNodes)));
     if (cell > options_.step)
-        run_.info("contours: slices are filled on a grid of " + to_text(cell) + ", coarser than the voxels, to bound memory");
+        run_.info("contours: slices are filled on a grid of " + detail::number(cell) + ", coarser than the voxels, to bound memory");
     data.grid.cell = cell;
     data.grid.origin = {low[0] - kMarginCells * cell, low[1] - kMarginCells * cell};
     data.grid.nx = int((high[0] - low[0]) / cell + 2 * kMarginCells) + 2;
@@ -311,7 +306,7 @@ void Densifier::summarise() {
 
 std::string ContourOptions::why_invalid() const {
     if (step > 0 && std::isfinite(step)) return {};
-    return "step: expected > 0, got " + to_text(step);
+    return "step: expected > 0, got " + detail::number(step);
 }
 
 Contours densify(const std::vector<PointCloud>& clouds, const ImageGeometry* geometry, const ContourOptions& options,

@@ -11,6 +11,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <numeric>
 
 #include "covol/error.h"
@@ -28,6 +29,30 @@ template <typename Real>
 Kernel::Point_3 to_cgal(const std::array<Real, 3>& p) {
     return {p[0], p[1], p[2]};
 }
+
+/// Some of a mesh's triangles.
+class TriangleTree {
+public:
+    TriangleTree(const TriangleMesh& mesh, std::size_t begin, std::size_t end) {
+        triangles_.reserve(end - begin);
+        for (std::size_t n = begin; n < end; ++n) {
+            const auto& t = mesh.triangles[n];
+            triangles_.emplace_back(to_cgal(mesh.vertices[t[0]]), to_cgal(mesh.vertices[t[1]]), to_cgal(mesh.vertices[t[2]]));
+        }
+        tree_.insert(triangles_.begin(), triangles_.end());
+        // A tree of the vertices, for first guesses, would cost as much as all queries: the point before has a better one.
+        tree_.do_not_accelerate_distance_queries();
+        tree_.build();  // now, for queries from many threads must find it finished
+    }
+    /// The closest of `guess` and the points of the triangles.
+    [[nodiscard]] Kernel::Point_3 closest_point(const Kernel::Point_3& query, const Kernel::Point_3& guess) const {
+        return tree_.closest_point(query, guess);
+    }
+
+private:
+    Triangles triangles_;
+    CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>> tree_;
+};
 
 /// Indices of the points along a Z curve through 1024^3 cells of their box: those that follow each other lie close.
 std::vector<std::uint32_t> along_z_curve(const std::vector<Vec3>& points) {
@@ -54,22 +79,22 @@ std::vector<std::uint32_t> along_z_curve(const std::vector<Vec3>& points) {
 }  // namespace
 
 std::vector<double> distances_to(const TriangleMesh& mesh, const std::vector<Vec3>& points) {
-    Triangles triangles;
-    triangles.reserve(mesh.triangles.size());
-    for (const auto& t : mesh.triangles)
-        triangles.emplace_back(to_cgal(mesh.vertices[t[0]]), to_cgal(mesh.vertices[t[1]]), to_cgal(mesh.vertices[t[2]]));
-    CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>> tree(triangles.begin(), triangles.end());
-    // A tree of the vertices, for first guesses, would cost as much as all queries: the point before has a better one.
-    tree.do_not_accelerate_distance_queries();
-    tree.build();  // now, for queries from many threads must find it finished
+    // Several trees of triangles that follow each other, and so mostly lie close: CGAL builds a tree on one thread, and the
+    // faster the smaller it is. Each more costs a query a look at its root.
+    constexpr std::size_t kTriangles = 1 << 17;
+    const std::size_t count = mesh.triangles.size();
+    std::vector<std::unique_ptr<TriangleTree>> trees((count + kTriangles - 1) / kTriangles);
+    tbb::parallel_for(std::size_t(0), trees.size(), [&](std::size_t n) {
+        trees[n] = std::make_unique<TriangleTree>(mesh, n * kTriangles, std::min(count, (n + 1) * kTriangles));
+    });
     const std::vector<std::uint32_t> order = along_z_curve(points);
     std::vector<double> distances(points.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, order.size(), 256), [&](const auto& range) {
-        Kernel::Point_3 guess = triangles.front().vertex(0);
+        Kernel::Point_3 closest = to_cgal(mesh.vertices[mesh.triangles.front()[0]]);
         for (std::size_t n = range.begin(); n != range.end(); ++n) {
             const Kernel::Point_3 query = to_cgal(points[order[n]]);
-            guess = tree.closest_point(query, guess);
-            distances[order[n]] = std::sqrt(CGAL::squared_distance(query, guess));
+            for (const auto& tree : trees) closest = tree->closest_point(query, closest);
+            distances[order[n]] = std::sqrt(CGAL::squared_distance(query, closest));
         }
     });
     return distances;

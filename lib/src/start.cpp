@@ -98,6 +98,44 @@ FloatGridPtr start_from_field(const Domain& domain, const std::vector<Coord>& ca
     return detail::make_start(band, u, domain, where);
 }
 
+/// From voxels of a domain to index space of a grid with a linear transform.
+class ToSource {
+public:
+    ToSource(const Domain& domain, const openvdb::math::Transform& source) {
+        const auto index_of = [&](const Vec3& at) {
+            const Vec3 x = domain.index_to_world(at);
+            return source.worldToIndex(openvdb::Vec3d(x[0], x[1], x[2]));
+        };
+        from_ = index_of({0, 0, 0});
+        along_ = {index_of({1, 0, 0}) - from_, index_of({0, 1, 0}) - from_, index_of({0, 0, 1}) - from_};
+    }
+    openvdb::Vec3d operator()(int i, int j, int k) const {
+        return from_ + double(i) * along_[0] + double(j) * along_[1] + double(k) * along_[2];
+    }
+    /// The source's voxels that interpolation at the voxels lo..hi asks for.
+    [[nodiscard]] openvdb::CoordBBox box(const Coord& lo, const Coord& hi) const {
+        openvdb::BBoxd corners;
+        for (int c = 0; c < 8; ++c)
+            corners.expand((*this)(c & 4 ? hi.x() : lo.x(), c & 2 ? hi.y() : lo.y(), c & 1 ? hi.z() : lo.z()));
+        return {Coord::floor(corners.min()), Coord::floor(corners.max()).offsetBy(1)};
+    }
+
+private:
+    openvdb::Vec3d from_;
+    std::array<openvdb::Vec3d, 3> along_;
+};
+
+/// False where all values in the box have one sign. Boxes that hold more voxels than a leaf with its next layer would take longer
+/// than what they may save.
+bool may_cross(const FloatGrid& grid, const openvdb::CoordBBox& box) {
+    if (box.volume() > 9 * 9 * 9) return true;
+    const auto accessor = grid.getConstAccessor();
+    const bool first = accessor.getValue(box.min()) < 0;
+    for (auto at = box.begin(); at; ++at)
+        if ((accessor.getValue(*at) < 0) != first) return true;
+    return false;
+}
+
 std::string to_text(const Vec3& p) {
     std::ostringstream s;
     s << "(" << p[0] << ", " << p[1] << ", " << p[2] << ")";
@@ -223,16 +261,14 @@ FloatGridPtr start_from_grid(const Domain& domain, const FloatGrid& level_set, c
         }
         std::sort(candidates.begin(), candidates.end());
         candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
+        const ToSource to_source(domain, level_set.transform());
+        candidates = filter(candidates, [&](const Coord& o) { return may_cross(level_set, to_source.box(o, o.offsetBy(kLeafDim))); });
         const Sampler sample = [&](const Coord& lo, const Coord& hi, float* values) {
             const auto accessor = level_set.getConstAccessor();
-            const openvdb::tools::GridSampler<FloatGrid::ConstAccessor, openvdb::tools::BoxSampler> sampler(
-                accessor, level_set.transform());
             for (int i = lo.x(); i <= hi.x(); ++i)
                 for (int j = lo.y(); j <= hi.y(); ++j)
-                    for (int k = lo.z(); k <= hi.z(); ++k) {
-                        const Vec3 x = domain.index_to_world({double(i), double(j), double(k)});
-                        *values++ = sampler.wsSample(openvdb::Vec3d(x[0], x[1], x[2]));
-                    }
+                    for (int k = lo.z(); k <= hi.z(); ++k)
+                        *values++ = openvdb::tools::BoxSampler::sample(accessor, to_source(i, j, k));
         };
         result = start_from_field(domain, candidates, sample, "start_from_grid", run);
     });

@@ -168,9 +168,4 @@ int run(const bench::Arguments& arguments) {
 
 }  // namespace
 
-int main(int argc, char** argv) try {
-    return run(bench::Arguments(argc, argv));
-} catch (const std::exception& e) {
-    std::cerr << "bench_dense: " << e.what() << '\n';
-    return 1;
-}
+int main(int argc, char** argv) { return bench::run_program("bench_dense", argc, argv, run); }

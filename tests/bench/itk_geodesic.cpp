@@ -122,9 +122,4 @@ int run(const bench::Arguments& arguments) {
 
 }  // namespace
 
-int main(int argc, char** argv) try {
-    return run(bench::Arguments(argc, argv));
-} catch (const std::exception& e) {
-    std::cerr << "bench_itk: " << e.what() << '\n';
-    return 1;
-}
+int main(int argc, char** argv) { return bench::run_program("bench_itk", argc, argv, run); }

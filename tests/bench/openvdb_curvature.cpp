@@ -101,10 +101,7 @@ int run(const bench::Arguments& arguments) {
 
 }  // namespace
 
-int main(int argc, char** argv) try {
+int main(int argc, char** argv) {
     openvdb::initialize();
-    return run(bench::Arguments(argc, argv));
-} catch (const std::exception& e) {
-    std::cerr << "bench_curvature: " << e.what() << '\n';
-    return 1;
+    return bench::run_program("bench_curvature", argc, argv, run);
 }

@@ -1,4 +1,6 @@
 #pragma once
+#include <exception>
+#include <iostream>
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -39,6 +41,14 @@ public:
 private:
     std::map<std::string, std::string> values_;
 };
+
+/// The body of main(): what `run` throws goes to stderr, after the program's name.
+inline int run_program(const char* name, int argc, char** argv, int (*run)(const Arguments&)) try {
+    return run(Arguments(argc, argv));
+} catch (const std::exception& e) {
+    std::cerr << name << ": " << e.what() << '\n';
+    return 1;
+}
 
 /// The zero level set of values on the whole domain, as triangles: by covol's own way for every solver, so that
 /// quality is measured alike. @param half_width  |u| from there on says nothing, world units

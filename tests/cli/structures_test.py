@@ -393,7 +393,7 @@ class TimeLapse(Case):
         self.assertEqual(len(volumes), 21)
         # A droplet is incompressible; half maximum of the first frame encloses about 16 x 17 x 7 voxels.
         for v in volumes:
-            self.assertLess(abs(v / np.median(volumes) - 1), 0.35)
+            self.assertLess(abs(v / np.median(volumes) - 1), 0.05)
 
 
 class Evidence(Case):

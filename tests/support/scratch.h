@@ -6,6 +6,7 @@
 #include <functional>
 #include <iterator>
 #include <random>
+#include <stdexcept>
 #include <string>
 
 #include "covol/error.h"
@@ -52,6 +53,18 @@ inline std::string message_of(const std::function<void()>& call) {
         return e.what();
     }
     return {};
+}
+
+/// The code of the covol::Error that `call` throws; its message begins with `begin`. Anything else is an exception.
+inline covol::Errc code_of(const std::function<void()>& call, const std::string& begin = "") {
+    try {
+        call();
+    } catch (const covol::Error& e) {
+        const std::string message = e.what();
+        if (message.rfind(begin, 0) == 0) return e.code();
+        throw std::logic_error("expected a message that begins with '" + begin + "', got '" + message + "'");
+    }
+    throw std::logic_error("expected a covol::Error, got none");
 }
 
 struct FuzzCounts {

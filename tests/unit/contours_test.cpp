@@ -136,16 +136,6 @@ BandReport flood(const std::vector<Vec3>& points, double h, double D) {
     return band(*d, {D, {}}).report;
 }
 
-Errc code_of(const std::function<void()>& work) {
-    try {
-        work();
-    } catch (const Error& error) {
-        return error.code();
-    }
-    FAIL("expected an error");
-    return Errc::Numerical;
-}
-
 struct Warnings {
     std::vector<std::string> lines;
     RunContext run;

@@ -10,6 +10,7 @@
 
 #include "covol/error.h"
 #include "support/dense_reference.h"
+#include "support/scratch.h"
 #include "support/shapes.h"
 
 using namespace covol;
@@ -67,17 +68,7 @@ double largest_difference(const Domain& domain, const FloatGrid& g, const DenseF
 
 bool everywhere(const Vec3&) { return true; }
 
-template <typename Run>
-Errc code_of(const Run& run) {
-    try {
-        run();
-    } catch (const Error& error) {
-        CHECK(std::string(error.what()).rfind("edge: ", 0) == 0);
-        return error.code();
-    }
-    FAIL_CHECK("expected an Error");
-    return Errc::Io;
-}
+Errc edge_code(const std::function<void()>& call) { return code_of(call, "edge: "); }
 
 }  // namespace
 
@@ -215,9 +206,9 @@ TEST_CASE("edge() refuses what has no edges") {
     const FloatGridPtr topology = topology_where(domain, everywhere);
     EdgeOptions bad;
     bad.edge_k = -1;
-    CHECK(code_of([&] { (void)edge(image, *topology, bad); }) == Errc::InvalidOptions);
-    CHECK(code_of([&] { (void)edge(constant, *topology); }) == Errc::InvalidInput);
-    CHECK(code_of([&] { (void)edge(image, *make_grid(domain, 1.0F, "band")); }) == Errc::InvalidInput);
+    CHECK(edge_code([&] { (void)edge(image, *topology, bad); }) == Errc::InvalidOptions);
+    CHECK(edge_code([&] { (void)edge(constant, *topology); }) == Errc::InvalidInput);
+    CHECK(edge_code([&] { (void)edge(image, *make_grid(domain, 1.0F, "band")); }) == Errc::InvalidInput);
 }
 
 // ---- lines ----------------------------------------------------------------------------------------------------------

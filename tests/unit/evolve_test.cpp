@@ -10,6 +10,7 @@
 
 #include "covol/error.h"
 #include "support/both_solvers.h"
+#include "support/scratch.h"
 #include "support/shapes.h"
 
 using namespace covol;
@@ -38,18 +39,7 @@ Problem everything_on(int n = 28, int first = -5) {
     return p;
 }
 
-template <typename Run>
-Errc code_of(const Run& run) {
-    try {
-        run();
-    } catch (const Error& error) {
-        INFO(error.what());
-        CHECK(std::string(error.what()).rfind("evolve: ", 0) == 0);
-        return error.code();
-    }
-    FAIL("expected an Error");
-    return Errc::Io;
-}
+Errc evolve_code(const std::function<void()>& call) { return code_of(call, "evolve: "); }
 
 bool same_bits(const FloatGrid& a, const FloatGrid& b) {
     if (!a.tree().hasSameTopology(b.tree())) return false;
@@ -111,29 +101,29 @@ TEST_CASE("unusable options and grids are refused, and u stays as it was") {
     SECTION("options") {
         EvolveOptions bad = good;
         bad.theta = -1;
-        CHECK(code_of([&] { evolve(*u, grids.get(), bad); }) == Errc::InvalidOptions);
+        CHECK(evolve_code([&] { evolve(*u, grids.get(), bad); }) == Errc::InvalidOptions);
     }
     SECTION("no distance") {
         EvolveFields fields = grids.get();
         fields.distance = nullptr;
-        CHECK(code_of([&] { evolve(*u, fields, good); }) == Errc::InvalidInput);
+        CHECK(evolve_code([&] { evolve(*u, fields, good); }) == Errc::InvalidInput);
     }
     SECTION("no edge detector") {
         EvolveFields fields = grids.get();
         fields.edge = nullptr;
-        CHECK(code_of([&] { evolve(*u, fields, good); }) == Errc::InvalidInput);
+        CHECK(evolve_code([&] { evolve(*u, fields, good); }) == Errc::InvalidInput);
     }
     SECTION("another voxel size") {
         Domain other = p.domain;
         other.voxel_size *= 1.01;
         set_domain(*grids.distance, other);
-        CHECK(code_of([&] { evolve(*u, grids.get(), good); }) == Errc::InvalidInput);
+        CHECK(evolve_code([&] { evolve(*u, grids.get(), good); }) == Errc::InvalidInput);
     }
     SECTION("another origin") {
         Domain other = p.domain;
         other.origin[1] += 0.1 * kH;
         set_domain(*grids.edge, other);
-        CHECK(code_of([&] { evolve(*u, grids.get(), good); }) == Errc::InvalidInput);
+        CHECK(evolve_code([&] { evolve(*u, grids.get(), good); }) == Errc::InvalidInput);
     }
     CHECK(same_bits(*u, *before));
 }
@@ -142,7 +132,7 @@ TEST_CASE("an empty band is refused") {
     const FloatGridPtr u = make_grid(cube_domain(8, kH), 1.0F, "u");
     EvolveOptions o;
     o.theta = o.rho = 0;
-    CHECK(code_of([&] { evolve(*u, {}, o); }) == Errc::InvalidInput);
+    CHECK(evolve_code([&] { evolve(*u, {}, o); }) == Errc::InvalidInput);
 }
 
 TEST_CASE("a value that is not finite is named, and u stays as it was") {
@@ -155,7 +145,7 @@ TEST_CASE("a value that is not finite is named, and u stays as it was") {
             (what == "u" ? u : what == "edge" ? grids.edge : grids.distance)->tree().setValueOn(at, bad);
             const FloatGridPtr before = u->deepCopy();
             INFO(bad << " in " << what);
-            CHECK(code_of([&] { evolve(*u, grids.get(), evolve_options(p.options, 2)); }) == Errc::InvalidInput);
+            CHECK(evolve_code([&] { evolve(*u, grids.get(), evolve_options(p.options, 2)); }) == Errc::InvalidInput);
             CHECK(same_bits(*u, *before));
         }
 }
@@ -168,7 +158,7 @@ TEST_CASE("a frozen value that is not finite leaves u at the step before") {
     while (u->tree().isValueOn(at)) at.x() -= 1;
     u->tree().setValueOff(at, std::numeric_limits<float>::quiet_NaN());
     const FloatGridPtr before = u->deepCopy();
-    const Errc code = code_of([&] { evolve(*u, Fields(p).get(), evolve_options(p.options, 2)); });
+    const Errc code = evolve_code([&] { evolve(*u, Fields(p).get(), evolve_options(p.options, 2)); });
     CHECK((code == Errc::Numerical || code == Errc::InvalidInput));
     CHECK(same_bits(*u, *before));
 }

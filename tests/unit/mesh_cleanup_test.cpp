@@ -5,8 +5,10 @@
 #include <random>
 
 #include "covol/error.h"
+#include "support/meshes.h"
 
 using namespace covol;
+using covol::test::joined;
 
 namespace {
 
@@ -33,13 +35,6 @@ TriangleMesh sphere(int n, float radius, float x0 = 0) {
             if (i > 0) mesh.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
         }
     return mesh;
-}
-
-TriangleMesh joined(TriangleMesh a, const TriangleMesh& b) {
-    const auto shift = std::uint32_t(a.vertices.size());
-    a.vertices.insert(a.vertices.end(), b.vertices.begin(), b.vertices.end());
-    for (const auto& t : b.triangles) a.triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
-    return a;
 }
 
 TriangleMesh two_triangles(std::array<float, 3> d, std::array<float, 3> e, std::array<float, 3> f) {

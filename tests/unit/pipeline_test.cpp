@@ -4,10 +4,10 @@
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <functional>
 
 #include "covol/error.h"
 #include "covol/surface.h"
+#include "support/scratch.h"
 
 using namespace covol;
 
@@ -46,16 +46,6 @@ double mean_radius(const TriangleMesh& mesh) {
     double sum = 0;
     for (const auto& v : mesh.vertices) sum += std::sqrt(double(v[0]) * v[0] + double(v[1]) * v[1] + double(v[2]) * v[2]);
     return sum / static_cast<double>(mesh.vertices.size());
-}
-
-Errc code_of(const std::function<void()>& work) {
-    try {
-        work();
-    } catch (const Error& error) {
-        return error.code();
-    }
-    FAIL("expected an error");
-    return Errc::Numerical;
 }
 
 }  // namespace

@@ -41,17 +41,15 @@ struct BandJob {
                          (result.report.holding_distance > 0
                               ? "; it would hold at " + std::to_string(result.report.holding_distance)
                               : "; no tag distance that holds was found"));
-        session.outputs().add(output, [grid = result.grid, vdb = WriteVdbOptions{half, session.metadata()}](
-                                          const std::string& path) { write_vdb(path, {grid}, vdb); });
+        session.add_grid(output, result.grid, half);
     }
 };
 
 }  // namespace
 
 void add_band(Session& session) {
-    const auto job = std::make_shared<BandJob>();
-    CLI::App* command = session.add_command("band", "Step 2: tag the inside, make the narrow band and the initial values",
-                                            [job, &session] { job->run(session); });
+    const auto [job, command] =
+        session.add_job<BandJob>("band", "Step 2: tag the inside, make the narrow band and the initial values");
     command->add_option("distance", job->distance_path, "what `covol distance` wrote")->required()->type_name("DISTANCE.vdb");
     command->add_option("-o,--output", job->output, "the grid 'band', .vdb")->required()->type_name("OUT.vdb");
     job->tag.bind(*command);

@@ -38,9 +38,7 @@ struct ConvertJob {
         const FloatGridPtr grid = to_grid(pixels, h, session.run());
         session.report()["image"] = to_json(pixels.geometry());
         session.report()["grid"] = {{"voxel_size", h}, {"domain", to_json(domain_of(*grid))}};
-        session.outputs().add(output, [grid, vdb = WriteVdbOptions{half, session.metadata()}](const std::string& path) {
-            write_vdb(path, {grid}, vdb);
-        });
+        session.add_grid(output, grid, half);
     }
 
     void vdb_to_image(Session& session) const {
@@ -100,9 +98,8 @@ struct ConvertJob {
 }  // namespace
 
 void add_convert(Session& session) {
-    const auto job = std::make_shared<ConvertJob>();
-    CLI::App* command = session.add_command("convert", "Image to .vdb and back, points to points, mesh to mesh",
-                                            [job, &session] { job->run(session); });
+    const auto [job, command] =
+        session.add_job<ConvertJob>("convert", "Image to .vdb and back, points to points, mesh to mesh");
     command->add_option("input", job->input, "the file to read")->required()->type_name("IN");
     command->add_option("output", job->output, "the file to write")->required()->type_name("OUT");
     command->add_option("--like", job->like, "image whose lattice the result gets, or that index points belong to")

@@ -2,7 +2,6 @@
 #include "commands.h"
 #include "covol/distance.h"
 #include "covol/error.h"
-#include "covol/vdb_io.h"
 #include "report.h"
 
 namespace covol::tool {
@@ -47,17 +46,15 @@ struct DistanceJob {
                                     {"domain", to_json(box)}};
         session.report()["distance"] = {{"max_distance", radius}, {"rounds", result.report.rounds}};
         session.note(std::to_string(result.report.active_voxels) + " active voxels");
-        session.outputs().add(output, [grid = result.grid, vdb = WriteVdbOptions{half, session.metadata()}](
-                                          const std::string& path) { write_vdb(path, {grid}, vdb); });
+        session.add_grid(output, result.grid, half);
     }
 };
 
 }  // namespace
 
 void add_distance(Session& session) {
-    const auto job = std::make_shared<DistanceJob>();
-    CLI::App* command = session.add_command("distance", "Step 1: distance to the points, in a tube around them",
-                                            [job, &session] { job->run(session); });
+    const auto [job, command] =
+        session.add_job<DistanceJob>("distance", "Step 1: distance to the points, in a tube around them");
     job->points.bind(*command, "points")->required();
     command->add_option("-o,--output", job->output, "the grid 'distance', .vdb")->required()->type_name("OUT.vdb");
     add_length(*command, "--max-distance", job->max_distance, "10vx", "radius of the tube");

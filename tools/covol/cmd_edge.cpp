@@ -28,17 +28,14 @@ struct EdgeJob {
         session.report()["edge"] = to_json(result.report);
         session.note("K = " + std::to_string(result.report.edge_k) + ": g = 1/2 at a gradient of " +
                      std::to_string(result.report.edge_contrast));
-        session.outputs().add(output, [grid = result.grid, vdb = WriteVdbOptions{half, session.metadata()}](
-                                          const std::string& path) { write_vdb(path, {grid}, vdb); });
+        session.add_grid(output, result.grid, half);
     }
 };
 
 }  // namespace
 
 void add_edge(Session& session) {
-    const auto job = std::make_shared<EdgeJob>();
-    CLI::App* command = session.add_command("edge", "Step 3: the image's edge detector g on the band",
-                                            [job, &session] { job->run(session); });
+    const auto [job, command] = session.add_job<EdgeJob>("edge", "Step 3: the image's edge detector g on the band");
     command->add_option("image", job->image_path, "3D image")->required()->type_name("IMAGE");
     command->add_option("--band", job->band_path, "a grid whose active voxels get g")->required()->type_name("BAND.vdb");
     command->add_option("-o,--output", job->output, "the grid 'edge', .vdb")->required()->type_name("OUT.vdb");

@@ -51,18 +51,15 @@ struct EvolveJob {
         if (result.stop_reason == StopReason::MaxSteps)
             session.warn("not steady after " + std::to_string(result.steps) + " steps");
         if (flags.strict && result.stop_reason != StopReason::Steady) session.set_exit_code(kNotSteady);
-        session.outputs().add(output, [u, vdb = WriteVdbOptions{half, session.metadata()}](const std::string& path) {
-            write_vdb(path, {u}, vdb);
-        });
+        session.add_grid(output, u, half);
     }
 };
 
 }  // namespace
 
 void add_evolve(Session& session) {
-    const auto job = std::make_shared<EvolveJob>();
-    CLI::App* command = session.add_command("evolve", "Step 4: move the level set to the structure's boundary",
-                                            [job, &session] { job->run(session); });
+    const auto [job, command] =
+        session.add_job<EvolveJob>("evolve", "Step 4: move the level set to the structure's boundary");
     command->add_option("band", job->band_path, "what `covol band` wrote, or the u of an earlier run")
         ->required()->type_name("BAND.vdb");
     command->add_option("-o,--output", job->output, "the grid u, .vdb")->required()->type_name("OUT.vdb");

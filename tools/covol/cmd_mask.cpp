@@ -36,9 +36,7 @@ struct MaskJob {
 }  // namespace
 
 void add_mask(Session& session) {
-    const auto job = std::make_shared<MaskJob>();
-    CLI::App* command =
-        session.add_command("mask", "Label image of a level set", [job, &session] { job->run(session); });
+    const auto [job, command] = session.add_job<MaskJob>("mask", "Label image of a level set");
     command->add_option("level_set", job->input, "a level set; of several in a file, :NAME picks one")->required()->type_name("IN.vdb[:NAME]");
     command->add_option("--like", job->like, "image whose lattice the mask gets")->required()->type_name("IMAGE");
     command->add_option("-o,--output", job->output, "label image")->required()->type_name("OUT.nrrd|.nii.gz|.tif|.mha");

@@ -57,9 +57,7 @@ struct MeshJob {
 }  // namespace
 
 void add_mesh(Session& session) {
-    const auto job = std::make_shared<MeshJob>();
-    CLI::App* command =
-        session.add_command("mesh", "Triangles of a level set, and their cleanup", [job, &session] { job->run(session); });
+    const auto [job, command] = session.add_job<MeshJob>("mesh", "Triangles of a level set, and their cleanup");
     command->add_option("level_set", job->input, "a level set; of several in a file, :NAME picks one")->required()->type_name("IN.vdb[:NAME]");
     command->add_option("-o,--output", job->output, "closed, manifold, outward triangles")
         ->required()->type_name("OUT.ply|.obj|.stl|.off|.glb");

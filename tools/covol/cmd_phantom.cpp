@@ -46,8 +46,7 @@ struct PhantomJob {
 }  // namespace
 
 void add_phantom(Session& session) {
-    const auto job = std::make_shared<PhantomJob>();
-    CLI::App* command = session.add_command("phantom", "Test shapes with known truth", [job, &session] { job->run(session); });
+    const auto [job, command] = session.add_job<PhantomJob>("phantom", "Test shapes with known truth");
     std::string kinds;
     for (const std::string& kind : phantom_kinds()) kinds += (kinds.empty() ? "" : ", ") + kind;
     command->add_option("kind", job->options.kind, kinds)->required()->type_name("KIND");

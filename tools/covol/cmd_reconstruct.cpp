@@ -4,10 +4,9 @@
 namespace covol::tool {
 
 void add_reconstruct(Session& session) {
-    const auto job = std::make_shared<SegmentJob>();
+    const auto [job, command] =
+        session.add_job<SegmentJob>("reconstruct", "Points alone: the surface behind a point cloud");
     job->evolve.options.rho = 0;
-    CLI::App* command = session.add_command("reconstruct", "Points alone: the surface behind a point cloud",
-                                            [job, &session] { job->run(session); });
     job->points.bind(*command, "points");
     job->bind(*command, false);
 }

@@ -30,9 +30,8 @@ struct RenderJob {
 }  // namespace
 
 void add_render(Session& session) {
-    const auto job = std::make_shared<RenderJob>();
-    CLI::App* command = session.add_command("render", "A picture: the shaded surface, slices with its outline and the points",
-                                            [job, &session] { job->run(session); });
+    const auto [job, command] =
+        session.add_job<RenderJob>("render", "A picture: the shaded surface, slices with its outline and the points");
     command->add_option("level_set", job->input, "a level set; of several in a file, :NAME picks one")->required()->type_name("IN.vdb[:NAME]");
     command->add_option("-o,--output", job->output, "the picture")->required()->type_name("OUT.png");
     command->add_option("--image", job->image_path, "image for the slices")->type_name("IMAGE");

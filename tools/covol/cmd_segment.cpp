@@ -4,9 +4,8 @@
 namespace covol::tool {
 
 void add_segment(Session& session) {
-    const auto job = std::make_shared<SegmentJob>();
-    CLI::App* command = session.add_command("segment", "Image and points together: the surface of a structure",
-                                            [job, &session] { job->run(session); });
+    const auto [job, command] =
+        session.add_job<SegmentJob>("segment", "Image and points together: the surface of a structure");
     command->add_option("image", job->images, "3D image: TIFF, NRRD, NIfTI, MetaImage; several are the frames of a time-lapse")
         ->required()
         ->type_name("IMAGE...");

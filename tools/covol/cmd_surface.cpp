@@ -28,9 +28,8 @@ struct SurfaceJob {
 }  // namespace
 
 void add_surface(Session& session) {
-    const auto job = std::make_shared<SurfaceJob>();
-    CLI::App* command = session.add_command("surface", "Step 5: the zero level set as a true signed distance",
-                                            [job, &session] { job->run(session); });
+    const auto [job, command] =
+        session.add_job<SurfaceJob>("surface", "Step 5: the zero level set as a true signed distance");
     command->add_option("u", job->input, "what `covol evolve` wrote")->required()->type_name("U.vdb");
     command->add_option("-o,--output", job->output, "the grid 'surface', .vdb")->required()->type_name("OUT.vdb");
     command->add_option("--density", job->density_path, "the solid as a fog volume in [0,1]")->type_name("OUT.vdb");

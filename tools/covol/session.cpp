@@ -7,6 +7,7 @@
 
 #include "arguments.h"
 #include "covol/error.h"
+#include "covol/vdb_io.h"
 #include "profile.h"
 
 namespace covol::tool {
@@ -159,6 +160,11 @@ CLI::App* Session::add_command(const std::string& name, const std::string& descr
                     "see covol --help.");
     bodies_[command] = std::move(body);
     return command;
+}
+
+void Session::add_grid(const std::string& path, const FloatGridPtr& grid, bool half) {
+    const WriteVdbOptions options{half, metadata()};
+    outputs_.add(path, [grid, options](const std::string& to) { write_vdb(to, {grid}, options); });
 }
 
 int Session::main(int argc, char** argv) {

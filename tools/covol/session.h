@@ -6,8 +6,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 
 #include "covol/error.h"
+#include "covol/fwd.h"
 #include "covol/image.h"
 #include "covol/run.h"
 #include "memory.h"
@@ -40,12 +42,21 @@ public:
     /// A subcommand; `body` runs after the whole command line has been understood.
     CLI::App* add_command(const std::string& name, const std::string& description, std::function<void()> body);
 
+    /// The same for a Job, to whose members the flags are bound: its run(session) is the body.
+    template <typename Job>
+    std::pair<std::shared_ptr<Job>, CLI::App*> add_job(const std::string& name, const std::string& description) {
+        const auto job = std::make_shared<Job>();
+        return {job, add_command(name, description, [job, this] { job->run(*this); })};
+    }
+
     /// Parses, runs and writes. @returns the exit code.
     int main(int argc, char** argv);
 
     // For the bodies of subcommands.
     [[nodiscard]] const RunContext& run() const noexcept { return run_; }
     [[nodiscard]] Outputs& outputs() noexcept { return outputs_; }
+    /// Queues a .vdb file with one grid and the provenance. @param half  values as 16-bit floats
+    void add_grid(const std::string& path, const FloatGridPtr& grid, bool half);
     /// The report that --json writes.
     [[nodiscard]] Json& report() noexcept { return report_; }
     /// Progress and remarks: silent with --quiet.

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "detail/cube_cases.h"
+
 namespace covol::detail {
 namespace {
 
@@ -16,78 +18,6 @@ float dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a
 Point cross(const Point& a, const Point& b) {
     return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
-
-// Corner c of a cell lies at (c>>2 & 1, c>>1 & 1, c & 1). Edge e = 4*axis + n joins kEdges[e][0] to the corner one
-// step further along the axis.
-constexpr std::array<std::array<int, 2>, 12> kEdges = [] {
-    std::array<std::array<int, 2>, 12> edges{};
-    int e = 0;
-    for (int axis = 0; axis < 3; ++axis)
-        for (int c = 0; c < 8; ++c)
-            if (const int step = 4 >> axis; (c & step) == 0) edges[e++] = {c, c | step};
-    return edges;
-}();
-
-constexpr int edge_between(int a, int b) {
-    for (int e = 0; e < 12; ++e)
-        if ((kEdges[e][0] == a && kEdges[e][1] == b) || (kEdges[e][0] == b && kEdges[e][1] == a)) return e;
-    return -1;
-}
-
-/// The polygons of one pattern of signs: closed walks over the edges with a crossing.
-struct CellCase {
-    int loops = 0;
-    int points = 0;                    ///< over all loops
-    std::array<std::int8_t, 4> size{};  ///< points of each loop
-    std::array<std::int8_t, 12> edge{}; ///< of the loops, one after the other
-};
-
-// Each face of the cell joins its crossings in pairs. A face with four separates its inside corners, a rule that depends
-// on the face alone, so that the polygons of neighbouring cells meet.
-constexpr CellCase make_case(int inside) {
-    std::array<std::array<int, 2>, 12> partner{};
-    for (auto& p : partner) p = {-1, -1};
-    const auto join = [&](int a, int b) {
-        partner[a][partner[a][0] >= 0] = b;
-        partner[b][partner[b][0] >= 0] = a;
-    };
-    for (int axis = 0; axis < 3; ++axis)
-        for (int side = 0; side < 2; ++side) {
-            const int u = 4 >> ((axis + 1) % 3), v = 4 >> ((axis + 2) % 3), base = side * (4 >> axis);
-            const int ring[4] = {base, base | u, base | u | v, base | v};
-            int crossed[4] = {}, count = 0;
-            for (int n = 0; n < 4; ++n)
-                if ((inside >> ring[n] & 1) != (inside >> ring[(n + 1) % 4] & 1))
-                    crossed[count++] = edge_between(ring[n], ring[(n + 1) % 4]);
-            if (count == 2) join(crossed[0], crossed[1]);
-            if (count == 4)
-                for (int n = 0; n < 4; ++n)
-                    if (inside >> ring[n] & 1)
-                        join(edge_between(ring[(n + 3) % 4], ring[n]), edge_between(ring[n], ring[(n + 1) % 4]));
-        }
-    CellCase result;
-    std::array<bool, 12> seen{};
-    for (int start = 0; start < 12; ++start) {
-        if (partner[start][0] < 0 || seen[start]) continue;
-        int size = 0;
-        for (int at = start, last = -1; !seen[at];) {
-            seen[at] = true;
-            result.edge[result.points++] = static_cast<std::int8_t>(at);
-            ++size;
-            const int next = partner[at][0] != last ? partner[at][0] : partner[at][1];
-            last = at;
-            at = next;
-        }
-        result.size[result.loops++] = static_cast<std::int8_t>(size);
-    }
-    return result;
-}
-
-constexpr std::array<CellCase, 256> kCases = [] {
-    std::array<CellCase, 256> cases{};
-    for (int inside = 0; inside < 256; ++inside) cases[inside] = make_case(inside);
-    return cases;
-}();
 
 constexpr int kSide = kLeafDim + 1;                                ///< voxels along an edge of a leaf's cells
 constexpr float kOutside = std::numeric_limits<float>::infinity();  ///< stands for a voxel outside the domain
@@ -135,10 +65,10 @@ public:
     /// Where edge e of the cell crosses zero, relative to the cell.
     [[nodiscard]] Point crossing(int i, int j, int k, int e) const {
         const float* at = values_.data() + cell_voxel(i, j, k);
-        const auto [a, b] = kEdges[e];
+        const int a = kEdgeStart[e], b = edge_end(e);
         const float va = at[kCornerOffset[a]], vb = at[kCornerOffset[b]];
         Point point = {float(a >> 2 & 1), float(a >> 1 & 1), float(a & 1)};
-        point[e / 4] = std::isinf(va) || std::isinf(vb) ? 0.5F : va / (va - vb);
+        point[edge_axis(e)] = std::isinf(va) || std::isinf(vb) ? 0.5F : va / (va - vb);
         return point;
     }
 
@@ -179,7 +109,7 @@ void for_each_cell(const CellValues& values, DomainEnd end, const Visit& visit) 
         for (int j = 0; j < kLeafDim; ++j)
             for (int k = 0; k < kLeafDim; ++k)
                 if (const int signs = values.signs(i, j, k); signs != 0 && signs != 255)
-                    if (end == DomainEnd::Closed || !values.sticks_out(i, j, k)) visit(i, j, k, kCases[signs]);
+                    if (end == DomainEnd::Closed || !values.sticks_out(i, j, k)) visit(i, j, k, kCubeCases[signs]);
 }
 
 Patch make_patch(const Coord& origin, const Point* points, int count, std::uint32_t first) {
@@ -256,50 +186,19 @@ std::vector<Coord> candidates(const FloatGrid& u, const Domain& domain) {
     return result;
 }
 
-/// Squared distance from p to the segment a, a + ab, with ap = p - a. The segment may have no length.
-float squared_distance_to_segment(const Point& ap, const Point& ab) {
-    const float length = dot(ab, ab);
-    const float t = length > 0 ? std::clamp(dot(ap, ab) / length, 0.0F, 1.0F) : 0.0F;
-    const Point r = {ap[0] - t * ab[0], ap[1] - t * ab[1], ap[2] - t * ab[2]};
-    return dot(r, r);
-}
-
 }  // namespace
 
-float InterfacePatches::squared_distance(const Coord& at, std::uint32_t index, float bound) const {
-    const Patch& patch = patches[index];
+PatchHit InterfacePatches::nearest(const Coord& at, const Patch& patch, float bound) const {
     const Point p = {float(at[0] - patch.origin[0]), float(at[1] - patch.origin[1]), float(at[2] - patch.origin[2])};
     const Point arm = p - patch.center;
     // The patch lies in a cylinder: what is farther from that than `bound` need not be looked at.
     const float along = dot(arm, patch.normal);
     const float beyond = std::max(0.0F, std::abs(along) - patch.height);
     const float beside = std::max(0.0F, std::sqrt(std::max(0.0F, dot(arm, arm) - along * along)) - patch.radius);
-    if (beyond * beyond + beside * beside >= bound) return bound;
-
-    // The triangle of the fan that faces p: the sector, seen along the normal, that p lies in.
-    const Point* points = vertices.data() + patch.first;
-    const Point turned = cross(arm, patch.normal);
-    Point from = points[patch.count - 1] - patch.center;
-    float from_side = dot(turned, from);
-    for (std::uint32_t n = 0; n < patch.count; ++n) {
-        const Point to = points[n] - patch.center;
-        const float to_side = dot(turned, to);
-        if (from_side >= 0 && to_side <= 0) {
-            const Point normal = cross(from, to);
-            const Point edge = to - from;
-            const Point from_edge = arm - from;
-            const float area = dot(normal, normal);
-            if (area > 0 && dot(cross(edge, from_edge), normal) >= 0) {
-                const float off = dot(arm, normal);
-                bound = std::min(bound, off * off / area);
-            } else {
-                bound = std::min(bound, squared_distance_to_segment(from_edge, edge));
-            }
-        }
-        from = to;
-        from_side = to_side;
-    }
-    return bound;
+    const PatchHit none{std::numeric_limits<float>::infinity(), false};
+    if (beyond * beyond + beside * beside >= bound) return none;
+    const PatchHit hit = nearest_on(fan(patch), arm.data());
+    return hit.squared < bound ? hit : none;
 }
 
 InterfacePatches find_interface(const FloatGrid& u, const Domain& domain, DomainEnd end, const RunContext& run) {
@@ -313,9 +212,9 @@ InterfacePatches find_interface(const FloatGrid& u, const Domain& domain, Domain
         CellValues values(u, domain);
         for (std::size_t n = range.begin(); n != range.end(); ++n)
             if (values.load(leaves[n]))
-                for_each_cell(values, end, [&](int, int, int, const CellCase& cell) {
-                    counts[n].patches += cell.loops;
-                    counts[n].vertices += cell.points;
+                for_each_cell(values, end, [&](int, int, int, const CubeCase& cell) {
+                    counts[n].patches += cell.loop_count;
+                    counts[n].vertices += cell.triangle_count + 2 * cell.loop_count;
                 });
     });
     run.check();
@@ -339,14 +238,14 @@ InterfacePatches find_interface(const FloatGrid& u, const Domain& domain, Domain
         for (std::size_t n = range.begin(); n != range.end(); ++n) {
             values.load(result.leaves[n]);
             Counts next = begins[n];
-            for_each_cell(values, end, [&](int i, int j, int k, const CellCase& cell) {
-                const std::int8_t* edge = cell.edge.data();
-                for (int loop = 0; loop < cell.loops; ++loop) {
+            for_each_cell(values, end, [&](int i, int j, int k, const CubeCase& cell) {
+                for (int l = 0; l < cell.loop_count; ++l) {
+                    const CubeLoop& loop = cell.loops[l];
                     Point* points = result.vertices.data() + next.vertices;
-                    for (int m = 0; m < cell.size[loop]; ++m) points[m] = values.crossing(i, j, k, *edge++);
+                    for (int m = 0; m < loop.size; ++m) points[m] = values.crossing(i, j, k, loop.edges[m]);
                     result.patches[next.patches++] =
-                        make_patch(result.leaves[n].offsetBy(i, j, k), points, cell.size[loop], next.vertices);
-                    next.vertices += cell.size[loop];
+                        make_patch(result.leaves[n].offsetBy(i, j, k), points, loop.size, next.vertices);
+                    next.vertices += loop.size;
                 }
             });
         }

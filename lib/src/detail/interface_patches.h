@@ -6,6 +6,7 @@
 #include "covol/domain.h"
 #include "covol/run.h"
 #include "detail/leaf_band.h"
+#include "detail/patch_kernel.h"
 
 namespace covol::detail {
 
@@ -28,8 +29,11 @@ struct InterfacePatches {
     std::vector<Patch> patches;                    ///< ordered by leaf, then by cell
     std::vector<std::array<float, 3>> vertices;
 
-    /// Squared distance from the centre of voxel `at` to the patch, at most `bound`: where that is not reached, `bound`.
-    [[nodiscard]] float squared_distance(const Coord& at, std::uint32_t patch, float bound) const;
+    [[nodiscard]] PatchFan fan(const Patch& patch) const {
+        return {patch.normal.data(), patch.center.data(), vertices.data() + patch.first, static_cast<int>(patch.count)};
+    }
+    /// From the centre of voxel `at` to the patch; infinitely far where the square is not below `bound`.
+    [[nodiscard]] PatchHit nearest(const Coord& at, const Patch& patch, float bound) const;
 };
 
 /// What becomes of a surface that reaches the domain's boundary.

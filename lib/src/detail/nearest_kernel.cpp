@@ -2,22 +2,10 @@
 
 #include <cstring>
 
-// Vectors are only passed to functions that are inlined, so that their calling convention does not matter.
-#pragma GCC diagnostic ignored "-Wpsabi"
-
-// Compiled twice and chosen at run time. No fused multiply-add, so that both give the same bits.
-#if defined(__x86_64__) && defined(__gnu_linux__)
-#define COVOL_CLONES __attribute__((target_clones("default", "avx2")))
-#else
-#define COVOL_CLONES
-#endif
-#define COVOL_INLINE inline __attribute__((always_inline))
+#include "detail/clones.h"
 
 namespace covol::detail {
 namespace {
-
-using Float8 = float __attribute__((vector_size(32)));
-using Int8 = std::int32_t __attribute__((vector_size(32)));
 
 template <typename Vector, typename T>
 COVOL_INLINE Vector load(const T* from) {
@@ -153,7 +141,7 @@ COVOL_INLINE bool face_has_news(const NearestBlock& b, float reach, const int (&
     const auto stride = [&](const int (&v)[3]) { return v[0] * kStride[0] + v[1] * kStride[1] + v[2] * kStride[2]; };
     const int outward = stride(normal), next_row = stride(row), next = stride(along);
     const Float8 lanes{0, 1, 2, 3, 4, 5, 6, 7};
-    Int8 any{};
+    Int8 news{};
     for (int r = 0; r < 8; ++r) {
         int at[3];  // the first voxel of the row, in the halo
         for (int a = 0; a < 3; ++a) at[a] = (normal[a] > 0 ? 8 : normal[a] < 0 ? -1 : 0) + r * row[a];
@@ -165,12 +153,10 @@ COVOL_INLINE bool face_has_news(const NearestBlock& b, float reach, const int (&
         const Float8 known = halo.distance_to(load_points(b, offset, next));
         for (int n = -1; n <= 1; ++n) {
             const Float8 s = halo.distance_to(load_points(b, offset - outward + n * next_row, next));
-            any |= (s < known) & (s <= reach);
+            news |= (s < known) & (s <= reach);
         }
     }
-    bool result = false;
-    for (int n = 0; n < 8; ++n) result = result || any[n] != 0;
-    return result;
+    return any(news);
 }
 
 }  // namespace

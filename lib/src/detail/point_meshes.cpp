@@ -277,15 +277,7 @@ PointTable parse_off(const std::string& path, const std::string& text) {
     Lines lines(text);
     string_view line;
     std::vector<string_view> fields;
-    const auto next_fields = [&] {
-        while (lines.next(line)) {
-            line = trim(line.substr(0, line.find('#')));
-            if (line.empty()) continue;
-            split(line, ' ', fields);
-            return true;
-        }
-        return false;
-    };
+    const auto next_fields = [&] { return lines.next_words(line, fields); };
     if (!next_fields()) fail(path, "expected a point, got none");
     // OFF, COFF, NOFF, STOFF, ...; the counts may follow on the same line
     const std::string magic = lower(fields[0]);

@@ -49,10 +49,7 @@ PcdHeader read_pcd_header(const std::string& path, Lines& lines) {
     std::uint64_t width = 0, height = 1;
     string_view line;
     std::vector<string_view> words;
-    while (lines.next(line)) {
-        line = trim(line.substr(0, line.find('#')));
-        if (line.empty()) continue;
-        split(line, ' ', words);
+    while (lines.next_words(line, words)) {
         const string_view key = words[0];
         const bool per_field = key == "SIZE" || key == "TYPE" || key == "COUNT";
         if (words.size() < 2 || (per_field && words.size() != header.fields.size() + 1))

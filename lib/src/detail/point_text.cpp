@@ -75,6 +75,16 @@ bool Lines::next_untrimmed(string_view& line) {
     return true;
 }
 
+bool Lines::next_words(string_view& line, std::vector<string_view>& words) {
+    while (next(line)) {
+        line = trim(line.substr(0, line.find('#')));
+        if (line.empty()) continue;
+        split(line, ' ', words);
+        return true;
+    }
+    return false;
+}
+
 void split(string_view line, char delimiter, std::vector<string_view>& fields) {
     fields.clear();
     if (delimiter == ' ') {

@@ -30,6 +30,8 @@ public:
     bool next(std::string_view& line);
     /// With its blanks: a leading tab is an empty first column.
     bool next_untrimmed(std::string_view& line);
+    /// The next line that holds more than a comment, which '#' begins, and its words between blanks.
+    bool next_words(std::string_view& line, std::vector<std::string_view>& words);
     [[nodiscard]] std::size_t number() const { return number_; }
     [[nodiscard]] std::string_view rest() const { return rest_; }
 

@@ -52,12 +52,17 @@ public:
           half_width_(static_cast<float>(half_width)),
           squared_(band.size(), static_cast<float>(half_width * half_width), 0),
           patch_(band.size(), kNoPatch, 0),
-          changed_(band.size(), LeafMask{}) {}
+          interior_(band.size(), LeafMask{}) {}
 
+    // A voxel whose nearest point lies within a patch lies in the cylinder above and below it. Voxels beside a crease
+    // lie in none; they, and those that slack in the patches' normals puts outside, learn from their neighbours.
     void find(const RunContext& run) {
         tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) { seed(leaf); });
-        propagate(band_, changed_, run, [this](std::size_t leaf, int p, std::size_t other, int q) {
-            return try_patch(leaf, p, patch_.leaf(other)[q]);
+        // Of two voxels above the insides of their patches neither has anything to learn from the other.
+        std::vector<LeafMask> beside(band_.size());
+        tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) { beside[leaf] = beside_creases(leaf); });
+        propagate(band_, beside, run, [this](std::size_t leaf, int p, std::size_t other, int q) {
+            return !(is_on(interior_[leaf], p) && is_on(interior_[other], q)) && try_patch(leaf, p, patch_.leaf(other)[q]);
         });
     }
 
@@ -67,18 +72,18 @@ public:
 private:
     bool try_patch(std::size_t leaf, int p, std::int32_t patch) {
         std::int32_t& mine = patch_.leaf(leaf)[p];
-        if (patch == mine) return false;
+        if (patch == mine || patch == kNoPatch) return false;
         float& best = squared_.leaf(leaf)[p];
         const Coord at = band_.origin(leaf).offsetBy(p >> 6, p >> 3 & 7, p & 7);
-        const float d = interface_.squared_distance(at, static_cast<std::uint32_t>(patch), best);
-        if (!(d < best)) return false;
-        best = d;
+        const PatchHit hit = interface_.nearest(at, interface_.patches[static_cast<std::size_t>(patch)], best);
+        if (!(hit.squared < best)) return false;
+        best = hit.squared;
         mine = patch;
+        const std::uint64_t bit = std::uint64_t(1) << (p & 63);
+        interior_[leaf][p >> 6] = hit.is_interior ? interior_[leaf][p >> 6] | bit : interior_[leaf][p >> 6] & ~bit;
         return true;
     }
 
-    // A voxel whose nearest point lies within a patch lies in the cylinder above and below it. Voxels beside a crease
-    // lie in none; they, and those that slack in the patches' normals puts outside, learn from their neighbours.
     void seed(std::size_t leaf) {
         const Coord origin = band_.origin(leaf);
         for (int n = 0; n < 27; ++n) {
@@ -94,32 +99,36 @@ private:
     void seed_cylinder(std::size_t leaf, std::uint32_t index) {
         const Patch& patch = interface_.patches[index];
         const Coord cell = patch.origin - band_.origin(leaf);
-        const int reach = static_cast<int>(half_width_) + 1;
-        for (int a = 0; a < 3; ++a)
-            if (cell[a] < -reach || cell[a] >= kLeafDim - 1 + reach) return;
-        const auto& n = patch.normal;
-        const int m = std::abs(n[0]) >= std::abs(n[1]) ? (std::abs(n[0]) >= std::abs(n[2]) ? 0 : 2)
-                                                       : (std::abs(n[1]) >= std::abs(n[2]) ? 1 : 2);
-        if (n[m] == 0) return;
-        const int u = (m + 1) % 3, v = (m + 2) % 3;
-        const float radius = patch.radius + kSlack;
-        const float half = half_width_ * std::abs(n[m]) + radius * std::sqrt(std::max(0.0F, 1 - n[m] * n[m]));
-        const float slope_u = n[u] / n[m], slope_v = n[v] / n[m];
-        const float half_u = radius * std::sqrt(1 + slope_u * slope_u), half_v = radius * std::sqrt(1 + slope_v * slope_v);
-        const float center_m = patch.center[m] + float(cell[m]);
-        const auto first = [](float x) { return std::max(0, static_cast<int>(std::ceil(x))); };
-        const auto last = [](float x) { return std::min(kLeafDim - 1, static_cast<int>(std::floor(x))); };
-        Coord at;
-        for (at[m] = first(center_m - half); at[m] <= last(center_m + half); ++at[m]) {
-            const float along = float(at[m]) - center_m;
-            const float center_u = patch.center[u] + float(cell[u]) + along * slope_u;
-            const float center_v = patch.center[v] + float(cell[v]) + along * slope_v;
-            for (at[u] = first(center_u - half_u); at[u] <= last(center_u + half_u); ++at[u])
-                for (at[v] = first(center_v - half_v); at[v] <= last(center_v + half_v); ++at[v]) {
-                    const int p = leaf_offset(at[0], at[1], at[2]);
-                    if (try_patch(leaf, p, static_cast<std::int32_t>(index))) set_on(changed_[leaf], p);
-                }
+        PatchCylinder cylinder{{}, patch.radius + kSlack, half_width_};
+        for (int a = 0; a < 3; ++a) {
+            cylinder.center[a] = patch.center[a] + float(cell[a]);
+            const float reach = half_width_ * std::abs(patch.normal[a]) + cylinder.radius;
+            if (cylinder.center[a] + reach < 0 || cylinder.center[a] - reach > kLeafDim - 1) return;
         }
+        offer_patch(interface_.fan(patch), cylinder, static_cast<std::int32_t>(index),
+                    {squared_.leaf(leaf), patch_.leaf(leaf), interior_[leaf].data()});
+    }
+
+    /// Voxels that are not above the inside of a patch, and their neighbours in the leaf and across its faces.
+    [[nodiscard]] LeafMask beside_creases(std::size_t leaf) const {
+        constexpr LeafMask kNone{};
+        const auto outside = [this](std::size_t n) {
+            LeafMask mask = interior_[n];
+            for (std::uint64_t& word : mask) word = ~word;
+            return mask;
+        };
+        const LeafMask own = outside(leaf);
+        LeafMask result = own;
+        for (int axis = 0; axis < 3; ++axis)
+            for (int sign = -1; sign <= 1; sign += 2) {
+                const std::int32_t across =
+                    band_.neighbours(leaf)[neighbour_slot(axis == 0 ? sign : 0, axis == 1 ? sign : 0, axis == 2 ? sign : 0)];
+                const LeafMask look = looking_at(own, across != band_.none() ? outside(across) : kNone, axis, sign);
+                for (int word = 0; word < 8; ++word) result[word] |= look[word];
+            }
+        for (int p = 0; p < kLeafSize; ++p)
+            if (patch_.leaf(leaf)[p] == kNoPatch) result[p >> 6] &= ~(std::uint64_t(1) << (p & 63));
+        return result;
     }
 
     static constexpr float kSlack = 0.25F;  ///< voxels, by which neighbouring patches' cylinders overlap
@@ -128,7 +137,7 @@ private:
     float half_width_;
     LeafArray<float> squared_;
     LeafArray<std::int32_t> patch_;
-    std::vector<LeafMask> changed_;
+    std::vector<LeafMask> interior_;  ///< voxels whose nearest point lies within their patch
 };
 
 /// Bit p: voxel p of the leaf is inside. Beyond an open end of the domain a voxel has the sign of the nearest one within.

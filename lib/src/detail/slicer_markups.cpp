@@ -136,10 +136,7 @@ PointTable parse_landmarks(const std::string& path, const std::string& text) {
     Lines lines(text);
     string_view line;
     std::vector<string_view> fields;
-    while (lines.next(line)) {
-        line = trim(line.substr(0, line.find('#')));
-        if (line.empty()) continue;
-        split(line, ' ', fields);
+    while (lines.next_words(line, fields)) {
         if (fields.size() < 4)
             fail(path, lines.number(), "expected x y z and a label, or a label and x y z, got " + quote(line));
         // A number first is x unless the label at the end is none.

@@ -1,0 +1,28 @@
+#pragma once
+#include <cstdint>
+
+// For functions on eight floats that are compiled twice, without and with AVX2, and chosen at run time. No fused
+// multiply-add, so that both give the same bits. What they call has to be inlined.
+
+// Vectors are only passed to functions that are inlined, so that their calling convention does not matter.
+#pragma GCC diagnostic ignored "-Wpsabi"
+
+#if defined(__x86_64__) && defined(__gnu_linux__)
+#define COVOL_CLONES __attribute__((target_clones("default", "avx2")))
+#else
+#define COVOL_CLONES
+#endif
+#define COVOL_INLINE inline __attribute__((always_inline))
+
+namespace covol::detail {
+
+using Float8 = float __attribute__((vector_size(32)));
+using Int8 = std::int32_t __attribute__((vector_size(32)));
+
+COVOL_INLINE bool any(Int8 mask) {
+    using Long4 = std::int64_t __attribute__((vector_size(32)));
+    const Long4 m = (Long4)mask;
+    return ((m[0] | m[1]) | (m[2] | m[3])) != 0;
+}
+
+}  // namespace covol::detail

@@ -1,0 +1,52 @@
+#pragma once
+#include <array>
+#include <cstdint>
+
+// Distances to a polygon of the zero level set, plain functions on arrays. Lengths are voxels.
+namespace covol::detail {
+
+/// A polygon of the zero level set as a fan of triangles around its centre.
+struct PatchFan {
+    static constexpr int kMaxTriangles = 12;  ///< a cell has twelve edges
+    /// Of the centre and two vertices that follow each other.
+    struct Triangle {
+        float from[3];  ///< the first vertex, from the centre
+        float edge[3];  ///< from the first to the second vertex
+        float normal[3];
+        float from_from, from_to, to_to;    ///< products of the vertices' arms
+        float area;                        ///< the normal's square; 0 where there is none
+        float inverse_area;                ///< infinite where there is none
+        float inverse_from, inverse_edge;  ///< of squared lengths; 0 where there is none
+    };
+    float axis[3];  ///< unit normal of the whole polygon
+    int count;
+    Triangle triangles[kMaxTriangles];
+
+    /// @param vertices  3 to kMaxTriangles points
+    PatchFan(const float* axis, const float* center, const std::array<float, 3>* vertices, int count);
+};
+
+struct PatchHit {
+    float squared;    ///< distance
+    bool is_interior; ///< the nearest point lies within the polygon, not on its outline
+};
+
+/// @param arm  from the polygon's centre to the point that asks
+[[nodiscard]] PatchHit nearest_on(const PatchFan& fan, const float arm[3]);
+
+/// A cylinder above and below a polygon, in a leaf's voxels, and what the leaf's voxels know.
+struct PatchCylinder {
+    float center[3];
+    float radius;      ///< of the cylinder
+    float half_width;  ///< no voxel farther away asks
+};
+struct PatchLeaf {
+    float* squared;             ///< 512 squared distances
+    std::int32_t* patch;        ///< whose they are
+    std::uint64_t* interior;    ///< 512 bits, PatchHit::is_interior
+};
+
+/// Gives the patch `index` to the voxels of the leaf within the cylinder that are nearer to it than to what they have.
+void offer_patch(const PatchFan& fan, const PatchCylinder& cylinder, std::int32_t index, const PatchLeaf& leaf);
+
+}  // namespace covol::detail

@@ -1,0 +1,129 @@
+#include "pipeline/automatic.h"
+
+#include <algorithm>
+
+#include "covol/error.h"
+#include "covol/scan_noise.h"
+
+namespace covol {
+namespace pipeline {
+namespace {
+
+constexpr double kFewPoints = 1000;  // fewer get a voxel size at which their surface has as many voxels as this many would
+constexpr double kMergeVoxels = 0.25;      // points closer than this do not move the surface apart
+constexpr double kAttractionVoxels = 5.0;  // automatic range of the points after starts other than tagging
+constexpr double kTagDeltaVoxels = 0.5, kTagSigmaVoxels = 2.0;  // measured as kTagAttractionVoxels
+constexpr double kScanRadiusVoxels = 2.5;  // layers of a scan within it are averaged
+constexpr double kNoisyShare = 0.3;        // of a voxel: a layer of points thicker than this is averaged
+
+// A thick layer of points, or several beside each other, has its surface in the middle.
+void average_noise(Job& job) {
+    const double radius = kScanRadiusVoxels * job.h(), thickness = layer_thickness(job.points, radius, job.run);
+    if (!(thickness > kNoisyShare * job.h())) return;
+    job.points = average_layers(job.points, radius, job.run);
+    job.choose("points_averaged", "within " + number(radius),
+               "they lie " + number(thickness) + " from their local plane on the mean, more than " +
+                   number(kNoisyShare) + " voxels");
+}
+
+void merge_points(Job& job) {
+    const std::size_t all = job.points.size();
+    job.points = merge_close_points(job.points, kMergeVoxels * job.h());
+    if (job.points.size() < all)
+        job.run.info("points: " + std::to_string(job.points.size()) + " of " + std::to_string(all) +
+                     " kept, the others are closer than half of " + number(kMergeVoxels * job.h()));
+    job.marks = job.points;
+    if (job.image == nullptr) average_noise(job);
+}
+
+void choose_attraction_range(Job& job) {
+    job.has_automatic_range = true;
+    double& range = job.options.evolve.attraction_range;
+    range = 0;
+    if (!job.uses_points()) return;
+    if (job.tags() && job.uses_image()) {
+        range = kTagAttractionVoxels * job.h();
+        job.choose("attraction_range", number(range),
+                   number(kTagAttractionVoxels) + " voxels: farther from marks the image decides");
+    } else if (job.tags()) {
+        job.choose("attraction_range", "0", "unlimited: the band around the points bounds it");
+    } else {
+        range = kAttractionVoxels * job.h();
+        job.choose("attraction_range", number(range), number(kAttractionVoxels) + " voxels");
+    }
+}
+
+}  // namespace
+
+void check_input(Job& job) {
+    const std::string why = job.options.why_invalid();
+    if (!why.empty()) throw Error(Errc::InvalidOptions, "segment: " + why);
+    if (job.image == nullptr && job.points.empty())
+        throw Error(Errc::InvalidInput, "segment: expected an image or points, got neither");
+    if (job.tags() && job.points.empty())
+        throw Error(Errc::InvalidInput, "segment: the start 'tag' expects points, got none; choose another start "
+                                        "(sphere, box, mesh, mask or vdb)");
+    job.report().point_count = job.given.size();
+    EvolveOptions& evolve = job.options.evolve;
+    if (job.points.empty() && evolve.theta > 0) {
+        evolve.theta = 0;
+        job.choose("theta", "0", "there are no points");
+    }
+    if (job.image == nullptr && evolve.rho > 0) {
+        evolve.rho = 0;
+        job.choose("rho", "0", "there is no image");
+    }
+}
+
+void choose_values(Job& job) {
+    SegmentOptions& options = job.options;
+    if (options.voxel_size <= 0) {
+        const VoxelSizeChoice choice = choose_voxel_size(job.image, job.points);
+        options.voxel_size = choice.voxel_size;
+        job.choose("voxel_size", number(job.h()), choice.reason);
+    }
+    merge_points(job);
+    const double h = job.h();
+    EvolveOptions& evolve = options.evolve;
+    if (evolve.delta < 0) {
+        const double voxels = job.tags() ? kTagDeltaVoxels : 1.0;
+        job.choose("delta", number(evolve.delta = voxels * h), number(voxels) + " voxels");
+    }
+    if (evolve.tau < 0) job.choose("tau", number(h), "1 voxel at unit speed; longer while the surface moves slowly");
+    if (options.edge.sigma < 0 && job.uses_image()) {
+        const double voxels = job.tags() ? kTagSigmaVoxels : 1.0;
+        job.choose("sigma", number(options.edge.sigma = voxels * h), number(voxels) + " voxels");
+    }
+    if (evolve.attraction_range < 0) choose_attraction_range(job);
+    if (evolve.image_yields < 0) {
+        evolve.image_yields = job.tags() && job.uses_points() && job.uses_image() ? 1.0 : 0.0;
+        if (evolve.image_yields > 0) job.choose("image_yields", "1", "near marks the marks know better than the edges");
+    }
+}
+
+}  // namespace pipeline
+
+VoxelSizeChoice choose_voxel_size(const Image* image, const std::vector<Vec3>& world_points) {
+    using pipeline::number;
+    if (image != nullptr) {
+        const Vec3& spacing = image->geometry().spacing;
+        return {*std::min_element(spacing.begin(), spacing.end()), "the image's smallest spacing"};
+    }
+    const std::vector<Vec3> distinct = merge_close_points(world_points, 0);
+    if (distinct.size() < 2)
+        throw Error(Errc::InvalidInput, "choose_voxel_size: expected an image or at least 2 distinct points, got " +
+                                            std::to_string(distinct.size()));
+    const double spacing = nearest_neighbour_spacing(distinct).median;
+    const ScanVoxelSize scan = scan_voxel_size(distinct, spacing);
+    if (scan.voxel_size <= spacing) {
+        // A surface of few points is so few spacings wide that in voxels as large as they are curvature would outweigh them.
+        const double finer = std::sqrt(double(distinct.size()) / kFewPoints);
+        if (finer >= 1) return {spacing, "the median distance between neighbouring points"};
+        return {finer * spacing, "finer than the median distance between neighbouring points, " + number(spacing) + ", for there are few"};
+    }
+    return {scan.voxel_size, "points lie " + number(scan.thickness) +
+                                 " from their local plane on the mean, noise wider than their median distance " +
+                                 number(spacing)};
+}
+
+}  // namespace covol

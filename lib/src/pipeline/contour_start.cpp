@@ -1,0 +1,45 @@
+// The start from the body between contours.
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/automatic.h"
+#include "pipeline/fields.h"
+#include "pipeline/starts.h"
+
+namespace covol::pipeline {
+namespace {
+
+/// Why the points are tagged after all, or null.
+const char* why_tag(const Job& job) {
+    for (const Vec3& seed : job.options.exterior_seeds)
+        if (job.body()->level(seed) < 0) return "an exterior seed lies inside the contours";
+    const double far = kTagAttractionVoxels * job.h();
+    const std::size_t loose = job.sure.size() - job.options.contours->along.size();
+    for (std::size_t n = 0; n < loose; ++n)
+        if (std::abs(job.body()->level(job.sure[n])) > far) return "points lie far from the contours' body";
+    return nullptr;
+}
+
+}  // namespace
+
+bool start_from_contours(Job& job) {
+    if (job.body() == nullptr || !job.tags()) return false;
+    if (const char* reason = why_tag(job)) {
+        job.choose("start", "tag", reason);
+        job.hole_seeds = job.body()->hole_seeds();
+        return false;
+    }
+    job.choose("start", "contours", "the body between the contours; what inner contours enclose is outside");
+    job.origin = StartOrigin::Contours;
+    job.options.evolve.follow = true;
+    job.report().domain = job.domain_with_chosen_margin(2 * kMarginVoxels * job.h());
+    {
+        Timed timed(job.report().seconds.tag);
+        job.result.u = covol::start_from_contours(job.domain(), *job.body(), job.run);
+    }
+    if (job.uses_points())
+        compute_distance(job, std::max(job.options.evolve.attraction_range, kMarginVoxels * job.h()) + band_slack(job));
+    return true;
+}
+
+}  // namespace covol::pipeline

@@ -1,0 +1,47 @@
+#include "pipeline/final_surface.h"
+
+#include <tbb/parallel_invoke.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "covol/compare.h"
+#include "covol/scan_solid.h"
+
+namespace covol::pipeline {
+namespace {
+
+constexpr double kFarFromPoints = 3.0;       // voxels and spacings: no point holds the surface there
+constexpr double kWarnWithoutPoints = 0.02;  // share of the area
+
+/// @return what counts as far
+double find_bare_surface(Job& job) {
+    RunContext quiet;  // beside another task nothing may be reported
+    quiet.threads = job.run.threads;
+    quiet.cancel = job.run.cancel;
+    const double reach = kFarFromPoints * std::max(job.h(), nearest_neighbour_spacing(job.points).median);
+    job.report().share_without_points = share_without_points(job.result.mesh, job.points, reach, quiet);
+    return reach;
+}
+
+}  // namespace
+
+void make_surface(Job& job) {
+    SegmentReport& report = job.report();
+    Timed timed(report.seconds.surface);
+    job.result.surface = surface(*job.result.u, job.run);
+    job.result.mesh = extract_mesh(*job.result.surface, job.options.extract, job.run);
+    report.surface = measure(job.result.mesh);
+    if (job.points.empty()) return;
+    // Most of the fit is the making of a search tree, on one thread.
+    double reach = 0;
+    const std::vector<Vec3>& marks = job.options.contours ? job.given : job.marks;
+    tbb::parallel_invoke([&] { report.fit = points_to_surface(marks, job.result.mesh, job.run); },
+                         [&] { if (job.image == nullptr) reach = find_bare_surface(job); });
+    if (report.share_without_points > kWarnWithoutPoints)
+        job.run.warn(number(std::round(1000 * report.share_without_points) / 10) +
+                     " % of the surface lie farther than " + number(reach) +
+                     " from every point: there curvature alone closes it");
+}
+
+}  // namespace covol::pipeline

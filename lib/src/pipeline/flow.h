@@ -1,0 +1,14 @@
+#pragma once
+#include "pipeline/job.h"
+
+namespace covol::pipeline {
+
+/// Moves job.result.u until nothing moves, in the fields of the job.
+void flow(Job& job);
+
+[[nodiscard]] bool has_vanished(const Job& job);
+
+/// @throws Error InvalidInput (the surface vanished).
+void check_flow(const Job& job);
+
+}  // namespace covol::pipeline

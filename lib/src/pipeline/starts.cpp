@@ -1,0 +1,12 @@
+#include "pipeline/starts.h"
+
+namespace covol::pipeline {
+
+void make_start(Job& job) {
+    if (!job.tags())
+        start_as_given(job);
+    else if (!start_from_contours(job))
+        start_by_tagging(job);
+}
+
+}  // namespace covol::pipeline

@@ -1,0 +1,21 @@
+#pragma once
+// How the level set starts: the domain, u0 on its band, and the distance to the points where they act.
+#include "pipeline/job.h"
+
+namespace covol::pipeline {
+
+/// One of those below, as options and input ask for.
+void make_start(Job& job);
+
+/// The sphere, box, mesh, mask or level set that the caller names. The band follows the surface.
+void start_as_given(Job& job);
+
+/// The body between closed contours.
+/// @return false, with nothing made, where there is no such body or it cannot be all that there is to start from
+bool start_from_contours(Job& job);
+
+/// From the points: the tagged surface, its closing where D is wide, or, for a scan that encloses nothing, a solid that
+/// carries the points.
+void start_by_tagging(Job& job);
+
+}  // namespace covol::pipeline
