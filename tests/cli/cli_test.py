@@ -260,7 +260,7 @@ class BadInput(Case):
         for args in [("mesh", fog, "-o", "m.ply"), ("mask", fog, "--like", self.image, "-o", "m.nrrd"),
                      ("render", fog, "-o", "p.png")]:
             self.refuse(*args, code=3, says="got a fog volume")
-        self.refuse("mesh", solid, "-o", "m.ply", "--min-component", "1000vx", code=3, says="nothing to mesh")
+        self.refuse("mesh", solid, "-o", "m.ply", "--min-component", "1000vx", code=3, says="use a smaller --min-component")
 
     def test_tag_start_without_points(self):
         self.refuse("segment", self.image, "-o", "s.vdb", code=3, says="points")

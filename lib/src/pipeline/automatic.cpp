@@ -1,6 +1,7 @@
 #include "pipeline/automatic.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "covol/error.h"
 #include "covol/scan_noise.h"
@@ -104,7 +105,7 @@ void choose_values(Job& job) {
 }  // namespace pipeline
 
 VoxelSizeChoice choose_voxel_size(const Image* image, const std::vector<Vec3>& world_points) {
-    using pipeline::number;
+    using pipeline::kFewPoints, pipeline::number;
     if (image != nullptr) {
         const Vec3& spacing = image->geometry().spacing;
         return {*std::min_element(spacing.begin(), spacing.end()), "the image's smallest spacing"};
