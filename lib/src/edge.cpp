@@ -78,23 +78,21 @@ Window sample_window(const Image& image, const FloatGrid& topology, const Domain
     return window;
 }
 
-// Calls work(leaf, padded values with mirrored boundary) for every leaf, one colour after the other.
-template <typename Load, typename Work>
-void for_each_leaf(const Window& window, const Domain& domain, Load load, Work work) {
-    const auto visit = [&](std::size_t leaf) {
+// Calls work(leaf, padded values with mirrored boundary) for every leaf.
+template <typename Work>
+void for_each_padded(const Window& window, const Domain& domain, Work work) {
+    tbb::parallel_for(std::size_t(0), window.band.size(), [&](std::size_t leaf) {
         alignas(64) float values[kPaddedSize];
-        load(window.image, leaf, values);
+        detail::load_padded(window.image, leaf, values);
         const LeafBounds bounds = known_bounds(domain, window.band, leaf);
         if (bounds.cuts()) detail::mirror_outside(values, bounds.lo, bounds.hi);
         work(leaf, values);
-    };
-    tbb::parallel_for(std::size_t(0), window.band.odd_begin(), visit);
-    tbb::parallel_for(window.band.odd_begin(), window.band.size(), visit);
+    });
 }
 
 // One visit of a leaf in an implicit heat step. Where the domain or the window ends in it or next to it, the faces there
-// are closed: mirrored values alone would be relaxed as if they were the image's.
-double relax_heat(float* values, const float* before, float t, float omega, const LeafBounds& bounds) {
+// are closed.
+double relax_heat(const detail::LeafStar& values, const float* before, float t, float omega, const LeafBounds& bounds) {
     const detail::SchemeKernels& kernels = detail::kernels();
     if (!bounds.cuts()) return kernels.heat(values, before, t, omega, kInnerSweeps);
     static constexpr std::array<unsigned long long, 8> kAll = {~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL};
@@ -119,11 +117,13 @@ void smooth(Window& window, const Domain& domain, double sigma, const RunContext
         const detail::LeafArray<float> before = window.image.values;
         double first = 0.0;
         for (int sweep = 0; sweep < kMaxHeatSweeps; ++sweep) {
-            for_each_leaf(window, domain, detail::load_star, [&](std::size_t leaf, float* values) {
-                residuals[leaf] = relax_heat(values, before.leaf(leaf), static_cast<float>(t), omega,
+            const auto visit = [&](std::size_t leaf) {
+                residuals[leaf] = relax_heat(detail::star_of(window.image, leaf), before.leaf(leaf), static_cast<float>(t), omega,
                                              known_bounds(domain, window.band, leaf));
-                detail::store_inner(values, window.image.values.leaf(leaf));
-            });
+            };
+            // Leaves of one colour share no face.
+            tbb::parallel_for(std::size_t(0), window.band.odd_begin(), visit);
+            tbb::parallel_for(window.band.odd_begin(), window.band.size(), visit);
             double sum = 0.0;
             for (const double r : residuals) sum += r;
             if (sweep == 0) first = sum;
@@ -203,7 +203,7 @@ EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions
         const detail::SchemeKernels& kernels = detail::kernels();
         const bool is_line = options.feature == EdgeFeature::BrightLine || options.feature == EdgeFeature::DarkLine;
         const auto per_length = static_cast<float>(1.0 / domain.voxel_size);
-        for_each_leaf(window, domain, detail::load_padded, [&](std::size_t leaf, float* values) {
+        for_each_padded(window, domain, [&](std::size_t leaf, float* values) {
             auto* node = result.grid->tree().probeLeaf(window.band.origin(leaf));
             if (node == nullptr) return;
             float slope[kLeafSize];

@@ -188,13 +188,13 @@ def part_stages(bench):
     bench.write("stages", rows)
 
 
-SPHERE_OPTIONS = ("--init", f"sphere:0,0,0,{START_RADIUS}", "--delta", "1vx", "--attraction-range", "5vx")
+SPHERE_OPTIONS = ("--init", f"sphere:0,0,0,{START_RADIUS}", "--attraction-range", "5vx")
 
 
-def sphere_job(bench, image, points, *extra, threads):
+def sphere_job(bench, image, points, *extra, threads, delta="1vx"):
     out = bench.work / "sphere.vdb"
     run = bench.run_covol("segment", image, "--points", points, "-o", out, "--mesh", out.with_suffix(".ply"),
-                          *SPHERE_OPTIONS, *extra, threads=threads)
+                          *SPHERE_OPTIONS, "--delta", delta, *extra, threads=threads)
     run.mesh = out.with_suffix(".ply")
     return run
 
@@ -208,13 +208,14 @@ def part_sphere(bench):
     if "--coarse-levels" in Run([bench.covol, "segment", "--help"]).stdout:
         single_level += ("--coarse-levels", "0")
     kinds = [("covol", (), threads) for threads in THREADS]
+    kinds += [("covol, delta 0.2 voxel", (), threads) for threads in THREADS]
     kinds += [("covol, one level, tau = h", single_level, 1), ("covol, image alone", ("--theta", "0"), 2)]
     runs = {(name, threads): [] for name, _, threads in kinds}
     errors = {}
 
     def covol_round(chosen):
         for name, extra, threads in chosen:
-            run = sphere_job(bench, image, points, *extra, threads=threads)
+            run = sphere_job(bench, image, points, *extra, threads=threads, delta="0.2vx" if "delta" in name else "1vx")
             runs[name, threads].append(run)
             errors[name] = shell_errors(run.mesh, kind, voxel)
 

@@ -92,19 +92,13 @@ void assemble(const SchemeKernels& kernels, Cube& cube, std::size_t leaf) {
 
 template <int inner>
 void relax(const SchemeKernels& kernels, Cube& cube, std::size_t leaf) {
-    alignas(64) float u[kPaddedSize];
-    load_star(cube.u, leaf, u);
     // also returns the residual that the first sweep saw
-    benchmark::DoNotOptimize(
-        kernels.relax(u, cube.previous.leaf(leaf), cube.rows_of(leaf), kEveryVoxel.data(), 1.5F, inner, {}));
-    store_inner(u, cube.u.values.leaf(leaf));
+    benchmark::DoNotOptimize(kernels.relax(star_of(cube.u, leaf), cube.previous.leaf(leaf), cube.rows_of(leaf),
+                                           kEveryVoxel.data(), 1.5F, inner, {}));
 }
 
 void heat(const SchemeKernels& kernels, Cube& cube, std::size_t leaf) {
-    alignas(64) float u[kPaddedSize];
-    load_star(cube.u, leaf, u);
-    benchmark::DoNotOptimize(kernels.heat(u, cube.previous.leaf(leaf), 0.5F, 1.3F, 2));
-    store_inner(u, cube.u.values.leaf(leaf));
+    benchmark::DoNotOptimize(kernels.heat(star_of(cube.u, leaf), cube.previous.leaf(leaf), 0.5F, 1.3F, 2));
 }
 
 void mean_gradient(const SchemeKernels& kernels, Cube& cube, std::size_t leaf) {

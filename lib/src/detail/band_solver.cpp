@@ -293,12 +293,9 @@ double BandSolver::sweep(float omega, double goal, Counts& counts) {
                 for (std::size_t leaf = range.begin(); leaf != range.end(); ++leaf) {
                     if (!awake_[leaf] || !is_hot(leaf, goal)) continue;
                     const std::size_t next = std::min(leaf + 1, end - 1);
-                    prefetch_star(field_, next);
-                    alignas(64) float u[kPaddedSize];
-                    load_star(field_, leaf, u);
-                    residuals_[leaf] = kernel.relax(u, previous_.leaf(leaf), rows(leaf), active(leaf), omega, kInnerSweeps,
-                                                    {previous_.leaf(next), rows(next)});
-                    store_inner(u, field_.values.leaf(leaf));
+                    prefetch(star_of(field_, next));
+                    residuals_[leaf] = kernel.relax(star_of(field_, leaf), previous_.leaf(leaf), rows(leaf), active(leaf), omega,
+                                                    kInnerSweeps, {previous_.leaf(next), rows(next)});
                     ++visits;
                 }
                 return visits;

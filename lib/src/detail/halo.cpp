@@ -112,10 +112,16 @@ void load_star_from(const float* inner, const float* const across[6], float* out
     }
 }
 
-void prefetch_star(const HaloField& field, std::size_t leaf) {
+LeafStar star_of(HaloField& field, std::size_t leaf) {
+    LeafStar star{field.values.leaf(leaf), {}};
+    for (int face = 0; face < 6; ++face) star.across[face] = field.values.leaf(field.blocks[leaf][kFaceSlots[face]]);
+    return star;
+}
+
+void prefetch(const LeafStar& star) {
     constexpr int kLine = 16;  // floats
-    const auto block = [&](int face) { return field.values.leaf(field.blocks[leaf][kFaceSlots[face]]); };
-    const float* inner = field.values.leaf(leaf);
+    const auto block = [&](int face) { return star.across[face]; };
+    const float* inner = star.inner;
     const float* minus_k = block(kMinusK);
     const float* plus_k = block(kPlusK);
     for (int n = 0; n < kLeafSize; n += kLine) {

@@ -28,8 +28,10 @@ void load_padded(const HaloField& field, std::size_t leaf, float* out);
 void load_star(const HaloField& field, std::size_t leaf, float* out);
 /// The same from seven blocks of 512: the leaf's own and those across its faces, by Face.
 void load_star_from(const float* inner, const float* const across[6], float* out);
-/// Asks the memory for what load_star will read of a leaf.
-void prefetch_star(const HaloField& field, std::size_t leaf);
+/// The blocks that load_star reads, in place.
+[[nodiscard]] LeafStar star_of(HaloField& field, std::size_t leaf);
+/// Asks the memory for what is read of them.
+void prefetch(const LeafStar& star);
 /// Writes a padded buffer's inner 8^3 voxels back.
 void store_inner(const float* in, float* leaf);
 

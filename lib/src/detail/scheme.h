@@ -27,6 +27,12 @@ inline constexpr int kShareUnit = 65535;
 /// sweep reads one stream.
 inline constexpr int share_at(int f, int n) { return (n >> 3) * 48 + f * 8 + (n & 7); }
 
+/// A leaf's own 512 values and those of the leaves across its faces, by Face.
+struct LeafStar {
+    float* inner;
+    const float* across[6];
+};
+
 struct NextRows {
     const float* b = nullptr;
     const Share* c = nullptr;
@@ -57,15 +63,14 @@ struct SchemeKernels {
     float (*assemble)(const float* u, const float* phi, const float* g, const float* rho,
                       const unsigned long long* active, const SchemeConstants& constants, Share* c);
 
-    /// `inner` SOR sweeps in four colours in a padded buffer (faces) over the rows of eight with an active voxel; the halo is
-    /// not written.
+    /// `inner` SOR sweeps in four colours in place over a leaf's rows of eight with an active voxel.
     /// @param next  b and c of the leaf that comes next, to be asked from memory meanwhile
     /// @return Σ (Gauss-Seidel value - u)² seen during the first sweep
-    double (*relax)(float* u, const float* b, const Share* c, const unsigned long long* active, float omega, int inner,
+    double (*relax)(const LeafStar& u, const float* b, const Share* c, const unsigned long long* active, float omega, int inner,
                     const NextRows& next);
 
     /// As relax, for u_p - t Σ_q (u_q - u_p) = b_p on every voxel: one step of the implicit heat equation.
-    double (*heat)(float* u, const float* b, float t, float omega, int inner);
+    double (*heat)(const LeafStar& u, const float* b, float t, float omega, int inner);
 
     /// Mean over the 24 tetrahedra of |∇u|, per voxel; 512 values. @param u padded, with edges and corners
     void (*mean_gradient)(const float* u, float* out);

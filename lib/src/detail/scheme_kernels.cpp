@@ -229,10 +229,22 @@ struct RowEquation {
     [[nodiscard]] Lanes value(Lanes before, Lanes after) const { return known + (minus * (before - old) + plus * (after - old)); }
 };
 
+/// The rows of eight around row (i,j) of a leaf, across its faces too.
+struct RowStar {
+    const float *minus_i, *plus_i, *minus_j, *plus_j;
+    RowStar(const LeafStar& u, int i, int j) {
+        const float* row = u.inner + i * 64 + j * 8;
+        minus_i = i > 0 ? row - 64 : u.across[kMinusI] + 7 * 64 + j * 8;
+        plus_i = i < 7 ? row + 64 : u.across[kPlusI] + j * 8;
+        minus_j = j > 0 ? row - 8 : u.across[kMinusJ] + i * 64 + 7 * 8;
+        plus_j = j < 7 ? row + 8 : u.across[kPlusJ] + i * 64;
+    }
+};
+
 // SOR in four colours: rows with i + j even, then odd, and within a row even k, then odd. It has red-black's rate, and
 // what a row gets from other rows is summed once for both of its halves.
 template <typename Equation>
-inline double relax_rows(float* u, RowMask rows, float omega, int inner, Equation equation) {
+inline double relax_rows(const LeafStar& u, RowMask rows, float omega, int inner, Equation equation) {
     const Lanes even = {1, 0, 1, 0, 1, 0, 1, 0};
     const Lanes odd = 1.0F - even;
     Lanes residual = Lanes{};
@@ -241,38 +253,40 @@ inline double relax_rows(float* u, RowMask rows, float omega, int inner, Equatio
             for (int i = 0; i < 8; ++i)
                 for (int j = (i + colour) & 1; j < 8; j += 2) {
                     if (!has_row(rows, i, j)) continue;
-                    float* p = u + padded(i, j, 0);
-                    const RowEquation row = equation(p, (i * 8 + j) * 8);
-                    const Lanes now = load(p), before = load(p - 1), after = load(p + 1);
-                    const Lanes first = even * (row.value(before, after) - now);
+                    const int at = (i * 8 + j) * 8;
+                    const RowEquation row = equation(RowStar(u, i, j), at);
+                    const Lanes now = load(u.inner + at);
+                    const Lanes below = broadcast(u.across[kMinusK][at + 7]), above = broadcast(u.across[kPlusK][at]);
+                    const Lanes first = even * (row.value(shifted_up(now, below), shifted_down(now, above)) - now);
                     const Lanes half = now + omega * first;
-                    const Lanes second = odd * (row.value(shifted_up(half, before), shifted_down(half, after)) - half);
+                    const Lanes second = odd * (row.value(shifted_up(half, below), shifted_down(half, above)) - half);
                     if (sweep == 0) residual += (first + second) * (first + second);
-                    store(p, half + omega * second);
+                    store(u.inner + at, half + omega * second);
                 }
     return sum(residual);
 }
 
-double relax(float* u, const float* b, const Share* c, const unsigned long long* active, float omega, int inner,
+double relax(const LeafStar& u, const float* b, const Share* c, const unsigned long long* active, float omega, int inner,
              const NextRows& next) {
-    return relax_rows(u, active_rows(active), omega, inner, [b, c, next](const float* p, int row) {
+    return relax_rows(u, active_rows(active), omega, inner, [b, c, next](const RowStar& beside, int row) {
         constexpr float kUnit = 1.0F / kShareUnit;
         __builtin_prefetch(next.c + share_at(0, row));
         __builtin_prefetch(next.c + share_at(5, row));
         __builtin_prefetch(next.b + row);
         const Lanes old = load(b + row);
         const auto share = [shares = c + share_at(0, row)](int face) { return load_shares(shares + face * 8); };
-        const auto pull = [&](int face, int stride) { return share(face) * (load(p + stride) - old); };
-        const Lanes pulls = (pull(kMinusI, -kI) + pull(kPlusI, kI)) + (pull(kMinusJ, -kJ) + pull(kPlusJ, kJ));
+        const auto pull = [&](int face, const float* from) { return share(face) * (load(from) - old); };
+        const Lanes pulls = (pull(kMinusI, beside.minus_i) + pull(kPlusI, beside.plus_i)) +
+                            (pull(kMinusJ, beside.minus_j) + pull(kPlusJ, beside.plus_j));
         return RowEquation{old + kUnit * pulls, kUnit * share(kMinusK), kUnit * share(kPlusK), old};
     });
 }
 
-double heat(float* u, const float* b, float t, float omega, int inner) {
+double heat(const LeafStar& u, const float* b, float t, float omega, int inner) {
     const float scale = 1.0F / (1.0F + 6.0F * t);
     const Lanes side = broadcast(scale * t);
-    return relax_rows(u, ~RowMask{0}, omega, inner, [b, t, scale, side](const float* p, int row) {
-        const Lanes across = (load(p - kI) + load(p + kI)) + (load(p - kJ) + load(p + kJ));
+    return relax_rows(u, ~RowMask{0}, omega, inner, [b, t, scale, side](const RowStar& beside, int row) {
+        const Lanes across = (load(beside.minus_i) + load(beside.plus_i)) + (load(beside.minus_j) + load(beside.plus_j));
         return RowEquation{scale * (load(b + row) + t * across), side, side, Lanes{}};
     });
 }

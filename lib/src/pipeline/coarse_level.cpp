@@ -15,7 +15,7 @@ constexpr double kRefinement = 2.0;
 // Voxels of the coarse level.
 constexpr double kLeastCoarseSigma = 0.5;
 constexpr double kLeastCoarseAttraction = 3.0;
-constexpr double kCoarseTolerance = 5e-3;
+constexpr double kCoarseTolerance = 5e-3;  // a surface far from all that pulls moves slowly, too
 constexpr double kStepBack = 2.0;
 constexpr int kLeastCoarsened = 64;  // of h: a smaller domain has little to gain, and thin things to lose
 
