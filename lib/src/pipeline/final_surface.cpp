@@ -1,5 +1,6 @@
 #include "pipeline/final_surface.h"
 
+#include <openvdb/openvdb.h>
 #include <tbb/parallel_invoke.h>
 
 #include <algorithm>
@@ -20,7 +21,10 @@ double find_bare_surface(Job& job) {
     quiet.threads = job.run.threads;
     quiet.cancel = job.run.cancel;
     const double reach = kFarFromPoints * std::max(job.h(), nearest_neighbour_spacing(job.points).median);
-    job.report().share_without_points = share_without_points(job.result.mesh, job.points, reach, quiet);
+    const FloatGridPtr& known = job.result.distance;
+    job.report().share_without_points = known && known->background() >= float(reach)
+                                            ? share_without_points(job.result.mesh, *known, reach, quiet)
+                                            : share_without_points(job.result.mesh, job.points, reach, quiet);
     return reach;
 }
 
@@ -31,13 +35,12 @@ void make_surface(Job& job) {
     Timed timed(report.seconds.surface);
     job.result.surface = surface(*job.result.u, job.run);
     job.result.mesh = extract_mesh(*job.result.surface, job.options.extract, job.run);
-    report.surface = measure(job.result.mesh);
-    if (job.points.empty()) return;
-    // Most of the fit is the making of a search tree, on one thread.
+    // Parts of each of these run on one thread.
     double reach = 0;
     const std::vector<Vec3>& marks = job.options.contours ? job.given : job.marks;
-    tbb::parallel_invoke([&] { report.fit = points_to_surface(marks, job.result.mesh, job.run); },
-                         [&] { if (job.image == nullptr) reach = find_bare_surface(job); });
+    tbb::parallel_invoke([&] { report.surface = measure(job.result.mesh); },
+                         [&] { if (!job.points.empty()) report.fit = points_to_surface(marks, job.result.mesh, job.run); },
+                         [&] { if (!job.points.empty() && job.image == nullptr) reach = find_bare_surface(job); });
     if (report.share_without_points > kWarnWithoutPoints)
         job.run.warn(number(std::round(1000 * report.share_without_points) / 10) +
                      " % of the surface lie farther than " + number(reach) +
