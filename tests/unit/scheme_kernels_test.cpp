@@ -71,9 +71,10 @@ Rows assemble_leaf(const detail::SchemeKernels& kernels, const DenseField& u, co
     std::copy(mask.begin(), mask.end(), bits.begin());
     alignas(64) std::array<detail::Share, 6 * kLeafSize> shares{};
     Rows rows;
-    rows.largest =
+    const detail::RowFacts facts =
         kernels.assemble(pu.values.data(), d != nullptr ? pd.values.data() : nullptr,
                          g != nullptr ? pg.values.data() : nullptr, nullptr, bits.data(), constants, shares.data());
+    rows.largest = facts.largest;
     for (int f = 0; f < 6; ++f)
         for (int n = 0; n < kLeafSize; ++n) rows.c[f * kLeafSize + n] = float(shares[detail::share_at(f, n)]) / detail::kShareUnit;
     return rows;

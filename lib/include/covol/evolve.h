@@ -26,7 +26,7 @@ struct EvolveOptions {
     int max_steps = 500;            ///< upper bound on time steps, >= 0
     double tolerance = 2e-3;        ///< steady when the zero crossings move less than tolerance * τ a step on the average,
                                     ///< or when over 10 steps fewer voxels than that changed sign
-    double solver_tolerance = 1e-3; ///< a step's solve ends at this residual, relative to its first
+    double solver_tolerance = 1e-3; ///< a step's solve ends at this residual, relative to that of u before
     int max_sweeps = 200;           ///< upper bound on a step's sweeps
     [[nodiscard]] std::string why_invalid() const;
 };

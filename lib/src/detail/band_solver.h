@@ -14,8 +14,8 @@
 namespace covol::detail {
 
 /// What is fixed for one band: u_p + Σ_q a_pq (u_q - u_p) = u_p^{n-1}, a_pq = (τ/h³) min(v_pq, 0) - (τδ/h²) M_p W_pq <= 0,
-/// Eqs. (14)-(22). One step assembles the rows of every leaf from u^{n-1}, then visits the leaves in two colours until
-/// the residual has fallen. Values are in voxels, not world units.
+/// Eqs. (14)-(22). One step assembles the rows of every leaf from u^{n-1}, then visits the leaves in two colours,
+/// from 2 u^{n-1} - u^{n-2} on, until the residual is `solver_tolerance` of that of u^{n-1}. Values are in voxels, not world units.
 ///
 /// Work is done only where something happens. A leaf sleeps from when neither it nor a leaf next to it has moved by more than
 /// `rest` until one of those has; a leaf whose residual is down, with neighbours whose is, is not visited again in a solve.
@@ -66,9 +66,14 @@ public:
 
 private:
     void gather_fields(const EvolveFields& fields);
-    double assemble(const SchemeConstants& constants);
-    void solve(double omega, Counts& counts);
+    struct Rows {
+        double largest;   ///< Σ_q |a_pq|
+        double residual;  ///< root mean square at u^{n-1}, voxels
+    };
+    Rows assemble(const SchemeConstants& constants);
+    void solve(double omega, double first, Counts& counts);
     double sweep(float omega, double goal, Counts& counts);
+    [[nodiscard]] double root_mean_square() const;  ///< of the residuals, over the band, voxels
     [[nodiscard]] bool is_hot(std::size_t leaf, double goal) const;
     Motion measure();
 
@@ -83,7 +88,8 @@ private:
     std::int64_t active_count_ = 0;
     HaloField field_;  // u
     std::optional<HaloField> phi_, edge_, image_weight_;
-    LeafArray<float> previous_;  // u^{n-1}; scratch between steps
+    LeafArray<float> previous_;  // u^{n-1}; scratch for redistance()
+    bool has_previous_ = false;  // it is from the step before
     static constexpr std::size_t kRowBytes = 6 * kLeafSize * sizeof(Share);
     std::vector<std::byte, LargeAllocator<std::byte>> rows_;  // of each leaf; scratch between steps
     // One for each leaf:

@@ -47,6 +47,12 @@ struct SchemeConstants {
     float edge_epsilon2; ///< ε² of |∇g|, per voxel
 };
 
+/// What the rows of a leaf are like.
+struct RowFacts {
+    float largest;    ///< Σ_q |a_pq| of an active row
+    double residual;  ///< Σ (Gauss-Seidel value - u)² over active voxels at u = u^{n-1}
+};
+
 struct SchemeKernels {
     const char* name;  ///< "avx2", ...
 
@@ -59,9 +65,8 @@ struct SchemeKernels {
     /// @param active 512 bits; other voxels get c = 0 (u_p = b_p); rows of
     ///               eight without an active voxel are left as they are
     /// @param c      6 x 512, see share_at()
-    /// @return       the largest Σ_q |a_pq| over active rows
-    float (*assemble)(const float* u, const float* phi, const float* g, const float* rho,
-                      const unsigned long long* active, const SchemeConstants& constants, Share* c);
+    RowFacts (*assemble)(const float* u, const float* phi, const float* g, const float* rho,
+                         const unsigned long long* active, const SchemeConstants& constants, Share* c);
 
     /// `inner` SOR sweeps in four colours in place over a leaf's rows of eight with an active voxel.
     /// @param next  b and c of the leaf that comes next, to be asked from memory meanwhile

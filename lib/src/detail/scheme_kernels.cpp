@@ -186,15 +186,15 @@ inline void store_shares(const Lanes a[6], Lanes scale, Share* c) {
     for (int f = 0; f < 6; ++f) store(c + f * 8, share[f] + (full & (share[f] > 0)));
 }
 
-float assemble(const float* u, const float* phi, const float* g, const float* rho, const unsigned long long* active,
-               const SchemeConstants& constants, Share* c) {
+RowFacts assemble(const float* u, const float* phi, const float* g, const float* rho, const unsigned long long* active,
+                  const SchemeConstants& constants, Share* c) {
     Vertices vertices;
     vertex_values(u, vertices);
     const RowMask rows = active_rows(active);
     Faces faces;
     sum_faces(u, vertices, constants.epsilon2, rows, faces);
 
-    Lanes largest_sum = Lanes{};
+    Lanes largest_sum = Lanes{}, residual = Lanes{};
     for (int i = 0; i < 8; ++i)
         for (int j = 0; j < 8; ++j) {
             if (!has_row(rows, i, j)) continue;
@@ -211,16 +211,20 @@ float assemble(const float* u, const float* phi, const float* g, const float* rh
             const Lanes mean = load(faces.norm + row) * (1.0F / 24.0F);
             const Lanes m2 = constants.epsilon2 + mean * mean;
             const Lanes m = (0.25F * constants.curvature) * (m2 * inverse_sqrt(m2));
-            Lanes row_sum = Lanes{};
+            Lanes row_sum = Lanes{}, pulls = Lanes{};
+            const Star around(u, i, j);
             for (int f = 0; f < 6; ++f) {
                 a[f] = constants.tau * max(-a[f], Lanes{}) + m * load(weight[f]);
                 row_sum += a[f];
+                pulls += a[f] * (around.q[f] - around.p);
             }
             const Lanes is_active = lanes_of(on);
             largest_sum = max(largest_sum, is_active * row_sum);
-            store_shares(a, float(kShareUnit) * is_active / (1.0F + row_sum), c + share_at(0, row));
+            const Lanes scale = is_active / (1.0F + row_sum);
+            residual += (scale * pulls) * (scale * pulls);
+            store_shares(a, float(kShareUnit) * scale, c + share_at(0, row));
         }
-    return largest(largest_sum);
+    return {largest(largest_sum), sum(residual)};
 }
 
 /// u_p = known + minus (u_{k-1} - old) + plus (u_{k+1} - old) for a row of eight along k.
