@@ -192,10 +192,10 @@ def part_stages(bench):
 SPHERE_OPTIONS = ("--init", f"sphere:0,0,0,{START_RADIUS}", "--attraction-range", "5vx")
 
 
-def sphere_job(bench, image, points, *extra, threads, delta="1vx"):
+def sphere_job(bench, image, points, *extra, threads):
     out = bench.work / "sphere.vdb"
     run = bench.run_covol("segment", image, "--points", points, "-o", out, "--mesh", out.with_suffix(".ply"),
-                          *SPHERE_OPTIONS, "--delta", delta, *extra, threads=threads)
+                          *SPHERE_OPTIONS, *extra, threads=threads)
     run.mesh = out.with_suffix(".ply")
     return run
 
@@ -208,15 +208,15 @@ def part_sphere(bench):
     single_level = ("--tau", "1vx")
     if "--coarse-levels" in Run([bench.covol, "segment", "--help"]).stdout:
         single_level += ("--coarse-levels", "0")
-    kinds = [("covol", (), threads) for threads in THREADS]
-    kinds += [("covol, delta 0.2 voxel", (), threads) for threads in THREADS]
-    kinds += [("covol, one level, tau = h", single_level, 1), ("covol, image alone", ("--theta", "0"), 2)]
-    runs = {(name, threads): [] for name, _, threads in kinds}
+    kinds = [("covol", "1vx", (), threads) for threads in THREADS]
+    kinds += [("covol, delta 0.2 voxel", "0.2vx", (), threads) for threads in THREADS]
+    kinds += [("covol, one level, tau = h", "1vx", single_level, 1), ("covol, image alone", "1vx", ("--theta", "0"), 2)]
+    runs = {(name, threads): [] for name, _, _, threads in kinds}
     errors = {}
 
     def covol_round(chosen):
-        for name, extra, threads in chosen:
-            run = sphere_job(bench, image, points, *extra, threads=threads, delta="0.2vx" if "delta" in name else "1vx")
+        for name, delta, extra, threads in chosen:
+            run = sphere_job(bench, image, points, "--delta", delta, *extra, threads=threads)
             runs[name, threads].append(run)
             errors[name] = shell_errors(run.mesh, kind, voxel)
 
@@ -240,7 +240,7 @@ def part_sphere(bench):
     itk_few = {threads: Run([*itk, "--iterations", few, "--threads", threads]).json() for threads in THREADS}
 
     rows = []
-    for name, _, threads in kinds:
+    for name, _, _, threads in kinds:
         run = best(runs[name, threads])
         solve = run.report["solve"]
         rows.append({"solver": name, "threads": threads, "seconds": run.wall, "cpu_seconds": run.cpu,

@@ -190,10 +190,12 @@ Motion BandSolver::step(double tau, Counts& counts) {
 // @param first  residual at u^{n-1}
 void BandSolver::solve(double omega, double first, Counts& counts) {
     const double goal = std::max(options_.solver_tolerance * first, kRounding);
+    double start = first;
     bool ask_all = true;
     for (int visit = 0; visit * kInnerSweeps < options_.max_sweeps; ++visit) {
         const double residual = sweep(static_cast<float>(omega), ask_all ? 0.0 : goal, counts);
-        ask_all = omega > 1.0 && !(residual <= kDiverged * first);
+        if (visit == 0) start = std::max(first, residual);  // a guess that is worse than u^{n-1} is no divergence
+        ask_all = omega > 1.0 && !(residual <= kDiverged * start);
         if (ask_all) {
             // Over-relaxation may fail where advection dominates; Gauss-Seidel converges on every M-matrix.
             omega = 1.0;

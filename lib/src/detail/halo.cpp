@@ -21,6 +21,11 @@ struct RowSource {
     explicit RowSource(int i) : d(i < 0 ? -1 : i > 7 ? 1 : 0), local(i & 7) {}
 };
 
+/// The blocks across the faces of a leaf, by Face.
+void find_across(const HaloField& field, std::size_t leaf, const float* (&across)[6]) {
+    for (int face = 0; face < 6; ++face) across[face] = field.values.leaf(field.blocks[leaf][kFaceSlots[face]]);
+}
+
 }  // namespace
 
 HaloField gather(const LeafBand& band, const FloatGrid& grid, bool corners, const ConvertBlock& convert) {
@@ -90,7 +95,7 @@ void load_padded(const HaloField& field, std::size_t leaf, float* out) {
 
 void load_star(const HaloField& field, std::size_t leaf, float* out) {
     const float* across[6];
-    for (int face = 0; face < 6; ++face) across[face] = field.values.leaf(field.blocks[leaf][kFaceSlots[face]]);
+    find_across(field, leaf, across);
     load_star_from(field.values.leaf(leaf), across, out);
 }
 
@@ -114,28 +119,24 @@ void load_star_from(const float* inner, const float* const across[6], float* out
 
 LeafStar star_of(HaloField& field, std::size_t leaf) {
     LeafStar star{field.values.leaf(leaf), {}};
-    for (int face = 0; face < 6; ++face) star.across[face] = field.values.leaf(field.blocks[leaf][kFaceSlots[face]]);
+    find_across(field, leaf, star.across);
     return star;
 }
 
 void prefetch(const LeafStar& star) {
     constexpr int kLine = 16;  // floats
-    const auto block = [&](int face) { return star.across[face]; };
-    const float* inner = star.inner;
-    const float* minus_k = block(kMinusK);
-    const float* plus_k = block(kPlusK);
     for (int n = 0; n < kLeafSize; n += kLine) {
-        __builtin_prefetch(inner + n);
-        __builtin_prefetch(minus_k + n);
-        __builtin_prefetch(plus_k + n);
+        __builtin_prefetch(star.inner + n);
+        __builtin_prefetch(star.across[kMinusK] + n);
+        __builtin_prefetch(star.across[kPlusK] + n);
     }
     for (int n = 0; n < 64; n += kLine) {
-        __builtin_prefetch(block(kMinusI) + leaf_offset(7, 0, n));
-        __builtin_prefetch(block(kPlusI) + n);
+        __builtin_prefetch(star.across[kMinusI] + leaf_offset(7, 0, n));
+        __builtin_prefetch(star.across[kPlusI] + n);
     }
     for (int i = 0; i < kLeafDim; ++i) {
-        __builtin_prefetch(block(kMinusJ) + leaf_offset(i, 7, 0));
-        __builtin_prefetch(block(kPlusJ) + leaf_offset(i, 0, 0));
+        __builtin_prefetch(star.across[kMinusJ] + leaf_offset(i, 7, 0));
+        __builtin_prefetch(star.across[kPlusJ] + leaf_offset(i, 0, 0));
     }
 }
 

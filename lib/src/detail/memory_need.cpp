@@ -14,6 +14,9 @@
 namespace covol::detail {
 namespace {
 
+// Measured: peak memory over voxels.
+constexpr double kTubeBytes = 12;   ///< for each voxel of a distance tube
+constexpr double kBandBytes = 200;  ///< for each active voxel of a band that is solved on
 constexpr double kCoarseVoxels = 1e6;   // on which volumes are measured
 constexpr double kBandVoxels = 10;      // a band that follows, with the leaves that it cuts, is this wide
 constexpr double kLeafVoxels = 4;       // a tube's leaves reach this far beyond it on the mean

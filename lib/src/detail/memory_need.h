@@ -7,10 +7,6 @@
 
 namespace covol::detail {
 
-// Measured: peak memory over voxels.
-inline constexpr double kTubeBytes = 12;   ///< for each voxel of a distance tube
-inline constexpr double kBandBytes = 200;  ///< for each active voxel of a band that is solved on
-
 /// A tube around the points, {d <= reach + voxels * h}, and how much is kept for its voxels.
 struct TubeNeed {
     double reach = 0, voxels = 0;

@@ -134,15 +134,8 @@ COVOL_CLONES void offer_patch(const PatchFan& fan, const PatchCylinder& cylinder
             arm[v] = pv - cylinder.center[v];
             const Hit<Float8> hit = nearest_of(fan, arm);
             const Int8 voxel = __builtin_convertvector(lane * float(kStride[m]) + pu * float(kStride[u]) + pv * float(kStride[v]), Int8);
-            for (int n = 0; n < 8; ++n) {
-                if (!here[n]) continue;
-                const int p = voxel[n];
-                if (!(hit.squared[n] < leaf.squared[p])) continue;
-                leaf.squared[p] = hit.squared[n];
-                leaf.patch[p] = index;
-                const std::uint64_t bit = std::uint64_t(1) << (p & 63);
-                leaf.interior[p >> 6] = hit.is_interior[n] ? leaf.interior[p >> 6] | bit : leaf.interior[p >> 6] & ~bit;
-            }
+            for (int n = 0; n < 8; ++n)
+                if (here[n]) leaf.offer(voxel[n], {hit.squared[n], hit.is_interior[n] != 0}, index);
         }
     }
 }

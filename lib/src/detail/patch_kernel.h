@@ -44,6 +44,16 @@ struct PatchLeaf {
     float* squared;             ///< 512 squared distances
     std::int32_t* patch;        ///< whose they are
     std::uint64_t* interior;    ///< 512 bits, PatchHit::is_interior
+
+    /// Voxel p takes the patch `index` where that is nearer than the one it has. @return whether it did
+    bool offer(int p, const PatchHit& hit, std::int32_t index) const {
+        if (!(hit.squared < squared[p])) return false;
+        squared[p] = hit.squared;
+        patch[p] = index;
+        const std::uint64_t bit = std::uint64_t(1) << (p & 63);
+        interior[p >> 6] = hit.is_interior ? interior[p >> 6] | bit : interior[p >> 6] & ~bit;
+        return true;
+    }
 };
 
 /// Gives the patch `index` to the voxels of the leaf within the cylinder that are nearer to it than to what they have.

@@ -71,17 +71,15 @@ public:
 
 private:
     bool try_patch(std::size_t leaf, int p, std::int32_t patch) {
-        std::int32_t& mine = patch_.leaf(leaf)[p];
-        if (patch == mine || patch == kNoPatch) return false;
-        float& best = squared_.leaf(leaf)[p];
+        const PatchLeaf known = known_by(leaf);
+        if (patch == known.patch[p] || patch == kNoPatch) return false;
         const Coord at = band_.origin(leaf).offsetBy(p >> 6, p >> 3 & 7, p & 7);
-        const PatchHit hit = interface_.nearest(at, interface_.patches[static_cast<std::size_t>(patch)], best);
-        if (!(hit.squared < best)) return false;
-        best = hit.squared;
-        mine = patch;
-        const std::uint64_t bit = std::uint64_t(1) << (p & 63);
-        interior_[leaf][p >> 6] = hit.is_interior ? interior_[leaf][p >> 6] | bit : interior_[leaf][p >> 6] & ~bit;
-        return true;
+        const Patch& candidate = interface_.patches[static_cast<std::size_t>(patch)];
+        return known.offer(p, interface_.nearest(at, candidate, known.squared[p]), patch);
+    }
+
+    [[nodiscard]] PatchLeaf known_by(std::size_t leaf) {
+        return {squared_.leaf(leaf), patch_.leaf(leaf), interior_[leaf].data()};
     }
 
     void seed(std::size_t leaf) {
@@ -105,8 +103,7 @@ private:
             const float reach = half_width_ * std::abs(patch.normal[a]) + cylinder.radius;
             if (cylinder.center[a] + reach < 0 || cylinder.center[a] - reach > kLeafDim - 1) return;
         }
-        offer_patch(interface_.fan(patch), cylinder, static_cast<std::int32_t>(index),
-                    {squared_.leaf(leaf), patch_.leaf(leaf), interior_[leaf].data()});
+        offer_patch(interface_.fan(patch), cylinder, static_cast<std::int32_t>(index), known_by(leaf));
     }
 
     /// Voxels that are not above the inside of a patch, and their neighbours in the leaf and across its faces.

@@ -71,7 +71,9 @@ Vec3 gradient(const ContourSolid& body, const Vec3& at, double h) {
 void compute_distance(Job& job, double radius, double reach) {
     Timed timed(job.report().seconds.distance);
     detail::require_tube_memory(job.points, job.domain(), {reach, (radius - reach) / job.h(), true}, "segment", job.run);
-    job.result.distance = distance(job.points, job.domain(), {radius}, job.run).grid;
+    RunContext checked = job.run;
+    checked.memory_budget = 0;  // distance() need not estimate it again
+    job.result.distance = distance(job.points, job.domain(), {radius}, checked).grid;
 }
 
 double tube_for_start(Job& job) {
