@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "covol/error.h"
+#include "detail/number.h"
 #include "detail/signed_distance.h"
 #include "detail/tagging.h"
 
@@ -129,6 +130,11 @@ BandResult make(const FloatGrid& distance, const BandOptions& options, const Run
 std::string BandOptions::why_invalid() const {
     if (tag_distance > 0 && std::isfinite(tag_distance)) return {};
     return "tag_distance: expected > 0, got " + std::to_string(tag_distance);
+}
+
+std::string BandReport::leak() const {
+    return "the points leave gaps wider than the tag distance " + detail::number(tag_distance) +
+           (holding_distance > 0 ? "; it would hold at " + detail::number(holding_distance) : "; no tag distance that holds was found");
 }
 
 BandResult band(const FloatGrid& distance, const BandOptions& options, const RunContext& run) {

@@ -449,12 +449,11 @@ void compare_surfaces(const TriangleMesh& a, const TriangleMesh& b, double spaci
 }  // namespace
 
 Solid read_solid(const std::string& path, int label, const RunContext& run) {
-    const std::string end = detail::extension(split_grid_name(path).path);
     Solid solid;
     solid.label = label;
-    if (end == ".vdb") {
+    if (detail::extension(split_grid_name(path).path) == ".vdb") {
         solid.level_set = read_vdb_level_set(path, run);
-    } else if (end == ".ply" || end == ".obj" || end == ".stl" || end == ".off" || end == ".glb") {
+    } else if (is_mesh_name(path)) {
         solid.mesh = read_mesh(path);
     } else {
         solid.mask = read_image(path, {}, run);

@@ -921,10 +921,14 @@ void write_meshes(const std::string& path, const std::vector<NamedMesh>& meshes,
     save(path, out);
 }
 
+bool is_mesh_name(const std::string& path) {
+    const std::string end = detail::extension(path);
+    return end == ".ply" || end == ".obj" || end == ".stl" || end == ".off" || end == ".glb";
+}
+
 TriangleMesh read_mesh(const std::string& path) {
     const std::string end = detail::extension(path);
-    const bool known = end == ".ply" || end == ".obj" || end == ".stl" || end == ".off" || end == ".glb";
-    if (!known)
+    if (!is_mesh_name(path))
         throw Error(Errc::Unsupported, "read_mesh: " + path + ": expected a name that ends in .ply, .obj, .stl, .off or .glb, got '" + end + "'");
     const std::string text = read_file(path);
     Source source(path, text);

@@ -36,11 +36,7 @@ struct BandJob {
         session.report()["band"] = to_json(result.report);
         session.note(std::to_string(result.report.active_voxels) + " active voxels, encloses " +
                      std::to_string(result.report.enclosed_volume));
-        if (result.report.leaks)
-            session.warn("the points leave gaps wider than the tag distance " + std::to_string(D) +
-                         (result.report.holding_distance > 0
-                              ? "; it would hold at " + std::to_string(result.report.holding_distance)
-                              : "; no tag distance that holds was found"));
+        if (result.report.leaks) session.warn(result.report.leak());
         session.add_grid(output, result.grid, half);
     }
 };

@@ -26,6 +26,9 @@ struct BandReport {
     bool leaks = false;           ///< no core enclosed at D or a little below, or one appears just above D
     double holding_distance = 0;  ///< where it leaks: the smallest D that would hold, 0 when none was found
     std::int64_t active_voxels = 0;
+
+    /// Where it leaks: what to tell people.
+    [[nodiscard]] std::string leak() const;
 };
 
 struct BandResult {

@@ -44,6 +44,9 @@ void write_meshes(const std::string& path, const std::vector<NamedMesh>& meshes,
 /// @throws Error Io, InvalidInput, Unsupported.
 [[nodiscard]] TriangleMesh read_mesh(const std::string& path);
 
+/// What read_mesh() reads, by the name alone.
+[[nodiscard]] bool is_mesh_name(const std::string& path);
+
 /// @throws Error InvalidOptions with the list of endings that write_mesh knows.
 void check_mesh_extension(const std::string& path);
 

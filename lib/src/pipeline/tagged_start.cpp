@@ -65,13 +65,6 @@ bool start_from_solid(Job& job) {
     return true;
 }
 
-void warn_of_leak(const Job& job, const BandReport& tagged) {
-    std::string line = "the points leave gaps wider than the tag distance " + number(tagged.tag_distance);
-    line += tagged.holding_distance > 0 ? "; it would hold at " + number(tagged.holding_distance)
-                                        : "; no tag distance that holds was found";
-    job.run.warn(line);
-}
-
 // The tagged surface lies D outside the points, as far as the widest gap is large. Its closing by a ball of radius D
 // touches them, needs a band of a few voxels instead of {d <= D + 3h}, and leaves the flow a short way.
 void start_from_closing(Job& job, double D) {
@@ -98,7 +91,7 @@ void start_by_tagging(Job& job) {
     BandResult tagged = band(*job.result.distance, {D, seeds_beyond(job, D)}, job.run);
     job.report().band = tagged.report;
     job.result.u = tagged.grid;
-    if (tagged.report.leaks) warn_of_leak(job, tagged.report);
+    if (tagged.report.leaks) job.run.warn(tagged.report.leak());
     if (D > kCloseFromVoxels * job.h()) start_from_closing(job, D);
     job.report().tag.tag_distance = D;
 }
