@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <set>
 #include <sstream>
 
 #include "covol/band.h"
@@ -96,6 +97,62 @@ FloatGridPtr start_from_field(const Domain& domain, const std::vector<Coord>& ca
     run.check();
     LeafArray<float> u = detail::signed_distance(band, phi, inside_domain, box, kWidth, run);
     return detail::make_start(band, u, domain, where);
+}
+
+/// The leaves that the zero level set passes, found from leaf to leaf from those around the seeds on.
+std::vector<Coord> leaves_crossed_from(const Domain& domain, const std::vector<Vec3>& seeds, const Sampler& sample,
+                                       const RunContext& run) {
+    constexpr int kSide = kLeafDim + 1;
+    const detail::VoxelBox box = detail::box_of(domain);
+    const auto in_domain = [&](const Coord& o) { return detail::any_on(detail::mask_in_box(o, box)); };
+    std::set<Coord> known;
+    std::vector<Coord> front, crossed;
+    const auto visit = [&](const Coord& o) {
+        if (in_domain(o) && known.insert(o).second) front.push_back(o);
+    };
+    for (const Vec3& seed : seeds) {
+        const Vec3 at = domain.world_to_index(seed);
+        const Coord center = Coord::floor(openvdb::Vec3d(at[0], at[1], at[2])) & ~(kLeafDim - 1);
+        for (int n = 0; n < 27; ++n) visit(center.offsetBy((n / 9 - 1) * kLeafDim, (n / 3 % 3 - 1) * kLeafDim, (n % 3 - 1) * kLeafDim));
+    }
+    while (!front.empty()) {
+        run.check();
+        const std::vector<Coord> now = std::move(front);
+        front.clear();
+        std::vector<std::array<bool, 6>> through(now.size());  // faces, as in kFaceSlots
+        std::vector<char> crosses(now.size());
+        tbb::parallel_for(std::size_t(0), now.size(), [&](std::size_t n) {
+            std::array<float, kSide * kSide * kSide> values;
+            sample(now[n], now[n].offsetBy(kLeafDim), values.data());
+            const auto negative = [&](int i, int j, int k) { return values[std::size_t((i * kSide + j) * kSide + k)] < 0; };
+            std::array<bool, 6> mixed{};
+            bool any = false;
+            for (int a = 0; a < kSide; ++a)
+                for (int b = 0; b < kSide; ++b) {
+                    mixed[0] |= negative(0, a, b) != negative(0, 0, 0);
+                    mixed[1] |= negative(kLeafDim, a, b) != negative(kLeafDim, 0, 0);
+                    mixed[2] |= negative(a, 0, b) != negative(0, 0, 0);
+                    mixed[3] |= negative(a, kLeafDim, b) != negative(0, kLeafDim, 0);
+                    mixed[4] |= negative(a, b, 0) != negative(0, 0, 0);
+                    mixed[5] |= negative(a, b, kLeafDim) != negative(0, 0, kLeafDim);
+                }
+            for (const float v : values) any |= (v < 0) != (values[0] < 0);
+            through[n] = mixed;
+            crosses[n] = any;
+        });
+        for (std::size_t n = 0; n < now.size(); ++n) {
+            if (!crosses[n]) continue;
+            crossed.push_back(now[n]);
+            for (int face = 0; face < 6; ++face) {
+                if (!through[n][std::size_t(face)]) continue;
+                Coord next = now[n];
+                next[face / 2] += face % 2 == 0 ? -kLeafDim : kLeafDim;
+                visit(next);
+            }
+        }
+    }
+    std::sort(crossed.begin(), crossed.end());
+    return crossed;
 }
 
 /// From voxels of a domain to index space of a grid with a linear transform.
@@ -242,6 +299,24 @@ FloatGridPtr start_from_contours(const Domain& domain, const ContourSolid& solid
                         *values++ = float(solid.level(domain.index_to_world({double(i), double(j), double(k)})));
         };
         result = start_from_field(domain, near, sample, "start_from_contours", run);
+    });
+    return result;
+}
+
+FloatGridPtr start_from_level(const Domain& domain, const std::vector<Vec3>& seeds, const LevelRow& level, const RunContext& run) {
+    FloatGridPtr result;
+    with_threads(run, [&] {
+        const double h = domain.voxel_size;
+        const Sampler sample = [&](const Coord& lo, const Coord& hi, float* values) {
+            const int count = hi.z() - lo.z() + 1;
+            std::array<double, kLeafDim + 1> row;
+            for (int i = lo.x(); i <= hi.x(); ++i)
+                for (int j = lo.y(); j <= hi.y(); ++j) {
+                    level(domain.index_to_world({double(i), double(j), double(lo.z())}), {0, 0, h}, count, row.data());
+                    for (int k = 0; k < count; ++k) *values++ = float(row[std::size_t(k)]);
+                }
+        };
+        result = start_from_field(domain, leaves_crossed_from(domain, seeds, sample, run), sample, "start_from_level", run);
     });
     return result;
 }

@@ -86,7 +86,10 @@ Start parse_start(const std::string& flag, const std::string& text) {
     const std::size_t colon = text.find(':');
     const std::string kind = text.substr(0, colon);
     const std::string rest = colon == std::string::npos ? "" : text.substr(colon + 1);
-    if (kind == "tag" && colon == std::string::npos) return start;
+    if (colon == std::string::npos && (kind == "auto" || kind == "guess" || kind == "tag")) {
+        start.kind = kind == "auto" ? Start::Kind::Auto : kind == "guess" ? Start::Kind::Guess : Start::Kind::Tag;
+        return start;
+    }
     if (kind == "sphere") {
         const std::vector<double> v = numbers(flag, "sphere:x,y,z,r", rest, 4);
         start.kind = Start::Kind::Sphere;
@@ -106,7 +109,7 @@ Start parse_start(const std::string& flag, const std::string& text) {
         start.path = rest;
         return start;
     }
-    bad_text(flag, "tag, sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1, mesh:FILE, mask:FILE or vdb:FILE", text);
+    bad_text(flag, "auto, guess, tag, sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1, mesh:FILE, mask:FILE or vdb:FILE", text);
 }
 
 FrameChoice parse_frames(const std::string& flag, const std::string& text) {

@@ -37,6 +37,8 @@ SegmentOptions SegmentJob::resolve(double h) const {
     options.roi = domain.roi;
     options.margin = domain.margin.resolve(h, 0);
     options.start = start;
+    options.model = model;
+    options.mark_precision = mark_precision.resolve(h, -1);
     options.tag_distance = tag.tag_distance.resolve(h, 0);
     if (tag.tag_distance.given && !(options.tag_distance > 0))
         throw Error(Errc::InvalidOptions, "--tag-distance: expected > 0, got 0");
@@ -88,9 +90,12 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
     tag.bind(command, with_image);
     command.add_option_function<std::string>(
                "--init", [this](const std::string& text) { start = parse_start("--init", text); },
-               "how the level set starts: tag, sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1, mesh:F, mask:F or vdb:F")
+               "how the level set starts: auto, guess (through the marks with the least bending), tag, sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1, mesh:F, mask:F or vdb:F")
         ->type_name("START")
-        ->default_str("tag");
+        ->default_str("auto");
+    add_choice(command, "--model", model, {{"guided", Model::Guided}, {"paper", Model::Paper}},
+               "what holds the surface where neither marks nor edges speak: a guess made from the marks, or curvature alone [guided]");
+    add_length(command, "--mark-precision", mark_precision, "", "standard deviation of a mark's place [0.3 of the image's spacing along each axis]");
     domain.bind(command, !with_image);
     command.add_option("--coarse-levels", coarse_levels, "levels of twice the voxel size, and so on, that the flow passes first; auto: 1 for a sphere or a box, else 0")
         ->check(CLI::Range(0, 4).description(""))

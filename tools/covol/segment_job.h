@@ -22,6 +22,8 @@ struct SegmentJob {
     EvolveFlags evolve;
     MeshFlags mesh;
     Start start;
+    Model model = Model::Guided;
+    Length mark_precision;
     int coarse_levels = SegmentOptions{}.coarse_levels;
     Length min_component;  ///< edge of a cube of the smallest volume that is kept
     EvidenceFlags evidence;

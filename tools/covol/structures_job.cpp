@@ -193,7 +193,7 @@ std::vector<StructureInput> structures_of(const SegmentJob& job) {
 
 std::vector<StructureStart> starts_of(const SegmentJob& job, const std::vector<StructureInput>& inputs) {
     std::vector<StructureStart> starts(inputs.size(), {job.start});
-    if (inputs.size() == 1 || job.start.kind == Start::Kind::Tag) return starts;
+    if (inputs.size() == 1 || job.start.kind <= Start::Kind::Tag) return starts;
     if (job.start.kind != Start::Kind::Vdb)
         throw UsageError("--init: several structures cannot start from one shape; expected tag, or vdb:FILE with a grid for each");
     std::vector<std::string> names;

@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -71,6 +72,11 @@ struct TagDistanceChoice {
 [[nodiscard]] FloatGridPtr start_from_mask(const Domain& domain, const Image& mask, const RunContext& run = {});
 /// The body between closed contours.
 [[nodiscard]] FloatGridPtr start_from_contours(const Domain& domain, const ContourSolid& solid, const RunContext& run = {});
+/// Fills values at from + n * step, n < count (world units): negative inside.
+using LevelRow = std::function<void(const Vec3& from, const Vec3& step, int count, double* values)>;
+/// The parts of a function's zero level set that pass near the seeds; its scale does not matter.
+[[nodiscard]] FloatGridPtr start_from_level(const Domain& domain, const std::vector<Vec3>& seeds, const LevelRow& level,
+                                            const RunContext& run = {});
 /// Any level-set-like grid (negative inside), resampled onto the domain.
 [[nodiscard]] FloatGridPtr start_from_grid(const Domain& domain, const FloatGrid& level_set, const RunContext& run = {});
 

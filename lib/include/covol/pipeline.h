@@ -9,6 +9,7 @@
 #include "covol/contours.h"
 #include "covol/edge.h"
 #include "covol/evolve.h"
+#include "covol/guess.h"
 #include "covol/image.h"
 #include "covol/mesh.h"
 #include "covol/points.h"
@@ -18,7 +19,8 @@ namespace covol {
 
 /// How the level set starts.
 struct Start {
-    enum class Kind { Tag, Sphere, Box, Mesh, Mask, Vdb } kind = Kind::Tag;
+    /// Auto: a guess from the marks where there are few of them (see SegmentOptions::model), else their tags.
+    enum class Kind { Auto, Guess, Tag, Sphere, Box, Mesh, Mask, Vdb } kind = Kind::Auto;
     Vec3 center{0, 0, 0};  ///< Sphere
     double radius = 0;     ///< Sphere
     WorldBox box;          ///< Box
@@ -26,7 +28,18 @@ struct Start {
     FloatGridPtr level_set;  ///< Vdb: one in memory, instead of the file
 };
 
+/// What holds the surface where neither marks nor edges speak.
+enum class Model {
+    Guided,  ///< a guess: the surface through the marks that bends least, or the body between contours; the image moves it
+             ///< where it shows the border that it has at the marks
+    Paper    ///< curvature alone, Eq. (1) as it is printed
+};
+[[nodiscard]] const char* to_string(Model model);
+
 struct SegmentOptions {
+    Model model = Model::Guided;
+    double mark_precision = -1.0;       ///< standard deviation of a mark's place, world units; < 0: 0.3 of the image's spacing along each axis
+    std::vector<Vec3> inside, outside;  ///< places whose side is known
     double voxel_size = 0.0;            ///< h, world units; 0: see choose_voxel_size()
     std::optional<WorldBox> roi;        ///< the domain, instead of the image's box
     double margin = 0.0;                ///< points alone: between points and domain boundary; 0 picks D + 6 voxels
@@ -62,6 +75,7 @@ struct SegmentReport {
     std::int64_t active_voxels = 0, leaf_count = 0;
     std::size_t point_count = 0;        ///< given, marks of contours included
     std::size_t densified = 0;          ///< points made from contours
+    GuessReport guess;                  ///< where the start was one
     TagDistanceChoice tag;
     BandReport band;
     EdgeReport edge;

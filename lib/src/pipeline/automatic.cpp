@@ -10,6 +10,7 @@ namespace covol {
 namespace pipeline {
 namespace {
 
+constexpr std::size_t kMostGuessMarks = 4000;
 constexpr double kFewPoints = 1000;  // fewer get a voxel size at which their surface has as many voxels as this many would
 constexpr double kMergeVoxels = 0.25;      // points closer than this do not move the surface apart
 constexpr double kAttractionVoxels = 5.0;  // automatic range of the points after starts other than tagging
@@ -54,6 +55,16 @@ void choose_attraction_range(Job& job) {
     }
 }
 
+// Tagging needs marks that lie closer together than the body is thick anywhere, by far; the guess does not.
+void choose_start(Job& job) {
+    Start::Kind& kind = job.options.start.kind;
+    if (kind != Start::Kind::Auto) return;
+    kind = Start::Kind::Tag;
+    if (!job.guided() || job.options.contours || job.points.size() > kMostGuessMarks) return;
+    kind = Start::Kind::Guess;
+    job.choose("start", "guess", std::to_string(job.points.size()) + " marks, at most " + std::to_string(kMostGuessMarks));
+}
+
 }  // namespace
 
 void check_input(Job& job) {
@@ -61,7 +72,7 @@ void check_input(Job& job) {
     if (!why.empty()) throw Error(Errc::InvalidOptions, "segment: " + why);
     if (job.image == nullptr && job.points.empty())
         throw Error(Errc::InvalidInput, "segment: expected an image or points, got neither");
-    if (job.tags() && job.points.empty())
+    if (job.options.start.kind <= Start::Kind::Tag && job.points.empty())
         throw Error(Errc::InvalidInput, "segment: the start 'tag' expects points, got none; choose another start "
                                         "(sphere, box, mesh, mask or vdb)");
     job.report().point_count = job.given.size();
@@ -84,6 +95,7 @@ void choose_values(Job& job) {
         job.choose("voxel_size", number(job.h()), choice.reason);
     }
     merge_points(job);
+    choose_start(job);
     const double h = job.h();
     EvolveOptions& evolve = options.evolve;
     if (evolve.delta < 0) {

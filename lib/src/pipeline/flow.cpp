@@ -110,9 +110,28 @@ std::string why_vanished(const Job& job) {
     return "nothing held it; lower --delta, or start closer to the edges (--init)";
 }
 
+// The guess, or where the image moved it, is the surface: nothing pulls it off the marks, and curvature smooths what
+// deviates from it, not the guess itself.
+bool rests_on_guess(const Job& job) {
+    return job.guided() && (job.origin == StartOrigin::Guess || job.origin == StartOrigin::Contours);
+}
+
+void rest(Job& job) {
+    EvolveReport& report = job.report().solve;
+    report.stop_reason = StopReason::Steady;
+    report.active_voxels = std::int64_t(job.result.u->activeVoxelCount());
+    report.leaf_count = std::int64_t(job.result.u->tree().leafCount());
+}
+
 }  // namespace
 
 void flow(Job& job) {
+    if (rests_on_guess(job)) {
+        rest(job);
+        job.report().active_voxels = job.report().solve.active_voxels;
+        job.report().leaf_count = job.report().solve.leaf_count;
+        return;
+    }
     EvolveFields fields;
     fields.distance = job.uses_points() ? job.result.distance.get() : nullptr;
     fields.edge = job.result.edge.get();

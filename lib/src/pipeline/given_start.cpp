@@ -25,6 +25,8 @@ FloatGridPtr start_grid(const Start& start, const Domain& domain, const RunConte
         case Start::Kind::Mask: return start_from_mask(domain, read_image(start.path, {}, run), run);
         case Start::Kind::Vdb:
             return start_from_grid(domain, start.level_set ? *start.level_set : *read_level_set(start.path), run);
+        case Start::Kind::Auto:
+        case Start::Kind::Guess:
         case Start::Kind::Tag: break;
     }
     throw Error(Errc::InvalidOptions, "segment: this start makes no grid of its own");

@@ -16,6 +16,7 @@ inline constexpr double kMarginVoxels = 6.0;  // between D and the domain's boun
 /// What the level set of now was made from: how far it may be from its end.
 enum class StartOrigin {
     Given,       ///< a sphere, a box, a file
+    Guess,       ///< the surface through few marks
     Tagged,      ///< the points, tagged (closed or as a solid, too)
     Contours,    ///< the body between contours
     CoarseLevel  ///< the end of the flow on a coarser lattice
@@ -44,6 +45,8 @@ struct Job {
     [[nodiscard]] bool uses_points() const { return options.evolve.theta > 0; }
     [[nodiscard]] bool uses_image() const { return options.evolve.rho > 0; }
     [[nodiscard]] bool tags() const { return options.start.kind == Start::Kind::Tag; }
+    [[nodiscard]] bool guesses() const { return options.start.kind == Start::Kind::Guess; }
+    [[nodiscard]] bool guided() const { return options.model == Model::Guided; }
     /// Between closed contours, or null.
     [[nodiscard]] const ContourSolid* body() const {
         return options.contours ? options.contours->solid.get() : nullptr;

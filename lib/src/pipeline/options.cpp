@@ -6,6 +6,8 @@
 
 namespace covol {
 
+const char* to_string(Model model) { return model == Model::Guided ? "guided" : "paper"; }
+
 EvolveOptions SegmentOptions::automatic_evolve() {
     EvolveOptions options;
     options.attraction_range = -1;

@@ -7,6 +7,9 @@ namespace covol::pipeline {
 /// One of those below, as options and input ask for.
 void make_start(Job& job);
 
+/// The surface through the marks that bends least.
+void start_from_guess(Job& job);
+
 /// The sphere, box, mesh, mask or level set that the caller names. The band follows the surface.
 void start_as_given(Job& job);
 

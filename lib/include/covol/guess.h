@@ -1,0 +1,36 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "covol/domain.h"
+#include "covol/run.h"
+
+namespace covol {
+
+struct GuessOptions {
+    /// Standard deviation of a mark along three directions, as world vectors (an image's axes, times a share of its spacing).
+    std::array<Vec3, 3> deviation{};
+    std::vector<Vec3> inside, outside;  ///< places whose side is known
+    /// The world's end: where the body is cut off. Marks in the cut are told from marks on the surface.
+    WorldBox end;
+    bool has_end = false;
+    [[nodiscard]] std::string why_invalid() const;
+};
+
+struct GuessReport {
+    std::size_t marks = 0;      ///< that hold the surface
+    std::size_t cut_marks = 0;  ///< that lie in the cut, inside the body: left out
+    std::size_t patches = 0;    ///< surfaces of a part of the marks; 0: one of all of them
+    std::string summary;        ///< one line for people
+};
+
+/// A guess of the surface from few marks: through them it bends least (variational implicit surface, see
+/// lib/src/guess/variational.h). No density of marks is asked for.
+/// @return a start as those of band.h: u0 clamped to +-3h, active beside the surface
+/// @throws Error InvalidOptions; InvalidInput (fewer than four distinct marks, all in one plane, nothing inside the domain).
+[[nodiscard]] FloatGridPtr guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks, const GuessOptions& options,
+                                            GuessReport& report, const RunContext& run = {});
+
+}  // namespace covol

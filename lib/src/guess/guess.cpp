@@ -1,0 +1,90 @@
+#include "covol/guess.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "covol/band.h"
+#include "covol/error.h"
+#include "guess/marks_surface.h"
+
+namespace covol {
+namespace {
+
+constexpr std::size_t kLeastOutline = 8;  // marks off the cuts, to say what is inside of them
+
+double longest(const std::array<Vec3, 3>& axes) {
+    double most = 0;
+    for (const Vec3& a : axes) most = std::max(most, std::hypot(a[0], a[1], a[2]));
+    return most;
+}
+
+/// Whether a mark is so close to the world's end that it may lie in the cut.
+bool at_end(const Vec3& mark, const GuessOptions& options) {
+    for (int a = 0; a < 3; ++a) {
+        double sd = 0;
+        for (const Vec3& axis : options.deviation) sd = std::hypot(sd, axis[a]);
+        const double near = 4 * sd;  // half a voxel from its centre to its end, and what the hand is off
+        if (mark[a] < options.end.min[a] + near || mark[a] > options.end.max[a] - near) return true;
+    }
+    return false;
+}
+
+guess::ImpreciseMarks imprecise(const std::vector<Vec3>& marks, const GuessOptions& options) {
+    guess::ImpreciseMarks result;
+    result.marks = marks;
+    result.deviation = options.deviation;
+    return result;
+}
+
+/// Marks in the cut lie deep inside the body that the others mark: the surface need not pass them.
+std::vector<Vec3> without_cut_marks(const std::vector<Vec3>& marks, const GuessOptions& options, const RunContext& run) {
+    if (!options.has_end) return marks;
+    std::vector<Vec3> sure, doubtful;
+    for (const Vec3& mark : marks) (at_end(mark, options) ? doubtful : sure).push_back(mark);
+    if (doubtful.empty() || sure.size() < kLeastOutline) return marks;
+    std::unique_ptr<guess::MarksSurface> body;
+    try {
+        body = std::make_unique<guess::MarksSurface>(imprecise(sure, options), run);
+    } catch (const Error& error) {
+        if (error.code() == Errc::Cancelled) throw;
+        return marks;
+    }
+    const double deep = 6 * longest(options.deviation);
+    for (const Vec3& mark : doubtful)
+        if (body->value(mark) > -deep) sure.push_back(mark);
+    return sure;
+}
+
+}  // namespace
+
+std::string GuessOptions::why_invalid() const {
+    for (const Vec3& axis : deviation)
+        for (const double x : axis)
+            if (!std::isfinite(x)) return "deviation: expected finite numbers";
+    return {};
+}
+
+FloatGridPtr guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks, const GuessOptions& options,
+                              GuessReport& report, const RunContext& run) {
+    if (const std::string why = options.why_invalid(); !why.empty()) throw Error(Errc::InvalidOptions, "guess: " + why);
+    FloatGridPtr result;
+    with_threads(run, [&] {
+        const std::vector<Vec3> held = without_cut_marks(marks, options, run);
+        guess::ImpreciseMarks known = imprecise(held, options);
+        report.marks = held.size();
+        report.cut_marks = marks.size() - held.size();
+        const guess::MarksSurface surface(known, run);
+        report.patches = surface.patches();
+        result = start_from_level(
+            domain, held,
+            [&](const Vec3& from, const Vec3& step, int count, double* values) { surface.row(from, step, count, values); }, run);
+    });
+    report.summary = std::to_string(report.marks) + " marks, the surface through them that bends least";
+    if (report.patches > 0) report.summary += ", in " + std::to_string(report.patches) + " overlapping parts";
+    if (report.cut_marks > 0)
+        report.summary += "; " + std::to_string(report.cut_marks) + " others lie in the cut where the image ends";
+    return result;
+}
+
+}  // namespace covol

@@ -1,0 +1,237 @@
+#include "guess/marks_surface.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "detail/kd_tree.h"
+
+namespace covol::guess {
+namespace {
+
+// Time, not accuracy, sets these: the whole takes the cube of its number of marks, a part the cube of its own.
+constexpr std::size_t kOriented = 100;  // marks whose normals are searched for from nothing
+constexpr std::size_t kWhole = 300;     // marks of the whole
+constexpr std::size_t kPatchMarks = 48; // marks of a part
+constexpr std::size_t kCoreMarks = 12;  // of these, nearest to its centre, need no part of their own
+constexpr double kWholeWeight = 1e-3;   // of the whole, among parts that weigh 1 at their centres
+
+double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+Vec3 unit(const Vec3& v) {
+    const double length = std::sqrt(dot(v, v));
+    return length > 0 ? Vec3{v[0] / length, v[1] / length, v[2] / length} : Vec3{1, 0, 0};
+}
+
+/// `count` of the points, each as far from those before it as can be.
+std::vector<std::size_t> spread_out(const std::vector<Vec3>& points, std::size_t count) {
+    std::vector<std::size_t> chosen;
+    std::vector<double> away(points.size(), std::numeric_limits<double>::infinity());
+    std::size_t next = 0;
+    while (chosen.size() < std::min(count, points.size())) {
+        chosen.push_back(next);
+        for (std::size_t n = 0; n < points.size(); ++n)
+            away[n] = std::min(away[n], detail::squared_distance(points[n], points[next]));
+        next = std::size_t(std::max_element(away.begin(), away.end()) - away.begin());
+        if (!(away[next] > 0)) break;  // the rest are copies
+    }
+    return chosen;
+}
+
+/// The part of the marks with these numbers, with the variance along the normals where these are known.
+Constraints part_of(const ImpreciseMarks& all, const std::vector<std::size_t>& chosen, const std::vector<Vec3>& normals) {
+    Constraints part;
+    const double mean_variance =
+        (dot(all.deviation[0], all.deviation[0]) + dot(all.deviation[1], all.deviation[1]) + dot(all.deviation[2], all.deviation[2])) / 3;
+    for (const std::size_t n : chosen) {
+        part.marks.push_back(all.marks[n]);
+        part.variance.push_back(normals.empty() ? mean_variance : all.variance_along(normals[n]));
+    }
+    return part;
+}
+
+std::vector<Vec3> at(const std::vector<Vec3>& all, const std::vector<std::size_t>& chosen) {
+    std::vector<Vec3> some;
+    for (const std::size_t n : chosen) some.push_back(all[n]);
+    return some;
+}
+
+std::vector<Vec3> normals_of(const VariationalSurface& surface, const std::vector<Vec3>& marks) {
+    std::vector<Vec3> normals(marks.size());
+    tbb::parallel_for(std::size_t(0), marks.size(), [&](std::size_t n) { normals[n] = unit(surface.gradient(marks[n])); });
+    return normals;
+}
+
+double mean_value(const VariationalSurface& surface, const Constraints& part) {
+    double sum = 0, weights = 0;
+    for (std::size_t n = 0; n < part.marks.size(); ++n) {
+        const double weight = 1 / std::max(part.variance[n], 1e-300);
+        sum += weight * surface.value(part.marks[n]);
+        weights += weight;
+    }
+    return weights > 0 ? sum / weights : 0.0;
+}
+
+/// Those nearest to one of them, itself first, by distance.
+std::vector<std::size_t> nearest(const std::vector<Vec3>& points, std::size_t to, std::size_t count) {
+    std::vector<std::pair<double, std::size_t>> by_distance(points.size());
+    for (std::size_t n = 0; n < points.size(); ++n) by_distance[n] = {detail::squared_distance(points[n], points[to]), n};
+    count = std::min(count, points.size());
+    std::partial_sort(by_distance.begin(), by_distance.begin() + std::ptrdiff_t(count), by_distance.end());
+    std::vector<std::size_t> chosen(count);
+    for (std::size_t n = 0; n < count; ++n) chosen[n] = by_distance[n].second;
+    return chosen;
+}
+
+/// Wendland's C2 function of the distance over the support.
+double weight(double squared, double radius) {
+    const double t = std::sqrt(squared) / radius;
+    if (t >= 1) return 0;
+    const double s = 1 - t, s2 = s * s;
+    return s2 * s2 * (4 * t + 1);
+}
+
+}  // namespace
+
+double ImpreciseMarks::variance_along(const Vec3& n) const {
+    double sum = 0;
+    for (const Vec3& axis : deviation) sum += dot(axis, n) * dot(axis, n);
+    return sum;
+}
+
+MarksSurface::MarksSurface(const ImpreciseMarks& marks, const RunContext& run) {
+    const auto with_seeds = [&](Constraints part) {
+        part.seeds = marks.seeds;
+        part.seed_value = marks.seed_value;
+        return part;
+    };
+    const std::vector<std::size_t> few = spread_out(marks.marks, kOriented);
+    const VariationalSurface oriented(with_seeds(part_of(marks, few, {})));
+    run.check();
+    const std::vector<Vec3> normals = normals_of(oriented, marks.marks);
+    const std::vector<std::size_t> many = spread_out(marks.marks, kWhole);
+    const Constraints part = with_seeds(part_of(marks, many, normals));
+    whole_ = std::make_unique<VariationalSurface>(part, at(normals, many), oriented.amplitude());
+    offset_ = mean_value(*whole_, part);
+    run.check();
+    if (marks.marks.size() > kWhole) make_patches(marks, run);
+}
+
+void MarksSurface::make_patches(const ImpreciseMarks& marks, const RunContext& run) {
+    const std::vector<Vec3> normals = normals_of(*whole_, marks.marks);
+    const std::size_t count = marks.marks.size();
+    std::vector<char> covered(count, 0);
+    struct Neighbourhood {
+        std::size_t center;
+        std::vector<std::size_t> marks;
+        double radius;
+    };
+    std::vector<Neighbourhood> places;
+    for (std::size_t n = 0; n < count; ++n) {
+        if (covered[n]) continue;
+        std::vector<std::size_t> near = nearest(marks.marks, n, kPatchMarks);
+        for (std::size_t k = 0; k < std::min(kCoreMarks, near.size()); ++k) covered[near[k]] = 1;
+        const double reach = std::sqrt(detail::squared_distance(marks.marks[near.back()], marks.marks[n]));
+        places.push_back({n, std::move(near), reach});
+    }
+    run.check();
+    std::vector<std::unique_ptr<Patch>> made(places.size());
+    tbb::parallel_for(std::size_t(0), places.size(), [&](std::size_t p) {
+        if (run.cancelled()) return;
+        const Constraints part = part_of(marks, places[p].marks, normals);
+        VariationalSurface surface(part, at(normals, places[p].marks), whole_->amplitude());
+        const double offset = mean_value(surface, part);
+        made[p] = std::make_unique<Patch>(Patch{marks.marks[places[p].center], places[p].radius, std::move(surface), offset});
+    });
+    run.check();
+    for (auto& patch : made) patches_.push_back(std::move(*patch));
+    sort_patches();
+}
+
+void MarksSurface::sort_patches() {
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    low_ = {kInfinity, kInfinity, kInfinity};
+    Vec3 high{-kInfinity, -kInfinity, -kInfinity};
+    double radii = 0;
+    for (const Patch& p : patches_) {
+        radii += p.radius / double(patches_.size());
+        for (int a = 0; a < 3; ++a) {
+            low_[a] = std::min(low_[a], p.center[a] - p.radius);
+            high[a] = std::max(high[a], p.center[a] + p.radius);
+        }
+    }
+    cell_ = radii;
+    for (int a = 0; a < 3; ++a) {
+        constexpr double kMostCells = 128;
+        cell_ = std::max(cell_, (high[a] - low_[a]) / kMostCells);
+    }
+    for (int a = 0; a < 3; ++a) cells_[a] = 1 + int((high[a] - low_[a]) / cell_);
+    in_cell_.assign(std::size_t(cells_[0]) * cells_[1] * cells_[2], {});
+    for (std::size_t n = 0; n < patches_.size(); ++n) {
+        const Patch& p = patches_[n];
+        int lo[3], hi[3];
+        for (int a = 0; a < 3; ++a) {
+            lo[a] = std::clamp(int((p.center[a] - p.radius - low_[a]) / cell_), 0, cells_[a] - 1);
+            hi[a] = std::clamp(int((p.center[a] + p.radius - low_[a]) / cell_), 0, cells_[a] - 1);
+        }
+        for (int i = lo[0]; i <= hi[0]; ++i)
+            for (int j = lo[1]; j <= hi[1]; ++j)
+                for (int k = lo[2]; k <= hi[2]; ++k)
+                    in_cell_[(std::size_t(i) * cells_[1] + j) * cells_[2] + k].push_back(std::uint32_t(n));
+    }
+}
+
+double MarksSurface::value(const Vec3& at) const {
+    double result = 0;
+    row(at, {0, 0, 0}, 1, &result);
+    return result;
+}
+
+void MarksSurface::row(const Vec3& from, const Vec3& step, int count, double* values) const {
+    whole_->row(from, step, count, values);
+    for (int n = 0; n < count; ++n) values[n] -= offset_;
+    if (patches_.empty()) return;
+    std::vector<double> weights(std::size_t(count), kWholeWeight), part(count);
+    for (int n = 0; n < count; ++n) values[n] *= kWholeWeight;
+    // The patches of all cells that the row passes, in order: the same sum however rows are cut.
+    std::vector<std::uint32_t> met;
+    std::size_t last = std::numeric_limits<std::size_t>::max();
+    for (int n = 0; n < count; ++n) {
+        int c[3];
+        bool inside = true;
+        for (int a = 0; a < 3; ++a) {
+            c[a] = int(std::floor((from[a] + n * step[a] - low_[a]) / cell_));
+            inside = inside && c[a] >= 0 && c[a] < cells_[a];
+        }
+        if (!inside) continue;
+        const std::size_t cell = (std::size_t(c[0]) * cells_[1] + c[1]) * cells_[2] + c[2];
+        if (cell == last) continue;
+        last = cell;
+        met.insert(met.end(), in_cell_[cell].begin(), in_cell_[cell].end());
+    }
+    std::sort(met.begin(), met.end());
+    met.erase(std::unique(met.begin(), met.end()), met.end());
+    for (const std::uint32_t id : met) {
+        const Patch& patch = patches_[id];
+        int first = count, end = 0;
+        std::vector<double> w(count);
+        for (int n = 0; n < count; ++n) {
+            const Vec3 at{from[0] + n * step[0], from[1] + n * step[1], from[2] + n * step[2]};
+            w[n] = weight(detail::squared_distance(at, patch.center), patch.radius);
+            if (w[n] > 0) first = std::min(first, n), end = n + 1;
+        }
+        if (first >= end) continue;
+        const Vec3 begin{from[0] + first * step[0], from[1] + first * step[1], from[2] + first * step[2]};
+        patch.surface.row(begin, step, end - first, part.data());
+        for (int n = first; n < end; ++n) {
+            values[n] += w[n] * (part[n - first] - patch.offset);
+            weights[n] += w[n];
+        }
+    }
+    for (int n = 0; n < count; ++n) values[n] /= weights[n];
+}
+
+}  // namespace covol::guess

@@ -1,0 +1,55 @@
+#pragma once
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "covol/run.h"
+#include "guess/variational.h"
+
+namespace covol::guess {
+
+/// Where marks lie, and how well: their standard deviation along three directions, as world vectors.
+struct ImpreciseMarks {
+    std::vector<Vec3> marks;
+    std::array<Vec3, 3> deviation{};
+    std::vector<Vec3> seeds;        ///< places that are inside (value < 0) or outside
+    std::vector<double> seed_value;
+
+    [[nodiscard]] double variance_along(const Vec3& unit) const;
+};
+
+/// The surface of least energy through any number of marks: one VariationalSurface through all of them where they are few;
+/// else one through a spread-out part of them, and around each place another one through its neighbours, blended by
+/// weights that add up to one (partition of unity). What the whole knows, the side, is passed on to the parts; where
+/// there are no marks near the whole goes on alone.
+class MarksSurface {
+public:
+    /// @throws Error as VariationalSurface.
+    MarksSurface(const ImpreciseMarks& marks, const RunContext& run);
+
+    /// Values at from + n * step, n < count; about a distance beside the marks, negative inside.
+    void row(const Vec3& from, const Vec3& step, int count, double* values) const;
+    [[nodiscard]] double value(const Vec3& at) const;
+    [[nodiscard]] std::size_t patches() const { return patches_.size(); }
+
+private:
+    struct Patch {
+        Vec3 center;
+        double radius;  ///< the weight's support
+        VariationalSurface surface;
+        double offset;  ///< mean value at its marks: smoothing must not move the surface as a whole
+    };
+    void make_patches(const ImpreciseMarks& marks, const RunContext& run);
+    void sort_patches();
+
+    std::unique_ptr<VariationalSurface> whole_;
+    double offset_ = 0;
+    std::vector<Patch> patches_;
+    // A lattice of cells, each with the patches that reach into it.
+    Vec3 low_{0, 0, 0};
+    double cell_ = 0;
+    std::array<int, 3> cells_{0, 0, 0};
+    std::vector<std::vector<std::uint32_t>> in_cell_;
+};
+
+}  // namespace covol::guess

@@ -1,0 +1,322 @@
+#include "guess/variational.h"
+
+#include <lbfgs.h>
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "covol/error.h"
+#include "guess/triharmonic.h"
+
+namespace covol::guess {
+namespace {
+
+using Eigen::Index;
+using Matrix = Eigen::MatrixXd;
+using Vector = Eigen::VectorXd;
+using Point = Eigen::Vector3d;
+
+constexpr int kPolynomial = 4;       // 1, x, y, z: what the energy does not see
+constexpr int kModes = 3;            // of the energy, tried as directions of the normals
+constexpr int kSubspace = 6, kSubspaceSteps = 12;
+constexpr int kLeastEnergySteps = 500;
+constexpr int kAmplitudeRounds = 3;
+constexpr double kLeastLambda = 1e-9;  // keeps M regular where marks coincide
+
+/// Least-energy interpolation at fixed nodes: the energy of values v and gradients g is that of
+/// g^T H g + 2 c^T g + constant.
+class HermiteSystem {
+public:
+    /// @param nodes   unit ball; the first `marks` of them have a gradient, too
+    /// @param lambda  of each node
+    HermiteSystem(const std::vector<Point>& nodes, Index marks, const Vector& lambda)
+        : values_(Index(nodes.size())), gradients_(3 * marks), size_(values_ + gradients_), matrix_(size_, size_) {
+        Matrix polynomials = Matrix::Zero(size_, kPolynomial);
+        fill(nodes, marks);
+        matrix_.diagonal().head(values_) += lambda;
+        for (Index i = 0; i < values_; ++i) {
+            polynomials(i, 0) = 1;
+            polynomials.row(i).tail<3>() = nodes[std::size_t(i)];
+        }
+        for (Index i = 0; i < marks; ++i)
+            for (int k = 0; k < 3; ++k) polynomials(values_ + 3 * i + k, 1 + k) = 1;
+        // Orthogonal to the polynomials the matrix is positive definite.
+        qr_.compute(polynomials);
+        Matrix projected = qr_.householderQ().adjoint() * matrix_;
+        projected = (projected * qr_.householderQ()).eval();
+        const Index rest = size_ - kPolynomial;
+        factor_.compute(projected.bottomRightCorner(rest, rest));
+        if (factor_.info() != Eigen::Success)
+            throw Error(Errc::Numerical, "guess: the marks' system is singular: do several marks coincide?");
+        Matrix basis = Matrix::Zero(size_, gradients_);
+        basis.bottomRows(gradients_).setIdentity();
+        basis = (qr_.householderQ().adjoint() * basis).eval();
+        whitened_ = basis.bottomRows(rest);
+        constexpr Index kBlock = 64;
+        const Index blocks = (gradients_ + kBlock - 1) / kBlock;
+        tbb::parallel_for(Index(0), blocks, [&](Index b) {
+            auto columns = whitened_.middleCols(b * kBlock, std::min(kBlock, gradients_ - b * kBlock));
+            factor_.matrixL().solveInPlace(columns);
+        });
+        energy_.resize(gradients_, gradients_);
+        tbb::parallel_for(Index(0), blocks, [&](Index b) {
+            const Index from = b * kBlock, count = std::min(kBlock, gradients_ - from);
+            energy_.block(from, from, gradients_ - from, count).noalias() =
+                whitened_.rightCols(gradients_ - from).transpose() * whitened_.middleCols(from, count);
+        });
+        energy_.triangularView<Eigen::StrictlyUpper>() = energy_.transpose();
+    }
+
+    [[nodiscard]] const Matrix& energy() const { return energy_; }
+    /// c of the energy, and its constant.
+    [[nodiscard]] Vector linear(const Vector& values, double& constant) const {
+        Vector y = Vector::Zero(size_);
+        y.head(values_) = values;
+        Vector w = (qr_.householderQ().adjoint() * y).eval().tail(size_ - kPolynomial);
+        factor_.matrixL().solveInPlace(w);
+        constant = w.squaredNorm();
+        return whitened_.transpose() * w;
+    }
+    /// Weights of the basis functions and of the polynomial.
+    void weights(const Vector& values, const Vector& gradients, Vector& basis, Eigen::Vector4d& polynomial) const {
+        Vector y(size_);
+        y << values, gradients;
+        Vector z = (qr_.householderQ().adjoint() * y).eval();
+        z.head<kPolynomial>().setZero();
+        z.tail(size_ - kPolynomial) = factor_.solve(z.tail(size_ - kPolynomial).eval());
+        basis = qr_.householderQ() * z;
+        const Vector left = qr_.householderQ().adjoint() * (y - matrix_ * basis).eval();
+        polynomial = qr_.matrixQR().topLeftCorner<kPolynomial, kPolynomial>().triangularView<Eigen::Upper>().solve(
+            left.head<kPolynomial>());
+    }
+    [[nodiscard]] double freedom() const { return double(size_ - kPolynomial); }
+
+private:
+    void fill(const std::vector<Point>& nodes, Index marks) {
+        tbb::parallel_for(Index(0), values_, [&](Index j) {
+            for (Index i = 0; i < values_; ++i) {
+                const Point d = nodes[std::size_t(i)] - nodes[std::size_t(j)];
+                const double r = d.norm();
+                matrix_(i, j) = r * r * r;
+                if (i < marks) matrix_.block<3, 1>(values_ + 3 * i, j) = 3 * r * d;
+                if (j < marks) matrix_.block<1, 3>(i, values_ + 3 * j) = -3 * r * d.transpose();
+                if (i >= marks || j >= marks) continue;
+                Eigen::Matrix3d second = Eigen::Matrix3d::Identity() * r;
+                if (r > 0) second += d * d.transpose() / r;
+                matrix_.block<3, 3>(values_ + 3 * i, values_ + 3 * j) = -3 * second;
+            }
+        });
+    }
+
+    const Index values_, gradients_, size_;
+    Matrix matrix_, whitened_, energy_;
+    Eigen::HouseholderQR<Eigen::Matrix<double, Eigen::Dynamic, kPolynomial>> qr_;
+    Eigen::LLT<Matrix> factor_;
+};
+
+Vector unit_vectors(const Vector& y) {
+    Vector unit = y;
+    for (Index i = 0; i < y.size(); i += 3) {
+        const double length = y.segment<3>(i).norm();
+        unit.segment<3>(i) = length > 1e-12 ? Point(y.segment<3>(i) / length) : Point(Point::UnitX());
+    }
+    return unit;
+}
+
+/// Unit gradients of least energy near a first guess.
+struct Gradients {
+    Vector unit;
+    double energy = std::numeric_limits<double>::infinity();
+};
+
+struct EnergyProblem {
+    const Matrix& H;
+    const Vector& c;
+};
+
+/// The energy of the unit vectors along y, and its derivative by y.
+double energy_of(void* instance, const double* y_values, double* derivative, int size, double /*step*/) {
+    const auto& problem = *static_cast<const EnergyProblem*>(instance);
+    const Eigen::Map<const Vector> y(y_values, size);
+    Eigen::Map<Vector> out(derivative, size);
+    const Vector unit = unit_vectors(y);
+    Vector q = problem.H * unit;
+    const double energy = unit.dot(q) + 2 * problem.c.dot(unit);
+    q += problem.c;
+    for (int i = 0; i < size; i += 3) {
+        const Point u = unit.segment<3>(i), g = 2 * q.segment<3>(i);
+        out.segment<3>(i) = (g - u * u.dot(g)) / std::max(y.segment<3>(i).norm(), 1e-12);
+    }
+    return energy;
+}
+
+Gradients descend(const Matrix& H, const Vector& c, const Vector& first) {
+    EnergyProblem problem{H, c};
+    const int size = int(first.size());
+    lbfgsfloatval_t* y = lbfgs_malloc(size);
+    const Vector start = unit_vectors(first);
+    std::copy(start.data(), start.data() + size, y);
+    lbfgs_parameter_t parameter;
+    lbfgs_parameter_init(&parameter);
+    parameter.max_iterations = kLeastEnergySteps;
+    parameter.epsilon = 1e-5;
+    parameter.past = 5;
+    parameter.delta = 1e-6;
+    lbfgs(size, y, nullptr, energy_of, nullptr, &problem, &parameter);  // its best point so far is of use whatever it says
+    Gradients found;
+    found.unit = unit_vectors(Eigen::Map<const Vector>(y, size));
+    lbfgs_free(y);
+    found.energy = found.unit.dot(H * found.unit) + 2 * c.dot(found.unit);
+    return found;
+}
+
+/// Approximate eigenvectors of the least eigenvalues: inverse iteration on a subspace.
+Matrix flattest_modes(const Matrix& H, const Vector& outward) {
+    const Index size = H.rows(), count = std::min<Index>(kSubspace, size);
+    Matrix shifted = H;
+    shifted.diagonal().array() += 1e-10 * H.trace() / double(size);
+    const Eigen::LLT<Matrix> factor(shifted);
+    Matrix space(size, count);
+    space.col(0) = outward;
+    for (Index j = 1; j < count; ++j)
+        for (Index i = 0; i < size; ++i) space(i, j) = std::cos(double((i + 1) * (j + 1)));  // any vectors do
+    for (int step = 0; step < kSubspaceSteps; ++step) {
+        space = factor.solve(space).eval();
+        space = (Eigen::HouseholderQR<Matrix>(space).householderQ() * Matrix::Identity(size, count)).eval();
+    }
+    const Eigen::SelfAdjointEigenSolver<Matrix> small(space.transpose() * H * space);
+    return space * small.eigenvectors();
+}
+
+Gradients least_energy(const Matrix& H, const Vector& c, const Vector& outward) {
+    Gradients best = descend(H, c, outward);
+    const Matrix modes = flattest_modes(H, outward);
+    for (Index k = 0; k < std::min<Index>(kModes, modes.cols()); ++k) {
+        const Gradients other = descend(H, c, modes.col(k));
+        if (other.energy < best.energy) best = other;
+    }
+    return best;
+}
+
+Point to_point(const Vec3& v) { return {v[0], v[1], v[2]}; }
+
+void check_spread(const std::vector<Vec3>& marks) {
+    if (marks.size() < 4)
+        throw Error(Errc::InvalidInput, "guess: expected at least 4 marks, got " + std::to_string(marks.size()));
+    Point mean = Point::Zero();
+    for (const Vec3& m : marks) mean += to_point(m) / double(marks.size());
+    Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+    for (const Vec3& m : marks) spread += (to_point(m) - mean) * (to_point(m) - mean).transpose();
+    const Point axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues();
+    if (!(axes[0] > 1e-8 * axes[2]))
+        throw Error(Errc::InvalidInput, "guess: all " + std::to_string(marks.size()) +
+                                            " marks lie in one plane, and so enclose nothing; mark a second slice");
+}
+
+}  // namespace
+
+VariationalSurface::VariationalSurface(const Constraints& given, const std::vector<Vec3>& normals, double amplitude)
+    : marks_(given.marks) {
+    check_spread(given.marks);
+    const auto marks = Index(given.marks.size()), count = marks + Index(given.seeds.size());
+    for (const Vec3& m : given.marks)
+        for (int a = 0; a < 3; ++a) center_[a] += m[a] / double(marks);
+    radius_ = 0;
+    std::vector<Point> nodes;
+    for (const std::vector<Vec3>* list : {&given.marks, &given.seeds})
+        for (const Vec3& m : *list) nodes.push_back(to_point(m) - to_point(center_));
+    for (Index n = 0; n < marks; ++n) radius_ = std::max(radius_, nodes[std::size_t(n)].norm());
+    for (Point& node : nodes) node /= radius_;
+
+    Vector values = Vector::Zero(count), variance = Vector::Zero(count);
+    for (Index n = 0; n < marks; ++n) variance[n] = given.variance[std::size_t(n)] / (radius_ * radius_);
+    for (Index n = marks; n < count; ++n) values[n] = given.seed_value[std::size_t(n - marks)] / radius_;
+
+    Vector outward(3 * marks);
+    for (Index n = 0; n < marks; ++n) outward.segment<3>(3 * n) = nodes[std::size_t(n)];
+    Vector known(3 * Index(normals.size()));
+    for (std::size_t n = 0; n < normals.size(); ++n) known.segment<3>(3 * Index(n)) = to_point(normals[n]);
+
+    double unit_amplitude = amplitude > 0 ? amplitude * radius_ : 1.0;
+    Gradients found;
+    Vector basis;
+    Eigen::Vector4d polynomial;
+    const int rounds = amplitude > 0 ? 1 : kAmplitudeRounds;
+    for (int round = 0; round < rounds; ++round) {
+        const Vector lambda = (variance / unit_amplitude).cwiseMax(kLeastLambda);
+        const HermiteSystem system(nodes, marks, lambda);
+        double constant = 0;
+        const Vector c = system.linear(values, constant);
+        if (round > 0)
+            found = descend(system.energy(), c, found.unit);
+        else
+            found = normals.empty() ? least_energy(system.energy(), c, outward) : descend(system.energy(), c, known);
+        system.weights(values, found.unit, basis, polynomial);
+        if (amplitude <= 0) unit_amplitude = std::max((found.energy + constant) / system.freedom(), 1e-12);
+    }
+    amplitude_ = unit_amplitude / radius_;
+    for (Index n = 0; n < count; ++n) {
+        const Point& p = nodes[std::size_t(n)];
+        x_.push_back(p[0]), y_.push_back(p[1]), z_.push_back(p[2]);
+        a_.push_back(basis[n]);
+        const Point b = n < marks ? Point(basis.segment<3>(count + 3 * n)) : Point(Point::Zero());
+        bx_.push_back(b[0]), by_.push_back(b[1]), bz_.push_back(b[2]);
+    }
+    std::copy(polynomial.data(), polynomial.data() + kPolynomial, c_);
+    // Without seeds nothing tells the sides apart but that the outside goes on for ever.
+    if (given.seeds.empty() && normals.empty()) {
+        double far = 0;
+        for (int corner = 0; corner < 8; ++corner)
+            far += value({center_[0] + (corner & 4 ? 3 : -3) * radius_, center_[1] + (corner & 2 ? 3 : -3) * radius_,
+                          center_[2] + (corner & 1 ? 3 : -3) * radius_});
+        if (far < 0) flip();
+    }
+}
+
+void VariationalSurface::flip() {
+    for (std::vector<double>* weights : {&a_, &bx_, &by_, &bz_})
+        for (double& w : *weights) w = -w;
+    for (double& c : c_) c = -c;
+}
+
+double VariationalSurface::value(const Vec3& at) const {
+    double result = 0;
+    row(at, {0, 0, 0}, 1, &result);
+    return result;
+}
+
+void VariationalSurface::row(const Vec3& from, const Vec3& step, int count, double* values) const {
+    const TriharmonicSum sum{x_.data(), y_.data(), z_.data(), a_.data(), bx_.data(), by_.data(), bz_.data(), x_.size()};
+    double start[3], along[3];
+    for (int k = 0; k < 3; ++k) {
+        start[k] = (from[k] - center_[k]) / radius_;
+        along[k] = step[k] / radius_;
+    }
+    for (int first = 0; first < count; first += kTriharmonicLanes) {
+        double x[3][kTriharmonicLanes], total[kTriharmonicLanes];
+        for (int l = 0; l < kTriharmonicLanes; ++l)
+            for (int k = 0; k < 3; ++k) x[k][l] = start[k] + std::min(first + l, count - 1) * along[k];
+        triharmonic_sum(sum, x[0], x[1], x[2], total);
+        for (int l = 0; l < std::min(kTriharmonicLanes, count - first); ++l)
+            values[first + l] =
+                radius_ * (total[l] + c_[0] + c_[1] * x[0][l] + c_[2] * x[1][l] + c_[3] * x[2][l]);
+    }
+}
+
+Vec3 VariationalSurface::gradient(const Vec3& at) const {
+    const Point p = (to_point(at) - to_point(center_)) / radius_;
+    Point sum(c_[1], c_[2], c_[3]);
+    for (std::size_t n = 0; n < x_.size(); ++n) {
+        const Point d = p - Point(x_[n], y_[n], z_[n]), b(bx_[n], by_[n], bz_[n]);
+        const double r = d.norm();
+        sum += 3 * r * a_[n] * d - 3 * r * b;
+        if (r > 0) sum -= 3 * d * d.dot(b) / r;
+    }
+    return {sum[0], sum[1], sum[2]};
+}
+
+}  // namespace covol::guess

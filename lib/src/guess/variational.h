@@ -1,0 +1,56 @@
+#pragma once
+#include <cstddef>
+#include <vector>
+
+#include "covol/fwd.h"
+
+namespace covol::guess {
+
+/// What a surface through marks has to meet. Lengths in one unit, any.
+struct Constraints {
+    std::vector<Vec3> marks;       ///< f is about 0 there, and its gradient has length 1
+    std::vector<double> variance;  ///< of each mark's place along the normal, length^2; the same count
+    std::vector<Vec3> seeds;       ///< f is about `seed_value` there
+    std::vector<double> seed_value;
+};
+
+/// The function whose zero level set passes the marks and bends least: variational implicit surfaces from points
+/// without normals (Huang, Carr, Ju, "Variational implicit point set surfaces", ACM Trans. Graph. 38(4), 2019).
+///
+///   f(x) = sum_j a_j phi(x - x_j) - sum_j b_j . grad phi(x - x_j) + c0 + c . x,   phi(r) = |r|^3
+///
+/// interpolates values s_j and unit gradients g_j at the marks with the least third-order energy y^T M^-1 y, y = (s, g)
+/// (triharmonic Hermite interpolation); the g_j are those unit vectors for which that least energy is least, and the
+/// values trade energy for closeness: minimise energy + sum_j s_j^2 / lambda_j, which adds lambda_j to the diagonal of
+/// the values' block of M. lambda_j is the mark's variance over the variance of f itself, which is its likeliest
+/// value given the marks: energy over its degrees of freedom.
+class VariationalSurface {
+public:
+    /// @param normals  a first guess of the gradients' directions, or empty: then several are tried (the flattest modes of the
+    ///                 energy, and away from the centroid)
+    /// @param amplitude  variance of f per length: f is as likely as amplitude * |x|^3 is its covariance; 0: from the marks
+    /// @throws Error InvalidInput (fewer than four distinct marks, or all in one plane); Numerical.
+    explicit VariationalSurface(const Constraints& constraints, const std::vector<Vec3>& normals = {}, double amplitude = 0);
+
+    /// About a distance beside the marks; negative inside (the side that does not reach to infinity).
+    [[nodiscard]] double value(const Vec3& at) const;
+    [[nodiscard]] Vec3 gradient(const Vec3& at) const;
+    /// value() at from + n * step, n < count.
+    void row(const Vec3& from, const Vec3& step, int count, double* values) const;
+
+    [[nodiscard]] double amplitude() const { return amplitude_; }
+    /// Which way is inside is a matter of the whole: a part of a surface takes it from the whole.
+    void flip();
+    [[nodiscard]] const std::vector<Vec3>& marks() const { return marks_; }
+
+private:
+    std::vector<Vec3> marks_;
+    Vec3 center_{0, 0, 0};
+    double radius_ = 1;
+    double amplitude_ = 0;
+    // In the unit ball, structure of arrays: node, weight of its value and of its gradient (0 for seeds).
+    std::vector<double> x_, y_, z_, a_, bx_, by_, bz_;
+    double c_[4] = {0, 0, 0, 0};
+};
+
+}  // namespace covol::guess

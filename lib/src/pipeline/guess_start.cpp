@@ -1,0 +1,47 @@
+// The start from few marks: the surface through them that bends least.
+#include "pipeline/fields.h"
+#include "pipeline/starts.h"
+
+namespace covol::pipeline {
+namespace {
+
+constexpr double kPrecision = 0.3;  // of a voxel: the deviation of what is uniform over one
+
+/// How well marks are placed, along the image's axes; without an image, of what the voxel size says.
+std::array<Vec3, 3> deviation(const Job& job) {
+    std::array<Vec3, 3> axes{};
+    for (int a = 0; a < 3; ++a) {
+        const double given = job.options.mark_precision;
+        if (job.image == nullptr || given >= 0) {
+            axes[a][a] = given >= 0 ? given : kPrecision * job.h();
+            continue;
+        }
+        const ImageGeometry& geometry = job.image->geometry();
+        for (int row = 0; row < 3; ++row) axes[a][row] = kPrecision * geometry.spacing[a] * geometry.direction[row][a];
+    }
+    return axes;
+}
+
+}  // namespace
+
+void start_from_guess(Job& job) {
+    job.origin = StartOrigin::Guess;
+    job.options.evolve.follow = true;
+    const WorldBox box = bounding_box(job.points);
+    double extent = 0;
+    for (int a = 0; a < 3; ++a) extent = std::max(extent, box.max[a] - box.min[a]);
+    job.report().domain = job.domain_with_chosen_margin(0.25 * extent + kMarginVoxels * job.h());
+    GuessOptions options;
+    options.deviation = deviation(job);
+    options.inside = job.options.inside;
+    options.outside = job.options.outside;
+    options.has_end = job.image != nullptr || job.options.roi.has_value();
+    options.end = job.domain().world_box();
+    {
+        Timed timed(job.report().seconds.tag);
+        job.result.u = guess_from_marks(job.domain(), job.points, options, job.report().guess, job.run);
+    }
+    job.choose("guess", job.report().guess.summary, "");
+}
+
+}  // namespace covol::pipeline
