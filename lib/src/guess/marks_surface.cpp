@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numeric>
 
@@ -17,6 +18,7 @@ constexpr std::size_t kOriented = 100;  // marks whose normals are searched for 
 constexpr std::size_t kWhole = 300;     // marks of the whole
 constexpr std::size_t kPatchMarks = 48; // marks of a part
 constexpr std::size_t kCoreMarks = 12;  // of these, nearest to its centre, need no part of their own
+constexpr double kVarianceStep = 4, kLeastFactor = 1e-3;
 constexpr double kWholeWeight = 1e-3;   // of the whole, among parts that weigh 1 at their centres
 
 double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
@@ -86,6 +88,34 @@ std::vector<std::size_t> nearest(const std::vector<Vec3>& points, std::size_t to
     return chosen;
 }
 
+/// The share of their variance that marks have that fit each other better than was said.
+struct LikeliestVariance {
+    double factor = 1;
+    std::unique_ptr<VariationalSurface> surface;  ///< with it
+};
+
+/// Exact marks are likelier by a factor of sqrt(kVarianceStep) each with a variance that is kVarianceStep times smaller;
+/// a step is taken where they show half of that. (What is said is never enlarged: a surface that is truly rough looks
+/// like imprecise marks.)
+LikeliestVariance likeliest_variance(const VariationalSurface& said, const ImpreciseMarks& marks, const std::vector<std::size_t>& chosen,
+                                     const std::function<Constraints(Constraints)>& complete, const RunContext& run) {
+    const std::vector<Vec3> normals = normals_of(said, marks.marks);
+    const auto with = [&](double factor) {
+        Constraints part = complete(part_of(marks, chosen, normals));
+        for (double& v : part.variance) v *= factor;
+        return std::make_unique<VariationalSurface>(part, at(normals, chosen));
+    };
+    const double enough = 0.5 * 0.5 * double(chosen.size()) * std::log(kVarianceStep);
+    LikeliestVariance best{1, with(1)};
+    while (best.factor > kLeastFactor) {
+        run.check();
+        std::unique_ptr<VariationalSurface> finer = with(best.factor / kVarianceStep);
+        if (finer->log_likelihood() - best.surface->log_likelihood() < enough) break;
+        best = {best.factor / kVarianceStep, std::move(finer)};
+    }
+    return best;
+}
+
 /// Wendland's C2 function of the distance over the support.
 double weight(double squared, double radius) {
     const double t = std::sqrt(squared) / radius;
@@ -109,11 +139,14 @@ MarksSurface::MarksSurface(const ImpreciseMarks& marks, const RunContext& run) {
         return part;
     };
     const std::vector<std::size_t> few = spread_out(marks.marks, kOriented);
-    const VariationalSurface oriented(with_seeds(part_of(marks, few, {})));
-    run.check();
+    const Constraints unoriented = with_seeds(part_of(marks, few, {}));
+    const VariationalSurface first(unoriented);
+    const LikeliestVariance likeliest = likeliest_variance(first, marks, few, with_seeds, run);
+    const VariationalSurface& oriented = *likeliest.surface;
+    variance_factor_ = likeliest.factor;
     const std::vector<Vec3> normals = normals_of(oriented, marks.marks);
     const std::vector<std::size_t> many = spread_out(marks.marks, kWhole);
-    const Constraints part = with_seeds(part_of(marks, many, normals));
+    const Constraints part = with_factor(with_seeds(part_of(marks, many, normals)));
     whole_ = std::make_unique<VariationalSurface>(part, at(normals, many), oriented.amplitude());
     offset_ = mean_value(*whole_, part);
     run.check();
@@ -141,10 +174,13 @@ void MarksSurface::make_patches(const ImpreciseMarks& marks, const RunContext& r
     std::vector<std::unique_ptr<Patch>> made(places.size());
     tbb::parallel_for(std::size_t(0), places.size(), [&](std::size_t p) {
         if (run.cancelled()) return;
-        const Constraints part = part_of(marks, places[p].marks, normals);
-        VariationalSurface surface(part, at(normals, places[p].marks), whole_->amplitude());
-        const double offset = mean_value(surface, part);
-        made[p] = std::make_unique<Patch>(Patch{marks.marks[places[p].center], places[p].radius, std::move(surface), offset});
+        Constraints part = with_factor(part_of(marks, places[p].marks, normals));
+        for (const Vec3& mark : part.marks) {
+            part.known_value.push_back(whole_->value(mark) - offset_);
+            part.known_gradient.push_back(whole_->gradient(mark));
+        }
+        made[p] = std::make_unique<Patch>(Patch{marks.marks[places[p].center], places[p].radius,
+                                                VariationalSurface(part, at(normals, places[p].marks), whole_->amplitude())});
     });
     run.check();
     for (auto& patch : made) patches_.push_back(std::move(*patch));
@@ -184,6 +220,11 @@ void MarksSurface::sort_patches() {
     }
 }
 
+Constraints MarksSurface::with_factor(Constraints part) const {
+    for (double& v : part.variance) v *= variance_factor_;
+    return part;
+}
+
 double MarksSurface::value(const Vec3& at) const {
     double result = 0;
     row(at, {0, 0, 0}, 1, &result);
@@ -194,8 +235,7 @@ void MarksSurface::row(const Vec3& from, const Vec3& step, int count, double* va
     whole_->row(from, step, count, values);
     for (int n = 0; n < count; ++n) values[n] -= offset_;
     if (patches_.empty()) return;
-    std::vector<double> weights(std::size_t(count), kWholeWeight), part(count);
-    for (int n = 0; n < count; ++n) values[n] *= kWholeWeight;
+    std::vector<double> added(count, 0.0), weights(std::size_t(count), kWholeWeight), part(count);
     // The patches of all cells that the row passes, in order: the same sum however rows are cut.
     std::vector<std::uint32_t> met;
     std::size_t last = std::numeric_limits<std::size_t>::max();
@@ -225,13 +265,13 @@ void MarksSurface::row(const Vec3& from, const Vec3& step, int count, double* va
         }
         if (first >= end) continue;
         const Vec3 begin{from[0] + first * step[0], from[1] + first * step[1], from[2] + first * step[2]};
-        patch.surface.row(begin, step, end - first, part.data());
+        patch.added.row(begin, step, end - first, part.data());
         for (int n = first; n < end; ++n) {
-            values[n] += w[n] * (part[n - first] - patch.offset);
+            added[n] += w[n] * part[n - first];
             weights[n] += w[n];
         }
     }
-    for (int n = 0; n < count; ++n) values[n] /= weights[n];
+    for (int n = 0; n < count; ++n) values[n] += added[n] / weights[n];
 }
 
 }  // namespace covol::guess

@@ -30,20 +30,22 @@ public:
     /// Values at from + n * step, n < count; about a distance beside the marks, negative inside.
     void row(const Vec3& from, const Vec3& step, int count, double* values) const;
     [[nodiscard]] double value(const Vec3& at) const;
+    /// The marks' variance over what was said: less than 1 where they fit each other much better.
+    [[nodiscard]] double variance_factor() const { return variance_factor_; }
     [[nodiscard]] std::size_t patches() const { return patches_.size(); }
 
 private:
     struct Patch {
         Vec3 center;
         double radius;  ///< the weight's support
-        VariationalSurface surface;
-        double offset;  ///< mean value at its marks: smoothing must not move the surface as a whole
+        VariationalSurface added;  ///< to the whole
     };
     void make_patches(const ImpreciseMarks& marks, const RunContext& run);
     void sort_patches();
+    [[nodiscard]] Constraints with_factor(Constraints part) const;
 
     std::unique_ptr<VariationalSurface> whole_;
-    double offset_ = 0;
+    double offset_ = 0, variance_factor_ = 1;
     std::vector<Patch> patches_;
     // A lattice of cells, each with the patches that reach into it.
     Vec3 low_{0, 0, 0};

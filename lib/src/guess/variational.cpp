@@ -93,6 +93,11 @@ public:
         polynomial = qr_.matrixQR().topLeftCorner<kPolynomial, kPolynomial>().triangularView<Eigen::Upper>().solve(
             left.head<kPolynomial>());
     }
+    [[nodiscard]] double log_determinant() const {
+        double sum = 0;
+        for (Index i = 0; i < factor_.rows(); ++i) sum += 2 * std::log(factor_.matrixLLT()(i, i));
+        return sum;
+    }
     [[nodiscard]] double freedom() const { return double(size_ - kPolynomial); }
 
 private:
@@ -133,6 +138,7 @@ struct Gradients {
     double energy = std::numeric_limits<double>::infinity();
 };
 
+/// g^T H g + 2 c^T g, g the unit gradients.
 struct EnergyProblem {
     const Matrix& H;
     const Vector& c;
@@ -235,6 +241,11 @@ VariationalSurface::VariationalSurface(const Constraints& given, const std::vect
     Vector values = Vector::Zero(count), variance = Vector::Zero(count);
     for (Index n = 0; n < marks; ++n) variance[n] = given.variance[std::size_t(n)] / (radius_ * radius_);
     for (Index n = marks; n < count; ++n) values[n] = given.seed_value[std::size_t(n - marks)] / radius_;
+    Vector before = Vector::Zero(3 * marks);  // known gradients
+    for (Index n = 0; n < Index(given.known_value.size()); ++n) {
+        values[n] = -given.known_value[std::size_t(n)] / radius_;
+        before.segment<3>(3 * n) = to_point(given.known_gradient[std::size_t(n)]);
+    }
 
     Vector outward(3 * marks);
     for (Index n = 0; n < marks; ++n) outward.segment<3>(3 * n) = nodes[std::size_t(n)];
@@ -250,13 +261,15 @@ VariationalSurface::VariationalSurface(const Constraints& given, const std::vect
         const Vector lambda = (variance / unit_amplitude).cwiseMax(kLeastLambda);
         const HermiteSystem system(nodes, marks, lambda);
         double constant = 0;
-        const Vector c = system.linear(values, constant);
+        const Vector c = system.linear(values, constant) - system.energy() * before;
         if (round > 0)
             found = descend(system.energy(), c, found.unit);
         else
             found = normals.empty() ? least_energy(system.energy(), c, outward) : descend(system.energy(), c, known);
-        system.weights(values, found.unit, basis, polynomial);
-        if (amplitude <= 0) unit_amplitude = std::max((found.energy + constant) / system.freedom(), 1e-12);
+        system.weights(values, found.unit - before, basis, polynomial);
+        if (amplitude > 0) continue;
+        unit_amplitude = std::max((found.energy + constant) / system.freedom(), 1e-12);
+        log_likelihood_ = -0.5 * (system.log_determinant() + system.freedom() * std::log(unit_amplitude));
     }
     amplitude_ = unit_amplitude / radius_;
     for (Index n = 0; n < count; ++n) {
@@ -268,7 +281,7 @@ VariationalSurface::VariationalSurface(const Constraints& given, const std::vect
     }
     std::copy(polynomial.data(), polynomial.data() + kPolynomial, c_);
     // Without seeds nothing tells the sides apart but that the outside goes on for ever.
-    if (given.seeds.empty() && normals.empty()) {
+    if (given.seeds.empty() && normals.empty() && given.known_value.empty()) {
         double far = 0;
         for (int corner = 0; corner < 8; ++corner)
             far += value({center_[0] + (corner & 4 ? 3 : -3) * radius_, center_[1] + (corner & 2 ? 3 : -3) * radius_,

@@ -12,6 +12,10 @@ struct Constraints {
     std::vector<double> variance;  ///< of each mark's place along the normal, length^2; the same count
     std::vector<Vec3> seeds;       ///< f is about `seed_value` there
     std::vector<double> seed_value;
+    /// What is known of f beforehand at the marks, its value and its gradient: the energy is that of what f adds to it, and
+    /// value() leaves it out. Empty: nothing.
+    std::vector<double> known_value;
+    std::vector<Vec3> known_gradient;
 };
 
 /// The function whose zero level set passes the marks and bends least: variational implicit surfaces from points
@@ -38,6 +42,8 @@ public:
     /// value() at from + n * step, n < count.
     void row(const Vec3& from, const Vec3& step, int count, double* values) const;
 
+    /// Of the marks, given their variance and the amplitude, but for a constant.
+    [[nodiscard]] double log_likelihood() const { return log_likelihood_; }
     [[nodiscard]] double amplitude() const { return amplitude_; }
     /// Which way is inside is a matter of the whole: a part of a surface takes it from the whole.
     void flip();
@@ -47,7 +53,7 @@ private:
     std::vector<Vec3> marks_;
     Vec3 center_{0, 0, 0};
     double radius_ = 1;
-    double amplitude_ = 0;
+    double amplitude_ = 0, log_likelihood_ = 0;
     // In the unit ball, structure of arrays: node, weight of its value and of its gradient (0 for seeds).
     std::vector<double> x_, y_, z_, a_, bx_, by_, bz_;
     double c_[4] = {0, 0, 0, 0};

@@ -1,0 +1,157 @@
+#include "covol/guess.h"
+
+#include <catch2/catch.hpp>
+#include <numbers>
+
+#include "covol/error.h"
+#include "covol/mesh.h"
+#include "covol/surface.h"
+#include "support/clouds.h"
+#include "support/shapes.h"
+
+using namespace covol;
+using namespace covol::test;
+
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+/// A closed surface with a known volume and a signed distance that is exact to first order beside it.
+struct Shape {
+    const char* name;
+    std::function<Vec3(std::mt19937&)> draw;  ///< a random point of it
+    Function distance;
+    double volume;
+};
+
+Vec3 random_direction(std::mt19937& random) {
+    std::normal_distribution<double> normal;
+    const Vec3 v{normal(random), normal(random), normal(random)};
+    const double l = length(v);
+    return {v[0] / l, v[1] / l, v[2] / l};
+}
+
+Shape ellipsoid(const char* name, const Vec3& r) {
+    const auto level = [r](const Vec3& x) { return length({x[0] / r[0], x[1] / r[1], x[2] / r[2]}); };
+    return {name,
+            [r](std::mt19937& random) {
+                const Vec3 d = random_direction(random);
+                return Vec3{r[0] * d[0], r[1] * d[1], r[2] * d[2]};
+            },
+            [r, level](const Vec3& x) {
+                const double l = level(x);
+                return l * (l - 1) / length({x[0] / (r[0] * r[0]), x[1] / (r[1] * r[1]), x[2] / (r[2] * r[2])});
+            },
+            4.0 / 3 * kPi * r[0] * r[1] * r[2]};
+}
+
+Shape torus(double R, double r) {
+    return {"torus",
+            [R, r](std::mt19937& random) {
+                std::uniform_real_distribution<double> angle(0, 2 * kPi), share(0, R + r);
+                for (;;) {
+                    const double u = angle(random), v = angle(random), ring = R + r * std::cos(v);
+                    if (share(random) < ring) return Vec3{ring * std::cos(u), ring * std::sin(u), r * std::sin(v)};
+                }
+            },
+            [R, r](const Vec3& x) { return std::hypot(std::hypot(x[0], x[1]) - R, x[2]) - r; }, 2 * kPi * kPi * R * r * r};
+}
+
+std::vector<Vec3> draw(const Shape& shape, int count, unsigned seed) {
+    std::mt19937 random(seed);
+    std::vector<Vec3> points;
+    for (int n = 0; n < count; ++n) points.push_back(shape.draw(random));
+    return points;
+}
+
+GuessOptions precision(const Vec3& spacing, double share = 0.3) {
+    GuessOptions options;
+    for (int a = 0; a < 3; ++a) options.deviation[a][a] = share * spacing[a];
+    return options;
+}
+
+struct Bias {
+    double mean, volume;
+};
+
+Bias bias_of(const Shape& shape, const std::vector<Vec3>& marks, const GuessOptions& options) {
+    const Domain domain = cube_domain(72, 1.0);
+    GuessReport report;
+    const FloatGridPtr guess = guess_from_marks(domain, marks, options, report);
+    const TriangleMesh mesh = extract_mesh(*surface(*guess), {});
+    double sum = 0;
+    for (const auto& v : mesh.vertices) sum += shape.distance({v[0], v[1], v[2]});
+    return {sum / double(mesh.vertices.size()), measure(mesh).volume / shape.volume};
+}
+
+}  // namespace
+
+TEST_CASE("exact points are met without bias, however few") {
+    const Shape shapes[] = {ellipsoid("sphere", {20, 20, 20}), ellipsoid("ellipsoid", {28, 18, 14}), torus(20, 9)};
+    for (const Vec3& spacing : {Vec3{1, 1, 1}, Vec3{1, 1, 5}})
+        for (const Shape& shape : shapes)
+            for (const int count : {50, 300, 3000})
+                for (const unsigned seed : {1u, 2u, 3u}) {
+                    const Bias bias = bias_of(shape, draw(shape, count, seed), precision(spacing));
+                    INFO(shape.name << ", " << count << " points, seed " << seed << ", spacing " << spacing[2] << ": mean "
+                                    << bias.mean << " voxels, volume " << bias.volume);
+                    UNSCOPED_INFO(1);
+                    WARN(shape.name << " " << count << " " << seed << " " << spacing[2] << " " << bias.mean << " " << bias.volume);
+                    CHECK(std::abs(bias.mean) <= (count == 50 ? 0.05 : 0.02));
+                    CHECK(std::abs(bias.volume - 1) <= 0.005);
+                }
+}
+
+TEST_CASE("what encloses nothing is refused with a reason") {
+    const Domain domain = cube_domain(40, 1.0);
+    GuessReport report;
+    const auto guess = [&](const std::vector<Vec3>& marks) { return guess_from_marks(domain, marks, precision({1, 1, 1}), report); };
+    CHECK_THROWS_WITH(guess({{0, 0, 0}, {5, 0, 0}, {0, 5, 0}}), Catch::Contains("at least 4 marks"));
+    std::vector<Vec3> ring;
+    for (int n = 0; n < 20; ++n) ring.push_back({10 * std::cos(0.3 * n), 10 * std::sin(0.3 * n), 2});
+    CHECK_THROWS_WITH(guess(ring), Catch::Contains("second slice"));
+}
+
+TEST_CASE("a guess does not depend on the number of threads, nor on where the world begins") {
+    const Shape shape = ellipsoid("ellipsoid", {18, 12, 10});
+    const Domain domain = cube_domain(56, 1.0);
+    const std::vector<Vec3> marks = draw(shape, 500, 5);  // parts, too
+    GuessReport report;
+    RunContext one, four;
+    one.threads = 1;
+    four.threads = 4;
+    const FloatGridPtr a = guess_from_marks(domain, marks, precision({1, 1, 1}), report, one);
+    const FloatGridPtr b = guess_from_marks(domain, marks, precision({1, 1, 1}), report, four);
+    CHECK(report.patches > 0);
+    CHECK(identical(*a, *b));
+}
+
+TEST_CASE("marks in the cut are told from marks on the surface") {
+    // A ball whose upper third the image cuts off, marked on its surface and on the cut.
+    const Shape shape = ellipsoid("sphere", {20, 20, 20});
+    Domain domain = cube_domain(72, 1.0);
+    domain.max[2] = domain.min[2] + 41;
+    GuessOptions options = precision({1, 1, 1});
+    options.has_end = true;
+    options.end = domain.world_box();
+    const double top = options.end.max[2];
+    std::vector<Vec3> marks;
+    for (const Vec3& p : draw(shape, 300, 7))
+        if (p[2] < top) marks.push_back(p);
+    const std::size_t on_surface = marks.size();
+    const double rim = std::sqrt(400 - top * top);
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> along(-rim, rim);
+    while (marks.size() < on_surface + 60) {
+        const Vec3 p{along(random), along(random), top - 0.5};
+        if (std::hypot(p[0], p[1]) < 0.8 * rim) marks.push_back(p);
+    }
+    GuessReport report;
+    const FloatGridPtr guess = guess_from_marks(domain, marks, options, report);
+    CHECK(report.cut_marks == 60);
+    double sum = 0;
+    int count = 0;
+    for (const auto& v : extract_mesh(*surface(*guess), {}).vertices)
+        if (v[2] < top - 1) sum += shape.distance({v[0], v[1], v[2]}), ++count;
+    CHECK(std::abs(sum / count) < 0.03);
+}
