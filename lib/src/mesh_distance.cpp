@@ -100,13 +100,7 @@ std::vector<double> distances_to(const TriangleMesh& mesh, const std::vector<Vec
     return distances;
 }
 
-}  // namespace detail
-
-FitStatistics points_to_surface(const std::vector<Vec3>& points, const TriangleMesh& mesh, const RunContext& run) {
-    if (points.empty()) throw Error(Errc::InvalidInput, "points_to_surface: expected at least one point, got none");
-    if (mesh.empty()) throw Error(Errc::InvalidInput, "points_to_surface: the surface has no triangle");
-    std::vector<double> distances;
-    with_threads(run, [&] { distances = detail::distances_to(mesh, points); });
+FitStatistics statistics_of(std::vector<double> distances) {
     FitStatistics fit;
     fit.mean = std::accumulate(distances.begin(), distances.end(), 0.0) / double(distances.size());
     const auto rank = std::size_t(std::ceil(0.95 * double(distances.size()))) - 1;
@@ -114,6 +108,16 @@ FitStatistics points_to_surface(const std::vector<Vec3>& points, const TriangleM
     fit.p95 = distances[rank];
     fit.max = *std::max_element(distances.begin() + std::ptrdiff_t(rank), distances.end());
     return fit;
+}
+
+}  // namespace detail
+
+FitStatistics points_to_surface(const std::vector<Vec3>& points, const TriangleMesh& mesh, const RunContext& run) {
+    if (points.empty()) throw Error(Errc::InvalidInput, "points_to_surface: expected at least one point, got none");
+    if (mesh.empty()) throw Error(Errc::InvalidInput, "points_to_surface: the surface has no triangle");
+    std::vector<double> distances;
+    with_threads(run, [&] { distances = detail::distances_to(mesh, points); });
+    return detail::statistics_of(std::move(distances));
 }
 
 }  // namespace covol

@@ -1,5 +1,6 @@
 // segment(): the steps in their order. Each is a module of pipeline/, and works on one Job.
 #include "covol/pipeline.h"
+#include "covol/error.h"
 
 #include <openvdb/openvdb.h>
 
@@ -8,6 +9,7 @@
 
 #include "pipeline/automatic.h"
 #include "pipeline/coarse_level.h"
+#include "pipeline/doubts.h"
 #include "pipeline/fields.h"
 #include "pipeline/final_surface.h"
 #include "pipeline/flow.h"
@@ -18,6 +20,28 @@ namespace {
 
 using namespace pipeline;
 
+// A surface that vanished, or that left the marks, is not returned while the marks alone tell of one.
+void fall_back(Job& job) {
+    const bool vanished = has_vanished(job);
+    if (!job.guided() || job.origin == StartOrigin::Guess || job.sure.size() < 4 || !job.uses_points()) return;
+    if (!vanished && (job.origin == StartOrigin::Contours || !misses_marks(job, *job.result.u))) return;
+    const FloatGridPtr before = job.result.u;
+    try {
+        start_from_guess(job);
+    } catch (const Error& error) {
+        if (error.code() == Errc::Cancelled) throw;
+        job.result.u = before;
+        return;
+    }
+    if (!vanished && misses_marks(job, *job.result.u)) {
+        job.result.u = before;
+        return;
+    }
+    job.warn(std::string("the surface ") + (vanished ? "vanished" : "left more than a tenth of the marks") +
+             ": this is the one through the marks that bends least instead; the image had no say in it");
+    flow(job);
+}
+
 void solve(Job& job, const std::optional<FineStart>& without_coarse) {
     flow(job);
     if (without_coarse && has_vanished(job)) {
@@ -25,6 +49,7 @@ void solve(Job& job, const std::optional<FineStart>& without_coarse) {
         find_edges(job);
         flow(job);
     }
+    fall_back(job);
     job.run.check();
     job.result.u->setName("u");
     check_flow(job);

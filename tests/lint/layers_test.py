@@ -13,6 +13,7 @@ LAYERS = [
     ["contours"],
     ["distance", "edge", "scan_noise"],
     ["band", "evolve", "scan_solid"],
+    ["guess"],
     ["surface", "mesh_cleanup", "cloud_cleanup", "compare"],
     ["structures", "evidence"],
     ["pipeline", "phantom", "render"],
@@ -26,7 +27,8 @@ SOURCE_LEVEL = {"contour_solid": LEVEL["contours"], "points_check": LEVEL["point
 PIPELINE = [
     ["job", "options"],
     ["automatic", "fields"],
-    ["starts", "given_start", "contour_start", "tagged_start", "flow", "final_surface"],
+    ["doubts", "starts", "given_start", "guess_start", "contour_start", "tagged_start", "flow"],
+    ["final_surface"],
     ["coarse_level"],
 ]
 PIPELINE_LEVEL = {name: level for level, names in enumerate(PIPELINE) for name in names}
@@ -64,7 +66,7 @@ def findings(root):
         if not path.read_text().startswith("#pragma once"):
             yield f"{path}:1: expected #pragma once"
     for path in public + sources:
-        level = LEVEL.get(path.stem, SOURCE_LEVEL.get(path.stem)) if path.parent.name not in ("detail", "pipeline") else None
+        level = LEVEL.get(path.stem, SOURCE_LEVEL.get(path.stem)) if path.parent.name not in ("detail", "pipeline", "guess") else None
         for number, line in enumerate(without_comments(path.read_text()).splitlines(), 1):
             where = f"{path.relative_to(root)}:{number}"
             include = INCLUDE.search(line)

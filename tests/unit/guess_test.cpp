@@ -155,3 +155,22 @@ TEST_CASE("marks in the cut are told from marks on the surface") {
         if (v[2] < top - 1) sum += shape.distance({v[0], v[1], v[2]}), ++count;
     CHECK(std::abs(sum / count) < 0.03);
 }
+
+TEST_CASE("a seed in a cavity makes it one, and one in a dent keeps it open") {
+    // A thick shell: marks on both of its walls. Without a seed the cavity may be taken for part of the body.
+    std::vector<Vec3> marks = draw(ellipsoid("outer", {22, 22, 22}), 120, 11);
+    const std::vector<Vec3> inner = draw(ellipsoid("inner", {10, 10, 10}), 40, 12);
+    marks.insert(marks.end(), inner.begin(), inner.end());
+    const Domain domain = cube_domain(64, 1.0);
+    GuessOptions options = precision({1, 1, 1});
+    options.outside = {{0, 0, 0}};
+    options.inside = {{16, 0, 0}, {0, -16, 0}};
+    GuessReport report;
+    const FloatGridPtr guess = guess_from_marks(domain, marks, options, report);
+    CHECK(report.wrong_seeds == 0);
+    CHECK(value_at(*guess, {0, 0, 0}) > 0);
+    CHECK(value_at(*guess, {0, 16, 0}) < 0);
+    CHECK(value_at(*guess, {0, 0, 28}) > 0);
+    const MeshMeasures measures = measure(extract_mesh(*surface(*guess), {}));
+    CHECK(measures.volume == Approx(4.0 / 3 * kPi * (22 * 22 * 22 - 1000)).epsilon(0.03));
+}

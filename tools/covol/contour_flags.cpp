@@ -9,7 +9,7 @@ void ContourFlags::bind(CLI::App& command, bool names) {
                            (names ? "; with names, ve=FILE exe=FILE, several structures" : ""))
         ->type_name(names ? "[NAME=]FILE..." : "FILE...");
     add_choice(command, "--contour-curve", curve, {{"lines", ContourCurve::Lines}, {"spline", ContourCurve::Spline}},
-               "how neighbouring marks are joined [lines]");
+               "how neighbouring marks are joined [spline]");
 }
 
 std::vector<PointCloud> ContourFlags::read(const ReadPointsOptions& reading, const ImageGeometry* geometry,

@@ -12,7 +12,7 @@ namespace covol::tool {
 /// Ordered marks on slices.
 struct ContourFlags {
     std::vector<std::string> paths;
-    ContourCurve curve = ContourCurve::Lines;
+    ContourCurve curve = ContourCurve::Spline;
 
     /// @param names  files may be NAME=FILE: of one structure among several
     void bind(CLI::App& command, bool names);

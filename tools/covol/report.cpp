@@ -70,7 +70,8 @@ Json to_json(const CompareReport& r) {
 
 Json to_json(const SegmentOptions& o) {
     const EvolveOptions& e = o.evolve;
-    return {{"voxel_size", o.voxel_size},
+    return {{"model", to_string(o.model)},
+            {"voxel_size", o.voxel_size},
             {"tag_distance", o.tag_distance},
             {"theta", e.theta},
             {"rho", e.rho},
@@ -105,6 +106,16 @@ Json to_json(const SegmentReport& r) {
     json["solve"] = to_json(r.solve);
     json["surface"] = to_json(r.surface);
     if (r.point_count > 0) json["fit"]["points_to_surface"] = to_json(r.fit);
+    if (r.point_count > 0) json["fit"]["points_to_surface"]["bias"] = r.fit.bias;
+    if (r.marks_off.beyond > 0)
+        json["fit"]["marks_off"] = {{"count", r.marks_off.count},
+                                    {"beyond", r.marks_off.beyond},
+                                    {"farthest", {{"distance", r.marks_off.farthest},
+                                                  {"world", to_json(r.marks_off.farthest_world)},
+                                                  {"index", to_json(r.marks_off.farthest_index)}}}};
+    if (!r.warnings.empty()) json["warnings"] = r.warnings;
+    if (r.guess.marks > 0)
+        json["guess"] = {{"marks", r.guess.marks}, {"cut_marks", r.guess.cut_marks}, {"parts", r.guess.patches}};
     if (r.share_without_points > 0) json["fit"]["surface_without_points"] = r.share_without_points;
     return json;
 }
@@ -126,7 +137,8 @@ std::vector<std::string> summary(const SegmentReport& r) {
     std::vector<std::string> lines{text.str(), "surface: " + one_line(r.surface)};
     if (r.point_count == 0) return lines;
     text.str("");
-    text << "points to surface: mean " << r.fit.mean << ", 95 % " << r.fit.p95 << ", max " << r.fit.max;
+    text << "points to surface: mean " << r.fit.mean << ", 95 % " << r.fit.p95 << ", max " << r.fit.max
+         << ", bias " << r.fit.bias;
     lines.push_back(text.str());
     return lines;
 }

@@ -18,7 +18,7 @@ enum class ContourCurve {
 
 struct ContourOptions {
     double step = 0.0;  ///< largest distance between neighbouring points, world units, > 0; the voxel size h
-    ContourCurve curve = ContourCurve::Lines;
+    ContourCurve curve = ContourCurve::Spline;
     [[nodiscard]] std::string why_invalid() const;
 };
 

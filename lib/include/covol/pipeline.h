@@ -82,6 +82,15 @@ struct SegmentReport {
     EvolveReport solve;
     MeshMeasures surface;
     FitStatistics fit;
+    /// Marks farther from the surface than two voxels of the image: wrong, or a part of the structure that is missing.
+    struct MarksOff {
+        std::size_t count = 0;
+        double beyond = 0;            ///< world units
+        double farthest = 0;          ///< world units
+        Vec3 farthest_world{0, 0, 0};
+        Vec3 farthest_index{0, 0, 0};  ///< voxels of the image; without one as farthest_world
+    } marks_off;
+    std::vector<std::string> warnings;  ///< what a person has to look at, in plain words
     double share_without_points = 0;  ///< of the surface's area: farther than 3 voxels and 3 spacings from every point
     SegmentOptions resolved;  ///< what was used: every automatic choice replaced by its value
     std::map<std::string, std::string> automatic;  ///< each automatic choice and its reason

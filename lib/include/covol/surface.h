@@ -28,7 +28,10 @@ struct ExtractOptions {
                                                   std::uint8_t label = 1, const RunContext& run = {});
 
 /// Distances from points to the zero level set (world units), exact to the extracted triangles.
-struct FitStatistics { double mean = 0, p95 = 0, max = 0; };
+struct FitStatistics {
+    double mean = 0, p95 = 0, max = 0;
+    double bias = 0;  ///< of segment() alone: mean of the signed distances; > 0 where the points lie outside, and the surface is too small
+};
 [[nodiscard]] FitStatistics points_to_surface(const std::vector<Vec3>& points, const TriangleMesh& mesh, const RunContext& run = {});
 
 }  // namespace covol

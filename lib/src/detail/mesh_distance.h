@@ -2,11 +2,15 @@
 #include <vector>
 
 #include "covol/mesh.h"
+#include "covol/surface.h"
 
 namespace covol::detail {
 
 /// The distance of each point to a mesh, exact to its triangles; in parallel.
 /// @pre mesh.triangles is not empty
 [[nodiscard]] std::vector<double> distances_to(const TriangleMesh& mesh, const std::vector<Vec3>& points);
+
+/// @pre there is at least one
+[[nodiscard]] FitStatistics statistics_of(std::vector<double> distances);
 
 }  // namespace covol::detail

@@ -11,6 +11,7 @@
 namespace covol {
 namespace {
 
+constexpr int kSeedRounds = 4;
 constexpr std::size_t kLeastOutline = 8;  // marks off the cuts, to say what is inside of them
 
 double longest(const std::array<Vec3, 3>& axes) {
@@ -35,6 +36,31 @@ guess::ImpreciseMarks imprecise(const std::vector<Vec3>& marks, const GuessOptio
     result.marks = marks;
     result.deviation = options.deviation;
     return result;
+}
+
+/// Adds those seeds to the constraints that lie on the wrong side, or on none: a little inside, or outside.
+/// @return whether there were any
+bool hold_seeds(const guess::MarksSurface& surface, const GuessOptions& options, guess::ImpreciseMarks& known) {
+    const double beyond = 1.0 / 0.3 * longest(options.deviation);  // a voxel, where the deviation is that of a voxel
+    bool any = false;
+    const auto hold = [&](const std::vector<Vec3>& seeds, double side) {
+        for (const Vec3& seed : seeds) {
+            if (side * surface.value(seed) > 0) continue;
+            known.seeds.push_back(seed);
+            known.seed_value.push_back(side * beyond);
+            any = true;
+        }
+    };
+    hold(options.inside, -1);
+    hold(options.outside, 1);
+    return any;
+}
+
+std::size_t count_wrong(const guess::MarksSurface& surface, const GuessOptions& options) {
+    std::size_t wrong = 0;
+    for (const Vec3& seed : options.inside) wrong += !(surface.value(seed) < 0);
+    for (const Vec3& seed : options.outside) wrong += !(surface.value(seed) > 0);
+    return wrong;
 }
 
 /// Marks in the cut lie deep inside the body that the others mark: the surface need not pass them.
@@ -74,11 +100,14 @@ FloatGridPtr guess_from_marks(const Domain& domain, const std::vector<Vec3>& mar
         guess::ImpreciseMarks known = imprecise(held, options);
         report.marks = held.size();
         report.cut_marks = marks.size() - held.size();
-        const guess::MarksSurface surface(known, run);
-        report.patches = surface.patches();
+        auto surface = std::make_unique<guess::MarksSurface>(known, run);
+        for (int round = 0; round < kSeedRounds && hold_seeds(*surface, options, known); ++round)
+            surface = std::make_unique<guess::MarksSurface>(known, run);
+        report.patches = surface->patches();
+        report.wrong_seeds = count_wrong(*surface, options);
         result = start_from_level(
             domain, held,
-            [&](const Vec3& from, const Vec3& step, int count, double* values) { surface.row(from, step, count, values); }, run);
+            [&](const Vec3& from, const Vec3& step, int count, double* values) { surface->row(from, step, count, values); }, run);
     });
     report.summary = std::to_string(report.marks) + " marks, the surface through them that bends least";
     if (report.patches > 0) report.summary += ", in " + std::to_string(report.patches) + " overlapping parts";

@@ -98,6 +98,7 @@ void choose_values(Job& job) {
     choose_start(job);
     const double h = job.h();
     EvolveOptions& evolve = options.evolve;
+    if (job.guesses() && job.uses_points()) return;  // nothing flows
     if (evolve.delta < 0) {
         const double voxels = job.tags() ? kTagDeltaVoxels : 1.0;
         job.choose("delta", number(evolve.delta = voxels * h), number(voxels) + " voxels");

@@ -19,6 +19,7 @@ constexpr std::size_t kFeatureMarks = 4000;  // this many are looked at
 /// A band that follows moves this far, in voxels, before g is extended.
 int edge_reach(StartOrigin origin) {
     switch (origin) {
+        case StartOrigin::Guess:
         case StartOrigin::Contours: return 5;     // lies close to the end
         case StartOrigin::CoarseLevel: return 4;  // closer still
         default: return 12;

@@ -8,6 +8,8 @@
 
 #include "covol/compare.h"
 #include "covol/scan_solid.h"
+#include "detail/mesh_distance.h"
+#include "pipeline/doubts.h"
 
 namespace covol::pipeline {
 namespace {
@@ -37,12 +39,17 @@ void make_surface(Job& job) {
     job.result.mesh = extract_mesh(*job.result.surface, job.options.extract, job.run);
     // Parts of each of these run on one thread.
     double reach = 0;
+    std::vector<double> distances;
     const std::vector<Vec3>& marks = job.options.contours ? job.given : job.marks;
     tbb::parallel_invoke([&] { report.surface = measure(job.result.mesh); },
-                         [&] { if (!job.points.empty()) report.fit = points_to_surface(marks, job.result.mesh, job.run); },
+                         [&] { if (!job.points.empty()) distances = detail::distances_to(job.result.mesh, marks); },
                          [&] { if (!job.points.empty() && job.image == nullptr) reach = find_bare_surface(job); });
+    if (!distances.empty()) {
+        report.fit = detail::statistics_of(distances);
+        doubt(job, marks, distances);
+    }
     if (report.share_without_points > kWarnWithoutPoints)
-        job.run.warn(number(std::round(1000 * report.share_without_points) / 10) +
+        job.warn(number(std::round(1000 * report.share_without_points) / 10) +
                      " % of the surface lie farther than " + number(reach) +
                      " from every point: there curvature alone closes it");
 }

@@ -113,7 +113,7 @@ std::string why_vanished(const Job& job) {
 // The guess, or where the image moved it, is the surface: nothing pulls it off the marks, and curvature smooths what
 // deviates from it, not the guess itself.
 bool rests_on_guess(const Job& job) {
-    return job.guided() && (job.origin == StartOrigin::Guess || job.origin == StartOrigin::Contours);
+    return job.guided() && job.uses_points() && (job.origin == StartOrigin::Guess || job.origin == StartOrigin::Contours);
 }
 
 void rest(Job& job) {

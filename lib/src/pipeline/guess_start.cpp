@@ -35,6 +35,7 @@ void start_from_guess(Job& job) {
     options.deviation = deviation(job);
     options.inside = job.options.inside;
     options.outside = job.options.outside;
+    options.outside.insert(options.outside.end(), job.options.exterior_seeds.begin(), job.options.exterior_seeds.end());
     options.has_end = job.image != nullptr || job.options.roi.has_value();
     options.end = job.domain().world_box();
     {

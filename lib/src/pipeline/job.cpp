@@ -25,6 +25,11 @@ void Job::choose(const std::string& what, const std::string& value, const std::s
     run.info(what + ": " + line);
 }
 
+void Job::warn(const std::string& line) {
+    report().warnings.push_back(line);
+    run.warn(line);
+}
+
 Domain Job::domain_with_margin(double margin) const {
     if (options.roi) return domain_of_box(*options.roi, h());
     if (image != nullptr) return domain_of_box(image->geometry().world_box(), h());

@@ -54,6 +54,8 @@ struct Job {
 
     /// Reports an automatic choice, and logs it.
     void choose(const std::string& what, const std::string& value, const std::string& reason);
+    /// Logs a warning, and keeps it for the report.
+    void warn(const std::string& line);
     /// The region of interest, else the image's box, else that of the points with `margin` around it.
     [[nodiscard]] Domain domain_with_margin(double margin) const;
     /// The same with the margin of the options where they have one.
