@@ -23,6 +23,8 @@ using Point = Eigen::Vector3d;
 constexpr int kPolynomial = 4;       // 1, x, y, z: what the energy does not see
 constexpr int kModes = 3;            // of the energy, tried as directions of the normals
 constexpr int kSubspace = 6, kSubspaceSteps = 12;
+constexpr int kDirections = 64;
+constexpr double kAround = 1.5;      // of the marks' radius
 constexpr int kLeastEnergySteps = 500;
 constexpr int kAmplitudeRounds = 3;
 constexpr double kLeastLambda = 1e-9;  // keeps M regular where marks coincide
@@ -136,6 +138,7 @@ Vector unit_vectors(const Vector& y) {
 struct Gradients {
     Vector unit;
     double energy = std::numeric_limits<double>::infinity();
+    bool closed = false;  ///< one sign all around the marks
 };
 
 /// g^T H g + 2 c^T g, g the unit gradients.
@@ -198,12 +201,46 @@ Matrix flattest_modes(const Matrix& H, const Vector& outward) {
     return space * small.eigenvectors();
 }
 
-Gradients least_energy(const Matrix& H, const Vector& c, const Vector& outward) {
-    Gradients best = descend(H, c, outward);
-    const Matrix modes = flattest_modes(H, outward);
-    for (Index k = 0; k < std::min<Index>(kModes, modes.cols()); ++k) {
-        const Gradients other = descend(H, c, modes.col(k));
-        if (other.energy < best.energy) best = other;
+/// The function's value, unit ball.
+double evaluate(const std::vector<Point>& nodes, Index marks, const Vector& basis, const Eigen::Vector4d& polynomial, const Point& at) {
+    const auto count = Index(nodes.size());
+    double sum = polynomial[0] + polynomial.tail<3>().dot(at);
+    for (Index n = 0; n < count; ++n) {
+        const Point d = at - nodes[std::size_t(n)];
+        const double r = d.norm();
+        sum += basis[n] * r * r * r;
+        if (n < marks) sum -= 3 * r * d.dot(basis.segment<3>(count + 3 * n));
+    }
+    return sum;
+}
+
+/// On a sphere around all nodes.
+bool has_one_sign_around(const std::vector<Point>& nodes, Index marks, const Vector& basis, const Eigen::Vector4d& polynomial) {
+    int positive = 0;
+    for (int n = 0; n < kDirections; ++n) {  // a Fibonacci lattice
+        const double z = 1 - (2 * n + 1) / double(kDirections), phi = n * 2.399963229728653;
+        const Point direction(std::sqrt(1 - z * z) * std::cos(phi), std::sqrt(1 - z * z) * std::sin(phi), z);
+        positive += evaluate(nodes, marks, basis, polynomial, kAround * direction) > 0;
+    }
+    return positive == 0 || positive == kDirections;
+}
+
+/// Of first guesses the one that ends at the least energy. A body ends: where some ends have one sign all around, far from
+/// the marks, the others are no bodies.
+Gradients least_energy(const HermiteSystem& system, const Vector& values, const Vector& c, const std::vector<Point>& nodes, Index marks,
+                       const Vector& outward) {
+    std::vector<Gradients> ends{descend(system.energy(), c, outward)};
+    const Matrix modes = flattest_modes(system.energy(), outward);
+    for (Index k = 0; k < std::min<Index>(kModes, modes.cols()); ++k)
+        ends.push_back(descend(system.energy(), c, modes.col(k)));
+    Gradients best;
+    for (Gradients& end : ends) {
+        Vector basis;
+        Eigen::Vector4d polynomial;
+        system.weights(values, end.unit, basis, polynomial);
+        end.closed = has_one_sign_around(nodes, marks, basis, polynomial);
+        const bool better = end.closed != best.closed ? end.closed : end.energy < best.energy;
+        if (better || !std::isfinite(best.energy)) best = end;
     }
     return best;
 }
@@ -265,7 +302,7 @@ VariationalSurface::VariationalSurface(const Constraints& given, const std::vect
         if (round > 0)
             found = descend(system.energy(), c, found.unit);
         else
-            found = normals.empty() ? least_energy(system.energy(), c, outward) : descend(system.energy(), c, known);
+            found = normals.empty() ? least_energy(system, values, c, nodes, marks, outward) : descend(system.energy(), c, known);
         system.weights(values, found.unit - before, basis, polynomial);
         if (amplitude > 0) continue;
         unit_amplitude = std::max((found.energy + constant) / system.freedom(), 1e-12);
