@@ -241,7 +241,9 @@ class Bench:
 
 
 def tell(value):
-    return " ".join(f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in value.items() if not isinstance(v, (list, dict)))
+    """On one line; of results in results (a count's, a method's) the Dice."""
+    text = {k: v.get("dice") if isinstance(v, dict) else v for k, v in value.items()}
+    return ", ".join(f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in text.items())
 
 
 def version_of(*modules):

@@ -107,12 +107,17 @@ def seeds(structure, marks, guess):
     spacing = structure.spacing[::-1]
     if not guess.any() or guess.all():
         return None
-    depth = ndimage.distance_transform_edt(guess, spacing)
-    height = ndimage.distance_transform_edt(~guess, spacing)
-    border = np.argwhere(guess & (depth <= 1.01 * spacing.max()))[:, ::-1] * structure.spacing
-    gap = cKDTree(marks * structure.spacing).query(border)[0].mean()
+    # The gap is at most half the depth, and that at most a quarter of the extent: nothing farther out is needed.
+    around = ndimage.find_objects(guess)[0]
+    room = min((s.stop - s.start) * h for s, h in zip(around, spacing)) / 4 + 3 * structure.h
+    around = tuple(slice(max(0, s.start - int(room / h) - 1), s.stop + int(room / h) + 1) for s, h in zip(around, spacing))
+    depth = ndimage.distance_transform_edt(guess[around], spacing)
+    height = ndimage.distance_transform_edt(~guess[around], spacing)
+    border = np.argwhere(guess[around] & (depth <= 1.01 * spacing.max())) + [s.start for s in around]
+    gap = cKDTree(marks * structure.spacing).query(border[:, ::-1] * structure.spacing)[0].mean()
     gap = min(max(gap, 1.5 * structure.h), 0.5 * depth.max())
-    labels = np.where(depth > gap, 1, np.where(height > gap, 2, 0)).astype(np.int8)
+    labels = np.full(guess.shape, 2, np.int8)
+    labels[around] = np.where(depth > gap, 1, np.where(height > gap, 2, 0))
     box = tuple(slice(max(0, s.start - 2), s.stop + 2) for s in ndimage.find_objects(labels == 0)[0:1][0])
     step = 2 if labels[box].size > MANY_VOXELS else 1
     image = ndimage.gaussian_filter(structure.intensities[box], structure.h * step / spacing)
