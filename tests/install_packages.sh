@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # Installs what covol is built with and tested with: Debian 12 packages only. Does nothing when all are there.
+# Packages that are named on the command line come on top (the benchmarks do that).
 set -euo pipefail
 
 packages=(
@@ -16,6 +17,7 @@ packages=(
   # tests: other programs that read what covol writes
   catch2 libopenvdb-tools python3 python3-openvdb python3-numpy python3-tifffile
   python3-nibabel python3-pydicom
+  "$@"
 )
 
 missing=()

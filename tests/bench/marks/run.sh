@@ -1,0 +1,27 @@
+#!/usr/bin/env bash
+# Builds covol and measures how good few marks are; writes tables (.csv, .md) and curve.png into tests/bench/marks/results.
+#
+#   COVOL_DATA=FOLDER bash tests/bench/marks/run.sh [PART...] [--quick] [OPTION...]      (PART: table contours curve bias cut)
+#
+# Options are those of the scripts (table.py --help). What was measured with the same binary and the same scripts is not measured
+# again (build/marks). Table, contours and curve need the images of COVOL_DATA and are skipped without them.
+set -euo pipefail
+cd "$(dirname "$0")/../../.."
+
+parts=()
+while (( $# > 0 )) && [[ $1 != -* ]]; do
+  parts+=("$1")
+  shift
+done
+(( ${#parts[@]} > 0 )) || parts=(table contours curve bias cut)
+
+bash tests/install_packages.sh python3-scipy python3-skimage python3-matplotlib
+cmake --preset default --log-level=WARNING
+cmake --build --preset default --parallel "${COVOL_JOBS:-$(nproc)}" --target covol_tool
+for part in "${parts[@]}"; do
+  if [[ $part != bias && $part != cut && -z ${COVOL_DATA:-} ]]; then
+    echo "$part: SKIPPED, COVOL_DATA is not set"
+    continue
+  fi
+  /usr/bin/python3 "tests/bench/marks/$part.py" --covol build/bin/covol "$@"
+done

@@ -1,0 +1,153 @@
+"""Structures with their truth, and scores.
+
+Positions are voxels of the image, x y z, voxel centres at whole numbers; arrays are z y x. Lengths that are told are in voxels
+of the image's smallest spacing.
+"""
+import dataclasses
+import functools
+import math
+import pathlib
+
+import nibabel
+import numpy as np
+import tifffile
+from scipy import ndimage
+from scipy.spatial import cKDTree
+from skimage import measure
+
+# ---- structures ----------------------------------------------------------------------------------------------------
+
+@dataclasses.dataclass(eq=False)
+class Structure:
+    name: str
+    image: pathlib.Path
+    truth: np.ndarray           # bool
+    spacing: np.ndarray         # x y z
+    options: tuple = ()         # that covol needs to read the image
+    contour_axis: int = 2       # a person draws contours in slices across it: 0 x, 1 y, 2 z
+    large: bool = False         # fewer draws
+
+    @property
+    def h(self):
+        return float(self.spacing.min())
+
+    @property
+    def sizes(self):
+        return np.array(self.truth.shape[::-1])
+
+    @functools.cached_property
+    def intensities(self):
+        return read_array(self.image).astype(np.float32)
+
+    @functools.cached_property
+    def surface(self):
+        """Vertices and triangles of the truth's 0.5-surface; closed on the image's end faces, half a voxel out."""
+        return half_surface(self.truth)
+
+    @functools.cached_property
+    def surface_tree(self):
+        return cKDTree(self.surface[0] * self.spacing)
+
+    def outlines(self, axis, k):
+        """Closed lines around the truth in slice k of an axis, an array of positions each; none on end faces."""
+        image = np.take(self.truth, k, 2 - axis).astype(np.float32)
+        across = [a for a in (2, 1, 0) if a != axis]  # of the rows and columns of the slice
+        lines = []
+        for line in measure.find_contours(np.pad(image, 1), 0.5):
+            positions = np.full((len(line), 3), float(k))
+            positions[:, across] = line - 1
+            lines.append(positions)
+        return lines
+
+    def slices(self, axis):
+        """The slices of an axis that the truth meets, first and last."""
+        met = np.flatnonzero(self.truth.any(axis=tuple(a for a in range(3) if a != 2 - axis)))
+        return met[0], met[-1]
+
+
+def read_array(path):
+    """z y x"""
+    if path.name.endswith((".nii", ".nii.gz")):
+        return np.asarray(nibabel.load(path).dataobj).transpose(2, 1, 0)
+    return tifffile.imread(path)
+
+
+def tiff_spacing(path):
+    with tifffile.TiffFile(path) as file:
+        count, length = file.pages[0].tags["XResolution"].value
+        return np.array([length / count, length / count, file.imagej_metadata["spacing"]])
+
+
+def half_surface(mask):
+    """Vertices (positions) and triangles of the 0.5-surface."""
+    box = ndimage.find_objects(mask)[0]
+    vertices, triangles, _, _ = measure.marching_cubes(np.pad(mask[box].astype(np.float32), 1), 0.5)
+    return vertices[:, ::-1] - 1 + [s.start for s in box[::-1]], triangles
+
+
+def structures(data):
+    """The structures with a known truth, small ones first."""
+    images = pathlib.Path(data) / "images"
+    nuclei, _ = ndimage.label(read_array(images / "mouse_embryo_8cell_gt_nuclei.tif") > 0)
+    for label in (2, 3, 6):  # the three largest
+        yield Structure(f"embryo nucleus {label}", images / "mouse_embryo_8cell.tif", nuclei == label, np.array([0.8, 0.8, 1.75]),
+                        ("--spacing", "0.8,0.8,1.75"))
+    image = images / "ovule_nuclei_1135.tif"
+    yield Structure("ovule nucleus 27", image, read_array(images / "ovule_nuclei_1135_gt_labels.tif") == 27, tiff_spacing(image))
+    medical = [("spinal cord", "mri_spinalcord_t2", "mri_spinalcord_t2_gt", 1, False),
+               ("spleen", "ct_spleen", "ct_spleen_gt", 2, False),
+               ("brain", "mri_t1_colin27", "mri_t1_colin27_brain", 2, True)]
+    for name, image, truth, axis, large in medical:
+        file = nibabel.load(images / f"{image}.nii.gz")
+        yield Structure(name, images / f"{image}.nii.gz", read_array(images / f"{truth}.nii.gz") > 0,
+                        np.array(file.header.get_zooms()[:3], float), (), axis, large)
+
+
+# ---- outlines ---------------------------------------------------------------------------------------------------------
+
+def off_end_faces(structure, positions):
+    return ((positions > 0) & (positions < structure.sizes - 1)).all(1)
+
+
+class Lines:
+    """Outlines of a slice, walked along by their length in the world."""
+
+    def __init__(self, structure, lines):
+        starts, ends, lengths = [], [], []
+        for line in lines:
+            keep = off_end_faces(structure, line[:-1]) & off_end_faces(structure, line[1:])
+            starts.append(line[:-1][keep])
+            ends.append(line[1:][keep])
+            lengths.append(np.linalg.norm((ends[-1] - starts[-1]) * structure.spacing, axis=1))
+        self.starts, self.ends, self.lengths = (np.concatenate(x) if x else np.empty((0, 3)) for x in (starts, ends, lengths))
+        self.total = float(self.lengths.sum())
+
+    def at(self, way):
+        """Positions at these lengths from the beginning, round and round."""
+        ends = np.cumsum(self.lengths)
+        way = np.asarray(way, float) % self.total
+        n = np.minimum(np.searchsorted(ends, way), len(ends) - 1)
+        share = 1 - (ends[n] - way) / self.lengths[n]
+        return self.starts[n] + share[:, None] * (self.ends[n] - self.starts[n])
+
+    def even(self, count, first=0.0):
+        """`count` positions at equal distances; `first`: of the first one, in [0,1) of these."""
+        return self.at((np.arange(count) + first) / count * self.total)
+
+
+# ---- scores --------------------------------------------------------------------------------------------------------
+
+def score(structure, mask):
+    """Dice, and the larger of the two directed 95 % distances between the surfaces; 0 and no distance where nothing is there."""
+    if mask is None or not mask.any():
+        return {"dice": 0.0, "p95": math.inf}
+    dice = 2 * np.count_nonzero(mask & structure.truth) / (np.count_nonzero(mask) + np.count_nonzero(structure.truth))
+    vertices = half_surface(mask)[0] * structure.spacing
+    there = structure.surface_tree.query(some(vertices))[0]
+    back = cKDTree(vertices).query(some(structure.surface_tree.data))[0]
+    return {"dice": float(dice), "p95": max(float(np.percentile(d, 95)) for d in (there, back)) / structure.h}
+
+
+def some(positions, enough=20_000):
+    """Every n-th, so many that a percentile of them is one of all."""
+    return positions[::max(1, len(positions) // enough)]
