@@ -35,6 +35,7 @@ guess::ImpreciseMarks imprecise(const std::vector<Vec3>& marks, const GuessOptio
     guess::ImpreciseMarks result;
     result.marks = marks;
     result.deviation = options.deviation;
+    if (options.has_end) result.world = &options.end;
     return result;
 }
 

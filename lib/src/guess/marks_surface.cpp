@@ -136,6 +136,7 @@ MarksSurface::MarksSurface(const ImpreciseMarks& marks, const RunContext& run) {
     const auto with_seeds = [&](Constraints part) {
         part.seeds = marks.seeds;
         part.seed_value = marks.seed_value;
+        part.world = marks.world;
         return part;
     };
     const std::vector<std::size_t> few = spread_out(marks.marks, kOriented);

@@ -15,6 +15,8 @@ struct ImpreciseMarks {
     std::vector<Vec3> seeds;        ///< places that are inside (value < 0) or outside
     std::vector<double> seed_value;
 
+    const WorldBox* world = nullptr;  ///< beyond its end nothing is known; may be null
+
     [[nodiscard]] double variance_along(const Vec3& unit) const;
 };
 

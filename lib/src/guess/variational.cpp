@@ -6,6 +6,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <string>
 
@@ -23,8 +24,10 @@ using Point = Eigen::Vector3d;
 constexpr int kPolynomial = 4;       // 1, x, y, z: what the energy does not see
 constexpr int kModes = 3;            // of the energy, tried as directions of the normals
 constexpr int kSubspace = 6, kSubspaceSteps = 12;
+constexpr double kLocalShares[] = {0.5, 0.25, 0.125};
+constexpr double kLeastLocal = 6;    // neighbours, to have a middle
 constexpr int kDirections = 64;
-constexpr double kAround = 1.5;      // of the marks' radius
+constexpr double kAround[] = {1.15, 1.5};  // of the farthest mark
 constexpr int kLeastEnergySteps = 500;
 constexpr int kAmplitudeRounds = 3;
 constexpr double kLeastLambda = 1e-9;  // keeps M regular where marks coincide
@@ -214,22 +217,56 @@ double evaluate(const std::vector<Point>& nodes, Index marks, const Vector& basi
     return sum;
 }
 
-/// On a sphere around all nodes.
-bool has_one_sign_around(const std::vector<Point>& nodes, Index marks, const Vector& basis, const Eigen::Vector4d& polynomial) {
-    int positive = 0;
+using Inside = std::function<bool(const Point& in_unit_ball)>;
+
+/// On ellipsoids around all marks, as far as the world reaches.
+bool has_one_sign_around(const std::vector<Point>& nodes, Index marks, const Vector& basis, const Eigen::Vector4d& polynomial,
+                         const Inside& in_world) {
+    // Marks with a variance of 1 along each axis lie in a ball.
+    Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+    for (Index n = 0; n < marks; ++n) spread += nodes[std::size_t(n)] * nodes[std::size_t(n)].transpose() / double(marks);
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread);
+    const Eigen::Matrix3d from_ball = axes.operatorSqrt(), to_ball = axes.operatorInverseSqrt();
+    double reach = 0;
+    for (Index n = 0; n < marks; ++n) reach = std::max(reach, (to_ball * nodes[std::size_t(n)]).norm());
+    int positive = 0, count = 0;
     for (int n = 0; n < kDirections; ++n) {  // a Fibonacci lattice
         const double z = 1 - (2 * n + 1) / double(kDirections), phi = n * 2.399963229728653;
         const Point direction(std::sqrt(1 - z * z) * std::cos(phi), std::sqrt(1 - z * z) * std::sin(phi), z);
-        positive += evaluate(nodes, marks, basis, polynomial, kAround * direction) > 0;
+        for (const double around : kAround) {
+            const Point at = around * reach * (from_ball * direction);
+            if (!in_world(at)) continue;
+            positive += evaluate(nodes, marks, basis, polynomial, at) > 0;
+            ++count;
+        }
     }
-    return positive == 0 || positive == kDirections;
+    return positive == 0 || positive == count;
+}
+
+/// From the centroid of each mark's nearest neighbours to the mark: across a tube or a sheet that many are wide around.
+Vector away_from_neighbours(const std::vector<Point>& nodes, Index marks, double share) {
+    const auto count = std::size_t(share * double(marks));
+    Vector directions(3 * marks);
+    for (Index n = 0; n < marks; ++n) {
+        std::vector<std::pair<double, Index>> others;
+        for (Index m = 0; m < marks; ++m)
+            others.emplace_back((nodes[std::size_t(m)] - nodes[std::size_t(n)]).squaredNorm(), m);
+        std::nth_element(others.begin(), others.begin() + std::ptrdiff_t(count) - 1, others.end());
+        std::sort(others.begin(), others.begin() + std::ptrdiff_t(count));
+        Point mean = Point::Zero();
+        for (std::size_t k = 0; k < count; ++k) mean += nodes[std::size_t(others[k].second)] / double(count);
+        directions.segment<3>(3 * n) = nodes[std::size_t(n)] - mean;
+    }
+    return directions;
 }
 
 /// Of first guesses the one that ends at the least energy. A body ends: where some ends have one sign all around, far from
 /// the marks, the others are no bodies.
 Gradients least_energy(const HermiteSystem& system, const Vector& values, const Vector& c, const std::vector<Point>& nodes, Index marks,
-                       const Vector& outward) {
+                       const Vector& outward, const Inside& in_world) {
     std::vector<Gradients> ends{descend(system.energy(), c, outward)};
+    for (const double share : kLocalShares)
+        if (share * double(marks) >= kLeastLocal) ends.push_back(descend(system.energy(), c, away_from_neighbours(nodes, marks, share)));
     const Matrix modes = flattest_modes(system.energy(), outward);
     for (Index k = 0; k < std::min<Index>(kModes, modes.cols()); ++k)
         ends.push_back(descend(system.energy(), c, modes.col(k)));
@@ -238,7 +275,7 @@ Gradients least_energy(const HermiteSystem& system, const Vector& values, const 
         Vector basis;
         Eigen::Vector4d polynomial;
         system.weights(values, end.unit, basis, polynomial);
-        end.closed = has_one_sign_around(nodes, marks, basis, polynomial);
+        end.closed = has_one_sign_around(nodes, marks, basis, polynomial, in_world);
         const bool better = end.closed != best.closed ? end.closed : end.energy < best.energy;
         if (better || !std::isfinite(best.energy)) best = end;
     }
@@ -284,6 +321,13 @@ VariationalSurface::VariationalSurface(const Constraints& given, const std::vect
         before.segment<3>(3 * n) = to_point(given.known_gradient[std::size_t(n)]);
     }
 
+    const Inside in_world = [&](const Point& p) {
+        for (int a = 0; a < 3 && given.world != nullptr; ++a) {
+            const double at = center_[a] + radius_ * p[a];
+            if (at < given.world->min[a] || at > given.world->max[a]) return false;
+        }
+        return true;
+    };
     Vector outward(3 * marks);
     for (Index n = 0; n < marks; ++n) outward.segment<3>(3 * n) = nodes[std::size_t(n)];
     Vector known(3 * Index(normals.size()));
@@ -302,7 +346,7 @@ VariationalSurface::VariationalSurface(const Constraints& given, const std::vect
         if (round > 0)
             found = descend(system.energy(), c, found.unit);
         else
-            found = normals.empty() ? least_energy(system, values, c, nodes, marks, outward) : descend(system.energy(), c, known);
+            found = normals.empty() ? least_energy(system, values, c, nodes, marks, outward, in_world) : descend(system.energy(), c, known);
         system.weights(values, found.unit - before, basis, polynomial);
         if (amplitude > 0) continue;
         unit_amplitude = std::max((found.energy + constant) / system.freedom(), 1e-12);

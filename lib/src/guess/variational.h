@@ -2,7 +2,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "covol/fwd.h"
+#include "covol/domain.h"
 
 namespace covol::guess {
 
@@ -12,6 +12,8 @@ struct Constraints {
     std::vector<double> variance;  ///< of each mark's place along the normal, length^2; the same count
     std::vector<Vec3> seeds;       ///< f is about `seed_value` there
     std::vector<double> seed_value;
+    /// Beyond its end nothing is known of the body, it may go on. Null: the world has no end.
+    const WorldBox* world = nullptr;
     /// What is known of f beforehand at the marks, its value and its gradient: the energy is that of what f adds to it, and
     /// value() leaves it out. Empty: nothing.
     std::vector<double> known_value;
