@@ -48,6 +48,7 @@ public:
     double end() const { return kind_ == Kind::Between ? data_.slices[n_ + 1].w : kind_ == Kind::Above ? slice().w + slice().cap : slice().w; }
 
     double level(double x, double y, double w) const {
+        if (kind_ != Kind::Between && slice().open) return carried_on(x, y, std::abs(w - slice().w));
         if (kind_ != Kind::Between) return slice().at(data_.grid, x, y) + beyond(std::abs(w - slice().w));
         const SolidSlice& next = data_.slices[n_ + 1];
         const double length = next.w - slice().w, t = (w - slice().w) / length;
@@ -64,6 +65,11 @@ public:
     /// Of the level within a ball around a position of the plane, whatever w is; upper is not needed on domes.
     std::array<double, 2> range(double x, double y, double radius) const {
         const double here = slice().at(data_.grid, x, y);
+        if (kind_ != Kind::Between && slice().open) {
+            // Neither section's level changes faster than the position does.
+            const double height = slice().cap + radius, share = height / std::abs(slice().w - inner().w);
+            return {std::min(here, carried_on(x, y, height)) - (1 + 2 * share) * radius, std::numeric_limits<double>::max()};
+        }
         if (kind_ != Kind::Between) return {here - radius, std::numeric_limits<double>::max()};
         const double there = data_.slices[n_ + 1].at(data_.grid, x, y);
         const double reach = radius + std::hypot(slice().shift[0], slice().shift[1]);
@@ -76,6 +82,7 @@ public:
 private:
     /// Slopes of the level along w at the interval's two slices; beyond an end slice the dome goes on.
     double slope_below(double x, double y, double here, double secant, double length) const {
+        if (n_ == 0 && slice().open) return secant;
         if (n_ == 0) return monotone_slope(-slice().depth / slice().cap, slice().cap, secant, length);
         const SolidSlice& before = data_.slices[n_ - 1];
         const double left = slice().w - before.w;
@@ -83,12 +90,20 @@ private:
     }
     double slope_above(double x, double y, double there, double secant, double length) const {
         const SolidSlice& next = data_.slices[n_ + 1];
+        if (n_ + 2 == data_.slices.size() && next.open) return secant;
         if (n_ + 2 == data_.slices.size()) return monotone_slope(secant, length, next.depth / next.cap, next.cap);
         const SolidSlice& after = data_.slices[n_ + 2];
         const double right = after.w - next.w;
         return monotone_slope(secant, length, (after.at(data_.grid, x, y) - there) / right, right);
     }
     const SolidSlice& slice() const { return data_.slices[n_]; }
+    /// The neighbour of an end slice.
+    const SolidSlice& inner() const { return data_.slices[kind_ == Kind::Below ? n_ + 1 : n_ - 1]; }
+    /// Beyond an open end the level goes on as it came.
+    double carried_on(double x, double y, double height) const {
+        const double here = slice().at(data_.grid, x, y), share = height / std::abs(slice().w - inner().w);
+        return here + share * (here - inner().at(data_.grid, x, y));
+    }
     double beyond(double height) const {
         const double cap = slice().cap;
         return dome(slice().depth, height / cap) + std::max(0.0, height - cap);
@@ -104,12 +119,14 @@ private:
 bool Interval::may_cross(int i, int j) const {
     if (slice().shift != Vec2{0, 0} && kind_ == Kind::Between) return true;
     const SliceGrid& grid = data_.grid;
-    bool inside = false, outside = kind_ != Kind::Between;
+    bool inside = false, outside = kind_ != Kind::Between && !slice().open;
     for (int dj = 0; dj <= 1; ++dj)
         for (int di = 0; di <= 1; ++di) {
             const std::size_t node = std::size_t(j + dj) * std::size_t(grid.nx) + std::size_t(i + di);
             const bool here = slice().level[node] < 0;
-            const bool there = kind_ == Kind::Between ? data_.slices[n_ + 1].level[node] < 0 : here;
+            bool there = kind_ == Kind::Between ? data_.slices[n_ + 1].level[node] < 0 : here;
+            if (kind_ != Kind::Between && slice().open)
+                there = carried_on(grid.origin[0] + grid.cell * (i + di), grid.origin[1] + grid.cell * (j + dj), slice().cap) < 0;
             inside |= here || there;
             outside |= !here || !there;
         }
@@ -227,8 +244,12 @@ WorldBox ContourSolid::box() const {
     const SliceGrid& grid = data_->grid;
     const auto& slices = data_->slices;
     std::vector<Vec3> corners;
-    for (const double x : {grid.origin[0], grid.origin[0] + grid.cell * (grid.nx - 1)})
-        for (const double y : {grid.origin[1], grid.origin[1] + grid.cell * (grid.ny - 1)})
+    // An open end may widen.
+    double wider = 0;
+    for (const SolidSlice* end : {&slices.front(), &slices.back()})
+        if (end->open) wider = std::max(wider, end->cap);
+    for (const double x : {grid.origin[0] - wider, grid.origin[0] + grid.cell * (grid.nx - 1) + wider})
+        for (const double y : {grid.origin[1] - wider, grid.origin[1] + grid.cell * (grid.ny - 1) + wider})
             for (const double w : {slices.front().w - slices.front().cap, slices.back().w + slices.back().cap})
                 corners.push_back(data_->frame.to_world({x, y, w}));
     return bounding_box(corners);

@@ -23,6 +23,7 @@ constexpr double kSameSlice = 0.1;          // voxels; marks of one slice may di
 constexpr double kSameSliceOfExtent = 1e-4; // without an image: of the line's extent
 constexpr std::size_t kMaxNodes = 64u << 20; // of all slices' grids together: 256 MB; a coarser grid beyond
 constexpr double kMarginCells = 2;
+constexpr double kOpenCells = 6;             // that a body goes on beyond the image's end: more than a band's half width
 
 constexpr const char* kAxisNames[3] = {"x", "y", "z"};
 
@@ -283,10 +284,18 @@ void Densifier::cap_ends(ContourSolid::Data& data) {
         gap = distances[distances.size() / 2];
     }
     result_.slice_distance = gap;
+    const double spacing = geometry_.spacing[frame_.axis];
     const auto cap = [&](std::size_t end, std::size_t before) {
-        const bool alone = end == before;
-        slices[end].cap = std::max(cap_height(slices[end].area, alone ? 0 : slices[before].area,
-                                              std::abs(slices[end].w - slices[before].w), gap), 1e-3 * gap);
+        const bool alone = end == before, first = end < before;
+        const double distance = std::abs(slices[end].w - slices[before].w);
+        slices[end].cap = std::max(cap_height(slices[end].area, alone ? 0 : slices[before].area, distance, gap), 1e-3 * gap);
+        if (!has_image_ || alone) return;
+        // On the image's last slice, or where the next one to be marked would lie beyond it and the sections do not end before.
+        const double left = first ? slices[end].w + 0.5 * spacing : (geometry_.size[frame_.axis] - 0.5) * spacing - slices[end].w;
+        const double shrinks_by = slices[before].area - slices[end].area;
+        const double ends_after = shrinks_by > 0 ? distance * slices[end].area / shrinks_by : 2 * gap;
+        slices[end].open = left < spacing || (left <= gap && left < ends_after);
+        if (slices[end].open) slices[end].cap = left + kOpenCells * options_.step;
     };
     if (slices.size() == 1) return cap(0, 0);
     cap(0, 1);

@@ -7,8 +7,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
+#include "clip/clipped.h"
 #include "covol/band.h"
+#include "covol/clip.h"
+#include "covol/error.h"
 #include "detail/leaf_band.h"
 #include "detail/redistance.h"
 
@@ -79,13 +83,50 @@ private:
     float certain_;
 };
 
+/// Every corner of the lattice's box, half a voxel beyond the last centres, lies in the clip.
+bool lies_within(const ImageGeometry& geometry, const Clip& clip) {
+    for (int corner = 0; corner < 8; ++corner) {
+        Vec3 index;
+        for (int a = 0; a < 3; ++a) index[a] = (corner >> a & 1) != 0 ? geometry.size[a] - 1.0 : 0.0;
+        if (detail::depth_in(clip, geometry.index_to_world(index)) > 0) return false;
+    }
+    return true;
+}
+
+/// The solid in the clip. Its wall ends at the domain's last voxels; a solid without one fills the domain.
+FloatGridPtr clipped_surface(const FloatGrid& u, const Domain& domain, const Clip& clip, const RunContext& run) {
+    const std::optional<detail::Uncut> whole = detail::uncut(u, detail::FaceLayer::InPlace);
+    // What is near the cut may be nearest to what the wall would be beyond it.
+    Domain wide = domain;
+    for (int a = 0; a < 3 && whole; ++a) {
+        wide.min[a] -= detail::kCarriedOn - 1;
+        wide.max[a] += detail::kCarriedOn - 1;
+    }
+    FloatGridPtr wall;
+    try {
+        wall = detail::redistance(whole ? *whole->distance : u, wide, kHalfWidthVoxels, detail::DomainEnd::Open, "surface", run);
+    } catch (const Error& error) {
+        const openvdb::CoordBBox all({wide.min[0], wide.min[1], wide.min[2]}, {wide.max[0], wide.max[1], wide.max[2]});
+        if (error.code() != Errc::InvalidInput || !(u.tree().getValue({domain.min[0], domain.min[1], domain.min[2]}) < 0)) throw;
+        const auto width = static_cast<float>(kHalfWidthVoxels * domain.voxel_size);
+        wall = make_grid(wide, width, "surface");
+        wall->fill(all, -width, false);
+        wall->setGridClass(openvdb::GRID_LEVEL_SET);
+    }
+    FloatGridPtr solid = detail::clipped(wall, wide, clip);
+    set_domain(*solid, domain);
+    return solid;
+}
+
 }  // namespace
 
 FloatGridPtr surface(const FloatGrid& u, const RunContext& run) {
     const Domain domain = domain_of(u);
     FloatGridPtr result;
+    const Clip clip = clip_of(u);
     with_threads(run, [&] {
-        result = detail::redistance(u, domain, kHalfWidthVoxels, detail::DomainEnd::Closed, "surface", run);
+        result = clip.empty() ? detail::redistance(u, domain, kHalfWidthVoxels, detail::DomainEnd::Closed, "surface", run)
+                              : clipped_surface(u, domain, clip, run);
     });
     return result;
 }
@@ -108,10 +149,17 @@ std::vector<std::uint8_t> rasterize(const FloatGrid& surface, const ImageGeometr
     const openvdb::Vec3d step = to_index(1, 0, 0) - to_index(0, 0, 0);
     std::vector<std::uint8_t> labels(std::size_t(ni) * std::size_t(nj) * std::size_t(nk), 0);
     with_threads(run, [&, ni = ni, nj = nj, nk = nk] {
+        const std::optional<detail::Uncut> whole = detail::uncut(surface, detail::FaceLayer::InPlace);
+        const Clip clip = whole ? clip_of(surface) : Clip{};
+        const bool all_within = lies_within(geometry, clip);
         tbb::parallel_for(0, nk, [&](int k) {
-            RowSampler sampler(surface);
-            for (int j = 0; j < nj; ++j)
-                sampler.fill(to_index(0, j, k), step, ni, label, labels.data() + (std::size_t(k) * nj + j) * ni);
+            RowSampler sampler(whole ? *whole->distance : surface);
+            for (int j = 0; j < nj; ++j) {
+                std::uint8_t* row = labels.data() + (std::size_t(k) * nj + j) * ni;
+                sampler.fill(to_index(0, j, k), step, ni, label, row);
+                for (int i = 0; i < ni && !all_within; ++i)
+                    if (row[i] != 0 && detail::depth_in(clip, geometry.index_to_world({double(i), double(j), double(k)})) > 0) row[i] = 0;
+            }
         });
     });
     return labels;

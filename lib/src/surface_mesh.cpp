@@ -9,8 +9,10 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <sstream>
 
+#include "clip/clipped.h"
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "covol/surface.h"
@@ -27,6 +29,8 @@ using detail::LeafMask;
 
 // Vertices keep this share of a voxel's edge away from its ends: no degenerate triangle, no needle.
 constexpr double kEdgeMargin = 0.01;
+// The same where two faces of a clip meet: the edge between them is as narrow a chamfer as that.
+constexpr double kChamfer = 0.5 * kEdgeMargin;
 
 /// A leaf of the grid, or 8^3 voxels of a tile that has the surface on its rim.
 struct Block {
@@ -54,8 +58,9 @@ std::uint64_t shift_z(std::uint64_t word, std::uint64_t next) {
 
 class MarchingCubes {
 public:
-    MarchingCubes(const FloatGrid& grid, double isovalue, const RunContext& run)
-        : grid_(grid), domain_(domain_of(grid)), isovalue_(float(isovalue)), run_(run) {
+    /// @param clip  where the grid has layers that stand for the faces of a cut.
+    MarchingCubes(const FloatGrid& grid, const detail::LatticeClip& clip, double isovalue, const RunContext& run)
+        : grid_(grid), clip_(clip), domain_(domain_of(grid)), isovalue_(float(isovalue)), run_(run) {
         if (!(grid.background() >= isovalue_))
             throw Error(Errc::InvalidInput, "extract_mesh: grid '" + grid.getName() + "': expected a background above the isovalue " +
                                                 std::to_string(isovalue_) + ", got " + std::to_string(grid.background()) +
@@ -304,12 +309,24 @@ private:
         const double t = (isovalue_ - a) / (b - a);
         if (!(t >= 0 && t <= 1)) not_a_number_ = true;
         std::array<float, 3> position{};
-        for (int c = 0; c < 3; ++c) position[c] = to_world(c, block.origin[c] + local[c]);
-        const float next = to_world(axis, block.origin[axis] + local[axis] + 1);
-        const float exact = to_world(axis, block.origin[axis] + local[axis] + std::clamp(t, kEdgeMargin, 1 - kEdgeMargin));
+        const Coord voxel = block.origin.offsetBy(local[0], local[1], local[2]);
+        const double from = clip_.position(axis, voxel[axis]), to = clip_.position(axis, voxel[axis] + 1);
+        const bool on_cap = from == to;  // beyond a face
+        for (int c = 0; c < 3; ++c) position[c] = to_world(c, clip_.position(c, voxel[c]) + (on_cap && c != axis ? chamfer(c, voxel[c]) : 0.0));
+        if (on_cap) return position;
+        const float next = to_world(axis, to);
+        const float exact = to_world(axis, from + (to - from) * std::clamp(t, kEdgeMargin, 1 - kEdgeMargin));
         // Strictly inside its edge after rounding, too.
         position[axis] = std::clamp(exact, std::nextafter(position[axis], next), std::nextafter(next, position[axis]));
         return position;
+    }
+
+    /// How far a cap's vertex keeps from another face that it lies on, index space.
+    [[nodiscard]] double chamfer(int axis, int layer) const {
+        if (!clip_.on_face(axis, layer)) return 0;
+        const bool upper = clip_.position(axis, layer) == clip_.high[axis];
+        const double inner = clip_.position(axis, clip_.face_layer(axis, upper) + (upper ? -1 : 1));
+        return kChamfer * (inner - clip_.position(axis, layer));
     }
 
     [[nodiscard]] float to_world(int axis, double index) const {
@@ -366,6 +383,7 @@ private:
     }
 
     const FloatGrid& grid_;
+    const detail::LatticeClip clip_;
     const Domain domain_;
     const float isovalue_;
     const RunContext& run_;
@@ -383,7 +401,12 @@ TriangleMesh extract_mesh(const FloatGrid& surface, const ExtractOptions& option
                                               std::to_string(options.isovalue) + " and " +
                                               std::to_string(options.min_component_volume));
     TriangleMesh mesh;
-    with_threads(run, [&] { mesh = MarchingCubes(surface, options.isovalue, run).extract(); });
+    with_threads(run, [&] {
+        std::optional<detail::Uncut> whole;
+        if (options.isovalue == 0) whole = detail::uncut(surface, detail::FaceLayer::OnFace);
+        mesh = whole ? MarchingCubes(*whole->distance, whole->clip, 0, run).extract()
+                     : MarchingCubes(surface, {}, options.isovalue, run).extract();
+    });
     if (options.min_component_volume > 0 && !mesh.empty()) {
         const double whole = std::abs(measure(mesh).volume);
         remove_small_components(mesh, options.min_component_volume);

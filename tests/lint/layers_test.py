@@ -9,7 +9,7 @@ import sys
 # From the bottom up; a file may include headers of its own layer and of those below.
 LAYERS = [
     ["error", "run", "fwd", "domain"],
-    ["image", "points", "mesh", "vdb_io", "mesh_io"],
+    ["image", "clip", "points", "mesh", "vdb_io", "mesh_io"],
     ["contours"],
     ["distance", "edge", "scan_noise"],
     ["band", "evolve", "scan_solid"],
@@ -22,7 +22,7 @@ LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 # Files of lib/src whose name is not their header's.
 SOURCE_LEVEL = {"contour_solid": LEVEL["contours"], "points_check": LEVEL["points"], "image_sampling": LEVEL["image"], "image_statistics": LEVEL["image"], "image_write": LEVEL["image"],
                 "tag_distance": LEVEL["band"], "start": LEVEL["band"], "surface_mesh": LEVEL["surface"],
-                "mesh_distance": LEVEL["surface"]}
+                "mesh_distance": LEVEL["surface"], "clipped": LEVEL["clip"], "open_ends": LEVEL["clip"]}
 # The modules of segment(), lib/src/pipeline, in the same way; lib/src/pipeline.cpp is above them all.
 PIPELINE = [
     ["job", "options"],

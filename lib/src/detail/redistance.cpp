@@ -159,6 +159,21 @@ LeafMask inside_mask(const FloatGrid::ConstAccessor& accessor, const Coord& orig
     return inside;
 }
 
+// The flood passes over leaves whose voxels are all active. Their signs are known; where the band ends at an open end of the
+// domain it would guess them wrong.
+void fill_tiles(FloatGrid::TreeType& tree) {
+    using Leaf = FloatGrid::TreeType::LeafNodeType;
+    std::vector<Leaf*> leaves;
+    tree.getNodes(leaves);
+    std::vector<Leaf::NodeMaskType> masks(leaves.size());
+    tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t n) {
+        masks[n] = leaves[n]->valueMask();
+        leaves[n]->setValuesOn();
+    });
+    openvdb::tools::signedFloodFill(tree);
+    tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t n) { leaves[n]->setValueMask(masks[n]); });
+}
+
 }  // namespace
 
 FloatGridPtr redistance(const FloatGrid& u, const Domain& domain, double half_width, DomainEnd end, const char* name,
@@ -193,7 +208,7 @@ FloatGridPtr redistance(const FloatGrid& u, const Domain& domain, double half_wi
     });
     FloatGridPtr result = export_grid(band, values, domain, background, name);
     result->setGridClass(openvdb::GRID_LEVEL_SET);
-    openvdb::tools::signedFloodFill(result->tree());
+    fill_tiles(result->tree());
     openvdb::tools::pruneLevelSet(result->tree());
     return result;
 }

@@ -9,6 +9,18 @@
 namespace covol::pipeline {
 namespace {
 
+/// A body that goes on beyond the image is followed a little there: at the image's end itself the flow would turn its wall
+/// to a right angle.
+void carry_beyond_image(Job& job) {
+    Domain& domain = job.report().domain;
+    const WorldBox body = job.body()->box(), box = domain.world_box();
+    const int layers = int(kMarginVoxels);
+    for (int a = 0; a < 3; ++a) {
+        if (body.min[a] < box.min[a]) domain.min[a] -= layers;
+        if (body.max[a] > box.max[a]) domain.max[a] += layers;
+    }
+}
+
 /// Why the points are tagged after all, or null.
 const char* why_tag(const Job& job) {
     for (const Vec3& seed : job.options.exterior_seeds)
@@ -33,6 +45,7 @@ bool start_from_contours(Job& job) {
     job.origin = StartOrigin::Contours;
     job.options.evolve.follow = true;
     job.report().domain = job.domain_with_chosen_margin(2 * kMarginVoxels * job.h());
+    if (!job.options.roi) carry_beyond_image(job);
     {
         Timed timed(job.report().seconds.tag);
         job.result.u = covol::start_from_contours(job.domain(), *job.body(), job.run);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "covol/clip.h"
 #include "covol/compare.h"
 #include "covol/scan_solid.h"
 #include "detail/mesh_distance.h"
@@ -16,6 +17,15 @@ namespace {
 
 constexpr double kFarFromPoints = 3.0;       // voxels and spacings: no point holds the surface there
 constexpr double kWarnWithoutPoints = 0.02;  // share of the area
+
+/// Where a solid ends whatever the marks say: the image's box, and the region of interest.
+Clip where_it_ends(const Job& job) {
+    Clip all = job.image != nullptr ? clip_at(job.image->geometry()) : Clip{};
+    if (!job.options.roi) return all;
+    const Clip region = clip_at(*job.options.roi);
+    all.insert(all.end(), region.begin(), region.end());
+    return all;
+}
 
 /// @return what counts as far
 double find_bare_surface(Job& job) {
@@ -35,6 +45,7 @@ double find_bare_surface(Job& job) {
 void make_surface(Job& job) {
     SegmentReport& report = job.report();
     Timed timed(report.seconds.surface);
+    set_clip(*job.result.u, where_it_ends(job));
     job.result.surface = surface(*job.result.u, job.run);
     job.result.mesh = extract_mesh(*job.result.surface, job.options.extract, job.run);
     // Parts of each of these run on one thread.

@@ -1,0 +1,30 @@
+#pragma once
+#include <vector>
+
+#include "covol/domain.h"
+#include "covol/image.h"
+
+namespace covol {
+
+/// A half-space: n·x <= offset; n is a unit vector, lengths are world units.
+struct HalfSpace {
+    Vec3 normal{1, 0, 0};
+    double offset = 0;
+    friend bool operator==(const HalfSpace&, const HalfSpace&) = default;
+};
+
+/// The convex body that a solid is clipped at: what lies in each of the half-spaces; empty where nothing is clipped.
+/// A domain holds whole voxels and may reach half a voxel beyond the image: the clip is the image's own end.
+using Clip = std::vector<HalfSpace>;
+
+[[nodiscard]] Clip clip_at(const WorldBox& box);
+/// The image's own box, half a voxel beyond the last centres; turned as the image is.
+[[nodiscard]] Clip clip_at(const ImageGeometry& geometry);
+
+/// Stores the clip as metadata ("covol_clip_0", ...). surface() closes the solid there by a flat cap; extract_mesh() puts
+/// caps along the lattice exactly on it, with sharp edges; rasterize() ends there.
+void set_clip(FloatGrid& grid, const Clip& clip);
+/// What set_clip stored, or an empty one.
+[[nodiscard]] Clip clip_of(const FloatGrid& grid);
+
+}  // namespace covol

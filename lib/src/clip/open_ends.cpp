@@ -1,0 +1,50 @@
+#include "clip/open_ends.h"
+
+#include <algorithm>
+
+namespace covol::detail {
+namespace {
+
+Vec3 moved(const Vec3& x, const Vec3& direction, double by) {
+    return {x[0] + by * direction[0], x[1] + by * direction[1], x[2] + by * direction[2]};
+}
+
+}  // namespace
+
+double ImageFace::depth(const Vec3& x) const {
+    return plane.offset - plane.normal[0] * x[0] - plane.normal[1] * x[1] - plane.normal[2] * x[2];
+}
+
+std::vector<ImageFace> faces_of(const ImageGeometry& geometry) {
+    const Clip clip = clip_at(geometry);  // two for each axis
+    std::vector<ImageFace> faces;
+    for (std::size_t n = 0; n < clip.size(); ++n) faces.push_back({clip[n], geometry.spacing[n / 2]});
+    return faces;
+}
+
+bool on_end_slice(const ImageFace& face, const Vec3& x) {
+    const double depth = face.depth(x);
+    return depth >= 0 && depth <= face.spacing;
+}
+
+std::vector<Vec3> carried_on(const std::vector<Vec3>& points, const std::vector<ImageFace>& faces, double length) {
+    std::vector<Vec3> beyond;
+    for (const ImageFace& face : faces)
+        for (const Vec3& p : points)
+            if (on_end_slice(face, p))
+                for (double by = face.spacing; by < length + face.spacing; by += face.spacing) beyond.push_back(moved(p, face.plane.normal, by));
+    return beyond;
+}
+
+std::vector<Vec3> mirrored(const std::vector<Vec3>& points, const std::vector<ImageFace>& faces, double reach) {
+    // Face by face, images of images too: a body cut by an edge of the box is one of four.
+    std::vector<Vec3> all = points;
+    for (const ImageFace& face : faces) {
+        if (std::none_of(points.begin(), points.end(), [&](const Vec3& p) { return face.depth(p) < reach; })) continue;
+        const std::size_t before = all.size();
+        for (std::size_t n = 0; n < before; ++n) all.push_back(moved(all[n], face.plane.normal, 2 * face.depth(all[n])));
+    }
+    return {all.begin() + std::ptrdiff_t(points.size()), all.end()};
+}
+
+}  // namespace covol::detail
