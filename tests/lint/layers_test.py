@@ -14,7 +14,7 @@ LAYERS = [
     ["distance", "edge", "scan_noise"],
     ["band", "evolve", "scan_solid"],
     ["surface", "mesh_cleanup", "cloud_cleanup", "compare"],
-    ["structures", "evidence"],
+    ["structures", "evidence", "guidance"],
     ["pipeline", "phantom", "render"],
 ]
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
