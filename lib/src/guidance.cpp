@@ -2,16 +2,13 @@
 #include "covol/guidance.h"
 
 #include <openvdb/openvdb.h>
-#include <openvdb/tools/Interpolation.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <numeric>
+#include <limits>
+#include <map>
 #include <optional>
 
 #include "covol/band.h"
@@ -21,289 +18,415 @@
 #include "detail/kd_tree.h"
 #include "detail/nearest.h"
 #include "detail/redistance.h"
-#include "guidance/border_profile.h"
-#include "guidance/offset_field.h"
-#include "guidance/patches.h"
-#include "guidance/smooth_image.h"
+#include "guidance/learning.h"
 
 namespace covol {
 namespace {
 
 using namespace guidance;
 
-constexpr double kLeastResponse = 0.25;  // a field that hardly follows the image cannot tell how good the image is
+constexpr int kIterations = 2;            // normals, and what is inside and outside, are better known the second time
+constexpr double kWidth = 14.0;           // voxels to both sides of the surface in which profiles are read
+constexpr double kLongestOffset = 12.0;   // voxels in one iteration
+constexpr double kPatchWidth = 2.0;       // voxels
+constexpr double kPatchesPerSpacing = 4;  // offsets that vary within a fourth of the marks' spacing are not sought
+constexpr int kNormalRounds = 6;          // of averaging, about two voxels
+constexpr std::array<double, 3> kSigmas{0.5, 1.0, 2.0};  // voxels
+constexpr std::size_t kFewestMarks = 8, kMostMarks = 400;
+constexpr double kLeastResponse = 0.25;  // a field that hardly follows the image does not tell how good the image is
+constexpr int kPriors = 5;               // each half of the one before
+// A surface that bends least leaves about a third of the sagitta d^2 / (2 R) between marks at distance d.
+constexpr double kShareOfSagitta = 0.3;
 
-bool debug() { return std::getenv("GUIDE_DEBUG") != nullptr; }
-double env(const char* name, double value) { const char* t = std::getenv(name); return t ? std::atof(t) : value; }
+double squared(double x) { return x * x; }
 
-struct Timer {
-    std::chrono::steady_clock::time_point at = std::chrono::steady_clock::now();
-    void operator()(const char* what) {
-        const auto now = std::chrono::steady_clock::now();
-        if (std::getenv("GUIDE_TIME")) std::fprintf(stderr, "    %-12s %.3f\n", what, std::chrono::duration<double>(now - at).count());
-        at = now;
+/// A surface on its way from the guess to the target, and what is known of it.
+class Guide {
+public:
+    Guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const Image& image, const GuidanceOptions& options,
+          GuidanceReport& report, const RunContext& run)
+        : marks_(marks), image_(image), options_(options), report_(report), run_(run), domain_(domain_of(guess)), h_(domain_.voxel_size) {
+        start_ = current_ = detail::redistance(guess, domain_, kWidth, detail::DomainEnd::Closed, "guess", run);
     }
-};
 
-struct Setting {
-    const Image& image;
-    const std::vector<Vec3>& marks;
-    const GuidanceOptions& options;
-    Domain domain;
-    double h;
-    double width;  // of the wide bands, voxels
-};
-
-Vec3 along(const Vec3& x, const Vec3& n, double s) { return {x[0] + s * n[0], x[1] + s * n[1], x[2] + s * n[2]}; }
-
-float value_at(const FloatGrid::ConstAccessor& accessor, const Domain& domain, const Vec3& world) {
-    const Vec3 at = domain.world_to_index(world);
-    return openvdb::tools::BoxSampler::sample(accessor, openvdb::Vec3d(at[0], at[1], at[2]));
-}
-
-/// How far a profile of a patch's vertex may be read: to where another part of the surface is nearer, or the image ends.
-PatchProfile read_profile(const Patches& p, std::size_t patch, int reach, const SmoothImage& image,
-                          const FloatGrid& distance, const Domain& domain) {
-    const auto accessor = distance.getConstAccessor();
-    const double step = p.voxel[patch] / kStepsPerVoxel, h = domain.voxel_size;
-    const std::uint32_t begin = p.first[patch], rows = p.first[patch + 1] - begin;
-    struct Row { int lo, hi; std::vector<float> values; };
-    std::vector<Row> all(rows);
-    std::vector<int> los, his;
-    for (std::uint32_t r = 0; r < rows; ++r) {
-        const std::uint32_t v = p.members[begin + r];
-        Row& row = all[r];
-        row.values.resize(2 * std::size_t(reach) + 1);
-        row.lo = 1;
-        row.hi = -1;
-        const Vec3 &x = p.places[v], &n = p.normals[v];
-        if (!image.sample(x, row.values[reach])) continue;
-        row.lo = row.hi = 0;
-        for (int side = -1; side <= 1; side += 2)
-            for (int s = side; std::abs(s) <= reach; s += side) {
-                const Vec3 at = along(x, n, s * step);
-                const double away = std::abs(s * step);
-                const double nearest = side * value_at(accessor, domain, at);
-                if (nearest < 0.7 * away - 1.0 * h) break;
-                if (!image.sample(at, row.values[reach + s])) break;
-                (side < 0 ? row.lo : row.hi) = s;
-            }
-        los.push_back(row.lo);
-        his.push_back(row.hi);
+    /// False, with the reason in the report, where the image is of no use.
+    bool step(bool first, bool last) {
+        run_.check();
+        if (!cut_surface() || !place_marks(first)) return false;
+        set_ranges();
+        const Scene scene{patches_, *current_, domain_, ranges_};
+        if (!learn(scene, first)) return false;
+        run_.check();
+        ask(scene);
+        run_.check();
+        weigh(first);
+        run_.check();
+        move(last);
+        return true;
     }
-    PatchProfile profile;
-    if (los.empty()) return profile;
-    std::nth_element(los.begin(), los.begin() + los.size() / 2, los.end());
-    std::nth_element(his.begin(), his.begin() + his.size() / 2, his.end());
-    profile.lo = los[los.size() / 2];
-    profile.hi = his[his.size() / 2];
-    for (const Row& row : all)
-        if (row.lo <= row.hi && row.lo <= profile.lo && row.hi >= profile.hi) {
-            profile.values.insert(profile.values.end(), row.values.begin() + reach + profile.lo, row.values.begin() + reach + profile.hi + 1);
-            ++profile.rows;
-        }
-    return profile;
-}
+    [[nodiscard]] const FloatGrid& current() const { return *current_; }
 
-struct MarkOnSurface {
-    std::size_t mark, patch;
-    double residual;   // world, outward
-    double deviation;  // of the mark along the normal
-};
+private:
+    bool cut_surface();
+    bool place_marks(bool first);
+    void set_ranges();
+    bool learn(const Scene& scene, bool first);
+    void ask(const Scene& scene);
+    void weigh(bool first);
+    void move(bool last);
 
-/// Reliability of the image at a patch: see density().
-struct Trust {
-    double sharpness = 0;  // exponent of the likelihood
-    double stray = 1;      // share of places where the image does not follow the profile
-};
-
-OffsetEvidence density(const std::vector<double>& log_likelihood, double first, double step, const Trust& trust) {
-    OffsetEvidence e;
-    e.first = first;
-    e.step = step;
-    const double top = *std::max_element(log_likelihood.begin(), log_likelihood.end());
-    double sum = 0;
-    e.density.resize(log_likelihood.size());
-    for (std::size_t n = 0; n < log_likelihood.size(); ++n) sum += e.density[n] = float(std::exp(trust.sharpness * (log_likelihood[n] - top)));
-    const double mean = sum / double(log_likelihood.size());
-    for (float& d : e.density) d = float(trust.stray + (1 - trust.stray) * d / mean);
-    return e;
-}
-
-struct Learnt {
-    std::optional<BorderProfile> profile;
-    std::vector<std::size_t> mark;  // of each place
-    double sigma = 0;
-    bool local = false;
-    double radius = 0;              // of the local tables
-    Trust trust;
-    double gain = 0, gain_error = 0;
-    std::vector<BorderTable> held_out;  // by place: learnt from the others
-};
-
-std::vector<double> around(const BorderProfile& profile, const Vec3& at, double radius) {
-    std::vector<double> w;
-    for (const MarkedPlace& place : profile.places()) w.push_back(std::exp(-0.5 * detail::squared_distance(place.at, at) / (radius * radius)));
-    return w;
-}
-
-double neighbourhood(const BorderProfile& profile, int count) {
-    std::vector<double> radii;
-    for (const MarkedPlace& a : profile.places()) {
-        std::vector<double> d;
-        for (const MarkedPlace& b : profile.places()) d.push_back(detail::squared_distance(a.at, b.at));
-        std::nth_element(d.begin(), d.begin() + count, d.end());
-        radii.push_back(std::sqrt(d[count]));
+    struct Word {
+        double prior2, error2, response, slope2;
+    };
+    [[nodiscard]] Word hear(const OffsetField& field, double prior) const;
+    [[nodiscard]] std::vector<double> on_vertices(const std::vector<double>& offset) const;
+    [[nodiscard]] double mean(const std::vector<double>& by_patch) const {
+        double sum = 0;
+        for (std::size_t i = 0; i < by_patch.size(); ++i) sum += patches_.area[i] * by_patch[i];
+        return sum / area_;
     }
-    std::nth_element(radii.begin(), radii.begin() + radii.size() / 2, radii.end());
-    return radii[radii.size() / 2];
-}
 
-/// The log-likelihoods of the offsets that a profile allows, within `range` steps of 0.
-bool offsets_of(const PatchProfile& p, const BorderTable& table, int range, int& first, std::vector<double>& out) {
-    if (p.empty()) return false;
-    first = std::max(-range, p.lo + 1);
-    const int last = std::min(range, p.hi - 1);
-    if (last - first < kStepsPerVoxel) return false;
-    out.assign(std::size_t(last - first) + 1, 0.0);
-    table.likelihood(p, first, out);
+    const std::vector<Vec3>& marks_;
+    const Image& image_;
+    const GuidanceOptions& options_;
+    GuidanceReport& report_;
+    const RunContext& run_;
+    Domain domain_;
+    double h_;
+    FloatGridPtr start_, current_;
+
+    // of the guess
+    double guess2_ = 0;  // variance at the marks
+    double misfit_ = 0;  // 0: the marks' own errors explain their distances from the guess; 1: they do not
+    double prior_ = 0;   // chosen in the first iteration
+    double sigma_ = 0;
+
+    // of this iteration, by patch
+    Patches patches_;
+    double area_ = 0, size_ = 0, spacing_ = 0, width_ = 0;
+    std::vector<double> to_mark_, home_, offset_;
+    std::vector<int> ranges_;
+    double broad_ = 0;  // deviation of a guess of which nothing is known but its marks
+    std::vector<OffsetEvidence> evidence_, held_out_;
+    std::vector<std::size_t> nearest_;
+
+    std::vector<PatchMark> on_;  // the marks on the surface
+    double mark2_ = 0;           // their variance
+    std::optional<SmoothImage> smooth_;
+    std::optional<Lesson> lesson_;
+};
+
+bool Guide::cut_surface() {
+    const TriangleMesh mesh = extract_mesh(*current_, {}, run_);
+    const MeshMeasures measures = measure(mesh);
+    area_ = measures.area;
+    size_ = 3 * std::abs(measures.volume) / area_;  // a ball's radius
+    const detail::KdTree tree(marks_);
+    const auto cut = [&](double width) {
+        width_ = width;
+        patches_ = make_patches(mesh, image_.geometry(), width, kNormalRounds);
+        to_mark_.resize(patches_.size());
+        tbb::parallel_for(std::size_t(0), patches_.size(), [&](std::size_t i) { to_mark_[i] = std::sqrt(tree.nearest(patches_.centers[i])); });
+        // Points spread at random with one in each s^2 are s / 2 away in the mean.
+        spacing_ = std::max(2 * mean(to_mark_), 2 * h_);
+    };
+    cut(kPatchWidth * h_);
+    if (spacing_ > kPatchesPerSpacing * width_) cut(spacing_ / kPatchesPerSpacing);
     return true;
 }
 
-struct Candidate { Learnt learnt; double score; };
-
-/// Learns the profile from an image of one smoothness, and how well it foretells marks that it is not learnt from.
-Learnt learn(const Setting& s, const Patches& patches, const std::vector<MarkOnSurface>& marks, const SmoothImage& image,
-             const FloatGrid& distance, double guess_deviation, double prior_deviation, const std::vector<int>& ranges, double width) {
-    std::vector<MarkedPlace> places(marks.size());
-    tbb::parallel_for(std::size_t(0), marks.size(), [&](std::size_t n) {
-        const MarkOnSurface& m = marks[n];
-        const double step = patches.voxel[m.patch] / kStepsPerVoxel;
-        places[n].profile = read_profile(patches, m.patch, ranges[m.patch] + 8 * kStepsPerVoxel, image, distance, s.domain);
-        const double share = guess_deviation * guess_deviation / (guess_deviation * guess_deviation + m.deviation * m.deviation);
-        places[n].offset = m.residual * share / step;
-        places[n].at = s.marks[m.mark];
-    });
-    Learnt best;
-    best.profile.emplace(std::move(places));
-    const BorderProfile& profile = *best.profile;
-    best.radius = marks.size() >= 40 ? neighbourhood(profile, 12) : 0;
-    double best_score = -1e300;
-    std::array<std::vector<BorderTable>, 2> held_out;
-    for (int local = 0; local <= (best.radius > 0 ? 1 : 0); ++local) {
-        // Likelihoods at each mark, by the profile of the others that do not share its patch.
-        std::vector<std::vector<double>> log_likelihood(marks.size());
-        std::vector<int> first(marks.size());
-        held_out[local].resize(marks.size());
-        tbb::parallel_for(std::size_t(0), marks.size(), [&](std::size_t n) {
-            std::vector<double> all(marks.size(), 1.0), near;
-            if (local) near = around(profile, profile.places()[n].at, best.radius);
-            for (std::size_t k = 0; k < marks.size(); ++k)
-                if (detail::squared_distance(profile.places()[k].at, profile.places()[n].at) < 4 * width * width) {
-                    all[k] = 0;
-                    if (local) near[k] = 0;
-                }
-            BorderTable& table = held_out[local][n];
-            table = local ? profile.table(near, &all) : profile.table(all);
-            if (!offsets_of(profile.places()[n].profile, table, ranges[marks[n].patch], first[n], log_likelihood[n])) log_likelihood[n].clear();
-        });
-        for (const double sharpness : {0.05, 0.1, 0.2, 0.4, 0.7, 1.0})
-            for (const double stray : {0.02, 0.1, 0.25, 0.5}) {
-                double sum = 0, squares = 0;
-                std::size_t count = 0;
-                for (std::size_t n = 0; n < marks.size(); ++n) {
-                    if (log_likelihood[n].empty()) continue;
-                    const double step = patches.voxel[marks[n].patch] / kStepsPerVoxel;
-                    const OffsetEvidence e = density(log_likelihood[n], first[n] * step, step, {sharpness, stray});
-                    // The mark is the border with its own error: mass of posterior near it against mass of the prior near it.
-                    double mean, variance;
-                    const double v = prior_deviation * prior_deviation, r = std::max(marks[n].deviation, 0.5 * step);
-                    const double mass = moments(e, 0, v, mean, variance);
-                    const double at = marks[n].residual * v / (v + r * r), spread = v * r * r / (v + r * r);
-                    const double near = moments(e, at, spread, mean, variance);
-                    const double gain = std::log(std::max(near, 1e-6) / std::max(mass, 1e-6));
-                    sum += gain;
-                    squares += gain * gain;
-                    ++count;
-                }
-                if (count == 0) continue;
-                const double mean = sum / double(count);
-                const double error = std::sqrt(std::max(squares / double(count) - mean * mean, 0.0) / double(count));
-                const double score = mean - error;
-                if (score > best_score) {
-                    best_score = score;
-                    best.local = local == 1;
-                    best.trust = {sharpness, stray};
-                    best.gain = mean;
-                    best.gain_error = error;
-                }
+bool Guide::place_marks(bool first) {
+    std::vector<std::size_t> patch(marks_.size());
+    std::vector<double> residual(marks_.size());
+    tbb::parallel_for(std::size_t(0), marks_.size(), [&](std::size_t m) {
+        double nearest = std::numeric_limits<double>::infinity();
+        for (std::size_t i = 0; i < patches_.size(); ++i) {
+            const double to = detail::squared_distance(patches_.centers[i], marks_[m]);
+            if (to < nearest) {
+                nearest = to;
+                patch[m] = i;
             }
+        }
+        residual[m] = value_at(*current_, domain_, marks_[m]);
+    });
+    // Marks of one patch are one mark; those far away mean another surface.
+    std::map<std::size_t, std::vector<std::size_t>> by_patch;
+    for (std::size_t m = 0; m < marks_.size(); ++m)
+        if (std::abs(residual[m]) < (kWidth - 2) * h_) by_patch[patch[m]].push_back(m);
+    on_.clear();
+    const std::size_t every = by_patch.size() / kMostMarks + 1;
+    std::size_t count = 0;
+    for (const auto& [i, members] : by_patch) {
+        if (count++ % every != 0) continue;
+        PatchMark mark;
+        mark.patch = i;
+        const double share = 1.0 / double(members.size());
+        for (const std::size_t m : members) {
+            mark.residual += share * residual[m];
+            for (int a = 0; a < 3; ++a) mark.at[a] += share * marks_[m][a];
+        }
+        const double precision = options_.mark_precision >= 0 ? options_.mark_precision : patches_.voxel[i];
+        mark.deviation = precision * std::sqrt(share / 12);  // of a uniform error
+        on_.push_back(mark);
     }
-    best.held_out = std::move(held_out[best.local]);
-    return best;
+    if (on_.size() < kFewestMarks) {
+        report_.reason = "only " + std::to_string(on_.size()) + " places of the guess have marks near them; the image's border cannot be learnt";
+        return false;
+    }
+    double residual2 = 0;
+    mark2_ = 0;
+    for (const PatchMark& mark : on_) {
+        residual2 += squared(mark.residual) / double(on_.size());
+        mark2_ += squared(mark.deviation) / double(on_.size());
+    }
+    mark2_ = std::max(mark2_, squared(0.05 * h_));
+    if (first) {
+        // A guess that takes up a share of the marks' errors leaves the rest as residuals.
+        guess2_ = std::max(std::abs(residual2 - mark2_), 0.1 * mark2_);
+        misfit_ = std::clamp((residual2 - mark2_) / mark2_, 0.0, 1.0);
+    }
+    return true;
 }
 
-/// u = distance to the surface less the offset of its nearest vertex.
-FloatGridPtr moved(const FloatGrid& distance, const Patches& patches, const std::vector<double>& offset, const Setting& s,
-                   const RunContext& run) {
-    double largest = 0;
-    for (const double o : offset) largest = std::max(largest, std::abs(o));
-    std::vector<Vec3> places(patches.places.size());
-    for (std::size_t v = 0; v < places.size(); ++v) places[v] = s.domain.world_to_index(patches.places[v]);
-    const detail::NearestField nearest = detail::nearest_points(places, detail::box_of(s.domain), largest / s.h + 3, "guide", run);
-    FloatGridPtr out = distance.deepCopy();
-    out->tree().voxelizeActiveTiles();
-    std::vector<const detail::NearestLeaf*> leaves;
-    for (const auto& leaf : nearest.leaves) leaves.push_back(&leaf);
-    std::vector<FloatGrid::TreeType::LeafNodeType*> targets;
-    for (const auto* leaf : leaves) targets.push_back(out->tree().touchLeaf(leaf->origin));
-    tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t n) {
-        float* values = targets[n]->buffer().data();
-        for (int p = 0; p < detail::kLeafSize; ++p) {
-            const std::int32_t at = leaves[n]->nearest[p];
-            if (at < 0) continue;
-            values[p] -= float(offset[std::size_t(nearest.source[std::size_t(at)])]);
-        }
+void Guide::set_ranges() {
+    const std::size_t count = patches_.size();
+    home_.assign(count, 0.0);
+    std::vector<double> reach(count), broad2(count);
+    tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
+        for (std::uint32_t n = patches_.first[i]; n < patches_.first[i + 1]; ++n)
+            home_[i] -= value_at(*start_, domain_, patches_.places[patches_.members[n]]) / (patches_.first[i + 1] - patches_.first[i]);
+        reach[i] = std::min(0.5 * to_mark_[i] + 2 * patches_.voxel[i], kLongestOffset * h_);
+        broad2[i] = squared(0.5 * reach[i]);
     });
-    return out;
+    broad_ = std::sqrt(mean(broad2));
+    if (options_.range >= 0) broad_ = std::min(broad_, 0.5 * options_.range);
+    ranges_.resize(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        // Marks are asked as any other place is, as if the guess were no better there.
+        double range = std::max(reach[i], 2 * broad_);
+        if (options_.range >= 0) range = std::min(range, options_.range);
+        range = std::min(range + std::abs(home_[i]), (kWidth - 2) * h_);
+        ranges_[i] = int(std::ceil(range * kStepsPerVoxel / patches_.voxel[i]));
+    }
+}
+
+bool Guide::learn(const Scene& scene, bool first) {
+    WorldBox box{patches_.places.front(), patches_.places.front()};
+    for (const Vec3& x : patches_.places)
+        for (int a = 0; a < 3; ++a) {
+            box.min[a] = std::min(box.min[a], x[a]);
+            box.max[a] = std::max(box.max[a], x[a]);
+        }
+    for (int a = 0; a < 3; ++a) {
+        box.min[a] -= kWidth * h_;
+        box.max[a] += kWidth * h_;
+    }
+    lesson_.reset();
+    const auto try_sigma = [&](double sigma) {
+        SmoothImage image(image_, box, sigma);
+        if (image.empty()) return;
+        Lesson lesson(scene, on_, image, std::sqrt(guess2_), broad_, 2 * width_);
+        if (lesson_ && lesson.sure_gain() <= lesson_->sure_gain()) return;
+        sigma_ = sigma;
+        lesson_.emplace(std::move(lesson));
+        smooth_.emplace(std::move(image));
+    };
+    if (first)
+        for (const double sigma : kSigmas) try_sigma(sigma * h_);
+    else
+        try_sigma(sigma_);
+    if (!lesson_) {
+        report_.reason = "the guess lies outside of the image";
+        return false;
+    }
+    report_.inside = lesson_->brightness(-2 * kStepsPerVoxel);
+    report_.border = lesson_->brightness(0);
+    report_.outside = lesson_->brightness(2 * kStepsPerVoxel);
+    if (!(lesson_->sure_gain() > 0)) {
+        report_.reason = "what the image shows at some marks does not foretell the others";
+        return false;
+    }
+    report_.sigma = sigma_;
+    report_.local = lesson_->local();
+    report_.gain = lesson_->gain();
+    return true;
+}
+
+void Guide::ask(const Scene& scene) {
+    const std::size_t count = patches_.size();
+    evidence_.assign(count, {});
+    held_out_.assign(count, {});
+    nearest_.resize(count);
+    tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
+        Lesson::Answer answer = lesson_->ask(scene, i, *smooth_);
+        evidence_[i] = std::move(answer.all);
+        held_out_[i] = std::move(answer.held_out);
+        nearest_[i] = answer.nearest;
+    });
+}
+
+/// The field of an image learnt without the nearest mark, for a guess that may be off by `prior` anywhere: how far it
+/// errs at the marks, how much of a wave of the guess, two spacings long, it would undo, and how fast it leaves the
+/// guess with the distance from the marks. Errors are taken a standard error larger, and the last one smaller.
+Guide::Word Guide::hear(const OffsetField& field, double prior) const {
+    const std::size_t count = patches_.size();
+    const std::vector<double> none(count, 0.0), deviation(count, prior);
+    std::vector<double> wave(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        const Vec3& x = patches_.centers[i];
+        wave[i] = std::cos(M_PI / spacing_ * (x[0] + x[1] + x[2]) / std::sqrt(3.0));
+    }
+    const OffsetField::Fit fit = field.fit(home_, deviation, held_out_, none, none, &wave);
+
+    const double marks = double(on_.size());
+    double off2 = 0, off4 = 0;
+    for (const PatchMark& mark : on_) {
+        const double off = fit.offset[mark.patch] - mark.residual;
+        off2 += squared(off) / marks;
+        off4 += squared(squared(off)) / marks;
+    }
+    const double error = std::sqrt(std::max(off4 - squared(off2), 0.0) / marks);
+    const double error2 = std::max(off2 + error - mark2_, mark2_ * std::sqrt(2 / marks));
+
+    double kept = 0, waves = 0, distance4 = 0;
+    std::vector<double> slopes(on_.size(), 0.0);
+    for (std::size_t i = 0; i < count; ++i) {
+        kept += patches_.area[i] * fit.carried[i] * wave[i];
+        waves += patches_.area[i] * squared(wave[i]);
+        const double weight = patches_.area[i] * squared(to_mark_[i]);
+        distance4 += weight * squared(to_mark_[i]);
+        slopes[nearest_[i]] += weight * (squared(fit.offset[i] - home_[i]) - guess2_ - error2);
+    }
+    double slope2 = 0, spread2 = 0;
+    for (const double s : slopes) slope2 += s;
+    for (const double s : slopes) spread2 += squared(s - slope2 / marks);
+    slope2 = std::max(slope2 - std::sqrt(spread2), 0.0) / distance4;
+    return {squared(prior), error2, std::clamp(1 - kept / waves, 0.01, 1.0), slope2};
+}
+
+/// Offsets between guess and image, by what each knows.
+void Guide::weigh(bool first) {
+    const std::size_t count = patches_.size();
+    const OffsetField field(patches_, std::max(spacing_, 4 * h_));
+    std::vector<double> distance2(count), least2(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        distance2[i] = squared(to_mark_[i]);
+        least2[i] = squared(kShareOfSagitta * distance2[i] / (2 * size_));
+    }
+    std::vector<Word> words;
+    if (first) {
+        for (int n = 0; n < kPriors; ++n) {
+            words.push_back(hear(field, broad_ * std::pow(0.5, n)));
+            if (words.back().response < kLeastResponse) break;
+        }
+    } else {
+        words.push_back(hear(field, prior_));
+    }
+    double slope2 = 0;
+    for (const Word& w : words) slope2 = std::max(slope2, w.slope2);
+    const double needed2 = guess2_ + std::max(slope2 * mean(distance2), mean(least2));
+    Word chosen = words.front();
+    for (const Word& w : words)
+        if (w.response >= kLeastResponse && w.prior2 >= needed2 &&
+            w.error2 / squared(w.response) < chosen.error2 / squared(chosen.response))
+            chosen = w;
+    prior_ = std::sqrt(chosen.prior2);
+
+    std::vector<double> guess2(count), deviation(count), zero(count, 0.0);
+    for (std::size_t i = 0; i < count; ++i) guess2[i] = guess2_ + std::max(slope2 * distance2[i], least2[i]);
+    const double mean2 = mean(guess2);
+    for (std::size_t i = 0; i < count; ++i)
+        deviation[i] = prior_ * std::sqrt((chosen.error2 + guess2[i]) / (chosen.error2 + mean2));
+    const OffsetField::Fit fit = field.fit(home_, deviation, evidence_, zero, zero, nullptr);
+
+    offset_.resize(count);
+    std::vector<double> left(count), sure(count, 0.0);
+    for (std::size_t i = 0; i < count; ++i) {
+        const double both = squared(chosen.response) * guess2[i] + chosen.error2;
+        const double share = options_.weight * std::min(chosen.response * guess2[i] / both, 1.0);
+        offset_[i] = home_[i] + share * (fit.offset[i] - home_[i]);
+        left[i] = std::sqrt(guess2[i] * chosen.error2 / both);
+        if (fit.precision[i] * squared(deviation[i]) > 1 && share > 0.5) sure[i] = 1;
+    }
+    if (misfit_ > 0) {
+        // A guess that passes by its marks, such as another tool's, is drawn to them.
+        std::vector<double> rest(count, 0.0), precision(count, 0.0);
+        for (const PatchMark& mark : on_) {
+            rest[mark.patch] = mark.residual - offset_[mark.patch];
+            precision[mark.patch] = misfit_ / (squared(mark.deviation) + squared(0.1 * h_));
+        }
+        const OffsetField::Fit to_marks = field.fit(zero, left, std::vector<OffsetEvidence>(count), rest, precision, nullptr);
+        for (std::size_t i = 0; i < count; ++i) offset_[i] += options_.weight * to_marks.offset[i];
+    }
+    report_.image_error = std::sqrt(chosen.error2);
+    report_.guess_error = std::sqrt(mean2);
+    report_.confident_share = mean(sure);
+    std::vector<double> whole(count);
+    report_.max_offset = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        whole[i] = offset_[i] - home_[i];
+        report_.max_offset = std::max(report_.max_offset, std::abs(whole[i]));
+    }
+    report_.mean_offset = mean(whole);
 }
 
 /// Offsets of patches as a smooth function on the vertices.
-std::vector<double> on_vertices(const Patches& p, const std::vector<double>& offset, double width) {
-    std::vector<std::vector<std::uint32_t>> neighbours(p.size());
-    for (const auto& b : p.borders) {
-        neighbours[b.a].push_back(b.b);
-        neighbours[b.b].push_back(b.a);
+std::vector<double> Guide::on_vertices(const std::vector<double>& offset) const {
+    std::vector<std::vector<std::uint32_t>> neighbours(patches_.size());
+    for (const Patches::Border& border : patches_.borders) {
+        neighbours[border.a].push_back(border.b);
+        neighbours[border.b].push_back(border.a);
     }
-    std::vector<double> out(p.places.size());
-    tbb::parallel_for(std::size_t(0), p.places.size(), [&](std::size_t v) {
-        const std::uint32_t own = p.patch[v];
+    std::vector<double> result(patches_.places.size());
+    tbb::parallel_for(std::size_t(0), result.size(), [&](std::size_t v) {
+        const std::uint32_t own = patches_.patch[v];
         double sum = 0, total = 0;
         const auto add = [&](std::uint32_t i) {
-            const double w = std::exp(-0.5 * detail::squared_distance(p.places[v], p.centers[i]) / (0.49 * width * width)) + 1e-12;
-            sum += w * offset[i];
-            total += w;
+            const double weight = std::exp(-detail::squared_distance(patches_.places[v], patches_.centers[i]) / squared(width_)) + 1e-12;
+            sum += weight * offset[i];
+            total += weight;
         };
         add(own);
         for (const std::uint32_t i : neighbours[own]) add(i);
-        out[v] = sum / total;
+        result[v] = sum / total;
     });
-    return out;
+    return result;
 }
 
-[[maybe_unused]] double median(std::vector<double> v) {
-    if (v.empty()) return 0;
-    std::nth_element(v.begin(), v.begin() + v.size() / 2, v.end());
-    return v[v.size() / 2];
+/// The distance to the surface less the offset of its nearest vertex.
+void Guide::move(bool last) {
+    const std::vector<double> offset = on_vertices(offset_);
+    double longest = 0;
+    for (const double o : offset) longest = std::max(longest, std::abs(o));
+    std::vector<Vec3> places(patches_.places.size());
+    for (std::size_t v = 0; v < places.size(); ++v) places[v] = domain_.world_to_index(patches_.places[v]);
+    const detail::NearestField nearest = detail::nearest_points(places, detail::box_of(domain_), longest / h_ + kHalfWidthVoxels, "guide", run_);
+    const FloatGridPtr moved = current_->deepCopy();
+    std::vector<float*> values;
+    for (const detail::NearestLeaf& leaf : nearest.leaves) values.push_back(moved->tree().touchLeaf(leaf.origin)->buffer().data());
+    tbb::parallel_for(std::size_t(0), values.size(), [&](std::size_t n) {
+        const detail::NearestLeaf& leaf = nearest.leaves[n];
+        for (int p = 0; p < detail::kLeafSize; ++p)
+            if (leaf.nearest[std::size_t(p)] >= 0)
+                values[n][p] -= float(offset[std::size_t(nearest.source[std::size_t(leaf.nearest[std::size_t(p)])])]);
+    });
+    current_ = last ? moved : detail::redistance(*moved, domain_, kWidth, detail::DomainEnd::Closed, "guess", run_);
 }
 
 }  // namespace
 
 std::string GuidanceOptions::why_invalid() const {
     std::string why;
-    if (!(weight >= 0 && weight <= 1)) why += "weight: expected 0 to 1, got " + std::to_string(weight) + "\n";
-    if (std::isnan(mark_precision)) why += "mark_precision: expected a number\n";
-    if (std::isnan(range)) why += "range: expected a number\n";
+    const auto expect = [&why](bool ok, const std::string& what, double got) {
+        if (ok) return;
+        std::string number = std::to_string(got);
+        number.erase(number.find_last_not_of('0') + 1);
+        if (!number.empty() && number.back() == '.') number.pop_back();
+        why += (why.empty() ? "" : "\n") + what + ", got " + number;
+    };
+    expect(std::isfinite(mark_precision), "mark_precision: expected a number", mark_precision);
+    expect(std::isfinite(range), "range: expected a number", range);
+    expect(weight >= 0 && weight <= 1, "weight: expected 0 to 1", weight);
     return why;
 }
 
@@ -313,265 +436,22 @@ FloatGridPtr guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const
     report = {};
     FloatGridPtr result;
     with_threads(run, [&] {
-        Setting s{image, marks, options, domain_of(guess), 0, 16};
-        s.h = s.domain.voxel_size;
-        Timer timer;
-        const FloatGridPtr start = detail::redistance(guess, s.domain, s.width, detail::DomainEnd::Closed, "guess", run);
-        FloatGridPtr current = start;
-        timer("redistance");
-        double guess2 = -1, misfit = 0, chosen_prior = 0, chosen_sigma = 0;
-        const int iterations = int(env("GUIDE_ITER", 2));
-        for (int iteration = 0; iteration < iterations; ++iteration) {
-            run.check();
-            const TriangleMesh mesh = extract_mesh(*current, {}, run);
-            double area = 0;
-            const double width0 = env("GUIDE_WIDTH", 2) * s.h;
-            Patches patches = make_patches(mesh, image.geometry(), width0, int(env("GUIDE_NORMALS", 6)));
-            for (const double a : patches.area) area += a;
-            const double spacing = std::sqrt(area / double(std::max<std::size_t>(marks.size(), 1)));
-            double width = width0;
-            if (spacing / env("GUIDE_CELLS", 4) > width) {
-                width = spacing / env("GUIDE_CELLS", 4);
-                patches = make_patches(mesh, image.geometry(), width, int(env("GUIDE_NORMALS", 6)));
+        const Domain domain = domain_of(guess);
+        std::optional<Guide> surface;
+        if (options.weight > 0 && options.range != 0 && !marks.empty()) {
+            surface.emplace(guess, marks, image, options, report, run);
+            for (int n = 0; n < kIterations; ++n) {
+                run.report("image guidance", double(n) / kIterations);
+                if (!surface->step(n == 0, n + 1 == kIterations)) break;
+                report.used = true;
             }
-            const std::size_t count = patches.size();
-
-            timer("patches");
-            // Distances to marks, and the marks on the surface.
-            std::vector<double> to_mark(count);
-            {
-                const detail::KdTree tree(marks);
-                tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) { to_mark[i] = std::sqrt(tree.nearest(patches.centers[i])); });
-            }
-            std::vector<MarkOnSurface> on(marks.size());
-            {
-                const auto accessor_source = current;
-                tbb::parallel_for(std::size_t(0), marks.size(), [&](std::size_t m) {
-                    const auto accessor = accessor_source->getConstAccessor();
-                    double best = 1e300;
-                    for (std::size_t v = 0; v < patches.places.size(); ++v) {
-                        const double d = detail::squared_distance(patches.places[v], marks[m]);
-                        if (d < best) {
-                            best = d;
-                            on[m].patch = patches.patch[v];
-                        }
-                    }
-                    on[m].mark = m;
-                    on[m].residual = value_at(accessor, s.domain, marks[m]);
-                    const double precision = options.mark_precision >= 0 ? options.mark_precision : patches.voxel[on[m].patch];
-                    on[m].deviation = precision / std::sqrt(12.0);
-                });
-            }
-            double residual2 = 0, mark2 = 0;
-            for (const auto& m : on) {
-                residual2 += std::min(m.residual * m.residual, 100 * s.h * s.h) / double(on.size());
-                mark2 += m.deviation * m.deviation / double(on.size());
-            }
-            if (iteration == 0) {
-                guess2 = std::max(std::abs(residual2 - mark2), 0.1 * mark2);
-                misfit = std::clamp((residual2 - mark2) / mark2, 0.0, 1.0);
-            }
-
-            // The prior: back to the guess.
-            std::vector<double> home(count), broad(count);
-            std::vector<int> ranges(count);
-            {
-                tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
-                    const auto accessor = start->getConstAccessor();
-                    for (std::uint32_t n = patches.first[i]; n < patches.first[i + 1]; ++n)
-                        home[i] -= value_at(accessor, s.domain, patches.places[patches.members[n]]) / (patches.first[i + 1] - patches.first[i]);
-                    double reach = std::min(env("GUIDE_SLOPE", 0.5) * to_mark[i] + 2 * patches.voxel[i], 12 * s.h);
-                    if (options.range >= 0) reach = std::min(reach, options.range);
-                    reach += std::abs(home[i]);
-                    ranges[i] = int(std::ceil(std::min(reach, (s.width - 2) * s.h) * kStepsPerVoxel / patches.voxel[i]));
-                    broad[i] = 0.5 * std::min(0.5 * to_mark[i] + 2 * patches.voxel[i], 12 * s.h);
-                });
-            }
-            double broad2 = 0;
-            for (std::size_t i = 0; i < count; ++i) broad2 += patches.area[i] * broad[i] * broad[i] / area;
-            // Marks are asked as any other place is: as if the guess were no better there.
-            for (std::size_t i = 0; i < count; ++i)
-                ranges[i] = std::max(ranges[i], int(std::ceil(std::min(2 * std::sqrt(broad2) + std::abs(home[i]), (s.width - 2) * s.h) * kStepsPerVoxel / patches.voxel[i])));
-
-            timer("marks");
-            // Learn at the marks; the smoothness that foretells best.
-            WorldBox box{{1e300, 1e300, 1e300}, {-1e300, -1e300, -1e300}};
-            for (const Vec3& x : patches.places)
-                for (int a = 0; a < 3; ++a) {
-                    box.min[a] = std::min(box.min[a], x[a] - s.width * s.h);
-                    box.max[a] = std::max(box.max[a], x[a] + s.width * s.h);
-                }
-            Learnt best;
-            std::optional<SmoothImage> smooth;
-            double best_score = -1e300;
-            for (const double sigma : {0.5, 1.0, 2.0}) {
-                if (iteration > 0 && sigma * s.h != chosen_sigma) continue;
-                SmoothImage candidate(image, box, sigma * s.h);
-                if (candidate.empty()) break;
-                Learnt learnt = learn(s, patches, on, candidate, *current, std::sqrt(guess2), std::sqrt(broad2), ranges, width);
-                if (debug())
-                    std::fprintf(stderr, "  it %d sigma %.1f local %d sharp %.2f stray %.2f gain %.3f +- %.3f\n", iteration, sigma, learnt.local,
-                                 learnt.trust.sharpness, learnt.trust.stray, learnt.gain, learnt.gain_error);
-                if (learnt.gain - learnt.gain_error > best_score) {
-                    best_score = learnt.gain - learnt.gain_error;
-                    learnt.sigma = sigma * s.h;
-                    best = std::move(learnt);
-                    smooth.emplace(std::move(candidate));
-                }
-            }
-            run.check();
-            if (!(best_score > 0)) {
-                report.reason = "the image does not foretell the marks";
-                break;
-            }
-
-            timer("learn");
-            // Evidence everywhere; `honest` is learnt without the nearest mark.
-            std::vector<OffsetEvidence> evidence(count), honest(count);
-            std::vector<std::size_t> nearest_mark(count);
-            std::vector<BorderTable> tables;
-            std::vector<double> ones(best.profile->places().size(), 1.0);
-            if (best.local) {
-                tables.resize(ones.size());
-                tbb::parallel_for(std::size_t(0), tables.size(), [&](std::size_t n) {
-                    const std::vector<double> near = around(*best.profile, best.profile->places()[n].at, best.radius);
-                    tables[n] = best.profile->table(near, &ones);
-                });
-            } else {
-                tables.push_back(best.profile->table(ones));
-            }
-            tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
-                PatchProfile p = read_profile(patches, i, ranges[i] + 3 * kStepsPerVoxel, *smooth, *current, s.domain);
-                best.profile->to_levels(p);
-                double nearest = 1e300;
-                for (std::size_t n = 0; n < ones.size(); ++n) {
-                    const double d = detail::squared_distance(best.profile->places()[n].at, patches.centers[i]);
-                    if (d < nearest) {
-                        nearest = d;
-                        nearest_mark[i] = n;
-                    }
-                }
-                int first;
-                std::vector<double> log_likelihood;
-                const double step = patches.voxel[i] / kStepsPerVoxel;
-                if (offsets_of(p, tables[best.local ? nearest_mark[i] : 0], ranges[i], first, log_likelihood))
-                    evidence[i] = density(log_likelihood, first * step, step, best.trust);
-                if (offsets_of(p, best.held_out[nearest_mark[i]], ranges[i], first, log_likelihood))
-                    honest[i] = density(log_likelihood, first * step, step, best.trust);
-            });
-            run.check();
-
-            timer("evidence");
-            // The image alone, then how far off it is at the marks, and how far off the guess is between them.
-            const OffsetField field(patches, std::max(env("GUIDE_RANGE", 1.0) * spacing, 4 * s.h));
-            std::vector<double> none(count, 0.0), zero(count, 0.0), deviation(count, std::sqrt(broad2));
-            double distance2 = 0, distance4 = 0;
-            for (std::size_t i = 0; i < count; ++i) distance4 += patches.area[i] * std::pow(to_mark[i], 4) / area;
-            for (std::size_t i = 0; i < count; ++i) distance2 += patches.area[i] * to_mark[i] * to_mark[i] / area;
-            timer("field");
-            // The image's field for a guess that may be this far off: how far it errs at the marks, how much of a
-            // deviation of the guess it would undo, and how far off it finds the guess where marks are far.
-            struct Word { double prior2, error2, response, slope2; };
-            std::vector<Word> words;
-            const double size = 3 * measure(mesh).volume / area;
-            const double bend = env("GUIDE_BEND", 0.15) / size;  // of the sagitta d^2 / (2 size) interpolation leaves about a third
-            const double least2 = bend * bend * distance4;
-            std::vector<double> shift(count);
-            for (std::size_t i = 0; i < count; ++i) {
-                const Vec3& x = patches.centers[i];
-                shift[i] = std::cos(M_PI / spacing * (x[0] + x[1] + x[2]) / std::sqrt(3.0));
-            }
-            for (double prior = iteration > 0 ? chosen_prior : std::sqrt(broad2); prior > 0.1 * s.h && words.size() < (iteration > 0 ? 1 : 5); prior *= 0.5) {
-                std::fill(deviation.begin(), deviation.end(), prior);
-                const OffsetField::Fit fit = field.fit(home, deviation, honest, zero, none, &shift);
-                double sum = 0, squares = 0, moved2 = 0, kept = 0, shift2 = 0;
-                for (const auto& m : on) {
-                    const double off = fit.offset[m.patch] - m.residual;
-                    sum += off * off;
-                    squares += off * off * off * off;
-                }
-                const double marks_count = double(on.size()), mean = sum / marks_count;
-                const double uncertain = std::sqrt(std::max(squares / marks_count - mean * mean, 0.0) / marks_count);
-                const double error2 = std::max(mean + env("GUIDE_SE", 1) * uncertain - mark2, mark2 * std::sqrt(2 / marks_count));
-                std::vector<double> slopes(on.size(), 0.0);
-                for (std::size_t i = 0; i < count; ++i) {
-                    const double squared = (fit.offset[i] - home[i]) * (fit.offset[i] - home[i]);
-                    moved2 += patches.area[i] / area * squared;
-                    kept += patches.area[i] * fit.carried[i] * shift[i];
-                    shift2 += patches.area[i] * shift[i] * shift[i];
-                    slopes[nearest_mark[i]] += patches.area[i] / area * to_mark[i] * to_mark[i] / distance4 * (squared - guess2 - error2);
-                }
-                const double response = std::clamp(1 - kept / shift2, 0.01, 1.0);
-                double slope2 = 0, slope_variance = 0;
-                for (const double b : slopes) slope2 += b;
-                for (const double b : slopes) slope_variance += std::pow(b - slope2 / marks_count, 2);
-                const double full2 = slope2;
-                slope2 = std::max(slope2 - env("GUIDE_SE2", 1) * std::sqrt(slope_variance), 0.0);
-                words.push_back({prior * prior, error2, response, slope2});
-                if (debug())
-                    std::fprintf(stderr, "  it %d patches %zu spacing %.2f residual %.3f mark %.3f prior %.2f image error %.3f response %.2f moved %.3f slope %.3f (%.3f) d %.2f (voxels)\n",
-                                 iteration, count, spacing / s.h, std::sqrt(residual2) / s.h, std::sqrt(mark2) / s.h, prior / s.h, std::sqrt(error2) / s.h,
-                                 response, std::sqrt(moved2) / s.h, std::sqrt(slope2), std::sqrt(std::max(full2, 0.0)), std::sqrt(distance2) / s.h);
-            }
-            double slope2 = 0;
-            for (const Word& w : words) slope2 = std::max(slope2, w.slope2);
-            Word chosen = words.front();
-            for (const Word& w : words)
-                if (w.response >= kLeastResponse && w.prior2 >= guess2 + std::max(slope2 * distance2, least2) && w.error2 / (w.response * w.response) < chosen.error2 / (chosen.response * chosen.response)) chosen = w;
-            chosen_prior = std::sqrt(chosen.prior2);
-            chosen_sigma = best.sigma;
-            const double error2 = chosen.error2, response = chosen.response;
-            if (debug()) std::fprintf(stderr, "  chosen prior %.3f response %.3f error %.3f slope %.3f\n", std::sqrt(chosen.prior2) / s.h, response, std::sqrt(error2) / s.h, std::sqrt(slope2));
-            std::vector<double> guess_variance(count);
-            double guess_mean2 = 0;
-            for (std::size_t i = 0; i < count; ++i) {
-                const double d2 = to_mark[i] * to_mark[i];
-                guess_variance[i] = guess2 + std::max(slope2 * d2, bend * bend * d2 * d2);
-                guess_mean2 += patches.area[i] / area * guess_variance[i];
-            }
-            for (std::size_t i = 0; i < count; ++i)
-                deviation[i] = std::sqrt(chosen.prior2 * (error2 + guess_variance[i]) / (error2 + guess_mean2));
-            const OffsetField::Fit fit = field.fit(home, deviation, evidence, zero, none, nullptr);
-            timer("fits");
-            // Truth between guess and image, and through the marks.
-            std::vector<double> offset(count), left(count), rest(count, 0.0), rest_precision(count, 0.0);
-            for (std::size_t i = 0; i < count; ++i) {
-                const double share = std::min(options.weight * response * guess_variance[i] / (response * response * guess_variance[i] + error2), 1.0);
-                offset[i] = home[i] + share * (fit.offset[i] - home[i]);
-                left[i] = std::sqrt(guess_variance[i] * error2 / (response * response * guess_variance[i] + error2));
-            }
-            for (const auto& m : on) {
-                const double precision = misfit / (m.deviation * m.deviation + 0.01 * s.h * s.h);
-                rest[m.patch] += precision * (m.residual - offset[m.patch]);
-                rest_precision[m.patch] += precision;
-            }
-            for (std::size_t i = 0; i < count; ++i)
-                if (rest_precision[i] > 0) rest[i] /= rest_precision[i];
-            if (misfit > 0) {
-                const OffsetField::Fit correction = field.fit(zero, left, std::vector<OffsetEvidence>(count), rest, rest_precision, nullptr);
-                for (std::size_t i = 0; i < count; ++i) offset[i] += correction.offset[i];
-            }
-            if (const char* path = std::getenv("GUIDE_DUMP")) {
-                std::FILE* f = std::fopen((std::string(path) + std::to_string(iteration)).c_str(), "w");
-                for (std::size_t i = 0; i < count; ++i)
-                    std::fprintf(f, "%g %g %g %g %g %g %g %g %g %g %g %g %g\n", patches.centers[i][0], patches.centers[i][1], patches.centers[i][2],
-                                 patches.directions[i][0], patches.directions[i][1], patches.directions[i][2], patches.area[i], to_mark[i], home[i],
-                                 fit.offset[i], fit.precision[i], offset[i], deviation[i]);
-                std::fclose(f);
-            }
-            timer("final");
-            current = moved(*current, patches, on_vertices(patches, offset, width), s, run);
-            current = detail::redistance(*current, s.domain, s.width, detail::DomainEnd::Closed, "guess", run);
-            timer("move");
-            report.used = true;
-            report.sigma = best.sigma;
-            report.local = best.local;
-            report.gain = best.gain;
-            report.image_error = std::sqrt(error2);
-            report.guess_error = std::sqrt(guess_mean2);
+        } else {
+            report.reason = marks.empty() ? "there are no marks to learn the border from" : "the image has no weight";
         }
-        result = start_from_grid(s.domain, report.used ? *current : guess, run);
+        result = start_from_grid(domain, report.used ? surface->current() : guess, run);
+        run.report("image guidance", 1);
     });
+    if (report.used) report.reason.clear();
     return result;
 }
 
