@@ -15,7 +15,7 @@ LAYERS = [
     ["band", "evolve", "scan_solid"],
     ["guess"],
     ["surface", "mesh_cleanup", "cloud_cleanup", "compare"],
-    ["structures", "evidence"],
+    ["structures", "evidence", "guidance"],
     ["pipeline", "phantom", "render"],
 ]
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}

@@ -1,0 +1,53 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "covol/edge.h"
+#include "covol/fwd.h"
+#include "covol/image.h"
+#include "covol/run.h"
+
+namespace covol {
+
+/// What changes the result of guide(); lengths in world units.
+struct GuidanceOptions {
+    double mark_precision = -1;  ///< a mark lies within half of this of the border it means, along each axis; < 0: one voxel of the image
+    double range = -1;           ///< how far from the guess the border is looked for; < 0: by the distance to the marks
+    double weight = 1;           ///< in [0,1]: share of what the image says that counts; 0 leaves the guess as it is
+    /// Empty when usable, else one line for each bad field: "weight: expected 0 to 1, got 2".
+    [[nodiscard]] std::string why_invalid() const;
+};
+
+/// What guide() saw and did. The defaults say that nothing ran.
+struct GuidanceReport {
+    bool used = false;           ///< the image had a say
+    std::string reason;          ///< why it had none, in plain words
+    MarkedFeature feature;       ///< what the image has at the marks
+    double inside = 0, border = 0, outside = 0;  ///< median intensities two voxels inside of the marks, there, two voxels outside
+    double sigma = 0;            ///< presmoothing, the one that foretold the marks best
+    bool local = false;          ///< the profile was learnt place by place
+    double gain = 0;             ///< what the image adds to the log-likelihood of a mark that it was not learnt from, nats
+    double image_error = 0;      ///< how far off the border the image alone would lie (rms, an upper estimate, at the marks)
+    double guess_error = 0;      ///< how far off the border the guess lies (rms, a lower estimate)
+    double confident_share = 0;  ///< of the area, where the image says more than the guess
+    double mean_offset = 0;      ///< by area, outward > 0
+    double max_offset = 0;       ///< of |offset|
+};
+
+/// Moves a guess to where the image shows, between the marks, the border that it shows at the marks.
+///
+/// How often each brightness occurs at each depth along the surface's normals is learnt at the marks, whatever it is: a
+/// step, a line, or a border that its annotator draws beside the steepest slope. Elsewhere this makes each offset along
+/// the normal more or less likely, and a smooth random field about the guess weighs that. How far off such a field
+/// lies is measured at marks that the profile was not learnt from, as if the guess were no better there than between
+/// them; the guess and the field are then averaged by their variances. An image that does not foretell the marks leaves
+/// the guess as it is.
+///
+/// @param guess  level set, negative inside, on its domain's lattice
+/// @param marks  world positions; at least 8 near the guess, or the image is not used
+/// @return a level set as start_from_grid() gives, on the guess's domain. Does not depend on the number of threads.
+/// @throws Error InvalidOptions, InvalidInput (no surface in the domain), Cancelled.
+[[nodiscard]] FloatGridPtr guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const Image& image,
+                                 const GuidanceOptions& options, GuidanceReport& report, const RunContext& run = {});
+
+}  // namespace covol

@@ -1,0 +1,153 @@
+#include "guidance/border_profile.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace covol::guidance {
+namespace {
+
+constexpr int kFarSteps = 4 * kStepsPerVoxel;  // beyond the border's own profile, as far as inside and outside are learnt
+constexpr double kDepthBlur = 1.4;             // steps: a mark's jitter, and samples closer than a voxel are no two samples
+constexpr double kLevelBlur = 1.0;
+constexpr double kBelief = 2.0;                // places' worth of belief in the more general counts
+
+/// Gaussian blur of rows of `count` values that lie `stride` apart; ends keep their mass.
+void blur(double* values, int count, int stride, double sigma) {
+    const int radius = int(std::ceil(2.5 * sigma));
+    std::vector<double> out(count, 0.0), kernel(2 * radius + 1);
+    for (int n = -radius; n <= radius; ++n) kernel[n + radius] = std::exp(-0.5 * n * n / (sigma * sigma));
+    for (int n = 0; n < count; ++n) {
+        double total = 0;
+        for (int m = std::max(n - radius, 0); m <= std::min(n + radius, count - 1); ++m) total += kernel[m - n + radius];
+        for (int m = std::max(n - radius, 0); m <= std::min(n + radius, count - 1); ++m)
+            out[m] += values[n * stride] * kernel[m - n + radius] / total;
+    }
+    for (int n = 0; n < count; ++n) values[n * stride] = out[n];
+}
+
+}  // namespace
+
+void BorderProfile::Counts::add(const Counts& other, double weight) {
+    for (std::size_t n = 0; n < border.size(); ++n) border[n] += weight * other.border[n];
+    for (std::size_t n = 0; n < inside.size(); ++n) inside[n] += weight * other.inside[n];
+    for (std::size_t n = 0; n < outside.size(); ++n) outside[n] += weight * other.outside[n];
+}
+
+BorderProfile::BorderProfile(std::vector<MarkedPlace> places) : places_(std::move(places)) {
+    // Levels hold equally many of the samples near the marks.
+    std::vector<float> all;
+    for (const MarkedPlace& place : places_) {
+        const PatchProfile& p = place.profile;
+        const int middle = int(std::lround(place.offset));
+        for (int row = 0; row < p.rows; ++row)
+            for (int s = std::max(p.lo, middle - kBorderSteps - kFarSteps); s <= std::min(p.hi, middle + kBorderSteps + kFarSteps); ++s)
+                all.push_back(p.values[std::size_t(row) * p.steps() + s - p.lo]);
+    }
+    std::sort(all.begin(), all.end());
+    for (int n = 1; n < kLevels && !all.empty(); ++n) edges_.push_back(all[all.size() * n / kLevels]);
+    counts_.resize(places_.size());
+    tbb::parallel_for(std::size_t(0), places_.size(), [&](std::size_t n) {
+        to_levels(places_[n].profile);
+        counts_[n] = count(places_[n]);
+    });
+}
+
+void BorderProfile::to_levels(PatchProfile& p) const {
+    p.levels.resize(p.values.size());
+    for (std::size_t n = 0; n < p.values.size(); ++n)
+        p.levels[n] = std::uint8_t(std::upper_bound(edges_.begin(), edges_.end(), p.values[n]) - edges_.begin());
+}
+
+BorderProfile::Counts BorderProfile::count(const MarkedPlace& place) const {
+    Counts c;
+    const PatchProfile& p = place.profile;
+    const int below = int(std::floor(place.offset));
+    const double part = place.offset - below;
+    for (int row = 0; row < p.rows; ++row)
+        for (int s = p.lo; s <= p.hi; ++s) {
+            const int level = p.levels[std::size_t(row) * p.steps() + s - p.lo];
+            for (int n = 0; n < 2; ++n) {
+                const int depth = s - below - n;
+                const double weight = (n == 0 ? 1 - part : part) / p.rows;
+                if (std::abs(depth) <= kBorderSteps)
+                    c.border[std::size_t(depth + kBorderSteps) * kLevels + level] += weight;
+                if (depth < -kBorderSteps / 2 && depth >= -kBorderSteps - kFarSteps) c.inside[level] += weight / kFarSteps;
+                if (depth > kBorderSteps / 2 && depth <= kBorderSteps + kFarSteps) c.outside[level] += weight / kFarSteps;
+            }
+        }
+    for (int level = 0; level < kLevels; ++level) blur(c.border.data() + level, kDepths, kLevels, kDepthBlur);
+    for (int depth = 0; depth < kDepths; ++depth) blur(c.border.data() + std::size_t(depth) * kLevels, kLevels, 1, kLevelBlur);
+    blur(c.inside.data(), kLevels, 1, kLevelBlur);
+    blur(c.outside.data(), kLevels, 1, kLevelBlur);
+    return c;
+}
+
+BorderProfile::Counts BorderProfile::sum(const std::vector<double>& weights) const {
+    Counts total;
+    for (std::size_t n = 0; n < counts_.size(); ++n)
+        if (weights[n] > 0) total.add(counts_[n], weights[n]);
+    return total;
+}
+
+/// Counts become probabilities, shrunk towards `base`, else inside and outside towards each other and the border
+/// towards the two.
+void BorderProfile::normalise(Counts& c, const Counts* base) {
+    const auto mix = [](double* values, const double* prior, double belief) {
+        double total = 0;
+        for (int level = 0; level < kLevels; ++level) total += values[level];
+        for (int level = 0; level < kLevels; ++level) values[level] = (values[level] + belief * prior[level]) / (total + belief);
+    };
+    std::vector<double> prior(kLevels, 1.0 / kLevels);
+    mix(c.inside.data(), base ? base->inside.data() : prior.data(), kBelief);
+    mix(c.outside.data(), base ? base->outside.data() : prior.data(), kBelief);
+    for (int depth = 0; depth < kDepths; ++depth) {
+        double* row = c.border.data() + std::size_t(depth) * kLevels;
+        const double out = std::clamp(0.5 + double(depth - kBorderSteps) / (2.0 * kStepsPerVoxel), 0.0, 1.0);
+        for (int level = 0; level < kLevels; ++level) prior[level] = (1 - out) * c.inside[level] + out * c.outside[level];
+        mix(row, base ? base->border.data() + std::size_t(depth) * kLevels : prior.data(), kBelief);
+    }
+}
+
+BorderTable BorderProfile::table(const std::vector<double>& weights, const std::vector<double>* base_weights) const {
+    Counts counts = sum(weights);
+    if (base_weights != nullptr) {
+        Counts base = sum(*base_weights);
+        normalise(base, nullptr);
+        normalise(counts, &base);
+    } else {
+        normalise(counts, nullptr);
+    }
+    BorderTable table;
+    const auto logs = [](const std::vector<double>& p) {
+        std::vector<float> out(p.size());
+        for (std::size_t n = 0; n < p.size(); ++n) out[n] = float(std::log(p[n]));
+        return out;
+    };
+    table.border = logs(counts.border);
+    table.inside = logs(counts.inside);
+    table.outside = logs(counts.outside);
+    return table;
+}
+
+void BorderTable::likelihood(const PatchProfile& p, int first, std::vector<double>& out) const {
+    const int steps = p.steps();
+    std::vector<double> in_sum(steps + 1), out_sum(steps + 1);
+    for (int row = 0; row < p.rows; ++row) {
+        const std::uint8_t* level = p.levels.data() + std::size_t(row) * steps;
+        for (int s = 0; s < steps; ++s) {
+            in_sum[s + 1] = in_sum[s] + inside[level[s]];
+            out_sum[s + 1] = out_sum[s] + outside[level[s]];
+        }
+        for (std::size_t n = 0; n < out.size(); ++n) {
+            const int at = first + int(n) - p.lo;
+            const int begin = std::clamp(at - kBorderSteps, 0, steps), end = std::clamp(at + kBorderSteps + 1, 0, steps);
+            double sum = in_sum[begin] + out_sum[steps] - out_sum[end];
+            for (int s = begin; s < end; ++s) sum += border[std::size_t(s - at + kBorderSteps) * kLevels + level[s]];
+            out[n] += sum / (double(p.rows) * kStepsPerVoxel);
+        }
+    }
+}
+
+}  // namespace covol::guidance

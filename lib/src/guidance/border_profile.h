@@ -1,0 +1,67 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "covol/fwd.h"
+
+namespace covol::guidance {
+
+/// Steps of a profile in a voxel of the image along the normal.
+inline constexpr int kStepsPerVoxel = 4;
+/// The border's own profile reaches so many steps to either side; beyond, depth does not matter.
+inline constexpr int kBorderSteps = 10;
+inline constexpr int kDepths = 2 * kBorderSteps + 1;
+inline constexpr int kLevels = 24;  ///< of brightness
+
+/// Brightness along the normals of one patch: rows from `lo` to `hi` steps outward of its vertices.
+struct PatchProfile {
+    int lo = 0, hi = -1;
+    int rows = 0;
+    std::vector<float> values;          ///< row by row
+    std::vector<std::uint8_t> levels;   ///< the same as levels of brightness
+    [[nodiscard]] int steps() const { return hi - lo + 1; }
+    [[nodiscard]] bool empty() const { return rows == 0; }
+};
+
+/// A marked place: a profile and where in it the border is.
+struct MarkedPlace {
+    PatchProfile profile;
+    double offset = 0;  ///< steps, from the patch outward
+    Vec3 at{};
+};
+
+/// Logarithms of how often each level occurs at each depth (steps outward of the border), and far inside and outside.
+struct BorderTable {
+    std::vector<float> border;           ///< [depth + kBorderSteps][level]
+    std::vector<float> inside, outside;  ///< [level]
+
+    /// Log-likelihood of each offset first .. first + out.size() - 1 (steps), per voxel of the image, up to a constant; mean over rows.
+    /// @pre the offsets lie within the profile.
+    void likelihood(const PatchProfile& profile, int first, std::vector<double>& out) const;
+};
+
+/// How often each level occurs at each depth around marked places; tables are drawn from some or all of them.
+class BorderProfile {
+public:
+    explicit BorderProfile(std::vector<MarkedPlace> places);
+    void to_levels(PatchProfile& profile) const;
+    /// From all places, weighted by `weights`, shrunk towards the counts of `base` (may be null).
+    [[nodiscard]] BorderTable table(const std::vector<double>& weights, const std::vector<double>* base_weights = nullptr) const;
+    [[nodiscard]] const std::vector<MarkedPlace>& places() const { return places_; }
+
+private:
+    struct Counts {
+        std::vector<double> border, inside, outside;
+        Counts() : border(kDepths * kLevels, 0.0), inside(kLevels, 0.0), outside(kLevels, 0.0) {}
+        void add(const Counts& other, double weight);
+    };
+    [[nodiscard]] Counts count(const MarkedPlace& place) const;
+    [[nodiscard]] Counts sum(const std::vector<double>& weights) const;
+    static void normalise(Counts& counts, const Counts* base);
+
+    std::vector<MarkedPlace> places_;
+    std::vector<float> edges_;    // between levels
+    std::vector<Counts> counts_;  // by place
+};
+
+}  // namespace covol::guidance

@@ -1,0 +1,127 @@
+#include "guidance/offset_field.h"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace covol::guidance {
+namespace {
+
+constexpr int kRounds = 4;
+using Sparse = Eigen::SparseMatrix<double>;
+
+}  // namespace
+
+struct OffsetField::System {
+    Sparse precision;  // of the field of unit variance
+    mutable Eigen::SimplicialLDLT<Sparse> solver;
+    std::vector<std::vector<std::uint32_t>> neighbours;
+};
+
+// A Matern field of smoothness 1 (F. Lindgren, H. Rue, J. Lindström 2011): (kappa^2 - Laplace) f = white noise, on the
+// patches as finite volumes. Its variance is 1 / (4 pi kappa^2 tau^2).
+OffsetField::OffsetField(const Patches& patches, double range) : patches_(patches), system_(std::make_unique<System>()) {
+    const std::size_t count = patches.size();
+    const double kappa = std::sqrt(8.0) / range;
+    std::vector<double> diagonal(count);
+    for (std::size_t i = 0; i < count; ++i) diagonal[i] = kappa * kappa * patches.area[i];
+    std::vector<Eigen::Triplet<double>> entries;
+    system_->neighbours.resize(count);
+    for (const auto& border : patches.borders) {
+        const double weight = border.length / std::max(border.distance, 1e-9);
+        diagonal[border.a] += weight;
+        diagonal[border.b] += weight;
+        entries.emplace_back(border.a, border.b, -weight);
+        entries.emplace_back(border.b, border.a, -weight);
+        system_->neighbours[border.a].push_back(border.b);
+        system_->neighbours[border.b].push_back(border.a);
+    }
+    for (std::size_t i = 0; i < count; ++i) entries.emplace_back(int(i), int(i), diagonal[i]);
+    Sparse half{Eigen::Index(count), Eigen::Index(count)};
+    half.setFromTriplets(entries.begin(), entries.end());
+    Eigen::VectorXd inverse_area(count);
+    for (std::size_t i = 0; i < count; ++i) inverse_area[Eigen::Index(i)] = 1 / std::max(patches.area[i], 1e-12);
+    const double tau2 = 1 / (4 * M_PI * kappa * kappa);
+    system_->precision = tau2 * (half * inverse_area.asDiagonal() * half);
+    system_->solver.analyzePattern(system_->precision);
+}
+
+OffsetField::~OffsetField() = default;
+
+double moments(const OffsetEvidence& e, double mean, double variance, double& new_mean, double& new_variance) {
+    double mass = 0, first = 0, second = 0, plain = 0;
+    for (std::size_t n = 0; n < e.density.size(); ++n) {
+        const double x = e.first + double(n) * e.step - mean;
+        const double normal = std::exp(-0.5 * x * x / variance);
+        const double weight = normal * e.density[n];
+        plain += normal;
+        mass += weight;
+        first += weight * x;
+        second += weight * x * x;
+    }
+    if (!(mass > 0) || !(plain > 0)) {
+        new_mean = mean;
+        new_variance = variance;
+        return 1;
+    }
+    first /= mass;
+    new_mean = mean + first;
+    new_variance = std::max(second / mass - first * first, 0.0) + e.step * e.step / 12;
+    return mass / plain;
+}
+
+OffsetField::Fit OffsetField::fit(const std::vector<double>& mean, const std::vector<double>& deviation,
+                                  const std::vector<OffsetEvidence>& evidence, const std::vector<double>& fixed,
+                                  const std::vector<double>& fixed_precision, const std::vector<double>* shift) const {
+    const std::size_t count = patches_.size();
+    Fit result{mean, std::vector<double>(count, 0.0), {}};
+    const bool asked = std::any_of(evidence.begin(), evidence.end(), [](const OffsetEvidence& e) { return !e.density.empty(); });
+    Eigen::VectorXd inverse_deviation(count), prior_mean(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        inverse_deviation[Eigen::Index(i)] = 1 / deviation[i];
+        prior_mean[Eigen::Index(i)] = mean[i];
+    }
+    const Sparse prior = inverse_deviation.asDiagonal() * system_->precision * inverse_deviation.asDiagonal();
+    const Eigen::VectorXd pull = prior * prior_mean;
+    std::vector<double> site(count, 0.0), cavity(count);
+    std::vector<double> believed(count);
+    for (int round = 0; round < (asked ? kRounds : 1); ++round) {
+        // What the others say about a patch: the field's value there, the surer the more they know.
+        for (std::size_t i = 0; i < count; ++i) {
+            believed[i] = 1 / (deviation[i] * deviation[i]) + fixed_precision[i];
+            for (const std::uint32_t j : system_->neighbours[i]) believed[i] += 0.5 * (result.precision[j] + fixed_precision[j]);
+        }
+        {
+            tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
+                if (evidence[i].density.empty()) return;
+                const double variance = 1 / believed[i];
+                double m, v;
+                const double centre = result.offset[i];
+                moments(evidence[i], centre, variance, m, v);
+                const double gained = std::max(1 / v - believed[i], 0.0);
+                site[i] = gained > 0 ? (m / v - centre * believed[i]) / gained : 0;
+                cavity[i] = gained;
+            });
+            for (std::size_t i = 0; i < count; ++i) result.precision[i] = evidence[i].density.empty() ? 0 : cavity[i];
+        }
+        Sparse matrix = prior;
+        Eigen::VectorXd right = pull;
+        for (std::size_t i = 0; i < count; ++i) {
+            matrix.coeffRef(Eigen::Index(i), Eigen::Index(i)) += result.precision[i] + fixed_precision[i];
+            right[Eigen::Index(i)] += result.precision[i] * site[i] + fixed_precision[i] * fixed[i];
+        }
+        system_->solver.factorize(matrix);
+        const Eigen::VectorXd solution = system_->solver.solve(right);
+        for (std::size_t i = 0; i < count; ++i) result.offset[i] = solution[Eigen::Index(i)];
+    }
+    if (shift != nullptr) {
+        Eigen::VectorXd right = Eigen::Map<const Eigen::VectorXd>(shift->data(), Eigen::Index(count));
+        right = system_->solver.solve(prior * right).eval();
+        result.carried.assign(right.data(), right.data() + count);
+    }
+    return result;
+}
+
+}  // namespace covol::guidance

@@ -1,0 +1,45 @@
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "guidance/patches.h"
+
+namespace covol::guidance {
+
+/// Where a patch's border may be by the image: a density over offsets, relative to that of an image that says nothing.
+struct OffsetEvidence {
+    double first = 0, step = 1;   ///< offsets first + n * step, world units
+    std::vector<float> density;   ///< mean 1; empty: nothing known
+};
+
+/// A smooth random field of offsets on the patches, with the guess as its mean.
+class OffsetField {
+public:
+    /// @param range      over which offsets are alike
+    /// @param deviation  by patch, prior standard deviation
+    OffsetField(const Patches& patches, double range);
+    ~OffsetField();
+
+    struct Fit {
+        std::vector<double> offset;
+        std::vector<double> precision;  ///< that the image gave, 1 / variance
+        std::vector<double> carried;    ///< how the offsets would follow a shift of the prior's mean
+    };
+    /// @param mean, deviation  the prior, by patch
+    /// @param evidence         by patch
+    /// @param fixed, fixed_precision  what else is known (marks), by patch
+    /// @param shift  of the prior's mean, for Fit::carried; may be null
+    [[nodiscard]] Fit fit(const std::vector<double>& mean, const std::vector<double>& deviation,
+                          const std::vector<OffsetEvidence>& evidence, const std::vector<double>& fixed,
+                          const std::vector<double>& fixed_precision, const std::vector<double>* shift) const;
+
+private:
+    struct System;
+    const Patches& patches_;
+    std::unique_ptr<System> system_;
+};
+
+/// Mean and variance of a density times a normal one. @return its mass relative to the normal one's.
+double moments(const OffsetEvidence& evidence, double mean, double variance, double& new_mean, double& new_variance);
+
+}  // namespace covol::guidance
