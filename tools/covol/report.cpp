@@ -113,6 +113,21 @@ Json to_json(const SegmentReport& r) {
                                     {"farthest", {{"distance", r.marks_off.farthest},
                                                   {"world", to_json(r.marks_off.farthest_world)},
                                                   {"index", to_json(r.marks_off.farthest_index)}}}};
+    if (r.guidance.used || !r.guidance.reason.empty())
+        json["guidance"] = {{"used", r.guidance.used},
+                            {"reason", r.guidance.reason},
+                            {"feature", to_string(r.guidance.feature.feature)},
+                            {"inside", r.guidance.inside},
+                            {"border", r.guidance.border},
+                            {"outside", r.guidance.outside},
+                            {"sigma", r.guidance.sigma},
+                            {"local", r.guidance.local},
+                            {"gain", r.guidance.gain},
+                            {"image_error", r.guidance.image_error},
+                            {"guess_error", r.guidance.guess_error},
+                            {"confident_share", r.guidance.confident_share},
+                            {"mean_offset", r.guidance.mean_offset},
+                            {"max_offset", r.guidance.max_offset}};
     if (!r.warnings.empty()) json["warnings"] = r.warnings;
     if (r.guess.marks > 0)
         json["guess"] = {{"marks", r.guess.marks}, {"cut_marks", r.guess.cut_marks}, {"parts", r.guess.patches}};

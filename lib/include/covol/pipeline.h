@@ -10,6 +10,7 @@
 #include "covol/edge.h"
 #include "covol/evolve.h"
 #include "covol/guess.h"
+#include "covol/guidance.h"
 #include "covol/image.h"
 #include "covol/mesh.h"
 #include "covol/points.h"
@@ -76,6 +77,7 @@ struct SegmentReport {
     std::size_t point_count = 0;        ///< given, marks of contours included
     std::size_t densified = 0;          ///< points made from contours
     GuessReport guess;                  ///< where the start was one
+    GuidanceReport guidance;            ///< what the image said to a guess
     TagDistanceChoice tag;
     BandReport band;
     EdgeReport edge;

@@ -15,6 +15,7 @@ namespace {
 constexpr double kApproachTau = 3.0;  // time steps of the points' own approach, in tau
 constexpr int kApproachSteps = 40;
 constexpr double kApproachTolerance = 0.01;
+constexpr double kUniformDeviation = 0.3;  // of what is uniform over a voxel, in voxels
 constexpr double kHoldDepth = 0.75;   // voxels that the surface may sink below a start that is held
 constexpr int kHoldSteps = 2;
 constexpr double kHoldTolerance = 0.01;  // voxels a step
@@ -116,6 +117,17 @@ bool rests_on_guess(const Job& job) {
     return job.guided() && job.uses_points() && (job.origin == StartOrigin::Guess || job.origin == StartOrigin::Contours);
 }
 
+// A surface through the marks is moved to where the image shows, between them, what it shows at them.
+void ask_image(Job& job) {
+    if (!job.uses_image()) return;
+    GuidanceOptions options;
+    if (job.options.mark_precision >= 0) options.mark_precision = job.options.mark_precision / kUniformDeviation;
+    options.weight = job.options.evolve.rho;
+    GuidanceReport& report = job.report().guidance;
+    job.result.u = guide(*job.result.u, job.sure, *job.image, options, report, job.run);
+    job.choose("image", report.used ? "used" : "not used", report.reason);
+}
+
 void rest(Job& job) {
     EvolveReport& report = job.report().solve;
     report.stop_reason = StopReason::Steady;
@@ -127,6 +139,8 @@ void rest(Job& job) {
 
 void flow(Job& job) {
     if (rests_on_guess(job)) {
+        Timed timed(job.report().seconds.solve);
+        ask_image(job);
         rest(job);
         job.report().active_voxels = job.report().solve.active_voxels;
         job.report().leaf_count = job.report().solve.leaf_count;
