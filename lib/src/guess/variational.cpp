@@ -301,7 +301,7 @@ void check_spread(const std::vector<Vec3>& marks) {
 
 VariationalSurface::VariationalSurface(const Constraints& given, const std::vector<Vec3>& normals, double amplitude)
     : marks_(given.marks) {
-    check_spread(given.marks);
+    if (normals.empty()) check_spread(given.marks);  // a part of a surface may be flat
     const auto marks = Index(given.marks.size()), count = marks + Index(given.seeds.size());
     for (const Vec3& m : given.marks)
         for (int a = 0; a < 3; ++a) center_[a] += m[a] / double(marks);
