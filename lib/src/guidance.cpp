@@ -34,6 +34,7 @@ constexpr int kNormalRounds = 6;          // of averaging, about two voxels
 constexpr std::array<double, 3> kSigmas{0.5, 1.0, 2.0};  // voxels
 constexpr std::size_t kFewestMarks = 8, kMostMarks = 400;
 constexpr double kLeastResponse = 0.25;  // a field that hardly follows the image does not tell how good the image is
+constexpr double kBeliefInAll = 4;       // marks' worth of belief that the image is as good everywhere
 constexpr int kPriors = 5;               // each half of the one before
 // A surface that bends least leaves about a third of the sagitta d^2 / (2 R) between marks at distance d.
 constexpr double kShareOfSagitta = 0.3;
@@ -77,8 +78,10 @@ private:
 
     struct Word {
         double prior2, error2, response, slope2;
+        std::vector<double> off2;  // by mark
     };
     [[nodiscard]] Word hear(const OffsetField& field, double prior) const;
+    [[nodiscard]] std::vector<double> local_error2(const Word& word) const;
     [[nodiscard]] std::vector<double> on_vertices(const std::vector<double>& offset) const;
     [[nodiscard]] double mean(const std::vector<double>& by_patch) const {
         double sum = 0;
@@ -280,10 +283,11 @@ Guide::Word Guide::hear(const OffsetField& field, double prior) const {
 
     const double marks = double(on_.size());
     double off2 = 0, off4 = 0;
+    std::vector<double> each;
     for (const PatchMark& mark : on_) {
-        const double off = fit.offset[mark.patch] - mark.residual;
-        off2 += squared(off) / marks;
-        off4 += squared(squared(off)) / marks;
+        each.push_back(squared(fit.offset[mark.patch] - mark.residual));
+        off2 += each.back() / marks;
+        off4 += squared(each.back()) / marks;
     }
     const double error = std::sqrt(std::max(off4 - squared(off2), 0.0) / marks);
     const double error2 = std::max(off2 + error - mark2_, mark2_ * std::sqrt(2 / marks));
@@ -301,7 +305,23 @@ Guide::Word Guide::hear(const OffsetField& field, double prior) const {
     for (const double s : slopes) slope2 += s;
     for (const double s : slopes) spread2 += squared(s - slope2 / marks);
     slope2 = std::max(slope2 - std::sqrt(spread2), 0.0) / distance4;
-    return {squared(prior), error2, std::clamp(1 - kept / waves, 0.01, 1.0), slope2};
+    return {squared(prior), error2, std::clamp(1 - kept / waves, 0.01, 1.0), slope2, std::move(each)};
+}
+
+/// The image's error by patch: of the marks around it, and as much as a few marks' worth, of all.
+std::vector<double> Guide::local_error2(const Word& word) const {
+    const double all = word.error2 + mark2_;
+    std::vector<double> result(patches_.size());
+    tbb::parallel_for(std::size_t(0), result.size(), [&](std::size_t i) {
+        double sum = kBeliefInAll * all, total = kBeliefInAll;
+        for (std::size_t n = 0; n < on_.size(); ++n) {
+            const double weight = std::exp(-0.5 * detail::squared_distance(on_[n].at, patches_.centers[i]) / squared(spacing_));
+            sum += weight * word.off2[n];
+            total += weight;
+        }
+        result[i] = std::max(sum / total - mark2_, mark2_ * std::sqrt(2 / total));
+    });
+    return result;
 }
 
 /// Offsets between guess and image, by what each knows.
@@ -335,6 +355,7 @@ void Guide::weigh(bool first) {
     std::vector<double> guess2(count), deviation(count), zero(count, 0.0);
     for (std::size_t i = 0; i < count; ++i) guess2[i] = guess2_ + std::max(slope2 * distance2[i], least2[i]);
     const double mean2 = mean(guess2);
+    const std::vector<double> error2 = local_error2(chosen);
     for (std::size_t i = 0; i < count; ++i)
         deviation[i] = prior_ * std::sqrt((chosen.error2 + guess2[i]) / (chosen.error2 + mean2));
     const OffsetField::Fit fit = field.fit(home_, deviation, evidence_, zero, zero, nullptr);
@@ -342,10 +363,10 @@ void Guide::weigh(bool first) {
     offset_.resize(count);
     std::vector<double> left(count), sure(count, 0.0);
     for (std::size_t i = 0; i < count; ++i) {
-        const double both = squared(chosen.response) * guess2[i] + chosen.error2;
+        const double both = squared(chosen.response) * guess2[i] + error2[i];
         const double share = options_.weight * std::min(chosen.response * guess2[i] / both, 1.0);
         offset_[i] = home_[i] + share * (fit.offset[i] - home_[i]);
-        left[i] = std::sqrt(guess2[i] * chosen.error2 / both);
+        left[i] = std::sqrt(guess2[i] * error2[i] / both);
         if (fit.precision[i] * squared(deviation[i]) > 1 && share > 0.5) sure[i] = 1;
     }
     if (misfit_ > 0) {
