@@ -71,6 +71,12 @@ struct TagDistanceChoice {
 [[nodiscard]] FloatGridPtr start_from_mask(const Domain& domain, const Image& mask, const RunContext& run = {});
 /// The body between closed contours.
 [[nodiscard]] FloatGridPtr start_from_contours(const Domain& domain, const ContourSolid& solid, const RunContext& run = {});
+/// What seeds alone tell: the surface halfway between the nearest seeds inside and outside, but no farther from the
+/// seeds inside than half of what separates the two kinds usually (the median over the seeds outside of the distance to
+/// the nearest one inside), and far enough to join them. Without seeds outside that is kHalfWidthVoxels.
+/// @throws Error also where there is no seed inside, or none in the domain.
+[[nodiscard]] FloatGridPtr start_from_seeds(const Domain& domain, const std::vector<Vec3>& inside,
+                                            const std::vector<Vec3>& outside, const RunContext& run = {});
 /// Any level-set-like grid (negative inside), resampled onto the domain.
 [[nodiscard]] FloatGridPtr start_from_grid(const Domain& domain, const FloatGrid& level_set, const RunContext& run = {});
 
