@@ -10,9 +10,11 @@ import sys
 LAYERS = [
     ["error", "run", "fwd", "domain"],
     ["image", "points", "mesh", "vdb_io", "mesh_io"],
-    ["contours"],
+    ["contours", "seeds"],
+    ["painted"],
     ["distance", "edge", "scan_noise"],
     ["band", "evolve", "scan_solid"],
+    ["guess_correction"],
     ["surface", "mesh_cleanup", "cloud_cleanup", "compare"],
     ["structures", "evidence"],
     ["pipeline", "phantom", "render"],
@@ -20,13 +22,14 @@ LAYERS = [
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 # Files of lib/src whose name is not their header's.
 SOURCE_LEVEL = {"contour_solid": LEVEL["contours"], "points_check": LEVEL["points"], "image_sampling": LEVEL["image"], "image_statistics": LEVEL["image"], "image_write": LEVEL["image"],
-                "tag_distance": LEVEL["band"], "start": LEVEL["band"], "surface_mesh": LEVEL["surface"],
+                "outline": LEVEL["painted"], "segments": LEVEL["painted"],
+                "tag_distance": LEVEL["band"], "start_from_seeds": LEVEL["band"], "start": LEVEL["band"], "surface_mesh": LEVEL["surface"],
                 "mesh_distance": LEVEL["surface"]}
 # The modules of segment(), lib/src/pipeline, in the same way; lib/src/pipeline.cpp is above them all.
 PIPELINE = [
     ["job", "options"],
     ["automatic", "fields"],
-    ["starts", "given_start", "contour_start", "tagged_start", "flow", "final_surface"],
+    ["starts", "given_start", "contour_start", "seed_start", "guess_start", "tagged_start", "flow", "final_surface"],
     ["coarse_level"],
 ]
 PIPELINE_LEVEL = {name: level for level, names in enumerate(PIPELINE) for name in names}

@@ -9,9 +9,11 @@
 #include "covol/contours.h"
 #include "covol/edge.h"
 #include "covol/evolve.h"
+#include "covol/guess_correction.h"
 #include "covol/image.h"
 #include "covol/mesh.h"
 #include "covol/points.h"
+#include "covol/seeds.h"
 #include "covol/surface.h"
 
 namespace covol {
@@ -24,6 +26,7 @@ struct Start {
     WorldBox box;          ///< Box
     std::string path;      ///< Mesh, Mask, Vdb
     FloatGridPtr level_set;  ///< Vdb: one in memory, instead of the file
+    std::shared_ptr<const Image> mask;  ///< Mask: likewise
 };
 
 struct SegmentOptions {
@@ -31,10 +34,15 @@ struct SegmentOptions {
     std::optional<WorldBox> roi;        ///< the domain, instead of the image's box
     double margin = 0.0;                ///< points alone: between points and domain boundary; 0 picks D + 6 voxels
     Start start;
+    /// Another tool's result (Mesh, Mask or Vdb): corrected by the marks and seeds near them, and no flow. `start` is then
+    /// not used.
+    std::optional<Start> guess;
+    CorrectionOptions correction;
     /// Marks on slices, densified with step h: their points join the others, those between the slices as guesses. With
     /// closed contours the start `Tag` is the body that they enclose, unless other points lie far from it or an exterior
     /// seed lies inside it: then all points are tagged, and each hole that inner contours leave is an exterior seed.
     std::shared_ptr<const Contours> contours;
+    std::vector<Vec3> inside, outside;  ///< seeds: positions whose side is known, world units
     double tag_distance = 0.0;          ///< D; 0: automatic
     std::vector<Vec3> exterior_seeds;
     EdgeOptions edge;
@@ -68,6 +76,8 @@ struct SegmentReport {
     EvolveReport solve;
     MeshMeasures surface;
     FitStatistics fit;
+    SeedCheck seeds;
+    CorrectionReport correction;  ///< of SegmentOptions::guess
     double share_without_points = 0;  ///< of the surface's area: farther than 3 voxels and 3 spacings from every point
     SegmentOptions resolved;  ///< what was used: every automatic choice replaced by its value
     std::map<std::string, std::string> automatic;  ///< each automatic choice and its reason
@@ -76,6 +86,7 @@ struct SegmentReport {
 struct SegmentResult {
     FloatGridPtr u, distance, edge, surface;
     TriangleMesh mesh;
+    std::shared_ptr<const GuessCorrection> correction;  ///< of SegmentOptions::guess
     SegmentReport report;
 };
 

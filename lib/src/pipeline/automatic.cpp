@@ -11,6 +11,7 @@ namespace pipeline {
 namespace {
 
 constexpr double kFewPoints = 1000;  // fewer get a voxel size at which their surface has as many voxels as this many would
+constexpr double kSameSeedVoxels = 1e-3;   // seeds closer than this are one position
 constexpr double kMergeVoxels = 0.25;      // points closer than this do not move the surface apart
 constexpr double kAttractionVoxels = 5.0;  // automatic range of the points after starts other than tagging
 constexpr double kTagDeltaVoxels = 0.5, kTagSigmaVoxels = 2.0;  // measured as kTagAttractionVoxels
@@ -62,8 +63,9 @@ void check_input(Job& job) {
     if (job.image == nullptr && job.points.empty())
         throw Error(Errc::InvalidInput, "segment: expected an image or points, got neither");
     if (job.tags() && job.points.empty())
-        throw Error(Errc::InvalidInput, "segment: the start 'tag' expects points, got none; choose another start "
-                                        "(sphere, box, mesh, mask or vdb)");
+        throw Error(Errc::InvalidInput, "segment: the start 'tag' expects points, got none; give points, contours or "
+                                        "seeds inside, or choose another start (sphere, box, mesh, mask or vdb)");
+    check_sides(job.options.inside, job.options.outside, kSameSeedVoxels * job.h());
     job.report().point_count = job.given.size();
     EvolveOptions& evolve = job.options.evolve;
     if (job.points.empty() && evolve.theta > 0) {

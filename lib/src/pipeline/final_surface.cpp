@@ -41,6 +41,8 @@ void make_surface(Job& job) {
     tbb::parallel_invoke([&] { report.surface = measure(job.result.mesh); },
                          [&] { if (!job.points.empty()) report.fit = points_to_surface(marks, job.result.mesh, job.run); },
                          [&] { if (!job.points.empty() && job.image == nullptr) reach = find_bare_surface(job); });
+    report.seeds = check_seeds(*job.result.surface, job.options.inside, job.options.outside);
+    if (const std::string warning = report.seeds.warning(); !warning.empty()) job.run.warn("seeds: " + warning);
     if (report.share_without_points > kWarnWithoutPoints)
         job.run.warn(number(std::round(1000 * report.share_without_points) / 10) +
                      " % of the surface lie farther than " + number(reach) +

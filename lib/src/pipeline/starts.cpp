@@ -3,7 +3,9 @@
 namespace covol::pipeline {
 
 void make_start(Job& job) {
-    if (!job.tags())
+    if (job.has_seeds_alone())
+        start_from_seeds(job);
+    else if (!job.tags())
         start_as_given(job);
     else if (!start_from_contours(job))
         start_by_tagging(job);
