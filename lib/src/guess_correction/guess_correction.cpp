@@ -21,7 +21,7 @@ namespace {
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
 constexpr double kPrecisionVoxels = 0.5;
-constexpr double kCorrectionVoxels = 8.0;   // measured, see tests/bench
+constexpr double kCorrectionVoxels = 8.0;   // to be measured over draws
 constexpr double kRadiusOfResidual = 3.0;  // above 2.11, see the header
 constexpr double kLevelRatio = 2.0;        // bumps whose radii differ by less are solved for together
 constexpr double kSeedDepthVoxels = 0.5;   // how far beyond a seed the surface is put

@@ -8,7 +8,7 @@
 namespace covol::pipeline {
 namespace {
 
-constexpr double kRadiusVoxels = 8.0;   // measured: see CorrectionOptions
+constexpr double kRadiusVoxels = 8.0;   // to be measured over draws
 constexpr double kRadiusSpacings = 2.0; // a mark on a slice tells of the next one
 
 }  // namespace
