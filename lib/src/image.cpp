@@ -226,6 +226,15 @@ Image Image::cropped() const {
     return part;
 }
 
+Image Image::placed(const ImageGeometry& geometry) const {
+    if (geometry.size != geometry_.size)
+        throw Error(Errc::InvalidInput, "placed: " + path_ + ": expected " + detail::size_text(geometry.size) + " voxels, got " +
+                                            detail::size_text(geometry_.size));
+    Image moved = *this;
+    moved.geometry_ = geometry;
+    return moved;
+}
+
 template <typename T>
 Image Image::copy_of(const ImageGeometry& geometry, PixelType type, const T* values) {
     Image image;

@@ -47,6 +47,11 @@ void write_image(const std::string& path, const ImageGeometry& geometry, const s
     write_values(path, geometry, PixelType::UInt8, values, metadata);
 }
 
+void write_image(const std::string& path, const ImageGeometry& geometry, const std::int32_t* labels,
+                 const std::vector<std::pair<std::string, std::string>>& metadata) {
+    write_values(path, geometry, PixelType::Int32, labels, metadata);
+}
+
 void write_image(const std::string& path, const ImageGeometry& geometry, const float* values) {
     write_values(path, geometry, PixelType::Float, values);
 }

@@ -59,6 +59,12 @@ void run_steps(Job& job) {
     Timed total(job.report().seconds.total);
     check_input(job);
     choose_values(job);
+    if (job.options.guess) {
+        start_from_corrected_guess(job);
+        choose_edge_feature(job);
+        find_edges(job);
+        return make_surface(job);
+    }
     make_start(job);  // distance and band
     choose_edge_feature(job);
     const std::optional<FineStart> without_coarse = pass_coarse_levels(job);

@@ -10,10 +10,11 @@ import sys
 LAYERS = [
     ["error", "run", "fwd", "domain"],
     ["image", "clip", "points", "mesh", "vdb_io", "mesh_io"],
-    ["contours"],
+    ["contours", "seeds"],
+    ["painted"],
     ["distance", "edge", "scan_noise"],
     ["band", "evolve", "scan_solid"],
-    ["guess"],
+    ["guess", "guess_correction"],
     ["surface", "mesh_cleanup", "cloud_cleanup", "compare"],
     ["structures", "evidence", "guidance"],
     ["pipeline", "phantom", "render"],
@@ -21,13 +22,14 @@ LAYERS = [
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 # Files of lib/src whose name is not their header's.
 SOURCE_LEVEL = {"contour_solid": LEVEL["contours"], "points_check": LEVEL["points"], "image_sampling": LEVEL["image"], "image_statistics": LEVEL["image"], "image_write": LEVEL["image"],
+                "outline": LEVEL["painted"], "segments": LEVEL["painted"], "start_from_seeds": LEVEL["band"],
                 "tag_distance": LEVEL["band"], "start": LEVEL["band"], "surface_mesh": LEVEL["surface"],
                 "mesh_distance": LEVEL["surface"], "clipped": LEVEL["clip"], "open_ends": LEVEL["clip"]}
 # The modules of segment(), lib/src/pipeline, in the same way; lib/src/pipeline.cpp is above them all.
 PIPELINE = [
     ["job", "options"],
     ["automatic", "fields"],
-    ["doubts", "starts", "given_start", "guess_start", "contour_start", "tagged_start", "flow"],
+    ["doubts", "starts", "given_start", "guess_start", "corrected_start", "seed_start", "contour_start", "tagged_start", "flow"],
     ["final_surface"],
     ["coarse_level"],
 ]

@@ -58,6 +58,12 @@ Json to_json(const MeshMeasures& m) {
 
 Json to_json(const FitStatistics& f) { return {{"mean", f.mean}, {"p95", f.p95}, {"max", f.max}}; }
 
+Json to_json(const SeedCheck& s) {
+    Json json{{"inside", s.inside}, {"outside", s.outside}, {"wrong", s.wrong()}, {"wrong_inside", s.wrong_inside}, {"wrong_outside", s.wrong_outside}};
+    if (s.wrong() > 0) json["first_wrong"] = to_json(s.first);
+    return json;
+}
+
 Json to_json(const CompareReport& r) {
     return {{"dice", r.dice},
             {"jaccard", r.jaccard},
@@ -131,6 +137,7 @@ Json to_json(const SegmentReport& r) {
     if (!r.warnings.empty()) json["warnings"] = r.warnings;
     if (r.guess.marks > 0)
         json["guess"] = {{"marks", r.guess.marks}, {"cut_marks", r.guess.cut_marks}, {"parts", r.guess.patches}};
+    if (r.seeds.inside + r.seeds.outside > 0) json["seeds"] = to_json(r.seeds);
     if (r.share_without_points > 0) json["fit"]["surface_without_points"] = r.share_without_points;
     return json;
 }

@@ -20,6 +20,7 @@ namespace covol::tool {
 [[nodiscard]] Json to_json(const EvolveReport& report);
 [[nodiscard]] Json to_json(const MeshMeasures& measures);
 [[nodiscard]] Json to_json(const FitStatistics& fit);
+[[nodiscard]] Json to_json(const SeedCheck& check);
 [[nodiscard]] Json to_json(const CompareReport& report);
 /// Every number that segment() used, in world units.
 [[nodiscard]] Json to_json(const SegmentOptions& options);

@@ -46,6 +46,7 @@ SegmentOptions SegmentJob::resolve(double h) const {
     options.edge = edge.resolve(h, -1);
     options.evolve = evolve.resolve(h, SegmentOptions::automatic_evolve());
     options.coarse_levels = coarse_levels;
+    options.correction.least_radius = guess.radius.resolve(h, 0);
     const double side = min_component.resolve(h, 0);
     options.extract.min_component_volume = side * side * side;
     return options;
@@ -84,6 +85,9 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
     command.add_option("--density", density_path, "the solid as a fog volume in [0,1]")->type_name("OUT.vdb");
     command.add_option("--fields", fields_path, "u, distance and edge, for a look inside")->type_name("OUT.vdb");
     contours.bind(command, with_image);
+    if (with_image) painted.bind(command);
+    seeds.bind(command, with_image);
+    if (with_image) guess.bind(command);
     cloud.bind(command);
     evolve.bind(command, with_image);
     if (with_image) edge.bind(command);
@@ -127,11 +131,12 @@ Image SegmentJob::read(const std::string& path, const ReadImageOptions& options,
 
 void SegmentJob::run(Session& session) const {
     const auto has_name = [](const std::string& text) { return !split_name(text).name.empty(); };
-    const bool names = std::any_of(points.paths.begin(), points.paths.end(), has_name) ||
-                       std::any_of(contours.paths.begin(), contours.paths.end(), has_name);
+    bool names = false;
+    for (const std::vector<std::string>* texts : {&points.paths, &contours.paths, &seeds.inside, &seeds.outside})
+        names = names || std::any_of(texts->begin(), texts->end(), has_name);
     if (names && images.empty()) throw UsageError("expected files without names: several structures need an image, see covol segment");
     if (is_timelapse(*this)) return run_timelapse(*this, session);
-    if (names || !tag.named_seeds.empty()) return run_structures(*this, session);
+    if (names || !tag.named_seeds.empty() || !painted.paths.empty() || !guess.paths.empty()) return run_structures(*this, session);
     run_one(session);
 }
 
@@ -160,6 +165,9 @@ void SegmentJob::run_one(Session& session) const {
     SegmentOptions options = resolve(h);
     check_tag_distance(options.tag_distance, marks.given);
     options.contours = marks.contours;
+    const Seeds sides = read_seeds(seeds, points.options, geometry, h, session.run());
+    options.inside = sides.inside;
+    options.outside = sides.outside;
     // Shared by the writers that run at the end.
     const auto result = std::make_shared<SegmentResult>(segment(pointer, marks.points, options, session.run()));
     input["points"]["densified"] = result->report.densified;

@@ -6,6 +6,9 @@
 #include "contour_flags.h"
 #include "cloud_flags.h"
 #include "evidence_flags.h"
+#include "guess_flags.h"
+#include "painted_flags.h"
+#include "seed_flags.h"
 
 namespace covol::tool {
 
@@ -15,6 +18,9 @@ struct SegmentJob {
     ImageFlags image;
     PointFlags points;
     ContourFlags contours;
+    PaintedFlags painted;
+    SeedFlags seeds;
+    GuessFlags guess;
     CloudFlags cloud;
     DomainFlags domain;
     TagFlags tag;

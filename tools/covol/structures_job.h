@@ -10,7 +10,7 @@
 #include "segment_job.h"
 #include "table.h"
 
-// One image, one or several structures: `--points NAME=FILE`, `--contours NAME=FILE`.
+// One image, one or several structures: `--points NAME=FILE`, `--contours NAME=FILE`, labels of `--painted FILE`.
 namespace covol::tool {
 
 /// A structure as the command line gives it.
@@ -19,11 +19,22 @@ struct StructureInput {
     PointFlags points;
     ContourFlags contours;
     std::vector<Vec3> exterior_seeds;
+    SeedFlags seeds;    ///< without names
+    std::string guess;  ///< another tool's result; empty: none
+    /// Labels that were painted for it.
+    struct Paint {
+        std::shared_ptr<const PaintedFile> file;
+        int label = 0;
+    };
+    std::vector<Paint> paint;
+    int label = 0;  ///< in the mask that is written
 };
 
-/// The structures of a run, in the order in which their names come first, those of --points before those of --contours.
+/// The structures of a run, in the order in which their names come first: those of --points, --contours, --painted,
+/// --guess, --inside. A single painted label without a name of its own belongs to marks that have none.
 /// @throws UsageError when some marks have names and others have none, or a seed names nobody.
-[[nodiscard]] std::vector<StructureInput> structures_of(const SegmentJob& job);
+[[nodiscard]] std::vector<StructureInput> structures_of(const SegmentJob& job,
+                                                        const std::vector<std::shared_ptr<const PaintedFile>>& painted = {});
 
 /// What came out for one.
 struct StructureOutput {
@@ -32,6 +43,8 @@ struct StructureOutput {
     Json input;               ///< of the report
     SegmentResult result;
     std::optional<Evidence> evidence;
+    int label = 0;                           ///< in the mask
+    std::optional<CorrectedMask> corrected;  ///< of a guess that is a mask in the image's geometry
 };
 
 /// All structures of one image, disjoint.
@@ -40,6 +53,7 @@ struct StructuresOutput {
     std::vector<StructureOutput> structures;
     Json overlaps = Json::array();
     [[nodiscard]] std::vector<std::string> names() const;
+    [[nodiscard]] std::vector<int> labels() const;
 };
 
 /// How a structure starts. The curvature's weight that an earlier frame found automatically goes on where the command

@@ -79,6 +79,8 @@ public:
         : job_(job), session_(session), inputs_(structures_of(job)), table_(columns()) {}
 
     void run() {
+        if (!job_.painted.paths.empty() || !job_.guess.paths.empty())
+            throw UsageError("--painted, --guess: expected one image, got a time-lapse");
         frames_ = frames_of(job_);
         check();
         starts_ = starts_of(job_, inputs_);
@@ -149,10 +151,9 @@ private:
             });
             report["status"] = "ok";
             report.update(to_json(*output));
-            int label = 0;
             for (std::size_t n = 0; n < output->structures.size(); ++n) {
                 const StructureOutput& s = output->structures[n];
-                add_result(table_.row() << frame.number, s.name.empty() ? s.grid : s.name, ++label, s.result.report);
+                add_result(table_.row() << frame.number, s.name.empty() ? s.grid : s.name, s.label, s.result.report);
                 table_ << "ok";
                 starts_[n].start = Start{};
                 starts_[n].start.kind = Start::Kind::Vdb;

@@ -77,6 +77,12 @@ using LevelRow = std::function<void(const Vec3& from, const Vec3& step, int coun
 /// The parts of a function's zero level set that pass near the seeds; its scale does not matter.
 [[nodiscard]] FloatGridPtr start_from_level(const Domain& domain, const std::vector<Vec3>& seeds, const LevelRow& level,
                                             const RunContext& run = {});
+/// What seeds alone tell: the surface halfway between the nearest seeds inside and outside, but no farther from the
+/// seeds inside than half of what separates the two kinds usually (the median over the seeds outside of the distance to
+/// the nearest one inside), and far enough to join them. Without seeds outside that is kHalfWidthVoxels.
+/// @throws Error also where there is no seed inside, or none in the domain.
+[[nodiscard]] FloatGridPtr start_from_seeds(const Domain& domain, const std::vector<Vec3>& inside,
+                                            const std::vector<Vec3>& outside, const RunContext& run = {});
 /// Any level-set-like grid (negative inside), resampled onto the domain.
 [[nodiscard]] FloatGridPtr start_from_grid(const Domain& domain, const FloatGrid& level_set, const RunContext& run = {});
 

@@ -82,6 +82,8 @@ public:
     [[nodiscard]] std::array<double, 2> range() const;
     /// The held voxels as an image of their own; shares their memory.
     [[nodiscard]] Image cropped() const;
+    /// The same voxels elsewhere in the world; shares their memory. @throws Error InvalidInput when the sizes differ.
+    [[nodiscard]] Image placed(const ImageGeometry& geometry) const;
 
     /// Takes a copy of `values` (i fastest, size[0]*size[1]*size[2]).
     static Image from_values(const ImageGeometry& geometry, const float* values);
@@ -153,6 +155,8 @@ void write_image(const std::string& path, const ImageGeometry& geometry, const s
 void write_image(const std::string& path, const ImageGeometry& geometry, const float* values);
 /// The same with key/value pairs, which NRRD keeps and the other formats drop.
 void write_image(const std::string& path, const ImageGeometry& geometry, const std::uint8_t* values,
+                 const std::vector<std::pair<std::string, std::string>>& metadata);
+void write_image(const std::string& path, const ImageGeometry& geometry, const std::int32_t* labels,
                  const std::vector<std::pair<std::string, std::string>>& metadata);
 
 /// What `write_image` can write, judged by the name alone. @throws Error InvalidOptions with the list.

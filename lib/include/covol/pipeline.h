@@ -11,9 +11,11 @@
 #include "covol/evolve.h"
 #include "covol/guess.h"
 #include "covol/guidance.h"
+#include "covol/guess_correction.h"
 #include "covol/image.h"
 #include "covol/mesh.h"
 #include "covol/points.h"
+#include "covol/seeds.h"
 #include "covol/surface.h"
 
 namespace covol {
@@ -27,6 +29,7 @@ struct Start {
     WorldBox box;          ///< Box
     std::string path;      ///< Mesh, Mask, Vdb
     FloatGridPtr level_set;  ///< Vdb: one in memory, instead of the file
+    std::shared_ptr<const Image> mask;  ///< Mask: likewise
 };
 
 /// What holds the surface where neither marks nor edges speak.
@@ -40,15 +43,19 @@ enum class Model {
 struct SegmentOptions {
     Model model = Model::Guided;
     double mark_precision = -1.0;       ///< standard deviation of a mark's place, world units; < 0: 0.3 of the image's spacing along each axis
-    std::vector<Vec3> inside, outside;  ///< places whose side is known
     double voxel_size = 0.0;            ///< h, world units; 0: see choose_voxel_size()
     std::optional<WorldBox> roi;        ///< the domain, instead of the image's box
     double margin = 0.0;                ///< points alone: between points and domain boundary; 0 picks D + 6 voxels
     Start start;
+    /// Another tool's result (Mesh, Mask or Vdb): corrected by the marks and seeds near them, and no flow. `start` is then
+    /// not used.
+    std::optional<Start> guess;
+    CorrectionOptions correction;
     /// Marks on slices, densified with step h: their points join the others, those between the slices as guesses. With
     /// closed contours the start `Tag` is the body that they enclose, unless other points lie far from it or an exterior
     /// seed lies inside it: then all points are tagged, and each hole that inner contours leave is an exterior seed.
     std::shared_ptr<const Contours> contours;
+    std::vector<Vec3> inside, outside;  ///< seeds: positions whose side is known, world units
     double tag_distance = 0.0;          ///< D; 0: automatic
     std::vector<Vec3> exterior_seeds;
     EdgeOptions edge;
@@ -93,6 +100,8 @@ struct SegmentReport {
         Vec3 farthest_index{0, 0, 0};  ///< voxels of the image; without one as farthest_world
     } marks_off;
     std::vector<std::string> warnings;  ///< what a person has to look at, in plain words
+    SeedCheck seeds;
+    CorrectionReport correction;  ///< of SegmentOptions::guess
     double share_without_points = 0;  ///< of the surface's area: farther than 3 voxels and 3 spacings from every point
     SegmentOptions resolved;  ///< what was used: every automatic choice replaced by its value
     std::map<std::string, std::string> automatic;  ///< each automatic choice and its reason
@@ -101,6 +110,7 @@ struct SegmentReport {
 struct SegmentResult {
     FloatGridPtr u, distance, edge, surface;
     TriangleMesh mesh;
+    std::shared_ptr<const GuessCorrection> correction;  ///< of SegmentOptions::guess
     SegmentReport report;
 };
 

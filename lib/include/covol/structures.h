@@ -69,11 +69,14 @@ struct SeparateResult {
 
 /// Key/value pairs that make an NRRD label image a segmentation of 3D Slicer (.seg.nrrd): names, colours, label values
 /// 1, 2, ... and extents.
+/// @param labels  n + 1 where structure n is
+/// @param values  the label values that the file has instead; empty: 1, 2, ...
 [[nodiscard]] std::vector<std::pair<std::string, std::string>> slicer_segments(const std::vector<std::string>& names,
                                                                                const std::vector<std::uint8_t>& labels,
-                                                                               const Index3& size);
+                                                                               const Index3& size,
+                                                                               const std::vector<int>& values = {});
 
-/// ITK-SNAP's label description file for labels 1, 2, ...
-[[nodiscard]] std::string itksnap_labels(const std::vector<std::string>& names);
+/// ITK-SNAP's label description file for labels 1, 2, ..., or those of `values`
+[[nodiscard]] std::string itksnap_labels(const std::vector<std::string>& names, const std::vector<int>& values = {});
 
 }  // namespace covol

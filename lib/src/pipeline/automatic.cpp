@@ -12,6 +12,7 @@ namespace {
 
 constexpr std::size_t kMostGuessMarks = 4000;
 constexpr double kFewPoints = 1000;  // fewer get a voxel size at which their surface has as many voxels as this many would
+constexpr double kSameSeedVoxels = 1e-3;   // seeds closer than this are one position
 constexpr double kMergeVoxels = 0.25;      // points closer than this do not move the surface apart
 constexpr double kAttractionVoxels = 5.0;  // automatic range of the points after starts other than tagging
 constexpr double kTagDeltaVoxels = 0.5, kTagSigmaVoxels = 2.0;  // measured as kTagAttractionVoxels
@@ -58,9 +59,9 @@ void choose_attraction_range(Job& job) {
 // Tagging needs marks that lie closer together than the body is thick anywhere, by far; the guess does not.
 void choose_start(Job& job) {
     Start::Kind& kind = job.options.start.kind;
-    if (kind != Start::Kind::Auto) return;
+    if (kind != Start::Kind::Auto || !job.starts_from_marks()) return;
     kind = Start::Kind::Tag;
-    if (!job.guided() || job.options.contours || job.points.size() > kMostGuessMarks) return;
+    if (!job.guided() || job.options.contours || job.options.tag_distance > 0 || job.points.size() > kMostGuessMarks) return;
     kind = Start::Kind::Guess;
     job.choose("start", "guess", std::to_string(job.points.size()) + " marks, at most " + std::to_string(kMostGuessMarks));
 }
@@ -72,9 +73,10 @@ void check_input(Job& job) {
     if (!why.empty()) throw Error(Errc::InvalidOptions, "segment: " + why);
     if (job.image == nullptr && job.points.empty())
         throw Error(Errc::InvalidInput, "segment: expected an image or points, got neither");
-    if (job.options.start.kind <= Start::Kind::Tag && job.points.empty())
-        throw Error(Errc::InvalidInput, "segment: the start 'tag' expects points, got none; choose another start "
-                                        "(sphere, box, mesh, mask or vdb)");
+    if (job.starts_from_marks() && job.points.empty())
+        throw Error(Errc::InvalidInput, "segment: the start 'tag' expects points, got none; give points, contours or "
+                                        "seeds inside, or choose another start (sphere, box, mesh, mask or vdb)");
+    check_sides(job.options.inside, job.options.outside, kSameSeedVoxels * job.h());
     job.report().point_count = job.given.size();
     EvolveOptions& evolve = job.options.evolve;
     if (job.points.empty() && evolve.theta > 0) {

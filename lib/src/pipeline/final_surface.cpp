@@ -59,6 +59,8 @@ void make_surface(Job& job) {
         report.fit = detail::statistics_of(distances);
         doubt(job, marks, distances);
     }
+    report.seeds = check_seeds(*job.result.surface, job.options.inside, job.options.outside);
+    if (const std::string warning = report.seeds.warning(); !warning.empty()) job.warn("seeds: " + warning);
     if (report.share_without_points > kWarnWithoutPoints)
         job.warn(number(std::round(1000 * report.share_without_points) / 10) +
                      " % of the surface lie farther than " + number(reach) +

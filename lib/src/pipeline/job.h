@@ -44,8 +44,15 @@ struct Job {
     [[nodiscard]] double h() const { return options.voxel_size; }
     [[nodiscard]] bool uses_points() const { return options.evolve.theta > 0; }
     [[nodiscard]] bool uses_image() const { return options.evolve.rho > 0; }
-    [[nodiscard]] bool tags() const { return options.start.kind == Start::Kind::Tag; }
-    [[nodiscard]] bool guesses() const { return options.start.kind == Start::Kind::Guess; }
+    /// Neither marks nor a start are given: the seeds inside are all there is.
+    [[nodiscard]] bool has_seeds_alone() const {
+        return options.start.kind <= Start::Kind::Tag && !options.guess && points.empty() && !options.inside.empty();
+    }
+    [[nodiscard]] bool starts_from_marks() const {
+        return options.start.kind <= Start::Kind::Tag && !options.guess && !has_seeds_alone();
+    }
+    [[nodiscard]] bool tags() const { return options.start.kind == Start::Kind::Tag && starts_from_marks(); }
+    [[nodiscard]] bool guesses() const { return options.start.kind == Start::Kind::Guess && starts_from_marks(); }
     [[nodiscard]] bool guided() const { return options.model == Model::Guided; }
     /// Between closed contours, or null.
     [[nodiscard]] const ContourSolid* body() const {

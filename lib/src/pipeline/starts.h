@@ -10,8 +10,17 @@ void make_start(Job& job);
 /// The surface through the marks that bends least.
 void start_from_guess(Job& job);
 
+/// The grid of a start other than `Tag`. @throws Error
+[[nodiscard]] FloatGridPtr start_grid(const Start& start, const Domain& domain, const RunContext& run);
+
+/// The guess of the options, corrected by the marks and seeds.
+void start_from_corrected_guess(Job& job);
+
 /// The sphere, box, mesh, mask or level set that the caller names. The band follows the surface.
 void start_as_given(Job& job);
+
+/// Halfway between the seeds, where there are no marks.
+void start_from_seeds(Job& job);
 
 /// The body between closed contours.
 /// @return false, with nothing made, where there is no such body or it cannot be all that there is to start from

@@ -23,14 +23,18 @@ constexpr double kSolidReach = 3.0;       // voxels of the solid's own grid that
 std::vector<Vec3> all_seeds(const Job& job) {
     std::vector<Vec3> seeds = job.options.exterior_seeds;
     seeds.insert(seeds.end(), job.hole_seeds.begin(), job.hole_seeds.end());
+    seeds.insert(seeds.end(), job.options.outside.begin(), job.options.outside.end());
     return seeds;
 }
 
-/// Holes narrower than D are no exterior; a seed that the user gave is band()'s to judge.
+/// Holes narrower than D are no exterior, and seeds outside may lie as close to the border as they like; a seed of the
+/// exterior that the user gave is band()'s to judge.
 std::vector<Vec3> seeds_beyond(const Job& job, double D) {
     std::vector<Vec3> seeds = job.options.exterior_seeds;
     const auto d_at = job.result.distance->getConstAccessor();
-    for (const Vec3& seed : job.hole_seeds) {
+    std::vector<Vec3> others = job.hole_seeds;
+    others.insert(others.end(), job.options.outside.begin(), job.options.outside.end());
+    for (const Vec3& seed : others) {
         const Vec3 at = job.domain().world_to_index(seed);
         if (d_at.getValue(openvdb::Coord::round(openvdb::Vec3d(at[0], at[1], at[2]))) > D) seeds.push_back(seed);
     }

@@ -1,0 +1,69 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "covol/fwd.h"
+#include "covol/image.h"
+#include "covol/run.h"
+
+namespace covol {
+
+struct CorrectionOptions {
+    double precision = 0.0;     ///< of the marks, world units; 0 picks half a voxel
+    double least_radius = 0.0;  ///< within which a mark acts on the guess, however little it moves it, world units;
+                                ///< 0 picks 8 voxels
+    [[nodiscard]] std::string why_invalid() const;
+};
+
+struct CorrectionReport {
+    std::size_t marks = 0, seeds = 0;                 ///< that act: seeds only where the guess had them on the wrong side
+    double before_mean = 0, before_max = 0;           ///< distances of the marks to the guess, world units
+    double after_mean = 0, after_max = 0;             ///< to the corrected surface
+    double least_radius = 0, largest_radius = 0;      ///< within which marks act, world units
+};
+
+/// A mask after a correction, in its own geometry.
+struct CorrectedMask {
+    std::vector<std::int32_t> values;                 ///< i fastest
+    std::size_t added = 0, removed = 0, reached = 0;  ///< voxels; reached: the correction is not 0 there
+};
+
+/// A guess, corrected where marks say so: s - c, with s the guess's signed distance and c a smooth sum of bumps of
+/// compact support (Wendland, Adv. Comput. Math. 4, 1995, C2) around the marks.
+///
+/// The radius of a bump is three times the distance between mark and guess, for s - c stays monotone across the surface
+/// while c is flatter than s (a bump's slope is at most 2.11 of its height by its radius), and not below the least one.
+/// Marks of equal size are solved for together (kriging with the marks' precision as the noise), far ones first, and
+/// those that the bigger bumps met hold their place under the smaller ones. Beyond all bumps c is exactly 0.
+class GuessCorrection {
+public:
+    struct Data;
+    explicit GuessCorrection(std::shared_ptr<const Data> data);
+    /// c, world units: how far out the surface moves there. Exactly 0 where no mark acts.
+    [[nodiscard]] double shift(const Vec3& world) const;
+    /// Of the guess; negative inside.
+    [[nodiscard]] double guess(const Vec3& world) const;
+    [[nodiscard]] const CorrectionReport& report() const;
+    /// Voxels where c is 0, and those whose side stays the same, keep their value to the bit. Of the others those of value 0
+    /// that come in get `label`, those with `label` that go out get 0, and voxels of other labels stay.
+    /// @throws Error InvalidInput (values that are no whole numbers).
+    [[nodiscard]] CorrectedMask apply(const Image& mask, int label, const RunContext& run = {}) const;
+    /// The corrected surface as a start on the guess's lattice: a signed distance, clamped.
+    [[nodiscard]] FloatGridPtr start(const RunContext& run = {}) const;
+
+private:
+    std::shared_ptr<const Data> data_;
+};
+
+/// @param guess  a start (start_from_mask() and its kin): a signed distance clamped to kHalfWidthVoxels
+/// @param marks  on the surface, world units
+/// @param inside, outside  seeds; those that the guess has on the wrong side move it to half a voxel beyond them
+/// @throws Error InvalidOptions, InvalidInput (no surface in the guess)
+[[nodiscard]] GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>& marks,
+                                            const std::vector<Vec3>& inside, const std::vector<Vec3>& outside,
+                                            const CorrectionOptions& options = {}, const RunContext& run = {});
+
+}  // namespace covol

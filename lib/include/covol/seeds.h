@@ -1,0 +1,37 @@
+#pragma once
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "covol/fwd.h"
+#include "covol/image.h"
+#include "covol/points.h"
+#include "covol/run.h"
+
+namespace covol {
+
+/// Positions inside or outside of a structure as a file gives them: loose points as they are, lines (scribbles) with
+/// points between their marks, no farther apart than `step`; closed lines are closed. World units.
+[[nodiscard]] std::vector<Vec3> seeds_of(const PointCloud& cloud, const ImageGeometry* geometry, double step);
+
+/// Seeds against a surface.
+struct SeedCheck {
+    std::size_t inside = 0, outside = 0;              ///< seeds that were checked
+    std::size_t wrong_inside = 0, wrong_outside = 0;  ///< those of them on the wrong side
+    Vec3 first{0, 0, 0};                              ///< the first of the wrong ones, world units
+    double farthest = 0;                              ///< of them from the surface; no more than the level set knows
+
+    [[nodiscard]] std::size_t wrong() const { return wrong_inside + wrong_outside; }
+    /// One line for people; empty where no seed is wrong.
+    [[nodiscard]] std::string warning() const;
+};
+
+/// Which seeds a surface has on the wrong side, by more than `slack` (world units).
+/// @param surface  a level set, negative inside
+[[nodiscard]] SeedCheck check_seeds(const FloatGrid& surface, const std::vector<Vec3>& inside,
+                                    const std::vector<Vec3>& outside, double slack = 0);
+
+/// @throws Error InvalidInput when a position is named inside and outside (closer than `same`): says where.
+void check_sides(const std::vector<Vec3>& inside, const std::vector<Vec3>& outside, double same);
+
+}  // namespace covol

@@ -1,0 +1,46 @@
+// Another tool's result, corrected by marks and seeds.
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+
+#include "pipeline/starts.h"
+
+namespace covol::pipeline {
+namespace {
+
+constexpr double kRadiusVoxels = 8.0;   // to be measured over draws
+constexpr double kRadiusSpacings = 2.0; // a mark on a slice tells of the next one
+
+}  // namespace
+
+void start_from_corrected_guess(Job& job) {
+    job.origin = StartOrigin::Given;
+    job.report().domain = job.domain_with_chosen_margin(2 * kMarginVoxels * job.h());
+    Timed timed(job.report().seconds.tag);
+    CorrectionOptions& options = job.options.correction;
+    if (options.least_radius <= 0) {
+        options.least_radius = kRadiusVoxels * job.h();
+        if (job.image != nullptr) {
+            const Vec3& spacing = job.image->geometry().spacing;
+            options.least_radius = std::max(options.least_radius, kRadiusSpacings * *std::max_element(spacing.begin(), spacing.end()));
+        }
+    }
+    const FloatGridPtr guess = start_grid(*job.options.guess, job.domain(), job.run);
+    const auto corrected = std::make_shared<const GuessCorrection>(
+        correct_guess(guess, job.options.contours ? job.sure : job.points, job.options.inside, job.options.outside, options, job.run));
+    // Where the image is to help between the marks, it is here, and where c is not 0 alone.
+    job.result.u = corrected->start(job.run);
+    job.result.correction = corrected;
+    job.result.u->setName("u");
+    job.report().active_voxels = std::int64_t(job.result.u->activeVoxelCount());
+    job.report().leaf_count = std::int64_t(job.result.u->tree().leafCount());
+    job.report().solve.stop_reason = StopReason::Steady;  // nothing flows
+    const CorrectionReport& report = job.report().correction = corrected->report();
+    job.choose("start", "guess",
+               "corrected within " + number(report.least_radius) + " to " + number(report.largest_radius) + " of " +
+                   std::to_string(report.marks) + " marks and " + std::to_string(report.seeds) +
+                   " seeds that it had on the wrong side; from the marks to it: mean " + number(report.before_mean) + ", max " +
+                   number(report.before_max) + ", corrected " + number(report.after_mean) + ", " + number(report.after_max));
+}
+
+}  // namespace covol::pipeline

@@ -1,0 +1,245 @@
+"""Painted labels, seeds and another tool's mask as marks, with the real binary.
+
+    COVOL=build/bin/covol python3 -m unittest tests/cli/kinds_test.py
+"""
+import unittest
+
+import numpy as np
+import tifffile
+
+from cli_test import Case, write_nrrd
+from structures_test import H, ORIGIN, SIZE, ball_image, fibonacci, lattice, nrrd_keys, write_points
+
+MIDDLE = (0.0, 0.0, 0.0)
+RADIUS = 7.0  # 14 voxels
+
+
+def ball(center=MIDDLE, radius=RADIUS):
+    x, y, z = lattice()
+    return (x - center[0]) ** 2 + (y - center[1]) ** 2 + (z - center[2]) ** 2 < radius ** 2
+
+
+def on_slices(mask, step, first=0, axis=0):
+    """The mask on every step-th slice; axis 0 is z."""
+    keep = np.zeros(mask.shape[axis], bool)
+    keep[first::step] = True
+    return np.where(np.expand_dims(keep, tuple(a for a in range(3) if a != axis)), mask, 0)
+
+
+def write_labels(path, labels, kind="uint8", keys=()):
+    write_nrrd(path, (SIZE,) * 3, np.asarray(labels).astype(kind).tobytes(), spacing=H, origin=ORIGIN, kind=kind)
+    if keys:
+        header, pixels = path.read_bytes().split(b"\n\n", 1)
+        path.write_bytes(header + "".join(f"\n{k}:={v}" for k, v in keys).encode() + b"\n\n" + pixels)
+
+
+def read_labels(path):
+    header, pixels = path.read_bytes().split(b"\n\n", 1)
+    text = header.decode()
+    if "gzip" in text:
+        import zlib
+        pixels = zlib.decompress(pixels, 47)
+    kind = {"unsigned char": "u1", "uint8": "u1", "int": "<i4", "int32": "<i4"}[text.split("type: ")[1].splitlines()[0]]
+    return np.frombuffer(pixels, kind).reshape((SIZE,) * 3)
+
+
+def dice(a, b):
+    return 2 * np.count_nonzero(a & b) / (np.count_nonzero(a) + np.count_nonzero(b))
+
+
+class KindsCase(Case):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.image = cls.inputs / "ball.nrrd"
+        write_nrrd(cls.image, (SIZE,) * 3, ball_image(MIDDLE, RADIUS).tobytes(), spacing=H, origin=ORIGIN)
+
+    def labels(self, name, values, **more):
+        path = self.inputs / name
+        write_labels(path, values, **more)
+        return path
+
+
+class Painted(KindsCase):
+    def test_slices_become_a_body(self):
+        paint = self.labels("paint.nrrd", 4 * on_slices(ball(), 4, 2))
+        report = self.report("segment", self.image, "--painted", paint, "-o", "s.vdb", "--mask", "m.nrrd")
+        told, = report["input"]["painted"]
+        self.assertEqual(told["label"], 4)
+        self.assertEqual(told["slices"], [{"axis": "z", "slices": [10, 14, 18, 22, 26, 30, 34], "outlines": 7}])
+        self.assertEqual(told["scribbled"], 0)
+        self.assertIn("7 slices across z (10, 14, 18, 22, 26, 30, 34) taken as painted as a whole", told["understood"])
+        mask = read_labels(self.out / "m.nrrd")
+        self.assertEqual(sorted(np.unique(mask)), [0, 4])
+        self.assertGreater(dice(mask > 0, ball()), 0.96)
+
+    def test_says_what_it_understood(self):
+        paint = self.labels("paint.nrrd", on_slices(ball(), 4, 2))
+        result = self.run_covol("segment", self.image, "--painted", paint, "-o", "s.vdb")
+        self.assertIn("label 1: ", result.stderr)
+        self.assertIn("taken as painted as a whole", result.stderr)
+
+    def test_several_labels_keep_values_and_names(self):
+        x, _, _ = lattice()
+        halves = np.where(x < 0.1, 300, 7) * ball()
+        keys = [("Segment0_ID", "a"), ("Segment0_Name", "left half"), ("Segment0_LabelValue", 300), ("Segment1_Name", "right"),
+                ("Segment1_LabelValue", 7)]
+        paint = self.labels("two.seg.nrrd", on_slices(halves, 4, 2), kind="uint16", keys=keys)
+        report = self.report("segment", self.image, "--painted", paint, "--rho", 0, "-o", "s.vdb", "--mask", "m.seg.nrrd")
+        self.assertEqual([(s["name"], s["label"]) for s in report["structures"]], [("right", 7), ("left half", 300)])
+        mask = read_labels(self.out / "m.seg.nrrd")
+        self.assertEqual(sorted(np.unique(mask)), [0, 7, 300])
+        for value in (7, 300):
+            self.assertGreater(dice(mask == value, halves == value), 0.93)
+        header = nrrd_keys(self.out / "m.seg.nrrd")
+        self.assertEqual((header["Segment0_Name"], header["Segment0_LabelValue"]), ("right", "7"))
+        self.assertEqual((header["Segment1_Name"], header["Segment1_LabelValue"]), ("left half", "300"))
+
+    def test_a_tiff_without_spacing_takes_the_images_geometry(self):
+        path = self.inputs / "paint.tif"
+        tifffile.imwrite(path, on_slices(ball(), 5, 3).astype(np.uint8))
+        report = self.report("segment", self.image, "--painted", path, "-o", "s.vdb", "--mask", "m.nrrd")
+        self.assertEqual(report["input"]["painted"][0]["slices"][0]["axis"], "z")
+        self.assertGreater(dice(read_labels(self.out / "m.nrrd") > 0, ball()), 0.95)
+
+    def test_paint_of_one_label_goes_with_points(self):
+        paint = self.labels("paint.nrrd", on_slices(ball(), 6, 2))
+        points = self.inputs / "p.xyz"
+        write_points(points, RADIUS * fibonacci(60))
+        report = self.report("segment", self.image, "--painted", paint, "--points", points, "-o", "s.vdb")
+        self.assertGreater(report["input"]["points"]["count"], 60)
+        self.assertNotIn("structures", report)
+
+    def test_scribbles_are_seeds_on_both_sides(self):
+        both = np.zeros((SIZE,) * 3)
+        both[ball((-4, 0, 0), 1.6)] = 1
+        both[ball((4, 0, 0), 1.6)] = 2
+        paint = self.labels("blobs.nrrd", both)
+        report = self.report("segment", self.image, "--painted", paint, "-o", "s.vdb", "--max-steps", 2)
+        for s in report["structures"]:
+            self.assertEqual(s["input"]["painted"][0]["slices"], [])
+            self.assertGreater(s["seeds"]["inside"], 20)
+            self.assertGreater(s["seeds"]["outside"], 20)
+
+    def test_an_outside_label(self):
+        paint = on_slices(ball(), 4, 2).astype(np.uint8)
+        paint[22, 2:5, 2:40] = 9
+        path = self.labels("paint.nrrd", paint)
+        report = self.report("segment", self.image, "--painted", path, "--painted-outside", 9, "-o", "s.vdb")
+        self.assertEqual(report["seeds"]["outside"], 3 * 38)
+        self.assertEqual(report["seeds"]["wrong"], 0)
+
+    def test_mistakes(self):
+        empty = self.labels("empty.nrrd", np.zeros((SIZE,) * 3))
+        paint = self.labels("paint.nrrd", on_slices(ball(), 4, 2))
+        elsewhere = self.inputs / "elsewhere.nrrd"
+        write_nrrd(elsewhere, (SIZE,) * 3, on_slices(ball(), 4, 2).astype(np.uint8).tobytes(), spacing=H, origin=(100, 0, 0))
+        small = self.inputs / "small.tif"
+        tifffile.imwrite(small, np.ones((5, 6, 7), np.uint8))
+        for arguments, expected in (
+                (("--painted", empty), "expected painted voxels, got 0 everywhere in 48 x 48 x 48"),
+                (("--painted", elsewhere), "painted voxels lie outside the image, the first at"),
+                (("--painted", small), "expected as many voxels as the image, 48 x 48 x 48"),
+                (("--painted", paint, "--painted-outside", 3), "expected the outside label 3 among its labels, got 1")):
+            self.assertIn(expected, self.run_covol("segment", self.image, *arguments, "-o", "s.vdb", code=3).stderr)
+        two = self.labels("two.nrrd", on_slices(np.where(lattice()[0] < 0, 1, 2) * ball(), 4, 2))
+        self.assertIn("expected one label in a file with a name, got 2",
+                      self.run_covol("segment", self.image, "--painted", f"a={two}", "-o", "s.vdb", code=2).stderr)
+
+
+class Seeds(KindsCase):
+    def cloud(self, name, radius, count=40):
+        path = self.inputs / name
+        write_points(path, radius * fibonacci(count))
+        return path
+
+    def test_seeds_beside_marks_are_checked(self):
+        marks = self.cloud("marks.xyz", RADIUS, 600)
+        report = self.report("segment", self.image, "--points", marks, "--inside", "0,0,0", "--outside", "9,9,9", "--outside",
+                             self.cloud("out.xyz", 10), "-o", "s.vdb")
+        self.assertEqual(report["seeds"], {"inside": 1, "outside": 41, "wrong": 0, "wrong_inside": 0, "wrong_outside": 0})
+        result = self.run_covol("segment", self.image, "--points", marks, "--inside", "9,0,0", "-o", "s.vdb", "--json", "r.json")
+        self.assertIn("1 of 1 seeds lie on the wrong side of the surface", result.stderr)
+
+    def test_seeds_alone_are_a_start(self):
+        report = self.report("segment", self.image, "--inside", self.cloud("in.xyz", 4), "--outside", self.cloud("out.xyz", 9),
+                             "-o", "s.vdb", "--mask", "m.nrrd", "--max-steps", 0)
+        self.assertIn("halfway between seeds", report["automatic"]["start"])
+        # Halfway is at 6.5.
+        self.assertGreater(dice(read_labels(self.out / "m.nrrd") > 0, ball(radius=6.5)), 0.95)
+
+    def test_mistakes(self):
+        self.assertIn("inside and outside", self.run_covol("segment", self.image, "--inside", "1,1,1", "--outside", "1,1,1", "-o", "s.vdb", code=3).stderr)
+        self.assertIn("outside", self.run_covol("segment", self.image, "--inside", "1000,1,1", "-o", "s.vdb", code=3).stderr)
+        self.assertIn("no structure is called 'b'", self.run_covol(
+            "segment", self.image, "--points", f"a={self.cloud('marks.xyz', RADIUS, 600)}", "--outside", "b=1,1,1", "-o", "s.vdb", code=2).stderr)
+
+
+class Guess(KindsCase):
+    """A ball's mask that lacks a cap and has a bump."""
+
+    def setUp(self):
+        super().setUp()
+        x, _, _ = lattice()
+        self.wrong = (ball() & (x < 4.5)) | ball((-6.5, 0, 0), 2.5)
+        self.marks = self.inputs / "marks.xyz"
+        directions = np.array([[1, 0, 0], [1, 0.35, 0], [1, -0.35, 0], [1, 0, 0.35], [1, 0, -0.35],
+                               [-1, 0, 0], [-1, 0.2, 0], [-1, -0.2, 0], [-1, 0, 0.2], [-1, 0, -0.2]])
+        write_points(self.marks, RADIUS * directions / np.linalg.norm(directions, axis=1, keepdims=True))
+
+    def test_marks_correct_a_mask_and_leave_the_rest(self):
+        mask = self.labels("mask.nrrd", 200 * self.wrong)
+        report = self.report("segment", self.image, "--guess", mask, "--points", self.marks, "-o", "s.vdb", "--mask", "m.nrrd",
+                             "--suggest", 2)
+        new = read_labels(self.out / "m.nrrd")
+        self.assertEqual(sorted(np.unique(new)), [0, 200])
+        before, after = dice(self.wrong, ball()), dice(new > 0, ball())
+        self.assertGreater(after, before + 0.5 * (1 - before))
+        changed = (new > 0) != self.wrong
+        told = report["correction"]
+        self.assertEqual(told["marks"], 10)
+        self.assertEqual(told["mask"]["added"] + told["mask"]["removed"], np.count_nonzero(changed))
+        self.assertLess(told["marks_to_corrected"]["max"], H)
+        # Beyond the largest reach of all marks every voxel is as it was.
+        x, y, z = lattice()
+        points = np.loadtxt(self.marks)
+        nearest = np.min([np.sqrt((x - p[0]) ** 2 + (y - p[1]) ** 2 + (z - p[2]) ** 2) for p in points], axis=0)
+        self.assertFalse(np.any(changed & (nearest >= told["radius"]["largest"])))
+        self.assertEqual(len(report["evidence"]["suggestions"]) > 0, True)
+        self.assertEqual(report["solve"]["steps"], 0)
+
+    def test_other_labels_stay(self):
+        labels = np.where(self.wrong, 3, 0)
+        labels[:, :, :4] = 8
+        mask = self.labels("mask.nrrd", labels)
+        common = ("segment", self.image, "--guess", mask, "--points", self.marks, "-o", "s.vdb", "--mask", "m.nrrd")
+        self.assertIn("expected one label, got 3, 8; choose one by --guess-label", self.run_covol(*common, code=3).stderr)
+        self.assertIn("expected one of the labels", self.run_covol(*common, "--guess-label", 5, code=3).stderr)
+        self.report(*common, "--guess-label", 3)
+        new = read_labels(self.out / "m.nrrd")
+        self.assertTrue(np.array_equal(new == 8, labels == 8))
+        self.assertGreater(dice(new == 3, ball()), dice(self.wrong, ball()))
+
+    def test_without_marks_it_stays_and_suggestions_say_where_to_look(self):
+        mask = self.labels("mask.nrrd", self.wrong)
+        report = self.report("segment", self.image, "--guess", mask, "-o", "s.vdb", "--mask", "m.nrrd", "--suggest", 1)
+        self.assertTrue(np.array_equal(read_labels(self.out / "m.nrrd"), self.wrong.astype(np.uint8)))
+        self.assertEqual(len(report["evidence"]["suggestions"]), 1)
+
+    def test_a_level_set_and_a_mesh(self):
+        mask = self.labels("mask.nrrd", self.wrong)
+        self.report("segment", self.image, "--guess", mask, "-o", "g.vdb", "--mesh", "g.ply")
+        for guess in ("g.vdb", "g.ply"):
+            report = self.report("segment", self.image, "--guess", self.out / guess, "--points", self.marks, "-o", "s.vdb", "--mask", "m.nrrd")
+            self.assertGreater(dice(read_labels(self.out / "m.nrrd") > 0, ball()), 0.97)
+            self.assertEqual(report["correction"]["marks"], 10)
+
+    def test_seeds_correct_it_too(self):
+        mask = self.labels("mask.nrrd", self.wrong)
+        report = self.report("segment", self.image, "--guess", mask, "--inside", "5.5,0,0", "--outside", "-8,0,0", "-o", "s.vdb")
+        self.assertEqual(report["correction"]["seeds"], 2)
+        self.assertEqual(report["seeds"]["wrong"], 0)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,273 @@
+#include "covol/painted.h"
+
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <functional>
+
+#include "covol/error.h"
+#include "painted/outline.h"
+#include "painted/segments.h"
+#include "support/scratch.h"
+
+using namespace covol;
+using detail::Polygon;
+using painted::Slice;
+
+namespace {
+
+const double kPi = std::acos(-1.0);
+
+Slice slice_of(int nx, int ny, const std::function<bool(int, int)>& inside) {
+    Slice slice;
+    slice.nx = nx;
+    slice.ny = ny;
+    for (int j = 0; j < ny; ++j)
+        for (int i = 0; i < nx; ++i) slice.inside.push_back(inside(i, j));
+    return slice;
+}
+
+Slice disc(double x, double y, double r) {
+    const int n = int(2 * r) + 8;
+    return slice_of(n, n, [&](int i, int j) { return std::hypot(i - x, j - y) < r; });
+}
+
+double signed_area(const Polygon& line) {
+    double twice = 0;
+    for (std::size_t n = 0; n < line.size(); ++n) {
+        const auto &p = line[n], &q = line[(n + 1) % line.size()];
+        twice += p[0] * q[1] - q[0] * p[1];
+    }
+    return twice / 2;
+}
+
+ImageGeometry lattice(Index3 size, Vec3 spacing = {1, 1, 1}) {
+    ImageGeometry geometry;
+    geometry.size = size;
+    geometry.spacing = spacing;
+    return geometry;
+}
+
+using Label = std::function<int(int, int, int)>;
+
+Image painting(const ImageGeometry& geometry, const Label& label) {
+    std::vector<std::uint8_t> values;
+    for (int k = 0; k < geometry.size[2]; ++k)
+        for (int j = 0; j < geometry.size[1]; ++j)
+            for (int i = 0; i < geometry.size[0]; ++i) values.push_back(std::uint8_t(label(i, j, k)));
+    return Image::from_values(geometry, values.data());
+}
+
+bool in_ball(int i, int j, int k, double middle, double r) { return std::hypot(i - middle, std::hypot(j - middle, k - middle)) < r; }
+
+Painted understood(const Image& image, const PaintedOptions& options = {}) {
+    return understand_painted(image, painted_labels(image), options);
+}
+
+}  // namespace
+
+TEST_CASE("the outline of a disc lies on its circle", "[painted]") {
+    for (const double r : {2.0, 3.0, 5.0, 10.0, 30.0}) {
+        double mean = 0, square = 0, worst = 0;
+        int count = 0;
+        for (int draw = 0; draw < 20; ++draw) {
+            const double x = r + 3.5 + 0.37 * std::sin(7.0 * draw), y = r + 3.5 + 0.41 * std::sin(11.0 * draw + 1);
+            const std::vector<Polygon> lines = painted::outlines(disc(x, y, r), {});
+            REQUIRE(lines.size() == 1);
+            for (const auto& p : lines[0]) {
+                const double off = std::hypot(p[0] - x, p[1] - y) - r;
+                mean += off;
+                square += off * off;
+                worst = std::max(worst, std::abs(off));
+                ++count;
+            }
+        }
+        INFO("radius " << r);
+        CHECK(std::abs(mean / count) < 0.03);
+        // The staircase itself is 0.235 off.
+        CHECK(std::sqrt(square / count) < (r < 5 ? 0.21 : 0.14));
+        CHECK(worst < 0.55);
+    }
+}
+
+TEST_CASE("a staircase becomes a straight line", "[painted]") {
+    for (const double slope : {0.0, 0.2, 0.5, 1.0}) {
+        const Slice half = slice_of(60, 90, [&](int i, int j) { return j < 20.3 + slope * i; });
+        double worst = 0;
+        for (const Polygon& line : painted::outlines(half, {true, true, true, true}))
+            for (const auto& p : line) {
+                if (p[1] < 0 || p[0] < 0 || p[0] > 59) continue;  // where the image cuts it
+                worst = std::max(worst, std::abs(p[1] - 20.3 - slope * p[0]) / std::hypot(1, slope));
+            }
+        INFO("slope " << slope);
+        CHECK(worst < 0.4);
+    }
+}
+
+TEST_CASE("no vertex of an outline moves by more than half a voxel", "[painted]") {
+    const Slice comb = slice_of(40, 40, [](int i, int j) { return j > 3 && j < 36 && i > 3 && i < 36 && ((i / 3) % 2 == 0 || j < 8); });
+    for (const Polygon& rough : painted::pixel_outlines(comb)) {
+        const Polygon line = painted::smoothed(rough);
+        REQUIRE(line.size() == rough.size());
+        for (std::size_t n = 0; n < line.size(); ++n)
+            for (int a = 0; a < 2; ++a) CHECK(std::abs(line[n][a] - rough[n][a]) <= 0.5);
+    }
+}
+
+TEST_CASE("outlines run around the inside, holes the other way, corners apart", "[painted]") {
+    const auto ring = painted::pixel_outlines(slice_of(20, 20, [](int i, int j) {
+        const double d = std::hypot(i - 9.5, j - 9.5);
+        return d < 8 && d > 3;
+    }));
+    REQUIRE(ring.size() == 2);
+    CHECK(signed_area(ring[0]) > 0);
+    CHECK(signed_area(ring[1]) < 0);
+    CHECK(painted::pixel_outlines(slice_of(4, 4, [](int i, int j) { return (i == 1 && j == 1) || (i == 2 && j == 2); })).size() == 2);
+    CHECK(painted::pixel_outlines(slice_of(3, 3, [](int, int) { return false; })).empty());
+}
+
+TEST_CASE("an outline is cut at the image's end, half a voxel beyond the last centres", "[painted]") {
+    const Slice half = slice_of(30, 30, [](int i, int j) { return std::hypot(i + 0.5, j - 14.5) < 10; });
+    const auto cut = painted::outlines(half, {true, false, false, false});
+    REQUIRE(cut.size() == 1);
+    double left = 1e9;
+    for (const auto& p : cut[0]) left = std::min(left, p[0]);
+    CHECK(left == -0.5);
+    CHECK(signed_area(cut[0]) == Approx(kPi * 50).epsilon(0.01));  // corners stay
+    // The same paint away from the image's end is rounded there.
+    CHECK(signed_area(painted::outlines(half, {})[0]) < kPi * 50 * 0.998);
+}
+
+TEST_CASE("strokes are long and thin", "[painted]") {
+    const auto bar = [](int width, int length) {
+        return painted::patches(slice_of(length + 4, width + 4, [&](int i, int j) { return i >= 2 && j >= 2 && i < length + 2 && j < width + 2; })).at(0);
+    };
+    for (const int width : {1, 2, 3, 4}) {
+        CHECK(bar(width, 14 * width).stroke);
+        CHECK_FALSE(bar(width, 3 * width).stroke);
+    }
+    CHECK_FALSE(bar(6, 60).stroke);
+    CHECK(bar(3, 10).width == 3);
+    CHECK(bar(4, 12).width == 4);
+    CHECK(bar(9, 30).width == 9);
+    CHECK(painted::patches(slice_of(9, 3, [](int i, int j) { return j == 1 && i != 4; })).size() == 2);
+}
+
+TEST_CASE("slices that lie apart were painted as a whole", "[painted]") {
+    const int axis = GENERATE(0, 1, 2);
+    const Image image = painting(lattice({40, 40, 40}), [&](int i, int j, int k) {
+        const int n = axis == 0 ? i : axis == 1 ? j : k;
+        return n % 5 == 0 && in_ball(i, j, k, 19.5, 14) ? 7 : 0;
+    });
+    const Painted result = understood(image);
+    REQUIRE(result.labels.size() == 1);
+    const PaintedLabel& label = result.labels[0];
+    CHECK(label.label == 7);
+    CHECK(label.name == "label7");
+    CHECK(label.inside.empty());
+    REQUIRE(label.views.size() == 1);
+    CHECK(label.views[0].axis == axis);
+    CHECK(label.views[0].slices == std::vector<int>{10, 15, 20, 25, 30});
+    CHECK(label.summary.find("5 slices across " + std::string(1, "xyz"[axis])) != std::string::npos);
+    const Contours contours = contours_of(label, result.geometry, 1);
+    CHECK(contours.slices == 5);
+    REQUIRE(contours.solid);
+    for (const Vec3& p : contours.marks) CHECK(std::abs(std::hypot(p[0] - 19.5, p[1] - 19.5, p[2] - 19.5) - 14) < 1);
+    CHECK(contours.solid->level({19.5, 19.5, 19.5}) < -10);
+}
+
+TEST_CASE("slices of several axes, and runs that are thin", "[painted]") {
+    const Label cross = [](int i, int j, int k) { return (k % 6 == 2 || j == 20) && in_ball(i, j, k, 19.5, 15) ? 1 : 0; };
+    const Painted crossed = understood(painting(lattice({40, 40, 40}), cross));
+    REQUIRE(crossed.labels[0].views.size() == 2);
+    CHECK(crossed.labels[0].views[0].axis == 2);
+    CHECK(crossed.labels[0].views[1].axis == 1);
+    CHECK(crossed.labels[0].views[1].slices == std::vector<int>{20});
+    CHECK(crossed.labels[0].inside.empty());
+    const Painted runs = understood(painting(lattice({40, 40, 40}), [](int i, int j, int k) { return k % 8 < 2 && in_ball(i, j, k, 19.5, 15) ? 1 : 0; }));
+    REQUIRE(runs.labels[0].views.size() == 1);
+    CHECK(runs.labels[0].views[0].slices.size() == 8);
+}
+
+TEST_CASE("paint in places is a scribble", "[painted]") {
+    const Label ball = [](int i, int j, int k) { return in_ball(i, j, k, 19.5, 5) ? 1 : 0; };
+    const Label stroke = [](int i, int j, int k) { return k == 12 && std::abs(j - 10 - i / 4) <= 1 && i > 3 && i < 36 ? 1 : 0; };
+    for (const Label& label : {ball, stroke}) {
+        const Image image = painting(lattice({40, 40, 40}), label);
+        const Painted result = understood(image);
+        CHECK(result.labels[0].views.empty());
+        CHECK_FALSE(result.labels[0].inside.empty());
+        for (const Vec3& p : result.labels[0].inside) CHECK(image.at(int(p[0]), int(p[1]), int(p[2])) == 1);
+        CHECK(result.labels[0].summary.find("scribbles") != std::string::npos);
+        PaintedOptions slices;
+        slices.as = PaintedAs::Slices;
+        CHECK(understood(image, slices).labels[0].views.size() == 1);
+    }
+    // A shell of the ball: the voxels within it tell nothing more.
+    CHECK(understood(painting(lattice({40, 40, 40}), ball)).labels[0].inside.size() < 400);
+    PaintedOptions scribbles;
+    scribbles.as = PaintedAs::Scribbles;
+    CHECK(understood(painting(lattice({40, 40, 40}), [](int i, int j, int k) { return k == 20 && in_ball(i, j, k, 19.5, 9) ? 1 : 0; }), scribbles).labels[0].views.empty());
+}
+
+TEST_CASE("slices with strokes beside slices painted as a whole", "[painted]") {
+    const Painted result = understood(painting(lattice({40, 40, 40}), [](int i, int j, int k) {
+        if (k % 10 == 0) return in_ball(i, j, k, 19.5, 16) ? 1 : 0;
+        return k == 25 && j == 18 && i > 8 && i < 34 ? 1 : 0;
+    }));
+    REQUIRE(result.labels[0].views.size() == 1);
+    CHECK(result.labels[0].views[0].slices == std::vector<int>{10, 20, 30});
+    CHECK(result.labels[0].inside.size() == 25);
+    CHECK(result.labels[0].inside[0] == Vec3{9, 18, 25});
+}
+
+TEST_CASE("several labels, and one for the outside", "[painted]") {
+    const Image image = painting(lattice({40, 40, 40}), [](int i, int j, int k) {
+        if (k % 10 != 0) return 0;
+        return in_ball(i, j, k, 19.5, 15) ? (i < 20 ? 3 : 5) : i < 2 ? 9 : 0;
+    });
+    PaintedOptions options;
+    options.outside_label = 9;
+    const Painted result = understood(image, options);
+    REQUIRE(result.labels.size() == 2);
+    CHECK(result.labels[0].label == 3);
+    CHECK(result.labels[1].label == 5);
+    CHECK(result.outside.size() == 4 * 2 * 40);
+    options.outside_label = 4;
+    CHECK(message_of([&] { (void)understood(image, options); }).find("expected the outside label 4 among its labels, got 3, 5, 9") != std::string::npos);
+}
+
+TEST_CASE("label images that say nothing", "[painted]") {
+    CHECK(message_of([] { (void)painted_labels(painting(lattice({4, 5, 6}), [](int, int, int) { return 0; })); })
+              .find("expected painted voxels, got 0 everywhere in 4 x 5 x 6") != std::string::npos);
+    std::vector<float> values(27, 0.0F);
+    values[13] = 0.5F;
+    CHECK(message_of([&] { (void)painted_labels(Image::from_values(lattice({3, 3, 3}), values.data())); })
+              .find("expected whole numbers >= 0, got 0.5 at voxel (1, 1, 1)") != std::string::npos);
+}
+
+TEST_CASE("paint lies on the image", "[painted]") {
+    const ImageGeometry image = lattice({10, 10, 10}, {1, 1, 2});
+    ImageGeometry unknown = lattice({10, 10, 10});
+    unknown.spacing_known = false;
+    const Label one = [](int i, int, int) { return i == 9 ? 1 : 0; };
+    CHECK(placed_on(painting(unknown, one), image).geometry().spacing[2] == 2);
+    CHECK(placed_on(painting(lattice({10, 10, 10}), one), image).geometry().spacing[2] == 1);
+    CHECK(placed_on(painting(lattice({10, 10, 10}), one), image, true).geometry().spacing[2] == 2);
+    unknown.size = {9, 10, 10};
+    CHECK(message_of([&] { (void)placed_on(painting(unknown, [](int, int, int) { return 1; }), image); }).find("expected as many voxels as the image") != std::string::npos);
+    ImageGeometry moved = lattice({10, 10, 10});
+    moved.origin = {5, 0, 0};
+    CHECK(message_of([&] { (void)placed_on(painting(moved, one), image); }).find("100 of 100 painted voxels lie outside the image, the first at (9, 0, 0)") != std::string::npos);
+}
+
+TEST_CASE("names of 3D Slicer's segments", "[painted]") {
+    const Scratch scratch;
+    const std::string path = scratch.write("a.seg.nrrd", "NRRD0004\ntype: unsigned char\nSegment0_ID:=Segment_1\nSegment0_LabelValue:=4\n"
+                                                         "Segment0_Name:=left kidney\r\nSegment1_Name:=spleen\nSegment1_LabelValue:=2\n\nSegment2_Name:=pixels");
+    CHECK(painted::segment_names(path) == std::map<int, std::string>{{2, "spleen"}, {4, "left kidney"}});
+    CHECK(painted::segment_names(scratch.path("none.nrrd")).empty());
+    CHECK(painted::segment_names("mask.tif").empty());
+}
