@@ -104,6 +104,17 @@ Domain widened(Domain domain, double by) {
     return domain;
 }
 
+/// On the same lattice, as large as all the points need, and `margin` more.
+Domain around(Domain domain, const std::vector<Vec3>& points, double margin) {
+    const WorldBox box = bounding_box(points);
+    const Vec3 low = domain.world_to_index(box.min), high = domain.world_to_index(box.max);
+    for (int a = 0; a < 3; ++a) {
+        domain.min[a] = std::min(domain.min[a], int(std::floor(low[a])));
+        domain.max[a] = std::max(domain.max[a], int(std::ceil(high[a])));
+    }
+    return widened(domain, margin);
+}
+
 /// A tagged body that goes on beyond the image.
 struct CutBody {
     std::vector<Vec3> beyond;  ///< the points that close it there
@@ -121,11 +132,11 @@ std::optional<CutBody> tag_with(Job& job, const std::vector<Vec3>& beyond) {
     CutBody body{.beyond = beyond, .level_set = nullptr, .band = {}, .tag = {}};
     body.tag.tag_distance = job.options.tag_distance;
     if (body.tag.tag_distance <= 0) {
-        body.tag = choose_tag_distance(closed, widened(job.domain(), 0.25 * longest_side(closed) + kMarginVoxels * h), all_seeds(job), job.run);
+        body.tag = choose_tag_distance(closed, around(job.domain(), closed, 0.25 * longest_side(closed) + kMarginVoxels * h), all_seeds(job), job.run);
         if (!body.tag.encloses) return {};
     }
     const double D = body.tag.tag_distance;
-    const Domain wide = widened(job.domain(), D + kMarginVoxels * h);
+    const Domain wide = around(job.domain(), closed, D + kMarginVoxels * h);
     const FloatGridPtr d = distance(closed, wide, {D + band_slack(job)}, job.run).grid;
     BandResult tagged = band(*d, {D, all_seeds(job)}, job.run);
     if (tagged.report.leaks) return {};
