@@ -23,6 +23,7 @@ constexpr double kSameSlice = 0.1;          // voxels; marks of one slice may di
 constexpr double kSameSliceOfExtent = 1e-4; // without an image: of the line's extent
 constexpr std::size_t kMaxNodes = 64u << 20; // of all slices' grids together: 256 MB; a coarser grid beyond
 constexpr double kMarginCells = 2;
+constexpr double kSideCells = 10;            // the same across the slices: the end of it lies where nothing is computed
 constexpr double kOpenCells = 6;             // that a body goes on beyond the image's end: more than a band's half width
 
 constexpr const char* kAxisNames[3] = {"x", "y", "z"};
@@ -68,6 +69,7 @@ private:
     void find_planes(Line& line) const;
     void choose_plane();
     void join_lines();
+    [[nodiscard]] std::vector<Vec3> carried_beyond_sides(std::vector<Vec3> curve) const;
     void make_solid();
     void drop_repeated_loops();
     void fill_slices(ContourSolid::Data& data, const std::vector<std::vector<Polygon>>& polygons);
@@ -160,13 +162,48 @@ void Densifier::choose_plane() {
     frame_ = {geometry_, best};
 }
 
+/// Where a contour runs along a side of the image, in its last row of voxels, the image cuts the section: it goes on beyond.
+std::vector<Vec3> Densifier::carried_beyond_sides(std::vector<Vec3> curve) const {
+    for (int side = 0; side < 4; ++side) {
+        const int a = side / 2, axis = a == 0 ? frame_.x_axis() : frame_.y_axis();
+        const double spacing = geometry_.spacing[axis], out = side % 2 == 0 ? -1.0 : 1.0;
+        const double face = (side % 2 == 0 ? -0.5 : geometry_.size[axis] - 0.5) * spacing;
+        const auto at_side = [&](const Vec3& p) { return (face - p[a]) * out <= spacing; };
+        // Begin with a mark that does not lie there, so that no run is cut in two.
+        const auto first = std::find_if_not(curve.begin(), curve.end(), at_side);
+        if (first == curve.end()) return curve;
+        std::rotate(curve.begin(), first, curve.end());
+        std::vector<Vec3> carried;
+        for (std::size_t n = 0; n < curve.size(); ++n) {
+            if (!at_side(curve[n])) {
+                carried.push_back(curve[n]);
+                continue;
+            }
+            std::size_t end = n;
+            while (end + 1 < curve.size() && at_side(curve[end + 1])) ++end;
+            carried.push_back(curve[n]);
+            if (end > n) {
+                for (std::size_t m = n; m <= end; ++m) {
+                    carried.push_back(curve[m]);
+                    carried.back()[a] = face + out * kSideCells * options_.step;
+                }
+                carried.push_back(curve[end]);
+            }
+            n = end;
+        }
+        curve = std::move(carried);
+    }
+    return curve;
+}
+
 void Densifier::join_lines() {
     for (const Line& line : lines_) {
         std::vector<Vec3> marks;
         for (const Vec3& p : line.index) marks.push_back(frame_.from_index(p));
-        const std::vector<Vec3> curve = options_.curve == ContourCurve::Spline
-                                            ? detail::centripetal_curve(marks, line.closed, options_.step)
-                                            : marks;
+        std::vector<Vec3> curve = options_.curve == ContourCurve::Spline
+                                      ? detail::centripetal_curve(marks, line.closed, options_.step)
+                                      : marks;
+        if (has_image_ && line.closed && line.constant[frame_.axis]) curve = carried_beyond_sides(curve);
         for (const Vec3& p : detail::subdivide(curve, line.closed, options_.step)) result_.along.push_back(frame_.to_world(p));
         ++(line.closed ? result_.closed : result_.open);
         if (!line.closed || !line.constant[frame_.axis]) continue;
