@@ -303,7 +303,9 @@ class Segment(Case):
         for stage in ("read", "distance", "tag", "edge", "solve", "surface", "write", "total"):
             self.assertGreaterEqual(report["seconds"][stage], 0)
         self.assertGreater(report["peak_rss_bytes"], 1 << 20)
-        self.assertIn("tag_distance", report["automatic"])
+        self.assertIn("1500 marks", report["automatic"]["guess"])
+        self.assertTrue(report["guidance"]["used"], report["guidance"])
+        self.assertEqual(report["fit"]["marks_off"]["count"], 0)
         # The three files are one solid.
         for other in ("m.nrrd", "m.ply"):
             alike = self.report("compare", "s.vdb", other)["compare"]
@@ -350,10 +352,10 @@ class Segment(Case):
         self.assertLess(abs(radius_of(report["surface"]["volume"]) - RADIUS), 0.25 * H)
 
     def test_not_steady(self):
-        report = self.report("segment", self.image, "--points", self.points, "-o", "s.vdb", "--max-steps", "1",
+        report = self.report("segment", self.image, "--points", self.points, "--init", "tag", "-o", "s.vdb", "--max-steps", "1",
                              "--tolerance", "0")
         self.assertEqual(report["solve"]["stop_reason"], "max_steps")
-        self.segment("--max-steps", "1", "--tolerance", "0", "--strict", code=5)
+        self.segment("--init", "tag", "--max-steps", "1", "--tolerance", "0", "--strict", code=5)
         self.assertEqual(self.files(), ["s.vdb"])
 
     def test_memory_limit(self):
@@ -384,7 +386,7 @@ class Segment(Case):
         self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", "--mesh", name, code=4)
 
     def test_interrupt(self):
-        process = subprocess.Popen([COVOL, "segment", self.image, "--points", self.points, "-o", "s.vdb", "--json",
+        process = subprocess.Popen([COVOL, "segment", self.image, "--points", self.points, "--init", "tag", "-o", "s.vdb", "--json",
                                     "r.json", "--max-steps", "100000000", "--tolerance", "0"], cwd=self.out,
                                    stderr=subprocess.PIPE, text=True)
         try:

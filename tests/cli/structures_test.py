@@ -101,7 +101,7 @@ class Structures(Case):
             self.assertEqual((s["surface"]["components"], s["surface"]["genus"]), (1, 0))
             # The surface comes to rest 0.1 voxel inside the points; the radius is 9 voxels.
             self.assertLess(abs(s["surface"]["volume"] / self.expected_volume() - 1), 0.045)
-            for field in ("resolved", "automatic", "grid", "fit", "band"):
+            for field in ("resolved", "automatic", "grid", "fit", "guess"):
                 self.assertIn(field, s)
         overlap, = report["overlaps"]
         self.assertEqual(overlap["structures"], ["left", "right"])

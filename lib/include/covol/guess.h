@@ -27,6 +27,9 @@ struct GuessReport {
     std::string summary;        ///< one line for people
 };
 
+/// Whether marks can have a body between them: at least four, not all in one plane.
+[[nodiscard]] bool can_enclose(const std::vector<Vec3>& marks);
+
 /// A guess of the surface from few marks: through them it bends least (variational implicit surface, see
 /// lib/src/guess/variational.h). No density of marks is asked for.
 /// @return a start as those of band.h: u0 clamped to +-3h, active beside the surface

@@ -92,6 +92,8 @@ std::string GuessOptions::why_invalid() const {
     return {};
 }
 
+bool can_enclose(const std::vector<Vec3>& marks) { return guess::span_space(marks); }
+
 FloatGridPtr guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks, const GuessOptions& options,
                               GuessReport& report, const RunContext& run) {
     if (const std::string why = options.why_invalid(); !why.empty()) throw Error(Errc::InvalidOptions, "guess: " + why);

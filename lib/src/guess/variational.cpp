@@ -30,6 +30,7 @@ constexpr int kDirections = 64;
 constexpr double kAround[] = {1.15, 1.5};  // of the farthest mark
 constexpr int kLeastEnergySteps = 500;
 constexpr int kAmplitudeRounds = 3;
+constexpr double kFlat = 1e-8;         // least over largest variance of marks in one plane
 constexpr double kLeastLambda = 1e-9;  // keeps M regular where marks coincide
 
 /// Least-energy interpolation at fixed nodes: the energy of values v and gradients g is that of
@@ -287,17 +288,22 @@ Point to_point(const Vec3& v) { return {v[0], v[1], v[2]}; }
 void check_spread(const std::vector<Vec3>& marks) {
     if (marks.size() < 4)
         throw Error(Errc::InvalidInput, "guess: expected at least 4 marks, got " + std::to_string(marks.size()));
-    Point mean = Point::Zero();
-    for (const Vec3& m : marks) mean += to_point(m) / double(marks.size());
-    Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-    for (const Vec3& m : marks) spread += (to_point(m) - mean) * (to_point(m) - mean).transpose();
-    const Point axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues();
-    if (!(axes[0] > 1e-8 * axes[2]))
+    if (!span_space(marks))
         throw Error(Errc::InvalidInput, "guess: all " + std::to_string(marks.size()) +
                                             " marks lie in one plane, and so enclose nothing; mark a second slice");
 }
 
 }  // namespace
+
+bool span_space(const std::vector<Vec3>& marks) {
+    if (marks.size() < 4) return false;
+    Point mean = Point::Zero();
+    for (const Vec3& m : marks) mean += to_point(m) / double(marks.size());
+    Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+    for (const Vec3& m : marks) spread += (to_point(m) - mean) * (to_point(m) - mean).transpose();
+    const Point axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues();
+    return axes[0] > kFlat * axes[2];
+}
 
 VariationalSurface::VariationalSurface(const Constraints& given, const std::vector<Vec3>& normals, double amplitude)
     : marks_(given.marks) {

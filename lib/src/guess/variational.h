@@ -6,6 +6,9 @@
 
 namespace covol::guess {
 
+/// Whether marks can have a body between them: at least four, not all in one plane.
+[[nodiscard]] bool span_space(const std::vector<Vec3>& marks);
+
 /// What a surface through marks has to meet. Lengths in one unit, any.
 struct Constraints {
     std::vector<Vec3> marks;       ///< f is about 0 there, and its gradient has length 1

@@ -62,6 +62,7 @@ void choose_start(Job& job) {
     if (kind != Start::Kind::Auto || !job.starts_from_marks()) return;
     kind = Start::Kind::Tag;
     if (!job.guided() || job.options.contours || job.options.tag_distance > 0 || job.points.size() > kMostGuessMarks) return;
+    if (job.image == nullptr && !can_enclose(job.points)) return;  // a layer: tagging tells what it needs
     kind = Start::Kind::Guess;
     job.choose("start", "guess", std::to_string(job.points.size()) + " marks, at most " + std::to_string(kMostGuessMarks));
 }
@@ -100,11 +101,12 @@ void choose_values(Job& job) {
     choose_start(job);
     const double h = job.h();
     EvolveOptions& evolve = options.evolve;
-    if (job.guesses() && job.uses_points()) return;  // nothing flows
-    if (evolve.delta < 0) {
-        const double voxels = job.tags() ? kTagDeltaVoxels : 1.0;
-        job.choose("delta", number(evolve.delta = voxels * h), number(voxels) + " voxels");
-    }
+    const bool marked = job.tags() || job.guesses();  // the start is close to the end
+    const double delta_voxels = marked ? kTagDeltaVoxels : 1.0;
+    const bool chooses_delta = evolve.delta < 0;
+    if (chooses_delta) evolve.delta = delta_voxels * h;
+    if (job.guesses() && job.uses_points()) return;  // nothing flows; a later frame may
+    if (chooses_delta) job.choose("delta", number(evolve.delta), number(delta_voxels) + " voxels");
     if (evolve.tau < 0) job.choose("tau", number(h), "1 voxel at unit speed; longer while the surface moves slowly");
     if (options.edge.sigma < 0 && job.uses_image()) {
         const double voxels = job.tags() ? kTagSigmaVoxels : 1.0;

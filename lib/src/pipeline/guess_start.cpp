@@ -1,4 +1,5 @@
 // The start from few marks: the surface through them that bends least.
+#include "detail/memory_need.h"
 #include "pipeline/fields.h"
 #include "pipeline/starts.h"
 
@@ -31,6 +32,12 @@ void start_from_guess(Job& job) {
     double extent = 0;
     for (int a = 0; a < 3; ++a) extent = std::max(extent, box.max[a] - box.min[a]);
     job.report().domain = job.domain_with_chosen_margin(0.25 * extent + kMarginVoxels * job.h());
+    double area = 0;  // of a ball of that size, at most
+    for (int a = 0; a < 3; ++a) {
+        const double u = box.max[(a + 1) % 3] - box.min[(a + 1) % 3], v = box.max[(a + 2) % 3] - box.min[(a + 2) % 3];
+        area += u * v;
+    }
+    detail::require_band_memory(area, job.h(), "segment", job.run);
     GuessOptions options;
     options.deviation = deviation(job);
     options.inside = job.options.inside;
