@@ -21,8 +21,14 @@ namespace {
 using namespace pipeline;
 
 // A surface that vanished, or that left the marks, is not returned while the marks alone tell of one.
-void fall_back(Job& job) {
+/// @param start  the body between contours; null: the start was another one
+void fall_back(Job& job, const FloatGridPtr& start) {
     const bool vanished = has_vanished(job);
+    if (vanished && start != nullptr) {
+        job.result.u = start;
+        job.report().solve.stop_reason = StopReason::NotRun;
+        return job.warn("the flow from the body between the contours lost it: this is that body itself");
+    }
     if (!job.guided() || job.origin == StartOrigin::Guess || job.sure.size() < 4 || !job.uses_points()) return;
     if (!vanished && (job.origin == StartOrigin::Contours || !misses_marks(job, *job.result.u))) return;
     const FloatGridPtr before = job.result.u;
@@ -43,13 +49,14 @@ void fall_back(Job& job) {
 }
 
 void solve(Job& job, const std::optional<FineStart>& without_coarse) {
+    const FloatGridPtr start = job.guided() && job.origin == StartOrigin::Contours ? job.result.u->deepCopy() : nullptr;
     flow(job);
     if (without_coarse && has_vanished(job)) {
         leave_out_coarse_level(job, *without_coarse);
         find_edges(job);
         flow(job);
     }
-    fall_back(job);
+    fall_back(job, start);
     job.run.check();
     job.result.u->setName("u");
     check_flow(job);

@@ -146,8 +146,8 @@ class Bodies(ContoursCase):
     def test_the_spline(self):
         few = [outline(radius_at(k), k, 8) for k in range(4, 19)]
         path = self.table("few.csv", few)
-        lines = self.volume(self.solid, "--contours", path, "--rho", 0, "--delta", "0.1vx")
-        spline = self.volume(self.solid, "--contours", path, "--rho", 0, "--delta", "0.1vx", "--contour-curve", "spline")
+        lines = self.volume(self.solid, "--contours", path, "--rho", 0, "--contour-curve", "lines")
+        spline = self.volume(self.solid, "--contours", path, "--rho", 0)
         octagon = 8 * math.sin(math.pi / 4) / (2 * math.pi)  # its share of the circle
         self.assertAlmostEqual(lines / ELLIPSOID, octagon, delta=0.02)
         self.assertAlmostEqual(spline / ELLIPSOID, 1, delta=0.03)
@@ -210,7 +210,7 @@ class Bodies(ContoursCase):
         beside = self.table("beside.csv", [outline(radius_at(k) - 0.7, k) for k in range(5, 18, 4)])
         volumes = {feature: self.volume(self.shell, "--contours", beside, "--edge-feature", feature)
                    for feature in ("bright-line", "slope")}
-        alone = self.volume(self.shell, "--contours", beside, "--rho", 0)
+        alone = self.volume(self.shell, "--contours", beside, "--rho", 0, "--model", "paper")
         self.assertGreater(volumes["bright-line"], alone)
         self.assertGreater(volumes["bright-line"], volumes["slope"])
 
@@ -363,8 +363,8 @@ class Several(ContoursCase):
         self.assertAlmostEqual(volume / (math.pi * 25 * 9 * SPACING[2]), 1, delta=0.08)
         self.assertGreater(self.report("compare", "s.vdb:core", "m.nrrd", "--label-b", 2)["compare"]["dice"], 0.98)
         self.assertLess(self.report("compare", "s.vdb:layer", "s.vdb:core")["compare"]["dice"], 0.01)
-        again = self.report("segment", self.solid, "--contours", self.core, "-o", "again.vdb", "--rho", 0, "--init", "vdb:s.vdb:core")
-        self.assertAlmostEqual(again["surface"]["volume"] / volume, 1, delta=0.02)
+        again = self.report("segment", self.solid, "--contours", self.core, "-o", "again.vdb", "--rho", 0, "--init", "vdb:s.vdb:core", "--delta", "0.1vx")
+        self.assertAlmostEqual(again["surface"]["volume"] / volume, 1, delta=0.03)  # it flows; the body it came from did not
 
     def test_time_lapse(self):
         frames = []

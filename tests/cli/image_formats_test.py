@@ -154,7 +154,7 @@ class Case(unittest.TestCase):
 
     def surface(self, image, *options, points=None):
         out = self.folder / "surface.vdb"
-        self.run_covol("segment", image, "--points", points or self.world_marks, "-o", out, "--quiet", *options)
+        self.run_covol("segment", image, "--points", points or self.world_marks, "--init", "tag", "-o", out, "--quiet", *options)
         return out
 
 

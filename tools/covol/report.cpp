@@ -134,7 +134,6 @@ Json to_json(const SegmentReport& r) {
                             {"confident_share", r.guidance.confident_share},
                             {"mean_offset", r.guidance.mean_offset},
                             {"max_offset", r.guidance.max_offset}};
-    if (!r.warnings.empty()) json["warnings"] = r.warnings;
     if (r.guess.marks > 0)
         json["guess"] = {{"marks", r.guess.marks}, {"cut_marks", r.guess.cut_marks}, {"parts", r.guess.patches}};
     if (r.seeds.inside + r.seeds.outside > 0) json["seeds"] = to_json(r.seeds);

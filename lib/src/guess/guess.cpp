@@ -11,6 +11,10 @@
 namespace covol {
 namespace {
 
+constexpr double kDeviationOfVoxel = 0.3;  // of what is uniform over one
+constexpr double kInsideVoxels = 1.5;      // within the section by more: in the cut
+constexpr double kLeastSlope = 0.05;       // a section whose body ends right beyond it
+constexpr int kCutRounds = 2;
 constexpr int kSeedRounds = 4;
 constexpr std::size_t kLeastOutline = 8;  // marks off the cuts, to say what is inside of them
 
@@ -20,15 +24,20 @@ double longest(const std::array<Vec3, 3>& axes) {
     return most;
 }
 
-/// Whether a mark is so close to the world's end that it may lie in the cut.
-bool at_end(const Vec3& mark, const GuessOptions& options) {
+/// The standard deviation of a mark's place along an axis of the world.
+double deviation_along(const GuessOptions& options, int axis) {
+    double sd = 0;
+    for (const Vec3& a : options.deviation) sd = std::hypot(sd, a[std::size_t(axis)]);
+    return sd;
+}
+
+/// The axis across the world's end that a mark is so close to that it may lie in the cut; -1: none.
+int end_beside(const Vec3& mark, const GuessOptions& options) {
     for (int a = 0; a < 3; ++a) {
-        double sd = 0;
-        for (const Vec3& axis : options.deviation) sd = std::hypot(sd, axis[a]);
-        const double near = 4 * sd;  // half a voxel from its centre to its end, and what the hand is off
-        if (mark[a] < options.end.min[a] + near || mark[a] > options.end.max[a] - near) return true;
+        const double near = 4 * deviation_along(options, a);  // half a voxel from its centre to its end, and what the hand is off
+        if (mark[a] < options.end.min[a] + near || mark[a] > options.end.max[a] - near) return a;
     }
-    return false;
+    return -1;
 }
 
 guess::ImpreciseMarks imprecise(const std::vector<Vec3>& marks, const GuessOptions& options) {
@@ -42,7 +51,7 @@ guess::ImpreciseMarks imprecise(const std::vector<Vec3>& marks, const GuessOptio
 /// Adds those seeds to the constraints that lie on the wrong side, or on none: a little inside, or outside.
 /// @return whether there were any
 bool hold_seeds(const guess::MarksSurface& surface, const GuessOptions& options, guess::ImpreciseMarks& known) {
-    const double beyond = 1.0 / 0.3 * longest(options.deviation);  // a voxel, where the deviation is that of a voxel
+    const double beyond = longest(options.deviation) / kDeviationOfVoxel;
     bool any = false;
     const auto hold = [&](const std::vector<Vec3>& seeds, double side) {
         for (const Vec3& seed : seeds) {
@@ -64,23 +73,39 @@ std::size_t count_wrong(const guess::MarksSurface& surface, const GuessOptions& 
     return wrong;
 }
 
-/// Marks in the cut lie deep inside the body that the others mark: the surface need not pass them.
+/// How far inside the body's section a mark lies, measured within the plane of the cut: negative, or positive outside.
+double within_section(const guess::MarksSurface& body, const Vec3& mark, int across, const GuessOptions& options) {
+    double slope = 0;
+    for (int a = 0; a < 3; ++a) {
+        if (a == across) continue;
+        const double step = std::max(deviation_along(options, a), 1e-12);
+        Vec3 low = mark, high = mark;
+        low[a] -= step;
+        high[a] += step;
+        slope = std::hypot(slope, (body.value(high) - body.value(low)) / (2 * step));
+    }
+    return body.value(mark) / std::max(slope, kLeastSlope);
+}
+
+/// Marks in the cut lie inside the section of the body that the others mark: the surface need not pass them.
 std::vector<Vec3> without_cut_marks(const std::vector<Vec3>& marks, const GuessOptions& options, const RunContext& run) {
     if (!options.has_end) return marks;
     std::vector<Vec3> sure, doubtful;
-    for (const Vec3& mark : marks) (at_end(mark, options) ? doubtful : sure).push_back(mark);
-    if (doubtful.empty() || sure.size() < kLeastOutline) return marks;
-    std::unique_ptr<guess::MarksSurface> body;
-    try {
-        body = std::make_unique<guess::MarksSurface>(imprecise(sure, options), run);
-    } catch (const Error& error) {
-        if (error.code() == Errc::Cancelled) throw;
-        return marks;
+    for (const Vec3& mark : marks) (end_beside(mark, options) >= 0 ? doubtful : sure).push_back(mark);
+    if (doubtful.empty() || sure.size() < kLeastOutline || !guess::span_space(sure)) return marks;
+    std::vector<Vec3> held = sure;
+    for (int round = 0; round < kCutRounds; ++round) {  // those on its outline tell better where the section ends
+        const guess::MarksSurface body(imprecise(held, options), run);
+        held = sure;
+        for (const Vec3& mark : doubtful) {
+            const int across = end_beside(mark, options);
+            double voxel = 0;
+            for (int a = 0; a < 3; ++a)
+                if (a != across) voxel = std::max(voxel, deviation_along(options, a) / kDeviationOfVoxel);
+            if (within_section(body, mark, across, options) > -kInsideVoxels * voxel) held.push_back(mark);
+        }
     }
-    const double deep = 6 * longest(options.deviation);
-    for (const Vec3& mark : doubtful)
-        if (body->value(mark) > -deep) sure.push_back(mark);
-    return sure;
+    return held;
 }
 
 }  // namespace

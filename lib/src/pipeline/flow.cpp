@@ -111,10 +111,16 @@ std::string why_vanished(const Job& job) {
     return "nothing held it; lower --delta, or start closer to the edges (--init)";
 }
 
-// The guess, or where the image moved it, is the surface: nothing pulls it off the marks, and curvature smooths what
-// deviates from it, not the guess itself.
+// Stained sheets run on beside and across the border that contours mark, and guidance by the profile alone cannot tell
+// them apart; the edge detector of lines, with the body as a guess, can.
+bool follows_lines(const Job& job) {
+    return job.origin == StartOrigin::Contours && job.uses_image() && job.options.edge.feature > EdgeFeature::Slope;
+}
+
+// The guess, or where the image moved it, is the surface: nothing pulls it off the marks, and no curvature shrinks it.
 bool rests_on_guess(const Job& job) {
-    return job.guided() && job.uses_points() && (job.origin == StartOrigin::Guess || job.origin == StartOrigin::Contours);
+    if (!job.guided() || !job.uses_points() || follows_lines(job)) return false;
+    return job.origin == StartOrigin::Guess || job.origin == StartOrigin::Contours;
 }
 
 // A surface through the marks is moved to where the image shows, between them, what it shows at them.
