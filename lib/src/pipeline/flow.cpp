@@ -16,6 +16,8 @@ constexpr double kApproachTau = 3.0;  // time steps of the points' own approach,
 constexpr int kApproachSteps = 40;
 constexpr double kApproachTolerance = 0.01;
 constexpr double kUniformDeviation = 0.3;  // of what is uniform over a voxel, in voxels
+constexpr double kEndVoxels = 1.0;     // from the last centres: a mark may lie in the cut
+constexpr double kInCutVoxels = 1.5;   // inside the guess: it does
 constexpr double kHoldDepth = 0.75;   // voxels that the surface may sink below a start that is held
 constexpr int kHoldSteps = 2;
 constexpr double kHoldTolerance = 0.01;  // voxels a step
@@ -123,6 +125,24 @@ bool rests_on_guess(const Job& job) {
     return job.origin == StartOrigin::Guess || job.origin == StartOrigin::Contours;
 }
 
+// Marks in the cut where the image ends lie inside the guess, and tell nothing of its border.
+std::vector<Vec3> marks_of_border(const Job& job) {
+    if (job.origin != StartOrigin::Guess) return job.sure;
+    const ImageGeometry& geometry = job.image->geometry();
+    const FloatGrid& guess = *job.result.u;
+    const auto accessor = guess.getConstAccessor();
+    std::vector<Vec3> marks;
+    for (const Vec3& mark : job.sure) {
+        const Vec3 index = geometry.world_to_index(mark);
+        bool at_end = false;
+        for (int a = 0; a < 3; ++a) at_end |= index[a] < kEndVoxels || index[a] > geometry.size[a] - 1 - kEndVoxels;
+        const openvdb::Vec3d at = guess.worldToIndex(openvdb::Vec3d(mark[0], mark[1], mark[2]));
+        if (at_end && accessor.getValue(openvdb::Coord::round(at)) < -kInCutVoxels * job.h()) continue;
+        marks.push_back(mark);
+    }
+    return marks;
+}
+
 // A surface through the marks is moved to where the image shows, between them, what it shows at them.
 void ask_image(Job& job) {
     if (!job.uses_image()) return;
@@ -130,7 +150,7 @@ void ask_image(Job& job) {
     if (job.options.mark_precision >= 0) options.mark_precision = job.options.mark_precision / kUniformDeviation;
     options.weight = job.options.evolve.rho;
     GuidanceReport& report = job.report().guidance;
-    job.result.u = guide(*job.result.u, job.sure, *job.image, options, report, job.run);
+    job.result.u = guide(*job.result.u, marks_of_border(job), *job.image, options, report, job.run);
     job.choose("image", report.used ? "used" : "not used", report.reason);
 }
 

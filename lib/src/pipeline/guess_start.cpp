@@ -6,6 +6,7 @@
 namespace covol::pipeline {
 namespace {
 
+constexpr double kBeyondVoxels = 8.0;
 constexpr double kPrecision = 0.3;  // of a voxel: the deviation of what is uniform over one
 
 /// How well marks are placed, along the image's axes; without an image, of what the voxel size says.
@@ -45,6 +46,9 @@ void start_from_guess(Job& job) {
     options.outside.insert(options.outside.end(), job.options.exterior_seeds.begin(), job.options.exterior_seeds.end());
     options.has_end = job.image != nullptr || job.options.roi.has_value();
     options.end = job.domain().world_box();
+    // A body that the image cuts goes on beyond it: at the image's end itself its wall would be closed, and the image asked
+    // about a cap. The clip at the end makes the cut.
+    if (job.image != nullptr && !job.options.roi) job.report().domain = widened(job.domain(), kBeyondVoxels * job.h());
     {
         Timed timed(job.report().seconds.tag);
         job.result.u = guess_from_marks(job.domain(), job.points, options, job.report().guess, job.run);

@@ -69,6 +69,9 @@ struct Job {
     [[nodiscard]] Domain domain_with_chosen_margin(double automatic) const;
 };
 
+/// The same lattice, with as many more voxels on every side as `by` (world units) holds.
+[[nodiscard]] Domain widened(Domain domain, double by);
+
 /// Adds the wall-clock time of its life to `seconds`.
 class Timed {
 public:

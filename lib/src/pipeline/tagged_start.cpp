@@ -95,15 +95,6 @@ void start_from_closing(Job& job, double D) {
 
 // ---- bodies that the image cuts off ------------------------------------------------------------------------------------
 
-Domain widened(Domain domain, double by) {
-    const int layers = int(std::ceil(by / domain.voxel_size));
-    for (int a = 0; a < 3; ++a) {
-        domain.min[a] -= layers;
-        domain.max[a] += layers;
-    }
-    return domain;
-}
-
 /// On the same lattice, as large as all the points need, and `margin` more.
 Domain around(Domain domain, const std::vector<Vec3>& points, double margin) {
     const WorldBox box = bounding_box(points);
