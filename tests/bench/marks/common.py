@@ -209,12 +209,13 @@ class Bench:
         return dict(self.known[key])
 
     def start_and_end(self, what, one, structure, **given):
-        """Rows of covol with the marks alone and with the image: its own start (the same run without a step), and its end.
+        """Rows of covol with the marks alone and with the image: its own start (no step, and no say of the image), and its end.
         @param what  names the marks; one: the columns of all rows; given: marks or contours"""
         rows = []
         for name, options in (("covol, marks alone", ("--rho", 0)), ("covol, both", ())):
-            start = self.once((*what, name, "start"),
-                              lambda: self.covol.segment(structure, *options, "--max-steps", 0, **given).columns(structure))
+            # Without a step the image would still move a guess: the start is what the marks alone give.
+            start = self.once((*what, "start"),
+                              lambda: self.covol.segment(structure, "--rho", 0, "--max-steps", 0, **given).columns(structure))
             end = self.once((*what, name), lambda: self.covol.segment(structure, *options, **given).columns(structure))
             rows.append(one | {"method": f"{name}: start"} | start)
             rows.append(one | {"method": name, "above_start": end["dice"] - start["dice"]} | end)

@@ -4,7 +4,7 @@
 
 Marks lie on the truth's outlines in slices across the structure's usual axis, four voxels apart and off by up to half a voxel
 within the slice. The draws differ in the marks and in the first marked slice, which is any of the step. "start" is covol's own,
-without a step of the flow.
+of the marks alone and without a step of the flow.
 """
 import sys
 
