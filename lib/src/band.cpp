@@ -45,11 +45,7 @@ void test_for_leaks(const Tube& tube, const Tagging& tagging, double limit, cons
     }
 }
 
-std::string to_text(const Vec3& p) {
-    std::ostringstream s;
-    s << "(" << p[0] << ", " << p[1] << ", " << p[2] << ")";
-    return s.str();
-}
+using detail::to_text;
 
 std::vector<Coord> seed_voxels(const FloatGrid& distance, const Domain& domain, const BandOptions& options) {
     std::vector<Coord> voxels;

@@ -75,6 +75,14 @@ Domain domain_of_box(const WorldBox& box, double voxel_size) {
     return domain;
 }
 
+Domain widened(Domain domain, int layers) {
+    for (int a = 0; a < 3; ++a) {
+        domain.min[a] -= layers;
+        domain.max[a] += layers;
+    }
+    return domain;
+}
+
 WorldBox bounding_box(const std::vector<Vec3>& points, double margin) {
     if (points.empty()) throw Error(Errc::InvalidInput, "bounding_box: expected at least one point");
     WorldBox box{points.front(), points.front()};

@@ -30,6 +30,7 @@ constexpr double kWidth = 14.0;           // voxels to both sides of the surface
 constexpr double kLongestOffset = 12.0;   // voxels in one iteration
 constexpr double kPatchWidth = 2.0;       // voxels
 constexpr double kPatchesPerSpacing = 4;  // offsets that vary within a fourth of the marks' spacing are not sought
+constexpr double kSides = 3.0;             // voxels beside a mark, to tell lines from steps
 constexpr int kNormalRounds = 6;          // of averaging, about two voxels
 constexpr std::array<double, 3> kSigmas{0.5, 1.0, 2.0};  // voxels
 constexpr std::size_t kFewestMarks = 8, kMostMarks = 400;
@@ -53,7 +54,8 @@ public:
     /// False, with the reason in the report, where the image is of no use.
     bool step(bool first, bool last) {
         run_.check();
-        if (!cut_surface() || !place_marks(first)) return false;
+        cut_surface();
+        if (!place_marks(first)) return false;
         set_ranges();
         const Scene scene{patches_, *current_, domain_, ranges_};
         if (!learn(scene, first)) return false;
@@ -68,7 +70,7 @@ public:
     [[nodiscard]] const FloatGrid& current() const { return *current_; }
 
 private:
-    bool cut_surface();
+    void cut_surface();
     bool place_marks(bool first);
     void set_ranges();
     bool learn(const Scene& scene, bool first);
@@ -119,7 +121,7 @@ private:
     std::optional<Lesson> lesson_;
 };
 
-bool Guide::cut_surface() {
+void Guide::cut_surface() {
     const TriangleMesh mesh = extract_mesh(*current_, {}, run_);
     const MeshMeasures measures = measure(mesh);
     area_ = measures.area;
@@ -135,7 +137,6 @@ bool Guide::cut_surface() {
     };
     cut(kPatchWidth * h_);
     if (spacing_ > kPatchesPerSpacing * width_) cut(spacing_ / kPatchesPerSpacing);
-    return true;
 }
 
 bool Guide::place_marks(bool first) {
@@ -242,6 +243,12 @@ bool Guide::learn(const Scene& scene, bool first) {
         report_.reason = "the guess lies outside of the image";
         return false;
     }
+    std::vector<Vec3> places, normals;
+    for (const PatchMark& mark : on_) {
+        places.push_back(mark.at);
+        normals.push_back(patches_.directions[mark.patch]);
+    }
+    report_.feature = feature_at(image_, places, normals, kSides * h_);
     report_.inside = lesson_->brightness(-2 * kStepsPerVoxel);
     report_.border = lesson_->brightness(0);
     report_.outside = lesson_->brightness(2 * kStepsPerVoxel);
@@ -393,11 +400,6 @@ void Guide::weigh(bool first) {
 
 /// Offsets of patches as a smooth function on the vertices.
 std::vector<double> Guide::on_vertices(const std::vector<double>& offset) const {
-    std::vector<std::vector<std::uint32_t>> neighbours(patches_.size());
-    for (const Patches::Border& border : patches_.borders) {
-        neighbours[border.a].push_back(border.b);
-        neighbours[border.b].push_back(border.a);
-    }
     std::vector<double> result(patches_.places.size());
     tbb::parallel_for(std::size_t(0), result.size(), [&](std::size_t v) {
         const std::uint32_t own = patches_.patch[v];
@@ -408,7 +410,7 @@ std::vector<double> Guide::on_vertices(const std::vector<double>& offset) const 
             total += weight;
         };
         add(own);
-        for (const std::uint32_t i : neighbours[own]) add(i);
+        for (const std::uint32_t i : patches_.neighbours[own]) add(i);
         result[v] = sum / total;
     });
     return result;

@@ -20,43 +20,55 @@ namespace {
 
 using namespace pipeline;
 
+/// Where the flow came to.
+struct FlowEnd {
+    FloatGridPtr u;
+    StartOrigin origin;
+    Domain domain;
+};
+
+void take_back(Job& job, const FlowEnd& end) {
+    job.result.u = end.u;
+    job.origin = end.origin;
+    job.report().domain = end.domain;
+    job.report().guess = {};
+    job.report().automatic.erase("guess");
+}
+
 // A surface that vanished, or that left the marks, is not returned while the marks alone tell of one.
-/// @param start  the body between contours; null: the start was another one
-void fall_back(Job& job, const FloatGridPtr& start) {
+void fall_back(Job& job, const FloatGridPtr& body) {
     const bool vanished = has_vanished(job);
-    if (vanished && start != nullptr) {
-        job.result.u = start;
+    if (vanished && body != nullptr) {
+        job.result.u = body;
         job.report().solve.stop_reason = StopReason::NotRun;
         return job.warn("the flow from the body between the contours lost it: this is that body itself");
     }
-    if (!job.guided() || job.origin == StartOrigin::Guess || job.sure.size() < 4 || !job.uses_points()) return;
+    if (!job.guided() || job.rests() || job.sure.size() < 4 || !job.uses_points()) return;
     if (!vanished && (job.origin == StartOrigin::Contours || !misses_marks(job, *job.result.u))) return;
-    const FloatGridPtr before = job.result.u;
+    const FlowEnd before{job.result.u, job.origin, job.domain()};
+    bool better = false;
     try {
         start_from_guess(job);
+        better = vanished || !misses_marks(job, *job.result.u);
     } catch (const Error& error) {
         if (error.code() == Errc::Cancelled) throw;
-        job.result.u = before;
-        return;
+        job.run.info(std::string("no guess instead: ") + error.what());
     }
-    if (!vanished && misses_marks(job, *job.result.u)) {
-        job.result.u = before;
-        return;
-    }
+    if (!better) return take_back(job, before);
     job.warn(std::string("the surface ") + (vanished ? "vanished" : "left more than a tenth of the marks") +
-             ": this is the one through the marks that bends least instead; the image had no say in it");
+             ": this is the one through the marks that bends least instead");
     flow(job);
 }
 
 void solve(Job& job, const std::optional<FineStart>& without_coarse) {
-    const FloatGridPtr start = job.guided() && job.origin == StartOrigin::Contours ? job.result.u->deepCopy() : nullptr;
+    const FloatGridPtr body = job.guided() && job.follows_lines() ? job.result.u->deepCopy() : nullptr;
     flow(job);
     if (without_coarse && has_vanished(job)) {
         leave_out_coarse_level(job, *without_coarse);
         find_edges(job);
         flow(job);
     }
-    fall_back(job, start);
+    fall_back(job, body);
     job.run.check();
     job.result.u->setName("u");
     check_flow(job);
@@ -66,12 +78,6 @@ void run_steps(Job& job) {
     Timed total(job.report().seconds.total);
     check_input(job);
     choose_values(job);
-    if (job.options.guess) {
-        start_from_corrected_guess(job);
-        choose_edge_feature(job);
-        find_edges(job);
-        return make_surface(job);
-    }
     make_start(job);  // distance and band
     choose_edge_feature(job);
     const std::optional<FineStart> without_coarse = pass_coarse_levels(job);

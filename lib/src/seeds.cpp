@@ -10,15 +10,12 @@
 #include "covol/error.h"
 #include "detail/contour_curve.h"
 #include "detail/kd_tree.h"
+#include "detail/number.h"
 
 namespace covol {
 namespace {
 
-std::string to_text(const Vec3& p) {
-    std::ostringstream text;
-    text << "(" << p[0] << ", " << p[1] << ", " << p[2] << ")";
-    return text.str();
-}
+using detail::to_text;
 
 }  // namespace
 

@@ -8,10 +8,10 @@
 #include <functional>
 #include <limits>
 #include <set>
-#include <sstream>
 
 #include "covol/band.h"
 #include "covol/error.h"
+#include "detail/number.h"
 #include "detail/signed_distance.h"
 
 namespace covol {
@@ -74,16 +74,19 @@ FloatGridPtr start_from_distance(const Domain& domain, const WorldBox& box, cons
 /// Values of a field at the voxels lo..hi of the domain's lattice, k fastest; negative is inside.
 using Sampler = std::function<void(const Coord& lo, const Coord& hi, float* values)>;
 
-/// A start from a field whose zero level set is the surface.
-/// @param candidates  leaves of the domain that hold all of the surface.
-FloatGridPtr start_from_field(const Domain& domain, const std::vector<Coord>& candidates, const Sampler& sample,
-                              const char* where, const RunContext& run) {
-    // A leaf and the next layer: the surface passes through one of its voxel edges.
-    const std::vector<Coord> crossed = filter(candidates, [&](const Coord& o) {
+/// Those of the leaves whose voxel edges, those to the next leaf included, the zero level set passes.
+std::vector<Coord> crossed_by(const std::vector<Coord>& leaves, const Sampler& sample) {
+    return filter(leaves, [&](const Coord& o) {
         std::array<float, 9 * 9 * 9> values;
         sample(o, o.offsetBy(kLeafDim), values.data());
         return std::any_of(values.begin(), values.end(), [&](float v) { return (v < 0) != (values[0] < 0); });
     });
+}
+
+/// A start from a field whose zero level set is the surface.
+/// @param crossed  the leaves that it passes, see crossed_by()
+FloatGridPtr start_from_field(const Domain& domain, const std::vector<Coord>& crossed, const Sampler& sample,
+                              const char* where, const RunContext& run) {
     run.check();
     const detail::VoxelBox box = detail::box_of(domain);
     const LeafBand band(detail::dilate_leaves(crossed, 1, domain));
@@ -193,11 +196,7 @@ bool may_cross(const FloatGrid& grid, const openvdb::CoordBBox& box) {
     return false;
 }
 
-std::string to_text(const Vec3& p) {
-    std::ostringstream s;
-    s << "(" << p[0] << ", " << p[1] << ", " << p[2] << ")";
-    return s.str();
-}
+using detail::to_text;
 
 double length(const Vec3& v) { return std::hypot(v[0], v[1], v[2]); }
 
@@ -280,7 +279,7 @@ FloatGridPtr start_from_mask(const Domain& domain, const Image& mask, const RunC
                                         ? 0.5F - values[n]
                                         : 0.5F;
         };
-        result = start_from_field(domain, leaves_in(domain, box), sample, "start_from_mask", run);
+        result = start_from_field(domain, crossed_by(leaves_in(domain, box), sample), sample, "start_from_mask", run);
     });
     return result;
 }
@@ -298,7 +297,7 @@ FloatGridPtr start_from_contours(const Domain& domain, const ContourSolid& solid
                     for (int k = lo.z(); k <= hi.z(); ++k)
                         *values++ = float(solid.level(domain.index_to_world({double(i), double(j), double(k)})));
         };
-        result = start_from_field(domain, near, sample, "start_from_contours", run);
+        result = start_from_field(domain, crossed_by(near, sample), sample, "start_from_contours", run);
     });
     return result;
 }
@@ -345,7 +344,7 @@ FloatGridPtr start_from_grid(const Domain& domain, const FloatGrid& level_set, c
                     for (int k = lo.z(); k <= hi.z(); ++k)
                         *values++ = openvdb::tools::BoxSampler::sample(accessor, to_source(i, j, k));
         };
-        result = start_from_field(domain, candidates, sample, "start_from_grid", run);
+        result = start_from_field(domain, crossed_by(candidates, sample), sample, "start_from_grid", run);
     });
     return result;
 }

@@ -97,11 +97,7 @@ bool lies_within(const ImageGeometry& geometry, const Clip& clip) {
 FloatGridPtr clipped_surface(const FloatGrid& u, const Domain& domain, const Clip& clip, const RunContext& run) {
     const std::optional<detail::Uncut> whole = detail::uncut(u, detail::FaceLayer::InPlace);
     // What is near the cut may be nearest to what the wall would be beyond it.
-    Domain wide = domain;
-    for (int a = 0; a < 3 && whole; ++a) {
-        wide.min[a] -= detail::kCarriedOn - 1;
-        wide.max[a] += detail::kCarriedOn - 1;
-    }
+    const Domain wide = whole ? widened(domain, detail::kCarriedOn - 1) : domain;
     FloatGridPtr wall;
     try {
         wall = detail::redistance(whole ? *whole->distance : u, wide, kHalfWidthVoxels, detail::DomainEnd::Open, "surface", run);

@@ -78,7 +78,7 @@ struct Bias {
 Bias bias_of(const Shape& shape, const std::vector<Vec3>& marks, const GuessOptions& options) {
     const Domain domain = cube_domain(80, 1.0);
     GuessReport report;
-    const FloatGridPtr guess = guess_from_marks(domain, marks, options, report);
+    const FloatGridPtr guess = guess_from_marks(domain, marks, options, report).u;
     const TriangleMesh mesh = extract_mesh(*surface(*guess), {});
     double sum = 0;
     for (const auto& v : mesh.vertices) sum += shape.distance({v[0], v[1], v[2]});
@@ -105,7 +105,7 @@ TEST_CASE("exact points are met without bias, however few") {
 TEST_CASE("what encloses nothing is refused with a reason") {
     const Domain domain = cube_domain(40, 1.0);
     GuessReport report;
-    const auto guess = [&](const std::vector<Vec3>& marks) { return guess_from_marks(domain, marks, precision({1, 1, 1}), report); };
+    const auto guess = [&](const std::vector<Vec3>& marks) { return guess_from_marks(domain, marks, precision({1, 1, 1}), report).u; };
     CHECK_THROWS_WITH(guess({{0, 0, 0}, {5, 0, 0}, {0, 5, 0}}), Catch::Contains("at least 4 marks"));
     std::vector<Vec3> ring;
     for (int n = 0; n < 20; ++n) ring.push_back({10 * std::cos(0.3 * n), 10 * std::sin(0.3 * n), 2});
@@ -120,8 +120,8 @@ TEST_CASE("a guess does not depend on the number of threads, nor on where the wo
     RunContext one, four;
     one.threads = 1;
     four.threads = 4;
-    const FloatGridPtr a = guess_from_marks(domain, marks, precision({1, 1, 1}), report, one);
-    const FloatGridPtr b = guess_from_marks(domain, marks, precision({1, 1, 1}), report, four);
+    const FloatGridPtr a = guess_from_marks(domain, marks, precision({1, 1, 1}), report, one).u;
+    const FloatGridPtr b = guess_from_marks(domain, marks, precision({1, 1, 1}), report, four).u;
     CHECK(report.patches > 0);
     CHECK(identical(*a, *b));
 }
@@ -132,9 +132,8 @@ TEST_CASE("marks in the cut are told from marks on the surface") {
     Domain domain = cube_domain(72, 1.0);
     domain.max[2] = domain.min[2] + 41;
     GuessOptions options = precision({1, 1, 1});
-    options.has_end = true;
     options.end = domain.world_box();
-    const double top = options.end.max[2];
+    const double top = options.end->max[2];
     std::vector<Vec3> marks;
     for (const Vec3& p : draw(shape, 300, 7))
         if (p[2] < top) marks.push_back(p);
@@ -147,7 +146,7 @@ TEST_CASE("marks in the cut are told from marks on the surface") {
         if (std::hypot(p[0], p[1]) < 0.8 * rim) marks.push_back(p);
     }
     GuessReport report;
-    const FloatGridPtr guess = guess_from_marks(domain, marks, options, report);
+    const FloatGridPtr guess = guess_from_marks(domain, marks, options, report).u;
     CHECK(report.cut_marks == 60);
     double sum = 0;
     int count = 0;
@@ -166,7 +165,7 @@ TEST_CASE("a seed in a cavity makes it one, and one in a dent keeps it open") {
     options.outside = {{0, 0, 0}};
     options.inside = {{16, 0, 0}, {0, -16, 0}};
     GuessReport report;
-    const FloatGridPtr guess = guess_from_marks(domain, marks, options, report);
+    const FloatGridPtr guess = guess_from_marks(domain, marks, options, report).u;
     CHECK(report.wrong_seeds == 0);
     CHECK(value_at(*guess, {0, 0, 0}) > 0);
     CHECK(value_at(*guess, {0, 16, 0}) < 0);

@@ -37,6 +37,9 @@ struct Domain {
 /// @throws Error InvalidOptions (h <= 0, not finite), InvalidInput (an empty box, or more than 2^30 voxels along an axis).
 [[nodiscard]] Domain domain_of_box(const WorldBox& box, double voxel_size);
 
+/// The same lattice with `layers` more voxels on every side.
+[[nodiscard]] Domain widened(Domain domain, int layers);
+
 /// Box around the points, `margin` (world units) wider on every side.
 [[nodiscard]] WorldBox bounding_box(const std::vector<Vec3>& points, double margin = 0.0);
 

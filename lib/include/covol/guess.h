@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,13 +10,15 @@
 
 namespace covol {
 
+/// Standard deviation of what is uniform over a unit: of a mark's place in its voxel, where nothing else is known.
+inline constexpr double kUniformDeviation = 0.3;
+
 struct GuessOptions {
     /// Standard deviation of a mark along three directions, as world vectors (an image's axes, times a share of its spacing).
     std::array<Vec3, 3> deviation{};
     std::vector<Vec3> inside, outside;  ///< places whose side is known
     /// The world's end: where the body is cut off. Marks in the cut are told from marks on the surface.
-    WorldBox end;
-    bool has_end = false;
+    std::optional<WorldBox> end;
     [[nodiscard]] std::string why_invalid() const;
 };
 
@@ -30,11 +33,15 @@ struct GuessReport {
 /// Whether marks can have a body between them: at least four, not all in one plane.
 [[nodiscard]] bool can_enclose(const std::vector<Vec3>& marks);
 
+struct Guess {
+    FloatGridPtr u;           ///< a start as those of band.h: u0 clamped to +-3h, active beside the surface
+    std::vector<Vec3> marks;  ///< on the surface; the others lie in the cut
+};
+
 /// A guess of the surface from few marks: through them it bends least (variational implicit surface, see
 /// lib/src/guess/variational.h). No density of marks is asked for.
-/// @return a start as those of band.h: u0 clamped to +-3h, active beside the surface
 /// @throws Error InvalidOptions; InvalidInput (fewer than four distinct marks, all in one plane, nothing inside the domain).
-[[nodiscard]] FloatGridPtr guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks, const GuessOptions& options,
-                                            GuessReport& report, const RunContext& run = {});
+[[nodiscard]] Guess guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks, const GuessOptions& options,
+                                     GuessReport& report, const RunContext& run = {});
 
 }  // namespace covol

@@ -11,10 +11,13 @@
 
 namespace covol {
 
+/// Within so many voxels a mark acts on a guess, however little it moves it.
+inline constexpr double kCorrectionVoxels = 8.0;
+
 struct CorrectionOptions {
     double precision = 0.0;     ///< of the marks, world units; 0 picks half a voxel
     double least_radius = 0.0;  ///< within which a mark acts on the guess, however little it moves it, world units;
-                                ///< 0 picks 8 voxels
+                                ///< 0 picks kCorrectionVoxels
     [[nodiscard]] std::string why_invalid() const;
 };
 

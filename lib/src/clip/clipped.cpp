@@ -162,12 +162,7 @@ private:
             tile.getBoundingBox(box);
             add_blocks(box, solid);
         }
-        Domain wide = domain_;
-        for (int a = 0; a < 3; ++a) {
-            wide.min[a] -= kLeafDim;
-            wide.max[a] += kLeafDim;
-        }
-        std::vector<Coord> all = dilate_leaves(solid, 1, wide);
+        std::vector<Coord> all = dilate_leaves(solid, 1, widened(domain_, kLeafDim));
         std::erase_if(all, [&](const Coord& o) { return !near_clip(openvdb::CoordBBox(o, o.offsetBy(kLeafDim - 1))); });
         return all;
     }

@@ -2,6 +2,8 @@
 #include <sstream>
 #include <string>
 
+#include "covol/fwd.h"
+
 namespace covol::detail {
 
 /// A number as messages show it: six digits.
@@ -10,5 +12,8 @@ inline std::string number(double value) {
     text << value;
     return text.str();
 }
+
+/// A place as messages show it.
+inline std::string to_text(const Vec3& p) { return "(" + number(p[0]) + ", " + number(p[1]) + ", " + number(p[2]) + ")"; }
 
 }  // namespace covol::detail

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <utility>
 
 #include "covol/band.h"
 #include "covol/error.h"
@@ -11,7 +12,6 @@
 namespace covol {
 namespace {
 
-constexpr double kDeviationOfVoxel = 0.3;  // of what is uniform over one
 constexpr double kInsideVoxels = 1.5;      // within the section by more: in the cut
 constexpr double kLeastSlope = 0.05;       // a section whose body ends right beyond it
 constexpr int kCutRounds = 2;
@@ -35,7 +35,7 @@ double deviation_along(const GuessOptions& options, int axis) {
 int end_beside(const Vec3& mark, const GuessOptions& options) {
     for (int a = 0; a < 3; ++a) {
         const double near = 4 * deviation_along(options, a);  // half a voxel from its centre to its end, and what the hand is off
-        if (mark[a] < options.end.min[a] + near || mark[a] > options.end.max[a] - near) return a;
+        if (mark[a] < options.end->min[a] + near || mark[a] > options.end->max[a] - near) return a;
     }
     return -1;
 }
@@ -44,14 +44,14 @@ guess::ImpreciseMarks imprecise(const std::vector<Vec3>& marks, const GuessOptio
     guess::ImpreciseMarks result;
     result.marks = marks;
     result.deviation = options.deviation;
-    if (options.has_end) result.world = &options.end;
+    if (options.end) result.world = &*options.end;
     return result;
 }
 
 /// Adds those seeds to the constraints that lie on the wrong side, or on none: a little inside, or outside.
 /// @return whether there were any
 bool hold_seeds(const guess::MarksSurface& surface, const GuessOptions& options, guess::ImpreciseMarks& known) {
-    const double beyond = longest(options.deviation) / kDeviationOfVoxel;
+    const double beyond = longest(options.deviation) / kUniformDeviation;
     bool any = false;
     const auto hold = [&](const std::vector<Vec3>& seeds, double side) {
         for (const Vec3& seed : seeds) {
@@ -89,19 +89,19 @@ double within_section(const guess::MarksSurface& body, const Vec3& mark, int acr
 
 /// Marks in the cut lie inside the section of the body that the others mark: the surface need not pass them.
 std::vector<Vec3> without_cut_marks(const std::vector<Vec3>& marks, const GuessOptions& options, const RunContext& run) {
-    if (!options.has_end) return marks;
+    if (!options.end) return marks;
     std::vector<Vec3> sure, doubtful;
     for (const Vec3& mark : marks) (end_beside(mark, options) >= 0 ? doubtful : sure).push_back(mark);
     if (doubtful.empty() || sure.size() < kLeastOutline || !guess::span_space(sure)) return marks;
-    std::vector<Vec3> held = sure;
-    for (int round = 0; round < kCutRounds; ++round) {  // those on its outline tell better where the section ends
+    std::vector<Vec3> held = sure, before;
+    for (int round = 0; round < kCutRounds && held != before; ++round) {  // those on its outline tell better where the section ends
         const guess::MarksSurface body(imprecise(held, options), run);
-        held = sure;
+        before = std::exchange(held, sure);
         for (const Vec3& mark : doubtful) {
             const int across = end_beside(mark, options);
             double voxel = 0;
             for (int a = 0; a < 3; ++a)
-                if (a != across) voxel = std::max(voxel, deviation_along(options, a) / kDeviationOfVoxel);
+                if (a != across) voxel = std::max(voxel, deviation_along(options, a) / kUniformDeviation);
             if (within_section(body, mark, across, options) > -kInsideVoxels * voxel) held.push_back(mark);
         }
     }
@@ -119,22 +119,22 @@ std::string GuessOptions::why_invalid() const {
 
 bool can_enclose(const std::vector<Vec3>& marks) { return guess::span_space(marks); }
 
-FloatGridPtr guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks, const GuessOptions& options,
-                              GuessReport& report, const RunContext& run) {
+Guess guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks, const GuessOptions& options, GuessReport& report,
+                       const RunContext& run) {
     if (const std::string why = options.why_invalid(); !why.empty()) throw Error(Errc::InvalidOptions, "guess: " + why);
-    FloatGridPtr result;
+    Guess result;
     with_threads(run, [&] {
-        const std::vector<Vec3> held = without_cut_marks(marks, options, run);
-        guess::ImpreciseMarks known = imprecise(held, options);
-        report.marks = held.size();
-        report.cut_marks = marks.size() - held.size();
+        result.marks = without_cut_marks(marks, options, run);
+        guess::ImpreciseMarks known = imprecise(result.marks, options);
+        report.marks = result.marks.size();
+        report.cut_marks = marks.size() - result.marks.size();
         auto surface = std::make_unique<guess::MarksSurface>(known, run);
         for (int round = 0; round < kSeedRounds && hold_seeds(*surface, options, known); ++round)
             surface = std::make_unique<guess::MarksSurface>(known, run);
         report.patches = surface->patches();
         report.wrong_seeds = count_wrong(*surface, options);
-        result = start_from_level(
-            domain, held,
+        result.u = start_from_level(
+            domain, result.marks,
             [&](const Vec3& from, const Vec3& step, int count, double* values) { surface->row(from, step, count, values); }, run);
     });
     report.summary = std::to_string(report.marks) + " marks, the surface through them that bends least";

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <numeric>
 
 #include "detail/kd_tree.h"
+#include "detail/wendland.h"
 
 namespace covol::guess {
 namespace {
@@ -114,14 +114,6 @@ LikeliestVariance likeliest_variance(const VariationalSurface& said, const Impre
         best = {best.factor / kVarianceStep, std::move(finer)};
     }
     return best;
-}
-
-/// Wendland's C2 function of the distance over the support.
-double weight(double squared, double radius) {
-    const double t = std::sqrt(squared) / radius;
-    if (t >= 1) return 0;
-    const double s = 1 - t, s2 = s * s;
-    return s2 * s2 * (4 * t + 1);
 }
 
 }  // namespace
@@ -236,7 +228,7 @@ void MarksSurface::row(const Vec3& from, const Vec3& step, int count, double* va
     whole_->row(from, step, count, values);
     for (int n = 0; n < count; ++n) values[n] -= offset_;
     if (patches_.empty()) return;
-    std::vector<double> added(count, 0.0), weights(std::size_t(count), kWholeWeight), part(count);
+    std::vector<double> added(count, 0.0), weights(std::size_t(count), kWholeWeight), part(count), w(count);
     // The patches of all cells that the row passes, in order: the same sum however rows are cut.
     std::vector<std::uint32_t> met;
     std::size_t last = std::numeric_limits<std::size_t>::max();
@@ -258,10 +250,9 @@ void MarksSurface::row(const Vec3& from, const Vec3& step, int count, double* va
     for (const std::uint32_t id : met) {
         const Patch& patch = patches_[id];
         int first = count, end = 0;
-        std::vector<double> w(count);
         for (int n = 0; n < count; ++n) {
             const Vec3 at{from[0] + n * step[0], from[1] + n * step[1], from[2] + n * step[2]};
-            w[n] = weight(detail::squared_distance(at, patch.center), patch.radius);
+            w[n] = detail::wendland(std::sqrt(detail::squared_distance(at, patch.center)) / patch.radius);
             if (w[n] > 0) first = std::min(first, n), end = n + 1;
         }
         if (first >= end) continue;

@@ -32,8 +32,6 @@ public:
     /// Values at from + n * step, n < count; about a distance beside the marks, negative inside.
     void row(const Vec3& from, const Vec3& step, int count, double* values) const;
     [[nodiscard]] double value(const Vec3& at) const;
-    /// The marks' variance over what was said: less than 1 where they fit each other much better.
-    [[nodiscard]] double variance_factor() const { return variance_factor_; }
     [[nodiscard]] std::size_t patches() const { return patches_.size(); }
 
 private:
@@ -47,7 +45,8 @@ private:
     [[nodiscard]] Constraints with_factor(Constraints part) const;
 
     std::unique_ptr<VariationalSurface> whole_;
-    double offset_ = 0, variance_factor_ = 1;
+    double offset_ = 0;
+    double variance_factor_ = 1;  // of the marks over what was said: less than 1 where they fit each other much better
     std::vector<Patch> patches_;
     // A lattice of cells, each with the patches that reach into it.
     Vec3 low_{0, 0, 0};

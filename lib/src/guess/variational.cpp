@@ -205,24 +205,27 @@ Matrix flattest_modes(const Matrix& H, const Vector& outward) {
     return space * small.eigenvectors();
 }
 
-/// The function's value, unit ball.
-double evaluate(const std::vector<Point>& nodes, Index marks, const Vector& basis, const Eigen::Vector4d& polynomial, const Point& at) {
-    const auto count = Index(nodes.size());
-    double sum = polynomial[0] + polynomial.tail<3>().dot(at);
+Expansion expansion(const HermiteSystem& system, const Vector& values, const Vector& gradients, const std::vector<Point>& nodes) {
+    Vector basis;
+    Eigen::Vector4d polynomial;
+    system.weights(values, gradients, basis, polynomial);
+    Expansion f;
+    const auto count = Index(nodes.size()), marks = gradients.size() / 3;
     for (Index n = 0; n < count; ++n) {
-        const Point d = at - nodes[std::size_t(n)];
-        const double r = d.norm();
-        sum += basis[n] * r * r * r;
-        if (n < marks) sum -= 3 * r * d.dot(basis.segment<3>(count + 3 * n));
+        const Point& p = nodes[std::size_t(n)];
+        const Point b = n < marks ? Point(basis.segment<3>(count + 3 * n)) : Point(Point::Zero());
+        f.x.push_back(p[0]), f.y.push_back(p[1]), f.z.push_back(p[2]);
+        f.a.push_back(basis[n]);
+        f.bx.push_back(b[0]), f.by.push_back(b[1]), f.bz.push_back(b[2]);
     }
-    return sum;
+    std::copy(polynomial.data(), polynomial.data() + kPolynomial, f.c);
+    return f;
 }
 
 using Inside = std::function<bool(const Point& in_unit_ball)>;
 
 /// On ellipsoids around all marks, as far as the world reaches.
-bool has_one_sign_around(const std::vector<Point>& nodes, Index marks, const Vector& basis, const Eigen::Vector4d& polynomial,
-                         const Inside& in_world) {
+bool has_one_sign_around(const std::vector<Point>& nodes, Index marks, const Expansion& f, const Inside& in_world) {
     // Marks with a variance of 1 along each axis lie in a ball.
     Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
     for (Index n = 0; n < marks; ++n) spread += nodes[std::size_t(n)] * nodes[std::size_t(n)].transpose() / double(marks);
@@ -230,6 +233,7 @@ bool has_one_sign_around(const std::vector<Point>& nodes, Index marks, const Vec
     const Eigen::Matrix3d from_ball = axes.operatorSqrt(), to_ball = axes.operatorInverseSqrt();
     double reach = 0;
     for (Index n = 0; n < marks; ++n) reach = std::max(reach, (to_ball * nodes[std::size_t(n)]).norm());
+    constexpr double kNoStep[3] = {0, 0, 0};
     int positive = 0, count = 0;
     for (int n = 0; n < kDirections; ++n) {  // a Fibonacci lattice
         const double z = 1 - (2 * n + 1) / double(kDirections), phi = n * 2.399963229728653;
@@ -237,7 +241,9 @@ bool has_one_sign_around(const std::vector<Point>& nodes, Index marks, const Vec
         for (const double around : kAround) {
             const Point at = around * reach * (from_ball * direction);
             if (!in_world(at)) continue;
-            positive += evaluate(nodes, marks, basis, polynomial, at) > 0;
+            double value = 0;
+            f.row(at.data(), kNoStep, 1, &value);
+            positive += value > 0;
             ++count;
         }
     }
@@ -252,8 +258,7 @@ Vector away_from_neighbours(const std::vector<Point>& nodes, Index marks, double
         std::vector<std::pair<double, Index>> others;
         for (Index m = 0; m < marks; ++m)
             others.emplace_back((nodes[std::size_t(m)] - nodes[std::size_t(n)]).squaredNorm(), m);
-        std::nth_element(others.begin(), others.begin() + std::ptrdiff_t(count) - 1, others.end());
-        std::sort(others.begin(), others.begin() + std::ptrdiff_t(count));
+        std::partial_sort(others.begin(), others.begin() + std::ptrdiff_t(count), others.end());
         Point mean = Point::Zero();
         for (std::size_t k = 0; k < count; ++k) mean += nodes[std::size_t(others[k].second)] / double(count);
         directions.segment<3>(3 * n) = nodes[std::size_t(n)] - mean;
@@ -273,10 +278,7 @@ Gradients least_energy(const HermiteSystem& system, const Vector& values, const 
         ends.push_back(descend(system.energy(), c, modes.col(k)));
     Gradients best;
     for (Gradients& end : ends) {
-        Vector basis;
-        Eigen::Vector4d polynomial;
-        system.weights(values, end.unit, basis, polynomial);
-        end.closed = has_one_sign_around(nodes, marks, basis, polynomial, in_world);
+        end.closed = has_one_sign_around(nodes, marks, expansion(system, values, end.unit, nodes), in_world);
         const bool better = end.closed != best.closed ? end.closed : end.energy < best.energy;
         if (better || !std::isfinite(best.energy)) best = end;
     }
@@ -305,8 +307,25 @@ bool span_space(const std::vector<Vec3>& marks) {
     return axes[0] > kFlat * axes[2];
 }
 
-VariationalSurface::VariationalSurface(const Constraints& given, const std::vector<Vec3>& normals, double amplitude)
-    : marks_(given.marks) {
+void Expansion::negate() {
+    for (std::vector<double>* weights : {&a, &bx, &by, &bz})
+        for (double& w : *weights) w = -w;
+    for (double& w : c) w = -w;
+}
+
+void Expansion::row(const double* from, const double* step, int count, double* values) const {
+    const TriharmonicSum sum{x.data(), y.data(), z.data(), a.data(), bx.data(), by.data(), bz.data(), x.size()};
+    for (int first = 0; first < count; first += kTriharmonicLanes) {
+        double at[3][kTriharmonicLanes], total[kTriharmonicLanes];
+        for (int l = 0; l < kTriharmonicLanes; ++l)
+            for (int k = 0; k < 3; ++k) at[k][l] = from[k] + std::min(first + l, count - 1) * step[k];
+        triharmonic_sum(sum, at[0], at[1], at[2], total);
+        for (int l = 0; l < std::min(kTriharmonicLanes, count - first); ++l)
+            values[first + l] = total[l] + c[0] + c[1] * at[0][l] + c[2] * at[1][l] + c[3] * at[2][l];
+    }
+}
+
+VariationalSurface::VariationalSurface(const Constraints& given, const std::vector<Vec3>& normals, double amplitude) {
     if (normals.empty()) check_spread(given.marks);  // a part of a surface may be flat
     const auto marks = Index(given.marks.size()), count = marks + Index(given.seeds.size());
     for (const Vec3& m : given.marks)
@@ -341,8 +360,6 @@ VariationalSurface::VariationalSurface(const Constraints& given, const std::vect
 
     double unit_amplitude = amplitude > 0 ? amplitude * radius_ : 1.0;
     Gradients found;
-    Vector basis;
-    Eigen::Vector4d polynomial;
     const int rounds = amplitude > 0 ? 1 : kAmplitudeRounds;
     for (int round = 0; round < rounds; ++round) {
         const Vector lambda = (variance / unit_amplitude).cwiseMax(kLeastLambda);
@@ -353,34 +370,20 @@ VariationalSurface::VariationalSurface(const Constraints& given, const std::vect
             found = descend(system.energy(), c, found.unit);
         else
             found = normals.empty() ? least_energy(system, values, c, nodes, marks, outward, in_world) : descend(system.energy(), c, known);
-        system.weights(values, found.unit - before, basis, polynomial);
+        if (round + 1 == rounds) f_ = expansion(system, values, found.unit - before, nodes);
         if (amplitude > 0) continue;
         unit_amplitude = std::max((found.energy + constant) / system.freedom(), 1e-12);
         log_likelihood_ = -0.5 * (system.log_determinant() + system.freedom() * std::log(unit_amplitude));
     }
     amplitude_ = unit_amplitude / radius_;
-    for (Index n = 0; n < count; ++n) {
-        const Point& p = nodes[std::size_t(n)];
-        x_.push_back(p[0]), y_.push_back(p[1]), z_.push_back(p[2]);
-        a_.push_back(basis[n]);
-        const Point b = n < marks ? Point(basis.segment<3>(count + 3 * n)) : Point(Point::Zero());
-        bx_.push_back(b[0]), by_.push_back(b[1]), bz_.push_back(b[2]);
-    }
-    std::copy(polynomial.data(), polynomial.data() + kPolynomial, c_);
     // Without seeds nothing tells the sides apart but that the outside goes on for ever.
     if (given.seeds.empty() && normals.empty() && given.known_value.empty()) {
         double far = 0;
         for (int corner = 0; corner < 8; ++corner)
             far += value({center_[0] + (corner & 4 ? 3 : -3) * radius_, center_[1] + (corner & 2 ? 3 : -3) * radius_,
                           center_[2] + (corner & 1 ? 3 : -3) * radius_});
-        if (far < 0) flip();
+        if (far < 0) f_.negate();
     }
-}
-
-void VariationalSurface::flip() {
-    for (std::vector<double>* weights : {&a_, &bx_, &by_, &bz_})
-        for (double& w : *weights) w = -w;
-    for (double& c : c_) c = -c;
 }
 
 double VariationalSurface::value(const Vec3& at) const {
@@ -390,30 +393,22 @@ double VariationalSurface::value(const Vec3& at) const {
 }
 
 void VariationalSurface::row(const Vec3& from, const Vec3& step, int count, double* values) const {
-    const TriharmonicSum sum{x_.data(), y_.data(), z_.data(), a_.data(), bx_.data(), by_.data(), bz_.data(), x_.size()};
     double start[3], along[3];
     for (int k = 0; k < 3; ++k) {
         start[k] = (from[k] - center_[k]) / radius_;
         along[k] = step[k] / radius_;
     }
-    for (int first = 0; first < count; first += kTriharmonicLanes) {
-        double x[3][kTriharmonicLanes], total[kTriharmonicLanes];
-        for (int l = 0; l < kTriharmonicLanes; ++l)
-            for (int k = 0; k < 3; ++k) x[k][l] = start[k] + std::min(first + l, count - 1) * along[k];
-        triharmonic_sum(sum, x[0], x[1], x[2], total);
-        for (int l = 0; l < std::min(kTriharmonicLanes, count - first); ++l)
-            values[first + l] =
-                radius_ * (total[l] + c_[0] + c_[1] * x[0][l] + c_[2] * x[1][l] + c_[3] * x[2][l]);
-    }
+    f_.row(start, along, count, values);
+    for (int n = 0; n < count; ++n) values[n] *= radius_;
 }
 
 Vec3 VariationalSurface::gradient(const Vec3& at) const {
     const Point p = (to_point(at) - to_point(center_)) / radius_;
-    Point sum(c_[1], c_[2], c_[3]);
-    for (std::size_t n = 0; n < x_.size(); ++n) {
-        const Point d = p - Point(x_[n], y_[n], z_[n]), b(bx_[n], by_[n], bz_[n]);
+    Point sum(f_.c[1], f_.c[2], f_.c[3]);
+    for (std::size_t n = 0; n < f_.x.size(); ++n) {
+        const Point d = p - Point(f_.x[n], f_.y[n], f_.z[n]), b(f_.bx[n], f_.by[n], f_.bz[n]);
         const double r = d.norm();
-        sum += 3 * r * a_[n] * d - 3 * r * b;
+        sum += 3 * r * f_.a[n] * d - 3 * r * b;
         if (r > 0) sum -= 3 * d * d.dot(b) / r;
     }
     return {sum[0], sum[1], sum[2]};

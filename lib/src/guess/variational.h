@@ -23,6 +23,15 @@ struct Constraints {
     std::vector<Vec3> known_gradient;
 };
 
+/// f of VariationalSurface, as arrays: node, weight of its value and of its gradient (0 for seeds).
+struct Expansion {
+    std::vector<double> x, y, z, a, bx, by, bz;
+    double c[4] = {0, 0, 0, 0};
+    /// At from + n * step, n < count.
+    void row(const double* from, const double* step, int count, double* values) const;
+    void negate();
+};
+
 /// The function whose zero level set passes the marks and bends least: variational implicit surfaces from points
 /// without normals (Huang, Carr, Ju, "Variational implicit point set surfaces", ACM Trans. Graph. 38(4), 2019).
 ///
@@ -50,18 +59,12 @@ public:
     /// Of the marks, given their variance and the amplitude, but for a constant.
     [[nodiscard]] double log_likelihood() const { return log_likelihood_; }
     [[nodiscard]] double amplitude() const { return amplitude_; }
-    /// Which way is inside is a matter of the whole: a part of a surface takes it from the whole.
-    void flip();
-    [[nodiscard]] const std::vector<Vec3>& marks() const { return marks_; }
 
 private:
-    std::vector<Vec3> marks_;
     Vec3 center_{0, 0, 0};
     double radius_ = 1;
     double amplitude_ = 0, log_likelihood_ = 0;
-    // In the unit ball, structure of arrays: node, weight of its value and of its gradient (0 for seeds).
-    std::vector<double> x_, y_, z_, a_, bx_, by_, bz_;
-    double c_[4] = {0, 0, 0, 0};
+    Expansion f_;  // in the unit ball
 };
 
 }  // namespace covol::guess

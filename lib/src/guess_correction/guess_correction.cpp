@@ -14,6 +14,7 @@
 #include "covol/error.h"
 #include "detail/kd_tree.h"
 #include "detail/number.h"
+#include "detail/wendland.h"
 
 namespace covol {
 namespace {
@@ -21,7 +22,6 @@ namespace {
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
 constexpr double kPrecisionVoxels = 0.5;
-constexpr double kCorrectionVoxels = 8.0;   // to be measured over draws
 constexpr double kRadiusOfResidual = 3.0;  // above 2.11, see the header
 constexpr double kLevelRatio = 2.0;        // bumps whose radii differ by less are solved for together
 constexpr double kSeedDepthVoxels = 0.5;   // how far beyond a seed the surface is put
@@ -29,13 +29,6 @@ constexpr int kSeedRounds = 4;             // moving for one seed may bring the 
 constexpr double kExactVoxels = 2.0;       // the clamped distance is taken below this
 constexpr double kSolved = 1e-6;           // of the right-hand side
 constexpr int kMostIterations = 1000;
-
-/// (1 - t)^4 (4 t + 1)
-double wendland(double t) {
-    if (t >= 1) return 0;
-    const double s = (1 - t) * (1 - t);
-    return s * s * (4 * t + 1);
-}
 
 struct Bump {
     Vec3 center;
@@ -87,7 +80,7 @@ double sum_of(const std::vector<Bump>& bumps, const Vec3& world) {
     double sum = 0;
     for (const Bump& b : bumps) {
         const double d2 = detail::squared_distance(b.center, world);
-        if (d2 < b.radius * b.radius) sum += b.height * wendland(std::sqrt(d2) / b.radius);
+        if (d2 < b.radius * b.radius) sum += b.height * detail::wendland(std::sqrt(d2) / b.radius);
     }
     return sum;
 }
@@ -105,7 +98,7 @@ std::vector<double> solve(const std::vector<Target>& targets, double radius, dou
     std::vector<std::vector<Entry>> rows(count);
     tbb::parallel_for(std::size_t(0), count, [&](std::size_t n) {
         for (std::size_t m = 0; m < count; ++m) {
-            const double k = wendland(std::sqrt(detail::squared_distance(targets[n].at, targets[m].at)) / radius) + (n == m ? noise : 0.0);
+            const double k = detail::wendland(std::sqrt(detail::squared_distance(targets[n].at, targets[m].at)) / radius) + (n == m ? noise : 0.0);
             if (k > 0) rows[n].push_back({m, k});
         }
     });

@@ -17,7 +17,6 @@ using Sparse = Eigen::SparseMatrix<double>;
 struct OffsetField::System {
     Sparse precision;  // of the field of unit variance
     mutable Eigen::SimplicialLDLT<Sparse> solver;
-    std::vector<std::vector<std::uint32_t>> neighbours;
 };
 
 // A Matern field of smoothness 1 (F. Lindgren, H. Rue, J. Lindström 2011): (kappa^2 - Laplace) f = white noise, on the
@@ -28,15 +27,12 @@ OffsetField::OffsetField(const Patches& patches, double range) : patches_(patche
     std::vector<double> diagonal(count);
     for (std::size_t i = 0; i < count; ++i) diagonal[i] = kappa * kappa * patches.area[i];
     std::vector<Eigen::Triplet<double>> entries;
-    system_->neighbours.resize(count);
     for (const auto& border : patches.borders) {
         const double weight = border.length / std::max(border.distance, 1e-9);
         diagonal[border.a] += weight;
         diagonal[border.b] += weight;
         entries.emplace_back(border.a, border.b, -weight);
         entries.emplace_back(border.b, border.a, -weight);
-        system_->neighbours[border.a].push_back(border.b);
-        system_->neighbours[border.b].push_back(border.a);
     }
     for (std::size_t i = 0; i < count; ++i) entries.emplace_back(int(i), int(i), diagonal[i]);
     Sparse half{Eigen::Index(count), Eigen::Index(count)};
@@ -85,27 +81,22 @@ OffsetField::Fit OffsetField::fit(const std::vector<double>& mean, const std::ve
     }
     const Sparse prior = inverse_deviation.asDiagonal() * system_->precision * inverse_deviation.asDiagonal();
     const Eigen::VectorXd pull = prior * prior_mean;
-    std::vector<double> site(count, 0.0), cavity(count);
-    std::vector<double> believed(count);
+    std::vector<double> site(count, 0.0), believed(count);
     for (int round = 0; round < (asked ? kRounds : 1); ++round) {
         // What the others say about a patch: the field's value there, the surer the more they know.
         for (std::size_t i = 0; i < count; ++i) {
             believed[i] = 1 / (deviation[i] * deviation[i]) + fixed_precision[i];
-            for (const std::uint32_t j : system_->neighbours[i]) believed[i] += 0.5 * (result.precision[j] + fixed_precision[j]);
+            for (const std::uint32_t j : patches_.neighbours[i]) believed[i] += 0.5 * (result.precision[j] + fixed_precision[j]);
         }
-        {
-            tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
-                if (evidence[i].density.empty()) return;
-                const double variance = 1 / believed[i];
-                double m, v;
-                const double centre = result.offset[i];
-                moments(evidence[i], centre, variance, m, v);
-                const double gained = std::max(1 / v - believed[i], 0.0);
-                site[i] = gained > 0 ? (m / v - centre * believed[i]) / gained : 0;
-                cavity[i] = gained;
-            });
-            for (std::size_t i = 0; i < count; ++i) result.precision[i] = evidence[i].density.empty() ? 0 : cavity[i];
-        }
+        tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
+            if (evidence[i].density.empty()) return;
+            double m, v;
+            const double centre = result.offset[i];
+            moments(evidence[i], centre, 1 / believed[i], m, v);
+            const double gained = std::max(1 / v - believed[i], 0.0);
+            site[i] = gained > 0 ? (m / v - centre * believed[i]) / gained : 0;
+            result.precision[i] = gained;
+        });
         Sparse matrix = prior;
         Eigen::VectorXd right = pull;
         for (std::size_t i = 0; i < count; ++i) {

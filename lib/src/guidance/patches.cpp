@@ -137,6 +137,11 @@ Patches make_patches(const TriangleMesh& mesh, const ImageGeometry& g, double wi
         // Each edge was met from both ends; on a triangle lattice 1/sqrt(3) of its length is the border's.
         p.borders.back().length += 0.5 * length / std::sqrt(3.0);
     }
+    p.neighbours.resize(p.size());
+    for (const Patches::Border& border : p.borders) {
+        p.neighbours[border.a].push_back(border.b);
+        p.neighbours[border.b].push_back(border.a);
+    }
     return p;
 }
 

@@ -22,6 +22,7 @@ struct Patches {
         double length, distance;
     };
     std::vector<Border> borders;
+    std::vector<std::vector<std::uint32_t>> neighbours;  ///< by patch: those with which it has a border
 
     [[nodiscard]] std::size_t size() const { return centers.size(); }
 };

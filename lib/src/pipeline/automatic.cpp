@@ -105,7 +105,7 @@ void choose_values(Job& job) {
     const double delta_voxels = marked ? kTagDeltaVoxels : 1.0;
     const bool chooses_delta = evolve.delta < 0;
     if (chooses_delta) evolve.delta = delta_voxels * h;
-    if (job.guesses() && job.uses_points()) return;  // nothing flows; a later frame may
+    if (job.options.guess || (job.guesses() && job.guided() && job.uses_points())) return;  // nothing flows; a later frame may
     if (chooses_delta) job.choose("delta", number(evolve.delta), number(delta_voxels) + " voxels");
     if (evolve.tau < 0) job.choose("tau", number(h), "1 voxel at unit speed; longer while the surface moves slowly");
     if (options.edge.sigma < 0 && job.uses_image()) {

@@ -8,18 +8,17 @@
 namespace covol::pipeline {
 namespace {
 
-constexpr double kRadiusVoxels = 8.0;   // to be measured over draws
 constexpr double kRadiusSpacings = 2.0; // a mark on a slice tells of the next one
 
 }  // namespace
 
 void start_from_corrected_guess(Job& job) {
-    job.origin = StartOrigin::Given;
+    job.origin = StartOrigin::Corrected;
     job.report().domain = job.domain_with_chosen_margin(2 * kMarginVoxels * job.h());
     Timed timed(job.report().seconds.tag);
     CorrectionOptions& options = job.options.correction;
     if (options.least_radius <= 0) {
-        options.least_radius = kRadiusVoxels * job.h();
+        options.least_radius = kCorrectionVoxels * job.h();
         if (job.image != nullptr) {
             const Vec3& spacing = job.image->geometry().spacing;
             options.least_radius = std::max(options.least_radius, kRadiusSpacings * *std::max_element(spacing.begin(), spacing.end()));
@@ -28,13 +27,8 @@ void start_from_corrected_guess(Job& job) {
     const FloatGridPtr guess = start_grid(*job.options.guess, job.domain(), job.run);
     const auto corrected = std::make_shared<const GuessCorrection>(
         correct_guess(guess, job.options.contours ? job.sure : job.points, job.options.inside, job.options.outside, options, job.run));
-    // Where the image is to help between the marks, it is here, and where c is not 0 alone.
     job.result.u = corrected->start(job.run);
     job.result.correction = corrected;
-    job.result.u->setName("u");
-    job.report().active_voxels = std::int64_t(job.result.u->activeVoxelCount());
-    job.report().leaf_count = std::int64_t(job.result.u->tree().leafCount());
-    job.report().solve.stop_reason = StopReason::Steady;  // nothing flows
     const CorrectionReport& report = job.report().correction = corrected->report();
     job.choose("start", "guess",
                "corrected within " + number(report.least_radius) + " to " + number(report.largest_radius) + " of " +

@@ -22,9 +22,8 @@ double off(const Job& job) {
 }
 
 std::string place(const Job& job, const SegmentReport::MarksOff& marks) {
-    const auto text = [](const Vec3& v) { return "(" + number(v[0]) + ", " + number(v[1]) + ", " + number(v[2]) + ")"; };
-    if (job.image == nullptr) return "at " + text(marks.farthest_world);
-    return "on slice " + std::to_string(std::lround(marks.farthest_index[2])) + ", at voxel " + text(marks.farthest_index);
+    if (job.image == nullptr) return "at " + detail::to_text(marks.farthest_world);
+    return "on slice " + std::to_string(std::lround(marks.farthest_index[2])) + ", at voxel " + detail::to_text(marks.farthest_index);
 }
 
 double level_at(const FloatGrid& u, const Vec3& world) {

@@ -97,7 +97,7 @@ double tube_for_start(Job& job) {
 
 void compute_sure_distance(Job& job) {
     const double range = job.options.evolve.attraction_range;
-    if (!job.options.contours || !job.uses_points() || !job.uses_image() || range <= 0) return;
+    if (job.rests() || !job.options.contours || !job.uses_points() || !job.uses_image() || range <= 0) return;
     Timed timed(job.report().seconds.distance);
     job.sure_distance = distance(job.sure, job.domain(), {range + kTubeSlackVoxels * job.h()}, job.run).grid;
 }

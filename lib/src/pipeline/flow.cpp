@@ -15,9 +15,6 @@ namespace {
 constexpr double kApproachTau = 3.0;  // time steps of the points' own approach, in tau
 constexpr int kApproachSteps = 40;
 constexpr double kApproachTolerance = 0.01;
-constexpr double kUniformDeviation = 0.3;  // of what is uniform over a voxel, in voxels
-constexpr double kEndVoxels = 1.0;     // from the last centres: a mark may lie in the cut
-constexpr double kInCutVoxels = 1.5;   // inside the guess: it does
 constexpr double kHoldDepth = 0.75;   // voxels that the surface may sink below a start that is held
 constexpr int kHoldSteps = 2;
 constexpr double kHoldTolerance = 0.01;  // voxels a step
@@ -113,44 +110,15 @@ std::string why_vanished(const Job& job) {
     return "nothing held it; lower --delta, or start closer to the edges (--init)";
 }
 
-// Stained sheets run on beside and across the border that contours mark, and guidance by the profile alone cannot tell
-// them apart; the edge detector of lines, with the body as a guess, can.
-bool follows_lines(const Job& job) {
-    return job.origin == StartOrigin::Contours && job.uses_image() && job.options.edge.feature > EdgeFeature::Slope;
-}
-
-// The guess, or where the image moved it, is the surface: nothing pulls it off the marks, and no curvature shrinks it.
-bool rests_on_guess(const Job& job) {
-    if (!job.guided() || !job.uses_points() || follows_lines(job)) return false;
-    return job.origin == StartOrigin::Guess || job.origin == StartOrigin::Contours;
-}
-
-// Marks in the cut where the image ends lie inside the guess, and tell nothing of its border.
-std::vector<Vec3> marks_of_border(const Job& job) {
-    if (job.origin != StartOrigin::Guess) return job.sure;
-    const ImageGeometry& geometry = job.image->geometry();
-    const FloatGrid& guess = *job.result.u;
-    const auto accessor = guess.getConstAccessor();
-    std::vector<Vec3> marks;
-    for (const Vec3& mark : job.sure) {
-        const Vec3 index = geometry.world_to_index(mark);
-        bool at_end = false;
-        for (int a = 0; a < 3; ++a) at_end |= index[a] < kEndVoxels || index[a] > geometry.size[a] - 1 - kEndVoxels;
-        const openvdb::Vec3d at = guess.worldToIndex(openvdb::Vec3d(mark[0], mark[1], mark[2]));
-        if (at_end && accessor.getValue(openvdb::Coord::round(at)) < -kInCutVoxels * job.h()) continue;
-        marks.push_back(mark);
-    }
-    return marks;
-}
-
 // A surface through the marks is moved to where the image shows, between them, what it shows at them.
 void ask_image(Job& job) {
-    if (!job.uses_image()) return;
+    if (!job.uses_image() || job.origin == StartOrigin::Corrected) return;
+    const std::vector<Vec3>& marks = job.origin == StartOrigin::Guess ? job.on_surface : job.sure;
     GuidanceOptions options;
     if (job.options.mark_precision >= 0) options.mark_precision = job.options.mark_precision / kUniformDeviation;
     options.weight = job.options.evolve.rho;
     GuidanceReport& report = job.report().guidance;
-    job.result.u = guide(*job.result.u, marks_of_border(job), *job.image, options, report, job.run);
+    job.result.u = guide(*job.result.u, marks, *job.image, options, report, job.run);
     job.choose("image", report.used ? "used" : "not used", report.reason);
 }
 
@@ -164,7 +132,7 @@ void rest(Job& job) {
 }  // namespace
 
 void flow(Job& job) {
-    if (rests_on_guess(job)) {
+    if (job.rests()) {
         Timed timed(job.report().seconds.solve);
         ask_image(job);
         rest(job);

@@ -6,8 +6,7 @@
 namespace covol::pipeline {
 namespace {
 
-constexpr double kBeyondVoxels = 8.0;
-constexpr double kPrecision = 0.3;  // of a voxel: the deviation of what is uniform over one
+constexpr int kBeyondVoxels = 8;
 
 /// How well marks are placed, along the image's axes; without an image, of what the voxel size says.
 std::array<Vec3, 3> deviation(const Job& job) {
@@ -15,11 +14,11 @@ std::array<Vec3, 3> deviation(const Job& job) {
     for (int a = 0; a < 3; ++a) {
         const double given = job.options.mark_precision;
         if (job.image == nullptr || given >= 0) {
-            axes[a][a] = given >= 0 ? given : kPrecision * job.h();
+            axes[a][a] = given >= 0 ? given : kUniformDeviation * job.h();
             continue;
         }
         const ImageGeometry& geometry = job.image->geometry();
-        for (int row = 0; row < 3; ++row) axes[a][row] = kPrecision * geometry.spacing[a] * geometry.direction[row][a];
+        for (int row = 0; row < 3; ++row) axes[a][row] = kUniformDeviation * geometry.spacing[a] * geometry.direction[row][a];
     }
     return axes;
 }
@@ -44,15 +43,17 @@ void start_from_guess(Job& job) {
     options.inside = job.options.inside;
     options.outside = job.options.outside;
     options.outside.insert(options.outside.end(), job.options.exterior_seeds.begin(), job.options.exterior_seeds.end());
-    options.has_end = job.image != nullptr || job.options.roi.has_value();
-    options.end = job.domain().world_box();
+    if (job.image != nullptr || job.options.roi) options.end = job.domain().world_box();
     // A body that the image cuts goes on beyond it: at the image's end itself its wall would be closed, and the image asked
     // about a cap. The clip at the end makes the cut.
-    if (job.image != nullptr && !job.options.roi) job.report().domain = widened(job.domain(), kBeyondVoxels * job.h());
+    if (job.image != nullptr && !job.options.roi) job.report().domain = widened(job.domain(), kBeyondVoxels);
     {
         Timed timed(job.report().seconds.tag);
-        job.result.u = guess_from_marks(job.domain(), job.points, options, job.report().guess, job.run);
+        Guess guess = guess_from_marks(job.domain(), job.points, options, job.report().guess, job.run);
+        job.result.u = std::move(guess.u);
+        job.on_surface = std::move(guess.marks);
     }
+    if (!job.rests() && job.uses_points()) compute_distance(job, tube_for_start(job));
     job.choose("guess", job.report().guess.summary, "");
 }
 

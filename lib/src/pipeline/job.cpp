@@ -1,7 +1,5 @@
 #include "pipeline/job.h"
 
-#include <cmath>
-
 namespace covol::pipeline {
 
 Job::Job(const Image* image_or_null, const std::vector<Vec3>& world_points, const SegmentOptions& segment_options,
@@ -40,15 +38,6 @@ Domain Job::domain_with_margin(double margin) const {
 
 Domain Job::domain_with_chosen_margin(double automatic) const {
     return domain_with_margin(options.margin > 0 ? options.margin : automatic);
-}
-
-Domain widened(Domain domain, double by) {
-    const int layers = int(std::ceil(by / domain.voxel_size));
-    for (int a = 0; a < 3; ++a) {
-        domain.min[a] -= layers;
-        domain.max[a] += layers;
-    }
-    return domain;
 }
 
 }  // namespace covol::pipeline

@@ -17,6 +17,7 @@ inline constexpr double kMarginVoxels = 6.0;  // between D and the domain's boun
 enum class StartOrigin {
     Given,       ///< a sphere, a box, a file
     Guess,       ///< the surface through few marks
+    Corrected,   ///< another tool's result, corrected by marks
     Tagged,      ///< the points, tagged (closed or as a solid, too)
     Contours,    ///< the body between contours
     CoarseLevel  ///< the end of the flow on a coarser lattice
@@ -30,6 +31,7 @@ struct Job {
     std::vector<Vec3> sure;        ///< those of them that are no guess between slices
     std::vector<Vec3> given;       ///< as the caller has them
     std::vector<Vec3> marks;       ///< without contours: the same without duplicates, for the fit
+    std::vector<Vec3> on_surface;  ///< of a guess: those points that do not lie in the cut at the image's end
     std::vector<Vec3> hole_seeds;  ///< in the holes of contours that are tagged after all
     SegmentOptions options;        ///< automatic values are replaced as they are chosen
     bool has_automatic_range = false;
@@ -54,6 +56,17 @@ struct Job {
     [[nodiscard]] bool tags() const { return options.start.kind == Start::Kind::Tag && starts_from_marks(); }
     [[nodiscard]] bool guesses() const { return options.start.kind == Start::Kind::Guess && starts_from_marks(); }
     [[nodiscard]] bool guided() const { return options.model == Model::Guided; }
+    /// Stained sheets run on beside and across the border that contours mark, and guidance by the profile alone cannot tell
+    /// them apart; the edge detector of lines, with the body as a guess, can.
+    [[nodiscard]] bool follows_lines() const {
+        return origin == StartOrigin::Contours && uses_image() && options.edge.feature > EdgeFeature::Slope;
+    }
+    /// The start, or where the image moved it, is the surface: nothing pulls it off the marks, and no curvature shrinks it.
+    [[nodiscard]] bool rests() const {
+        if (origin == StartOrigin::Corrected) return true;
+        const bool from_marks = origin == StartOrigin::Guess || origin == StartOrigin::Contours;
+        return from_marks && guided() && uses_points() && !follows_lines();
+    }
     /// Between closed contours, or null.
     [[nodiscard]] const ContourSolid* body() const {
         return options.contours ? options.contours->solid.get() : nullptr;
@@ -68,9 +81,6 @@ struct Job {
     /// The same with the margin of the options where they have one.
     [[nodiscard]] Domain domain_with_chosen_margin(double automatic) const;
 };
-
-/// The same lattice, with as many more voxels on every side as `by` (world units) holds.
-[[nodiscard]] Domain widened(Domain domain, double by);
 
 /// Adds the wall-clock time of its life to `seconds`.
 class Timed {

@@ -3,7 +3,9 @@
 namespace covol::pipeline {
 
 void make_start(Job& job) {
-    if (job.has_seeds_alone())
+    if (job.options.guess)
+        start_from_corrected_guess(job);
+    else if (job.has_seeds_alone())
         start_from_seeds(job);
     else if (job.guesses())
         start_from_guess(job);

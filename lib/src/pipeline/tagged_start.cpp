@@ -95,15 +95,15 @@ void start_from_closing(Job& job, double D) {
 
 // ---- bodies that the image cuts off ------------------------------------------------------------------------------------
 
-/// On the same lattice, as large as all the points need, and `margin` more.
-Domain around(Domain domain, const std::vector<Vec3>& points, double margin) {
+/// On the same lattice, as large as all the points need, and some layers more.
+Domain around(Domain domain, const std::vector<Vec3>& points, int layers) {
     const WorldBox box = bounding_box(points);
     const Vec3 low = domain.world_to_index(box.min), high = domain.world_to_index(box.max);
     for (int a = 0; a < 3; ++a) {
         domain.min[a] = std::min(domain.min[a], int(std::floor(low[a])));
         domain.max[a] = std::max(domain.max[a], int(std::ceil(high[a])));
     }
-    return widened(domain, margin);
+    return widened(domain, layers);
 }
 
 /// A tagged body that goes on beyond the image.
@@ -181,7 +181,7 @@ bool start_from_cut_body(Job& job) {
         }
         if (!body) return false;
         // At the image's end itself the flow would turn the wall to a right angle.
-        job.report().domain = widened(job.domain(), kBeyondVoxels * job.h());
+        job.report().domain = widened(job.domain(), kBeyondVoxels);
         job.result.u = start_from_grid(job.domain(), *body->level_set, job.run);
         job.points.insert(job.points.end(), body->beyond.begin(), body->beyond.end());
         job.sure.insert(job.sure.end(), body->beyond.begin(), body->beyond.end());
