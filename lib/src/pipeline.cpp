@@ -35,13 +35,16 @@ void take_back(Job& job, const FlowEnd& end) {
     job.report().automatic.erase("guess");
 }
 
-// A surface that vanished, or that left the marks, is not returned while the marks alone tell of one.
-void fall_back(Job& job, const FloatGridPtr& body) {
+// A surface that vanished, or that left the marks, is not returned while the start or the marks tell of one.
+/// @param start  null: it was not good by itself
+void fall_back(Job& job, const FloatGridPtr& start) {
     const bool vanished = has_vanished(job);
-    if (vanished && body != nullptr) {
-        job.result.u = body;
+    if (start != nullptr && has_lost(job, *start)) {
+        job.result.u = start;
         job.report().solve.stop_reason = StopReason::NotRun;
-        return job.warn("the flow from the body between the contours lost it: this is that body itself");
+        return job.warn(job.origin == StartOrigin::Grown
+                            ? "the flow closed what had grown to the image's edges: this is that start itself"
+                            : "the flow from the body between the contours lost it: this is that body itself");
     }
     if (!job.guided() || job.rests() || job.sure.size() < 4 || !job.uses_points()) return;
     if (!vanished && (job.origin == StartOrigin::Contours || !misses_marks(job, *job.result.u))) return;
@@ -61,14 +64,15 @@ void fall_back(Job& job, const FloatGridPtr& body) {
 }
 
 void solve(Job& job, const std::optional<FineStart>& without_coarse) {
-    const FloatGridPtr body = job.guided() && job.follows_lines() ? job.result.u->deepCopy() : nullptr;
+    const bool is_good = job.origin == StartOrigin::Grown || (job.guided() && job.follows_lines());
+    const FloatGridPtr start = is_good ? job.result.u->deepCopy() : nullptr;
     flow(job);
     if (without_coarse && has_vanished(job)) {
         leave_out_coarse_level(job, *without_coarse);
         find_edges(job);
         flow(job);
     }
-    fall_back(job, body);
+    fall_back(job, start);
     job.run.check();
     job.result.u->setName("u");
     check_flow(job);

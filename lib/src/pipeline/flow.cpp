@@ -16,6 +16,7 @@ constexpr double kApproachTau = 3.0;  // time steps of the points' own approach,
 constexpr int kApproachSteps = 40;
 constexpr double kApproachTolerance = 0.01;
 constexpr double kHoldDepth = 0.75;   // voxels that the surface may sink below a start that is held
+constexpr double kLeastOfGrown = 0.5;  // of its volume: a flow that leaves less has lost the edges
 constexpr int kHoldSteps = 2;
 constexpr double kHoldTolerance = 0.01;  // voxels a step
 
@@ -98,6 +99,13 @@ EvolveReport approach_and_evolve(Job& job, const EvolveFields& fields) {
     return solved;
 }
 
+double inside_volume(const FloatGrid& u) {
+    double voxels = 0;
+    for (auto value = u.tree().cbeginValueAll(); value; ++value)
+        if (*value < 0) voxels += double(value.getVoxelCount());
+    return voxels * std::pow(u.voxelSize()[0], 3);
+}
+
 std::string why_vanished(const Job& job) {
     const SegmentReport& report = job.result.report;
     if (job.tags() && job.origin != StartOrigin::Contours) {
@@ -158,6 +166,11 @@ void flow(Job& job) {
 }
 
 bool has_vanished(const Job& job) { return job.result.report.solve.stop_reason == StopReason::Vanished; }
+
+bool has_lost(const Job& job, const FloatGrid& start) {
+    if (has_vanished(job)) return true;
+    return job.origin == StartOrigin::Grown && inside_volume(*job.result.u) < kLeastOfGrown * inside_volume(start);
+}
 
 void check_flow(const Job& job) {
     const EvolveReport& solved = job.result.report.solve;

@@ -55,6 +55,7 @@ void start_as_given(Job& job) {
         Timed timed(job.report().seconds.tag);
         job.result.u = start_grid(job.options.start, job.domain(), job.run);
     }
+    if (const Start::Kind kind = job.options.start.kind; kind == Start::Kind::Sphere || kind == Start::Kind::Box) grow_to_edges(job);
     if (job.uses_points()) compute_distance(job, tube_for_start(job));
 }
 

@@ -16,6 +16,7 @@ inline constexpr double kMarginVoxels = 6.0;  // between D and the domain's boun
 /// What the level set of now was made from: how far it may be from its end.
 enum class StartOrigin {
     Given,       ///< a sphere, a box, a file
+    Grown,       ///< one of these that has grown to the image's edges
     Guess,       ///< the surface through few marks
     Corrected,   ///< another tool's result, corrected by marks
     Tagged,      ///< the points, tagged (closed or as a solid, too)

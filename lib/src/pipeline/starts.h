@@ -19,6 +19,9 @@ void start_from_corrected_guess(Job& job);
 /// The sphere, box, mesh, mask or level set that the caller names. The band follows the surface.
 void start_as_given(Job& job);
 
+/// A start inside an object grows to the object's edges, where the image alone decides and shows any.
+void grow_to_edges(Job& job);
+
 /// Halfway between the seeds, where there are no marks.
 void start_from_seeds(Job& job);
 
