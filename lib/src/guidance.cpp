@@ -16,15 +16,17 @@
 #include "covol/error.h"
 #include "covol/surface.h"
 #include "detail/kd_tree.h"
-#include "detail/nearest.h"
 #include "detail/redistance.h"
 #include "guidance/learning.h"
+#include "guidance/pieces.h"
+#include "guidance/wide_distance.h"
 
 namespace covol {
 namespace {
 
 using namespace guidance;
 
+constexpr int kMostPasses = 3;
 constexpr int kIterations = 2;            // normals, and what is inside and outside, are better known the second time
 constexpr double kWidth = 14.0;           // voxels to both sides of the surface in which profiles are read
 constexpr double kLongestOffset = 12.0;   // voxels in one iteration
@@ -45,29 +47,37 @@ double squared(double x) { return x * x; }
 /// A surface on its way from the guess to the target, and what is known of it.
 class Guide {
 public:
-    Guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const Image& image, const GuidanceOptions& options,
+    /// @param guess  a start: a signed distance, clamped
+    Guide(FloatGridPtr guess, const std::vector<Vec3>& marks, const Image& image, const GuidanceOptions& options,
           GuidanceReport& report, const RunContext& run)
-        : marks_(marks), image_(image), options_(options), report_(report), run_(run), domain_(domain_of(guess)), h_(domain_.voxel_size) {
-        start_ = current_ = detail::redistance(guess, domain_, kWidth, detail::DomainEnd::Closed, "guess", run);
-    }
+        : marks_(marks),
+          image_(image),
+          options_(options),
+          report_(report),
+          run_(run),
+          domain_(domain_of(*guess)),
+          h_(domain_.voxel_size),
+          surface_(std::move(guess)) {}
 
     /// False, with the reason in the report, where the image is of no use.
-    bool step(bool first, bool last) {
+    bool step(bool first) {
         run_.check();
         cut_surface();
+        distance_.emplace(*surface_, patches_.places, domain_, kWidth, run_);
+        if (first) start_ = distance_->grid();
         if (!place_marks(first)) return false;
         set_ranges();
-        const Scene scene{patches_, *current_, domain_, ranges_};
+        const Scene scene{patches_, *distance_->grid(), domain_, ranges_};
         if (!learn(scene, first)) return false;
         run_.check();
         ask(scene);
         run_.check();
         weigh(first);
         run_.check();
-        move(last);
+        move();
         return true;
     }
-    [[nodiscard]] const FloatGrid& current() const { return *current_; }
+    [[nodiscard]] const FloatGrid& surface() const { return *surface_; }
 
 private:
     void cut_surface();
@@ -76,7 +86,7 @@ private:
     bool learn(const Scene& scene, bool first);
     void ask(const Scene& scene);
     void weigh(bool first);
-    void move(bool last);
+    void move();
 
     struct Word {
         double prior2, error2, response, slope2;
@@ -98,7 +108,9 @@ private:
     const RunContext& run_;
     Domain domain_;
     double h_;
-    FloatGridPtr start_, current_;
+    FloatGridPtr surface_;
+    FloatGridPtr start_;                    // the distance to the guess
+    std::optional<WideDistance> distance_;  // to the surface
 
     // of the guess
     double guess2_ = 0;  // variance at the marks
@@ -122,7 +134,7 @@ private:
 };
 
 void Guide::cut_surface() {
-    const TriangleMesh mesh = extract_mesh(*current_, {}, run_);
+    const TriangleMesh mesh = extract_mesh(*surface_, {}, run_);
     const MeshMeasures measures = measure(mesh);
     area_ = measures.area;
     size_ = 3 * std::abs(measures.volume) / area_;  // a ball's radius
@@ -151,7 +163,7 @@ bool Guide::place_marks(bool first) {
                 patch[m] = i;
             }
         }
-        residual[m] = value_at(*current_, domain_, marks_[m]);
+        residual[m] = value_at(*distance_->grid(), domain_, marks_[m]);
     });
     // Marks of one patch are one mark; those far away mean another surface.
     std::map<std::size_t, std::vector<std::size_t>> by_patch;
@@ -417,26 +429,25 @@ std::vector<double> Guide::on_vertices(const std::vector<double>& offset) const 
 }
 
 /// The distance to the surface less the offset of its nearest vertex.
-void Guide::move(bool last) {
-    const std::vector<double> offset = on_vertices(offset_);
-    double longest = 0;
-    for (const double o : offset) longest = std::max(longest, std::abs(o));
-    std::vector<Vec3> places(patches_.places.size());
-    for (std::size_t v = 0; v < places.size(); ++v) places[v] = domain_.world_to_index(patches_.places[v]);
-    const detail::NearestField nearest = detail::nearest_points(places, detail::box_of(domain_), longest / h_ + kHalfWidthVoxels, "guide", run_);
-    const FloatGridPtr moved = current_->deepCopy();
-    std::vector<float*> values;
-    for (const detail::NearestLeaf& leaf : nearest.leaves) values.push_back(moved->tree().touchLeaf(leaf.origin)->buffer().data());
-    tbb::parallel_for(std::size_t(0), values.size(), [&](std::size_t n) {
-        const detail::NearestLeaf& leaf = nearest.leaves[n];
-        for (int p = 0; p < detail::kLeafSize; ++p)
-            if (leaf.nearest[std::size_t(p)] >= 0)
-                values[n][p] -= float(offset[std::size_t(nearest.source[std::size_t(leaf.nearest[std::size_t(p)])])]);
-    });
-    current_ = last ? moved : detail::redistance(*moved, domain_, kWidth, detail::DomainEnd::Closed, "guess", run_);
+void Guide::move() {
+    const FloatGridPtr moved = distance_->less(on_vertices(offset_));
+    drop_unmarked_pieces(*moved, marks_);
+    surface_ = detail::redistance(*moved, domain_, kHalfWidthVoxels, detail::DomainEnd::Closed, "guess", run_);
 }
 
 }  // namespace
+
+void GuidanceReport::add(const GuidanceReport& pass, bool moved) {
+    if (!moved && used) return;
+    const double mean = mean_offset + pass.mean_offset, most = std::max(max_offset, pass.max_offset);
+    const int before = passes;
+    *this = pass;
+    mean_offset = mean;
+    max_offset = most;
+    passes = before + (moved ? 1 : 0);
+    used = moved;
+    if (used) reason.clear();
+}
 
 std::string GuidanceOptions::why_invalid() const {
     std::string why;
@@ -459,22 +470,24 @@ FloatGridPtr guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const
     report = {};
     FloatGridPtr result;
     with_threads(run, [&] {
-        const Domain domain = domain_of(guess);
-        std::optional<Guide> surface;
-        if (options.weight > 0 && options.range != 0 && !marks.empty()) {
-            surface.emplace(guess, marks, image, options, report, run);
-            for (int n = 0; n < kIterations; ++n) {
-                run.report("image guidance", double(n) / kIterations);
-                if (!surface->step(n == 0, n + 1 == kIterations)) break;
-                report.used = true;
-            }
-        } else {
+        result = start_from_grid(domain_of(guess), guess, run);
+        if (marks.empty() || !(options.weight > 0) || options.range == 0) {
             report.reason = marks.empty() ? "there are no marks to learn the border from" : "the image has no weight";
+            return;
         }
-        result = start_from_grid(domain, report.used ? surface->current() : guess, run);
+        // Where the image errs less than the guess, what it made of that is the better guess.
+        for (int pass = 0; pass < kMostPasses; ++pass) {
+            GuidanceReport now;
+            Guide surface(result, marks, image, options, now, run);
+            int done = 0;
+            while (done < kIterations && surface.step(done == 0))
+                run.report("image guidance", (pass + double(++done) / kIterations) / kMostPasses);
+            if (done > 0) result = start_from_grid(domain_of(guess), surface.surface(), run);
+            report.add(now, done > 0);
+            if (done < kIterations || !(now.image_error < now.guess_error)) break;
+        }
         run.report("image guidance", 1);
     });
-    if (report.used) report.reason.clear();
     return result;
 }
 

@@ -31,7 +31,11 @@ struct GuidanceReport {
     double guess_error = 0;      ///< how far off the border the guess lies (rms, a lower estimate)
     double confident_share = 0;  ///< of the area, where the image says more than the guess
     double mean_offset = 0;      ///< by area, outward > 0
-    double max_offset = 0;       ///< of |offset|
+    double max_offset = 0;       ///< of |offset|, in one pass
+    int passes = 0;              ///< times that the image was asked: again where it erred less than the guess; what else stands here is of the last one
+
+    /// One more pass, which may not have moved anything.
+    void add(const GuidanceReport& pass, bool moved);
 };
 
 /// Moves a guess to where the image shows, between the marks, the border that it shows at the marks.

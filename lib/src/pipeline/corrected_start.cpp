@@ -10,31 +10,50 @@ namespace {
 
 constexpr double kRadiusSpacings = 2.0; // a mark on a slice tells of the next one
 
+CorrectionOptions correction(const Job& job) {
+    CorrectionOptions options = job.options.correction;
+    if (options.least_radius > 0) return options;
+    options.least_radius = kCorrectionVoxels * job.h();
+    if (job.image != nullptr) {
+        const Vec3& spacing = job.image->geometry().spacing;
+        options.least_radius = std::max(options.least_radius, kRadiusSpacings * *std::max_element(spacing.begin(), spacing.end()));
+    }
+    return options;
+}
+
+std::string distances(const CorrectionReport& report) {
+    return "from the marks to it: mean " + number(report.before_mean) + ", max " + number(report.before_max) + ", corrected " +
+           number(report.after_mean) + ", " + number(report.after_max);
+}
+
 }  // namespace
+
+void meet_marks(Job& job) {
+    Timed timed(job.report().seconds.tag);
+    const GuessCorrection corrected =
+        correct_guess(job.result.u, job.sure, job.options.inside, job.options.outside, correction(job), job.run);
+    job.result.u = corrected.start(job.run);
+    job.on_surface = job.sure;
+    job.origin = StartOrigin::Guess;
+    job.report().correction = corrected.report();
+    job.choose("start", "near its marks", "it is a guess that they correct, and nothing flows; " + distances(corrected.report()));
+}
 
 void start_from_corrected_guess(Job& job) {
     job.origin = StartOrigin::Corrected;
     job.report().domain = job.domain_with_chosen_margin(2 * kMarginVoxels * job.h());
     Timed timed(job.report().seconds.tag);
-    CorrectionOptions& options = job.options.correction;
-    if (options.least_radius <= 0) {
-        options.least_radius = kCorrectionVoxels * job.h();
-        if (job.image != nullptr) {
-            const Vec3& spacing = job.image->geometry().spacing;
-            options.least_radius = std::max(options.least_radius, kRadiusSpacings * *std::max_element(spacing.begin(), spacing.end()));
-        }
-    }
+    job.options.correction = correction(job);
     const FloatGridPtr guess = start_grid(*job.options.guess, job.domain(), job.run);
     const auto corrected = std::make_shared<const GuessCorrection>(
-        correct_guess(guess, job.options.contours ? job.sure : job.points, job.options.inside, job.options.outside, options, job.run));
+        correct_guess(guess, job.options.contours ? job.sure : job.points, job.options.inside, job.options.outside, job.options.correction, job.run));
     job.result.u = corrected->start(job.run);
     job.result.correction = corrected;
     const CorrectionReport& report = job.report().correction = corrected->report();
     job.choose("start", "guess",
                "corrected within " + number(report.least_radius) + " to " + number(report.largest_radius) + " of " +
                    std::to_string(report.marks) + " marks and " + std::to_string(report.seeds) +
-                   " seeds that it had on the wrong side; from the marks to it: mean " + number(report.before_mean) + ", max " +
-                   number(report.before_max) + ", corrected " + number(report.after_mean) + ", " + number(report.after_max));
+                   " seeds that it had on the wrong side; " + distances(report));
 }
 
 }  // namespace covol::pipeline

@@ -5,6 +5,7 @@
 #include "covol/error.h"
 #include "covol/mesh_io.h"
 #include "detail/memory_need.h"
+#include "pipeline/doubts.h"
 #include "pipeline/fields.h"
 #include "pipeline/starts.h"
 
@@ -55,8 +56,11 @@ void start_as_given(Job& job) {
         Timed timed(job.report().seconds.tag);
         job.result.u = start_grid(job.options.start, job.domain(), job.run);
     }
-    if (const Start::Kind kind = job.options.start.kind; kind == Start::Kind::Sphere || kind == Start::Kind::Box) grow_to_edges(job);
-    if (job.uses_points()) compute_distance(job, tube_for_start(job));
+    const bool is_rough = job.options.start.kind == Start::Kind::Sphere || job.options.start.kind == Start::Kind::Box;
+    if (is_rough) grow_to_edges(job);
+    if (!job.uses_points()) return;
+    if (job.guided() && !is_rough && !misses_marks(job, *job.result.u)) return meet_marks(job);
+    compute_distance(job, tube_for_start(job));
 }
 
 }  // namespace covol::pipeline
