@@ -79,6 +79,7 @@ private:
 
     ImageGeometry geometry_;
     bool has_image_;
+    bool has_loose_ = false;  // marks that belong to no line
     ContourOptions options_;
     const RunContext& run_;
     std::vector<Line> lines_;
@@ -107,7 +108,10 @@ void Densifier::read(const PointCloud& cloud) {
         lines_.push_back(std::move(line));
     }
     for (std::size_t p = 0; p < world.size(); ++p)
-        if (!in_line[p]) result_.along.push_back(world[p]);
+        if (!in_line[p]) {
+            result_.along.push_back(world[p]);
+            has_loose_ = true;
+        }
 }
 
 void Densifier::check_inside(const Line& line) const {
@@ -334,7 +338,14 @@ void Densifier::cap_ends(ContourSolid::Data& data) {
         slices[end].open = left < spacing || (left <= gap && left < ends_after);
         if (slices[end].open) slices[end].cap = left + kOpenCells * options_.step;
     };
-    if (slices.size() == 1) return cap(0, 0);
+    if (slices.size() == 1) {
+        cap(0, 0);
+        if (options_.thickness > 0) slices[0].cap = 0.5 * options_.thickness;
+        const bool only_plane = std::all_of(lines_.begin(), lines_.end(), [&](const Line& l) { return l.constant[frame_.axis]; });
+        const bool one_slice = has_image_ && geometry_.size[frame_.axis] == 1;
+        result_.flat = !(options_.thickness > 0) && only_plane && !one_slice && !has_loose_;
+        return;
+    }
     cap(0, 1);
     cap(slices.size() - 1, slices.size() - 2);
 }
@@ -351,8 +362,9 @@ void Densifier::summarise() {
 }  // namespace
 
 std::string ContourOptions::why_invalid() const {
-    if (step > 0 && std::isfinite(step)) return {};
-    return "step: expected > 0, got " + detail::number(step);
+    if (!(step > 0 && std::isfinite(step))) return "step: expected > 0, got " + detail::number(step);
+    if (!(thickness >= 0 && std::isfinite(thickness))) return "thickness: expected >= 0, got " + detail::number(thickness);
+    return {};
 }
 
 Contours densify(const std::vector<PointCloud>& clouds, const ImageGeometry* geometry, const ContourOptions& options,

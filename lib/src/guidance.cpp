@@ -77,7 +77,7 @@ public:
         move();
         return true;
     }
-    [[nodiscard]] const FloatGrid& surface() const { return *surface_; }
+    [[nodiscard]] const FloatGridPtr& surface() const { return surface_; }
 
 private:
     void cut_surface();
@@ -482,10 +482,11 @@ FloatGridPtr guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const
             int done = 0;
             while (done < kIterations && surface.step(done == 0))
                 run.report("image guidance", (pass + double(++done) / kIterations) / kMostPasses);
-            if (done > 0) result = start_from_grid(domain_of(guess), surface.surface(), run);
+            result = surface.surface();
             report.add(now, done > 0);
             if (done < kIterations || !(now.image_error < now.guess_error)) break;
         }
+        if (report.used) result = start_from_grid(domain_of(guess), *result, run);
         run.report("image guidance", 1);
     });
     return result;

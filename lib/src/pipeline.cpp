@@ -41,10 +41,12 @@ void fall_back(Job& job, const FloatGridPtr& start) {
     const bool vanished = has_vanished(job);
     if (start != nullptr && has_lost(job, *start)) {
         job.result.u = start;
-        job.report().solve.stop_reason = StopReason::NotRun;
-        return job.warn(job.origin == StartOrigin::Grown
-                            ? "the flow closed what had grown to the image's edges: this is that start itself"
-                            : "the flow from the body between the contours lost it: this is that body itself");
+        job.report().solve = {};
+        if (job.origin == StartOrigin::Grown)
+            return job.warn("the flow closed what had grown to the image's edges: this is that start itself");
+        job.options.edge.feature = EdgeFeature::Slope;
+        job.choose("edge_feature", to_string(EdgeFeature::Slope), "along lines the surface left the marks: the body between them rests instead");
+        return flow(job);
     }
     if (!job.guided() || job.rests() || job.sure.size() < 4 || !job.uses_points()) return;
     if (!vanished && (job.origin == StartOrigin::Contours || !misses_marks(job, *job.result.u))) return;

@@ -30,7 +30,8 @@ SOURCE_LEVEL = {"contour_solid": LEVEL["contours"], "points_check": LEVEL["point
 PIPELINE = [
     ["job", "options"],
     ["automatic", "fields"],
-    ["doubts", "starts", "given_start", "guess_start", "corrected_start", "seed_start", "contour_start", "tagged_start", "flow"],
+    ["doubts"],
+    ["starts", "given_start", "grown_start", "guess_start", "corrected_start", "seed_start", "contour_start", "tagged_start", "flow"],
     ["final_surface"],
     ["coarse_level"],
 ]

@@ -10,6 +10,7 @@ void ContourFlags::bind(CLI::App& command, bool names) {
         ->type_name(names ? "[NAME=]FILE..." : "FILE...");
     add_choice(command, "--contour-curve", curve, {{"lines", ContourCurve::Lines}, {"spline", ContourCurve::Spline}},
                "how neighbouring marks are joined [spline]");
+    add_length(command, "--contour-thickness", thickness, "", "of a body whose contours all lie on one slice");
 }
 
 std::vector<PointCloud> ContourFlags::read(const ReadPointsOptions& reading, const ImageGeometry* geometry,
@@ -25,7 +26,7 @@ std::vector<PointCloud> ContourFlags::read(const ReadPointsOptions& reading, con
 
 std::shared_ptr<const Contours> ContourFlags::densify(const std::vector<PointCloud>& clouds, const ImageGeometry* geometry,
                                                       double h, const RunContext& run, Json& report) const {
-    const auto contours = std::make_shared<Contours>(covol::densify(clouds, geometry, {h, curve}, run));
+    const auto contours = std::make_shared<Contours>(covol::densify(clouds, geometry, {h, curve, thickness.resolve(h, 0)}, run));
     run.info("contours: " + contours->summary);
     Json rules = Json::array();
     for (const PointCloud& cloud : clouds) rules.push_back(cloud.rule);

@@ -13,6 +13,7 @@ namespace covol::tool {
 struct ContourFlags {
     std::vector<std::string> paths;
     ContourCurve curve = ContourCurve::Spline;
+    Length thickness;
 
     /// @param names  files may be NAME=FILE: of one structure among several
     void bind(CLI::App& command, bool names);

@@ -58,6 +58,20 @@ void SegmentJob::check_options() const {
     cloud.check();
 }
 
+std::string SegmentJob::unused(const SegmentReport& report) const {
+    if (report.solve.steps > 0 || report.solve.stop_reason != StopReason::Steady) return {};
+    std::string flags;
+    const auto name = [&](bool given, const char* flag) {
+        if (given) flags += (flags.empty() ? "" : ", ") + std::string(flag);
+    };
+    name(evolve.delta.given, "--delta");
+    name(evolve.tau.given, "--tau");
+    name(evolve.attraction_range.given, "--attraction-range");
+    name(evolve.image_yields.has_value(), "--image-yields");
+    if (flags.empty()) return {};
+    return flags + " did nothing: the surface is a guess that marks and image hold, and nothing flowed; --model paper flows";
+}
+
 void SegmentJob::check_outputs(Outputs& outputs) const {
     outputs.check("-o", output, OutputKind::Vdb);
     outputs.check("--mask", mask_path, OutputKind::Image);
@@ -174,6 +188,7 @@ void SegmentJob::run_one(Session& session) const {
     session.report().update(to_json(result->report), true);
     add_seconds(session, result->report.seconds);
     for (const std::string& line : summary(result->report)) session.note(line);
+    if (const std::string line = unused(result->report); !line.empty()) session.warn(line);
     std::optional<Evidence> judged;
     if (pixels && evidence.wanted()) {
         judged = evidence.judge(*result, marks.given, *pixels, session.run());

@@ -45,6 +45,8 @@ struct SegmentJob {
     [[nodiscard]] SegmentOptions resolve(double h) const;
     /// Options that are wrong whatever h is are found before anything is read.
     void check_options() const;
+    /// Which of the given flags had nothing to do; empty where all had.
+    [[nodiscard]] std::string unused(const SegmentReport& report) const;
     /// The image; the report tells of it.
     [[nodiscard]] Image read(const std::string& path, const ReadImageOptions& options, Session& session) const;
 

@@ -446,6 +446,8 @@ StructuresOutput segment_structures(const SegmentJob& job, const std::vector<Str
     }
     session.add_seconds("total", separating.seconds());
     summarise(output, session);
+    for (const StructureOutput& one : output.structures)
+        if (const std::string line = job.unused(one.result.report); !line.empty()) session.warn((one.name.empty() ? "" : one.name + ": ") + line);
     return output;
 }
 

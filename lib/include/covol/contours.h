@@ -19,6 +19,7 @@ enum class ContourCurve {
 struct ContourOptions {
     double step = 0.0;  ///< largest distance between neighbouring points, world units, > 0; the voxel size h
     ContourCurve curve = ContourCurve::Spline;
+    double thickness = 0.0;  ///< of a body that is marked on a single slice, world units; 0: not known
     [[nodiscard]] std::string why_invalid() const;
 };
 
@@ -67,6 +68,7 @@ struct Contours {
     std::shared_ptr<const ContourSolid> solid;  ///< null without a closed contour
     std::size_t closed = 0, open = 0;           ///< lines
     std::size_t slices = 0;     ///< with closed contours
+    bool flat = false;          ///< all marks lie on one of several slices, and no thickness was given: the body is a guess
     double slice_distance = 0;  ///< between neighbouring ones of them, the median; world units
     std::string summary;        ///< one line for people
 };

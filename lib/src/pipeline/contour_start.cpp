@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "covol/error.h"
 #include "pipeline/automatic.h"
 #include "pipeline/fields.h"
 #include "pipeline/starts.h"
@@ -21,14 +22,20 @@ void carry_beyond_image(Job& job) {
     }
 }
 
+/// Those of the sure points that are no contours'.
+std::vector<Vec3> loose_points(const Job& job) {
+    const auto loose = std::ptrdiff_t(job.sure.size() - job.options.contours->along.size());
+    return {job.sure.begin(), job.sure.begin() + loose};
+}
+
 /// Why the points are tagged after all, or null.
-const char* why_tag(const Job& job) {
+const char* why_tag(const Job& job, const std::vector<Vec3>& loose) {
     for (const Vec3& seed : job.options.exterior_seeds)
         if (job.body()->level(seed) < 0) return "an exterior seed lies inside the contours";
-    const double far = kTagAttractionVoxels * job.h();
-    const std::size_t loose = job.sure.size() - job.options.contours->along.size();
-    for (std::size_t n = 0; n < loose; ++n)
-        if (std::abs(job.body()->level(job.sure[n])) > far) return "points lie far from the contours' body";
+    // Between slices, and beyond the last, the body may be that wrong.
+    const double far = std::max(kTagAttractionVoxels * job.h(), job.guided() ? job.options.contours->slice_distance : 0.0);
+    for (const Vec3& point : loose)
+        if (std::abs(job.body()->level(point)) > far) return "points lie far from the contours' body";
     return nullptr;
 }
 
@@ -36,11 +43,16 @@ const char* why_tag(const Job& job) {
 
 bool start_from_contours(Job& job) {
     if (job.body() == nullptr || !job.tags()) return false;
-    if (const char* reason = why_tag(job)) {
+    const std::vector<Vec3> loose = loose_points(job);
+    if (const char* reason = why_tag(job, loose)) {
         job.choose("start", "tag", reason);
         job.hole_seeds = job.body()->hole_seeds();
         return false;
     }
+    if (job.options.contours->flat && loose.empty())
+        throw Error(Errc::InvalidInput,
+                    "segment: all contours lie on one slice, which tells nothing of how thick the body is; mark a second slice, "
+                    "or give its --contour-thickness");
     job.choose("start", "contours", "the body between the contours; what inner contours enclose is outside");
     job.origin = StartOrigin::Contours;
     job.options.evolve.follow = true;
@@ -50,6 +62,7 @@ bool start_from_contours(Job& job) {
         Timed timed(job.report().seconds.tag);
         job.result.u = covol::start_from_contours(job.domain(), *job.body(), job.run);
     }
+    if (job.guided() && job.uses_points() && !loose.empty()) correct_start(job);
     if (job.uses_points())
         compute_distance(job, std::max(job.options.evolve.attraction_range, kMarginVoxels * job.h()) + band_slack(job));
     return true;

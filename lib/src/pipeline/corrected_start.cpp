@@ -28,15 +28,13 @@ std::string distances(const CorrectionReport& report) {
 
 }  // namespace
 
-void meet_marks(Job& job) {
+void correct_start(Job& job) {
     Timed timed(job.report().seconds.tag);
     const GuessCorrection corrected =
         correct_guess(job.result.u, job.sure, job.options.inside, job.options.outside, correction(job), job.run);
     job.result.u = corrected.start(job.run);
-    job.on_surface = job.sure;
-    job.origin = StartOrigin::Guess;
     job.report().correction = corrected.report();
-    job.choose("start", "near its marks", "it is a guess that they correct, and nothing flows; " + distances(corrected.report()));
+    job.choose("correction", "of the start", distances(corrected.report()));
 }
 
 void start_from_corrected_guess(Job& job) {

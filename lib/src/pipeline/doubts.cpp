@@ -26,10 +26,6 @@ std::string place(const Job& job, const SegmentReport::MarksOff& marks) {
     return "on slice " + std::to_string(std::lround(marks.farthest_index[2])) + ", at voxel " + detail::to_text(marks.farthest_index);
 }
 
-double level_at(const FloatGrid& u, const Vec3& world) {
-    return openvdb::tools::BoxSampler::sample(u.getConstAccessor(), u.worldToIndex(openvdb::Vec3d(world[0], world[1], world[2])));
-}
-
 void find_marks_off(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& distances) {
     SegmentReport::MarksOff& found = job.report().marks_off;
     found.beyond = off(job);
@@ -62,6 +58,10 @@ void find_bias(Job& job, const std::vector<Vec3>& marks, const std::vector<doubl
 }
 
 }  // namespace
+
+double level_at(const FloatGrid& u, const Vec3& world) {
+    return openvdb::tools::BoxSampler::sample(u.getConstAccessor(), u.worldToIndex(openvdb::Vec3d(world[0], world[1], world[2])));
+}
 
 void doubt(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& distances) {
     find_marks_off(job, marks, distances);

@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kCoarseFactor = 8.0;        // voxels of the coarse distance field, in h
 constexpr double kSidesSigmas = 3.0;         // beside a mark, to tell lines from borders
+constexpr double kSideDepth = 0.7;           // of the way to a side: how deep inside it has to be
 constexpr std::size_t kFeatureMarks = 4000;  // this many are looked at
 
 /// A band that follows moves this far, in voxels, before g is extended.
@@ -67,6 +68,20 @@ Vec3 gradient(const ContourSolid& body, const Vec3& at, double h) {
     return slope;
 }
 
+/// How far beside the marks a side is that is still inside: across a thin body the other wall would be taken for it.
+double reach_within(const ContourSolid& body, const std::vector<Vec3>& places, const std::vector<Vec3>& normals, double reach, double least) {
+    for (; reach > least; reach *= 0.75) {
+        std::size_t inside = 0;
+        for (std::size_t n = 0; n < places.size(); ++n) {
+            Vec3 side = places[n];
+            for (int a = 0; a < 3; ++a) side[a] -= reach * normals[n][a];
+            inside += body.level(side) < -kSideDepth * reach;
+        }
+        if (2 * inside > places.size()) return reach;
+    }
+    return least;
+}
+
 }  // namespace
 
 void compute_distance(Job& job, double radius, double reach) {
@@ -116,7 +131,8 @@ void choose_edge_feature(Job& job) {
         places.push_back(along[n]);
         normals.push_back(normal);
     }
-    const MarkedFeature found = feature_at(*job.image, places, normals, kSidesSigmas * std::max(edge.sigma, job.h()));
+    const double reach = reach_within(*job.body(), places, normals, kSidesSigmas * std::max(edge.sigma, job.h()), job.h());
+    const MarkedFeature found = feature_at(*job.image, places, normals, reach);
     edge.feature = found.feature;
     const std::string line = "at the marks the image is " + number(std::abs(found.line)) +
                              (found.line > 0 ? " brighter" : " darker") + " than on both sides, which differ by " +

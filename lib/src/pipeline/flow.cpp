@@ -7,6 +7,7 @@
 
 #include "covol/error.h"
 #include "detail/vanished.h"
+#include "pipeline/doubts.h"
 #include "pipeline/fields.h"
 
 namespace covol::pipeline {
@@ -17,6 +18,7 @@ constexpr int kApproachSteps = 40;
 constexpr double kApproachTolerance = 0.01;
 constexpr double kHoldDepth = 0.75;   // voxels that the surface may sink below a start that is held
 constexpr double kLeastOfGrown = 0.5;  // of its volume: a flow that leaves less has lost the edges
+constexpr double kLeavesVoxels = 0.25;  // farther from its marks than the start: what flowed has left them
 constexpr int kHoldSteps = 2;
 constexpr double kHoldTolerance = 0.01;  // voxels a step
 
@@ -99,6 +101,13 @@ EvolveReport approach_and_evolve(Job& job, const EvolveFields& fields) {
     return solved;
 }
 
+/// Of places to the zero level set; in its band, so clamped.
+double mean_distance(const std::vector<Vec3>& places, const FloatGrid& u) {
+    double sum = 0;
+    for (const Vec3& place : places) sum += std::abs(level_at(u, place));
+    return sum / double(places.size());
+}
+
 double inside_volume(const FloatGrid& u) {
     double voxels = 0;
     for (auto value = u.tree().cbeginValueAll(); value; ++value)
@@ -169,7 +178,8 @@ bool has_vanished(const Job& job) { return job.result.report.solve.stop_reason =
 
 bool has_lost(const Job& job, const FloatGrid& start) {
     if (has_vanished(job)) return true;
-    return job.origin == StartOrigin::Grown && inside_volume(*job.result.u) < kLeastOfGrown * inside_volume(start);
+    if (job.origin == StartOrigin::Grown) return inside_volume(*job.result.u) < kLeastOfGrown * inside_volume(start);
+    return mean_distance(job.sure, *job.result.u) > mean_distance(job.sure, start) + kLeavesVoxels * job.h();
 }
 
 void check_flow(const Job& job) {

@@ -59,7 +59,12 @@ void start_as_given(Job& job) {
     const bool is_rough = job.options.start.kind == Start::Kind::Sphere || job.options.start.kind == Start::Kind::Box;
     if (is_rough) grow_to_edges(job);
     if (!job.uses_points()) return;
-    if (job.guided() && !is_rough && !misses_marks(job, *job.result.u)) return meet_marks(job);
+    if (job.guided() && !is_rough && !misses_marks(job, *job.result.u)) {
+        correct_start(job);
+        job.on_surface = job.sure;
+        job.origin = StartOrigin::Guess;
+        return job.choose("start", "near its marks", "it is a guess that they correct, and nothing flows");
+    }
     compute_distance(job, tube_for_start(job));
 }
 

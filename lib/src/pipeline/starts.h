@@ -16,8 +16,8 @@ void start_from_guess(Job& job);
 /// The guess of the options, corrected by the marks and seeds.
 void start_from_corrected_guess(Job& job);
 
-/// Makes a start that passes most of its marks pass all of them. From there on it is a guess.
-void meet_marks(Job& job);
+/// Makes a start that passes most of the sure points pass all of them.
+void correct_start(Job& job);
 
 /// The sphere, box, mesh, mask or level set that the caller names. The band follows the surface.
 void start_as_given(Job& job);
