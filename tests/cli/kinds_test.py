@@ -178,6 +178,52 @@ class Seeds(KindsCase):
             "segment", self.image, "--points", f"a={self.cloud('marks.xyz', RADIUS, 600)}", "--outside", "b=1,1,1", "-o", "s.vdb", code=2).stderr)
 
 
+class Starts(KindsCase):
+    def marks(self, count, name="marks.csv"):
+        path = self.inputs / name
+        write_points(path, [tuple(RADIUS * v for v in p) for p in fibonacci(count)])
+        return path
+
+    def test_the_image_alone_grows_from_a_sphere_or_a_seed(self):
+        # Far from every edge, and beside one.
+        for place, radius in (("0,0,0", 1.5), ("4,0,0", 1.5), ("0,-3,3", 2)):
+            with self.subTest(place):
+                report = self.report("segment", self.image, "--theta", 0, "--init", f"sphere:{place},{radius}", "-o", "s.vdb", "--mask", "m.nrrd")
+                self.assertIn("to edges", report["automatic"]["growth"])
+                self.assertGreater(dice(read_labels(self.out / "m.nrrd") > 0, ball()), 0.95)
+        # The model of the paper has no such start, and curvature closes it.
+        for name in self.files():
+            (self.out / name).unlink()
+        self.refuse("segment", self.image, "--theta", 0, "--init", "sphere:0,0,0,1.5", "--model", "paper", "-o", "p.vdb", code=3, says="vanished")
+
+    def test_a_guess_flows_by_the_model_of_the_paper(self):
+        marks = self.marks(600)
+        report = self.report("segment", self.image, "--points", marks, "--rho", 0, "--init", "guess", "--model", "paper", "-o", "s.vdb")
+        self.assertGreater(report["solve"]["steps"], 0)
+        self.assertGreater(report["surface"]["volume"], 0.8 * 4 / 3 * np.pi * RADIUS ** 3)
+        rested = self.report("segment", self.image, "--points", marks, "--rho", 0, "-o", "s.vdb")
+        self.assertEqual(rested["solve"]["steps"], 0)
+        self.assertLess(abs(rested["surface"]["volume"] / (4 / 3 * np.pi * RADIUS ** 3) - 1), 0.01)
+
+    def test_flags_that_did_nothing_are_named(self):
+        done = self.run_covol("segment", self.image, "--points", self.marks(60), "--delta", "0.1vx", "--tau", "1vx", "-o", "s.vdb")
+        self.assertIn("--delta, --tau did nothing", done.stderr)
+        done = self.run_covol("segment", self.image, "--points", self.marks(60), "--delta", "0.1vx", "--model", "paper", "-o", "s.vdb")
+        self.assertNotIn("did nothing", done.stderr)
+
+    def test_one_more_mark_on_the_last_result(self):
+        self.run_covol("segment", self.image, "--points", self.marks(60), "--rho", 0, "-o", "first.vdb")
+        more = self.inputs / "more.csv"
+        write_points(more, [tuple(RADIUS * v for v in p) for p in fibonacci(60)] + [(RADIUS + 3 * H, 0, 0)])
+        again = self.report("segment", self.image, "--points", more, "--rho", 0, "--init", "vdb:first.vdb", "-o", "again.vdb")
+        self.assertIn("near its marks", again["automatic"]["start"])
+        self.assertEqual(again["solve"]["steps"], 0)
+        self.assertLess(again["fit"]["points_to_surface"]["max"], 0.5 * H)
+        # Far from the mark nothing has changed.
+        far = self.report("compare", "first.vdb", "again.vdb")["compare"]
+        self.assertGreater(far["dice"], 0.98)
+
+
 class Guess(KindsCase):
     """A ball's mask that lacks a cap and has a bump."""
 

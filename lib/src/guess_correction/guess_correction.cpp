@@ -140,7 +140,7 @@ void add_bumps(std::vector<Bump>& bumps, const std::vector<Target>& targets, dou
         }
         const double radius = radius_of(largest);
         std::vector<Target> group = met, later;
-        double square = 0;
+        double square = 0, fourth = 0;  // of residuals
         std::size_t now = 0;
         for (std::size_t n = 0; n < open.size(); ++n) {
             if (radius_of(left[n]) * kLevelRatio < radius) {
@@ -150,10 +150,12 @@ void add_bumps(std::vector<Bump>& bumps, const std::vector<Target>& targets, dou
             met.push_back(open[n]);
             group.push_back({open[n].at, left[n]});
             square += left[n] * left[n];
+            fourth += left[n] * left[n] * left[n] * left[n];
             ++now;
         }
         for (std::size_t n = 0; n + now < group.size(); ++n) group[n].shift -= sum_of(bumps, group[n].at);
-        const double noise = square > 0 ? precision * precision * double(now) / square : 1.0;
+        // How far off the guess is where it is off: many marks that it meets are no reason to take another one for noise.
+        const double noise = fourth > 0 ? precision * precision * square / fourth : 1.0;
         const std::vector<double> heights = solve(group, radius, noise);
         for (std::size_t n = 0; n < group.size(); ++n)
             if (heights[n] != 0) bumps.push_back({group[n].at, radius, heights[n]});
