@@ -38,7 +38,7 @@ void GuessFlags::bind(CLI::App& command) {
         ->check(CLI::PositiveNumber.description(""))
         ->type_name("LABEL");
     add_length(command, "--guess-radius", radius, "",
-               "a mark acts on the guess at least so far around it [8vx, or two of the image's widest spacing; three times its "
+               "a mark acts on the guess at least so far around it [12vx, or two of the image's widest spacing; three times its "
                "distance to the guess where that is more]");
 }
 
