@@ -211,6 +211,14 @@ class Starts(KindsCase):
         done = self.run_covol("segment", self.image, "--points", self.marks(60), "--delta", "0.1vx", "--model", "paper", "-o", "s.vdb")
         self.assertNotIn("did nothing", done.stderr)
 
+    def test_two_bodies_are_told(self):
+        path = self.inputs / "two.csv"
+        write_points(path, [(x + 3 * p[0], 3 * p[1], 3 * p[2]) for x in (-4, 4) for p in fibonacci(60)])
+        done = self.run_covol("segment", self.image, "--points", path, "--rho", 0, "-o", "two.vdb")
+        self.assertIn("falls into 2 pieces", done.stderr)
+        done = self.run_covol("segment", self.image, "--points", self.marks(60), "--rho", 0, "-o", "two.vdb")
+        self.assertNotIn("pieces", done.stderr)
+
     def test_one_more_mark_on_the_last_result(self):
         self.run_covol("segment", self.image, "--points", self.marks(60), "--rho", 0, "-o", "first.vdb")
         more = self.inputs / "more.csv"

@@ -59,6 +59,9 @@ void make_surface(Job& job) {
         report.fit = detail::statistics_of(distances);
         doubt(job, marks, distances);
     }
+    if (job.origin == StartOrigin::Guess && report.surface.components > 1)
+        job.warn("the surface through the marks falls into " + std::to_string(report.surface.components) +
+                 " pieces: where they are one body, mark between them; several bodies are better marked each by itself");
     report.seeds = check_seeds(*job.result.surface, job.options.inside, job.options.outside);
     if (const std::string warning = report.seeds.warning(); !warning.empty()) job.warn("seeds: " + warning);
     if (report.share_without_points > kWarnWithoutPoints)
