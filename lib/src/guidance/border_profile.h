@@ -16,6 +16,7 @@ inline constexpr int kLevels = 24;  ///< of brightness
 /// Brightness along the normals of one patch: rows from `lo` to `hi` steps outward of its vertices.
 struct PatchProfile {
     int lo = 0, hi = -1;
+    bool image_ends_below = false, image_ends_above = false;  ///< why it is no longer: the border may lie beyond
     int rows = 0;
     std::vector<float> values;          ///< row by row
     std::vector<std::uint8_t> levels;   ///< the same as levels of brightness
@@ -36,7 +37,7 @@ struct BorderTable {
     std::vector<float> inside, outside;  ///< [level]
 
     /// Log-likelihood of each offset first .. first + out.size() - 1 (steps), per voxel of the image, up to a constant; mean over rows.
-    /// @pre the offsets lie within the profile.
+    /// An offset beyond the profile says that all of the profile lies on one side of the border.
     void likelihood(const PatchProfile& profile, int first, std::vector<double>& out) const;
 };
 

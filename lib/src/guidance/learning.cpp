@@ -56,8 +56,8 @@ struct Likelihood {
 Likelihood likelihood(const PatchProfile& profile, const BorderTable& table, int range) {
     Likelihood l;
     if (profile.empty()) return l;
-    l.first = std::max(-range, profile.lo + 1);
-    const int last = std::min(range, profile.hi - 1);
+    l.first = profile.image_ends_below ? -range : std::max(-range, profile.lo + 1);
+    const int last = profile.image_ends_above ? range : std::min(range, profile.hi - 1);
     if (last - l.first < kStepsPerVoxel) return l;
     l.values.assign(std::size_t(last - l.first) + 1, 0.0);
     table.likelihood(profile, l.first, l.values);
@@ -115,6 +115,7 @@ PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, cons
     };
     std::vector<Row> rows;
     std::vector<double> lows, highs;
+    int ends_below = 0, ends_above = 0;
     for (std::uint32_t n = p.first[patch]; n < p.first[patch + 1]; ++n) {
         const Vec3 &x = p.places[p.members[n]], &normal = p.normals[p.members[n]];
         Row row;
@@ -126,7 +127,10 @@ PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, cons
                 const Vec3 at{x[0] + side * away * normal[0], x[1] + side * away * normal[1], x[2] + side * away * normal[2]};
                 // Beyond the middle of a gap or of the body another part of the surface is nearer.
                 if (side * sampled(accessor, scene.domain, at) < 0.7 * away - h) break;
-                if (!image.sample(at, row.values[std::size_t(reach + side * s)])) break;
+                if (!image.sample(at, row.values[std::size_t(reach + side * s)])) {
+                    ++(side < 0 ? ends_below : ends_above);
+                    break;
+                }
                 (side < 0 ? row.lo : row.hi) = side * s;
             }
         lows.push_back(row.lo);
@@ -138,6 +142,8 @@ PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, cons
     // One stretch for all rows, or offsets could not be compared; those that are shorter are left out.
     profile.lo = int(median(lows));
     profile.hi = int(median(highs));
+    profile.image_ends_below = 2 * ends_below > int(rows.size());
+    profile.image_ends_above = 2 * ends_above > int(rows.size());
     for (const Row& row : rows)
         if (row.lo <= profile.lo && row.hi >= profile.hi) {
             profile.values.insert(profile.values.end(), row.values.begin() + reach + profile.lo,
