@@ -10,7 +10,6 @@ namespace covol {
 namespace pipeline {
 namespace {
 
-constexpr std::size_t kMostGuessMarks = 4000;
 constexpr double kFewPoints = 1000;  // fewer get a voxel size at which their surface has as many voxels as this many would
 constexpr double kSameSeedVoxels = 1e-3;   // seeds closer than this are one position
 constexpr double kMergeVoxels = 0.25;      // points closer than this do not move the surface apart

@@ -5,6 +5,7 @@
 #include "covol/error.h"
 #include "covol/mesh_io.h"
 #include "detail/memory_need.h"
+#include "pipeline/automatic.h"
 #include "pipeline/doubts.h"
 #include "pipeline/fields.h"
 #include "pipeline/starts.h"
@@ -59,7 +60,7 @@ void start_as_given(Job& job) {
     const bool is_rough = job.options.start.kind == Start::Kind::Sphere || job.options.start.kind == Start::Kind::Box;
     if (is_rough) grow_to_edges(job);
     if (!job.uses_points()) return;
-    if (job.guided() && !is_rough && !misses_marks(job, *job.result.u)) {
+    if (job.guided() && !is_rough && job.sure.size() <= kMostGuessMarks && !misses_marks(job, *job.result.u)) {
         correct_start(job);
         job.on_surface = job.sure;
         job.origin = StartOrigin::Guess;
