@@ -21,6 +21,10 @@ CorrectionOptions correction(const Job& job) {
     return options;
 }
 
+GuessCorrection corrected(const Job& job, const FloatGridPtr& guess, const std::vector<Vec3>& marks) {
+    return correct_guess(guess, marks, job.options.inside, job.options.outside, correction(job), job.run);
+}
+
 std::string distances(const CorrectionReport& report) {
     return "from the marks to it: mean " + number(report.before_mean) + ", max " + number(report.before_max) + ", corrected " +
            number(report.after_mean) + ", " + number(report.after_max);
@@ -30,11 +34,10 @@ std::string distances(const CorrectionReport& report) {
 
 void correct_start(Job& job) {
     Timed timed(job.report().seconds.tag);
-    const GuessCorrection corrected =
-        correct_guess(job.result.u, job.sure, job.options.inside, job.options.outside, correction(job), job.run);
-    job.result.u = corrected.start(job.run);
-    job.report().correction = corrected.report();
-    job.choose("correction", "of the start", distances(corrected.report()));
+    const GuessCorrection correction = corrected(job, job.result.u, job.sure);
+    job.result.u = correction.start(job.run);
+    job.report().correction = correction.report();
+    job.choose("correction", "of the start", distances(correction.report()));
 }
 
 void start_from_corrected_guess(Job& job) {
@@ -43,11 +46,9 @@ void start_from_corrected_guess(Job& job) {
     Timed timed(job.report().seconds.tag);
     job.options.correction = correction(job);
     const FloatGridPtr guess = start_grid(*job.options.guess, job.domain(), job.run);
-    const auto corrected = std::make_shared<const GuessCorrection>(
-        correct_guess(guess, job.options.contours ? job.sure : job.points, job.options.inside, job.options.outside, job.options.correction, job.run));
-    job.result.u = corrected->start(job.run);
-    job.result.correction = corrected;
-    const CorrectionReport& report = job.report().correction = corrected->report();
+    job.result.correction = std::make_shared<const GuessCorrection>(corrected(job, guess, job.options.contours ? job.sure : job.points));
+    job.result.u = job.result.correction->start(job.run);
+    const CorrectionReport& report = job.report().correction = job.result.correction->report();
     job.choose("start", "guess",
                "corrected within " + number(report.least_radius) + " to " + number(report.largest_radius) + " of " +
                    std::to_string(report.marks) + " marks and " + std::to_string(report.seeds) +
