@@ -18,7 +18,7 @@
 #include "detail/kd_tree.h"
 #include "detail/redistance.h"
 #include "guidance/learning.h"
-#include "guidance/pieces.h"
+#include "detail/pieces.h"
 #include "guidance/wide_distance.h"
 
 namespace covol {
@@ -431,7 +431,7 @@ std::vector<double> Guide::on_vertices(const std::vector<double>& offset) const 
 /// The distance to the surface less the offset of its nearest vertex.
 void Guide::move() {
     const FloatGridPtr moved = distance_->less(on_vertices(offset_));
-    drop_unmarked_pieces(*moved, marks_);
+    detail::drop_unmarked_pieces(*moved, marks_);
     surface_ = detail::redistance(*moved, domain_, kHalfWidthVoxels, detail::DomainEnd::Closed, "guess", run_);
 }
 

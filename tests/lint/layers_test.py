@@ -12,9 +12,9 @@ LAYERS = [
     ["image", "clip", "points", "mesh", "vdb_io", "mesh_io"],
     ["contours", "seeds"],
     ["painted"],
-    ["distance", "edge", "scan_noise"],
+    ["distance", "edge", "scan_noise", "orientation"],
     ["band", "evolve", "scan_solid"],
-    ["guess", "guess_correction"],
+    ["guess", "guess_correction", "cloud_surface"],
     ["surface", "mesh_cleanup", "cloud_cleanup", "compare"],
     ["structures", "evidence", "guidance"],
     ["pipeline", "phantom", "render"],
@@ -25,13 +25,15 @@ SOURCE_LEVEL = {"contour_solid": LEVEL["contours"], "points_check": LEVEL["point
                 "outline": LEVEL["painted"], "segments": LEVEL["painted"], "start_from_seeds": LEVEL["band"],
                 "tag_distance": LEVEL["band"], "start": LEVEL["band"], "surface_mesh": LEVEL["surface"],
                 "mesh_distance": LEVEL["surface"], "clipped": LEVEL["clip"], "open_ends": LEVEL["clip"],
-                "grow": LEVEL["band"]}
+                "grow": LEVEL["band"], "cloud_scale": LEVEL["orientation"], "winding_field": LEVEL["orientation"],
+                "point_cells": LEVEL["orientation"], "neighbours": LEVEL["orientation"], "local_fit": LEVEL["orientation"],
+                "stray": LEVEL["orientation"]}
 # The modules of segment(), lib/src/pipeline, in the same way; lib/src/pipeline.cpp is above them all.
 PIPELINE = [
     ["job", "options"],
     ["automatic", "fields"],
     ["doubts"],
-    ["starts", "given_start", "grown_start", "guess_start", "corrected_start", "seed_start", "contour_start", "tagged_start", "flow"],
+    ["starts", "given_start", "grown_start", "guess_start", "cloud_start", "corrected_start", "seed_start", "contour_start", "tagged_start", "flow"],
     ["final_surface"],
     ["coarse_level"],
 ]

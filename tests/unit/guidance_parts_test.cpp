@@ -7,7 +7,7 @@
 
 #include "covol/band.h"
 #include "covol/surface.h"
-#include "guidance/pieces.h"
+#include "detail/pieces.h"
 #include "guidance/wide_distance.h"
 #include "support/clouds.h"
 #include "support/shapes.h"
@@ -79,10 +79,10 @@ TEST_CASE("small pieces and cavities go where no mark is near", "[guidance]") {
     };
     const FloatGridPtr none = made();
     REQUIRE(sides(*none) == std::pair(true, true));
-    guidance::drop_unmarked_pieces(*none, {{0, 0, kRadius}});
+    detail::drop_unmarked_pieces(*none, {{0, 0, kRadius}});
     CHECK(sides(*none) == std::pair(false, false));
     CHECK(test::negative_volume(*none) == Approx(4.0 / 3 * M_PI * std::pow(kRadius, 3)).epsilon(0.02));
     const FloatGridPtr marked = made();
-    guidance::drop_unmarked_pieces(*marked, {{27.5, 0, 0}});
+    detail::drop_unmarked_pieces(*marked, {{27.5, 0, 0}});
     CHECK(sides(*marked) == std::pair(true, false));
 }

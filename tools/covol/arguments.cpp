@@ -86,8 +86,8 @@ Start parse_start(const std::string& flag, const std::string& text) {
     const std::size_t colon = text.find(':');
     const std::string kind = text.substr(0, colon);
     const std::string rest = colon == std::string::npos ? "" : text.substr(colon + 1);
-    if (colon == std::string::npos && (kind == "auto" || kind == "guess" || kind == "tag")) {
-        start.kind = kind == "auto" ? Start::Kind::Auto : kind == "guess" ? Start::Kind::Guess : Start::Kind::Tag;
+    if (colon == std::string::npos && (kind == "auto" || kind == "guess" || kind == "cloud" || kind == "tag")) {
+        start.kind = kind == "auto" ? Start::Kind::Auto : kind == "guess" ? Start::Kind::Guess : kind == "cloud" ? Start::Kind::Cloud : Start::Kind::Tag;
         return start;
     }
     if (kind == "sphere") {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "covol/band.h"
+#include "covol/cloud_surface.h"
 #include "covol/contours.h"
 #include "covol/edge.h"
 #include "covol/evolve.h"
@@ -22,8 +23,9 @@ namespace covol {
 
 /// How the level set starts.
 struct Start {
-    /// Auto: a guess from the marks where there are few of them (see SegmentOptions::model), else their tags.
-    enum class Kind { Auto, Guess, Tag, Sphere, Box, Mesh, Mask, Vdb } kind = Kind::Auto;
+    /// Auto: a guess from the marks where there are few of them (see SegmentOptions::model); more, without an image, are
+    /// a Cloud (surface_from_cloud()), with one they are tagged.
+    enum class Kind { Auto, Guess, Cloud, Tag, Sphere, Box, Mesh, Mask, Vdb } kind = Kind::Auto;
     Vec3 center{0, 0, 0};  ///< Sphere
     double radius = 0;     ///< Sphere
     WorldBox box;          ///< Box
@@ -84,6 +86,7 @@ struct SegmentReport {
     std::size_t point_count = 0;        ///< given, marks of contours included
     std::size_t densified = 0;          ///< points made from contours
     GuessReport guess;                  ///< where the start was one
+    CloudReport cloud;                  ///< likewise
     GuidanceReport guidance;            ///< what the image said to a guess
     TagDistanceChoice tag;
     BandReport band;
@@ -115,12 +118,13 @@ struct SegmentResult {
 };
 
 /// h and how it was found: the image's smallest spacing, or for points alone the median distance to the nearest other
-/// point, coarser where the scan is noisy (scan_voxel_size), finer by sqrt(n / 1000) for n < 1000 points. @throws Error InvalidInput when there is neither, or fewer than two distinct points.
+/// point, coarser where the scan is noisy (cloud_scale(); for tagging scan_voxel_size()), finer by sqrt(n / 1000) for
+/// n < 1000 points. @throws Error InvalidInput when there is neither, or fewer than two distinct points.
 struct VoxelSizeChoice {
     double voxel_size = 0;
     std::string reason;  ///< one line for people
 };
-[[nodiscard]] VoxelSizeChoice choose_voxel_size(const Image* image, const std::vector<Vec3>& world_points);
+[[nodiscard]] VoxelSizeChoice choose_voxel_size(const Image* image, const std::vector<Vec3>& world_points, bool tagged = false);
 
 /// The main job: image and points together (either may be absent: null, empty).
 /// @throws Error as the single steps; InvalidInput when there is neither.

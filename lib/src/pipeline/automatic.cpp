@@ -11,6 +11,7 @@ namespace pipeline {
 namespace {
 
 constexpr double kFewPoints = 1000;  // fewer get a voxel size at which their surface has as many voxels as this many would
+constexpr double kCloudNoise = 0.6;   // voxels of a cloud, in standard deviations of its points
 constexpr double kSameSeedVoxels = 1e-3;   // seeds closer than this are one position
 constexpr double kMergeVoxels = 0.25;      // points closer than this do not move the surface apart
 constexpr double kAttractionVoxels = 5.0;  // automatic range of the points after starts other than tagging
@@ -35,7 +36,6 @@ void merge_points(Job& job) {
         job.run.info("points: " + std::to_string(job.points.size()) + " of " + std::to_string(all) +
                      " kept, the others are closer than half of " + number(kMergeVoxels * job.h()));
     job.marks = job.points;
-    if (job.image == nullptr) average_noise(job);
 }
 
 void choose_attraction_range(Job& job) {
@@ -60,8 +60,12 @@ void choose_start(Job& job) {
     Start::Kind& kind = job.options.start.kind;
     if (kind != Start::Kind::Auto || !job.starts_from_marks()) return;
     kind = Start::Kind::Tag;
-    if (!job.guided() || job.options.contours || job.options.tag_distance > 0 || job.points.size() > kMostGuessMarks) return;
+    if (!job.guided() || job.options.contours || job.options.tag_distance > 0) return;
     if (job.image == nullptr && !can_enclose(job.points)) return;  // a layer: tagging tells what it needs
+    if (job.points.size() > kMostGuessMarks) {
+        if (job.image == nullptr && job.uses_points()) kind = Start::Kind::Cloud;
+        return;
+    }
     kind = Start::Kind::Guess;
     job.choose("start", "guess", std::to_string(job.points.size()) + " marks, at most " + std::to_string(kMostGuessMarks));
 }
@@ -92,19 +96,20 @@ void check_input(Job& job) {
 void choose_values(Job& job) {
     SegmentOptions& options = job.options;
     if (options.voxel_size <= 0) {
-        const VoxelSizeChoice choice = choose_voxel_size(job.image, job.points);
+        const VoxelSizeChoice choice = choose_voxel_size(job.image, job.points, job.tags());
         options.voxel_size = choice.voxel_size;
         job.choose("voxel_size", number(job.h()), choice.reason);
     }
     merge_points(job);
     choose_start(job);
+    if (job.image == nullptr && job.tags()) average_noise(job);
     const double h = job.h();
     EvolveOptions& evolve = options.evolve;
     const bool marked = job.tags() || job.guesses();  // the start is close to the end
     const double delta_voxels = marked ? kTagDeltaVoxels : 1.0;
     const bool chooses_delta = evolve.delta < 0;
     if (chooses_delta) evolve.delta = delta_voxels * h;
-    if (job.options.guess || (job.guesses() && job.guided() && job.uses_points())) return;  // nothing flows; a later frame may
+    if (job.options.guess || ((job.guesses() || job.is_cloud()) && job.guided() && job.uses_points())) return;  // nothing flows; a later frame may
     if (chooses_delta) job.choose("delta", number(evolve.delta), number(delta_voxels) + " voxels");
     if (evolve.tau < 0) job.choose("tau", number(h), "1 voxel at unit speed; longer while the surface moves slowly");
     if (options.edge.sigma < 0 && job.uses_image()) {
@@ -120,8 +125,8 @@ void choose_values(Job& job) {
 
 }  // namespace pipeline
 
-VoxelSizeChoice choose_voxel_size(const Image* image, const std::vector<Vec3>& world_points) {
-    using pipeline::kFewPoints, pipeline::number;
+VoxelSizeChoice choose_voxel_size(const Image* image, const std::vector<Vec3>& world_points, bool tagged) {
+    using pipeline::kFewPoints, pipeline::kCloudNoise, pipeline::number;
     if (image != nullptr) {
         const Vec3& spacing = image->geometry().spacing;
         return {*std::min_element(spacing.begin(), spacing.end()), "the image's smallest spacing"};
@@ -131,6 +136,12 @@ VoxelSizeChoice choose_voxel_size(const Image* image, const std::vector<Vec3>& w
         throw Error(Errc::InvalidInput, "choose_voxel_size: expected an image or at least 2 distinct points, got " +
                                             std::to_string(distinct.size()));
     const double spacing = nearest_neighbour_spacing(distinct).median;
+    if (!tagged && distinct.size() > pipeline::kMostGuessMarks) {
+        const CloudScale scale = cloud_scale(distinct);
+        const double h = kCloudNoise * scale.noise;
+        if (h > spacing) return {h, number(kCloudNoise) + " times the noise of the points, " + number(scale.noise)};
+        return {spacing, "the median distance between neighbouring points"};
+    }
     const ScanVoxelSize scan = scan_voxel_size(distinct, spacing);
     if (scan.voxel_size <= spacing) {
         // A surface of few points is so few spacings wide that in voxels as large as they are curvature would outweigh them.

@@ -31,6 +31,7 @@ FloatGridPtr start_grid(const Start& start, const Domain& domain, const RunConte
             return start_from_grid(domain, start.level_set ? *start.level_set : *read_level_set(start.path), run);
         case Start::Kind::Auto:
         case Start::Kind::Guess:
+        case Start::Kind::Cloud:
         case Start::Kind::Tag: break;
     }
     throw Error(Errc::InvalidOptions, "segment: this start makes no grid of its own");

@@ -19,6 +19,7 @@ enum class StartOrigin {
     Grown,       ///< one of these that has grown to the image's edges
     Guess,       ///< the surface through few marks
     Corrected,   ///< another tool's result, corrected by marks
+    Cloud,       ///< the surface behind a cloud: quadrics, and an indicator between them
     Tagged,      ///< the points, tagged (closed or as a solid, too)
     Contours,    ///< the body between contours
     CoarseLevel  ///< the end of the flow on a coarser lattice
@@ -56,6 +57,7 @@ struct Job {
     }
     [[nodiscard]] bool tags() const { return options.start.kind == Start::Kind::Tag && starts_from_marks(); }
     [[nodiscard]] bool guesses() const { return options.start.kind == Start::Kind::Guess && starts_from_marks(); }
+    [[nodiscard]] bool is_cloud() const { return options.start.kind == Start::Kind::Cloud && starts_from_marks(); }
     [[nodiscard]] bool guided() const { return options.model == Model::Guided; }
     /// Stained sheets run on beside and across the border that contours mark, and guidance by the profile alone cannot tell
     /// them apart; the edge detector of lines, with the body as a guess, can.
@@ -65,7 +67,7 @@ struct Job {
     /// The start, or where the image moved it, is the surface: nothing pulls it off the marks, and no curvature shrinks it.
     [[nodiscard]] bool rests() const {
         if (origin == StartOrigin::Corrected) return true;
-        const bool from_marks = origin == StartOrigin::Guess || origin == StartOrigin::Contours;
+        const bool from_marks = origin == StartOrigin::Guess || origin == StartOrigin::Contours || origin == StartOrigin::Cloud;
         return from_marks && guided() && uses_points() && !follows_lines();
     }
     /// Between closed contours, or null.

@@ -9,6 +9,8 @@ void make_start(Job& job) {
         start_from_seeds(job);
     else if (job.guesses())
         start_from_guess(job);
+    else if (job.is_cloud())
+        start_from_cloud(job);
     else if (!job.tags())
         start_as_given(job);
     else if (!start_from_contours(job))

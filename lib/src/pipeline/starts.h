@@ -10,6 +10,9 @@ void make_start(Job& job);
 /// The surface through the marks that bends least.
 void start_from_guess(Job& job);
 
+/// The surface behind a cloud, oriented by itself.
+void start_from_cloud(Job& job);
+
 /// The grid of a start other than `Tag`. @throws Error
 [[nodiscard]] FloatGridPtr start_grid(const Start& start, const Domain& domain, const RunContext& run);
 

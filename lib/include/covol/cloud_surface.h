@@ -1,0 +1,32 @@
+#pragma once
+#include <vector>
+
+#include "covol/domain.h"
+#include "covol/orientation.h"
+#include "covol/run.h"
+
+namespace covol {
+
+/// What surface_from_cloud() found out about the points.
+struct CloudReport {
+    double spacing = 0;        ///< world units: 1 / sqrt(points per area)
+    double noise = 0;          ///< standard deviation of the points from the surface, median
+    double radius = 0;         ///< of the neighbourhoods that were averaged, median
+    int iterations = 0;        ///< of the orientation
+    double indicator_cell = 0; ///< of its finest lattice
+    std::size_t stray = 0;     ///< points far from all surfaces, left out
+    std::size_t bare_nodes = 0;  ///< places with points that are no sheet: the indicator alone tells of the surface
+    std::size_t dropped_pieces = 0;  ///< of the surface, that hardly a point rested on
+};
+
+/// The closed surface behind points without normals, as a start (negative inside).
+///
+/// The points are oriented by the indicator function that they make themselves (orient()). Near them the level set is the
+/// signed distance to local quadrics, fitted to neighbourhoods as wide as their noise asks for, blended (implicit moving
+/// least squares; Kolluri, Provably good moving least squares, ACM Trans. Algorithms 4(2), 2008; Ohtake and others,
+/// Multi-level partition of unity implicits, 2003); where there are no points it is the indicator's.
+/// @throws Error InvalidInput (fewer than 4 points, no surface), Cancelled.
+[[nodiscard]] FloatGridPtr surface_from_cloud(const Domain& domain, const std::vector<Vec3>& points, CloudReport& report,
+                                              const RunContext& run = {});
+
+}  // namespace covol

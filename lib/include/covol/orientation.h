@@ -1,0 +1,46 @@
+#pragma once
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "covol/domain.h"
+#include "covol/run.h"
+
+namespace covol {
+
+/// How far apart points lie on the surface, and how far off it.
+struct CloudScale {
+    double spacing = 0;  ///< world units: 1 / sqrt(points per area)
+    double noise = 0;    ///< standard deviation along the normal
+};
+/// From quadrics through neighbourhoods of a sample of the points: that radius at which they are most of a sheet.
+[[nodiscard]] CloudScale cloud_scale(const std::vector<Vec3>& points, const RunContext& run = {});
+
+/// What a cloud without normals tells of inside and outside.
+struct Orientation {
+    std::vector<Vec3> normals;     ///< unit, outward, of the points as they were given
+    std::vector<double> areas;     ///< of the surface that each point stands for, world units squared, from the density
+    /// The indicator function of the solid: about 1 inside and 0 outside, smooth over a few cells; nearest node beyond its
+    /// lattice. Thread-safe.
+    struct Indicator;
+    std::shared_ptr<const Indicator> indicator;
+    [[nodiscard]] double inside(const Vec3& world) const;   ///< the indicator
+    [[nodiscard]] Vec3 gradient(const Vec3& world) const;   ///< of it, 1 / world unit
+    /// visit(box) for each cell of its lattice, world box, that its level 1/2 passes.
+    void crossed(const std::function<void(const WorldBox&)>& visit) const;
+    [[nodiscard]] double cell() const;                      ///< of its lattice, world units
+    double turned = 0;             ///< share of the points whose normal the last iteration turned by more than 90 degrees
+    int iterations = 0;
+};
+
+/// Normals that agree with the indicator function which they make: from a first guess, which points away from where the
+/// points are, chi is solved for and each normal replaced by the direction in which chi falls at its point, on finer and
+/// finer lattices (Hou and others, Iterative Poisson surface reconstruction, ACM Trans. Graph. 41(4), 2022; Lin, Shi and
+/// Liu, Fast and globally consistent normal orientation based on the winding number normal consistency, ACM Trans. Graph.
+/// 43(6), 2024). That alone leaves parts turned as a whole, for example a leg: their surface is where chi is -1/2 instead of
+/// 1/2. So a normal is also turned where chi says that its point lies on the wrong side.
+/// @param scale  of the points: no lattice is finer
+/// @throws Error InvalidInput (fewer than 4 points, points without extent), Cancelled.
+[[nodiscard]] Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run = {});
+
+}  // namespace covol

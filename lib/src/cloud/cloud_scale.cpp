@@ -1,0 +1,101 @@
+// Quadrics through neighbourhoods: how far apart the points of a cloud lie on its surface, and how far off it.
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "cloud/point_cells.h"
+#include "covol/orientation.h"
+#include "covol/points.h"
+
+namespace covol {
+namespace {
+
+constexpr std::size_t kSamples = 2000, kLeast = 12;
+constexpr int kRadii = 14;
+constexpr double kGrowth = 1.4142135623730951;
+constexpr double kFirstSpacings = 3.0;  // the first radius, in median distances to the nearest point
+constexpr double kSheet = 0.15;         // standard deviation from the quadric, of the radius; points that fill a ball have 0.45
+constexpr double kWorse = 1.05;
+
+/// Standard deviation of points from the quadric over the plane of the last two axes that fits them best.
+double off_quadric(const std::vector<Eigen::Vector3d>& points, const Eigen::Matrix3d& axes) {
+    using Vector6 = Eigen::Matrix<double, 6, 1>;
+    Eigen::Matrix<double, 6, 6> m = Eigen::Matrix<double, 6, 6>::Zero();
+    Vector6 right = Vector6::Zero();
+    double squares = 0;
+    for (const Eigen::Vector3d& p : points) {
+        const Eigen::Vector3d x = axes.transpose() * p;
+        Vector6 b;
+        b << 1, x[1], x[2], x[1] * x[1], x[1] * x[2], x[2] * x[2];
+        m.noalias() += b * b.transpose();
+        right += x[0] * b;
+        squares += x[0] * x[0];
+    }
+    const double left = squares - right.dot(m.ldlt().solve(right));
+    return std::sqrt(std::max(0.0, left) / double(points.size() - 6));
+}
+
+}  // namespace
+
+CloudScale cloud_scale(const std::vector<Vec3>& points, const RunContext& run) {
+    CloudScale scale;
+    const double nearest = nearest_neighbour_spacing(points).median;
+    scale.spacing = 2 * nearest;  // what it is for points spread evenly at random
+    if (!(nearest > 0)) return scale;
+    const std::size_t step = std::max<std::size_t>(1, points.size() / kSamples);
+    double radius = kFirstSpacings * nearest, best = 1;
+    for (int n = 0; n < kRadii; ++n, radius *= kGrowth) {
+        run.check();
+        const cloud::PointCells cells(points, radius);
+        std::vector<double> share, spacing, noise;
+        std::vector<Eigen::Vector3d> near;
+        std::vector<cloud::PointCells::Range> ranges;
+        for (std::size_t m = 0; m < points.size(); m += step) {
+            const Vec3& at = points[m];
+            WorldBox box;
+            for (int a = 0; a < 3; ++a) {
+                box.min[a] = at[a] - radius;
+                box.max[a] = at[a] + radius;
+            }
+            cells.find(box, ranges);
+            near.clear();
+            Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+            Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+            for (const auto& range : ranges)
+                for (std::uint32_t p = range.begin; p < range.end; ++p) {
+                    const Vec3& q = cells.sorted()[p];
+                    const Eigen::Vector3d v(q[0] - at[0], q[1] - at[1], q[2] - at[2]);
+                    if (v.squaredNorm() > radius * radius) continue;
+                    near.push_back(v / radius);
+                    sum += near.back();
+                    squares += near.back() * near.back().transpose();
+                }
+            const double count = double(near.size());
+            if (near.size() < kLeast) continue;
+            const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares / count - sum * sum.transpose() / (count * count));
+            const double deviation = radius * off_quadric(near, axes.eigenvectors());
+            share.push_back(deviation / radius);
+            noise.push_back(deviation);
+            spacing.push_back(radius * std::sqrt(M_PI / count));
+        }
+        if (2 * share.size() * step < points.size()) continue;  // too few neighbours yet
+        const auto middle = [](std::vector<double>& v) {
+            std::nth_element(v.begin(), v.begin() + std::ptrdiff_t(v.size() / 2), v.end());
+            return v[v.size() / 2];
+        };
+        const double now = middle(share);
+        if (now < best) {
+            best = now;
+            scale.spacing = middle(spacing);
+            scale.noise = middle(noise);
+        }
+        // Wider, the surface's own curvature is all that comes.
+        if (best < kSheet || now > kWorse * best) break;
+    }
+    return scale;
+}
+
+}  // namespace covol

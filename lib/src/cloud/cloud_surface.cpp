@@ -1,0 +1,277 @@
+#include "covol/cloud_surface.h"
+
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/SignedFloodFill.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "cloud/local_fit.h"
+#include "cloud/point_cells.h"
+#include "cloud/stray.h"
+#include "covol/band.h"
+#include "covol/error.h"
+#include "covol/orientation.h"
+#include "detail/pieces.h"
+
+namespace covol {
+namespace {
+
+using cloud::OrientedCloud;
+using cloud::PointCells;
+using cloud::Quadric;
+using openvdb::Coord;
+using Leaf = FloatGrid::TreeType::LeafNodeType;
+
+constexpr double kReachVoxels = 2.5;      // of a quadric, at least
+constexpr double kReachOfLeast = 1.25;    // of the smallest neighbourhood that tells of it
+constexpr double kReachOfRadius = 0.35;   // of the one that it was fitted to
+constexpr double kMostOfRadius = 0.8;     // beyond it the quadric was never fitted
+constexpr double kMostOfCurvature = 0.7;  // of the smallest radius of curvature
+constexpr double kLeastReachVoxels = 1.5;
+constexpr double kBesideOfLeast = 0.75;   // of the smallest neighbourhood: beyond it, sideways, there should be others
+constexpr double kTrusted = 0.6;          // of the reach; beyond, the indicator takes over
+constexpr double kSlope = 0.4;            // of the indicator at the surface, per cell
+constexpr double kNodeVoxels = 0.75;      // distance of quadrics
+constexpr std::size_t kLeastResting = 30;  // points, on a piece of its own
+constexpr double kLeastRestingShare = 5e-4;
+
+double squared(const Vec3& a, const Vec3& b) {
+    double sum = 0;
+    for (int n = 0; n < 3; ++n) sum += (a[n] - b[n]) * (a[n] - b[n]);
+    return sum;
+}
+
+/// Quadrics where they act, sorted into cells.
+class Pieces {
+public:
+    Pieces(std::vector<Quadric> quadrics, double h) : quadrics_(std::move(quadrics)), cells_(feet(quadrics_), 4 * h) {
+        std::vector<Quadric> sorted;
+        for (const std::uint32_t n : cells_.order()) {
+            const Quadric& q = quadrics_[n];
+            sorted.push_back(q);
+            const double wanted = std::max({kReachVoxels * h, kReachOfLeast * q.least_radius, kReachOfRadius * q.radius});
+            reach_.push_back(float(std::max(kLeastReachVoxels * h, std::min({wanted, kMostOfRadius * q.radius, kMostOfCurvature / q.curvature()}))));
+            longest_ = std::max(longest_, double(reach_.back()));
+        }
+        quadrics_ = std::move(sorted);
+    }
+
+    [[nodiscard]] std::size_t size() const { return quadrics_.size(); }
+    [[nodiscard]] const Quadric& operator[](std::size_t n) const { return quadrics_[n]; }
+    [[nodiscard]] double reach(std::size_t n) const { return double(reach_[n]); }
+    [[nodiscard]] const Vec3& foot(std::size_t n) const { return cells_.sorted()[n]; }
+    /// Those that may reach the box.
+    void find(const WorldBox& box, std::vector<PointCells::Range>& ranges) const {
+        WorldBox wide = box;
+        for (int a = 0; a < 3; ++a) {
+            wide.min[a] -= longest_;
+            wide.max[a] += longest_;
+        }
+        cells_.find(wide, ranges);
+    }
+
+private:
+    static std::vector<Vec3> feet(const std::vector<Quadric>& quadrics) {
+        std::vector<Vec3> at;
+        for (const Quadric& q : quadrics) at.push_back(q.foot());
+        return at;
+    }
+    std::vector<Quadric> quadrics_;
+    PointCells cells_;
+    std::vector<float> reach_;
+    double longest_ = 0;
+};
+
+/// The leaves of the domain that quadrics reach or the indicator's surface passes.
+std::vector<Coord> leaves_of(const Pieces& pieces, const Orientation& orientation, const Domain& domain) {
+    std::vector<Coord> leaves;
+    const auto add = [&](const Vec3& low, const Vec3& high) {
+        Coord first, last;
+        for (int a = 0; a < 3; ++a) {
+            first[a] = std::max(int(std::floor(low[a])), domain.min[a]) & ~7;
+            last[a] = std::min(int(std::ceil(high[a])), domain.max[a]);
+        }
+        for (int i = first.x(); i <= last.x(); i += 8)
+            for (int j = first.y(); j <= last.y(); j += 8)
+                for (int k = first.z(); k <= last.z(); k += 8) leaves.emplace_back(i, j, k);
+    };
+    const auto settle = [&] {
+        std::sort(leaves.begin(), leaves.end());
+        leaves.erase(std::unique(leaves.begin(), leaves.end()), leaves.end());
+    };
+    for (std::size_t n = 0; n < pieces.size(); ++n) {
+        Vec3 low = domain.world_to_index(pieces.foot(n)), high = low;
+        for (int a = 0; a < 3; ++a) {
+            low[a] -= pieces.reach(n) / domain.voxel_size;
+            high[a] += pieces.reach(n) / domain.voxel_size;
+        }
+        add(low, high);
+        if (leaves.size() > 1000000) settle();
+    }
+    orientation.crossed([&](const WorldBox& box) { add(domain.world_to_index(box.min), domain.world_to_index(box.max)); });
+    settle();
+    return leaves;
+}
+
+/// Fills one leaf.
+class Blend {
+public:
+    Blend(const Pieces& pieces, const Orientation& orientation, const Domain& domain)
+        : pieces_(pieces), orientation_(orientation), domain_(domain) {}
+
+    void fill(Leaf& leaf) {
+        const double h = domain_.voxel_size;
+        const Coord origin = leaf.origin();
+        const WorldBox box{domain_.index_to_world({double(origin.x()), double(origin.y()), double(origin.z())}),
+                           domain_.index_to_world({origin.x() + 7.0, origin.y() + 7.0, origin.z() + 7.0})};
+        near_.fill(1e30F);
+        nearest_.fill(-1);
+        pieces_.find(box, ranges_);
+        visit(origin, box, [&](std::size_t piece, int at, double share) {
+            if (float(share) < near_[at]) {
+                near_[at] = float(share);
+                nearest_[at] = std::int32_t(piece);
+            }
+        });
+        sum_.fill(0);
+        weights_.fill(0);
+        visit(origin, box, [&](std::size_t piece, int at, double share) {
+            const Vec3 &a = pieces_[piece].axes[2], &b = pieces_[std::size_t(nearest_[at])].axes[2];
+            if (a[0] * b[0] + a[1] * b[1] + a[2] * b[2] <= 0) return;
+            const double w = (1 - share) * (1 - share);
+            sum_[at] += w * pieces_[piece].distance(place(origin, at));
+            weights_[at] += w;
+        });
+        const double limit = kHalfWidthVoxels * h;
+        for (int at = 0; at < 512; ++at) {
+            double own = 0, trust = 0;
+            if (nearest_[at] >= 0) {
+                own = std::clamp(sum_[at] / weights_[at], -limit, limit);
+                const std::size_t piece = std::size_t(nearest_[at]);
+                trust = faded(std::sqrt(double(near_[at]))) * faded(beside(piece, place(origin, at)));
+            }
+            double value = trust * own;
+            if (trust < 1)
+                value += (1 - trust) * std::clamp((0.5 - orientation_.inside(place(origin, at))) * orientation_.cell() / kSlope, -limit, limit);
+            leaf.setValueOn(openvdb::Index(at), float(value));
+        }
+    }
+
+private:
+    /// 1 below the share that is trusted, 0 from 1 on.
+    static double faded(double share) {
+        const double beyond = std::clamp((share - kTrusted) / (1 - kTrusted), 0.0, 1.0);
+        return 1 - beyond * beyond * (3 - 2 * beyond);
+    }
+
+    /// How far a place lies beside the nearest foot, not above it, as a share of what points lie apart: where the surface
+    /// goes on there is a nearer one.
+    [[nodiscard]] double beside(std::size_t piece, const Vec3& world) const {
+        const Quadric& q = pieces_[piece];
+        double d2 = 0, up = 0;
+        for (int a = 0; a < 3; ++a) {
+            const double to = world[a] - pieces_.foot(piece)[a];
+            d2 += to * to;
+            up += to * q.axes[2][a];
+        }
+        return std::sqrt(std::max(0.0, d2 - up * up)) / std::max(q.least_radius * kBesideOfLeast, kLeastReachVoxels * domain_.voxel_size);
+    }
+
+    [[nodiscard]] Vec3 place(const Coord& origin, int at) const {
+        return domain_.index_to_world({double(origin.x() + (at >> 6)), double(origin.y() + (at >> 3 & 7)), double(origin.z() + (at & 7))});
+    }
+
+    /// visit(piece, voxel, squared distance from the piece's foot over its squared reach) where that is below 1.
+    template <typename Visit>
+    void visit(const Coord& origin, const WorldBox& box, Visit visit) const {
+        const double h = domain_.voxel_size;
+        for (const PointCells::Range& range : ranges_)
+            for (std::uint32_t n = range.begin; n < range.end; ++n) {
+                const double reach = pieces_.reach(n), r2 = reach * reach;
+                const Vec3& foot = pieces_.foot(n);
+                int first[3], last[3];
+                bool meets = true;
+                for (int a = 0; a < 3; ++a) {
+                    first[a] = std::max(0, int(std::ceil((foot[a] - reach - box.min[a]) / h)));
+                    last[a] = std::min(7, int(std::floor((foot[a] + reach - box.min[a]) / h)));
+                    meets = meets && first[a] <= last[a];
+                }
+                if (!meets) continue;
+                for (int i = first[0]; i <= last[0]; ++i)
+                    for (int j = first[1]; j <= last[1]; ++j)
+                        for (int k = first[2]; k <= last[2]; ++k) {
+                            const int at = (i << 6) | (j << 3) | k;
+                            const double d2 = squared(place(origin, at), foot);
+                            if (d2 < r2) visit(n, at, d2 / r2);
+                        }
+            }
+    }
+
+    const Pieces& pieces_;
+    const Orientation& orientation_;
+    const Domain& domain_;
+    std::vector<PointCells::Range> ranges_;
+    std::array<float, 512> near_;
+    std::array<std::int32_t, 512> nearest_;
+    std::array<double, 512> sum_, weights_;
+};
+
+double median(std::vector<double> values) {
+    if (values.empty()) return 0;
+    const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+}  // namespace
+
+FloatGridPtr surface_from_cloud(const Domain& domain, const std::vector<Vec3>& points, CloudReport& report, const RunContext& run) {
+    FloatGridPtr result;
+    with_threads(run, [&] {
+        const double h = domain.voxel_size;
+        const CloudScale scale = cloud_scale(points, run);
+        report.spacing = scale.spacing;
+        const std::vector<char> stray = cloud::find_stray(points, scale.spacing, run);
+        OrientedCloud cloud;
+        for (std::size_t n = 0; n < points.size(); ++n)
+            if (!stray[n]) cloud.points.push_back(points[n]);
+        report.stray = points.size() - cloud.size();
+        cloud.counts.assign(cloud.size(), 1.0F);
+        const Orientation orientation = orient(cloud.points, scale, run);
+        report.iterations = orientation.iterations;
+        report.indicator_cell = orientation.cell();
+        cloud.normals = orientation.normals;
+        const OrientedCloud nodes = thinned(cloud, kNodeVoxels * h);
+        std::vector<Quadric> quadrics = cloud::fit_quadrics(nodes, cloud, scale.spacing, run);
+        report.bare_nodes = std::size_t(std::erase_if(quadrics, [](const Quadric& q) { return !(q.radius > 0); }));
+        std::vector<double> noise, radius;
+        for (const Quadric& q : quadrics) {
+            noise.push_back(q.noise);
+            radius.push_back(q.radius);
+        }
+        report.noise = median(noise);
+        report.radius = median(radius);
+        const Pieces pieces(std::move(quadrics), h);
+        run.check();
+        const FloatGridPtr field = make_grid(domain, float(kHalfWidthVoxels * h), "u");
+        std::vector<Leaf*> leaves;
+        for (const Coord& origin : leaves_of(pieces, orientation, domain)) leaves.push_back(field->tree().touchLeaf(origin));
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 8), [&](const auto& range) {
+            if (run.cancelled()) return;
+            Blend blend(pieces, orientation, domain);
+            for (std::size_t n = range.begin(); n < range.end(); ++n) blend.fill(*leaves[n]);
+        });
+        run.check();
+        openvdb::tools::signedFloodFill(field->tree());
+        result = start_from_grid(domain, *field, run);
+        const std::size_t least = std::max(kLeastResting, std::size_t(kLeastRestingShare * double(cloud.size())));
+        report.dropped_pieces = detail::drop_bare_pieces(*result, cloud.points, least);
+        if (report.dropped_pieces > 0) result = start_from_grid(domain, *result, run);
+    });
+    return result;
+}
+
+}  // namespace covol

@@ -1,0 +1,284 @@
+#include "cloud/local_fit.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "cloud/point_cells.h"
+
+namespace covol::cloud {
+namespace {
+
+constexpr int kLevels = 9;
+constexpr double kGrowth = 1.4142135623730951;
+constexpr double kFirstSpacings = 2.0;    // radius of the first: about 12 points
+constexpr double kThinnedShare = 0.2;     // of the radius: points closer are averaged first
+constexpr std::size_t kLeastPoints = 9;
+constexpr double kSheetShare = 0.3;       // noise, of the radius; points that fill a ball have 0.45
+constexpr double kAgreement = 2.0;        // standard deviations
+constexpr double kResidualGrowth = 1.25;  // beyond it the fit itself is off
+constexpr double kRidge = 1e-4;
+constexpr double kSheetHeight = 0.15;     // of the radius: what is farther off the plane may be another sheet
+constexpr double kMostHeight = 0.4;       // of the radius: a foot farther from its node is no sheet's
+constexpr double kLeastCosine = 0.4;      // between the normal as it was oriented and as it is fitted
+constexpr double kLeastSpread = 0.16;     // standard deviation along any direction, of the radius; where points fill the disc 0.35
+constexpr double kMostGrowth = 2.9;       // of the radius, until the points are a sheet
+constexpr double kLeastMajority = 5;      // points
+
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Vec3 minus(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+Vec3 cross(const Vec3& a, const Vec3& b) {
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+Vec3 unit(const Vec3& v) {
+    const double l = std::sqrt(dot(v, v));
+    return {v[0] / l, v[1] / l, v[2] / l};
+}
+
+std::array<Vec3, 3> frame_of(const Vec3& normal) {
+    int least = 0;
+    for (int a = 1; a < 3; ++a)
+        if (std::abs(normal[a]) < std::abs(normal[least])) least = a;
+    Vec3 other{0, 0, 0};
+    other[least] = 1;
+    const Vec3 u = unit(cross(normal, other));
+    return {u, cross(normal, u), normal};
+}
+
+struct Fit {
+    std::array<double, 6> c{};
+    double noise = 0;      // standard deviation of the points
+    double deviation = 0;  // of c0
+    bool good = false;
+};
+
+/// The cloud, thinned for one radius.
+struct Level {
+    Level(const OrientedCloud& all, double r) : radius(r), cloud(all), cells(cloud.points, r) {
+        normals.reserve(cloud.size());
+        counts.reserve(cloud.size());
+        for (const std::uint32_t n : cells.order()) {
+            normals.push_back(cloud.normals[n]);
+            counts.push_back(cloud.counts[n]);
+        }
+    }
+    double radius;
+    const OrientedCloud& cloud;
+    PointCells cells;
+    std::vector<Vec3> normals;   // in the cells' order
+    std::vector<float> counts;
+};
+
+struct Scratch {
+    std::vector<PointCells::Range> ranges;
+    std::vector<std::array<double, 4>> near;  // u, v, t, in radii, and the weight
+    std::vector<float> counts;
+};
+
+Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes, Scratch& scratch) {
+    const double r = level.radius, r2 = r * r;
+    scratch.near.clear();
+    scratch.counts.clear();
+    for (const PointCells::Range& range : scratch.ranges)
+        for (std::uint32_t n = range.begin; n < range.end; ++n) {
+            const Vec3 to = minus(level.cells.sorted()[n], origin);
+            const double d2 = dot(to, to);
+            if (d2 >= r2 || dot(level.normals[n], axes[2]) <= 0) continue;
+            const double near = 1 - d2 / r2;
+            scratch.near.push_back({dot(to, axes[0]) / r, dot(to, axes[1]) / r, dot(to, axes[2]) / r, near * near});
+            scratch.counts.push_back(level.counts[n]);
+        }
+    Fit result;
+    if (scratch.near.size() < kLeastPoints) return result;
+    Matrix6 m = Matrix6::Zero();
+    Vector6 right = Vector6::Zero();
+    double sum = 0, squares = 0, count = 0;
+    for (std::size_t n = 0; n < scratch.near.size(); ++n) {
+        const auto& [u, v, t, near] = scratch.near[n];
+        const double c = double(scratch.counts[n]), w = c * near;
+        Vector6 b;
+        b << 1, u, v, u * u, u * v, v * v;
+        m.noalias() += w * b * b.transpose();
+        right += w * t * b;
+        sum += w;
+        squares += c * near * near;
+        count += c;
+    }
+    // Narrow bodies seen from the side: across them the quadric knows nothing beyond its points.
+    const double uu = m(1, 1) / sum - m(0, 1) * m(0, 1) / (sum * sum), vv = m(2, 2) / sum - m(0, 2) * m(0, 2) / (sum * sum),
+                 uv = m(1, 2) / sum - m(0, 1) * m(0, 2) / (sum * sum);
+    if (0.5 * (uu + vv) - std::hypot(0.5 * (uu - vv), uv) < kLeastSpread * kLeastSpread) return result;
+    for (int d = 3; d < 6; ++d) m(d, d) += kRidge * sum;
+    const Eigen::LDLT<Matrix6> solver(m);
+    if (solver.info() != Eigen::Success || !solver.isPositive()) return result;
+    const Vector6 x = solver.solve(right);
+    const Vector6 first = solver.solve(Vector6::Unit(0));
+    double residual = 0;
+    for (std::size_t n = 0; n < scratch.near.size(); ++n) {
+        const auto& [u, v, t, near] = scratch.near[n];
+        const double off = t - (x[0] + u * (x[1] + u * x[3] + v * x[4]) + v * (x[2] + v * x[5]));
+        residual += double(scratch.counts[n]) * near * off * off;
+    }
+    const double effective = sum * sum / squares;
+    if (effective < 7) return result;
+    result.noise = r * std::sqrt(residual / sum * effective / (effective - 6));
+    result.deviation = result.noise * std::sqrt(std::max(0.0, first[0]) * squares / sum);
+    result.c = {x[0] * r, x[1], x[2], x[3] / r, x[4] / r, x[5] / r};
+    result.good = std::isfinite(x.sum());
+    return result;
+}
+
+/// Whether most points beside this one on its own sheet have a normal like it; -1: too few to tell.
+int is_of_majority(const Level& level, const Vec3& origin, const Vec3& normal, const std::vector<PointCells::Range>& ranges) {
+    const double r2 = level.radius * level.radius, height = kSheetHeight * level.radius;
+    double same = 0, opposite = 0;
+    for (const PointCells::Range& range : ranges)
+        for (std::uint32_t n = range.begin; n < range.end; ++n) {
+            const Vec3 to = minus(level.cells.sorted()[n], origin);
+            if (dot(to, to) >= r2 || std::abs(dot(to, normal)) > height) continue;
+            (dot(level.normals[n], normal) > 0 ? same : opposite) += double(level.counts[n]);
+        }
+    return same + opposite < kLeastMajority ? -1 : same >= opposite;
+}
+
+Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& normal, Scratch& scratch) {
+    Quadric best;
+    best.origin = point;
+    best.axes = frame_of(normal);
+    struct Seen { double height, deviation, noise; };
+    std::vector<Seen> seen;
+    int majority = -1;
+    for (const Level& level : levels) {
+        WorldBox box;
+        for (int a = 0; a < 3; ++a) {
+            box.min[a] = point[a] - level.radius;
+            box.max[a] = point[a] + level.radius;
+        }
+        level.cells.find(box, scratch.ranges);
+        if (majority < 0) {
+            majority = is_of_majority(level, point, normal, scratch.ranges);
+            best.least_radius = level.radius;
+        }
+        if (majority == 0) return best;
+        if (seen.empty() && majority >= 0 && level.radius > kMostGrowth * best.least_radius) return best;
+        Fit now = fit(level, point, best.axes, scratch);
+        if (!now.good || now.noise > kSheetShare * level.radius) {
+            if (seen.empty()) continue;
+            break;
+        }
+        if (seen.empty()) {
+            // Over the plane that it tells itself.
+            Vec3 tilted;
+            for (int a = 0; a < 3; ++a) tilted[a] = best.axes[2][a] - now.c[1] * best.axes[0][a] - now.c[2] * best.axes[1][a];
+            const std::array<Vec3, 3> before = best.axes;
+            best.axes = frame_of(unit(tilted));
+            const Fit again = fit(level, point, best.axes, scratch);
+            if (again.good) now = again; else best.axes = before;
+        }
+        const bool agrees = std::all_of(seen.begin(), seen.end(), [&](const Seen& s) {
+            return std::abs(s.height - now.c[0]) <= kAgreement * s.deviation && now.noise <= kResidualGrowth * s.noise;
+        });
+        if (!agrees) break;
+        if (seen.empty() && (std::abs(now.c[0]) > kMostHeight * level.radius || dot(best.axes[2], normal) < kLeastCosine)) return best;
+        seen.push_back({now.c[0], now.deviation, now.noise});
+        best.c = now.c;
+        best.radius = level.radius;
+        best.noise = now.noise;
+    }
+    return best;
+}
+
+}  // namespace
+
+double Quadric::distance(const Vec3& world) const {
+    const Vec3 to = minus(world, origin);
+    const double u = dot(to, axes[0]), v = dot(to, axes[1]), t = dot(to, axes[2]);
+    const double height = c[0] + u * (c[1] + u * c[3] + v * c[4]) + v * (c[2] + v * c[5]);
+    const double du = c[1] + 2 * u * c[3] + v * c[4], dv = c[2] + 2 * v * c[5] + u * c[4];
+    return (t - height) / std::sqrt(1 + du * du + dv * dv);
+}
+
+double Quadric::curvature() const {
+    // Of [2 c3, c4; c4, 2 c5], the slope at the foot being small.
+    const double mean = c[3] + c[5];
+    return std::abs(mean) + std::hypot(c[3] - c[5], c[4]);
+}
+
+Vec3 Quadric::foot() const {
+    Vec3 at = origin;
+    for (int a = 0; a < 3; ++a) at[a] += c[0] * axes[2][a];
+    return at;
+}
+
+OrientedCloud thinned(const OrientedCloud& cloud, double edge) {
+    const PointCells cells(cloud.points, edge);
+    struct Mean { Vec3 point{0, 0, 0}, normal{0, 0, 0}; double count = 0; };
+    OrientedCloud result;
+    for (std::size_t n = 0; n < cells.cell_count(); ++n) {
+        std::array<Mean, 6> means;  // by the direction that is closest to the normal's
+        const auto [begin, end] = cells.cell(n);
+        for (std::uint32_t at = begin; at < end; ++at) {
+            const std::uint32_t point = cells.order()[at];
+            const Vec3& normal = cloud.normals[point];
+            int axis = 0;
+            for (int a = 1; a < 3; ++a)
+                if (std::abs(normal[a]) > std::abs(normal[axis])) axis = a;
+            Mean& mean = means[std::size_t(2 * axis + (normal[axis] < 0))];
+            const double c = double(cloud.counts[point]);
+            for (int a = 0; a < 3; ++a) {
+                mean.point[a] += c * cloud.points[point][a];
+                mean.normal[a] += c * normal[a];
+            }
+            mean.count += c;
+        }
+        // Normals that are close, on either side of the limit between two directions, are one side of a sheet.
+        for (std::size_t m = 0; m < 6; ++m)
+            for (std::size_t o = 0; o < m; ++o)
+                if (means[m].count > 0 && means[o].count > 0 && dot(means[m].normal, means[o].normal) > 0) {
+                    for (int a = 0; a < 3; ++a) {
+                        means[m].point[a] += means[o].point[a];
+                        means[m].normal[a] += means[o].normal[a];
+                    }
+                    means[m].count += means[o].count;
+                    means[o] = {};
+                }
+        for (const Mean& mean : means) {
+            if (!(mean.count > 0) || !(dot(mean.normal, mean.normal) > 0)) continue;
+            result.points.push_back({mean.point[0] / mean.count, mean.point[1] / mean.count, mean.point[2] / mean.count});
+            result.normals.push_back(unit(mean.normal));
+            result.counts.push_back(float(mean.count));
+        }
+    }
+    return result;
+}
+
+std::vector<Quadric> fit_quadrics(const OrientedCloud& nodes, const OrientedCloud& cloud, double spacing, const RunContext& run) {
+    std::vector<OrientedCloud> clouds;
+    clouds.reserve(kLevels);
+    std::vector<Level> levels;
+    levels.reserve(kLevels);
+    double radius = kFirstSpacings * spacing;
+    for (int n = 0; n < kLevels; ++n, radius *= kGrowth) {
+        run.check();
+        // Averages of averages cost little and miss nothing that a radius this large could see.
+        clouds.push_back(thinned(clouds.empty() ? cloud : clouds.back(), kThinnedShare * radius));
+        levels.emplace_back(clouds.back(), radius);
+    }
+    std::vector<Quadric> result(nodes.size());
+    tbb::enumerable_thread_specific<Scratch> scratch;
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, nodes.size(), 256), [&](const auto& range) {
+        if (run.cancelled()) return;
+        Scratch& mine = scratch.local();
+        for (std::size_t n = range.begin(); n < range.end(); ++n) result[n] = choose(levels, nodes.points[n], nodes.normals[n], mine);
+    });
+    run.check();
+    return result;
+}
+
+}  // namespace covol::cloud

@@ -1,0 +1,45 @@
+#pragma once
+// Pieces of the surface behind an oriented cloud: quadrics over neighbourhoods as wide as the noise asks for and the shape
+// allows.
+#include <array>
+#include <vector>
+
+#include "covol/domain.h"
+#include "covol/run.h"
+
+namespace covol::cloud {
+
+/// Points with outward normals, each of which may stand for several.
+struct OrientedCloud {
+    std::vector<Vec3> points, normals;
+    std::vector<float> counts;
+    [[nodiscard]] std::size_t size() const { return points.size(); }
+};
+
+/// Means of the points of each cell of the given edge, those on the two sides of a sheet apart.
+[[nodiscard]] OrientedCloud thinned(const OrientedCloud& cloud, double edge);
+
+/// A height over a plane: t = c0 + c1 u + c2 v + c3 u^2 + c4 uv + c5 v^2, world units.
+struct Quadric {
+    Vec3 origin;
+    std::array<Vec3, 3> axes;  ///< u, v and the normal, outward
+    std::array<double, 6> c;
+    double radius = 0;         ///< of the neighbourhood that it was fitted to
+    double least_radius = 0;   ///< of the smallest that tells anything
+    double noise = 0;          ///< standard deviation of the points from it
+    /// First-order signed distance, > 0 outside.
+    [[nodiscard]] double distance(const Vec3& world) const;
+    [[nodiscard]] double curvature() const;  ///< the larger one at the foot, absolute, nearly
+    [[nodiscard]] Vec3 foot() const;  ///< above the origin
+};
+
+/// Quadrics at the nodes, by weighted least squares. The neighbourhood is the largest of a geometric sequence whose fit
+/// agrees with those of all smaller ones up to noise (Lepski, Theory Probab. Appl. 35, 1990, for points: Wang and Mitra
+/// 2004, Goldenshluger and Nemirovski 1997): wide where noise has to be averaged, narrow at edges and tips.
+/// @param nodes    where; their normals say which side of a sheet they are on
+/// @param spacing  mean distance of neighbours on the surface, of `cloud`'s points as they were measured
+/// @return as many as there are nodes; radius 0 where no neighbourhood is a sheet
+[[nodiscard]] std::vector<Quadric> fit_quadrics(const OrientedCloud& nodes, const OrientedCloud& cloud, double spacing,
+                                                const RunContext& run);
+
+}  // namespace covol::cloud

@@ -1,0 +1,289 @@
+#include "covol/orientation.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+
+#include "cloud/neighbours.h"
+#include "cloud/point_cells.h"
+#include "cloud/winding_field.h"
+#include "covol/error.h"
+
+namespace covol {
+
+struct Orientation::Indicator {
+    cloud::LatticeField field;
+};
+
+namespace {
+
+using cloud::Lattice;
+using cloud::LatticeField;
+using cloud::PointCells;
+using cloud::WindingField;
+
+constexpr double kBeyond = 0.2;          // of the longest side, around the points: chi is 0 at the end
+constexpr double kPatchCells = 2;        // edge of the cells over which the indicator is averaged
+constexpr double kPatchOff = 0.12;       // from 1/2, of a patch that may be turned
+constexpr int kPatchRounds = 4, kPatchCycles = 2, kAfterTurning = 3;
+constexpr std::size_t kNeighbours = 8;                  // that an area is taken from
+constexpr int kFirstPasses = 12;         // of smoothing, for the first guess
+constexpr double kSteady = 1e-4;         // the normals' mean change, 1 - cosine
+constexpr double kHighest = 1.2;         // chi at a point beyond which another part encloses it already
+constexpr int kCycles = 1, kLastCycles = 4;  // of multigrid
+// The finest lattice's cell: smaller ones let single points turn, larger ones lose thin parts.
+constexpr double kCellSpacings = 0.8, kCellNoises = 1.0;
+constexpr double kLeastSpacings = 0.5, kFiner = 1.5, kFewTurned = 0.002;
+constexpr int kMostTries = 3;
+constexpr int kLeastCells = 48, kMostCells = 192;
+
+/// A lattice and what is done on it.
+struct Stage {
+    int cells;       // along the longest side, the part beyond the points included
+    int iterations;  // at most
+    bool is_last;
+};
+
+Vec3 unit(const Vec3& v) {
+    const double length = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    return length > 1e-30 ? Vec3{v[0] / length, v[1] / length, v[2] / length} : Vec3{0, 0, 0};
+}
+
+double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+double median(std::vector<double> values) {
+    const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+/// Of the surface around each point: the disc to its eighth neighbour. A density on a lattice would count the other side of
+/// thin parts, too.
+std::vector<double> areas_of(const std::vector<Vec3>& points, double spacing) {
+    const PointCells cells(points, cloud::kFirstRadius * spacing);
+    std::vector<double> areas(points.size());
+    cloud::for_nearest(cells, spacing, kNeighbours, [&](std::uint32_t point, const std::vector<cloud::Neighbour>& near) {
+        areas[point] = near.empty() ? spacing * spacing : M_PI * near.back().squared / double(near.size());
+    });
+    return areas;
+}
+
+class Iteration {
+public:
+    explicit Iteration(const std::vector<Vec3>& points) : points_(points), vectors_(points.size()), values_(points.size()) {}
+
+    void run(const Stage& stage, Orientation& result, const RunContext& run) {
+        const Lattice lattice = cloud::lattice_around(bounding_box(points_), kBeyond, stage.cells);
+        WindingField field(lattice);
+        if (last_) field.start_from(last_->indicator());
+        if (result.normals.empty()) first_guess(lattice, result);
+        for (int n = 0; n < stage.iterations; ++n) {
+            run.check();
+            ++result.iterations;
+            if (turn(field, result, kCycles) < kSteady) break;
+        }
+        turn_patches(field, result, run);
+        if (stage.is_last) turn(field, result, kLastCycles);
+        last_.emplace(std::move(field));
+    }
+
+    [[nodiscard]] WindingField& last() { return *last_; }
+
+private:
+    void first_guess(const Lattice& lattice, Orientation& result) const {
+        const LatticeField density = cloud::point_density(lattice, points_, kFirstPasses);
+        result.normals.resize(points_.size());
+        tbb::parallel_for(std::size_t(0), points_.size(), [&](std::size_t n) {
+            const Vec3 g = density.at(points_[n]).gradient;
+            result.normals[n] = unit({-g[0], -g[1], -g[2]});
+        });
+    }
+
+    /// The indicator of the normals.
+    void solve(WindingField& field, Orientation& result, int cycles) {
+        const std::size_t count = points_.size();
+        tbb::parallel_for(std::size_t(0), count, [&](std::size_t n) {
+            for (int a = 0; a < 3; ++a) vectors_[n][a] = result.areas[n] * result.normals[n][a];
+        });
+        field.solve(points_, vectors_, cycles);
+        const LatticeField& chi = field.indicator();
+        tbb::parallel_for(std::size_t(0), count, [&](std::size_t n) { values_[n] = std::abs(chi.at(points_[n]).value); });
+        // Half of the indicator's step is at the points, whichever way they are turned.
+        if (const double half = median(values_); half > 0) {
+            field.multiply(0.5 / half);
+            for (double& area : result.areas) area *= 0.5 / half;
+        }
+    }
+
+    /// @return the normals' mean change, 1 - cosine
+    double turn(WindingField& field, Orientation& result, int cycles) {
+        solve(field, result, cycles);
+        const std::size_t count = points_.size();
+        const LatticeField& chi = field.indicator();
+        std::vector<double> cosine(count);
+        tbb::parallel_for(std::size_t(0), count, [&](std::size_t n) {
+            const LatticeField::Sample here = chi.at(points_[n]);
+            const double sign = here.value < 0 || here.value > kHighest ? 1 : -1;
+            const Vec3 normal = unit({sign * here.gradient[0], sign * here.gradient[1], sign * here.gradient[2]});
+            cosine[n] = dot(normal, result.normals[n]);
+            if (dot(normal, normal) > 0) result.normals[n] = normal;
+        });
+        result.turned = double(std::count_if(cosine.begin(), cosine.end(), [](double c) { return c < 0; })) / double(count);
+        return 1 - std::accumulate(cosine.begin(), cosine.end(), 0.0) / double(count);
+    }
+
+    /// Where the indicator is not 1/2 on the mean over a patch, the patch may be turned as a whole, and stay so: it makes its
+    /// own normals. Each such patch is turned to try, all at once, and stays turned where that brings it closer to 1/2.
+    void turn_patches(WindingField& field, Orientation& result, const RunContext& run) {
+        const PointCells cells(points_, kPatchCells * field.indicator().lattice.cell);
+        const std::vector<std::vector<std::uint32_t>> beside = neighbours_of(cells);
+        for (int round = 0; round < kPatchRounds; ++round) {
+            run.check();
+            turn(field, result, kPatchCycles);  // the indicator of what the normals are now
+            const std::vector<double> off = mean_off(cells, field.indicator());
+            const std::vector<int> patch = patches_of(cells, beside, off);
+            const int patches = 1 + *std::max_element(patch.begin(), patch.end());
+            if (patches == 0) return;
+            const std::vector<Vec3> before = result.normals;
+            for_points_of(cells, [&](std::size_t cell, std::uint32_t point) {
+                if (patch[cell] >= 0)
+                    for (double& c : result.normals[point]) c = -c;
+            });
+            solve(field, result, kPatchCycles);
+            const std::vector<double> turned = mean_off(cells, field.indicator());
+            std::vector<double> gain(std::size_t(patches), 0.0);
+            for (std::size_t cell = 0; cell < patch.size(); ++cell) {
+                if (patch[cell] < 0) continue;
+                const auto [begin, end] = cells.cell(cell);
+                gain[std::size_t(patch[cell])] += double(end - begin) * (off[cell] * off[cell] - turned[cell] * turned[cell]);
+            }
+            bool any = false;
+            for_points_of(cells, [&](std::size_t cell, std::uint32_t point) {
+                if (patch[cell] >= 0 && gain[std::size_t(patch[cell])] <= 0) result.normals[point] = before[point];
+            });
+            for (const double g : gain) any = any || g > 0;
+            for (int n = 0; n < kAfterTurning; ++n) turn(field, result, kPatchCycles);
+            if (!any) return;
+        }
+    }
+
+    template <typename Visit>
+    static void for_points_of(const PointCells& cells, Visit visit) {
+        for (std::size_t cell = 0; cell < cells.cell_count(); ++cell)
+            for (std::uint32_t at = cells.cell(cell).begin; at < cells.cell(cell).end; ++at) visit(cell, cells.order()[at]);
+    }
+
+    static std::vector<std::vector<std::uint32_t>> neighbours_of(const PointCells& cells) {
+        std::vector<std::uint32_t> cell_of(cells.sorted().size());
+        for (std::uint32_t cell = 0; cell < cells.cell_count(); ++cell)
+            for (std::uint32_t at = cells.cell(cell).begin; at < cells.cell(cell).end; ++at) cell_of[at] = cell;
+        std::vector<std::vector<std::uint32_t>> beside(cells.cell_count());
+        std::vector<PointCells::Range> ranges;
+        for (std::uint32_t cell = 0; cell < cells.cell_count(); ++cell) {
+            const Vec3& p = cells.sorted()[cells.cell(cell).begin];
+            const double r = cells.edge();
+            cells.find({{p[0] - r, p[1] - r, p[2] - r}, {p[0] + r, p[1] + r, p[2] + r}}, ranges);
+            for (const PointCells::Range& range : ranges)
+                for (std::uint32_t at = range.begin; at < range.end; at = cells.cell(cell_of[at]).end)
+                    if (cell_of[at] != cell) beside[cell].push_back(cell_of[at]);
+        }
+        return beside;
+    }
+
+    /// Mean over each cell's points of the indicator, less 1/2.
+    static std::vector<double> mean_off(const PointCells& cells, const LatticeField& chi) {
+        std::vector<double> off(cells.cell_count());
+        tbb::parallel_for(std::size_t(0), off.size(), [&](std::size_t cell) {
+            const auto [begin, end] = cells.cell(cell);
+            double sum = 0;
+            for (std::uint32_t at = begin; at < end; ++at) sum += chi.at(cells.sorted()[at]).value - 0.5;
+            off[cell] = sum / double(end - begin);
+        });
+        return off;
+    }
+
+    /// Connected cells that are off to the same side; -1: not off.
+    static std::vector<int> patches_of(const PointCells& cells, const std::vector<std::vector<std::uint32_t>>& beside, const std::vector<double>& off) {
+        std::vector<int> patch(cells.cell_count(), -1);
+        const auto side = [&](std::size_t cell) { return std::abs(off[cell]) < kPatchOff ? 0 : off[cell] < 0 ? -1 : 1; };
+        int count = 0;
+        std::vector<std::uint32_t> front;
+        for (std::uint32_t first = 0; first < patch.size(); ++first) {
+            if (patch[first] >= 0 || side(first) == 0) continue;
+            patch[first] = count;
+            front.push_back(first);
+            while (!front.empty()) {
+                const std::uint32_t cell = front.back();
+                front.pop_back();
+                for (const std::uint32_t next : beside[cell])
+                    if (patch[next] < 0 && side(next) == side(first)) {
+                        patch[next] = count;
+                        front.push_back(next);
+                    }
+            }
+            ++count;
+        }
+        return patch;
+    }
+
+    const std::vector<Vec3>& points_;
+    std::vector<Vec3> vectors_;
+    std::vector<double> values_;
+    std::optional<WindingField> last_;
+};
+
+}  // namespace
+
+double Orientation::inside(const Vec3& world) const { return indicator->field.at(world).value; }
+Vec3 Orientation::gradient(const Vec3& world) const { return indicator->field.at(world).gradient; }
+double Orientation::cell() const { return indicator->field.lattice.cell; }
+
+void Orientation::crossed(const std::function<void(const WorldBox&)>& visit) const {
+    const Lattice& l = indicator->field.lattice;
+    const std::vector<float>& values = indicator->field.values;
+    const std::size_t up_i = std::size_t(l.nodes[1]) * std::size_t(l.nodes[2]), up_j = std::size_t(l.nodes[2]);
+    for (int i = 0; i + 1 < l.nodes[0]; ++i)
+        for (int j = 0; j + 1 < l.nodes[1]; ++j)
+            for (int k = 0; k + 1 < l.nodes[2]; ++k) {
+                const std::size_t at = std::size_t(i) * up_i + std::size_t(j) * up_j + std::size_t(k);
+                int inside = 0;
+                for (int corner = 0; corner < 8; ++corner)
+                    inside += values[at + (corner & 4 ? up_i : 0) + (corner & 2 ? up_j : 0) + (corner & 1 ? 1 : 0)] > 0.5F;
+                if (inside == 0 || inside == 8) continue;
+                const Vec3 low{l.origin[0] + i * l.cell, l.origin[1] + j * l.cell, l.origin[2] + k * l.cell};
+                visit({low, {low[0] + l.cell, low[1] + l.cell, low[2] + l.cell}});
+            }
+}
+
+Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run) {
+    if (points.size() < 4) throw Error(Errc::InvalidInput, "orient: expected at least 4 points, got " + std::to_string(points.size()));
+    const WorldBox box = bounding_box(points);
+    double longest = 0;
+    for (int a = 0; a < 3; ++a) longest = std::max(longest, box.max[a] - box.min[a]);
+    if (!(longest > 0)) throw Error(Errc::InvalidInput, "orient: all points lie at one place");
+    Orientation best;
+    with_threads(run, [&] {
+        const std::vector<double> areas = areas_of(points, scale.spacing);
+        // Noise is hard to tell from thin parts: where normals go on turning a finer lattice may hold them.
+        double cell = std::max(kCellSpacings * scale.spacing, kCellNoises * scale.noise);
+        int last = 0;
+        for (int n = 0; n < kMostTries; ++n, cell /= kFiner) {
+            const int cells = std::clamp(int(longest * (1 + 2 * kBeyond) / std::max(cell, kLeastSpacings * scale.spacing)), kLeastCells, kMostCells);
+            if (cells == last) break;
+            last = cells;
+            Orientation now;
+            now.areas = areas;
+            Iteration iteration(points);
+            for (const Stage& stage : {Stage{cells * 2 / 3, 12, false}, Stage{cells, 8, true}}) iteration.run(stage, now, run);
+            now.indicator = std::make_shared<const Orientation::Indicator>(Orientation::Indicator{iteration.last().indicator()});
+            if (n == 0 || now.turned < best.turned) best = std::move(now);
+            if (best.turned < kFewTurned) break;
+        }
+    });
+    return best;
+}
+
+}  // namespace covol

@@ -1,0 +1,31 @@
+// The start from a cloud: the surface itself.
+#include "detail/memory_need.h"
+#include "pipeline/fields.h"
+#include "pipeline/starts.h"
+
+namespace covol::pipeline {
+namespace {
+
+constexpr double kMarginShare = 0.1;  // of the longest side, beyond the points: where they leave holes the surface bulges
+
+}  // namespace
+
+void start_from_cloud(Job& job) {
+    job.origin = StartOrigin::Cloud;
+    job.options.evolve.follow = true;
+    const WorldBox box = bounding_box(job.points);
+    double extent = 0;
+    for (int a = 0; a < 3; ++a) extent = std::max(extent, box.max[a] - box.min[a]);
+    job.report().domain = job.domain_with_chosen_margin(kMarginShare * extent + kMarginVoxels * job.h());
+    CloudReport& report = job.report().cloud;
+    {
+        Timed timed(job.report().seconds.tag);
+        job.result.u = surface_from_cloud(job.domain(), job.points, report, job.run);
+    }
+    if (!job.rests() && job.uses_points()) compute_distance(job, tube_for_start(job));
+    job.choose("start", "cloud",
+               std::to_string(job.points.size()) + " points, " + number(report.spacing) + " apart, noise " + number(report.noise) +
+                   "; averaged within " + number(report.radius) + "; oriented in " + std::to_string(report.iterations) + " iterations");
+}
+
+}  // namespace covol::pipeline

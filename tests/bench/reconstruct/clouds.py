@@ -1,0 +1,41 @@
+"""Point clouds drawn from truth meshes: uniform by area, with noise and outliers.
+
+    /usr/bin/python3 tests/bench/reconstruct/clouds.py MESH.ply OUT.ply COUNT [NOISE [OUTLIERS [SEED]]]
+"""
+import sys
+
+import numpy as np
+
+import ply
+
+
+def sample(vertices, triangles, count, random):
+    """Points on the triangles, uniform by area."""
+    corners = vertices[triangles]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    a, b, c = np.moveaxis(corners[random.choice(len(triangles), count, p=areas / areas.sum())], 1, 0)
+    root, share = np.sqrt(random.random((count, 1))), random.random((count, 1))
+    return a * (1 - root) + b * root * (1 - share) + c * root * share
+
+
+def cloud(mesh, count, noise=0, outliers=0, seed=1):
+    """(n x 3) points; the same places for all noises and outliers of a seed.
+
+    @param mesh      (vertices, triangles)
+    @param noise     standard deviation along each axis, in % of the mesh's bounding box diagonal
+    @param outliers  in % of count, on top of it; uniform in the bounding box, which is 10 % longer than the mesh's
+    """
+    vertices, triangles = mesh
+    places, errors, strays = (np.random.default_rng([seed, stream]) for stream in range(3))
+    low, high = vertices.min(0), vertices.max(0)
+    points = sample(vertices, triangles, count, places)
+    points += errors.normal(size=points.shape) * np.linalg.norm(high - low) * noise / 100
+    wide = 1.1 * (strays.random((round(count * outliers / 100), 3)) - 0.5)
+    return np.concatenate([points, (low + high) / 2 + wide * (high - low)])
+
+
+if __name__ == "__main__":
+    if not 4 <= len(sys.argv) <= 7:
+        raise SystemExit(__doc__)
+    numbers = [kind(word) for kind, word in zip((int, float, float, int), sys.argv[3:])]
+    ply.write(sys.argv[2], cloud(ply.read(sys.argv[1]), *numbers))
