@@ -9,7 +9,8 @@ namespace covol {
 
 /// What surface_from_cloud() found out about the points.
 struct CloudReport {
-    double spacing = 0;        ///< world units: 1 / sqrt(points per area)
+    double spacing = 0;        ///< CloudScale::spacing
+    double turned = 0;         ///< Orientation::turned
     double noise = 0;          ///< standard deviation of the points from the surface, median
     double radius = 0;         ///< of the neighbourhoods that were averaged, median
     int iterations = 0;        ///< of the orientation
@@ -21,12 +22,12 @@ struct CloudReport {
 
 /// The closed surface behind points without normals, as a start (negative inside).
 ///
-/// The points are oriented by the indicator function that they make themselves (orient()). Near them the level set is the
+/// Near the points, oriented by the indicator function that they make themselves (orient_cloud()), the level set is the
 /// signed distance to local quadrics, fitted to neighbourhoods as wide as their noise asks for, blended (implicit moving
 /// least squares; Kolluri, Provably good moving least squares, ACM Trans. Algorithms 4(2), 2008; Ohtake and others,
 /// Multi-level partition of unity implicits, 2003); where there are no points it is the indicator's.
-/// @throws Error InvalidInput (fewer than 4 points, no surface), Cancelled.
-[[nodiscard]] FloatGridPtr surface_from_cloud(const Domain& domain, const std::vector<Vec3>& points, CloudReport& report,
+/// @throws Error InvalidInput (no surface), Cancelled.
+[[nodiscard]] FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cloud, CloudReport& report,
                                               const RunContext& run = {});
 
 }  // namespace covol

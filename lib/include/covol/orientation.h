@@ -43,4 +43,17 @@ struct Orientation {
 /// @throws Error InvalidInput (fewer than 4 points, points without extent), Cancelled.
 [[nodiscard]] Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run = {});
 
+/// A cloud that is ready for surface_from_cloud().
+struct CloudOrientation {
+    std::vector<Vec3> points;  ///< those that lie on a surface
+    Orientation orientation;   ///< of them
+    CloudScale scale;
+    std::size_t stray = 0;     ///< points far from all others that lie on no sheet, left out
+    /// Few normals go on turning. Else the points hardly enclose anything, or noise hides on which side they lie.
+    [[nodiscard]] bool settled() const { return orientation.turned < kSettled; }
+    static constexpr double kSettled = 0.025;  // clouds of closed shapes have up to 0.02, scans of one side 0.03 to 0.15
+};
+/// cloud_scale(), without stray points, and orient().
+[[nodiscard]] CloudOrientation orient_cloud(const std::vector<Vec3>& points, const RunContext& run = {});
+
 }  // namespace covol

@@ -10,7 +10,6 @@
 
 #include "cloud/local_fit.h"
 #include "cloud/point_cells.h"
-#include "cloud/stray.h"
 #include "covol/band.h"
 #include "covol/error.h"
 #include "covol/orientation.h"
@@ -228,24 +227,19 @@ double median(std::vector<double> values) {
 
 }  // namespace
 
-FloatGridPtr surface_from_cloud(const Domain& domain, const std::vector<Vec3>& points, CloudReport& report, const RunContext& run) {
+FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& oriented, CloudReport& report, const RunContext& run) {
     FloatGridPtr result;
     with_threads(run, [&] {
         const double h = domain.voxel_size;
-        const CloudScale scale = cloud_scale(points, run);
-        report.spacing = scale.spacing;
-        const std::vector<char> stray = cloud::find_stray(points, scale.spacing, run);
-        OrientedCloud cloud;
-        for (std::size_t n = 0; n < points.size(); ++n)
-            if (!stray[n]) cloud.points.push_back(points[n]);
-        report.stray = points.size() - cloud.size();
-        cloud.counts.assign(cloud.size(), 1.0F);
-        const Orientation orientation = orient(cloud.points, scale, run);
+        const Orientation& orientation = oriented.orientation;
+        report.spacing = oriented.scale.spacing;
+        report.stray = oriented.stray;
         report.iterations = orientation.iterations;
         report.indicator_cell = orientation.cell();
-        cloud.normals = orientation.normals;
+        report.turned = orientation.turned;
+        const OrientedCloud cloud{oriented.points, orientation.normals, std::vector<float>(oriented.points.size(), 1.0F)};
         const OrientedCloud nodes = thinned(cloud, kNodeVoxels * h);
-        std::vector<Quadric> quadrics = cloud::fit_quadrics(nodes, cloud, scale.spacing, run);
+        std::vector<Quadric> quadrics = cloud::fit_quadrics(nodes, cloud, report.spacing, run);
         report.bare_nodes = std::size_t(std::erase_if(quadrics, [](const Quadric& q) { return !(q.radius > 0); }));
         std::vector<double> noise, radius;
         for (const Quadric& q : quadrics) {

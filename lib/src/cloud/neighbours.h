@@ -28,7 +28,7 @@ void for_nearest(const PointCells& cells, double spacing, std::size_t count, Vis
         std::vector<Neighbour> near;
         for (std::size_t n = some.begin(); n < some.end(); ++n) {
             const Vec3& p = cells.sorted()[n];
-            for (double r = kFirstRadius * spacing;; r *= 2) {
+            for (double r = kFirstRadius * spacing; r > 0; r *= 2) {
                 cells.find({{p[0] - r, p[1] - r, p[2] - r}, {p[0] + r, p[1] + r, p[2] + r}}, ranges);
                 near.clear();
                 for (const PointCells::Range& range : ranges)

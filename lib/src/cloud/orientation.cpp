@@ -9,8 +9,10 @@
 
 #include "cloud/neighbours.h"
 #include "cloud/point_cells.h"
+#include "cloud/stray.h"
 #include "cloud/winding_field.h"
 #include "covol/error.h"
+#include "covol/points.h"
 
 namespace covol {
 
@@ -36,8 +38,8 @@ constexpr double kHighest = 1.2;         // chi at a point beyond which another 
 constexpr int kCycles = 1, kLastCycles = 4;  // of multigrid
 // The finest lattice's cell: smaller ones let single points turn, larger ones lose thin parts.
 constexpr double kCellSpacings = 0.8, kCellNoises = 1.0;
-constexpr double kLeastSpacings = 0.5, kFiner = 1.5, kFewTurned = 0.002;
-constexpr int kMostTries = 3;
+constexpr double kTries[] = {1, 0.67, 1.5, 0.44, 2.25};  // of it, until few normals turn
+constexpr double kLeastSpacings = 0.5, kFewTurned = 0.002;
 constexpr int kLeastCells = 48, kMostCells = 192;
 
 /// A lattice and what is done on it.
@@ -263,16 +265,17 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
     const WorldBox box = bounding_box(points);
     double longest = 0;
     for (int a = 0; a < 3; ++a) longest = std::max(longest, box.max[a] - box.min[a]);
-    if (!(longest > 0)) throw Error(Errc::InvalidInput, "orient: all points lie at one place");
+    if (!(longest > 0) || !(scale.spacing > 0)) throw Error(Errc::InvalidInput, "orient: all points lie at one place");
     Orientation best;
     with_threads(run, [&] {
         const std::vector<double> areas = areas_of(points, scale.spacing);
         // Noise is hard to tell from thin parts: where normals go on turning a finer lattice may hold them.
-        double cell = std::max(kCellSpacings * scale.spacing, kCellNoises * scale.noise);
+        const double first = std::max(kCellSpacings * scale.spacing, kCellNoises * scale.noise);
         int last = 0;
-        for (int n = 0; n < kMostTries; ++n, cell /= kFiner) {
+        for (int n = 0; n < int(std::size(kTries)); ++n) {
+            const double cell = first * kTries[n];
             const int cells = std::clamp(int(longest * (1 + 2 * kBeyond) / std::max(cell, kLeastSpacings * scale.spacing)), kLeastCells, kMostCells);
-            if (cells == last) break;
+            if (cells == last) continue;
             last = cells;
             Orientation now;
             now.areas = areas;
@@ -284,6 +287,20 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
         }
     });
     return best;
+}
+
+CloudOrientation orient_cloud(const std::vector<Vec3>& points, const RunContext& run) {
+    CloudOrientation cloud;
+    with_threads(run, [&] {
+        const std::vector<Vec3> distinct = merge_close_points(points, 0);
+        cloud.scale = cloud_scale(distinct, run);
+        const std::vector<char> stray = cloud::find_stray(distinct, cloud.scale.spacing, run);
+        for (std::size_t n = 0; n < distinct.size(); ++n)
+            if (!stray[n]) cloud.points.push_back(distinct[n]);
+        cloud.stray = distinct.size() - cloud.points.size();
+        cloud.orientation = orient(cloud.points, cloud.scale, run);
+    });
+    return cloud;
 }
 
 }  // namespace covol

@@ -44,7 +44,11 @@ std::vector<char> find_stray(const std::vector<Vec3>& points, double spacing, co
     std::vector<double> sorted = reach;
     const auto middle = sorted.begin() + std::ptrdiff_t(sorted.size() / 2);
     std::nth_element(sorted.begin(), middle, sorted.end());
-    for (std::size_t n = 0; n < points.size(); ++n) stray[n] = reach[n] > kFar * *middle && off[n] > kOffPlane;
+    for (std::size_t n = 0; n < points.size(); ++n) {
+        // The farther the neighbours, the flatter they have to lie.
+        const double far = reach[n] / (kFar * *middle);
+        stray[n] = far > 1 && off[n] * far > kOffPlane;
+    }
     return stray;
 }
 

@@ -62,12 +62,33 @@ void choose_start(Job& job) {
     kind = Start::Kind::Tag;
     if (!job.guided() || job.options.contours || job.options.tag_distance > 0) return;
     if (job.image == nullptr && !can_enclose(job.points)) return;  // a layer: tagging tells what it needs
-    if (job.points.size() > kMostGuessMarks) {
-        if (job.image == nullptr && job.uses_points()) kind = Start::Kind::Cloud;
-        return;
-    }
+    if (job.points.size() > kMostGuessMarks) return;
     kind = Start::Kind::Guess;
     job.choose("start", "guess", std::to_string(job.points.size()) + " marks, at most " + std::to_string(kMostGuessMarks));
+}
+
+// Points without an image that enclose something tell inside from outside themselves.
+void try_cloud(Job& job) {
+    Start::Kind& kind = job.options.start.kind;
+    const bool asked = kind == Start::Kind::Cloud;
+    if (!job.starts_from_marks() || !(asked || kind == Start::Kind::Auto)) return;
+    if (asked && job.image != nullptr) throw Error(Errc::InvalidOptions, "segment: the start 'cloud' is for points without an image");
+    if (!asked && (!job.guided() || job.options.contours || job.options.tag_distance > 0 || job.image != nullptr || !job.uses_points() ||
+                   job.points.size() <= kMostGuessMarks || !can_enclose(job.points)))
+        return;
+    Timed timed(job.report().seconds.tag);
+    CloudOrientation cloud = orient_cloud(job.points, job.run);
+    if (asked || cloud.settled()) {
+        kind = Start::Kind::Cloud;
+        job.cloud = std::move(cloud);
+        return;
+    }
+    kind = Start::Kind::Tag;
+    job.choose("start", "tag", "the points tell no inside from outside: " + number(100 * cloud.orientation.turned) + " % of their normals go on turning");
+    if (!job.options.voxel_size_is_automatic) return;
+    const VoxelSizeChoice choice = choose_voxel_size(nullptr, job.points, true);
+    job.options.voxel_size = choice.voxel_size;
+    job.choose("voxel_size", number(job.h()), choice.reason);
 }
 
 }  // namespace
@@ -96,10 +117,12 @@ void check_input(Job& job) {
 void choose_values(Job& job) {
     SegmentOptions& options = job.options;
     if (options.voxel_size <= 0) {
+        options.voxel_size_is_automatic = true;
         const VoxelSizeChoice choice = choose_voxel_size(job.image, job.points, job.tags());
         options.voxel_size = choice.voxel_size;
         job.choose("voxel_size", number(job.h()), choice.reason);
     }
+    try_cloud(job);
     merge_points(job);
     choose_start(job);
     if (job.image == nullptr && job.tags()) average_noise(job);

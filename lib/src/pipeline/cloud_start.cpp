@@ -20,12 +20,15 @@ void start_from_cloud(Job& job) {
     CloudReport& report = job.report().cloud;
     {
         Timed timed(job.report().seconds.tag);
-        job.result.u = surface_from_cloud(job.domain(), job.points, report, job.run);
+        job.result.u = surface_from_cloud(job.domain(), *job.cloud, report, job.run);
     }
     if (!job.rests() && job.uses_points()) compute_distance(job, tube_for_start(job));
     job.choose("start", "cloud",
                std::to_string(job.points.size()) + " points, " + number(report.spacing) + " apart, noise " + number(report.noise) +
-                   "; averaged within " + number(report.radius) + "; oriented in " + std::to_string(report.iterations) + " iterations");
+                   "; averaged within " + number(report.radius));
+    if (report.stray > 0) job.choose("stray_points", std::to_string(report.stray), "far from all others and on no sheet: left out");
+    if (report.dropped_pieces > 0)
+        job.run.info("cloud: " + std::to_string(report.dropped_pieces) + " pieces of the surface that hardly a point rested on left out");
 }
 
 }  // namespace covol::pipeline

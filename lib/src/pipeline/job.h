@@ -1,6 +1,7 @@
 #pragma once
 // What the steps of segment() share: what came in, what was chosen, what is made so far.
 #include <chrono>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -40,6 +41,7 @@ struct Job {
     const RunContext& run;
     SegmentResult result;
     StartOrigin origin = StartOrigin::Given;
+    std::optional<CloudOrientation> cloud;  ///< of points alone that enclose something
     FloatGridPtr hold;             ///< the start that the surface may not leave, or null
     FloatGridPtr sure_distance;    ///< to the sure points, or null
 
