@@ -34,6 +34,7 @@ void check_tag_distance(double tag_distance, const std::vector<Vec3>& points) {
 SegmentOptions SegmentJob::resolve(double h) const {
     SegmentOptions options;
     options.voxel_size = h;
+    options.voxel_size_is_automatic = !domain.voxel_size.given;
     options.roi = domain.roi;
     options.margin = domain.margin.resolve(h, 0);
     options.start = start;

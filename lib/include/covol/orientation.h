@@ -16,19 +16,29 @@ struct CloudScale {
 /// From quadrics through neighbourhoods of a sample of the points: that radius at which they are most of a sheet.
 [[nodiscard]] CloudScale cloud_scale(const std::vector<Vec3>& points, const RunContext& run = {});
 
-/// What a cloud without normals tells of inside and outside.
-struct Orientation {
-    std::vector<Vec3> normals;     ///< unit, outward, of the points as they were given
-    std::vector<double> areas;     ///< of the surface that each point stands for, world units squared, from the density
-    /// The indicator function of the solid: about 1 inside and 0 outside, smooth over a few cells; nearest node beyond its
-    /// lattice. Thread-safe.
-    struct Indicator;
-    std::shared_ptr<const Indicator> indicator;
-    [[nodiscard]] double inside(const Vec3& world) const;   ///< the indicator
-    [[nodiscard]] Vec3 gradient(const Vec3& world) const;   ///< of it, 1 / world unit
+/// The indicator function of a solid: about 1 inside and 0 outside, smooth over a few cells; nearest node beyond its lattice.
+/// Thread-safe.
+class Indicator {
+public:
+    struct Values;
+    explicit Indicator(std::unique_ptr<const Values> values);
+    ~Indicator();
+    [[nodiscard]] double inside(const Vec3& world) const;   ///< its value
+    [[nodiscard]] Vec3 gradient(const Vec3& world) const;   ///< 1 / world unit
+    [[nodiscard]] double cell() const;                      ///< of its lattice, world units
     /// visit(box) for each cell of its lattice, world box, that its level 1/2 passes.
     void crossed(const std::function<void(const WorldBox&)>& visit) const;
-    [[nodiscard]] double cell() const;                      ///< of its lattice, world units
+
+private:
+    std::unique_ptr<const Values> values_;
+};
+
+/// What a cloud without normals tells of inside and outside.
+struct Orientation {
+    std::vector<Vec3> normals;     ///< unit, outward, of the points as they were given; 0 where nothing tells
+    std::vector<double> areas;     ///< of the surface that each point stands for, world units squared, from the density
+    std::shared_ptr<const Indicator> indicator;  ///< of these
+    std::shared_ptr<const Indicator> screened;   ///< drawn to 1/2 at the points as well; null: quadrics tell more
     double turned = 0;             ///< share of the points whose normal the last iteration turned by more than 90 degrees
     int iterations = 0;
 };
@@ -49,11 +59,10 @@ struct CloudOrientation {
     Orientation orientation;   ///< of them
     CloudScale scale;
     std::size_t stray = 0;     ///< points far from all others that lie on no sheet, left out
-    /// Few normals go on turning. Else the points hardly enclose anything, or noise hides on which side they lie.
-    [[nodiscard]] bool settled() const { return orientation.turned < kSettled; }
-    static constexpr double kSettled = 0.025;  // clouds of closed shapes have up to 0.02, scans of one side 0.03 to 0.15
+    bool encloses = true;      ///< else the normals are those of what was seen from outside
 };
-/// cloud_scale(), without stray points, and orient().
+/// cloud_scale(), without stray points, and orient(); where normals go on turning there, the points hardly enclose anything,
+/// as scans of some sides do: then each normal points to where its point can be seen from.
 [[nodiscard]] CloudOrientation orient_cloud(const std::vector<Vec3>& points, const RunContext& run = {});
 
 }  // namespace covol

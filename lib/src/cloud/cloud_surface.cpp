@@ -8,11 +8,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cloud/hold_topology.h"
 #include "cloud/local_fit.h"
 #include "cloud/point_cells.h"
 #include "covol/band.h"
 #include "covol/error.h"
-#include "covol/orientation.h"
+#include "covol/mesh.h"
+#include "covol/surface.h"
 #include "detail/pieces.h"
 
 namespace covol {
@@ -85,7 +87,7 @@ private:
 };
 
 /// The leaves of the domain that quadrics reach or the indicator's surface passes.
-std::vector<Coord> leaves_of(const Pieces& pieces, const Orientation& orientation, const Domain& domain) {
+std::vector<Coord> leaves_of(const Pieces& pieces, const Indicator& indicator, const Domain& domain) {
     std::vector<Coord> leaves;
     const auto add = [&](const Vec3& low, const Vec3& high) {
         Coord first, last;
@@ -110,7 +112,7 @@ std::vector<Coord> leaves_of(const Pieces& pieces, const Orientation& orientatio
         add(low, high);
         if (leaves.size() > 1000000) settle();
     }
-    orientation.crossed([&](const WorldBox& box) { add(domain.world_to_index(box.min), domain.world_to_index(box.max)); });
+    indicator.crossed([&](const WorldBox& box) { add(domain.world_to_index(box.min), domain.world_to_index(box.max)); });
     settle();
     return leaves;
 }
@@ -118,8 +120,7 @@ std::vector<Coord> leaves_of(const Pieces& pieces, const Orientation& orientatio
 /// Fills one leaf.
 class Blend {
 public:
-    Blend(const Pieces& pieces, const Orientation& orientation, const Domain& domain)
-        : pieces_(pieces), orientation_(orientation), domain_(domain) {}
+    Blend(const Pieces& pieces, const Indicator& indicator, const Domain& domain) : pieces_(pieces), indicator_(indicator), domain_(domain) {}
 
     void fill(Leaf& leaf) {
         const double h = domain_.voxel_size;
@@ -154,7 +155,7 @@ public:
             }
             double value = trust * own;
             if (trust < 1)
-                value += (1 - trust) * std::clamp((0.5 - orientation_.inside(place(origin, at))) * orientation_.cell() / kSlope, -limit, limit);
+                value += (1 - trust) * std::clamp((0.5 - indicator_.inside(place(origin, at))) * indicator_.cell() / kSlope, -limit, limit);
             leaf.setValueOn(openvdb::Index(at), float(value));
         }
     }
@@ -210,7 +211,7 @@ private:
     }
 
     const Pieces& pieces_;
-    const Orientation& orientation_;
+    const Indicator& indicator_;
     const Domain& domain_;
     std::vector<PointCells::Range> ranges_;
     std::array<float, 512> near_;
@@ -225,45 +226,80 @@ double median(std::vector<double> values) {
     return *middle;
 }
 
+/// The level set of the pieces where they act, of the indicator's level 1/2 elsewhere.
+FloatGridPtr level_set_of(const Pieces& pieces, const Indicator& indicator, const Domain& domain, const RunContext& run) {
+    const FloatGridPtr field = make_grid(domain, float(kHalfWidthVoxels * domain.voxel_size), "u");
+    std::vector<Leaf*> leaves;
+    for (const Coord& origin : leaves_of(pieces, indicator, domain)) leaves.push_back(field->tree().touchLeaf(origin));
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 8), [&](const auto& range) {
+        if (run.cancelled()) return;
+        Blend blend(pieces, indicator, domain);
+        for (std::size_t n = range.begin(); n < range.end(); ++n) blend.fill(*leaves[n]);
+    });
+    run.check();
+    openvdb::tools::signedFloodFill(field->tree());
+    return start_from_grid(domain, *field, run);
+}
+
+/// Pieces, cavities and handles.
+int complexity(const FloatGrid& level_set, const RunContext& run) {
+    const MeshMeasures m = measure(extract_mesh(level_set, {}, run));
+    return m.components + std::max(0, m.genus);
+}
+
+std::vector<Quadric> quadrics_of(const CloudOrientation& cloud, double h, CloudReport& report, const RunContext& run) {
+    const OrientedCloud points{cloud.points, cloud.orientation.normals, std::vector<float>(cloud.points.size(), 1.0F)};
+    std::vector<Quadric> quadrics = cloud::fit_quadrics(thinned(points, kNodeVoxels * h), points, report.spacing, run);
+    report.bare_nodes = std::size_t(std::erase_if(quadrics, [](const Quadric& q) { return !(q.radius > 0); }));
+    std::vector<double> noise, radius;
+    for (const Quadric& q : quadrics) {
+        noise.push_back(q.noise);
+        radius.push_back(q.radius);
+    }
+    report.noise = median(noise);
+    report.radius = median(radius);
+    return quadrics;
+}
+
 }  // namespace
 
-FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& oriented, CloudReport& report, const RunContext& run) {
+FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cloud, CloudReport& report, const RunContext& run) {
     FloatGridPtr result;
     with_threads(run, [&] {
         const double h = domain.voxel_size;
-        const Orientation& orientation = oriented.orientation;
-        report.spacing = oriented.scale.spacing;
-        report.stray = oriented.stray;
+        const Orientation& orientation = cloud.orientation;
+        report.spacing = cloud.scale.spacing;
+        report.noise = cloud.scale.noise;
+        report.stray = cloud.stray;
+        report.encloses = cloud.encloses;
         report.iterations = orientation.iterations;
-        report.indicator_cell = orientation.cell();
+        report.indicator_cell = orientation.indicator->cell();
         report.turned = orientation.turned;
-        const OrientedCloud cloud{oriented.points, orientation.normals, std::vector<float>(oriented.points.size(), 1.0F)};
-        const OrientedCloud nodes = thinned(cloud, kNodeVoxels * h);
-        std::vector<Quadric> quadrics = cloud::fit_quadrics(nodes, cloud, report.spacing, run);
-        report.bare_nodes = std::size_t(std::erase_if(quadrics, [](const Quadric& q) { return !(q.radius > 0); }));
-        std::vector<double> noise, radius;
-        for (const Quadric& q : quadrics) {
-            noise.push_back(q.noise);
-            radius.push_back(q.radius);
+        const Pieces none({}, h);
+        if (orientation.screened) {
+            result = level_set_of(none, *orientation.screened, domain, run);
+        } else {
+            const Pieces pieces(quadrics_of(cloud, h, report, run), h);
+            result = level_set_of(pieces, *orientation.indicator, domain, run);
         }
-        report.noise = median(noise);
-        report.radius = median(radius);
-        const Pieces pieces(std::move(quadrics), h);
-        run.check();
-        const FloatGridPtr field = make_grid(domain, float(kHalfWidthVoxels * h), "u");
-        std::vector<Leaf*> leaves;
-        for (const Coord& origin : leaves_of(pieces, orientation, domain)) leaves.push_back(field->tree().touchLeaf(origin));
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 8), [&](const auto& range) {
-            if (run.cancelled()) return;
-            Blend blend(pieces, orientation, domain);
-            for (std::size_t n = range.begin(); n < range.end(); ++n) blend.fill(*leaves[n]);
-        });
-        run.check();
-        openvdb::tools::signedFloodFill(field->tree());
-        result = start_from_grid(domain, *field, run);
-        const std::size_t least = std::max(kLeastResting, std::size_t(kLeastRestingShare * double(cloud.size())));
-        report.dropped_pieces = detail::drop_bare_pieces(*result, cloud.points, least);
-        if (report.dropped_pieces > 0) result = start_from_grid(domain, *result, run);
+        const std::size_t least = std::max(kLeastResting, std::size_t(kLeastRestingShare * double(cloud.points.size())));
+        const auto drop = [&](FloatGridPtr& level_set) {
+            const std::size_t dropped = detail::drop_bare_pieces(*level_set, cloud.points, least);
+            if (dropped > 0) level_set = start_from_grid(domain, *level_set, run);
+            return dropped;
+        };
+        report.dropped_pieces = drop(result);
+        const int own = complexity(*result, run);
+        if (own <= 1) return;
+        FloatGridPtr rough = level_set_of(none, *orientation.indicator, domain, run);
+        drop(rough);
+        if (complexity(*rough, run) >= own) return;
+        auto pr = [&](const char* w, const FloatGrid& g) { const MeshMeasures m = measure(extract_mesh(g, {}, run)); fprintf(stderr, "%s c %d g %d closed %d manifold %d\n", w, m.components, m.genus, m.closed, m.manifold); };
+        pr("rough", *rough); pr("target", *result);
+        report.held_voxels = cloud::hold_topology(*rough, *result);
+        fprintf(stderr, "held %zu\n", report.held_voxels); pr("held", *result);
+        result = start_from_grid(domain, *result, run);
+        pr("start", *result);
     });
     return result;
 }

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "cloud/point_cells.h"
+#include "cloud/vector.h"
 
 namespace covol::cloud {
 namespace {
@@ -30,16 +31,6 @@ constexpr double kLeastMajority = 5;      // points
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
-
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec3 minus(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-Vec3 cross(const Vec3& a, const Vec3& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-Vec3 unit(const Vec3& v) {
-    const double l = std::sqrt(dot(v, v));
-    return {v[0] / l, v[1] / l, v[2] / l};
-}
 
 std::array<Vec3, 3> frame_of(const Vec3& normal) {
     int least = 0;

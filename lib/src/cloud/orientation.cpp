@@ -7,18 +7,16 @@
 #include <numeric>
 #include <optional>
 
-#include "cloud/neighbours.h"
+#include "cloud/areas.h"
+#include "cloud/indicator.h"
 #include "cloud/point_cells.h"
 #include "cloud/stray.h"
-#include "cloud/winding_field.h"
+#include "cloud/vector.h"
+#include "cloud/views.h"
 #include "covol/error.h"
 #include "covol/points.h"
 
 namespace covol {
-
-struct Orientation::Indicator {
-    cloud::LatticeField field;
-};
 
 namespace {
 
@@ -26,12 +24,12 @@ using cloud::Lattice;
 using cloud::LatticeField;
 using cloud::PointCells;
 using cloud::WindingField;
+using cloud::dot;
+using cloud::unit;
 
-constexpr double kBeyond = 0.2;          // of the longest side, around the points: chi is 0 at the end
 constexpr double kPatchCells = 2;        // edge of the cells over which the indicator is averaged
 constexpr double kPatchOff = 0.12;       // from 1/2, of a patch that may be turned
 constexpr int kPatchRounds = 4, kPatchCycles = 2, kAfterTurning = 3;
-constexpr std::size_t kNeighbours = 8;                  // that an area is taken from
 constexpr int kFirstPasses = 12;         // of smoothing, for the first guess
 constexpr double kSteady = 1e-4;         // the normals' mean change, 1 - cosine
 constexpr double kHighest = 1.2;         // chi at a point beyond which another part encloses it already
@@ -40,7 +38,7 @@ constexpr int kCycles = 1, kLastCycles = 4;  // of multigrid
 constexpr double kCellSpacings = 0.8, kCellNoises = 1.0;
 constexpr double kTries[] = {1, 0.67, 1.5, 0.44, 2.25};  // of it, until few normals turn
 constexpr double kLeastSpacings = 0.5, kFewTurned = 0.002;
-constexpr int kLeastCells = 48, kMostCells = 192;
+constexpr double kSettled = 0.025;  // clouds of closed shapes turn up to 0.02, scans of one side 0.03 to 0.15
 
 /// A lattice and what is done on it.
 struct Stage {
@@ -49,36 +47,12 @@ struct Stage {
     bool is_last;
 };
 
-Vec3 unit(const Vec3& v) {
-    const double length = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-    return length > 1e-30 ? Vec3{v[0] / length, v[1] / length, v[2] / length} : Vec3{0, 0, 0};
-}
-
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-double median(std::vector<double> values) {
-    const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
-
-/// Of the surface around each point: the disc to its eighth neighbour. A density on a lattice would count the other side of
-/// thin parts, too.
-std::vector<double> areas_of(const std::vector<Vec3>& points, double spacing) {
-    const PointCells cells(points, cloud::kFirstRadius * spacing);
-    std::vector<double> areas(points.size());
-    cloud::for_nearest(cells, spacing, kNeighbours, [&](std::uint32_t point, const std::vector<cloud::Neighbour>& near) {
-        areas[point] = near.empty() ? spacing * spacing : M_PI * near.back().squared / double(near.size());
-    });
-    return areas;
-}
-
 class Iteration {
 public:
-    explicit Iteration(const std::vector<Vec3>& points) : points_(points), vectors_(points.size()), values_(points.size()) {}
+    explicit Iteration(const std::vector<Vec3>& points) : points_(points), vectors_(points.size()) {}
 
     void run(const Stage& stage, Orientation& result, const RunContext& run) {
-        const Lattice lattice = cloud::lattice_around(bounding_box(points_), kBeyond, stage.cells);
+        const Lattice lattice = cloud::indicator_lattice(points_, stage.cells);
         WindingField field(lattice);
         if (last_) field.start_from(last_->indicator());
         if (result.normals.empty()) first_guess(lattice, result);
@@ -111,13 +85,8 @@ private:
             for (int a = 0; a < 3; ++a) vectors_[n][a] = result.areas[n] * result.normals[n][a];
         });
         field.solve(points_, vectors_, cycles);
-        const LatticeField& chi = field.indicator();
-        tbb::parallel_for(std::size_t(0), count, [&](std::size_t n) { values_[n] = std::abs(chi.at(points_[n]).value); });
-        // Half of the indicator's step is at the points, whichever way they are turned.
-        if (const double half = median(values_); half > 0) {
-            field.multiply(0.5 / half);
-            for (double& area : result.areas) area *= 0.5 / half;
-        }
+        const double half = cloud::scale_to_half(field, points_);
+        for (double& area : result.areas) area *= half;
     }
 
     /// @return the normals' mean change, 1 - cosine
@@ -233,55 +202,29 @@ private:
 
     const std::vector<Vec3>& points_;
     std::vector<Vec3> vectors_;
-    std::vector<double> values_;
     std::optional<WindingField> last_;
 };
 
 }  // namespace
 
-double Orientation::inside(const Vec3& world) const { return indicator->field.at(world).value; }
-Vec3 Orientation::gradient(const Vec3& world) const { return indicator->field.at(world).gradient; }
-double Orientation::cell() const { return indicator->field.lattice.cell; }
-
-void Orientation::crossed(const std::function<void(const WorldBox&)>& visit) const {
-    const Lattice& l = indicator->field.lattice;
-    const std::vector<float>& values = indicator->field.values;
-    const std::size_t up_i = std::size_t(l.nodes[1]) * std::size_t(l.nodes[2]), up_j = std::size_t(l.nodes[2]);
-    for (int i = 0; i + 1 < l.nodes[0]; ++i)
-        for (int j = 0; j + 1 < l.nodes[1]; ++j)
-            for (int k = 0; k + 1 < l.nodes[2]; ++k) {
-                const std::size_t at = std::size_t(i) * up_i + std::size_t(j) * up_j + std::size_t(k);
-                int inside = 0;
-                for (int corner = 0; corner < 8; ++corner)
-                    inside += values[at + (corner & 4 ? up_i : 0) + (corner & 2 ? up_j : 0) + (corner & 1 ? 1 : 0)] > 0.5F;
-                if (inside == 0 || inside == 8) continue;
-                const Vec3 low{l.origin[0] + i * l.cell, l.origin[1] + j * l.cell, l.origin[2] + k * l.cell};
-                visit({low, {low[0] + l.cell, low[1] + l.cell, low[2] + l.cell}});
-            }
-}
-
 Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run) {
     if (points.size() < 4) throw Error(Errc::InvalidInput, "orient: expected at least 4 points, got " + std::to_string(points.size()));
-    const WorldBox box = bounding_box(points);
-    double longest = 0;
-    for (int a = 0; a < 3; ++a) longest = std::max(longest, box.max[a] - box.min[a]);
-    if (!(longest > 0) || !(scale.spacing > 0)) throw Error(Errc::InvalidInput, "orient: all points lie at one place");
+    if (!(cloud::longest_side(bounding_box(points)) > 0) || !(scale.spacing > 0)) throw Error(Errc::InvalidInput, "orient: all points lie at one place");
     Orientation best;
     with_threads(run, [&] {
-        const std::vector<double> areas = areas_of(points, scale.spacing);
+        const std::vector<double> areas = cloud::areas_of(points, scale.spacing);
         // Noise is hard to tell from thin parts: where normals go on turning a finer lattice may hold them.
         const double first = std::max(kCellSpacings * scale.spacing, kCellNoises * scale.noise);
         int last = 0;
         for (int n = 0; n < int(std::size(kTries)); ++n) {
-            const double cell = first * kTries[n];
-            const int cells = std::clamp(int(longest * (1 + 2 * kBeyond) / std::max(cell, kLeastSpacings * scale.spacing)), kLeastCells, kMostCells);
+            const int cells = cloud::cells_along(points, std::max(first * kTries[n], kLeastSpacings * scale.spacing));
             if (cells == last) continue;
             last = cells;
             Orientation now;
             now.areas = areas;
             Iteration iteration(points);
             for (const Stage& stage : {Stage{cells * 2 / 3, 12, false}, Stage{cells, 8, true}}) iteration.run(stage, now, run);
-            now.indicator = std::make_shared<const Orientation::Indicator>(Orientation::Indicator{iteration.last().indicator()});
+            now.indicator = cloud::make_indicator(iteration.last());
             if (n == 0 || now.turned < best.turned) best = std::move(now);
             if (best.turned < kFewTurned) break;
         }
@@ -299,6 +242,8 @@ CloudOrientation orient_cloud(const std::vector<Vec3>& points, const RunContext&
             if (!stray[n]) cloud.points.push_back(distinct[n]);
         cloud.stray = distinct.size() - cloud.points.size();
         cloud.orientation = orient(cloud.points, cloud.scale, run);
+        cloud.encloses = cloud.orientation.turned < kSettled;
+        if (!cloud.encloses) cloud.orientation = cloud::orient_by_views(cloud.points, cloud.scale, run);
     });
     return cloud;
 }

@@ -44,21 +44,26 @@ void for_rows(const Lattice& l, Visit visit) {
     });
 }
 
-/// Gauss-Seidel in red and black order: (6 u - sum of neighbours) = right.
-void sweep(const Lattice& l, std::vector<float>& u, const std::vector<float>& right) {
+/// Gauss-Seidel in red and black order: (6 + screen) u - sum of neighbours = right.
+void sweep(const Lattice& l, std::vector<float>& u, const std::vector<float>& right, const std::vector<float>& screen) {
     const Strides s(l);
-    for (int colour = 0; colour < 2; ++colour)
-        for_rows(l, [&](int i, int j, std::size_t row) {
-            for (std::size_t at = row + 1 + std::size_t((i + j + colour) & 1), end = row + s.j - 1; at < end; at += 2)
-                u[at] = (right[at] + u[at - s.i] + u[at + s.i] + u[at - s.j] + u[at + s.j] + u[at - 1] + u[at + 1]) * (1.0F / 6.0F);
-        });
+    const auto visit = [&](const auto& inverse_diagonal) {
+        for (int colour = 0; colour < 2; ++colour)
+            for_rows(l, [&](int i, int j, std::size_t row) {
+                for (std::size_t at = row + 1 + std::size_t((i + j + colour) & 1), end = row + s.j - 1; at < end; at += 2)
+                    u[at] = (right[at] + u[at - s.i] + u[at + s.i] + u[at - s.j] + u[at + s.j] + u[at - 1] + u[at + 1]) * inverse_diagonal(at);
+            });
+    };
+    if (screen.empty()) visit([](std::size_t) { return 1.0F / 6.0F; });
+    else visit([&](std::size_t at) { return 1 / (6 + screen[at]); });
 }
 
-void find_residual(const Lattice& l, const std::vector<float>& u, const std::vector<float>& right, std::vector<float>& residual) {
+void find_residual(const Lattice& l, const std::vector<float>& u, const std::vector<float>& right, const std::vector<float>& screen,
+                   std::vector<float>& residual) {
     const Strides s(l);
     for_rows(l, [&](int, int, std::size_t row) {
         for (std::size_t at = row + 1, end = row + s.j - 1; at < end; ++at)
-            residual[at] = right[at] - 6 * u[at] + u[at - s.i] + u[at + s.i] + u[at - s.j] + u[at + s.j] + u[at - 1] + u[at + 1];
+            residual[at] = right[at] - (screen.empty() ? 6.0F : 6 + screen[at]) * u[at] + u[at - s.i] + u[at + s.i] + u[at - s.j] + u[at + s.j] + u[at - 1] + u[at + 1];
     });
 }
 
@@ -149,16 +154,21 @@ LatticeField::Sample LatticeField::at(const Vec3& world) const {
     return sample;
 }
 
-LatticeField point_density(const Lattice& lattice, const std::vector<Vec3>& points, int passes) {
-    LatticeField density(lattice);
+LatticeField spread(const Lattice& lattice, const std::vector<Vec3>& points, const std::vector<double>& values) {
+    LatticeField sum(lattice);
     const Strides s(lattice);
-    for (const Vec3& p : points) {
-        const Spline b(lattice, p);
+    for (std::size_t n = 0; n < points.size(); ++n) {
+        const Spline b(lattice, points[n]);
         for (std::size_t i = 0; i < 4; ++i)
             for (std::size_t j = 0; j < 4; ++j)
                 for (std::size_t k = 0; k < 4; ++k)
-                    density.values[b.first + i * s.i + j * s.j + k] += float(b.w[0][i] * b.w[1][j] * b.w[2][k]);
+                    sum.values[b.first + i * s.i + j * s.j + k] += float(values[n] * b.w[0][i] * b.w[1][j] * b.w[2][k]);
     }
+    return sum;
+}
+
+LatticeField point_density(const Lattice& lattice, const std::vector<Vec3>& points, int passes) {
+    LatticeField density = spread(lattice, points, std::vector<double>(points.size(), 1.0));
     std::vector<float> scratch(passes > 0 ? lattice.size() : 0);
     for (int pass = 0; pass < passes; ++pass) smooth(lattice, density.values, scratch);
     return density;
@@ -167,7 +177,7 @@ LatticeField point_density(const Lattice& lattice, const std::vector<Vec3>& poin
 WindingField::WindingField(const Lattice& lattice) {
     Lattice l = lattice;
     for (int factor = 1; factor <= kCoarsening; factor *= 2) {
-        levels_.push_back({LatticeField(l), std::vector<float>(l.size()), std::vector<float>(l.size())});
+        levels_.push_back({LatticeField(l), std::vector<float>(l.size()), std::vector<float>(l.size()), {}});
         l.cell *= 2;
         for (int& n : l.nodes) n = (n - 1) / 2 + 1;
         if (*std::min_element(l.nodes.begin(), l.nodes.end()) < 3) break;
@@ -179,17 +189,17 @@ void WindingField::cycle(std::size_t n) {
     const Lattice& l = level.solution.lattice;
     std::vector<float>& u = level.solution.values;
     if (n + 1 == levels_.size()) {
-        for (int sweeps = 0; sweeps < kCoarsestSweeps; ++sweeps) sweep(l, u, level.right);
+        for (int sweeps = 0; sweeps < kCoarsestSweeps; ++sweeps) sweep(l, u, level.right, level.screen);
         return;
     }
     Level& coarse = levels_[n + 1];
-    for (int sweeps = 0; sweeps < kSweeps; ++sweeps) sweep(l, u, level.right);
-    find_residual(l, u, level.right, level.residual);
+    for (int sweeps = 0; sweeps < kSweeps; ++sweeps) sweep(l, u, level.right, level.screen);
+    find_residual(l, u, level.right, level.screen, level.residual);
     restrict_to(l, level.residual, coarse.solution.lattice, coarse.right);
     std::fill(coarse.solution.values.begin(), coarse.solution.values.end(), 0.0F);
     cycle(n + 1);
     prolong(coarse.solution.lattice, coarse.solution.values, l, u);
-    for (int sweeps = 0; sweeps < kSweeps; ++sweeps) sweep(l, u, level.right);
+    for (int sweeps = 0; sweeps < kSweeps; ++sweeps) sweep(l, u, level.right, level.screen);
 }
 
 void WindingField::solve(const std::vector<Vec3>& points, const std::vector<Vec3>& vectors, int cycles) {
@@ -208,6 +218,7 @@ void WindingField::solve(const std::vector<Vec3>& points, const std::vector<Vec3
                 for (std::size_t k = 0; k < 4; ++k) row[k] -= float(across * b.w[2][k] + along * b.d[2][k]);
             }
     }
+    for (std::size_t n = 0; n < finest.screen.size(); ++n) finest.right[n] += 0.5F * finest.screen[n];
     for (int n = 0; n < cycles; ++n) cycle(0);
 }
 
@@ -218,6 +229,14 @@ void WindingField::start_from(const LatticeField& other) {
         for (int k = 1; k + 1 < l.nodes[2]; ++k)
             u.values[row + std::size_t(k)] = float(other.at({l.origin[0] + i * l.cell, l.origin[1] + j * l.cell, l.origin[2] + k * l.cell}).value);
     });
+}
+
+void WindingField::screen(const std::vector<Vec3>& points, const std::vector<double>& weights) {
+    levels_.front().screen = spread(levels_.front().solution.lattice, points, weights).values;
+    for (std::size_t n = 1; n < levels_.size(); ++n) {
+        levels_[n].screen.assign(levels_[n].right.size(), 0.0F);
+        restrict_to(levels_[n - 1].solution.lattice, levels_[n - 1].screen, levels_[n].solution.lattice, levels_[n].screen);
+    }
 }
 
 void WindingField::multiply(double factor) {

@@ -30,6 +30,9 @@ struct LatticeField {
     [[nodiscard]] Sample at(const Vec3& world) const;
 };
 
+/// Sums of the points' values, spread over the nodes around them.
+[[nodiscard]] LatticeField spread(const Lattice& lattice, const std::vector<Vec3>& points, const std::vector<double>& values);
+
 /// The number of points in a cell's volume, smoothed by passes of (1 2 1) / 4 along each axis.
 [[nodiscard]] LatticeField point_density(const Lattice& lattice, const std::vector<Vec3>& points, int passes);
 
@@ -41,6 +44,9 @@ public:
     /// @param vectors  area * outward unit normal, world units squared
     /// @param cycles   V-cycles of multigrid
     void solve(const std::vector<Vec3>& points, const std::vector<Vec3>& vectors, int cycles);
+    /// From now on the indicator is drawn to 1/2 at the points; weight 1 on each node as strongly as its neighbours draw it to
+    /// themselves.
+    void screen(const std::vector<Vec3>& points, const std::vector<double>& weights);
     /// Takes another one's solution as the first guess.
     void start_from(const LatticeField& other);
     [[nodiscard]] const LatticeField& indicator() const { return levels_.front().solution; }
@@ -51,6 +57,7 @@ private:
     struct Level {
         LatticeField solution;
         std::vector<float> right, residual;
+        std::vector<float> screen;  ///< weights at the nodes, or empty
     };
     void cycle(std::size_t level);
     std::vector<Level> levels_;

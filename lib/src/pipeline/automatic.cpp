@@ -11,6 +11,7 @@ namespace pipeline {
 namespace {
 
 constexpr double kFewPoints = 1000;  // fewer get a voxel size at which their surface has as many voxels as this many would
+constexpr double kViewVoxel = 0.5;    // cells of the indicator, for a cloud that encloses nothing
 constexpr double kCloudNoise = 0.6;   // voxels of a cloud, in standard deviations of its points
 constexpr double kSameSeedVoxels = 1e-3;   // seeds closer than this are one position
 constexpr double kMergeVoxels = 0.25;      // points closer than this do not move the surface apart
@@ -77,18 +78,14 @@ void try_cloud(Job& job) {
                    job.points.size() <= kMostGuessMarks || !can_enclose(job.points)))
         return;
     Timed timed(job.report().seconds.tag);
-    CloudOrientation cloud = orient_cloud(job.points, job.run);
-    if (asked || cloud.settled()) {
-        kind = Start::Kind::Cloud;
-        job.cloud = std::move(cloud);
-        return;
-    }
-    kind = Start::Kind::Tag;
-    job.choose("start", "tag", "the points tell no inside from outside: " + number(100 * cloud.orientation.turned) + " % of their normals go on turning");
-    if (!job.options.voxel_size_is_automatic) return;
-    const VoxelSizeChoice choice = choose_voxel_size(nullptr, job.points, true);
-    job.options.voxel_size = choice.voxel_size;
-    job.choose("voxel_size", number(job.h()), choice.reason);
+    job.cloud = orient_cloud(job.points, job.run);
+    kind = Start::Kind::Cloud;
+    if (job.cloud->encloses || !job.options.voxel_size_is_automatic) return;
+    // The indicator is all that there is to see.
+    const double h = kViewVoxel * job.cloud->orientation.indicator->cell();
+    if (h <= job.h()) return;
+    job.options.voxel_size = h;
+    job.choose("voxel_size", number(h), number(kViewVoxel) + " cells of the indicator");
 }
 
 }  // namespace

@@ -1,0 +1,23 @@
+#pragma once
+// The indicator of a cloud's solid, as orient() leaves it.
+#include "cloud/winding_field.h"
+#include "covol/orientation.h"
+
+namespace covol::cloud {
+
+/// Longest side of a box.
+[[nodiscard]] double longest_side(const WorldBox& box);
+
+/// Around the points, so much wider that the indicator is 0 at its end; of about the cell asked for, and 48 to 192 cells
+/// along the longest side.
+[[nodiscard]] Lattice indicator_lattice(const std::vector<Vec3>& points, double cell);
+[[nodiscard]] Lattice indicator_lattice(const std::vector<Vec3>& points, int cells);
+/// Cells along the longest side.
+[[nodiscard]] int cells_along(const std::vector<Vec3>& points, double cell);
+
+/// Half of the indicator's step is at the points, whichever way they are turned. @return the factor
+double scale_to_half(WindingField& field, const std::vector<Vec3>& points);
+
+[[nodiscard]] std::shared_ptr<const Indicator> make_indicator(const WindingField& field);
+
+}  // namespace covol::cloud

@@ -1,0 +1,22 @@
+#pragma once
+// Arithmetic of vectors.
+#include <cmath>
+#include <vector>
+
+#include "covol/domain.h"
+
+namespace covol::cloud {
+
+inline double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+inline Vec3 minus(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+inline Vec3 times(double s, const Vec3& a) { return {s * a[0], s * a[1], s * a[2]}; }
+inline Vec3 cross(const Vec3& a, const Vec3& b) {
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+/// 0 stays 0.
+inline Vec3 unit(const Vec3& v) {
+    const double length = std::sqrt(dot(v, v));
+    return length > 1e-30 ? times(1 / length, v) : Vec3{0, 0, 0};
+}
+
+}  // namespace covol::cloud
