@@ -5,12 +5,15 @@
 #include <openvdb/tools/Interpolation.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 
+#include "covol/distance.h"
 #include "covol/error.h"
+#include "covol/points.h"
 #include "detail/kd_tree.h"
 #include "detail/mesh_distance.h"
 
@@ -293,6 +296,42 @@ Evidence evidence(const TriangleMesh& mesh, const std::vector<Vec3>& marks, cons
     Evidence result;
     with_threads(run, [&] { result = Judge(mesh, marks, geometry, options, run).go(edge); });
     return result;
+}
+
+double share_without_points(const TriangleMesh& mesh, const FloatGrid& distance, double reach, const RunContext& run) {
+    struct Areas {
+        double total = 0, bare = 0;
+    } areas;
+    with_threads(run, [&] {
+        // The same splits, and so the same bits, on any number of threads.
+        areas = tbb::parallel_deterministic_reduce(
+            tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 4096), Areas{},
+            [&](const tbb::blocked_range<std::size_t>& range, Areas sum) {
+                const auto known = distance.getConstAccessor();
+                for (std::size_t t = range.begin(); t != range.end(); ++t) {
+                    openvdb::Vec3d corner[3];
+                    for (int n = 0; n < 3; ++n) {
+                        const auto& v = mesh.vertices[mesh.triangles[t][n]];
+                        corner[n] = {v[0], v[1], v[2]};
+                    }
+                    const double area = 0.5 * (corner[1] - corner[0]).cross(corner[2] - corner[0]).length();
+                    const openvdb::Vec3d at = distance.worldToIndex((corner[0] + corner[1] + corner[2]) / 3.0);
+                    float d = 0;
+                    const bool near = known.probeValue(openvdb::Coord::round(at), d) && d <= reach;
+                    sum.total += area;
+                    if (!near) sum.bare += area;
+                }
+                return sum;
+            },
+            [](const Areas& a, const Areas& b) { return Areas{a.total + b.total, a.bare + b.bare}; });
+    });
+    return areas.total > 0 ? areas.bare / areas.total : 0.0;
+}
+
+double share_without_points(const TriangleMesh& mesh, const std::vector<Vec3>& points, double reach, const RunContext& run) {
+    if (points.empty() || mesh.empty()) return 0;
+    const Domain domain = domain_of_box(bounding_box(points, reach), reach / 3);
+    return share_without_points(mesh, *distance(points, domain, {reach}, run).grid, reach, run);
 }
 
 }  // namespace covol

@@ -13,10 +13,10 @@ LAYERS = [
     ["contours", "seeds"],
     ["painted"],
     ["distance", "edge", "scan_noise", "orientation"],
-    ["band", "evolve", "scan_solid"],
-    ["guess", "guess_correction", "cloud_surface"],
+    ["band", "evolve"],
+    ["guess", "guess_correction"],
     ["surface", "mesh_cleanup", "cloud_cleanup", "compare"],
-    ["structures", "evidence", "guidance"],
+    ["structures", "evidence", "guidance", "cloud_surface"],
     ["pipeline", "phantom", "render"],
 ]
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
@@ -27,7 +27,9 @@ SOURCE_LEVEL = {"contour_solid": LEVEL["contours"], "points_check": LEVEL["point
                 "mesh_distance": LEVEL["surface"], "clipped": LEVEL["clip"], "open_ends": LEVEL["clip"],
                 "grow": LEVEL["band"], "cloud_scale": LEVEL["orientation"], "winding_field": LEVEL["orientation"],
                 "point_cells": LEVEL["orientation"], "neighbours": LEVEL["orientation"], "local_fit": LEVEL["orientation"],
-                "stray": LEVEL["orientation"]}
+                "stray": LEVEL["orientation"],
+                "areas": LEVEL["orientation"], "indicator": LEVEL["orientation"], "views": LEVEL["orientation"],
+                "vector": LEVEL["orientation"], "hold_topology": LEVEL["cloud_surface"]}
 # The modules of segment(), lib/src/pipeline, in the same way; lib/src/pipeline.cpp is above them all.
 PIPELINE = [
     ["job", "options"],

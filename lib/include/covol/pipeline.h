@@ -46,7 +46,7 @@ struct SegmentOptions {
     Model model = Model::Guided;
     double mark_precision = -1.0;       ///< standard deviation of a mark's place, world units; < 0: 0.3 of the image's spacing along each axis
     double voxel_size = 0.0;            ///< h, world units; 0: see choose_voxel_size()
-    bool voxel_size_is_automatic = false;  ///< it is choose_voxel_size()'s: a scan that encloses nothing may be given another
+    bool voxel_size_is_automatic = false;  ///< it is choose_voxel_size()'s: points that enclose nothing may be given another
     std::optional<WorldBox> roi;        ///< the domain, instead of the image's box
     double margin = 0.0;                ///< points alone: between points and domain boundary; 0 picks D + 6 voxels
     Start start;

@@ -294,12 +294,8 @@ FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cl
         FloatGridPtr rough = level_set_of(none, *orientation.indicator, domain, run);
         drop(rough);
         if (complexity(*rough, run) >= own) return;
-        auto pr = [&](const char* w, const FloatGrid& g) { const MeshMeasures m = measure(extract_mesh(g, {}, run)); fprintf(stderr, "%s c %d g %d closed %d manifold %d\n", w, m.components, m.genus, m.closed, m.manifold); };
-        pr("rough", *rough); pr("target", *result);
         report.held_voxels = cloud::hold_topology(*rough, *result);
-        fprintf(stderr, "held %zu\n", report.held_voxels); pr("held", *result);
         result = start_from_grid(domain, *result, run);
-        pr("start", *result);
     });
     return result;
 }

@@ -19,7 +19,8 @@ constexpr int kRays = 96;
 constexpr int kMostViewCells = 256;      // along the longest side
 constexpr double kFirstStep = 2.5;       // cells: beyond the point's own sheet
 constexpr double kViewSpacings = 2.0;    // edge of the cells that stop a view: about four points each
-constexpr double kCellSpacings = 1.2;    // edge of the indicator's
+constexpr double kCoarseSpacings = 2.4;  // edge of the indicator's cells: its topology counts
+constexpr double kFineSpacings = 1.2;    // of the screened one's
 constexpr double kLeastFree = 0.01;      // of all directions, less those opposite
 constexpr double kScreening = 4;         // of the indicator's own slope over a cell
 constexpr int kCycles = 8;               // of multigrid
@@ -102,20 +103,22 @@ Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& s
     const std::vector<Vec3> free = free_directions(points, kViewSpacings * apart);
     run.check();
     result.areas = areas_of(points, scale.spacing);
-    WindingField field(indicator_lattice(points, kCellSpacings * apart));
-    const double cell = field.indicator().lattice.cell;
-    std::vector<Vec3> vectors(points.size());
-    const auto solve = [&] {
-        for (std::size_t n = 0; n < points.size(); ++n) vectors[n] = times(result.areas[n], result.normals[n]);
-        field.solve(points, vectors, kCycles);
-    };
     result.normals.resize(points.size());
     for (std::size_t n = 0; n < points.size(); ++n)
         if (std::sqrt(dot(free[n], free[n])) > kLeastFree) result.normals[n] = unit(free[n]);
-    solve();
-    const double half = scale_to_half(field, points);
+    std::vector<Vec3> vectors(points.size());
+    const auto solve = [&](WindingField& field) {
+        for (std::size_t n = 0; n < points.size(); ++n) vectors[n] = times(result.areas[n], result.normals[n]);
+        field.solve(points, vectors, kCycles);
+    };
+    WindingField coarse(indicator_lattice(points, kCoarseSpacings * apart));
+    solve(coarse);
+    const double half = scale_to_half(coarse, points);
     for (double& area : result.areas) area *= half;
-    result.indicator = make_indicator(field);
+    result.indicator = make_indicator(coarse);
+    run.check();
+    WindingField fine(indicator_lattice(points, kFineSpacings * apart));
+    const double cell = fine.indicator().lattice.cell;
     // A view tells the side alone; which way the surface lies its neighbours know better.
     std::vector<double> screen(points.size());
     std::size_t against = 0;
@@ -127,10 +130,10 @@ Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& s
         screen[n] = agrees ? kScreening * result.areas[n] / (cell * cell) : 0;
     }
     result.turned = double(against) / double(points.size());
-    run.check();
-    field.screen(points, screen);
-    solve();
-    result.screened = make_indicator(field);
+    fine.start_from(coarse.indicator());
+    fine.screen(points, screen);
+    solve(fine);
+    result.screened = make_indicator(fine);
     return result;
 }
 

@@ -82,7 +82,7 @@ void try_cloud(Job& job) {
     kind = Start::Kind::Cloud;
     if (job.cloud->encloses || !job.options.voxel_size_is_automatic) return;
     // The indicator is all that there is to see.
-    const double h = kViewVoxel * job.cloud->orientation.indicator->cell();
+    const double h = kViewVoxel * job.cloud->orientation.screened->cell();
     if (h <= job.h()) return;
     job.options.voxel_size = h;
     job.choose("voxel_size", number(h), number(kViewVoxel) + " cells of the indicator");

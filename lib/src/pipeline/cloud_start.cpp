@@ -1,4 +1,6 @@
 // The start from a cloud: the surface itself.
+#include <openvdb/openvdb.h>
+
 #include "detail/memory_need.h"
 #include "pipeline/fields.h"
 #include "pipeline/starts.h"
@@ -6,6 +8,7 @@
 namespace covol::pipeline {
 namespace {
 
+constexpr double kReachSpacings = 3.0;  // that the start may lie off the points
 constexpr double kMarginShare = 0.1;  // of the longest side, beyond the points: where they leave holes the surface bulges
 
 }  // namespace
@@ -22,13 +25,24 @@ void start_from_cloud(Job& job) {
         Timed timed(job.report().seconds.tag);
         job.result.u = surface_from_cloud(job.domain(), *job.cloud, report, job.run);
     }
-    if (!job.rests() && job.uses_points()) compute_distance(job, tube_for_start(job));
+    if (!job.rests() && job.uses_points()) {
+        double& range = job.options.evolve.attraction_range;
+        if (job.has_automatic_range) {
+            range = kReachSpacings * std::max(report.spacing, job.h());
+            job.choose("attraction_range", number(range), "the start touches the points, and where there are none nothing should pull");
+        }
+        if (!report.encloses) job.hold = job.result.u->deepCopy();
+        compute_distance(job, tube_for_start(job));
+    }
+    const std::string how = report.encloses ? "; averaged within " + number(report.radius) : "; they enclose nothing: inside is what they hide";
     job.choose("start", "cloud",
-               std::to_string(job.points.size()) + " points, " + number(report.spacing) + " apart, noise " + number(report.noise) +
-                   "; averaged within " + number(report.radius));
+               std::to_string(job.points.size()) + " points, " + number(report.spacing) + " apart, noise " + number(report.noise) + how);
     if (report.stray > 0) job.choose("stray_points", std::to_string(report.stray), "far from all others and on no sheet: left out");
     if (report.dropped_pieces > 0)
         job.run.info("cloud: " + std::to_string(report.dropped_pieces) + " pieces of the surface that hardly a point rested on left out");
+    if (report.held_voxels > 0)
+        job.run.info("cloud: its handles and pieces are those of the points' indicator function, which has fewer; " +
+                     std::to_string(report.held_voxels) + " voxels held");
 }
 
 }  // namespace covol::pipeline

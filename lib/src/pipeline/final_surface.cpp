@@ -8,7 +8,7 @@
 
 #include "covol/clip.h"
 #include "covol/compare.h"
-#include "covol/scan_solid.h"
+#include "covol/evidence.h"
 #include "detail/mesh_distance.h"
 #include "pipeline/doubts.h"
 

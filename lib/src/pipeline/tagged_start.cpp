@@ -7,7 +7,7 @@
 
 #include "clip/open_ends.h"
 #include "covol/distance.h"
-#include "covol/scan_solid.h"
+#include "covol/guess.h"
 #include "pipeline/fields.h"
 #include "pipeline/starts.h"
 
@@ -18,7 +18,6 @@ constexpr double kCloseFromVoxels = 5.0;  // a tag distance beyond this starts f
 constexpr double kCapDepthVoxels = 2.5;   // a mark on an end slice that lies deeper in the start is none of the outline
 constexpr double kBeyondVoxels = 6.0;     // that a cut body goes on beyond the image, for a band at a right angle to the face
 constexpr double kMirrorSpacings = 4.0;   // of the points, beyond which none of them tells of a cut
-constexpr double kSolidReach = 3.0;       // voxels of the solid's own grid that its start may lie off the points
 
 std::vector<Vec3> all_seeds(const Job& job) {
     std::vector<Vec3> seeds = job.options.exterior_seeds;
@@ -56,29 +55,6 @@ void choose_tag(Job& job) {
     job.report().tag = choose_tag_distance(job.points, wide, all_seeds(job), job.run);
     job.options.tag_distance = job.report().tag.tag_distance;
     job.choose("tag_distance", number(job.options.tag_distance), job.report().tag.reason);
-}
-
-// Nothing is enclosed at any D, as where one side was seen only: the surface of a solid that carries the points.
-bool start_from_solid(Job& job) {
-    Timed timed(job.report().seconds.tag);
-    const ScanSolid solid = solid_from_scan(job.points, job.h(), job.run);
-    if (!solid.level_set) return false;
-    double& range = job.options.evolve.attraction_range;
-    if (job.has_automatic_range && job.uses_points()) {
-        range = kSolidReach * solid.voxel_size;
-        job.choose("attraction_range", number(range),
-                   "the start touches the points, and where there are none nothing should pull");
-    }
-    job.report().domain = job.domain_with_chosen_margin(range + kMarginVoxels * job.h());
-    job.result.u = start_from_grid(job.domain(), *solid.level_set, job.run);
-    job.hold = job.result.u->deepCopy();
-    job.options.evolve.follow = true;
-    job.choose("start", "solid",
-               "the points enclose nothing; a ball of radius " + number(solid.ball_radius) +
-                   " rolled around them leaves a solid behind " + number(100 * solid.carried) + " % of them, with " +
-                   std::to_string(solid.carved) + " of its hollows opened again");
-    if (job.uses_points()) compute_distance(job, tube_for_start(job));
-    return true;
 }
 
 // The tagged surface lies D outside the points, as far as the widest gap is large. Its closing by a ball of radius D
@@ -204,7 +180,12 @@ void start_by_tagging(Job& job) {
     const bool is_automatic = job.options.tag_distance <= 0;
     if (start_from_cut_body(job)) return;
     if (is_automatic) choose_tag(job);
-    if (job.image == nullptr && is_automatic && !job.report().tag.encloses && start_from_solid(job)) return;
+    if (job.image == nullptr && is_automatic && !job.report().tag.encloses && can_enclose(job.points)) {
+        // At no D, as where one side was seen only.
+        job.cloud = orient_cloud(job.points, job.run);
+        start_from_cloud(job);
+        return;
+    }
     const double D = job.options.tag_distance;
     job.report().domain = job.domain_with_chosen_margin(D + kMarginVoxels * job.h());
     compute_distance(job, D + band_slack(job), D);
