@@ -53,6 +53,7 @@ TEST_CASE("pieces and cavities with fewer points than asked for go") {
     const auto left = [&](const std::vector<Vec3>& points, std::size_t least) {
         const FloatGridPtr grid = solid(kBeside);
         CHECK(detail::drop_bare_pieces(*grid, points, least) > 0);
+        CHECK(test::value_at(*grid, {-0.75, 0, 0}) < -0.9F * float(kVoxel));  // of the largest
         return components(*grid);
     };
     CHECK(left(joined(on_main, on_second), 1) == 2);
