@@ -1,12 +1,5 @@
-"""Point clouds drawn from truth meshes: uniform by area, with noise and outliers.
-
-    /usr/bin/python3 tests/bench/reconstruct/clouds.py MESH.ply OUT.ply COUNT [NOISE [OUTLIERS [SEED]]]
-"""
-import sys
-
+"""Point clouds drawn from truth meshes: uniform by area, with noise and outliers."""
 import numpy as np
-
-import ply
 
 
 def sample(vertices, triangles, count, random):
@@ -32,10 +25,3 @@ def cloud(mesh, count, noise=0, outliers=0, seed=1):
     points += errors.normal(size=points.shape) * np.linalg.norm(high - low) * noise / 100
     wide = 1.1 * (strays.random((round(count * outliers / 100), 3)) - 0.5)
     return np.concatenate([points, (low + high) / 2 + wide * (high - low)])
-
-
-if __name__ == "__main__":
-    if not 4 <= len(sys.argv) <= 7:
-        raise SystemExit(__doc__)
-    numbers = [kind(word) for kind, word in zip((int, float, float, int), sys.argv[3:])]
-    ply.write(sys.argv[2], cloud(ply.read(sys.argv[1]), *numbers))

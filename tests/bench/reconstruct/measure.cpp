@@ -3,12 +3,9 @@
 #include <CGAL/AABB_traits.h>
 #include <CGAL/AABB_tree.h>
 #include <CGAL/AABB_triangle_primitive.h>
-#include <CGAL/Box_intersection_d/Box_with_info_d.h>
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Orthogonal_k_neighbor_search.h>
 #include <CGAL/Search_traits_3.h>
 #include <CGAL/Simple_cartesian.h>
-#include <CGAL/box_intersection_d.h>
 
 #include <algorithm>
 #include <cmath>
@@ -29,7 +26,7 @@ using Triangles = std::vector<Triangle>;
 using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
 using Tree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
 using Neighbours = CGAL::Orthogonal_k_neighbor_search<CGAL::Search_traits_3<Kernel>>;
-using nlohmann::json;
+using json = nlohmann::ordered_json;  // columns of the table: in this order
 
 constexpr std::size_t samples = 200'000;
 
@@ -77,28 +74,30 @@ std::vector<Sample> sample(const Triangles& triangles) {
     return found;
 }
 
-/// Numbers of a set of lengths, in % of `unit`.
-json told(std::vector<double> lengths, double unit) {
-    std::sort(lengths.begin(), lengths.end());
-    const auto at = [&](double share) { return 100 / unit * lengths[std::size_t(share * double(lengths.size() - 1))]; };
-    return {{"mean", 100 / unit * std::accumulate(lengths.begin(), lengths.end(), 0.0) / double(lengths.size())},
-            {"median", at(0.5)},
-            {"p95", at(0.95)},
-            {"max", at(1)}};
-}
+double mean(const std::vector<double>& numbers) { return std::accumulate(numbers.begin(), numbers.end(), 0.0) / double(numbers.size()); }
 
-/// One way: from samples of a surface to the triangles of the other.
-json one_way(const Triangles& from, const Tree& to, double unit) {
-    std::vector<double> lengths;
-    double angles = 0;
+double largest(const std::vector<double>& numbers) { return *std::max_element(numbers.begin(), numbers.end()); }
+
+struct OneWay {
+    std::vector<double> lengths, angles;
+};
+
+/// From samples of a surface to the triangles of the other.
+OneWay one_way(const Triangles& from, const Tree& to) {
+    OneWay found;
     for (const Sample& s : sample(from)) {
         const auto [nearest, triangle] = to.closest_point_and_primitive(s.p);
-        lengths.push_back(std::sqrt((nearest - s.p).squared_length()));
-        angles += std::acos(std::min(1.0, std::abs(s.normal * unit_normal(*triangle))));
+        found.lengths.push_back(std::sqrt((nearest - s.p).squared_length()));
+        found.angles.push_back(180 / std::numbers::pi * std::acos(std::min(1.0, std::abs(s.normal * unit_normal(*triangle)))));
     }
-    json report = told(std::move(lengths), unit);
-    report["angle"] = angles / double(samples) * 180 / std::numbers::pi;
-    return report;
+    return found;
+}
+
+/// Distances in % of `unit`.
+json distances(const std::vector<double>& to, const std::vector<double>& from, double unit) {
+    return {{"mean_to", 100 / unit * mean(to)},
+            {"mean_from", 100 / unit * mean(from)},
+            {"hausdorff", 100 / unit * std::max(largest(to), largest(from))}};
 }
 
 class Sets {
@@ -114,25 +113,24 @@ private:
     std::vector<std::size_t> parent_;
 };
 
-/// Of the triangles by their indices. Genus: from V - E + F = 2 components - 2 genus - boundary loops; null where the mesh is no
-/// manifold (an edge of more than two triangles, two fans at a vertex).
+/// Of the triangles by their indices. Genus: from V - E + F = 2 components - 2 genus - boundary loops, where the mesh is a manifold
+/// (no edge of more than two triangles, no two fans at a vertex).
 json topology(const Ply& ply) {
     struct Edge {
         std::uint32_t a, b;              // a < b
         std::size_t corner_a, corner_b;  // 3 * triangle + corner
-        bool forward;
     };
     std::vector<Edge> edges;
     for (std::size_t t = 0; t < ply.triangles.size(); ++t)
         for (std::size_t k = 0; k < 3; ++k) {
             const std::size_t from = 3 * t + k, to = 3 * t + (k + 1) % 3;
             const auto a = ply.triangles[t][k], b = ply.triangles[t][(k + 1) % 3];
-            edges.push_back(a < b ? Edge{a, b, from, to, true} : Edge{b, a, to, from, false});
+            edges.push_back(a < b ? Edge{a, b, from, to} : Edge{b, a, to, from});
         }
     std::sort(edges.begin(), edges.end(), [](const Edge& x, const Edge& y) { return std::tie(x.a, x.b) < std::tie(y.a, y.b); });
 
     Sets fans(3 * ply.triangles.size()), pieces(ply.points.size()), loops(ply.points.size());
-    std::size_t edge_count = 0, open = 0, crowded = 0, turned = 0;
+    std::size_t edge_count = 0, open = 0, crowded = 0;
     std::set<std::uint32_t> rim;
     for (std::size_t n = 0, next = 0; n < edges.size(); n = next) {
         while (next < edges.size() && edges[next].a == edges[n].a && edges[next].b == edges[n].b) ++next;
@@ -148,8 +146,6 @@ json topology(const Ply& ply) {
             rim.insert({edges[n].a, edges[n].b});
         } else if (next > n + 2) {
             ++crowded;
-        } else if (edges[n].forward == edges[n + 1].forward) {
-            ++turned;
         }
     }
     std::vector<std::size_t> fan_of(ply.points.size(), std::size_t(-1));
@@ -169,51 +165,11 @@ json topology(const Ply& ply) {
     for (const auto v : rim) rims.insert(loops.of(v));
     const bool manifold = crowded == 0 && pinched.empty();
     const long euler = vertices - long(edge_count) + long(ply.triangles.size());
-    json report = {{"vertices", vertices},
-                   {"triangles", ply.triangles.size()},
-                   {"euler", euler},
-                   {"components", components.size()},
-                   {"boundary_loops", rims.size()},
-                   {"closed", open == 0},
-                   {"manifold", manifold},
-                   {"oriented", turned == 0}};
-    if (manifold) report["genus"] = (2 * long(components.size()) - long(rims.size()) - euler) / 2;
-    return report;
-}
-
-/// Pairs of triangles that meet elsewhere than in the corners they share. (Two on one edge that lie folded onto each other are not
-/// found.)
-std::size_t crossing_pairs(const Ply& ply) {
-    using Exact = CGAL::Exact_predicates_inexact_constructions_kernel;
-    using Corner = std::uint32_t;
-    using Box = CGAL::Box_intersection_d::Box_with_info_d<double, 3, std::array<Corner, 3>>;
-    const auto at = [&](Corner v) {
-        const auto& p = ply.points[v];
-        return Exact::Point_3(p[0], p[1], p[2]);
-    };
-    const auto triangle = [&](const std::array<Corner, 3>& t) { return Exact::Triangle_3(at(t[0]), at(t[1]), at(t[2])); };
-    std::vector<Box> boxes;
-    for (const auto& t : ply.triangles)
-        if (!triangle(t).is_degenerate()) boxes.emplace_back(triangle(t).bbox(), t);
-
-    std::size_t found = 0;
-    CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const Box& one, const Box& two) {
-        const auto s = one.info(), t = two.info();
-        const auto shared_by = [](const std::array<Corner, 3>& corners) {
-            return [&corners](Corner v) { return std::find(corners.begin(), corners.end(), v) != corners.end(); };
-        };
-        const auto shared = std::count_if(s.begin(), s.end(), shared_by(t));
-        if (shared == 0) {
-            found += CGAL::do_intersect(triangle(s), triangle(t));
-        } else if (shared == 1) {
-            const auto opposite = [&](const std::array<Corner, 3>& own, const std::array<Corner, 3>& other) {
-                const auto k = std::find_if(own.begin(), own.end(), shared_by(other)) - own.begin();
-                return Exact::Segment_3(at(own[(k + 1) % 3]), at(own[(k + 2) % 3]));
-            };
-            found += CGAL::do_intersect(opposite(s, t), triangle(t)) || CGAL::do_intersect(opposite(t, s), triangle(s));
-        }
-    });
-    return found;
+    const long genus = (2 * long(components.size()) - long(rims.size()) - euler) / 2;
+    return {{"genus", manifold ? json(genus) : json("no manifold")},
+            {"components", components.size()},
+            {"closed", open == 0 ? "yes" : "no"},
+            {"triangles", ply.triangles.size()}};
 }
 
 double spacing_of(const Neighbours::Tree& tree) {
@@ -229,35 +185,31 @@ double spacing_of(const Neighbours::Tree& tree) {
 
 }  // namespace
 
-json measure(const Ply& mesh, const Ply& truth, bool self_intersections) {
-    const double unit = diagonal(truth);
+json measure(const Ply& mesh, const Ply& truth) {
     const Triangles a = solid_triangles(mesh), b = solid_triangles(truth);
     const Tree tree_a(a.begin(), a.end()), tree_b(b.begin(), b.end());
-    json report = {{"topology", topology(mesh)},
-                   {"to_truth", one_way(a, tree_b, unit)},
-                   {"from_truth", one_way(b, tree_a, unit)}};
-    report["angle"] = (report["to_truth"]["angle"].get<double>() + report["from_truth"]["angle"].get<double>()) / 2;
-    if (self_intersections) report["self_intersections"] = crossing_pairs(mesh);
+    const OneWay to = one_way(a, tree_b), from = one_way(b, tree_a);
+    json report = distances(to.lengths, from.lengths, diagonal(truth));
+    report["normals"] = (mean(to.angles) + mean(from.angles)) / 2;
+    report["genus_truth"] = topology(truth)["genus"];
+    report.update(topology(mesh));
     return report;
 }
 
 json measure_points(const Ply& mesh, const Ply& points) {
-    const double unit = diagonal(points);
     const Triangles triangles = solid_triangles(mesh);
     const Tree surface(triangles.begin(), triangles.end());
     Neighbours::Tree cloud;
-    std::vector<double> to_mesh, to_points;
+    std::vector<double> to, from;
     for (const auto& p : points.points) {
         cloud.insert(point(p));
-        to_mesh.push_back(std::sqrt(surface.squared_distance(point(p))));
+        from.push_back(std::sqrt(surface.squared_distance(point(p))));
     }
     cloud.build();
-    for (const Sample& s : sample(triangles)) to_points.push_back(std::sqrt(Neighbours(cloud, s.p, 1).begin()->second));
+    for (const Sample& s : sample(triangles)) to.push_back(std::sqrt(Neighbours(cloud, s.p, 1).begin()->second));
+    json report = distances(to, from, diagonal(points));
     const double spacing = spacing_of(cloud);
-    const auto far = std::count_if(to_points.begin(), to_points.end(), [=](double d) { return d > 3 * spacing; });
-    return {{"topology", topology(mesh)},
-            {"points_to_mesh", told(std::move(to_mesh), unit)},
-            {"mesh_to_points", told(std::move(to_points), unit)},
-            {"spacing", 100 * spacing / unit},
-            {"share_beyond_3_spacings", double(far) / double(samples)}};
+    report["beyond_points"] = 100 * double(std::count_if(to.begin(), to.end(), [=](double d) { return d > 3 * spacing; })) / double(samples);
+    report.update(topology(mesh));
+    return report;
 }

@@ -4,9 +4,10 @@
 
 #include "ply.h"
 
-/// Distances are in % of the diagonal of `truth`'s bounding box; angles in degrees, without regard to orientation.
-nlohmann::json measure(const Ply& mesh, const Ply& truth, bool self_intersections);
+/// Mean distances to the truth and from it, and the largest either way, in % of the diagonal of the truth's bounding box; mean
+/// angle between normals at nearest points, in degrees, without regard to orientation; topology of both.
+nlohmann::ordered_json measure(const Ply& mesh, const Ply& truth);
 
-/// Of a surface without a truth: to the points it was made from. Lengths are in % of the diagonal of the points' bounding
-/// box; the spacing is the mean distance to the 6 nearest points.
-nlohmann::json measure_points(const Ply& mesh, const Ply& points);
+/// Of a surface without a truth: the same distances, to the points it was made from; beyond_points is the share of it, in %, that is
+/// farther from all points than 3 times their mean distance to the 6 nearest.
+nlohmann::ordered_json measure_points(const Ply& mesh, const Ply& points);

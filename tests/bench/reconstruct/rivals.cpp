@@ -140,8 +140,8 @@ const std::map<std::string, Method> methods = {
 };
 
 int usage() {
-    std::cerr << "rivals measure MESH TRUTH [--self-intersections 1]   JSON; lengths in % of the truth's diagonal\n"
-                 "rivals points MESH POINTS                            JSON; lengths in % of the points' diagonal\n";
+    std::cerr << "rivals measure MESH TRUTH   JSON; lengths in % of the truth's diagonal\n"
+                 "rivals points MESH POINTS   JSON; lengths in % of the points' diagonal\n";
     for (const auto& [name, method] : methods) {
         std::cerr << "rivals " << name << " POINTS OUT";
         for (const auto& [option, value] : method.options) std::cerr << " [--" << option << " " << value << "]";
@@ -155,7 +155,7 @@ int run(int count, char** words) {
     const std::string what = words[1];
     const bool measures = what == "measure" || what == "points";
     if (!measures && !methods.count(what)) return usage();
-    Options options = measures ? Options{{"self-intersections", 0}} : methods.at(what).options;
+    Options options = measures ? Options{} : methods.at(what).options;
     for (int n = 4; n + 1 < count; n += 2) {
         const std::string option = words[n];
         if (option.size() < 3 || !options.count(option.substr(2))) return usage();
@@ -163,7 +163,7 @@ int run(int count, char** words) {
     }
     const Ply given = read_ply(words[2]);
     if (what == "measure") {
-        std::cout << measure(given, read_ply(words[3]), options["self-intersections"] != 0).dump(1) << "\n";
+        std::cout << measure(given, read_ply(words[3])).dump(1) << "\n";
     } else if (what == "points") {
         std::cout << measure_points(given, read_ply(words[3])).dump(1) << "\n";
     } else {

@@ -1,23 +1,16 @@
-"""Truth meshes: closed, in one piece, of known genus; meshes of COVOL_DATA, and own shapes with thin parts.
+"""Truth meshes with thin parts, branches, handles: closed, in one piece, of known genus.
 
-    [COVOL_DATA=FOLDER] /usr/bin/python3 tests/bench/reconstruct/shapes.py FOLDER      (writes FOLDER/SHAPE.ply)
-
-Own shapes are zero sets of signed functions f (negative inside; lengths in the shape's own unit, its longest side about 2), meshed
+Shapes are zero sets of signed functions f (negative inside; lengths in the shape's own unit, its longest side about 2), meshed
 by marching cubes; the vertices are then moved onto f = 0. Tubes about closed curves are meshed along the curve.
 """
-import os
 import pathlib
-import shutil
-import sys
 
 import numpy as np
 from skimage.measure import marching_cubes
 
 import ply
 
-
 BLOCK = 8         # cells along the edge of the blocks in which f is sampled where it may be 0
-GIVEN = ("koala", "spot", "hammer")
 
 
 # ---- signed functions: f(p), p an array (..., 3) ---------------------------------------------------------------------
@@ -195,40 +188,26 @@ def trefoil(t):
     return np.stack([np.sin(t) + 2 * np.sin(2 * t), np.cos(t) - 2 * np.cos(2 * t), -1.2 * np.sin(3 * t)], 1) / 3
 
 
-OWN = {  # name: (how its mesh is made, genus)
-    "sphere": (lambda: mesh_of(sphere, (-1.05,) * 3, (1.05,) * 3, 160), 0),
-    "torus": (lambda: tube_about(circle, 0.3, 900, 400), 1),
-    "knot": (lambda: tube_about(trefoil, 0.16, 2000, 120), 1),
-    "head": (lambda: mesh_of(head, (-1, -0.65, -0.6), (1, 0.8, 1.45)), 0),
-    "creature": (lambda: mesh_of(creature, (-1.1, -0.3, -0.2), (1.1, 0.35, 1.3)), 0),
-    "tubes": (lambda: mesh_of(tubes, *tree_box()), 0),
-    "skull": (lambda: mesh_of(skull, (-0.95, -1.05, -0.95), (0.95, 1.05, 0.9), 280), 5),
-}
-NAMES = (*GIVEN, *OWN)
-GENUS = dict.fromkeys(GIVEN, 0) | {name: genus for name, (_, genus) in OWN.items()}
-
-
 def tree_box():
     knots = np.concatenate([knots for knots, _ in branches()])
     return knots.min(0) - 0.1, knots.max(0) + 0.1
 
 
+OWN = {  # name: how its mesh is made
+    "sphere": lambda: mesh_of(sphere, (-1.05,) * 3, (1.05,) * 3, 160),
+    "torus": lambda: tube_about(circle, 0.3, 900, 400),
+    "knot": lambda: tube_about(trefoil, 0.16, 2000, 120),
+    "head": lambda: mesh_of(head, (-1, -0.65, -0.6), (1, 0.8, 1.45)),
+    "creature": lambda: mesh_of(creature, (-1.1, -0.3, -0.2), (1.1, 0.35, 1.3)),
+    "tubes": lambda: mesh_of(tubes, *tree_box()),
+    "skull": lambda: mesh_of(skull, (-0.95, -1.05, -0.95), (0.95, 1.05, 0.9), 280),
+}
+
+
 def truth(name, folder):
-    """Path of the mesh in `folder`; made unless it is there. None: COVOL_DATA, which has it, is not set."""
+    """Path of the mesh in `folder`; made unless it is there, and newer than this file."""
     target = pathlib.Path(folder) / f"{name}.ply"
-    if not target.exists():
+    if not target.exists() or target.stat().st_mtime < pathlib.Path(__file__).stat().st_mtime:
         target.parent.mkdir(parents=True, exist_ok=True)
-        if name in GIVEN:
-            if "COVOL_DATA" not in os.environ:
-                return None
-            shutil.copyfile(pathlib.Path(os.environ["COVOL_DATA"]) / "meshes" / f"{name}.ply", target)
-        else:
-            ply.write(target, *OWN[name][0]())
+        ply.write(target, *OWN[name]())
     return target
-
-
-if __name__ == "__main__":
-    if len(sys.argv) != 2:
-        raise SystemExit("expected the folder to write to")
-    for shape in NAMES:
-        print(truth(shape, sys.argv[1]) or f"{shape}: SKIPPED, COVOL_DATA is not set", flush=True)
