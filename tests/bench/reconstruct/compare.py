@@ -34,13 +34,15 @@ METHODS = ("covol", "poissonrecon", "poisson", "scale-space", "advancing-front",
 
 def methods(options):
     """{method: [variant]}; a variant is a tuple of commands, each from {in} to {out}; the last one writes the mesh."""
+    covol, rivals, poisson_recon = (shlex.quote(str(path)) for path in (options.covol, options.rivals, options.poisson_recon))
+
     def rival(what, **knobs):
-        return " ".join([options.rivals, what, "{in} {out}", *(f"--{knob} {value}" for knob, value in knobs.items())])
+        return " ".join([rivals, what, "{in} {out}", *(f"--{knob} {value}" for knob, value in knobs.items())])
 
     normals = [rival("normals", k=k) for k in options.normals_k]
-    screened = [f"{options.poisson_recon} --in {{in}} --out {{out}} --depth {depth}" for depth in options.depths]
+    screened = [f"{poisson_recon} --in {{in}} --out {{out}} --depth {depth}" for depth in options.depths]
     found = {
-        "covol": [(f"{options.covol} reconstruct {{in}} -o {{out}}.vdb --mesh {{out}} --quiet",)],
+        "covol": [(f"{covol} reconstruct {{in}} -o {{out}}.vdb --mesh {{out}} --quiet",)],
         "poissonrecon": itertools.product(normals, screened),
         "poisson": itertools.product(normals, [rival("poisson")]),
         "scale-space": [(rival("scale-space", smoothed=smoothed),) for smoothed in (0, 1)],
@@ -187,15 +189,14 @@ def summary(rows):
         by_method.setdefault(row["method"], {})[case] = cases.setdefault(case, {})[row["method"]] = row
     for method, found in by_method.items():
         good = {case: row for case, row in found.items() if "fails" not in row}
-        told = {"method": method, "cases": len(found), "fail": len(found) - len(good),
-                "closed in one piece": sum(row["closed"] == "yes" and row["components"] == 1 for row in good.values())}
-        if any("genus_truth" in row for row in good.values()):
-            told["of these, genus right"] = sum(row["closed"] == "yes" and row["components"] == 1 and row["genus"] == row["genus_truth"]
-                                                for row in good.values())
+        whole = [row for row in good.values() if row["closed"] == "yes" and row["components"] == 1]
+        told = {"method": method, "cases": len(found), "fail": len(found) - len(good), "closed in one piece": len(whole)}
+        if "shape" in rows[0]:
+            told["these of the right genus"] = sum(row["genus"] == row["genus_truth"] for row in whole)
         for column in ("mean_to", "mean_from", "hausdorff", "normals", "cpu"):
-            own = [(row[column], cases[case]["covol"][column]) for case, row in good.items()
-                   if column in row and column in cases[case].get("covol", {})]
-            told[f"{column} / covol's, median"] = float(np.median([a / b for a, b in own if b > 0])) if own else ""
+            ratios = [row[column] / cases[case]["covol"][column] for case, row in good.items()
+                      if column in row and cases[case].get("covol", {}).get(column)]
+            told[f"{column} / covol's, median"] = float(np.median(ratios)) if ratios else ""
         yield told
 
 
