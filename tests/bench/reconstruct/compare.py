@@ -79,16 +79,16 @@ class Case:
 
 def truths(options):
     """{shape: path of its mesh}"""
-    folder = options.meshes and pathlib.Path(options.meshes)
-    given = {path.stem: path for path in sorted(folder.glob("*.ply"))} if folder else {}
-    if not folder:
-        print("meshes of a folder: SKIPPED, --meshes is not given and COVOL_DATA is not set")
-    elif not given:
-        raise SystemExit(f"--meshes: {folder}: expected .ply files, found none")
+    given = {path.stem: path for path in sorted(pathlib.Path(options.meshes).glob("*.ply"))} if options.meshes else {}
+    if options.meshes and not given:
+        raise SystemExit(f"--meshes: {options.meshes}: expected .ply files, found none")
     wanted = options.shapes or [*given, *shapes.OWN]
-    if unknown := [name for name in wanted if name not in given and name not in shapes.OWN]:
-        raise SystemExit(f"--shapes: expected some of {', '.join([*given, *shapes.OWN])}, got {', '.join(unknown)}")
-    return {name: given.get(name) or shapes.truth(name, pathlib.Path(options.work) / "truth") for name in wanted}
+    missing = [name for name in wanted if name not in given and name not in shapes.OWN]
+    if options.meshes and missing:
+        raise SystemExit(f"--shapes: expected some of {', '.join([*given, *shapes.OWN])}, got {', '.join(missing)}")
+    if not options.meshes and (missing or not options.shapes):
+        print(f"{', '.join(missing) or 'meshes of a folder'}: SKIPPED, --meshes is not given and COVOL_DATA is not set")
+    return {name: given.get(name) or shapes.truth(name, pathlib.Path(options.work) / "truth") for name in wanted if name not in missing}
 
 
 def drawn(options):
