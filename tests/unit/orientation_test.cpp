@@ -120,27 +120,27 @@ TEST_CASE("orient: the indicator is 1 in the solid and 0 elsewhere; its level pa
     const Orientation o = orient(s.points, cloud_scale(s.points));
     double worst_in = 0, worst_out = 0;
     for (const Vec3& x : test::box_cloud(2000, {{-1.2, -1.2, -1.2}, {1.2, 1.2, 1.2}}, 6)) {
-        if (shape.distance(x) < -0.2) worst_in = std::max(worst_in, std::abs(o.inside(x) - 1));
-        if (shape.distance(x) > 0.2) worst_out = std::max(worst_out, std::abs(o.inside(x)));
+        if (shape.distance(x) < -0.2) worst_in = std::max(worst_in, std::abs(o.indicator->inside(x) - 1));
+        if (shape.distance(x) > 0.2) worst_out = std::max(worst_out, std::abs(o.indicator->inside(x)));
     }
     CHECK(worst_in < 0.2);
     CHECK(worst_out < 0.2);
     double slope = 0;
-    for (const Vec3& x : s.points) slope -= test::dot(o.gradient(x), test::normal_of(shape.distance, x)) / 4000;
-    CHECK(slope > 0.2 / o.cell());
+    for (const Vec3& x : s.points) slope -= test::dot(o.indicator->gradient(x), test::normal_of(shape.distance, x)) / 4000;
+    CHECK(slope > 0.2 / o.indicator->cell());
 
     std::vector<WorldBox> crossed;
-    o.crossed([&](const WorldBox& box) { crossed.push_back(box); });
+    o.indicator->crossed([&](const WorldBox& box) { crossed.push_back(box); });
     double farthest = 0;
     for (const WorldBox& box : crossed) {
-        CHECK(box.max[0] - box.min[0] == Approx(o.cell()));
+        CHECK(box.max[0] - box.min[0] == Approx(o.indicator->cell()));
         farthest = std::max(farthest, std::abs(shape.distance(test::scaled(0.5, test::sum(box.min, box.max)))));
     }
-    CHECK(farthest < 3 * o.cell());
+    CHECK(farthest < 3 * o.indicator->cell());
     for (std::size_t n = 0; n < s.points.size(); n += 10) {
         const Vec3& p = s.points[n];
         CHECK(std::any_of(crossed.begin(), crossed.end(), [&](const WorldBox& box) {
-            return test::norm(test::sum(test::scaled(0.5, test::sum(box.min, box.max)), test::scaled(-1, p))) < 3 * o.cell();
+            return test::norm(test::sum(test::scaled(0.5, test::sum(box.min, box.max)), test::scaled(-1, p))) < 3 * o.indicator->cell();
         }));
     }
 }
@@ -160,7 +160,7 @@ TEST_CASE("orient: the same bits for any number of threads, and in any unit") {
     for (Vec3& p : larger) p = test::scaled(4096, p);
     const Orientation of_larger = orient(larger, {4096 * one.scale.spacing, 4096 * one.scale.noise});
     CHECK(of_larger.normals == one.orientation.normals);
-    CHECK(of_larger.cell() == Approx(4096 * one.orientation.cell()));
+    CHECK(of_larger.indicator->cell() == Approx(4096 * one.orientation.indicator->cell()));
 }
 
 TEST_CASE("orient: points given several times") {
@@ -201,7 +201,7 @@ TEST_CASE("orient_cloud leaves out points spread through space, and none of a su
             REQUIRE(far > 50);
             CHECK(far_kept < 0.25 * far);
             CHECK(lost < 0.001 * double(shape.count));
-            CHECK(cloud.settled());
+            CHECK(cloud.encloses);
             std::vector<Vec3> normals, truth;
             for (std::size_t n = 0, m = 0; n < s.points.size(); ++n) {
                 if (!kept.count(s.points[n])) continue;
@@ -243,5 +243,5 @@ TEST_CASE("orient: clouds that have no inside are refused, a stop is heeded") {
 TEST_CASE("orient: a flat cloud gets unit normals, too") {
     const Orientation o = orient(test::box_cloud(500, {{-1, -1, 0}, {1, 1, 1e-300}}, 10), {0.09, 0});
     for (const Vec3& n : o.normals) REQUIRE(test::norm(n) == Approx(1));
-    CHECK(std::isfinite(o.inside({0, 0, 0})));
+    CHECK(std::isfinite(o.indicator->inside({0, 0, 0})));
 }

@@ -15,7 +15,7 @@ namespace {
 constexpr double kVoxel = 0.05;
 constexpr double kSmall = 0.12;  // radius of the small ones: thinner than the band
 const Vec3 kBeside{1.1, 0, 0};   // the second ball's band meets the first one's
-const Vec3 kFar{1.6, 0, 0};      // it does not meet it
+const Vec3 kFar{1.6, 0, 0};      // it does not
 const Vec3 kCavity{0, 0.3, 0};
 
 double ball(const Vec3& p, const Vec3& center, double radius) { return test::distance(p, center) - radius; }
@@ -49,29 +49,36 @@ TEST_CASE("pieces and cavities that points lie on stay") {
 }
 
 TEST_CASE("pieces and cavities with fewer points than asked for go") {
-    const std::vector<Vec3> in_cavity = on_small(kCavity), on_second = on_small(kBeside);
-    const auto left = [&](const std::vector<Vec3>& points, std::size_t least) {
-        const FloatGridPtr grid = solid(kBeside);
-        CHECK(detail::drop_bare_pieces(*grid, points, least) > 0);
-        CHECK(test::value_at(*grid, {-0.75, 0, 0}) < -0.9F * float(kVoxel));  // of the largest
-        return components(*grid);
-    };
-    CHECK(left(joined(on_main, on_second), 1) == 2);
-    CHECK(left(joined(on_main, in_cavity), 1) == 2);
-    CHECK(left(on_main, 1) == 1);
-    CHECK(left(joined(joined(on_main, in_cavity), on_second), 41) == 1);
-    // The largest piece stays in any case.
-    CHECK(left({}, 1) == 1);
+    for (const Vec3& second : {kBeside, kFar}) {
+        INFO("second ball at " << second[0]);
+        const std::vector<Vec3> in_cavity = on_small(kCavity), on_second = on_small(second);
+        const auto dropped = [&](const std::vector<Vec3>& points, std::size_t least, int left) {
+            const FloatGridPtr grid = solid(second);
+            const std::size_t count = detail::drop_bare_pieces(*grid, points, least);
+            CHECK(components(*grid) == left);
+            return count;
+        };
+        CHECK(dropped(joined(on_main, on_second), 1, 2) == 1);
+        CHECK(dropped(joined(on_main, in_cavity), 1, 2) == 1);
+        CHECK(dropped(on_main, 1, 1) == 2);
+        CHECK(dropped(joined(joined(on_main, in_cavity), on_second), 41, 1) == 2);
+        // The largest piece stays in any case.
+        CHECK(dropped({}, 1, 1) == 2);
+        CHECK(dropped(joined(in_cavity, on_second), 1, 3) == 0);
+    }
 }
 
 TEST_CASE("the right piece goes, the rest keeps its values") {
-    const FloatGridPtr grid = solid(kBeside), before = solid(kBeside);
-    CHECK(detail::drop_bare_pieces(*grid, joined(on_main, on_small(kCavity)), 1) == 1);
-    for (auto value = before->cbeginValueOn(); value; ++value) {
-        const Vec3 at = test::world_of(domain_of(*before), value.getCoord());
-        const float now = grid->tree().getValue(value.getCoord());
-        if (ball(at, kBeside, kSmall) < 0) REQUIRE(now > 0);
-        else REQUIRE(now == *value);
+    for (const Vec3& second : {kBeside, kFar}) {
+        INFO("second ball at " << second[0]);
+        const FloatGridPtr grid = solid(second), before = solid(second);
+        detail::drop_bare_pieces(*grid, joined(on_main, on_small(kCavity)), 1);
+        for (auto value = before->cbeginValueOn(); value; ++value) {
+            const Vec3 at = test::world_of(domain_of(*before), value.getCoord());
+            const float now = grid->tree().getValue(value.getCoord());
+            if (ball(at, second, kSmall) < 0) REQUIRE(now > 0);
+            else REQUIRE(now == *value);
+        }
     }
 }
 

@@ -283,16 +283,11 @@ FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cl
             result = level_set_of(pieces, *orientation.indicator, domain, run);
         }
         const std::size_t least = std::max(kLeastResting, std::size_t(kLeastRestingShare * double(cloud.points.size())));
-        const auto drop = [&](FloatGridPtr& level_set) {
-            const std::size_t dropped = detail::drop_bare_pieces(*level_set, cloud.points, least);
-            if (dropped > 0) level_set = start_from_grid(domain, *level_set, run);
-            return dropped;
-        };
-        report.dropped_pieces = drop(result);
+        report.dropped_pieces = detail::drop_bare_pieces(*result, cloud.points, least);
         const int own = complexity(*result, run);
         if (own <= 1) return;
         FloatGridPtr rough = level_set_of(none, *orientation.indicator, domain, run);
-        drop(rough);
+        detail::drop_bare_pieces(*rough, cloud.points, least);
         if (complexity(*rough, run) >= own) return;
         report.held_voxels = cloud::hold_topology(*rough, *result);
         result = start_from_grid(domain, *result, run);

@@ -89,7 +89,7 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
     if (scratch.near.size() < kLeastPoints) return result;
     Matrix6 m = Matrix6::Zero();
     Vector6 right = Vector6::Zero();
-    double sum = 0, squares = 0, count = 0;
+    double sum = 0, squares = 0, nears = 0, near_squares = 0;
     for (std::size_t n = 0; n < scratch.near.size(); ++n) {
         const auto& [u, v, t, near] = scratch.near[n];
         const double c = double(scratch.counts[n]), w = c * near;
@@ -99,7 +99,8 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
         right += w * t * b;
         sum += w;
         squares += c * near * near;
-        count += c;
+        nears += near;
+        near_squares += near * near;
     }
     // Narrow bodies seen from the side: across them the quadric knows nothing beyond its points.
     const double uu = m(1, 1) / sum - m(0, 1) * m(0, 1) / (sum * sum), vv = m(2, 2) / sum - m(0, 2) * m(0, 2) / (sum * sum),
@@ -110,15 +111,15 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
     if (solver.info() != Eigen::Success || !solver.isPositive()) return result;
     const Vector6 x = solver.solve(right);
     const Vector6 first = solver.solve(Vector6::Unit(0));
-    double residual = 0;
+    double residual = 0;  // a mean of c points is off by 1 / c of their variance
     for (std::size_t n = 0; n < scratch.near.size(); ++n) {
         const auto& [u, v, t, near] = scratch.near[n];
         const double off = t - (x[0] + u * (x[1] + u * x[3] + v * x[4]) + v * (x[2] + v * x[5]));
         residual += double(scratch.counts[n]) * near * off * off;
     }
-    const double effective = sum * sum / squares;
+    const double effective = nears * nears / near_squares;
     if (effective < 7) return result;
-    result.noise = r * std::sqrt(residual / sum * effective / (effective - 6));
+    result.noise = r * std::sqrt(residual / nears * effective / (effective - 6));
     result.deviation = result.noise * std::sqrt(std::max(0.0, first[0]) * squares / sum);
     result.c = {x[0] * r, x[1], x[2], x[3] / r, x[4] / r, x[5] / r};
     result.good = std::isfinite(x.sum());
