@@ -40,6 +40,7 @@ struct Orientation {
     std::shared_ptr<const Indicator> indicator;  ///< of these
     std::shared_ptr<const Indicator> screened;   ///< drawn to 1/2 at the points as well; null: quadrics tell more
     double turned = 0;             ///< share of the points whose normal the last iteration turned by more than 90 degrees
+    double off_half = 0;           ///< mean of the indicator over the points, less 1/2, absolute
     int iterations = 0;
 };
 

@@ -36,8 +36,8 @@ constexpr double kBesideOfLeast = 0.75;   // of the smallest neighbourhood: beyo
 constexpr double kTrusted = 0.6;          // of the reach; beyond, the indicator takes over
 constexpr double kSlope = 0.4;            // of the indicator at the surface, per cell
 constexpr double kNodeVoxels = 0.75;      // distance of quadrics
-constexpr std::size_t kLeastResting = 30;  // points, on a piece of its own
-constexpr double kLeastRestingShare = 5e-4;
+constexpr std::size_t kLeastResting = 8;   // points, on a piece of its own
+constexpr double kLeastRestingShare = 1e-3;
 
 double squared(const Vec3& a, const Vec3& b) {
     double sum = 0;

@@ -19,8 +19,8 @@ constexpr double kFirstSpacings = 2.0;    // radius of the first: about 12 point
 constexpr double kThinnedShare = 0.2;     // of the radius: points closer are averaged first
 constexpr std::size_t kLeastPoints = 9;
 constexpr double kSheetShare = 0.3;       // noise, of the radius; points that fill a ball have 0.45
-constexpr double kAgreement = 2.0;        // standard deviations
-constexpr double kResidualGrowth = 1.25;  // beyond it the fit itself is off
+constexpr double kAgreement = 1.5;        // standard deviations; 1 to 2 change the errors by a tenth
+constexpr double kMisfitGrowth = 1.2;     // beyond it the fit itself is off
 constexpr double kRidge = 1e-4;
 constexpr double kSheetHeight = 0.15;     // of the radius: what is farther off the plane may be another sheet
 constexpr double kMostHeight = 0.4;       // of the radius: a foot farther from its node is no sheet's
@@ -45,6 +45,7 @@ std::array<Vec3, 3> frame_of(const Vec3& normal) {
 struct Fit {
     std::array<double, 6> c{};
     double noise = 0;      // standard deviation of the points
+    double misfit = 0;     // of their means, in which noise is averaged and what the quadric lacks is not
     double deviation = 0;  // of c0
     bool good = false;
 };
@@ -120,6 +121,7 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
     const double effective = nears * nears / near_squares;
     if (effective < 7) return result;
     result.noise = r * std::sqrt(residual / nears * effective / (effective - 6));
+    result.misfit = r * std::sqrt(residual / sum * effective / (effective - 6));
     result.deviation = result.noise * std::sqrt(std::max(0.0, first[0]) * squares / sum);
     result.c = {x[0] * r, x[1], x[2], x[3] / r, x[4] / r, x[5] / r};
     result.good = std::isfinite(x.sum());
@@ -139,11 +141,12 @@ int is_of_majority(const Level& level, const Vec3& origin, const Vec3& normal, c
     return same + opposite < kLeastMajority ? -1 : same >= opposite;
 }
 
+
 Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& normal, Scratch& scratch) {
     Quadric best;
     best.origin = point;
     best.axes = frame_of(normal);
-    struct Seen { double height, deviation, noise; };
+    struct Seen { double height, deviation, misfit; };
     std::vector<Seen> seen;
     int majority = -1;
     for (const Level& level : levels) {
@@ -160,7 +163,7 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
         if (majority == 0) return best;
         if (seen.empty() && majority >= 0 && level.radius > kMostGrowth * best.least_radius) return best;
         Fit now = fit(level, point, best.axes, scratch);
-        if (!now.good || now.noise > kSheetShare * level.radius) {
+        if (!now.good || now.misfit > kSheetShare * level.radius) {
             if (seen.empty()) continue;
             break;
         }
@@ -174,11 +177,11 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
             if (again.good) now = again; else best.axes = before;
         }
         const bool agrees = std::all_of(seen.begin(), seen.end(), [&](const Seen& s) {
-            return std::abs(s.height - now.c[0]) <= kAgreement * s.deviation && now.noise <= kResidualGrowth * s.noise;
+            return std::abs(s.height - now.c[0]) <= kAgreement * s.deviation && now.misfit <= kMisfitGrowth * s.misfit;
         });
         if (!agrees) break;
         if (seen.empty() && (std::abs(now.c[0]) > kMostHeight * level.radius || dot(best.axes[2], normal) < kLeastCosine)) return best;
-        seen.push_back({now.c[0], now.deviation, now.noise});
+        seen.push_back({now.c[0], now.deviation, now.misfit});
         best.c = now.c;
         best.radius = level.radius;
         best.noise = now.noise;

@@ -32,13 +32,15 @@ constexpr double kPatchOff = 0.12;       // from 1/2, of a patch that may be tur
 constexpr int kPatchRounds = 4, kPatchCycles = 2, kAfterTurning = 3;
 constexpr int kFirstPasses = 12;         // of smoothing, for the first guess
 constexpr double kSteady = 1e-4;         // the normals' mean change, 1 - cosine
-constexpr double kHighest = 1.2;         // chi at a point beyond which another part encloses it already
+// chi at a point beyond which another part encloses it already; noise brings points there that are none of these.
+constexpr double kFirstHighest = 0.9, kLastHighest = 1.2;
 constexpr int kCycles = 1, kLastCycles = 4;  // of multigrid
 // The finest lattice's cell: smaller ones let single points turn, larger ones lose thin parts.
 constexpr double kCellSpacings = 0.8, kCellNoises = 1.0;
 constexpr double kTries[] = {1, 0.67, 1.5, 0.44, 2.25};  // of it, until few normals turn
 constexpr double kLeastSpacings = 0.5, kFewTurned = 0.002;
-constexpr double kSettled = 0.025;  // clouds of closed shapes turn up to 0.02, scans of one side 0.03 to 0.15
+constexpr double kOffHalf = 0.015;   // that the indicator's mean over the points may differ from 1/2
+constexpr double kSettled = 0.0225;  // clouds of closed shapes turn up to 0.02, scans of one side 0.025 to 0.15
 
 /// A lattice and what is done on it.
 struct Stage {
@@ -55,6 +57,7 @@ public:
         const Lattice lattice = cloud::indicator_lattice(points_, stage.cells);
         WindingField field(lattice);
         if (last_) field.start_from(last_->indicator());
+        highest_ = stage.is_last ? kLastHighest : kFirstHighest;
         if (result.normals.empty()) first_guess(lattice, result);
         for (int n = 0; n < stage.iterations; ++n) {
             run.check();
@@ -97,7 +100,7 @@ private:
         std::vector<double> cosine(count);
         tbb::parallel_for(std::size_t(0), count, [&](std::size_t n) {
             const LatticeField::Sample here = chi.at(points_[n]);
-            const double sign = here.value < 0 || here.value > kHighest ? 1 : -1;
+            const double sign = here.value < 0 || here.value > highest_ ? 1 : -1;
             const Vec3 normal = unit({sign * here.gradient[0], sign * here.gradient[1], sign * here.gradient[2]});
             cosine[n] = dot(normal, result.normals[n]);
             if (dot(normal, normal) > 0) result.normals[n] = normal;
@@ -201,9 +204,19 @@ private:
     }
 
     const std::vector<Vec3>& points_;
+    double highest_ = kLastHighest;
     std::vector<Vec3> vectors_;
     std::optional<WindingField> last_;
 };
+
+double mean_of(const Indicator& indicator, const std::vector<Vec3>& points) {
+    std::vector<double> values(points.size());
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) { values[n] = indicator.inside(points[n]); });
+    return std::accumulate(values.begin(), values.end(), 0.0) / double(points.size());
+}
+
+/// Parts that are turned as a whole go on turning, or lie where the indicator is not 1/2.
+double doubt(const Orientation& o) { return o.turned + std::max(0.0, o.off_half - kOffHalf); }
 
 }  // namespace
 
@@ -225,8 +238,9 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
             Iteration iteration(points);
             for (const Stage& stage : {Stage{cells * 2 / 3, 12, false}, Stage{cells, 8, true}}) iteration.run(stage, now, run);
             now.indicator = cloud::make_indicator(iteration.last());
-            if (n == 0 || now.turned < best.turned) best = std::move(now);
-            if (best.turned < kFewTurned) break;
+            now.off_half = std::abs(mean_of(*now.indicator, points) - 0.5);
+            if (n == 0 || doubt(now) < doubt(best)) best = std::move(now);
+            if (doubt(best) < kFewTurned) break;
         }
     });
     return best;
@@ -242,7 +256,7 @@ CloudOrientation orient_cloud(const std::vector<Vec3>& points, const RunContext&
             if (!stray[n]) cloud.points.push_back(distinct[n]);
         cloud.stray = distinct.size() - cloud.points.size();
         cloud.orientation = orient(cloud.points, cloud.scale, run);
-        cloud.encloses = cloud.orientation.turned < kSettled;
+        cloud.encloses = doubt(cloud.orientation) < kSettled;
         if (!cloud.encloses) cloud.orientation = cloud::orient_by_views(cloud.points, cloud.scale, run);
     });
     return cloud;
