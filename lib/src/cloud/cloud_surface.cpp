@@ -36,8 +36,8 @@ constexpr double kBesideOfLeast = 0.75;   // of the smallest neighbourhood: beyo
 constexpr double kTrusted = 0.6;          // of the reach; beyond, the indicator takes over
 constexpr double kSlope = 0.4;            // of the indicator at the surface, per cell
 constexpr double kNodeVoxels = 0.75;      // distance of quadrics
-constexpr std::size_t kLeastResting = 8;   // points, on a piece of its own
-constexpr double kLeastRestingShare = 1e-3;
+constexpr double kLeastResting = 12, kLeastRestingShare = 1e-3;  // points, on a piece of its own
+constexpr double kLeastRestingOpen = 1e-2;  // of them, where they enclose nothing: the pieces are none of thin parts
 
 double squared(const Vec3& a, const Vec3& b) {
     double sum = 0;
@@ -282,7 +282,8 @@ FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cl
             const Pieces pieces(quadrics_of(cloud, h, report, run), h);
             result = level_set_of(pieces, *orientation.indicator, domain, run);
         }
-        const std::size_t least = std::max(kLeastResting, std::size_t(kLeastRestingShare * double(cloud.points.size())));
+        const double share = cloud.encloses ? kLeastRestingShare : kLeastRestingOpen;
+        const auto least = std::size_t(std::max(kLeastResting, share * double(cloud.points.size())));
         report.dropped_pieces = detail::drop_bare_pieces(*result, cloud.points, least);
         const int own = complexity(*result, run);
         if (own <= 1) return;

@@ -32,21 +32,27 @@ constexpr double kPatchOff = 0.12;       // from 1/2, of a patch that may be tur
 constexpr int kPatchRounds = 4, kPatchCycles = 2, kAfterTurning = 3;
 constexpr int kFirstPasses = 12;         // of smoothing, for the first guess
 constexpr double kSteady = 1e-4;         // the normals' mean change, 1 - cosine
-// chi at a point beyond which another part encloses it already; noise brings points there that are none of these.
-constexpr double kFirstHighest = 0.9, kLastHighest = 1.2;
+// chi at a point beyond which another part encloses it already. Noise brings points there that are none of these.
+constexpr double kEnclosed = 0.9, kSurelyEnclosed = 1.2;
 constexpr int kCycles = 1, kLastCycles = 4;  // of multigrid
 // The finest lattice's cell: smaller ones let single points turn, larger ones lose thin parts.
 constexpr double kCellSpacings = 0.8, kCellNoises = 1.0;
-constexpr double kTries[] = {1, 0.67, 1.5, 0.44, 2.25};  // of it, until few normals turn
+/// What is tried until few normals turn.
+struct Try {
+    double cell;      // of those
+    double enclosed;  // on the first lattice
+};
+constexpr Try kTries[] = {{1, kEnclosed}, {1, kSurelyEnclosed}, {0.67, kSurelyEnclosed}, {1.5, kSurelyEnclosed}, {0.44, kEnclosed}, {2.25, kSurelyEnclosed}};
 constexpr double kLeastSpacings = 0.5, kFewTurned = 0.002;
-constexpr double kOffHalf = 0.015;   // that the indicator's mean over the points may differ from 1/2
-constexpr double kSettled = 0.0225;  // clouds of closed shapes turn up to 0.02, scans of one side 0.025 to 0.15
+constexpr double kOffHalf = 0.02;   // that the indicator's mean over the points may differ from 1/2
+constexpr double kSettled = 0.018;  // clouds of closed shapes are mostly below 0.015, scans of one side from 0.02 to 0.15
 
 /// A lattice and what is done on it.
 struct Stage {
     int cells;       // along the longest side, the part beyond the points included
     int iterations;  // at most
     bool is_last;
+    double enclosed;  // the indicator from which on a point counts as enclosed by another part
 };
 
 class Iteration {
@@ -57,7 +63,7 @@ public:
         const Lattice lattice = cloud::indicator_lattice(points_, stage.cells);
         WindingField field(lattice);
         if (last_) field.start_from(last_->indicator());
-        highest_ = stage.is_last ? kLastHighest : kFirstHighest;
+        stage_ = stage;
         if (result.normals.empty()) first_guess(lattice, result);
         for (int n = 0; n < stage.iterations; ++n) {
             run.check();
@@ -100,7 +106,7 @@ private:
         std::vector<double> cosine(count);
         tbb::parallel_for(std::size_t(0), count, [&](std::size_t n) {
             const LatticeField::Sample here = chi.at(points_[n]);
-            const double sign = here.value < 0 || here.value > highest_ ? 1 : -1;
+            const double sign = here.value < 0 || here.value > stage_.enclosed ? 1 : -1;
             const Vec3 normal = unit({sign * here.gradient[0], sign * here.gradient[1], sign * here.gradient[2]});
             cosine[n] = dot(normal, result.normals[n]);
             if (dot(normal, normal) > 0) result.normals[n] = normal;
@@ -204,7 +210,7 @@ private:
     }
 
     const std::vector<Vec3>& points_;
-    double highest_ = kLastHighest;
+    Stage stage_{};
     std::vector<Vec3> vectors_;
     std::optional<WindingField> last_;
 };
@@ -228,18 +234,18 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
         const std::vector<double> areas = cloud::areas_of(points, scale.spacing);
         // Noise is hard to tell from thin parts: where normals go on turning a finer lattice may hold them.
         const double first = std::max(kCellSpacings * scale.spacing, kCellNoises * scale.noise);
-        int last = 0;
-        for (int n = 0; n < int(std::size(kTries)); ++n) {
-            const int cells = cloud::cells_along(points, std::max(first * kTries[n], kLeastSpacings * scale.spacing));
-            if (cells == last) continue;
-            last = cells;
+        std::vector<std::pair<int, double>> tried;
+        for (const Try& attempt : kTries) {
+            const int cells = cloud::cells_along(points, std::max(first * attempt.cell, kLeastSpacings * scale.spacing));
+            if (std::count(tried.begin(), tried.end(), std::pair{cells, attempt.enclosed}) > 0) continue;
+            tried.emplace_back(cells, attempt.enclosed);
             Orientation now;
             now.areas = areas;
             Iteration iteration(points);
-            for (const Stage& stage : {Stage{cells * 2 / 3, 12, false}, Stage{cells, 8, true}}) iteration.run(stage, now, run);
+            for (const Stage& stage : {Stage{cells * 2 / 3, 12, false, attempt.enclosed}, Stage{cells, 8, true, kSurelyEnclosed}}) iteration.run(stage, now, run);
             now.indicator = cloud::make_indicator(iteration.last());
             now.off_half = std::abs(mean_of(*now.indicator, points) - 0.5);
-            if (n == 0 || doubt(now) < doubt(best)) best = std::move(now);
+            if (tried.size() == 1 || doubt(now) < doubt(best)) best = std::move(now);
             if (doubt(best) < kFewTurned) break;
         }
     });

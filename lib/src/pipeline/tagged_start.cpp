@@ -7,7 +7,6 @@
 
 #include "clip/open_ends.h"
 #include "covol/distance.h"
-#include "covol/guess.h"
 #include "pipeline/fields.h"
 #include "pipeline/starts.h"
 
@@ -180,12 +179,6 @@ void start_by_tagging(Job& job) {
     const bool is_automatic = job.options.tag_distance <= 0;
     if (start_from_cut_body(job)) return;
     if (is_automatic) choose_tag(job);
-    if (job.image == nullptr && is_automatic && !job.report().tag.encloses && can_enclose(job.points)) {
-        // At no D, as where one side was seen only.
-        job.cloud = orient_cloud(job.points, job.run);
-        start_from_cloud(job);
-        return;
-    }
     const double D = job.options.tag_distance;
     job.report().domain = job.domain_with_chosen_margin(D + kMarginVoxels * job.h());
     compute_distance(job, D + band_slack(job), D);
