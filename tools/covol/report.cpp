@@ -137,6 +137,18 @@ Json to_json(const SegmentReport& r) {
                             {"max_offset", r.guidance.max_offset}};
     if (r.guess.marks > 0)
         json["guess"] = {{"marks", r.guess.marks}, {"cut_marks", r.guess.cut_marks}, {"parts", r.guess.patches}};
+    if (r.cloud.spacing > 0)
+        json["cloud"] = {{"spacing", r.cloud.spacing},
+                         {"noise", r.cloud.noise},
+                         {"encloses", r.cloud.encloses},
+                         {"averaged_within", r.cloud.radius},
+                         {"stray_points", r.cloud.stray},
+                         {"turned", r.cloud.turned},
+                         {"iterations", r.cloud.iterations},
+                         {"indicator_cell", r.cloud.indicator_cell},
+                         {"bare_nodes", r.cloud.bare_nodes},
+                         {"dropped_pieces", r.cloud.dropped_pieces},
+                         {"held_voxels", r.cloud.held_voxels}};
     if (r.seeds.inside + r.seeds.outside > 0) json["seeds"] = to_json(r.seeds);
     if (r.share_without_points > 0) json["fit"]["surface_without_points"] = r.share_without_points;
     return json;

@@ -109,7 +109,8 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
     tag.bind(command, with_image);
     command.add_option_function<std::string>(
                "--init", [this](const std::string& text) { start = parse_start("--init", text); },
-               "how the level set starts: auto, guess (through the marks with the least bending), tag, sphere:x,y,z,r, "
+               "how the level set starts: auto, guess (through the marks with the least bending), cloud (many points without an image: "
+               "their own surface), tag, sphere:x,y,z,r, "
                "box:x0,y0,z0,x1,y1,z1 (inside an object and without marks these grow to its edges), mesh:F, mask:F or vdb:F "
                "(near its marks such a start is a guess that they correct)")
         ->type_name("START")

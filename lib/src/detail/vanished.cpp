@@ -49,6 +49,7 @@ std::string why_nothing_held(const std::vector<Vec3>& points, double tag_distanc
     const double layer = std::min(kLayerSpacings * nearest_neighbour_spacing(points).mean, 0.5 * std::hypot(side[0], side[1], side[2]));
     text << (is_line ? "the points lie on a line" : is_flat ? "the points lie in a plane" : "the points enclose nothing")
          << " and nothing held it; add points on the sides that are missing";
+    if (!is_flat) text << ", or try --init cloud";
     const double hull = kHull * *std::max_element(side.begin(), side.end());
     if (!is_flat && tag_distance < hull) text << "; if they surround a body on all sides, try --tag-distance " << hull;
     text << "; for a closed layer around them give --max-steps 0 --tag-distance " << layer << " --voxel-size " << layer / kLayerVoxels;

@@ -74,7 +74,9 @@ void try_cloud(Job& job) {
     const bool asked = kind == Start::Kind::Cloud;
     if (!job.starts_from_marks() || !(asked || kind == Start::Kind::Auto)) return;
     if (asked && job.image != nullptr) throw Error(Errc::InvalidOptions, "segment: the start 'cloud' is for points without an image");
-    if (!asked && (!job.guided() || job.options.contours || job.options.tag_distance > 0 || job.image != nullptr || !job.uses_points() ||
+    const SegmentOptions& o = job.options;
+    const bool has_seeds = !o.exterior_seeds.empty() || !job.hole_seeds.empty() || !o.inside.empty() || !o.outside.empty();
+    if (!asked && (!job.guided() || o.contours || o.tag_distance > 0 || has_seeds || job.image != nullptr || !job.uses_points() ||
                    job.points.size() <= kMostGuessMarks || !can_enclose(job.points)))
         return;
     Timed timed(job.report().seconds.tag);
