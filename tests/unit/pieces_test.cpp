@@ -77,7 +77,7 @@ TEST_CASE("the right piece goes, the rest keeps its surface") {
             const Vec3 at = test::world_of(domain_of(*before), value.getCoord());
             const float now = grid->tree().getValue(value.getCoord());
             if (ball(at, second, kSmall) < 0) REQUIRE(now > 0);
-            else if (std::abs(*value) < kVoxel) REQUIRE(now == Approx(*value).margin(0.05 * kVoxel));  // the band is made anew
+            else if (std::abs(*value) < kVoxel) REQUIRE(now == Approx(*value).margin(0.1 * kVoxel));  // values in the gap knew of both
         }
     }
 }
