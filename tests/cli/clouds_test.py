@@ -81,6 +81,62 @@ class Few(Clouds):
             self.assertEqual((surface["components"], surface["genus"]), (1, 0))
 
 
+def shell_share(surface):
+    return surface["volume"] / (4 / 3 * math.pi * RADIUS ** 3)
+
+
+class Many(Clouds):
+    """Enough points for a surface of their own."""
+
+    def report(self, points, *more):
+        done = self.reconstruct(points, *more)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return json.loads(done.stdout)
+
+    def test_noise_is_averaged(self):
+        draw = random.Random(3)
+        noisy = []
+        for p in random_sphere(6000, 3):
+            factor = 1 + draw.gauss(0, 0.01)
+            noisy.append(tuple(factor * x for x in p))
+        report = self.report(noisy)
+        self.assertTrue(report["cloud"]["encloses"])
+        self.assertAlmostEqual(report["cloud"]["noise"], 0.01 * RADIUS, delta=0.003 * RADIUS)
+        self.assertEqual((report["surface"]["components"], report["surface"]["genus"]), (1, 0))
+        self.assertAlmostEqual(shell_share(report["surface"]), 1, delta=0.005)
+
+    def test_stray_points_are_left_out(self):
+        draw = random.Random(4)
+        stray = [tuple(draw.uniform(-2 * RADIUS, 2 * RADIUS) for _ in range(3)) for _ in range(200)]
+        report = self.report(random_sphere(6000, 4) + stray)
+        self.assertGreater(report["cloud"]["stray_points"], 150)
+        self.assertLess(report["cloud"]["stray_points"], 220)
+        self.assertEqual((report["surface"]["components"], report["surface"]["genus"]), (1, 0))
+        self.assertAlmostEqual(shell_share(report["surface"]), 1, delta=0.01)
+
+    def test_one_side_is_closed_and_doubted(self):
+        half = [p for p in random_sphere(12000, 5) if p[2] < 0]
+        done = self.reconstruct(half)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("from every point", done.stderr)
+        surface = json.loads(done.stdout)["surface"]
+        self.assertEqual((surface["closed"], surface["components"], surface["genus"]), (True, 1, 0))
+
+    def test_few_points_when_asked(self):
+        report = self.report(random_sphere(800, 6), "--init", "cloud")
+        self.assertTrue(report["automatic"]["start"].startswith("cloud"))
+        self.assertAlmostEqual(shell_share(report["surface"]), 1, delta=0.03)
+
+    def test_with_an_image_there_is_no_cloud(self):
+        write_nrrd(self.out / "i.nrrd", (8, 8, 8), bytes(512), spacing=1, origin=(0, 0, 0))
+        write_xyz(self.out / "p.xyz", [(2, 2, 2), (5, 2, 2), (2, 5, 2), (2, 2, 5), (5, 5, 5)])
+        done = subprocess.run([COVOL, "segment", "i.nrrd", "--points", "p.xyz", "--init", "cloud", "-o", "s.vdb"], cwd=self.out,
+                              capture_output=True, text=True, timeout=60)
+        self.assertNotEqual(done.returncode, 0)
+        self.assertIn("points without an image", done.stderr)
+        self.assertFalse((self.out / "s.vdb").exists())
+
+
 class Open(Clouds):
     def check_layer(self, points, says, *more):
         advice = re.search(r"(--max-steps 0) (--tag-distance [0-9.e-]+) (--voxel-size [0-9.e-]+)", self.advice(points, says, *more))

@@ -9,10 +9,12 @@
 #include <cmath>
 
 #include "cloud/hold_topology.h"
+#include "cloud/indicator.h"
 #include "cloud/local_fit.h"
 #include "cloud/point_cells.h"
 #include "covol/band.h"
 #include "covol/error.h"
+#include "covol/evidence.h"
 #include "covol/mesh.h"
 #include "covol/surface.h"
 #include "detail/pieces.h"
@@ -37,6 +39,8 @@ constexpr double kTrusted = 0.6;          // of the reach; beyond, the indicator
 constexpr double kSlope = 0.4;            // of the indicator at the surface, per cell
 constexpr double kNodeVoxels = 0.75;      // distance of quadrics
 constexpr double kLeastResting = 12, kLeastRestingShare = 1e-3;  // points, on a piece of its own
+constexpr double kCoarseSpacings = 2.4;  // cells of an indicator for points with gaps
+constexpr double kFarSpacings = 3, kOpenShare = 0.05;
 constexpr double kLeastRestingOpen = 1e-2;  // of them, where they enclose nothing: the pieces are none of thin parts
 
 double squared(const Vec3& a, const Vec3& b) {
@@ -247,6 +251,31 @@ int complexity(const FloatGrid& level_set, const RunContext& run) {
     return m.components + std::max(0, m.genus);
 }
 
+/// Gives a level set the topology of an indicator that has fewer pieces and handles.
+struct TopologyOf {
+    int own;            // complexity
+    std::size_t least;  // points, on a piece
+    const std::vector<Vec3>& points;
+    const RunContext& run;
+
+    void hold(FloatGridPtr& level_set, const Indicator& indicator, CloudReport& report) {
+        if (own <= 1) return;
+        const Domain domain = domain_of(*level_set);
+        const FloatGridPtr rough = level_set_of(Pieces({}, domain.voxel_size), indicator, domain, run);
+        detail::drop_bare_pieces(*rough, points, least);
+        const int simpler = complexity(*rough, run);
+        if (simpler >= own) return;
+        report.held_voxels += cloud::hold_topology(*rough, *level_set);
+        level_set = start_from_grid(domain, *level_set, run);
+        own = simpler;
+    }
+};
+
+/// Whether some of the surface is far from all points.
+bool is_open(const FloatGrid& level_set, const CloudOrientation& cloud, const RunContext& run) {
+    return share_without_points(extract_mesh(level_set, {}, run), cloud.points, kFarSpacings * cloud.scale.spacing, run) > kOpenShare;
+}
+
 std::vector<Quadric> quadrics_of(const CloudOrientation& cloud, double h, CloudReport& report, const RunContext& run) {
     const OrientedCloud points{cloud.points, cloud.orientation.normals, std::vector<float>(cloud.points.size(), 1.0F)};
     std::vector<Quadric> quadrics = cloud::fit_quadrics(thinned(points, kNodeVoxels * h), points, report.spacing, run);
@@ -285,13 +314,11 @@ FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cl
         const double share = cloud.encloses ? kLeastRestingShare : kLeastRestingOpen;
         const auto least = std::size_t(std::max(kLeastResting, share * double(cloud.points.size())));
         report.dropped_pieces = detail::drop_bare_pieces(*result, cloud.points, least);
-        const int own = complexity(*result, run);
-        if (own <= 1) return;
-        FloatGridPtr rough = level_set_of(none, *orientation.indicator, domain, run);
-        detail::drop_bare_pieces(*rough, cloud.points, least);
-        if (complexity(*rough, run) >= own) return;
-        report.held_voxels = cloud::hold_topology(*rough, *result);
-        result = start_from_grid(domain, *result, run);
+        TopologyOf topology{complexity(*result, run), least, cloud.points, run};
+        topology.hold(result, *orientation.indicator, report);
+        // Where the points leave gaps, what surrounds a gap makes small handles on a lattice as fine as they are.
+        if (topology.own > 1 && !orientation.screened && is_open(*result, cloud, run))
+            topology.hold(result, *cloud::indicator_of(cloud.points, orientation, kCoarseSpacings * cloud.scale.spacing), report);
     });
     return result;
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cloud/vector.h"
 #include "covol/points.h"
 
 namespace covol {
@@ -41,6 +42,7 @@ namespace cloud {
 namespace {
 
 constexpr double kBeyond = 0.2;  // of the longest side, around the points
+constexpr int kCycles = 8;       // of multigrid, from nothing
 constexpr int kLeastCells = 48, kMostCells = 192;
 
 }  // namespace
@@ -71,6 +73,15 @@ double scale_to_half(WindingField& field, const std::vector<Vec3>& points) {
 
 std::shared_ptr<const Indicator> make_indicator(const WindingField& field) {
     return std::make_shared<const Indicator>(std::make_unique<const Indicator::Values>(Indicator::Values{field.indicator()}));
+}
+
+std::shared_ptr<const Indicator> indicator_of(const std::vector<Vec3>& points, const Orientation& orientation, double cell) {
+    std::vector<Vec3> vectors(points.size());
+    for (std::size_t n = 0; n < points.size(); ++n) vectors[n] = times(orientation.areas[n], orientation.normals[n]);
+    WindingField field(indicator_lattice(points, cell));
+    field.solve(points, vectors, kCycles);
+    scale_to_half(field, points);
+    return make_indicator(field);
 }
 
 }  // namespace cloud

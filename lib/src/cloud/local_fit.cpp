@@ -181,10 +181,10 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
         });
         if (!agrees) break;
         if (seen.empty() && (std::abs(now.c[0]) > kMostHeight * level.radius || dot(best.axes[2], normal) < kLeastCosine)) return best;
+        if (seen.empty()) best.noise = now.noise;  // wider, it has the surface's own shape in it
         seen.push_back({now.c[0], now.deviation, now.misfit});
         best.c = now.c;
         best.radius = level.radius;
-        best.noise = now.noise;
     }
     return best;
 }
