@@ -145,4 +145,10 @@ FloatGridPtr make_grid(const Domain& domain, float background, const char* name)
     return grid;
 }
 
+double longest_side(const WorldBox& box) {
+    double longest = 0;
+    for (int a = 0; a < 3; ++a) longest = std::max(longest, box.max[a] - box.min[a]);
+    return longest;
+}
+
 }  // namespace covol

@@ -27,8 +27,8 @@ struct CloudReport {
 /// Near the points, oriented by the indicator function that they make themselves (orient_cloud()), the level set is the
 /// signed distance to local quadrics, fitted to neighbourhoods as wide as their noise asks for, blended (implicit moving
 /// least squares; Kolluri, Provably good moving least squares, ACM Trans. Algorithms 4(2), 2008; Ohtake and others,
-/// Multi-level partition of unity implicits, 2003); where there are no points it is the indicator's. Of points that enclose nothing it is the screened indicator. Where the
-/// indicator has fewer pieces and handles its topology is held.
+/// Multi-level partition of unity implicits, 2003); where there are no points it is the indicator's. Of points that enclose
+/// nothing it is the screened indicator. Where the indicator has fewer pieces and handles its topology is held.
 /// @throws Error InvalidInput (no surface), Cancelled.
 [[nodiscard]] FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cloud, CloudReport& report,
                                               const RunContext& run = {});

@@ -10,6 +10,7 @@ struct WorldBox {
     Vec3 min{0, 0, 0};
     Vec3 max{0, 0, 0};
 };
+[[nodiscard]] double longest_side(const WorldBox& box);
 
 /// The computational domain: a box of isotropic voxels, aligned with the world's axes.
 ///

@@ -47,12 +47,6 @@ constexpr int kLeastCells = 48, kMostCells = 192;
 
 }  // namespace
 
-double longest_side(const WorldBox& box) {
-    double longest = 0;
-    for (int a = 0; a < 3; ++a) longest = std::max(longest, box.max[a] - box.min[a]);
-    return longest;
-}
-
 int cells_along(const std::vector<Vec3>& points, double cell) {
     return std::clamp(int(longest_side(bounding_box(points)) * (1 + 2 * kBeyond) / cell), kLeastCells, kMostCells);
 }

@@ -5,9 +5,6 @@
 
 namespace covol::cloud {
 
-/// Longest side of a box.
-[[nodiscard]] double longest_side(const WorldBox& box);
-
 /// Around the points, so much wider that the indicator is 0 at its end; of about the cell asked for, and 48 to 192 cells
 /// along the longest side.
 [[nodiscard]] Lattice indicator_lattice(const std::vector<Vec3>& points, double cell);

@@ -45,6 +45,8 @@ struct Try {
 constexpr Try kTries[] = {{1, kEnclosed}, {1, kSurelyEnclosed}, {0.67, kSurelyEnclosed}, {1.5, kSurelyEnclosed}, {0.44, kEnclosed}, {2.25, kSurelyEnclosed}};
 constexpr double kLeastSpacings = 0.5, kFewTurned = 0.002;
 constexpr double kOffHalf = 0.02;   // that the indicator's mean over the points may differ from 1/2
+constexpr int kStrayRounds = 3;
+constexpr double kManyStray = 0.005;  // of the points
 constexpr double kSettled = 0.018;  // clouds of closed shapes are mostly below 0.015, scans of one side from 0.02 to 0.15
 
 /// A lattice and what is done on it.
@@ -228,7 +230,7 @@ double doubt(const Orientation& o) { return o.turned + std::max(0.0, o.off_half 
 
 Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run) {
     if (points.size() < 4) throw Error(Errc::InvalidInput, "orient: expected at least 4 points, got " + std::to_string(points.size()));
-    if (!(cloud::longest_side(bounding_box(points)) > 0) || !(scale.spacing > 0)) throw Error(Errc::InvalidInput, "orient: all points lie at one place");
+    if (!(longest_side(bounding_box(points)) > 0) || !(scale.spacing > 0)) throw Error(Errc::InvalidInput, "orient: all points lie at one place");
     Orientation best;
     with_threads(run, [&] {
         const std::vector<double> areas = cloud::areas_of(points, scale.spacing);
@@ -255,12 +257,19 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
 CloudOrientation orient_cloud(const std::vector<Vec3>& points, const RunContext& run) {
     CloudOrientation cloud;
     with_threads(run, [&] {
-        const std::vector<Vec3> distinct = merge_close_points(points, 0);
-        cloud.scale = cloud_scale(distinct, run);
-        const std::vector<char> stray = cloud::find_stray(distinct, cloud.scale.spacing, run);
-        for (std::size_t n = 0; n < distinct.size(); ++n)
-            if (!stray[n]) cloud.points.push_back(distinct[n]);
-        cloud.stray = distinct.size() - cloud.points.size();
+        cloud.points = merge_close_points(points, 0);
+        cloud.scale = cloud_scale(cloud.points, run);
+        // Where there are many, some show once others are gone.
+        for (int round = 0; round < kStrayRounds; ++round) {
+            const std::vector<char> stray = cloud::find_stray(cloud.points, cloud.scale.spacing, run);
+            std::size_t kept = 0;
+            for (std::size_t n = 0; n < stray.size(); ++n)
+                if (!stray[n]) cloud.points[kept++] = cloud.points[n];
+            const std::size_t gone = stray.size() - kept;
+            cloud.stray += gone;
+            cloud.points.resize(kept);
+            if (double(gone) < kManyStray * double(stray.size())) break;
+        }
         cloud.orientation = orient(cloud.points, cloud.scale, run);
         cloud.encloses = doubt(cloud.orientation) < kSettled;
         if (!cloud.encloses) cloud.orientation = cloud::orient_by_views(cloud.points, cloud.scale, run);

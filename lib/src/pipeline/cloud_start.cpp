@@ -16,10 +16,7 @@ constexpr double kMarginShare = 0.1;  // of the longest side, beyond the points:
 void start_from_cloud(Job& job) {
     job.origin = StartOrigin::Cloud;
     job.options.evolve.follow = true;
-    const WorldBox box = bounding_box(job.points);
-    double extent = 0;
-    for (int a = 0; a < 3; ++a) extent = std::max(extent, box.max[a] - box.min[a]);
-    job.report().domain = job.domain_with_chosen_margin(kMarginShare * extent + kMarginVoxels * job.h());
+    job.report().domain = job.domain_with_chosen_margin(kMarginShare * longest_side(bounding_box(job.points)) + kMarginVoxels * job.h());
     CloudReport& report = job.report().cloud;
     {
         Timed timed(job.report().seconds.tag);

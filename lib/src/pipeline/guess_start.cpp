@@ -29,8 +29,7 @@ void start_from_guess(Job& job) {
     job.origin = StartOrigin::Guess;
     job.options.evolve.follow = true;
     const WorldBox box = bounding_box(job.points);
-    double extent = 0;
-    for (int a = 0; a < 3; ++a) extent = std::max(extent, box.max[a] - box.min[a]);
+    const double extent = longest_side(box);
     job.report().domain = job.domain_with_chosen_margin(0.25 * extent + kMarginVoxels * job.h());
     double area = 0;  // of a ball of that size, at most
     for (int a = 0; a < 3; ++a) {

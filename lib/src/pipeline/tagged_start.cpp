@@ -39,18 +39,10 @@ std::vector<Vec3> seeds_beyond(const Job& job, double D) {
     return seeds;
 }
 
-/// Of the points' box.
-double longest_side(const std::vector<Vec3>& points) {
-    const WorldBox box = bounding_box(points);
-    double extent = 0;
-    for (int a = 0; a < 3; ++a) extent = std::max(extent, box.max[a] - box.min[a]);
-    return extent;
-}
-
 void choose_tag(Job& job) {
     Timed timed(job.report().seconds.tag);
     // Wide enough for any D below a quarter of the cloud: the final domain is made once D is known.
-    const Domain wide = job.domain_with_margin(0.25 * longest_side(job.points) + kMarginVoxels * job.h());
+    const Domain wide = job.domain_with_margin(0.25 * longest_side(bounding_box(job.points)) + kMarginVoxels * job.h());
     job.report().tag = choose_tag_distance(job.points, wide, all_seeds(job), job.run);
     job.options.tag_distance = job.report().tag.tag_distance;
     job.choose("tag_distance", number(job.options.tag_distance), job.report().tag.reason);
@@ -98,7 +90,7 @@ std::optional<CutBody> tag_with(Job& job, const std::vector<Vec3>& beyond) {
     CutBody body{.beyond = beyond, .level_set = nullptr, .band = {}, .tag = {}};
     body.tag.tag_distance = job.options.tag_distance;
     if (body.tag.tag_distance <= 0) {
-        body.tag = choose_tag_distance(closed, around(job.domain(), closed, 0.25 * longest_side(closed) + kMarginVoxels * h), all_seeds(job), job.run);
+        body.tag = choose_tag_distance(closed, around(job.domain(), closed, 0.25 * longest_side(bounding_box(closed)) + kMarginVoxels * h), all_seeds(job), job.run);
         if (!body.tag.encloses) return {};
     }
     const double D = body.tag.tag_distance;
