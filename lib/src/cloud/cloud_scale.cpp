@@ -3,9 +3,9 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
-#include <algorithm>
 #include <cmath>
 
+#include "cloud/median.h"
 #include "cloud/point_cells.h"
 #include "covol/orientation.h"
 #include "covol/points.h"
@@ -82,15 +82,11 @@ CloudScale cloud_scale(const std::vector<Vec3>& points, const RunContext& run) {
             spacing.push_back(radius * std::sqrt(M_PI / count));
         }
         if (2 * share.size() * step < points.size()) continue;  // too few neighbours yet
-        const auto middle = [](std::vector<double>& v) {
-            std::nth_element(v.begin(), v.begin() + std::ptrdiff_t(v.size() / 2), v.end());
-            return v[v.size() / 2];
-        };
-        const double now = middle(share);
+        const double now = cloud::median(share);
         if (now < best) {
             best = now;
-            scale.spacing = middle(spacing);
-            scale.noise = middle(noise);
+            scale.spacing = cloud::median(spacing);
+            scale.noise = cloud::median(noise);
         }
         // Wider, the surface's own curvature is all that comes.
         if (best < kSheet || now > kWorse * best) break;

@@ -2,7 +2,6 @@
 
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/SignedFloodFill.h>
-#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -11,17 +10,21 @@
 #include "cloud/hold_topology.h"
 #include "cloud/indicator.h"
 #include "cloud/local_fit.h"
+#include "cloud/median.h"
 #include "cloud/point_cells.h"
+#include "cloud/vector.h"
 #include "covol/band.h"
-#include "covol/error.h"
 #include "covol/evidence.h"
 #include "covol/mesh.h"
 #include "covol/surface.h"
+#include "detail/kd_tree.h"
 #include "detail/pieces.h"
 
 namespace covol {
 namespace {
 
+using cloud::dot;
+using cloud::median;
 using cloud::OrientedCloud;
 using cloud::PointCells;
 using cloud::Quadric;
@@ -42,12 +45,6 @@ constexpr double kLeastResting = 12, kLeastRestingShare = 1e-3;  // points, on a
 constexpr double kCoarseSpacings = 2.4;  // cells of an indicator for points with gaps
 constexpr double kFarSpacings = 3, kOpenShare = 0.05;
 constexpr double kLeastRestingOpen = 1e-2;  // of them, where they enclose nothing: the pieces are none of thin parts
-
-double squared(const Vec3& a, const Vec3& b) {
-    double sum = 0;
-    for (int n = 0; n < 3; ++n) sum += (a[n] - b[n]) * (a[n] - b[n]);
-    return sum;
-}
 
 /// Quadrics where they act, sorted into cells.
 class Pieces {
@@ -143,8 +140,7 @@ public:
         sum_.fill(0);
         weights_.fill(0);
         visit(origin, box, [&](std::size_t piece, int at, double share) {
-            const Vec3 &a = pieces_[piece].axes[2], &b = pieces_[std::size_t(nearest_[at])].axes[2];
-            if (a[0] * b[0] + a[1] * b[1] + a[2] * b[2] <= 0) return;
+            if (dot(pieces_[piece].axes[2], pieces_[std::size_t(nearest_[at])].axes[2]) <= 0) return;
             const double w = (1 - share) * (1 - share);
             sum_[at] += w * pieces_[piece].distance(place(origin, at));
             weights_[at] += w;
@@ -175,13 +171,9 @@ private:
     /// goes on there is a nearer one.
     [[nodiscard]] double beside(std::size_t piece, const Vec3& world) const {
         const Quadric& q = pieces_[piece];
-        double d2 = 0, up = 0;
-        for (int a = 0; a < 3; ++a) {
-            const double to = world[a] - pieces_.foot(piece)[a];
-            d2 += to * to;
-            up += to * q.axes[2][a];
-        }
-        return std::sqrt(std::max(0.0, d2 - up * up)) / std::max(q.least_radius * kBesideOfLeast, kLeastReachVoxels * domain_.voxel_size);
+        const Vec3 to = cloud::minus(world, pieces_.foot(piece));
+        const double up = dot(to, q.axes[2]);
+        return std::sqrt(std::max(0.0, dot(to, to) - up * up)) / std::max(q.least_radius * kBesideOfLeast, kLeastReachVoxels * domain_.voxel_size);
     }
 
     [[nodiscard]] Vec3 place(const Coord& origin, int at) const {
@@ -208,7 +200,7 @@ private:
                     for (int j = first[1]; j <= last[1]; ++j)
                         for (int k = first[2]; k <= last[2]; ++k) {
                             const int at = (i << 6) | (j << 3) | k;
-                            const double d2 = squared(place(origin, at), foot);
+                            const double d2 = detail::squared_distance(place(origin, at), foot);
                             if (d2 < r2) visit(n, at, d2 / r2);
                         }
             }
@@ -222,13 +214,6 @@ private:
     std::array<std::int32_t, 512> nearest_;
     std::array<double, 512> sum_, weights_;
 };
-
-double median(std::vector<double> values) {
-    if (values.empty()) return 0;
-    const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
 
 /// The level set of the pieces where they act, of the indicator's level 1/2 elsewhere.
 FloatGridPtr level_set_of(const Pieces& pieces, const Indicator& indicator, const Domain& domain, const RunContext& run) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cloud/median.h"
 #include "cloud/vector.h"
 #include "covol/points.h"
 
@@ -42,7 +43,6 @@ namespace cloud {
 namespace {
 
 constexpr double kBeyond = 0.2;  // of the longest side, around the points
-constexpr int kCycles = 8;       // of multigrid, from nothing
 constexpr int kLeastCells = 48, kMostCells = 192;
 
 }  // namespace
@@ -53,27 +53,28 @@ int cells_along(const std::vector<Vec3>& points, double cell) {
 
 Lattice indicator_lattice(const std::vector<Vec3>& points, int cells) { return lattice_around(bounding_box(points), kBeyond, cells); }
 
-Lattice indicator_lattice(const std::vector<Vec3>& points, double cell) { return indicator_lattice(points, cells_along(points, cell)); }
-
 double scale_to_half(WindingField& field, const std::vector<Vec3>& points) {
     std::vector<double> values(points.size());
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) { values[n] = std::abs(field.indicator().at(points[n]).value); });
-    const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    if (!(*middle > 0)) return 1;
-    field.multiply(0.5 / *middle);
-    return 0.5 / *middle;
+    const double half = median(std::move(values));
+    if (!(half > 0)) return 1;
+    field.multiply(0.5 / half);
+    return 0.5 / half;
 }
 
 std::shared_ptr<const Indicator> make_indicator(const WindingField& field) {
     return std::make_shared<const Indicator>(std::make_unique<const Indicator::Values>(Indicator::Values{field.indicator()}));
 }
 
-std::shared_ptr<const Indicator> indicator_of(const std::vector<Vec3>& points, const Orientation& orientation, double cell) {
+void solve(WindingField& field, const std::vector<Vec3>& points, const Orientation& orientation, int cycles) {
     std::vector<Vec3> vectors(points.size());
-    for (std::size_t n = 0; n < points.size(); ++n) vectors[n] = times(orientation.areas[n], orientation.normals[n]);
-    WindingField field(indicator_lattice(points, cell));
-    field.solve(points, vectors, kCycles);
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) { vectors[n] = times(orientation.areas[n], orientation.normals[n]); });
+    field.solve(points, vectors, cycles);
+}
+
+std::shared_ptr<const Indicator> indicator_of(const std::vector<Vec3>& points, const Orientation& orientation, double cell) {
+    WindingField field(indicator_lattice(points, cells_along(points, cell)));
+    solve(field, points, orientation, kCyclesFromNothing);
     scale_to_half(field, points);
     return make_indicator(field);
 }

@@ -5,12 +5,15 @@
 
 namespace covol::cloud {
 
-/// Around the points, so much wider that the indicator is 0 at its end; of about the cell asked for, and 48 to 192 cells
-/// along the longest side.
-[[nodiscard]] Lattice indicator_lattice(const std::vector<Vec3>& points, double cell);
-[[nodiscard]] Lattice indicator_lattice(const std::vector<Vec3>& points, int cells);
-/// Cells along the longest side.
+inline constexpr int kCyclesFromNothing = 8;  // of multigrid
+
+/// Of a lattice of about this cell, along its longest side: 48 to 192.
 [[nodiscard]] int cells_along(const std::vector<Vec3>& points, double cell);
+/// Around the points, so much wider that the indicator is 0 at its end.
+[[nodiscard]] Lattice indicator_lattice(const std::vector<Vec3>& points, int cells);
+
+/// The indicator of normals and areas, from the field's last solution.
+void solve(WindingField& field, const std::vector<Vec3>& points, const Orientation& orientation, int cycles);
 
 /// Half of the indicator's step is at the points, whichever way they are turned. @return the factor
 double scale_to_half(WindingField& field, const std::vector<Vec3>& points);

@@ -52,16 +52,15 @@ struct Fit {
 
 /// The cloud, thinned for one radius.
 struct Level {
-    Level(const OrientedCloud& all, double r) : radius(r), cloud(all), cells(cloud.points, r) {
-        normals.reserve(cloud.size());
-        counts.reserve(cloud.size());
+    Level(const OrientedCloud& all, double r) : radius(r), cells(all.points, r) {
+        normals.reserve(all.size());
+        counts.reserve(all.size());
         for (const std::uint32_t n : cells.order()) {
-            normals.push_back(cloud.normals[n]);
-            counts.push_back(cloud.counts[n]);
+            normals.push_back(all.normals[n]);
+            counts.push_back(all.counts[n]);
         }
     }
     double radius;
-    const OrientedCloud& cloud;
     PointCells cells;
     std::vector<Vec3> normals;   // in the cells' order
     std::vector<float> counts;
@@ -140,7 +139,6 @@ int is_of_majority(const Level& level, const Vec3& origin, const Vec3& normal, c
         }
     return same + opposite < kLeastMajority ? -1 : same >= opposite;
 }
-
 
 Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& normal, Scratch& scratch) {
     Quadric best;

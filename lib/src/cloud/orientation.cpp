@@ -17,7 +17,6 @@
 #include "covol/points.h"
 
 namespace covol {
-
 namespace {
 
 using cloud::Lattice;
@@ -59,7 +58,7 @@ struct Stage {
 
 class Iteration {
 public:
-    explicit Iteration(const std::vector<Vec3>& points) : points_(points), vectors_(points.size()) {}
+    explicit Iteration(const std::vector<Vec3>& points) : points_(points) {}
 
     void run(const Stage& stage, Orientation& result, const RunContext& run) {
         const Lattice lattice = cloud::indicator_lattice(points_, stage.cells);
@@ -91,11 +90,7 @@ private:
 
     /// The indicator of the normals.
     void solve(WindingField& field, Orientation& result, int cycles) {
-        const std::size_t count = points_.size();
-        tbb::parallel_for(std::size_t(0), count, [&](std::size_t n) {
-            for (int a = 0; a < 3; ++a) vectors_[n][a] = result.areas[n] * result.normals[n][a];
-        });
-        field.solve(points_, vectors_, cycles);
+        cloud::solve(field, points_, result, cycles);
         const double half = cloud::scale_to_half(field, points_);
         for (double& area : result.areas) area *= half;
     }
@@ -142,13 +137,11 @@ private:
                 const auto [begin, end] = cells.cell(cell);
                 gain[std::size_t(patch[cell])] += double(end - begin) * (off[cell] * off[cell] - turned[cell] * turned[cell]);
             }
-            bool any = false;
             for_points_of(cells, [&](std::size_t cell, std::uint32_t point) {
                 if (patch[cell] >= 0 && gain[std::size_t(patch[cell])] <= 0) result.normals[point] = before[point];
             });
-            for (const double g : gain) any = any || g > 0;
             for (int n = 0; n < kAfterTurning; ++n) turn(field, result, kPatchCycles);
-            if (!any) return;
+            if (std::none_of(gain.begin(), gain.end(), [](double g) { return g > 0; })) return;
         }
     }
 
@@ -213,7 +206,6 @@ private:
 
     const std::vector<Vec3>& points_;
     Stage stage_{};
-    std::vector<Vec3> vectors_;
     std::optional<WindingField> last_;
 };
 

@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "cloud/median.h"
 #include "cloud/neighbours.h"
 
 namespace covol::cloud {
@@ -41,12 +42,10 @@ std::vector<char> find_stray(const std::vector<Vec3>& points, double spacing, co
         const double deviation = std::sqrt(std::max(0.0, axes.eigenvalues()[0]));
         off[point] = std::max(deviation, std::abs(axes.eigenvectors().col(0).dot(sum))) / reach[point];
     });
-    std::vector<double> sorted = reach;
-    const auto middle = sorted.begin() + std::ptrdiff_t(sorted.size() / 2);
-    std::nth_element(sorted.begin(), middle, sorted.end());
+    const double usual = median(reach);
     for (std::size_t n = 0; n < points.size(); ++n) {
         // The farther the neighbours, the flatter they have to lie.
-        const double far = reach[n] / (kFar * *middle);
+        const double far = reach[n] / (kFar * usual);
         stray[n] = far > 1 && off[n] * far > kOffPlane;
     }
     return stray;

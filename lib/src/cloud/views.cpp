@@ -23,7 +23,6 @@ constexpr double kCoarseSpacings = 2.4;  // edge of the indicator's cells: its t
 constexpr double kFineSpacings = 1.2;    // of the screened one's
 constexpr double kLeastFree = 0.01;      // of all directions, less those opposite
 constexpr double kScreening = 4;         // of the indicator's own slope over a cell
-constexpr int kCycles = 8;               // of multigrid
 
 /// Evenly over the sphere: a Fibonacci spiral.
 std::vector<Vec3> directions() {
@@ -106,18 +105,13 @@ Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& s
     result.normals.resize(points.size());
     for (std::size_t n = 0; n < points.size(); ++n)
         if (std::sqrt(dot(free[n], free[n])) > kLeastFree) result.normals[n] = unit(free[n]);
-    std::vector<Vec3> vectors(points.size());
-    const auto solve = [&](WindingField& field) {
-        for (std::size_t n = 0; n < points.size(); ++n) vectors[n] = times(result.areas[n], result.normals[n]);
-        field.solve(points, vectors, kCycles);
-    };
-    WindingField coarse(indicator_lattice(points, kCoarseSpacings * apart));
-    solve(coarse);
+    WindingField coarse(indicator_lattice(points, cells_along(points, kCoarseSpacings * apart)));
+    solve(coarse, points, result, kCyclesFromNothing);
     const double half = scale_to_half(coarse, points);
     for (double& area : result.areas) area *= half;
     result.indicator = make_indicator(coarse);
     run.check();
-    WindingField fine(indicator_lattice(points, kFineSpacings * apart));
+    WindingField fine(indicator_lattice(points, cells_along(points, kFineSpacings * apart)));
     const double cell = fine.indicator().lattice.cell;
     // A view tells the side alone; which way the surface lies its neighbours know better.
     std::vector<double> screen(points.size());
@@ -132,7 +126,7 @@ Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& s
     result.turned = double(against) / double(points.size());
     fine.start_from(coarse.indicator());
     fine.screen(points, screen);
-    solve(fine);
+    solve(fine, points, result, kCyclesFromNothing);
     result.screened = make_indicator(fine);
     return result;
 }

@@ -120,8 +120,7 @@ void smooth(const Lattice& l, std::vector<float>& values, std::vector<float>& sc
 }  // namespace
 
 Lattice lattice_around(const WorldBox& box, double share, int cells) {
-    double longest = 0;
-    for (int a = 0; a < 3; ++a) longest = std::max(longest, box.max[a] - box.min[a]);
+    const double longest = longest_side(box);
     Lattice l;
     l.cell = longest * (1 + 2 * share) / cells;
     for (int a = 0; a < 3; ++a) {

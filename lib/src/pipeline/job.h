@@ -41,7 +41,7 @@ struct Job {
     const RunContext& run;
     SegmentResult result;
     StartOrigin origin = StartOrigin::Given;
-    std::optional<CloudOrientation> cloud;  ///< of points alone that enclose something
+    std::optional<CloudOrientation> cloud;  ///< of points alone, many or asked for
     FloatGridPtr hold;             ///< the start that the surface may not leave, or null
     FloatGridPtr sure_distance;    ///< to the sure points, or null
 
