@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <set>
 
 #include "covol/band.h"
@@ -172,6 +173,15 @@ public:
     openvdb::Vec3d operator()(int i, int j, int k) const {
         return from_ + double(i) * along_[0] + double(j) * along_[1] + double(k) * along_[2];
     }
+    /// From a voxel to the source's where the lattices coincide.
+    [[nodiscard]] std::optional<Coord> shift() const {
+        constexpr double kSame = 1e-9;  // of a voxel for each
+        for (int a = 0; a < 3; ++a)
+            for (int b = 0; b < 3; ++b)
+                if (std::abs(along_[std::size_t(a)][b] - (a == b ? 1 : 0)) > kSame) return std::nullopt;
+        const Coord nearest = Coord::round(from_);
+        return (from_ - nearest.asVec3d()).length() < 1e3 * kSame ? std::optional(nearest) : std::nullopt;
+    }
     /// The source's voxels that interpolation at the voxels lo..hi asks for.
     [[nodiscard]] openvdb::CoordBBox box(const Coord& lo, const Coord& hi) const {
         openvdb::BBoxd corners;
@@ -336,13 +346,15 @@ FloatGridPtr start_from_grid(const Domain& domain, const FloatGrid& level_set, c
         std::sort(candidates.begin(), candidates.end());
         candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
         const ToSource to_source(domain, level_set.transform());
+        const std::optional<Coord> shift = to_source.shift();
         candidates = filter(candidates, [&](const Coord& o) { return may_cross(level_set, to_source.box(o, o.offsetBy(kLeafDim))); });
         const Sampler sample = [&](const Coord& lo, const Coord& hi, float* values) {
             const auto accessor = level_set.getConstAccessor();
             for (int i = lo.x(); i <= hi.x(); ++i)
                 for (int j = lo.y(); j <= hi.y(); ++j)
                     for (int k = lo.z(); k <= hi.z(); ++k)
-                        *values++ = openvdb::tools::BoxSampler::sample(accessor, to_source(i, j, k));
+                        *values++ = shift ? accessor.getValue(*shift + Coord(i, j, k))
+                                          : openvdb::tools::BoxSampler::sample(accessor, to_source(i, j, k));
         };
         result = start_from_field(domain, crossed_by(candidates, sample), sample, "start_from_grid", run);
     });

@@ -29,7 +29,8 @@ SOURCE_LEVEL = {"contour_solid": LEVEL["contours"], "points_check": LEVEL["point
                 "point_cells": LEVEL["orientation"], "neighbours": LEVEL["orientation"], "local_fit": LEVEL["orientation"],
                 "stray": LEVEL["orientation"],
                 "areas": LEVEL["orientation"], "indicator": LEVEL["orientation"], "views": LEVEL["orientation"],
-                "vector": LEVEL["orientation"], "median": LEVEL["orientation"], "hold_topology": LEVEL["cloud_surface"]}
+                "vector": LEVEL["orientation"], "median": LEVEL["orientation"], "hold_topology": LEVEL["cloud_surface"],
+                "lattice_kernel": LEVEL["orientation"], "fit_kernel": LEVEL["orientation"], "blend_kernel": LEVEL["cloud_surface"]}
 # The modules of segment(), lib/src/pipeline, in the same way; lib/src/pipeline.cpp is above them all.
 PIPELINE = [
     ["job", "options"],

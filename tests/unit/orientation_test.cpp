@@ -126,7 +126,7 @@ TEST_CASE("orient: the indicator is 1 in the solid and 0 elsewhere; its level pa
     CHECK(worst_in < 0.2);
     CHECK(worst_out < 0.2);
     double slope = 0;
-    for (const Vec3& x : s.points) slope -= test::dot(o.indicator->gradient(x), test::normal_of(shape.distance, x)) / 4000;
+    for (const Vec3& x : s.points) slope -= test::dot(o.indicator->at(x).gradient, test::normal_of(shape.distance, x)) / 4000;
     CHECK(slope > 0.2 / o.indicator->cell());
 
     std::vector<WorldBox> crossed;

@@ -23,9 +23,10 @@ public:
     struct Values;
     explicit Indicator(std::unique_ptr<const Values> values);
     ~Indicator();
-    [[nodiscard]] double inside(const Vec3& world) const;   ///< its value
-    [[nodiscard]] Vec3 gradient(const Vec3& world) const;   ///< 1 / world unit
-    [[nodiscard]] double cell() const;                      ///< of its lattice, world units
+    struct Sample { double inside; Vec3 gradient; };  ///< 1, and 1 / world unit
+    [[nodiscard]] Sample at(const Vec3& world) const;
+    [[nodiscard]] double inside(const Vec3& world) const;  ///< at(), faster
+    [[nodiscard]] double cell() const;                     ///< of its lattice, world units
     /// visit(box) for each cell of its lattice, world box, that its level 1/2 passes.
     void crossed(const std::function<void(const WorldBox&)>& visit) const;
 

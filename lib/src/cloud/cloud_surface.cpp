@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cloud/blend_kernel.h"
 #include "cloud/hold_topology.h"
 #include "cloud/indicator.h"
 #include "cloud/local_fit.h"
@@ -128,30 +129,15 @@ public:
         const Coord origin = leaf.origin();
         const WorldBox box{domain_.index_to_world({double(origin.x()), double(origin.y()), double(origin.z())}),
                            domain_.index_to_world({origin.x() + 7.0, origin.y() + 7.0, origin.z() + 7.0})};
-        near_.fill(1e30F);
-        nearest_.fill(-1);
-        pieces_.find(box, ranges_);
-        visit(origin, box, [&](std::size_t piece, int at, double share) {
-            if (float(share) < near_[at]) {
-                near_[at] = float(share);
-                nearest_[at] = std::int32_t(piece);
-            }
-        });
-        sum_.fill(0);
-        weights_.fill(0);
-        visit(origin, box, [&](std::size_t piece, int at, double share) {
-            if (dot(pieces_[piece].axes[2], pieces_[std::size_t(nearest_[at])].axes[2]) <= 0) return;
-            const double w = (1 - share) * (1 - share);
-            sum_[at] += w * pieces_[piece].distance(place(origin, at));
-            weights_[at] += w;
-        });
+        gather(box);
+        cloud::blend(near_.data(), near_.size(), float(h), leaf_);
         const double limit = kHalfWidthVoxels * h;
         for (int at = 0; at < 512; ++at) {
             double own = 0, trust = 0;
-            if (nearest_[at] >= 0) {
-                own = std::clamp(sum_[at] / weights_[at], -limit, limit);
-                const std::size_t piece = std::size_t(nearest_[at]);
-                trust = faded(std::sqrt(double(near_[at]))) * faded(beside(piece, place(origin, at)));
+            const std::size_t n = std::size_t(at);
+            if (leaf_.nearest[n] >= 0) {
+                own = std::clamp(double(leaf_.sum[n] / leaf_.weight[n]), -limit, limit);
+                trust = faded(std::sqrt(double(leaf_.share[n]))) * faded(beside(pieces_of_near_[std::size_t(leaf_.nearest[n])], place(origin, at)));
             }
             double value = trust * own;
             if (trust < 1)
@@ -180,29 +166,32 @@ private:
         return domain_.index_to_world({double(origin.x() + (at >> 6)), double(origin.y() + (at >> 3 & 7)), double(origin.z() + (at & 7))});
     }
 
-    /// visit(piece, voxel, squared distance from the piece's foot over its squared reach) where that is below 1.
-    template <typename Visit>
-    void visit(const Coord& origin, const WorldBox& box, Visit visit) const {
-        const double h = domain_.voxel_size;
+    /// The pieces that may reach the voxels of the box, in its frame.
+    void gather(const WorldBox& box) {
+        pieces_.find(box, ranges_);
+        near_.clear();
+        pieces_of_near_.clear();
         for (const PointCells::Range& range : ranges_)
             for (std::uint32_t n = range.begin; n < range.end; ++n) {
-                const double reach = pieces_.reach(n), r2 = reach * reach;
                 const Vec3& foot = pieces_.foot(n);
-                int first[3], last[3];
-                bool meets = true;
+                double off = 0;
                 for (int a = 0; a < 3; ++a) {
-                    first[a] = std::max(0, int(std::ceil((foot[a] - reach - box.min[a]) / h)));
-                    last[a] = std::min(7, int(std::floor((foot[a] + reach - box.min[a]) / h)));
-                    meets = meets && first[a] <= last[a];
+                    const double beyond = std::max({box.min[a] - foot[a], foot[a] - box.max[a], 0.0});
+                    off += beyond * beyond;
                 }
-                if (!meets) continue;
-                for (int i = first[0]; i <= last[0]; ++i)
-                    for (int j = first[1]; j <= last[1]; ++j)
-                        for (int k = first[2]; k <= last[2]; ++k) {
-                            const int at = (i << 6) | (j << 3) | k;
-                            const double d2 = detail::squared_distance(place(origin, at), foot);
-                            if (d2 < r2) visit(n, at, d2 / r2);
-                        }
+                const double reach = pieces_.reach(n);
+                if (off >= reach * reach) continue;
+                const Quadric& q = pieces_[n];
+                cloud::BlendPiece piece{};
+                piece.reach = float(reach);
+                for (int a = 0; a < 3; ++a) {
+                    piece.foot[a] = float(foot[a] - box.min[a]);
+                    piece.origin[a] = float(q.origin[a] - box.min[a]);
+                    for (int b = 0; b < 3; ++b) piece.axes[a][b] = float(q.axes[a][b]);
+                }
+                for (int c = 0; c < 6; ++c) piece.c[c] = float(q.c[c]);
+                near_.push_back(piece);
+                pieces_of_near_.push_back(n);
             }
     }
 
@@ -210,12 +199,12 @@ private:
     const Indicator& indicator_;
     const Domain& domain_;
     std::vector<PointCells::Range> ranges_;
-    std::array<float, 512> near_;
-    std::array<std::int32_t, 512> nearest_;
-    std::array<double, 512> sum_, weights_;
+    std::vector<cloud::BlendPiece> near_;
+    std::vector<std::size_t> pieces_of_near_;
+    cloud::BlendLeaf leaf_;
 };
 
-/// The level set of the pieces where they act, of the indicator's level 1/2 elsewhere.
+/// The pieces' distance where they act, what the indicator's level 1/2 says of it elsewhere; not yet a level set's band.
 FloatGridPtr level_set_of(const Pieces& pieces, const Indicator& indicator, const Domain& domain, const RunContext& run) {
     const FloatGridPtr field = make_grid(domain, float(kHalfWidthVoxels * domain.voxel_size), "u");
     std::vector<Leaf*> leaves;
@@ -227,7 +216,7 @@ FloatGridPtr level_set_of(const Pieces& pieces, const Indicator& indicator, cons
     });
     run.check();
     openvdb::tools::signedFloodFill(field->tree());
-    return start_from_grid(domain, *field, run);
+    return field;
 }
 
 /// Pieces, cavities and handles.
@@ -251,7 +240,6 @@ struct TopologyOf {
         const int simpler = complexity(*rough, run);
         if (simpler >= own) return;
         report.held_voxels += cloud::hold_topology(*rough, *level_set);
-        level_set = start_from_grid(domain, *level_set, run);
         own = simpler;
     }
 };
@@ -304,6 +292,7 @@ FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cl
         // Where the points leave gaps, what surrounds a gap makes small handles on a lattice as fine as they are.
         if (topology.own > 1 && !orientation.screened && is_open(*result, cloud, run))
             topology.hold(result, *cloud::indicator_of(cloud.points, orientation, kCoarseSpacings * cloud.scale.spacing), report);
+        result = start_from_grid(domain, *result, run);
     });
     return result;
 }

@@ -18,8 +18,11 @@ struct Indicator::Values {
 Indicator::Indicator(std::unique_ptr<const Values> values) : values_(std::move(values)) {}
 Indicator::~Indicator() = default;
 
-double Indicator::inside(const Vec3& world) const { return values_->field.at(world).value; }
-Vec3 Indicator::gradient(const Vec3& world) const { return values_->field.at(world).gradient; }
+double Indicator::inside(const Vec3& world) const { return values_->field.value_at(world); }
+Indicator::Sample Indicator::at(const Vec3& world) const {
+    const cloud::LatticeField::Sample sample = values_->field.at(world);
+    return {sample.value, sample.gradient};
+}
 double Indicator::cell() const { return values_->field.lattice.cell; }
 
 void Indicator::crossed(const std::function<void(const WorldBox&)>& visit) const {
@@ -55,7 +58,7 @@ Lattice indicator_lattice(const std::vector<Vec3>& points, int cells) { return l
 
 double scale_to_half(WindingField& field, const std::vector<Vec3>& points) {
     std::vector<double> values(points.size());
-    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) { values[n] = std::abs(field.indicator().at(points[n]).value); });
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) { values[n] = std::abs(field.indicator().value_at(points[n])); });
     const double half = median(std::move(values));
     if (!(half > 0)) return 1;
     field.multiply(0.5 / half);

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cloud/fit_kernel.h"
 #include "cloud/point_cells.h"
 #include "cloud/vector.h"
 
@@ -20,12 +21,13 @@ constexpr double kThinnedShare = 0.2;     // of the radius: points closer are av
 constexpr std::size_t kLeastPoints = 9;
 constexpr double kSheetShare = 0.3;       // noise, of the radius; points that fill a ball have 0.45
 constexpr double kAgreement = 1.5;        // standard deviations; 1 to 2 change the errors by a tenth
-constexpr double kMisfitGrowth = 1.2;     // beyond it the fit itself is off
+constexpr double kMisfitGrowth = 1.13;     // beyond it the fit itself is off
 constexpr double kRidge = 1e-4;
 constexpr double kSheetHeight = 0.15;     // of the radius: what is farther off the plane may be another sheet
 constexpr double kMostHeight = 0.4;       // of the radius: a foot farther from its node is no sheet's
 constexpr double kLeastCosine = 0.4;      // between the normal as it was oriented and as it is fitted
 constexpr double kLeastSpread = 0.16;     // standard deviation along any direction, of the radius; where points fill the disc 0.35
+constexpr double kMostOffCentre = 0.33;   // of the points' mean, of the radius: half a disc has 0.29, what lies beyond a sheet's end more
 constexpr double kMostGrowth = 2.9;       // of the radius, until the points are a sheet
 constexpr double kLeastMajority = 5;      // points
 
@@ -68,40 +70,31 @@ struct Level {
 
 struct Scratch {
     std::vector<PointCells::Range> ranges;
-    std::vector<std::array<double, 4>> near;  // u, v, t, in radii, and the weight
-    std::vector<float> counts;
+    FitPoints near;  // in radii
 };
 
 Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes, Scratch& scratch) {
     const double r = level.radius, r2 = r * r;
-    scratch.near.clear();
-    scratch.counts.clear();
+    FitPoints& near = scratch.near;
+    near.clear();
     for (const PointCells::Range& range : scratch.ranges)
         for (std::uint32_t n = range.begin; n < range.end; ++n) {
             const Vec3 to = minus(level.cells.sorted()[n], origin);
-            const double d2 = dot(to, to);
-            if (d2 >= r2 || dot(level.normals[n], axes[2]) <= 0) continue;
-            const double near = 1 - d2 / r2;
-            scratch.near.push_back({dot(to, axes[0]) / r, dot(to, axes[1]) / r, dot(to, axes[2]) / r, near * near});
-            scratch.counts.push_back(level.counts[n]);
+            if (dot(to, to) >= r2 || dot(level.normals[n], axes[2]) <= 0) continue;
+            near.add(dot(to, axes[0]) / r, dot(to, axes[1]) / r, dot(to, axes[2]) / r, double(level.counts[n]));
         }
     Fit result;
-    if (scratch.near.size() < kLeastPoints) return result;
-    Matrix6 m = Matrix6::Zero();
-    Vector6 right = Vector6::Zero();
-    double sum = 0, squares = 0, nears = 0, near_squares = 0;
-    for (std::size_t n = 0; n < scratch.near.size(); ++n) {
-        const auto& [u, v, t, near] = scratch.near[n];
-        const double c = double(scratch.counts[n]), w = c * near;
-        Vector6 b;
-        b << 1, u, v, u * u, u * v, v * v;
-        m.noalias() += w * b * b.transpose();
-        right += w * t * b;
-        sum += w;
-        squares += c * near * near;
-        nears += near;
-        near_squares += near * near;
-    }
+    if (near.size < kLeastPoints) return result;
+    near.fill_up();
+    const FitSums sums = fit_sums(near);
+    constexpr int kMoment[6][6] = {{0, 1, 2, 3, 4, 5},   {1, 3, 4, 6, 7, 8},    {2, 4, 5, 7, 8, 9},
+                                   {3, 6, 7, 10, 11, 12}, {4, 7, 8, 11, 12, 13}, {5, 8, 9, 12, 13, 14}};
+    Matrix6 m;
+    for (int a = 0; a < 6; ++a)
+        for (int b = 0; b < 6; ++b) m(a, b) = sums.moments[kMoment[a][b]];
+    const Vector6 right = Eigen::Map<const Vector6>(sums.heights);
+    const double sum = sums.moments[0];
+    if (std::hypot(m(0, 1), m(0, 2)) > kMostOffCentre * sum) return result;
     // Narrow bodies seen from the side: across them the quadric knows nothing beyond its points.
     const double uu = m(1, 1) / sum - m(0, 1) * m(0, 1) / (sum * sum), vv = m(2, 2) / sum - m(0, 2) * m(0, 2) / (sum * sum),
                  uv = m(1, 2) / sum - m(0, 1) * m(0, 2) / (sum * sum);
@@ -111,17 +104,12 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
     if (solver.info() != Eigen::Success || !solver.isPositive()) return result;
     const Vector6 x = solver.solve(right);
     const Vector6 first = solver.solve(Vector6::Unit(0));
-    double residual = 0;  // a mean of c points is off by 1 / c of their variance
-    for (std::size_t n = 0; n < scratch.near.size(); ++n) {
-        const auto& [u, v, t, near] = scratch.near[n];
-        const double off = t - (x[0] + u * (x[1] + u * x[3] + v * x[4]) + v * (x[2] + v * x[5]));
-        residual += double(scratch.counts[n]) * near * off * off;
-    }
-    const double effective = nears * nears / near_squares;
+    const FitResidual residual = fit_residual(near, x.data());  // a mean of c points is off by 1 / c of their variance
+    const double effective = sums.near * sums.near / sums.near_squares;
     if (effective < 7) return result;
-    result.noise = r * std::sqrt(residual / nears * effective / (effective - 6));
-    result.misfit = r * std::sqrt(residual / sum * effective / (effective - 6));
-    result.deviation = result.noise * std::sqrt(std::max(0.0, first[0]) * squares / sum);
+    result.noise = r * std::sqrt(residual.squares / residual.near * effective / (effective - 6));
+    result.misfit = r * std::sqrt(residual.squares / residual.weight * effective / (effective - 6));
+    result.deviation = result.noise * std::sqrt(std::max(0.0, first[0]) * sums.squares / sum);
     result.c = {x[0] * r, x[1], x[2], x[3] / r, x[4] / r, x[5] / r};
     result.good = std::isfinite(x.sum());
     return result;

@@ -44,6 +44,8 @@ struct Try {
 constexpr Try kTries[] = {{1, kEnclosed}, {1, kSurelyEnclosed}, {0.67, kSurelyEnclosed}, {1.5, kSurelyEnclosed}, {0.44, kEnclosed}, {2.25, kSurelyEnclosed}};
 constexpr double kLeastSpacings = 0.5, kFewTurned = 0.002;
 constexpr double kOffHalf = 0.02;   // that the indicator's mean over the points may differ from 1/2
+constexpr double kSampledPerCell = 4;  // points that iterate, on the surface in a lattice cell's square
+constexpr double kSampleSpacings = 4;  // edge of the cells that they are taken from
 constexpr int kStrayRounds = 3;
 constexpr double kManyStray = 0.005;  // of the points
 constexpr double kSettled = 0.018;  // clouds of closed shapes are mostly below 0.015, scans of one side from 0.02 to 0.15
@@ -174,7 +176,7 @@ private:
         tbb::parallel_for(std::size_t(0), off.size(), [&](std::size_t cell) {
             const auto [begin, end] = cells.cell(cell);
             double sum = 0;
-            for (std::uint32_t at = begin; at < end; ++at) sum += chi.at(cells.sorted()[at]).value - 0.5;
+            for (std::uint32_t at = begin; at < end; ++at) sum += chi.value_at(cells.sorted()[at]) - 0.5;
             off[cell] = sum / double(end - begin);
         });
         return off;
@@ -215,8 +217,37 @@ double mean_of(const Indicator& indicator, const std::vector<Vec3>& points) {
     return std::accumulate(values.begin(), values.end(), 0.0) / double(points.size());
 }
 
+/// Outward, by the indicator: down its slope where it is between outside and inside, up where another part encloses the point.
+std::vector<Vec3> normals_of(const Indicator& indicator, const std::vector<Vec3>& points, double enclosed) {
+    std::vector<Vec3> normals(points.size());
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
+        const auto [inside, g] = indicator.at(points[n]);
+        const double sign = inside < 0 || inside > enclosed ? 1 : -1;
+        normals[n] = unit({sign * g[0], sign * g[1], sign * g[2]});
+    });
+    return normals;
+}
+
 /// Parts that are turned as a whole go on turning, or lie where the indicator is not 1/2.
 double doubt(const Orientation& o) { return o.turned + std::max(0.0, o.off_half - kOffHalf); }
+
+/// Every few points of those that lie together, and what each stands for.
+struct Sample {
+    Sample(const std::vector<Vec3>& all, double spacing, std::size_t every) : step(every), order(cloud::PointCells(all, kSampleSpacings * spacing).order()) {
+        for (std::size_t n = step / 2; n < order.size(); n += step) points.push_back(all[order[n]]);
+        areas = cloud::areas_of(points, spacing * std::sqrt(double(step)));
+    }
+    /// Of all points.
+    [[nodiscard]] std::vector<double> all_areas() const {
+        std::vector<double> all(order.size());
+        for (std::size_t n = 0; n < order.size(); ++n) all[order[n]] = areas[std::min(n / step, areas.size() - 1)] / double(step);
+        return all;
+    }
+    std::size_t step;
+    std::vector<std::uint32_t> order;
+    std::vector<Vec3> points;
+    std::vector<double> areas;
+};
 
 }  // namespace
 
@@ -225,23 +256,29 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
     if (!(longest_side(bounding_box(points)) > 0) || !(scale.spacing > 0)) throw Error(Errc::InvalidInput, "orient: all points lie at one place");
     Orientation best;
     with_threads(run, [&] {
-        const std::vector<double> areas = cloud::areas_of(points, scale.spacing);
         // Noise is hard to tell from thin parts: where normals go on turning a finer lattice may hold them.
         const double first = std::max(kCellSpacings * scale.spacing, kCellNoises * scale.noise);
+        const double cell = cloud::indicator_lattice(points, cloud::cells_along(points, first)).cell;
+        const double share = kSampledPerCell * scale.spacing * scale.spacing / (cell * cell);
+        const Sample sample(points, scale.spacing, std::size_t(std::max(1.0, 1 / share)));
         std::vector<std::pair<int, double>> tried;
         for (const Try& attempt : kTries) {
             const int cells = cloud::cells_along(points, std::max(first * attempt.cell, kLeastSpacings * scale.spacing));
             if (std::count(tried.begin(), tried.end(), std::pair{cells, attempt.enclosed}) > 0) continue;
             tried.emplace_back(cells, attempt.enclosed);
             Orientation now;
-            now.areas = areas;
-            Iteration iteration(points);
+            now.areas = sample.areas;
+            Iteration iteration(sample.points);
             for (const Stage& stage : {Stage{cells * 2 / 3, 12, false, attempt.enclosed}, Stage{cells, 8, true, kSurelyEnclosed}}) iteration.run(stage, now, run);
             now.indicator = cloud::make_indicator(iteration.last());
-            now.off_half = std::abs(mean_of(*now.indicator, points) - 0.5);
+            now.off_half = std::abs(mean_of(*now.indicator, sample.points) - 0.5);
             if (tried.size() == 1 || doubt(now) < doubt(best)) best = std::move(now);
             if (doubt(best) < kFewTurned) break;
         }
+        const double half = std::accumulate(best.areas.begin(), best.areas.end(), 0.0) / std::accumulate(sample.areas.begin(), sample.areas.end(), 0.0);
+        best.areas = sample.all_areas();
+        for (double& area : best.areas) area *= half;
+        best.normals = normals_of(*best.indicator, points, kSurelyEnclosed);
     });
     return best;
 }

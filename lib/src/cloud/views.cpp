@@ -117,7 +117,7 @@ Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& s
     std::vector<double> screen(points.size());
     std::size_t against = 0;
     for (std::size_t n = 0; n < points.size(); ++n) {
-        const Vec3 falling = unit(times(-1, result.indicator->gradient(points[n])));
+        const Vec3 falling = unit(times(-1, result.indicator->at(points[n]).gradient));
         const bool agrees = dot(falling, result.normals[n]) > 0;
         against += !agrees;
         if (agrees) result.normals[n] = falling;

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+
+#include "cloud/lattice_kernel.h"
 
 namespace covol::cloud {
 namespace {
@@ -12,6 +15,8 @@ constexpr int kCoarsening = 16;    // of the finest lattice, by halving
 constexpr int kSweeps = 1;         // before and after each correction
 constexpr int kCoarsestSweeps = 16;
 
+using Float4 = float __attribute__((vector_size(16)));
+
 /// Cubic B-splines at a place: weights of 4 nodes along each axis, and their derivatives in cells.
 struct Spline {
     Spline(const Lattice& l, const Vec3& world) {
@@ -19,19 +24,29 @@ struct Spline {
         for (int a = 0; a < 3; ++a) {
             const double at = std::clamp((world[a] - l.origin[a]) / l.cell, 1.0, double(l.nodes[a]) - 2.000001);
             index[a] = std::size_t(at);
-            const double t = at - double(index[a]), s = 1 - t;
-            w[a] = {s * s * s / 6, (4 - 6 * t * t + 3 * t * t * t) / 6, (4 - 6 * s * s + 3 * s * s * s) / 6, t * t * t / 6};
-            d[a] = {-s * s / 2, (-4 * t + 3 * t * t) / 2, (4 * s - 3 * s * s) / 2, t * t / 2};
+            const float t = float(at - double(index[a])), s = 1 - t;
+            w[a] = Float4{s * s * s, 4 - 6 * t * t + 3 * t * t * t, 4 - 6 * s * s + 3 * s * s * s, t * t * t} / 6.0F;
+            d[a] = 0.5F * Float4{-s * s, -4 * t + 3 * t * t, 4 * s - 3 * s * s, t * t};
             --index[a];
         }
         first = (index[0] * std::size_t(l.nodes[1]) + index[1]) * std::size_t(l.nodes[2]) + index[2];
     }
     std::size_t first;  // of 4^3 nodes
-    std::array<std::array<double, 4>, 3> w, d;
+    std::array<Float4, 3> w, d;
 };
+
+Float4 load(const float* p) {
+    Float4 v;
+    std::memcpy(&v, p, sizeof v);
+    return v;
+}
+
+double sum_of(Float4 v) { return double((v[0] + v[1]) + (v[2] + v[3])); }
 
 struct Strides {
     explicit Strides(const Lattice& l) : i(std::size_t(l.nodes[1]) * std::size_t(l.nodes[2])), j(std::size_t(l.nodes[2])) {}
+    [[nodiscard]] RowStrides row() const { return {std::ptrdiff_t(i), std::ptrdiff_t(j)}; }
+    [[nodiscard]] std::size_t inner() const { return j - 2; }  // nodes of a row
     std::size_t i, j;
 };
 
@@ -44,44 +59,35 @@ void for_rows(const Lattice& l, Visit visit) {
     });
 }
 
+const float* row_of(const std::vector<float>& values, std::size_t at) { return values.empty() ? nullptr : values.data() + at; }
+
 /// Gauss-Seidel in red and black order: (6 + screen) u - sum of neighbours = right.
 void sweep(const Lattice& l, std::vector<float>& u, const std::vector<float>& right, const std::vector<float>& screen) {
     const Strides s(l);
-    const auto visit = [&](const auto& inverse_diagonal) {
-        for (int colour = 0; colour < 2; ++colour)
-            for_rows(l, [&](int i, int j, std::size_t row) {
-                for (std::size_t at = row + 1 + std::size_t((i + j + colour) & 1), end = row + s.j - 1; at < end; at += 2)
-                    u[at] = (right[at] + u[at - s.i] + u[at + s.i] + u[at - s.j] + u[at + s.j] + u[at - 1] + u[at + 1]) * inverse_diagonal(at);
-            });
-    };
-    if (screen.empty()) visit([](std::size_t) { return 1.0F / 6.0F; });
-    else visit([&](std::size_t at) { return 1 / (6 + screen[at]); });
+    for (int colour = 0; colour < 2; ++colour)
+        for_rows(l, [&](int i, int j, std::size_t row) {
+            sweep_row(u.data() + row + 1, right.data() + row + 1, row_of(screen, row + 1), s.row(), s.inner(), std::size_t((i + j + colour) & 1));
+        });
 }
 
 void find_residual(const Lattice& l, const std::vector<float>& u, const std::vector<float>& right, const std::vector<float>& screen,
                    std::vector<float>& residual) {
     const Strides s(l);
     for_rows(l, [&](int, int, std::size_t row) {
-        for (std::size_t at = row + 1, end = row + s.j - 1; at < end; ++at)
-            residual[at] = right[at] - (screen.empty() ? 6.0F : 6 + screen[at]) * u[at] + u[at - s.i] + u[at + s.i] + u[at - s.j] + u[at + s.j] + u[at - 1] + u[at + 1];
+        residual_row(u.data() + row + 1, right.data() + row + 1, row_of(screen, row + 1), s.row(), s.inner(), residual.data() + row + 1);
     });
 }
 
 /// Full weighting; the right-hand side holds integrals over hats, whose sum over a coarser hat is this one's.
 void restrict_to(const Lattice& fine, const std::vector<float>& residual, const Lattice& coarse, std::vector<float>& right) {
-    const Strides s(fine), t(coarse);
-    const float weight[3] = {0.5F, 1.0F, 0.5F};
+    const Strides s(fine);
     for_rows(coarse, [&](int i, int j, std::size_t row) {
-        for (int k = 1; k + 1 < coarse.nodes[2]; ++k) {
-            const std::size_t at = std::size_t(2 * i) * s.i + std::size_t(2 * j) * s.j + std::size_t(2 * k);
-            float sum = 0;
-            for (int a = 0; a < 3; ++a)
-                for (int b = 0; b < 3; ++b) {
-                    const float* p = residual.data() + (at + std::size_t(a) * s.i + std::size_t(b) * s.j - s.i - s.j);
-                    sum += weight[a] * weight[b] * (0.5F * (p[-1] + p[1]) + p[0]);
-                }
-            right[row + std::size_t(k)] = 0.5F * sum;  // the stencil is h times the weak form's, and h doubles
-        }
+        thread_local std::vector<float> sums;
+        sums.resize(s.inner());
+        restrict_row(residual.data() + std::size_t(2 * i) * s.i + std::size_t(2 * j) * s.j + 1, s.row(), s.inner(), sums.data());
+        for (std::size_t k = 1; k + 1 < std::size_t(coarse.nodes[2]); ++k)
+            // The stencil is h times the weak form's, and h doubles.
+            right[row + k] = 0.5F * (0.5F * (sums[2 * k - 2] + sums[2 * k]) + sums[2 * k - 1]);
     });
 }
 
@@ -110,12 +116,57 @@ void smooth(const Lattice& l, std::vector<float>& values, std::vector<float>& sc
     const Strides s(l);
     for (const std::size_t stride : {s.i, s.j, std::size_t(1)}) {
         for_rows(l, [&](int, int, std::size_t row) {
-            for (std::size_t at = row + 1, end = row + s.j - 1; at < end; ++at)
-                scratch[at] = 0.5F * values[at] + 0.25F * (values[at - stride] + values[at + stride]);
+            smooth_row(values.data() + row + 1, std::ptrdiff_t(stride), s.inner(), scratch.data() + row + 1);
         });
         std::swap(values, scratch);
     }
 }
+
+/// Points by the slab of the lattice that they lie in, in which order they are summed whatever the number of threads.
+class SlabOrder {
+public:
+    SlabOrder(const Lattice& l, const std::vector<Vec3>& points) : lattice_(l), points_(points) {
+        const std::size_t slabs = std::size_t(l.nodes[0]) / kSlab + 1;
+        std::vector<std::uint32_t> slab(points.size());
+        tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
+            slab[n] = std::uint32_t(std::clamp((points[n][0] - l.origin[0]) / l.cell, 0.0, double(l.nodes[0] - 1)) / kSlab);
+        });
+        starts_.assign(slabs + 1, 0);
+        for (const std::uint32_t s : slab) ++starts_[s + 1];
+        for (std::size_t s = 0; s < slabs; ++s) starts_[s + 1] += starts_[s];
+        std::vector<std::size_t> next(starts_.begin(), starts_.end() - 1);
+        order_.resize(points.size());
+        for (std::size_t n = 0; n < points.size(); ++n) order_[next[slab[n]]++] = std::uint32_t(n);
+    }
+
+    /// Adds row(spline, point, i, j), a Float4, to the nodes around each point; slabs beside each other never at once.
+    template <typename Row>
+    void add(std::vector<float>& nodes, Row row) const {
+        const Strides s(lattice_);
+        for (std::size_t parity = 0; parity < 2; ++parity)
+            tbb::parallel_for(std::size_t(0), starts_.size() / 2, [&](std::size_t pair) {
+                const std::size_t slab = 2 * pair + parity;
+                if (slab + 1 >= starts_.size()) return;
+                for (std::size_t at = starts_[slab]; at < starts_[slab + 1]; ++at) {
+                    const std::size_t n = order_[at];
+                    const Spline b(lattice_, points_[n]);
+                    for (std::size_t i = 0; i < 4; ++i)
+                        for (std::size_t j = 0; j < 4; ++j) {
+                            float* p = nodes.data() + b.first + i * s.i + j * s.j;
+                            const Float4 sum = load(p) + row(b, n, i, j);
+                            std::memcpy(p, &sum, sizeof sum);
+                        }
+                }
+            });
+    }
+
+private:
+    static constexpr int kSlab = 8;  // nodes; a point reaches 4
+    const Lattice& lattice_;
+    const std::vector<Vec3>& points_;
+    std::vector<std::uint32_t> order_;
+    std::vector<std::size_t> starts_;
+};
 
 }  // namespace
 
@@ -132,37 +183,42 @@ Lattice lattice_around(const WorldBox& box, double share, int cells) {
     return l;
 }
 
+double LatticeField::value_at(const Vec3& world) const {
+    const Spline b(lattice, world);
+    const Strides s(lattice);
+    Float4 sum{};
+    for (std::size_t i = 0; i < 4; ++i) {
+        const float* row = values.data() + b.first + i * s.i;
+        sum += b.w[0][i] * (b.w[1][0] * load(row) + b.w[1][1] * load(row + s.j) + b.w[1][2] * load(row + 2 * s.j) + b.w[1][3] * load(row + 3 * s.j));
+    }
+    return sum_of(sum * b.w[2]);
+}
+
 LatticeField::Sample LatticeField::at(const Vec3& world) const {
     const Spline b(lattice, world);
     const Strides s(lattice);
-    Sample sample{0, {0, 0, 0}};
-    for (std::size_t i = 0; i < 4; ++i)
+    Float4 sum{}, along_i{}, along_j{};
+    for (std::size_t i = 0; i < 4; ++i) {
+        const float* row = values.data() + b.first + i * s.i;
+        Float4 here{}, slope{};
         for (std::size_t j = 0; j < 4; ++j) {
-            const float* row = values.data() + b.first + i * s.i + j * s.j;
-            double sum = 0, slope = 0;
-            for (std::size_t k = 0; k < 4; ++k) {
-                sum += b.w[2][k] * double(row[k]);
-                slope += b.d[2][k] * double(row[k]);
-            }
-            sample.value += b.w[0][i] * b.w[1][j] * sum;
-            sample.gradient[0] += b.d[0][i] * b.w[1][j] * sum;
-            sample.gradient[1] += b.w[0][i] * b.d[1][j] * sum;
-            sample.gradient[2] += b.w[0][i] * b.w[1][j] * slope;
+            const Float4 v = load(row + j * s.j);
+            here += b.w[1][j] * v;
+            slope += b.d[1][j] * v;
         }
-    for (double& g : sample.gradient) g /= lattice.cell;
-    return sample;
+        sum += b.w[0][i] * here;
+        along_i += b.d[0][i] * here;
+        along_j += b.w[0][i] * slope;
+    }
+    return {sum_of(sum * b.w[2]),
+            {sum_of(along_i * b.w[2]) / lattice.cell, sum_of(along_j * b.w[2]) / lattice.cell, sum_of(sum * b.d[2]) / lattice.cell}};
 }
 
 LatticeField spread(const Lattice& lattice, const std::vector<Vec3>& points, const std::vector<double>& values) {
     LatticeField sum(lattice);
-    const Strides s(lattice);
-    for (std::size_t n = 0; n < points.size(); ++n) {
-        const Spline b(lattice, points[n]);
-        for (std::size_t i = 0; i < 4; ++i)
-            for (std::size_t j = 0; j < 4; ++j)
-                for (std::size_t k = 0; k < 4; ++k)
-                    sum.values[b.first + i * s.i + j * s.j + k] += float(values[n] * b.w[0][i] * b.w[1][j] * b.w[2][k]);
-    }
+    SlabOrder(lattice, points).add(sum.values, [&](const Spline& b, std::size_t n, std::size_t i, std::size_t j) {
+        return float(values[n]) * b.w[0][i] * b.w[1][j] * b.w[2];
+    });
     return sum;
 }
 
@@ -204,19 +260,12 @@ void WindingField::cycle(std::size_t n) {
 void WindingField::solve(const std::vector<Vec3>& points, const std::vector<Vec3>& vectors, int cycles) {
     Level& finest = levels_.front();
     const Lattice& l = finest.solution.lattice;
-    const Strides s(l);
     std::fill(finest.right.begin(), finest.right.end(), 0.0F);
     const double area = 1 / (l.cell * l.cell);
-    for (std::size_t n = 0; n < points.size(); ++n) {
-        const Spline b(l, points[n]);
-        const Vec3 v{area * vectors[n][0], area * vectors[n][1], area * vectors[n][2]};
-        for (std::size_t i = 0; i < 4; ++i)
-            for (std::size_t j = 0; j < 4; ++j) {
-                const double across = v[0] * b.d[0][i] * b.w[1][j] + v[1] * b.w[0][i] * b.d[1][j], along = v[2] * b.w[0][i] * b.w[1][j];
-                float* row = finest.right.data() + b.first + i * s.i + j * s.j;
-                for (std::size_t k = 0; k < 4; ++k) row[k] -= float(across * b.w[2][k] + along * b.d[2][k]);
-            }
-    }
+    SlabOrder(l, points).add(finest.right, [&](const Spline& b, std::size_t n, std::size_t i, std::size_t j) {
+        const float x = float(area * vectors[n][0]), y = float(area * vectors[n][1]), z = float(area * vectors[n][2]);
+        return -((x * b.d[0][i] * b.w[1][j] + y * b.w[0][i] * b.d[1][j]) * b.w[2] + (z * b.w[0][i] * b.w[1][j]) * b.d[2]);
+    });
     for (std::size_t n = 0; n < finest.screen.size(); ++n) finest.right[n] += 0.5F * finest.screen[n];
     for (int n = 0; n < cycles; ++n) cycle(0);
 }
@@ -226,7 +275,7 @@ void WindingField::start_from(const LatticeField& other) {
     const Lattice& l = u.lattice;
     for_rows(l, [&](int i, int j, std::size_t row) {
         for (int k = 1; k + 1 < l.nodes[2]; ++k)
-            u.values[row + std::size_t(k)] = float(other.at({l.origin[0] + i * l.cell, l.origin[1] + j * l.cell, l.origin[2] + k * l.cell}).value);
+            u.values[row + std::size_t(k)] = float(other.value_at({l.origin[0] + i * l.cell, l.origin[1] + j * l.cell, l.origin[2] + k * l.cell}));
     });
 }
 

@@ -28,6 +28,7 @@ struct LatticeField {
 
     struct Sample { double value; Vec3 gradient; };  ///< gradient in 1 / world unit
     [[nodiscard]] Sample at(const Vec3& world) const;
+    [[nodiscard]] double value_at(const Vec3& world) const;
 };
 
 /// Sums of the points' values, spread over the nodes around them.
