@@ -91,6 +91,13 @@ PointCloud read_points(const std::string& path, const ReadPointsOptions& options
     cloud.points = std::move(table.points);
     for (Vec3& p : cloud.points) p = detail::read_as(cloud.reading, p);
     cloud.lines = std::move(table.lines);
+    if (cloud.space == PointSpace::World) {
+        cloud.normals = std::move(table.normals);
+        for (Vec3& n : cloud.normals) n = detail::direction_as(cloud.reading, n);
+        if (table.sensor) cloud.sensor = detail::read_as(cloud.reading, *table.sensor);
+        if (!cloud.normals.empty()) table.rule += " with normals";
+        if (cloud.sensor) table.rule += " seen from a sensor";
+    }
     cloud.rule = table.rule + ", as " + detail::describe(cloud.reading);
     return cloud;
 }

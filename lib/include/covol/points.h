@@ -1,5 +1,6 @@
 #pragma once
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,8 @@ struct MarkLine {
 struct PointCloud {
     std::vector<Vec3> points;
     std::vector<MarkLine> lines;  ///< what the file says of their order; empty for loose points
+    std::vector<Vec3> normals;    ///< unit, one for each point, 0 where the file has none that is a direction; empty: no normals
+    std::optional<Vec3> sensor;   ///< where a scan was taken from; both in World alone
     PointSpace space = PointSpace::World;  ///< World, Index, Local or Slices
     ReadPointsOptions reading;             ///< how the file's coordinates became these
     bool stated = false;                   ///< the format or the caller said so; else `reading` is a guess
@@ -51,6 +54,9 @@ struct PointCloud {
 ///   napari's points and shapes; Fiji's Results (X, Y, Slice)
 /// - .roi, .zip: Fiji's selections. .mrk.json, .fcsv: 3D Slicer. .annot: ITK-SNAP. .landmarks, .lmk: Convert3D
 /// - .ply (ascii, both binary byte orders), .obj, .off: their vertices. .pcd, .las: scans
+/// Normals: nx, ny, nz of PLY and of columns, columns 4 to 6 of six without names where all are unit vectors, normal_x,
+/// normal_y, normal_z of PCD, vn of an OBJ that has one for each vertex. The sensor: VIEWPOINT of a PCD that is organised or
+/// says another one than 0 0 0, which writers put where they know none.
 ///
 /// Each format's own coordinate rule is applied and told in `rule`; the options go before it.
 /// @throws Error Io, InvalidInput (with path:line: text instead of numbers, NaN, truncated, no point), Unsupported.

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <map>
 #include <numeric>
@@ -22,6 +23,8 @@ struct Columns {
     PointSpace space = PointSpace::Unstated;
     PointOrder order = PointOrder::Unstated;
     bool slice_from_one = false;        ///< the third column counts slices from 1
+    std::optional<std::array<std::size_t, 3>> normal;
+    bool normal_is_guess = false;       ///< the columns have no names
     std::vector<std::size_t> line;      ///< rows that agree in these columns are one line
     std::optional<std::size_t> shape;   ///< napari's shape-type
     std::optional<std::size_t> vertex;  ///< the place of a mark in its line
@@ -144,6 +147,8 @@ std::optional<Columns> find_columns(const std::vector<string_view>& fields) {
         columns.rule += " of Fiji Results, slices from 1, X and Y taken in the image's unit, not in pixels";
     }
     find_lines(header, slice, columns);
+    const auto nx = header.find("nx"), ny = header.find("ny"), nz = header.find("nz");
+    if (nx && ny && nz && columns.line.empty()) columns.normal = {*nx, *ny, *nz};
     return columns;
 }
 
@@ -240,6 +245,25 @@ Vec3 read_row(const std::string& path, std::size_t number, const std::vector<str
     return point;
 }
 
+/// As it stands there; 0 where it is no direction.
+Vec3 read_normal(const std::vector<string_view>& fields, const std::array<std::size_t, 3>& at) {
+    Vec3 normal{0, 0, 0};
+    for (std::size_t a = 0; a < 3; ++a) {
+        if (at[a] >= fields.size()) return {0, 0, 0};
+        normal[a] = to_number(fields[at[a]]).value_or(0);
+    }
+    return std::isfinite(normal[0] + normal[1] + normal[2]) ? normal : Vec3{0, 0, 0};
+}
+
+/// Columns without names may hold colours, too.
+bool are_unit_vectors(const std::vector<Vec3>& all) {
+    constexpr double kTolerance = 0.02;  // two decimals
+    return std::all_of(all.begin(), all.end(), [](const Vec3& n) {
+        const double length = std::hypot(n[0], n[1], n[2]);
+        return length == 0 || std::abs(length - 1) < kTolerance;
+    });
+}
+
 }  // namespace
 
 PointTable parse_columns(const std::string& path, const std::string& text, bool blanks_only) {
@@ -278,18 +302,23 @@ PointTable parse_columns(const std::string& path, const std::string& text, bool 
             columns.rule = fields.size() > 3
                                ? "the first three of " + std::to_string(fields.size()) + " columns without names"
                                : "three columns without names";
+            if (fields.size() == 6) columns.normal = {3, 4, 5};
+            columns.normal_is_guess = columns.normal.has_value();
         }
         if (fields.size() < needed)
             fail(path, lines.number(),
                  "expected " + std::to_string(needed) + (needed == 3 ? " numbers" : " columns") + ", got " +
                      std::to_string(fields.size()) + " in " + quote(line));
         const Vec3 point = read_row(path, lines.number(), fields, delimiter, columns);
+        if (columns.normal) table.normals.push_back(read_normal(fields, *columns.normal));
         if (columns.line.empty())
             table.points.push_back(point);
         else
             collector.add(path, lines.number(), fields, point);
     }
     collector.finish(path, table);
+    if (columns.normal_is_guess && !are_unit_vectors(table.normals)) table.normals.clear();
+    for (Vec3& n : table.normals) n = normal_of(n);
     table.space = columns.space;
     table.order = columns.order;
     table.rule = columns.rule;

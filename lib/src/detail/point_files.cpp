@@ -73,6 +73,12 @@ std::vector<Vec3> ellipse(const Vec3& centre, const Vec3& u, const Vec3& v) {
     return points;
 }
 
+Vec3 normal_of(const Vec3& given) {
+    const double length = std::hypot(given[0], given[1], given[2]);
+    if (!std::isfinite(length) || !(length > 1e-30)) return {0, 0, 0};
+    return {given[0] / length, given[1] / length, given[2] / length};
+}
+
 void add_line(PointTable& table, const std::vector<Vec3>& points, bool closed, const std::string& name) {
     const std::size_t begin = table.points.size();
     table.points.insert(table.points.end(), points.begin(), points.end());

@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,8 @@ namespace covol::detail {
 struct PointTable {
     std::vector<Vec3> points;
     std::vector<MarkLine> lines;
+    std::vector<Vec3> normals;   ///< none, or one for each point, by normal_of()
+    std::optional<Vec3> sensor;
     PointSpace space = PointSpace::Unstated;
     PointOrder order = PointOrder::Unstated;
     std::string rule;  ///< which columns or elements, for people
@@ -17,6 +20,9 @@ struct PointTable {
 
 /// Picks the reader by the name's end. @throws as read_points(), which it serves.
 PointTable read_point_table(const std::string& path);
+
+/// A unit vector; 0 of what is no direction (NaN, zero length), which scanners write where they know none.
+[[nodiscard]] Vec3 normal_of(const Vec3& given);
 
 /// Appends an ordered line of marks to a table.
 void add_line(PointTable& table, const std::vector<Vec3>& points, bool closed, const std::string& name);

@@ -159,33 +159,44 @@ std::uint64_t measure_ply(const PlyElement& element, const char* data, std::uint
     return at;
 }
 
-/// The places of x, y, z among the properties.
-std::array<std::size_t, 3> ply_coordinates(const std::string& path, const PlyElement& vertex) {
-    std::array<std::size_t, 3> at{};
-    for (std::size_t a = 0; a < 3; ++a) {
-        const std::string name(1, "xyz"[a]);
-        const auto found = std::find_if(vertex.properties.begin(), vertex.properties.end(),
+/// The places of x, y, z among the properties, and of nx, ny, nz where there are all three; of what is no vertex, none.
+std::vector<std::size_t> ply_columns(const std::string& path, const PlyElement& element) {
+    std::vector<std::size_t> at;
+    if (element.name != "vertex") return at;
+    for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) {
+        const auto found = std::find_if(element.properties.begin(), element.properties.end(),
                                         [&](const PlyProperty& p) { return p.name == name && !p.is_list; });
-        if (found == vertex.properties.end()) fail(path, "expected a vertex property '" + name + "', got none");
-        at[a] = static_cast<std::size_t>(found - vertex.properties.begin());
+        if (found != element.properties.end())
+            at.push_back(static_cast<std::size_t>(found - element.properties.begin()));
+        else if (at.size() < 3)
+            fail(path, std::string("expected a vertex property '") + name + "', got none");
+        else
+            break;
     }
+    if (at.size() < 6) at.resize(3);
     return at;
 }
 
-std::vector<Vec3> read_ply_ascii(const std::string& path, const PlyHeader& header, Lines& lines) {
-    std::vector<Vec3> points;
+/// A vertex's values, of the columns that ply_columns() found.
+void add_vertex(const std::vector<double>& values, PointTable& table) {
+    table.points.push_back({values[0], values[1], values[2]});
+    if (values.size() == 6) table.normals.push_back(normal_of({values[3], values[4], values[5]}));
+}
+
+void read_ply_ascii(const std::string& path, const PlyHeader& header, Lines& lines, PointTable& table) {
     string_view line;
     std::vector<string_view> fields;
+    std::vector<double> values;
     for (const PlyElement& element : header.elements) {
-        const bool is_vertex = element.name == "vertex";
-        const auto at = is_vertex ? ply_coordinates(path, element) : std::array<std::size_t, 3>{};
+        const std::vector<std::size_t> at = ply_columns(path, element);
+        values.resize(at.size());
         if (element.properties.empty()) continue;
         // a line takes at least a digit and its end for each property
         if (element.count > lines.rest().size() / 2 + 1)
             fail(path, lines.number(),
                  "expected " + std::to_string(element.count) + " elements '" + element.name +
                      "', the file is too short for them; it is truncated");
-        if (is_vertex) points.reserve(element.count);
+        if (!at.empty()) table.points.reserve(element.count);
         for (std::uint64_t n = 0; n < element.count;) {
             if (!lines.next(line))
                 fail(path, lines.number(),
@@ -194,13 +205,12 @@ std::vector<Vec3> read_ply_ascii(const std::string& path, const PlyHeader& heade
             if (line.empty()) continue;
             ++n;
             split(line, ' ', fields);
-            Vec3 point;
-            std::array<std::size_t, 3> column = at;
+            std::vector<std::size_t> column = at;
             if (element.has_list()) {
                 // lists before a coordinate shift it
                 std::size_t field = 0;
                 for (std::size_t p = 0; p < element.properties.size() && field < fields.size(); ++p) {
-                    for (std::size_t a = 0; is_vertex && a < 3; ++a)
+                    for (std::size_t a = 0; a < at.size(); ++a)
                         if (at[a] == p) column[a] = field;
                     const double length =
                         element.properties[p].is_list ? to_coordinate(path, lines.number(), fields[field]) : 0;
@@ -210,49 +220,55 @@ std::vector<Vec3> read_ply_ascii(const std::string& path, const PlyHeader& heade
                     fail(path, lines.number(), "the last of " + std::to_string(element.count) + " elements '" + element.name +
                                                    "' ends early; the file is truncated");
             }
-            if (!is_vertex) continue;
-            for (std::size_t a = 0; a < 3; ++a) {
+            if (at.empty()) continue;
+            for (std::size_t a = 0; a < at.size(); ++a) {
                 if (column[a] >= fields.size())
                     fail(path, lines.number(),
                          "expected " + std::to_string(element.properties.size()) + " numbers, got " +
                              std::to_string(fields.size()));
-                point[a] = to_coordinate(path, lines.number(), fields[column[a]]);
+                const string_view field = fields[column[a]];
+                values[a] = a < 3 ? to_coordinate(path, lines.number(), field) : to_number(field).value_or(0);
             }
-            points.push_back(point);
+            add_vertex(values, table);
         }
     }
-    return points;
 }
 
-std::vector<Vec3> read_ply_binary(const std::string& path, const PlyHeader& header, string_view data) {
+void read_ply_binary(const std::string& path, const PlyHeader& header, string_view data, PointTable& table) {
     const bool swap = (header.format == PlyFormat::BigEndian) != (std::endian::native == std::endian::big);
-    std::vector<Vec3> points;
+    std::vector<double> values;
     for (const PlyElement& element : header.elements) {
-        const bool is_vertex = element.name == "vertex";
-        const auto at = is_vertex ? ply_coordinates(path, element) : std::array<std::size_t, 3>{};
+        const std::vector<std::size_t> at = ply_columns(path, element);
+        values.resize(at.size());
         if (element.properties.empty()) continue;
         if (element.count > data.size())
             fail(path, "expected " + std::to_string(element.count) + " elements '" + element.name + "', the file has " +
                            std::to_string(data.size()) + " bytes left for them; it is truncated");
-        if (is_vertex) points.reserve(element.count);
+        if (!at.empty()) table.points.reserve(element.count);
         std::vector<std::uint64_t> place(element.properties.size());
         for (std::uint64_t n = 0; n < element.count; ++n) {
             const std::uint64_t bytes = measure_ply(element, data.data(), data.size(), swap, place);
             if (bytes == 0)
                 fail(path, "expected " + std::to_string(element.count) + " elements '" + element.name + "', got " +
                                std::to_string(n) + "; the file is truncated");
-            if (is_vertex) {
-                Vec3 point;
-                for (std::size_t a = 0; a < 3; ++a)
-                    point[a] = ply_value(data.data() + place[at[a]], element.properties[at[a]].type, swap);
-                if (!std::isfinite(point[0] + point[1] + point[2]))
+            if (!at.empty()) {
+                for (std::size_t a = 0; a < at.size(); ++a)
+                    values[a] = ply_value(data.data() + place[at[a]], element.properties[at[a]].type, swap);
+                if (!std::isfinite(values[0] + values[1] + values[2]))
                     fail(path, "vertex " + std::to_string(n) + ": expected finite numbers, got NaN or infinity");
-                points.push_back(point);
+                add_vertex(values, table);
             }
             data.remove_prefix(bytes);
         }
     }
-    return points;
+}
+
+/// Whether a face of an OBJ gives a vertex another normal than the one of the same number.
+bool mixes_normals(const std::vector<string_view>& fields) {
+    return std::any_of(fields.begin() + 1, fields.end(), [](string_view corner) {
+        const std::size_t first = corner.find('/'), last = corner.rfind('/');
+        return first != last && corner.substr(0, first) != corner.substr(last + 1);
+    });
 }
 
 }  // namespace
@@ -263,11 +279,19 @@ PointTable parse_obj(const std::string& path, const std::string& text) {
     Lines lines(text);
     string_view line;
     std::vector<string_view> fields;
+    bool by_number = true;
     while (lines.next(line)) {
-        if (line.size() < 2 || line[0] != 'v' || !is_blank(line[1])) continue;
         split(line, ' ', fields);
-        table.points.push_back(first_three(path, lines.number(), fields, 1));
+        if (fields.empty()) continue;
+        if (fields[0] == "v") table.points.push_back(first_three(path, lines.number(), fields, 1));
+        if (fields[0] == "vn") {
+            Vec3 normal{0, 0, 0};
+            for (std::size_t a = 0; a < 3 && fields.size() >= 4; ++a) normal[a] = to_number(fields[a + 1]).value_or(0);
+            table.normals.push_back(normal_of(normal));
+        }
+        if (fields[0] == "f") by_number = by_number && !mixes_normals(fields);
     }
+    if (!by_number || table.normals.size() != table.points.size()) table.normals.clear();
     return table;
 }
 
@@ -313,8 +337,10 @@ PointTable parse_ply(const std::string& path, const std::string& text) {
         fail(path, "expected an element 'vertex', got none");
     PointTable table;
     table.rule = "vertices of a PLY";
-    table.points = header.format == PlyFormat::Ascii ? read_ply_ascii(path, header, lines)
-                                                     : read_ply_binary(path, header, lines.rest());
+    if (header.format == PlyFormat::Ascii)
+        read_ply_ascii(path, header, lines, table);
+    else
+        read_ply_binary(path, header, lines.rest(), table);
     return table;
 }
 

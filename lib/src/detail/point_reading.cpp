@@ -24,6 +24,12 @@ Vec3 read_as(const ReadPointsOptions& reading, Vec3 p) {
     }
 }
 
+Vec3 direction_as(const ReadPointsOptions& reading, Vec3 v) {
+    ReadPointsOptions turned = reading;
+    turned.scale = 1;
+    return read_as(turned, v);
+}
+
 Vec3 undo(const ReadPointsOptions& reading, Vec3 p) {
     const double s = reading.scale;
     switch (reading.space) {

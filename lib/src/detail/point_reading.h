@@ -10,6 +10,8 @@ namespace covol::detail {
 [[nodiscard]] PointSpace space_after(PointSpace read_as);
 /// A file's coordinates as a position in space_after(reading.space).
 [[nodiscard]] Vec3 read_as(const ReadPointsOptions& reading, Vec3 p);
+/// Likewise of a direction; @pre space_after(reading.space) is World.
+[[nodiscard]] Vec3 direction_as(const ReadPointsOptions& reading, Vec3 v);
 /// What the file says of a position; @pre reading.channels == 1.
 [[nodiscard]] Vec3 undo(const ReadPointsOptions& reading, Vec3 p);
 [[nodiscard]] Vec3 to_world(PointSpace space, const Vec3& p, const ImageGeometry& geometry);

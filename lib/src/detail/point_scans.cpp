@@ -26,6 +26,8 @@ struct PcdField {
 struct PcdHeader {
     std::vector<PcdField> fields;
     std::uint64_t points = 0;
+    std::optional<Vec3> viewpoint;
+    bool is_organised = false;  ///< rows of pixels: a camera's frame, with the camera at its origin unless it says otherwise
     std::string data;
 
     [[nodiscard]] std::uint64_t stride() const {
@@ -74,8 +76,13 @@ PcdHeader read_pcd_header(const std::string& path, Lines& lines) {
         } else if (key == "DATA") {
             header.data = lower(words[1]);
             header.points = points.value_or(width * height);
+            header.is_organised = height > 1;
             if (header.points > kMostPoints) fail(path, "expected fewer points");
             return header;
+        } else if (key == "VIEWPOINT" && words.size() >= 4) {
+            Vec3 at;
+            for (std::size_t a = 0; a < 3; ++a) at[a] = to_coordinate(path, lines.number(), words[a + 1]);
+            header.viewpoint = at;
         } else if (key != "VERSION" && key != "VIEWPOINT") {
             fail(path, lines.number(), "not a line of a PCD header: " + quote(line));
         }
@@ -83,16 +90,21 @@ PcdHeader read_pcd_header(const std::string& path, Lines& lines) {
     fail(path, "expected the line DATA, got the end; the file is truncated");
 }
 
-/// Which fields are x, y, z.
-std::array<std::size_t, 3> pcd_coordinates(const std::string& path, const PcdHeader& header) {
-    std::array<std::size_t, 3> at{};
-    for (std::size_t a = 0; a < 3; ++a) {
-        const std::string name(1, "xyz"[a]);
-        at[a] = header.fields.size();
+/// Which fields are x, y, z, and the normal's where there are all three.
+std::vector<std::size_t> pcd_columns(const std::string& path, const PcdHeader& header) {
+    std::vector<std::size_t> at;
+    for (const char* name : {"x", "y", "z", "normal_x", "normal_y", "normal_z"}) {
+        std::size_t found = header.fields.size();
         for (std::size_t n = 0; n < header.fields.size(); ++n)
-            if (header.fields[n].name == name && header.fields[n].count == 1) at[a] = n;
-        if (at[a] == header.fields.size()) fail(path, "expected a field '" + name + "', got none");
+            if (header.fields[n].name == name && header.fields[n].count == 1) found = n;
+        if (found < header.fields.size())
+            at.push_back(found);
+        else if (at.size() < 3)
+            fail(path, std::string("expected a field '") + name + "', got none");
+        else
+            break;
     }
+    if (at.size() < 6) at.resize(3);
     return at;
 }
 
@@ -136,17 +148,20 @@ bool lzf_decompress(string_view in, std::string& out) {
 }
 
 /// Organised clouds hold NaN where the scanner saw nothing.
-void add_valid(PointTable& table, const Vec3& point, std::size_t& invalid) {
-    if (std::isfinite(point[0]) && std::isfinite(point[1]) && std::isfinite(point[2]))
-        table.points.push_back(point);
-    else
+void add_valid(PointTable& table, const std::vector<double>& values, std::size_t& invalid) {
+    if (!std::isfinite(values[0]) || !std::isfinite(values[1]) || !std::isfinite(values[2])) {
         ++invalid;
+        return;
+    }
+    table.points.push_back({values[0], values[1], values[2]});
+    if (values.size() == 6) table.normals.push_back(normal_of({values[3], values[4], values[5]}));
 }
 
 void read_pcd_ascii(const std::string& path, const PcdHeader& header, Lines& lines, PointTable& table, std::size_t& invalid) {
-    const auto at = pcd_coordinates(path, header);
-    std::array<std::size_t, 3> column{};
-    for (std::size_t a = 0; a < 3; ++a)
+    const std::vector<std::size_t> at = pcd_columns(path, header);
+    std::vector<std::size_t> column(at.size(), 0);
+    std::vector<double> values(at.size());
+    for (std::size_t a = 0; a < at.size(); ++a)
         for (std::size_t n = 0; n < at[a]; ++n) column[a] += header.fields[n].count;
     string_view line;
     std::vector<string_view> words;
@@ -156,36 +171,35 @@ void read_pcd_ascii(const std::string& path, const PcdHeader& header, Lines& lin
         if (line.empty()) continue;
         ++n;
         split(line, ' ', words);
-        Vec3 point;
-        for (std::size_t a = 0; a < 3; ++a) {
+        for (std::size_t a = 0; a < at.size(); ++a) {
             const auto value = column[a] < words.size() ? to_number(words[column[a]]) : std::nullopt;
             if (!value) fail(path, lines.number(), "expected numbers for x, y and z, got " + quote(line));
-            point[a] = *value;
+            values[a] = *value;
         }
-        add_valid(table, point, invalid);
+        add_valid(table, values, invalid);
     }
 }
 
 /// @param planar  all values of a field follow each other
 void read_pcd_binary(const std::string& path, const PcdHeader& header, string_view data, bool planar, PointTable& table,
                      std::size_t& invalid) {
-    const auto at = pcd_coordinates(path, header);
+    const std::vector<std::size_t> at = pcd_columns(path, header);
     const std::uint64_t stride = header.stride();
     if (header.points > data.size() / std::max<std::uint64_t>(stride, 1))
         fail(path, "expected " + std::to_string(header.points) + " points of " + std::to_string(stride) + " bytes, got " +
                        std::to_string(data.size()) + " bytes; the file is truncated");
-    std::array<std::uint64_t, 3> offset{};
-    for (std::size_t a = 0; a < 3; ++a)
+    std::vector<std::uint64_t> offset(at.size(), 0);
+    std::vector<double> values(at.size());
+    for (std::size_t a = 0; a < at.size(); ++a)
         for (std::size_t n = 0; n < at[a]; ++n) offset[a] += header.fields[n].size * header.fields[n].count;
     table.points.reserve(header.points);
     for (std::uint64_t n = 0; n < header.points; ++n) {
-        Vec3 point;
-        for (std::size_t a = 0; a < 3; ++a) {
+        for (std::size_t a = 0; a < at.size(); ++a) {
             const PcdField& field = header.fields[at[a]];
             const std::uint64_t place = planar ? header.points * offset[a] + n * field.size : n * stride + offset[a];
-            point[a] = pcd_value(path, data.data() + place, field);
+            values[a] = pcd_value(path, data.data() + place, field);
         }
-        add_valid(table, point, invalid);
+        add_valid(table, values, invalid);
     }
 }
 
@@ -217,6 +231,7 @@ PointTable parse_pcd(const std::string& path, const std::string& bytes) {
     else
         throw Error(Errc::Unsupported, "read_points: " + path + ": expected DATA ascii, binary or binary_compressed, got " +
                                            quote(header.data));
+    if (header.viewpoint && (header.is_organised || *header.viewpoint != Vec3{0, 0, 0})) table.sensor = header.viewpoint;
     table.rule = "points of a PCD (" + header.data + ")";
     if (invalid > 0) table.rule += ", " + std::to_string(invalid) + " invalid ones left out";
     return table;
