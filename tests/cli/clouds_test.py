@@ -137,6 +137,47 @@ class Many(Clouds):
         self.assertFalse((self.out / "s.vdb").exists())
 
 
+class Normals(Clouds):
+    """What files say of normals and sensors is checked, and told."""
+
+    def report(self, name, text):
+        (self.out / name).write_text(text)
+        done = subprocess.run([COVOL, "reconstruct", name, "-o", "s.vdb", "--quiet", "--json", "-"], cwd=self.out, capture_output=True, text=True, timeout=300)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return json.loads(done.stdout), done.stderr
+
+    @staticmethod
+    def rows(points, normals):
+        return "".join(" ".join(f"{x:.6f}" for x in (*p, *n)) + "\n" for p, n in zip(points, normals))
+
+    def test_normals_of_a_file(self):
+        points = random_sphere(6000, 21)
+        outward = [tuple(x / RADIUS for x in p) for p in points]
+        draw = random.Random(2)
+        for sign, inward in ((1, False), (-1, True)):
+            report, _ = self.report("p.xyz", self.rows(points, [tuple(sign * x for x in n) for n in outward]))
+            found = report["cloud"]["normals"]
+            self.assertEqual((found["given"], found["used"], found["inward"], found["from_sensor"]), (6000, True, inward, False))
+            self.assertGreater(found["agree"], 0.99)
+            self.assertAlmostEqual(shell_share(report["surface"]), 1, delta=0.01)
+        noise = [tuple(draw.choice((-1, 1)) * x for x in n) for n in outward]
+        report, said = self.report("p.xyz", self.rows(points, noise))
+        self.assertFalse(report["cloud"]["normals"]["used"])
+        self.assertAlmostEqual(report["cloud"]["normals"]["agree"], 0.5, delta=0.05)
+        self.assertIn("file not used: half of them", said)
+        self.assertAlmostEqual(shell_share(report["surface"]), 1, delta=0.01)
+
+    def test_sensor_of_a_pcd(self):
+        sensor = (0, 0, 8 * RADIUS)
+        seen = [p for p in random_sphere(16000, 22) if p[2] > 0.3 * RADIUS]
+        header = (f"VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {len(seen)}\nHEIGHT 1\n"
+                  f"VIEWPOINT {sensor[0]} {sensor[1]} {sensor[2]} 1 0 0 0\nPOINTS {len(seen)}\nDATA ascii\n")
+        report, _ = self.report("p.pcd", header + "".join(f"{x:.6f} {y:.6f} {z:.6f}\n" for x, y, z in seen))
+        found = report["cloud"]["normals"]
+        self.assertEqual((found["sensor_given"], found["used"], found["from_sensor"]), (len(seen), True, True))
+        self.assertGreater(found["agree"], 0.99)
+
+
 class Open(Clouds):
     def check_layer(self, points, says, *more):
         advice = re.search(r"(--max-steps 0) (--tag-distance [0-9.e-]+) (--voxel-size [0-9.e-]+)", self.advice(points, says, *more))

@@ -30,7 +30,7 @@ SOURCE_LEVEL = {"contour_solid": LEVEL["contours"], "points_check": LEVEL["point
                 "stray": LEVEL["orientation"],
                 "areas": LEVEL["orientation"], "indicator": LEVEL["orientation"], "views": LEVEL["orientation"],
                 "vector": LEVEL["orientation"], "median": LEVEL["orientation"], "hold_topology": LEVEL["cloud_surface"],
-                "lattice_kernel": LEVEL["orientation"], "fit_kernel": LEVEL["orientation"], "blend_kernel": LEVEL["cloud_surface"]}
+                "lattice_kernel": LEVEL["orientation"], "fit_kernel": LEVEL["orientation"], "blend_kernel": LEVEL["cloud_surface"], "given_sides": LEVEL["orientation"]}
 # The modules of segment(), lib/src/pipeline, in the same way; lib/src/pipeline.cpp is above them all.
 PIPELINE = [
     ["job", "options"],

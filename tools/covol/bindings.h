@@ -58,6 +58,7 @@ struct PointFlags {
 /// Clouds read and moved to the world; with an image, points outside it are an error.
 struct WorldPoints {
     std::vector<Vec3> points;
+    PointHints hints;                ///< of them
     std::vector<std::string> rules;  ///< how each file was understood
 };
 [[nodiscard]] WorldPoints read_world_points(const PointFlags& flags, const ImageGeometry* geometry,

@@ -8,6 +8,7 @@ Marks read_marks(const PointFlags& points, const ContourFlags& contours, const I
     Marks marks;
     WorldPoints cloud = read_world_points(points, geometry, run);
     marks.points = std::move(cloud.points);
+    marks.hints = std::move(cloud.hints);
     marks.drawn = contours.read(points.options, geometry, run);
     marks.given = marks.points;
     for (const PointCloud& lines : marks.drawn) {
@@ -20,7 +21,9 @@ Marks read_marks(const PointFlags& points, const ContourFlags& contours, const I
 
 void prepare(Marks& marks, const CloudFlags& cloud, const ContourFlags& contours, const ImageGeometry* geometry, double h,
              Session& session, const RunContext& run) {
-    marks.points = cloud.clean(marks.points, h, run, marks.report["points"]);
+    std::vector<Vec3> cleaned = cloud.clean(marks.points, h, run, marks.report["points"]);
+    if (cleaned != marks.points) marks.hints = carried(marks.hints, marks.points, cleaned);
+    marks.points = std::move(cleaned);
     marks.given = marks.points;
     if (marks.drawn.empty()) return;
     const Stopwatch watch;

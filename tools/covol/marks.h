@@ -14,6 +14,7 @@ namespace covol::tool {
 struct Marks {
     std::vector<Vec3> given;          ///< all of them as they were clicked, world units; cleaned by prepare()
     std::vector<Vec3> points;         ///< those that are no contours
+    PointHints hints;                 ///< of those
     std::vector<PointCloud> drawn;    ///< contours
     std::shared_ptr<const Contours> contours;  ///< null before densify(), and without a file
     Json report;                      ///< {"points": {...}, "contours": {...}}

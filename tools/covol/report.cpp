@@ -149,6 +149,11 @@ Json to_json(const SegmentReport& r) {
                          {"bare_nodes", r.cloud.bare_nodes},
                          {"dropped_pieces", r.cloud.dropped_pieces},
                          {"held_voxels", r.cloud.held_voxels}};
+    if (const HintsReport& h = r.cloud.hints; h.normals + h.sensors > 0) {
+        json["cloud"]["normals"] = {{"given", h.normals}, {"sensor_given", h.sensors}, {"used", h.used}, {"from_sensor", h.from_sensor},
+                                    {"inward", h.inward}, {"foreseen", h.foreseen},    {"agree", h.agree}};
+        if (!h.why_not.empty()) json["cloud"]["normals"]["why_not"] = h.why_not;
+    }
     if (r.seeds.inside + r.seeds.outside > 0) json["seeds"] = to_json(r.seeds);
     if (r.share_without_points > 0) json["fit"]["surface_without_points"] = r.share_without_points;
     return json;

@@ -183,6 +183,7 @@ void SegmentJob::run_one(Session& session) const {
     SegmentOptions options = resolve(h);
     check_tag_distance(options.tag_distance, marks.given);
     options.contours = marks.contours;
+    options.hints = marks.hints;
     const Seeds sides = read_seeds(seeds, points.options, geometry, h, session.run());
     options.inside = sides.inside;
     options.outside = sides.outside;

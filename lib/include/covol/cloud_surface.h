@@ -20,6 +20,7 @@ struct CloudReport {
     std::size_t bare_nodes = 0;  ///< places with points that are no sheet: the indicator alone tells of the surface
     std::size_t dropped_pieces = 0;  ///< of the surface, that hardly a point rested on
     std::size_t held_voxels = 0;     ///< that the indicator's topology holds, for it is simpler than the points' own
+    HintsReport hints;               ///< CloudOrientation::hints
 };
 
 /// The closed surface behind points without normals, as a start (negative inside).

@@ -1,6 +1,7 @@
 #pragma once
 #include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "covol/domain.h"
@@ -55,6 +56,25 @@ struct Orientation {
 /// @throws Error InvalidInput (fewer than 4 points, points without extent), Cancelled.
 [[nodiscard]] Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run = {});
 
+/// What files tell of points beside where they are. Each list is empty or has an entry for each point, 0 where nothing is told.
+struct PointHints {
+    std::vector<Vec3> normals;    ///< unit
+    std::vector<Vec3> to_sensor;  ///< unit: from the point to where it was seen from
+};
+/// Those of `from` for the points `to` that are left of them, or were made from them: each has those of the nearest.
+[[nodiscard]] PointHints carried(const PointHints& hints, const std::vector<Vec3>& from, const std::vector<Vec3>& to);
+
+/// What became of hints, which are checked and not trusted.
+struct HintsReport {
+    std::size_t normals = 0, sensors = 0;  ///< points that have them
+    bool used = false;         ///< they make the orientation
+    bool from_sensor = false;  ///< by the side from which each point was seen, for its normals are none or not used
+    bool inward = false;       ///< all were turned over, for most pointed inwards
+    double foreseen = 0;       ///< share of those given, turned over, that agree with the indicator of the other half of them
+    double agree = 0;          ///< and with that of the result: how far off they are
+    std::string why_not;       ///< used; else empty
+};
+
 /// A cloud that is ready for surface_from_cloud().
 struct CloudOrientation {
     std::vector<Vec3> points;  ///< those that lie on a surface
@@ -62,9 +82,15 @@ struct CloudOrientation {
     CloudScale scale;
     std::size_t stray = 0;     ///< points far from all others that lie on no sheet, left out
     bool encloses = true;      ///< else the normals are those of what was seen from outside
+    HintsReport hints;
 };
 /// cloud_scale(), without stray points, and orient(); where normals go on turning there, the points hardly enclose anything,
 /// as scans of some sides do: then each normal points to where its point can be seen from.
 [[nodiscard]] CloudOrientation orient_cloud(const std::vector<Vec3>& points, const RunContext& run = {});
+/// The same, by normals and sensors where they are consistent: half of them has to foresee the sides of the other half, and
+/// an orientation that settles without them may not contradict them in whole parts. A sensor gives each point the normal of its
+/// local plane on the side that was seen.
+/// @throws Error also InvalidInput (a list of another size)
+[[nodiscard]] CloudOrientation orient_cloud(const std::vector<Vec3>& points, const PointHints& hints, const RunContext& run = {});
 
 }  // namespace covol

@@ -58,6 +58,7 @@ struct SegmentOptions {
     /// closed contours the start `Tag` is the body that they enclose, unless other points lie far from it or an exterior
     /// seed lies inside it: then all points are tagged, and each hole that inner contours leave is an exterior seed.
     std::shared_ptr<const Contours> contours;
+    PointHints hints;  ///< of the points as they are given; for a cloud
     std::vector<Vec3> inside, outside;  ///< seeds: positions whose side is known, world units
     double tag_distance = 0.0;          ///< D; 0: automatic
     std::vector<Vec3> exterior_seeds;

@@ -274,6 +274,7 @@ FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cl
         report.noise = cloud.scale.noise;
         report.stray = cloud.stray;
         report.encloses = cloud.encloses;
+        report.hints = cloud.hints;
         report.iterations = orientation.iterations;
         report.indicator_cell = orientation.indicator->cell();
         report.turned = orientation.turned;

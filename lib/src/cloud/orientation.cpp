@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "cloud/areas.h"
+#include "cloud/given_sides.h"
 #include "cloud/indicator.h"
 #include "cloud/point_cells.h"
 #include "cloud/stray.h"
@@ -42,12 +43,15 @@ struct Try {
     double enclosed;  // on the first lattice
 };
 constexpr Try kTries[] = {{1, kEnclosed}, {1, kSurelyEnclosed}, {0.67, kSurelyEnclosed}, {1.5, kSurelyEnclosed}, {0.44, kEnclosed}, {2.25, kSurelyEnclosed}};
-constexpr double kLeastSpacings = 0.5, kFewTurned = 0.002;
+constexpr double kLeastSpacings = 0.5;
 constexpr double kOffHalf = 0.02;   // that the indicator's mean over the points may differ from 1/2
 constexpr double kSampledPerCell = 4;  // points that iterate, on the surface in a lattice cell's square
 constexpr double kSampleSpacings = 4;  // edge of the cells that they are taken from
 constexpr int kStrayRounds = 3;
 constexpr double kManyStray = 0.005;  // of the points
+// Of given normals: with opposite ones beside them, and against an orientation that settled. Good ones have less than 0.001
+// without noise and 0.005 at any, those of which a part is turned as a whole more than 0.01 and 0.1.
+constexpr double kFewTorn = 0.002, kContradicted = 0.03;
 constexpr double kSettled = 0.018;  // clouds of closed shapes are mostly below 0.015, scans of one side from 0.02 to 0.15
 
 /// A lattice and what is done on it.
@@ -228,6 +232,8 @@ std::vector<Vec3> normals_of(const Indicator& indicator, const std::vector<Vec3>
     return normals;
 }
 
+double first_cell(const CloudScale& scale) { return std::max(kCellSpacings * scale.spacing, kCellNoises * scale.noise); }
+
 /// Parts that are turned as a whole go on turning, or lie where the indicator is not 1/2.
 double doubt(const Orientation& o) { return o.turned + std::max(0.0, o.off_half - kOffHalf); }
 
@@ -249,6 +255,28 @@ struct Sample {
     std::vector<double> areas;
 };
 
+/// By the hints where they are consistent and nothing that is certain contradicts them, else by itself, else by views.
+void choose_orientation(CloudOrientation& cloud, const PointHints& hints, const RunContext& run) {
+    cloud::GivenSides given = cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale), run);
+    HintsReport& report = cloud.hints = given.report;
+    const bool is_certain = report.used && given.torn < kFewTorn && doubt(given.orientation) < cloud::kFewTurned;
+    if (!is_certain) {
+        cloud.orientation = orient(cloud.points, cloud.scale, run);
+        cloud.encloses = doubt(cloud.orientation) < kSettled;
+        if (report.used && cloud.encloses &&
+            1 - cloud::agreeing(cloud.points, given.orientation.normals, cloud.orientation, false) > kContradicted) {
+            report.used = false;
+            report.why_not = "parts of them are turned as a whole";
+        }
+        if (!report.used && !cloud.encloses) cloud.orientation = cloud::orient_by_views(cloud.points, cloud.scale, run);
+    }
+    if (report.used) {
+        cloud.orientation = std::move(given.orientation);
+        cloud.encloses = true;
+    }
+    report.agree = cloud::agreeing(cloud.points, given.given, cloud.orientation, report.inward);
+}
+
 }  // namespace
 
 Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run) {
@@ -257,7 +285,7 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
     Orientation best;
     with_threads(run, [&] {
         // Noise is hard to tell from thin parts: where normals go on turning a finer lattice may hold them.
-        const double first = std::max(kCellSpacings * scale.spacing, kCellNoises * scale.noise);
+        const double first = first_cell(scale);
         const double cell = cloud::indicator_lattice(points, cloud::cells_along(points, first)).cell;
         const double share = kSampledPerCell * scale.spacing * scale.spacing / (cell * cell);
         const Sample sample(points, scale.spacing, std::size_t(std::max(1.0, 1 / share)));
@@ -273,7 +301,7 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
             now.indicator = cloud::make_indicator(iteration.last());
             now.off_half = std::abs(mean_of(*now.indicator, sample.points) - 0.5);
             if (tried.size() == 1 || doubt(now) < doubt(best)) best = std::move(now);
-            if (doubt(best) < kFewTurned) break;
+            if (doubt(best) < cloud::kFewTurned) break;
         }
         const double half = std::accumulate(best.areas.begin(), best.areas.end(), 0.0) / std::accumulate(sample.areas.begin(), sample.areas.end(), 0.0);
         best.areas = sample.all_areas();
@@ -283,7 +311,9 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
     return best;
 }
 
-CloudOrientation orient_cloud(const std::vector<Vec3>& points, const RunContext& run) {
+CloudOrientation orient_cloud(const std::vector<Vec3>& points, const RunContext& run) { return orient_cloud(points, {}, run); }
+
+CloudOrientation orient_cloud(const std::vector<Vec3>& points, const PointHints& hints, const RunContext& run) {
     CloudOrientation cloud;
     with_threads(run, [&] {
         cloud.points = merge_close_points(points, 0);
@@ -299,9 +329,7 @@ CloudOrientation orient_cloud(const std::vector<Vec3>& points, const RunContext&
             cloud.points.resize(kept);
             if (double(gone) < kManyStray * double(stray.size())) break;
         }
-        cloud.orientation = orient(cloud.points, cloud.scale, run);
-        cloud.encloses = doubt(cloud.orientation) < kSettled;
-        if (!cloud.encloses) cloud.orientation = cloud::orient_by_views(cloud.points, cloud.scale, run);
+        choose_orientation(cloud, carried(hints, points, cloud.points), run);
     });
     return cloud;
 }

@@ -24,6 +24,9 @@ constexpr double kFineSpacings = 1.2;    // of the screened one's
 constexpr double kLeastFree = 0.01;      // of all directions, less those opposite
 constexpr double kScreening = 4;         // of the indicator's own slope over a cell
 
+/// What tells points of a sheet from each other.
+double apart(const CloudScale& scale) { return std::max(scale.spacing, scale.noise); }
+
 /// Evenly over the sphere: a Fibonacci spiral.
 std::vector<Vec3> directions() {
     std::vector<Vec3> all;
@@ -96,22 +99,32 @@ std::vector<Vec3> free_directions(const std::vector<Vec3>& points, double cell) 
     return free;
 }
 
+double share_free(const std::vector<Vec3>& points, const std::vector<Vec3>& directions, const CloudScale& scale) {
+    const Occupied occupied(points, kViewSpacings * apart(scale));
+    std::vector<char> free(points.size());
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
+        free[n] = directions[n] != Vec3{0, 0, 0} && occupied.is_free(points[n], directions[n]);
+    });
+    const auto told = std::count_if(directions.begin(), directions.end(), [](const Vec3& d) { return d != Vec3{0, 0, 0}; });
+    return double(std::count(free.begin(), free.end(), 1)) / double(std::max<std::ptrdiff_t>(told, 1));
+}
+
 Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run) {
     Orientation result;
-    const double apart = std::max(scale.spacing, scale.noise);
-    const std::vector<Vec3> free = free_directions(points, kViewSpacings * apart);
+    const double between = apart(scale);
+    const std::vector<Vec3> free = free_directions(points, kViewSpacings * between);
     run.check();
     result.areas = areas_of(points, scale.spacing);
     result.normals.resize(points.size());
     for (std::size_t n = 0; n < points.size(); ++n)
         if (std::sqrt(dot(free[n], free[n])) > kLeastFree) result.normals[n] = unit(free[n]);
-    WindingField coarse(indicator_lattice(points, cells_along(points, kCoarseSpacings * apart)));
+    WindingField coarse(indicator_lattice(points, cells_along(points, kCoarseSpacings * between)));
     solve(coarse, points, result, kCyclesFromNothing);
     const double half = scale_to_half(coarse, points);
     for (double& area : result.areas) area *= half;
     result.indicator = make_indicator(coarse);
     run.check();
-    WindingField fine(indicator_lattice(points, cells_along(points, kFineSpacings * apart)));
+    WindingField fine(indicator_lattice(points, cells_along(points, kFineSpacings * between)));
     const double cell = fine.indicator().lattice.cell;
     // A view tells the side alone; which way the surface lies its neighbours know better.
     std::vector<double> screen(points.size());

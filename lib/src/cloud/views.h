@@ -9,6 +9,9 @@ namespace covol::cloud {
 /// @param cell  edge of the cells, as wide as a sheet of points needs to have no holes
 [[nodiscard]] std::vector<Vec3> free_directions(const std::vector<Vec3>& points, double cell);
 
+/// Share of the points from which nothing is in the way in a direction of their own; those without one, 0, do not count.
+[[nodiscard]] double share_free(const std::vector<Vec3>& points, const std::vector<Vec3>& directions, const CloudScale& scale);
+
 /// Normals towards where each point can be seen from, and their indicator, solved for once. `screened` is the indicator that
 /// is drawn to 1/2 at the points as well (Kazhdan and Hoppe, Screened Poisson surface reconstruction, ACM Trans. Graph.
 /// 32(3), 2013): closer to them, with more handles where layers of the scan differ.

@@ -18,6 +18,7 @@ struct KdTree::Search {
     Vec3 query;
     double best;
     bool skip_self;  ///< the query itself is in the tree and has not been met yet
+    const Vec3* at = nullptr;
 };
 
 void KdTree::build(std::size_t begin, std::size_t end) {
@@ -48,8 +49,10 @@ void KdTree::visit(const Vec3& point, Search& search) const {
     const double distance = squared_distance(point, search.query);
     if (distance == 0 && search.skip_self)
         search.skip_self = false;
-    else
-        search.best = std::min(search.best, distance);
+    else if (distance < search.best) {
+        search.best = distance;
+        search.at = &point;
+    }
 }
 
 void KdTree::descend(std::size_t begin, std::size_t end, Search& search) const {
@@ -74,6 +77,12 @@ double KdTree::nearest(const Vec3& query) const {
     Search search{query, std::numeric_limits<double>::infinity(), false};
     descend(0, points_.size(), search);
     return search.best;
+}
+
+Vec3 KdTree::nearest_point(const Vec3& query) const {
+    Search search{query, std::numeric_limits<double>::infinity(), false};
+    descend(0, points_.size(), search);
+    return *search.at;
 }
 
 double KdTree::nearest_other(const Vec3& query) const {

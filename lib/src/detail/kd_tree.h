@@ -19,6 +19,8 @@ public:
     explicit KdTree(std::vector<Vec3> points);
     /// Squared distance to the nearest point; infinite when there is none.
     [[nodiscard]] double nearest(const Vec3& query) const;
+    /// The nearest one. @pre there is one
+    [[nodiscard]] Vec3 nearest_point(const Vec3& query) const;
     /// Squared distance from one of the points to the nearest other one.
     [[nodiscard]] double nearest_other(const Vec3& query) const;
 

@@ -79,7 +79,7 @@ void try_cloud(Job& job) {
                    job.points.size() <= kMostGuessMarks || !can_enclose(job.points)))
         return;
     Timed timed(job.report().seconds.tag);
-    job.cloud = orient_cloud(job.points, job.run);
+    job.cloud = orient_cloud(job.points, job.points.size() == job.given.size() ? job.options.hints : PointHints{}, job.run);
     kind = Start::Kind::Cloud;
     if (job.cloud->encloses || !job.options.voxel_size_is_automatic) return;
     // The indicator is all that there is to see.

@@ -1,6 +1,8 @@
 // The start from a cloud: the surface itself.
 #include <openvdb/openvdb.h>
 
+#include <cmath>
+
 #include "detail/memory_need.h"
 #include "pipeline/fields.h"
 #include "pipeline/starts.h"
@@ -9,7 +11,20 @@ namespace covol::pipeline {
 namespace {
 
 constexpr double kReachSpacings = 3.0;  // that the start may lie off the points
+constexpr double kWarnDisagreeing = 0.1;  // of given normals
 constexpr double kMarginShare = 0.1;  // of the longest side, beyond the points: where they leave holes the surface bulges
+
+void tell_of_hints(Job& job, const HintsReport& hints) {
+    if (hints.normals + hints.sensors == 0) return;
+    const bool normals = hints.normals > 0 && !hints.from_sensor;
+    if (!hints.used)
+        return job.warn(std::string(normals ? "the normals" : "the sensor") + " of the points' file not used: " +
+                        (hints.why_not.empty() ? "most points have none" : hints.why_not));
+    job.choose("normals", normals ? "as given" : "by the sensor", number(std::round(1000 * hints.agree) / 10) + " % agree with the result" +
+                                    (hints.inward ? ", after all were turned over, for they pointed inwards" : ""));
+    if (1 - hints.agree > kWarnDisagreeing)
+        job.warn(number(std::round(1000 * (1 - hints.agree)) / 10) + " % of the normals that are " + (normals ? "given" : "made by the sensor") + " point to the wrong side");
+}
 
 }  // namespace
 
@@ -34,6 +49,7 @@ void start_from_cloud(Job& job) {
     const std::string how = report.encloses ? "; averaged within " + number(report.radius) : "; they enclose nothing: inside is what they hide";
     job.choose("start", "cloud",
                std::to_string(job.points.size()) + " points, " + number(report.spacing) + " apart, noise " + number(report.noise) + how);
+    tell_of_hints(job, report.hints);
     if (report.stray > 0) job.choose("stray_points", std::to_string(report.stray), "far from all others and on no sheet: left out");
     if (report.dropped_pieces > 0)
         job.run.info("cloud: " + std::to_string(report.dropped_pieces) + " pieces of the surface that hardly a point rested on left out");
