@@ -137,6 +137,61 @@ class Many(Clouds):
         self.assertFalse((self.out / "s.vdb").exists())
 
 
+class Holes(Clouds):
+    """What becomes of the surface where no points are."""
+
+    def bowl(self, *more):
+        half = [p for p in random_sphere(16000, 11) if p[2] < 0]
+        done = self.reconstruct(half, "--mesh", "m.ply", *more)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return json.loads(done.stdout)
+
+    def level_set(self):
+        done = subprocess.run([COVOL, "mesh", "s.vdb", "-o", "again.ply", "--quiet", "--json", "-"], cwd=self.out, capture_output=True, text=True, timeout=300)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return json.loads(done.stdout)["surface"]
+
+    def test_close(self):
+        report = self.bowl()
+        self.assertEqual((report["holes"]["policy"], report["holes"]["loops"]), ("close", []))
+        self.assertGreater(report["holes"]["surface_without_points"], 0.2)
+        self.assertTrue(report["surface"]["closed"])
+        self.assertIn(b"property float distance_to_points\n", (self.out / "m.ply").read_bytes()[:8000])
+
+    def test_open(self):
+        report = self.bowl("--holes", "open")
+        holes, surface = report["holes"], report["surface"]
+        self.assertEqual(len(holes["loops"]), 1)
+        self.assertAlmostEqual(holes["loops"][0]["length"] / (2 * math.pi * RADIUS), 1, delta=0.12)
+        self.assertAlmostEqual(surface["area"] / (2 * math.pi * RADIUS ** 2), 1, delta=0.04)
+        self.assertEqual((surface["closed"], surface["manifold"], surface["components"]), (False, True, 1))
+        self.assertIn("the level set stays closed", report["automatic"]["holes"])
+        self.assertTrue(self.level_set()["closed"])
+        self.assertIn(b"covol_holes", (self.out / "s.vdb").read_bytes())
+
+    def test_flat(self):
+        report = self.bowl("--holes", "flat")
+        for surface in (report["surface"], self.level_set()):
+            self.assertEqual((surface["closed"], surface["components"], surface["genus"]), (True, 1, 0))
+            self.assertAlmostEqual(surface["area"] / (3 * math.pi * RADIUS ** 2), 1, delta=0.02)
+            self.assertAlmostEqual(shell_share(surface), 0.5, delta=0.01)
+        self.assertEqual(len(report["holes"]["loops"]), 1)
+
+    def test_the_distance_is_the_users(self):
+        report = self.bowl("--holes", "open", "--hole-distance", str(3 * RADIUS))
+        self.assertEqual(report["holes"]["loops"], [])
+        self.assertEqual(report["holes"]["distance"], 3 * RADIUS)
+        self.assertTrue(report["surface"]["closed"])
+
+    def test_what_is_wrong_is_said(self):
+        points = random_sphere(100, 1)
+        for more, says in ((["--holes", "half"], "--holes"), (["--hole-distance", "0"], "--hole-distance: expected > 0")):
+            done = self.reconstruct(points, *more)
+            self.assertIn(done.returncode, (2, 3))
+            self.assertIn(says, done.stderr)
+            self.assertFalse((self.out / "s.vdb").exists())
+
+
 class Normals(Clouds):
     """What files say of normals and sensors is checked, and told."""
 

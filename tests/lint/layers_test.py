@@ -16,7 +16,7 @@ LAYERS = [
     ["band", "evolve"],
     ["guess", "guess_correction"],
     ["surface", "mesh_cleanup", "cloud_cleanup", "compare"],
-    ["structures", "evidence", "guidance", "cloud_surface"],
+    ["structures", "evidence", "guidance", "cloud_surface", "holes"],
     ["pipeline", "phantom", "render"],
 ]
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
@@ -30,7 +30,8 @@ SOURCE_LEVEL = {"contour_solid": LEVEL["contours"], "points_check": LEVEL["point
                 "stray": LEVEL["orientation"],
                 "areas": LEVEL["orientation"], "indicator": LEVEL["orientation"], "views": LEVEL["orientation"],
                 "vector": LEVEL["orientation"], "median": LEVEL["orientation"], "hold_topology": LEVEL["cloud_surface"],
-                "lattice_kernel": LEVEL["orientation"], "fit_kernel": LEVEL["orientation"], "blend_kernel": LEVEL["cloud_surface"], "given_sides": LEVEL["orientation"]}
+                "lattice_kernel": LEVEL["orientation"], "fit_kernel": LEVEL["orientation"], "blend_kernel": LEVEL["cloud_surface"], "given_sides": LEVEL["orientation"],
+                "cut": LEVEL["holes"], "membrane": LEVEL["holes"]}
 # The modules of segment(), lib/src/pipeline, in the same way; lib/src/pipeline.cpp is above them all.
 PIPELINE = [
     ["job", "options"],

@@ -154,6 +154,15 @@ Json to_json(const SegmentReport& r) {
                                     {"inward", h.inward}, {"foreseen", h.foreseen},    {"agree", h.agree}};
         if (!h.why_not.empty()) json["cloud"]["normals"]["why_not"] = h.why_not;
     }
+    if (r.holes.distance > 0) {
+        json["holes"] = {{"policy", to_string(r.holes.policy)},
+                         {"distance", r.holes.distance},
+                         {"surface_without_points", r.share_without_points},
+                         {"share", r.holes.share},
+                         {"dropped_pieces", r.holes.dropped_pieces},
+                         {"loops", Json::array()}};
+        for (const BoundaryLoop& loop : r.holes.loops) json["holes"]["loops"].push_back({{"length", loop.length}, {"edges", loop.edges}});
+    }
     if (r.seeds.inside + r.seeds.outside > 0) json["seeds"] = to_json(r.seeds);
     if (r.share_without_points > 0) json["fit"]["surface_without_points"] = r.share_without_points;
     return json;

@@ -47,6 +47,10 @@ SegmentOptions SegmentJob::resolve(double h) const {
     options.edge = edge.resolve(h, -1);
     options.evolve = evolve.resolve(h, SegmentOptions::automatic_evolve());
     options.coarse_levels = coarse_levels;
+    options.holes.policy = holes.policy;
+    options.holes.distance = hole_distance.resolve(h, 0);
+    if (hole_distance.given && !(options.holes.distance > 0))
+        throw Error(Errc::InvalidOptions, "--hole-distance: expected > 0, got 0");
     options.correction.least_radius = guess.radius.resolve(h, 0);
     const double side = min_component.resolve(h, 0);
     options.extract.min_component_volume = side * side * side;
@@ -123,6 +127,13 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
         ->check(CLI::Range(0, 4).description(""))
         ->type_name("N")
         ->default_str("auto");
+    if (!with_image) {
+        add_choice(command, "--holes", holes.policy, {{"close", Holes::Close}, {"open", Holes::Open}, {"flat", Holes::Flat}},
+                   "where no points are, the surface goes on smoothly, or the mesh ends (the level set stays closed), or the flattest "
+                   "patch spans it, in both [close]");
+        add_length(command, "--hole-distance", hole_distance, "",
+                   "a hole is where the surface lies farther from all points [3 spacings where they are sparse, at least 3vx]");
+    }
     add_length(command, "--min-component", min_component, "", "drop pieces of the mesh smaller than a cube of this edge");
     command.add_flag("--half", half, "store values in .vdb files as 16-bit floats");
     mesh.bind(command);
@@ -201,7 +212,8 @@ void SegmentJob::run_one(Session& session) const {
         tell(session, *judged);
     }
 
-    const WriteVdbOptions vdb{half, session.metadata()};
+    WriteVdbOptions vdb{half, session.metadata()};
+    if (result->report.holes.policy == Holes::Open) vdb.metadata["covol_holes"] = "closed here; the mesh alone is open";
     Outputs& outputs = session.outputs();
     outputs.add(output, [=](const std::string& path) { write_vdb(path, {result->surface}, vdb); });
     outputs.add(density_path, [=](const std::string& path) { write_vdb(path, {density(*result->surface)}, vdb); });
@@ -213,6 +225,7 @@ void SegmentJob::run_one(Session& session) const {
     });
     WriteMeshOptions write = mesh.options(session);
     write.attributes = vertex_attributes(judged);
+    if (!result->distance_to_points.empty()) write.attributes.push_back({"distance_to_points", result->distance_to_points});
     outputs.add(mesh_path, [=](const std::string& path) { write_mesh(path, result->mesh, write); });
     outputs.add(evidence.path, [=](const std::string& path) { write_text(path, evidence_csv({{"surface", &*judged}})); });
     outputs.add(table_path, [=](const std::string& path) {

@@ -31,6 +31,8 @@ struct SegmentJob {
     Model model = Model::Guided;
     Length mark_precision;
     int coarse_levels = SegmentOptions{}.coarse_levels;
+    HolesOptions holes;
+    Length hole_distance;
     Length min_component;  ///< edge of a cube of the smallest volume that is kept
     EvidenceFlags evidence;
     FrameChoice frames;

@@ -13,6 +13,7 @@
 #include "covol/guess.h"
 #include "covol/guidance.h"
 #include "covol/guess_correction.h"
+#include "covol/holes.h"
 #include "covol/image.h"
 #include "covol/mesh.h"
 #include "covol/points.h"
@@ -67,6 +68,7 @@ struct SegmentOptions {
     /// 5 voxels after the other starts. Their `follow` is set by the pipeline too.
     EvolveOptions evolve = automatic_evolve();
     ExtractOptions extract;
+    HolesOptions holes;      ///< of points without an image
     int coarse_levels = -1;  ///< levels of voxel size 2h, 4h, ... that the flow passes first; -1: 1 for a sphere or a box, else 0
     [[nodiscard]] std::string why_invalid() const;
 
@@ -94,7 +96,7 @@ struct SegmentReport {
     BandReport band;
     EdgeReport edge;
     EvolveReport solve;
-    MeshMeasures surface;
+    MeshMeasures surface;  ///< of the mesh; where that is open its volume is the level set's
     FitStatistics fit;
     /// Marks farther from the surface than two voxels of the image: wrong, or a part of the structure that is missing.
     struct MarksOff {
@@ -107,7 +109,8 @@ struct SegmentReport {
     std::vector<std::string> warnings;  ///< what a person has to look at, in plain words
     SeedCheck seeds;
     CorrectionReport correction;  ///< of SegmentOptions::guess
-    double share_without_points = 0;  ///< of the surface's area: farther than 3 voxels and 3 spacings from every point
+    double share_without_points = 0;  ///< of the closed surface's area: farther than holes.distance from every point
+    HolesReport holes;  ///< of points without an image; distance 0: none
     SegmentOptions resolved;  ///< what was used: every automatic choice replaced by its value
     std::map<std::string, std::string> automatic;  ///< each automatic choice and its reason
 };
@@ -115,6 +118,7 @@ struct SegmentReport {
 struct SegmentResult {
     FloatGridPtr u, distance, edge, surface;
     TriangleMesh mesh;
+    std::vector<float> distance_to_points;  ///< at its vertices; of points without an image
     std::shared_ptr<const GuessCorrection> correction;  ///< of SegmentOptions::guess
     SegmentReport report;
 };

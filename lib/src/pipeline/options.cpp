@@ -24,6 +24,7 @@ std::string SegmentOptions::why_invalid() const {
     expect(std::isfinite(voxel_size) && voxel_size >= 0, "voxel_size", ">= 0", voxel_size);
     expect(std::isfinite(margin) && margin >= 0, "margin", ">= 0", margin);
     expect(std::isfinite(tag_distance) && tag_distance >= 0, "tag_distance", ">= 0", tag_distance);
+    expect(std::isfinite(holes.distance) && holes.distance >= 0, "holes.distance", ">= 0", holes.distance);
     if (start.kind == Start::Kind::Sphere)
         expect(std::isfinite(start.radius) && start.radius > 0, "start.radius", "> 0", start.radius);
     if (roi)

@@ -1,0 +1,270 @@
+#include "covol/holes.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "covol/error.h"
+#include "covol/points.h"
+#include "detail/kd_tree.h"
+#include "holes/cut.h"
+#include "holes/membrane.h"
+
+namespace covol {
+namespace {
+
+constexpr double kFar = 3;              // spacings, and voxels
+constexpr double kSmoothing = 0.5;      // of the distance: wiggles of the rim shorter than about three times that go
+constexpr float kStep = 0.5F;           // of smoothing, towards the neighbours' mean
+constexpr double kP95OfSpacing = 0.976; // nearest neighbour of points spread evenly at random, their spacing being 1 / sqrt(density)
+
+using Triangle = std::array<std::uint32_t, 3>;
+
+Vec3 place(const TriangleMesh& mesh, std::uint32_t v) { return {mesh.vertices[v][0], mesh.vertices[v][1], mesh.vertices[v][2]}; }
+
+double area_of(const TriangleMesh& mesh, const Triangle& t) {
+    const Vec3 a = place(mesh, t[0]), b = place(mesh, t[1]), c = place(mesh, t[2]);
+    const Vec3 u{b[0] - a[0], b[1] - a[1], b[2] - a[2]}, v{c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+    return 0.5 * std::hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]);
+}
+
+/// Diffusion over the mesh: a Gaussian of standard deviation `width`, nearly, where triangles are even.
+void smooth(const TriangleMesh& mesh, double width, std::vector<float>& values) {
+    std::vector<std::uint32_t> count(values.size(), 0);
+    double squares = 0;
+    for (const Triangle& t : mesh.triangles)
+        for (int k = 0; k < 3; ++k) {
+            count[t[k]] += 2;
+            squares += detail::squared_distance(place(mesh, t[k]), place(mesh, t[(k + 1) % 3]));
+        }
+    // A step adds half of a mean squared edge, times kStep, to the variance along each axis.
+    const double variance = 0.5 * kStep * squares / double(3 * mesh.triangles.size());
+    const auto steps = int(std::ceil(width * width / variance));
+    std::vector<float> sums(values.size());
+    for (int n = 0; n < steps; ++n) {
+        std::fill(sums.begin(), sums.end(), 0.0F);
+        for (const Triangle& t : mesh.triangles)
+            for (int k = 0; k < 3; ++k) sums[t[k]] += values[t[(k + 1) % 3]] + values[t[(k + 2) % 3]];
+        for (std::size_t v = 0; v < values.size(); ++v)
+            if (count[v] > 0) values[v] += kStep * (sums[v] / float(count[v]) - values[v]);
+    }
+}
+
+/// Vertices that triangles of one kind join.
+class Parts {
+public:
+    Parts(const holes::CutMesh& cut, bool kept) : parent_(cut.mesh.vertices.size()) {
+        std::iota(parent_.begin(), parent_.end(), 0U);
+        for (std::size_t t = 0; t < cut.kept.size(); ++t) {
+            if ((cut.kept[t] != 0) != kept) continue;
+            const Triangle& c = cut.mesh.triangles[t];
+            for (const std::uint32_t v : {c[1], c[2]}) parent_[root(v)] = root(c[0]);
+        }
+    }
+    std::uint32_t root(std::uint32_t v) {
+        while (parent_[v] != v) v = parent_[v] = parent_[parent_[v]];
+        return v;
+    }
+
+private:
+    std::vector<std::uint32_t> parent_;
+};
+
+/// The triangles that go, and those that stay: what a ball of the distance's radius does not reach whose middle is where
+/// points are missing.
+class HoleFinder {
+public:
+    HoleFinder(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack)
+        : mesh_(mesh), to_points_(to_points), distance_(distance), reach_(distance - slack) {}
+
+    holes::CutMesh find(HolesReport& report, const RunContext& run) const {
+        const std::vector<Vec3> bare = bare_places();
+        run.check();
+        holes::CutMesh cut = holes::cut_along(mesh_, from(bare));
+        report.dropped_pieces = drop_small(cut);
+        double area = 0, gone = 0;
+        for (std::size_t t = 0; t < cut.kept.size(); ++t) {
+            const double own = area_of(cut.mesh, cut.mesh.triangles[t]);
+            area += own;
+            if (!cut.kept[t]) gone += own;
+        }
+        report.distance = distance_;
+        report.share = area > 0 ? gone / area : 0;
+        report.loops = boundary_loops(holes::kept_part(cut));
+        return cut;
+    }
+
+private:
+    /// Where the mesh is farther from the points, and the line around that.
+    [[nodiscard]] std::vector<Vec3> bare_places() const {
+        const auto far = float(distance_);
+        std::vector<Vec3> places;
+        for (std::uint32_t v = 0; v < to_points_.size(); ++v)
+            if (to_points_[v] > far) places.push_back(place(mesh_, v));
+        for (const Triangle& t : mesh_.triangles)
+            for (int k = 0; k < 3; ++k) {
+                const std::uint32_t a = t[k], b = t[(k + 1) % 3];
+                if (!(to_points_[a] > far) || to_points_[b] > far) continue;
+                const double share = double(to_points_[a] - far) / double(to_points_[a] - to_points_[b]);
+                const Vec3 p = place(mesh_, a), q = place(mesh_, b);
+                places.push_back({p[0] + share * (q[0] - p[0]), p[1] + share * (q[1] - p[1]), p[2] + share * (q[2] - p[2])});
+            }
+        return places;
+    }
+
+    /// Distance from the places, less the reach, between plus and minus that; smoothed.
+    [[nodiscard]] std::vector<float> from(const std::vector<Vec3>& bare) const {
+        std::vector<float> values(to_points_.size(), float(reach_));
+        if (bare.empty()) return values;
+        const detail::KdTree tree(bare);
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, values.size(), 1024), [&](const auto& range) {
+            for (std::size_t v = range.begin(); v != range.end(); ++v)
+                values[v] = float(std::min(std::sqrt(tree.nearest(place(mesh_, std::uint32_t(v)))), 2 * reach_) - reach_);
+        });
+        smooth(mesh_, kSmoothing * distance_, values);
+        return values;
+    }
+
+    /// Of those that end at a hole. @return how many
+    std::size_t drop_small(holes::CutMesh& cut) const {
+        Parts parts(cut, true);
+        std::vector<char> ends(cut.mesh.vertices.size(), 0);
+        for (std::size_t t = 0; t < cut.kept.size(); ++t)
+            if (!cut.kept[t])
+                for (const std::uint32_t v : cut.mesh.triangles[t]) ends[v] = 1;
+        std::vector<double> area(cut.mesh.vertices.size(), 0);
+        std::vector<char> is_cut(cut.mesh.vertices.size(), 0);
+        for (std::size_t t = 0; t < cut.kept.size(); ++t) {
+            if (!cut.kept[t]) continue;
+            const std::uint32_t root = parts.root(cut.mesh.triangles[t][0]);
+            area[root] += area_of(cut.mesh, cut.mesh.triangles[t]);
+            for (const std::uint32_t v : cut.mesh.triangles[t]) is_cut[root] = is_cut[root] || ends[v];
+        }
+        const double least = M_PI * distance_ * distance_;
+        for (std::size_t t = 0; t < cut.kept.size(); ++t) {
+            const std::uint32_t root = parts.root(cut.mesh.triangles[t][0]);
+            if (cut.kept[t] && is_cut[root] && area[root] < least) cut.kept[t] = 0;
+        }
+        std::size_t dropped = 0;
+        for (std::size_t v = 0; v < area.size(); ++v) dropped += is_cut[v] && area[v] < least;
+        return dropped;
+    }
+
+    const TriangleMesh& mesh_;
+    const std::vector<float>& to_points_;
+    double distance_, reach_;
+};
+
+void check(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack, const char* function) {
+    if (to_points.size() != mesh.vertices.size())
+        throw Error(Errc::InvalidInput, std::string(function) + ": expected a distance for each of " + std::to_string(mesh.vertices.size()) +
+                                            " vertices, got " + std::to_string(to_points.size()));
+    if (!(distance > 0) || !(slack >= 0) || !(slack < distance))
+        throw Error(Errc::InvalidOptions, std::string(function) + ": expected 0 <= slack < distance, got " + std::to_string(slack) + " and " +
+                                              std::to_string(distance));
+}
+
+void expect_some(const holes::CutMesh& cut, double distance, const char* function) {
+    if (std::find(cut.kept.begin(), cut.kept.end(), 1) == cut.kept.end())
+        throw Error(Errc::InvalidInput, std::string(function) + ": no part of the surface is within " + std::to_string(distance) +
+                                            " of points all around; a hole is what lies farther: give a larger distance");
+}
+
+}  // namespace
+
+const char* to_string(Holes holes) { return holes == Holes::Close ? "close" : holes == Holes::Open ? "open" : "flat"; }
+
+double hole_distance(const std::vector<Vec3>& points, double voxel_size) {
+    return kFar * std::max(voxel_size, nearest_neighbour_spacing(points).p95 / kP95OfSpacing);
+}
+
+std::vector<float> distances_to_points(const TriangleMesh& mesh, const std::vector<Vec3>& points, const RunContext& run) {
+    std::vector<float> result(mesh.vertices.size());
+    with_threads(run, [&] {
+        const detail::KdTree tree(points);
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, result.size(), 1024), [&](const auto& range) {
+            for (std::size_t v = range.begin(); v != range.end(); ++v) result[v] = float(std::sqrt(tree.nearest(place(mesh, std::uint32_t(v)))));
+        });
+    });
+    return result;
+}
+
+double share_beyond(const TriangleMesh& mesh, const std::vector<float>& distances, double distance) {
+    double area = 0, beyond = 0;
+    for (const Triangle& t : mesh.triangles) {
+        const double own = area_of(mesh, t);
+        area += own;
+        if ((double(distances[t[0]]) + distances[t[1]] + distances[t[2]]) / 3 > distance) beyond += own;
+    }
+    return area > 0 ? beyond / area : 0;
+}
+
+std::vector<BoundaryLoop> boundary_loops(const TriangleMesh& mesh) {
+    // Sides without a partner, by their first vertex.
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> sides;
+    for (const Triangle& t : mesh.triangles)
+        for (int k = 0; k < 3; ++k) sides.emplace_back(t[k], t[(k + 1) % 3]);
+    std::sort(sides.begin(), sides.end());
+    constexpr std::uint32_t kNone = ~std::uint32_t(0);
+    std::vector<std::uint32_t> next(mesh.vertices.size(), kNone);
+    for (const auto& [a, b] : sides)
+        if (!std::binary_search(sides.begin(), sides.end(), std::pair{b, a})) next[a] = b;
+    std::vector<BoundaryLoop> loops;
+    for (std::uint32_t first = 0; first < next.size(); ++first) {
+        if (next[first] == kNone) continue;
+        BoundaryLoop loop;
+        for (std::uint32_t v = first; next[v] != kNone;) {
+            const std::uint32_t to = std::exchange(next[v], kNone);
+            const Vec3 a = place(mesh, v), b = place(mesh, to);
+            loop.length += std::hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]);
+            ++loop.edges;
+            v = to;
+        }
+        loops.push_back(loop);
+    }
+    std::sort(loops.begin(), loops.end(), [](const BoundaryLoop& a, const BoundaryLoop& b) { return a.length > b.length; });
+    return loops;
+}
+
+TriangleMesh trimmed(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack, HolesReport& report,
+                     const RunContext& run) {
+    check(mesh, to_points, distance, slack, "trimmed");
+    TriangleMesh result;
+    with_threads(run, [&] {
+        const holes::CutMesh cut = HoleFinder(mesh, to_points, distance, slack).find(report, run);
+        expect_some(cut, distance, "trimmed");
+        result = report.share > 0 ? holes::kept_part(cut) : mesh;
+    });
+    report.policy = Holes::Open;
+    return result;
+}
+
+TriangleMesh flattened(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack, HolesReport& report,
+                       const RunContext& run) {
+    check(mesh, to_points, distance, slack, "flattened");
+    TriangleMesh result;
+    with_threads(run, [&] {
+        holes::CutMesh cut = HoleFinder(mesh, to_points, distance, slack).find(report, run);
+        expect_some(cut, distance, "flattened");
+        std::vector<char> fixed(cut.mesh.vertices.size(), 0), spans(cut.mesh.vertices.size(), 0);
+        for (std::size_t t = 0; t < cut.kept.size(); ++t)
+            if (cut.kept[t])
+                for (const std::uint32_t v : cut.mesh.triangles[t]) fixed[v] = 1;
+        // A piece without any points hangs at nothing: it goes.
+        Parts patches(cut, false);
+        for (std::uint32_t v = 0; v < fixed.size(); ++v)
+            if (fixed[v]) spans[patches.root(v)] = 1;
+        std::erase_if(cut.mesh.triangles, [&](const Triangle& t) { return !fixed[t[0]] && !spans[patches.root(t[0])]; });
+        for (std::uint32_t v = 0; v < fixed.size(); ++v) fixed[v] = fixed[v] || !spans[patches.root(v)];
+        holes::span_membrane(cut.mesh, fixed, run);
+        result = std::move(cut.mesh);
+        remove_small_components(result, 0);  // vertices that nothing refers to
+    });
+    report.policy = Holes::Flat;
+    return result;
+}
+
+}  // namespace covol

@@ -1,0 +1,80 @@
+#include "holes/membrane.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/Sparse>
+#include <algorithm>
+#include <cmath>
+
+#include "covol/error.h"
+
+namespace covol::holes {
+namespace {
+
+constexpr int kMostRounds = 20;
+constexpr double kSteady = 1e-3;  // of the mean edge: the largest move of a round that is the last
+constexpr double kLeastWeight = 1e-3, kMostWeight = 100;  // triangles without area have no cotangents
+
+using Matrix = Eigen::SparseMatrix<double>;
+using Positions = Eigen::Matrix<double, Eigen::Dynamic, 3>;
+
+/// Between the sides of a corner.
+double cotangent(const Eigen::Vector3d& u, const Eigen::Vector3d& v) {
+    const double across = u.cross(v).norm();
+    return across > 1e-12 * u.norm() * v.norm() ? u.dot(v) / across : 0;
+}
+
+}  // namespace
+
+void span_membrane(TriangleMesh& mesh, const std::vector<char>& fixed, const RunContext& run) {
+    std::vector<int> number(mesh.vertices.size(), -1);
+    int count = 0;
+    for (std::size_t v = 0; v < number.size(); ++v)
+        if (!fixed[v]) number[v] = count++;
+    if (count == 0) return;
+    Positions at(mesh.vertices.size(), 3);
+    for (std::size_t v = 0; v < number.size(); ++v)
+        for (int a = 0; a < 3; ++a) at(std::ptrdiff_t(v), a) = mesh.vertices[v][a];
+    Eigen::SimplicialLDLT<Matrix> solver;
+    for (int round = 0; round < kMostRounds; ++round) {
+        run.check();
+        std::vector<Eigen::Triplet<double>> entries;
+        Positions right = Positions::Zero(count, 3);
+        double edges = 0, edge_count = 0;
+        for (const auto& t : mesh.triangles)
+            for (int k = 0; k < 3; ++k) {
+                const std::uint32_t a = t[(k + 1) % 3], b = t[(k + 2) % 3];
+                if (fixed[a] && fixed[b]) continue;
+                const Eigen::Vector3d tip = at.row(t[k]), u = at.row(a).transpose() - tip, v = at.row(b).transpose() - tip;
+                // At first all edges are springs: that spreads the vertices of a bulge over what it is to become.
+                const double w = round == 0 ? 1 : std::clamp(cotangent(u, v), kLeastWeight, kMostWeight);
+                edges += (u - v).norm();
+                ++edge_count;
+                for (const auto& [own, other] : {std::pair{a, b}, {b, a}}) {
+                    if (fixed[own]) continue;
+                    entries.emplace_back(number[own], number[own], w);
+                    if (fixed[other])
+                        right.row(number[own]) += w * at.row(other);
+                    else
+                        entries.emplace_back(number[own], number[other], -w);
+                }
+            }
+        Matrix matrix(count, count);
+        matrix.setFromTriplets(entries.begin(), entries.end());
+        if (round == 0) solver.analyzePattern(matrix);
+        solver.factorize(matrix);
+        if (solver.info() != Eigen::Success) throw Error(Errc::Numerical, "span_membrane: the patch hangs at nothing");
+        const Positions solved = solver.solve(right);
+        double most = 0;
+        for (std::size_t v = 0; v < number.size(); ++v) {
+            if (number[v] < 0) continue;
+            most = std::max(most, (solved.row(number[v]) - at.row(std::ptrdiff_t(v))).norm());
+            at.row(std::ptrdiff_t(v)) = solved.row(number[v]);
+        }
+        if (most < kSteady * edges / edge_count) break;
+    }
+    for (std::size_t v = 0; v < number.size(); ++v)
+        if (number[v] >= 0)
+            for (int a = 0; a < 3; ++a) mesh.vertices[v][a] = float(at(std::ptrdiff_t(v), a));
+}
+
+}  // namespace covol::holes
