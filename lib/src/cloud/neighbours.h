@@ -20,13 +20,15 @@ struct Neighbour {
 
 /// visit(point, neighbours), from several threads, for each point as it was given: its `count` nearest others, the nearest
 /// first; fewer where the points end, or lie farther than 40 spacings.
-/// @param cells  of an edge of about two spacings
-template <typename Visit>
-void for_nearest(const PointCells& cells, double spacing, std::size_t count, Visit visit) {
+/// @param cells   of an edge of about two spacings
+/// @param wanted  (sorted position) -> whether that point is visited
+template <typename Visit, typename Wanted>
+void for_nearest(const PointCells& cells, double spacing, std::size_t count, Visit visit, Wanted wanted) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, cells.sorted().size(), 512), [&](const auto& some) {
         std::vector<PointCells::Range> ranges;
         std::vector<Neighbour> near;
         for (std::size_t n = some.begin(); n < some.end(); ++n) {
+            if (!wanted(n)) continue;
             const Vec3& p = cells.sorted()[n];
             for (double r = kFirstRadius * spacing; r > 0; r *= 2) {
                 cells.find({{p[0] - r, p[1] - r, p[2] - r}, {p[0] + r, p[1] + r, p[2] + r}}, ranges);
@@ -45,6 +47,11 @@ void for_nearest(const PointCells& cells, double spacing, std::size_t count, Vis
             visit(cells.order()[n], near);
         }
     });
+}
+
+template <typename Visit>
+void for_nearest(const PointCells& cells, double spacing, std::size_t count, Visit visit) {
+    for_nearest(cells, spacing, count, visit, [](std::size_t) { return true; });
 }
 
 }  // namespace covol::cloud

@@ -10,6 +10,7 @@ namespace covol::cloud {
 namespace {
 
 constexpr int kKeyBits = 20;  // for each axis
+constexpr std::int64_t kMostRowsPerCell = 4;
 
 std::uint64_t key(std::int64_t i, std::int64_t j, std::int64_t k) {
     return (std::uint64_t(i) << (2 * kKeyBits)) | (std::uint64_t(j) << kKeyBits) | std::uint64_t(k);
@@ -50,6 +51,15 @@ PointCells::PointCells(const std::vector<Vec3>& points, double edge) : edge_(edg
         sorted_[n] = points[entries[n].index];
     }
     starts_.push_back(std::uint32_t(points.size()));
+    index_rows();
+}
+
+void PointCells::index_rows() {
+    const std::int64_t count = count_[0] * count_[1];
+    if (count > kMostRowsPerCell * std::int64_t(keys_.size())) return;
+    rows_.assign(std::size_t(count) + 1, 0);
+    for (const std::uint64_t k : keys_) ++rows_[std::size_t((k >> (2 * kKeyBits)) * std::uint64_t(count_[1]) + (k >> kKeyBits & ((1U << kKeyBits) - 1))) + 1];
+    for (std::size_t n = 1; n < rows_.size(); ++n) rows_[n] += rows_[n - 1];
 }
 
 std::int64_t PointCells::cell_along(double x, int axis) const {
@@ -67,8 +77,14 @@ void PointCells::find(const WorldBox& box, std::vector<Range>& ranges) const {
     }
     for (std::int64_t i = first[0]; i <= last[0]; ++i)
         for (std::int64_t j = first[1]; j <= last[1]; ++j) {
-            const auto from = std::lower_bound(keys_.begin(), keys_.end(), key(i, j, first[2]));
-            const auto to = std::upper_bound(from, keys_.end(), key(i, j, last[2]));
+            auto begin = keys_.begin(), end = keys_.end();
+            if (!rows_.empty()) {
+                const std::size_t row = std::size_t(i * count_[1] + j);
+                end = begin + rows_[row + 1];
+                begin += rows_[row];
+            }
+            const auto from = std::lower_bound(begin, end, key(i, j, first[2]));
+            const auto to = std::upper_bound(from, end, key(i, j, last[2]));
             if (from != to) ranges.push_back({starts_[std::size_t(from - keys_.begin())], starts_[std::size_t(to - keys_.begin())]});
         }
 }

@@ -31,12 +31,14 @@ public:
 
 private:
     [[nodiscard]] std::int64_t cell_along(double x, int axis) const;
+    void index_rows();
 
     double edge_;
     Vec3 lowest_;
     std::array<std::int64_t, 3> count_;   // cells along each axis
     std::vector<std::uint32_t> order_, starts_;
     std::vector<std::uint64_t> keys_;     // of the cells, ascending
+    std::vector<std::uint32_t> rows_;     // along k, the first of each in keys_; empty where most would be, too
     std::vector<Vec3> sorted_;
 };
 

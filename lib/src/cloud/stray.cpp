@@ -5,13 +5,39 @@
 
 #include "cloud/median.h"
 #include "cloud/neighbours.h"
+#include "cloud/vector.h"
 
 namespace covol::cloud {
 namespace {
 
-constexpr std::size_t kNeighbours = 8;
+constexpr std::size_t kNeighbours = 8, kSamples = 20000;
 constexpr double kFar = 2.5;        // times the median distance to the eighth neighbour
 constexpr double kOffPlane = 0.25;  // standard deviation of the neighbours, or the point's own distance, of that to the eighth
+
+/// Of a sample of the points.
+double usual_reach(const PointCells& cells, double spacing) {
+    const std::size_t count = cells.sorted().size(), step = std::max<std::size_t>(1, count / kSamples);
+    std::vector<double> reach(count, -1);
+    for_nearest(cells, spacing, kNeighbours,
+                [&](std::uint32_t point, const std::vector<Neighbour>& near) { reach[point] = near.size() < kNeighbours ? 1e300 : std::sqrt(near.back().squared); },
+                [&](std::size_t n) { return n % step == 0; });
+    std::erase(reach, -1);
+    return median(std::move(reach));
+}
+
+/// Whether fewer points than that lie within a distance.
+bool is_lonely(const PointCells& cells, std::size_t n, double distance, std::vector<PointCells::Range>& ranges) {
+    const Vec3& p = cells.sorted()[n];
+    cells.find({{p[0] - distance, p[1] - distance, p[2] - distance}, {p[0] + distance, p[1] + distance, p[2] + distance}}, ranges);
+    std::size_t found = 0;
+    for (const PointCells::Range& range : ranges)
+        for (std::uint32_t m = range.begin; m < range.end; ++m) {
+            const Vec3 to = minus(cells.sorted()[m], p);
+            found += m != n && dot(to, to) <= distance * distance;
+            if (found >= kNeighbours) return false;
+        }
+    return true;
+}
 
 }  // namespace
 
@@ -19,14 +45,17 @@ std::vector<char> find_stray(const std::vector<Vec3>& points, double spacing, co
     std::vector<char> stray(points.size(), 0);
     if (points.size() <= 2 * kNeighbours) return stray;
     const PointCells cells(points, kFirstRadius * spacing);
-    std::vector<double> reach(points.size()), off(points.size());
+    const double far_reach = kFar * usual_reach(cells, spacing);
+    run.check();
+    std::vector<char> lonely(points.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 1024), [&](const auto& some) {
+        std::vector<PointCells::Range> ranges;
+        for (std::size_t n = some.begin(); n < some.end(); ++n) lonely[n] = is_lonely(cells, n, far_reach, ranges);
+    });
     run.check();
     for_nearest(cells, spacing, kNeighbours, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
-        reach[point] = near.size() < kNeighbours ? 1e300 : std::sqrt(near.back().squared);
-        if (near.size() < kNeighbours) {
-            off[point] = 1;
-            return;
-        }
+        stray[point] = 1;
+        if (near.size() < kNeighbours) return;
         Eigen::Vector3d sum = Eigen::Vector3d::Zero();
         Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
         const Vec3& p = points[point];
@@ -39,15 +68,11 @@ std::vector<char> find_stray(const std::vector<Vec3>& points, double spacing, co
         const double count = double(near.size());
         sum /= count;
         const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares / count - sum * sum.transpose());
-        const double deviation = std::sqrt(std::max(0.0, axes.eigenvalues()[0]));
-        off[point] = std::max(deviation, std::abs(axes.eigenvectors().col(0).dot(sum))) / reach[point];
-    });
-    const double usual = median(reach);
-    for (std::size_t n = 0; n < points.size(); ++n) {
+        const double deviation = std::sqrt(std::max(0.0, axes.eigenvalues()[0])), reach = std::sqrt(near.back().squared);
         // The farther the neighbours, the flatter they have to lie.
-        const double far = reach[n] / (kFar * usual);
-        stray[n] = far > 1 && off[n] * far > kOffPlane;
-    }
+        const double off = std::max(deviation, std::abs(axes.eigenvectors().col(0).dot(sum))) / reach;
+        stray[point] = off * reach / far_reach > kOffPlane;
+    }, [&](std::size_t n) { return lonely[n] != 0; });
     return stray;
 }
 
