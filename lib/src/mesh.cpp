@@ -2,20 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <numbers>
 #include <numeric>
+
+#include "meshing/corner_table.h"
 
 namespace covol {
 namespace {
 
-Vec3 point(const TriangleMesh& mesh, std::uint32_t v) {
-    return {mesh.vertices[v][0], mesh.vertices[v][1], mesh.vertices[v][2]};
-}
-Vec3 minus(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec3 cross(const Vec3& a, const Vec3& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-double length(const Vec3& a) { return std::sqrt(dot(a, a)); }
+using meshing::cross;
+using meshing::dot;
+using meshing::length;
+using meshing::minus;
+
+Vec3 point(const TriangleMesh& mesh, std::uint32_t v) { return meshing::to_vec3(mesh.vertices[v]); }
 
 bool is_degenerate(const std::array<std::uint32_t, 3>& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
@@ -124,6 +125,17 @@ MeshMeasures measure(const TriangleMesh& mesh) {
     return m;
 }
 
+double smallest_angle(const TriangleMesh& mesh) {
+    if (mesh.empty()) return 0;
+    std::vector<float> worst(mesh.triangles.size());
+    std::transform(mesh.triangles.begin(), mesh.triangles.end(), worst.begin(), [&](const auto& t) {
+        return float(meshing::worst_cosine(point(mesh, t[0]), point(mesh, t[1]), point(mesh, t[2])));
+    });
+    const auto rank = std::ptrdiff_t(worst.size() / 100);
+    std::nth_element(worst.begin(), worst.begin() + rank, worst.end(), std::greater<>());
+    return std::acos(std::clamp(double(worst[std::size_t(rank)]), -1.0, 1.0)) * 180 / std::numbers::pi;
+}
+
 std::vector<std::array<float, 3>> vertex_normals(const TriangleMesh& mesh) {
     std::vector<Vec3> sums(mesh.vertices.size(), Vec3{0, 0, 0});
     for (const auto& t : mesh.triangles)
@@ -157,24 +169,9 @@ void remove_small_components(TriangleMesh& mesh, double min_volume) {
         const std::uint32_t root = components.root(t);
         volumes[root] += six_volumes(mesh, mesh.triangles[t], point(mesh, mesh.triangles[root][0])) / 6;
     }
-    constexpr std::uint32_t kUnused = ~std::uint32_t(0);
-    std::vector<std::uint32_t> renumbered(mesh.vertices.size(), kUnused);
-    std::size_t kept = 0;
-    for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-        if (std::abs(volumes[components.root(t)]) < min_volume) continue;
-        mesh.triangles[kept++] = mesh.triangles[t];
-        for (const std::uint32_t v : mesh.triangles[kept - 1]) renumbered[v] = 0;
-    }
-    mesh.triangles.resize(kept);
-    std::uint32_t count = 0;
-    for (std::size_t v = 0; v < renumbered.size(); ++v) {
-        if (renumbered[v] == kUnused) continue;
-        mesh.vertices[count] = mesh.vertices[v];
-        renumbered[v] = count++;
-    }
-    mesh.vertices.resize(count);
-    for (auto& t : mesh.triangles)
-        for (std::uint32_t& v : t) v = renumbered[v];
+    for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
+        if (std::abs(volumes[components.root(t)]) < min_volume) mesh.triangles[t].fill(meshing::CornerTable::kNone);
+    meshing::remove_gone(mesh.triangles, mesh.vertices);
 }
 
 }  // namespace covol

@@ -10,7 +10,6 @@
 #include <CGAL/Polygon_mesh_processing/stitch_borders.h>
 #include <CGAL/Polygon_mesh_processing/triangulate_hole.h>
 #include <CGAL/Surface_mesh.h>
-#include <CGAL/box_intersection_d.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
 
@@ -20,7 +19,11 @@
 #include <vector>
 
 #include "covol/error.h"
-#include "detail/mesh_decimate.h"
+#include "covol/domain.h"
+#include "covol/mesh_relax.h"
+#include "detail/mesh_distance.h"
+#include "meshing/decimate.h"
+#include "meshing/safe_moves.h"
 
 namespace covol {
 namespace {
@@ -126,16 +129,69 @@ std::size_t triangles_of(double edge, double area) {
     return std::size_t(std::max(4.0, area / (std::sqrt(3.0) / 4 * edge * edge)));
 }
 
-/// Decimation leaves a subset of the vertices, so that a round solid loses volume; an even offset along the normals
-/// brings it back.
-void decimate_keeping_volume(TriangleMesh& mesh, double target_edge, const MeshMeasures& before) {
-    detail::decimate(mesh, triangles_of(target_edge, before.area));
+/// A mesh, and what it stands for where that is known.
+struct Work {
+    TriangleMesh& mesh;
+    const FloatGrid* level_set;
+    double isovalue;
+    const CleanupOptions& options;
+    const RunContext& run;
+
+    [[nodiscard]] double voxel_size() const { return domain_of(*level_set).voxel_size; }
+};
+
+/// Both ways: a part that is lost shows in the one, one that sticks out in the other.
+MeshDeviation change_of(const TriangleMesh& before, const TriangleMesh& after) {
+    const auto samples = [](const TriangleMesh& mesh) {
+        std::vector<Vec3> points;
+        for (const auto& v : mesh.vertices) points.push_back(meshing::to_vec3(v));
+        for (const auto& t : mesh.triangles) {
+            Vec3 middle{};
+            for (const std::uint32_t v : t) middle = meshing::plus(middle, 1.0 / 3, meshing::to_vec3(mesh.vertices[v]));
+            points.push_back(middle);
+        }
+        return points;
+    };
+    MeshDeviation worst;
+    for (const auto& [from, to] : {std::pair(&before, &after), std::pair(&after, &before)}) {
+        const FitStatistics fit = detail::statistics_of(detail::distances_to(*to, samples(*from)));
+        worst = {std::max(worst.max, fit.max), std::max(worst.mean, fit.mean)};
+    }
+    return worst;
+}
+
+CleanupStep step_report(const Work& work, const TriangleMesh& before) {
+    CleanupStep step{std::int64_t(work.mesh.triangles.size()), smallest_angle(work.mesh), change_of(before, work.mesh), {}};
+    if (work.level_set != nullptr) step.deviation = deviation_from(*work.level_set, work.mesh, work.isovalue, work.run);
+    return step;
+}
+
+/// A round solid with vertices on its surface loses volume by the chords; an even offset along the normals brings it back.
+/// What lies on the faces of a clip stays there.
+void keep_volume(TriangleMesh& mesh, const MeshMeasures& before, const meshing::Surface* surface) {
     const MeshMeasures after = measure(mesh);
     if (!before.closed || !after.closed || !(after.area > 0)) return;
     const auto offset = static_cast<float>((before.volume - after.volume) / after.area);
     const auto normals = vertex_normals(mesh);
-    for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
-        for (int a = 0; a < 3; ++a) mesh.vertices[v][a] += offset * normals[v][a];
+    std::optional<meshing::Level> level;
+    if (surface != nullptr) level.emplace(surface->level());
+    meshing::Positions goal = mesh.vertices;
+    for (std::size_t v = 0; v < goal.size(); ++v)
+        for (int a = 0; a < 3 && !(level && level->faces(goal[v]) != 0); ++a) goal[v][a] += offset * normals[v][a];
+    meshing::move_where_free(mesh, goal);
+}
+
+CleanupStep decimate(const Work& work, const MeshMeasures& facts) {
+    constexpr int kRounds = 3;  // what collapses leave is relaxed
+    const TriangleMesh before = work.mesh;
+    std::optional<meshing::Surface> surface;
+    if (work.level_set != nullptr) surface.emplace(*work.level_set, work.isovalue);
+    const double tolerance = work.options.adaptive > 0 ? work.options.adaptive / work.voxel_size() : 0.0;
+    const std::size_t triangles = work.options.target_edge > 0 ? triangles_of(work.options.target_edge, facts.area) : 4;
+    meshing::decimate(work.mesh, surface ? &*surface : nullptr, {triangles, tolerance}, work.run);
+    if (surface) relax_mesh(work.mesh, *work.level_set, {work.isovalue, kRounds, tolerance}, work.run);
+    if (!(tolerance > 0)) keep_volume(work.mesh, facts, surface ? &*surface : nullptr);
+    return step_report(work, before);
 }
 
 /// One step of Laplacian smoothing with this weight.
@@ -154,12 +210,19 @@ void smooth_step(TriangleMesh& mesh, double weight) {
 
 /// Taubin 1995: a shrinking and an inflating step in turn. Weights of nearly the same size keep the gain at low
 /// frequencies, and with it the growth of the volume, below 1e-4 an iteration.
-void smooth(TriangleMesh& mesh, int iterations, const RunContext& run) {
-    for (int i = 0; i < iterations; ++i) {
-        smooth_step(mesh, 0.5);
-        smooth_step(mesh, -0.51);
-        run.check();
+CleanupStep smooth(const Work& work, bool proper) {
+    const TriangleMesh before = work.mesh;
+    for (int i = 0; i < work.options.smooth_iterations; ++i) {
+        smooth_step(work.mesh, 0.5);
+        smooth_step(work.mesh, -0.51);
+        work.run.check();
     }
+    if (proper) {
+        meshing::Positions goal = before.vertices;
+        goal.swap(work.mesh.vertices);
+        meshing::move_where_free(work.mesh, goal);
+    }
+    return step_report(work, before);
 }
 
 /// Runs CGAL's part; what CGAL throws becomes an Error.
@@ -185,6 +248,7 @@ std::string CleanupOptions::why_invalid() const {
     std::string why;
     if (!(target_edge >= 0) || !std::isfinite(target_edge))
         why += "target_edge: expected >= 0, got " + std::to_string(target_edge) + "\n";
+    if (!(adaptive >= 0) || !std::isfinite(adaptive)) why += "adaptive: expected >= 0, got " + std::to_string(adaptive) + "\n";
     if (smooth_iterations < 0)
         why += "smooth_iterations: expected >= 0, got " + std::to_string(smooth_iterations) + "\n";
     return why;
@@ -192,18 +256,8 @@ std::string CleanupOptions::why_invalid() const {
 
 int count_self_intersections(const TriangleMesh& mesh) {
     check_indices(mesh, "count_self_intersections");
-    using Box = CGAL::Box_intersection_d::Box_with_info_d<double, 3, std::size_t>;
-    std::vector<Box> boxes;
-    boxes.reserve(mesh.triangles.size());
-    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-        CGAL::Bbox_3 box;
-        for (const std::uint32_t v : mesh.triangles[t]) box += to_point(mesh.vertices[v]).bbox();
-        boxes.emplace_back(box, t);
-    }
-    std::vector<std::pair<std::size_t, std::size_t>> pairs;
-    CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const Box& a, const Box& b) {
-        pairs.emplace_back(a.info(), b.info());
-    });
+    // Most pairs are apart by far; exact predicates decide on the others.
+    const std::vector<meshing::ContactFinder::Pair> pairs = meshing::ContactFinder(mesh.vertices, mesh.triangles).contacts(false);
     return tbb::parallel_reduce(
         tbb::blocked_range<std::size_t>(0, pairs.size()), 0,
         [&](const auto& range, int count) {
@@ -214,44 +268,44 @@ int count_self_intersections(const TriangleMesh& mesh) {
         std::plus<>());
 }
 
-CleanupReport clean_mesh(TriangleMesh& mesh, const CleanupOptions& options, const RunContext& run) {
+namespace {
+
+CleanupReport clean(const Work& work) {
+    const auto& [mesh, level_set, isovalue, options, run] = work;
     if (const std::string why = options.why_invalid(); !why.empty()) throw Error(Errc::InvalidOptions, "clean_mesh: " + why);
+    if (options.adaptive > 0 && (level_set == nullptr || options.adaptive > 2 * work.voxel_size()))
+        throw Error(Errc::InvalidOptions, level_set == nullptr ? std::string("clean_mesh: adaptive: expected the level set of the mesh, got none")
+                                                               : "clean_mesh: adaptive: expected at most two voxels, " + std::to_string(2 * work.voxel_size()) +
+                                                                     ", got " + std::to_string(options.adaptive));
     check_indices(mesh, "clean_mesh");
     CleanupReport report;
     with_threads(run, [&] {
         report.self_intersections = count_self_intersections(mesh);
         MeshMeasures facts = measure(mesh);
-        const auto is_good = [&](int intersections) {
-            return facts.closed && facts.manifold && facts.volume > 0 && intersections == 0;
-        };
-        const auto repair_mesh = [&] {
+        int intersections = report.self_intersections;
+        const auto repair_where_needed = [&] {
+            if (!options.repair || (facts.closed && facts.manifold && facts.volume > 0 && intersections == 0)) return;
             guarded([&] {
-                SurfaceMesh work = to_surface_mesh(mesh);
-                report.holes_filled += repair(work);
-                mesh = from_surface_mesh(work);
+                SurfaceMesh soup = to_surface_mesh(mesh);
+                report.holes_filled += repair(soup);
+                mesh = from_surface_mesh(soup);
             });
             facts = measure(mesh);
+            intersections = count_self_intersections(mesh);
         };
         run.report("clean", 0.2);
         run.check();
-        int intersections = report.self_intersections;
-        if (options.repair && !is_good(intersections)) {
-            repair_mesh();
-            intersections = count_self_intersections(mesh);
-        }
+        repair_where_needed();
         run.report("clean", 0.4);
         run.check();
-        if (options.target_edge > 0)
-            decimate_keeping_volume(mesh, options.target_edge, facts);
-        smooth(mesh, options.smooth_iterations, run);
+        if (options.target_edge > 0 || options.adaptive > 0) report.decimation = decimate(work, facts);
+        run.report("clean", 0.6);
+        if (options.smooth_iterations > 0) report.smoothing = smooth(work, facts.closed && facts.manifold);
         run.report("clean", 0.8);
-        if (options.target_edge > 0 || options.smooth_iterations > 0) {
+        if (report.decimation || report.smoothing) {
             facts = measure(mesh);
             intersections = count_self_intersections(mesh);
-            if (options.repair && !is_good(intersections)) {
-                repair_mesh();
-                intersections = count_self_intersections(mesh);
-            }
+            repair_where_needed();
         }
         report.closed = facts.closed;
         report.manifold = facts.manifold;
@@ -259,6 +313,16 @@ CleanupReport clean_mesh(TriangleMesh& mesh, const CleanupOptions& options, cons
         run.report("clean", 1.0);
     });
     return report;
+}
+
+}  // namespace
+
+CleanupReport clean_mesh(TriangleMesh& mesh, const CleanupOptions& options, const RunContext& run) {
+    return clean({mesh, nullptr, 0.0, options, run});
+}
+
+CleanupReport clean_mesh(TriangleMesh& mesh, const FloatGrid& level_set, double isovalue, const CleanupOptions& options, const RunContext& run) {
+    return clean({mesh, &level_set, isovalue, options, run});
 }
 
 }  // namespace covol

@@ -56,6 +56,12 @@ Json to_json(const MeshMeasures& m) {
             {"genus", m.genus},   {"closed", m.closed}, {"manifold", m.manifold}};
 }
 
+Json to_json(const MeshDeviation& d) { return {{"mean", d.mean}, {"max", d.max}}; }
+
+Json to_json(const RelaxReport& r) {
+    return {{"triangles", r.triangles}, {"smallest_angle", r.smallest_angle}, {"deviation_voxels", to_json(r.deviation)}};
+}
+
 Json to_json(const FitStatistics& f) { return {{"mean", f.mean}, {"p95", f.p95}, {"max", f.max}}; }
 
 Json to_json(const SeedCheck& s) {
@@ -111,6 +117,7 @@ Json to_json(const SegmentReport& r) {
     for (const auto& level : r.coarse) json["coarse"].push_back(to_json(level));
     json["solve"] = to_json(r.solve);
     json["surface"] = to_json(r.surface);
+    json["mesh"] = to_json(r.mesh);
     if (r.point_count > 0) json["fit"]["points_to_surface"] = to_json(r.fit);
     if (r.point_count > 0) json["fit"]["points_to_surface"]["bias"] = r.fit.bias;
     if (r.marks_off.beyond > 0)
@@ -182,13 +189,26 @@ std::vector<std::string> summary(const SegmentReport& r) {
     std::ostringstream text;
     text << std::setprecision(4) << r.active_voxels << " active voxels of " << r.domain.voxel_size << ", " << r.solve.steps
          << " steps (" << to_string(r.solve.stop_reason) << "), " << r.seconds.total << " s";
-    std::vector<std::string> lines{text.str(), "surface: " + one_line(r.surface)};
+    std::vector<std::string> lines{text.str(), "surface: " + one_line(r.surface), "mesh: " + mesh_line(r.mesh.triangles, r.mesh.smallest_angle, r.mesh.deviation)};
     if (r.point_count == 0) return lines;
     text.str("");
     text << "points to surface: mean " << r.fit.mean << ", 95 % " << r.fit.p95 << ", max " << r.fit.max
          << ", bias " << r.fit.bias;
     lines.push_back(text.str());
     return lines;
+}
+
+std::string one_line(const MeshDeviation& d) {
+    std::ostringstream text;
+    text << std::setprecision(2) << "mean " << d.mean << ", max " << d.max << " voxels";
+    return text.str();
+}
+
+std::string mesh_line(std::int64_t triangles, double smallest_angle, const MeshDeviation& deviation) {
+    std::ostringstream text;
+    text << triangles << " triangles, 99 % of them without an angle below " << std::setprecision(3) << smallest_angle
+         << " degrees; off the level set: " << one_line(deviation);
+    return text.str();
 }
 
 std::string one_line(const MeshMeasures& m) {

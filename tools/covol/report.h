@@ -19,6 +19,8 @@ namespace covol::tool {
 [[nodiscard]] Json to_json(const EdgeReport& report);
 [[nodiscard]] Json to_json(const EvolveReport& report);
 [[nodiscard]] Json to_json(const MeshMeasures& measures);
+[[nodiscard]] Json to_json(const MeshDeviation& deviation);
+[[nodiscard]] Json to_json(const RelaxReport& report);
 [[nodiscard]] Json to_json(const FitStatistics& fit);
 [[nodiscard]] Json to_json(const SeedCheck& check);
 [[nodiscard]] Json to_json(const CompareReport& report);
@@ -33,5 +35,8 @@ void add_seconds(Session& session, const SegmentReport::Seconds& seconds);
 
 /// "{ mean, p95, max }" and the like as one line for people.
 [[nodiscard]] std::string one_line(const MeshMeasures& measures);
+[[nodiscard]] std::string one_line(const MeshDeviation& deviation);
+/// @param smallest_angle  degrees: 1st percentile. @param deviation  from the level set, voxels
+[[nodiscard]] std::string mesh_line(std::int64_t triangles, double smallest_angle, const MeshDeviation& deviation);
 
 }  // namespace covol::tool

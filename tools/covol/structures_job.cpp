@@ -76,6 +76,7 @@ void separate_all(StructuresOutput& output, const SegmentOptions& options, const
         StructureOutput& s = output.structures[n];
         s.result.surface = separated.surfaces[n];
         s.result.mesh = extract_mesh(*s.result.surface, options.extract, run);
+        s.result.report.mesh = relax_mesh(s.result.mesh, *s.result.surface, {options.extract.isovalue}, run);
         s.result.report.surface = measure(s.result.mesh);
         if (!s.marks.empty()) s.result.report.fit = points_to_surface(s.marks, s.result.mesh, run);
         SegmentReport& report = s.result.report;

@@ -25,6 +25,15 @@ struct MeshMeasures {
 };
 [[nodiscard]] MeshMeasures measure(const TriangleMesh& mesh);
 
+/// How far a mesh is from the surface that it stands for, in voxels.
+struct MeshDeviation {
+    double max = 0;
+    double mean = 0;  ///< over the area
+};
+
+/// The 1st percentile of the triangles' smallest angles, degrees; 0 of an empty mesh.
+[[nodiscard]] double smallest_angle(const TriangleMesh& mesh);
+
 /// Unit normals at the vertices, weighted by angle.
 [[nodiscard]] std::vector<std::array<float, 3>> vertex_normals(const TriangleMesh& mesh);
 

@@ -16,6 +16,7 @@
 #include "covol/holes.h"
 #include "covol/image.h"
 #include "covol/mesh.h"
+#include "covol/mesh_relax.h"
 #include "covol/points.h"
 #include "covol/seeds.h"
 #include "covol/surface.h"
@@ -97,6 +98,7 @@ struct SegmentReport {
     EdgeReport edge;
     EvolveReport solve;
     MeshMeasures surface;  ///< of the mesh; where that is open its volume is the level set's
+    RelaxReport mesh;
     FitStatistics fit;
     /// Marks farther from the surface than two voxels of the image: wrong, or a part of the structure that is missing.
     struct MarksOff {

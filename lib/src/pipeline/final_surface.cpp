@@ -29,9 +29,14 @@ Clip where_it_ends(const Job& job) {
     return all;
 }
 
+void relax(Job& job) {
+    job.report().mesh = relax_mesh(job.result.mesh, *job.result.surface, {job.options.extract.isovalue}, job.run);
+}
+
 void mesh_of(Job& job, const FloatGrid& level_set) {
     job.result.surface = surface(level_set, job.run);
     job.result.mesh = extract_mesh(*job.result.surface, job.options.extract, job.run);
+    relax(job);
 }
 
 int complexity(const MeshMeasures& m) { return m.components + std::max(0, m.genus); }
@@ -64,7 +69,10 @@ void treat_holes(Job& job) {
     if (options.policy == Holes::Open) {
         const double volume = measure(mesh).volume;
         mesh = trimmed(mesh, distances, distance, slack, report.holes, job.run);
-        if (report.holes.share > 0) report.holes.closed_volume = volume;
+        if (report.holes.share > 0) {
+            report.holes.closed_volume = volume;
+            relax(job);
+        }
     }
     if (options.policy == Holes::Flat) {
         const TriangleMesh flat = flattened(mesh, distances, distance, slack, report.holes, job.run);

@@ -1,0 +1,111 @@
+#pragma once
+#include <algorithm>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "meshing/triangle.h"
+
+namespace covol::meshing {
+
+/// Whether two triangles are sure to have nothing in common beyond the corners and the side that they share: a plane is found
+/// that separates them by more than rounding can be wrong. Of triangles that only just miss each other it may not be.
+/// Triangles that share a side are apart unless folded flat onto each other.
+[[nodiscard]] bool are_apart(const Positions& positions, const Triangle& s, const Triangle& t);
+
+/// Finds triangles that touch: boxes around runs of triangles that lie close to each other, in a tree.
+class ContactFinder {
+public:
+    using Pair = std::pair<std::uint32_t, std::uint32_t>;
+
+    /// @param positions, triangles  kept by reference.
+    ContactFinder(const Positions& positions, const std::vector<Triangle>& triangles);
+
+    /// Once positions, or corners of triangles, have changed.
+    void update();
+
+    /// Pairs of triangles that are not sure to be apart, each once, lower number first, sorted; those that are gone (a corner
+    /// that is no vertex) touch nothing.
+    /// @param was_free  whether the mesh is one of a closed surface without contacts whose vertices have moved by less than a
+    ///                  triangle: single sheets need no look then.
+    [[nodiscard]] std::vector<Pair> contacts(bool was_free);
+    /// The same, of pairs with one of these; sorted, unique.
+    [[nodiscard]] std::vector<Pair> contacts_of(const std::vector<std::uint32_t>& some) const;
+
+    /// The same once most have changed, or many are gone: puts them in order anew.
+    void rebuild();
+    /// Finds where the surface is a single sheet: in cells as large as a triangle, whose neighbours have no triangle that looks away
+    /// from their common direction. A line in this direction can pass a closed surface without contacts only once there, so
+    /// that nothing touches (as the normal cones of Volino and Magnenat-Thalmann, Efficient self-collision detection, 1994).
+    void find_single_sheets();
+    /// The common direction where the last find_single_sheets() found a single sheet around a point; 0 where not.
+    [[nodiscard]] Vec3 single_sheet(const Position& p) const;
+    /// Once one triangle, not yet in this place, or its corners have changed: much cheaper than update().
+    void grow(std::uint32_t triangle);
+    /// Calls visit(number) for the triangles whose boxes may meet that of a triangle with these corners, which need not be in the mesh.
+    template <typename Visit>
+    void near(const Triangle& t, const Visit& visit) const {
+        descend(box_of(t), 0, [&](std::size_t place) { visit(order_[place]); });
+    }
+
+private:
+    struct Box {
+        Position low, high;
+    };
+    [[nodiscard]] Box box_of(const Triangle& t) const;
+    static constexpr std::size_t kRun = 4;  ///< triangles in a leaf of the tree
+    static void join(Box& box, const Box& other) {
+        for (int a = 0; a < 3; ++a) {
+            box.low[a] = std::min(box.low[a], other.low[a]);
+            box.high[a] = std::max(box.high[a], other.high[a]);
+        }
+    }
+    static bool meet(const Box& a, const Box& b) {
+        for (int k = 0; k < 3; ++k)
+            if (a.low[k] > b.high[k] || a.high[k] < b.low[k]) return false;
+        return true;
+    }
+    template <typename Visit>
+    void descend(const Box& box, std::size_t first_run, const Visit& visit) const;
+    void add_contact(std::uint32_t s, std::uint32_t t, std::vector<Pair>& pairs) const;
+
+    const Positions* positions_ = nullptr;
+    const std::vector<Triangle>* triangles_ = nullptr;
+    std::vector<std::uint32_t> order_, place_;  ///< the triangles along the tree's leaves, and where each is
+    std::vector<Box> boxes_;          ///< of a binary tree: node n has the children 2 n + 1 and 2 n + 2
+    std::vector<Box> triangle_boxes_; ///< in the tree's order
+    struct Cell {
+        std::uint64_t key;
+        Vec3 direction;
+    };
+    [[nodiscard]] std::uint64_t key_of(const Position& p, int dx = 0, int dy = 0, int dz = 0) const;
+    [[nodiscard]] const Cell* cell_at(std::uint64_t key) const;
+    std::vector<Cell> cells_;  ///< sorted
+    Position cell_origin_{};
+    float cell_size_ = 1;
+    std::size_t runs_ = 1;            ///< leaves of the tree, a power of two
+};
+
+/// Calls visit(place in the order) for the triangles whose boxes meet this one, from a run on.
+template <typename Visit>
+void ContactFinder::descend(const Box& box, std::size_t first_run, const Visit& visit) const {
+    struct Node {
+        std::size_t number, end, runs;  // it stands for the runs [end - runs, end)
+    };
+    Node stack[64];
+    int size = 0;
+    stack[size++] = {0, runs_, runs_};
+    while (size > 0) {
+        const auto [node, end, runs] = stack[--size];
+        if (end <= first_run || !meet(boxes_[node], box)) continue;
+        if (runs > 1) {
+            stack[size++] = {2 * node + 2, end, runs / 2};
+            stack[size++] = {2 * node + 1, end - runs / 2, runs / 2};
+            continue;
+        }
+        for (std::size_t n = (end - 1) * kRun; n < std::min(end * kRun, order_.size()); ++n)
+            if (meet(triangle_boxes_[n], box)) visit(n);
+    }
+}
+
+}  // namespace covol::meshing

@@ -1,0 +1,188 @@
+#include "meshing/level.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "detail/leaf_band.h"
+
+namespace covol::meshing {
+namespace {
+
+constexpr int kSteps = 6;           // of Newton's method
+constexpr double kConverged = 1e-4;   // voxels
+constexpr double kLongest = 0.5;    // voxels, a step
+constexpr double kReach = 1.0;      // voxels, all steps
+constexpr double kFlat = 0.05;      // of the slope that a distance has: no direction to go
+constexpr double kLeastSlope = 0.5;  // of a distance: between two walls it has none
+constexpr double kSampling = 0.75;  // voxels
+constexpr double kNearFace = 0.01;  // voxels: twice extract_mesh()'s chamfer
+
+/// Calls visit(point) for points of a triangle at most `step` apart: its middle and those of its sides where it is not larger.
+template <typename Visit>
+void for_each_sample(const Vec3& a, const Vec3& b, const Vec3& c, double step, const Visit& visit) {
+    const double longest = std::max({length(minus(b, a)), length(minus(c, b)), length(minus(a, c))});
+    const int n = std::max(2, int(std::ceil(longest / step)));
+    for (int i = 0; i <= n; ++i)
+        for (int j = 0; i + j <= n; ++j) {
+            const double s = double(i) / n, t = double(j) / n;
+            visit(plus(plus(a, s, minus(b, a)), t, minus(c, a)));
+        }
+    visit(plus(plus(a, 1.0 / 3, minus(b, a)), 1.0 / 3, minus(c, a)));
+}
+
+}  // namespace
+
+Level::Level(const FloatGrid& grid, const detail::LatticeClip& clip, double isovalue)
+    : accessor_(grid.getConstAccessor()), clip_(clip), domain_(domain_of(grid)), isovalue_(isovalue) {
+    for (int a = 0; a < 3; ++a) {
+        face_[a] = {float(domain_.origin[a] + domain_.voxel_size * clip_.low[a]), float(domain_.origin[a] + domain_.voxel_size * clip_.high[a])};
+        clipped_ = clipped_ || std::isfinite(face_[a][0]) || std::isfinite(face_[a][1]);
+    }
+}
+
+/// Undoes LatticeClip::position(): the last layer within and that on the face are not a voxel apart.
+double Level::lattice(int axis, double index, double& stretch) const {
+    stretch = 1;
+    for (const bool upper : {false, true}) {
+        const double face = upper ? clip_.high[axis] : clip_.low[axis];
+        if (std::isinf(face)) continue;
+        const int layer = clip_.face_layer(axis, upper), inner = layer + (upper ? -1 : 1);
+        if (upper ? index <= inner : index >= inner) continue;
+        stretch = (layer - inner) / (face - inner);
+        return inner + (index - inner) * stretch;
+    }
+    return index;
+}
+
+Level::Sample Level::sample(const Vec3& world) const {
+    using detail::Coord;
+    Vec3 at, stretch{1, 1, 1};
+    for (int a = 0; a < 3; ++a) {
+        at[a] = (world[a] - domain_.origin[a]) / domain_.voxel_size;
+        if (clipped_) at[a] = lattice(a, at[a], stretch[a]);
+    }
+    const Coord base(int(std::floor(at[0])), int(std::floor(at[1])), int(std::floor(at[2])));
+    const double x = at[0] - base[0], y = at[1] - base[1], z = at[2] - base[2];
+    float v[8];
+    const auto* leaf = accessor_.probeConstLeaf(base);
+    const int i = base[0] & 7, j = base[1] & 7, k = base[2] & 7;
+    if (leaf != nullptr && i < 7 && j < 7 && k < 7) {
+        const float* data = leaf->buffer().data() + detail::leaf_offset(i, j, k);
+        for (int c = 0; c < 8; ++c) v[c] = data[(c >> 2) * 64 + (c >> 1 & 1) * 8 + (c & 1)];
+    } else {
+        for (int c = 0; c < 8; ++c) v[c] = accessor_.getValue(base.offsetBy(c >> 2, c >> 1 & 1, c & 1));
+    }
+    double along_z[4], slope_z[4];
+    for (int c = 0; c < 4; ++c) {
+        slope_z[c] = double(v[2 * c + 1]) - v[2 * c];
+        along_z[c] = v[2 * c] + z * slope_z[c];
+    }
+    const double low = along_z[0] + y * (along_z[1] - along_z[0]), high = along_z[2] + y * (along_z[3] - along_z[2]);
+    Sample result;
+    result.value = low + x * (high - low) - isovalue_;
+    const double h = domain_.voxel_size;
+    result.gradient[0] = (high - low) * stretch[0] / h;
+    result.gradient[1] = ((1 - x) * (along_z[1] - along_z[0]) + x * (along_z[3] - along_z[2])) * stretch[1] / h;
+    result.gradient[2] = ((1 - x) * ((1 - y) * slope_z[0] + y * slope_z[1]) + x * ((1 - y) * slope_z[2] + y * slope_z[3])) * stretch[2] / h;
+    return result;
+}
+
+std::optional<Vec3> Level::project(const Vec3& world, unsigned held) const {
+    const double h = domain_.voxel_size;
+    Vec3 p = world;
+    double gone = 0;
+    for (int step = 0; step <= kSteps; ++step) {
+        const Sample here = sample(p);
+        Vec3 g = here.gradient;
+        for (int a = 0; a < 3; ++a)
+            if (held >> a & 1) g[a] = 0;
+        const double steep = dot(g, g);
+        if (std::abs(here.value) <= kConverged * h * std::sqrt(steep) || here.value == 0) return p;
+        if (step == kSteps || !(steep > kFlat * kFlat)) return {};
+        const double whole = here.value / std::sqrt(steep);
+        const double move = std::clamp(whole, -kLongest * h, kLongest * h);
+        gone += std::abs(move);
+        if (!(gone <= kReach * h)) return {};
+        p = plus(p, -move / std::sqrt(steep), g);
+    }
+    return {};
+}
+
+double Level::distance(const Vec3& world) const {
+    const Sample here = sample(world);
+    return std::abs(here.value) / std::max(length(here.gradient), kLeastSlope);
+}
+
+bool Level::is_farther(const Vec3& a, const Vec3& b, const Vec3& c, double voxels) const {
+    bool farther = false;
+    for_each_sample(a, b, c, kSampling * voxel_size(), [&](const Vec3& p) { farther = farther || distance(p) > voxels * voxel_size(); });
+    return farther;
+}
+
+unsigned Level::faces(const Position& p) const {
+    unsigned on = 0;
+    for (int a = 0; a < 3; ++a) on |= unsigned(p[a] == face_[a][0] || p[a] == face_[a][1]) << a;
+    return on;
+}
+
+bool Level::on_chamfer(const Position& p) const {
+    int near = 0;
+    for (int a = 0; a < 3; ++a)
+        near += std::abs(p[a] - face_[a][0]) < kNearFace * domain_.voxel_size || std::abs(p[a] - face_[a][1]) < kNearFace * domain_.voxel_size;
+    return near > 1;
+}
+
+Surface::Surface(const FloatGrid& level_set, double isovalue)
+    : whole_(isovalue == 0 ? detail::uncut(level_set, detail::FaceLayer::OnFace) : std::nullopt),
+      grid_(whole_ ? *whole_->distance : level_set), clip_(whole_ ? whole_->clip : detail::LatticeClip{}), isovalue_(isovalue) {}
+
+MeshDeviation Surface::deviation(const TriangleMesh& mesh) const {
+    struct Sum {
+        double max = 0, whole = 0, area = 0;
+    };
+    // Fixed pieces, joined in a fixed order: the same bits for any number of threads.
+    constexpr std::size_t kPiece = 4096;
+    std::vector<Sum> sums((mesh.triangles.size() + kPiece - 1) / kPiece);
+    tbb::parallel_for(std::size_t(0), sums.size(), [&](std::size_t piece) {
+        const Level level = this->level();
+        Sum& sum = sums[piece];
+        for (std::size_t n = piece * kPiece; n < std::min((piece + 1) * kPiece, mesh.triangles.size()); ++n) {
+            const Triangle& t = mesh.triangles[n];
+            if ((level.faces(mesh.vertices[t[0]]) & level.faces(mesh.vertices[t[1]]) & level.faces(mesh.vertices[t[2]])) != 0) continue;
+            const Vec3 a = to_vec3(mesh.vertices[t[0]]), b = to_vec3(mesh.vertices[t[1]]), c = to_vec3(mesh.vertices[t[2]]);
+            double distances = 0;
+            int count = 0;
+            for_each_sample(a, b, c, kSampling * level.voxel_size(), [&](const Vec3& p) {
+                const double distance = level.distance(p);
+                sum.max = std::max(sum.max, distance);
+                distances += distance;
+                ++count;
+            });
+            const double area = length(area_normal(a, b, c));
+            sum.whole += area * distances / count;
+            sum.area += area;
+        }
+    });
+    Sum all;
+    for (const Sum& sum : sums) all = {std::max(all.max, sum.max), all.whole + sum.whole, all.area + sum.area};
+    const double h = level().voxel_size();
+    return {all.max / h, all.area > 0 ? all.whole / all.area / h : 0.0};
+}
+
+std::vector<std::uint8_t> holds_of(const CornerTable& table, const Positions& positions, const Level& level) {
+    std::vector<std::uint8_t> faces(positions.size()), holds(positions.size());
+    for (std::size_t v = 0; v < faces.size(); ++v) faces[v] = std::uint8_t(level.faces(positions[v]));
+    tbb::parallel_for(std::uint32_t(0), std::uint32_t(holds.size()), [&](std::uint32_t v) {
+        bool within = faces[v] != 0;
+        table.around(v, [&](std::uint32_t c) { within = within && (faces[table.vertex(CornerTable::next(c))] & faces[v]) == faces[v]; });
+        holds[v] = faces[v];
+        if (!within) holds[v] |= kOnLevel;
+        if (level.on_chamfer(positions[v])) holds[v] |= kChamfer;
+        if (table.corner_of(v) == CornerTable::kNone || table.is_boundary(v)) holds[v] |= kFixed;
+    });
+    return holds;
+}
+
+}  // namespace covol::meshing

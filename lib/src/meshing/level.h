@@ -1,0 +1,83 @@
+#pragma once
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "clip/clipped.h"
+#include "covol/domain.h"
+#include "covol/mesh.h"
+#include "meshing/corner_table.h"
+
+namespace covol::meshing {
+
+/// The surface that extract_mesh() takes from a grid: where its trilinear interpolation has a value, cut off at the faces of a
+/// clip. One object for each thread.
+class Level {
+public:
+    /// @param grid  kept by reference. @param clip  where the grid has layers that stand for the faces of a cut.
+    Level(const FloatGrid& grid, const detail::LatticeClip& clip, double isovalue);
+
+    struct Sample {
+        double value = 0;   ///< above the isovalue, world units; < 0 inside
+        Vec3 gradient{};
+    };
+    [[nodiscard]] Sample sample(const Vec3& world) const;
+    [[nodiscard]] double voxel_size() const { return domain_.voxel_size; }
+
+    /// The point of the surface found from a point along the gradient, within a voxel or so; none where there is none. A
+    /// coordinate of which `held` has the bit stays.
+    [[nodiscard]] std::optional<Vec3> project(const Vec3& world, unsigned held = 0) const;
+    /// How far a point is from the surface, to the first order, world units.
+    [[nodiscard]] double distance(const Vec3& world) const;
+
+    /// Whether a point of a triangle is farther from the surface than so many voxels.
+    [[nodiscard]] bool is_farther(const Vec3& a, const Vec3& b, const Vec3& c, double voxels) const;
+
+    /// A bit for each axis along which a point lies on a face of the clip.
+    [[nodiscard]] unsigned faces(const Position& p) const;
+    /// Whether the clip has a face, and the point is so close to two of them that it belongs to the chamfer between them.
+    [[nodiscard]] bool on_chamfer(const Position& p) const;
+
+private:
+    [[nodiscard]] double lattice(int axis, double index, double& stretch) const;
+
+    FloatGrid::ConstAccessor accessor_;
+    detail::LatticeClip clip_;
+    Domain domain_;
+    double isovalue_;
+    bool clipped_ = false;
+    std::array<std::array<float, 2>, 3> face_{};  ///< world, low and high; infinite where there is none
+};
+
+/// The same surface for any number of threads.
+class Surface {
+public:
+    /// @param level_set  kept by reference; its clip is undone as in extract_mesh().
+    Surface(const FloatGrid& level_set, double isovalue);
+    [[nodiscard]] Level level() const { return {grid_, clip_, isovalue_}; }
+    /// Of points less than a voxel apart; faces of the clip left out.
+    [[nodiscard]] MeshDeviation deviation(const TriangleMesh& mesh) const;
+
+private:
+    std::optional<detail::Uncut> whole_;
+    const FloatGrid& grid_;
+    detail::LatticeClip clip_;
+    double isovalue_;
+};
+
+/// What a vertex lies on, and has to stay on when it moves.
+enum Hold : std::uint8_t {
+    kFaces = 7,      ///< a bit for each axis: on a face of the clip across it
+    kOnLevel = 8,    ///< where the grid has its value; on a face that is its rim
+    kChamfer = 16,   ///< between two faces of the clip: does not move by itself
+    kFixed = 32      ///< on the mesh's boundary, or in no triangle: stays
+};
+
+[[nodiscard]] std::vector<std::uint8_t> holds_of(const CornerTable& table, const Positions& positions, const Level& level);
+
+}  // namespace covol::meshing

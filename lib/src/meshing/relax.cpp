@@ -1,0 +1,373 @@
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <limits>
+#include <numeric>
+#include <optional>
+
+#include "covol/error.h"
+#include "covol/mesh_relax.h"
+#include "meshing/contacts.h"
+#include "meshing/corner_table.h"
+#include "meshing/edge_collapser.h"
+#include "meshing/level.h"
+#include "meshing/safe_moves.h"
+
+namespace covol {
+namespace meshing {
+namespace {
+
+constexpr int kMovesPerRound = 5;
+constexpr double kStep = 0.7;        // of the way to the middle of the neighbours
+constexpr double kSameSide = 0.3;    // cosine: a triangle may not turn farther in a move
+constexpr double kSmooth = 0.5;      // cosine: farther than this neighbours are not turned into each other
+constexpr double kDrop = 0.5;        // of a tangential move: what the projection may add to it
+constexpr double kGain = 1e-3;       // of a cosine: below this an edge is not worth turning
+constexpr double kPoor = 0.85;       // cosine of an angle, 32 degrees: what is better needs no second round
+constexpr double kSliver = 0.9;      // cosine of an angle, 26 degrees: below it a triangle's shortest side is drawn together
+constexpr double kShort = 0.5;       // voxels: longer sides are not
+constexpr double kOffLevel = 0.1;    // voxels: a turned edge may leave the level set so far, or as far as before; ends that meet so far
+
+class Relaxer {
+public:
+    Relaxer(TriangleMesh& mesh, const Surface& surface, double tolerance, const RunContext& run)
+        : mesh_(mesh), table_(mesh.triangles, mesh.vertices.size()), finder_(mesh.vertices, mesh.triangles),
+          levels_([&surface] { return surface.level(); }),
+          holds_(holds_of(table_, mesh.vertices, levels_.local())), tolerance_(tolerance), run_(run) {}
+
+    /// The first round concerns the whole mesh, the others what is still badly shaped.
+    void relax(int rounds, RelaxReport& report) {
+        for (int round = 0; round < rounds; ++round) {
+            if (round > 0) report.collapses += std::int64_t(collapse_slivers());
+            choose(round == 0 ? 2.0 : kPoor);
+            std::vector<Flip> turned = flip_edges();
+            const Positions before = mesh_.vertices;
+            for (int n = 0; n < kMovesPerRound; ++n) {
+                move();
+                run_.check();
+            }
+            take_back(before, turned);
+            report.flips += std::int64_t(turned.size());
+            run_.report("relax", double(round + 1) / rounds);
+            run_.check();
+        }
+        if (rounds > 0) report.collapses += std::int64_t(collapse_slivers());
+    }
+
+private:
+    /// Chooses the corners of triangles worse than this, the vertices next to them, and the triangles around all these; all
+    /// where `poor` is above 1.
+    void choose(double poor) {
+        std::vector<std::uint8_t> vertex(mesh_.vertices.size(), poor > 1), triangle(mesh_.triangles.size(), 0);
+        if (poor <= 1) {
+            tbb::parallel_for(std::size_t(0), triangle.size(), [&](std::size_t t) { triangle[t] = is_worse(std::uint32_t(t), poor); });
+            for (std::size_t t = 0; t < triangle.size(); ++t) {
+                if (triangle[t] == 0) continue;
+                for (const std::uint32_t v : mesh_.triangles[t]) {
+                    vertex[v] = 1;
+                    table_.around(v, [&](std::uint32_t c) { vertex[table_.vertex(CornerTable::next(c))] = 1; });
+                }
+            }
+        }
+        vertices_.clear();
+        for (std::uint32_t v = 0; v < vertex.size(); ++v)
+            if (vertex[v] != 0 && table_.corner_of(v) != CornerTable::kNone) vertices_.push_back(v);
+        scope_.clear();
+        for (std::uint32_t t = 0; t < triangle.size(); ++t)
+            if (!table_.is_gone(t) && std::any_of(mesh_.triangles[t].begin(), mesh_.triangles[t].end(), [&](std::uint32_t v) { return vertex[v] != 0; }))
+                scope_.push_back(t);
+    }
+
+    [[nodiscard]] Vec3 at(std::uint32_t v) const { return to_vec3(mesh_.vertices[v]); }
+    [[nodiscard]] unsigned face_of(std::uint32_t a, std::uint32_t b, std::uint32_t c) const { return holds_[a] & holds_[b] & holds_[c] & kFaces; }
+
+    /// Whether turning the edge that the corner faces widens the smallest angle and leaves the surface as it is.
+    [[nodiscard]] bool worth_flipping(std::uint32_t corner) const {
+        const std::uint32_t across = table_.opposite(corner);
+        if (across == CornerTable::kNone) return false;
+        const std::uint32_t a = table_.vertex(CornerTable::next(corner)), b = table_.vertex(CornerTable::previous(corner));
+        const std::uint32_t v = table_.vertex(corner), w = table_.vertex(across);
+        const Vec3 pa = at(a), pb = at(b), pv = at(v), pw = at(w);
+        const double now = std::max(worst_cosine(pv, pa, pb), worst_cosine(pw, pb, pa));
+        if (!(std::max(worst_cosine(pv, pa, pw), worst_cosine(pw, pb, pv)) < now - kGain)) return false;
+        const Vec3 was[2] = {area_normal(pv, pa, pb), area_normal(pw, pb, pa)};
+        const Vec3 is[2] = {area_normal(pv, pa, pw), area_normal(pw, pb, pv)};
+        for (const Vec3& m : was)
+            for (const Vec3& n : is)
+                if (!(dot(m, n) > kSmooth * length(m) * length(n))) return false;
+        const unsigned face = face_of(v, a, b);
+        if (face_of(w, b, a) != face || face_of(v, a, w) != face || face_of(w, b, v) != face) return false;
+        if (face != 0) return table_.can_flip(corner);
+        const Level& level = levels_.local();
+        const double off = std::abs(level.sample(plus(pv, 0.5, minus(pw, pv))).value);
+        if (off > kOffLevel * level.voxel_size() && off > std::abs(level.sample(plus(pa, 0.5, minus(pb, pa))).value)) return false;
+        if (tolerance_ > 0 && (is_off(pv, pa, pw, 0) || is_off(pw, pb, pv, 0))) return false;
+        return table_.can_flip(corner);
+    }
+
+    struct Flip {
+        std::uint32_t corner, across;  ///< that faced the edge
+    };
+
+    /// @return the edges turned, in this order
+    std::vector<Flip> flip_edges() {
+        std::vector<std::uint8_t> wanted(3 * scope_.size(), 0);
+        const auto corner = [&](std::size_t n) { return 3 * scope_[n / 3] + std::uint32_t(n % 3); };
+        tbb::parallel_for(std::size_t(0), wanted.size(), [&](std::size_t n) {
+            const std::uint32_t c = corner(n), across = table_.opposite(c);
+            wanted[n] = across != CornerTable::kNone && c < across && worth_flipping(c);
+        });
+        std::deque<std::uint32_t> queue;
+        for (std::size_t n = 0; n < wanted.size(); ++n)
+            if (wanted[n] != 0) queue.push_back(corner(n));
+        std::vector<Flip> turned;
+        for (; !queue.empty(); queue.pop_front()) {
+            const std::uint32_t c = queue.front();
+            if (!worth_flipping(c)) continue;
+            const std::uint32_t o = table_.opposite(c);
+            table_.flip(c);
+            turned.push_back({c, o});
+            for (const std::uint32_t side : {c, CornerTable::previous(c), o, CornerTable::previous(o)}) queue.push_back(side);
+        }
+        return turned;
+    }
+
+    /// Undoes the flips that made these triangles, with all flips that they depend on. @return the triangles changed
+    std::vector<std::uint32_t> undo_flips(const std::vector<std::uint32_t>& some, std::vector<Flip>& turned) {
+        std::vector<std::uint8_t> dirty(mesh_.triangles.size(), 0);
+        for (const std::uint32_t t : some) dirty[t] = 1;
+        for (bool grown = true; grown;) {  // whole chains of flips that share triangles
+            grown = false;
+            for (const Flip& flip : turned) {
+                std::uint8_t &s = dirty[flip.corner / 3], &t = dirty[flip.across / 3];
+                grown = grown || s != t;
+                s = t = s | t;
+            }
+        }
+        std::vector<std::uint32_t> changed;
+        for (std::size_t n = turned.size(); n-- > 0;) {
+            if (dirty[turned[n].corner / 3] == 0) continue;
+            table_.unflip(turned[n].corner);
+            changed.push_back(turned[n].corner / 3);
+            changed.push_back(turned[n].across / 3);
+        }
+        std::erase_if(turned, [&](const Flip& flip) { return dirty[flip.corner / 3] != 0; });
+        return changed;
+    }
+
+    /// Where the middle of a vertex's neighbours would have it.
+    [[nodiscard]] Position moved(std::uint32_t v) const {
+        const Position& here = mesh_.vertices[v];
+        if (holds_[v] & (kFixed | kChamfer)) return here;
+        Vec3 sum{}, normal{};
+        int count = 0;
+        table_.around(v, [&](std::uint32_t c) {
+            const Vec3 next = at(table_.vertex(CornerTable::next(c)));
+            sum = plus(sum, 1, next);
+            normal = plus(normal, 1, area_normal(to_vec3(here), next, at(table_.vertex(CornerTable::previous(c)))));
+            ++count;
+        });
+        const Vec3 p = to_vec3(here);
+        Vec3 step = plus(Vec3{}, kStep, minus(plus(Vec3{}, 1.0 / count, sum), p));
+        const unsigned held = holds_[v] & kFaces;
+        for (int a = 0; a < 3; ++a)
+            if (held >> a & 1) step[a] = normal[a] = 0;
+        if (!(holds_[v] & kOnLevel)) return to_position(plus(p, 1, step));
+        const double size = dot(normal, normal);
+        if (!(size > 0)) return here;
+        step = plus(step, -dot(step, normal) / size, normal);
+        const Vec3 goal = plus(p, 1, step);
+        const std::optional<Vec3> found = levels_.local().project(goal, held);
+        const double slack = 1e-3 * levels_.local().voxel_size();
+        if (!found || length(minus(*found, goal)) > kDrop * length(step) + slack) return here;
+        Position there = to_position(*found);
+        for (int a = 0; a < 3; ++a)
+            if (held >> a & 1) there[a] = here[a];
+        return there;
+    }
+
+    /// Whether a move turns the triangle over, or moves it off the surface.
+    [[nodiscard]] bool spoilt(const Triangle& t, const Positions& before, const Positions& after) const {
+        if (is_turned(t, before, after, kSameSide)) return true;
+        return tolerance_ > 0 && has_moved(t, before, after) && is_off(to_vec3(after[t[0]]), to_vec3(after[t[1]]), to_vec3(after[t[2]]), face_of(t[0], t[1], t[2]));
+    }
+    /// Whether a triangle lies farther off the surface than it may; of one on a face of the clip no.
+    [[nodiscard]] bool is_off(const Vec3& a, const Vec3& b, const Vec3& c, unsigned face) const {
+        return face == 0 && levels_.local().is_farther(a, b, c, tolerance_);
+    }
+
+    /// One step of the chosen vertices at once; those of a triangle that it would turn over stay.
+    void move() {
+        Positions next = mesh_.vertices;
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices_.size(), 512), [&](const auto& range) {
+            for (std::size_t n = range.begin(); n < range.end(); ++n) next[vertices_[n]] = moved(vertices_[n]);
+        });
+        const auto bad = [&](std::uint32_t t) { return spoilt(mesh_.triangles[t], mesh_.vertices, next); };
+        restore_all(table_, those(scope_, bad), mesh_.vertices, next, bad);
+        mesh_.vertices.swap(next);
+    }
+
+    /// Moves vertices back to `before`, and undoes flips, until no triangles touch that did not before.
+    void take_back(const Positions& before, std::vector<Flip>& turned) {
+        finder_.update();
+        const bool all = 20 * scope_.size() > mesh_.triangles.size();  // cheaper then
+        std::vector<ContactFinder::Pair> contacts = all ? finder_.contacts(table_.is_closed()) : finder_.contacts_of(touched(turned));
+        while (!contacts.empty()) {
+            std::vector<std::uint32_t> moved, still;
+            for (const auto& [s, t] : contacts) {
+                const bool any_moved = has_moved(mesh_.triangles[s], before, mesh_.vertices) || has_moved(mesh_.triangles[t], before, mesh_.vertices);
+                for (const std::uint32_t n : {s, t}) (any_moved ? moved : still).push_back(n);
+            }
+            std::vector<std::uint32_t> changed = undo_flips(still, turned);
+            moved.insert(moved.end(), changed.begin(), changed.end());
+            const std::vector<std::uint32_t> more = restore_all(table_, moved, before, mesh_.vertices, [&](std::uint32_t t) {
+                return spoilt(mesh_.triangles[t], before, mesh_.vertices);
+            });
+            changed.insert(changed.end(), more.begin(), more.end());
+            finder_.update();
+            contacts = finder_.contacts_of(changed);
+        }
+    }
+    /// The chosen triangles, and those of flips.
+    [[nodiscard]] std::vector<std::uint32_t> touched(const std::vector<Flip>& turned) const {
+        std::vector<std::uint32_t> all = scope_;
+        for (const Flip& flip : turned) {
+            all.push_back(flip.corner / 3);
+            all.push_back(flip.across / 3);
+        }
+        std::sort(all.begin(), all.end());
+        all.erase(std::unique(all.begin(), all.end()), all.end());
+        return all;
+    }
+
+    /// Draws the shortest sides of slivers together: those that moves cannot widen, for they stand on an edge of the solid that
+    /// is narrower than a triangle. @return how many
+    std::size_t collapse_slivers() {
+        finder_.update();
+        std::deque<std::uint32_t> queue;
+        for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
+            if (is_sliver(t)) queue.push_back(t);
+        std::size_t count = 0;
+        for (; !queue.empty(); queue.pop_front()) {
+            const std::uint32_t t = queue.front();
+            if (!is_sliver(t)) continue;
+            const std::uint32_t corner = shortest_side(t), a = table_.vertex(CornerTable::next(corner));
+            if (!try_collapse(corner)) continue;
+            ++count;
+            table_.around(a, [&](std::uint32_t c) { queue.push_back(c / 3); });
+        }
+        return count;
+    }
+
+    [[nodiscard]] bool is_worse(std::uint32_t t, double cosine) const {
+        if (table_.is_gone(t)) return false;
+        const Triangle& v = mesh_.triangles[t];
+        return worst_cosine(at(v[0]), at(v[1]), at(v[2])) > cosine;
+    }
+    [[nodiscard]] bool is_sliver(std::uint32_t t) const { return is_worse(t, kSliver); }
+
+    /// The corner that faces it.
+    [[nodiscard]] std::uint32_t shortest_side(std::uint32_t t) const {
+        std::uint32_t best = 3 * t;
+        double least = std::numeric_limits<double>::max();
+        for (std::uint32_t c = 3 * t; c < 3 * t + 3; ++c) {
+            const double size = length(minus(at(table_.vertex(CornerTable::next(c))), at(table_.vertex(CornerTable::previous(c)))));
+            if (size >= least) continue;
+            least = size;
+            best = c;
+        }
+        return best;
+    }
+
+    /// Where an edge's ends can meet: half-way on what both lie on, or at the end that lies on all that the other does.
+    [[nodiscard]] std::vector<Position> meeting_points(std::uint32_t a, std::uint32_t b) const {
+        const Level& level = levels_.local();
+        const unsigned all = holds_[a] | holds_[b];
+        const Position &pa = mesh_.vertices[a], &pb = mesh_.vertices[b];
+        std::vector<Position> points;
+        if ((all & kFixed) || length(minus(to_vec3(pa), to_vec3(pb))) > kShort * level.voxel_size()) return points;
+        Position goal;
+        for (int k = 0; k < 3; ++k) goal[k] = holds_[a] >> k & 1 ? pa[k] : holds_[b] >> k & 1 ? pb[k] : 0.5F * (pa[k] + pb[k]);
+        if ((all & kChamfer) || (holds_[a] == holds_[b] && !(all & kOnLevel))) points.push_back(goal);
+        else if (holds_[a] == holds_[b]) {
+            const auto found = level.project(to_vec3(goal), all & kFaces);
+            if (found && length(minus(*found, to_vec3(goal))) < kOffLevel * level.voxel_size()) points.push_back(to_position(*found));
+            for (int k = 0; k < 3 && !points.empty(); ++k)
+                if (all >> k & 1) points.back()[k] = goal[k];
+        }
+        if (!(all & kChamfer))
+            for (const std::uint32_t v : {a, b})
+                if (holds_[v] == all) points.push_back(mesh_.vertices[v]);
+        return points;
+    }
+
+    bool try_collapse(std::uint32_t corner) {
+        EdgeCollapser edge(table_, mesh_.vertices, finder_);
+        if (!edge.look(corner)) return false;
+        const std::uint32_t a = edge.kept(), b = edge.lost();
+        for (const Position& there : meeting_points(a, b)) {
+            int slivers = int(is_sliver(edge.going()[0])) + int(is_sliver(edge.going()[1]));
+            bool worse = false;
+            for (const EdgeCollapser::Left& t : edge.left()) {
+                const Vec3 next = at(t.next), previous = at(t.previous), p = to_vec3(there);
+                const Vec3 was = area_normal(at(t.mover), next, previous), is = area_normal(p, next, previous);
+                const bool was_sliver = is_sliver(t.number), sliver = worst_cosine(p, next, previous) > kSliver;
+                slivers += int(was_sliver) - int(sliver);
+                worse = worse || (tolerance_ > 0 && is_off(p, next, previous, holds_[t.mover] & holds_[t.next] & holds_[t.previous] & kFaces));
+                worse = worse || (sliver && !was_sliver) || !(dot(was, is) > (was_sliver ? 0.0 : kSameSide) * length(was) * length(is));
+            }
+            if (worse || slivers <= 0 || !edge.collapse(there)) continue;
+            holds_[a] |= holds_[b];
+            return true;
+        }
+        return false;
+    }
+
+    TriangleMesh& mesh_;
+    CornerTable table_;
+    ContactFinder finder_;
+    mutable tbb::enumerable_thread_specific<Level> levels_;
+    std::vector<std::uint8_t> holds_;
+    std::vector<std::uint32_t> vertices_, scope_;  // chosen: to be moved, and the triangles around them, sorted
+    const double tolerance_;  // voxels; 0: none
+    const RunContext& run_;
+};
+
+}  // namespace
+}  // namespace meshing
+
+std::string RelaxOptions::why_invalid() const {
+    std::string why;
+    if (!std::isfinite(isovalue)) why += "isovalue: expected a finite number, got " + std::to_string(isovalue) + "\n";
+    if (rounds < 0) why += "rounds: expected >= 0, got " + std::to_string(rounds) + "\n";
+    if (!(tolerance >= 0)) why += "tolerance: expected >= 0, got " + std::to_string(tolerance) + "\n";
+    return why;
+}
+
+RelaxReport relax_mesh(TriangleMesh& mesh, const FloatGrid& level_set, const RelaxOptions& options, const RunContext& run) {
+    if (const std::string why = options.why_invalid(); !why.empty()) throw Error(Errc::InvalidOptions, "relax_mesh: " + why);
+    RelaxReport report;
+    if (mesh.empty()) return report;
+    with_threads(run, [&] {
+        report.smallest_angle_before = smallest_angle(mesh);
+        const meshing::Surface surface(level_set, options.isovalue);
+        meshing::Relaxer(mesh, surface, options.tolerance, run).relax(options.rounds, report);
+        meshing::remove_gone(mesh.triangles, mesh.vertices);
+        report.triangles = std::int64_t(mesh.triangles.size());
+        report.smallest_angle = smallest_angle(mesh);
+        report.deviation = surface.deviation(mesh);
+    });
+    return report;
+}
+
+MeshDeviation deviation_from(const FloatGrid& level_set, const TriangleMesh& mesh, double isovalue, const RunContext& run) {
+    MeshDeviation deviation;
+    with_threads(run, [&] { deviation = meshing::Surface(level_set, isovalue).deviation(mesh); });
+    return deviation;
+}
+
+}  // namespace covol
