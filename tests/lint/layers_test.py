@@ -15,7 +15,7 @@ LAYERS = [
     ["distance", "edge", "scan_noise", "orientation"],
     ["band", "evolve"],
     ["guess", "guess_correction"],
-    ["surface", "mesh_cleanup", "cloud_cleanup", "compare"],
+    ["surface", "mesh_relax", "mesh_cleanup", "cloud_cleanup", "compare"],
     ["structures", "evidence", "guidance", "cloud_surface", "holes"],
     ["pipeline", "phantom", "render"],
 ]
@@ -24,7 +24,7 @@ LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 SOURCE_LEVEL = {"contour_solid": LEVEL["contours"], "points_check": LEVEL["points"], "image_sampling": LEVEL["image"], "image_statistics": LEVEL["image"], "image_write": LEVEL["image"],
                 "outline": LEVEL["painted"], "segments": LEVEL["painted"], "start_from_seeds": LEVEL["band"],
                 "tag_distance": LEVEL["band"], "start": LEVEL["band"], "surface_mesh": LEVEL["surface"],
-                "mesh_distance": LEVEL["surface"], "clipped": LEVEL["clip"], "open_ends": LEVEL["clip"],
+                "mesh_distance": LEVEL["surface"], "triangle": LEVEL["mesh"], "corner_table": LEVEL["mesh"], "contacts": LEVEL["mesh"], "edge_collapser": LEVEL["mesh"], "safe_moves": LEVEL["mesh"], "decimate": LEVEL["surface"], "level": LEVEL["surface"], "relax": LEVEL["surface"], "clipped": LEVEL["clip"], "open_ends": LEVEL["clip"],
                 "grow": LEVEL["band"], "cloud_scale": LEVEL["orientation"], "winding_field": LEVEL["orientation"],
                 "point_cells": LEVEL["orientation"], "neighbours": LEVEL["orientation"], "local_fit": LEVEL["orientation"],
                 "stray": LEVEL["orientation"],
