@@ -1,5 +1,6 @@
 # Everything covol builds on; all of it from Debian packages, listed in tests/install_packages.sh.
 include(CovolOpenVDB)
+find_package(OpenMesh CONFIG REQUIRED)
 find_package(CGAL 5.5 CONFIG REQUIRED)
 find_package(Eigen3 CONFIG REQUIRED)
 find_package(ITK 5.2 CONFIG REQUIRED COMPONENTS

@@ -9,7 +9,7 @@ packages=(
   # grids, parallelism
   libopenvdb-dev libtbb-dev libimath-dev libblosc-dev zlib1g-dev libboost-dev
   # meshes, geometry
-  libcgal-dev libeigen3-dev liblbfgs-dev libgmp-dev libmpfr-dev
+  libopenmesh-dev libcgal-dev libeigen3-dev liblbfgs-dev libgmp-dev libmpfr-dev
   # images
   libinsighttoolkit5-dev libtiff-dev libpng-dev
   # command line, reports

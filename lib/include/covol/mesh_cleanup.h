@@ -29,7 +29,7 @@ struct CleanupReport {
     bool closed = false, manifold = false, intersection_free = false;  ///< afterwards
     std::optional<CleanupStep> decimation, smoothing;
 };
-/// Makes a mesh closed, manifold, outward and free of self-intersections, in place (CGAL). Decimation and smoothing leave
+/// Makes a mesh closed, manifold, outward and free of self-intersections, in place (CGAL, OpenMesh). Decimation and smoothing leave
 /// vertices where they are whose move would let triangles touch.
 /// @throws Error InvalidOptions, InvalidInput (a mesh that is not manifold, and is to be decimated without repair).
 CleanupReport clean_mesh(TriangleMesh& mesh, const CleanupOptions& options = {}, const RunContext& run = {});

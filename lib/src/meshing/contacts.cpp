@@ -310,4 +310,30 @@ std::vector<ContactFinder::Pair> ContactFinder::contacts_of(const std::vector<st
     return gathered(found);
 }
 
+bool ContactFinder::would_touch(const std::vector<Change>& changed, const std::array<std::uint32_t, 2>& gone) const {
+    const auto apart = [&](const Triangle& s, const Triangle& t) { return are_apart(*positions_, s, t); };
+    for (std::size_t n = 0; n < changed.size(); ++n)
+        for (std::size_t m = n + 1; m < changed.size(); ++m)
+            if (!apart(changed[n].corners, changed[m].corners)) return true;
+    const auto stays = [&](std::uint32_t t) {
+        return (*triangles_)[t][0] < positions_->size() && t != gone[0] && t != gone[1] &&
+               std::none_of(changed.begin(), changed.end(), [&](const Change& change) { return change.number == t; });
+    };
+    for (const Change& change : changed) {
+        bool touching = false;
+        near(change.corners, [&](std::uint32_t t) { touching = touching || (stays(t) && !apart(change.corners, (*triangles_)[t])); });
+        if (touching) return true;
+    }
+    return false;
+}
+
+bool ContactFinder::look_along_sheet(const std::vector<Change>& changed, const Position& around) const {
+    constexpr double kAlong = 0.3;  // cosine
+    const Vec3 direction = single_sheet(around);
+    return dot(direction, direction) > 0 && std::all_of(changed.begin(), changed.end(), [&](const Change& change) {
+        const Vec3 n = area_normal(*positions_, change.corners);
+        return dot(n, direction) > kAlong * length(n);
+    });
+}
+
 }  // namespace covol::meshing

@@ -1,5 +1,6 @@
 #pragma once
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -42,6 +43,17 @@ public:
     [[nodiscard]] Vec3 single_sheet(const Position& p) const;
     /// Once one triangle, not yet in this place, or its corners have changed: much cheaper than update().
     void grow(std::uint32_t triangle);
+
+    /// A triangle as it would be.
+    struct Change {
+        std::uint32_t number;
+        Triangle corners;
+    };
+    /// Whether, once these have changed and two others are gone, one of them would touch another triangle.
+    [[nodiscard]] bool would_touch(const std::vector<Change>& changed, const std::array<std::uint32_t, 2>& gone) const;
+    /// Whether there is a single sheet around a point, as the last find_single_sheets() has found it, and these look its way.
+    [[nodiscard]] bool look_along_sheet(const std::vector<Change>& changed, const Position& around) const;
+
     /// Calls visit(number) for the triangles whose boxes may meet that of a triangle with these corners, which need not be in the mesh.
     template <typename Visit>
     void near(const Triangle& t, const Visit& visit) const {

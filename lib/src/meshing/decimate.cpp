@@ -1,289 +1,287 @@
 #include "meshing/decimate.h"
 
-#include <tbb/parallel_for.h>
+#include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
+#include <OpenMesh/Tools/Decimater/DecimaterT.hh>
+#include <OpenMesh/Tools/Decimater/ModQuadricT.hh>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <optional>
 
+#include "covol/error.h"
 #include "meshing/contacts.h"
 #include "meshing/corner_table.h"
-#include "meshing/edge_collapser.h"
 
 namespace covol::meshing {
 namespace {
 
-constexpr double kRoundness = 1e-3;  // weight of the distance from an edge's middle against that from the planes
-constexpr double kTurn = 0.5;        // cosine: a triangle may not turn farther
-/// Cosines of angles, 23, 14 and 6 degrees: no triangle with a smaller one, but where one was; the next once nothing else is left.
-constexpr double kNeedles[] = {0.92, 0.97, 0.995};
-constexpr double kNearMiddle = 1.0;  // lengths of the edge: the point of least error is no good farther from its middle
+/// Weight of an edge's length, to the fourth power, against squared distances from planes times areas.
+constexpr double kRoundness = 3e-3;
+constexpr double kTurn = 0.5;  // cosine: a triangle may not turn farther
+/// Collapses that make a triangle with a smaller angle than that of the cosine, 23, 14 and 6 degrees, and than there was, cost so
+/// many times as much.
+struct Needle {
+    double cosine;
+    float factor;
+};
+constexpr Needle kNeedles[] = {{0.92, 10}, {0.97, 100}, {0.995, std::numeric_limits<float>::infinity()}};
+constexpr double kAdaptiveNeedle = 0.945;  // 19 degrees: with a tolerance the goal is good triangles, not few, and none may have less
+constexpr int kPasses = 3;                 // a collapse that was in another's way is asked for again in the next
 
-/// The sum of squared distances to planes, weighted: x A x - 2 b x + c.
-struct Quadric {
-    double a[6]{}, b[3]{}, c = 0;  ///< A: xx, xy, xz, yy, yz, zz
-
-    void add_plane(const Vec3& n, double offset, double weight) {
-        const double products[6] = {n[0] * n[0], n[0] * n[1], n[0] * n[2], n[1] * n[1], n[1] * n[2], n[2] * n[2]};
-        for (int k = 0; k < 6; ++k) a[k] += weight * products[k];
-        for (int k = 0; k < 3; ++k) b[k] += weight * offset * n[k];
-        c += weight * offset * offset;
-    }
-    void add_point(const Vec3& p, double weight) {
-        for (const int k : {0, 3, 5}) a[k] += weight;
-        for (int k = 0; k < 3; ++k) b[k] += weight * p[k];
-        c += weight * dot(p, p);
-    }
-    void add(const Quadric& other) {
-        for (int k = 0; k < 6; ++k) a[k] += other.a[k];
-        for (int k = 0; k < 3; ++k) b[k] += other.b[k];
-        c += other.c;
-    }
-    /// Twice the areas that it weighs.
-    [[nodiscard]] double trace() const { return a[0] + a[3] + a[5]; }
-    [[nodiscard]] double at(const Vec3& p) const {
-        const Vec3 ap{a[0] * p[0] + a[1] * p[1] + a[2] * p[2], a[1] * p[0] + a[3] * p[1] + a[4] * p[2], a[2] * p[0] + a[4] * p[1] + a[5] * p[2]};
-        return dot(ap, p) - 2 * (b[0] * p[0] + b[1] * p[1] + b[2] * p[2]) + c;
-    }
-    /// Of the coordinates that are not held.
-    [[nodiscard]] std::optional<Vec3> minimum(const Vec3& start, unsigned held) const {
-        double m[3][4] = {{a[0], a[1], a[2], b[0]}, {a[1], a[3], a[4], b[1]}, {a[2], a[4], a[5], b[2]}};
-        for (int k = 0; k < 3; ++k)
-            if (held >> k & 1) {
-                for (double& x : m[k]) x = 0;
-                m[k][k] = 1;
-                m[k][3] = start[k];
-            }
-        for (int i = 0; i < 3; ++i) {
-            int pivot = i;
-            for (int r = i + 1; r < 3; ++r)
-                if (std::abs(m[r][i]) > std::abs(m[pivot][i])) pivot = r;
-            std::swap(m[i], m[pivot]);
-            if (!(std::abs(m[i][i]) > 1e-12 * trace())) return {};
-            for (int r = i + 1; r < 3; ++r) {
-                const double f = m[r][i] / m[i][i];
-                for (int k = i; k < 4; ++k) m[r][k] -= f * m[i][k];
-            }
-        }
-        Vec3 x;
-        for (int i = 2; i >= 0; --i) {
-            double sum = m[i][3];
-            for (int k = i + 1; k < 3; ++k) sum -= m[i][k] * x[k];
-            x[i] = sum / m[i][i];
-        }
-        return x;
-    }
+struct Traits : OpenMesh::DefaultTraitsDouble {
+    VertexAttributes(OpenMesh::Attributes::Status);
+    EdgeAttributes(OpenMesh::Attributes::Status);
+    HalfedgeAttributes(OpenMesh::Attributes::PrevHalfedge);
+    FaceAttributes(OpenMesh::Attributes::Status);
 };
 
-struct Edge {
-    float cost;  ///< >= 0
-    std::uint32_t a, b, stamp;
-};
-
-/// Edges by their cost, to three percent: by a float's exponent and the first bits after it. Those alike come as they went in.
-class CheapestFirst {
+/// The decimater asks is_collapse_ok() of each edge before it looks at its priority, and again right before it collapses the edge.
+class HalfEdges : public OpenMesh::TriMesh_ArrayKernelT<Traits> {
 public:
-    CheapestFirst() : buckets_(std::size_t(1) << (31 - kDropped)), taken_(buckets_.size(), 0), lowest_(buckets_.size()) {}
-    void push(const Edge& edge) {
-        const std::size_t bucket = std::bit_cast<std::uint32_t>(edge.cost) >> kDropped;
-        buckets_[bucket].push_back(edge);
-        lowest_ = std::min(lowest_, bucket);
-    }
-    [[nodiscard]] std::optional<Edge> pop() {
-        for (; lowest_ < buckets_.size(); ++lowest_) {
-            if (taken_[lowest_] < buckets_[lowest_].size()) return buckets_[lowest_][taken_[lowest_]++];
-            buckets_[lowest_].clear();
-            taken_[lowest_] = 0;
-        }
-        return {};
-    }
-
-private:
-    static constexpr int kDropped = 18;
-    std::vector<std::vector<Edge>> buckets_;
-    std::vector<std::size_t> taken_;
-    std::size_t lowest_;
+    std::function<bool(HalfedgeHandle)> is_chosen;
+    bool is_collapse_ok(HalfedgeHandle edge) { return is_chosen(edge); }
+    bool keeps_topology(HalfedgeHandle edge) { return OpenMesh::TriMesh_ArrayKernelT<Traits>::is_collapse_ok(edge); }
 };
 
-class Decimater {
+/// Faces and vertices have the numbers of the triangles and vertices until the garbage is collected, which we never do.
+void build(HalfEdges& edges, const TriangleMesh& mesh) {
+    // Quadrics are differences of squares, and costs go with the fourth power of the size, in single precision: near 0, of about 1.
+    const Vec3 middle = to_vec3(mesh.vertices[mesh.triangles.front()[0]]);
+    double area = 0;
+    for (const Triangle& t : mesh.triangles) area += length(area_normal(mesh.vertices, t)) / double(mesh.triangles.size());
+    const double scale = area > 0 ? 1 / std::sqrt(area) : 1.0;
+    edges.reserve(mesh.vertices.size(), 3 * mesh.triangles.size() / 2, mesh.triangles.size());
+    for (const Position& v : mesh.vertices) {
+        const Vec3 p = minus(to_vec3(v), middle);
+        edges.add_vertex({scale * p[0], scale * p[1], scale * p[2]});
+    }
+    for (const Triangle& t : mesh.triangles) {
+        const auto corner = [&](int k) { return HalfEdges::VertexHandle(int(t[std::size_t(k)])); };
+        if (!edges.add_face(corner(0), corner(1), corner(2)).is_valid())
+            throw Error(Errc::InvalidInput, "decimate: expected a manifold mesh; repair it first");
+    }
+}
+
+/// What decides on collapses: OpenMesh's quadrics, the shorter edges first of those that cost the same, and no collapse that would
+/// let a vertex leave a face of a clip, turn a triangle, make a needle of it, move it off the level set or let it touch another.
+class SafeQuadric : public OpenMesh::Decimater::ModQuadricT<HalfEdges> {
 public:
-    Decimater(TriangleMesh& mesh, const Surface* surface, const DecimateGoal& goal)
-        : mesh_(mesh), table_(mesh.triangles, mesh.vertices.size()), finder_(mesh.vertices, mesh.triangles),
-          edge_(table_, mesh.vertices, finder_), goal_(goal), stamps_(mesh.vertices.size(), 0) {
+    using Quadric = OpenMesh::Decimater::ModQuadricT<HalfEdges>;
+    using Handle = OpenMesh::Decimater::ModHandleT<SafeQuadric>;
+    using CollapseInfo = Quadric::CollapseInfo;
+    explicit SafeQuadric(HalfEdges& mesh) : Quadric(mesh) {}
+    DECIMATER_MODNAME(SafeQuadric)
+
+    /// @param trust  whether it is enough, where the finder has found a single sheet, that triangles look its way.
+    void begin(TriangleMesh& mesh, const CornerTable& table, const Surface* surface, const DecimateGoal& goal, bool trust, const RunContext& run) {
+        mesh_ = &mesh;
+        goal_ = goal;
+        run_ = &run;
         if (surface != nullptr) {
             level_.emplace(surface->level());
-            holds_ = holds_of(table_, mesh.vertices, *level_);
+            holds_ = holds_of(table, mesh.vertices, *level_);
         } else {
             holds_.assign(mesh.vertices.size(), kOnLevel);
             for (std::uint32_t v = 0; v < holds_.size(); ++v)
-                if (table_.corner_of(v) == CornerTable::kNone || table_.is_boundary(v)) holds_[v] |= kFixed;
+                if (table.corner_of(v) == CornerTable::kNone || table.is_boundary(v)) holds_[v] |= kFixed;
         }
+        finder_.emplace(mesh.vertices, mesh.triangles);
+        trust_ = trust && table.is_closed();
+        if (trust_) finder_->find_single_sheets();
+        left_ = refreshed_ = mesh.triangles.size();
+        cost_.assign(mesh.vertices.size(), 0);
+        careful_.assign(mesh.vertices.size(), 0);
+        this->mesh().is_chosen = [this](HalfEdges::HalfedgeHandle edge) { return is_chosen(edge); };
     }
 
-    /// @param trust  see EdgeCollapser::collapse(). @return whether no triangles touch afterwards, known where `trust`
-    bool run(bool trust, const RunContext& run) {
-        trust = trust && table_.is_closed();
-        if (trust) finder_.find_single_sheets();
-        gather_quadrics();
-        left_ = refreshed_ = mesh_.triangles.size();
-        for (const double needle : kNeedles) {
-            needle_ = needle;
-            // With a tolerance the goal is good triangles, not few.
-            if (left_ <= goal_.triangles || (goal_.tolerance > 0 && needle != kNeedles[0])) break;
-            fill_queue();
-            collapse_in_order(trust, run);
+    /// Before each call of decimate(), which asks for all vertices.
+    void begin_pass() {
+        chosen_.assign(mesh_->vertices.size(), HalfEdges::HalfedgeHandle());
+        asked_ = kNobody;
+    }
+    [[nodiscard]] std::size_t left() const { return left_; }
+
+    /// @return whether no triangles touch, where the checks have trusted single sheets
+    [[nodiscard]] bool is_free() {
+        if (!trust_) return true;
+        finder_->rebuild();
+        return finder_->contacts(true).empty();
+    }
+
+    /// Of the chosen collapse.
+    float collapse_priority(const CollapseInfo& edge) override { return cost_[number(edge.v0)]; }
+
+    void preprocess_collapse(const CollapseInfo& edge) override {
+        gather(edge.v0v1);
+        for (const auto v : mesh().vv_range(edge.v0)) chosen_[number(v)].invalidate();  // will be asked for anew
+    }
+
+    void postprocess_collapse(const CollapseInfo& edge) override {
+        Quadric::postprocess_collapse(edge);
+        for (const std::uint32_t t : gone_) mesh_->triangles[t].fill(CornerTable::kNone);
+        for (const ContactFinder::Change& change : changed_) {
+            mesh_->triangles[change.number] = change.corners;
+            finder_->grow(change.number);
         }
-        if (!trust) return true;
-        finder_.rebuild();
-        return finder_.contacts(true).empty();
+        asked_ = kNobody;
+        left_ -= gone_.size();
+        if (left_ >= refreshed_ / 2) return;
+        finder_->rebuild();  // boxes only grow
+        if (trust_) finder_->find_single_sheets();
+        refreshed_ = left_;
+        const auto all = double(mesh_->triangles.size());
+        run_->report("decimate", (all - double(left_)) / std::max(1.0, all - double(goal_.triangles)));
+        run_->check();
     }
 
 private:
-    void collapse_in_order(bool trust, const RunContext& run) {
-        const auto all = double(mesh_.triangles.size());
-        while (left_ > goal_.triangles) {
-            const std::optional<Edge> next = queue_.pop();
-            if (!next) return;
-            const Edge& entry = *next;
-            if (entry.stamp != stamps_[entry.a] + stamps_[entry.b]) continue;  // an end has moved since
-            const std::uint32_t corner = corner_facing(entry.a, entry.b);
-            if (corner == CornerTable::kNone || !collapse(corner, trust)) continue;
-            left_ -= 2;
-            if (left_ >= refreshed_ / 2) continue;
-            finder_.rebuild();  // boxes only grow
-            if (trust) finder_.find_single_sheets();
-            refreshed_ = left_;
-            run.report("decimate", (all - double(left_)) / std::max(1.0, all - double(goal_.triangles)));
-            run.check();
+    static constexpr std::uint32_t kNobody = CornerTable::kNone;
+    template <typename Handle>
+    static std::uint32_t number(Handle handle) {
+        return std::uint32_t(handle.idx());
+    }
+
+    /// The decimater asks for all edges that leave a vertex, one after the other, to queue the cheapest; and for that one again when
+    /// its turn has come.
+    bool is_chosen(HalfEdges::HalfedgeHandle edge) {
+        const auto lost = mesh().from_vertex_handle(edge);
+        const bool again = asked_ == number(lost);
+        if (chosen_[number(lost)] == edge && (!again || queued_)) return is_free_still(edge);
+        if (!again) {
+            asked_ = number(lost);
+            choose(lost);
+            queued_ = false;
+        }
+        queued_ = queued_ || chosen_[asked_] == edge;
+        return chosen_[asked_] == edge;
+    }
+
+    void choose(HalfEdges::VertexHandle vertex) {
+        const std::uint32_t lost = number(vertex);
+        chosen_[lost].invalidate();
+        if (holds_[lost] & (kFixed | kChamfer)) return;
+        candidates_.clear();
+        for (const auto edge : mesh().voh_range(vertex)) {
+            const CollapseInfo info(mesh(), edge);
+            const std::uint8_t kept = holds_[number(info.v1)];
+            if ((kept & (kFixed | kChamfer)) || (holds_[lost] & ~kept)) continue;
+            const double square = (info.p1 - info.p0).sqrnorm();
+            candidates_.push_back({std::max(0.0F, Quadric::collapse_priority(info)) + float(kRoundness * square * square), edge});
+        }
+        for (auto& [cost, edge] : candidates_) {
+            gather(edge);
+            cost *= shape_factor(lost);
+        }
+        std::sort(candidates_.begin(), candidates_.end());
+        for (const auto& [cost, edge] : candidates_) {
+            if (!std::isfinite(cost)) return;
+            gather(edge);
+            if (!mesh().keeps_topology(edge) || leaves_surface(lost) || (careful_[lost] && touches(edge))) continue;
+            chosen_[lost] = edge;
+            cost_[lost] = cost;
+            return;
         }
     }
 
-    [[nodiscard]] Vec3 at(std::uint32_t v) const { return minus(to_vec3(mesh_.vertices[v]), middle_); }
-
-    void gather_quadrics() {
-        middle_ = to_vec3(mesh_.vertices[mesh_.triangles.front()[0]]);
-        quadrics_.resize(mesh_.vertices.size());
-        tbb::parallel_for(std::uint32_t(0), std::uint32_t(quadrics_.size()), [&](std::uint32_t v) {
-            table_.around(v, [&](std::uint32_t c) {
-                const Triangle& t = mesh_.triangles[c / 3];
-                const Vec3 n = area_normal(at(t[0]), at(t[1]), at(t[2]));
-                const double size = length(n);
-                if (!(size > 0)) return;
-                const Vec3 unit{n[0] / size, n[1] / size, n[2] / size};
-                quadrics_[v].add_plane(unit, dot(unit, at(v)), size);
-            });
-        });
+    /// The neighbours' neighbours may have changed, and triangles that are not next to it come in its way; then this vertex is looked
+    /// at with more care next time, which most do not need.
+    bool is_free_still(HalfEdges::HalfedgeHandle edge) {
+        if (!mesh().keeps_topology(edge)) return false;
+        gather(edge);
+        const bool touching = touches(edge);
+        if (touching) careful_[number(mesh().from_vertex_handle(edge))] = 1;
+        return !touching;
     }
 
-    /// What an edge's ends have in common can move, and where to. None where they cannot meet.
-    struct Meeting {
-        Vec3 there;
-        double cost;
-    };
-    [[nodiscard]] std::optional<Meeting> meeting(std::uint32_t a, std::uint32_t b) const {
-        const unsigned all = holds_[a] | holds_[b];
-        if (all & (kFixed | kChamfer)) return {};
-        Quadric q = quadrics_[a];
-        q.add(quadrics_[b]);
-        const Vec3 pa = at(a), pb = at(b), half = plus(pa, 0.5, minus(pb, pa));
-        const double edge = length(minus(pb, pa));
-        q.add_point(half, kRoundness * q.trace());
-        if (holds_[a] != holds_[b]) {
-            if (holds_[a] != all && holds_[b] != all) return {};
-            const Vec3 end = holds_[a] == all ? pa : pb;
-            return Meeting{end, q.at(end)};
+    /// What a collapse makes of the triangles around the vertex that goes; the first corner is where that has gone to.
+    void gather(HalfEdges::HalfedgeHandle edge) {
+        const HalfEdges& edges = mesh();
+        const auto lost = edges.from_vertex_handle(edge), kept = edges.to_vertex_handle(edge);
+        gone_ = {number(edges.face_handle(edge)), number(edges.opposite_face_handle(edge))};
+        changed_.clear();
+        for (const auto side : edges.voh_range(lost)) {
+            const std::uint32_t t = number(edges.face_handle(side));
+            if (t == gone_[0] || t == gone_[1]) continue;
+            changed_.push_back({t, {number(kept), number(edges.to_vertex_handle(side)), number(edges.to_vertex_handle(edges.next_halfedge_handle(side)))}});
         }
-        Vec3 best = half;
-        if (const auto found = q.minimum(pa, all & kFaces); found && length(minus(*found, half)) < kNearMiddle * edge) best = *found;
-        for (int k = 0; k < 3; ++k)
-            if (all >> k & 1) best[k] = pa[k];
-        return Meeting{best, q.at(best)};
     }
 
-    [[nodiscard]] std::optional<Edge> edge_of(std::uint32_t a, std::uint32_t b) const {
-        const auto found = meeting(a, b);
-        if (!found) return {};
-        return Edge{float(std::max(0.0, found->cost)), a, b, stamps_[a] + stamps_[b]};
-    }
+    [[nodiscard]] Vec3 at(std::uint32_t v) const { return to_vec3(mesh_->vertices[v]); }
 
-    void fill_queue() {
-        std::vector<std::optional<Edge>> edges(3 * mesh_.triangles.size());
-        tbb::parallel_for(std::uint32_t(0), std::uint32_t(edges.size()), [&](std::uint32_t c) {
-            if (!table_.is_gone(c / 3) && table_.opposite(c) != CornerTable::kNone && c < table_.opposite(c))
-                edges[c] = edge_of(table_.vertex(CornerTable::next(c)), table_.vertex(CornerTable::previous(c)));
-        });
-        for (const auto& edge : edges)
-            if (edge) queue_.push(*edge);
-    }
-
-    [[nodiscard]] std::uint32_t corner_facing(std::uint32_t a, std::uint32_t b) const {
-        std::uint32_t found = CornerTable::kNone;
-        table_.around(a, [&](std::uint32_t c) {
-            if (table_.vertex(CornerTable::next(c)) == b) found = CornerTable::previous(c);
-        });
-        return found;
-    }
-
-    bool collapse(std::uint32_t corner, bool trust) {
-        if (!edge_.look(corner)) return false;
-        const std::uint32_t a = edge_.kept(), b = edge_.lost();
-        const auto found = meeting(a, b);
-        if (!found) return false;
-        Position there = to_position(plus(found->there, 1, middle_));
-        for (int k = 0; k < 3; ++k)
-            if ((holds_[a] | holds_[b]) >> k & 1) there[k] = mesh_.vertices[holds_[a] >> k & 1 ? a : b][k];
-        if (spoils(there) || !edge_.collapse(there, trust)) return false;
-        quadrics_[a].add(quadrics_[b]);
-        holds_[a] |= holds_[b];
-        ++stamps_[a];
-        ++stamps_[b];
-        table_.around(a, [&](std::uint32_t c) {
-            if (const auto edge = edge_of(a, table_.vertex(CornerTable::next(c)))) queue_.push(*edge);
-        });
-        return true;
-    }
-
-    /// Whether the collapse that is looked at would turn a triangle, make a needle of it, or move it off the surface.
-    [[nodiscard]] bool spoils(const Position& there) const {
-        const Vec3 p = to_vec3(there);
-        for (const EdgeCollapser::Left& t : edge_.left()) {
-            const Vec3 next = to_vec3(mesh_.vertices[t.next]), previous = to_vec3(mesh_.vertices[t.previous]), mover = to_vec3(mesh_.vertices[t.mover]);
-            const Vec3 was = area_normal(mover, next, previous), is = area_normal(p, next, previous);
-            if (!(dot(was, is) > kTurn * length(was) * length(is))) return true;
-            const double worst = worst_cosine(p, next, previous);
-            if (worst > needle_ && worst > worst_cosine(mover, next, previous)) return true;
+    /// How many times as dear the collapse is for the shapes that it makes: infinite if it turns a triangle.
+    [[nodiscard]] float shape_factor(std::uint32_t lost) const {
+        const Vec3 from = at(lost);
+        double worst = -1;
+        for (const auto& [triangle, t] : changed_) {
+            const Vec3 to = at(t[0]), next = at(t[1]), previous = at(t[2]);
+            const Vec3 was = area_normal(from, next, previous), is = area_normal(to, next, previous);
+            if (!(dot(was, is) > kTurn * length(was) * length(is))) return std::numeric_limits<float>::infinity();
+            const double now = worst_cosine(to, next, previous);
+            if (now > worst && now > kNeedles[0].cosine && now > worst_cosine(from, next, previous)) worst = now;
         }
-        if (!(goal_.tolerance > 0)) return false;
-        for (const EdgeCollapser::Left& t : edge_.left()) {
-            if (holds_[t.mover] & holds_[t.next] & holds_[t.previous] & kFaces) continue;
-            if (level_->is_farther(p, to_vec3(mesh_.vertices[t.next]), to_vec3(mesh_.vertices[t.previous]), goal_.tolerance)) return true;
-        }
-        return false;
+        float factor = 1;
+        for (const Needle& needle : kNeedles)
+            if (worst > needle.cosine) factor = needle.factor;
+        return goal_.tolerance > 0 && worst > kAdaptiveNeedle ? std::numeric_limits<float>::infinity() : factor;
     }
 
-    TriangleMesh& mesh_;
-    CornerTable table_;
-    ContactFinder finder_;
-    EdgeCollapser edge_;
-    const DecimateGoal goal_;
+    [[nodiscard]] bool leaves_surface(std::uint32_t lost) {
+        return goal_.tolerance > 0 && std::any_of(changed_.begin(), changed_.end(), [&](const ContactFinder::Change& change) {
+            const Triangle& t = change.corners;
+            return !(holds_[lost] & holds_[t[1]] & holds_[t[2]] & kFaces) && level_->is_farther(at(t[0]), at(t[1]), at(t[2]), goal_.tolerance);
+        });
+    }
+
+    [[nodiscard]] bool touches(HalfEdges::HalfedgeHandle edge) {
+        const Position& there = mesh_->vertices[number(mesh().to_vertex_handle(edge))];
+        return !(trust_ && finder_->look_along_sheet(changed_, there)) && finder_->would_touch(changed_, gone_);
+    }
+
+    TriangleMesh* mesh_ = nullptr;
+    DecimateGoal goal_;
+    const RunContext* run_ = nullptr;
+    std::optional<ContactFinder> finder_;
     std::optional<Level> level_;
-    Vec3 middle_{};  // near the mesh: quadrics are differences of squares
-    std::vector<Quadric> quadrics_;
     std::vector<std::uint8_t> holds_;
-    std::vector<std::uint32_t> stamps_;
-    CheapestFirst queue_;
+    bool trust_ = false;
     std::size_t left_ = 0, refreshed_ = 0;  // triangles: now, and when the finder was put in order
-    double needle_ = 1;
+    std::uint32_t asked_ = kNobody;         // the vertex whose edges the decimater asks for
+    bool queued_ = false;                   // whether it has had the chosen one
+    std::vector<HalfEdges::HalfedgeHandle> chosen_;  // that leaves each vertex; none where no collapse is possible
+    std::vector<float> cost_;                        // of that collapse
+    std::vector<std::pair<float, HalfEdges::HalfedgeHandle>> candidates_;
+    std::vector<std::uint8_t> careful_;              // whether the collapse chosen before had something in its way
+    std::vector<ContactFinder::Change> changed_;     // by the collapse that is looked at
+    std::array<std::uint32_t, 2> gone_{};
 };
+
+/// @return whether no triangles touch afterwards
+bool decimate(TriangleMesh& mesh, const Surface* surface, const DecimateGoal& goal, bool trust, const RunContext& run) {
+    const CornerTable table(mesh.triangles, mesh.vertices.size());  // OpenMesh would print what is wrong with a mesh
+    HalfEdges edges;
+    build(edges, mesh);
+    OpenMesh::Decimater::DecimaterT<HalfEdges> decimater(edges);
+    SafeQuadric::Handle handle;
+    decimater.add(handle);
+    SafeQuadric& decider = decimater.module(handle);
+    decider.begin(mesh, table, surface, goal, trust, run);
+    decimater.initialize();
+    for (int pass = 0; pass < kPasses && decider.left() > goal.triangles; ++pass) {
+        decider.begin_pass();
+        if (decimater.decimate((decider.left() - goal.triangles + 1) / 2) == 0) break;  // two triangles each
+    }
+    return decider.is_free();
+}
 
 }  // namespace
 
 void decimate(TriangleMesh& mesh, const Surface* surface, const DecimateGoal& goal, const RunContext& run) {
     if (mesh.triangles.size() <= goal.triangles) return;
     TriangleMesh work = mesh;
-    if (Decimater(work, surface, goal).run(true, run)) mesh = std::move(work);
-    else Decimater(mesh, surface, goal).run(false, run);  // each collapse is checked
+    if (decimate(work, surface, goal, true, run)) mesh = std::move(work);
+    else decimate(mesh, surface, goal, false, run);  // each collapse is checked
     remove_gone(mesh.triangles, mesh.vertices);
 }
 

@@ -30,13 +30,9 @@ public:
 
     /// Draws the edge together in a point unless a triangle would touch another that it does not share a corner with, or
     /// more of one that it does. @return whether it was. @pre look() was true, and nothing has changed since.
-    /// @param trust  whether it is enough, where find_single_sheets() has found a single sheet, that the triangles look its way.
-    bool collapse(const Position& there, bool trust = false);
+    bool collapse(const Position& there);
 
 private:
-    [[nodiscard]] bool touches() const;
-    [[nodiscard]] bool looks_along_sheet(const Position& there) const;
-
     CornerTable& table_;
     Positions& positions_;
     ContactFinder& finder_;
