@@ -5,6 +5,7 @@
 #include "commands.h"
 #include "covol/compare.h"
 #include "covol/error.h"
+#include "covol/mesh_relax.h"
 #include "covol/surface.h"
 #include "file_kind.h"
 #include "report.h"
@@ -55,9 +56,15 @@ struct CompareJob {
         session.say(text.str());
     }
 
+    /// Of a level set the mesh that the other commands write.
+    static TriangleMesh mesh_of(const FloatGrid& level_set, const RunContext& run) {
+        TriangleMesh mesh = extract_mesh(level_set, {}, run);
+        relax_mesh(mesh, level_set, {}, run);
+        return mesh;
+    }
     static TriangleMesh surface_of(const std::string& path, const RunContext& run) {
         switch (kind_of_file(path)) {
-            case FileKind::Vdb: return extract_mesh(*read_vdb_level_set(path, run), {}, run);
+            case FileKind::Vdb: return mesh_of(*read_vdb_level_set(path, run), run);
             case FileKind::Mesh: return read_mesh(path);
             default: break;
         }
