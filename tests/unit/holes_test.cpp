@@ -50,7 +50,7 @@ TriangleMesh sphere_mesh(int subdivisions) {
     return mesh;
 }
 
-double smallest_angle(const TriangleMesh& mesh) {
+double narrowest_angle(const TriangleMesh& mesh) {
     double least = kPi;
     for (const auto& t : mesh.triangles)
         for (int k = 0; k < 3; ++k) {
@@ -125,7 +125,7 @@ TEST_CASE("a cut parts the area where it should, and leaves no slivers") {
         const TriangleMesh part = holes::kept_part(cut);
         CHECK(measure(part).area == Approx(2 * kPi * (1 - level)).margin(0.004 * area));
         CHECK(measure(part).manifold);
-        CHECK(smallest_angle(part) > 8);
+        CHECK(narrowest_angle(part) > 8);
         const std::vector<BoundaryLoop> loops = boundary_loops(part);
         REQUIRE(loops.size() == 1);
         CHECK(loops[0].length == Approx(2 * kPi * std::sqrt(1 - level * level)).epsilon(0.01));
@@ -194,7 +194,7 @@ TEST_CASE("a sphere with holes is cut at the last points, whatever the draw") {
             CHECK(m.components == 1);
             CHECK(m.area == Approx(2 * kPi * (1 + level)).margin(rim * spacing));
             CHECK(open.report.share == Approx((1 - level) / 2).margin(rim * spacing / (4 * kPi)));
-            CHECK(smallest_angle(open.mesh) > 5);
+            CHECK(narrowest_angle(open.mesh) > 5);
             // Outward: away from the middle.
             std::size_t inward = 0;
             for (const auto& t : open.mesh.triangles) {
