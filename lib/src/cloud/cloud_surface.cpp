@@ -18,7 +18,6 @@
 #include "covol/evidence.h"
 #include "covol/mesh.h"
 #include "covol/surface.h"
-#include "detail/kd_tree.h"
 #include "detail/pieces.h"
 
 namespace covol {
@@ -232,14 +231,14 @@ struct TopologyOf {
     const std::vector<Vec3>& points;
     const RunContext& run;
 
-    void hold(FloatGridPtr& level_set, const Indicator& indicator, CloudReport& report) {
+    void hold(FloatGrid& level_set, const Indicator& indicator, CloudReport& report) {
         if (own <= 1) return;
-        const Domain domain = domain_of(*level_set);
+        const Domain domain = domain_of(level_set);
         const FloatGridPtr rough = level_set_of(Pieces({}, domain.voxel_size), indicator, domain, run);
         detail::drop_bare_pieces(*rough, points, least);
         const int simpler = complexity(*rough, run);
         if (simpler >= own) return;
-        report.held_voxels += cloud::hold_topology(*rough, *level_set);
+        report.held_voxels += cloud::hold_topology(*rough, level_set);
         own = simpler;
     }
 };
@@ -289,10 +288,10 @@ FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cl
         const auto least = std::size_t(std::max(kLeastResting, share * double(cloud.points.size())));
         report.dropped_pieces = detail::drop_bare_pieces(*result, cloud.points, least);
         TopologyOf topology{complexity(*result, run), least, cloud.points, run};
-        topology.hold(result, *orientation.indicator, report);
+        topology.hold(*result, *orientation.indicator, report);
         // Where the points leave gaps, what surrounds a gap makes small handles on a lattice as fine as they are.
         if (topology.own > 1 && !orientation.screened && is_open(*result, cloud, run))
-            topology.hold(result, *cloud::indicator_of(cloud.points, orientation, kCoarseSpacings * cloud.scale.spacing), report);
+            topology.hold(*result, *cloud::indicator_of(cloud.points, orientation, kCoarseSpacings * cloud.scale.spacing), report);
         result = start_from_grid(domain, *result, run);
     });
     return result;

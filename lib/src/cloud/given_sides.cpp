@@ -5,7 +5,6 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 #include "cloud/areas.h"
@@ -43,15 +42,7 @@ std::vector<Vec3> plane_normals(const std::vector<Vec3>& points, const std::vect
     const PointCells cells(points, kFirstRadius * scale.spacing);
     std::vector<Vec3> normals(points.size());
     for_nearest(cells, scale.spacing, count, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
-        const Vec3& p = points[point];
-        Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-        Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
-        for (const Neighbour& other : near) {
-            const Vec3& q = cells.sorted()[other.at];
-            const Eigen::Vector3d v(q[0] - p[0], q[1] - p[1], q[2] - p[2]);
-            sum += v;
-            squares += v * v.transpose();
-        }
+        const auto [sum, squares] = moments_of(cells, points[point], near);
         const double all = double(near.size()) + 1;
         const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares / all - sum * sum.transpose() / (all * all));
         const Eigen::Vector3d thin = axes.eigenvectors().col(0);
@@ -74,9 +65,7 @@ public:
     double foreseen(HintsReport& report) {
         std::vector<char> all(points_.size(), 1);
         listen(all);
-        double sum = 0;
-        for (const Vec3& p : points_) sum += field_.indicator().value_at(p);
-        report.inward = sum < 0;
+        report.inward = mean_at(field_, points_) < 0;
         if (report.inward)
             for (Vec3& n : voice_.normals) n = times(-1, n);
         std::size_t agree = 0;
@@ -149,9 +138,7 @@ void find_indicator(WindingField& field, const std::vector<Vec3>& points, Orient
     const double half = scale_to_half(field, points);
     for (double& area : result.areas) area *= half;
     result.indicator = make_indicator(field);
-    double sum = 0;
-    for (const Vec3& p : points) sum += field.indicator().value_at(p);
-    result.off_half = std::abs(sum / double(points.size()) - 0.5);
+    result.off_half = std::abs(mean_at(field, points) - 0.5);
 }
 
 /// @param given  normals; @return whether they are used

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "cloud/median.h"
 #include "cloud/vector.h"
@@ -63,6 +64,12 @@ double scale_to_half(WindingField& field, const std::vector<Vec3>& points) {
     if (!(half > 0)) return 1;
     field.multiply(0.5 / half);
     return 0.5 / half;
+}
+
+double mean_at(const WindingField& field, const std::vector<Vec3>& points) {
+    std::vector<double> values(points.size());
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) { values[n] = field.indicator().value_at(points[n]); });
+    return std::accumulate(values.begin(), values.end(), 0.0) / double(points.size());
 }
 
 std::shared_ptr<const Indicator> make_indicator(const WindingField& field) {

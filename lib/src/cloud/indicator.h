@@ -18,6 +18,9 @@ void solve(WindingField& field, const std::vector<Vec3>& points, const Orientati
 /// Half of the indicator's step is at the points, whichever way they are turned. @return the factor
 double scale_to_half(WindingField& field, const std::vector<Vec3>& points);
 
+/// Of the indicator, over the points.
+[[nodiscard]] double mean_at(const WindingField& field, const std::vector<Vec3>& points);
+
 [[nodiscard]] std::shared_ptr<const Indicator> make_indicator(const WindingField& field);
 
 /// The indicator of normals as they are, on cells of another size.

@@ -3,6 +3,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <vector>
 
@@ -17,6 +18,22 @@ struct Neighbour {
     std::uint32_t at;  ///< sorted position
     friend bool operator<(const Neighbour& a, const Neighbour& b) { return a.squared != b.squared ? a.squared < b.squared : a.at < b.at; }
 };
+
+/// Sums over neighbours, of where they lie from a point.
+struct Moments {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+};
+[[nodiscard]] inline Moments moments_of(const PointCells& cells, const Vec3& point, const std::vector<Neighbour>& near) {
+    Moments moments;
+    for (const Neighbour& other : near) {
+        const Vec3& q = cells.sorted()[other.at];
+        const Eigen::Vector3d v(q[0] - point[0], q[1] - point[1], q[2] - point[2]);
+        moments.sum += v;
+        moments.squares += v * v.transpose();
+    }
+    return moments;
+}
 
 /// visit(point, neighbours), from several threads, for each point as it was given: its `count` nearest others, the nearest
 /// first; fewer where the points end, or lie farther than 40 spacings.

@@ -215,12 +215,6 @@ private:
     std::optional<WindingField> last_;
 };
 
-double mean_of(const Indicator& indicator, const std::vector<Vec3>& points) {
-    std::vector<double> values(points.size());
-    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) { values[n] = indicator.inside(points[n]); });
-    return std::accumulate(values.begin(), values.end(), 0.0) / double(points.size());
-}
-
 /// Outward, by the indicator: down its slope where it is between outside and inside, up where another part encloses the point.
 std::vector<Vec3> normals_of(const Indicator& indicator, const std::vector<Vec3>& points, double enclosed) {
     std::vector<Vec3> normals(points.size());
@@ -299,7 +293,7 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
             Iteration iteration(sample.points);
             for (const Stage& stage : {Stage{cells * 2 / 3, 12, false, attempt.enclosed}, Stage{cells, 8, true, kSurelyEnclosed}}) iteration.run(stage, now, run);
             now.indicator = cloud::make_indicator(iteration.last());
-            now.off_half = std::abs(mean_of(*now.indicator, sample.points) - 0.5);
+            now.off_half = std::abs(cloud::mean_at(iteration.last(), sample.points) - 0.5);
             if (tried.size() == 1 || doubt(now) < doubt(best)) best = std::move(now);
             if (doubt(best) < cloud::kFewTurned) break;
         }

@@ -56,21 +56,13 @@ std::vector<char> find_stray(const std::vector<Vec3>& points, double spacing, co
     for_nearest(cells, spacing, kNeighbours, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
         stray[point] = 1;
         if (near.size() < kNeighbours) return;
-        Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-        Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
-        const Vec3& p = points[point];
-        for (const Neighbour& n : near) {
-            const Vec3& q = cells.sorted()[n.at];
-            const Eigen::Vector3d v(q[0] - p[0], q[1] - p[1], q[2] - p[2]);
-            sum += v;
-            squares += v * v.transpose();
-        }
+        const auto [whole, squares] = moments_of(cells, points[point], near);
         const double count = double(near.size());
-        sum /= count;
-        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares / count - sum * sum.transpose());
+        const Eigen::Vector3d mean = whole / count;
+        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares / count - mean * mean.transpose());
         const double deviation = std::sqrt(std::max(0.0, axes.eigenvalues()[0])), reach = std::sqrt(near.back().squared);
         // The farther the neighbours, the flatter they have to lie.
-        const double off = std::max(deviation, std::abs(axes.eigenvectors().col(0).dot(sum))) / reach;
+        const double off = std::max(deviation, std::abs(axes.eigenvectors().col(0).dot(mean))) / reach;
         stray[point] = off * reach / far_reach > kOffPlane;
     }, [&](std::size_t n) { return lonely[n] != 0; });
     return stray;

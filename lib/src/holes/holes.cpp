@@ -167,10 +167,15 @@ void check(const TriangleMesh& mesh, const std::vector<float>& to_points, double
                                               std::to_string(distance));
 }
 
-void expect_some(const holes::CutMesh& cut, double distance, const char* function) {
+holes::CutMesh cut_holes(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack,
+                         HolesReport& report, const RunContext& run, const char* function) {
+    check(mesh, to_points, distance, slack, function);
+    holes::CutMesh cut;
+    with_threads(run, [&] { cut = HoleFinder(mesh, to_points, distance, slack).find(report, run); });
     if (std::find(cut.kept.begin(), cut.kept.end(), 1) == cut.kept.end())
         throw Error(Errc::InvalidInput, std::string(function) + ": no part of the surface is within " + std::to_string(distance) +
                                             " of points all around; a hole is what lies farther: give a larger distance");
+    return cut;
 }
 
 }  // namespace
@@ -231,24 +236,16 @@ std::vector<BoundaryLoop> boundary_loops(const TriangleMesh& mesh) {
 
 TriangleMesh trimmed(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack, HolesReport& report,
                      const RunContext& run) {
-    check(mesh, to_points, distance, slack, "trimmed");
-    TriangleMesh result;
-    with_threads(run, [&] {
-        const holes::CutMesh cut = HoleFinder(mesh, to_points, distance, slack).find(report, run);
-        expect_some(cut, distance, "trimmed");
-        result = report.share > 0 ? holes::kept_part(cut) : mesh;
-    });
+    const holes::CutMesh cut = cut_holes(mesh, to_points, distance, slack, report, run, "trimmed");
     report.policy = Holes::Open;
-    return result;
+    return report.share > 0 ? holes::kept_part(cut) : mesh;
 }
 
 TriangleMesh flattened(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack, HolesReport& report,
                        const RunContext& run) {
-    check(mesh, to_points, distance, slack, "flattened");
+    holes::CutMesh cut = cut_holes(mesh, to_points, distance, slack, report, run, "flattened");
     TriangleMesh result;
     with_threads(run, [&] {
-        holes::CutMesh cut = HoleFinder(mesh, to_points, distance, slack).find(report, run);
-        expect_some(cut, distance, "flattened");
         std::vector<char> fixed(cut.mesh.vertices.size(), 0), spans(cut.mesh.vertices.size(), 0);
         for (std::size_t t = 0; t < cut.kept.size(); ++t)
             if (cut.kept[t])
