@@ -56,8 +56,7 @@ TEST_CASE("segment: points alone give a closed sphere and record what was chosen
     const SegmentResult result = segment(nullptr, sphere_points(1200), options);
     CHECK(result.report.surface.closed);
     CHECK(result.report.surface.genus == 0);
-    // Relaxed vertices lie within cells, where trilinear interpolation cuts off h^2/8 times the curvature along each axis.
-    CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.04 * options.voxel_size);
+    CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.03 * options.voxel_size);
     CHECK(result.report.fit.mean < 0.05 * options.voxel_size);
     CHECK(result.report.resolved.evolve.rho == 0);
     CHECK(result.report.resolved.evolve.delta == Approx(0.5 * options.voxel_size));

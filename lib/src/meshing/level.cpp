@@ -32,6 +32,12 @@ void for_each_sample(const Vec3& a, const Vec3& b, const Vec3& c, double step, c
     visit(plus(plus(a, 1.0 / 3, minus(b, a)), 1.0 / 3, minus(c, a)));
 }
 
+/// The smaller of two bends, none where they differ in sign: across a crease the distance has no bend that holds on both sides.
+double gentler(double a, double b) {
+    if (a * b <= 0) return 0;
+    return std::abs(a) < std::abs(b) ? a : b;
+}
+
 }  // namespace
 
 Level::Level(const FloatGrid& grid, const detail::LatticeClip& clip, double isovalue)
@@ -56,36 +62,67 @@ double Level::lattice(int axis, double index, double& stretch) const {
     return index;
 }
 
+void Level::look_at(const openvdb::Coord& base) const {
+    cell_.base = base;
+    float v[4][4][4];  // the corners' neighbours along the axes; those with two odd ones out are not read
+    const auto fill = [&](const auto& value) {
+        for (int i = 0; i < 4; ++i)
+            for (int j = 0; j < 4; ++j)
+                for (int k = 0; k < 4; ++k)
+                    if ((i % 3 == 0) + (j % 3 == 0) + (k % 3 == 0) < 2) v[i][j][k] = value(i - 1, j - 1, k - 1);
+    };
+    const int i = base[0] & 7, j = base[1] & 7, k = base[2] & 7;
+    const auto* leaf = accessor_.probeConstLeaf(base);
+    if (leaf != nullptr && std::min({i, j, k}) >= 1 && std::max({i, j, k}) <= 5) {
+        const float* data = leaf->buffer().data() + detail::leaf_offset(i, j, k);
+        fill([data](int x, int y, int z) { return data[64 * x + 8 * y + z]; });
+    } else {
+        fill([&](int x, int y, int z) { return accessor_.getValue(base.offsetBy(x, y, z)); });
+    }
+    for (int c = 0; c < 8; ++c) cell_.corner[c] = v[1 + (c >> 2)][1 + (c >> 1 & 1)][1 + (c & 1)];
+    const auto bend = [](double before, double from, double to, double after) { return gentler(before - 2 * from + to, from - 2 * to + after); };
+    for (int q = 0; q < 4; ++q) {
+        const int s = 1 + (q >> 1), t = 1 + (q & 1);
+        cell_.bend[0][q] = bend(v[0][s][t], v[1][s][t], v[2][s][t], v[3][s][t]);
+        cell_.bend[1][q] = bend(v[s][0][t], v[s][1][t], v[s][2][t], v[s][3][t]);
+        cell_.bend[2][q] = bend(v[s][t][0], v[s][t][1], v[s][t][2], v[s][t][3]);
+    }
+}
+
 Level::Sample Level::sample(const Vec3& world) const {
-    using detail::Coord;
+    using openvdb::Coord;
     Vec3 at, stretch{1, 1, 1};
     for (int a = 0; a < 3; ++a) {
         at[a] = (world[a] - domain_.origin[a]) / domain_.voxel_size;
         if (clipped_) at[a] = lattice(a, at[a], stretch[a]);
     }
-    const Coord base(int(std::floor(at[0])), int(std::floor(at[1])), int(std::floor(at[2])));
-    const double x = at[0] - base[0], y = at[1] - base[1], z = at[2] - base[2];
-    float v[8];
-    const auto* leaf = accessor_.probeConstLeaf(base);
-    const int i = base[0] & 7, j = base[1] & 7, k = base[2] & 7;
-    if (leaf != nullptr && i < 7 && j < 7 && k < 7) {
-        const float* data = leaf->buffer().data() + detail::leaf_offset(i, j, k);
-        for (int c = 0; c < 8; ++c) v[c] = data[(c >> 2) * 64 + (c >> 1 & 1) * 8 + (c & 1)];
-    } else {
-        for (int c = 0; c < 8; ++c) v[c] = accessor_.getValue(base.offsetBy(c >> 2, c >> 1 & 1, c & 1));
-    }
+    const openvdb::Coord base(int(std::floor(at[0])), int(std::floor(at[1])), int(std::floor(at[2])));
+    if (base != cell_.base) look_at(base);
+    const double t[3] = {at[0] - base[0], at[1] - base[1], at[2] - base[2]};
+
+    const auto& v = cell_.corner;
     double along_z[4], slope_z[4];
     for (int c = 0; c < 4; ++c) {
-        slope_z[c] = double(v[2 * c + 1]) - v[2 * c];
-        along_z[c] = v[2 * c] + z * slope_z[c];
+        slope_z[c] = v[2 * c + 1] - v[2 * c];
+        along_z[c] = v[2 * c] + t[2] * slope_z[c];
     }
-    const double low = along_z[0] + y * (along_z[1] - along_z[0]), high = along_z[2] + y * (along_z[3] - along_z[2]);
-    Sample result;
-    result.value = low + x * (high - low) - isovalue_;
-    const double h = domain_.voxel_size;
-    result.gradient[0] = (high - low) * stretch[0] / h;
-    result.gradient[1] = ((1 - x) * (along_z[1] - along_z[0]) + x * (along_z[3] - along_z[2])) * stretch[1] / h;
-    result.gradient[2] = ((1 - x) * ((1 - y) * slope_z[0] + y * slope_z[1]) + x * ((1 - y) * slope_z[2] + y * slope_z[3])) * stretch[2] / h;
+    const double low = along_z[0] + t[1] * (along_z[1] - along_z[0]), high = along_z[2] + t[1] * (along_z[3] - along_z[2]);
+    double value = low + t[0] * (high - low);
+    Vec3 slope{high - low, (1 - t[0]) * (along_z[1] - along_z[0]) + t[0] * (along_z[3] - along_z[2]),
+               (1 - t[0]) * ((1 - t[1]) * slope_z[0] + t[1] * slope_z[1]) + t[0] * ((1 - t[1]) * slope_z[2] + t[1] * slope_z[3])};
+
+    for (int a = 0; a < 3; ++a) {  // less t (1 - t) / 2 of the second differences along each axis
+        const int b = a == 0 ? 1 : 0, c = a == 2 ? 1 : 2;
+        const auto& bend = cell_.bend[a];
+        const double first = bend[0] + t[c] * (bend[1] - bend[0]), second = bend[2] + t[c] * (bend[3] - bend[2]);
+        const double whole = first + t[b] * (second - first), weight = 0.5 * t[a] * (1 - t[a]);
+        value -= weight * whole;
+        slope[a] -= (0.5 - t[a]) * whole;
+        slope[b] -= weight * (second - first);
+        slope[c] -= weight * ((1 - t[b]) * (bend[1] - bend[0]) + t[b] * (bend[3] - bend[2]));
+    }
+    Sample result{value - isovalue_, slope};
+    for (int a = 0; a < 3; ++a) result.gradient[a] *= stretch[a] / domain_.voxel_size;
     return result;
 }
 

@@ -310,17 +310,28 @@ private:
         if (!edge.look(corner)) return false;
         const std::uint32_t a = edge.kept(), b = edge.lost();
         for (const Position& there : meeting_points(a, b)) {
-            int slivers = int(is_sliver(edge.going()[0])) + int(is_sliver(edge.going()[1]));
+            // Fewer slivers, and none narrower than the narrowest was.
+            int slivers = 0;
+            double narrowest_before = 0, narrowest = 0;
             bool worse = false;
+            const auto shape_of = [&](std::uint32_t t) {
+                const Triangle& v = mesh_.triangles[t];
+                const double shape = worst_cosine(at(v[0]), at(v[1]), at(v[2]));
+                slivers += int(shape > kSliver);
+                narrowest_before = std::max(narrowest_before, shape);
+                return shape;
+            };
+            for (const std::uint32_t t : edge.going()) shape_of(t);
             for (const EdgeCollapser::Left& t : edge.left()) {
                 const Vec3 next = at(t.next), previous = at(t.previous), p = to_vec3(there);
                 const Vec3 was = area_normal(at(t.mover), next, previous), is = area_normal(p, next, previous);
-                const bool was_sliver = is_sliver(t.number), sliver = worst_cosine(p, next, previous) > kSliver;
-                slivers += int(was_sliver) - int(sliver);
+                const double before = shape_of(t.number), after = worst_cosine(p, next, previous);
+                slivers -= int(after > kSliver);
+                narrowest = std::max(narrowest, after);
                 worse = worse || (tolerance_ > 0 && is_off(p, next, previous, holds_[t.mover] & holds_[t.next] & holds_[t.previous] & kFaces));
-                worse = worse || (sliver && !was_sliver) || !(dot(was, is) > (was_sliver ? 0.0 : kSameSide) * length(was) * length(is));
+                worse = worse || !(dot(was, is) > (before > kSliver ? 0.0 : kSameSide) * length(was) * length(is));
             }
-            if (worse || slivers <= 0 || !edge.collapse(there)) continue;
+            if (worse || slivers <= 0 || narrowest > narrowest_before || !edge.collapse(there)) continue;
             holds_[a] |= holds_[b];
             return true;
         }
