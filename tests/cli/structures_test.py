@@ -380,7 +380,8 @@ class TimeLapse(Case):
             for volume in volumes:
                 self.assertTrue(0.95 < volume / half < 1, (t, volume / half))
         for old, new in zip(before, after):
-            self.assertAlmostEqual(new / old, (self.ball_at(1)[1] / self.ball_at(0)[1]) ** 3, delta=0.03)
+            # Frame 0 has its flat sides on a plane of the lattice and loses 1.6 %, frame 1 between two and up to 4 %.
+            self.assertAlmostEqual(new / old / (self.ball_at(1)[1] / self.ball_at(0)[1]) ** 3, 1, delta=0.03)
         self.assertEqual([(row["frame"], row["structure"]) for row in rows_of(self.out / "t.csv")],
                          [("0", "low"), ("0", "up"), ("1", "low"), ("1", "up")])
 
