@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "cloud/median.h"
+#include "cloud/point_cells.h"
 #include "cloud/vector.h"
 #include "covol/points.h"
 
@@ -70,6 +71,26 @@ double mean_at(const WindingField& field, const std::vector<Vec3>& points) {
     std::vector<double> values(points.size());
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) { values[n] = field.indicator().value_at(points[n]); });
     return std::accumulate(values.begin(), values.end(), 0.0) / double(points.size());
+}
+
+double share_bare(const Indicator& indicator, const std::vector<Vec3>& points, double reach) {
+    const PointCells cells(points, reach);
+    std::vector<PointCells::Range> ranges;
+    const auto is_near = [&](const Vec3& place) {
+        cells.find({{place[0] - reach, place[1] - reach, place[2] - reach}, {place[0] + reach, place[1] + reach, place[2] + reach}}, ranges);
+        return std::any_of(ranges.begin(), ranges.end(), [&](const PointCells::Range& range) {
+            return std::any_of(cells.sorted().begin() + range.begin, cells.sorted().begin() + range.end, [&](const Vec3& p) {
+                const Vec3 to = minus(p, place);
+                return dot(to, to) < reach * reach;
+            });
+        });
+    };
+    std::size_t all = 0, bare = 0;
+    indicator.crossed([&](const WorldBox& box) {
+        ++all;
+        bare += !is_near(times(0.5, plus(box.min, box.max)));
+    });
+    return all > 0 ? double(bare) / double(all) : 1;
 }
 
 std::shared_ptr<const Indicator> make_indicator(const WindingField& field) {

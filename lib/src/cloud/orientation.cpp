@@ -52,7 +52,10 @@ constexpr double kManyStray = 0.005;  // of the points
 // Of given normals: with opposite ones beside them, and against an orientation that settled. Good ones have less than 0.001
 // without noise and 0.005 at any, those of which a part is turned as a whole more than 0.01 and 0.1.
 constexpr double kFewTorn = 0.002, kContradicted = 0.03;
-constexpr double kSettled = 0.018;  // clouds of closed shapes are mostly below 0.015, scans of one side from 0.02 to 0.15
+// Whether points enclose a solid. Where they lie all around it its surface rests on them: of closed shapes less than 0.01 of
+// it is bare, however noisy they are, of scans of one side 0.14 to 0.4. Of a shape of which a part is missing, up to 0.2, the
+// normals settle all the same: doubts up to 0.012, of the scans from 0.016 to 0.19.
+constexpr double kSettled = 0.014, kBare = 0.05, kBareReach = 2;
 
 /// A lattice and what is done on it.
 struct Stage {
@@ -231,6 +234,11 @@ double first_cell(const CloudScale& scale) { return std::max(kCellSpacings * sca
 /// Parts that are turned as a whole go on turning, or lie where the indicator is not 1/2.
 double doubt(const Orientation& o) { return o.turned + std::max(0.0, o.off_half - kOffHalf); }
 
+bool does_enclose(const CloudOrientation& cloud) {
+    const double reach = kBareReach * std::max(cloud.scale.spacing, cloud.scale.noise);
+    return doubt(cloud.orientation) < kSettled || cloud::share_bare(*cloud.orientation.indicator, cloud.points, reach) < kBare;
+}
+
 /// Every few points of those that lie together, and what each stands for.
 struct Sample {
     Sample(const std::vector<Vec3>& all, double spacing, std::size_t every) : step(every), order(cloud::PointCells(all, kSampleSpacings * spacing).order()) {
@@ -256,7 +264,7 @@ void choose_orientation(CloudOrientation& cloud, const PointHints& hints, const 
     const bool is_certain = report.used && given.torn < kFewTorn && doubt(given.orientation) < cloud::kFewTurned;
     if (!is_certain) {
         cloud.orientation = orient(cloud.points, cloud.scale, run);
-        cloud.encloses = doubt(cloud.orientation) < kSettled;
+        cloud.encloses = does_enclose(cloud);
         if (report.used && cloud.encloses &&
             1 - cloud::agreeing(cloud.points, given.orientation.normals, cloud.orientation, false) > kContradicted) {
             report.used = false;
