@@ -41,7 +41,8 @@ constexpr double kBesideOfLeast = 0.75;   // of the smallest neighbourhood: beyo
 constexpr double kTrusted = 0.6;          // of the reach; beyond, the indicator takes over
 constexpr double kSlope = 0.4;            // of the indicator at the surface, per cell
 constexpr double kNodeVoxels = 0.75;      // distance of quadrics
-constexpr double kLeastResting = 12, kLeastRestingShare = 1e-3;  // points, on a piece of its own
+// Points on a piece of its own; at least as many as on a ball of the noise's radius, for noise makes such pieces of nothing.
+constexpr double kLeastResting = 12, kLeastRestingShare = 1e-3;
 constexpr double kCoarseSpacings = 2.4;  // cells of an indicator for points with gaps
 constexpr double kFarSpacings = 3, kOpenShare = 0.05;
 constexpr double kLeastRestingOpen = 1e-2;  // of them, where they enclose nothing: the pieces are none of thin parts
@@ -284,8 +285,8 @@ FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cl
             const Pieces pieces(quadrics_of(cloud, h, report, run), h);
             result = level_set_of(pieces, *orientation.indicator, domain, run);
         }
-        const double share = cloud.encloses ? kLeastRestingShare : kLeastRestingOpen;
-        const auto least = std::size_t(std::max(kLeastResting, share * double(cloud.points.size())));
+        const double share = cloud.encloses ? kLeastRestingShare : kLeastRestingOpen, noises = report.noise / report.spacing;
+        const auto least = std::size_t(std::max({kLeastResting, share * double(cloud.points.size()), 4 * M_PI * noises * noises}));
         report.dropped_pieces = detail::drop_bare_pieces(*result, cloud.points, least);
         TopologyOf topology{complexity(*result, run), least, cloud.points, run};
         topology.hold(*result, *orientation.indicator, report);

@@ -45,6 +45,7 @@ struct Try {
 constexpr Try kTries[] = {{1, kEnclosed}, {1, kSurelyEnclosed}, {0.67, kSurelyEnclosed}, {1.5, kSurelyEnclosed}, {0.44, kEnclosed}, {2.25, kSurelyEnclosed}};
 constexpr double kLeastSpacings = 0.5;
 constexpr double kOffHalf = 0.02;   // that the indicator's mean over the points may differ from 1/2
+constexpr double kOffWeight = 2;    // of more than that: walls that run into each other turn less than those that waver
 constexpr double kSampledPerCell = 4;  // points that iterate, on the surface in a lattice cell's square
 constexpr double kSampleSpacings = 4;  // edge of the cells that they are taken from
 constexpr int kStrayRounds = 3;
@@ -232,7 +233,7 @@ std::vector<Vec3> normals_of(const Indicator& indicator, const std::vector<Vec3>
 double first_cell(const CloudScale& scale) { return std::max(kCellSpacings * scale.spacing, kCellNoises * scale.noise); }
 
 /// Parts that are turned as a whole go on turning, or lie where the indicator is not 1/2.
-double doubt(const Orientation& o) { return o.turned + std::max(0.0, o.off_half - kOffHalf); }
+double doubt(const Orientation& o) { return o.turned + kOffWeight * std::max(0.0, o.off_half - kOffHalf); }
 
 bool does_enclose(const CloudOrientation& cloud) {
     const double reach = kBareReach * std::max(cloud.scale.spacing, cloud.scale.noise);
