@@ -30,6 +30,7 @@ using cloud::unit;
 constexpr double kPatchCells = 2;        // edge of the cells over which the indicator is averaged
 constexpr double kPatchOff = 0.12;       // from 1/2, of a patch that may be turned
 constexpr int kPatchRounds = 4, kPatchCycles = 2, kAfterTurning = 3;
+constexpr double kFewStayed = 0.002;     // of the points, in patches that stay turned: those left may turn to and fro
 constexpr int kFirstPasses = 12;         // of smoothing, for the first guess
 constexpr double kSteady = 1e-4;         // the normals' mean change, 1 - cosine
 // chi at a point beyond which another part encloses it already. Noise brings points there that are none of these.
@@ -147,11 +148,14 @@ private:
                 const auto [begin, end] = cells.cell(cell);
                 gain[std::size_t(patch[cell])] += double(end - begin) * (off[cell] * off[cell] - turned[cell] * turned[cell]);
             }
+            double stayed = 0;
             for_points_of(cells, [&](std::size_t cell, std::uint32_t point) {
-                if (patch[cell] >= 0 && gain[std::size_t(patch[cell])] <= 0) result.normals[point] = before[point];
+                if (patch[cell] < 0) return;
+                if (gain[std::size_t(patch[cell])] > 0) ++stayed;
+                else result.normals[point] = before[point];
             });
             for (int n = 0; n < kAfterTurning; ++n) turn(field, result, kPatchCycles);
-            if (std::none_of(gain.begin(), gain.end(), [](double g) { return g > 0; })) return;
+            if (stayed < kFewStayed * double(points_.size())) return;
         }
     }
 
