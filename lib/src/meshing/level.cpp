@@ -62,8 +62,17 @@ double Level::lattice(int axis, double index, double& stretch) const {
     return index;
 }
 
-void Level::look_at(const openvdb::Coord& base) const {
-    cell_.base = base;
+const Level::Cell& Level::cell_at(const openvdb::Coord& base) const {
+    Cell& cell = cells_[std::size_t((base[0] & 3) * 16 + (base[1] & 3) * 4 + (base[2] & 3))];
+    if (cell.base != base) {
+        cell.base = base;
+        look_at(cell);
+    }
+    return cell;
+}
+
+void Level::look_at(Cell& cell) const {
+    const openvdb::Coord& base = cell.base;
     float v[4][4][4];  // the corners' neighbours along the axes; those with two odd ones out are not read
     const auto fill = [&](const auto& value) {
         for (int i = 0; i < 4; ++i)
@@ -79,13 +88,13 @@ void Level::look_at(const openvdb::Coord& base) const {
     } else {
         fill([&](int x, int y, int z) { return accessor_.getValue(base.offsetBy(x, y, z)); });
     }
-    for (int c = 0; c < 8; ++c) cell_.corner[c] = v[1 + (c >> 2)][1 + (c >> 1 & 1)][1 + (c & 1)];
+    for (int c = 0; c < 8; ++c) cell.corner[c] = v[1 + (c >> 2)][1 + (c >> 1 & 1)][1 + (c & 1)];
     const auto bend = [](double before, double from, double to, double after) { return gentler(before - 2 * from + to, from - 2 * to + after); };
     for (int q = 0; q < 4; ++q) {
         const int s = 1 + (q >> 1), t = 1 + (q & 1);
-        cell_.bend[0][q] = bend(v[0][s][t], v[1][s][t], v[2][s][t], v[3][s][t]);
-        cell_.bend[1][q] = bend(v[s][0][t], v[s][1][t], v[s][2][t], v[s][3][t]);
-        cell_.bend[2][q] = bend(v[s][t][0], v[s][t][1], v[s][t][2], v[s][t][3]);
+        cell.bend[0][q] = bend(v[0][s][t], v[1][s][t], v[2][s][t], v[3][s][t]);
+        cell.bend[1][q] = bend(v[s][0][t], v[s][1][t], v[s][2][t], v[s][3][t]);
+        cell.bend[2][q] = bend(v[s][t][0], v[s][t][1], v[s][t][2], v[s][t][3]);
     }
 }
 
@@ -97,10 +106,10 @@ Level::Sample Level::sample(const Vec3& world) const {
         if (clipped_) at[a] = lattice(a, at[a], stretch[a]);
     }
     const openvdb::Coord base(int(std::floor(at[0])), int(std::floor(at[1])), int(std::floor(at[2])));
-    if (base != cell_.base) look_at(base);
+    const Cell& cell = cell_at(base);
     const double t[3] = {at[0] - base[0], at[1] - base[1], at[2] - base[2]};
 
-    const auto& v = cell_.corner;
+    const auto& v = cell.corner;
     double along_z[4], slope_z[4];
     for (int c = 0; c < 4; ++c) {
         slope_z[c] = v[2 * c + 1] - v[2 * c];
@@ -113,7 +122,7 @@ Level::Sample Level::sample(const Vec3& world) const {
 
     for (int a = 0; a < 3; ++a) {  // less t (1 - t) / 2 of the second differences along each axis
         const int b = a == 0 ? 1 : 0, c = a == 2 ? 1 : 2;
-        const auto& bend = cell_.bend[a];
+        const auto& bend = cell.bend[a];
         const double first = bend[0] + t[c] * (bend[1] - bend[0]), second = bend[2] + t[c] * (bend[3] - bend[2]);
         const double whole = first + t[b] * (second - first), weight = 0.5 * t[a] * (1 - t[a]);
         value -= weight * whole;

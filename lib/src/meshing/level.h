@@ -55,13 +55,14 @@ private:
     };
 
     [[nodiscard]] double lattice(int axis, double index, double& stretch) const;
-    void look_at(const openvdb::Coord& base) const;
+    [[nodiscard]] const Cell& cell_at(const openvdb::Coord& base) const;
+    void look_at(Cell& cell) const;
 
     FloatGrid::ConstAccessor accessor_;
     detail::LatticeClip clip_;
     Domain domain_;
     double isovalue_;
-    mutable Cell cell_;  ///< looked at last
+    mutable std::array<Cell, 64> cells_;  ///< looked at last, of each 4^3 places one
     bool clipped_ = false;
     std::array<std::array<float, 2>, 3> face_{};  ///< world, low and high; infinite where there is none
 };
