@@ -155,6 +155,7 @@ Json to_json(const SegmentReport& r) {
                          {"indicator_cell", r.cloud.indicator_cell},
                          {"bare_nodes", r.cloud.bare_nodes},
                          {"dropped_pieces", r.cloud.dropped_pieces},
+                         {"joined_pieces", r.cloud.joined_pieces},
                          {"held_voxels", r.cloud.held_voxels}};
     if (const HintsReport& h = r.cloud.hints; h.normals + h.sensors > 0) {
         json["cloud"]["normals"] = {{"given", h.normals}, {"sensor_given", h.sensors}, {"used", h.used}, {"from_sensor", h.from_sensor},

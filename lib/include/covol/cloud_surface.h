@@ -19,6 +19,7 @@ struct CloudReport {
     std::size_t stray = 0;     ///< points far from all surfaces, left out
     std::size_t bare_nodes = 0;  ///< places with points that are no sheet: the indicator alone tells of the surface
     std::size_t dropped_pieces = 0;  ///< of the surface, that hardly a point rested on
+    std::size_t joined_pieces = 0;   ///< small ones, joined to what is nearest along points
     std::size_t held_voxels = 0;     ///< that the indicator's topology holds, for it is simpler than the points' own
     HintsReport hints;               ///< CloudOrientation::hints
 };

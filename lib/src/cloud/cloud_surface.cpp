@@ -10,6 +10,7 @@
 #include "cloud/blend_kernel.h"
 #include "cloud/hold_topology.h"
 #include "cloud/indicator.h"
+#include "cloud/join_pieces.h"
 #include "cloud/local_fit.h"
 #include "cloud/median.h"
 #include "cloud/point_cells.h"
@@ -293,6 +294,7 @@ FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cl
         // Where the points leave gaps, what surrounds a gap makes small handles on a lattice as fine as they are.
         if (topology.own > 1 && !orientation.screened && is_open(*result, cloud, run))
             topology.hold(*result, *cloud::indicator_of(cloud.points, orientation, kCoarseSpacings * cloud.scale.spacing), report);
+        if (topology.own > 1) report.joined_pieces = cloud::join_pieces(*result, cloud.points, std::max(report.spacing, report.noise), run);
         result = start_from_grid(domain, *result, run);
     });
     return result;

@@ -75,20 +75,10 @@ double mean_at(const WindingField& field, const std::vector<Vec3>& points) {
 
 double share_bare(const Indicator& indicator, const std::vector<Vec3>& points, double reach) {
     const PointCells cells(points, reach);
-    std::vector<PointCells::Range> ranges;
-    const auto is_near = [&](const Vec3& place) {
-        cells.find({{place[0] - reach, place[1] - reach, place[2] - reach}, {place[0] + reach, place[1] + reach, place[2] + reach}}, ranges);
-        return std::any_of(ranges.begin(), ranges.end(), [&](const PointCells::Range& range) {
-            return std::any_of(cells.sorted().begin() + range.begin, cells.sorted().begin() + range.end, [&](const Vec3& p) {
-                const Vec3 to = minus(p, place);
-                return dot(to, to) < reach * reach;
-            });
-        });
-    };
     std::size_t all = 0, bare = 0;
     indicator.crossed([&](const WorldBox& box) {
         ++all;
-        bare += !is_near(times(0.5, plus(box.min, box.max)));
+        bare += !cells.any_within(times(0.5, plus(box.min, box.max)), reach);
     });
     return all > 0 ? double(bare) / double(all) : 1;
 }

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cloud/vector.h"
+
 namespace covol::cloud {
 namespace {
 
@@ -87,6 +89,22 @@ void PointCells::find(const WorldBox& box, std::vector<Range>& ranges) const {
             const auto to = std::upper_bound(from, end, key(i, j, last[2]));
             if (from != to) ranges.push_back({starts_[std::size_t(from - keys_.begin())], starts_[std::size_t(to - keys_.begin())]});
         }
+}
+
+bool PointCells::any_within(const Vec3& place, double reach) const {
+    WorldBox box;
+    for (int a = 0; a < 3; ++a) {
+        box.min[a] = place[a] - reach;
+        box.max[a] = place[a] + reach;
+    }
+    std::vector<Range> ranges;
+    find(box, ranges);
+    return std::any_of(ranges.begin(), ranges.end(), [&](const Range& range) {
+        return std::any_of(sorted_.begin() + range.begin, sorted_.begin() + range.end, [&](const Vec3& p) {
+            const Vec3 to = minus(p, place);
+            return dot(to, to) < reach * reach;
+        });
+    });
 }
 
 }  // namespace covol::cloud

@@ -28,6 +28,7 @@ public:
     /// Ranges of sorted positions that hold all points of the box (and others of the cells it touches); `ranges` is
     /// overwritten.
     void find(const WorldBox& box, std::vector<Range>& ranges) const;
+    [[nodiscard]] bool any_within(const Vec3& place, double reach) const;
 
 private:
     [[nodiscard]] std::int64_t cell_along(double x, int axis) const;

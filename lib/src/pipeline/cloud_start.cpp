@@ -53,6 +53,8 @@ void start_from_cloud(Job& job) {
     if (report.stray > 0) job.choose("stray_points", std::to_string(report.stray), "far from all others and on no sheet: left out");
     if (report.dropped_pieces > 0)
         job.run.info("cloud: " + std::to_string(report.dropped_pieces) + " pieces of the surface that hardly a point rested on left out");
+    if (report.joined_pieces > 0)
+        job.run.info("cloud: " + std::to_string(report.joined_pieces) + " small pieces of the surface joined to what is nearest, points lie between");
     if (report.held_voxels > 0)
         job.run.info("cloud: its handles and pieces are those of the points' indicator function, which has fewer; " +
                      std::to_string(report.held_voxels) + " voxels held");
