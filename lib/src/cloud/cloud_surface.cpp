@@ -39,6 +39,9 @@ constexpr double kMostOfRadius = 0.8;     // beyond it the quadric was never fit
 constexpr double kMostOfCurvature = 0.7;  // of the smallest radius of curvature
 constexpr double kLeastReachVoxels = 1.5;
 constexpr double kBesideOfLeast = 0.75;   // of the smallest neighbourhood: beyond it, sideways, there should be others
+constexpr double kBesideOfApart = 2;      // of what nodes are apart
+constexpr double kMostNoises = 3;        // that nodes may be moved
+constexpr int kLevelSteps = 2;           // of Newton's method
 constexpr double kTrusted = 0.6;          // of the reach; beyond, the indicator takes over
 constexpr double kSlope = 0.4;            // of the indicator at the surface, per cell
 constexpr double kNodeVoxels = 0.75;      // distance of quadrics
@@ -160,7 +163,7 @@ private:
         const Quadric& q = pieces_[piece];
         const Vec3 to = cloud::minus(world, pieces_.foot(piece));
         const double up = dot(to, q.axes[2]);
-        return std::sqrt(std::max(0.0, dot(to, to) - up * up)) / std::max(q.least_radius * kBesideOfLeast, kLeastReachVoxels * domain_.voxel_size);
+        return std::sqrt(std::max(0.0, dot(to, to) - up * up)) / std::max({q.least_radius * kBesideOfLeast, kLeastReachVoxels * domain_.voxel_size, kBesideOfApart * q.apart});
     }
 
     [[nodiscard]] Vec3 place(const Coord& origin, int at) const {
@@ -250,10 +253,27 @@ bool is_open(const FloatGrid& level_set, const CloudOrientation& cloud, const Ru
     return share_without_points(extract_mesh(level_set, {}, run), cloud.points, kFarSpacings * cloud.scale.spacing, run) > kOpenShare;
 }
 
+/// The points where the indicator has its surface, as far as noise can have brought them from there: else there would be nodes
+/// all through the layer that they fill.
+OrientedCloud near_level(OrientedCloud points, const CloudOrientation& cloud) {
+    const double most = kMostNoises * cloud.scale.noise;
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
+        Vec3 place = points.points[n];
+        for (int step = 0; step < kLevelSteps; ++step) {
+            const auto [inside, gradient] = cloud.orientation.indicator->at(place);
+            const double steep = dot(gradient, gradient);
+            if (!(steep > 0)) return;
+            place = cloud::plus(place, cloud::times((0.5 - inside) / steep, gradient));
+        }
+        const Vec3 moved = cloud::minus(place, points.points[n]);
+        if (dot(moved, moved) < most * most) points.points[n] = place;
+    });
+    return points;
+}
+
 std::vector<Quadric> quadrics_of(const CloudOrientation& cloud, double h, CloudReport& report, const RunContext& run) {
     const OrientedCloud points{cloud.points, cloud.orientation.normals, std::vector<float>(cloud.points.size(), 1.0F)};
-    std::vector<Quadric> quadrics = cloud::fit_quadrics(thinned(points, kNodeVoxels * h), points, report.spacing, run);
-    report.bare_nodes = std::size_t(std::erase_if(quadrics, [](const Quadric& q) { return !(q.radius > 0); }));
+    std::vector<Quadric> quadrics = cloud::quadrics_over(near_level(points, cloud), points, kNodeVoxels * h, report.spacing, report.bare_nodes, run);
     std::vector<double> noise, radius;
     for (const Quadric& q : quadrics) {
         noise.push_back(q.noise);

@@ -6,6 +6,8 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <ctime>
 
 #include "cloud/fit_kernel.h"
 #include "cloud/point_cells.h"
@@ -30,6 +32,10 @@ constexpr double kLeastSpread = 0.16;     // standard deviation along any direct
 constexpr double kMostOffCentre = 0.33;   // of the points' mean, of the radius: half a disc has 0.29, what lies beyond a sheet's end more
 constexpr double kMostGrowth = 2.9;       // of the radius, until the points are a sheet
 constexpr double kLeastMajority = 5;      // points
+constexpr double kMostUnbent = 0.5;       // of the noise, that it is taken to have lowered the points
+constexpr double kWidest = 2;             // of the nodes' cells: the first are so large
+constexpr double kWideOfApart = 7;        // the radius, of what its nodes are apart: there need not be more
+constexpr double kSameSheet = 0.7;        // cosine of the normals
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
@@ -172,7 +178,75 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
         best.c = now.c;
         best.radius = level.radius;
     }
+    // Noise along the surface brings points here from where it lies lower, or higher: their mean height is off by half the
+    // variance times the Laplacian.
+    const double lower = best.noise * best.noise * (best.c[3] + best.c[5]), most = kMostUnbent * best.noise;
+    best.c[0] -= std::clamp(lower, -most, most);
     return best;
+}
+
+/// The cloud, thinned for each radius.
+class Fitter {
+public:
+    Fitter(const OrientedCloud& cloud, double spacing, const RunContext& run) {
+        levels_.reserve(kLevels);
+        OrientedCloud last;
+        double radius = kFirstSpacings * spacing;
+        for (int n = 0; n < kLevels; ++n, radius *= kGrowth) {
+            run.check();
+            // Averages of averages cost little and miss nothing that a radius this large could see.
+            last = thinned(n == 0 ? cloud : last, kThinnedShare * radius);
+            levels_.emplace_back(last, radius);
+        }
+    }
+
+    [[nodiscard]] std::vector<Quadric> fit(const OrientedCloud& nodes, const RunContext& run) const {
+        std::vector<Quadric> result(nodes.size());
+        tbb::enumerable_thread_specific<Scratch> scratch;
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, nodes.size(), 256), [&](const auto& range) {
+            if (run.cancelled()) return;
+            Scratch& mine = scratch.local();
+            for (std::size_t n = range.begin(); n < range.end(); ++n) result[n] = choose(levels_, nodes.points[n], nodes.normals[n], mine);
+        });
+        run.check();
+        return result;
+    }
+
+private:
+    std::vector<Level> levels_;
+};
+
+/// The nodes that no quadric is so close to that it tells of their place, too.
+OrientedCloud without_covered(const OrientedCloud& nodes, const std::vector<Quadric>& quadrics) {
+    std::vector<Vec3> feet;
+    double reach = 0;
+    for (const Quadric& q : quadrics) {
+        feet.push_back(q.foot());
+        reach = std::max(reach, q.apart);
+    }
+    const PointCells cells(feet, reach);
+    std::vector<char> covered(nodes.size(), 0);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, nodes.size(), 256), [&](const auto& part) {
+        std::vector<PointCells::Range> ranges;
+        for (std::size_t n = part.begin(); n < part.end(); ++n) {
+            const Vec3& p = nodes.points[n];
+            cells.find({{p[0] - reach, p[1] - reach, p[2] - reach}, {p[0] + reach, p[1] + reach, p[2] + reach}}, ranges);
+            for (const PointCells::Range& range : ranges)
+                for (std::uint32_t at = range.begin; at < range.end && !covered[n]; ++at) {
+                    const Quadric& q = quadrics[cells.order()[at]];
+                    const Vec3 to = minus(p, cells.sorted()[at]);
+                    covered[n] = dot(to, to) < q.apart * q.apart && dot(nodes.normals[n], q.axes[2]) > kSameSheet;
+                }
+        }
+    });
+    OrientedCloud left;
+    for (std::size_t n = 0; n < nodes.size(); ++n) {
+        if (covered[n]) continue;
+        left.points.push_back(nodes.points[n]);
+        left.normals.push_back(nodes.normals[n]);
+        left.counts.push_back(nodes.counts[n]);
+    }
+    return left;
 }
 
 }  // namespace
@@ -240,26 +314,30 @@ OrientedCloud thinned(const OrientedCloud& cloud, double edge) {
 }
 
 std::vector<Quadric> fit_quadrics(const OrientedCloud& nodes, const OrientedCloud& cloud, double spacing, const RunContext& run) {
-    std::vector<OrientedCloud> clouds;
-    clouds.reserve(kLevels);
-    std::vector<Level> levels;
-    levels.reserve(kLevels);
-    double radius = kFirstSpacings * spacing;
-    for (int n = 0; n < kLevels; ++n, radius *= kGrowth) {
-        run.check();
-        // Averages of averages cost little and miss nothing that a radius this large could see.
-        clouds.push_back(thinned(clouds.empty() ? cloud : clouds.back(), kThinnedShare * radius));
-        levels.emplace_back(clouds.back(), radius);
+    return Fitter(cloud, spacing, run).fit(nodes, run);
+}
+
+std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCloud& cloud, double edge, double spacing, std::size_t& bare, const RunContext& run) {
+    const Fitter fitter(cloud, spacing, run);
+    std::vector<Quadric> all;
+    bare = 0;
+    for (const double times : {kWidest, 1.0}) {
+        const double apart = times * edge;
+        OrientedCloud nodes = thinned(places, apart);
+        if (!all.empty()) nodes = without_covered(nodes, all);
+        timespec t0,t1; clock_gettime(CLOCK_PROCESS_CPUTIME_ID,&t0);
+        std::vector<Quadric> found = fitter.fit(nodes, run);
+        clock_gettime(CLOCK_PROCESS_CPUTIME_ID,&t1);
+        const double least = times > 1 ? kWideOfApart * apart : 0;
+        bare = std::size_t(std::count_if(found.begin(), found.end(), [](const Quadric& q) { return !(q.radius > 0); }));
+        if(getenv("DBG")) { std::size_t acc=0; double mr=0; for(auto&q:found){acc+=q.radius>least; mr+=q.radius;} fprintf(stderr,"apart %g nodes %zu bare %zu accepted %zu mean radius/edge %.1f cpu %.2f\n",times,nodes.size(),bare,acc,mr/double(found.size()-bare)/edge,double(t1.tv_sec-t0.tv_sec)+1e-9*double(t1.tv_nsec-t0.tv_nsec)); }
+        for (Quadric& q : found) {
+            if (!(q.radius > least)) continue;
+            q.apart = apart;
+            all.push_back(q);
+        }
     }
-    std::vector<Quadric> result(nodes.size());
-    tbb::enumerable_thread_specific<Scratch> scratch;
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, nodes.size(), 256), [&](const auto& range) {
-        if (run.cancelled()) return;
-        Scratch& mine = scratch.local();
-        for (std::size_t n = range.begin(); n < range.end(); ++n) result[n] = choose(levels, nodes.points[n], nodes.normals[n], mine);
-    });
-    run.check();
-    return result;
+    return all;
 }
 
 }  // namespace covol::cloud
