@@ -246,3 +246,44 @@ TEST_CASE("thinned: one mean for each cell of a smooth surface, whichever way it
         REQUIRE(test::dot(thin.normals[n], thin.points[n]) > 0.98);
     }
 }
+
+TEST_CASE("noise along a bent surface does not draw the quadrics inwards") {
+    // Where a ball's points are moved by sigma along each axis, their mean height over a tangent plane is sigma^2 / R too low.
+    double bias = 0;
+    int count = 0;
+    const double sigma = 0.06;
+    for (const unsigned seed : {1, 2, 3}) {
+        test::SurfaceSample s = test::ball(1).sample(20000, seed);
+        const OrientedCloud nodes = every(oriented(s), 100);
+        const double spacing = s.spacing();
+        test::add_noise(s, sigma, seed + 10);
+        for (const Quadric& q : fit_quadrics(nodes, oriented(s), spacing, {})) {
+            if (!(q.radius > 0)) continue;
+            bias += std::sqrt(test::dot(q.foot(), q.foot())) - 1;
+            ++count;
+        }
+    }
+    INFO("bias " << bias / count / (sigma * sigma) << " sigma^2 / R over " << count);
+    REQUIRE(count > 400);
+    CHECK(std::abs(bias / count) < 0.4 * sigma * sigma);
+}
+
+TEST_CASE("where neighbourhoods are wide there are fewer quadrics, and none is far from any place") {
+    test::SurfaceSample s = test::ball(1).sample(40000, 1);
+    const double spacing = s.spacing(), edge = 1.2 * spacing;
+    const OrientedCloud places = oriented(s);
+    test::add_noise(s, spacing, 2);
+    std::size_t bare = 1000;
+    const std::vector<Quadric> quadrics = quadrics_over(places, oriented(s), edge, spacing, bare, {});
+    CHECK(bare < 20);  // of 10,000 places
+    CHECK(double(quadrics.size()) < 0.5 * double(thinned(places, edge).size()));
+    std::vector<Vec3> feet;
+    for (const Quadric& q : quadrics) {
+        CHECK((q.apart == edge || q.apart == 2 * edge));
+        CHECK(q.radius > 0);
+        feet.push_back(q.foot());
+    }
+    double farthest = 0;
+    for (std::size_t n = 0; n < places.size(); n += 10) farthest = std::max(farthest, test::brute_force_distance(feet, places.points[n]));
+    CHECK(farthest < 3 * edge);
+}

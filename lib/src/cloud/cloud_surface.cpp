@@ -40,11 +40,11 @@ constexpr double kMostOfCurvature = 0.7;  // of the smallest radius of curvature
 constexpr double kLeastReachVoxels = 1.5;
 constexpr double kBesideOfLeast = 0.75;   // of the smallest neighbourhood: beyond it, sideways, there should be others
 constexpr double kBesideOfApart = 2;      // of what nodes are apart
-constexpr double kMostNoises = 3;        // that nodes may be moved
-constexpr int kLevelSteps = 2;           // of Newton's method
 constexpr double kTrusted = 0.6;          // of the reach; beyond, the indicator takes over
 constexpr double kSlope = 0.4;            // of the indicator at the surface, per cell
 constexpr double kNodeVoxels = 0.75;      // distance of quadrics
+constexpr double kMostNoises = 3;         // that their nodes may be moved
+constexpr int kLevelSteps = 2;            // of Newton's method
 // Points on a piece of its own; at least as many as on a ball of the noise's radius, for noise makes such pieces of nothing.
 constexpr double kLeastResting = 12, kLeastRestingShare = 1e-3;
 constexpr double kCoarseSpacings = 2.4;  // cells of an indicator for points with gaps
@@ -163,7 +163,8 @@ private:
         const Quadric& q = pieces_[piece];
         const Vec3 to = cloud::minus(world, pieces_.foot(piece));
         const double up = dot(to, q.axes[2]);
-        return std::sqrt(std::max(0.0, dot(to, to) - up * up)) / std::max({q.least_radius * kBesideOfLeast, kLeastReachVoxels * domain_.voxel_size, kBesideOfApart * q.apart});
+        const double expected = std::max({kBesideOfLeast * q.least_radius, kLeastReachVoxels * domain_.voxel_size, kBesideOfApart * q.apart});
+        return std::sqrt(std::max(0.0, dot(to, to) - up * up)) / expected;
     }
 
     [[nodiscard]] Vec3 place(const Coord& origin, int at) const {

@@ -6,8 +6,6 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <ctime>
 
 #include "cloud/fit_kernel.h"
 #include "cloud/point_cells.h"
@@ -317,7 +315,8 @@ std::vector<Quadric> fit_quadrics(const OrientedCloud& nodes, const OrientedClou
     return Fitter(cloud, spacing, run).fit(nodes, run);
 }
 
-std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCloud& cloud, double edge, double spacing, std::size_t& bare, const RunContext& run) {
+std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCloud& cloud, double edge, double spacing,
+                                   std::size_t& bare, const RunContext& run) {
     const Fitter fitter(cloud, spacing, run);
     std::vector<Quadric> all;
     bare = 0;
@@ -325,12 +324,9 @@ std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCl
         const double apart = times * edge;
         OrientedCloud nodes = thinned(places, apart);
         if (!all.empty()) nodes = without_covered(nodes, all);
-        timespec t0,t1; clock_gettime(CLOCK_PROCESS_CPUTIME_ID,&t0);
         std::vector<Quadric> found = fitter.fit(nodes, run);
-        clock_gettime(CLOCK_PROCESS_CPUTIME_ID,&t1);
         const double least = times > 1 ? kWideOfApart * apart : 0;
         bare = std::size_t(std::count_if(found.begin(), found.end(), [](const Quadric& q) { return !(q.radius > 0); }));
-        if(getenv("DBG")) { std::size_t acc=0; double mr=0; for(auto&q:found){acc+=q.radius>least; mr+=q.radius;} fprintf(stderr,"apart %g nodes %zu bare %zu accepted %zu mean radius/edge %.1f cpu %.2f\n",times,nodes.size(),bare,acc,mr/double(found.size()-bare)/edge,double(t1.tv_sec-t0.tv_sec)+1e-9*double(t1.tv_nsec-t0.tv_nsec)); }
         for (Quadric& q : found) {
             if (!(q.radius > least)) continue;
             q.apart = apart;

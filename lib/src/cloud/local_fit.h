@@ -49,6 +49,7 @@ struct Quadric {
 /// where the neighbourhoods are so wide that more nodes would tell the same.
 /// @param places  the cloud's points, moved to about where the surface is; the nodes are means of them
 /// @param bare    how many nodes have none
-[[nodiscard]] std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCloud& cloud, double edge, double spacing, std::size_t& bare, const RunContext& run);
+[[nodiscard]] std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCloud& cloud, double edge,
+                                                 double spacing, std::size_t& bare, const RunContext& run);
 
 }  // namespace covol::cloud
