@@ -46,7 +46,7 @@ struct Try {
 constexpr Try kTries[] = {{1, kEnclosed}, {1, kSurelyEnclosed}, {0.67, kSurelyEnclosed}, {1.5, kSurelyEnclosed}, {0.44, kEnclosed}, {2.25, kSurelyEnclosed}};
 constexpr double kLeastSpacings = 0.5;
 constexpr double kOffHalf = 0.02;   // that the indicator's mean over the points may differ from 1/2
-constexpr double kOffWeight = 2;    // of more than that: walls that run into each other turn less than those that waver
+constexpr double kOffWeight = 2;    // of more than that, among tries: walls that run into each other turn less than those that waver
 constexpr double kSampledPerCell = 4;  // points that iterate, on the surface in a lattice cell's square
 constexpr double kSampleSpacings = 4;  // edge of the cells that they are taken from
 constexpr int kStrayRounds = 3;
@@ -56,7 +56,7 @@ constexpr double kManyStray = 0.005;  // of the points
 constexpr double kFewTorn = 0.002, kContradicted = 0.03;
 // Whether points enclose a solid. Where they lie all around it its surface rests on them: of closed shapes less than 0.01 of
 // it is bare, however noisy they are, of scans of one side 0.14 to 0.4. Of a shape of which a part is missing, up to 0.2, the
-// normals settle all the same: doubts up to 0.012, of the scans from 0.016 to 0.19.
+// normals settle all the same: doubts up to 0.013, of the scans from 0.026 to 0.19.
 constexpr double kSettled = 0.014, kBare = 0.05, kBareReach = 2;
 
 /// A lattice and what is done on it.
@@ -237,7 +237,8 @@ std::vector<Vec3> normals_of(const Indicator& indicator, const std::vector<Vec3>
 double first_cell(const CloudScale& scale) { return std::max(kCellSpacings * scale.spacing, kCellNoises * scale.noise); }
 
 /// Parts that are turned as a whole go on turning, or lie where the indicator is not 1/2.
-double doubt(const Orientation& o) { return o.turned + kOffWeight * std::max(0.0, o.off_half - kOffHalf); }
+double doubt(const Orientation& o, double weight = kOffWeight) { return o.turned + weight * std::max(0.0, o.off_half - kOffHalf); }
+bool is_settled(const Orientation& o) { return doubt(o, 1) < cloud::kFewTurned; }
 
 bool does_enclose(const CloudOrientation& cloud) {
     const double reach = kBareReach * std::max(cloud.scale.spacing, cloud.scale.noise);
@@ -266,7 +267,7 @@ struct Sample {
 void choose_orientation(CloudOrientation& cloud, const PointHints& hints, const RunContext& run) {
     cloud::GivenSides given = cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale), run);
     HintsReport& report = cloud.hints = given.report;
-    const bool is_certain = report.used && given.torn < kFewTorn && doubt(given.orientation) < cloud::kFewTurned;
+    const bool is_certain = report.used && given.torn < kFewTorn && is_settled(given.orientation);
     if (!is_certain) {
         cloud.orientation = orient(cloud.points, cloud.scale, run);
         cloud.encloses = does_enclose(cloud);
@@ -308,7 +309,7 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
             now.indicator = cloud::make_indicator(iteration.last());
             now.off_half = std::abs(cloud::mean_at(iteration.last(), sample.points) - 0.5);
             if (tried.size() == 1 || doubt(now) < doubt(best)) best = std::move(now);
-            if (doubt(best) < cloud::kFewTurned) break;
+            if (is_settled(best)) break;
         }
         const double half = std::accumulate(best.areas.begin(), best.areas.end(), 0.0) / std::accumulate(sample.areas.begin(), sample.areas.end(), 0.0);
         best.areas = sample.all_areas();
