@@ -310,12 +310,20 @@ FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cl
         const double share = cloud.encloses ? kLeastRestingShare : kLeastRestingOpen, noises = report.noise / report.spacing;
         const auto least = std::size_t(std::max({kLeastResting, share * double(cloud.points.size()), 4 * M_PI * noises * noises}));
         report.dropped_pieces = detail::drop_bare_pieces(*result, cloud.points, least);
-        TopologyOf topology{complexity(*result, run), least, cloud.points, run};
+        // Before the indicator's topology is held, for it may have lost torn parts, and after, for it may tear others.
+        const auto join = [&] {
+            const std::size_t joined = cloud::join_pieces(*result, cloud.points, std::max(report.spacing, report.noise), run);
+            report.joined_pieces += joined;
+            return joined > 0;
+        };
+        int own = complexity(*result, run);
+        if (own > 1 && join()) own = complexity(*result, run);
+        TopologyOf topology{own, least, cloud.points, run};
         topology.hold(*result, *orientation.indicator, report);
         // Where the points leave gaps, what surrounds a gap makes small handles on a lattice as fine as they are.
         if (topology.own > 1 && !orientation.screened && is_open(*result, cloud, run))
             topology.hold(*result, *cloud::indicator_of(cloud.points, orientation, kCoarseSpacings * cloud.scale.spacing), report);
-        if (topology.own > 1) report.joined_pieces = cloud::join_pieces(*result, cloud.points, std::max(report.spacing, report.noise), run);
+        if (topology.own > 1) join();
         result = start_from_grid(domain, *result, run);
     });
     return result;
