@@ -225,25 +225,30 @@ FloatGridPtr level_set_of(const Pieces& pieces, const Indicator& indicator, cons
 }
 
 /// Pieces, cavities and handles.
-int complexity(const FloatGrid& level_set, const RunContext& run) {
-    const MeshMeasures m = measure(extract_mesh(level_set, {}, run));
-    return m.components + std::max(0, m.genus);
-}
+struct Complexity {
+    Complexity(const FloatGrid& level_set, const RunContext& run) {
+        const MeshMeasures m = measure(extract_mesh(level_set, {}, run));
+        pieces = m.components;
+        all = m.components + std::max(0, m.genus);
+    }
+    int pieces;  ///< and cavities
+    int all;
+};
 
 /// Gives a level set the topology of an indicator that has fewer pieces and handles.
 struct TopologyOf {
-    int own;            // complexity
+    Complexity own;
     std::size_t least;  // points, on a piece
     const std::vector<Vec3>& points;
     const RunContext& run;
 
     void hold(FloatGrid& level_set, const Indicator& indicator, CloudReport& report) {
-        if (own <= 1) return;
+        if (own.all <= 1) return;
         const Domain domain = domain_of(level_set);
         const FloatGridPtr rough = level_set_of(Pieces({}, domain.voxel_size), indicator, domain, run);
         detail::drop_bare_pieces(*rough, points, least);
-        const int simpler = complexity(*rough, run);
-        if (simpler >= own) return;
+        const Complexity simpler(*rough, run);
+        if (simpler.all >= own.all) return;
         report.held_voxels += cloud::hold_topology(*rough, level_set);
         own = simpler;
     }
@@ -316,14 +321,13 @@ FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cl
             report.joined_pieces += joined;
             return joined > 0;
         };
-        int own = complexity(*result, run);
-        if (own > 1 && join()) own = complexity(*result, run);
-        TopologyOf topology{own, least, cloud.points, run};
+        TopologyOf topology{Complexity(*result, run), least, cloud.points, run};
+        if (topology.own.pieces > 1 && join()) topology.own = Complexity(*result, run);
         topology.hold(*result, *orientation.indicator, report);
         // Where the points leave gaps, what surrounds a gap makes small handles on a lattice as fine as they are.
-        if (topology.own > 1 && !orientation.screened && is_open(*result, cloud, run))
+        if (topology.own.all > 1 && !orientation.screened && is_open(*result, cloud, run))
             topology.hold(*result, *cloud::indicator_of(cloud.points, orientation, kCoarseSpacings * cloud.scale.spacing), report);
-        if (topology.own > 1) join();
+        if (topology.own.pieces > 1) join();
         result = start_from_grid(domain, *result, run);
     });
     return result;

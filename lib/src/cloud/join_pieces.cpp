@@ -14,6 +14,7 @@
 #include "covol/mesh.h"
 #include "covol/surface.h"
 #include "detail/kd_tree.h"
+#include "meshing/triangle.h"
 
 namespace covol::cloud {
 namespace {
@@ -41,11 +42,6 @@ struct Piece {
     }
 };
 
-Vec3 vertex(const TriangleMesh& mesh, std::uint32_t n) {
-    const auto& v = mesh.vertices[n];
-    return {double(v[0]), double(v[1]), double(v[2])};
-}
-
 /// The largest first; without cavities.
 std::vector<Piece> pieces_of(const TriangleMesh& mesh) {
     std::vector<std::uint32_t> parent(mesh.vertices.size());
@@ -57,12 +53,11 @@ std::vector<Piece> pieces_of(const TriangleMesh& mesh) {
     for (const auto& t : mesh.triangles)
         for (const std::uint32_t v : {t[1], t[2]}) parent[root(v)] = root(t[0]);
     std::map<std::uint32_t, Piece> pieces;
-    for (std::uint32_t v = 0; v < parent.size(); ++v) pieces[root(v)].surface.push_back(vertex(mesh, v));
+    for (std::uint32_t v = 0; v < parent.size(); ++v) pieces[root(v)].surface.push_back(meshing::to_vec3(mesh.vertices[v]));
     for (const auto& t : mesh.triangles) {
         Piece& piece = pieces[root(t[0])];
-        const Vec3 a = minus(vertex(mesh, t[0]), piece.surface.front()), b = minus(vertex(mesh, t[1]), piece.surface.front()),
-                   c = minus(vertex(mesh, t[2]), piece.surface.front());
-        piece.volume += dot(a, cross(b, c)) / 6;
+        const auto corner = [&](std::size_t n) { return minus(meshing::to_vec3(mesh.vertices[t[n]]), piece.surface.front()); };
+        piece.volume += dot(corner(0), cross(corner(1), corner(2))) / 6;
     }
     std::vector<Piece> solid;
     for (auto& [number, piece] : pieces)
