@@ -5,7 +5,6 @@
 #include <CGAL/AABB_triangle_primitive.h>
 #include <CGAL/Simple_cartesian.h>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <array>
@@ -15,6 +14,7 @@
 #include <numeric>
 
 #include "covol/error.h"
+#include "covol/points.h"
 #include "covol/surface.h"
 
 namespace covol {
@@ -54,28 +54,6 @@ private:
     CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>> tree_;
 };
 
-/// Indices of the points along a Z curve through 1024^3 cells of their box: those that follow each other lie close.
-std::vector<std::uint32_t> along_z_curve(const std::vector<Vec3>& points) {
-    constexpr int kBits = 10;
-    const WorldBox box = bounding_box(points, 0);
-    double longest = 0;
-    for (int a = 0; a < 3; ++a) longest = std::max(longest, box.max[a] - box.min[a]);
-    const double scale = longest > 0 ? ((1 << kBits) - 1) / longest : 0.0;
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> keyed(points.size());
-    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
-        std::uint32_t key = 0;
-        for (int a = 0; a < 3; ++a) {
-            const auto cell = static_cast<std::uint32_t>((points[n][a] - box.min[a]) * scale);
-            for (int bit = 0; bit < kBits; ++bit) key |= (cell >> bit & 1U) << (3 * bit + a);
-        }
-        keyed[n] = {key, static_cast<std::uint32_t>(n)};
-    });
-    tbb::parallel_sort(keyed.begin(), keyed.end());
-    std::vector<std::uint32_t> order(points.size());
-    std::transform(keyed.begin(), keyed.end(), order.begin(), [](const auto& k) { return k.second; });
-    return order;
-}
-
 }  // namespace
 
 std::vector<double> distances_to(const TriangleMesh& mesh, const std::vector<Vec3>& points) {
@@ -87,7 +65,8 @@ std::vector<double> distances_to(const TriangleMesh& mesh, const std::vector<Vec
     tbb::parallel_for(std::size_t(0), trees.size(), [&](std::size_t n) {
         trees[n] = std::make_unique<TriangleTree>(mesh, n * kTriangles, std::min(count, (n + 1) * kTriangles));
     });
-    const std::vector<std::uint32_t> order = along_z_curve(points);
+    if (points.empty()) return {};
+    const std::vector<std::uint32_t> order = spatial_order(points, points.size());
     std::vector<double> distances(points.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, order.size(), 256), [&](const auto& range) {
         Kernel::Point_3 closest = to_cgal(mesh.vertices[mesh.triangles.front()[0]]);

@@ -149,6 +149,32 @@ std::vector<Vec3> merge_close_points(const std::vector<Vec3>& points, double cel
     return result;
 }
 
+std::vector<std::uint32_t> spatial_order(const std::vector<Vec3>& points, std::size_t most) {
+    if (most == 0) throw Error(Errc::InvalidOptions, "spatial_order: most: expected > 0, got 0");
+    if (points.size() > std::numeric_limits<std::uint32_t>::max())
+        throw Error(Errc::InvalidInput, "spatial_order: expected fewer than 2^32 points, got " + std::to_string(points.size()));
+    if (points.empty()) return {};
+    constexpr int kBits = 10;
+    const WorldBox box = bounding_box(points);
+    const double longest = longest_side(box);
+    const double scale = longest > 0 ? ((1 << kBits) - 1) / longest : 0.0;
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> keyed(points.size());
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
+        std::uint32_t key = 0;
+        for (int a = 0; a < 3; ++a) {
+            const auto cell = static_cast<std::uint32_t>((points[n][a] - box.min[a]) * scale);
+            for (int bit = 0; bit < kBits; ++bit) key |= (cell >> bit & 1U) << (3 * bit + a);
+        }
+        keyed[n] = {key, static_cast<std::uint32_t>(n)};
+    });
+    tbb::parallel_sort(keyed.begin(), keyed.end());
+    std::vector<std::uint32_t> order(std::min(points.size(), most));
+    const double step = double(points.size()) / double(order.size());
+    for (std::size_t n = 0; n < order.size(); ++n)
+        order[n] = keyed[order.size() < points.size() ? std::size_t((double(n) + 0.5) * step) : n].second;
+    return order;
+}
+
 SpacingStatistics nearest_neighbour_spacing(const std::vector<Vec3>& points) {
     if (points.size() < 2) return {};
     constexpr std::size_t kQueries = 50000;

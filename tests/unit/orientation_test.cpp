@@ -215,7 +215,7 @@ TEST_CASE("orient_cloud leaves out points spread through space, and none of a su
 }
 
 TEST_CASE("orient: clouds that have no inside are refused, a stop is heeded") {
-    const CloudScale scale{0.1, 0};
+    const CloudScale scale{0.1, 0, 0};
     const std::vector<Vec3> three{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, at_one_place(10, Vec3{1, 2, 3});
     for (const auto& points : {std::vector<Vec3>{}, three, at_one_place}) {
         try {
@@ -227,7 +227,7 @@ TEST_CASE("orient: clouds that have no inside are refused, a stop is heeded") {
         CHECK_THROWS_AS(orient_cloud(points), Error);
     }
     CHECK_THROWS_AS(orient({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, CloudScale{}), Error);
-    CHECK_NOTHROW(orient({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, CloudScale{1, 0}));
+    CHECK_NOTHROW(orient({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, CloudScale{1, 0, 0}));
 
     const std::atomic<bool> stop{true};
     RunContext run;

@@ -26,7 +26,7 @@ TEST_CASE("points spread through space are stray, a surface's are not") {
         std::vector<Vec3> points = s.points;
         for (const Vec3& p : test::box_cloud(400, {{-3, -3, -3}, {3, 3, 3}}, seed + 20))
             if (shape.distance(p) > 6 * s.spacing()) points.push_back(p);
-        const std::vector<char> stray = find_stray(points, s.spacing(), {});
+        const std::vector<char> stray = find_stray(points, {s.spacing(), 0, 0}, {});
         INFO("seed " << seed << ": " << count(stray, 0, 4000) << " of the surface, " << count(stray, 4000, points.size()) << " of "
                      << points.size() - 4000);
         CHECK(count(stray, 0, 4000) <= 4);
@@ -47,7 +47,7 @@ TEST_CASE("sparse parts of a surface are not stray") {
             points.push_back(p);
         }
         REQUIRE(sparse > 100);
-        const std::vector<char> stray = find_stray(points, s.spacing(), {});
+        const std::vector<char> stray = find_stray(points, {s.spacing(), 0, 0}, {});
         INFO("seed " << seed << ": " << count(stray, 0, points.size()) << ", sparse " << sparse);
         CHECK(double(count(stray, 0, points.size())) < 0.05 * double(sparse));
     }
@@ -60,7 +60,7 @@ TEST_CASE("a point above a sheet is stray when it is far, not when it is close")
     points.push_back({2.03, 2.01, 0.1});
     points.push_back({1.03, 1.01, 0.9});
     points.push_back({2, 2, 500});  // beyond where neighbours are looked for
-    const std::vector<char> stray = find_stray(points, 0.1, {});
+    const std::vector<char> stray = find_stray(points, {0.1, 0, 0}, {});
     CHECK(count(stray, 0, 1600) == 0);
     CHECK_FALSE(stray[1600]);
     CHECK(stray[1601]);
@@ -69,8 +69,8 @@ TEST_CASE("a point above a sheet is stray when it is far, not when it is close")
 
 TEST_CASE("a handful of points and points at one place are not stray") {
     const std::vector<Vec3> few = test::box_cloud(16, {{-1, -1, -1}, {1, 1, 1}}, 1);
-    CHECK(count(find_stray(few, 0.01, {}), 0, 16) == 0);
-    CHECK(find_stray({}, 1, {}).empty());
-    const std::vector<char> at_one_place = find_stray(std::vector<Vec3>(100, Vec3{1, 2, 3}), 0.1, {});
+    CHECK(count(find_stray(few, {0.01, 0, 0}, {}), 0, 16) == 0);
+    CHECK(find_stray({}, {1, 0, 0}, {}).empty());
+    const std::vector<char> at_one_place = find_stray(std::vector<Vec3>(100, Vec3{1, 2, 3}), {0.1, 0, 0}, {});
     CHECK(count(at_one_place, 0, 100) == 0);
 }

@@ -1,9 +1,11 @@
 #include "cloud_flags.h"
 
+#include <limits>
 #include <sstream>
 
 #include "bindings.h"
 #include "covol/error.h"
+#include "covol/points.h"
 
 namespace covol::tool {
 namespace {
@@ -27,13 +29,26 @@ std::string one_line(const CloudCleanupReport& r, const CloudCleanupOptions& opt
 
 }  // namespace
 
-void CloudFlags::bind(CLI::App& command) {
+void CloudFlags::bind(CLI::App& command, bool with_most) {
     command.add_flag("--remove-outliers{3}", outlier_factor,
                      "drop points whose distance to their 24 neighbours is more than 3 (or =FACTOR) times the cloud's mean");
+    if (with_most)
+        command.add_option("--most-points", most_points, "of larger clouds so many points are used, evenly spread over the surface; 0: all")
+            ->type_name("N")
+            ->default_str(std::to_string(most_points));
     add_length(command, "--simplify", simplify, "", "keep one point in each cell of this edge, 1vx for example");
     add_choice(command, "--smooth", smooth,
                {{"none", CloudSmoothing::None}, {"jets", CloudSmoothing::Jets}, {"wlop", CloudSmoothing::Wlop}},
                "move the points to fitted quadrics, or make a quarter as many by projection, evenly spread");
+}
+
+std::vector<std::uint32_t> CloudFlags::used(const std::vector<Vec3>& points, const RunContext& run, Json& report) const {
+    std::vector<std::uint32_t> order = spatial_order(points, most_points > 0 ? most_points : std::numeric_limits<std::size_t>::max());
+    if (order.size() < points.size()) {
+        report["thinned_to"] = order.size();
+        run.info("cloud: " + std::to_string(order.size()) + " of " + std::to_string(points.size()) + " points used, evenly spread; --most-points 0 takes all");
+    }
+    return order;
 }
 
 CloudCleanupOptions CloudFlags::resolve(double h) const {

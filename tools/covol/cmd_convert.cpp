@@ -107,7 +107,7 @@ void add_convert(Session& session) {
     command->add_option("--grid", job->grid_name, "grid to take from a .vdb file [the first]")->type_name("NAME");
     add_length(*command, "--voxel-size", job->voxel_size, "", "edge of the voxels of a .vdb file [smallest spacing]");
     job->points.bind_options(*command);
-    job->cloud_flags.bind(*command);
+    job->cloud_flags.bind(*command, false);
     job->mesh.bind(*command);
     job->image.bind(*command);
     command->add_flag("--half", job->half, "store values as 16-bit floats");

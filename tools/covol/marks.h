@@ -20,9 +20,9 @@ struct Marks {
     Json report;                      ///< {"points": {...}, "contours": {...}}
 };
 
-/// Reads both kinds of files. With an image, marks outside it are an error.
-[[nodiscard]] Marks read_marks(const PointFlags& points, const ContourFlags& contours, const ImageGeometry* geometry,
-                               const RunContext& run);
+/// Reads both kinds of files. With an image, marks outside it are an error; without one, points are sorted in space and thinned.
+[[nodiscard]] Marks read_marks(const PointFlags& points, const ContourFlags& contours, const CloudFlags& cloud,
+                               const ImageGeometry* geometry, const RunContext& run);
 
 /// Cleans the points, and densifies the contours with step h.
 void prepare(Marks& marks, const CloudFlags& cloud, const ContourFlags& contours, const ImageGeometry* geometry, double h,

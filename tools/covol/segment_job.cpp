@@ -107,7 +107,7 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
     if (with_image) painted.bind(command);
     seeds.bind(command, with_image);
     if (with_image) guess.bind(command);
-    cloud.bind(command);
+    cloud.bind(command, !with_image);
     evolve.bind(command, with_image);
     if (with_image) edge.bind(command);
     tag.bind(command, with_image);
@@ -182,7 +182,7 @@ void SegmentJob::run_one(Session& session) const {
     Json& input = session.report()["input"];
     const Stopwatch reading;
     const ImageGeometry* geometry = pixels ? &pixels->geometry() : nullptr;
-    Marks marks = read_marks(points, contours, geometry, session.run());
+    Marks marks = read_marks(points, contours, cloud, geometry, session.run());
     session.add_seconds("read", reading.seconds());
     session.add_seconds("total", reading.seconds());
 

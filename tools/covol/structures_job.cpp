@@ -393,7 +393,7 @@ StructuresOutput segment_structures(const SegmentJob& job, const std::vector<Str
         s.name = inputs[n].name;
         s.grid = grids[n];
         s.label = inputs[n].label;
-        Marks marks = read_marks(inputs[n].points, inputs[n].contours, &image.geometry(), own);
+        Marks marks = read_marks(inputs[n].points, inputs[n].contours, job.cloud, &image.geometry(), own);
         const std::shared_ptr<const Contours> painted = paint.own_contours(inputs[n], marks, h, own);
         if (!painted) paint.add_outlines(inputs[n], marks, own);
         prepare(marks, job.cloud, inputs[n].contours, &image.geometry(), h, session, own);

@@ -13,6 +13,7 @@ namespace covol {
 struct CloudScale {
     double spacing = 0;  ///< world units: 1 / sqrt(points per area)
     double noise = 0;    ///< standard deviation along the normal
+    double nearest = 0;  ///< median distance to the nearest other point
 };
 /// From quadrics through neighbourhoods of a sample of the points: that radius at which they are most of a sheet.
 [[nodiscard]] CloudScale cloud_scale(const std::vector<Vec3>& points, const RunContext& run = {});

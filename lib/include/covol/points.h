@@ -1,5 +1,6 @@
 #pragma once
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -76,6 +77,11 @@ void check_inside(const PointCloud& cloud, const ImageGeometry& geometry, const 
 /// Exact duplicates, and points closer than `cell` / 2 in the same cell of a lattice of edge `cell`, become one.
 /// The first of each stays; the order stays. cell = 0 removes exact duplicates only.
 [[nodiscard]] std::vector<Vec3> merge_close_points(const std::vector<Vec3>& points, double cell);
+
+/// Indices of points along a Z curve through 1024^3 cells of their box: those that follow each other lie close. Of more than
+/// `most`, so many of them, evenly out of that order: the cloud thins by the same share everywhere.
+/// @throws Error InvalidOptions (most = 0), InvalidInput (2^32 points and more).
+[[nodiscard]] std::vector<std::uint32_t> spatial_order(const std::vector<Vec3>& points, std::size_t most);
 
 /// Spacing of a cloud, from nearest neighbours of a fixed subsample (world units).
 struct SpacingStatistics {

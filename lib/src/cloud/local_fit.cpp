@@ -272,8 +272,7 @@ Vec3 Quadric::foot() const {
 OrientedCloud thinned(const OrientedCloud& cloud, double edge) {
     const PointCells cells(cloud.points, edge);
     struct Mean { Vec3 point{0, 0, 0}, normal{0, 0, 0}; double count = 0; };
-    OrientedCloud result;
-    for (std::size_t n = 0; n < cells.cell_count(); ++n) {
+    const auto add_cell = [&](std::size_t n, OrientedCloud& result) {
         std::array<Mean, 6> means;  // by the direction that is closest to the normal's
         const auto [begin, end] = cells.cell(n);
         for (std::uint32_t at = begin; at < end; ++at) {
@@ -307,6 +306,17 @@ OrientedCloud thinned(const OrientedCloud& cloud, double edge) {
             result.normals.push_back(unit(mean.normal));
             result.counts.push_back(float(mean.count));
         }
+    };
+    constexpr std::size_t kCells = 4096;
+    std::vector<OrientedCloud> parts((cells.cell_count() + kCells - 1) / kCells);
+    tbb::parallel_for(std::size_t(0), parts.size(), [&](std::size_t part) {
+        for (std::size_t n = part * kCells; n < std::min(cells.cell_count(), (part + 1) * kCells); ++n) add_cell(n, parts[part]);
+    });
+    OrientedCloud result;
+    for (const OrientedCloud& part : parts) {
+        result.points.insert(result.points.end(), part.points.begin(), part.points.end());
+        result.normals.insert(result.normals.end(), part.normals.begin(), part.normals.end());
+        result.counts.insert(result.counts.end(), part.counts.begin(), part.counts.end());
     }
     return result;
 }

@@ -328,7 +328,7 @@ CloudOrientation orient_cloud(const std::vector<Vec3>& points, const PointHints&
         cloud.scale = cloud_scale(cloud.points, run);
         // Where there are many, some show once others are gone.
         for (int round = 0; round < kStrayRounds; ++round) {
-            const std::vector<char> stray = cloud::find_stray(cloud.points, cloud.scale.spacing, run);
+            const std::vector<char> stray = cloud::find_stray(cloud.points, cloud.scale, run);
             std::size_t kept = 0;
             for (std::size_t n = 0; n < stray.size(); ++n)
                 if (!stray[n]) cloud.points[kept++] = cloud.points[n];

@@ -1,6 +1,7 @@
 #include "cloud/stray.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 
 #include "cloud/median.h"
@@ -10,7 +11,8 @@
 namespace covol::cloud {
 namespace {
 
-constexpr std::size_t kNeighbours = 8, kSamples = 20000;
+constexpr std::size_t kNeighbours = 8, kSamples = 20000, kBeside = 16;
+constexpr double kCellNoises = 0.5;  // a layer as thick as several of the points' spacings has few in a cell of theirs
 constexpr double kFar = 2.5;        // times the median distance to the eighth neighbour
 constexpr double kOffPlane = 0.25;  // standard deviation of the neighbours, or the point's own distance, of that to the eighth
 
@@ -28,24 +30,28 @@ double usual_reach(const PointCells& cells, double spacing) {
 /// Whether fewer points than that lie within a distance.
 bool is_lonely(const PointCells& cells, std::size_t n, double distance, std::vector<PointCells::Range>& ranges) {
     const Vec3& p = cells.sorted()[n];
-    cells.find({{p[0] - distance, p[1] - distance, p[2] - distance}, {p[0] + distance, p[1] + distance, p[2] + distance}}, ranges);
     std::size_t found = 0;
-    for (const PointCells::Range& range : ranges)
-        for (std::uint32_t m = range.begin; m < range.end; ++m) {
+    const auto has_company = [&](std::size_t begin, std::size_t end) {
+        for (std::size_t m = begin; m < end && found < kNeighbours; ++m) {
             const Vec3 to = minus(cells.sorted()[m], p);
             found += m != n && dot(to, to) <= distance * distance;
-            if (found >= kNeighbours) return false;
         }
-    return true;
+        return found >= kNeighbours;
+    };
+    // Most have it beside them in their cell.
+    if (has_company(n - std::min(n, kBeside), std::min(n + kBeside, cells.sorted().size()))) return false;
+    found = 0;
+    cells.find({{p[0] - distance, p[1] - distance, p[2] - distance}, {p[0] + distance, p[1] + distance, p[2] + distance}}, ranges);
+    return std::none_of(ranges.begin(), ranges.end(), [&](const PointCells::Range& range) { return has_company(range.begin, range.end); });
 }
 
 }  // namespace
 
-std::vector<char> find_stray(const std::vector<Vec3>& points, double spacing, const RunContext& run) {
+std::vector<char> find_stray(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run) {
     std::vector<char> stray(points.size(), 0);
     if (points.size() <= 2 * kNeighbours) return stray;
-    const PointCells cells(points, kFirstRadius * spacing);
-    const double far_reach = kFar * usual_reach(cells, spacing);
+    const PointCells cells(points, kFirstRadius * std::max(scale.spacing, kCellNoises * scale.noise));
+    const double far_reach = kFar * usual_reach(cells, scale.spacing);
     run.check();
     std::vector<char> lonely(points.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 1024), [&](const auto& some) {
@@ -53,7 +59,7 @@ std::vector<char> find_stray(const std::vector<Vec3>& points, double spacing, co
         for (std::size_t n = some.begin(); n < some.end(); ++n) lonely[n] = is_lonely(cells, n, far_reach, ranges);
     });
     run.check();
-    for_nearest(cells, spacing, kNeighbours, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
+    for_nearest(cells, scale.spacing, kNeighbours, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
         stray[point] = 1;
         if (near.size() < kNeighbours) return;
         const auto [whole, squares] = moments_of(cells, points[point], near);

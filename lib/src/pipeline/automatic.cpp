@@ -156,18 +156,19 @@ VoxelSizeChoice choose_voxel_size(const Image* image, const std::vector<Vec3>& w
     if (distinct.size() < 2)
         throw Error(Errc::InvalidInput, "choose_voxel_size: expected an image or at least 2 distinct points, got " +
                                             std::to_string(distinct.size()));
-    const double spacing = nearest_neighbour_spacing(distinct).median;
+    constexpr const char* kNearest = "the median distance between neighbouring points";
     if (!tagged && distinct.size() > pipeline::kMostGuessMarks) {
         const CloudScale scale = cloud_scale(distinct);
         const double h = kCloudNoise * scale.noise;
-        if (h > spacing) return {h, number(kCloudNoise) + " times the noise of the points, " + number(scale.noise)};
-        return {spacing, "the median distance between neighbouring points"};
+        if (h > scale.nearest) return {h, number(kCloudNoise) + " times the noise of the points, " + number(scale.noise)};
+        return {scale.nearest, kNearest};
     }
+    const double spacing = nearest_neighbour_spacing(distinct).median;
     const ScanVoxelSize scan = scan_voxel_size(distinct, spacing);
     if (scan.voxel_size <= spacing) {
         // A surface of few points is so few spacings wide that in voxels as large as they are curvature would outweigh them.
         const double finer = std::sqrt(double(distinct.size()) / kFewPoints);
-        if (finer >= 1) return {spacing, "the median distance between neighbouring points"};
+        if (finer >= 1) return {spacing, kNearest};
         return {finer * spacing, "finer than the median distance between neighbouring points, " + number(spacing) + ", for there are few"};
     }
     return {scan.voxel_size, "points lie " + number(scan.thickness) +
