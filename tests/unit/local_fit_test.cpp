@@ -274,7 +274,7 @@ TEST_CASE("where neighbourhoods are wide there are fewer quadrics, and none is f
     const OrientedCloud places = oriented(s);
     test::add_noise(s, spacing, 2);
     std::size_t bare = 1000;
-    const std::vector<Quadric> quadrics = quadrics_over(places, oriented(s), edge, spacing, bare, {});
+    const std::vector<Quadric> quadrics = quadrics_over(places, oriented(s), edge, {spacing, spacing, 0}, bare, {});
     CHECK(bare < 20);  // of 10,000 places
     CHECK(double(quadrics.size()) < 0.5 * double(thinned(places, edge).size()));
     std::vector<Vec3> feet;
@@ -286,4 +286,5 @@ TEST_CASE("where neighbourhoods are wide there are fewer quadrics, and none is f
     double farthest = 0;
     for (std::size_t n = 0; n < places.size(); n += 10) farthest = std::max(farthest, test::brute_force_distance(feet, places.points[n]));
     CHECK(farthest < 3 * edge);
+    for (const Quadric& q : quadrics_over(places, places, edge, {spacing, 0, 0}, bare, {})) CHECK(q.apart == edge);
 }

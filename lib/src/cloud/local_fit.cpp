@@ -325,12 +325,14 @@ std::vector<Quadric> fit_quadrics(const OrientedCloud& nodes, const OrientedClou
     return Fitter(cloud, spacing, run).fit(nodes, run);
 }
 
-std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCloud& cloud, double edge, double spacing,
+std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCloud& cloud, double edge, const CloudScale& scale,
                                    std::size_t& bare, const RunContext& run) {
-    const Fitter fitter(cloud, spacing, run);
+    const Fitter fitter(cloud, scale.spacing, run);
     std::vector<Quadric> all;
     bare = 0;
     for (const double times : {kWidest, 1.0}) {
+        // Where noise is less, wide neighbourhoods are those of flat parts: they tell less about what lies beside these.
+        if (times > 1 && scale.noise < scale.spacing) continue;
         const double apart = times * edge;
         OrientedCloud nodes = thinned(places, apart);
         if (!all.empty()) nodes = without_covered(nodes, all);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "covol/domain.h"
+#include "covol/orientation.h"
 #include "covol/run.h"
 
 namespace covol::cloud {
@@ -46,10 +47,11 @@ struct Quadric {
                                                 const RunContext& run);
 
 /// Quadrics all over a cloud, as fit_quadrics() makes them: at nodes taken from cells of the given edge, or of twice as much
-/// where the neighbourhoods are so wide that more nodes would tell the same.
+/// where the neighbourhoods are so wide, for noise wants it, that more nodes would tell the same.
 /// @param places  the cloud's points, moved to about where the surface is; the nodes are means of them
+/// @param scale   of the cloud's points
 /// @param bare    how many nodes have none
 [[nodiscard]] std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCloud& cloud, double edge,
-                                                 double spacing, std::size_t& bare, const RunContext& run);
+                                                 const CloudScale& scale, std::size_t& bare, const RunContext& run);
 
 }  // namespace covol::cloud
