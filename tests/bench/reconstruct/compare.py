@@ -20,6 +20,7 @@ import tempfile
 import numpy as np
 
 import clouds
+import picture
 import ply
 import shapes
 
@@ -174,9 +175,13 @@ def measured(options, case, trial, steps):
     return json.loads(known.read_text())
 
 
+def rank(result):
+    return np.inf if "fails" in result else result["mean_to"] + result["mean_from"]
+
+
 def best(results):
     """The one with the smallest sum of both mean distances; one that fails where all do."""
-    return min(results, key=lambda r: np.inf if "fails" in r else r["mean_to"] + r["mean_from"])
+    return min(results, key=rank)
 
 
 # ---- tables --------------------------------------------------------------------------------------------------------
@@ -238,6 +243,7 @@ def parsed():
     parser.add_argument("--meshes", default=data and f"{data}/meshes", help="folder of closed truth meshes, .ply [meshes in COVOL_DATA]")
     parser.add_argument("--scans", nargs="+", metavar="FILE.ply", help="clouds without a truth, instead of shapes")
     parser.add_argument("--results", default=str(HERE / "results"), help="folder for the tables [results beside run.sh]")
+    parser.add_argument("--picture", metavar="FILE.png", help="each cloud and each method's best surface, coloured by its distance to the truth")
     parser.add_argument("--poisson-recon", metavar="BINARY", help="PoissonRecon (github.com/mkazhdan/PoissonRecon)")
     parser.add_argument("--wnnc", metavar="COMMAND", help="with {in} and {out}; writes points with normals, PLY, which PoissonRecon gets")
     parser.add_argument("--ipsr", metavar="COMMAND", help="with {in} and {out}; writes a mesh, PLY")
@@ -256,19 +262,33 @@ def parsed():
     return options
 
 
+def drawn_in(panels, case, trial, found):
+    """Adds a case to the panels: its cloud and each method's best surface."""
+    chosen = {method: min(results, key=lambda steps: rank(results[steps])) for method, results in found.items()}
+    surfaces = [(method, *ply.read(trial.make(steps).path)) for method, steps in chosen.items() if "fails" not in found[method][steps]]
+    panels.add(" ".join(f"{value:g}" if isinstance(value, float) else str(value) for value in case.columns.values()),
+               ply.read(case.cloud)[0], ply.read(case.truth), surfaces)
+
+
 def main():
     options = parsed()
     head = provenance()  # with the load before
     chosen, rows = methods(options), []
+    panels = picture.Panels()
     for case in (scanned if options.scans else drawn)(options):
         print(*case.columns.values(), flush=True)
         with tempfile.TemporaryDirectory(prefix="covol_reconstruct_") as folder:
             trial = Trial(options, case, folder)
-            for method, variants in chosen.items():
-                rows.append(case.columns | {"method": method} | best([measured(options, case, trial, steps) for steps in variants]))
+            found = {method: {steps: measured(options, case, trial, steps) for steps in variants} for method, variants in chosen.items()}
+            rows += [case.columns | {"method": method} | best(results.values()) for method, results in found.items()]
+            if options.picture and case.truth:
+                drawn_in(panels, case, trial, found)
     if not rows:
         raise SystemExit("nothing to measure: see --shapes, --counts, --noise, --outliers, --methods")
     write(options, "scans" if options.scans else "results", rows, head)
+    if options.picture and not options.scans:
+        panels.write(options.picture)
+        print(f"wrote {options.picture}")
 
 
 if __name__ == "__main__":
