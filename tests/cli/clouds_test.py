@@ -195,9 +195,9 @@ class Holes(Clouds):
 class Normals(Clouds):
     """What files say of normals and sensors is checked, and told."""
 
-    def report(self, name, text):
+    def report(self, name, text, *more):
         (self.out / name).write_text(text)
-        done = subprocess.run([COVOL, "reconstruct", name, "-o", "s.vdb", "--quiet", "--json", "-"], cwd=self.out, capture_output=True, text=True, timeout=300)
+        done = subprocess.run([COVOL, "reconstruct", name, "-o", "s.vdb", "--quiet", "--json", "-", *more], cwd=self.out, capture_output=True, text=True, timeout=300)
         self.assertEqual(done.returncode, 0, done.stderr)
         return json.loads(done.stdout), done.stderr
 
@@ -221,6 +221,18 @@ class Normals(Clouds):
         self.assertAlmostEqual(report["cloud"]["normals"]["agree"], 0.5, delta=0.05)
         self.assertIn("file not used: half of them", said)
         self.assertAlmostEqual(shell_share(report["surface"]), 1, delta=0.01)
+
+    def test_normals_stay_with_their_points_where_a_cloud_is_thinned(self):
+        points = random_sphere(12000, 23)
+        text = self.rows(points, [tuple(x / RADIUS for x in p) for p in points])
+        for most, used in ((6000, 6000), (0, 12000), (20000, 12000)):
+            report, _ = self.report("p.xyz", text, "--most-points", str(most))
+            told = report["input"]["points"]
+            self.assertEqual((told["count"], told.get("thinned_to", 12000)), (12000, used))
+            found = report["cloud"]["normals"]
+            self.assertEqual((found["given"], found["used"]), (used, True))
+            self.assertGreater(found["agree"], 0.99)
+            self.assertAlmostEqual(shell_share(report["surface"]), 1, delta=0.01)
 
     def test_sensor_of_a_pcd(self):
         sensor = (0, 0, 8 * RADIUS)

@@ -314,6 +314,38 @@ TEST_CASE("close points become one, the first stays and so does the order") {
         }
 }
 
+TEST_CASE("points sorted in space follow their neighbours, and thin by the same share everywhere") {
+    std::vector<Vec3> points = random_points(20000, 7);
+    for (Vec3& p : points) p[0] *= p[0];  // denser on one side
+    std::vector<std::uint32_t> order = spatial_order(points, points.size());
+    const auto path = [&](const std::vector<std::uint32_t>& along) {
+        double length = 0;
+        for (std::size_t n = 1; n < along.size(); ++n) {
+            const Vec3 &p = points[along[n - 1]], &q = points[along[n]];
+            length += std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
+        }
+        return length;
+    };
+    std::vector<std::uint32_t> all(points.size());
+    for (std::size_t n = 0; n < all.size(); ++n) all[n] = std::uint32_t(n);
+    CHECK(path(order) < 0.12 * path(all));
+    CHECK(spatial_order(points, 1000000) == order);
+    const std::vector<std::uint32_t> some = spatial_order(points, 3000);
+    REQUIRE(some.size() == 3000);
+    for (int octant = 0; octant < 8; ++octant) {
+        const auto is_in = [&](std::uint32_t n) {
+            return (points[n][0] > 0.5) == bool(octant & 1) && (points[n][1] > 0.5) == bool(octant & 2) && (points[n][2] > 0.5) == bool(octant & 4);
+        };
+        const double before = double(std::count_if(all.begin(), all.end(), is_in)), after = double(std::count_if(some.begin(), some.end(), is_in));
+        CHECK(after / before == Approx(0.15).margin(0.003));  // drawn at random: 0.006
+    }
+    std::sort(order.begin(), order.end());
+    CHECK(order == all);
+    CHECK(spatial_order({}, 5).empty());
+    CHECK(spatial_order(std::vector<Vec3>(10, Vec3{1, 2, 3}), 4).size() == 4);
+    CHECK_THROWS_AS(spatial_order(points, 0), Error);
+}
+
 TEST_CASE("spacing of a lattice, of clusters, and against brute force") {
     std::vector<Vec3> lattice;
     for (int i = 0; i < 12; ++i)

@@ -266,7 +266,8 @@ def drawn_in(panels, case, trial, found):
     """Adds a case to the panels: its cloud and each method's best surface."""
     chosen = {method: min(results, key=lambda steps: rank(results[steps])) for method, results in found.items()}
     surfaces = [(method, *ply.read(trial.make(steps).path)) for method, steps in chosen.items() if "fails" not in found[method][steps]]
-    panels.add(" ".join(f"{value:g}" if isinstance(value, float) else str(value) for value in case.columns.values()),
+    shape, count, noise, outliers = case.columns.values()
+    panels.add(f"{shape}, {count} points, noise {noise:g} %" + (f", {outliers:g} % outliers" if outliers else ""),
                ply.read(case.cloud)[0], ply.read(case.truth), surfaces)
 
 

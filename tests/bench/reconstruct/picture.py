@@ -1,6 +1,7 @@
 """Surfaces beside each other: shaded, and coloured by how far each place lies from the true surface."""
 import matplotlib
 import numpy as np
+from PIL import Image
 from scipy.spatial import cKDTree
 
 matplotlib.use("Agg")
@@ -23,14 +24,19 @@ class Panels:
         axes = _axes(truth[0])
         low, high = (truth[0] @ axes.T).min(0), (truth[0] @ axes.T).max(0)
         grid = _Grid(low - 0.04 * (high - low), high + 0.04 * (high - low))
-        tree = cKDTree(_sampled(*truth, SAMPLES // 4)[0])
+        true_points, true_normals = _sampled(*truth, SAMPLES // 4)
+        tree = cKDTree(true_points)
         diagonal = np.linalg.norm(np.ptp(truth[0], axis=0))
         row = [(title, grid.draw(cloud @ axes.T, np.full((len(cloud), 3), 0.35)))]
         for name, vertices, triangles in surfaces:
             points, normals = _sampled(vertices, triangles, SAMPLES)
-            off = 100 / diagonal * tree.query(points, workers=-1)[0]
+            # To the plane of the nearest sample, as these lie farther apart than the surfaces.
+            distance, nearest = tree.query(points, workers=-1)
+            off = np.minimum(distance, np.abs(((points - true_points[nearest]) * true_normals[nearest]).sum(1))) * 100 / diagonal
             colour = pyplot.get_cmap("turbo")(np.clip(off / FARTHEST, 0, 1))[:, :3]
-            shade = 0.25 + 0.75 * np.clip(normals @ axes.T @ LIGHT, 0, 1)
+            normals = normals @ axes.T
+            normals[normals[:, 2] < 0] *= -1  # what is seen faces who looks, whichever way a mesh is oriented
+            shade = 0.25 + 0.75 * np.clip(normals @ LIGHT, 0, 1)
             row.append((f"{name}, {off.mean():.3f} %", grid.draw(points @ axes.T, colour * shade[:, None])))
         self.rows.append(row)
 
@@ -50,6 +56,7 @@ class Panels:
                         label="distance to the true surface, % of its diagonal (mean in the titles)")
         figure.savefig(path, dpi=80)
         pyplot.close(figure)
+        Image.open(path).convert("P", palette=Image.Palette.ADAPTIVE, colors=200).save(path, optimize=True)
 
 
 class _Grid:
