@@ -13,7 +13,6 @@
 #include <cmath>
 #include <iostream>
 
-#include "covol/band.h"
 #include "covol/distance.h"
 #include "covol/image.h"
 #include "covol/points.h"

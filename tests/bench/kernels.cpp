@@ -8,10 +8,10 @@
 #include <string>
 
 #include "counters.h"
-#include "detail/halo.h"
-#include "detail/leaf_band.h"
-#include "detail/motion.h"
-#include "detail/scheme.h"
+#include "evolve/motion.h"
+#include "grid/halo.h"
+#include "grid/leaf_band.h"
+#include "scheme/scheme.h"
 #include "stream.h"
 
 namespace covol::bench {

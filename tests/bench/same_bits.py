@@ -7,6 +7,7 @@ prints counts without its times. Exit code 1: something differs.
 """
 import argparse
 import json
+import os
 import pathlib
 import re
 import shlex
@@ -184,7 +185,8 @@ def content(path):
 def run(covol, folder, arguments):
     """{file: what counts of it}, with what was printed and the exit code."""
     folder.mkdir(parents=True)
-    done = subprocess.run([covol, *shlex.split(arguments), "--threads", "2"], cwd=folder, capture_output=True, text=True)
+    own = os.environ | {"LD_LIBRARY_PATH": str(covol.parent.parent / "lib")}  # a copied build finds its own library
+    done = subprocess.run([covol, *shlex.split(arguments), "--threads", "2"], cwd=folder, capture_output=True, text=True, env=own)
     printed = re.sub(r"[\d.]+ (s|GB|MB|GiB|MiB)\b", "", done.stdout + done.stderr)
     found = {path.name: content(path) for path in sorted(folder.iterdir())}
     return found | {"(printed)": printed.encode(), "(exit code)": str(done.returncode).encode()}

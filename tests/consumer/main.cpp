@@ -2,7 +2,6 @@
 #include <cmath>
 #include <cstdio>
 
-#include "covol/band.h"
 #include "covol/compare.h"
 #include "covol/distance.h"
 #include "covol/edge.h"
@@ -11,6 +10,7 @@
 #include "covol/phantom.h"
 #include "covol/pipeline.h"
 #include "covol/render.h"
+#include "covol/start.h"
 #include "covol/vdb_io.h"
 
 int main() {

@@ -12,6 +12,9 @@ struct WorldBox {
 };
 [[nodiscard]] double longest_side(const WorldBox& box);
 
+/// Half the width of narrow bands, and the clamp on initial values, in voxels: u0 is in [-3h, 3h].
+inline constexpr double kHalfWidthVoxels = 3.0;
+
 /// The computational domain: a box of isotropic voxels, aligned with the world's axes.
 ///
 /// Voxel (i,j,k) is a cube of edge h whose centre lies at origin + h * (i,j,k);

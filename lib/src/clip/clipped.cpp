@@ -8,7 +8,7 @@
 #include <cmath>
 #include <vector>
 
-#include "detail/leaf_band.h"
+#include "grid/leaf_band.h"
 
 namespace covol::detail {
 namespace {

@@ -5,8 +5,8 @@
 #include <memory>
 #include <utility>
 
-#include "covol/band.h"
 #include "covol/error.h"
+#include "covol/start.h"
 #include "guess/marks_surface.h"
 
 namespace covol {

@@ -7,8 +7,8 @@
 #include <functional>
 #include <limits>
 
-#include "detail/kd_tree.h"
-#include "detail/wendland.h"
+#include "base/wendland.h"
+#include "points/kd_tree.h"
 
 namespace covol::guess {
 namespace {

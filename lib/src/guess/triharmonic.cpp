@@ -1,6 +1,6 @@
 #include "guess/triharmonic.h"
 
-#include "detail/clones.h"
+#include "base/clones.h"
 
 namespace covol::guess {
 

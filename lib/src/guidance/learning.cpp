@@ -9,7 +9,7 @@
 #include <cmath>
 #include <limits>
 
-#include "detail/kd_tree.h"
+#include "points/kd_tree.h"
 
 namespace covol::guidance {
 namespace {

@@ -8,7 +8,7 @@
 #include <numeric>
 #include <tuple>
 
-#include "detail/kd_tree.h"
+#include "points/kd_tree.h"
 
 namespace covol::guidance {
 namespace {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "detail/matrix.h"
+#include "base/matrix.h"
 
 namespace covol::guidance {
 namespace {

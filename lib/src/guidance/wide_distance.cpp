@@ -6,7 +6,6 @@
 
 #include <cmath>
 
-#include "covol/band.h"
 
 namespace covol::guidance {
 namespace {
@@ -38,7 +37,7 @@ WideDistance::WideDistance(const FloatGrid& start, const std::vector<Vec3>& vert
     const auto own = float(kOwnVoxels * h), far = float(width * h);
     openvdb::tools::changeLevelSetBackground(grid_->tree(), far);
     const std::vector<Leaf*> leaves = touched(*grid_, nearest_);
-    const detail::VoxelBox box = detail::box_of(domain);
+    const detail::CoordBBox box = detail::box_of(domain);
     tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t n) {
         alignas(32) float squared[detail::kLeafSize];
         detail::squared_distances(nearest_, nearest_.leaves[n], squared);

@@ -3,7 +3,7 @@
 
 #include "covol/domain.h"
 #include "covol/run.h"
-#include "detail/nearest.h"
+#include "distance/nearest.h"
 
 namespace covol::guidance {
 

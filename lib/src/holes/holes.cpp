@@ -9,9 +9,9 @@
 
 #include "covol/error.h"
 #include "covol/points.h"
-#include "detail/kd_tree.h"
 #include "holes/cut.h"
 #include "holes/membrane.h"
+#include "points/kd_tree.h"
 
 namespace covol {
 namespace {

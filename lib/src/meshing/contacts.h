@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "meshing/triangle.h"
+#include "mesh/triangle.h"
 
 namespace covol::meshing {
 

@@ -11,8 +11,8 @@
 #include <optional>
 
 #include "covol/error.h"
+#include "mesh/corner_table.h"
 #include "meshing/contacts.h"
-#include "meshing/corner_table.h"
 
 namespace covol::meshing {
 namespace {

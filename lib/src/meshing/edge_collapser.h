@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "mesh/corner_table.h"
 #include "meshing/contacts.h"
-#include "meshing/corner_table.h"
 
 namespace covol::meshing {
 

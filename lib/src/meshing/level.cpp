@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "detail/leaf_band.h"
+#include "grid/leaf_band.h"
 
 namespace covol::meshing {
 namespace {

@@ -12,7 +12,7 @@
 #include "clip/clipped.h"
 #include "covol/domain.h"
 #include "covol/mesh.h"
-#include "meshing/corner_table.h"
+#include "mesh/corner_table.h"
 
 namespace covol::meshing {
 

@@ -11,8 +11,8 @@
 
 #include "covol/error.h"
 #include "covol/mesh_relax.h"
+#include "mesh/corner_table.h"
 #include "meshing/contacts.h"
-#include "meshing/corner_table.h"
 #include "meshing/edge_collapser.h"
 #include "meshing/level.h"
 #include "meshing/safe_moves.h"

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "covol/mesh.h"
+#include "mesh/corner_table.h"
 #include "meshing/contacts.h"
-#include "meshing/corner_table.h"
 
 // Moves of vertices that are taken back where they would do harm.
 namespace covol::meshing {

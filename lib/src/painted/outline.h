@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "detail/slice_field.h"
+#include "contours/slice_field.h"
 
 namespace covol::painted {
 

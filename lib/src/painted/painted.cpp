@@ -9,8 +9,8 @@
 #include <mutex>
 #include <sstream>
 
+#include "base/file.h"
 #include "covol/error.h"
-#include "detail/file.h"
 #include "painted/outline.h"
 #include "painted/segments.h"
 

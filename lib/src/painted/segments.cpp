@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <fstream>
 
-#include "detail/file.h"
+#include "base/file.h"
 
 namespace covol::painted {
 

@@ -8,8 +8,8 @@
 #include <queue>
 #include <vector>
 
-#include "covol/band.h"
-#include "detail/number.h"
+#include "base/number.h"
+#include "covol/start.h"
 
 namespace covol::detail {
 namespace {

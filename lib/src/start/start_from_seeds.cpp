@@ -6,9 +6,9 @@
 #include <cmath>
 #include <limits>
 
-#include "covol/band.h"
 #include "covol/error.h"
-#include "detail/kd_tree.h"
+#include "covol/start.h"
+#include "points/kd_tree.h"
 
 namespace covol {
 namespace {

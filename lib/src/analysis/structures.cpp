@@ -1,0 +1,481 @@
+// Several solids in one space: disjoint, and without slits where they touch.
+#include "covol/structures.h"
+
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/Composite.h>
+#include <openvdb/tools/LevelSetUtil.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <sstream>
+
+#include "covol/domain.h"
+#include "covol/error.h"
+#include "covol/surface.h"
+#include "grid/leaf_band.h"
+#include "redistance/redistance.h"
+
+namespace covol {
+namespace {
+
+using detail::kLeafSize;
+using openvdb::Coord;
+using Accessor = FloatGrid::ConstAccessor;
+
+std::string quoted(const std::string& name) { return "'" + name + "'"; }
+
+std::string percent(double share) {
+    std::ostringstream text;
+    text.precision(3);
+    text << 100 * share << " %";
+    return text.str();
+}
+
+/// The structures while they are made disjoint.
+class Separation {
+public:
+    Separation(const std::vector<Structure>& structures, const SeparateOptions& options, const RunContext& run)
+        : structures_(structures), options_(options), run_(run) {
+        check_input();
+        h_ = domain_of(*structures.front().surface).voxel_size;
+        gap_ = options.gap < 0 ? h_ : options.gap;
+        for (const Structure& s : structures) phi_.push_back(s.surface);
+        report_.changed.assign(structures.size(), false);
+    }
+
+    SeparateResult go() {
+        find_overlaps();
+        carve();
+        deepen();
+        std::vector<FloatGridPtr> surfaces;
+        for (std::size_t i = 0; i < phi_.size(); ++i) surfaces.push_back(settled(i));
+        return {surfaces, report_};
+    }
+
+private:
+    void check_input() const {
+        if (const std::string why = options_.why_invalid(); !why.empty())
+            throw Error(Errc::InvalidOptions, "separate: " + why);
+        if (structures_.empty()) throw Error(Errc::InvalidInput, "separate: expected a structure, got none");
+        std::set<std::string> names;
+        for (const Structure& s : structures_) {
+            if (s.name.empty() || !names.insert(s.name).second)
+                throw Error(Errc::InvalidInput, "separate: expected unique names, got " + quoted(s.name) + " twice or empty");
+            if (!s.surface || s.surface->transform() != structures_.front().surface->transform())
+                throw Error(Errc::InvalidInput, "separate: " + quoted(s.name) + " and " + quoted(structures_.front().name) +
+                                                    ": expected grids with one transform");
+        }
+    }
+
+    // ---- overlaps ------------------------------------------------------------------------------------------------
+
+    using Mask = openvdb::BoolGrid::Ptr;
+    [[nodiscard]] Mask inside(std::size_t i, double below) const {
+        return openvdb::tools::sdfInteriorMask(*phi_[i], static_cast<float>(below));
+    }
+    static std::uint64_t common(const Mask& a, const Mask& b) {
+        openvdb::BoolTree both(a->tree());
+        both.topologyIntersection(b->tree());
+        return both.activeVoxelCount();
+    }
+
+    void find_overlaps() {
+        std::vector<Mask> solids;
+        std::vector<openvdb::CoordBBox> boxes;
+        for (std::size_t i = 0; i < phi_.size(); ++i) {
+            run_.check();
+            solids.push_back(inside(i, 0));
+            boxes.push_back(solids.back()->evalActiveVoxelBoundingBox());
+        }
+        for (std::size_t a = 0; a < phi_.size(); ++a)
+            for (std::size_t b = a + 1; b < phi_.size(); ++b) {
+                if (!boxes[a].hasOverlap(boxes[b])) continue;
+                run_.check();
+                const std::uint64_t both = common(solids[a], solids[b]);
+                if (both == 0) continue;
+                StructureOverlap overlap{a, b, double(both) * h_ * h_ * h_, std::nullopt};
+                const std::uint64_t in_a = solids[a]->activeVoxelCount(), in_b = solids[b]->activeVoxelCount();
+                const double share = double(both) / double(std::min(in_a, in_b));
+                if (share >= options_.nested_share) {
+                    if (in_a == in_b)
+                        throw Error(Errc::InvalidInput, "separate: " + quoted(structures_[a].name) + " and " +
+                                                            quoted(structures_[b].name) + " are the same solid: " + percent(share) +
+                                                            " of their voxels are common; mark each by its own points");
+                    overlap.inner = in_a < in_b ? a : b;
+                }
+                report_.overlaps.push_back(overlap);
+            }
+    }
+
+    void carve() {
+        std::vector<FloatGridPtr> carved = phi_;
+        for (const StructureOverlap& overlap : report_.overlaps) {
+            if (!overlap.inner) continue;
+            const std::size_t outer = *overlap.inner == overlap.a ? overlap.b : overlap.a;
+            run_.info("separate: " + quoted(structures_[*overlap.inner].name) + " lies inside " +
+                      quoted(structures_[outer].name) + " and is carved out of it");
+            const FloatGridPtr inner = phi_[*overlap.inner]->deepCopy();
+            carved[outer] = carved[outer]->deepCopy();
+            openvdb::tools::csgDifference(*carved[outer], *inner);
+            report_.changed[outer] = true;
+        }
+        phi_ = carved;
+    }
+
+    // The middle of an overlap is where both distances are equal: both must be known as deep as that.
+    void deepen() {
+        if (report_.overlaps.empty()) return;
+        const double margin = 2 * h_;
+        for (double width = kHalfWidthVoxels * h_;; width *= 2) {
+            std::vector<Mask> cores;
+            for (std::size_t i = 0; i < phi_.size(); ++i) cores.push_back(inside(i, margin - width));
+            std::set<std::size_t> shallow;
+            for (const StructureOverlap& overlap : report_.overlaps)
+                if (common(cores[overlap.a], cores[overlap.b]) > 0) shallow.insert({overlap.a, overlap.b});
+            if (shallow.empty()) return;
+            run_.check();
+            // All alike, or a shallow distance would lose against a deep one.
+            for (FloatGridPtr& phi : phi_)
+                phi = detail::redistance(*phi, domain_of(*phi), 2 * width / h_, detail::DomainEnd::Closed, "surface", run_);
+        }
+    }
+
+    // ---- interfaces ----------------------------------------------------------------------------------------------
+
+    static openvdb::Vec3d gradient(const Accessor& phi, const Coord& at) {
+        openvdb::Vec3d g;
+        for (int a = 0; a < 3; ++a) {
+            Coord step(0, 0, 0);
+            step[a] = 1;
+            g[a] = double(phi.getValue(at + step)) - phi.getValue(at - step);
+        }
+        return g;
+    }
+
+    /// The distances of the others in one leaf: their minimum, where it can matter.
+    struct Nearest {
+        std::array<float, kLeafSize> value;
+        bool matters = false;
+    };
+
+    void gather(std::size_t i, const Coord& origin, Nearest& nearest) const {
+        nearest.value.fill(std::numeric_limits<float>::max());
+        nearest.matters = false;
+        for (std::size_t j = 0; j < phi_.size(); ++j) {
+            if (j == i) continue;
+            const auto* leaf = phi_[j]->tree().probeConstLeaf(origin);
+            const float tile = leaf == nullptr ? phi_[j]->tree().getValue(origin) : 0.0F;
+            if (leaf == nullptr && tile > 0) continue;
+            nearest.matters = true;
+            const float* values = leaf == nullptr ? nullptr : leaf->buffer().data();
+            for (int p = 0; p < kLeafSize; ++p)
+                nearest.value[p] = std::min(nearest.value[p], values == nullptr ? tile : values[p]);
+        }
+    }
+
+    /// `at` lies between i and one of those at the distance m: towards one is away from the other.
+    [[nodiscard]] bool is_between(std::size_t i, float m, const Coord& at, const std::vector<Accessor>& phi) const {
+        const openvdb::Vec3d mine = gradient(phi[i], at);
+        for (std::size_t j = 0; j < phi.size(); ++j)
+            if (j != i && phi[j].getValue(at) == m && mine.dot(gradient(phi[j], at)) < 0) return true;
+        return false;
+    }
+
+    /// The surface of structure i among the others.
+    FloatGridPtr settled(std::size_t i) {
+        run_.check();
+        const FloatGridPtr u = phi_[i]->deepCopy();
+        std::vector<FloatGrid::TreeType::LeafNodeType*> leaves;
+        u->tree().getNodes(leaves);
+        std::atomic<bool> moved = false;
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 8), [&](const auto& range) {
+            std::vector<Accessor> phi;
+            for (const FloatGridPtr& grid : phi_) phi.push_back(grid->getConstAccessor());
+            Nearest nearest;
+            for (std::size_t n = range.begin(); n != range.end(); ++n) {
+                gather(i, leaves[n]->origin(), nearest);
+                if (nearest.matters && settle(i, *leaves[n], nearest, phi)) moved = true;
+            }
+        });
+        if (!moved && !report_.changed[i]) return structures_[i].surface;
+        report_.changed[i] = true;
+        try {
+            return surface(*u, run_);
+        } catch (const Error& error) {
+            if (error.code() != Errc::InvalidInput) throw;
+            throw Error(Errc::InvalidInput, "separate: nothing is left of " + quoted(structures_[i].name) +
+                                                ": the other structures cover it; mark each by its own points");
+        }
+    }
+
+    template <typename Leaf>
+    bool settle(std::size_t i, Leaf& leaf, const Nearest& nearest, const std::vector<Accessor>& phi) const {
+        float* values = leaf.buffer().data();
+        const float gap = static_cast<float>(gap_);
+        bool moved = false;
+        for (int p = 0; p < kLeafSize; ++p) {
+            const float mine = values[p], other = nearest.value[p];
+            const float between = mine + other;  // the width of the gap, negative where both claim the voxel
+            if (!(between < gap)) continue;
+            const Coord at = leaf.origin().offsetBy(p >> 6, p >> 3 & 7, p & 7);
+            if (!(between <= 0) && !is_between(i, other, at, phi)) continue;
+            values[p] = (mine - other) / 2;
+            // Exact contact, and overlaps of others far from this surface, move nothing.
+            moved = moved || (between != 0 && std::abs(mine) < 2 * h_);
+        }
+        return moved;
+    }
+
+    const std::vector<Structure>& structures_;
+    const SeparateOptions& options_;
+    const RunContext& run_;
+    double h_ = 0, gap_ = 0;
+    std::vector<FloatGridPtr> phi_;
+    SeparateReport report_;
+};
+
+/// Trilinear samples of the structures' distances at world positions.
+class Distances {
+public:
+    explicit Distances(const std::vector<Structure>& structures) {
+        for (const Structure& s : structures) {
+            accessors_.push_back(s.surface->getConstAccessor());
+            transforms_.push_back(&s.surface->transform());
+        }
+    }
+    [[nodiscard]] float operator()(std::size_t n, const Vec3& world) const {
+        const openvdb::Vec3d at = transforms_[n]->worldToIndex(openvdb::Vec3d(world[0], world[1], world[2]));
+        const Coord base = Coord::floor(at);
+        const openvdb::Vec3d t = at - base.asVec3d();
+        double sum = 0;
+        for (int corner = 0; corner < 8; ++corner) {
+            const Coord c(corner & 1, corner >> 1 & 1, corner >> 2);
+            double weight = 1;
+            for (int a = 0; a < 3; ++a) weight *= c[a] != 0 ? t[a] : 1 - t[a];
+            if (weight != 0) sum += weight * accessors_[n].getValue(base + c);
+        }
+        return static_cast<float>(sum);
+    }
+
+private:
+    std::vector<Accessor> accessors_;
+    std::vector<const openvdb::math::Transform*> transforms_;
+};
+
+constexpr std::uint8_t kContested = 255;
+
+/// Adds one structure's voxels; those that are taken already become contested.
+void add_label(const std::vector<std::uint8_t>& solid, std::uint8_t label, std::vector<std::uint8_t>& labels) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, labels.size(), 1 << 16), [&](const auto& range) {
+        for (std::size_t n = range.begin(); n != range.end(); ++n)
+            if (solid[n] != 0) labels[n] = labels[n] == 0 ? label : kContested;
+    });
+}
+
+/// Decides the voxels that two structures claim, and those that none does where two touch.
+class Arbiter {
+public:
+    Arbiter(const std::vector<Structure>& structures, const ImageGeometry& geometry, const std::vector<std::uint8_t>& claims)
+        : structures_(structures), geometry_(geometry), claims_(claims), distances_(structures) {
+        touching_ = 0.5F * static_cast<float>(structures.front().surface->voxelSize()[0]);
+    }
+
+    [[nodiscard]] std::uint8_t decide(int i, int j, int k) const {
+        const std::uint8_t claim = claims_[at(i, j, k)];
+        if (claim != 0 && claim != kContested) return claim;
+        const std::vector<std::size_t> candidates = claim == kContested ? everyone() : neighbours(i, j, k);
+        if (candidates.size() < 2) return 0;
+        const Vec3 world = geometry_.index_to_world({double(i), double(j), double(k)});
+        std::size_t best = 0;
+        float first = std::numeric_limits<float>::max(), second = first;
+        for (const std::size_t n : candidates) {
+            const float d = distances_(n, world);
+            if (d < first || (d == first && structures_[n].name < structures_[best].name)) {
+                second = first;
+                first = d;
+                best = n;
+            } else {
+                second = std::min(second, d);
+            }
+        }
+        return claim == kContested || first + second < touching_ ? static_cast<std::uint8_t>(best + 1) : 0;
+    }
+
+private:
+    [[nodiscard]] std::size_t at(int i, int j, int k) const {
+        return (std::size_t(k) * geometry_.size[1] + j) * geometry_.size[0] + i;
+    }
+    [[nodiscard]] std::vector<std::size_t> everyone() const {
+        std::vector<std::size_t> all(structures_.size());
+        for (std::size_t n = 0; n < all.size(); ++n) all[n] = n;
+        return all;
+    }
+    /// The different labels of the six neighbours, ascending. A slit of no width has both within one voxel.
+    [[nodiscard]] std::vector<std::size_t> neighbours(int i, int j, int k) const {
+        std::vector<std::size_t> found;
+        const Index3 here{i, j, k};
+        for (int face = 0; face < 6; ++face) {
+            Index3 c = here;
+            c[face / 2] += face % 2 == 0 ? -1 : 1;
+            if (c[face / 2] < 0 || c[face / 2] >= geometry_.size[face / 2]) continue;
+            const std::uint8_t label = claims_[at(c[0], c[1], c[2])];
+            if (label == 0 || label == kContested) continue;
+            if (std::find(found.begin(), found.end(), std::size_t(label - 1)) == found.end()) found.push_back(label - 1);
+        }
+        std::sort(found.begin(), found.end());
+        return found;
+    }
+
+    const std::vector<Structure>& structures_;
+    const ImageGeometry& geometry_;
+    const std::vector<std::uint8_t>& claims_;
+    Distances distances_;
+    float touching_;
+};
+
+}  // namespace
+
+std::string SeparateOptions::why_invalid() const {
+    std::string why;
+    if (!std::isfinite(gap)) why = "gap: expected a number, got " + std::to_string(gap);
+    if (!(nested_share > 0.5 && nested_share <= 1))
+        why += std::string(why.empty() ? "" : "\n") + "nested_share: expected > 0.5 and <= 1, got " + std::to_string(nested_share);
+    return why;
+}
+
+SeparateResult separate(const std::vector<Structure>& structures, const SeparateOptions& options, const RunContext& run) {
+    SeparateResult result;
+    with_threads(run, [&] { result = Separation(structures, options, run).go(); });
+    return result;
+}
+
+std::vector<std::uint8_t> label_image(const std::vector<Structure>& structures, const ImageGeometry& geometry,
+                                      const RunContext& run) {
+    if (structures.size() >= kContested)
+        throw Error(Errc::InvalidInput, "label_image: expected at most 254 structures, got " + std::to_string(structures.size()));
+    const auto [ni, nj, nk] = geometry.size;
+    std::vector<std::uint8_t> claims(std::size_t(ni) * std::size_t(nj) * std::size_t(nk), 0);
+    if (structures.empty()) return claims;
+    std::vector<std::uint8_t> labels;
+    with_threads(run, [&, ni = ni, nj = nj, nk = nk] {
+        for (std::size_t n = 0; n < structures.size(); ++n) {
+            run.check();
+            add_label(rasterize(*structures[n].surface, geometry, 1, run), static_cast<std::uint8_t>(n + 1), claims);
+        }
+        labels.resize(claims.size());
+        tbb::parallel_for(0, nk, [&](int k) {
+            const Arbiter arbiter(structures, geometry, claims);
+            std::uint8_t* out = labels.data() + std::size_t(k) * nj * ni;
+            for (int j = 0; j < nj; ++j)
+                for (int i = 0; i < ni; ++i) *out++ = arbiter.decide(i, j, k);
+        });
+    });
+    return labels;
+}
+
+std::vector<std::string> grid_names(const std::vector<std::string>& names) {
+    if (names.size() == 1) return {"surface"};
+    std::vector<std::string> result;
+    std::set<std::string> taken;
+    for (const std::string& name : names) {
+        std::string id;
+        for (const char c : name) {
+            const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';
+            id += letter || (c >= '0' && c <= '9') ? c : '_';
+        }
+        if (id.empty() || (id[0] >= '0' && id[0] <= '9')) id.insert(0, "_");
+        std::string unique = id;
+        for (int n = 2; !taken.insert(unique).second; ++n) unique = id + "_" + std::to_string(n);
+        result.push_back(unique);
+    }
+    return result;
+}
+
+std::array<std::uint8_t, 3> structure_color(std::size_t n) {
+    // Paul Tol's "bright" scheme and then "muted" ones: told apart by colour-blind readers too.
+    static constexpr std::array<std::array<std::uint8_t, 3>, 12> kColors{{{68, 119, 170},
+                                                                           {238, 102, 119},
+                                                                           {34, 136, 51},
+                                                                           {204, 187, 68},
+                                                                           {102, 204, 238},
+                                                                           {170, 51, 119},
+                                                                           {238, 119, 51},
+                                                                           {0, 153, 136},
+                                                                           {136, 34, 85},
+                                                                           {153, 153, 51},
+                                                                           {51, 34, 136},
+                                                                           {187, 187, 187}}};
+    return kColors[n % kColors.size()];
+}
+
+std::vector<std::pair<std::string, std::string>> slicer_segments(const std::vector<std::string>& names,
+                                                                 const std::vector<std::uint8_t>& labels,
+                                                                 const Index3& size, const std::vector<int>& values) {
+    struct Extent {
+        Index3 min, max;
+    };
+    std::vector<Extent> extents(names.size(), {size, {-1, -1, -1}});
+    std::size_t at = 0;
+    for (int k = 0; k < size[2]; ++k)
+        for (int j = 0; j < size[1]; ++j)
+            for (int i = 0; i < size[0]; ++i, ++at) {
+                if (labels[at] == 0 || labels[at] > names.size()) continue;
+                Extent& e = extents[labels[at] - 1];
+                const Index3 here{i, j, k};
+                for (int a = 0; a < 3; ++a) {
+                    e.min[a] = std::min(e.min[a], here[a]);
+                    e.max[a] = std::max(e.max[a], here[a]);
+                }
+            }
+    std::vector<std::pair<std::string, std::string>> fields{{"Segmentation_ContainedRepresentationNames", "Binary labelmap|"},
+                                                            {"Segmentation_MasterRepresentation", "Binary labelmap"},
+                                                            {"Segmentation_SourceRepresentation", "Binary labelmap"},
+                                                            {"Segmentation_ReferenceImageExtentOffset", "0 0 0"}};
+    for (std::size_t n = 0; n < names.size(); ++n) {
+        const std::string key = "Segment" + std::to_string(n) + "_";
+        std::ostringstream color, extent;
+        const auto rgb = structure_color(n);
+        color.precision(6);
+        color << rgb[0] / 255.0 << " " << rgb[1] / 255.0 << " " << rgb[2] / 255.0;
+        const Extent& e = extents[n];
+        // Slicer writes an empty segment's extent as 0 -1.
+        for (int a = 0; a < 3; ++a)
+            extent << (a == 0 ? "" : " ") << (e.max[a] < 0 ? 0 : e.min[a]) << " " << e.max[a];
+        for (const auto& [field, value] : std::vector<std::pair<std::string, std::string>>{
+                 {"ID", grid_names({names[n], {}})[0]},
+                 {"Name", names[n]},
+                 {"NameAutoGenerated", "0"},
+                 {"Color", color.str()},
+                 {"ColorAutoGenerated", "0"},
+                 {"LabelValue", std::to_string(values.empty() ? int(n) + 1 : values[n])},
+                 {"Layer", "0"},
+                 {"Extent", extent.str()},
+                 {"Tags", "|"}})
+            fields.emplace_back(key + field, value);
+    }
+    return fields;
+}
+
+std::string itksnap_labels(const std::vector<std::string>& names, const std::vector<int>& values) {
+    std::ostringstream text;
+    text << "################################################\n"
+            "# ITK-SnAP Label Description File\n"
+            "# File format:\n"
+            "# IDX   -R-  -G-  -B-  -A--  VIS MSH  LABEL\n"
+            "################################################\n"
+            "    0     0    0    0        0  0  0    \"Clear Label\"\n";
+    for (std::size_t n = 0; n < names.size(); ++n) {
+        const auto rgb = structure_color(n);
+        std::string name = names[n];
+        std::replace(name.begin(), name.end(), '"', '\'');
+        text << "    " << (values.empty() ? int(n) + 1 : values[n]) << "   " << int(rgb[0]) << "  " << int(rgb[1]) << "  " << int(rgb[2])
+             << "        1  1  1    \"" << name << "\"\n";
+    }
+    return text.str();
+}
+
+}  // namespace covol

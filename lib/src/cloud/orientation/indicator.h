@@ -1,0 +1,32 @@
+#pragma once
+// The indicator of a cloud's solid, as orient() leaves it.
+#include "cloud/orientation/winding_field.h"
+#include "covol/orientation.h"
+
+namespace covol::cloud {
+
+inline constexpr int kCyclesFromNothing = 8;  // of multigrid
+
+/// Of a lattice of about this cell, along its longest side: 48 to 192.
+[[nodiscard]] int cells_along(const std::vector<Vec3>& points, double cell);
+/// Around the points, so much wider that the indicator is 0 at its end.
+[[nodiscard]] Lattice indicator_lattice(const std::vector<Vec3>& points, int cells);
+
+/// The indicator of normals and areas, from the field's last solution.
+void solve(WindingField& field, const std::vector<Vec3>& points, const Orientation& orientation, int cycles);
+
+/// Half of the indicator's step is at the points, whichever way they are turned. @return the factor
+double scale_to_half(WindingField& field, const std::vector<Vec3>& points);
+
+/// Of the indicator, over the points.
+[[nodiscard]] double mean_at(const WindingField& field, const std::vector<Vec3>& points);
+
+/// The share of the cells which the indicator's surface passes that have no point within `reach` of their middle.
+[[nodiscard]] double share_bare(const Indicator& indicator, const std::vector<Vec3>& points, double reach);
+
+[[nodiscard]] std::shared_ptr<const Indicator> make_indicator(const WindingField& field);
+
+/// The indicator of normals as they are, on cells of another size.
+[[nodiscard]] std::shared_ptr<const Indicator> indicator_of(const std::vector<Vec3>& points, const Orientation& orientation, double cell);
+
+}  // namespace covol::cloud

@@ -1,0 +1,345 @@
+#include "covol/orientation.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+
+#include "base/vector.h"
+#include "cloud/orientation/areas.h"
+#include "cloud/orientation/given_sides.h"
+#include "cloud/orientation/indicator.h"
+#include "cloud/orientation/stray.h"
+#include "cloud/orientation/views.h"
+#include "covol/error.h"
+#include "covol/points.h"
+#include "points/point_cells.h"
+
+namespace covol {
+namespace {
+
+using cloud::Lattice;
+using cloud::LatticeField;
+using cloud::PointCells;
+using cloud::WindingField;
+using cloud::dot;
+using cloud::unit;
+
+constexpr double kPatchCells = 2;        // edge of the cells over which the indicator is averaged
+constexpr double kPatchOff = 0.12;       // from 1/2, of a patch that may be turned
+constexpr int kPatchRounds = 4, kPatchCycles = 2, kAfterTurning = 3;
+constexpr double kFewStayed = 0.002;     // of the points, in patches that stay turned: those left may turn to and fro
+constexpr int kFirstPasses = 12;         // of smoothing, for the first guess
+constexpr double kSteady = 1e-4;         // the normals' mean change, 1 - cosine
+// chi at a point beyond which another part encloses it already. Noise brings points there that are none of these.
+constexpr double kEnclosed = 0.9, kSurelyEnclosed = 1.2;
+constexpr int kCycles = 1, kLastCycles = 4;  // of multigrid
+// The finest lattice's cell: smaller ones let single points turn, larger ones lose thin parts.
+constexpr double kCellSpacings = 0.8, kCellNoises = 1.0;
+/// What is tried until few normals turn.
+struct Try {
+    double cell;      // of those
+    double enclosed;  // on the first lattice
+};
+constexpr Try kTries[] = {{1, kEnclosed}, {1, kSurelyEnclosed}, {0.67, kSurelyEnclosed}, {1.5, kSurelyEnclosed}, {0.44, kEnclosed}, {2.25, kSurelyEnclosed}};
+constexpr double kLeastSpacings = 0.5;
+constexpr double kOffHalf = 0.02;   // that the indicator's mean over the points may differ from 1/2
+constexpr double kOffWeight = 2;    // of more than that, among tries: walls that run into each other turn less than those that waver
+constexpr double kSampledPerCell = 4;  // points that iterate, on the surface in a lattice cell's square
+constexpr double kSampleSpacings = 4;  // edge of the cells that they are taken from
+constexpr int kStrayRounds = 3;
+constexpr double kManyStray = 0.005;  // of the points
+// Of given normals: with opposite ones beside them, and against an orientation that settled. Good ones have less than 0.001
+// without noise and 0.005 at any, those of which a part is turned as a whole more than 0.01 and 0.1.
+constexpr double kFewTorn = 0.002, kContradicted = 0.03;
+// Whether points enclose a solid. Where they lie all around it its surface rests on them: of closed shapes less than 0.01 of
+// it is bare, however noisy they are, of scans of one side 0.14 to 0.4. Of a shape of which a part is missing, up to 0.2, the
+// normals settle all the same: doubts up to 0.013, of the scans from 0.026 to 0.19.
+constexpr double kSettled = 0.014, kBare = 0.05, kBareReach = 2;
+
+/// A lattice and what is done on it.
+struct Stage {
+    int cells;       // along the longest side, the part beyond the points included
+    int iterations;  // at most
+    bool is_last;
+    double enclosed;  // the indicator from which on a point counts as enclosed by another part
+};
+
+class Iteration {
+public:
+    explicit Iteration(const std::vector<Vec3>& points) : points_(points) {}
+
+    void run(const Stage& stage, Orientation& result, const RunContext& run) {
+        const Lattice lattice = cloud::indicator_lattice(points_, stage.cells);
+        WindingField field(lattice);
+        if (last_) field.start_from(last_->indicator());
+        stage_ = stage;
+        if (result.normals.empty()) first_guess(lattice, result);
+        for (int n = 0; n < stage.iterations; ++n) {
+            run.check();
+            ++result.iterations;
+            if (turn(field, result, kCycles) < kSteady) break;
+        }
+        turn_patches(field, result, run);
+        if (stage.is_last) turn(field, result, kLastCycles);
+        last_.emplace(std::move(field));
+    }
+
+    [[nodiscard]] WindingField& last() { return *last_; }
+
+private:
+    void first_guess(const Lattice& lattice, Orientation& result) const {
+        const LatticeField density = cloud::point_density(lattice, points_, kFirstPasses);
+        result.normals.resize(points_.size());
+        tbb::parallel_for(std::size_t(0), points_.size(), [&](std::size_t n) {
+            const Vec3 g = density.at(points_[n]).gradient;
+            result.normals[n] = unit({-g[0], -g[1], -g[2]});
+        });
+    }
+
+    /// The indicator of the normals.
+    void solve(WindingField& field, Orientation& result, int cycles) {
+        cloud::solve(field, points_, result, cycles);
+        const double half = cloud::scale_to_half(field, points_);
+        for (double& area : result.areas) area *= half;
+    }
+
+    /// @return the normals' mean change, 1 - cosine
+    double turn(WindingField& field, Orientation& result, int cycles) {
+        solve(field, result, cycles);
+        const std::size_t count = points_.size();
+        const LatticeField& chi = field.indicator();
+        std::vector<double> cosine(count);
+        tbb::parallel_for(std::size_t(0), count, [&](std::size_t n) {
+            const LatticeField::Sample here = chi.at(points_[n]);
+            const double sign = here.value < 0 || here.value > stage_.enclosed ? 1 : -1;
+            const Vec3 normal = unit({sign * here.gradient[0], sign * here.gradient[1], sign * here.gradient[2]});
+            cosine[n] = dot(normal, result.normals[n]);
+            if (dot(normal, normal) > 0) result.normals[n] = normal;
+        });
+        result.turned = double(std::count_if(cosine.begin(), cosine.end(), [](double c) { return c < 0; })) / double(count);
+        return 1 - std::accumulate(cosine.begin(), cosine.end(), 0.0) / double(count);
+    }
+
+    /// Where the indicator is not 1/2 on the mean over a patch, the patch may be turned as a whole, and stay so: it makes its
+    /// own normals. Each such patch is turned to try, all at once, and stays turned where that brings it closer to 1/2.
+    void turn_patches(WindingField& field, Orientation& result, const RunContext& run) {
+        const PointCells cells(points_, kPatchCells * field.indicator().lattice.cell);
+        const std::vector<std::vector<std::uint32_t>> beside = neighbours_of(cells);
+        for (int round = 0; round < kPatchRounds; ++round) {
+            run.check();
+            turn(field, result, kPatchCycles);  // the indicator of what the normals are now
+            const std::vector<double> off = mean_off(cells, field.indicator());
+            const std::vector<int> patch = patches_of(cells, beside, off);
+            const int patches = 1 + *std::max_element(patch.begin(), patch.end());
+            if (patches == 0) return;
+            const std::vector<Vec3> before = result.normals;
+            for_points_of(cells, [&](std::size_t cell, std::uint32_t point) {
+                if (patch[cell] >= 0)
+                    for (double& c : result.normals[point]) c = -c;
+            });
+            solve(field, result, kPatchCycles);
+            const std::vector<double> turned = mean_off(cells, field.indicator());
+            std::vector<double> gain(std::size_t(patches), 0.0);
+            for (std::size_t cell = 0; cell < patch.size(); ++cell) {
+                if (patch[cell] < 0) continue;
+                const auto [begin, end] = cells.cell(cell);
+                gain[std::size_t(patch[cell])] += double(end - begin) * (off[cell] * off[cell] - turned[cell] * turned[cell]);
+            }
+            double stayed = 0;
+            for_points_of(cells, [&](std::size_t cell, std::uint32_t point) {
+                if (patch[cell] < 0) return;
+                if (gain[std::size_t(patch[cell])] > 0) ++stayed;
+                else result.normals[point] = before[point];
+            });
+            for (int n = 0; n < kAfterTurning; ++n) turn(field, result, kPatchCycles);
+            if (stayed < kFewStayed * double(points_.size())) return;
+        }
+    }
+
+    template <typename Visit>
+    static void for_points_of(const PointCells& cells, Visit visit) {
+        for (std::size_t cell = 0; cell < cells.cell_count(); ++cell)
+            for (std::uint32_t at = cells.cell(cell).begin; at < cells.cell(cell).end; ++at) visit(cell, cells.order()[at]);
+    }
+
+    static std::vector<std::vector<std::uint32_t>> neighbours_of(const PointCells& cells) {
+        std::vector<std::uint32_t> cell_of(cells.sorted().size());
+        for (std::uint32_t cell = 0; cell < cells.cell_count(); ++cell)
+            for (std::uint32_t at = cells.cell(cell).begin; at < cells.cell(cell).end; ++at) cell_of[at] = cell;
+        std::vector<std::vector<std::uint32_t>> beside(cells.cell_count());
+        std::vector<PointCells::Range> ranges;
+        for (std::uint32_t cell = 0; cell < cells.cell_count(); ++cell) {
+            const Vec3& p = cells.sorted()[cells.cell(cell).begin];
+            const double r = cells.edge();
+            cells.find({{p[0] - r, p[1] - r, p[2] - r}, {p[0] + r, p[1] + r, p[2] + r}}, ranges);
+            for (const PointCells::Range& range : ranges)
+                for (std::uint32_t at = range.begin; at < range.end; at = cells.cell(cell_of[at]).end)
+                    if (cell_of[at] != cell) beside[cell].push_back(cell_of[at]);
+        }
+        return beside;
+    }
+
+    /// Mean over each cell's points of the indicator, less 1/2.
+    static std::vector<double> mean_off(const PointCells& cells, const LatticeField& chi) {
+        std::vector<double> off(cells.cell_count());
+        tbb::parallel_for(std::size_t(0), off.size(), [&](std::size_t cell) {
+            const auto [begin, end] = cells.cell(cell);
+            double sum = 0;
+            for (std::uint32_t at = begin; at < end; ++at) sum += chi.value_at(cells.sorted()[at]) - 0.5;
+            off[cell] = sum / double(end - begin);
+        });
+        return off;
+    }
+
+    /// Connected cells that are off to the same side; -1: not off.
+    static std::vector<int> patches_of(const PointCells& cells, const std::vector<std::vector<std::uint32_t>>& beside, const std::vector<double>& off) {
+        std::vector<int> patch(cells.cell_count(), -1);
+        const auto side = [&](std::size_t cell) { return std::abs(off[cell]) < kPatchOff ? 0 : off[cell] < 0 ? -1 : 1; };
+        int count = 0;
+        std::vector<std::uint32_t> front;
+        for (std::uint32_t first = 0; first < patch.size(); ++first) {
+            if (patch[first] >= 0 || side(first) == 0) continue;
+            patch[first] = count;
+            front.push_back(first);
+            while (!front.empty()) {
+                const std::uint32_t cell = front.back();
+                front.pop_back();
+                for (const std::uint32_t next : beside[cell])
+                    if (patch[next] < 0 && side(next) == side(first)) {
+                        patch[next] = count;
+                        front.push_back(next);
+                    }
+            }
+            ++count;
+        }
+        return patch;
+    }
+
+    const std::vector<Vec3>& points_;
+    Stage stage_{};
+    std::optional<WindingField> last_;
+};
+
+/// Outward, by the indicator: down its slope where it is between outside and inside, up where another part encloses the point.
+std::vector<Vec3> normals_of(const Indicator& indicator, const std::vector<Vec3>& points, double enclosed) {
+    std::vector<Vec3> normals(points.size());
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
+        const auto [inside, g] = indicator.at(points[n]);
+        const double sign = inside < 0 || inside > enclosed ? 1 : -1;
+        normals[n] = unit({sign * g[0], sign * g[1], sign * g[2]});
+    });
+    return normals;
+}
+
+double first_cell(const CloudScale& scale) { return std::max(kCellSpacings * scale.spacing, kCellNoises * scale.noise); }
+
+/// Parts that are turned as a whole go on turning, or lie where the indicator is not 1/2.
+double doubt(const Orientation& o, double weight = kOffWeight) { return o.turned + weight * std::max(0.0, o.off_half - kOffHalf); }
+bool is_settled(const Orientation& o) { return doubt(o, 1) < cloud::kFewTurned; }
+
+bool does_enclose(const CloudOrientation& cloud) {
+    const double reach = kBareReach * std::max(cloud.scale.spacing, cloud.scale.noise);
+    return doubt(cloud.orientation) < kSettled || cloud::share_bare(*cloud.orientation.indicator, cloud.points, reach) < kBare;
+}
+
+/// Every few points of those that lie together, and what each stands for.
+struct Sample {
+    Sample(const std::vector<Vec3>& all, double spacing, std::size_t every) : step(every), order(cloud::PointCells(all, kSampleSpacings * spacing).order()) {
+        for (std::size_t n = step / 2; n < order.size(); n += step) points.push_back(all[order[n]]);
+        areas = cloud::areas_of(points, spacing * std::sqrt(double(step)));
+    }
+    /// Of all points.
+    [[nodiscard]] std::vector<double> all_areas() const {
+        std::vector<double> all(order.size());
+        for (std::size_t n = 0; n < order.size(); ++n) all[order[n]] = areas[std::min(n / step, areas.size() - 1)] / double(step);
+        return all;
+    }
+    std::size_t step;
+    std::vector<std::uint32_t> order;
+    std::vector<Vec3> points;
+    std::vector<double> areas;
+};
+
+/// By the hints where they are consistent and nothing that is certain contradicts them, else by itself, else by views.
+void choose_orientation(CloudOrientation& cloud, const PointHints& hints, const RunContext& run) {
+    cloud::GivenSides given = cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale), run);
+    HintsReport& report = cloud.hints = given.report;
+    const bool is_certain = report.used && given.torn < kFewTorn && is_settled(given.orientation);
+    if (!is_certain) {
+        cloud.orientation = orient(cloud.points, cloud.scale, run);
+        cloud.encloses = does_enclose(cloud);
+        if (report.used && cloud.encloses &&
+            1 - cloud::agreeing(cloud.points, given.orientation.normals, cloud.orientation, false) > kContradicted) {
+            report.used = false;
+            report.why_not = "parts of them are turned as a whole";
+        }
+        if (!report.used && !cloud.encloses) cloud.orientation = cloud::orient_by_views(cloud.points, cloud.scale, run);
+    }
+    if (report.used) {
+        cloud.orientation = std::move(given.orientation);
+        cloud.encloses = true;
+    }
+    report.agree = cloud::agreeing(cloud.points, given.given, cloud.orientation, report.inward);
+}
+
+}  // namespace
+
+Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run) {
+    if (points.size() < 4) throw Error(Errc::InvalidInput, "orient: expected at least 4 points, got " + std::to_string(points.size()));
+    if (!(longest_side(bounding_box(points)) > 0) || !(scale.spacing > 0)) throw Error(Errc::InvalidInput, "orient: all points lie at one place");
+    Orientation best;
+    with_threads(run, [&] {
+        // Noise is hard to tell from thin parts: where normals go on turning a finer lattice may hold them.
+        const double first = first_cell(scale);
+        const double cell = cloud::indicator_lattice(points, cloud::cells_along(points, first)).cell;
+        const double share = kSampledPerCell * scale.spacing * scale.spacing / (cell * cell);
+        const Sample sample(points, scale.spacing, std::size_t(std::max(1.0, 1 / share)));
+        std::vector<std::pair<int, double>> tried;
+        for (const Try& attempt : kTries) {
+            const int cells = cloud::cells_along(points, std::max(first * attempt.cell, kLeastSpacings * scale.spacing));
+            if (std::count(tried.begin(), tried.end(), std::pair{cells, attempt.enclosed}) > 0) continue;
+            tried.emplace_back(cells, attempt.enclosed);
+            Orientation now;
+            now.areas = sample.areas;
+            Iteration iteration(sample.points);
+            for (const Stage& stage : {Stage{cells * 2 / 3, 12, false, attempt.enclosed}, Stage{cells, 8, true, kSurelyEnclosed}}) iteration.run(stage, now, run);
+            now.indicator = cloud::make_indicator(iteration.last());
+            now.off_half = std::abs(cloud::mean_at(iteration.last(), sample.points) - 0.5);
+            if (tried.size() == 1 || doubt(now) < doubt(best)) best = std::move(now);
+            if (is_settled(best)) break;
+        }
+        const double half = std::accumulate(best.areas.begin(), best.areas.end(), 0.0) / std::accumulate(sample.areas.begin(), sample.areas.end(), 0.0);
+        best.areas = sample.all_areas();
+        for (double& area : best.areas) area *= half;
+        best.normals = normals_of(*best.indicator, points, kSurelyEnclosed);
+    });
+    return best;
+}
+
+CloudOrientation orient_cloud(const std::vector<Vec3>& points, const RunContext& run) { return orient_cloud(points, {}, run); }
+
+CloudOrientation orient_cloud(const std::vector<Vec3>& points, const PointHints& hints, const RunContext& run) {
+    CloudOrientation cloud;
+    with_threads(run, [&] {
+        cloud.points = merge_close_points(points, 0);
+        cloud.scale = cloud_scale(cloud.points, run);
+        // Where there are many, some show once others are gone.
+        for (int round = 0; round < kStrayRounds; ++round) {
+            const std::vector<char> stray = cloud::find_stray(cloud.points, cloud.scale, run);
+            std::size_t kept = 0;
+            for (std::size_t n = 0; n < stray.size(); ++n)
+                if (!stray[n]) cloud.points[kept++] = cloud.points[n];
+            const std::size_t gone = stray.size() - kept;
+            cloud.stray += gone;
+            cloud.points.resize(kept);
+            if (double(gone) < kManyStray * double(stray.size())) break;
+        }
+        choose_orientation(cloud, carried(hints, points, cloud.points), run);
+    });
+    return cloud;
+}
+
+}  // namespace covol

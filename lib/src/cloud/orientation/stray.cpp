@@ -1,0 +1,77 @@
+#include "cloud/orientation/stray.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "base/median.h"
+#include "base/vector.h"
+#include "points/neighbours.h"
+
+namespace covol::cloud {
+namespace {
+
+constexpr std::size_t kNeighbours = 8, kSamples = 20000, kBeside = 16;
+constexpr double kCellNoises = 0.5;  // a layer as thick as several of the points' spacings has few in a cell of theirs
+constexpr double kFar = 2.5;        // times the median distance to the eighth neighbour
+constexpr double kOffPlane = 0.25;  // standard deviation of the neighbours, or the point's own distance, of that to the eighth
+
+/// Of a sample of the points.
+double usual_reach(const PointCells& cells, double spacing) {
+    const std::size_t count = cells.sorted().size(), step = std::max<std::size_t>(1, count / kSamples);
+    std::vector<double> reach(count, -1);
+    for_nearest(cells, spacing, kNeighbours,
+                [&](std::uint32_t point, const std::vector<Neighbour>& near) { reach[point] = near.size() < kNeighbours ? 1e300 : std::sqrt(near.back().squared); },
+                [&](std::size_t n) { return n % step == 0; });
+    std::erase(reach, -1);
+    return median(std::move(reach));
+}
+
+/// Whether fewer points than that lie within a distance.
+bool is_lonely(const PointCells& cells, std::size_t n, double distance, std::vector<PointCells::Range>& ranges) {
+    const Vec3& p = cells.sorted()[n];
+    std::size_t found = 0;
+    const auto has_company = [&](std::size_t begin, std::size_t end) {
+        for (std::size_t m = begin; m < end && found < kNeighbours; ++m) {
+            const Vec3 to = minus(cells.sorted()[m], p);
+            found += m != n && dot(to, to) <= distance * distance;
+        }
+        return found >= kNeighbours;
+    };
+    // Most have it beside them in their cell.
+    if (has_company(n - std::min(n, kBeside), std::min(n + kBeside, cells.sorted().size()))) return false;
+    found = 0;
+    cells.find({{p[0] - distance, p[1] - distance, p[2] - distance}, {p[0] + distance, p[1] + distance, p[2] + distance}}, ranges);
+    return std::none_of(ranges.begin(), ranges.end(), [&](const PointCells::Range& range) { return has_company(range.begin, range.end); });
+}
+
+}  // namespace
+
+std::vector<char> find_stray(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run) {
+    std::vector<char> stray(points.size(), 0);
+    if (points.size() <= 2 * kNeighbours) return stray;
+    const PointCells cells(points, kFirstRadius * std::max(scale.spacing, kCellNoises * scale.noise));
+    const double far_reach = kFar * usual_reach(cells, scale.spacing);
+    run.check();
+    std::vector<char> lonely(points.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 1024), [&](const auto& some) {
+        std::vector<PointCells::Range> ranges;
+        for (std::size_t n = some.begin(); n < some.end(); ++n) lonely[n] = is_lonely(cells, n, far_reach, ranges);
+    });
+    run.check();
+    for_nearest(cells, scale.spacing, kNeighbours, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
+        stray[point] = 1;
+        if (near.size() < kNeighbours) return;
+        const auto [whole, squares] = moments_of(cells, points[point], near);
+        const double count = double(near.size());
+        const Eigen::Vector3d mean = whole / count;
+        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares / count - mean * mean.transpose());
+        const double deviation = std::sqrt(std::max(0.0, axes.eigenvalues()[0])), reach = std::sqrt(near.back().squared);
+        // The farther the neighbours, the flatter they have to lie.
+        const double off = std::max(deviation, std::abs(axes.eigenvectors().col(0).dot(mean))) / reach;
+        stray[point] = off * reach / far_reach > kOffPlane;
+    }, [&](std::size_t n) { return lonely[n] != 0; });
+    return stray;
+}
+
+}  // namespace covol::cloud

@@ -1,0 +1,147 @@
+#include "cloud/orientation/views.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+
+#include "base/vector.h"
+#include "cloud/orientation/areas.h"
+#include "cloud/orientation/indicator.h"
+#include "covol/points.h"
+#include "points/point_cells.h"
+
+namespace covol::cloud {
+namespace {
+
+constexpr int kRays = 96;
+constexpr int kMostViewCells = 256;      // along the longest side
+constexpr double kFirstStep = 2.5;       // cells: beyond the point's own sheet
+constexpr double kViewSpacings = 2.0;    // edge of the cells that stop a view: about four points each
+constexpr double kCoarseSpacings = 2.4;  // edge of the indicator's cells: its topology counts
+constexpr double kFineSpacings = 1.2;    // of the screened one's
+constexpr double kLeastFree = 0.01;      // of all directions, less those opposite
+constexpr double kScreening = 4;         // of the indicator's own slope over a cell
+
+/// What tells points of a sheet from each other.
+double apart(const CloudScale& scale) { return std::max(scale.spacing, scale.noise); }
+
+/// Evenly over the sphere: a Fibonacci spiral.
+std::vector<Vec3> directions() {
+    std::vector<Vec3> all;
+    const double golden = M_PI * (3 - std::sqrt(5.0));
+    for (int n = 0; n < kRays; ++n) {
+        const double z = 1 - (2 * n + 1.0) / kRays, r = std::sqrt(1 - z * z);
+        all.push_back({r * std::cos(golden * n), r * std::sin(golden * n), z});
+    }
+    return all;
+}
+
+/// The cells with points, as a dense mask.
+class Occupied {
+public:
+    Occupied(const std::vector<Vec3>& points, double cell) : box_(bounding_box(points)), cell_(std::max(cell, longest_side(box_) / kMostViewCells)) {
+        std::size_t all = 1;
+        for (std::size_t a = 0; a < 3; ++a) {
+            count_[a] = std::ptrdiff_t((box_.max[int(a)] - box_.min[int(a)]) / cell_) + 1;
+            all *= std::size_t(count_[a]);
+        }
+        full_.resize(all);
+        for (const Vec3& p : points) full_[std::size_t(index(p))] = 1;
+    }
+
+    [[nodiscard]] double cell() const { return cell_; }
+
+    [[nodiscard]] bool is_free(const Vec3& from, const Vec3& direction) const {
+        for (double t = kFirstStep;; ++t) {
+            const std::ptrdiff_t at = index({from[0] + t * cell_ * direction[0], from[1] + t * cell_ * direction[1], from[2] + t * cell_ * direction[2]});
+            if (at < 0) return true;
+            if (full_[std::size_t(at)]) return false;
+        }
+    }
+
+private:
+    /// < 0: beyond the box.
+    [[nodiscard]] std::ptrdiff_t index(const Vec3& at) const {
+        std::ptrdiff_t n = 0;
+        for (std::size_t a = 0; a < 3; ++a) {
+            const double x = (at[int(a)] - box_.min[int(a)]) / cell_;
+            if (x < 0 || x >= double(count_[a])) return -1;
+            n = n * count_[a] + std::ptrdiff_t(x);
+        }
+        return n;
+    }
+
+    WorldBox box_;
+    double cell_;
+    std::array<std::ptrdiff_t, 3> count_{};
+    std::vector<std::uint8_t> full_;
+};
+
+}  // namespace
+
+std::vector<Vec3> free_directions(const std::vector<Vec3>& points, double cell) {
+    const Occupied occupied(points, cell);
+    const PointCells cells(points, occupied.cell());
+    const std::vector<Vec3> rays = directions();
+    std::vector<Vec3> free(points.size());
+    tbb::parallel_for(std::size_t(0), cells.cell_count(), [&](std::size_t c) {
+        const auto [begin, end] = cells.cell(c);
+        Vec3 from{0, 0, 0}, sum{0, 0, 0};
+        for (std::uint32_t at = begin; at < end; ++at)
+            for (int a = 0; a < 3; ++a) from[a] += cells.sorted()[at][a] / double(end - begin);
+        for (const Vec3& ray : rays)
+            if (occupied.is_free(from, ray))
+                for (int a = 0; a < 3; ++a) sum[a] += ray[a] / kRays;
+        for (std::uint32_t at = begin; at < end; ++at) free[cells.order()[at]] = sum;
+    });
+    return free;
+}
+
+double share_free(const std::vector<Vec3>& points, const std::vector<Vec3>& directions, const CloudScale& scale) {
+    const Occupied occupied(points, kViewSpacings * apart(scale));
+    std::vector<char> free(points.size());
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
+        free[n] = directions[n] != Vec3{0, 0, 0} && occupied.is_free(points[n], directions[n]);
+    });
+    const auto told = std::count_if(directions.begin(), directions.end(), [](const Vec3& d) { return d != Vec3{0, 0, 0}; });
+    return double(std::count(free.begin(), free.end(), 1)) / double(std::max<std::ptrdiff_t>(told, 1));
+}
+
+Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run) {
+    Orientation result;
+    const double between = apart(scale);
+    const std::vector<Vec3> free = free_directions(points, kViewSpacings * between);
+    run.check();
+    result.areas = areas_of(points, scale.spacing);
+    result.normals.resize(points.size());
+    for (std::size_t n = 0; n < points.size(); ++n)
+        if (std::sqrt(dot(free[n], free[n])) > kLeastFree) result.normals[n] = unit(free[n]);
+    WindingField coarse(indicator_lattice(points, cells_along(points, kCoarseSpacings * between)));
+    solve(coarse, points, result, kCyclesFromNothing);
+    const double half = scale_to_half(coarse, points);
+    for (double& area : result.areas) area *= half;
+    result.indicator = make_indicator(coarse);
+    run.check();
+    WindingField fine(indicator_lattice(points, cells_along(points, kFineSpacings * between)));
+    const double cell = fine.indicator().lattice.cell;
+    // A view tells the side alone; which way the surface lies its neighbours know better.
+    std::vector<double> screen(points.size());
+    std::size_t against = 0;
+    for (std::size_t n = 0; n < points.size(); ++n) {
+        const Vec3 falling = unit(times(-1, result.indicator->at(points[n]).gradient));
+        const bool agrees = dot(falling, result.normals[n]) > 0;
+        against += !agrees;
+        if (agrees) result.normals[n] = falling;
+        screen[n] = agrees ? kScreening * result.areas[n] / (cell * cell) : 0;
+    }
+    result.turned = double(against) / double(points.size());
+    fine.start_from(coarse.indicator());
+    fine.screen(points, screen);
+    solve(fine, points, result, kCyclesFromNothing);
+    result.screened = make_indicator(fine);
+    return result;
+}
+
+}  // namespace covol::cloud

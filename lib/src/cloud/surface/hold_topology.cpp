@@ -1,0 +1,131 @@
+#include "cloud/surface/hold_topology.h"
+
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <deque>
+#include <vector>
+
+namespace covol::cloud {
+namespace {
+
+using openvdb::Coord;
+
+constexpr double kHeldVoxels = 0.1;  // from the surface, of a voxel that keeps its sign
+
+/// The 26 neighbours of a voxel, one bit each, and which of them are neighbours of each other.
+struct Neighbourhood {
+    std::array<Coord, 26> offset;
+    std::array<std::uint32_t, 26> beside6{}, beside18{};
+    std::uint32_t faces = 0, faces_and_edges = 0;
+
+    Neighbourhood() {
+        std::size_t n = 0;
+        for (int i = -1; i <= 1; ++i)
+            for (int j = -1; j <= 1; ++j)
+                for (int k = -1; k <= 1; ++k)
+                    if (i != 0 || j != 0 || k != 0) offset[n++] = Coord(i, j, k);
+        for (std::size_t a = 0; a < 26; ++a) {
+            const int axes = steps(offset[a], Coord(0, 0, 0));
+            if (axes == 1) faces |= 1U << a;
+            if (axes <= 2) faces_and_edges |= 1U << a;
+            for (std::size_t b = 0; b < 26; ++b) {
+                const int apart = steps(offset[a], offset[b]);
+                if (apart == 1) beside6[a] |= 1U << b;
+                if (apart == 1 || apart == 2) beside18[a] |= 1U << b;
+            }
+        }
+    }
+
+private:
+    /// The number of axes along which two voxels differ; 9 where they are no neighbours.
+    static int steps(const Coord& a, const Coord& b) {
+        int axes = 0;
+        for (int n = 0; n < 3; ++n) {
+            const int apart = std::abs(a[n] - b[n]);
+            if (apart > 1) return 9;
+            axes += apart;
+        }
+        return axes;
+    }
+};
+
+const Neighbourhood kAround;
+
+/// The voxels beside any of the front.
+std::uint32_t beside(std::uint32_t front, const std::array<std::uint32_t, 26>& neighbours) {
+    std::uint32_t all = 0;
+    for (; front != 0; front &= front - 1) all |= neighbours[std::size_t(__builtin_ctz(front))];
+    return all;
+}
+
+/// Whether the voxels of the set that are next to the centre hang together by paths of at most `steps` from there, and there
+/// are any.
+bool is_one_piece(std::uint32_t set, std::uint32_t next, const std::array<std::uint32_t, 26>& neighbours, int steps) {
+    const std::uint32_t touching = set & next;
+    if (touching == 0) return false;
+    std::uint32_t within = touching;
+    for (int n = 1; n < steps; ++n) within |= beside(within, neighbours) & set;
+    std::uint32_t reached = 0;
+    for (std::uint32_t front = touching & (~touching + 1); front != 0; front = beside(front, neighbours) & within & ~reached) reached |= front;
+    return (touching & ~reached) == 0;
+}
+
+/// Whether a voxel may change sides.
+bool is_simple(std::uint32_t inside) {
+    return is_one_piece(inside, kAround.faces, kAround.beside6, 3) &&
+           is_one_piece(~inside & 0x3FFFFFFU, kAround.faces_and_edges, kAround.beside18, 2);
+}
+
+}  // namespace
+
+std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target) {
+    auto rough_at = rough.getConstAccessor();
+    auto target_at = target.getAccessor();
+    openvdb::MaskGrid kept;  // voxels that have rough's sign still, and not target's
+    auto kept_at = kept.getAccessor();
+    std::deque<Coord> queue;
+    const auto compare = [&](const Coord& at) {
+        if ((rough_at.getValue(at) < 0) == (target_at.getValue(at) < 0) || kept_at.isValueOn(at)) return;
+        kept_at.setValueOn(at);
+        queue.push_back(at);
+    };
+    for (auto value = target.cbeginValueOn(); value; ++value)
+        if (value.isVoxelValue()) compare(value.getCoord());
+    for (auto value = rough.cbeginValueOn(); value; ++value)
+        if (value.isVoxelValue()) compare(value.getCoord());
+    // What lies between the two surfaces, far from both, is active in neither.
+    for (std::size_t n = 0; n < queue.size(); ++n)
+        for (std::uint32_t face = kAround.faces; face != 0; face &= face - 1)
+            compare(Coord(queue[n]) + kAround.offset[std::size_t(__builtin_ctz(face))]);
+    std::sort(queue.begin(), queue.end());
+    std::size_t left = queue.size();
+    while (!queue.empty()) {
+        const Coord at = queue.front();
+        queue.pop_front();
+        if (!kept_at.isValueOn(at)) continue;
+        std::uint32_t inside = 0, waiting = 0;
+        for (std::size_t n = 0; n < 26; ++n) {
+            const Coord beside = at + kAround.offset[n];
+            const bool waits = kept_at.isValueOn(beside);
+            if ((target_at.getValue(beside) < 0) != waits) inside |= 1U << n;
+            if (waits) waiting |= 1U << n;
+        }
+        if (!is_simple(inside)) continue;
+        kept_at.setValueOff(at);
+        --left;
+        for (; waiting != 0; waiting &= waiting - 1) queue.push_back(at + kAround.offset[std::size_t(__builtin_ctz(waiting))]);
+    }
+    const auto small = float(kHeldVoxels * target.voxelSize()[0]);
+    for (auto value = kept.cbeginValueOn(); value; ++value) {
+        const Coord at = value.getCoord();
+        target_at.setValue(at, target_at.getValue(at) < 0 ? small : -small);
+    }
+    return left;
+}
+
+}  // namespace covol::cloud

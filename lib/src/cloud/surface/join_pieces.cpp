@@ -1,0 +1,146 @@
+#include "cloud/surface/join_pieces.h"
+
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numeric>
+
+#include "base/median.h"
+#include "base/vector.h"
+#include "covol/mesh.h"
+#include "covol/surface.h"
+#include "mesh/triangle.h"
+#include "points/kd_tree.h"
+#include "points/point_cells.h"
+
+namespace covol::cloud {
+namespace {
+
+constexpr double kSmall = 0.1;       // of the largest piece's volume
+constexpr double kMostGap = 4;       // of what points are apart
+constexpr double kNear = 1.0;       // of it: a place of the gap without a point as near is one where the surface ends
+constexpr double kAround = 1;        // of it: points that tell how thick the part is
+constexpr double kThickest = 0.5;    // of it: what is thicker does not tear
+
+struct Gap {
+    double length = std::numeric_limits<double>::infinity();
+    Vec3 from{}, to{};
+};
+
+struct Piece {
+    std::vector<Vec3> surface;
+    double volume = 0;  ///< a cavity's is negative
+    Gap gap;            ///< to what it may be joined to
+    void meet(const detail::KdTree& other) {
+        for (const Vec3& v : surface) {
+            const Vec3 near = other.nearest_point(v), between = minus(near, v);
+            if (const double length = std::sqrt(dot(between, between)); length < gap.length) gap = {length, v, near};
+        }
+    }
+};
+
+/// The largest first; without cavities.
+std::vector<Piece> pieces_of(const TriangleMesh& mesh) {
+    std::vector<std::uint32_t> parent(mesh.vertices.size());
+    std::iota(parent.begin(), parent.end(), 0U);
+    const auto root = [&](std::uint32_t v) {
+        while (parent[v] != v) v = parent[v] = parent[parent[v]];
+        return v;
+    };
+    for (const auto& t : mesh.triangles)
+        for (const std::uint32_t v : {t[1], t[2]}) parent[root(v)] = root(t[0]);
+    std::map<std::uint32_t, Piece> pieces;
+    for (std::uint32_t v = 0; v < parent.size(); ++v) pieces[root(v)].surface.push_back(meshing::to_vec3(mesh.vertices[v]));
+    for (const auto& t : mesh.triangles) {
+        Piece& piece = pieces[root(t[0])];
+        const auto corner = [&](std::size_t n) { return minus(meshing::to_vec3(mesh.vertices[t[n]]), piece.surface.front()); };
+        piece.volume += dot(corner(0), cross(corner(1), corner(2))) / 6;
+    }
+    std::vector<Piece> solid;
+    for (auto& [number, piece] : pieces)
+        if (piece.volume > 0) solid.push_back(std::move(piece));
+    std::stable_sort(solid.begin(), solid.end(), [](const Piece& a, const Piece& b) { return a.volume > b.volume; });
+    return solid;
+}
+
+/// Squared distance from a segment.
+double squared_from(const Gap& gap, const Vec3& place) {
+    const Vec3 along = minus(gap.to, gap.from), to = minus(place, gap.from);
+    const double squared = dot(along, along), t = squared > 0 ? std::clamp(dot(to, along) / squared, 0.0, 1.0) : 0;
+    const Vec3 off = minus(to, times(t, along));
+    return dot(off, off);
+}
+
+WorldBox box_around(const Gap& gap, double reach) {
+    WorldBox box;
+    for (int a = 0; a < 3; ++a) {
+        box.min[a] = std::min(gap.from[a], gap.to[a]) - reach;
+        box.max[a] = std::max(gap.from[a], gap.to[a]) + reach;
+    }
+    return box;
+}
+
+/// A rod of the solid from end to end.
+void fill(FloatGrid& level_set, const Gap& gap, double radius) {
+    const Domain domain = domain_of(level_set);
+    const WorldBox box = box_around(gap, radius + domain.voxel_size);
+    const Vec3 low = domain.world_to_index(box.min), high = domain.world_to_index(box.max);
+    auto values = level_set.getAccessor();
+    for (int i = int(std::floor(low[0])); i <= high[0]; ++i)
+        for (int j = int(std::floor(low[1])); j <= high[1]; ++j)
+            for (int k = int(std::floor(low[2])); k <= high[2]; ++k) {
+                const double distance = std::sqrt(squared_from(gap, domain.index_to_world({double(i), double(j), double(k)}))) - radius;
+                const openvdb::Coord at(i, j, k);
+                if (distance < double(values.getValue(at))) values.setValueOn(at, float(distance));
+            }
+}
+
+}  // namespace
+
+std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, double apart, const RunContext& run) {
+    std::vector<Piece> pieces = pieces_of(extract_mesh(level_set, {}, run));
+    const auto first_small = std::find_if(pieces.begin(), pieces.end(), [&](const Piece& p) { return p.volume < kSmall * pieces.front().volume; });
+    if (first_small == pieces.end()) return 0;
+    std::vector<Vec3> large;
+    for (auto piece = pieces.begin(); piece != first_small; ++piece) large.insert(large.end(), piece->surface.begin(), piece->surface.end());
+    std::vector<Piece> small(std::make_move_iterator(first_small), std::make_move_iterator(pieces.end()));
+    const detail::KdTree whole(std::move(large));
+    for (Piece& piece : small) piece.meet(whole);
+
+    const double voxel = domain_of(level_set).voxel_size;
+    const PointCells cells(points, apart);
+    std::vector<PointCells::Range> ranges;
+    const auto goes_on = [&](const Gap& gap) {
+        const int steps = 1 + int(2 * gap.length / voxel);
+        for (int n = 0; n <= steps; ++n)
+            if (!cells.any_within(plus(gap.from, times(double(n) / steps, minus(gap.to, gap.from))), kNear * apart)) return false;
+        return true;
+    };
+    std::size_t joined = 0;
+    while (!small.empty()) {
+        run.check();
+        const auto next = std::min_element(small.begin(), small.end(), [](const Piece& a, const Piece& b) { return a.gap.length < b.gap.length; });
+        const Gap gap = next->gap;
+        if (!(gap.length <= kMostGap * apart)) break;
+        if (!goes_on(gap)) {
+            next->gap = {};  // it may be joined to one that is joined later
+            continue;
+        }
+        std::vector<double> around;
+        cells.find(box_around(gap, kAround * apart), ranges);
+        for (const PointCells::Range& range : ranges)
+            for (std::uint32_t n = range.begin; n < range.end; ++n)
+                if (const double off = std::sqrt(squared_from(gap, cells.sorted()[n])); off < kAround * apart) around.push_back(off);
+        fill(level_set, gap, std::max(std::min(median(std::move(around)), kThickest * apart), voxel));
+        ++joined;
+        const detail::KdTree own(std::move(next->surface));
+        small.erase(next);
+        for (Piece& piece : small) piece.meet(own);
+    }
+    return joined;
+}
+
+}  // namespace covol::cloud

@@ -1,0 +1,351 @@
+#include "cloud/surface/local_fit.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "base/vector.h"
+#include "cloud/surface/fit_kernel.h"
+#include "points/point_cells.h"
+
+namespace covol::cloud {
+namespace {
+
+constexpr int kLevels = 9;
+constexpr double kGrowth = 1.4142135623730951;
+constexpr double kFirstSpacings = 2.0;    // radius of the first: about 12 points
+constexpr double kThinnedShare = 0.2;     // of the radius: points closer are averaged first
+constexpr std::size_t kLeastPoints = 9;
+constexpr double kSheetShare = 0.3;       // noise, of the radius; points that fill a ball have 0.45
+constexpr double kAgreement = 1.5;        // standard deviations; 1 to 2 change the errors by a tenth
+constexpr double kMisfitGrowth = 1.13;     // beyond it the fit itself is off
+constexpr double kRidge = 1e-4;
+constexpr double kSheetHeight = 0.15;     // of the radius: what is farther off the plane may be another sheet
+constexpr double kMostHeight = 0.4;       // of the radius: a foot farther from its node is no sheet's
+constexpr double kLeastCosine = 0.4;      // between the normal as it was oriented and as it is fitted
+constexpr double kLeastSpread = 0.16;     // standard deviation along any direction, of the radius; where points fill the disc 0.35
+constexpr double kMostOffCentre = 0.33;   // of the points' mean, of the radius: half a disc has 0.29, what lies beyond a sheet's end more
+constexpr double kMostGrowth = 2.9;       // of the radius, until the points are a sheet
+constexpr double kLeastMajority = 5;      // points
+constexpr double kMostUnbent = 0.5;       // of the noise, that it is taken to have lowered the points
+constexpr double kWidest = 2;             // of the nodes' cells: the first are so large
+constexpr double kWideOfApart = 7;        // the radius, of what its nodes are apart: there need not be more
+constexpr double kSameSheet = 0.7;        // cosine of the normals
+
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+std::array<Vec3, 3> frame_of(const Vec3& normal) {
+    int least = 0;
+    for (int a = 1; a < 3; ++a)
+        if (std::abs(normal[a]) < std::abs(normal[least])) least = a;
+    Vec3 other{0, 0, 0};
+    other[least] = 1;
+    const Vec3 u = unit(cross(normal, other));
+    return {u, cross(normal, u), normal};
+}
+
+struct Fit {
+    std::array<double, 6> c{};
+    double noise = 0;      // standard deviation of the points
+    double misfit = 0;     // of their means, in which noise is averaged and what the quadric lacks is not
+    double deviation = 0;  // of c0
+    bool good = false;
+};
+
+/// The cloud, thinned for one radius.
+struct Level {
+    Level(const OrientedCloud& all, double r) : radius(r), cells(all.points, r) {
+        normals.reserve(all.size());
+        counts.reserve(all.size());
+        for (const std::uint32_t n : cells.order()) {
+            normals.push_back(all.normals[n]);
+            counts.push_back(all.counts[n]);
+        }
+    }
+    double radius;
+    PointCells cells;
+    std::vector<Vec3> normals;   // in the cells' order
+    std::vector<float> counts;
+};
+
+struct Scratch {
+    std::vector<PointCells::Range> ranges;
+    FitPoints near;  // in radii
+};
+
+Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes, Scratch& scratch) {
+    const double r = level.radius, r2 = r * r;
+    FitPoints& near = scratch.near;
+    near.clear();
+    for (const PointCells::Range& range : scratch.ranges)
+        for (std::uint32_t n = range.begin; n < range.end; ++n) {
+            const Vec3 to = minus(level.cells.sorted()[n], origin);
+            if (dot(to, to) >= r2 || dot(level.normals[n], axes[2]) <= 0) continue;
+            near.add(dot(to, axes[0]) / r, dot(to, axes[1]) / r, dot(to, axes[2]) / r, double(level.counts[n]));
+        }
+    Fit result;
+    if (near.size < kLeastPoints) return result;
+    near.fill_up();
+    const FitSums sums = fit_sums(near);
+    constexpr int kMoment[6][6] = {{0, 1, 2, 3, 4, 5},   {1, 3, 4, 6, 7, 8},    {2, 4, 5, 7, 8, 9},
+                                   {3, 6, 7, 10, 11, 12}, {4, 7, 8, 11, 12, 13}, {5, 8, 9, 12, 13, 14}};
+    Matrix6 m;
+    for (int a = 0; a < 6; ++a)
+        for (int b = 0; b < 6; ++b) m(a, b) = sums.moments[kMoment[a][b]];
+    const Vector6 right = Eigen::Map<const Vector6>(sums.heights);
+    const double sum = sums.moments[0];
+    if (std::hypot(m(0, 1), m(0, 2)) > kMostOffCentre * sum) return result;
+    // Narrow bodies seen from the side: across them the quadric knows nothing beyond its points.
+    const double uu = m(1, 1) / sum - m(0, 1) * m(0, 1) / (sum * sum), vv = m(2, 2) / sum - m(0, 2) * m(0, 2) / (sum * sum),
+                 uv = m(1, 2) / sum - m(0, 1) * m(0, 2) / (sum * sum);
+    if (0.5 * (uu + vv) - std::hypot(0.5 * (uu - vv), uv) < kLeastSpread * kLeastSpread) return result;
+    for (int d = 3; d < 6; ++d) m(d, d) += kRidge * sum;
+    const Eigen::LDLT<Matrix6> solver(m);
+    if (solver.info() != Eigen::Success || !solver.isPositive()) return result;
+    const Vector6 x = solver.solve(right);
+    const Vector6 first = solver.solve(Vector6::Unit(0));
+    const FitResidual residual = fit_residual(near, x.data());  // a mean of c points is off by 1 / c of their variance
+    const double effective = sums.near * sums.near / sums.near_squares;
+    if (effective < 7) return result;
+    result.noise = r * std::sqrt(residual.squares / residual.near * effective / (effective - 6));
+    result.misfit = r * std::sqrt(residual.squares / residual.weight * effective / (effective - 6));
+    result.deviation = result.noise * std::sqrt(std::max(0.0, first[0]) * sums.squares / sum);
+    result.c = {x[0] * r, x[1], x[2], x[3] / r, x[4] / r, x[5] / r};
+    result.good = std::isfinite(x.sum());
+    return result;
+}
+
+/// Whether most points beside this one on its own sheet have a normal like it; -1: too few to tell.
+int is_of_majority(const Level& level, const Vec3& origin, const Vec3& normal, const std::vector<PointCells::Range>& ranges) {
+    const double r2 = level.radius * level.radius, height = kSheetHeight * level.radius;
+    double same = 0, opposite = 0;
+    for (const PointCells::Range& range : ranges)
+        for (std::uint32_t n = range.begin; n < range.end; ++n) {
+            const Vec3 to = minus(level.cells.sorted()[n], origin);
+            if (dot(to, to) >= r2 || std::abs(dot(to, normal)) > height) continue;
+            (dot(level.normals[n], normal) > 0 ? same : opposite) += double(level.counts[n]);
+        }
+    return same + opposite < kLeastMajority ? -1 : same >= opposite;
+}
+
+Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& normal, Scratch& scratch) {
+    Quadric best;
+    best.origin = point;
+    best.axes = frame_of(normal);
+    struct Seen { double height, deviation, misfit; };
+    std::vector<Seen> seen;
+    int majority = -1;
+    for (const Level& level : levels) {
+        WorldBox box;
+        for (int a = 0; a < 3; ++a) {
+            box.min[a] = point[a] - level.radius;
+            box.max[a] = point[a] + level.radius;
+        }
+        level.cells.find(box, scratch.ranges);
+        if (majority < 0) {
+            majority = is_of_majority(level, point, normal, scratch.ranges);
+            best.least_radius = level.radius;
+        }
+        if (majority == 0) return best;
+        if (seen.empty() && majority >= 0 && level.radius > kMostGrowth * best.least_radius) return best;
+        Fit now = fit(level, point, best.axes, scratch);
+        if (!now.good || now.misfit > kSheetShare * level.radius) {
+            if (seen.empty()) continue;
+            break;
+        }
+        if (seen.empty()) {
+            // Over the plane that it tells itself.
+            Vec3 tilted;
+            for (int a = 0; a < 3; ++a) tilted[a] = best.axes[2][a] - now.c[1] * best.axes[0][a] - now.c[2] * best.axes[1][a];
+            const std::array<Vec3, 3> before = best.axes;
+            best.axes = frame_of(unit(tilted));
+            const Fit again = fit(level, point, best.axes, scratch);
+            if (again.good) now = again; else best.axes = before;
+        }
+        const bool agrees = std::all_of(seen.begin(), seen.end(), [&](const Seen& s) {
+            return std::abs(s.height - now.c[0]) <= kAgreement * s.deviation && now.misfit <= kMisfitGrowth * s.misfit;
+        });
+        if (!agrees) break;
+        if (seen.empty() && (std::abs(now.c[0]) > kMostHeight * level.radius || dot(best.axes[2], normal) < kLeastCosine)) return best;
+        if (seen.empty()) best.noise = now.noise;  // wider, it has the surface's own shape in it
+        seen.push_back({now.c[0], now.deviation, now.misfit});
+        best.c = now.c;
+        best.radius = level.radius;
+    }
+    // Noise along the surface brings points here from where it lies lower, or higher: their mean height is off by half the
+    // variance times the Laplacian.
+    const double lower = best.noise * best.noise * (best.c[3] + best.c[5]), most = kMostUnbent * best.noise;
+    best.c[0] -= std::clamp(lower, -most, most);
+    return best;
+}
+
+/// The cloud, thinned for each radius.
+class Fitter {
+public:
+    Fitter(const OrientedCloud& cloud, double spacing, const RunContext& run) {
+        levels_.reserve(kLevels);
+        OrientedCloud last;
+        double radius = kFirstSpacings * spacing;
+        for (int n = 0; n < kLevels; ++n, radius *= kGrowth) {
+            run.check();
+            // Averages of averages cost little and miss nothing that a radius this large could see.
+            last = thinned(n == 0 ? cloud : last, kThinnedShare * radius);
+            levels_.emplace_back(last, radius);
+        }
+    }
+
+    [[nodiscard]] std::vector<Quadric> fit(const OrientedCloud& nodes, const RunContext& run) const {
+        std::vector<Quadric> result(nodes.size());
+        tbb::enumerable_thread_specific<Scratch> scratch;
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, nodes.size(), 256), [&](const auto& range) {
+            if (run.cancelled()) return;
+            Scratch& mine = scratch.local();
+            for (std::size_t n = range.begin(); n < range.end(); ++n) result[n] = choose(levels_, nodes.points[n], nodes.normals[n], mine);
+        });
+        run.check();
+        return result;
+    }
+
+private:
+    std::vector<Level> levels_;
+};
+
+/// The nodes that no quadric is so close to that it tells of their place, too.
+OrientedCloud without_covered(const OrientedCloud& nodes, const std::vector<Quadric>& quadrics) {
+    std::vector<Vec3> feet;
+    double reach = 0;
+    for (const Quadric& q : quadrics) {
+        feet.push_back(q.foot());
+        reach = std::max(reach, q.apart);
+    }
+    const PointCells cells(feet, reach);
+    std::vector<char> covered(nodes.size(), 0);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, nodes.size(), 256), [&](const auto& part) {
+        std::vector<PointCells::Range> ranges;
+        for (std::size_t n = part.begin(); n < part.end(); ++n) {
+            const Vec3& p = nodes.points[n];
+            cells.find({{p[0] - reach, p[1] - reach, p[2] - reach}, {p[0] + reach, p[1] + reach, p[2] + reach}}, ranges);
+            for (const PointCells::Range& range : ranges)
+                for (std::uint32_t at = range.begin; at < range.end && !covered[n]; ++at) {
+                    const Quadric& q = quadrics[cells.order()[at]];
+                    const Vec3 to = minus(p, cells.sorted()[at]);
+                    covered[n] = dot(to, to) < q.apart * q.apart && dot(nodes.normals[n], q.axes[2]) > kSameSheet;
+                }
+        }
+    });
+    OrientedCloud left;
+    for (std::size_t n = 0; n < nodes.size(); ++n) {
+        if (covered[n]) continue;
+        left.points.push_back(nodes.points[n]);
+        left.normals.push_back(nodes.normals[n]);
+        left.counts.push_back(nodes.counts[n]);
+    }
+    return left;
+}
+
+}  // namespace
+
+double Quadric::distance(const Vec3& world) const {
+    const Vec3 to = minus(world, origin);
+    const double u = dot(to, axes[0]), v = dot(to, axes[1]), t = dot(to, axes[2]);
+    const double height = c[0] + u * (c[1] + u * c[3] + v * c[4]) + v * (c[2] + v * c[5]);
+    const double du = c[1] + 2 * u * c[3] + v * c[4], dv = c[2] + 2 * v * c[5] + u * c[4];
+    return (t - height) / std::sqrt(1 + du * du + dv * dv);
+}
+
+double Quadric::curvature() const {
+    // Of [2 c3, c4; c4, 2 c5], the slope at the foot being small.
+    const double mean = c[3] + c[5];
+    return std::abs(mean) + std::hypot(c[3] - c[5], c[4]);
+}
+
+Vec3 Quadric::foot() const {
+    Vec3 at = origin;
+    for (int a = 0; a < 3; ++a) at[a] += c[0] * axes[2][a];
+    return at;
+}
+
+OrientedCloud thinned(const OrientedCloud& cloud, double edge) {
+    const PointCells cells(cloud.points, edge);
+    struct Mean { Vec3 point{0, 0, 0}, normal{0, 0, 0}; double count = 0; };
+    const auto add_cell = [&](std::size_t n, OrientedCloud& result) {
+        std::array<Mean, 6> means;  // by the direction that is closest to the normal's
+        const auto [begin, end] = cells.cell(n);
+        for (std::uint32_t at = begin; at < end; ++at) {
+            const std::uint32_t point = cells.order()[at];
+            const Vec3& normal = cloud.normals[point];
+            int axis = 0;
+            for (int a = 1; a < 3; ++a)
+                if (std::abs(normal[a]) > std::abs(normal[axis])) axis = a;
+            Mean& mean = means[std::size_t(2 * axis + (normal[axis] < 0))];
+            const double c = double(cloud.counts[point]);
+            for (int a = 0; a < 3; ++a) {
+                mean.point[a] += c * cloud.points[point][a];
+                mean.normal[a] += c * normal[a];
+            }
+            mean.count += c;
+        }
+        // Normals that are close, on either side of the limit between two directions, are one side of a sheet.
+        for (std::size_t m = 0; m < 6; ++m)
+            for (std::size_t o = 0; o < m; ++o)
+                if (means[m].count > 0 && means[o].count > 0 && dot(means[m].normal, means[o].normal) > 0) {
+                    for (int a = 0; a < 3; ++a) {
+                        means[m].point[a] += means[o].point[a];
+                        means[m].normal[a] += means[o].normal[a];
+                    }
+                    means[m].count += means[o].count;
+                    means[o] = {};
+                }
+        for (const Mean& mean : means) {
+            if (!(mean.count > 0) || !(dot(mean.normal, mean.normal) > 0)) continue;
+            result.points.push_back({mean.point[0] / mean.count, mean.point[1] / mean.count, mean.point[2] / mean.count});
+            result.normals.push_back(unit(mean.normal));
+            result.counts.push_back(float(mean.count));
+        }
+    };
+    constexpr std::size_t kCells = 4096;
+    std::vector<OrientedCloud> parts((cells.cell_count() + kCells - 1) / kCells);
+    tbb::parallel_for(std::size_t(0), parts.size(), [&](std::size_t part) {
+        for (std::size_t n = part * kCells; n < std::min(cells.cell_count(), (part + 1) * kCells); ++n) add_cell(n, parts[part]);
+    });
+    OrientedCloud result;
+    for (const OrientedCloud& part : parts) {
+        result.points.insert(result.points.end(), part.points.begin(), part.points.end());
+        result.normals.insert(result.normals.end(), part.normals.begin(), part.normals.end());
+        result.counts.insert(result.counts.end(), part.counts.begin(), part.counts.end());
+    }
+    return result;
+}
+
+std::vector<Quadric> fit_quadrics(const OrientedCloud& nodes, const OrientedCloud& cloud, double spacing, const RunContext& run) {
+    return Fitter(cloud, spacing, run).fit(nodes, run);
+}
+
+std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCloud& cloud, double edge, const CloudScale& scale,
+                                   std::size_t& bare, const RunContext& run) {
+    const Fitter fitter(cloud, scale.spacing, run);
+    std::vector<Quadric> all;
+    bare = 0;
+    for (const double times : {kWidest, 1.0}) {
+        // Where noise is less, wide neighbourhoods are those of flat parts: they tell less about what lies beside these.
+        if (times > 1 && scale.noise < scale.spacing) continue;
+        const double apart = times * edge;
+        OrientedCloud nodes = thinned(places, apart);
+        if (!all.empty()) nodes = without_covered(nodes, all);
+        std::vector<Quadric> found = fitter.fit(nodes, run);
+        const double least = times > 1 ? kWideOfApart * apart : 0;
+        bare = std::size_t(std::count_if(found.begin(), found.end(), [](const Quadric& q) { return !(q.radius > 0); }));
+        for (Quadric& q : found) {
+            if (!(q.radius > least)) continue;
+            q.apart = apart;
+            all.push_back(q);
+        }
+    }
+    return all;
+}
+
+}  // namespace covol::cloud

@@ -1,0 +1,283 @@
+// The body between contours: shape-based interpolation of signed distance fields, and domes beyond the end slices.
+#include "contours/contour_solid.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "covol/contours.h"
+
+namespace covol {
+
+using detail::Polygon;
+using detail::PolygonMoments;
+using detail::SliceGrid;
+using detail::SolidSlice;
+using detail::Vec2;
+
+namespace {
+
+/// The dome's profile: how far inside the last contour the body ends at the fraction t of the dome's height. A
+/// paraboloid, whose area falls linearly.
+double dome(double radius, double t) { return t < 1 ? radius * (1 - std::sqrt(1 - t)) : radius; }
+
+/// The slope at a node from the secants on both sides, which span `left` and `right`: their weighted harmonic mean, 0
+/// where they differ in sign (Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5, 1984), so that cubics do not overshoot.
+double monotone_slope(double secant_left, double left, double secant_right, double right) {
+    if (!(secant_left * secant_right > 0)) return 0;
+    const double a = 2 * right + left, b = right + 2 * left;
+    return (a + b) / (a / secant_left + b / secant_right);
+}
+
+/// Cubic from 0 to 1 by Hermite's basis; slopes times the interval's length.
+double hermite(double v0, double v1, double m0, double m1, double t) {
+    const double s = 1 - t;
+    return s * s * ((1 + 2 * t) * v0 + t * m0) + t * t * ((1 + 2 * s) * v1 - s * m1);
+}
+
+/// One stretch of the body along the slices' normal, with the level inside it.
+class Interval {
+public:
+    enum class Kind { Below, Between, Above };
+    /// @param n  the slice below, or the end slice of a dome
+    Interval(const ContourSolid::Data& data, Kind kind, std::size_t n) : data_(data), kind_(kind), n_(n) {}
+
+    double begin() const { return kind_ == Kind::Below ? slice().w - slice().cap : slice().w; }
+    double end() const { return kind_ == Kind::Between ? data_.slices[n_ + 1].w : kind_ == Kind::Above ? slice().w + slice().cap : slice().w; }
+
+    double level(double x, double y, double w) const {
+        if (kind_ != Kind::Between && slice().open) return carried_on(x, y, std::abs(w - slice().w));
+        if (kind_ != Kind::Between) return slice().at(data_.grid, x, y) + beyond(std::abs(w - slice().w));
+        const SolidSlice& next = data_.slices[n_ + 1];
+        const double length = next.w - slice().w, t = (w - slice().w) / length;
+        const Vec2& s = slice().shift;
+        if (s == Vec2{0, 0}) {
+            const double here = slice().at(data_.grid, x, y), there = next.at(data_.grid, x, y);
+            const double secant = (there - here) / length;
+            return hermite(here, there, slope_below(x, y, here, secant, length) * length,
+                           slope_above(x, y, there, secant, length) * length, t);
+        }
+        return (1 - t) * slice().at(data_.grid, x - t * s[0], y - t * s[1]) +
+               t * next.at(data_.grid, x + (1 - t) * s[0], y + (1 - t) * s[1]);
+    }
+    /// Of the level within a ball around a position of the plane, whatever w is; upper is not needed on domes.
+    std::array<double, 2> range(double x, double y, double radius) const {
+        const double here = slice().at(data_.grid, x, y);
+        if (kind_ != Kind::Between && slice().open) {
+            // Neither section's level changes faster than the position does.
+            const double height = slice().cap + radius, share = height / std::abs(slice().w - inner().w);
+            return {std::min(here, carried_on(x, y, height)) - (1 + 2 * share) * radius, std::numeric_limits<double>::max()};
+        }
+        if (kind_ != Kind::Between) return {here - radius, std::numeric_limits<double>::max()};
+        const double there = data_.slices[n_ + 1].at(data_.grid, x, y);
+        const double reach = radius + std::hypot(slice().shift[0], slice().shift[1]);
+        return {std::min(here, there) - reach, std::max(here, there) + reach};
+    }
+    /// The surface's points strictly inside the interval: one for each lattice line that it crosses along the axis its
+    /// normal is closest to. In the frame (x, y, w).
+    void append_surface(double step, std::vector<Vec3>& points) const;
+
+private:
+    /// Slopes of the level along w at the interval's two slices; beyond an end slice the dome goes on.
+    double slope_below(double x, double y, double here, double secant, double length) const {
+        if (n_ == 0 && slice().open) return secant;
+        if (n_ == 0) return monotone_slope(-slice().depth / slice().cap, slice().cap, secant, length);
+        const SolidSlice& before = data_.slices[n_ - 1];
+        const double left = slice().w - before.w;
+        return monotone_slope((here - before.at(data_.grid, x, y)) / left, left, secant, length);
+    }
+    double slope_above(double x, double y, double there, double secant, double length) const {
+        const SolidSlice& next = data_.slices[n_ + 1];
+        if (n_ + 2 == data_.slices.size() && next.open) return secant;
+        if (n_ + 2 == data_.slices.size()) return monotone_slope(secant, length, next.depth / next.cap, next.cap);
+        const SolidSlice& after = data_.slices[n_ + 2];
+        const double right = after.w - next.w;
+        return monotone_slope(secant, length, (after.at(data_.grid, x, y) - there) / right, right);
+    }
+    const SolidSlice& slice() const { return data_.slices[n_]; }
+    /// The neighbour of an end slice.
+    const SolidSlice& inner() const { return data_.slices[kind_ == Kind::Below ? n_ + 1 : n_ - 1]; }
+    /// Beyond an open end the level goes on as it came.
+    double carried_on(double x, double y, double height) const {
+        const double here = slice().at(data_.grid, x, y), share = height / std::abs(slice().w - inner().w);
+        return here + share * (here - inner().at(data_.grid, x, y));
+    }
+    double beyond(double height) const {
+        const double cap = slice().cap;
+        return dome(slice().depth, height / cap) + std::max(0.0, height - cap);
+    }
+    bool may_cross(int i, int j) const;
+
+    const ContourSolid::Data& data_;
+    Kind kind_;
+    std::size_t n_;
+};
+
+/// Whether the surface can pass the columns at a node and at its next ones.
+bool Interval::may_cross(int i, int j) const {
+    if (slice().shift != Vec2{0, 0} && kind_ == Kind::Between) return true;
+    const SliceGrid& grid = data_.grid;
+    bool inside = false, outside = kind_ != Kind::Between && !slice().open;
+    for (int dj = 0; dj <= 1; ++dj)
+        for (int di = 0; di <= 1; ++di) {
+            const std::size_t node = std::size_t(j + dj) * std::size_t(grid.nx) + std::size_t(i + di);
+            const bool here = slice().level[node] < 0;
+            bool there = kind_ == Kind::Between ? data_.slices[n_ + 1].level[node] < 0 : here;
+            if (kind_ != Kind::Between && slice().open)
+                there = carried_on(grid.origin[0] + grid.cell * (i + di), grid.origin[1] + grid.cell * (j + dj), slice().cap) < 0;
+            inside |= here || there;
+            outside |= !here || !there;
+        }
+    return inside && outside;
+}
+
+void Interval::append_surface(double step, std::vector<Vec3>& points) const {
+    const SliceGrid& grid = data_.grid;
+    const int layers = std::max(1, int(std::ceil((end() - begin()) / step)));
+    const double dw = (end() - begin()) / layers;
+    for (int j = 0; j + 1 < grid.ny; ++j)
+        for (int i = 0; i + 1 < grid.nx; ++i) {
+            if (!may_cross(i, j)) continue;
+            const double x = grid.origin[0] + grid.cell * i, y = grid.origin[1] + grid.cell * j;
+            for (int layer = 0; layer < layers; ++layer) {
+                const double w = begin() + dw * layer;
+                const double here = level(x, y, w);
+                const std::array<double, 3> next{level(x + grid.cell, y, w), level(x, y + grid.cell, w), level(x, y, w + dw)};
+                if ((next[0] < 0) == (here < 0) && (next[1] < 0) == (here < 0) && (next[2] < 0) == (here < 0)) continue;
+                const std::array<double, 3> slope{(next[0] - here) / grid.cell, (next[1] - here) / grid.cell, (next[2] - here) / dw};
+                int axis = 0;
+                for (int a = 1; a < 3; ++a)
+                    if (std::abs(slope[a]) > std::abs(slope[axis])) axis = a;
+                if ((next[axis] < 0) == (here < 0)) continue;
+                Vec3 p{x, y, w};
+                // On a slice itself the contour lies there already.
+                if (axis != 2 && layer == 0 && kind_ != Kind::Below) continue;
+                p[axis] -= here / slope[axis];
+                points.push_back(p);
+            }
+        }
+}
+
+/// The interval that holds w; the domes hold all that lies beyond.
+Interval interval_at(const ContourSolid::Data& data, double w) {
+    const auto above = std::upper_bound(data.slices.begin(), data.slices.end(), w,
+                                        [](double value, const SolidSlice& s) { return value < s.w; });
+    if (above == data.slices.begin()) return {data, Interval::Kind::Below, 0};
+    const auto n = std::size_t(above - data.slices.begin()) - 1;
+    return {data, above == data.slices.end() ? Interval::Kind::Above : Interval::Kind::Between, n};
+}
+
+std::vector<Interval> intervals(const ContourSolid::Data& data) {
+    std::vector<Interval> all{{data, Interval::Kind::Below, 0}};
+    for (std::size_t n = 0; n + 1 < data.slices.size(); ++n) all.emplace_back(data, Interval::Kind::Between, n);
+    all.emplace_back(data, Interval::Kind::Above, data.slices.size() - 1);
+    return all;
+}
+
+/// The deepest node of each part of the outside that does not reach the grid's border.
+std::vector<Vec2> deepest_in_holes(const std::vector<float>& level, const SliceGrid& grid) {
+    std::vector<char> seen(level.size(), 0);
+    std::vector<std::size_t> stack;
+    std::vector<Vec2> found;
+    const auto flood = [&](std::size_t from) {
+        std::size_t deepest = from;
+        bool at_border = false;
+        stack.assign(1, from);
+        seen[from] = 1;
+        while (!stack.empty()) {
+            const std::size_t node = stack.back();
+            stack.pop_back();
+            if (level[node] > level[deepest]) deepest = node;
+            const auto i = int(node % std::size_t(grid.nx)), j = int(node / std::size_t(grid.nx));
+            if (i == 0 || j == 0 || i == grid.nx - 1 || j == grid.ny - 1) {
+                at_border = true;
+                continue;  // beyond a row along the border nothing is left to tell
+            }
+            for (const std::ptrdiff_t to : {std::ptrdiff_t(-1), std::ptrdiff_t(1), -std::ptrdiff_t(grid.nx), std::ptrdiff_t(grid.nx)}) {
+                const auto other = std::size_t(std::ptrdiff_t(node) + to);
+                if (seen[other] || level[other] < 0) continue;
+                seen[other] = 1;
+                stack.push_back(other);
+            }
+        }
+        if (!at_border)
+            found.push_back({grid.origin[0] + grid.cell * double(deepest % std::size_t(grid.nx)),
+                             grid.origin[1] + grid.cell * double(deepest / std::size_t(grid.nx))});
+    };
+    for (std::size_t node = 0; node < level.size(); ++node)
+        if (!seen[node] && level[node] >= 0) flood(node);
+    return found;
+}
+
+}  // namespace
+
+double cap_height(double area, double before, double distance, double gap) {
+    return before > area ? std::min(gap, distance * area / (before - area)) : gap;
+}
+
+ContourSolid::ContourSolid(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
+
+double ContourSolid::level(const Vec3& world) const {
+    const Vec3 p = data_->frame.from_world(world);
+    return interval_at(*data_, p[2]).level(p[0], p[1], p[2]);
+}
+
+bool ContourSolid::may_meet(const Vec3& center, double radius) const {
+    const Vec3 p = data_->frame.from_world(center);
+    double low = std::numeric_limits<double>::max(), high = -low;
+    const auto include = [&](const Interval& interval) {
+        const auto [least, most] = interval.range(p[0], p[1], radius);
+        low = std::min(low, least);
+        high = std::max(high, most);
+    };
+    const auto& slices = data_->slices;
+    if (p[2] + radius < slices.front().w - slices.front().cap || p[2] - radius > slices.back().w + slices.back().cap) return false;
+    include(interval_at(*data_, p[2] - radius));
+    auto above = std::upper_bound(slices.begin(), slices.end(), p[2] - radius, [](double value, const SolidSlice& s) { return value < s.w; });
+    for (; above != slices.end() && above->w < p[2] + radius; ++above) include(interval_at(*data_, above->w));
+    return low < 0 && high >= 0;
+}
+
+WorldBox ContourSolid::box() const {
+    const SliceGrid& grid = data_->grid;
+    const auto& slices = data_->slices;
+    std::vector<Vec3> corners;
+    // An open end may widen.
+    double wider = 0;
+    for (const SolidSlice* end : {&slices.front(), &slices.back()})
+        if (end->open) wider = std::max(wider, end->cap);
+    for (const double x : {grid.origin[0] - wider, grid.origin[0] + grid.cell * (grid.nx - 1) + wider})
+        for (const double y : {grid.origin[1] - wider, grid.origin[1] + grid.cell * (grid.ny - 1) + wider})
+            for (const double w : {slices.front().w - slices.front().cap, slices.back().w + slices.back().cap})
+                corners.push_back(data_->frame.to_world({x, y, w}));
+    return bounding_box(corners);
+}
+
+std::vector<Vec3> ContourSolid::surface_points(double step, const RunContext& run) const {
+    std::vector<Vec3> points;
+    with_threads(run, [&] {
+        const std::vector<Interval> all = intervals(*data_);
+        std::vector<std::vector<Vec3>> parts(all.size());
+        tbb::parallel_for(std::size_t(0), all.size(), [&](std::size_t n) { all[n].append_surface(step, parts[n]); });
+        for (const std::vector<Vec3>& part : parts)
+            for (const Vec3& p : part) points.push_back(data_->frame.to_world(p));
+    });
+    run.check();
+    return points;
+}
+
+std::vector<Vec3> ContourSolid::hole_seeds() const {
+    std::vector<std::vector<Vec2>> parts(data_->slices.size());
+    tbb::parallel_for(std::size_t(0), parts.size(), [&](std::size_t n) {
+        // A single contour that does not cross itself has no hole.
+        if (data_->slices[n].polygons > 1) parts[n] = deepest_in_holes(data_->slices[n].level, data_->grid);
+    });
+    std::vector<Vec3> seeds;
+    for (std::size_t n = 0; n < parts.size(); ++n)
+        for (const Vec2& p : parts[n]) seeds.push_back(data_->frame.to_world({p[0], p[1], data_->slices[n].w}));
+    return seeds;
+}
+
+}  // namespace covol

@@ -1,0 +1,42 @@
+#pragma once
+#include <deque>
+#include <vector>
+
+#include "covol/run.h"
+#include "grid/leaf_band.h"
+
+namespace covol::detail {
+
+/// The nearest known point of each voxel of a leaf; -1: none known.
+struct NearestLeaf {
+    Coord origin;
+    std::array<std::int32_t, 27> neighbours;  // -1: no such leaf
+    std::array<std::int32_t, kLeafSize> nearest;
+    std::uint32_t wanted = 0;  // neighbours that this leaf's last change concerns, by neighbour_slot
+    bool queued = false;
+    bool visited = false;
+};
+
+/// The voxels around a set of points, each with the index of its nearest point.
+struct NearestField {
+    std::vector<Vec3> points;          ///< index space, sorted by leaf
+    std::vector<std::int32_t> source;  ///< where points[n] stood in the input
+    std::deque<NearestLeaf> leaves;
+    int rounds = 0;
+};
+
+/// Sweeps point indices through the tube of `radius` voxels around the points, within `box`.
+///
+/// Every leaf that the tube meets is there; voxels further away than `radius` may hold a point that is not the nearest.
+/// Leaves of equal parity in I, J and K are swept in parallel, since none of them reads another; a leaf is visited again
+/// when a neighbour has changed the voxels next to it.
+/// @param points  index space, finite. Points outside `box` count: the tube is followed outside of it where they need it.
+/// @param where   the caller's name, for messages.
+/// @throws Error InvalidInput when the box is longer than 2^24 voxels; Cancelled.
+[[nodiscard]] NearestField nearest_points(const std::vector<Vec3>& points, const CoordBBox& box, double radius,
+                                          const char* where, const RunContext& run);
+
+/// Squared distances, in voxels, of a leaf's voxels to the points they hold; huge where there is none.
+void squared_distances(const NearestField& field, const NearestLeaf& leaf, float* squared);
+
+}  // namespace covol::detail

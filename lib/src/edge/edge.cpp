@@ -1,0 +1,268 @@
+// The edge detector g(s) = 1/(1 + K s²), Eq. (2), where the band needs it: s = |∇G_σ * I|, or the brightness of lines.
+#include "covol/edge.h"
+
+#include <openvdb/openvdb.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <sstream>
+
+#include "covol/error.h"
+#include "grid/halo.h"
+#include "scheme/scheme.h"
+
+namespace covol {
+namespace {
+
+using detail::Coord;
+using detail::HaloField;
+using detail::kLeafDim;
+using detail::kLeafSize;
+using detail::kPaddedSize;
+using detail::LeafBand;
+using detail::LeafBounds;
+
+constexpr double kHaloSigmas = 3.0;      // beyond it smoothing carries nothing worth computing
+constexpr double kLargestHeatStep = 0.5; // h²; shorter steps make the kernel rounder, more like a Gaussian
+constexpr double kHeatTolerance = 1e-4;  // relative residual
+constexpr int kMaxHeatSweeps = 100;
+constexpr int kInnerSweeps = 2;
+constexpr double kSlopePercentile = 0.9;
+constexpr double kLinePercentile = 0.5, kLineShare = 1.0 / 3.0;
+constexpr double kStandardErrors = 3.0;  // a line weaker than that may be noise
+constexpr double kLowPercentile = 0.005, kHighPercentile = 0.995;
+
+// The band's leaves and enough around them, with the normalised image.
+struct Window {
+    LeafBand band;
+    HaloField image;  // missing neighbours are filled per load: homogeneous Neumann
+};
+
+// Which of a leaf's neighbours are missing, as bounds for mirror_outside. A neighbour that exists on a diagonal but
+// not on a face is ignored with it, far from where the result is used.
+LeafBounds known_bounds(const Domain& domain, const LeafBand& band, std::size_t leaf) {
+    LeafBounds bounds(domain, band.origin(leaf));
+    const auto& n = band.neighbours(leaf);
+    for (int a = 0; a < 3; ++a) {
+        int step[3] = {0, 0, 0};
+        step[a] = -1;
+        if (n[detail::neighbour_slot(step[0], step[1], step[2])] == band.none()) bounds.lo[a] = std::max(bounds.lo[a], 0);
+        step[a] = 1;
+        if (n[detail::neighbour_slot(step[0], step[1], step[2])] == band.none()) bounds.hi[a] = std::min(bounds.hi[a], 7);
+    }
+    return bounds;
+}
+
+Window sample_window(const Image& image, const FloatGrid& topology, const Domain& domain, double sigma,
+                     const EdgeReport& report) {
+    std::vector<Coord> origins;
+    for (auto leaf = topology.tree().cbeginLeaf(); leaf; ++leaf)
+        if (!leaf->isEmpty()) origins.push_back(leaf->origin());
+    const int rings = int(std::ceil((kHaloSigmas * sigma / domain.voxel_size + 2.0) / kLeafDim));
+    Window window{LeafBand(detail::dilate_leaves(origins, rings, domain)), {}};
+    const LeafBand& band = window.band;
+    window.image.values = detail::LeafArray<float>(band.size(), 0.0F, 1);
+    window.image.blocks.resize(band.size());
+    const auto low = static_cast<float>(report.low);
+    const auto scale = static_cast<float>(1.0 / (report.high - report.low));
+    tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
+        window.image.blocks[leaf] = band.neighbours(leaf);
+        const Coord& o = band.origin(leaf);
+        float* values = window.image.values.leaf(leaf);
+        image.sample(domain, {o.x(), o.y(), o.z()}, {o.x() + 7, o.y() + 7, o.z() + 7}, values);
+        for (int n = 0; n < kLeafSize; ++n) values[n] = std::clamp((values[n] - low) * scale, 0.0F, 1.0F);
+    });
+    return window;
+}
+
+// Calls work(leaf, padded values with mirrored boundary) for every leaf.
+template <typename Work>
+void for_each_padded(const Window& window, const Domain& domain, Work work) {
+    tbb::parallel_for(std::size_t(0), window.band.size(), [&](std::size_t leaf) {
+        alignas(64) float values[kPaddedSize];
+        detail::load_padded(window.image, leaf, values);
+        const LeafBounds bounds = known_bounds(domain, window.band, leaf);
+        if (bounds.cuts()) detail::mirror_outside(values, bounds.lo, bounds.hi);
+        work(leaf, values);
+    });
+}
+
+// One visit of a leaf in an implicit heat step. Where the domain or the window ends in it or next to it, the faces there
+// are closed.
+double relax_heat(const detail::LeafStar& values, const float* before, float t, float omega, const LeafBounds& bounds) {
+    const detail::SchemeKernels& kernels = detail::kernels();
+    if (!bounds.cuts()) return kernels.heat(values, before, t, omega, kInnerSweeps);
+    static constexpr std::array<unsigned long long, 8> kAll = {~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL};
+    alignas(64) detail::Share rows[6 * kLeafSize];
+    std::fill(std::begin(rows), std::end(rows), static_cast<detail::Share>(detail::kShareUnit * t / (1.0F + 6.0F * t) + 0.5F));
+    detail::close_faces(rows, bounds.lo, bounds.hi);
+    return kernels.relax(values, before, rows, kAll.data(), omega, kInnerSweeps, {});
+}
+
+// I_t = ΔI over time σ²/2 by implicit steps.
+void smooth(Window& window, const Domain& domain, double sigma, const RunContext& run) {
+    const double time = 0.5 * sigma * sigma / (domain.voxel_size * domain.voxel_size);
+    const int steps = int(std::ceil(time / kLargestHeatStep - 1e-9));
+    if (steps == 0) return;
+    const double t = time / steps;
+    const double jacobi = 6.0 * t / (1.0 + 6.0 * t);
+    const auto omega = static_cast<float>(2.0 / (1.0 + std::sqrt(1.0 - jacobi * jacobi)));
+    std::vector<double> residuals(window.band.size());
+    for (int step = 0; step < steps; ++step) {
+        run.check();
+        run.report("edge", double(step) / steps);
+        const detail::LeafArray<float> before = window.image.values;
+        double first = 0.0;
+        for (int sweep = 0; sweep < kMaxHeatSweeps; ++sweep) {
+            const auto visit = [&](std::size_t leaf) {
+                residuals[leaf] = relax_heat(detail::star_of(window.image, leaf), before.leaf(leaf), static_cast<float>(t), omega,
+                                             known_bounds(domain, window.band, leaf));
+            };
+            // Leaves of one colour share no face.
+            tbb::parallel_for(std::size_t(0), window.band.odd_begin(), visit);
+            tbb::parallel_for(window.band.odd_begin(), window.band.size(), visit);
+            double sum = 0.0;
+            for (const double r : residuals) sum += r;
+            if (sweep == 0) first = sum;
+            if (sum <= kHeatTolerance * kHeatTolerance * first) break;
+        }
+    }
+}
+
+// K = 1/s² at the percentile of s over the topology's active voxels.
+double contrast_of(const FloatGrid& slopes, double percentile) {
+    std::vector<float> values;
+    values.reserve(slopes.activeVoxelCount());
+    for (auto v = slopes.cbeginValueOn(); v; ++v) values.push_back(*v);
+    const auto at = values.begin() + std::ptrdiff_t(percentile * double(values.size() - 1));
+    std::nth_element(values.begin(), at, values.end());
+    if (*at > 0.0F) return *at;
+    // Edges rarer than the percentile: half of the steepest one.
+    return 0.5 * *std::max_element(values.begin(), values.end());
+}
+
+double automatic_contrast(const FloatGrid& s, const EdgeOptions& options, bool is_line) {
+    if (options.contrast_percentile > 0) return contrast_of(s, options.contrast_percentile);
+    return is_line ? kLineShare * contrast_of(s, kLinePercentile) : contrast_of(s, kSlopePercentile);
+}
+
+}  // namespace
+
+const char* to_string(EdgeFeature feature) {
+    switch (feature) {
+        case EdgeFeature::Automatic: return "auto";
+        case EdgeFeature::Slope: return "slope";
+        case EdgeFeature::BrightLine: return "bright-line";
+        case EdgeFeature::DarkLine: break;
+    }
+    return "dark-line";
+}
+
+std::string EdgeOptions::why_invalid() const {
+    std::ostringstream lines;
+    const auto expect = [&](bool ok, const char* field, const char* expected, double got) {
+        if (!ok) lines << (lines.tellp() > 0 ? "\n" : "") << field << ": expected " << expected << ", got " << got;
+    };
+    expect(std::isfinite(sigma), "sigma", "a finite number", sigma);
+    expect(edge_k >= 0 && std::isfinite(edge_k), "edge_k", ">= 0", edge_k);
+    expect(edge_contrast >= 0 && std::isfinite(edge_contrast), "edge_contrast", ">= 0", edge_contrast);
+    expect(contrast_percentile >= 0 && contrast_percentile < 1, "contrast_percentile", "between 0 and 1", contrast_percentile);
+    expect(std::isfinite(low) && std::isfinite(high) && low <= high, "low", "<= high", low);
+    return lines.str();
+}
+
+EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions& options, const RunContext& run) {
+    if (const std::string why = options.why_invalid(); !why.empty()) throw Error(Errc::InvalidOptions, "edge: " + why);
+    if (topology.activeVoxelCount() == 0) throw Error(Errc::InvalidInput, "edge: expected active voxels in the band, got none");
+    const Domain domain = domain_of(topology);
+    EdgeResult result;
+    EdgeReport& report = result.report;
+    report.sigma = options.sigma < 0 ? domain.voxel_size : options.sigma;
+    report.low = options.low, report.high = options.high;
+    if (!(report.low < report.high)) {
+        const auto percentiles = image.percentiles(kLowPercentile, kHighPercentile);
+        report.low = percentiles[0], report.high = percentiles[1];
+        if (!(report.low < report.high)) {
+            const auto range = image.range();
+            report.low = range[0], report.high = range[1];
+        }
+    }
+    if (!(report.low < report.high))
+        throw Error(Errc::InvalidInput, "edge: " + image.path() + ": every voxel has the value " + std::to_string(report.low) +
+                                            ", there is no edge to find; segment with the points alone (--rho 0)");
+    with_threads(run, [&] {
+        Window window = sample_window(image, topology, domain, report.sigma, report);
+        smooth(window, domain, report.sigma, run);
+
+        result.grid = make_grid(domain, 1.0F, "edge");
+        result.grid->topologyUnion(topology);
+        result.grid->tree().voxelizeActiveTiles();
+        const detail::SchemeKernels& kernels = detail::kernels();
+        const bool is_line = options.feature == EdgeFeature::BrightLine || options.feature == EdgeFeature::DarkLine;
+        const auto per_length = static_cast<float>(1.0 / domain.voxel_size);
+        for_each_padded(window, domain, [&](std::size_t leaf, float* values) {
+            auto* node = result.grid->tree().probeLeaf(window.band.origin(leaf));
+            if (node == nullptr) return;
+            float slope[kLeafSize];
+            if (is_line) {
+                detail::store_inner(values, slope);
+                if (options.feature == EdgeFeature::DarkLine)
+                    for (float& s : slope) s = 1.0F - s;
+            } else {
+                kernels.mean_gradient(values, slope);
+                for (float& s : slope) s *= per_length;
+            }
+            for (int n = 0; n < kLeafSize; ++n)
+                if (node->isValueOn(n)) node->setValueOnly(n, slope[n]);
+        });
+        report.edge_contrast = options.edge_contrast;
+        if (options.edge_k > 0) report.edge_contrast = 1.0 / std::sqrt(options.edge_k);
+        if (!(report.edge_contrast > 0)) report.edge_contrast = automatic_contrast(*result.grid, options, is_line);
+        if (!(report.edge_contrast > 0))
+            throw Error(Errc::InvalidInput, "edge: " + image.path() +
+                                                ": constant wherever the band lies, there is no edge to find; check that the "
+                                                "points lie on the image's structure");
+        report.edge_k = 1.0 / (report.edge_contrast * report.edge_contrast);
+        const auto k = static_cast<float>(report.edge_k);
+        for (auto leaf = result.grid->tree().beginLeaf(); leaf; ++leaf)
+            for (auto v = leaf->beginValueOn(); v; ++v) v.setValue(1.0F / (1.0F + k * *v * *v));
+    });
+    return result;
+}
+
+MarkedFeature feature_at(const Image& image, const std::vector<Vec3>& places, const std::vector<Vec3>& normals, double reach) {
+    const auto value_at = [&](const Vec3& x) {
+        Domain one;
+        one.origin = x;
+        float value = 0;
+        image.sample(one, {0, 0, 0}, {0, 0, 0}, &value);
+        return double(value);
+    };
+    double line = 0, squares = 0, step = 0;
+    for (std::size_t n = 0; n < places.size(); ++n) {
+        Vec3 inner = places[n], outer = places[n];
+        for (int a = 0; a < 3; ++a) {
+            inner[a] -= reach * normals[n][a];
+            outer[a] += reach * normals[n][a];
+        }
+        const double inside = value_at(inner), outside = value_at(outer);
+        const double here = value_at(places[n]) - 0.5 * (inside + outside);
+        line += here;
+        squares += here * here;
+        step += 0.5 * (outside - inside);
+    }
+    MarkedFeature found;
+    const auto count = double(places.size());
+    if (count < 2) return found;
+    found.line = line / count;
+    found.step = step / count;
+    const double error = std::sqrt(std::max(0.0, squares / count - found.line * found.line) / (count - 1));
+    if (std::abs(found.line) > std::abs(found.step) && std::abs(found.line) > kStandardErrors * error)
+        found.feature = found.line > 0 ? EdgeFeature::BrightLine : EdgeFeature::DarkLine;
+    return found;
+}
+
+}  // namespace covol

@@ -1,0 +1,103 @@
+#pragma once
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "base/large_allocator.h"
+#include "covol/domain.h"
+#include "covol/evolve.h"
+#include "evolve/motion.h"
+#include "grid/halo.h"
+#include "grid/leaf_band.h"
+#include "scheme/scheme.h"
+
+namespace covol::detail {
+
+/// What is fixed for one band: u_p + Σ_q a_pq (u_q - u_p) = u_p^{n-1}, a_pq = (τ/h³) min(v_pq, 0) - (τδ/h²) M_p W_pq <= 0,
+/// Eqs. (14)-(22). One step assembles the rows of every leaf from u^{n-1}, then visits the leaves in two colours,
+/// from 2 u^{n-1} - u^{n-2} on, until the residual is `solver_tolerance` of that of u^{n-1}. Values are in voxels, not world units.
+///
+/// Work is done only where something happens. A leaf sleeps from when neither it nor a leaf next to it has moved by more than
+/// `rest` until one of those has; a leaf whose residual is down, with neighbours whose is, is not visited again in a solve.
+class BandSolver {
+public:
+    struct Counts {
+        std::int64_t passes = 0;        ///< over the leaves
+        std::int64_t visits = 0;        ///< of leaves
+        std::int64_t visits_saved = 0;  ///< that passes over all leaves would have had
+        double seconds_assembly = 0, seconds_sweeps = 0;
+    };
+
+    /// Gathers u and the fields that have a weight.
+    /// @throws Error InvalidInput (no active voxel; a value that is not finite).
+    BandSolver(const FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options, const Domain& domain);
+
+    /// Who sleeps, and what the next step has to know of the steps before.
+    struct Rest {
+        LeafBand band;
+        std::vector<unsigned char> awake;
+        std::vector<float> unannounced;  ///< motion that the neighbours have not been woken for, voxels
+        std::vector<LeafMotion> motions;
+    };
+    /// The solver is of no use afterwards.
+    [[nodiscard]] Rest take_rest();
+    /// Leaves that slept in a band before sleep on.
+    /// @param changed  sorted origins of leaves with other values than there
+    void sleep_on(const Rest& old, const std::vector<Coord>& changed);
+
+    /// One time step of length τ = tau * h on the leaves that are awake.
+    Motion step(double tau, Counts& counts);
+    /// Decides who sleeps from here on: motion is announced to the neighbours once it has added up to `rest` voxels.
+    /// @param motion  of each leaf since the last call, voxels
+    void doze(const std::vector<float>& motion, double rest);
+    /// max |u^n - u^{n-1}| of each leaf in the last step, voxels
+    [[nodiscard]] std::vector<float> largest_changes() const;
+    [[nodiscard]] bool is_awake(std::size_t leaf) const { return awake_[leaf] != 0; }
+    /// Makes u on the leaves that are awake a distance again, clamped to `clamp` voxels; see LocalDistance.
+    void redistance(double clamp);
+    /// Takes the last step back.
+    void restore_previous();
+    /// Active voxels into the grid that u came from; inactive ones keep their bits.
+    void store(FloatGrid& u) const;
+
+    [[nodiscard]] const LeafBand& band() const noexcept { return band_; }
+    [[nodiscard]] const LeafArray<float>& u() const noexcept { return field_.values; }
+    [[nodiscard]] std::int64_t active_count() const noexcept { return active_count_; }
+
+private:
+    void gather_fields(const EvolveFields& fields);
+    struct Rows {
+        double largest;   ///< Σ_q |a_pq|
+        double residual;  ///< root mean square at u^{n-1}, voxels
+    };
+    Rows assemble(const SchemeConstants& constants);
+    void solve(double omega, double first, Counts& counts);
+    double sweep(float omega, double goal, Counts& counts);
+    [[nodiscard]] double root_mean_square() const;  ///< of the residuals, over the band, voxels
+    [[nodiscard]] bool is_hot(std::size_t leaf, double goal) const;
+    Motion measure();
+
+    [[nodiscard]] const unsigned long long* active(std::size_t leaf) const {
+        return reinterpret_cast<const unsigned long long*>(band_.active(leaf).data());
+    }
+    [[nodiscard]] Share* rows(std::size_t leaf) { return reinterpret_cast<Share*>(rows_.data() + leaf * kRowBytes); }
+
+    const EvolveOptions& options_;
+    const Domain domain_;
+    LeafBand band_;
+    std::int64_t active_count_ = 0;
+    HaloField field_;  // u
+    std::optional<HaloField> phi_, edge_, image_weight_;
+    LeafArray<float> previous_;  // u^{n-1}; scratch for redistance()
+    bool has_previous_ = false;  // it is from the step before
+    static constexpr std::size_t kRowBytes = 6 * kLeafSize * sizeof(Share);
+    std::vector<std::byte, LargeAllocator<std::byte>> rows_;  // of each leaf; scratch between steps
+    // One for each leaf:
+    std::vector<int> active_counts_;
+    std::vector<unsigned char> awake_;
+    std::vector<float> unannounced_;
+    std::vector<LeafMotion> motions_;
+    std::vector<double> residuals_;  // squared, as seen by the last visit
+};
+
+}  // namespace covol::detail

@@ -1,0 +1,267 @@
+// The semi-implicit co-volume scheme of Kósa, Mikula et al., "3D image segmentation supported by a point cloud",
+// Eqs. (14)-(22), on the active voxels of a narrow band:
+//   u_p + Σ_q a_pq (u_q - u_p) = u_p^{n-1},   a_pq = (τ/h³) min(v_pq, 0) - (τδ/h²) M_p W_pq <= 0.
+// Here is the loop over time; a step is in band_solver.cpp, the arithmetic on a leaf in scheme/scheme_kernels.cpp.
+#include "covol/evolve.h"
+
+#include <openvdb/openvdb.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <sstream>
+#include <utility>
+
+#include "covol/domain.h"
+#include "covol/error.h"
+#include "evolve/band_solver.h"
+#include "evolve/follow.h"
+#include "evolve/motion.h"
+
+namespace covol {
+namespace {
+
+// A leaf rests when a step moves it by less than this share of the motion that counts as steady.
+constexpr double kRestShare = 0.2;
+constexpr int kCycle = 3;  // steps between two redistancings of a follower
+
+// An automatic time step grows while the surface moves by little, up to kLargestTau, and shrinks when it moves by much.
+constexpr double kSlowMotion = 0.1, kFastMotion = 0.4;  // voxels a step
+constexpr double kTauGrowth = 1.5, kLargestTau = 10.0;  // h
+
+double follow_clamp(const EvolveOptions& options) {
+    return options.rho > 0 ? kHalfWidthVoxels : detail::kFollowWidth;
+}
+
+bool has_active(const FloatGrid& u) {
+    for (auto leaf = u.tree().cbeginLeaf(); leaf; ++leaf)
+        if (!leaf->isEmpty()) return true;
+    return false;
+}
+
+class Evolver {
+public:
+    Evolver(FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options, const RunContext& run)
+        : u_(u), fields_(fields), options_(options), run_(run), domain_(domain_of(u)) {
+        tau_ = options.tau < 0 ? 1.0 : options.tau / domain_.voxel_size;
+        if (options.theta > 0) check_field(fields.distance, "distance", "theta");
+        if (options.rho > 0) check_field(fields.edge, "edge", "rho");
+        if (options.follow) detail::follow_surface(u_, domain_, follow_clamp(options_), run_);
+        make_solver();
+    }
+
+    EvolveReport run() {
+        report_.stop_reason = StopReason::MaxSteps;
+        while (report_.steps < options_.max_steps) {
+            if (run_.cancelled()) {
+                report_.stop_reason = StopReason::Cancelled;
+                break;
+            }
+            const detail::Motion motion = solver_->step(tau_, counts_);
+            if (!motion.finite) {
+                solver_->restore_previous();
+                solver_->store(u_);
+                throw Error(Errc::Numerical, "evolve: step " + std::to_string(report_.steps + 1) +
+                                                 ": a value that is not finite appeared; u is as after the step before");
+            }
+            ++report_.steps;
+            report_.last_change = motion.mean;
+            run_.report("evolve", progress());
+            if (!motion.crosses) {
+                report_.stop_reason = StopReason::Vanished;
+                break;
+            }
+            const double settled = options_.follow ? follow(motion.mean) : stay(motion.mean);
+            if (!solver_) {
+                report_.stop_reason = StopReason::Vanished;
+                return report_;
+            }
+            if (settled < options_.tolerance * tau_) {
+                report_.stop_reason = StopReason::Steady;
+                break;
+            }
+            if (options_.tau < 0 && (options_.rho == 0 || options_.image_yields > 0)) adapt_tau(motion.mean);
+        }
+        solver_->store(u_);
+        report_.sweeps_per_step = report_.steps > 0 ? double(counts_.passes) / report_.steps : 0.0;
+        report_.leaf_visits = counts_.visits;
+        report_.leaf_visits_saved = counts_.visits_saved;
+        report_.seconds_assembly = counts_.seconds_assembly;
+        report_.seconds_sweeps = counts_.seconds_sweeps;
+        report_.active_voxels = solver_->active_count();
+        report_.leaf_count = static_cast<std::int64_t>(solver_->band().size());
+        return report_;
+    }
+
+private:
+    void check_field(const FloatGrid* field, const char* name, const char* weight) const {
+        if (field == nullptr)
+            throw Error(Errc::InvalidInput, std::string("evolve: ") + weight + " > 0 needs the " + name + " grid, got none");
+        const Domain other = domain_of(*field);
+        const double h = domain_.voxel_size;
+        double apart = std::abs(other.voxel_size - h);
+        for (int a = 0; a < 3; ++a) apart = std::max(apart, std::abs(other.origin[a] - domain_.origin[a]));
+        if (apart > 1e-6 * h)
+            throw Error(Errc::InvalidInput, std::string("evolve: expected one transform for all grids, but that of ") + name +
+                                                " differs from u's");
+    }
+
+    void make_solver() {
+        solver_ = std::make_unique<detail::BandSolver>(u_, fields_, options_, domain_);
+        if (!options_.follow) return;
+        departure_.remember(solver_->u(), solver_->band().size());
+        marks_.resize(solver_->band().size());
+    }
+
+    [[nodiscard]] double rest() const { return kRestShare * options_.tolerance * tau_; }
+
+    // A fixed band. @return how much the surface still moves, voxels a step
+    double stay(double motion) {
+        solver_->doze(solver_->largest_changes(), rest());
+        return std::min(motion, net_motion_.per_step(solver_->u(), solver_->band().size()));
+    }
+
+    // A band that follows. Advection turns the profile of u into a step, which creeps over the lattice: every few steps it is
+    // made a distance again. How far the surface has come is asked just before, from time to time at the same phase.
+    double follow(double motion) {
+        if (report_.steps % kCycle != 0) return motion;
+        std::vector<float> largest;
+        const double moved = ask_marks(largest);
+        const std::vector<std::size_t> left = departure_.left(solver_->u());
+        if (left.empty())
+            solver_->redistance(follow_clamp(options_));
+        else
+            remake_band(left, largest);
+        // Only now, so that a leaf sleeps in the same phase as the others are in at the end.
+        if (solver_) solver_->doze(largest, kCycle * rest());
+        return std::min(motion, moved / kCycle);
+    }
+
+    // @param largest  out: of each leaf, the way of the crossing that moved most since the last marks, voxels
+    // @return the surface's mean way since then
+    double ask_marks(std::vector<float>& largest) {
+        const std::size_t leaves = solver_->band().size();
+        std::vector<float> mean(leaves, 0.0F);
+        largest.assign(leaves, 0.0F);
+        tbb::parallel_for(std::size_t(0), leaves, [&](std::size_t leaf) {
+            if (!solver_->is_awake(leaf)) return;
+            const detail::CrossingMarks::Way moved = marks_.renew(leaf, solver_->u().leaf(leaf));
+            largest[leaf] = static_cast<float>(moved.largest);
+            mean[leaf] = static_cast<float>(moved.mean);
+        });
+        double way = 0.0, crossings = 0.0;
+        for (std::size_t leaf = 0; leaf < leaves; ++leaf) {
+            const auto count = static_cast<double>(marks_.count(leaf));
+            if (count > 0) way += mean[leaf] * count;
+            crossings += count;
+        }
+        return crossings > 0 ? way / crossings : 0.0;
+    }
+
+    // Leaves no solver where no surface is left. @param largest  in: of each leaf before; out: of each leaf now
+    void remake_band(const std::vector<std::size_t>& left, std::vector<float>& largest) {
+        std::vector<detail::Coord> stale;
+        for (const std::size_t leaf : left) stale.push_back(solver_->band().origin(leaf));
+        solver_->store(u_);
+        const detail::BandSolver::Rest rest = solver_->take_rest();
+        solver_.reset();  // its memory first
+        const std::vector<detail::Coord> changed = detail::follow_surface_near(stale, u_, domain_, follow_clamp(options_));
+        if (!has_active(u_)) return;
+        if (fields_.extend) fields_.extend(u_, fields_);
+        solver_ = std::make_unique<detail::BandSolver>(u_, fields_, options_, domain_);
+        solver_->sleep_on(rest, changed);
+        const detail::LeafBand& band = solver_->band();
+        std::vector<std::int32_t> place(band.size()), same(band.size());
+        for (std::size_t leaf = 0; leaf < band.size(); ++leaf) {
+            const std::int32_t at = rest.band.find(band.origin(leaf));
+            place[leaf] = at == rest.band.none() ? -1 : at;
+            same[leaf] = std::binary_search(changed.begin(), changed.end(), band.origin(leaf)) ? -1 : place[leaf];
+        }
+        std::vector<float> moved(band.size(), std::numeric_limits<float>::infinity());
+        for (std::size_t leaf = 0; leaf < band.size(); ++leaf)
+            if (place[leaf] >= 0) moved[leaf] = largest[place[leaf]];
+        largest = std::move(moved);
+        departure_.remake(same, solver_->u());
+        marks_.remake(place);
+        solver_->redistance(follow_clamp(options_));
+    }
+
+    void adapt_tau(double motion) {
+        if (motion < kSlowMotion) tau_ = std::min(tau_ * kTauGrowth, kLargestTau);
+        if (motion > kFastMotion) tau_ = std::max(tau_ / kTauGrowth, 1.0);
+    }
+
+    // Steps and the fall of the change, whichever is further.
+    [[nodiscard]] double progress() const {
+        const double by_steps = double(report_.steps) / options_.max_steps;
+        if (!(report_.last_change > 0) || !(options_.tolerance > 0)) return by_steps;
+        const double by_change = std::log(report_.last_change / tau_) / std::log(options_.tolerance);
+        return std::clamp(std::max(by_steps, by_change), 0.0, 1.0);
+    }
+
+    FloatGrid& u_;
+    EvolveFields fields_;
+    const EvolveOptions& options_;
+    const RunContext& run_;
+    const Domain domain_;
+    double tau_ = 1.0;  // in h
+    std::unique_ptr<detail::BandSolver> solver_;
+    detail::BandSolver::Counts counts_;
+    detail::NetMotion net_motion_;
+    detail::Departure departure_;
+    detail::CrossingMarks marks_;
+    EvolveReport report_;
+};
+
+void expect(std::string& lines, bool ok, const char* field, const char* expected, double got) {
+    if (ok) return;
+    std::ostringstream line;
+    line << (lines.empty() ? "" : "\n") << field << ": expected " << expected << ", got " << got;
+    lines += line.str();
+}
+
+}  // namespace
+
+std::string EvolveOptions::why_invalid() const {
+    std::string lines;
+    const auto unit = [](double x) { return x >= 0 && x <= 1; };
+    expect(lines, unit(theta), "theta", "0 to 1", theta);
+    expect(lines, unit(rho), "rho", "0 to 1", rho);
+    expect(lines, std::isfinite(delta), "delta", "a finite number", delta);
+    expect(lines, std::isfinite(tau) && tau != 0, "tau", "> 0", tau);
+    expect(lines, epsilon > 0 && std::isfinite(epsilon), "epsilon", "> 0", epsilon);
+    expect(lines, edge_epsilon > 0 && std::isfinite(edge_epsilon), "edge_epsilon", "> 0", edge_epsilon);
+    expect(lines, attraction_range >= 0 && std::isfinite(attraction_range), "attraction_range", ">= 0", attraction_range);
+    expect(lines, unit(image_yields), "image_yields", "0 to 1", image_yields);
+    expect(lines, unit(guess_weight), "guess_weight", "0 to 1", guess_weight);
+    expect(lines, max_steps >= 0, "max_steps", ">= 0", max_steps);
+    expect(lines, tolerance >= 0 && std::isfinite(tolerance), "tolerance", ">= 0", tolerance);
+    expect(lines, solver_tolerance > 0 && solver_tolerance < 1, "solver_tolerance", "between 0 and 1", solver_tolerance);
+    expect(lines, max_sweeps >= 1, "max_sweeps", ">= 1", max_sweeps);
+    return lines;
+}
+
+const char* to_string(StopReason reason) {
+    switch (reason) {
+        case StopReason::Steady: return "steady";
+        case StopReason::MaxSteps: return "max_steps";
+        case StopReason::Cancelled: return "cancelled";
+        case StopReason::Vanished: return "vanished";
+        case StopReason::NotRun: break;
+    }
+    return "not_run";
+}
+
+EvolveReport evolve(FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options, const RunContext& run) {
+    if (const std::string why = options.why_invalid(); !why.empty()) throw Error(Errc::InvalidOptions, "evolve: " + why);
+    EvolveReport report;
+    with_threads(run, [&] {
+        u.tree().voxelizeActiveTiles();
+        report = Evolver(u, fields, options, run).run();
+    });
+    return report;
+}
+
+}  // namespace covol

@@ -1,0 +1,201 @@
+#include "evolve/motion.h"
+
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "grid/sign_masks.h"
+
+namespace covol::detail {
+namespace {
+
+constexpr double kLeftBy = 0.75, kLeavingBy = 0.4;  // voxels, on the average over a leaf
+constexpr double kShareLeft = 0.1;  // of the leaves with the surface in them; before that it is not worth while
+constexpr int kFewCrossings = 32;   // a leaf's average over fewer says little
+constexpr float kDeep = 2.0F;       // voxels, anywhere
+
+double crossing(float a, float b) { return double(a) / (double(a) - b); }
+
+int crossed_edges(const LeafMask& negative) {
+    int crossed = 0;
+    for (int axis = 0; axis < 3; ++axis) crossed += count_on(sign_changes(negative, axis));
+    return crossed;
+}
+
+struct Flips {
+    std::int64_t flipped = 0, crossed = 0;
+    Flips operator+(const Flips& o) const { return {flipped + o.flipped, crossed + o.crossed}; }
+};
+
+template <typename Count>
+Flips sum_over_leaves(std::size_t leaves, Count count) {
+    return tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, leaves, 64), Flips{},
+        [&](const tbb::blocked_range<std::size_t>& range, Flips sum) {
+            for (std::size_t leaf = range.begin(); leaf != range.end(); ++leaf) sum = sum + count(leaf);
+            return sum;
+        },
+        std::plus<>());
+}
+
+}  // namespace
+
+LeafMotion motion_of(const float* now, const float* before, bool is_active) {
+    LeafMotion motion;
+    // A sum is finite when every value is, and takes no branches.
+    float sum = 0.0F, largest = 0.0F;
+    for (int n = 0; n < kLeafSize; ++n) {
+        sum += now[n];
+        largest = std::max(largest, std::abs(now[n] - before[n]));
+    }
+    motion.finite = std::isfinite(sum);
+    motion.largest = largest;
+    const LeafMask negative = negative_mask(now);
+    for (int word = 0; word < 8; ++word) {
+        motion.negative |= negative[word] != 0;
+        motion.positive |= ~negative[word] != 0;
+    }
+    if (!is_active) return motion;
+    const LeafMask was_negative = negative_mask(before);
+    if (negative == was_negative && !(motion.negative && motion.positive)) return motion;
+    for (int axis = 0; axis < 3; ++axis) {
+        const LeafMask after = sign_changes(negative, axis), first = sign_changes(was_negative, axis);
+        const int step = 64 >> (3 * axis);
+        for (int word = 0; word < 8; ++word)
+            for (std::uint64_t bits = after[word] | first[word]; bits != 0; bits &= bits - 1) {
+                const int n = word << 6 | __builtin_ctzll(bits);
+                ++motion.edges;
+                motion.way += is_on(after, n) && is_on(first, n)
+                                  ? std::abs(crossing(now[n], now[n + step]) - crossing(before[n], before[n + step]))
+                                  : 0.5;
+            }
+    }
+    return motion;
+}
+
+Motion total(const std::vector<LeafMotion>& leaves) {
+    Motion motion;
+    double way = 0.0;
+    std::int64_t edges = 0;
+    bool negative = false, positive = false;
+    for (const LeafMotion& leaf : leaves) {
+        way += leaf.way;
+        edges += leaf.edges;
+        negative |= leaf.negative;
+        positive |= leaf.positive;
+        motion.finite &= leaf.finite;
+    }
+    motion.crosses = negative && positive;
+    motion.mean = edges > 0 ? way / static_cast<double>(edges) : 0.0;
+    return motion;
+}
+
+double NetMotion::per_step(const LeafArray<float>& u, std::size_t leaves) {
+    if (++age_ < kWindow && !signs_.empty()) return std::numeric_limits<double>::infinity();
+    const bool is_first = signs_.size() != leaves;
+    signs_.resize(leaves);
+    const Flips flips = sum_over_leaves(leaves, [&](std::size_t leaf) {
+        const LeafMask negative = negative_mask(u.leaf(leaf));
+        Flips here{0, crossed_edges(negative)};
+        for (int word = 0; word < 8; ++word) here.flipped += __builtin_popcountll(negative[word] ^ signs_[leaf][word]);
+        signs_[leaf] = negative;
+        return here;
+    });
+    age_ = 0;
+    if (is_first || flips.crossed == 0) return std::numeric_limits<double>::infinity();
+    return kCrossingsPerVoxel * double(flips.flipped) / double(flips.crossed) / kWindow;
+}
+
+CrossingMarks::Way CrossingMarks::renew(std::size_t leaf, const float* u) {
+    std::vector<Crossing> now;
+    const LeafMask negative = negative_mask(u);
+    for (int axis = 0; axis < 3; ++axis) {
+        const LeafMask changes = sign_changes(negative, axis);
+        const int step = 64 >> (3 * axis);
+        for (int word = 0; word < 8; ++word)
+            for (std::uint64_t bits = changes[word]; bits != 0; bits &= bits - 1) {
+                const int n = word << 6 | __builtin_ctzll(bits);
+                now.push_back({std::uint16_t(axis * kLeafSize + n), float(crossing(u[n], u[n + step]))});
+            }
+    }
+    Leaf& mark = leaves_[leaf];
+    double sum = 0.0, largest = 0.0;
+    int edges = 0;
+    const auto add = [&](double way) {
+        sum += way;
+        largest = std::max(largest, way);
+        ++edges;
+    };
+    auto before = mark.crossings.begin();
+    const auto end = mark.crossings.end();
+    for (const Crossing& c : now) {
+        for (; before != end && before->edge < c.edge; ++before) add(0.5);
+        const bool same = before != end && before->edge == c.edge;
+        add(same ? std::abs(c.at - before->at) : 0.5);
+        before += same;
+    }
+    for (; before != end; ++before) add(0.5);
+    const bool is_first = !mark.is_marked;
+    mark = {std::move(now), true};
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    return is_first ? Way{kInfinity, kInfinity} : Way{edges > 0 ? sum / edges : 0.0, largest};
+}
+
+void CrossingMarks::remake(const std::vector<std::int32_t>& old_leaf) {
+    std::vector<Leaf> leaves(old_leaf.size());
+    for (std::size_t leaf = 0; leaf < leaves.size(); ++leaf)
+        if (old_leaf[leaf] >= 0) leaves[leaf] = std::move(leaves_[old_leaf[leaf]]);
+    leaves_ = std::move(leaves);
+}
+
+Departure::MadeFor::MadeFor(const float* values) : negative(negative_mask(values)), crossed(crossed_edges(negative)) {
+    for (int n = 0; n < kLeafSize; ++n) near[n >> 6] |= std::uint64_t(std::abs(values[n]) < kDeep) << (n & 63);
+}
+
+void Departure::remember(const LeafArray<float>& u, std::size_t leaves) {
+    made_for_.resize(leaves);
+    tbb::parallel_for(std::size_t(0), leaves, [&](std::size_t leaf) { made_for_[leaf] = MadeFor(u.leaf(leaf)); });
+}
+
+void Departure::remake(const std::vector<std::int32_t>& old_leaf, const LeafArray<float>& u) {
+    std::vector<MadeFor> made_for(old_leaf.size());
+    tbb::parallel_for(std::size_t(0), old_leaf.size(), [&](std::size_t leaf) {
+        made_for[leaf] = old_leaf[leaf] >= 0 ? made_for_[old_leaf[leaf]] : MadeFor(u.leaf(leaf));
+    });
+    made_for_ = std::move(made_for);
+}
+
+std::vector<std::size_t> Departure::left(const LeafArray<float>& u) const {
+    enum State : unsigned char { kStays, kLeaving, kLeft, kDeepDown };
+    std::vector<State> states(made_for_.size());
+    tbb::parallel_for(std::size_t(0), made_for_.size(), [&](std::size_t leaf) {
+        const MadeFor& made = made_for_[leaf];
+        const LeafMask negative = negative_mask(u.leaf(leaf));
+        int flips = 0;
+        bool deep = false;
+        for (int word = 0; word < 8; ++word) {
+            const std::uint64_t flipped = negative[word] ^ made.negative[word];
+            deep |= (flipped & ~made.near[word]) != 0;
+            flips += __builtin_popcountll(flipped);
+        }
+        const double moved = flips > 0 ? kCrossingsPerVoxel * flips / std::max(made.crossed, kFewCrossings) : 0.0;
+        states[leaf] = deep ? kDeepDown : moved >= kLeftBy ? kLeft : moved >= kLeavingBy ? kLeaving : kStays;
+    });
+    std::vector<std::size_t> leaving;
+    std::size_t crossed = 0, left = 0;
+    bool deep = false;
+    for (std::size_t leaf = 0; leaf < states.size(); ++leaf) {
+        crossed += made_for_[leaf].crossed > 0;
+        left += states[leaf] >= kLeft;
+        deep |= states[leaf] == kDeepDown;
+        if (states[leaf] >= kLeaving) leaving.push_back(leaf);
+    }
+    if (!deep && double(left) < kShareLeft * double(crossed)) leaving.clear();
+    return leaving;
+}
+
+}  // namespace covol::detail

@@ -1,0 +1,39 @@
+#pragma once
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
+#include "grid/leaf_band.h"
+#include "grid/leaf_propagation.h"
+
+namespace covol::detail {
+
+/// The voxels of a leaf below zero.
+inline LeafMask negative_mask(const float* values) {
+    LeafMask mask{};
+    for (int word = 0; word < 8; ++word) {
+        const float* v = values + 64 * word;
+#if defined(__SSE2__)
+        for (int n = 0; n < 64; n += 4) {
+            const __m128 below = _mm_cmplt_ps(_mm_loadu_ps(v + n), _mm_setzero_ps());
+            mask[word] |= std::uint64_t(_mm_movemask_ps(below)) << n;
+        }
+#else
+        for (int n = 0; n < 64; ++n) mask[word] |= std::uint64_t(v[n] < 0.0F) << n;
+#endif
+    }
+    return mask;
+}
+
+/// Voxels whose next voxel along an axis, in the same leaf, has the other sign.
+inline LeafMask sign_changes(const LeafMask& negative, int axis) {
+    constexpr LeafMask kRest{};
+    LeafMask changes = looking_at(negative, kRest, axis, 1);
+    for (int word = 0; word < 8; ++word) changes[word] ^= negative[word];
+    // The last voxels along the axis have no next one here.
+    if (axis == 0) changes[7] = 0;
+    for (std::uint64_t& word : changes) word &= axis == 1 ? ~std::uint64_t(0) >> 8 : axis == 2 ? 0x7f7f7f7f7f7f7f7fULL : ~0ULL;
+    return changes;
+}
+
+}  // namespace covol::detail

@@ -1,0 +1,345 @@
+#include "covol/guess_correction.h"
+
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/Interpolation.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <numeric>
+#include <sstream>
+
+#include "base/number.h"
+#include "base/wendland.h"
+#include "covol/error.h"
+#include "covol/start.h"
+#include "points/kd_tree.h"
+
+namespace covol {
+namespace {
+
+using Leaf = FloatGrid::TreeType::LeafNodeType;
+
+constexpr double kPrecisionVoxels = 0.5;
+constexpr double kRadiusOfResidual = 3.0;  // above 2.11, see the header
+constexpr double kLevelRatio = 2.0;        // bumps whose radii differ by less are solved for together
+constexpr double kSeedDepthVoxels = 0.5;   // how far beyond a seed the surface is put
+constexpr int kSeedRounds = 4;             // moving for one seed may bring the next to the wrong side
+constexpr double kExactVoxels = 2.0;       // the clamped distance is taken below this
+constexpr double kSolved = 1e-6;           // of the right-hand side
+constexpr int kMostIterations = 1000;
+
+struct Bump {
+    Vec3 center;
+    double radius, height;
+};
+
+/// The signed distance to the guess, however far.
+class FarDistance {
+public:
+    explicit FarDistance(const FloatGridPtr& guess)
+        : guess_(guess), exact_(kExactVoxels * guess->voxelSize()[0]), surface_(crossings(*guess)) {}
+
+    [[nodiscard]] double at(const Vec3& world) const {
+        const double near = double(openvdb::tools::BoxSampler::sample(
+            guess_->getConstAccessor(), guess_->transform().worldToIndex(openvdb::Vec3d(world[0], world[1], world[2]))));
+        if (std::abs(near) < exact_) return near;
+        return std::copysign(std::max(exact_, std::sqrt(surface_.nearest(world))), near);
+    }
+
+private:
+    /// Where the edges of the lattice cross the surface.
+    static std::vector<Vec3> crossings(const FloatGrid& guess) {
+        std::vector<Vec3> points;
+        const auto accessor = guess.getConstAccessor();
+        for (auto at = guess.cbeginValueOn(); at; ++at) {
+            const openvdb::Coord c = at.getCoord();
+            const double here = double(*at);
+            for (int a = 0; a < 3; ++a) {
+                openvdb::Coord next = c;
+                ++next[a];
+                const double there = double(accessor.getValue(next));
+                if ((here < 0) == (there < 0)) continue;
+                openvdb::Vec3d p = c.asVec3d();
+                p[a] += here / (here - there);
+                const openvdb::Vec3d w = guess.transform().indexToWorld(p);
+                points.push_back({w[0], w[1], w[2]});
+            }
+        }
+        if (points.empty()) throw Error(Errc::InvalidInput, "correct_guess: expected a guess with a surface, got none");
+        return points;
+    }
+
+    FloatGridPtr guess_;
+    double exact_;
+    detail::KdTree surface_;
+};
+
+double sum_of(const std::vector<Bump>& bumps, const Vec3& world) {
+    double sum = 0;
+    for (const Bump& b : bumps) {
+        const double d2 = detail::squared_distance(b.center, world);
+        if (d2 < b.radius * b.radius) sum += b.height * detail::wendland(std::sqrt(d2) / b.radius);
+    }
+    return sum;
+}
+
+/// A place and how far out the surface has to move there.
+struct Target {
+    Vec3 at;
+    double shift;
+};
+
+/// Heights of equal bumps at the targets that give the wanted shifts, up to noise: (K + noise I) heights = shifts.
+std::vector<double> solve(const std::vector<Target>& targets, double radius, double noise) {
+    struct Entry { std::size_t column; double value; };
+    const std::size_t count = targets.size();
+    std::vector<std::vector<Entry>> rows(count);
+    tbb::parallel_for(std::size_t(0), count, [&](std::size_t n) {
+        for (std::size_t m = 0; m < count; ++m) {
+            const double k = detail::wendland(std::sqrt(detail::squared_distance(targets[n].at, targets[m].at)) / radius) + (n == m ? noise : 0.0);
+            if (k > 0) rows[n].push_back({m, k});
+        }
+    });
+    // Conjugate gradients: the matrix is symmetric and positive definite.
+    const auto dot = [](const std::vector<double>& a, const std::vector<double>& b) { return std::inner_product(a.begin(), a.end(), b.begin(), 0.0); };
+    std::vector<double> x(count, 0), r(count), p, q(count);
+    for (std::size_t n = 0; n < count; ++n) r[n] = targets[n].shift;
+    p = r;
+    double norm = dot(r, r);
+    const double enough = kSolved * kSolved * norm;
+    for (int iteration = 0; iteration < kMostIterations && norm > enough; ++iteration) {
+        tbb::parallel_for(std::size_t(0), count, [&](std::size_t n) {
+            double sum = 0;
+            for (const Entry& e : rows[n]) sum += e.value * p[e.column];
+            q[n] = sum;
+        });
+        const double alpha = norm / dot(p, q);
+        for (std::size_t n = 0; n < count; ++n) {
+            x[n] += alpha * p[n];
+            r[n] -= alpha * q[n];
+        }
+        const double next = dot(r, r), beta = next / norm;
+        for (std::size_t n = 0; n < count; ++n) p[n] = r[n] + beta * p[n];
+        norm = next;
+    }
+    return x;
+}
+
+/// Adds bumps until the targets have their shifts, the farthest first.
+void add_bumps(std::vector<Bump>& bumps, const std::vector<Target>& targets, double least_radius, double precision) {
+    std::vector<Target> met, open = targets;
+    const auto radius_of = [&](double shift) { return std::max(least_radius, kRadiusOfResidual * std::abs(shift)); };
+    while (!open.empty()) {
+        std::vector<double> left;
+        double largest = 0;
+        for (const Target& t : open) {
+            left.push_back(t.shift - sum_of(bumps, t.at));
+            largest = std::max(largest, std::abs(left.back()));
+        }
+        const double radius = radius_of(largest);
+        std::vector<Target> group = met, later;
+        double square = 0, fourth = 0;  // of residuals
+        std::size_t now = 0;
+        for (std::size_t n = 0; n < open.size(); ++n) {
+            if (radius_of(left[n]) * kLevelRatio < radius) {
+                later.push_back(open[n]);
+                continue;
+            }
+            met.push_back(open[n]);
+            group.push_back({open[n].at, left[n]});
+            square += left[n] * left[n];
+            fourth += left[n] * left[n] * left[n] * left[n];
+            ++now;
+        }
+        for (std::size_t n = 0; n + now < group.size(); ++n) group[n].shift -= sum_of(bumps, group[n].at);
+        // How far off the guess is where it is off: many marks that it meets are no reason to take another one for noise.
+        const double noise = fourth > 0 ? precision * precision * square / fourth : 1.0;
+        const std::vector<double> heights = solve(group, radius, noise);
+        for (std::size_t n = 0; n < group.size(); ++n)
+            if (heights[n] != 0) bumps.push_back({group[n].at, radius, heights[n]});
+        open = std::move(later);
+    }
+}
+
+/// Those that reach the row of voxels (0..., j, k).
+std::vector<Bump> beside(const std::vector<Bump>& bumps, const ImageGeometry& geometry, int j, int k) {
+    const Vec3 origin = geometry.index_to_world({0, double(j), double(k)});
+    std::vector<Bump> near;
+    for (const Bump& b : bumps) {
+        Vec3 to;
+        double along = 0;
+        for (int a = 0; a < 3; ++a) {
+            to[a] = b.center[a] - origin[a];
+            along += to[a] * geometry.direction[a][0];
+        }
+        const double off = detail::squared_distance(to, {0, 0, 0}) - along * along;
+        if (off < 1.001 * b.radius * b.radius) near.push_back(b);
+    }
+    return near;
+}
+
+std::array<double, 2> mean_and_max(const std::vector<Target>& marks, const std::vector<Bump>& bumps) {
+    double sum = 0, largest = 0;
+    for (const Target& t : marks) {
+        const double left = std::abs(t.shift - sum_of(bumps, t.at));
+        sum += left;
+        largest = std::max(largest, left);
+    }
+    return {marks.empty() ? 0 : sum / double(marks.size()), largest};
+}
+
+}  // namespace
+
+struct GuessCorrection::Data {
+    Data(const FloatGridPtr& start) : grid(start), distance(start) {}
+    FloatGridPtr grid;
+    FarDistance distance;
+    std::vector<Bump> bumps;
+    CorrectionReport report;
+};
+
+GuessCorrection::GuessCorrection(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
+
+double GuessCorrection::shift(const Vec3& world) const { return sum_of(data_->bumps, world); }
+double GuessCorrection::guess(const Vec3& world) const { return data_->distance.at(world); }
+const CorrectionReport& GuessCorrection::report() const { return data_->report; }
+
+FloatGridPtr GuessCorrection::start(const RunContext& run) const {
+    const Domain domain = domain_of(*data_->grid);
+    const FloatGridPtr field = data_->grid->deepCopy();
+    const double clamp = kHalfWidthVoxels * domain.voxel_size;
+    std::vector<openvdb::Coord> origins;
+    for (const Bump& b : data_->bumps) {
+        openvdb::Coord first, last;
+        for (int a = 0; a < 3; ++a) {
+            const double middle = domain.world_to_index(b.center)[a], reach = b.radius / domain.voxel_size;
+            first[a] = std::max(int(std::floor(middle - reach)), domain.min[a]) & ~7;
+            last[a] = std::min(int(std::ceil(middle + reach)), domain.max[a]);
+        }
+        for (int i = first.x(); i <= last.x(); i += 8)
+            for (int j = first.y(); j <= last.y(); j += 8)
+                for (int k = first.z(); k <= last.z(); k += 8) origins.emplace_back(i, j, k);
+    }
+    std::sort(origins.begin(), origins.end());
+    origins.erase(std::unique(origins.begin(), origins.end()), origins.end());
+    std::vector<Leaf*> leaves;
+    for (const openvdb::Coord& origin : origins) leaves.push_back(field->tree().touchLeaf(origin));
+    with_threads(run, [&] {
+        tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t n) {
+            const Vec3 middle = domain.index_to_world({leaves[n]->origin().x() + 3.5, leaves[n]->origin().y() + 3.5, leaves[n]->origin().z() + 3.5});
+            std::vector<Bump> near;
+            for (const Bump& b : data_->bumps)
+                if (std::sqrt(detail::squared_distance(b.center, middle)) < b.radius + 3.5 * std::sqrt(3.0) * domain.voxel_size) near.push_back(b);
+            for (openvdb::Index at = 0; at < Leaf::SIZE; ++at) {
+                const openvdb::Coord c = leaves[n]->offsetToGlobalCoord(at);
+                const Vec3 world = domain.index_to_world({double(c.x()), double(c.y()), double(c.z())});
+                const double move = sum_of(near, world);
+                if (move != 0) leaves[n]->setValueOn(at, float(std::clamp(data_->distance.at(world) - move, -clamp, clamp)));
+            }
+        });
+    });
+    run.check();
+    return start_from_grid(domain, *field, run);
+}
+
+std::string CorrectionOptions::why_invalid() const {
+    std::string why;
+    const auto expect = [&](double value, const char* field) {
+        if (!(std::isfinite(value) && value >= 0))
+            why += std::string(why.empty() ? "" : "\n") + field + ": expected >= 0, got " + detail::number(value);
+    };
+    expect(precision, "precision");
+    expect(least_radius, "least_radius");
+    return why;
+}
+
+GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>& marks, const std::vector<Vec3>& inside,
+                              const std::vector<Vec3>& outside, const CorrectionOptions& options, const RunContext& run) {
+    if (const std::string why = options.why_invalid(); !why.empty()) throw Error(Errc::InvalidOptions, "correct_guess: " + why);
+    auto data = std::make_shared<GuessCorrection::Data>(guess);
+    with_threads(run, [&] {
+        const double h = guess->voxelSize()[0];
+        const double precision = options.precision > 0 ? options.precision : kPrecisionVoxels * h;
+        const double least = options.least_radius > 0 ? options.least_radius : kCorrectionVoxels * h;
+        std::vector<Target> on_surface;
+        for (const Vec3& mark : marks) on_surface.push_back({mark, data->distance.at(mark)});
+        std::vector<Target> targets = on_surface;
+        std::vector<char> used(inside.size() + outside.size(), 0);
+        // Seeds act once they are on the wrong side.
+        for (int round = 0; round < kSeedRounds; ++round) {
+            run.check();
+            data->bumps.clear();
+            add_bumps(data->bumps, targets, least, precision);
+            const std::size_t before = targets.size();
+            for (std::size_t n = 0; n < used.size(); ++n) {
+                const bool in = n < inside.size();
+                const Vec3& seed = in ? inside[n] : outside[n - inside.size()];
+                const double distance = data->distance.at(seed), now = distance - sum_of(data->bumps, seed);
+                if (used[n] || (in ? now < 0 : now > 0)) continue;
+                used[n] = 1;
+                targets.push_back({seed, distance + (in ? 1 : -1) * kSeedDepthVoxels * h});
+            }
+            if (targets.size() == before) break;
+        }
+        CorrectionReport& report = data->report;
+        report.marks = marks.size();
+        report.seeds = targets.size() - marks.size();
+        const auto before = mean_and_max(on_surface, {}), after = mean_and_max(on_surface, data->bumps);
+        report.before_mean = before[0];
+        report.before_max = before[1];
+        report.after_mean = after[0];
+        report.after_max = after[1];
+        report.least_radius = least;
+        for (const Bump& b : data->bumps) report.largest_radius = std::max(report.largest_radius, b.radius);
+    });
+    return GuessCorrection(data);
+}
+
+CorrectedMask GuessCorrection::apply(const Image& mask, int label, const RunContext& run) const {
+    const ImageGeometry& geometry = mask.geometry();
+    const auto [ni, nj, nk] = geometry.size;
+    CorrectedMask result;
+    result.values.resize(std::size_t(ni) * std::size_t(nj) * std::size_t(nk));
+    std::atomic<std::size_t> added = 0, removed = 0, reached = 0;
+    std::atomic<bool> broken = false;
+    with_threads(run, [&, ni = ni, nj = nj, nk = nk] {
+        tbb::parallel_for(0, nk, [&](int k) {
+            std::size_t in = 0, out = 0, near = 0;
+            std::int32_t* value = result.values.data() + std::size_t(k) * std::size_t(nj) * std::size_t(ni);
+            for (int j = 0; j < nj; ++j) {
+                const std::vector<Bump> bumps = beside(data_->bumps, geometry, j, k);
+                for (int i = 0; i < ni; ++i, ++value) {
+                    const double old = mask.at(i, j, k);
+                    if (old != std::floor(old) || std::abs(old) > 2147483647.0) broken = true;
+                    *value = broken ? 0 : std::int32_t(old);
+                    const Vec3 world = geometry.index_to_world({double(i), double(j), double(k)});
+                    const double move = sum_of(bumps, world);
+                    if (move == 0) continue;
+                    ++near;
+                    const double before = data_->distance.at(world), now = before - move;
+                    if ((before < 0) == (now < 0)) continue;
+                    if (now < 0 && *value == 0) {
+                        *value = label;
+                        ++in;
+                    } else if (now >= 0 && *value == label) {
+                        *value = 0;
+                        ++out;
+                    }
+                }
+            }
+            added += in;
+            removed += out;
+            reached += near;
+        });
+    });
+    run.check();
+    if (broken) throw Error(Errc::InvalidInput, "correct_guess: " + mask.path() + ": expected a label image of whole numbers");
+    result.added = added;
+    result.removed = removed;
+    result.reached = reached;
+    return result;
+}
+
+}  // namespace covol

@@ -1,0 +1,495 @@
+// Image guidance: where, between the marks, the image shows the border that it shows at the marks.
+#include "covol/guidance.h"
+
+#include <openvdb/openvdb.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+
+#include "covol/domain.h"
+#include "covol/error.h"
+#include "covol/start.h"
+#include "covol/surface.h"
+#include "guidance/learning.h"
+#include "guidance/wide_distance.h"
+#include "points/kd_tree.h"
+#include "redistance/redistance.h"
+#include "surface/pieces.h"
+
+namespace covol {
+namespace {
+
+using namespace guidance;
+
+constexpr int kMostPasses = 3;
+constexpr int kIterations = 2;            // normals, and what is inside and outside, are better known the second time
+constexpr double kWidth = 14.0;           // voxels to both sides of the surface in which profiles are read
+constexpr double kLongestOffset = 12.0;   // voxels in one iteration
+constexpr double kPatchWidth = 2.0;       // voxels
+constexpr double kPatchesPerSpacing = 4;  // offsets that vary within a fourth of the marks' spacing are not sought
+constexpr double kSides = 3.0;             // voxels beside a mark, to tell lines from steps
+constexpr int kNormalRounds = 6;          // of averaging, about two voxels
+constexpr std::array<double, 3> kSigmas{0.5, 1.0, 2.0};  // voxels
+constexpr std::size_t kFewestMarks = 8, kMostMarks = 400;
+constexpr double kLeastResponse = 0.25;  // a field that hardly follows the image does not tell how good the image is
+constexpr double kBeliefInAll = 4;       // marks' worth of belief that the image is as good everywhere
+constexpr int kPriors = 5;               // each half of the one before
+// A surface that bends least leaves about a third of the sagitta d^2 / (2 R) between marks at distance d.
+constexpr double kShareOfSagitta = 0.3;
+
+double squared(double x) { return x * x; }
+
+/// A surface on its way from the guess to the target, and what is known of it.
+class Guide {
+public:
+    /// @param guess  a start: a signed distance, clamped
+    Guide(FloatGridPtr guess, const std::vector<Vec3>& marks, const Image& image, const GuidanceOptions& options,
+          GuidanceReport& report, const RunContext& run)
+        : marks_(marks),
+          image_(image),
+          options_(options),
+          report_(report),
+          run_(run),
+          domain_(domain_of(*guess)),
+          h_(domain_.voxel_size),
+          surface_(std::move(guess)) {}
+
+    /// False, with the reason in the report, where the image is of no use.
+    bool step(bool first) {
+        run_.check();
+        cut_surface();
+        distance_.emplace(*surface_, patches_.places, domain_, kWidth, run_);
+        if (first) start_ = distance_->grid();
+        if (!place_marks(first)) return false;
+        set_ranges();
+        const Scene scene{patches_, *distance_->grid(), domain_, ranges_};
+        if (!learn(scene, first)) return false;
+        run_.check();
+        ask(scene);
+        run_.check();
+        weigh(first);
+        run_.check();
+        move();
+        return true;
+    }
+    [[nodiscard]] const FloatGridPtr& surface() const { return surface_; }
+
+private:
+    void cut_surface();
+    bool place_marks(bool first);
+    void set_ranges();
+    bool learn(const Scene& scene, bool first);
+    void ask(const Scene& scene);
+    void weigh(bool first);
+    void move();
+
+    struct Word {
+        double prior2, error2, response, slope2;
+        std::vector<double> off2;  // by mark
+    };
+    [[nodiscard]] Word hear(const OffsetField& field, double prior) const;
+    [[nodiscard]] std::vector<double> local_error2(const Word& word) const;
+    [[nodiscard]] std::vector<double> on_vertices(const std::vector<double>& offset) const;
+    [[nodiscard]] double mean(const std::vector<double>& by_patch) const {
+        double sum = 0;
+        for (std::size_t i = 0; i < by_patch.size(); ++i) sum += patches_.area[i] * by_patch[i];
+        return sum / area_;
+    }
+
+    const std::vector<Vec3>& marks_;
+    const Image& image_;
+    const GuidanceOptions& options_;
+    GuidanceReport& report_;
+    const RunContext& run_;
+    Domain domain_;
+    double h_;
+    FloatGridPtr surface_;
+    FloatGridPtr start_;                    // the distance to the guess
+    std::optional<WideDistance> distance_;  // to the surface
+
+    // of the guess
+    double guess2_ = 0;  // variance at the marks
+    double misfit_ = 0;  // 0: the marks' own errors explain their distances from the guess; 1: they do not
+    double prior_ = 0;   // chosen in the first iteration
+    double sigma_ = 0;
+
+    // of this iteration, by patch
+    Patches patches_;
+    double area_ = 0, size_ = 0, spacing_ = 0, width_ = 0;
+    std::vector<double> to_mark_, home_, offset_;
+    std::vector<int> ranges_;
+    double broad_ = 0;  // deviation of a guess of which nothing is known but its marks
+    std::vector<OffsetEvidence> evidence_, held_out_;
+    std::vector<std::size_t> nearest_;
+
+    std::vector<PatchMark> on_;  // the marks on the surface
+    double mark2_ = 0;           // their variance
+    std::optional<SmoothImage> smooth_;
+    std::optional<Lesson> lesson_;
+};
+
+void Guide::cut_surface() {
+    const TriangleMesh mesh = extract_mesh(*surface_, {}, run_);
+    const MeshMeasures measures = measure(mesh);
+    area_ = measures.area;
+    size_ = 3 * std::abs(measures.volume) / area_;  // a ball's radius
+    const detail::KdTree tree(marks_);
+    const auto cut = [&](double width) {
+        width_ = width;
+        patches_ = make_patches(mesh, image_.geometry(), width, kNormalRounds);
+        to_mark_.resize(patches_.size());
+        tbb::parallel_for(std::size_t(0), patches_.size(), [&](std::size_t i) { to_mark_[i] = std::sqrt(tree.nearest(patches_.centers[i])); });
+        // Points spread at random with one in each s^2 are s / 2 away in the mean.
+        spacing_ = std::max(2 * mean(to_mark_), 2 * h_);
+    };
+    cut(kPatchWidth * h_);
+    if (spacing_ > kPatchesPerSpacing * width_) cut(spacing_ / kPatchesPerSpacing);
+}
+
+bool Guide::place_marks(bool first) {
+    std::vector<std::size_t> patch(marks_.size());
+    std::vector<double> residual(marks_.size());
+    tbb::parallel_for(std::size_t(0), marks_.size(), [&](std::size_t m) {
+        double nearest = std::numeric_limits<double>::infinity();
+        for (std::size_t i = 0; i < patches_.size(); ++i) {
+            const double to = detail::squared_distance(patches_.centers[i], marks_[m]);
+            if (to < nearest) {
+                nearest = to;
+                patch[m] = i;
+            }
+        }
+        residual[m] = value_at(*distance_->grid(), domain_, marks_[m]);
+    });
+    // Marks of one patch are one mark; those far away mean another surface.
+    std::map<std::size_t, std::vector<std::size_t>> by_patch;
+    for (std::size_t m = 0; m < marks_.size(); ++m)
+        if (std::abs(residual[m]) < (kWidth - 2) * h_) by_patch[patch[m]].push_back(m);
+    on_.clear();
+    const std::size_t every = by_patch.size() / kMostMarks + 1;
+    std::size_t count = 0;
+    for (const auto& [i, members] : by_patch) {
+        if (count++ % every != 0) continue;
+        PatchMark mark;
+        mark.patch = i;
+        const double share = 1.0 / double(members.size());
+        for (const std::size_t m : members) {
+            mark.residual += share * residual[m];
+            for (int a = 0; a < 3; ++a) mark.at[a] += share * marks_[m][a];
+        }
+        const double precision = options_.mark_precision >= 0 ? options_.mark_precision : patches_.voxel[i];
+        mark.deviation = precision * std::sqrt(share / 12);  // of a uniform error
+        on_.push_back(mark);
+    }
+    if (on_.size() < kFewestMarks) {
+        report_.reason = "only " + std::to_string(on_.size()) + " places of the guess have marks near them; the image's border cannot be learnt";
+        return false;
+    }
+    double residual2 = 0;
+    mark2_ = 0;
+    for (const PatchMark& mark : on_) {
+        residual2 += squared(mark.residual) / double(on_.size());
+        mark2_ += squared(mark.deviation) / double(on_.size());
+    }
+    mark2_ = std::max(mark2_, squared(0.05 * h_));
+    if (first) {
+        // A guess that takes up a share of the marks' errors leaves the rest as residuals.
+        guess2_ = std::max(std::abs(residual2 - mark2_), 0.1 * mark2_);
+        misfit_ = std::clamp((residual2 - mark2_) / mark2_, 0.0, 1.0);
+    }
+    return true;
+}
+
+void Guide::set_ranges() {
+    const std::size_t count = patches_.size();
+    home_.assign(count, 0.0);
+    std::vector<double> reach(count), broad2(count);
+    tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
+        for (std::uint32_t n = patches_.first[i]; n < patches_.first[i + 1]; ++n)
+            home_[i] -= value_at(*start_, domain_, patches_.places[patches_.members[n]]) / (patches_.first[i + 1] - patches_.first[i]);
+        reach[i] = std::min(0.5 * to_mark_[i] + 2 * patches_.voxel[i], kLongestOffset * h_);
+        broad2[i] = squared(0.5 * reach[i]);
+    });
+    broad_ = std::sqrt(mean(broad2));
+    if (options_.range >= 0) broad_ = std::min(broad_, 0.5 * options_.range);
+    ranges_.resize(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        // Marks are asked as any other place is, as if the guess were no better there.
+        double range = std::max(reach[i], 2 * broad_);
+        if (options_.range >= 0) range = std::min(range, options_.range);
+        range = std::min(range + std::abs(home_[i]), (kWidth - 2) * h_);
+        ranges_[i] = int(std::ceil(range * kStepsPerVoxel / patches_.voxel[i]));
+    }
+}
+
+bool Guide::learn(const Scene& scene, bool first) {
+    WorldBox box{patches_.places.front(), patches_.places.front()};
+    for (const Vec3& x : patches_.places)
+        for (int a = 0; a < 3; ++a) {
+            box.min[a] = std::min(box.min[a], x[a]);
+            box.max[a] = std::max(box.max[a], x[a]);
+        }
+    for (int a = 0; a < 3; ++a) {
+        box.min[a] -= kWidth * h_;
+        box.max[a] += kWidth * h_;
+    }
+    lesson_.reset();
+    const auto try_sigma = [&](double sigma) {
+        SmoothImage image(image_, box, sigma);
+        if (image.empty()) return;
+        Lesson lesson(scene, on_, image, std::sqrt(guess2_), broad_, 2 * width_);
+        if (lesson_ && lesson.sure_gain() <= lesson_->sure_gain()) return;
+        sigma_ = sigma;
+        lesson_.emplace(std::move(lesson));
+        smooth_.emplace(std::move(image));
+    };
+    if (first)
+        for (const double sigma : kSigmas) try_sigma(sigma * h_);
+    else
+        try_sigma(sigma_);
+    if (!lesson_) {
+        report_.reason = "the guess lies outside of the image";
+        return false;
+    }
+    std::vector<Vec3> places, normals;
+    for (const PatchMark& mark : on_) {
+        places.push_back(mark.at);
+        normals.push_back(patches_.directions[mark.patch]);
+    }
+    report_.feature = feature_at(image_, places, normals, kSides * h_);
+    report_.inside = lesson_->brightness(-2 * kStepsPerVoxel);
+    report_.border = lesson_->brightness(0);
+    report_.outside = lesson_->brightness(2 * kStepsPerVoxel);
+    if (!(lesson_->sure_gain() > 0)) {
+        report_.reason = "what the image shows at some marks does not foretell the others";
+        return false;
+    }
+    report_.sigma = sigma_;
+    report_.local = lesson_->local();
+    report_.gain = lesson_->gain();
+    return true;
+}
+
+void Guide::ask(const Scene& scene) {
+    const std::size_t count = patches_.size();
+    evidence_.assign(count, {});
+    held_out_.assign(count, {});
+    nearest_.resize(count);
+    tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
+        Lesson::Answer answer = lesson_->ask(scene, i, *smooth_);
+        evidence_[i] = std::move(answer.all);
+        held_out_[i] = std::move(answer.held_out);
+        nearest_[i] = answer.nearest;
+    });
+}
+
+/// The field of an image learnt without the nearest mark, for a guess that may be off by `prior` anywhere: how far it
+/// errs at the marks, how much of a wave of the guess, two spacings long, it would undo, and how fast it leaves the
+/// guess with the distance from the marks. Errors are taken a standard error larger, and the last one smaller.
+Guide::Word Guide::hear(const OffsetField& field, double prior) const {
+    const std::size_t count = patches_.size();
+    const std::vector<double> none(count, 0.0), deviation(count, prior);
+    std::vector<double> wave(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        const Vec3& x = patches_.centers[i];
+        wave[i] = std::cos(M_PI / spacing_ * (x[0] + x[1] + x[2]) / std::sqrt(3.0));
+    }
+    const OffsetField::Fit fit = field.fit(home_, deviation, held_out_, none, none, &wave);
+
+    const double marks = double(on_.size());
+    double off2 = 0, off4 = 0;
+    std::vector<double> each;
+    for (const PatchMark& mark : on_) {
+        each.push_back(squared(fit.offset[mark.patch] - mark.residual));
+        off2 += each.back() / marks;
+        off4 += squared(each.back()) / marks;
+    }
+    const double error = std::sqrt(std::max(off4 - squared(off2), 0.0) / marks);
+    const double error2 = std::max(off2 + error - mark2_, mark2_ * std::sqrt(2 / marks));
+
+    double kept = 0, waves = 0, distance4 = 0;
+    std::vector<double> slopes(on_.size(), 0.0);
+    for (std::size_t i = 0; i < count; ++i) {
+        kept += patches_.area[i] * fit.carried[i] * wave[i];
+        waves += patches_.area[i] * squared(wave[i]);
+        const double weight = patches_.area[i] * squared(to_mark_[i]);
+        distance4 += weight * squared(to_mark_[i]);
+        slopes[nearest_[i]] += weight * (squared(fit.offset[i] - home_[i]) - guess2_ - error2);
+    }
+    double slope2 = 0, spread2 = 0;
+    for (const double s : slopes) slope2 += s;
+    for (const double s : slopes) spread2 += squared(s - slope2 / marks);
+    slope2 = std::max(slope2 - std::sqrt(spread2), 0.0) / distance4;
+    return {squared(prior), error2, std::clamp(1 - kept / waves, 0.01, 1.0), slope2, std::move(each)};
+}
+
+/// The image's error by patch: of the marks around it, and as much as a few marks' worth, of all.
+std::vector<double> Guide::local_error2(const Word& word) const {
+    const double all = word.error2 + mark2_;
+    std::vector<double> result(patches_.size());
+    tbb::parallel_for(std::size_t(0), result.size(), [&](std::size_t i) {
+        double sum = kBeliefInAll * all, total = kBeliefInAll;
+        for (std::size_t n = 0; n < on_.size(); ++n) {
+            const double weight = std::exp(-0.5 * detail::squared_distance(on_[n].at, patches_.centers[i]) / squared(spacing_));
+            sum += weight * word.off2[n];
+            total += weight;
+        }
+        result[i] = std::max(sum / total - mark2_, mark2_ * std::sqrt(2 / total));
+    });
+    return result;
+}
+
+/// Offsets between guess and image, by what each knows.
+void Guide::weigh(bool first) {
+    const std::size_t count = patches_.size();
+    const OffsetField field(patches_, std::max(spacing_, 4 * h_));
+    std::vector<double> distance2(count), least2(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        distance2[i] = squared(to_mark_[i]);
+        least2[i] = squared(kShareOfSagitta * distance2[i] / (2 * size_));
+    }
+    std::vector<Word> words;
+    if (first) {
+        for (int n = 0; n < kPriors; ++n) {
+            words.push_back(hear(field, broad_ * std::pow(0.5, n)));
+            if (words.back().response < kLeastResponse) break;
+        }
+    } else {
+        words.push_back(hear(field, prior_));
+    }
+    double slope2 = 0;
+    for (const Word& w : words) slope2 = std::max(slope2, w.slope2);
+    const double needed2 = guess2_ + std::max(slope2 * mean(distance2), mean(least2));
+    Word chosen = words.front();
+    for (const Word& w : words)
+        if (w.response >= kLeastResponse && w.prior2 >= needed2 &&
+            w.error2 / squared(w.response) < chosen.error2 / squared(chosen.response))
+            chosen = w;
+    prior_ = std::sqrt(chosen.prior2);
+
+    std::vector<double> guess2(count), deviation(count), zero(count, 0.0);
+    for (std::size_t i = 0; i < count; ++i) guess2[i] = guess2_ + std::max(slope2 * distance2[i], least2[i]);
+    const double mean2 = mean(guess2);
+    const std::vector<double> error2 = local_error2(chosen);
+    for (std::size_t i = 0; i < count; ++i)
+        deviation[i] = prior_ * std::sqrt((chosen.error2 + guess2[i]) / (chosen.error2 + mean2));
+    const OffsetField::Fit fit = field.fit(home_, deviation, evidence_, zero, zero, nullptr);
+
+    offset_.resize(count);
+    std::vector<double> left(count), sure(count, 0.0);
+    for (std::size_t i = 0; i < count; ++i) {
+        const double both = squared(chosen.response) * guess2[i] + error2[i];
+        const double share = options_.weight * std::min(chosen.response * guess2[i] / both, 1.0);
+        offset_[i] = home_[i] + share * (fit.offset[i] - home_[i]);
+        left[i] = std::sqrt(guess2[i] * error2[i] / both);
+        if (fit.precision[i] * squared(deviation[i]) > 1 && share > 0.5) sure[i] = 1;
+    }
+    if (misfit_ > 0) {
+        // A guess that passes by its marks, such as another tool's, is drawn to them.
+        std::vector<double> rest(count, 0.0), precision(count, 0.0);
+        for (const PatchMark& mark : on_) {
+            rest[mark.patch] = mark.residual - offset_[mark.patch];
+            precision[mark.patch] = misfit_ / (squared(mark.deviation) + squared(0.1 * h_));
+        }
+        const OffsetField::Fit to_marks = field.fit(zero, left, std::vector<OffsetEvidence>(count), rest, precision, nullptr);
+        for (std::size_t i = 0; i < count; ++i) offset_[i] += options_.weight * to_marks.offset[i];
+    }
+    report_.image_error = std::sqrt(chosen.error2);
+    report_.guess_error = std::sqrt(mean2);
+    report_.confident_share = mean(sure);
+    std::vector<double> whole(count);
+    report_.max_offset = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        whole[i] = offset_[i] - home_[i];
+        report_.max_offset = std::max(report_.max_offset, std::abs(whole[i]));
+    }
+    report_.mean_offset = mean(whole);
+}
+
+/// Offsets of patches as a smooth function on the vertices.
+std::vector<double> Guide::on_vertices(const std::vector<double>& offset) const {
+    std::vector<double> result(patches_.places.size());
+    tbb::parallel_for(std::size_t(0), result.size(), [&](std::size_t v) {
+        const std::uint32_t own = patches_.patch[v];
+        double sum = 0, total = 0;
+        const auto add = [&](std::uint32_t i) {
+            const double weight = std::exp(-detail::squared_distance(patches_.places[v], patches_.centers[i]) / squared(width_)) + 1e-12;
+            sum += weight * offset[i];
+            total += weight;
+        };
+        add(own);
+        for (const std::uint32_t i : patches_.neighbours[own]) add(i);
+        result[v] = sum / total;
+    });
+    return result;
+}
+
+/// The distance to the surface less the offset of its nearest vertex.
+void Guide::move() {
+    const FloatGridPtr moved = distance_->less(on_vertices(offset_));
+    detail::drop_unmarked_pieces(*moved, marks_);
+    surface_ = detail::redistance(*moved, domain_, kHalfWidthVoxels, detail::DomainEnd::Closed, "guess", run_);
+}
+
+}  // namespace
+
+void GuidanceReport::add(const GuidanceReport& pass, bool moved) {
+    if (!moved && used) return;
+    const double mean = mean_offset + pass.mean_offset, most = std::max(max_offset, pass.max_offset);
+    const int before = passes;
+    *this = pass;
+    mean_offset = mean;
+    max_offset = most;
+    passes = before + (moved ? 1 : 0);
+    used = moved;
+    if (used) reason.clear();
+}
+
+std::string GuidanceOptions::why_invalid() const {
+    std::string why;
+    const auto expect = [&why](bool ok, const std::string& what, double got) {
+        if (ok) return;
+        std::string number = std::to_string(got);
+        number.erase(number.find_last_not_of('0') + 1);
+        if (!number.empty() && number.back() == '.') number.pop_back();
+        why += (why.empty() ? "" : "\n") + what + ", got " + number;
+    };
+    expect(std::isfinite(mark_precision), "mark_precision: expected a number", mark_precision);
+    expect(std::isfinite(range), "range: expected a number", range);
+    expect(weight >= 0 && weight <= 1, "weight: expected 0 to 1", weight);
+    return why;
+}
+
+FloatGridPtr guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const Image& image, const GuidanceOptions& options,
+                   GuidanceReport& report, const RunContext& run) {
+    if (const std::string why = options.why_invalid(); !why.empty()) throw Error(Errc::InvalidOptions, "guide: " + why);
+    report = {};
+    FloatGridPtr result;
+    with_threads(run, [&] {
+        result = start_from_grid(domain_of(guess), guess, run);
+        if (marks.empty() || !(options.weight > 0) || options.range == 0) {
+            report.reason = marks.empty() ? "there are no marks to learn the border from" : "the image has no weight";
+            return;
+        }
+        // Where the image errs less than the guess, what it made of that is the better guess.
+        for (int pass = 0; pass < kMostPasses; ++pass) {
+            GuidanceReport now;
+            Guide surface(result, marks, image, options, now, run);
+            int done = 0;
+            while (done < kIterations && surface.step(done == 0))
+                run.report("image guidance", (pass + double(++done) / kIterations) / kMostPasses);
+            result = surface.surface();
+            report.add(now, done > 0);
+            if (done < kIterations || !(now.image_error < now.guess_error)) break;
+        }
+        if (report.used) result = start_from_grid(domain_of(guess), *result, run);
+        run.report("image guidance", 1);
+    });
+    return result;
+}
+
+}  // namespace covol

@@ -1,0 +1,144 @@
+// Statistics of an image's values.
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "covol/image.h"
+#include "io/image/raw_image.h"
+
+namespace covol {
+namespace {
+
+struct MinMax {
+    double min = std::numeric_limits<double>::infinity();
+    double max = -std::numeric_limits<double>::infinity();
+    bool finite = true;
+
+    void add(const MinMax& o) {
+        min = std::min(min, o.min);
+        max = std::max(max, o.max);
+        finite = finite && o.finite;
+    }
+};
+
+template <typename T>
+MinMax scan_row(const T* row, std::int32_t count, std::int64_t stride) {
+    T lo = std::numeric_limits<T>::max();
+    T hi = std::numeric_limits<T>::lowest();
+    bool finite = true;
+    for (std::int64_t n = 0; n < count; ++n) {
+        const T value = row[n * stride];
+        lo = std::min(lo, value);
+        hi = std::max(hi, value);
+        if constexpr (std::is_floating_point_v<T>) finite = finite && std::isfinite(value);
+    }
+    return {double(lo), double(hi), finite};
+}
+
+/// Slices in parallel; visit(k) gives each slice's.
+template <typename Visit>
+MinMax scan_slices(const VoxelBox& box, const Visit& visit) {
+    std::vector<MinMax> slices(std::size_t(box.size()[2]));
+    tbb::parallel_for(std::size_t(0), slices.size(), [&](std::size_t n) { slices[n] = visit(box.min[2] + int(n)); });
+    MinMax all;
+    for (const MinMax& slice : slices) all.add(slice);
+    return all;
+}
+
+}  // namespace
+
+template <typename T>
+const T* Image::row(int j, int k) const {
+    return static_cast<const T*>(data_.get()) + stride_[1] * (j - held_.min[1]) + stride_[2] * (k - held_.min[2]);
+}
+
+std::uint64_t Image::slice_bytes() const {
+    // from the first held pixel to the last
+    const Index3 n = held_.size();
+    return (std::uint64_t(stride_[1]) * std::uint64_t(n[1] - 1) + std::uint64_t(stride_[0]) * std::uint64_t(n[0] - 1) + 1) *
+           detail::pixel_bytes(type_);
+}
+
+void Image::expect_slice(int k) const {
+    if (!mapped_) return;
+    detail::with_pixel_type(
+        type_, [&](auto pixel) { detail::expect_pages(row<decltype(pixel)>(held_.min[1], k), slice_bytes()); });
+}
+
+void Image::forget_slice(int k) const {
+    if (!mapped_) return;
+    detail::with_pixel_type(
+        type_, [&](auto pixel) { detail::release_pages(row<decltype(pixel)>(held_.min[1], k), slice_bytes()); });
+}
+
+std::array<double, 2> Image::percentiles(double low, double high) const {
+    constexpr double kSamples = 4e6;
+    const double ratio = double(detail::voxel_count(held_.size())) / kSamples;
+    const auto step = static_cast<std::int32_t>(std::max(1.0, std::ceil(std::cbrt(ratio))));
+    return detail::with_pixel_type(type_, [&](auto pixel) {
+        using T = decltype(pixel);
+        std::vector<T> values;
+        const Index3 n = held_.size();
+        for (std::int32_t k = 0; k < n[2]; k += step) {
+            for (std::int32_t j = 0; j < n[1]; j += step) {
+                const T* line = row<T>(held_.min[1] + j, held_.min[2] + k);
+                for (std::int64_t i = 0; i < n[0]; i += step) values.push_back(line[i * stride_[0]]);
+            }
+            forget_slice(held_.min[2] + k);
+        }
+        const auto value_at = [&](double fraction) {
+            const double place = std::clamp(fraction, 0.0, 1.0) * double(values.size() - 1);
+            const auto nth = values.begin() + static_cast<std::ptrdiff_t>(std::lround(place));
+            std::nth_element(values.begin(), nth, values.end());
+            return double(*nth);
+        };
+        const double first = value_at(low);
+        return std::array<double, 2>{first, value_at(high)};
+    });
+}
+
+std::array<double, 2> Image::range() const {
+    return detail::with_pixel_type(type_, [&](auto pixel) {
+        const MinMax all = scan_slices(held_, [&](int k) {
+            MinMax slice;
+            expect_slice(k);
+            for (int j = held_.min[1]; j <= held_.max[1]; ++j)
+                slice.add(scan_row(row<decltype(pixel)>(j, k), held_.size()[0], stride_[0]));
+            forget_slice(k);
+            return slice;
+        });
+        return std::array<double, 2>{all.min, all.max};
+    });
+}
+
+void Image::require_finite() const {
+    detail::with_pixel_type(type_, [&](auto pixel) {
+        using T = decltype(pixel);
+        if constexpr (std::is_floating_point_v<T>) {
+            const auto slice_is_finite = [&](int k) {
+                MinMax slice;
+                expect_slice(k);
+                for (int j = held_.min[1]; j <= held_.max[1]; ++j)
+                    slice.add(scan_row(row<T>(j, k), held_.size()[0], stride_[0]));
+                forget_slice(k);
+                return slice;
+            };
+            if (scan_slices(held_, slice_is_finite).finite) return;
+            for (int k = held_.min[2]; k <= held_.max[2]; ++k)
+                for (int j = held_.min[1]; j <= held_.max[1]; ++j)
+                    for (int i = held_.min[0]; i <= held_.max[0]; ++i)
+                        if (!std::isfinite(at(i, j, k)))
+                            throw detail::read_error(Errc::InvalidInput, path_,
+                                                     "expected finite values, got NaN or infinity at voxel (" +
+                                                         std::to_string(i) + ", " + std::to_string(j) + ", " +
+                                                         std::to_string(k) + ")");
+        }
+    });
+}
+
+}  // namespace covol

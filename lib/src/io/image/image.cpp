@@ -1,0 +1,294 @@
+#include "covol/image.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "base/file.h"
+#include "base/matrix.h"
+#include "covol/error.h"
+#include "covol/vdb_io.h"
+#include "io/image/image_formats.h"
+#include "io/image/tiff.h"
+
+namespace covol {
+namespace {
+
+namespace fs = std::filesystem;
+using detail::ImageFile;
+using detail::PixelRequest;
+using detail::read_error;
+
+constexpr const char* kReadable = ".tif, .tiff, .nrrd, .nhdr, .nii, .nii.gz, .mha, .mhd, .mrc, .map, .h5, .dcm or .vdb, "
+                                  "or a folder with a DICOM series";
+
+bool is_one_of(const std::string& text, std::initializer_list<const char*> list) {
+    return std::any_of(list.begin(), list.end(), [&](const char* known) { return text == known; });
+}
+
+/// @throws Error InvalidInput, Unsupported unless spacing is positive, origin finite and the axes perpendicular.
+void check_geometry(const std::string& path, const ImageGeometry& g) {
+    constexpr double kTolerance = 1e-3;
+    for (int a = 0; a < 3; ++a) {
+        if (!(g.spacing[a] > 0) || !std::isfinite(g.spacing[a]))
+            throw detail::read_error(Errc::InvalidInput, path, "expected a positive spacing, got " +
+                                                std::to_string(g.spacing[a]) + " along axis " + std::to_string(a));
+        if (!std::isfinite(g.origin[a]))
+            throw Error(Errc::InvalidInput, "read_image: " + path + ": the origin is not finite");
+        for (int b = 0; b <= a; ++b) {
+            double dot = 0;
+            for (int c = 0; c < 3; ++c) dot += g.direction[c][a] * g.direction[c][b];
+            if (!(std::abs(dot - (a == b ? 1.0 : 0.0)) <= kTolerance))
+                throw Error(Errc::Unsupported, "read_image: " + path +
+                                                   ": expected perpendicular axes, got sheared or degenerate ones; "
+                                                   "resample the image");
+        }
+    }
+}
+
+std::unique_ptr<ImageFile> open_image(const std::string& given, const RunContext& run) {
+    const auto [path, grid] = split_grid_name(given);
+    std::error_code status;
+    if (!fs::exists(path, status)) throw read_error(Errc::Io, path, "no such file");
+    if (fs::is_directory(path, status)) return detail::open_dicom(path, run);
+    if (!fs::is_regular_file(path, status) || !std::ifstream(path).good())
+        throw read_error(Errc::Io, path, "cannot be opened");
+    const std::string end = detail::extension(path);
+    const bool marked = is_one_of(end, {".dcm", ".ima", ".dicom", ""}) && detail::is_dicom(path);
+    const bool itk = is_one_of(end, {".nrrd", ".nhdr", ".nii", ".nii.gz", ".mha", ".mhd", ".h5", ".hdf5"});
+    const bool mrc = is_one_of(end, {".mrc", ".map", ".rec", ".st", ".ccp4", ".ali"});
+    const bool tiff = is_one_of(end, {".tif", ".tiff", ".btf", ".tf8"});
+    if (!marked && !itk && !mrc && !tiff && end != ".vdb")
+        throw read_error(Errc::Unsupported, path,
+                         std::string("expected a name ending in ") + kReadable + ", got '" + end + "'");
+    if (fs::file_size(path) == 0) throw read_error(Errc::InvalidInput, path, "the file is empty");
+    if (marked) return detail::open_dicom(path, run);
+    if (itk) return detail::open_itk(path);
+    if (mrc) return detail::open_mrc(path);
+    if (tiff) return detail::open_tiff(path, run);
+    return detail::open_vdb_image(path, grid);
+}
+
+/// What is wrong with the spacing, and the option that mends it.
+void warn_of_spacing(const std::string& path, const ImageInfo& info, const RunContext& run) {
+    std::string axes;
+    for (int a = 0; a < 3; ++a)
+        if (!info.spacing_known[a]) axes += (axes.empty() ? "" : ", ") + std::string(1, "xyz"[a]);
+    if (axes.empty()) return;
+    run.warn(path + ": the file states no spacing along " + axes + ": 1 stands in for it, and lengths, volumes and shapes "
+                    "may be wrong; --spacing sx,sy,sz gives it");
+}
+
+/// The user's corrections, and the last checks.
+ImageInfo corrected_info(const std::string& path, const ImageFile& file, const ReadImageOptions& options,
+                         const RunContext& run) {
+    ImageInfo info = file.info();
+    for (int a = 0; a < 3; ++a) {
+        if (options.spacing[a] > 0) {
+            info.geometry.spacing[a] = options.spacing[a];
+            info.spacing_known[a] = true;
+        } else if (!info.spacing_known[a]) {
+            info.geometry.spacing[a] = 1;
+        }
+    }
+    info.geometry.spacing_known = info.spacing_known[0] && info.spacing_known[1] && info.spacing_known[2];
+    check_geometry(path, info.geometry);
+    warn_of_spacing(path, info, run);
+    return info;
+}
+
+/// The index along channels or frames that the caller chose, or the only one there is.
+std::uint64_t choose(const std::string& path, const std::string& what, int wanted, int count,
+                     const std::vector<std::string>& names) {
+    if (wanted < 0 && count == 1) return 0;
+    if (wanted >= 0 && wanted < count) return std::uint64_t(wanted);
+    std::string list = "0 to " + std::to_string(count - 1);
+    if (!names.empty()) {
+        list.clear();
+        for (std::size_t n = 0; n < names.size(); ++n)
+            list += (n == 0 ? "" : ", ") + std::to_string(n) + (names[n].empty() ? "" : " (" + names[n] + ")");
+    }
+    const std::string choice = "; choose " + list + " with --" + what;
+    if (wanted < 0)
+        throw read_error(Errc::Unsupported, path, "expected one " + what + ", got " + std::to_string(count) + choice);
+    throw read_error(Errc::InvalidOptions, path, what + " " + std::to_string(wanted) + " does not exist" + choice);
+}
+
+PixelRequest choose_pixels(const std::string& path, const ImageInfo& info, const ReadImageOptions& options) {
+    PixelRequest request;
+    request.channel = choose(path, "channel", options.channel, info.channels, info.channel_names);
+    request.frame = choose(path, "frame", options.frame, info.frames, {});
+    request.box = options.roi ? voxels_around(info.geometry, *options.roi) : detail::whole_box(info.geometry.size);
+    return request;
+}
+
+}  // namespace
+
+// ---------------------------------------------------------------------------------------------- geometry
+
+Vec3 ImageGeometry::index_to_world(const Vec3& index) const {
+    const Vec3 moved = detail::multiply(direction, {index[0] * spacing[0], index[1] * spacing[1], index[2] * spacing[2]});
+    return {origin[0] + moved[0], origin[1] + moved[1], origin[2] + moved[2]};
+}
+
+Vec3 ImageGeometry::world_to_index(const Vec3& world) const {
+    const Vec3 moved = detail::multiply(detail::inverse(direction), {world[0] - origin[0], world[1] - origin[1], world[2] - origin[2]});
+    return {moved[0] / spacing[0], moved[1] / spacing[1], moved[2] / spacing[2]};
+}
+
+WorldBox ImageGeometry::world_box() const {
+    std::vector<Vec3> corners;
+    for (int corner = 0; corner < 8; ++corner) {
+        Vec3 index;
+        for (int a = 0; a < 3; ++a) index[a] = (corner >> a & 1) != 0 ? size[a] - 0.5 : -0.5;
+        corners.push_back(index_to_world(index));
+    }
+    return bounding_box(corners);
+}
+
+bool ImageGeometry::is_axis_aligned() const {
+    for (int a = 0; a < 3; ++a)
+        for (int b = 0; b < 3; ++b)
+            if (std::abs(direction[a][b] - (a == b ? 1.0 : 0.0)) > 1e-6) return false;
+    return true;
+}
+
+bool VoxelBox::contains(const Index3& voxel) const {
+    for (int a = 0; a < 3; ++a)
+        if (voxel[a] < min[a] || voxel[a] > max[a]) return false;
+    return true;
+}
+
+VoxelBox voxels_around(const ImageGeometry& geometry, const WorldBox& roi) {
+    VoxelBox box;
+    Vec3 lo{}, hi{};
+    for (int corner = 0; corner < 8; ++corner) {
+        Vec3 world;
+        for (int a = 0; a < 3; ++a) world[a] = (corner >> a & 1) != 0 ? roi.max[a] : roi.min[a];
+        const Vec3 index = geometry.world_to_index(world);
+        for (int a = 0; a < 3; ++a) {
+            lo[a] = corner == 0 ? index[a] : std::min(lo[a], index[a]);
+            hi[a] = corner == 0 ? index[a] : std::max(hi[a], index[a]);
+        }
+    }
+    for (int a = 0; a < 3; ++a) {
+        const double last = geometry.size[a] - 1;
+        if (!(lo[a] <= last + 0.5 && hi[a] >= -0.5)) {
+            const auto text = [](const WorldBox& b) {
+                std::string line;
+                for (const Vec3& corner : {b.min, b.max})
+                    for (int c = 0; c < 3; ++c) line += (line.empty() ? "" : ",") + std::to_string(corner[c]);
+                return line;
+            };
+            throw Error(Errc::InvalidInput, "read_image: the roi " + text(roi) + " lies outside the image, which is " +
+                                                text(geometry.world_box()));
+        }
+        box.min[a] = static_cast<std::int32_t>(std::clamp(std::floor(lo[a]) - 1, 0.0, last));
+        box.max[a] = static_cast<std::int32_t>(std::clamp(std::ceil(hi[a]) + 1, 0.0, last));
+    }
+    return box;
+}
+
+ImageGeometry cropped(const ImageGeometry& geometry, const VoxelBox& box) {
+    ImageGeometry part = geometry;
+    part.size = box.size();
+    part.origin = geometry.index_to_world({double(box.min[0]), double(box.min[1]), double(box.min[2])});
+    return part;
+}
+
+// ---------------------------------------------------------------------------------------------- images
+
+const char* to_string(PixelType type) {
+    switch (type) {
+        case PixelType::UInt8: return "uint8";
+        case PixelType::Int8: return "int8";
+        case PixelType::UInt16: return "uint16";
+        case PixelType::Int16: return "int16";
+        case PixelType::UInt32: return "uint32";
+        case PixelType::Int32: return "int32";
+        case PixelType::Float: return "float";
+        case PixelType::Double: break;
+    }
+    return "double";
+}
+
+double Image::at(int i, int j, int k) const {
+    const std::int64_t n = stride_[0] * (i - held_.min[0]) + stride_[1] * (j - held_.min[1]) + stride_[2] * (k - held_.min[2]);
+    return detail::with_pixel_type(
+        type_, [&](auto pixel) { return double(static_cast<const decltype(pixel)*>(data_.get())[n]); });
+}
+
+Image Image::cropped() const {
+    Image part = *this;
+    part.geometry_ = covol::cropped(geometry_, held_);
+    part.held_ = detail::whole_box(part.geometry_.size);
+    return part;
+}
+
+Image Image::placed(const ImageGeometry& geometry) const {
+    if (geometry.size != geometry_.size)
+        throw Error(Errc::InvalidInput, "placed: " + path_ + ": expected " + detail::size_text(geometry.size) + " voxels, got " +
+                                            detail::size_text(geometry_.size));
+    Image moved = *this;
+    moved.geometry_ = geometry;
+    return moved;
+}
+
+template <typename T>
+Image Image::copy_of(const ImageGeometry& geometry, PixelType type, const T* values) {
+    Image image;
+    image.geometry_ = geometry;
+    image.type_ = type;
+    image.held_ = detail::whole_box(geometry.size);
+    image.stride_ = detail::dense_strides(geometry.size);
+    const std::shared_ptr<T[]> data(new T[detail::voxel_count(geometry.size)]);
+    std::copy_n(values, detail::voxel_count(geometry.size), data.get());
+    image.data_ = data;
+    return image;
+}
+
+Image Image::from_values(const ImageGeometry& geometry, const float* values) {
+    return copy_of(geometry, PixelType::Float, values);
+}
+
+Image Image::from_values(const ImageGeometry& geometry, const std::uint8_t* values) {
+    return copy_of(geometry, PixelType::UInt8, values);
+}
+
+// ---------------------------------------------------------------------------------------------- reading
+
+Image read_image(const std::string& path, const ReadImageOptions& options, const RunContext& run) {
+    Image image;
+    with_threads(run, [&] {
+        const std::unique_ptr<ImageFile> file = open_image(path, run);
+        const ImageInfo info = corrected_info(path, *file, options, run);
+        const PixelRequest request = choose_pixels(path, info, options);
+        const detail::Pixels pixels = file->read(request, run);
+        image.geometry_ = info.geometry;
+        image.type_ = info.type;
+        image.path_ = path;
+        image.held_ = request.box;
+        image.data_ = pixels.data;
+        image.stride_ = pixels.stride;
+        image.mapped_ = pixels.mapped;
+        image.require_finite();
+    });
+    return image;
+}
+
+ImageGeometry read_image_geometry(const std::string& path, const ReadImageOptions& options, const RunContext& run) {
+    return read_image_info(path, options, run).geometry;
+}
+
+ImageInfo read_image_info(const std::string& path, const ReadImageOptions& options, const RunContext& run) {
+    const std::unique_ptr<ImageFile> file = open_image(path, run);
+    ImageInfo info = corrected_info(path, *file, options, run);
+    ReadImageOptions first = options;
+    if (info.channels > 1 && first.channel < 0) first.channel = 0;
+    if (info.frames > 1 && first.frame < 0) first.frame = 0;
+    info.bytes_to_hold = file->bytes_to_hold(choose_pixels(path, info, first));
+    return info;
+}
+
+}  // namespace covol

@@ -1,0 +1,34 @@
+#pragma once
+#include <memory>
+#include <string>
+
+#include "io/image/raw_image.h"
+
+// One function for each family of image files; read_image() picks by the name's end.
+namespace covol::detail {
+
+/// NRRD (.nrrd, .nhdr), NIfTI (.nii, .nii.gz), MetaImage (.mha, .mhd), ITK's HDF5 (.h5, .hdf5): ITK reads the header.
+std::unique_ptr<ImageFile> open_itk(const std::string& path);
+
+/// MRC2014 and CCP4 maps: modes 0, 1, 2, 6 and 12, either byte order.
+std::unique_ptr<ImageFile> open_mrc(const std::string& path);
+
+/// The series in a folder, or the one that a file belongs to; its slices sorted by position.
+/// @throws Error Unsupported when a folder holds several series: lists them.
+std::unique_ptr<ImageFile> open_dicom(const std::string& path, const RunContext& run);
+
+/// Whether the file has DICOM's mark.
+bool is_dicom(const std::string& path);
+
+/// A float grid as an image, on the box of its active voxels.
+/// @param name  the grid's, or empty for the file's first float grid
+std::unique_ptr<ImageFile> open_vdb_image(const std::string& path, const std::string& name);
+
+/// Key/value pairs beside the pixels.
+using ImageMetadata = std::vector<std::pair<std::string, std::string>>;
+
+/// What write_image() hands to ITK; NRRD alone keeps the metadata.
+void write_itk(const std::string& path, const ImageGeometry& geometry, PixelType type, const void* values,
+               const ImageMetadata& metadata);
+
+}  // namespace covol::detail

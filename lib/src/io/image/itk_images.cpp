@@ -1,0 +1,437 @@
+// Formats whose headers ITK reads: NRRD, NIfTI, MetaImage, HDF5.
+#include <hdf5.h>
+#include <itkHDF5ImageIO.h>
+#include <itkMetaDataObject.h>
+#include <itkMetaImageIO.h>
+#include <itkNiftiImageIO.h>
+#include <itkNrrdImageIO.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <sstream>
+#include <vector>
+
+#include "base/file.h"
+#include "io/image/image_formats.h"
+#include "io/image/itk_call.h"
+
+namespace covol::detail {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// HDF5's own messages, which it would print, are off while this lives.
+class QuietHdf5 {
+public:
+    QuietHdf5() {
+        H5Eget_auto2(H5E_DEFAULT, &print_, &data_);
+        H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+    }
+    ~QuietHdf5() { H5Eset_auto2(H5E_DEFAULT, print_, data_); }
+    QuietHdf5(const QuietHdf5&) = delete;
+    QuietHdf5& operator=(const QuietHdf5&) = delete;
+
+private:
+    H5E_auto2_t print_ = nullptr;
+    void* data_ = nullptr;
+};
+
+/// ITK's reader and writer for files of this ending. Made directly: a static library has no registered factories.
+itk::ImageIOBase::Pointer make_io(const std::string& extension) {
+    itk::ImageIOBase::Pointer io;
+    if (extension == ".nrrd" || extension == ".nhdr")
+        io = itk::NrrdImageIO::New().GetPointer();
+    else if (extension == ".nii" || extension == ".nii.gz")
+        io = itk::NiftiImageIO::New().GetPointer();
+    else if (extension == ".h5" || extension == ".hdf5")
+        io = itk::HDF5ImageIO::New().GetPointer();
+    else
+        io = itk::MetaImageIO::New().GetPointer();
+    return io;
+}
+
+itk::IOComponentEnum component_type(PixelType type) {
+    using Component = itk::IOComponentEnum;
+    switch (type) {
+        case PixelType::UInt8: return Component::UCHAR;
+        case PixelType::Int8: return Component::CHAR;
+        case PixelType::UInt16: return Component::USHORT;
+        case PixelType::Int16: return Component::SHORT;
+        case PixelType::UInt32: return Component::UINT;
+        case PixelType::Int32: return Component::INT;
+        case PixelType::Float: return Component::FLOAT;
+        case PixelType::Double: break;
+    }
+    return Component::DOUBLE;
+}
+
+std::string lower(std::string text) {
+    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+    return text;
+}
+
+/// The lines of a NRRD's or MetaImage's text header, for what ITK keeps to itself.
+struct TextHeader {
+    std::vector<std::string> lines;  ///< as written
+    std::uint64_t end = 0;           ///< where the pixels begin, when they are in the same file
+
+    explicit TextHeader(const std::string& path) {
+        constexpr std::size_t kMost = 1000;
+        std::ifstream file(path, std::ios::binary);
+        std::string line;
+        while (lines.size() < kMost && std::getline(file, line) && !line.empty() && line != "\r") {
+            lines.push_back(line);
+            if (lower(line).rfind("elementdatafile", 0) == 0) break;
+        }
+        if (file) end = static_cast<std::uint64_t>(file.tellg());
+    }
+    /// What follows "key", one of ":", ":=" or "=", and blanks; empty when there is no such line. Keys are lower case.
+    [[nodiscard]] std::string value(const std::string& key) const {
+        for (const std::string& line : lines) {
+            if (lower(line.substr(0, key.size())) != key) continue;
+            const std::size_t separator = line.find_first_not_of(' ', key.size());
+            if (separator == std::string::npos || (line[separator] != ':' && line[separator] != '=')) continue;
+            const std::size_t begin = line.find_first_not_of(":= ", separator);
+            const std::size_t last = line.find_last_not_of(" \r");
+            return begin == std::string::npos ? "" : line.substr(begin, last + 1 - begin);
+        }
+        return {};
+    }
+    /// The first of the keys that there is.
+    [[nodiscard]] std::string value_of(std::initializer_list<const char*> keys) const {
+        for (const char* key : keys)
+            if (std::string found = value(key); !found.empty()) return found;
+        return {};
+    }
+    [[nodiscard]] bool says(const std::string& key, const std::string& wanted) const {
+        return lower(value(key)).rfind(wanted, 0) == 0;
+    }
+    /// The file with the pixels, as written; empty when they follow the header.
+    [[nodiscard]] std::string data_file() const {
+        const std::string name = value_of({"data file", "datafile", "elementdatafile"});
+        return lower(name) == "local" ? "" : name;
+    }
+};
+
+/// Unit, whether there is a spacing at all, and the fields that were used.
+void read_text_header(const TextHeader& header, ImageInfo& info) {
+    std::string unit = header.value_of({"space units", "units", "distanceunits", "unit"});
+    // "mm" "mm" "mm": the axes have one unit in practice
+    if (!unit.empty() && unit.front() == '"') unit = unit.substr(1, unit.find('"', 1) - 1);
+    info.geometry.unit = normal_unit(unit);
+    const bool known = !header.value_of({"spacings", "space directions", "elementspacing", "elementsize"}).empty();
+    info.spacing_known = {known, known, known};
+    for (const char* key :
+         {"type", "elementtype", "sizes", "dimsize", "elementnumberofchannels", "kinds", "spacings", "space directions",
+          "elementspacing", "elementsize", "space origin", "offset", "position", "origin", "space", "transformmatrix",
+          "orientation", "rotation", "space units", "units", "distanceunits", "unit", "encoding", "compresseddata",
+          "data file", "datafile", "elementdatafile"})
+        if (const std::string found = header.value(key); !found.empty()) info.fields.emplace_back(key, found);
+}
+
+template <typename T>
+T load(const char* data, bool swap) {
+    T value;
+    std::memcpy(&value, data, sizeof(T));
+    if (swap) swap_bytes(&value, 1, sizeof(T));
+    return value;
+}
+
+std::optional<PixelType> nifti_type(int code) {
+    switch (code) {
+        case 2: return PixelType::UInt8;
+        case 4: return PixelType::Int16;
+        case 8: return PixelType::Int32;
+        case 16: return PixelType::Float;
+        case 64: return PixelType::Double;
+        case 256: return PixelType::Int8;
+        case 512: return PixelType::UInt16;
+        case 768: return PixelType::UInt32;
+        default: return std::nullopt;
+    }
+}
+
+/// The 348 bytes that a NIfTI-1 file begins with.
+class NiftiHeader {
+public:
+    /// @throws Error InvalidInput, Unsupported (NIfTI-2).
+    NiftiHeader(const PixelPlace& begin, const std::string& unusable) {
+        if (!read_bytes(begin, bytes_.size(), bytes_.data())) throw Error(Errc::InvalidInput, unusable);
+        const auto size = load<std::int32_t>(bytes_.data(), false), swapped = load<std::int32_t>(bytes_.data(), true);
+        constexpr std::int32_t kVersion2 = 540;
+        if (size == kVersion2 || swapped == kVersion2)
+            throw Error(Errc::Unsupported, "read_image: " + begin.path + ": NIfTI-2 is not read; convert it to NIfTI-1");
+        swap_ = size != std::int32_t(bytes_.size());
+        if (swap_ && swapped != std::int32_t(bytes_.size())) throw Error(Errc::InvalidInput, unusable);
+    }
+    [[nodiscard]] bool swap() const { return swap_; }
+    [[nodiscard]] double number(std::size_t at) const { return double(load<float>(bytes_.data() + at, swap_)); }
+    [[nodiscard]] int integer(std::size_t at) const { return load<std::int16_t>(bytes_.data() + at, swap_); }
+    [[nodiscard]] bool in_one_piece() const { return std::memcmp(bytes_.data() + 344, "n+1", 4) == 0; }
+    /// 0: not stated, 1: m, 2: mm, 3: um
+    [[nodiscard]] int unit() const { return bytes_[123] & 7; }
+
+private:
+    std::array<char, 348> bytes_{};
+    bool swap_ = false;
+};
+
+/// Empty when the file is not in one piece or holds no grey values. Adds the fields to `info`.
+std::optional<PixelPlace> nifti_pixels(const NiftiHeader& header, PixelPlace place, ImageInfo& info) {
+    const auto type = nifti_type(header.integer(70));
+    const double offset = header.number(108), slope = header.number(112), intercept = header.number(116);
+    constexpr double kLeastOffset = 352;
+    if (!type || !header.in_one_piece() || !(offset >= 0 && offset < 1e9)) return std::nullopt;
+    place.swap = header.swap() && pixel_bytes(*type) > 1;
+    place.type = *type;
+    place.skip = static_cast<std::uint64_t>(std::max(kLeastOffset, offset));
+    if (std::isfinite(slope) && std::isfinite(intercept) && slope != 0) {
+        place.slope = slope;
+        place.intercept = intercept;
+    }
+    std::ostringstream pixdim;
+    for (std::size_t a = 0; a < 3; ++a) {
+        const double spacing = header.number(80 + 4 * a);
+        info.spacing_known[a] = std::abs(spacing) > 0;
+        pixdim << (a == 0 ? "" : " ") << spacing;
+    }
+    static constexpr const char* kUnits[] = {"not stated, taken as mm", "m", "mm", "um"};
+    info.format = "NIfTI-1";
+    info.fields = {{"pixdim", pixdim.str()},
+                   {"xyzt_units", kUnits[header.unit() <= 3 ? header.unit() : 0]},
+                   {"qform_code", std::to_string(header.integer(252))},
+                   {"sform_code", std::to_string(header.integer(254))},
+                   {"space", "RAS in the file, turned to LPS"}};
+    return place;
+}
+
+/// ITK 5.2 turns the spacing of files in um or m into mm, and forgets the origin.
+void scale_nifti_origin(const NiftiHeader& header, ImageGeometry& geometry) {
+    const double scale = header.unit() == 1 ? 1e3 : header.unit() == 3 ? 1e-3 : 1;
+    const auto is_as_stored = [&](std::size_t first, std::size_t step) {
+        bool same = true;
+        for (std::size_t a = 0; a < 3; ++a)
+            same = same && std::abs(geometry.origin[a]) == std::abs(header.number(first + a * step));
+        return same;
+    };
+    constexpr std::size_t kQoffset = 268, kSrowEnd = 292, kSrow = 16;
+    if (is_as_stored(kQoffset, 4) || is_as_stored(kSrowEnd, kSrow))
+        for (double& o : geometry.origin) o *= scale;
+}
+
+/// Empty for the rare kinds that are left to ITK: ascii pixels, one file for each slice, a header to skip.
+std::optional<PixelPlace> meta_pixels(const std::string& path, const TextHeader& header, PixelType type) {
+    const std::string file = header.data_file();
+    if (header.says("binarydata", "false") || !header.value("headersize").empty()) return std::nullopt;
+    if (header.says("elementdatafile", "list") || file.find('%') != std::string::npos) return std::nullopt;
+    PixelPlace place;
+    place.path = file.empty() ? path : (fs::path(path).parent_path() / file).string();
+    place.file_offset = file.empty() ? header.end : 0;
+    place.packed = header.says("compresseddata", "true");
+    const bool big = header.says("binarydatabyteordermsb", "true") || header.says("elementbyteordermsb", "true");
+    place.swap = big == (std::endian::native == std::endian::little) && pixel_bytes(type) > 1;
+    place.type = type;
+    return place;
+}
+
+/// Empty for the rare kinds that are left to ITK: text and bzip2, many data files, skipped lines, channels that are not
+/// the first axis.
+std::optional<PixelPlace> nrrd_pixels(const std::string& path, const TextHeader& header, PixelType type, int channels) {
+    const std::string file = header.data_file(), encoding = lower(header.value("encoding"));
+    PixelPlace place;
+    place.packed = encoding == "gzip" || encoding == "gz";
+    if (!place.packed && encoding != "raw") return std::nullopt;
+    if (lower(file).rfind("list", 0) == 0 || file.find('%') != std::string::npos || file.find(' ') != std::string::npos)
+        return std::nullopt;
+    if (!header.value_of({"line skip", "lineskip", "byte skip", "byteskip"}).empty()) return std::nullopt;
+    if (channels > 1 && (header.value("kinds").empty() || header.says("kinds", "domain") || header.says("kinds", "space")))
+        return std::nullopt;
+    place.path = file.empty() ? path : (fs::path(path).parent_path() / file).string();
+    place.file_offset = file.empty() ? header.end : 0;
+    place.swap = header.says("endian", "big") == (std::endian::native == std::endian::little) && pixel_bytes(type) > 1;
+    place.type = type;
+    return place;
+}
+
+/// MetaIO says on std::cerr what a header lacks; such headers do not get that far.
+void require_meta_header(const TextHeader& header, const std::string& unusable) {
+    for (const char* key : {"ndims", "dimsize", "elementtype", "elementdatafile"})
+        if (header.value(key).empty()) throw Error(Errc::InvalidInput, unusable + " (no " + key + " in its header)");
+}
+
+/// What only ITK reads: all at once, but HDF5, which is read in boxes.
+class ItkFile : public ImageFile {
+public:
+    ItkFile(std::string path, std::string unusable, ImageInfo info, itk::ImageIOBase::Pointer io, bool in_boxes,
+            std::uint64_t file_bytes)
+        : path_(std::move(path)), unusable_(std::move(unusable)), io_(std::move(io)), in_boxes_(in_boxes),
+          file_bytes_(file_bytes) {
+        info_ = std::move(info);
+    }
+
+    Pixels read(const PixelRequest& request, const RunContext&) override {
+        const unsigned dimensions = io_->GetNumberOfDimensions();
+        itk::ImageIORegion region(dimensions);
+        for (unsigned a = 0; a < dimensions; ++a) region.SetSize(a, io_->GetDimensions(a));
+        VoxelBox box = whole_box(info_.geometry.size);
+        if (in_boxes_ && dimensions == 3) {
+            box = request.box;
+            for (unsigned a = 0; a < 3; ++a) {
+                region.SetIndex(a, box.min[a]);
+                region.SetSize(a, static_cast<itk::SizeValueType>(box.size()[a]));
+            }
+        }
+        const auto channels = std::uint64_t(info_.channels);
+        const std::uint64_t frame = voxel_count(box.size()) * channels;
+        const std::shared_ptr<void> data = allocate_pixels(path_, frame * std::uint64_t(info_.frames), info_.type, file_bytes_);
+        io_->SetIORegion(region);
+        const QuietHdf5 quiet;
+        with_itk(Errc::InvalidInput, unusable_, [&] { io_->Read(data.get()); });
+        Pixels pixels;
+        pixels.stride = dense_strides(box.size());
+        std::uint64_t first = request.frame * frame + request.channel;
+        for (int a = 0; a < 3; ++a) {
+            pixels.stride[a] *= std::int64_t(channels);
+            first += std::uint64_t(pixels.stride[a]) * std::uint64_t(request.box.min[a] - box.min[a]);
+        }
+        pixels.data = {data, static_cast<char*>(data.get()) + first * pixel_bytes(info_.type)};
+        return pixels;
+    }
+
+private:
+    std::string path_, unusable_;
+    itk::ImageIOBase::Pointer io_;
+    bool in_boxes_;
+    std::uint64_t file_bytes_;
+};
+
+}  // namespace
+
+PixelType itk_pixel_type(const std::string& path, const itk::ImageIOBase& io) {
+    using Component = itk::IOComponentEnum;
+    switch (io.GetComponentType()) {
+        case Component::UCHAR: return PixelType::UInt8;
+        case Component::CHAR: return PixelType::Int8;
+        case Component::USHORT: return PixelType::UInt16;
+        case Component::SHORT: return PixelType::Int16;
+        case Component::UINT: return PixelType::UInt32;
+        case Component::INT: return PixelType::Int32;
+        case Component::FLOAT: return PixelType::Float;
+        case Component::DOUBLE: return PixelType::Double;
+        default:
+            throw read_error(Errc::Unsupported, path,
+                             "expected values of 8, 16 or 32 bits, float or double, got " +
+                                 itk::ImageIOBase::GetComponentTypeAsString(io.GetComponentType()));
+    }
+}
+
+ImageGeometry itk_geometry(const std::string& path, const itk::ImageIOBase& io) {
+    std::uint64_t size[3] = {1, 1, 1};
+    for (unsigned a = 0; a < std::min(3U, io.GetNumberOfDimensions()); ++a) size[a] = io.GetDimensions(a);
+    ImageGeometry geometry;
+    geometry.size = require_3d(path, size);
+    for (unsigned a = 0; a < 3; ++a) {
+        geometry.spacing[a] = io.GetSpacing(a);
+        geometry.origin[a] = io.GetOrigin(a);
+        const std::vector<double> axis = io.GetDirection(a);
+        for (unsigned b = 0; b < 3; ++b) geometry.direction[b][a] = b < axis.size() ? axis[b] : 0;
+    }
+    return geometry;
+}
+
+std::unique_ptr<ImageFile> open_itk(const std::string& path) {
+    const std::string end = extension(path);
+    const std::string unusable = "read_image: " + path + ": damaged, truncated, or not a " + end + " file";
+    const bool is_nifti = end.rfind(".nii", 0) == 0, is_meta = end.rfind(".mh", 0) == 0;
+    const bool is_nrrd = end == ".nrrd" || end == ".nhdr", is_hdf5 = !is_nifti && !is_meta && !is_nrrd;
+    std::optional<TextHeader> header;
+    if (is_nrrd || is_meta) header.emplace(path);
+    if (is_meta) require_meta_header(*header, unusable);
+    PixelPlace begin;
+    begin.path = path;
+    begin.packed = end == ".nii.gz";
+    std::optional<NiftiHeader> nifti;
+    if (is_nifti) nifti.emplace(begin, unusable);
+    const QuietHdf5 quiet;
+    const itk::ImageIOBase::Pointer io = make_io(end);
+    io->SetFileName(path);
+    with_itk(Errc::InvalidInput, unusable, [&] {
+        if (!io->CanReadFile(path.c_str())) throw Error(Errc::InvalidInput, unusable);
+        io->ReadImageInformation();
+    });
+
+    ImageInfo info;
+    info.type = itk_pixel_type(path, *io);
+    info.geometry = itk_geometry(path, *io);
+    info.axis_order = io->GetNumberOfDimensions() > 3 ? "XYZT" : "XYZ";
+    constexpr std::uint64_t kMost = std::uint64_t(1) << 20;
+    std::uint64_t frames = 1;
+    for (unsigned a = 3; a < io->GetNumberOfDimensions(); ++a)
+        frames = std::min(frames * std::min<std::uint64_t>(io->GetDimensions(a), kMost), kMost);
+    info.frames = static_cast<int>(std::max<std::uint64_t>(frames, 1));
+    info.channels = static_cast<int>(std::clamp<std::uint64_t>(io->GetNumberOfComponents(), 1, kMost));
+    if (info.channels > 1) info.axis_order = "C" + info.axis_order;
+    if (io->GetPixelType() == itk::IOPixelEnum::RGB) info.channel_names = {"red", "green", "blue"};
+
+    std::optional<PixelPlace> place;
+    if (is_nifti) {
+        place = nifti_pixels(*nifti, begin, info);
+        scale_nifti_origin(*nifti, info.geometry);
+        info.geometry.unit = "mm";  // ITK converts NIfTI to millimetres
+        const bool integers = info.type != PixelType::Float && info.type != PixelType::Double;
+        if (!place || info.channels > 1 || (integers && info.type != place->type))
+            throw read_error(Errc::Unsupported, path, "expected a NIfTI file in one piece with grey values");
+    } else if (is_hdf5) {
+        info.format = "HDF5 (ITK's layout)";
+        info.fields = {{"ITKImage/0", "Dimension, Spacing, Origin, Directions, VoxelData"}};
+    } else {
+        info.format = is_meta ? "MetaImage" : "NRRD";
+        read_text_header(*header, info);
+        place = is_meta ? meta_pixels(path, *header, info.type) : nrrd_pixels(path, *header, info.type, info.channels);
+    }
+    if (place) return open_placed(path, info, *place);
+    constexpr std::uint64_t kMostPixels = std::uint64_t(1) << 48;
+    if (std::uint64_t(info.channels) * std::uint64_t(info.frames) > kMostPixels / voxel_count(info.geometry.size))
+        throw read_error(Errc::InvalidInput, path, "the header claims " + size_text(info.geometry.size) + " voxels of " +
+                                                       std::to_string(info.channels) + " channels and " +
+                                                       std::to_string(info.frames) + " frames");
+    const bool detached = header && !header->data_file().empty();
+    return std::make_unique<ItkFile>(path, unusable, info, io, is_hdf5, detached ? 0 : fs::file_size(path));
+}
+
+void write_itk(const std::string& path, const ImageGeometry& g, PixelType type, const void* values,
+               const ImageMetadata& metadata) {
+    const itk::ImageIOBase::Pointer io = make_io(extension(path));
+    with_itk(Errc::Io, "write_image: " + path + ": cannot write", [&] {
+        io->SetFileName(path);
+        io->SetNumberOfDimensions(3);
+        itk::ImageIORegion region(3);
+        for (unsigned a = 0; a < 3; ++a) {
+            io->SetDimensions(a, static_cast<itk::SizeValueType>(g.size[a]));
+            io->SetSpacing(a, g.spacing[a]);
+            io->SetOrigin(a, g.origin[a]);
+            io->SetDirection(a, std::vector<double>{g.direction[0][a], g.direction[1][a], g.direction[2][a]});
+            region.SetSize(a, static_cast<itk::SizeValueType>(g.size[a]));
+        }
+        io->SetIORegion(region);
+        io->SetNumberOfComponents(1);
+        io->SetPixelType(itk::IOPixelEnum::SCALAR);
+        io->SetComponentType(component_type(type));
+        io->SetUseCompression(true);
+        // ITK has no field for the unit; as a key of our own the file keeps it, and read_image finds it again.
+        if (!g.unit.empty()) itk::EncapsulateMetaData<std::string>(io->GetMetaDataDictionary(), "unit", g.unit);
+        if (extension(path) == ".nrrd")
+            for (const auto& [key, value] : metadata)
+                itk::EncapsulateMetaData<std::string>(io->GetMetaDataDictionary(), key, value);
+        io->WriteImageInformation();
+        io->Write(values);
+    });
+}
+
+}  // namespace covol::detail

@@ -1,0 +1,18 @@
+#pragma once
+#include <memory>
+#include <string>
+
+#include "covol/run.h"
+#include "io/image/raw_image.h"
+
+namespace covol::detail {
+
+/// The pages of a TIFF as one 3D image, straight through libtiff: ITK drops the spacing that ImageJ and OME store, and
+/// reads no hyperstacks. Pages are z unless the description says otherwise (see tiff_stack.h). Samples of a pixel
+/// (colour) are channels.
+std::unique_ptr<ImageFile> open_tiff(const std::string& path, const RunContext& run);
+
+/// One deflated page per z; spacing, unit and origin as ImageJ has them. TIFF has no place for a direction.
+void write_tiff(const std::string& path, const ImageGeometry& geometry, PixelType type, const void* values);
+
+}  // namespace covol::detail

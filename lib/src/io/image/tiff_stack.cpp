@@ -1,0 +1,426 @@
+// The three ways in which programs describe what the pages of a TIFF are.
+#include "io/image/tiff_stack.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "io/image/raw_image.h"
+
+namespace covol::detail {
+namespace {
+
+namespace fs = std::filesystem;
+
+// More planes than any microscope makes; a damaged description may claim more.
+constexpr std::uint64_t kMostPlanes = std::uint64_t(1) << 24;
+
+double to_number(const std::string& text) {
+    double value = 0;
+    const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), value);
+    return status == std::errc() && std::isfinite(value) ? value : 0;
+}
+
+double to_length(const std::string& text) { return std::max(0.0, to_number(text)); }
+
+std::uint64_t to_count(const std::string& text, std::uint64_t otherwise = 1) {
+    const double value = to_number(text);
+    return !text.empty() && value >= 0 && value < 1e9 ? static_cast<std::uint64_t>(value) : otherwise;
+}
+
+std::uint64_t at_least_one(const std::string& text) { return std::max<std::uint64_t>(1, to_count(text)); }
+
+/// Expresses the lengths along j and k in the unit of i where both units are known.
+void unify_units(TiffStack& stack, const std::array<std::string, 3>& units) {
+    stack.unit = units[0];
+    const double first = unit_in_metres(units[0]);
+    for (int a = 1; a < 3; ++a) {
+        const double own = unit_in_metres(units[a]);
+        if (own > 0 && first > 0 && own != first) stack.spacing[a] *= own / first;
+    }
+}
+
+/// The spacing along x and y from the resolution, in whatever unit.
+void read_resolution(const TiffFacts& facts, TiffStack& stack) {
+    for (std::size_t a = 0; a < 2; ++a) {
+        const float spacing = 1.0F / facts.resolution[a];
+        if (!std::isfinite(spacing) || !(spacing > 0)) continue;
+        // libtiff hands out single precision; the shortest text that means this float is what was meant (0.35).
+        std::array<char, 32> text{};
+        const auto end = std::to_chars(text.data(), text.data() + text.size(), spacing).ptr;
+        std::from_chars(text.data(), end, stack.spacing[a]);
+        stack.fields.emplace_back(a == 0 ? "XResolution" : "YResolution",
+                                  "1 / " + std::string(text.data(), std::size_t(end - text.data())));
+    }
+}
+
+// ---- ImageJ ----------------------------------------------------------------------------------------------------------
+
+/// The value of `key=` in ImageJ's description, one key a line.
+std::string imagej_value(const std::string& description, const std::string& key) {
+    for (std::size_t begin = 0; begin < description.size();) {
+        const std::size_t end = std::min(description.find('\n', begin), description.size());
+        if (description.compare(begin, key.size() + 1, key + "=") == 0)
+            return description.substr(begin + key.size() + 1, end - begin - key.size() - 1);
+        begin = end + 1;
+    }
+    return {};
+}
+
+void read_imagej(const TiffFacts& facts, TiffStack& stack) {
+    const auto value = [&](const char* key) {
+        std::string text = imagej_value(facts.description, key);
+        if (!text.empty()) stack.fields.emplace_back(key, text);
+        return text;
+    };
+    stack.format = "ImageJ TIFF";
+    stack.channels = at_least_one(value("channels"));
+    const std::string slices = value("slices");
+    stack.frames = at_least_one(value("frames"));
+    stack.slices = at_least_one(slices);
+    if (slices.empty() && stack.channels * stack.frames == 1) stack.slices = facts.pages;
+
+    std::array<std::string, 3> units{normal_unit(value("unit")), normal_unit(value("yunit")), normal_unit(value("zunit"))};
+    constexpr int kInch = 2, kCentimetre = 3;
+    if (units[0].empty() && facts.resolution_unit == kInch) units[0] = "inch";
+    if (units[0].empty() && facts.resolution_unit == kCentimetre) units[0] = "cm";
+    const std::string depth = value("spacing");
+    // One pixel per nothing is what writers leave when they know no spacing.
+    const bool known = !units[0].empty() || facts.resolution[0] != 1.0F || !depth.empty();
+    if (!known) return;
+    read_resolution(facts, stack);
+    stack.spacing[2] = to_length(depth);
+    // ImageJ leaves a depth of 1 out.
+    if (stack.spacing[2] == 0 && stack.spacing[0] > 0) stack.spacing[2] = 1;
+    unify_units(stack, units);
+    // The origin is told in voxels, as the voxel that lies at 0.
+    const std::array<std::string, 3> origin{value("xorigin"), value("yorigin"), value("zorigin")};
+    for (int a = 0; a < 3; ++a)
+        if (const double voxel = to_number(origin[a]); voxel != 0) stack.origin[a] = -voxel * stack.spacing[a];
+}
+
+// ---- tifffile --------------------------------------------------------------------------------------------------------
+
+/// tifffile's own description: {"shape": [58, 512, 512], "axes": "ZYX", "spacing": 1.0, "unit": "um"}.
+/// @returns whether it is one.
+bool read_tifffile(const TiffFacts& facts, TiffStack& stack) {
+    const auto json = nlohmann::json::parse(facts.description, nullptr, false);
+    if (!json.is_object() || !json.contains("shape") || !json.at("shape").is_array()) return false;
+    std::vector<std::uint64_t> shape;
+    for (const auto& n : json.at("shape")) shape.push_back(n.is_number_unsigned() ? n.get<std::uint64_t>() : 0);
+    std::string axes;
+    if (json.contains("axes") && json.at("axes").is_string()) axes = json.at("axes").get<std::string>();
+    if (axes.size() != shape.size()) axes = std::string("TCZYX").substr(shape.size() < 5 ? 5 - shape.size() : 0);
+    if (axes.size() != shape.size()) return false;
+    stack.format = "tifffile's TIFF";
+    stack.fields.emplace_back("axes", axes);
+    std::uint64_t planes = 1;
+    TiffStack read = stack;
+    read.slices = 1;
+    read.order.clear();
+    for (std::size_t n = shape.size(); n-- > 0;) {
+        const char axis = axes[n];
+        if (axis == 'X' || axis == 'Y' || axis == 'S') continue;
+        std::uint64_t& count = axis == 'C' ? read.channels : axis == 'T' ? read.frames : read.slices;
+        count = shape[n];
+        read.order += axis == 'C' || axis == 'T' ? axis : 'Z';
+        if (shape[n] == 0 || (planes *= shape[n]) > kMostPlanes) break;
+    }
+    for (const char axis : {'Z', 'C', 'T'})
+        if (read.order.find(axis) == std::string::npos) read.order += axis;
+    if (planes == facts.pages && read.order.size() == 3) stack = read;
+    if (json.contains("spacing") && json.at("spacing").is_number()) {
+        const double depth = json.at("spacing").get<double>();
+        if (std::isfinite(depth) && depth > 0) {
+            stack.spacing[2] = depth;
+            stack.fields.emplace_back("spacing", std::to_string(depth));
+        }
+    }
+    if (json.contains("unit") && json.at("unit").is_string()) stack.unit = normal_unit(json.at("unit").get<std::string>());
+    // Without a resolution tifffile writes 1/1.
+    if (facts.resolution[0] != 1.0F && facts.resolution_unit == 1) read_resolution(facts, stack);
+    return true;
+}
+
+// ---- OME -------------------------------------------------------------------------------------------------------------
+
+struct XmlTag {
+    std::string name;  ///< without a namespace
+    bool closing = false;
+    std::map<std::string, std::string> attributes;
+
+    [[nodiscard]] std::string value(const std::string& key) const {
+        const auto found = attributes.find(key);
+        return found == attributes.end() ? "" : found->second;
+    }
+};
+
+std::string decode_entities(const std::string& text) {
+    static constexpr std::pair<const char*, const char*> kEntities[] = {
+        {"amp;", "&"},     {"lt;", "<"},          {"gt;", ">"},          {"quot;", "\""},     {"apos;", "'"},
+        {"#181;", "\xC2\xB5"}, {"#xB5;", "\xC2\xB5"}, {"#xb5;", "\xC2\xB5"}, {"#956;", "\xCE\xBC"}, {"#197;", "\xC3\x85"}};
+    std::string out;
+    for (std::size_t at = 0; at < text.size(); ++at) {
+        out += text[at];
+        if (text[at] != '&') continue;
+        for (const auto& [name, meaning] : kEntities) {
+            const std::string_view entity(name);
+            if (text.compare(at + 1, entity.size(), entity) != 0) continue;
+            out.back() = meaning[0];
+            out += meaning + 1;
+            at += entity.size();
+            break;
+        }
+    }
+    return out;
+}
+
+/// Goes through the tags of an XML text; comments, declarations and text are passed over. Whatever is no XML ends it.
+class XmlTags {
+public:
+    explicit XmlTags(const std::string& text) : text_(text) {}
+
+    bool next(XmlTag& tag) {
+        while ((at_ = text_.find('<', at_)) != std::string::npos) {
+            if (text_.compare(at_, 4, "<!--") == 0) {
+                at_ = text_.find("-->", at_);
+                if (at_ == std::string::npos) return false;
+                continue;
+            }
+            ++at_;
+            if (at_ < text_.size() && (text_[at_] == '?' || text_[at_] == '!')) continue;
+            return read(tag);
+        }
+        return false;
+    }
+
+private:
+    static bool is_space(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
+    void skip_spaces() {
+        while (at_ < text_.size() && is_space(text_[at_])) ++at_;
+    }
+    std::string word() {
+        const std::size_t begin = at_;
+        while (at_ < text_.size() && !is_space(text_[at_]) && text_[at_] != '=' && text_[at_] != '>' && text_[at_] != '/') ++at_;
+        const std::string name = text_.substr(begin, at_ - begin);
+        return name.substr(name.rfind(':') == std::string::npos ? 0 : name.rfind(':') + 1);
+    }
+    bool read(XmlTag& tag) {
+        tag = {};
+        if (at_ < text_.size() && text_[at_] == '/') {
+            tag.closing = true;
+            ++at_;
+        }
+        tag.name = word();
+        for (;;) {
+            skip_spaces();
+            if (at_ >= text_.size() || text_[at_] == '>') return at_ < text_.size();
+            if (text_[at_] == '/') {
+                ++at_;
+                continue;
+            }
+            const std::string key = word();
+            skip_spaces();
+            if (key.empty() || at_ >= text_.size() || text_[at_] != '=') return false;
+            ++at_;
+            skip_spaces();
+            const char quote = at_ < text_.size() ? text_[at_] : '\0';
+            const std::size_t end = quote == '"' || quote == '\'' ? text_.find(quote, at_ + 1) : std::string::npos;
+            if (end == std::string::npos) return false;
+            tag.attributes[key] = decode_entities(text_.substr(at_ + 1, end - at_ - 1));
+            at_ = end + 1;
+        }
+    }
+
+    const std::string& text_;
+    std::size_t at_ = 0;
+};
+
+/// <TiffData>: which pages hold which planes.
+struct TiffData {
+    std::string ifd, plane_count, file;  ///< as written; empty: not given
+    std::uint64_t z = 0, c = 0, t = 0;
+};
+
+struct OmePixels {
+    XmlTag pixels;
+    std::vector<std::string> channels;
+    std::vector<TiffData> data;
+    std::string metadata_file;  ///< the XML lies in another file
+    int images = 0;
+};
+
+/// The first image of the XML.
+OmePixels parse_ome(const std::string& xml) {
+    OmePixels ome;
+    XmlTags tags(xml);
+    XmlTag tag;
+    while (tags.next(tag)) {
+        if (tag.closing) continue;
+        if (tag.name == "BinaryOnly") ome.metadata_file = tag.value("MetadataFile");
+        // Some writers leave <Image> out.
+        if (tag.name == "Image") ++ome.images;
+        if (ome.images > 1) continue;
+        if (tag.name == "Pixels" && ome.pixels.name.empty()) ome.pixels = tag;
+        if (tag.name == "Channel") ome.channels.push_back(tag.value("Name"));
+        if (tag.name == "TiffData")
+            ome.data.push_back({tag.value("IFD"), tag.value("PlaneCount"), "", to_count(tag.value("FirstZ"), 0),
+                                to_count(tag.value("FirstC"), 0), to_count(tag.value("FirstT"), 0)});
+        if (tag.name == "UUID" && !ome.data.empty()) ome.data.back().file = tag.value("FileName");
+    }
+    return ome;
+}
+
+OmePixels read_ome_xml(const TiffFacts& facts) {
+    OmePixels ome = parse_ome(facts.description);
+    if (!ome.pixels.name.empty() || ome.metadata_file.empty()) return ome;
+    constexpr std::uintmax_t kLargest = std::uintmax_t(256) << 20;
+    const fs::path other = fs::path(facts.path).parent_path() / fs::path(ome.metadata_file).filename();
+    std::error_code status;
+    const std::uintmax_t bytes = fs::file_size(other, status);
+    if (status || bytes > kLargest)
+        throw read_error(Errc::Io, facts.path, "its description lies in " + other.string() + ", which cannot be read");
+    std::string xml(bytes, '\0');
+    std::ifstream(other, std::ios::binary).read(xml.data(), static_cast<std::streamsize>(bytes));
+    return parse_ome(xml);
+}
+
+/// Fills stack.planes from <TiffData>.
+class OmePlanes {
+public:
+    OmePlanes(const TiffFacts& facts, TiffStack& stack) : facts_(facts), stack_(stack) {}
+
+    void assign(const std::vector<TiffData>& data) {
+        const std::uint64_t planes = stack_.slices * stack_.channels * stack_.frames;
+        stack_.planes.assign(planes, {});
+        name_files(data);
+        for (const TiffData& block : data) {
+            if (block.z >= stack_.slices || block.c >= stack_.channels || block.t >= stack_.frames)
+                throw read_error(Errc::InvalidInput, facts_.path, "its OME-XML names a plane beyond SizeZ, SizeC or SizeT");
+            const std::uint32_t file = number_of(block.file);
+            const std::uint64_t first = stack_.number(block.z, block.c, block.t);
+            const std::uint64_t page = to_count(block.ifd, 0);
+            std::uint64_t count = 1;
+            if (!block.plane_count.empty())
+                count = to_count(block.plane_count, 0);
+            else if (block.ifd.empty())
+                count = pages_of(file);
+            for (std::uint64_t n = 0; n < count && first + n < planes && page + n < kMostPlanes; ++n)
+                stack_.planes[first + n] = {file, static_cast<std::uint32_t>(page + n)};
+        }
+    }
+
+private:
+    /// A single name that is not ours means that the file has been renamed.
+    void name_files(const std::vector<TiffData>& data) {
+        const std::string own = fs::path(facts_.path).filename().string();
+        numbers_[""] = numbers_[own] = 0;
+        std::map<std::string, int> others;
+        bool own_is_named = false;
+        for (const TiffData& block : data) {
+            own_is_named = own_is_named || block.file.empty() || block.file == own;
+            if (!block.file.empty() && block.file != own) ++others[block.file];
+        }
+        if (!own_is_named && others.size() == 1 && !fs::exists(path_of(others.begin()->first)))
+            numbers_[others.begin()->first] = 0;
+    }
+    [[nodiscard]] std::string path_of(const std::string& name) const {
+        return (fs::path(facts_.path).parent_path() / fs::path(name).filename()).string();
+    }
+    std::uint32_t number_of(const std::string& name) {
+        const auto [entry, is_new] = numbers_.try_emplace(name, static_cast<std::uint32_t>(stack_.files.size()));
+        if (is_new) stack_.files.push_back(path_of(name));
+        return entry->second;
+    }
+    std::uint64_t pages_of(std::uint32_t file) {
+        return file == 0 ? facts_.pages : facts_.count_pages(stack_.files[file]);
+    }
+
+    const TiffFacts& facts_;
+    TiffStack& stack_;
+    std::map<std::string, std::uint32_t> numbers_;
+};
+
+void read_ome(const TiffFacts& facts, TiffStack& stack) {
+    const OmePixels ome = read_ome_xml(facts);
+    const XmlTag& pixels = ome.pixels;
+    if (pixels.name.empty()) return;
+    const auto value = [&](const std::string& key) {
+        std::string text = pixels.value(key);
+        if (!text.empty()) stack.fields.emplace_back(key, text);
+        return text;
+    };
+    stack.format = "OME-TIFF";
+    stack.slices = at_least_one(value("SizeZ"));
+    stack.channels = at_least_one(value("SizeC"));
+    stack.frames = at_least_one(value("SizeT"));
+    if (ome.images > 1) stack.fields.emplace_back("Image", "the first of " + std::to_string(ome.images));
+    const std::string order = value("DimensionOrder");
+    if (order.size() == 5) stack.order = order.substr(2);
+    std::string sorted = stack.order;
+    std::sort(sorted.begin(), sorted.end());
+    if (sorted != "CTZ") stack.order = "CZT";
+    std::array<std::string, 3> units;
+    for (int a = 0; a < 3; ++a) {
+        const std::string key = std::string("PhysicalSize") + "XYZ"[a];
+        stack.spacing[a] = to_length(value(key));
+        const std::string unit = value(key + "Unit");
+        units[a] = unit.empty() ? "um" : normal_unit(unit);  // the OME schema's default
+    }
+    if (stack.spacing[0] > 0) unify_units(stack, units);
+    const bool named = std::any_of(ome.channels.begin(), ome.channels.end(), [](const std::string& n) { return !n.empty(); });
+    if (named && ome.channels.size() == stack.channels) stack.channel_names = ome.channels;
+    if (stack.slices > kMostPlanes || stack.channels > kMostPlanes || stack.frames > kMostPlanes ||
+        stack.slices * stack.channels > kMostPlanes || stack.slices * stack.channels * stack.frames > kMostPlanes)
+        throw read_error(Errc::InvalidInput, facts.path, "its OME-XML claims more planes than there can be; damaged");
+    if (!ome.data.empty()) OmePlanes(facts, stack).assign(ome.data);
+}
+
+}  // namespace
+
+std::uint64_t TiffStack::number(std::uint64_t z, std::uint64_t c, std::uint64_t t) const {
+    std::uint64_t number = 0;
+    std::uint64_t stride = 1;
+    for (const char axis : order) {
+        number += stride * (axis == 'Z' ? z : axis == 'C' ? c : t);
+        stride *= axis == 'Z' ? slices : axis == 'C' ? channels : frames;
+    }
+    return number;
+}
+
+TiffStack::Plane TiffStack::plane(std::uint64_t z, std::uint64_t c, std::uint64_t t) const {
+    const std::uint64_t n = number(z, c, t);
+    return planes.empty() ? Plane{0, static_cast<std::uint32_t>(n)} : planes[n];
+}
+
+std::uint64_t imagej_images(const std::string& description) {
+    return description.rfind("ImageJ=", 0) == 0 ? at_least_one(imagej_value(description, "images")) : 1;
+}
+
+TiffStack describe_tiff(const TiffFacts& facts) {
+    TiffStack stack;
+    stack.slices = facts.pages;
+    stack.files = {facts.path};
+    const std::string& text = facts.description;
+    if (text.rfind("ImageJ=", 0) == 0)
+        read_imagej(facts, stack);
+    else if (text.find("<OME") != std::string::npos || text.find(":OME") != std::string::npos)
+        read_ome(facts, stack);
+    else if (text.rfind('{', 0) == 0)
+        read_tifffile(facts, stack);
+    const bool in_order = stack.planes.empty();
+    if (in_order && (stack.slices > kMostPlanes || stack.channels > kMostPlanes || stack.frames > kMostPlanes ||
+                     stack.slices * stack.channels * stack.frames != facts.pages)) {
+        // The description is stale (a tool that kept it while it changed the pages): the pages are right.
+        stack.slices = facts.pages;
+        stack.channels = stack.frames = 1;
+        stack.channel_names.clear();
+    }
+    return stack;
+}
+
+}  // namespace covol::detail

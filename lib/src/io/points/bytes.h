@@ -1,0 +1,49 @@
+#pragma once
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <string_view>
+
+#include "io/points/point_text.h"
+
+namespace covol::detail {
+
+/// The number that begins at `data`. @param swap  its byte order is not this machine's
+template <typename T>
+[[nodiscard]] T load(const char* data, bool swap) {
+    std::array<char, sizeof(T)> bytes;
+    std::memcpy(bytes.data(), data, sizeof(T));
+    if (swap) std::reverse(bytes.begin(), bytes.end());
+    return std::bit_cast<T>(bytes);
+}
+
+/// A file's bytes, never read beyond their end.
+class Bytes {
+public:
+    /// @param name  for messages; both must outlive this
+    Bytes(std::string_view data, const std::string& name, std::endian order)
+        : data_(data), name_(name), swap_(order != std::endian::native) {}
+
+    [[nodiscard]] std::uint64_t size() const { return data_.size(); }
+    /// @throws Error InvalidInput beyond the end.
+    template <typename T>
+    [[nodiscard]] T at(std::uint64_t offset) const {
+        return load<T>(part(offset, sizeof(T)).data(), swap_);
+    }
+    [[nodiscard]] std::string_view part(std::uint64_t offset, std::uint64_t count) const {
+        if (offset > data_.size() || count > data_.size() - offset)
+            fail(name_, "expected " + std::to_string(count) + " bytes at byte " + std::to_string(offset) + ", the file has " +
+                            std::to_string(data_.size()) + "; it is truncated or damaged");
+        return data_.substr(offset, count);
+    }
+
+private:
+    std::string_view data_;
+    const std::string& name_;
+    bool swap_;
+};
+
+}  // namespace covol::detail

@@ -1,0 +1,103 @@
+#include "io/points/point_files.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <numbers>
+
+#include "base/file.h"
+#include "covol/error.h"
+#include "io/points/point_formats.h"
+#include "io/points/point_text.h"
+
+namespace covol::detail {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string read_text(const std::string& path) {
+    std::error_code status;
+    if (!fs::exists(path, status)) throw Error(Errc::Io, "read_points: " + path + ": no such file");
+    std::ifstream file(path, std::ios::binary);
+    if (!fs::is_regular_file(path, status) || !file)
+        throw Error(Errc::Io, "read_points: " + path + ": cannot be opened");
+    std::string text(fs::file_size(path), '\0');
+    file.read(text.data(), static_cast<std::streamsize>(text.size()));
+    text.resize(static_cast<std::size_t>(file.gcount()));
+    return text;
+}
+
+using Parser = std::function<PointTable(const std::string& path, const std::string& content)>;
+
+struct Format {
+    const char* ending;
+    Parser parse;
+};
+
+PointTable parse_table(const std::string& path, const std::string& text) { return parse_columns(path, text, false); }
+PointTable parse_blanks(const std::string& path, const std::string& text) { return parse_columns(path, text, true); }
+
+PointTable parse_one_roi(const std::string& path, const std::string& bytes) {
+    return parse_roi(path, bytes, fs::path(path).stem().string());
+}
+
+PointTable refuse_laz(const std::string& path, const std::string&) {
+    throw Error(Errc::Unsupported,
+                "read_points: " + path + ": LAZ is not read; unpack it to .las with laszip or pdal translate");
+}
+
+const std::vector<Format>& formats() {
+    static const std::vector<Format> list{
+        {".xyz", parse_blanks},      {".txt", parse_blanks},      {".pts", parse_blanks},  {".asc", parse_blanks},
+        {".csv", parse_table},       {".tsv", parse_table},       {".ply", parse_ply},     {".obj", parse_obj},
+        {".off", parse_off},         {".roi", parse_one_roi},     {".zip", parse_roi_zip}, {".json", parse_markups},
+        {".fcsv", parse_fcsv},       {".landmarks", parse_landmarks}, {".lmk", parse_landmarks},
+        {".annot", parse_annotations}, {".pcd", parse_pcd},       {".las", parse_las},     {".laz", refuse_laz}};
+    return list;
+}
+
+}  // namespace
+
+std::vector<Vec3> ellipse(const Vec3& centre, const Vec3& u, const Vec3& v) {
+    double longest = 0;
+    for (int a = 0; a < 3; ++a) longest = std::max({longest, std::abs(u[a]), std::abs(v[a])});
+    constexpr double kFewest = 16, kMost = 4096;
+    const int count = static_cast<int>(std::clamp(std::ceil(2 * std::numbers::pi * longest), kFewest, kMost));
+    std::vector<Vec3> points;
+    for (int n = 0; n < count; ++n) {
+        const double angle = 2 * std::numbers::pi * n / count, c = std::cos(angle), s = std::sin(angle);
+        points.push_back({centre[0] + c * u[0] + s * v[0], centre[1] + c * u[1] + s * v[1], centre[2] + c * u[2] + s * v[2]});
+    }
+    return points;
+}
+
+Vec3 normal_of(const Vec3& given) {
+    const double length = std::hypot(given[0], given[1], given[2]);
+    if (!std::isfinite(length) || !(length > 1e-30)) return {0, 0, 0};
+    return {given[0] / length, given[1] / length, given[2] / length};
+}
+
+void add_line(PointTable& table, const std::vector<Vec3>& points, bool closed, const std::string& name) {
+    const std::size_t begin = table.points.size();
+    table.points.insert(table.points.end(), points.begin(), points.end());
+    table.lines.push_back({begin, table.points.size(), closed, name});
+}
+
+PointTable read_point_table(const std::string& path) {
+    const std::string extension = detail::extension(path);
+    const auto& list = formats();
+    const auto format = std::find_if(list.begin(), list.end(), [&](const Format& f) { return f.ending == extension; });
+    if (format == list.end()) {
+        std::string known;
+        for (const Format& f : list) known += (known.empty() ? "" : ", ") + std::string(f.ending);
+        throw Error(Errc::Unsupported,
+                    "read_points: " + path + ": expected a name ending in one of " + known + ", got '" + extension + "'");
+    }
+    const std::string content = read_text(path);
+    if (content.empty()) fail(path, "the file is empty");
+    return format->parse(path, content);
+}
+
+}  // namespace covol::detail

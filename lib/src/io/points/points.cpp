@@ -1,0 +1,127 @@
+#include "covol/points.h"
+
+#include <array>
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "base/file.h"
+#include "covol/error.h"
+#include "io/points/point_files.h"
+#include "io/points/point_reading.h"
+
+namespace covol {
+namespace {
+
+// ---------------------------------------------------------------------------------------------- reading
+
+template <typename T>
+T first_stated(T options, T file, T otherwise) {
+    if (options != T::Unstated) return options;
+    return file != T::Unstated ? file : otherwise;
+}
+
+// ---------------------------------------------------------------------------------------------- writing
+
+void append_number(std::string& text, double value) {
+    std::array<char, 32> digits;
+    text.append(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr);
+}
+
+void append_row(std::string& text, const Vec3& p, char separator) {
+    append_number(text, p[0]);
+    text += separator;
+    append_number(text, p[1]);
+    text += separator;
+    append_number(text, p[2]);
+    text += '\n';
+}
+
+/// Each line of the comment behind `prefix`.
+std::string comment_lines(const std::string& comment, const std::string& prefix) {
+    std::string text;
+    std::istringstream lines(comment);
+    for (std::string line; std::getline(lines, line);) text += prefix + line + "\n";
+    return text;
+}
+
+std::string to_ply(const std::vector<Vec3>& points, const std::string& comment) {
+    std::string text = std::string("ply\nformat ") +
+                       (std::endian::native == std::endian::little ? "binary_little_endian" : "binary_big_endian") +
+                       " 1.0\n" + comment_lines(comment, "comment ") + "element vertex " +
+                       std::to_string(points.size()) +
+                       "\nproperty double x\nproperty double y\nproperty double z\nend_header\n";
+    text.append(reinterpret_cast<const char*>(points.data()), points.size() * sizeof(Vec3));
+    return text;
+}
+
+}  // namespace
+
+PointCloud read_points(const std::string& path, const ReadPointsOptions& options) {
+    if (!(options.scale > 0) || !std::isfinite(options.scale))
+        throw Error(Errc::InvalidOptions, "read_points: scale: expected > 0, got " + std::to_string(options.scale));
+    if (options.channels < 1)
+        throw Error(Errc::InvalidOptions,
+                    "read_points: channels: expected >= 1, got " + std::to_string(options.channels));
+    detail::PointTable table = detail::read_point_table(path);
+    if (table.points.empty())
+        throw Error(Errc::InvalidInput, "read_points: " + path + ": expected at least one point, got none");
+    PointCloud cloud;
+    cloud.source = path;
+    cloud.stated = (options.space != PointSpace::Unstated || table.space != PointSpace::Unstated) &&
+                   (options.order != PointOrder::Unstated || table.order != PointOrder::Unstated);
+    cloud.reading = {first_stated(options.space, table.space, PointSpace::World),
+                     first_stated(options.order, table.order, PointOrder::XYZ), options.scale,
+                     options.channels};
+    cloud.space = detail::space_after(cloud.reading.space);
+    cloud.points = std::move(table.points);
+    for (Vec3& p : cloud.points) p = detail::read_as(cloud.reading, p);
+    cloud.lines = std::move(table.lines);
+    if (cloud.space == PointSpace::World) {
+        cloud.normals = std::move(table.normals);
+        for (Vec3& n : cloud.normals) n = detail::direction_as(cloud.reading, n);
+        if (table.sensor) cloud.sensor = detail::read_as(cloud.reading, *table.sensor);
+        if (!cloud.normals.empty()) table.rule += " with normals";
+        if (cloud.sensor) table.rule += " seen from a sensor";
+    }
+    cloud.rule = table.rule + ", as " + detail::describe(cloud.reading);
+    return cloud;
+}
+
+std::vector<Vec3> to_world(const PointCloud& cloud, const ImageGeometry* geometry) {
+    if (cloud.space == PointSpace::World) return cloud.points;
+    if (geometry == nullptr)
+        throw Error(Errc::InvalidInput, "to_world: " + cloud.source +
+                                            ": the points are in an image's own frame, and there is no image; give one, "
+                                            "or --points-space world for points in lengths");
+    std::vector<Vec3> world;
+    world.reserve(cloud.points.size());
+    for (const Vec3& p : cloud.points) world.push_back(detail::to_world(cloud.space, p, *geometry));
+    return world;
+}
+
+void write_points(const std::string& path, const std::vector<Vec3>& points, const std::string& comment) {
+    const std::string extension = detail::extension(path);
+    std::string text;
+    if (extension == ".ply") {
+        text = to_ply(points, comment);
+    } else if (extension == ".xyz" || extension == ".csv") {
+        const bool csv = extension == ".csv";
+        text = comment_lines(comment, "# ") + (csv ? "x,y,z\n" : "");
+        for (const Vec3& p : points) append_row(text, p, csv ? ',' : ' ');
+    } else {
+        throw Error(
+            Errc::InvalidOptions,
+            "write_points: " + path + ": expected a name ending in .xyz, .csv or .ply, got '" + extension + "'");
+    }
+    detail::write_atomically(path, [&](const std::string& temporary) {
+        std::ofstream file(temporary, std::ios::binary);
+        file.write(text.data(), static_cast<std::streamsize>(text.size()));
+        file.close();
+        if (!file) throw Error(Errc::Io, "write_points: " + path + ": cannot write");
+    });
+}
+
+}  // namespace covol

@@ -1,0 +1,233 @@
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <vector>
+
+#include "covol/error.h"
+#include "covol/points.h"
+#include "io/points/point_reading.h"
+
+namespace covol {
+namespace {
+
+/// A way to read the same file.
+struct Reading {
+    ReadPointsOptions options;
+    int changes = 0;     ///< how many things are read otherwise than now
+    std::string advice;  ///< the options that ask for it
+};
+
+const char* flag_of(PointSpace space) {
+    switch (space) {
+        case PointSpace::Index: return "--points-space index";
+        case PointSpace::IndexOne: return "--points-space index1";
+        case PointSpace::Ras: return "--points-space ras";
+        case PointSpace::Local: return "--points-space local";
+        default: return "--points-space world";
+    }
+}
+
+/// What the mistake is called.
+std::string name_of(const Reading& reading, const ReadPointsOptions& now) {
+    std::string text;
+    const auto add = [&](const std::string& what) { text += (text.empty() ? "" : ", ") + what; };
+    if (reading.options.order != now.order) add("the order of the axes is reversed");
+    if (reading.options.space != now.space) switch (reading.options.space) {
+            case PointSpace::Index: add("they are voxels, not world units"); break;
+            case PointSpace::IndexOne: add("they are voxels counted from 1"); break;
+            case PointSpace::Ras: add("they are in RAS, the image is in LPS"); break;
+            case PointSpace::Local: add("they leave out the image's origin"); break;
+            default: add(now.space == PointSpace::Ras ? "they are in LPS, not in RAS" : "they are world units, not voxels");
+        }
+    if (reading.options.scale != now.scale) add("their unit is another than the image's (micrometre, millimetre)");
+    if (reading.options.channels != now.channels) add("their slices count the channels of a hyperstack");
+    return text;
+}
+
+class Checker {
+public:
+    Checker(const PointCloud& cloud, const ImageGeometry& geometry) : cloud_(cloud), geometry_(geometry), now_(cloud.reading) {
+        if (now_.space == PointSpace::Unstated) now_.space = cloud.space;  // a cloud that no file gave
+        if (now_.order == PointOrder::Unstated) now_.order = PointOrder::XYZ;
+        world_ = to_world(cloud, &geometry);
+    }
+
+    [[nodiscard]] std::size_t count_outside() const {
+        return static_cast<std::size_t>(
+            std::count_if(world_.begin(), world_.end(), [&](const Vec3& p) { return !is_inside(p); }));
+    }
+
+    [[nodiscard]] std::string boxes() const {
+        return "points from " + text_of(bounding_box(world_)) + ", image from " + text_of(geometry_.world_box());
+    }
+
+    /// The readings with the fewest changes that put every point inside. Another unit is the last thing to think of:
+    /// whatever is made small enough fits.
+    [[nodiscard]] std::vector<Reading> remedies() const {
+        std::vector<Reading> found;
+        const auto rank = [&](const Reading& r) { return std::pair(r.options.scale != now_.scale && !in_voxels(r.options), r.changes); };
+        std::vector<Reading> candidates = others();
+        std::stable_sort(candidates.begin(), candidates.end(), [&](const Reading& a, const Reading& b) { return rank(a) < rank(b); });
+        for (const Reading& reading : candidates) {
+            if (!found.empty() && rank(reading) > rank(found.front())) break;
+            if (rank(reading).first && is_speck(reading)) continue;
+            if (fits(reading)) found.push_back(reading);
+        }
+        // Voxels counted from 1 are told only where counting from 0 does not do.
+        const auto has = [&](PointSpace space, PointOrder order) {
+            return std::any_of(found.begin(), found.end(), [&](const Reading& r) {
+                return r.options.space == space && r.options.order == order;
+            });
+        };
+        std::erase_if(found, [&](const Reading& r) {
+            return r.options.space == PointSpace::IndexOne && has(PointSpace::Index, r.options.order);
+        });
+        return found;
+    }
+
+    [[nodiscard]] std::string name(const Reading& reading) const { return name_of(reading, now_); }
+
+    /// Clicked marks lie on slices and often on whole voxels. A reading that puts them all on voxel centres along more
+    /// axes than the present one does, is more plausible.
+    [[nodiscard]] std::vector<Reading> more_plausible() const {
+        constexpr std::size_t kFewest = 8;  // fewer may lie on voxel centres by chance
+        if (world_.size() < kFewest || cloud_.stated || now_.scale != 1) return {};
+        const int axes = axes_on_centres(now_);
+        std::vector<Reading> best;
+        int most = axes;
+        for (const Reading& reading : others()) {
+            if (reading.options.scale != now_.scale || reading.options.space == PointSpace::IndexOne || !fits(reading)) continue;
+            const int count = axes_on_centres(reading.options);
+            if (count > most) {
+                most = count;
+                best.assign(1, reading);
+            }
+        }
+        return best;
+    }
+
+private:
+    [[nodiscard]] bool is_inside(const Vec3& world) const {
+        constexpr double kTolerance = 1e-3;  // voxels
+        const Vec3 index = geometry_.world_to_index(world);
+        for (int a = 0; a < 3; ++a)
+            if (index[a] < -0.5 - kTolerance || index[a] > geometry_.size[a] - 0.5 + kTolerance) return false;
+        return true;
+    }
+
+    /// A cloud point's position if it were read otherwise.
+    [[nodiscard]] Vec3 place(const ReadPointsOptions& reading, const Vec3& point) const {
+        return detail::to_world(detail::space_after(reading.space), detail::read_as(reading, detail::undo(now_, point)), geometry_);
+    }
+
+    [[nodiscard]] bool fits(const Reading& reading) const {
+        return std::all_of(cloud_.points.begin(), cloud_.points.end(),
+                           [&](const Vec3& p) { return is_inside(place(reading.options, p)); });
+    }
+
+    /// Made so small that fitting says nothing.
+    [[nodiscard]] bool is_speck(const Reading& reading) const {
+        constexpr double kLeast = 0.02;  // of the image's edge
+        std::vector<Vec3> index;
+        for (const Vec3& p : cloud_.points) index.push_back(geometry_.world_to_index(place(reading.options, p)));
+        const WorldBox box = bounding_box(index);
+        for (int a = 0; a < 3; ++a)
+            if (box.max[a] - box.min[a] >= kLeast * geometry_.size[a]) return false;
+        return true;
+    }
+
+    [[nodiscard]] int axes_on_centres(const ReadPointsOptions& reading) const {
+        constexpr double kTolerance = 0.01;  // voxels
+        std::array<bool, 3> on{true, true, true};
+        for (const Vec3& p : cloud_.points) {
+            const Vec3 index = geometry_.world_to_index(place(reading, p));
+            for (int a = 0; a < 3; ++a) on[a] = on[a] && std::abs(index[a] - std::round(index[a])) < kTolerance;
+        }
+        return int(on[0]) + int(on[1]) + int(on[2]);
+    }
+
+    static bool in_voxels(const ReadPointsOptions& reading) {
+        return reading.space == PointSpace::Index || reading.space == PointSpace::IndexOne;
+    }
+
+    /// All other readings, fewest changes first.
+    [[nodiscard]] std::vector<Reading> others() const {
+        std::vector<Reading> list;
+        if (now_.channels != 1) return list;  // a slice cannot be undone
+        const bool lengths = !in_voxels(now_);
+        const bool shifted = geometry_.origin != Vec3{0, 0, 0} || !geometry_.is_axis_aligned();
+        for (const PointSpace space : {PointSpace::World, PointSpace::Index, PointSpace::IndexOne, PointSpace::Ras, PointSpace::Local,
+                                       PointSpace::Slices}) {
+            if ((space == PointSpace::Slices && now_.space != space) || (space == PointSpace::Local && !shifted)) continue;
+            const bool voxels = in_voxels({space});
+            for (const PointOrder order : {PointOrder::XYZ, PointOrder::ZYX})
+                for (const double scale : {1.0, 1e3, 1e-3}) {
+                    if (voxels && scale != 1) continue;
+                    add(list, {space, order, voxels && lengths ? 1.0 : now_.scale * scale, 1});
+                }
+        }
+        constexpr int kMostChannels = 6;
+        if (!lengths)
+            for (int channels = 2; channels <= kMostChannels; ++channels) add(list, {now_.space, now_.order, now_.scale, channels});
+        std::stable_sort(list.begin(), list.end(), [](const Reading& a, const Reading& b) { return a.changes < b.changes; });
+        return list;
+    }
+
+    void add(std::vector<Reading>& list, const ReadPointsOptions& options) const {
+        constexpr int kMostChanges = 2;
+        Reading reading{options, 0, ""};
+        const auto change = [&](const std::string& advice) {
+            ++reading.changes;
+            reading.advice += (reading.advice.empty() ? "" : " ") + advice;
+        };
+        if (options.space != now_.space) change(flag_of(options.space));
+        if (options.order != now_.order) change(options.order == PointOrder::ZYX ? "--points-order zyx" : "--points-order xyz");
+        if (options.channels != now_.channels) change("--points-channels " + std::to_string(options.channels));
+        if (options.scale != now_.scale && !in_voxels(options)) {
+            std::ostringstream flag;
+            flag << "--points-scale " << options.scale;
+            change(flag.str());
+        }
+        if (reading.changes > 0 && reading.changes <= kMostChanges) list.push_back(reading);
+    }
+
+    static std::string text_of(const WorldBox& box) {
+        std::ostringstream s;
+        s << "(" << box.min[0] << ", " << box.min[1] << ", " << box.min[2] << ") to (" << box.max[0] << ", " << box.max[1]
+          << ", " << box.max[2] << ")";
+        return s.str();
+    }
+
+    const PointCloud& cloud_;
+    const ImageGeometry& geometry_;
+    ReadPointsOptions now_;
+    std::vector<Vec3> world_;
+};
+
+std::string advice_of(const Checker& checker, const std::vector<Reading>& remedies, bool spacing_known) {
+    std::string text;
+    for (const Reading& reading : remedies)
+        text += (text.empty() ? "; " : ", or ") + reading.advice + " would bring them inside (" + checker.name(reading) + ")";
+    if (remedies.size() > 1) text += "; more than one reading fits: look which one is meant";
+    if (!spacing_known) text += "; the image states no spacing, --spacing sx,sy,sz gives it";
+    return text;
+}
+
+}  // namespace
+
+void check_inside(const PointCloud& cloud, const ImageGeometry& geometry, const RunContext& run) {
+    const Checker checker(cloud, geometry);
+    const std::size_t outside = checker.count_outside();
+    if (outside > 0)
+        throw Error(Errc::InvalidInput, "check_inside: " + cloud.source + ": " + std::to_string(outside) + " of " +
+                                            std::to_string(cloud.points.size()) + " points lie outside the image: " + checker.boxes() +
+                                            advice_of(checker, checker.remedies(), geometry.spacing_known));
+    if (!geometry.spacing_known && cloud.space != PointSpace::Index)
+        run.warn(cloud.source + ": the points are in world units, and the image states no spacing, so that a voxel counts as 1: "
+                                "--spacing sx,sy,sz gives it, or --points-space index if the points are voxels");
+    for (const Reading& reading : checker.more_plausible())
+        run.warn(cloud.source + ": the points lie inside the image, but " + reading.advice +
+                 " would put them on voxel centres: is it that " + checker.name(reading) + "?");
+}
+
+}  // namespace covol

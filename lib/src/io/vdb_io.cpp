@@ -1,0 +1,324 @@
+#include "covol/vdb_io.h"
+
+#include <openvdb/io/Archive.h>
+#include <openvdb/io/File.h>
+#include <openvdb/io/GridDescriptor.h>
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <set>
+
+#include "base/file.h"
+#include "covol/error.h"
+
+namespace covol {
+namespace {
+
+namespace fs = std::filesystem;
+namespace vdb = openvdb;
+
+std::string one_line(std::string text) {
+    std::replace(text.begin(), text.end(), '\n', ' ');
+    return text;
+}
+
+/// Runs one call into OpenVDB and turns its exceptions into ours.
+template <typename Call>
+auto with_openvdb(Errc code, const std::string& what, Call&& call) {
+    try {
+        return call();
+    } catch (const Error&) {
+        throw;
+    } catch (const std::exception& e) {
+        throw Error(code, what + " (" + one_line(e.what()) + ")");
+    }
+}
+
+std::map<std::string, std::string> to_text(const vdb::MetaMap& metadata) {
+    std::map<std::string, std::string> result;
+    for (auto entry = metadata.beginMeta(); entry != metadata.endMeta(); ++entry)
+        result[entry->first] = entry->second->str();
+    return result;
+}
+
+/// Reads single grids out of a .vdb file. openvdb::io::File would do, were it not that it goes on reading behind the
+/// end of a damaged file, and makes a string of any length that such a file asks for. Here the stream throws at the
+/// file's end, and lengths are walked over before OpenVDB sees them.
+class Reader : public vdb::io::Archive {
+public:
+    explicit Reader(const std::string& path) : stream_(path, std::ios::binary) {
+        stream_.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
+        file_bytes_ = static_cast<std::int64_t>(fs::file_size(path));
+        readHeader(stream_);
+        tags_->setSeekable(true);
+        vdb::io::setStreamMetadataPtr(stream_, tags_, /*transfer=*/false);
+        setFormatVersion(stream_);
+        setLibraryVersion(stream_);
+        setDataCompression(stream_);
+        look_ahead([&] { skip_metadata(); });
+        vdb::MetaMap file_metadata;
+        file_metadata.readMeta(stream_);
+        if (!inputHasGridOffsets()) OPENVDB_THROW(vdb::IoError, "written to a stream, without grid offsets");
+        const std::int32_t count = readGridCount(stream_);
+        for (std::int32_t n = 0; n < count; ++n) {
+            look_ahead([&] {
+                for (const char* text : {"name", "type", "parent"}) skip_text(text);
+            });
+            Entry entry;
+            entry.empty_grid = entry.descriptor.read(stream_);
+            const std::int64_t end = entry.descriptor.getEndPos();
+            if (end < stream_.tellg() || end > file_bytes_) OPENVDB_THROW(vdb::IoError, "truncated");
+            stream_.seekg(end);
+            entries_.push_back(std::move(entry));
+        }
+    }
+    ~Reader() override {
+        stream_.exceptions(std::ios::goodbit);
+        // The tags die before the stream does.
+        vdb::io::clearStreamMetadataPtr(stream_);
+    }
+    Reader(const Reader&) = delete;
+    Reader& operator=(const Reader&) = delete;
+
+    [[nodiscard]] std::size_t size() const { return entries_.size(); }
+    [[nodiscard]] std::string name(std::size_t n) const { return entries_[n].descriptor.gridName(); }
+    [[nodiscard]] std::string type(std::size_t n) const { return entries_[n].descriptor.gridType(); }
+    [[nodiscard]] bool is_half(std::size_t n) const { return entries_[n].descriptor.saveFloatAsHalf(); }
+
+    /// Metadata and transform; the tree stays empty.
+    vdb::GridBase::Ptr read_metadata(std::size_t n) {
+        const Entry& entry = entries_[n];
+        seek_to_grid(entry);
+        readGridCompression(stream_);
+        entry.empty_grid->readMeta(stream_);
+        entry.empty_grid->readTransform(stream_);
+        return entry.empty_grid;
+    }
+
+    vdb::GridBase::Ptr read_whole(std::size_t n) {
+        const Entry& entry = entries_[n];
+        seek_to_grid(entry);
+        const vdb::GridBase::Ptr grid = entry.empty_grid->copyGridWithNewTree();
+        readGrid(grid, entry.descriptor, stream_);
+        if (entry.descriptor.isInstance()) {
+            for (std::size_t parent = 0; parent < entries_.size(); ++parent)
+                if (parent != n && !entries_[parent].descriptor.isInstance() &&
+                    entries_[parent].descriptor.uniqueName() == entry.descriptor.instanceParentName()) {
+                    grid->setTree(read_whole(parent)->baseTreePtr());
+                    return grid;
+                }
+            OPENVDB_THROW(vdb::IoError, "the grid that '" + grid->getName() + "' shares its tree with is missing");
+        }
+        return grid;
+    }
+
+private:
+    struct Entry {
+        vdb::io::GridDescriptor descriptor;
+        vdb::GridBase::Ptr empty_grid;
+    };
+
+    void seek_to_grid(const Entry& entry) {
+        const std::int64_t at = entry.descriptor.getGridPos();
+        if (at < 0 || at > file_bytes_) OPENVDB_THROW(vdb::IoError, "truncated");
+        stream_.seekg(at);
+        if (fileVersion() < vdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION) return;
+        look_ahead([&] {
+            stream_.seekg(sizeof(std::uint32_t), std::ios::cur);  // compression flags
+            skip_metadata();
+            skip_text("transform");
+        });
+    }
+
+    template <typename Walk>
+    void look_ahead(Walk&& walk) {
+        const auto here = stream_.tellg();
+        walk();
+        stream_.seekg(here);
+    }
+    std::uint32_t read_length() {
+        std::uint32_t length = 0;
+        stream_.read(reinterpret_cast<char*>(&length), sizeof(length));
+        return length;
+    }
+    void skip_text(const char* what) {
+        const std::uint32_t length = read_length();
+        if (length > file_bytes_ - stream_.tellg())
+            OPENVDB_THROW(vdb::IoError, "a " << what << " of " << length << " bytes does not fit into the file");
+        stream_.seekg(length, std::ios::cur);
+    }
+    void skip_metadata() {
+        const std::uint32_t count = read_length();
+        for (std::uint32_t n = 0; n < count; ++n)
+            for (const char* part : {"metadata name", "metadata type", "metadata value"}) skip_text(part);
+    }
+
+    vdb::io::StreamMetadata::Ptr tags_ = std::make_shared<vdb::io::StreamMetadata>();
+    std::ifstream stream_;
+    std::int64_t file_bytes_ = 0;
+    std::vector<Entry> entries_;
+};
+
+void require_readable(const std::string& where, const std::string& path) {
+    std::error_code status;
+    if (!fs::exists(path, status)) throw Error(Errc::Io, where + ": " + path + ": no such file");
+    if (!fs::is_regular_file(path, status) || !std::ifstream(path).good())
+        throw Error(Errc::Io, where + ": " + path + ": cannot be opened");
+    vdb::initialize();
+}
+
+std::string unusable(const std::string& where, const std::string& path) {
+    return where + ": " + path + ": damaged, truncated, or not a .vdb file";
+}
+
+bool is_float(const std::string& type) { return type == FloatGrid::gridType(); }
+
+/// "u (Tree_float_5_4_3), Cd (Tree_vec3s_5_4_3)"
+std::string list_grids(const Reader& reader) {
+    std::string list;
+    for (std::size_t n = 0; n < reader.size(); ++n)
+        list += (n == 0 ? "" : ", ") + reader.name(n) + " (" + reader.type(n) + ")";
+    return list.empty() ? "no grid at all" : list;
+}
+
+void check_grids(const std::string& path, const std::vector<FloatGridPtr>& grids) {
+    std::set<std::string> names;
+    for (const FloatGridPtr& grid : grids) {
+        if (!grid) throw Error(Errc::InvalidInput, "write_vdb: " + path + ": expected a grid, got a null pointer");
+        if (grid->getName().empty())
+            throw Error(Errc::InvalidInput, "write_vdb: " + path + ": expected a name for every grid, got none");
+        if (!names.insert(grid->getName()).second)
+            throw Error(Errc::InvalidInput,
+                        "write_vdb: " + path + ": expected unique names, got '" + grid->getName() + "' twice");
+    }
+}
+
+VdbGridInfo describe(Reader& reader, std::size_t n) {
+    vdb::GridBase::Ptr grid = reader.read_metadata(n);
+    const char* const kCount = vdb::GridBase::META_FILE_VOXEL_COUNT;
+    const char* const kMin = vdb::GridBase::META_FILE_BBOX_MIN;
+    const char* const kMax = vdb::GridBase::META_FILE_BBOX_MAX;
+    const auto has_statistics = [&] {
+        return grid->getMetadata<vdb::Int64Metadata>(kCount) && grid->getMetadata<vdb::Vec3IMetadata>(kMin) &&
+               grid->getMetadata<vdb::Vec3IMetadata>(kMax);
+    };
+    VdbGridInfo info;
+    info.metadata = to_text(*grid);
+    if (!has_statistics()) {
+        grid = reader.read_whole(n);
+        grid->addStatsMetadata();
+    }
+    info.name = reader.name(n);
+    info.type = reader.type(n) + (reader.is_half(n) ? "_HalfFloat" : "");
+    info.grid_class = vdb::GridBase::gridClassToString(grid->getGridClass());
+    info.voxel_size = grid->voxelSize()[0];
+    info.uniform = grid->hasUniformVoxels();
+    if (has_statistics()) {
+        info.active_voxels = static_cast<std::uint64_t>(grid->metaValue<std::int64_t>(kCount));
+        const auto lo = grid->metaValue<vdb::Vec3i>(kMin);
+        const auto hi = grid->metaValue<vdb::Vec3i>(kMax);
+        info.min = {lo[0], lo[1], lo[2]};
+        info.max = {hi[0], hi[1], hi[2]};
+    }
+    return info;
+}
+
+}  // namespace
+
+void write_vdb(const std::string& path, const std::vector<FloatGridPtr>& grids, const WriteVdbOptions& options) {
+    check_grids(path, grids);
+    vdb::initialize();
+    const auto add_provenance = [&](vdb::MetaMap& metadata) {
+        for (const auto& [key, value] : options.metadata) metadata.insertMeta(key, vdb::StringMetadata(value));
+        metadata.insertMeta(vdb::GridBase::META_GRID_CREATOR, vdb::StringMetadata("covol " COVOL_VERSION));
+    };
+    vdb::MetaMap file_metadata;
+    add_provenance(file_metadata);
+    vdb::GridPtrVec copies;  // of the metadata; the trees are shared
+    for (const FloatGridPtr& grid : grids) {
+        const FloatGridPtr copy = grid->copy();
+        add_provenance(*copy);
+        copy->setSaveFloatAsHalf(options.half);
+        copies.push_back(copy);
+    }
+    detail::write_atomically(path, [&](const std::string& temporary) {
+        with_openvdb(Errc::Io, "write_vdb: " + path + ": cannot write", [&] {
+            vdb::io::File file(temporary);
+            file.setCompression(vdb::io::COMPRESS_BLOSC | vdb::io::COMPRESS_ACTIVE_MASK);
+            file.setGridStatsMetadataEnabled(true);
+            file.write(copies, file_metadata);
+            file.close();
+        });
+    });
+}
+
+VdbGridName split_grid_name(const std::string& text) {
+    const std::size_t colon = text.find(".vdb:");
+    std::error_code status;
+    if (colon == std::string::npos || fs::exists(text, status)) return {text, ""};
+    return {text.substr(0, colon + 4), text.substr(colon + 5)};
+}
+
+FloatGridPtr read_vdb(const std::string& given, const std::string& wanted_name) {
+    const auto [path, named] = split_grid_name(given);
+    const std::string& name = wanted_name.empty() ? named : wanted_name;
+    require_readable("read_vdb", path);
+    return with_openvdb(Errc::InvalidInput, unusable("read_vdb", path), [&] {
+        Reader reader(path);
+        for (std::size_t n = 0; n < reader.size(); ++n) {
+            const bool usable = is_float(reader.type(n));
+            if (name.empty() ? !usable : reader.name(n) != name) continue;
+            if (!usable)
+                throw Error(Errc::InvalidInput, "read_vdb: " + path + ": expected float values in grid '" + name +
+                                                    "', got " + reader.type(n) + "; the file has " +
+                                                    list_grids(reader));
+            FloatGridPtr grid = vdb::gridPtrCast<FloatGrid>(reader.read_whole(n));
+            if (!grid) throw Error(Errc::InvalidInput, unusable("read_vdb", path));
+            return grid;
+        }
+        const std::string wanted = name.empty() ? "a float grid" : "a grid named '" + name + "'";
+        throw Error(Errc::InvalidInput, "read_vdb: " + path + ": expected " + wanted + ", got " + list_grids(reader));
+    });
+}
+
+FloatGridPtr read_vdb_level_set(const std::string& path, const RunContext& run) {
+    std::string chosen = split_grid_name(path).grid;
+    if (chosen.empty()) {
+        std::vector<std::string> level_sets, others;
+        for (const VdbGridInfo& grid : list_vdb(path)) {
+            if (!grid.type.starts_with(FloatGrid::gridType()) || grid.grid_class == "fog volume") continue;
+            (grid.grid_class == "level set" ? level_sets : others).push_back(grid.name);
+        }
+        const bool has_surface = std::find(level_sets.begin(), level_sets.end(), "surface") != level_sets.end();
+        if (level_sets.empty()) std::swap(level_sets, others);
+        if (!level_sets.empty()) chosen = has_surface ? "surface" : level_sets.front();
+        if (level_sets.size() > 1) {
+            std::string list;
+            for (const std::string& name : level_sets) list += (list.empty() ? "" : ", ") + name;
+            run.warn(path + ": '" + chosen + "' is taken of the level sets " + list + "; name one: " + path + ":" + level_sets.back());
+        }
+    }
+    const FloatGridPtr grid = read_vdb(path, chosen);
+    if (grid->getGridClass() == vdb::GRID_FOG_VOLUME)
+        throw Error(Errc::Unsupported, "read_vdb_level_set: " + path + ": grid '" + grid->getName() +
+                                           "': expected a level set, got a fog volume");
+    return grid;
+}
+
+std::vector<VdbGridInfo> list_vdb(const std::string& given) {
+    const auto [path, name] = split_grid_name(given);
+    require_readable("list_vdb", path);
+    return with_openvdb(Errc::InvalidInput, unusable("list_vdb", path), [&] {
+        Reader reader(path);
+        std::vector<VdbGridInfo> list;
+        for (std::size_t n = 0; n < reader.size(); ++n)
+            if (name.empty() || reader.name(n) == name) list.push_back(describe(reader, n));
+        if (list.empty() && !name.empty())
+            throw Error(Errc::InvalidInput, "list_vdb: " + path + ": expected a grid named '" + name + "', got " + list_grids(reader));
+        return list;
+    });
+}
+
+}  // namespace covol

@@ -1,0 +1,177 @@
+#include "covol/mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <numeric>
+
+#include "mesh/corner_table.h"
+
+namespace covol {
+namespace {
+
+using meshing::cross;
+using meshing::dot;
+using meshing::length;
+using meshing::minus;
+
+Vec3 point(const TriangleMesh& mesh, std::uint32_t v) { return meshing::to_vec3(mesh.vertices[v]); }
+
+bool is_degenerate(const std::array<std::uint32_t, 3>& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
+
+class DisjointSets {
+public:
+    explicit DisjointSets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0U); }
+    std::uint32_t root(std::uint32_t i) {
+        while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+        return i;
+    }
+    void unite(std::uint32_t a, std::uint32_t b) {
+        a = root(a);
+        b = root(b);
+        if (a != b) parent_[std::max(a, b)] = std::min(a, b);
+    }
+
+private:
+    std::vector<std::uint32_t> parent_;
+};
+
+/// A triangle's side from corner k to corner k+1, number 3 t + k, under its lower vertex.
+struct Side {
+    std::uint32_t high;
+    std::uint32_t number;
+    friend bool operator<(const Side& a, const Side& b) {
+        return a.high != b.high ? a.high < b.high : a.number < b.number;
+    }
+};
+std::uint32_t corner_vertex(const TriangleMesh& mesh, std::uint32_t corner) {
+    return mesh.triangles[corner / 3][corner % 3];
+}
+std::uint32_t next_corner(std::uint32_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
+
+/// Calls visit(first, last) with the sides that lie on each edge; degenerate triangles have none.
+template <typename Visit>
+void for_each_edge(const TriangleMesh& mesh, const Visit& visit) {
+    const auto corners = std::uint32_t(3 * mesh.triangles.size());
+    const auto low = [&](std::uint32_t c) { return std::min(corner_vertex(mesh, c), corner_vertex(mesh, next_corner(c))); };
+    std::vector<std::uint32_t> first(mesh.vertices.size() + 1, 0);
+    for (std::uint32_t c = 0; c < corners; ++c)
+        if (!is_degenerate(mesh.triangles[c / 3])) ++first[low(c) + 1];
+    std::partial_sum(first.begin(), first.end(), first.begin());
+    std::vector<Side> sides(first.back());
+    std::vector<std::uint32_t> fill(first.begin(), first.end() - 1);
+    for (std::uint32_t c = 0; c < corners; ++c)
+        if (!is_degenerate(mesh.triangles[c / 3]))
+            sides[fill[low(c)]++] = {std::max(corner_vertex(mesh, c), corner_vertex(mesh, next_corner(c))), c};
+    for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+        Side* side = sides.data() + first[v];
+        Side* const end = sides.data() + first[v + 1];
+        std::sort(side, end);
+        while (side != end) {
+            Side* last = side + 1;
+            while (last != end && last->high == side->high) ++last;
+            visit(side, last);
+            side = last;
+        }
+    }
+}
+
+/// Six times the signed volume between a triangle and `origin`.
+double six_volumes(const TriangleMesh& mesh, const std::array<std::uint32_t, 3>& t, const Vec3& origin) {
+    return dot(minus(point(mesh, t[0]), origin),
+               cross(minus(point(mesh, t[1]), origin), minus(point(mesh, t[2]), origin)));
+}
+
+}  // namespace
+
+MeshMeasures measure(const TriangleMesh& mesh) {
+    MeshMeasures m;
+    if (mesh.empty()) return m;
+    const Vec3 origin = point(mesh, mesh.triangles.front()[0]);
+    bool degenerate = false;
+    std::vector<bool> used(mesh.vertices.size(), false);
+    for (const auto& t : mesh.triangles) {
+        m.volume += six_volumes(mesh, t, origin) / 6;
+        m.area += length(cross(minus(point(mesh, t[1]), point(mesh, t[0])), minus(point(mesh, t[2]), point(mesh, t[0])))) / 2;
+        degenerate = degenerate || is_degenerate(t);
+        for (const std::uint32_t v : t) used[v] = true;
+    }
+
+    m.closed = m.manifold = !degenerate;
+    DisjointSets components(mesh.triangles.size());
+    DisjointSets umbrellas(3 * mesh.triangles.size());  // of corners, around their vertices
+    std::int64_t edges = 0;
+    for_each_edge(mesh, [&](const Side* first, const Side* last) {
+        ++edges;
+        const auto count = last - first;
+        if (count > 2) m.manifold = false;
+        const std::uint32_t c = first->number;
+        if (count != 2 || corner_vertex(mesh, c) == corner_vertex(mesh, first[1].number)) m.closed = false;
+        for (const Side* other = first + 1; other != last; ++other) {
+            const std::uint32_t o = other->number;
+            components.unite(c / 3, o / 3);
+            const bool opposite = corner_vertex(mesh, c) != corner_vertex(mesh, o);
+            umbrellas.unite(c, opposite ? next_corner(o) : o);
+            umbrellas.unite(next_corner(c), opposite ? o : next_corner(o));
+        }
+    });
+    std::int64_t umbrella_count = 0;
+    for (std::uint32_t c = 0; c < 3 * mesh.triangles.size(); ++c) umbrella_count += umbrellas.root(c) == c;
+    for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) m.components += components.root(t) == t;
+    if (umbrella_count != std::count(used.begin(), used.end(), true)) m.manifold = false;
+    const std::int64_t euler = umbrella_count - edges + std::int64_t(mesh.triangles.size());
+    m.genus = m.closed ? int(m.components - euler / 2) : -1;
+    return m;
+}
+
+double smallest_angle(const TriangleMesh& mesh) {
+    if (mesh.empty()) return 0;
+    std::vector<float> worst(mesh.triangles.size());
+    std::transform(mesh.triangles.begin(), mesh.triangles.end(), worst.begin(), [&](const auto& t) {
+        return float(meshing::worst_cosine(point(mesh, t[0]), point(mesh, t[1]), point(mesh, t[2])));
+    });
+    const auto rank = std::ptrdiff_t(worst.size() / 100);
+    std::nth_element(worst.begin(), worst.begin() + rank, worst.end(), std::greater<>());
+    return std::acos(std::clamp(double(worst[std::size_t(rank)]), -1.0, 1.0)) * 180 / std::numbers::pi;
+}
+
+std::vector<std::array<float, 3>> vertex_normals(const TriangleMesh& mesh) {
+    std::vector<Vec3> sums(mesh.vertices.size(), Vec3{0, 0, 0});
+    for (const auto& t : mesh.triangles)
+        for (int k = 0; k < 3; ++k) {
+            const Vec3 a = minus(point(mesh, t[(k + 1) % 3]), point(mesh, t[k]));
+            const Vec3 b = minus(point(mesh, t[(k + 2) % 3]), point(mesh, t[k]));
+            const Vec3 normal = cross(a, b);
+            const double size = length(normal);
+            if (!(size > 0)) continue;
+            const double angle = std::atan2(size, dot(a, b));
+            for (int c = 0; c < 3; ++c) sums[t[k]][c] += angle / size * normal[c];
+        }
+    std::vector<std::array<float, 3>> normals(sums.size());
+    for (std::size_t v = 0; v < sums.size(); ++v) {
+        const double size = length(sums[v]);
+        // A vertex without a direction of its own still needs a unit vector in most file formats.
+        normals[v] = size > 0 ? std::array{float(sums[v][0] / size), float(sums[v][1] / size), float(sums[v][2] / size)}
+                              : std::array{0.0F, 0.0F, 1.0F};
+    }
+    return normals;
+}
+
+void remove_small_components(TriangleMesh& mesh, double min_volume) {
+    DisjointSets components(mesh.triangles.size());
+    for_each_edge(mesh, [&](const Side* first, const Side* last) {
+        for (const Side* other = first + 1; other != last; ++other)
+            components.unite(first->number / 3, other->number / 3);
+    });
+    std::vector<double> volumes(mesh.triangles.size(), 0.0);
+    for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+        const std::uint32_t root = components.root(t);
+        volumes[root] += six_volumes(mesh, mesh.triangles[t], point(mesh, mesh.triangles[root][0])) / 6;
+    }
+    for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
+        if (std::abs(volumes[components.root(t)]) < min_volume) mesh.triangles[t].fill(meshing::CornerTable::kNone);
+    meshing::remove_gone(mesh.triangles, mesh.vertices);
+}
+
+}  // namespace covol

@@ -1,0 +1,102 @@
+#include "meshing/mesh_distance.h"
+
+#include <CGAL/AABB_traits.h>
+#include <CGAL/AABB_tree.h>
+#include <CGAL/AABB_triangle_primitive.h>
+#include <CGAL/Simple_cartesian.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <numeric>
+
+#include "covol/error.h"
+#include "covol/points.h"
+#include "covol/surface.h"
+
+namespace covol {
+namespace detail {
+namespace {
+
+using Kernel = CGAL::Simple_cartesian<double>;
+using Triangles = std::vector<Kernel::Triangle_3>;
+using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
+
+template <typename Real>
+Kernel::Point_3 to_cgal(const std::array<Real, 3>& p) {
+    return {p[0], p[1], p[2]};
+}
+
+/// Some of a mesh's triangles.
+class TriangleTree {
+public:
+    TriangleTree(const TriangleMesh& mesh, std::size_t begin, std::size_t end) {
+        triangles_.reserve(end - begin);
+        for (std::size_t n = begin; n < end; ++n) {
+            const auto& t = mesh.triangles[n];
+            triangles_.emplace_back(to_cgal(mesh.vertices[t[0]]), to_cgal(mesh.vertices[t[1]]), to_cgal(mesh.vertices[t[2]]));
+        }
+        tree_.insert(triangles_.begin(), triangles_.end());
+        // A tree of the vertices, for first guesses, would cost as much as all queries: the point before has a better one.
+        tree_.do_not_accelerate_distance_queries();
+        tree_.build();  // now, for queries from many threads must find it finished
+    }
+    /// The closest of `guess` and the points of the triangles.
+    [[nodiscard]] Kernel::Point_3 closest_point(const Kernel::Point_3& query, const Kernel::Point_3& guess) const {
+        return tree_.closest_point(query, guess);
+    }
+
+private:
+    Triangles triangles_;
+    CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>> tree_;
+};
+
+}  // namespace
+
+std::vector<double> distances_to(const TriangleMesh& mesh, const std::vector<Vec3>& points) {
+    // Several trees of triangles that follow each other, and so mostly lie close: CGAL builds a tree on one thread, and the
+    // faster the smaller it is. Each more costs a query a look at its root.
+    constexpr std::size_t kTriangles = 1 << 17;
+    const std::size_t count = mesh.triangles.size();
+    std::vector<std::unique_ptr<TriangleTree>> trees((count + kTriangles - 1) / kTriangles);
+    tbb::parallel_for(std::size_t(0), trees.size(), [&](std::size_t n) {
+        trees[n] = std::make_unique<TriangleTree>(mesh, n * kTriangles, std::min(count, (n + 1) * kTriangles));
+    });
+    if (points.empty()) return {};
+    const std::vector<std::uint32_t> order = spatial_order(points, points.size());
+    std::vector<double> distances(points.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, order.size(), 256), [&](const auto& range) {
+        Kernel::Point_3 closest = to_cgal(mesh.vertices[mesh.triangles.front()[0]]);
+        for (std::size_t n = range.begin(); n != range.end(); ++n) {
+            const Kernel::Point_3 query = to_cgal(points[order[n]]);
+            for (const auto& tree : trees) closest = tree->closest_point(query, closest);
+            distances[order[n]] = std::sqrt(CGAL::squared_distance(query, closest));
+        }
+    });
+    return distances;
+}
+
+FitStatistics statistics_of(std::vector<double> distances) {
+    FitStatistics fit;
+    fit.mean = std::accumulate(distances.begin(), distances.end(), 0.0) / double(distances.size());
+    const auto rank = std::size_t(std::ceil(0.95 * double(distances.size()))) - 1;
+    std::nth_element(distances.begin(), distances.begin() + std::ptrdiff_t(rank), distances.end());
+    fit.p95 = distances[rank];
+    fit.max = *std::max_element(distances.begin() + std::ptrdiff_t(rank), distances.end());
+    return fit;
+}
+
+}  // namespace detail
+
+FitStatistics points_to_surface(const std::vector<Vec3>& points, const TriangleMesh& mesh, const RunContext& run) {
+    if (points.empty()) throw Error(Errc::InvalidInput, "points_to_surface: expected at least one point, got none");
+    if (mesh.empty()) throw Error(Errc::InvalidInput, "points_to_surface: the surface has no triangle");
+    std::vector<double> distances;
+    with_threads(run, [&] { distances = detail::distances_to(mesh, points); });
+    return detail::statistics_of(std::move(distances));
+}
+
+}  // namespace covol

@@ -1,0 +1,252 @@
+#include "redistance/interface_patches.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "grid/cube_cases.h"
+
+namespace covol::detail {
+namespace {
+
+using Point = std::array<float, 3>;
+
+Point operator-(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+float dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Point cross(const Point& a, const Point& b) {
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+constexpr int kSide = kLeafDim + 1;                                ///< voxels along an edge of a leaf's cells
+constexpr float kOutside = std::numeric_limits<float>::infinity();  ///< stands for a voxel outside the domain
+
+constexpr int cell_voxel(int i, int j, int k) { return (i * kSide + j) * kSide + k; }
+constexpr std::array<int, 8> kCornerOffset = [] {
+    std::array<int, 8> offset{};
+    for (int c = 0; c < 8; ++c) offset[c] = cell_voxel(c >> 2 & 1, c >> 1 & 1, c & 1);
+    return offset;
+}();
+
+/// The values of u at the 9^3 corners of a leaf's cells.
+class CellValues {
+public:
+    CellValues(const FloatGrid& u, const Domain& domain) : accessor_(u.getConstAccessor()), domain_(box_of(domain)) {}
+
+    /// False when no cell has a crossing.
+    bool load(const Coord& origin) {
+        for (int block = 0; block < 8; ++block) load_block(origin, {block >> 2 & 1, block >> 1 & 1, block & 1});
+        const openvdb::CoordBBox box(origin, origin.offsetBy(kLeafDim));
+        if (!domain_.isInside(box)) clip(origin);
+        int inside = 0;
+        for (const float v : values_) inside += v < 0;
+        return inside != 0 && inside != kSide * kSide * kSide;
+    }
+
+    /// Bit c says that corner c of the cell is inside.
+    [[nodiscard]] int signs(int i, int j, int k) const {
+        const float* at = values_.data() + cell_voxel(i, j, k);
+        int result = 0;
+        for (int c = 0; c < 8; ++c) result |= (at[kCornerOffset[c]] < 0) << c;
+        return result;
+    }
+
+    /// A corner of the cell lies outside the domain.
+    [[nodiscard]] bool sticks_out(int i, int j, int k) const {
+        const float* at = values_.data() + cell_voxel(i, j, k);
+        return std::any_of(kCornerOffset.begin(), kCornerOffset.end(), [at](int c) { return at[c] == kOutside; });
+    }
+
+    /// Where edge e of the cell crosses zero, relative to the cell.
+    [[nodiscard]] Point crossing(int i, int j, int k, int e) const {
+        const float* at = values_.data() + cell_voxel(i, j, k);
+        const int a = kEdgeStart[e], b = edge_end(e);
+        const float va = at[kCornerOffset[a]], vb = at[kCornerOffset[b]];
+        Point point = {float(a >> 2 & 1), float(a >> 1 & 1), float(a & 1)};
+        point[edge_axis(e)] = std::isinf(va) || std::isinf(vb) ? 0.5F : va / (va - vb);
+        return point;
+    }
+
+private:
+    void load_block(const Coord& origin, const std::array<int, 3>& side) {
+        const Coord from = origin.offsetBy(side[0] * kLeafDim, side[1] * kLeafDim, side[2] * kLeafDim);
+        const auto* leaf = accessor_.probeConstLeaf(from);
+        const float* buffer = leaf ? leaf->buffer().data() : nullptr;
+        const float constant = leaf ? 0.0F : accessor_.getValue(from);
+        const std::array<int, 3> n = {side[0] ? 1 : kLeafDim, side[1] ? 1 : kLeafDim, side[2] ? 1 : kLeafDim};
+        for (int i = 0; i < n[0]; ++i)
+            for (int j = 0; j < n[1]; ++j) {
+                float* to = values_.data() +
+                            cell_voxel(i + side[0] * kLeafDim, j + side[1] * kLeafDim, side[2] * kLeafDim);
+                if (buffer)
+                    std::copy_n(buffer + leaf_offset(i, j, 0), n[2], to);
+                else
+                    std::fill_n(to, n[2], constant);
+            }
+    }
+
+    void clip(const Coord& origin) {
+        for (int i = 0; i < kSide; ++i)
+            for (int j = 0; j < kSide; ++j)
+                for (int k = 0; k < kSide; ++k)
+                    if (!domain_.isInside(origin.offsetBy(i, j, k))) values_[cell_voxel(i, j, k)] = kOutside;
+    }
+
+    FloatGrid::ConstAccessor accessor_;
+    openvdb::CoordBBox domain_;
+    std::array<float, kSide * kSide * kSide> values_;
+};
+
+/// Calls visit(i, j, k, case) for the cells with a crossing, in OpenVDB's order.
+template <typename Visit>
+void for_each_cell(const CellValues& values, DomainEnd end, const Visit& visit) {
+    for (int i = 0; i < kLeafDim; ++i)
+        for (int j = 0; j < kLeafDim; ++j)
+            for (int k = 0; k < kLeafDim; ++k)
+                if (const int signs = values.signs(i, j, k); signs != 0 && signs != 255)
+                    if (end == DomainEnd::Closed || !values.sticks_out(i, j, k)) visit(i, j, k, kCubeCases[signs]);
+}
+
+Patch make_patch(const Coord& origin, const Point* points, int count, std::uint32_t first) {
+    Patch patch{origin, {0, 0, 0}, {0, 0, 0}, 0, 0, first, static_cast<std::uint32_t>(count)};
+    for (int n = 0; n < count; ++n)
+        for (int a = 0; a < 3; ++a) patch.center[a] += points[n][a] / static_cast<float>(count);
+    Point area{};
+    for (int n = 0; n < count; ++n) {
+        const Point c = cross(points[n] - patch.center, points[(n + 1) % count] - patch.center);
+        for (int a = 0; a < 3; ++a) area[a] += c[a];
+    }
+    if (const float length = std::sqrt(dot(area, area)); length > 0)
+        for (int a = 0; a < 3; ++a) patch.normal[a] = area[a] / length;
+    for (int n = 0; n < count; ++n) {
+        const Point arm = points[n] - patch.center;
+        const float along = dot(arm, patch.normal);
+        patch.height = std::max(patch.height, std::abs(along));
+        patch.radius = std::max(patch.radius, std::sqrt(std::max(0.0F, dot(arm, arm) - along * along)));
+    }
+    return patch;
+}
+
+/// Adds `block` and the neighbours whose cells reach into it.
+void add_with_lower_neighbours(const Coord& block, std::vector<Coord>& blocks) {
+    for (int n = 0; n < 8; ++n)
+        blocks.push_back(block.offsetBy(-kLeafDim * (n >> 2 & 1), -kLeafDim * (n >> 1 & 1), -kLeafDim * (n & 1)));
+}
+
+/// Blocks of 8^3 in tiles that are inside, where something outside may be next to them without a leaf between: the
+/// domain's end, or a tile of the other sign.
+void add_tile_blocks(const FloatGrid& u, const openvdb::CoordBBox& domain, std::vector<Coord>& blocks) {
+    const auto accessor = u.getConstAccessor();
+    const auto meets_outside = [&](const Coord& block) {
+        openvdb::CoordBBox box(block, block.offsetBy(kLeafDim - 1));
+        box.expand(1);
+        if (!domain.isInside(box)) return true;
+        for (int axis = 0; axis < 3; ++axis)
+            for (int sign = -1; sign <= 1; sign += 2) {
+                Coord next = block;
+                next[axis] += sign * kLeafDim;
+                if (!accessor.probeConstLeaf(next) && accessor.getValue(next) >= 0) return true;
+            }
+        return false;
+    };
+    auto tile = u.tree().cbeginValueAll();
+    tile.setMaxDepth(FloatGrid::TreeType::ValueAllCIter::LEAF_DEPTH - 1);
+    for (; tile; ++tile) {
+        if (!(*tile < 0)) continue;
+        openvdb::CoordBBox box;
+        tile.getBoundingBox(box);
+        box.intersect(domain);
+        if (box.empty()) continue;
+        const Coord lo = box.min() & ~(kLeafDim - 1), hi = box.max() & ~(kLeafDim - 1);
+        for (int i = lo[0]; i <= hi[0]; i += kLeafDim)
+            for (int j = lo[1]; j <= hi[1]; j += kLeafDim) {
+                const bool shell = i == lo[0] || i == hi[0] || j == lo[1] || j == hi[1];
+                const int step = shell ? kLeafDim : std::max(hi[2] - lo[2], int(kLeafDim));
+                for (int k = lo[2]; k <= hi[2]; k += step)
+                    if (meets_outside(Coord(i, j, k))) add_with_lower_neighbours(Coord(i, j, k), blocks);
+            }
+    }
+}
+
+/// Leaves that may have cells with a crossing, sorted.
+std::vector<Coord> candidates(const FloatGrid& u, const Domain& domain) {
+    const openvdb::CoordBBox box = box_of(domain);
+    std::vector<Coord> result;
+    for (auto leaf = u.tree().cbeginLeaf(); leaf; ++leaf)
+        if (openvdb::CoordBBox(leaf->origin(), leaf->origin().offsetBy(kLeafDim - 1)).hasOverlap(box))
+            add_with_lower_neighbours(leaf->origin(), result);
+    add_tile_blocks(u, box, result);
+    std::sort(result.begin(), result.end());
+    result.erase(std::unique(result.begin(), result.end()), result.end());
+    return result;
+}
+
+}  // namespace
+
+PatchHit InterfacePatches::nearest(const Coord& at, const Patch& patch, float bound) const {
+    const Point p = {float(at[0] - patch.origin[0]), float(at[1] - patch.origin[1]), float(at[2] - patch.origin[2])};
+    const Point arm = p - patch.center;
+    // The patch lies in a cylinder: what is farther from that than `bound` need not be looked at.
+    const float along = dot(arm, patch.normal);
+    const float beyond = std::max(0.0F, std::abs(along) - patch.height);
+    const float beside = std::max(0.0F, std::sqrt(std::max(0.0F, dot(arm, arm) - along * along)) - patch.radius);
+    const PatchHit none{std::numeric_limits<float>::infinity(), false};
+    if (beyond * beyond + beside * beside >= bound) return none;
+    const PatchHit hit = nearest_on(fan(patch), arm.data());
+    return hit.squared < bound ? hit : none;
+}
+
+InterfacePatches find_interface(const FloatGrid& u, const Domain& domain, DomainEnd end, const RunContext& run) {
+    run.check();
+    const std::vector<Coord> leaves = candidates(u, domain);
+    struct Counts {
+        std::uint32_t patches = 0, vertices = 0;
+    };
+    std::vector<Counts> counts(leaves.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 16), [&](const auto& range) {
+        CellValues values(u, domain);
+        for (std::size_t n = range.begin(); n != range.end(); ++n)
+            if (values.load(leaves[n]))
+                for_each_cell(values, end, [&](int, int, int, const CubeCase& cell) {
+                    counts[n].patches += cell.loop_count;
+                    counts[n].vertices += cell.triangle_count + 2 * cell.loop_count;
+                });
+    });
+    run.check();
+
+    InterfacePatches result;
+    std::vector<Counts> begins;
+    Counts total;
+    for (std::size_t n = 0; n < leaves.size(); ++n) {
+        if (counts[n].patches == 0) continue;
+        result.leaves.push_back(leaves[n]);
+        result.first.push_back(total.patches);
+        begins.push_back(total);
+        total.patches += counts[n].patches;
+        total.vertices += counts[n].vertices;
+    }
+    result.first.push_back(total.patches);
+    result.patches.resize(total.patches);
+    result.vertices.resize(total.vertices);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, result.leaves.size(), 16), [&](const auto& range) {
+        CellValues values(u, domain);
+        for (std::size_t n = range.begin(); n != range.end(); ++n) {
+            values.load(result.leaves[n]);
+            Counts next = begins[n];
+            for_each_cell(values, end, [&](int i, int j, int k, const CubeCase& cell) {
+                for (int l = 0; l < cell.loop_count; ++l) {
+                    const CubeLoop& loop = cell.loops[l];
+                    Point* points = result.vertices.data() + next.vertices;
+                    for (int m = 0; m < loop.size; ++m) points[m] = values.crossing(i, j, k, loop.edges[m]);
+                    result.patches[next.patches++] =
+                        make_patch(result.leaves[n].offsetBy(i, j, k), points, loop.size, next.vertices);
+                    next.vertices += loop.size;
+                }
+            });
+        }
+    });
+    return result;
+}
+
+}  // namespace covol::detail

@@ -1,0 +1,48 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "covol/domain.h"
+#include "covol/run.h"
+#include "grid/leaf_band.h"
+#include "redistance/patch_kernel.h"
+
+namespace covol::detail {
+
+/// A polygon of the zero level set in one cell (the cube between eight voxel centres), as a fan of triangles around
+/// its centre. Lengths are voxels, positions are relative to `origin`, the cell's first voxel.
+struct Patch {
+    Coord origin;
+    std::array<float, 3> center;
+    std::array<float, 3> normal;  ///< unit; of the whole polygon
+    float radius;                 ///< no vertex is farther from the axis (center, normal) ...
+    float height;                 ///< ... nor from the plane through the center
+    std::uint32_t first;          ///< vertices [first, first + count)
+    std::uint32_t count;
+};
+
+/// The zero level set of linear interpolation along the voxel edges, cell by cell. Cells of a leaf have their first voxel there.
+struct InterfacePatches {
+    std::vector<Coord> leaves;                     ///< sorted origins of the leaves with patches
+    std::vector<std::uint32_t> first;              ///< leaf i has the patches [first[i], first[i+1])
+    std::vector<Patch> patches;                    ///< ordered by leaf, then by cell
+    std::vector<std::array<float, 3>> vertices;
+
+    [[nodiscard]] PatchFan fan(const Patch& patch) const {
+        return {patch.normal.data(), patch.center.data(), vertices.data() + patch.first, static_cast<int>(patch.count)};
+    }
+    /// From the centre of voxel `at` to the patch; infinitely far where the square is not below `bound`.
+    [[nodiscard]] PatchHit nearest(const Coord& at, const Patch& patch, float bound) const;
+};
+
+/// What becomes of a surface that reaches the domain's boundary.
+enum class DomainEnd {
+    Closed,  ///< beyond it is outside: the surface is closed half a voxel beyond the last voxel centres
+    Open     ///< it ends there
+};
+
+/// Finds them; negative is inside.
+[[nodiscard]] InterfacePatches find_interface(const FloatGrid& u, const Domain& domain, DomainEnd end, const RunContext& run);
+
+}  // namespace covol::detail

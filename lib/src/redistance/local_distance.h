@@ -1,0 +1,60 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "covol/domain.h"
+#include "grid/halo.h"
+#include "grid/leaf_band.h"
+
+namespace covol::detail {
+
+/// How far the band of a moving surface reaches, in voxels: the 3 of the clamp and about two that the surface may move
+/// before the band is made again.
+inline constexpr double kFollowWidth = 5.0;
+
+/// Distances to the zero level set of a field on some leaves of a band, up to a width, in voxels: Godunov's scheme with the
+/// surface's cuts through voxel edges as boundary. First order, a twentieth of the cost of looking for nearest points.
+class LocalDistance {
+public:
+    static constexpr std::size_t kCuts = 3 * kLeafSize;  ///< floats for each leaf
+    struct Scratch {
+        float* cuts;       ///< kCuts for each leaf to compute
+        float* distances;  ///< kLeafSize for each leaf
+        const std::uint32_t* place = nullptr;  ///< of a leaf among `cuts`; null: the leaf's own number
+    };
+
+    /// @param u        in voxels; blocks beyond the band say nothing of distances
+    /// @param zone     one flag for each leaf: those to compute; the others give what their |u| says
+    /// @param clamp    |u| from there on says nothing
+    /// @param width    how far to go, voxels
+    /// @param scratch  nothing in it is read
+    LocalDistance(const LeafBand& band, const HaloField& u, const std::vector<unsigned char>& zone, const Domain& domain,
+                  float clamp, float width, Scratch scratch);
+    void compute();
+
+    /// The width where the surface is farther.
+    [[nodiscard]] const float* distance(std::size_t leaf) const { return scratch_.distances + leaf * kLeafSize; }
+    /// The same, but next to the surface |u| is only scaled: by one factor for a voxel and those across the edges that the
+    /// surface cuts, so that it hardly moves (D. Hartmann, M. Meinke, W. Schroeder 2010, scheme CR-1).
+    [[nodiscard]] const float* settled(std::size_t leaf) const { return cut(leaf); }
+
+private:
+    [[nodiscard]] float* cut(std::size_t leaf) const {
+        return scratch_.cuts + (scratch_.place != nullptr ? scratch_.place[leaf] : leaf) * kCuts;
+    }
+    [[nodiscard]] float* distances(std::size_t leaf) { return scratch_.distances + leaf * kLeafSize; }
+    void start(std::size_t leaf);
+    void load_distance(std::size_t leaf, float* out) const;
+    void spread();
+    void settle(std::size_t leaf);
+
+    const LeafBand& band_;
+    const HaloField& u_;
+    const std::vector<unsigned char>& zone_;
+    const Domain& domain_;
+    float clamp_, width_;
+    LeafArray<float> far_;
+    Scratch scratch_;  // the cuts become the settled values
+};
+
+}  // namespace covol::detail

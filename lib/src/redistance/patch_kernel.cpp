@@ -1,0 +1,143 @@
+#include "redistance/patch_kernel.h"
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <type_traits>
+
+#include "base/clones.h"
+
+namespace covol::detail {
+namespace {
+
+template <typename Real>
+COVOL_INLINE Real dot(const Real (&a)[3], const float (&b)[3]) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+template <typename Real>
+struct Hit {
+    Real squared;
+    decltype(Real{} < Real{}) is_interior;
+};
+
+template <typename Real>
+COVOL_INLINE Real unit(Real x) {
+    x = x > 0.0F ? x : Real{};
+    return x < 1.0F ? x : Real{} + 1.0F;
+}
+
+// The nearest point lies in a triangle, on a spoke between two, or on the outline. One source for a float and for eight.
+template <typename Real>
+COVOL_INLINE Hit<Real> nearest_of(const PatchFan& fan, const Real (&arm)[3]) {
+    Real within = Real{} + std::numeric_limits<float>::infinity(), outline = within;
+    const auto keep_least = [](Real& least, Real squared) __attribute__((always_inline)) {
+        least = squared < least ? squared : least;
+    };
+    const Real first = dot(arm, fan.triangles[0].from);
+    Real from = first;
+    for (int n = 0; n < fan.count; ++n) {
+        const PatchFan::Triangle& t = fan.triangles[n];
+        const Real to = n + 1 < fan.count ? dot(arm, fan.triangles[n + 1].from) : first;
+        const Real beside_to = t.to_to * from - t.from_to * to, beside_from = t.from_from * to - t.from_to * from;
+        const auto inside = (beside_to >= 0.0F) & (beside_from >= 0.0F) & (beside_to + beside_from <= t.area);
+        const Real off = dot(arm, t.normal);
+        const Real plane = off * off * t.inverse_area;
+        within = inside & (plane < within) ? plane : within;
+
+        const Real along = unit(from * t.inverse_from);
+        const Real spoke[3] = {arm[0] - along * t.from[0], arm[1] - along * t.from[1], arm[2] - along * t.from[2]};
+        keep_least(within, spoke[0] * spoke[0] + spoke[1] * spoke[1] + spoke[2] * spoke[2]);
+
+        const Real side[3] = {arm[0] - t.from[0], arm[1] - t.from[1], arm[2] - t.from[2]};
+        const Real on_edge = unit(dot(side, t.edge) * t.inverse_edge);
+        const Real rest[3] = {side[0] - on_edge * t.edge[0], side[1] - on_edge * t.edge[1], side[2] - on_edge * t.edge[2]};
+        keep_least(outline, rest[0] * rest[0] + rest[1] * rest[1] + rest[2] * rest[2]);
+        from = to;
+    }
+    return {within < outline ? within : outline, within < outline};
+}
+
+COVOL_INLINE Float8 ceil_of(Float8 x) {
+    const Float8 whole = __builtin_convertvector(__builtin_convertvector(x, Int8), Float8);  // towards 0
+    return whole < x ? whole + 1.0F : whole;
+}
+
+/// Positions first, first + 1, ... along an axis that lie in an interval and in the leaf.
+struct Positions {
+    Float8 first, last;
+    int most;
+    COVOL_INLINE Positions(Float8 center, float half)
+        : first(ceil_of(center - half)), last(center + half), most(static_cast<int>(2 * half) + 1) {}
+    COVOL_INLINE Int8 are_in(Float8 at) const { return (at <= last) & (at >= 0.0F) & (at <= 7.0F); }
+    COVOL_INLINE Int8 meet_leaf() const { return (first <= 7.0F) & (last >= 0.0F); }
+};
+
+}  // namespace
+
+PatchFan::PatchFan(const float* axis_of, const float* center, const std::array<float, 3>* vertices, int vertex_count)
+    : count(vertex_count) {
+    const auto product = [](const float* a, const float* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; };
+    std::memcpy(axis, axis_of, sizeof axis);
+    for (int n = 0; n < count; ++n) {
+        Triangle& t = triangles[n];
+        const auto& next = vertices[n + 1 < count ? n + 1 : 0];
+        float to[3];
+        for (int k = 0; k < 3; ++k) {
+            t.from[k] = vertices[n][k] - center[k];
+            to[k] = next[k] - center[k];
+            t.edge[k] = next[k] - vertices[n][k];
+        }
+        for (int k = 0; k < 3; ++k) t.normal[k] = t.from[(k + 1) % 3] * to[(k + 2) % 3] - t.from[(k + 2) % 3] * to[(k + 1) % 3];
+        t.from_from = product(t.from, t.from), t.from_to = product(t.from, to), t.to_to = product(to, to);
+        t.area = product(t.normal, t.normal);
+        const auto inverse = [](float square) { return square > 0 ? 1 / square : 0.0F; };
+        t.inverse_from = inverse(t.from_from);
+        t.inverse_edge = inverse(product(t.edge, t.edge));
+        t.inverse_area = 1 / t.area;  // without one nothing is within
+    }
+}
+
+PatchHit nearest_on(const PatchFan& fan, const float arm[3]) {
+    const float point[3] = {arm[0], arm[1], arm[2]};
+    const Hit<float> hit = nearest_of(fan, point);
+    return {hit.squared, hit.is_interior};
+}
+
+// Lanes lie along the axis that the polygon faces most: the cylinder's section moves from lane to lane by the slope.
+COVOL_CLONES void offer_patch(const PatchFan& fan, const PatchCylinder& cylinder, std::int32_t index, const PatchLeaf& leaf) {
+    constexpr int kStride[3] = {64, 8, 1};
+    const auto size = [&](int a) { return std::abs(fan.axis[a]); };
+    const int m = size(0) >= size(1) ? (size(0) >= size(2) ? 0 : 2) : (size(1) >= size(2) ? 1 : 2);
+    const int u = (m + 1) % 3, v = (m + 2) % 3;
+    if (fan.axis[m] == 0) return;
+    const float slope_u = fan.axis[u] / fan.axis[m], slope_v = fan.axis[v] / fan.axis[m];
+    const float radius = cylinder.radius;
+    const float half = cylinder.half_width * size(m) + radius * std::sqrt(std::max(0.0F, 1 - fan.axis[m] * fan.axis[m]));
+    const Float8 lane = {0, 1, 2, 3, 4, 5, 6, 7};
+    const Float8 along = lane - cylinder.center[m];
+    const Positions at_u(cylinder.center[u] + along * slope_u, radius * std::sqrt(1 + slope_u * slope_u));
+    const Positions at_v(cylinder.center[v] + along * slope_v, radius * std::sqrt(1 + slope_v * slope_v));
+    const Int8 in_m = (along <= half) & (along >= -half) & at_u.meet_leaf() & at_v.meet_leaf();
+    if (!any(in_m)) return;
+    for (int du = 0; du < at_u.most; ++du) {
+        const Float8 pu = at_u.first + float(du);
+        const Int8 in_u = in_m & at_u.are_in(pu);
+        if (!any(in_u)) continue;
+        for (int dv = 0; dv < at_v.most; ++dv) {
+            const Float8 pv = at_v.first + float(dv);
+            const Int8 here = in_u & at_v.are_in(pv);
+            if (!any(here)) continue;
+            Float8 arm[3];
+            arm[m] = along;
+            arm[u] = pu - cylinder.center[u];
+            arm[v] = pv - cylinder.center[v];
+            const Hit<Float8> hit = nearest_of(fan, arm);
+            const Int8 voxel = __builtin_convertvector(lane * float(kStride[m]) + pu * float(kStride[u]) + pv * float(kStride[v]), Int8);
+            for (int n = 0; n < 8; ++n)
+                if (here[n]) leaf.offer(voxel[n], {hit.squared[n], hit.is_interior[n] != 0}, index);
+        }
+    }
+}
+
+}  // namespace covol::detail

@@ -1,0 +1,212 @@
+// Distance to the zero level set: each voxel of the band finds its nearest patch of the surface.
+#include "redistance/redistance.h"
+
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/Prune.h>
+#include <openvdb/tools/SignedFloodFill.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "covol/error.h"
+#include "grid/leaf_band.h"
+#include "grid/leaf_propagation.h"
+#include "redistance/interface_patches.h"
+
+namespace covol::detail {
+namespace {
+
+constexpr std::int32_t kNoPatch = -1;
+
+/// Leaves with voxels that may be nearer than the band's half width to a patch.
+std::vector<Coord> band_leaves(const InterfacePatches& interface, double half_width) {
+    const int reach = static_cast<int>(std::ceil(half_width));
+    std::vector<Coord> result;
+    for (std::size_t n = 0; n < interface.leaves.size(); ++n) {
+        openvdb::CoordBBox box;
+        for (std::uint32_t m = interface.first[n]; m < interface.first[n + 1]; ++m)
+            box.expand(interface.patches[m].origin);
+        const Coord lo = box.min().offsetBy(-reach) & ~(kLeafDim - 1);
+        const Coord hi = box.max().offsetBy(1 + reach) & ~(kLeafDim - 1);
+        for (int i = lo[0]; i <= hi[0]; i += kLeafDim)
+            for (int j = lo[1]; j <= hi[1]; j += kLeafDim)
+                for (int k = lo[2]; k <= hi[2]; k += kLeafDim) result.emplace_back(i, j, k);
+    }
+    std::sort(result.begin(), result.end());
+    result.erase(std::unique(result.begin(), result.end()), result.end());
+    return result;
+}
+
+/// Each voxel of the band with the nearest patch that it knows.
+class NearestPatches {
+public:
+    NearestPatches(const InterfacePatches& interface, const LeafBand& band, double half_width)
+        : interface_(interface),
+          band_(band),
+          half_width_(static_cast<float>(half_width)),
+          squared_(band.size(), static_cast<float>(half_width * half_width), 0),
+          patch_(band.size(), kNoPatch, 0),
+          interior_(band.size(), LeafMask{}) {}
+
+    // A voxel whose nearest point lies within a patch lies in the cylinder above and below it. Voxels beside a crease
+    // lie in none; they, and those that slack in the patches' normals puts outside, learn from their neighbours.
+    void find(const RunContext& run) {
+        tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) { seed(leaf); });
+        // Of two voxels above the insides of their patches neither has anything to learn from the other.
+        std::vector<LeafMask> beside(band_.size());
+        tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) { beside[leaf] = beside_creases(leaf); });
+        propagate(band_, beside, run, [this](std::size_t leaf, int p, std::size_t other, int q) {
+            return !(is_on(interior_[leaf], p) && is_on(interior_[other], q)) && try_patch(leaf, p, patch_.leaf(other)[q]);
+        });
+    }
+
+    [[nodiscard]] const float* squared(std::size_t leaf) const { return squared_.leaf(leaf); }
+    [[nodiscard]] const std::int32_t* patch(std::size_t leaf) const { return patch_.leaf(leaf); }
+
+private:
+    bool try_patch(std::size_t leaf, int p, std::int32_t patch) {
+        const PatchLeaf known = known_by(leaf);
+        if (patch == known.patch[p] || patch == kNoPatch) return false;
+        const Coord at = band_.origin(leaf).offsetBy(p >> 6, p >> 3 & 7, p & 7);
+        const Patch& candidate = interface_.patches[static_cast<std::size_t>(patch)];
+        return known.offer(p, interface_.nearest(at, candidate, known.squared[p]), patch);
+    }
+
+    [[nodiscard]] PatchLeaf known_by(std::size_t leaf) {
+        return {squared_.leaf(leaf), patch_.leaf(leaf), interior_[leaf].data()};
+    }
+
+    void seed(std::size_t leaf) {
+        const Coord origin = band_.origin(leaf);
+        for (int n = 0; n < 27; ++n) {
+            const Coord from = origin.offsetBy((n / 9 - 1) * kLeafDim, (n / 3 % 3 - 1) * kLeafDim, (n % 3 - 1) * kLeafDim);
+            const auto at = std::lower_bound(interface_.leaves.begin(), interface_.leaves.end(), from);
+            if (at == interface_.leaves.end() || *at != from) continue;
+            const std::size_t m = static_cast<std::size_t>(at - interface_.leaves.begin());
+            for (std::uint32_t patch = interface_.first[m]; patch < interface_.first[m + 1]; ++patch)
+                seed_cylinder(leaf, patch);
+        }
+    }
+
+    void seed_cylinder(std::size_t leaf, std::uint32_t index) {
+        const Patch& patch = interface_.patches[index];
+        const Coord cell = patch.origin - band_.origin(leaf);
+        PatchCylinder cylinder{{}, patch.radius + kSlack, half_width_};
+        for (int a = 0; a < 3; ++a) {
+            cylinder.center[a] = patch.center[a] + float(cell[a]);
+            const float reach = half_width_ * std::abs(patch.normal[a]) + cylinder.radius;
+            if (cylinder.center[a] + reach < 0 || cylinder.center[a] - reach > kLeafDim - 1) return;
+        }
+        offer_patch(interface_.fan(patch), cylinder, static_cast<std::int32_t>(index), known_by(leaf));
+    }
+
+    /// Voxels that are not above the inside of a patch, and their neighbours in the leaf and across its faces.
+    [[nodiscard]] LeafMask beside_creases(std::size_t leaf) const {
+        constexpr LeafMask kNone{};
+        const auto outside = [this](std::size_t n) {
+            LeafMask mask = interior_[n];
+            for (std::uint64_t& word : mask) word = ~word;
+            return mask;
+        };
+        const LeafMask own = outside(leaf);
+        LeafMask result = own;
+        for (int axis = 0; axis < 3; ++axis)
+            for (int sign = -1; sign <= 1; sign += 2) {
+                const std::int32_t across =
+                    band_.neighbours(leaf)[neighbour_slot(axis == 0 ? sign : 0, axis == 1 ? sign : 0, axis == 2 ? sign : 0)];
+                const LeafMask look = looking_at(own, across != band_.none() ? outside(across) : kNone, axis, sign);
+                for (int word = 0; word < 8; ++word) result[word] |= look[word];
+            }
+        for (int p = 0; p < kLeafSize; ++p)
+            if (patch_.leaf(leaf)[p] == kNoPatch) result[p >> 6] &= ~(std::uint64_t(1) << (p & 63));
+        return result;
+    }
+
+    static constexpr float kSlack = 0.25F;  ///< voxels, by which neighbouring patches' cylinders overlap
+    const InterfacePatches& interface_;
+    const LeafBand& band_;
+    float half_width_;
+    LeafArray<float> squared_;
+    LeafArray<std::int32_t> patch_;
+    std::vector<LeafMask> interior_;  ///< voxels whose nearest point lies within their patch
+};
+
+/// Bit p: voxel p of the leaf is inside. Beyond an open end of the domain a voxel has the sign of the nearest one within.
+LeafMask inside_mask(const FloatGrid::ConstAccessor& accessor, const Coord& origin, const openvdb::CoordBBox& domain,
+                     DomainEnd end) {
+    LeafMask inside{};
+    if (const auto* leaf = accessor.probeConstLeaf(origin)) {
+        const float* values = leaf->buffer().data();
+        for (int p = 0; p < kLeafSize; ++p) inside[p >> 6] |= std::uint64_t(values[p] < 0) << (p & 63);
+    } else if (accessor.getValue(origin) < 0) {
+        inside.fill(~std::uint64_t(0));
+    }
+    if (domain.isInside(openvdb::CoordBBox(origin, origin.offsetBy(kLeafDim - 1)))) return inside;
+    for (int p = 0; p < kLeafSize; ++p) {
+        const Coord at = origin.offsetBy(p >> 6, p >> 3 & 7, p & 7);
+        if (domain.isInside(at)) continue;
+        const Coord nearest = Coord::minComponent(Coord::maxComponent(at, domain.min()), domain.max());
+        const std::uint64_t bit = std::uint64_t(1) << (p & 63);
+        inside[p >> 6] &= ~bit;
+        if (end == DomainEnd::Open && accessor.getValue(nearest) < 0) inside[p >> 6] |= bit;
+    }
+    return inside;
+}
+
+// The flood passes over leaves whose voxels are all active. Their signs are known; where the band ends at an open end of the
+// domain it would guess them wrong.
+void fill_tiles(FloatGrid::TreeType& tree) {
+    using Leaf = FloatGrid::TreeType::LeafNodeType;
+    std::vector<Leaf*> leaves;
+    tree.getNodes(leaves);
+    std::vector<Leaf::NodeMaskType> masks(leaves.size());
+    tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t n) {
+        masks[n] = leaves[n]->valueMask();
+        leaves[n]->setValuesOn();
+    });
+    openvdb::tools::signedFloodFill(tree);
+    tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t n) { leaves[n]->setValueMask(masks[n]); });
+}
+
+}  // namespace
+
+FloatGridPtr redistance(const FloatGrid& u, const Domain& domain, double half_width, DomainEnd end, const char* name,
+                        const RunContext& run) {
+    if (!(u.background() > 0))
+        throw Error(Errc::InvalidInput, std::string(name) + ": grid '" + u.getName() + "': expected a background > 0 (outside), got " +
+                                            std::to_string(u.background()));
+    const InterfacePatches interface = find_interface(u, domain, end, run);
+    if (interface.patches.empty())
+        throw Error(Errc::InvalidInput, std::string(name) + ": grid '" + u.getName() +
+                                            "' has no zero crossing: nothing in the domain is inside, or nothing outside");
+    LeafBand band(band_leaves(interface, half_width));
+    NearestPatches nearest(interface, band, half_width);
+    nearest.find(run);
+
+    const float h = static_cast<float>(domain.voxel_size);
+    const float background = static_cast<float>(half_width * domain.voxel_size);
+    LeafArray<float> values(band.size(), background, 0);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, band.size(), 16), [&](const auto& range) {
+        const auto accessor = u.getConstAccessor();
+        for (std::size_t leaf = range.begin(); leaf != range.end(); ++leaf) {
+            const LeafMask inside = inside_mask(accessor, band.origin(leaf), box_of(domain), end);
+            for (int p = 0; p < kLeafSize; ++p) {
+                float d = background;
+                if (nearest.patch(leaf)[p] != kNoPatch) {
+                    set_on(band.active(leaf), p);
+                    d = std::min(background, h * std::sqrt(nearest.squared(leaf)[p]));
+                }
+                values.leaf(leaf)[p] = is_on(inside, p) ? -d : d;
+            }
+        }
+    });
+    FloatGridPtr result = export_grid(band, values, domain, background, name);
+    result->setGridClass(openvdb::GRID_LEVEL_SET);
+    fill_tiles(result->tree());
+    openvdb::tools::pruneLevelSet(result->tree());
+    return result;
+}
+
+}  // namespace covol::detail

@@ -1,0 +1,84 @@
+#include "scheme/scheme.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+#include <utility>
+
+namespace covol::detail {
+
+namespace baseline {
+extern const SchemeKernels kKernels;
+}
+#ifdef COVOL_X86
+namespace avx2 {
+extern const SchemeKernels kKernels;
+}
+namespace avx512 {
+extern const SchemeKernels kKernels;
+}
+#endif
+
+namespace {
+
+constexpr int kLeafSize = 512;
+
+const SchemeKernels& choose() {
+    const std::vector<const SchemeKernels*> available = available_kernels();
+    const char* asked = std::getenv("COVOL_SIMD");
+    for (const SchemeKernels* set : available)
+        if (asked != nullptr && std::strcmp(set->name, asked) == 0) return *set;
+    return *available.back();
+}
+
+}  // namespace
+
+std::vector<const SchemeKernels*> available_kernels() {
+    std::vector<const SchemeKernels*> sets = {&baseline::kKernels};
+#ifdef COVOL_X86
+    const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+    if (has_avx2) sets.push_back(&avx2::kKernels);
+    if (has_avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+        __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw"))
+        sets.push_back(&avx512::kKernels);
+#endif
+    return sets;
+}
+
+const SchemeKernels& kernels() {
+    static const SchemeKernels& chosen = choose();
+    return chosen;
+}
+
+void mirror_outside(float* values, const int lo[3], const int hi[3]) {
+    for (int i = -1; i <= 8; ++i)
+        for (int j = -1; j <= 8; ++j)
+            for (int k = -1; k <= 8; ++k) {
+                const int ci = std::clamp(i, lo[0], hi[0]);
+                const int cj = std::clamp(j, lo[1], hi[1]);
+                const int ck = std::clamp(k, lo[2], hi[2]);
+                if (ci != i || cj != j || ck != k) values[padded(i, j, k)] = values[padded(ci, cj, ck)];
+            }
+}
+
+void close_faces(Share* c, const int lo[3], const int hi[3]) {
+    for (int n = 0; n < kLeafSize; ++n) {
+        const int at[3] = {n >> 6, (n >> 3) & 7, n & 7};
+        bool outside = false;
+        int closed = 0;
+        for (int axis = 0; axis < 3; ++axis) {
+            outside |= at[axis] < lo[axis] || at[axis] > hi[axis];
+            if (at[axis] == lo[axis]) closed += std::exchange(c[share_at(2 * axis, n)], Share{0});
+            if (at[axis] == hi[axis]) closed += std::exchange(c[share_at(2 * axis + 1, n)], Share{0});
+        }
+        // c = a/(1+S): without the closed share x of S it becomes a/(1+S-x) = c / (1 - closed).
+        const double scale = outside ? 0.0 : closed < kShareUnit ? 1.0 / (1.0 - double(closed) / kShareUnit) : 1.0;
+        if (scale != 1.0)
+            for (int f = 0; f < 6; ++f) {
+                Share& share = c[share_at(f, n)];
+                share = static_cast<Share>(std::min(share * scale + 0.5, double(kShareUnit)));
+            }
+    }
+}
+
+}  // namespace covol::detail

@@ -1,0 +1,376 @@
+// The arithmetic of the scheme on one leaf, compiled once for each instruction set (see lib/CMakeLists.txt).
+// No header with inline functions of external linkage may be included here: the linker would keep one copy of them for
+// the whole program, perhaps the one with instructions that the processor lacks.
+#include "scheme/scheme.h"
+#include "scheme/simd.h"
+
+#ifndef COVOL_SIMD_NAME
+#error "set COVOL_SIMD_NAME for each compilation"
+#endif
+
+namespace covol::detail::COVOL_SIMD_NAME {
+namespace {
+
+constexpr int kI = 10 * kRow;  // stride of i in a padded buffer
+constexpr int kJ = kRow;       // stride of j
+constexpr float kTiny = 1e-30F;
+
+/// Bit 8i+j: the row (i,j) of eight voxels.
+using RowMask = unsigned long long;
+
+/// Rows with an active voxel.
+inline RowMask active_rows(const unsigned long long* active) {
+    RowMask rows = 0;
+    for (int i = 0; i < 8; ++i)
+        for (int j = 0; j < 8; ++j) rows |= RowMask((active[i] >> (8 * j) & 0xffU) != 0) << (8 * i + j);
+    return rows;
+}
+
+constexpr int kVertexI = 9 * kRow;
+/// Values at the 9^3 vertices, rows of 16: vertex (i,j,k) is the corner between voxels i-1 and i, and so on.
+struct Vertices {
+    alignas(64) float z[9 * 9 * kRow];
+};
+
+void vertex_values(const float* u, Vertices& out) {
+    for (int i = 0; i < 9; ++i)
+        for (int j = 0; j < 9; ++j) {
+            const float* row = u + padded(i - 1, j - 1, -1);
+            float* z = out.z + i * kVertexI + j * kRow;
+            const auto column = [row](int k) {
+                return (load(row + k) + load(row + k + kJ)) + (load(row + k + kI) + load(row + k + kI + kJ));
+            };
+            store(z, 0.125F * (column(0) + column(1)));
+            const auto scalar = [row](int k) { return (row[k] + row[k + kJ]) + (row[k + kI] + row[k + kI + kJ]); };
+            z[8] = 0.125F * (scalar(8) + scalar(9));
+        }
+}
+
+inline bool has_row(RowMask rows, int i, int j) {
+    return ((unsigned(i) | unsigned(j)) & ~7U) == 0 && (rows >> (8 * i + j) & 1U) != 0;
+}
+
+/// Sums over a face's four tetrahedra, for 8 faces.
+struct FaceSums {
+    Lanes weight;  // Σ 1/√(ε²+|∇u_T|²)
+    Lanes norm;    // Σ |∇u_T|
+};
+
+// A tetrahedron is p, q and one edge of the face between them. With u in voxels the derivatives are differences: along
+// pq, along the edge, and from the face's centre, whose value is the mean of p and q, to the edge.
+inline FaceSums face_sums(Lanes p, Lanes q, Lanes z00, Lanes z10, Lanes z01, Lanes z11, float epsilon2) {
+    const Lanes along = (q - p) * (q - p);
+    const Lanes middle = p + q;
+    FaceSums sums{};
+    const auto tetrahedron = [&](Lanes a, Lanes b) {
+        const Lanes n = along + (b - a) * (b - a) + (a + b - middle) * (a + b - middle);
+        sums.weight += inverse_sqrt(n + epsilon2);
+        sums.norm += n * inverse_sqrt(n + kTiny);
+    };
+    tetrahedron(z00, z10);
+    tetrahedron(z01, z11);
+    tetrahedron(z00, z01);
+    tetrahedron(z10, z11);
+    return sums;
+}
+
+/// What the faces of a leaf add up to.
+struct Faces {
+    alignas(64) float weight_i[9 * 64];    // face (i,j,k) between voxels i-1 and i
+    alignas(64) float weight_j[8 * 9 * 8]; // (i,j,k), between j-1 and j
+    alignas(64) float weight_k[64 * kRow]; // (i,j,k), between k-1 and k; rows of 16
+    alignas(64) float norm[512];           // Σ_24 |∇u_T| of each voxel
+};
+
+inline void add(float* to, Lanes what) { store(to, load(to) + what); }
+
+// Faces across i or j: `z` is the lower corner's vertex, `edge` the stride to the face's other corner.
+inline FaceSums row_face(const float* q, int across, const float* z, int edge, float epsilon2) {
+    return face_sums(load(q - across), load(q), load(z), load(z + edge), load(z + 1), load(z + edge + 1), epsilon2);
+}
+
+// Only for the voxel rows in `rows`, and the faces that they need.
+void sum_faces(const float* u, const Vertices& vertices, float epsilon2, RowMask rows, Faces& faces) {
+    for (int row = 0; row < 64; ++row) store(faces.norm + row * 8, Lanes{});
+    const auto voxel = [u](int i, int j) { return u + padded(i, j, 0); };
+    const auto vertex = [&vertices](int i, int j) { return vertices.z + i * kVertexI + j * kRow; };
+    for (int i = 0; i < 9; ++i)
+        for (int j = 0; j < 8; ++j) {
+            if (!has_row(rows, i, j) && !has_row(rows, i - 1, j)) continue;
+            const FaceSums sums = row_face(voxel(i, j), kI, vertex(i, j), kRow, epsilon2);
+            store(faces.weight_i + (i * 8 + j) * 8, sums.weight);
+            if (i > 0) add(faces.norm + ((i - 1) * 8 + j) * 8, sums.norm);
+            if (i < 8) add(faces.norm + (i * 8 + j) * 8, sums.norm);
+        }
+    for (int i = 0; i < 8; ++i)
+        for (int j = 0; j < 9; ++j) {
+            if (!has_row(rows, i, j) && !has_row(rows, i, j - 1)) continue;
+            const FaceSums sums = row_face(voxel(i, j), kJ, vertex(i, j), kVertexI, epsilon2);
+            store(faces.weight_j + (i * 9 + j) * 8, sums.weight);
+            if (j > 0) add(faces.norm + (i * 8 + j - 1) * 8, sums.norm);
+            if (j < 8) add(faces.norm + (i * 8 + j) * 8, sums.norm);
+        }
+    for (int i = 0; i < 8; ++i) {
+        if ((rows >> (8 * i) & 0xffU) == 0) continue;
+        for (int j = 0; j < 8; ++j) {
+            if (!has_row(rows, i, j)) continue;
+            const float* q = voxel(i, j);
+            const float* z = vertex(i, j);
+            const FaceSums sums = face_sums(load(q - 1), load(q), load(z), load(z + kVertexI), load(z + kRow),
+                                            load(z + kVertexI + kRow), epsilon2);
+            store(faces.weight_k + (i * 8 + j) * kRow, sums.weight);
+            float* norm = faces.norm + (i * 8 + j) * 8;
+            add(norm, sums.norm);
+            for (int k = 1; k < 8; ++k) norm[k - 1] += sums.norm[k];
+        }
+        // The ninth faces of eight rows make one more bundle; its lanes run along j.
+        const float* q = voxel(i, 0) + 8;
+        const float* z = vertex(i, 0) + 8;
+        const auto lanes = [](const float* first) { return load_strided(first, kRow); };
+        const FaceSums sums = face_sums(lanes(q - 1), lanes(q), lanes(z), lanes(z + kVertexI), lanes(z + kRow),
+                                        lanes(z + kVertexI + kRow), epsilon2);
+        for (int j = 0; j < 8; ++j) {
+            faces.weight_k[(i * 8 + j) * kRow + 8] = sums.weight[j];
+            faces.norm[(i * 8 + j) * 8 + 7] += sums.norm[j];
+        }
+    }
+}
+
+/// A row of a padded field and its six neighbours, by Face.
+struct Star {
+    Lanes p, q[6];
+    Star(const float* field, int i, int j) {
+        const float* row = field + padded(i, j, 0);
+        p = load(row);
+        q[kMinusI] = load(row - kI), q[kPlusI] = load(row + kI);
+        q[kMinusJ] = load(row - kJ), q[kPlusJ] = load(row + kJ);
+        q[kMinusK] = load(row - 1), q[kPlusK] = load(row + 1);
+    }
+    /// q - p, or 0 where either is unknown
+    [[nodiscard]] Lanes difference(int face) const {
+        return (q[face] >= 0.0F) & (p >= 0.0F) ? q[face] - p : Lanes{};
+    }
+};
+
+// velocity[f] = v_pq / h², Eqs. (17), (20).
+inline void add_point_pull(const Star& phi, float theta, Lanes velocity[6]) {
+    for (int f = 0; f < 6; ++f) velocity[f] -= theta * phi.difference(f);
+}
+
+inline void add_image_pull(const Star& g, Lanes rho, float epsilon2, Lanes velocity[6]) {
+    Lanes difference[6];
+    Lanes norm2 = Lanes{};
+    for (int f = 0; f < 6; ++f) {
+        difference[f] = g.difference(f);
+        norm2 += 0.5F * difference[f] * difference[f];
+    }
+    const Lanes scale = rho * inverse_sqrt(norm2 + epsilon2);
+    for (int f = 0; f < 6; ++f) velocity[f] -= scale * difference[f];
+}
+
+/// 1 where the bit of the lane is set, else 0.
+inline Lanes lanes_of(unsigned bits) {
+    constexpr LaneBits kBit = {1, 2, 4, 8, 16, 32, 64, 128};
+    return ((LaneBits{} + int(bits)) & kBit) != 0 ? broadcast(1.0F) : Lanes{};
+}
+
+/// a * scale, rounded alike for all faces, so that what is symmetric stays so. A row that rounds up to 1 or more gets one
+/// unit less on each face.
+inline void store_shares(const Lanes a[6], Lanes scale, Share* c) {
+    LaneBits share[6], total = LaneBits{};
+    for (int f = 0; f < 6; ++f) {
+        share[f] = __builtin_convertvector(a[f] * scale + 0.5F, LaneBits);
+        total += share[f];
+    }
+    const LaneBits full = total >= kShareUnit;  // -1 where true
+    for (int f = 0; f < 6; ++f) store(c + f * 8, share[f] + (full & (share[f] > 0)));
+}
+
+RowFacts assemble(const float* u, const float* phi, const float* g, const float* rho, const unsigned long long* active,
+                  const SchemeConstants& constants, Share* c) {
+    Vertices vertices;
+    vertex_values(u, vertices);
+    const RowMask rows = active_rows(active);
+    Faces faces;
+    sum_faces(u, vertices, constants.epsilon2, rows, faces);
+
+    Lanes largest_sum = Lanes{}, residual = Lanes{};
+    for (int i = 0; i < 8; ++i)
+        for (int j = 0; j < 8; ++j) {
+            if (!has_row(rows, i, j)) continue;
+            const int row = (i * 8 + j) * 8;
+            const unsigned on = static_cast<unsigned>(active[i] >> (8 * j)) & 0xffU;
+            Lanes a[6] = {};  // the velocities, then -a_pq >= 0
+            if (phi != nullptr) add_point_pull(Star(phi, i, j), constants.theta, a);
+            if (g != nullptr)
+                add_image_pull(Star(g, i, j), constants.rho * (rho != nullptr ? load(rho + row) : broadcast(1.0F)),
+                               constants.edge_epsilon2, a);
+            const float* weight[6] = {faces.weight_i + (i * 8 + j) * 8,    faces.weight_i + ((i + 1) * 8 + j) * 8,
+                                      faces.weight_j + (i * 9 + j) * 8,    faces.weight_j + (i * 9 + j + 1) * 8,
+                                      faces.weight_k + (i * 8 + j) * kRow, faces.weight_k + (i * 8 + j) * kRow + 1};
+            const Lanes mean = load(faces.norm + row) * (1.0F / 24.0F);
+            const Lanes m2 = constants.epsilon2 + mean * mean;
+            const Lanes m = (0.25F * constants.curvature) * (m2 * inverse_sqrt(m2));
+            Lanes row_sum = Lanes{}, pulls = Lanes{};
+            const Star around(u, i, j);
+            for (int f = 0; f < 6; ++f) {
+                a[f] = constants.tau * max(-a[f], Lanes{}) + m * load(weight[f]);
+                row_sum += a[f];
+                pulls += a[f] * (around.q[f] - around.p);
+            }
+            const Lanes is_active = lanes_of(on);
+            largest_sum = max(largest_sum, is_active * row_sum);
+            const Lanes scale = is_active / (1.0F + row_sum);
+            residual += (scale * pulls) * (scale * pulls);
+            store_shares(a, float(kShareUnit) * scale, c + share_at(0, row));
+        }
+    return {largest(largest_sum), sum(residual)};
+}
+
+/// u_p = known + minus (u_{k-1} - old) + plus (u_{k+1} - old) for a row of eight along k.
+struct RowEquation {
+    Lanes known, minus, plus, old;
+    [[nodiscard]] Lanes value(Lanes before, Lanes after) const { return known + (minus * (before - old) + plus * (after - old)); }
+};
+
+/// The rows of eight around row (i,j) of a leaf, across its faces too.
+struct RowStar {
+    const float *minus_i, *plus_i, *minus_j, *plus_j;
+    RowStar(const LeafStar& u, int i, int j) {
+        const float* row = u.inner + i * 64 + j * 8;
+        minus_i = i > 0 ? row - 64 : u.across[kMinusI] + 7 * 64 + j * 8;
+        plus_i = i < 7 ? row + 64 : u.across[kPlusI] + j * 8;
+        minus_j = j > 0 ? row - 8 : u.across[kMinusJ] + i * 64 + 7 * 8;
+        plus_j = j < 7 ? row + 8 : u.across[kPlusJ] + i * 64;
+    }
+};
+
+// SOR in four colours: rows with i + j even, then odd, and within a row even k, then odd. It has red-black's rate, and
+// what a row gets from other rows is summed once for both of its halves.
+template <typename Equation>
+inline double relax_rows(const LeafStar& u, RowMask rows, float omega, int inner, Equation equation) {
+    const Lanes even = {1, 0, 1, 0, 1, 0, 1, 0};
+    const Lanes odd = 1.0F - even;
+    Lanes residual = Lanes{};
+    for (int sweep = 0; sweep < inner; ++sweep)
+        for (int colour = 0; colour < 2; ++colour)
+            for (int i = 0; i < 8; ++i)
+                for (int j = (i + colour) & 1; j < 8; j += 2) {
+                    if (!has_row(rows, i, j)) continue;
+                    const int at = (i * 8 + j) * 8;
+                    const RowEquation row = equation(RowStar(u, i, j), at);
+                    const Lanes now = load(u.inner + at);
+                    const Lanes below = broadcast(u.across[kMinusK][at + 7]), above = broadcast(u.across[kPlusK][at]);
+                    const Lanes first = even * (row.value(shifted_up(now, below), shifted_down(now, above)) - now);
+                    const Lanes half = now + omega * first;
+                    const Lanes second = odd * (row.value(shifted_up(half, below), shifted_down(half, above)) - half);
+                    if (sweep == 0) residual += (first + second) * (first + second);
+                    store(u.inner + at, half + omega * second);
+                }
+    return sum(residual);
+}
+
+double relax(const LeafStar& u, const float* b, const Share* c, const unsigned long long* active, float omega, int inner,
+             const NextRows& next) {
+    return relax_rows(u, active_rows(active), omega, inner, [b, c, next](const RowStar& beside, int row) {
+        constexpr float kUnit = 1.0F / kShareUnit;
+        __builtin_prefetch(next.c + share_at(0, row));
+        __builtin_prefetch(next.c + share_at(5, row));
+        __builtin_prefetch(next.b + row);
+        const Lanes old = load(b + row);
+        const auto share = [shares = c + share_at(0, row)](int face) { return load_shares(shares + face * 8); };
+        const auto pull = [&](int face, const float* from) { return share(face) * (load(from) - old); };
+        const Lanes pulls = (pull(kMinusI, beside.minus_i) + pull(kPlusI, beside.plus_i)) +
+                            (pull(kMinusJ, beside.minus_j) + pull(kPlusJ, beside.plus_j));
+        return RowEquation{old + kUnit * pulls, kUnit * share(kMinusK), kUnit * share(kPlusK), old};
+    });
+}
+
+double heat(const LeafStar& u, const float* b, float t, float omega, int inner) {
+    const float scale = 1.0F / (1.0F + 6.0F * t);
+    const Lanes side = broadcast(scale * t);
+    return relax_rows(u, ~RowMask{0}, omega, inner, [b, t, scale, side](const RowStar& beside, int row) {
+        const Lanes across = (load(beside.minus_i) + load(beside.plus_i)) + (load(beside.minus_j) + load(beside.plus_j));
+        return RowEquation{scale * (load(b + row) + t * across), side, side, Lanes{}};
+    });
+}
+
+void mean_gradient(const float* u, float* out) {
+    Vertices vertices;
+    vertex_values(u, vertices);
+    Faces faces;
+    sum_faces(u, vertices, 1.0F, ~RowMask{0}, faces);
+    for (int n = 0; n < 512; n += 8) store(out + n, load(faces.norm + n) * (1.0F / 24.0F));
+}
+
+/// Where the front comes from along one axis: from the value v at the distance 1/q.
+struct Arrival {
+    Lanes v, q;
+};
+
+inline void order(Arrival& a, Arrival& b) {
+    const auto swap = a.v > b.v;
+    const Arrival first = {swap ? b.v : a.v, swap ? b.q : a.q};
+    b = {swap ? a.v : b.v, swap ? a.q : b.q};
+    a = first;
+}
+
+/// The root x >= v of Σ q² (x - v)² = 1 over the axes whose v lies below it.
+inline Lanes arrive(Arrival a, Arrival b, Arrival c) {
+    order(a, b), order(b, c), order(a, b);
+    const Lanes one = broadcast(1.0F);
+    Lanes x = a.v + one / a.q;
+    Lanes qq = a.q * a.q, qv = qq * a.v, vv = qv * a.v;
+    const auto add_axis = [&](const Arrival& next) {
+        const Lanes w = next.q * next.q;
+        qq += w, qv += w * next.v, vv += w * next.v * next.v;
+        const Lanes root = qv * qv - qq * (vv - one);
+        const Lanes safe = max(root, Lanes{} + kTiny);
+        const Lanes both = (qv + safe * inverse_sqrt(safe)) / qq;
+        x = x > next.v ? both : x;
+    };
+    add_axis(b);
+    // Where the second axis does not count the third does not either.
+    const Lanes limit = x;
+    add_axis(c);
+    x = limit > c.v ? x : limit;
+    return x;
+}
+
+bool eikonal(float* d, const float* cut, float tolerance) {
+    const Lanes one = broadcast(1.0F);
+    bool fell = false;
+    for (int order = 0;; ++order) {
+        Lanes largest_fall = Lanes{};
+        const bool up_i = (order & 1) == 0, up_j = (order & 2) == 0;
+        for (int n = 0; n < 64; ++n) {
+            const int i = up_i ? n >> 3 : 7 - (n >> 3), j = up_j ? n & 7 : 7 - (n & 7);
+            float* row = d + padded(i, j, 0);
+            const float* q = cut + (i * 8 + j) * 8;
+            const auto along = [&](int axis, int stride) {
+                const Lanes least = -max(-load(row - stride), -load(row + stride));
+                const Lanes at = load(q + axis * 512);
+                return Arrival{at > 0.0F ? Lanes{} : least, at > 0.0F ? at : one};
+            };
+            const Lanes now = load(row);
+            const Arrival ai = along(0, kI), aj = along(1, kJ), ak = along(2, 1);
+            // Nothing comes from where the values are no lower.
+            if (!(largest(now + max(-ai.v, max(-aj.v, -ak.v))) > 0.0F)) continue;
+            const Lanes fall = now - arrive(ai, aj, ak);
+            largest_fall = max(largest_fall, fall);
+            store(row, now - max(fall, Lanes{}));
+        }
+        // A pass that changes nothing says that every voxel fits its neighbours.
+        if (!(largest(largest_fall) > tolerance)) return fell;
+        fell = true;
+    }
+}
+
+#define COVOL_TEXT_(x) #x
+#define COVOL_TEXT(x) COVOL_TEXT_(x)
+}  // namespace
+
+extern const SchemeKernels kKernels;
+const SchemeKernels kKernels = {COVOL_TEXT(COVOL_SIMD_NAME), assemble, relax, heat, mean_gradient, eikonal};
+
+}  // namespace covol::detail::COVOL_SIMD_NAME

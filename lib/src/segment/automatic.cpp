@@ -1,0 +1,179 @@
+#include "segment/automatic.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "covol/error.h"
+#include "covol/scan_noise.h"
+
+namespace covol {
+namespace pipeline {
+namespace {
+
+constexpr double kFewPoints = 1000;  // fewer get a voxel size at which their surface has as many voxels as this many would
+constexpr double kViewVoxel = 0.5;    // cells of the indicator, for a cloud that encloses nothing
+constexpr double kCloudNoise = 0.6;   // voxels of a cloud, in standard deviations of its points
+constexpr double kSameSeedVoxels = 1e-3;   // seeds closer than this are one position
+constexpr double kMergeVoxels = 0.25;      // points closer than this do not move the surface apart
+constexpr double kAttractionVoxels = 5.0;  // automatic range of the points after starts other than tagging
+constexpr double kTagDeltaVoxels = 0.5, kTagSigmaVoxels = 2.0;  // measured as kTagAttractionVoxels
+constexpr double kScanRadiusVoxels = 2.5;  // layers of a scan within it are averaged
+constexpr double kNoisyShare = 0.3;        // of a voxel: a layer of points thicker than this is averaged
+
+// A thick layer of points, or several beside each other, has its surface in the middle.
+void average_noise(Job& job) {
+    const double radius = kScanRadiusVoxels * job.h(), thickness = layer_thickness(job.points, radius, job.run);
+    if (!(thickness > kNoisyShare * job.h())) return;
+    job.points = average_layers(job.points, radius, job.run);
+    job.choose("points_averaged", "within " + number(radius),
+               "they lie " + number(thickness) + " from their local plane on the mean, more than " +
+                   number(kNoisyShare) + " voxels");
+}
+
+void merge_points(Job& job) {
+    const std::size_t all = job.points.size();
+    job.points = merge_close_points(job.points, kMergeVoxels * job.h());
+    if (job.points.size() < all)
+        job.run.info("points: " + std::to_string(job.points.size()) + " of " + std::to_string(all) +
+                     " kept, the others are closer than half of " + number(kMergeVoxels * job.h()));
+    job.marks = job.points;
+}
+
+void choose_attraction_range(Job& job) {
+    job.has_automatic_range = true;
+    double& range = job.options.evolve.attraction_range;
+    range = 0;
+    if (!job.uses_points()) return;
+    if (job.tags() && job.uses_image()) {
+        range = kTagAttractionVoxels * job.h();
+        job.choose("attraction_range", number(range),
+                   number(kTagAttractionVoxels) + " voxels: farther from marks the image decides");
+    } else if (job.tags()) {
+        job.choose("attraction_range", "0", "unlimited: the band around the points bounds it");
+    } else {
+        range = kAttractionVoxels * job.h();
+        job.choose("attraction_range", number(range), number(kAttractionVoxels) + " voxels");
+    }
+}
+
+// Tagging needs marks that lie closer together than the body is thick anywhere, by far; the guess does not.
+void choose_start(Job& job) {
+    Start::Kind& kind = job.options.start.kind;
+    if (kind != Start::Kind::Auto || !job.starts_from_marks()) return;
+    kind = Start::Kind::Tag;
+    if (!job.guided() || job.options.contours || job.options.tag_distance > 0 || job.points.size() > kMostGuessMarks) return;
+    if (job.image == nullptr && !can_enclose(job.points)) return;  // a layer: tagging tells what it needs
+    kind = Start::Kind::Guess;
+    job.choose("start", "guess", std::to_string(job.points.size()) + " marks, at most " + std::to_string(kMostGuessMarks));
+}
+
+// Points without an image that enclose something tell inside from outside themselves.
+void try_cloud(Job& job) {
+    Start::Kind& kind = job.options.start.kind;
+    const bool asked = kind == Start::Kind::Cloud;
+    if (!job.starts_from_marks() || !(asked || kind == Start::Kind::Auto)) return;
+    if (asked && job.image != nullptr) throw Error(Errc::InvalidOptions, "segment: the start 'cloud' is for points without an image");
+    const SegmentOptions& o = job.options;
+    const bool has_seeds = !o.exterior_seeds.empty() || !job.hole_seeds.empty() || !o.inside.empty() || !o.outside.empty();
+    if (!asked && (!job.guided() || o.contours || o.tag_distance > 0 || has_seeds || job.image != nullptr || !job.uses_points() ||
+                   job.points.size() <= kMostGuessMarks || !can_enclose(job.points)))
+        return;
+    Timed timed(job.report().seconds.tag);
+    job.cloud = orient_cloud(job.points, job.points.size() == job.given.size() ? job.options.hints : PointHints{}, job.run);
+    kind = Start::Kind::Cloud;
+    if (job.cloud->encloses || !job.options.voxel_size_is_automatic) return;
+    // The indicator is all that there is to see.
+    const double h = kViewVoxel * job.cloud->orientation.screened->cell();
+    if (h <= job.h()) return;
+    job.options.voxel_size = h;
+    job.choose("voxel_size", number(h), number(kViewVoxel) + " cells of the indicator");
+}
+
+}  // namespace
+
+void check_input(Job& job) {
+    const std::string why = job.options.why_invalid();
+    if (!why.empty()) throw Error(Errc::InvalidOptions, "segment: " + why);
+    if (job.image == nullptr && job.points.empty())
+        throw Error(Errc::InvalidInput, "segment: expected an image or points, got neither");
+    if (job.starts_from_marks() && job.points.empty())
+        throw Error(Errc::InvalidInput, "segment: the start 'tag' expects points, got none; give points, contours or "
+                                        "seeds inside, or choose another start (sphere, box, mesh, mask or vdb)");
+    check_sides(job.options.inside, job.options.outside, kSameSeedVoxels * job.h());
+    job.report().point_count = job.given.size();
+    EvolveOptions& evolve = job.options.evolve;
+    if (job.points.empty() && evolve.theta > 0) {
+        evolve.theta = 0;
+        job.choose("theta", "0", "there are no points");
+    }
+    if (job.image == nullptr && evolve.rho > 0) {
+        evolve.rho = 0;
+        job.choose("rho", "0", "there is no image");
+    }
+}
+
+void choose_values(Job& job) {
+    SegmentOptions& options = job.options;
+    if (options.voxel_size <= 0) {
+        options.voxel_size_is_automatic = true;
+        const VoxelSizeChoice choice = choose_voxel_size(job.image, job.points, job.tags());
+        options.voxel_size = choice.voxel_size;
+        job.choose("voxel_size", number(job.h()), choice.reason);
+    }
+    try_cloud(job);
+    merge_points(job);
+    choose_start(job);
+    if (job.image == nullptr && job.tags()) average_noise(job);
+    const double h = job.h();
+    EvolveOptions& evolve = options.evolve;
+    const bool marked = job.tags() || job.guesses();  // the start is close to the end
+    const double delta_voxels = marked ? kTagDeltaVoxels : 1.0;
+    const bool chooses_delta = evolve.delta < 0;
+    if (chooses_delta) evolve.delta = delta_voxels * h;
+    if (job.options.guess || ((job.guesses() || job.is_cloud()) && job.guided() && job.uses_points())) return;  // nothing flows; a later frame may
+    if (chooses_delta) job.choose("delta", number(evolve.delta), number(delta_voxels) + " voxels");
+    if (evolve.tau < 0) job.choose("tau", number(h), "1 voxel at unit speed; longer while the surface moves slowly");
+    if (options.edge.sigma < 0 && job.uses_image()) {
+        const double voxels = job.tags() ? kTagSigmaVoxels : 1.0;
+        job.choose("sigma", number(options.edge.sigma = voxels * h), number(voxels) + " voxels");
+    }
+    if (evolve.attraction_range < 0) choose_attraction_range(job);
+    if (evolve.image_yields < 0) {
+        evolve.image_yields = job.tags() && job.uses_points() && job.uses_image() ? 1.0 : 0.0;
+        if (evolve.image_yields > 0) job.choose("image_yields", "1", "near marks the marks know better than the edges");
+    }
+}
+
+}  // namespace pipeline
+
+VoxelSizeChoice choose_voxel_size(const Image* image, const std::vector<Vec3>& world_points, bool tagged) {
+    using pipeline::kFewPoints, pipeline::kCloudNoise, pipeline::number;
+    if (image != nullptr) {
+        const Vec3& spacing = image->geometry().spacing;
+        return {*std::min_element(spacing.begin(), spacing.end()), "the image's smallest spacing"};
+    }
+    const std::vector<Vec3> distinct = merge_close_points(world_points, 0);
+    if (distinct.size() < 2)
+        throw Error(Errc::InvalidInput, "choose_voxel_size: expected an image or at least 2 distinct points, got " +
+                                            std::to_string(distinct.size()));
+    constexpr const char* kNearest = "the median distance between neighbouring points";
+    if (!tagged && distinct.size() > pipeline::kMostGuessMarks) {
+        const CloudScale scale = cloud_scale(distinct);
+        const double h = kCloudNoise * scale.noise;
+        if (h > scale.nearest) return {h, number(kCloudNoise) + " times the noise of the points, " + number(scale.noise)};
+        return {scale.nearest, kNearest};
+    }
+    const double spacing = nearest_neighbour_spacing(distinct).median;
+    const ScanVoxelSize scan = scan_voxel_size(distinct, spacing);
+    if (scan.voxel_size <= spacing) {
+        // A surface of few points is so few spacings wide that in voxels as large as they are curvature would outweigh them.
+        const double finer = std::sqrt(double(distinct.size()) / kFewPoints);
+        if (finer >= 1) return {spacing, kNearest};
+        return {finer * spacing, "finer than the median distance between neighbouring points, " + number(spacing) + ", for there are few"};
+    }
+    return {scan.voxel_size, "points lie " + number(scan.thickness) +
+                                 " from their local plane on the mean, noise wider than their median distance " +
+                                 number(spacing)};
+}
+
+}  // namespace covol

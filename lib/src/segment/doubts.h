@@ -1,0 +1,19 @@
+#pragma once
+#include <vector>
+
+#include "segment/job.h"
+
+namespace covol::pipeline {
+
+/// What speaks against the result: marks that lie off the surface, or on one side of it. Goes into the report, and to people.
+/// @param marks      world units
+/// @param distances  of each to the surface
+void doubt(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& distances);
+
+/// Of a level set, trilinear.
+[[nodiscard]] double level_at(const FloatGrid& u, const Vec3& world);
+
+/// Whether so many marks lie off the zero level set of `u` that it cannot be what they mark.
+[[nodiscard]] bool misses_marks(const Job& job, const FloatGrid& u);
+
+}  // namespace covol::pipeline

@@ -1,0 +1,123 @@
+#include "segment/final_surface.h"
+
+#include <openvdb/openvdb.h>
+#include <tbb/parallel_invoke.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "cloud/surface/hold_topology.h"
+#include "covol/clip.h"
+#include "covol/compare.h"
+#include "covol/start.h"
+#include "meshing/mesh_distance.h"
+#include "segment/doubts.h"
+
+namespace covol::pipeline {
+namespace {
+
+constexpr double kWarnWithoutPoints = 0.02;  // share of the area
+constexpr double kRimSlack = 1.0 / 6;        // of the distance between points and a hole: half a spacing, where it is automatic
+constexpr std::size_t kLoopsToTell = 8;
+
+/// Where a solid ends whatever the marks say: the image's box, and the region of interest.
+Clip where_it_ends(const Job& job) {
+    Clip all = job.image != nullptr ? clip_at(job.image->geometry()) : Clip{};
+    if (!job.options.roi) return all;
+    const Clip region = clip_at(*job.options.roi);
+    all.insert(all.end(), region.begin(), region.end());
+    return all;
+}
+
+void relax(Job& job) {
+    job.report().mesh = relax_mesh(job.result.mesh, *job.result.surface, {job.options.extract.isovalue}, job.run);
+}
+
+void mesh_of(Job& job, const FloatGrid& level_set) {
+    job.result.surface = surface(level_set, job.run);
+    job.result.mesh = extract_mesh(*job.result.surface, job.options.extract, job.run);
+    relax(job);
+}
+
+int complexity(const MeshMeasures& m) { return m.components + std::max(0, m.genus); }
+
+/// Makes level set and mesh those of another closed mesh, with no more pieces and handles than they had.
+void replace_by(Job& job, const TriangleMesh& mesh) {
+    const int before = complexity(measure(job.result.mesh));
+    const FloatGridPtr rough = job.result.surface;
+    FloatGridPtr level_set = start_from_mesh(job.domain(), mesh, job.run);
+    mesh_of(job, *level_set);
+    if (complexity(measure(job.result.mesh)) <= before) return;
+    cloud::hold_topology(*rough, *level_set);
+    mesh_of(job, *start_from_grid(job.domain(), *level_set, job.run));
+}
+
+/// How much of the surface no point holds, and what becomes of that.
+void treat_holes(Job& job) {
+    SegmentReport& report = job.report();
+    TriangleMesh& mesh = job.result.mesh;
+    std::vector<float>& distances = job.result.distance_to_points;
+    const std::vector<Vec3>& points = job.cloud ? job.cloud->points : job.points;  // without stray ones
+    const HolesOptions& options = job.options.holes;
+    const double automatic = hole_distance(points, job.h()), distance = options.distance > 0 ? options.distance : automatic;
+    const double slack = kRimSlack * std::min(automatic, distance);
+    distances = distances_to_points(mesh, points, job.run);
+    report.share_without_points = share_beyond(mesh, distances, distance);
+    report.holes.policy = options.policy;
+    report.holes.distance = distance;
+    if (options.policy == Holes::Close) return;
+    if (options.policy == Holes::Open) {
+        const double volume = measure(mesh).volume;
+        mesh = trimmed(mesh, distances, distance, slack, report.holes, job.run);
+        if (report.holes.share > 0) {
+            report.holes.closed_volume = volume;
+            relax(job);
+        }
+    }
+    if (options.policy == Holes::Flat) {
+        const TriangleMesh flat = flattened(mesh, distances, distance, slack, report.holes, job.run);
+        if (report.holes.share > 0) replace_by(job, flat);
+    }
+    if (report.holes.share > 0) distances = distances_to_points(mesh, points, job.run);
+    std::string lengths;
+    for (std::size_t n = 0; n < report.holes.loops.size() && n < kLoopsToTell; ++n)
+        lengths += (n > 0 ? ", " : "") + number(report.holes.loops[n].length);
+    job.choose("holes", to_string(options.policy),
+               report.holes.loops.empty() ? "none: all of the surface is within " + number(distance) + " of points"
+                                          : std::to_string(report.holes.loops.size()) + " rims, of length " + lengths +
+                                                (report.holes.loops.size() > kLoopsToTell ? ", ..." : "") +
+                                                (options.policy == Holes::Open ? "; the level set stays closed" : ""));
+}
+
+}  // namespace
+
+void make_surface(Job& job) {
+    SegmentReport& report = job.report();
+    Timed timed(report.seconds.surface);
+    set_clip(*job.result.u, where_it_ends(job));
+    mesh_of(job, *job.result.u);
+    if (!job.points.empty() && job.image == nullptr) treat_holes(job);
+    // Parts of each of these run on one thread.
+    std::vector<double> distances;
+    const std::vector<Vec3>& marks = job.options.contours ? job.given : job.marks;
+    tbb::parallel_invoke([&] { report.surface = measure(job.result.mesh); },
+                         [&] { if (!job.points.empty()) distances = detail::distances_to(job.result.mesh, marks); });
+    if (report.holes.closed_volume > 0) report.surface.volume = report.holes.closed_volume;
+    if (!distances.empty()) {
+        report.fit = detail::statistics_of(distances);
+        doubt(job, marks, distances);
+    }
+    if (job.origin == StartOrigin::Guess && report.surface.components > 1)
+        job.warn("the surface through the marks falls into " + std::to_string(report.surface.components) +
+                 " pieces: where they are one body, mark between them; several bodies are better marked each by itself");
+    report.seeds = check_seeds(*job.result.surface, job.options.inside, job.options.outside);
+    if (const std::string warning = report.seeds.warning(); !warning.empty()) job.warn("seeds: " + warning);
+    if (report.share_without_points > kWarnWithoutPoints)
+        job.warn(number(std::round(1000 * report.share_without_points) / 10) +
+                     " % of the surface lie farther than " + number(report.holes.distance) + " from every point: " +
+                     (report.holes.policy == Holes::Close ? "there curvature alone closes it"
+                      : report.holes.policy == Holes::Flat ? "there flat patches close it"
+                                                           : "there the mesh is open, the level set closed by curvature alone"));
+}
+
+}  // namespace covol::pipeline

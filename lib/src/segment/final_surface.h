@@ -1,0 +1,9 @@
+#pragma once
+#include "segment/job.h"
+
+namespace covol::pipeline {
+
+/// The signed distance to u's zero level set, its mesh, and how they fit the points.
+void make_surface(Job& job);
+
+}  // namespace covol::pipeline

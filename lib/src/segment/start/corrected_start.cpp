@@ -1,0 +1,58 @@
+// Another tool's result, corrected by marks and seeds.
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+
+#include "segment/start/starts.h"
+
+namespace covol::pipeline {
+namespace {
+
+constexpr double kRadiusSpacings = 2.0; // a mark on a slice tells of the next one
+
+CorrectionOptions correction(const Job& job) {
+    CorrectionOptions options = job.options.correction;
+    if (options.least_radius > 0) return options;
+    options.least_radius = kCorrectionVoxels * job.h();
+    if (job.image != nullptr) {
+        const Vec3& spacing = job.image->geometry().spacing;
+        options.least_radius = std::max(options.least_radius, kRadiusSpacings * *std::max_element(spacing.begin(), spacing.end()));
+    }
+    return options;
+}
+
+GuessCorrection corrected(const Job& job, const FloatGridPtr& guess, const std::vector<Vec3>& marks) {
+    return correct_guess(guess, marks, job.options.inside, job.options.outside, correction(job), job.run);
+}
+
+std::string distances(const CorrectionReport& report) {
+    return "from the marks to it: mean " + number(report.before_mean) + ", max " + number(report.before_max) + ", corrected " +
+           number(report.after_mean) + ", " + number(report.after_max);
+}
+
+}  // namespace
+
+void correct_start(Job& job) {
+    Timed timed(job.report().seconds.tag);
+    const GuessCorrection correction = corrected(job, job.result.u, job.sure);
+    job.result.u = correction.start(job.run);
+    job.report().correction = correction.report();
+    job.choose("correction", "of the start", distances(correction.report()));
+}
+
+void start_from_corrected_guess(Job& job) {
+    job.origin = StartOrigin::Corrected;
+    job.report().domain = job.domain_with_chosen_margin(2 * kMarginVoxels * job.h());
+    Timed timed(job.report().seconds.tag);
+    job.options.correction = correction(job);
+    const FloatGridPtr guess = start_grid(*job.options.guess, job.domain(), job.run);
+    job.result.correction = std::make_shared<const GuessCorrection>(corrected(job, guess, job.options.contours ? job.sure : job.points));
+    job.result.u = job.result.correction->start(job.run);
+    const CorrectionReport& report = job.report().correction = job.result.correction->report();
+    job.choose("start", "guess",
+               "corrected within " + number(report.least_radius) + " to " + number(report.largest_radius) + " of " +
+                   std::to_string(report.marks) + " marks and " + std::to_string(report.seeds) +
+                   " seeds that it had on the wrong side; " + distances(report));
+}
+
+}  // namespace covol::pipeline

@@ -1,0 +1,364 @@
+// Starts other than tagging: the signed distance to a given surface, clamped, in a band around it.
+#include <openvdb/tools/Interpolation.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <set>
+
+#include "base/number.h"
+#include "covol/error.h"
+#include "covol/start.h"
+#include "redistance/signed_distance.h"
+
+namespace covol {
+namespace {
+
+using detail::Coord;
+using detail::kLeafDim;
+using detail::kLeafSize;
+using detail::LeafArray;
+using detail::LeafBand;
+
+constexpr auto kWidth = float(kHalfWidthVoxels);
+
+/// Origins of the leaves that meet both the domain and the world box.
+std::vector<Coord> leaves_in(const Domain& domain, const WorldBox& box) {
+    const Vec3 low = domain.world_to_index(box.min), high = domain.world_to_index(box.max);
+    Coord lo, hi;
+    for (int a = 0; a < 3; ++a) {
+        lo[a] = int(std::floor(std::clamp(low[a], double(domain.min[a]), double(domain.max[a])))) & ~(kLeafDim - 1);
+        hi[a] = int(std::ceil(std::clamp(high[a], double(domain.min[a]), double(domain.max[a]))));
+    }
+    std::vector<Coord> origins;
+    for (int i = lo.x(); i <= hi.x(); i += kLeafDim)
+        for (int j = lo.y(); j <= hi.y(); j += kLeafDim)
+            for (int k = lo.z(); k <= hi.z(); k += kLeafDim) origins.emplace_back(i, j, k);
+    return origins;
+}
+
+/// Those of the leaves for which `keep` holds, in their order.
+std::vector<Coord> filter(const std::vector<Coord>& leaves, const std::function<bool(const Coord&)>& keep) {
+    std::vector<char> kept(leaves.size());
+    tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t n) { kept[n] = keep(leaves[n]); });
+    std::vector<Coord> result;
+    for (std::size_t n = 0; n < leaves.size(); ++n)
+        if (kept[n]) result.push_back(leaves[n]);
+    return result;
+}
+
+using SignedDistance = std::function<double(const Vec3& world)>;
+
+/// A start from a signed distance that is known everywhere.
+FloatGridPtr start_from_distance(const Domain& domain, const WorldBox& box, const SignedDistance& distance,
+                                 const char* where) {
+    const double h = domain.voxel_size;
+    const auto world = [&](const Coord& origin, double i, double j, double k) {
+        return domain.index_to_world({origin.x() + i, origin.y() + j, origin.z() + k});
+    };
+    // The leaf's farthest voxel centre lies 3.5 sqrt(3) voxels from its middle.
+    const double reach = (kHalfWidthVoxels + 3.5 * std::sqrt(3.0)) * h;
+    LeafBand band(filter(leaves_in(domain, box),
+                         [&](const Coord& o) { return std::abs(distance(world(o, 3.5, 3.5, 3.5))) <= reach; }));
+    LeafArray<float> u(band.size(), kWidth);
+    tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
+        for (int at = 0; at < kLeafSize; ++at)
+            u.leaf(leaf)[at] = float(distance(world(band.origin(leaf), at >> 6, at >> 3 & 7, at & 7)) / h);
+    });
+    return detail::make_start(band, u, domain, where);
+}
+
+/// Values of a field at the voxels lo..hi of the domain's lattice, k fastest; negative is inside.
+using Sampler = std::function<void(const Coord& lo, const Coord& hi, float* values)>;
+
+/// Those of the leaves whose voxel edges, those to the next leaf included, the zero level set passes.
+std::vector<Coord> crossed_by(const std::vector<Coord>& leaves, const Sampler& sample) {
+    return filter(leaves, [&](const Coord& o) {
+        std::array<float, 9 * 9 * 9> values;
+        sample(o, o.offsetBy(kLeafDim), values.data());
+        return std::any_of(values.begin(), values.end(), [&](float v) { return (v < 0) != (values[0] < 0); });
+    });
+}
+
+/// A start from a field whose zero level set is the surface.
+/// @param crossed  the leaves that it passes, see crossed_by()
+FloatGridPtr start_from_field(const Domain& domain, const std::vector<Coord>& crossed, const Sampler& sample,
+                              const char* where, const RunContext& run) {
+    run.check();
+    const detail::CoordBBox box = detail::box_of(domain);
+    const LeafBand band(detail::dilate_leaves(crossed, 1, domain));
+    LeafArray<float> phi(band.size(), 0.0F);
+    std::vector<detail::LeafMask> inside_domain(band.size());
+    tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
+        const Coord& o = band.origin(leaf);
+        sample(o, o.offsetBy(kLeafDim - 1), phi.leaf(leaf));
+        inside_domain[leaf] = detail::mask_in_box(o, box);
+    });
+    run.check();
+    LeafArray<float> u = detail::signed_distance(band, phi, inside_domain, box, kWidth, run);
+    return detail::make_start(band, u, domain, where);
+}
+
+/// The leaves that the zero level set passes, found from leaf to leaf from those around the seeds on.
+std::vector<Coord> leaves_crossed_from(const Domain& domain, const std::vector<Vec3>& seeds, const Sampler& sample,
+                                       const RunContext& run) {
+    constexpr int kSide = kLeafDim + 1;
+    const detail::CoordBBox box = detail::box_of(domain);
+    const auto in_domain = [&](const Coord& o) { return detail::any_on(detail::mask_in_box(o, box)); };
+    std::set<Coord> known;
+    std::vector<Coord> front, crossed;
+    const auto visit = [&](const Coord& o) {
+        if (in_domain(o) && known.insert(o).second) front.push_back(o);
+    };
+    for (const Vec3& seed : seeds) {
+        const Vec3 at = domain.world_to_index(seed);
+        const Coord center = Coord::floor(openvdb::Vec3d(at[0], at[1], at[2])) & ~(kLeafDim - 1);
+        for (int n = 0; n < 27; ++n) visit(center.offsetBy((n / 9 - 1) * kLeafDim, (n / 3 % 3 - 1) * kLeafDim, (n % 3 - 1) * kLeafDim));
+    }
+    while (!front.empty()) {
+        run.check();
+        const std::vector<Coord> now = std::move(front);
+        front.clear();
+        std::vector<std::array<bool, 6>> through(now.size());  // faces, as in kFaceSlots
+        std::vector<char> crosses(now.size());
+        tbb::parallel_for(std::size_t(0), now.size(), [&](std::size_t n) {
+            std::array<float, kSide * kSide * kSide> values;
+            sample(now[n], now[n].offsetBy(kLeafDim), values.data());
+            const auto negative = [&](int i, int j, int k) { return values[std::size_t((i * kSide + j) * kSide + k)] < 0; };
+            std::array<bool, 6> mixed{};
+            bool any = false;
+            for (int a = 0; a < kSide; ++a)
+                for (int b = 0; b < kSide; ++b) {
+                    mixed[0] |= negative(0, a, b) != negative(0, 0, 0);
+                    mixed[1] |= negative(kLeafDim, a, b) != negative(kLeafDim, 0, 0);
+                    mixed[2] |= negative(a, 0, b) != negative(0, 0, 0);
+                    mixed[3] |= negative(a, kLeafDim, b) != negative(0, kLeafDim, 0);
+                    mixed[4] |= negative(a, b, 0) != negative(0, 0, 0);
+                    mixed[5] |= negative(a, b, kLeafDim) != negative(0, 0, kLeafDim);
+                }
+            for (const float v : values) any |= (v < 0) != (values[0] < 0);
+            through[n] = mixed;
+            crosses[n] = any;
+        });
+        for (std::size_t n = 0; n < now.size(); ++n) {
+            if (!crosses[n]) continue;
+            crossed.push_back(now[n]);
+            for (int face = 0; face < 6; ++face) {
+                if (!through[n][std::size_t(face)]) continue;
+                Coord next = now[n];
+                next[face / 2] += face % 2 == 0 ? -kLeafDim : kLeafDim;
+                visit(next);
+            }
+        }
+    }
+    std::sort(crossed.begin(), crossed.end());
+    return crossed;
+}
+
+/// From voxels of a domain to index space of a grid with a linear transform.
+class ToSource {
+public:
+    ToSource(const Domain& domain, const openvdb::math::Transform& source) {
+        const auto index_of = [&](const Vec3& at) {
+            const Vec3 x = domain.index_to_world(at);
+            return source.worldToIndex(openvdb::Vec3d(x[0], x[1], x[2]));
+        };
+        from_ = index_of({0, 0, 0});
+        along_ = {index_of({1, 0, 0}) - from_, index_of({0, 1, 0}) - from_, index_of({0, 0, 1}) - from_};
+    }
+    openvdb::Vec3d operator()(int i, int j, int k) const {
+        return from_ + double(i) * along_[0] + double(j) * along_[1] + double(k) * along_[2];
+    }
+    /// From a voxel to the source's where the lattices coincide.
+    [[nodiscard]] std::optional<Coord> shift() const {
+        constexpr double kSame = 1e-9;  // of a voxel for each
+        for (int a = 0; a < 3; ++a)
+            for (int b = 0; b < 3; ++b)
+                if (std::abs(along_[std::size_t(a)][b] - (a == b ? 1 : 0)) > kSame) return std::nullopt;
+        const Coord nearest = Coord::round(from_);
+        return (from_ - nearest.asVec3d()).length() < 1e3 * kSame ? std::optional(nearest) : std::nullopt;
+    }
+    /// The source's voxels that interpolation at the voxels lo..hi asks for.
+    [[nodiscard]] openvdb::CoordBBox box(const Coord& lo, const Coord& hi) const {
+        openvdb::BBoxd corners;
+        for (int c = 0; c < 8; ++c)
+            corners.expand((*this)(c & 4 ? hi.x() : lo.x(), c & 2 ? hi.y() : lo.y(), c & 1 ? hi.z() : lo.z()));
+        return {Coord::floor(corners.min()), Coord::floor(corners.max()).offsetBy(1)};
+    }
+
+private:
+    openvdb::Vec3d from_;
+    std::array<openvdb::Vec3d, 3> along_;
+};
+
+/// False where all values in the box have one sign. Boxes that hold more voxels than a leaf with its next layer would take longer
+/// than what they may save.
+bool may_cross(const FloatGrid& grid, const openvdb::CoordBBox& box) {
+    if (box.volume() > 9 * 9 * 9) return true;
+    const auto accessor = grid.getConstAccessor();
+    const bool first = accessor.getValue(box.min()) < 0;
+    for (auto at = box.begin(); at; ++at)
+        if ((accessor.getValue(*at) < 0) != first) return true;
+    return false;
+}
+
+using detail::to_text;
+
+double length(const Vec3& v) { return std::hypot(v[0], v[1], v[2]); }
+
+/// 1 where the mask is above 0: labels must not be interpolated.
+Image binarised(const Image& mask) {
+    const Index3 n = mask.geometry().size;
+    const std::size_t count = std::size_t{1} * n[0] * n[1] * n[2];
+    std::vector<std::uint8_t> values(count);
+    tbb::parallel_for(0, n[2], [&](int k) {
+        for (int j = 0; j < n[1]; ++j)
+            for (int i = 0; i < n[0]; ++i)
+                values[(std::size_t(k) * n[1] + j) * n[0] + i] = mask.at(i, j, k) > 0 ? 1 : 0;
+    });
+    return Image::from_values(mask.geometry(), values.data());
+}
+
+bool contains(const ImageGeometry& geometry, const Vec3& world) {
+    const Vec3 at = geometry.world_to_index(world);
+    for (int a = 0; a < 3; ++a)
+        if (!(at[a] >= -0.5 && at[a] <= geometry.size[a] - 0.5)) return false;
+    return true;
+}
+
+}  // namespace
+
+FloatGridPtr start_from_sphere(const Domain& domain, const Vec3& center, double radius) {
+    if (!(radius > 0) || !std::isfinite(radius) || !std::isfinite(length(center)))
+        throw Error(Errc::InvalidOptions, "start_from_sphere: expected a finite center and a radius > 0, got " +
+                                              to_text(center) + " and " + std::to_string(radius));
+    const double reach = radius + kHalfWidthVoxels * domain.voxel_size;
+    const WorldBox box{{center[0] - reach, center[1] - reach, center[2] - reach},
+                       {center[0] + reach, center[1] + reach, center[2] + reach}};
+    return start_from_distance(
+        domain, box,
+        [&](const Vec3& x) { return length({x[0] - center[0], x[1] - center[1], x[2] - center[2]}) - radius; },
+        "start_from_sphere");
+}
+
+FloatGridPtr start_from_box(const Domain& domain, const WorldBox& box) {
+    for (int a = 0; a < 3; ++a)
+        if (!(box.max[a] > box.min[a]) || !std::isfinite(box.max[a] - box.min[a]))
+            throw Error(Errc::InvalidOptions, "start_from_box: expected a box with a positive extent, got " +
+                                                  to_text(box.min) + " to " + to_text(box.max));
+    WorldBox wide = box;
+    for (int a = 0; a < 3; ++a) {
+        wide.min[a] -= kHalfWidthVoxels * domain.voxel_size;
+        wide.max[a] += kHalfWidthVoxels * domain.voxel_size;
+    }
+    const auto distance = [&](const Vec3& x) {
+        Vec3 out;
+        double deepest = -std::numeric_limits<double>::max();
+        for (int a = 0; a < 3; ++a) {
+            const double beyond = std::max(box.min[a] - x[a], x[a] - box.max[a]);
+            deepest = std::max(deepest, beyond);
+            out[a] = std::max(beyond, 0.0);
+        }
+        return deepest > 0 ? length(out) : deepest;
+    };
+    return start_from_distance(domain, wide, distance, "start_from_box");
+}
+
+FloatGridPtr start_from_mask(const Domain& domain, const Image& mask, const RunContext& run) {
+    FloatGridPtr result;
+    with_threads(run, [&] {
+        const Image inside = binarised(mask);
+        const ImageGeometry& geometry = mask.geometry();
+        WorldBox box = geometry.world_box();
+        for (int a = 0; a < 3; ++a) {
+            box.min[a] -= domain.voxel_size;
+            box.max[a] += domain.voxel_size;
+        }
+        const Sampler sample = [&](const Coord& lo, const Coord& hi, float* values) {
+            inside.sample(domain, {lo.x(), lo.y(), lo.z()}, {hi.x(), hi.y(), hi.z()}, values);
+            std::size_t n = 0;
+            for (int i = lo.x(); i <= hi.x(); ++i)
+                for (int j = lo.y(); j <= hi.y(); ++j)
+                    for (int k = lo.z(); k <= hi.z(); ++k, ++n)
+                        // The image repeats its border beyond its end; the mask ends there.
+                        values[n] = values[n] > 0 && contains(geometry, domain.index_to_world({double(i), double(j), double(k)}))
+                                        ? 0.5F - values[n]
+                                        : 0.5F;
+        };
+        result = start_from_field(domain, crossed_by(leaves_in(domain, box), sample), sample, "start_from_mask", run);
+    });
+    return result;
+}
+
+FloatGridPtr start_from_contours(const Domain& domain, const ContourSolid& solid, const RunContext& run) {
+    constexpr double kLeafRadius = 4.5 * 1.7320508;  // voxels, from the middle of a leaf and its next layer to a corner
+    FloatGridPtr result;
+    with_threads(run, [&] {
+        const std::vector<Coord> near = filter(leaves_in(domain, solid.box()), [&](const Coord& o) {
+            return solid.may_meet(domain.index_to_world({o.x() + 4.0, o.y() + 4.0, o.z() + 4.0}), kLeafRadius * domain.voxel_size);
+        });
+        const Sampler sample = [&](const Coord& lo, const Coord& hi, float* values) {
+            for (int i = lo.x(); i <= hi.x(); ++i)
+                for (int j = lo.y(); j <= hi.y(); ++j)
+                    for (int k = lo.z(); k <= hi.z(); ++k)
+                        *values++ = float(solid.level(domain.index_to_world({double(i), double(j), double(k)})));
+        };
+        result = start_from_field(domain, crossed_by(near, sample), sample, "start_from_contours", run);
+    });
+    return result;
+}
+
+FloatGridPtr start_from_level(const Domain& domain, const std::vector<Vec3>& seeds, const LevelRow& level, const RunContext& run) {
+    FloatGridPtr result;
+    with_threads(run, [&] {
+        const double h = domain.voxel_size;
+        const Sampler sample = [&](const Coord& lo, const Coord& hi, float* values) {
+            const int count = hi.z() - lo.z() + 1;
+            std::array<double, kLeafDim + 1> row;
+            for (int i = lo.x(); i <= hi.x(); ++i)
+                for (int j = lo.y(); j <= hi.y(); ++j) {
+                    level(domain.index_to_world({double(i), double(j), double(lo.z())}), {0, 0, h}, count, row.data());
+                    for (int k = 0; k < count; ++k) *values++ = float(row[std::size_t(k)]);
+                }
+        };
+        result = start_from_field(domain, leaves_crossed_from(domain, seeds, sample, run), sample, "start_from_level", run);
+    });
+    return result;
+}
+
+FloatGridPtr start_from_grid(const Domain& domain, const FloatGrid& level_set, const RunContext& run) {
+    FloatGridPtr result;
+    with_threads(run, [&] {
+        // Leaves of the domain that meet a leaf of the level set.
+        std::vector<Coord> candidates;
+        for (auto leaf = level_set.tree().cbeginLeaf(); leaf; ++leaf) {
+            const openvdb::CoordBBox voxels(leaf->origin().offsetBy(-1), leaf->origin().offsetBy(kLeafDim));
+            const openvdb::BBoxd world = level_set.transform().indexToWorld(voxels);
+            const WorldBox box{{world.min()[0], world.min()[1], world.min()[2]},
+                               {world.max()[0], world.max()[1], world.max()[2]}};
+            const std::vector<Coord> met = leaves_in(domain, box);
+            candidates.insert(candidates.end(), met.begin(), met.end());
+        }
+        std::sort(candidates.begin(), candidates.end());
+        candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
+        const ToSource to_source(domain, level_set.transform());
+        const std::optional<Coord> shift = to_source.shift();
+        candidates = filter(candidates, [&](const Coord& o) { return may_cross(level_set, to_source.box(o, o.offsetBy(kLeafDim))); });
+        const Sampler sample = [&](const Coord& lo, const Coord& hi, float* values) {
+            const auto accessor = level_set.getConstAccessor();
+            for (int i = lo.x(); i <= hi.x(); ++i)
+                for (int j = lo.y(); j <= hi.y(); ++j)
+                    for (int k = lo.z(); k <= hi.z(); ++k)
+                        *values++ = shift ? accessor.getValue(*shift + Coord(i, j, k))
+                                          : openvdb::tools::BoxSampler::sample(accessor, to_source(i, j, k));
+        };
+        result = start_from_field(domain, crossed_by(candidates, sample), sample, "start_from_grid", run);
+    });
+    return result;
+}
+
+}  // namespace covol

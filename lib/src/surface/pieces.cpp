@@ -1,0 +1,313 @@
+#include "surface/pieces.h"
+
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/LevelSetUtil.h>
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <unordered_map>
+
+namespace covol::detail {
+namespace {
+
+constexpr double kSmall = 0.01;  // of the largest
+constexpr int kMarkVoxels = 2;   // around a piece
+
+using Pieces = std::vector<openvdb::MaskGrid::Ptr>;
+
+/// The connected parts of the active voxels of one sign, the largest first.
+Pieces pieces_of(const FloatGrid& level_set, bool inside) {
+    openvdb::MaskGrid voxels;
+    for (auto leaf = level_set.tree().cbeginLeaf(); leaf; ++leaf) {
+        auto* mask = voxels.tree().touchLeaf(leaf->origin());
+        for (auto value = leaf->cbeginValueOn(); value; ++value)
+            if ((*value < 0) == inside) mask->setValueOn(value.pos());
+    }
+    Pieces pieces;
+    openvdb::tools::segmentActiveVoxels(voxels, pieces);
+    return pieces;
+}
+
+bool has_mark(const openvdb::MaskGrid& piece, const FloatGrid& level_set, const std::vector<Vec3>& marks) {
+    openvdb::CoordBBox box = piece.evalActiveVoxelBoundingBox();
+    box.expand(kMarkVoxels);
+    return std::any_of(marks.begin(), marks.end(), [&](const Vec3& m) {
+        return box.isInside(openvdb::Coord::round(level_set.worldToIndex(openvdb::Vec3d(m[0], m[1], m[2]))));
+    });
+}
+
+void erase(const openvdb::MaskGrid& piece, FloatGrid& level_set, bool inside) {
+    const auto limit = float(0.5 * level_set.voxelSize()[0]);
+    auto accessor = level_set.getAccessor();
+    for (auto value = piece.cbeginValueOn(); value; ++value) accessor.setValue(value.getCoord(), inside ? limit : -limit);
+}
+
+/// The regions of equal sign, 6-connected, of all that lies between the leaves too.
+class Regions {
+public:
+    using Label = std::uint32_t;
+
+    explicit Regions(FloatGrid& level_set) : level_set_(level_set) {
+        for (auto leaf = level_set.tree().beginLeaf(); leaf; ++leaf) leaves_.push_back(&*leaf);
+        std::sort(leaves_.begin(), leaves_.end(), [](const Leaf* x, const Leaf* y) { return x->origin() < y->origin(); });
+        label_leaves();
+        find_gaps();
+        join();
+        for (Label n = 0; n < parents_.size(); ++n) parents_[n] = root(n);
+        surface_.assign(parents_.size(), 0);
+        for (std::size_t n = 0; n < leaves_.size(); ++n)
+            for (auto value = leaves_[n]->cbeginValueOn(); value; ++value) ++surface_[parents_[labels_[n][value.pos()]]];
+    }
+
+    /// Of one sign, those that fewer than `least` points rest on, without the largest and what lies around everything, get
+    /// the other sign. @return how many
+    std::size_t drop(bool inside, const std::vector<Vec3>& points, std::size_t least) {
+        std::vector<Label> roots;
+        for (Label n = 0; n < parents_.size(); ++n)
+            if (parents_[n] == n && is_inside_[n] == inside && surface_[n] > 0) roots.push_back(n);
+        if (roots.size() < 2) return 0;
+        const Label main = *std::max_element(roots.begin(), roots.end(), [&](Label x, Label y) { return surface_[x] < surface_[y]; });
+        const std::vector<std::size_t> resting = resting_points(points);
+        std::vector<char> goes(parents_.size(), 0);
+        std::size_t count = 0;
+        for (const Label n : roots) {
+            if (n == main || parents_[kAround] == n || resting[n] >= least) continue;
+            goes[n] = 1;
+            ++count;
+        }
+        if (count > 0) change_sign(goes, inside);
+        return count;
+    }
+
+private:
+    using Leaf = FloatGrid::TreeType::LeafNodeType;
+    static constexpr int kDim = 8, kVoxels = 512;
+    static constexpr Label kAround = 0;
+    /// Blocks of 8^3 along k without a leaf, from the first to before the last.
+    struct Gap { int begin, end; Label label; };
+    struct Row {
+        std::size_t first, last;  // leaves
+        std::vector<Gap> gaps;
+    };
+    using RowKey = std::pair<int, int>;
+
+    Label new_label(bool inside) {
+        parents_.push_back(Label(parents_.size()));
+        is_inside_.push_back(inside);
+        return parents_.back();
+    }
+    Label root(Label n) {
+        while (parents_[n] != n) n = parents_[n] = parents_[parents_[n]];
+        return n;
+    }
+    void unite(Label x, Label y) {
+        x = root(x), y = root(y);
+        parents_[std::max(x, y)] = std::min(x, y);
+    }
+
+    /// Regions within each leaf.
+    void label_leaves() {
+        new_label(false);  // kAround
+        labels_.resize(leaves_.size());
+        std::vector<std::vector<bool>> inside(leaves_.size());  // of each local label
+        tbb::parallel_for(std::size_t(0), leaves_.size(), [&](std::size_t n) {
+            const float* values = leaves_[n]->buffer().data();
+            std::array<std::uint16_t, kVoxels> parent;
+            const auto top = [&](std::uint16_t v) {
+                while (parent[v] != v) v = parent[v] = parent[parent[v]];
+                return v;
+            };
+            for (int v = 0; v < kVoxels; ++v) {
+                parent[std::size_t(v)] = std::uint16_t(v);
+                for (const auto& [stride, position] : {std::pair{64, v >> 6}, {8, v >> 3 & 7}, {1, v & 7}}) {
+                    if (position == 0 || (values[v] < 0) != (values[v - stride] < 0)) continue;
+                    const std::uint16_t x = top(std::uint16_t(v)), y = top(std::uint16_t(v - stride));
+                    parent[std::max(x, y)] = std::min(x, y);
+                }
+            }
+            for (int v = 0; v < kVoxels; ++v) {
+                const std::uint16_t t = top(std::uint16_t(v));
+                if (t == v) {
+                    labels_[n][std::size_t(v)] = Label(inside[n].size());
+                    inside[n].push_back(values[v] < 0);
+                } else {
+                    labels_[n][std::size_t(v)] = labels_[n][t];
+                }
+            }
+        });
+        for (std::size_t n = 0; n < leaves_.size(); ++n) {
+            const auto first = Label(parents_.size());
+            for (const bool is_inside : inside[n]) new_label(is_inside);
+            for (Label& label : labels_[n]) label += first;
+        }
+    }
+
+    /// What lies between the leaves of a row of blocks has one sign.
+    void find_gaps() {
+        if (leaves_.empty()) return;
+        int low[3], high[3];
+        for (int a = 0; a < 3; ++a) low[a] = high[a] = leaves_.front()->origin()[a] / kDim;
+        for (const Leaf* leaf : leaves_)
+            for (int a = 0; a < 3; ++a) {
+                low[a] = std::min(low[a], leaf->origin()[a] / kDim);
+                high[a] = std::max(high[a], leaf->origin()[a] / kDim);
+            }
+        const auto values = level_set_.getConstAccessor();
+        std::size_t next = 0;
+        for (int i = low[0] - 1; i <= high[0] + 1; ++i)
+            for (int j = low[1] - 1; j <= high[1] + 1; ++j) {
+                Row row{next, next, {}};
+                int from = low[2] - 1;
+                const auto add_gap = [&](int to) {
+                    if (from < to)
+                        row.gaps.push_back({from, to, new_label(values.getValue({kDim * i, kDim * j, kDim * from}) < 0)});
+                };
+                for (; next < leaves_.size() && leaves_[next]->origin().x() == kDim * i && leaves_[next]->origin().y() == kDim * j; ++next) {
+                    const int k = leaves_[next]->origin().z() / kDim;
+                    add_gap(k);
+                    from = k + 1;
+                }
+                row.last = next;
+                add_gap(high[2] + 2);
+                for (const Gap& gap : row.gaps)
+                    if (!is_inside_[gap.label] && (i < low[0] || i > high[0] || j < low[1] || j > high[1] || gap.begin < low[2] || gap.end > high[2] + 1))
+                        unite(kAround, gap.label);
+                rows_.emplace(RowKey{i, j}, std::move(row));
+            }
+    }
+
+    void join() {
+        for (const auto& [key, row] : rows_)
+            for (const auto& [axis, other] : {std::pair{0, rows_.find({key.first + 1, key.second})}, std::pair{1, rows_.find({key.first, key.second + 1})}}) {
+                if (other == rows_.end()) continue;
+                for (std::size_t x = 0, y = 0; x < row.gaps.size() && y < other->second.gaps.size();) {
+                    const Gap &one = row.gaps[x], &two = other->second.gaps[y];
+                    if (std::max(one.begin, two.begin) < std::min(one.end, two.end)) unite_equal(one.label, two.label);
+                    if (one.end < two.end) ++x; else ++y;
+                }
+                join_faces(row, other->second, axis);
+                join_to_gaps(row, other->second.gaps, axis, true);
+                join_to_gaps(other->second, row.gaps, axis, false);
+            }
+        for (const auto& [key, row] : rows_) {
+            for (std::size_t n = row.first; n + 1 < row.last; ++n)
+                if (leaves_[n + 1]->origin().z() == leaves_[n]->origin().z() + kDim) join_face(n, n + 1, 2);
+            for (std::size_t n = row.first; n < row.last; ++n)
+                for (const Gap& gap : row.gaps) {
+                    const int k = leaves_[n]->origin().z() / kDim;
+                    if (gap.begin == k + 1) join_to_gap(n, 2, true, gap);
+                    if (gap.end == k) join_to_gap(n, 2, false, gap);
+                }
+        }
+    }
+
+    void unite_equal(Label x, Label y) {
+        if (is_inside_[x] == is_inside_[y]) unite(x, y);
+    }
+    /// visit(voxel) for those of a leaf's lower or upper face.
+    template <typename Visit>
+    static void for_face(int axis, bool upper, Visit visit) {
+        const int stride = axis == 0 ? 64 : axis == 1 ? 8 : 1, u = axis == 0 ? 8 : 64, v = axis == 2 ? 8 : 1;
+        for (int a = 0; a < kDim; ++a)
+            for (int b = 0; b < kDim; ++b) visit(std::size_t(a * u + b * v + (upper ? (kDim - 1) * stride : 0)), std::size_t(a * u + b * v + (upper ? 0 : (kDim - 1) * stride)));
+    }
+    void join_face(std::size_t lower, std::size_t upper, int axis) {
+        for_face(axis, true, [&](std::size_t here, std::size_t there) { unite_equal(labels_[lower][here], labels_[upper][there]); });
+    }
+    void join_to_gap(std::size_t leaf, int axis, bool upper, const Gap& gap) {
+        for_face(axis, upper, [&](std::size_t here, std::size_t) { unite_equal(labels_[leaf][here], gap.label); });
+    }
+    void join_faces(const Row& lower, const Row& upper, int axis) {
+        for (std::size_t x = lower.first, y = upper.first; x < lower.last && y < upper.last;) {
+            const int one = leaves_[x]->origin().z(), two = leaves_[y]->origin().z();
+            if (one == two) join_face(x, y, axis);
+            if (one <= two) ++x;
+            if (two <= one) ++y;
+        }
+    }
+    void join_to_gaps(const Row& row, const std::vector<Gap>& gaps, int axis, bool upper) {
+        std::size_t at = 0;
+        for (std::size_t n = row.first; n < row.last; ++n) {
+            const int k = leaves_[n]->origin().z() / kDim;
+            while (at < gaps.size() && gaps[at].end <= k) ++at;
+            if (at < gaps.size() && gaps[at].begin <= k) join_to_gap(n, axis, upper, gaps[at]);
+        }
+    }
+
+    /// Points on each region, within a voxel.
+    [[nodiscard]] std::vector<std::size_t> resting_points(const std::vector<Vec3>& points) const {
+        std::vector<std::size_t> all(parents_.size(), 0);
+        std::unordered_map<const Leaf*, std::size_t> numbers;
+        for (std::size_t n = 0; n < leaves_.size(); ++n) numbers.emplace(leaves_[n], n);
+        tbb::enumerable_thread_specific<std::vector<std::size_t>> counts(all);
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 1024), [&](const auto& range) {
+            std::vector<std::size_t>& mine = counts.local();
+            const auto tree = level_set_.getConstAccessor();
+            std::array<Label, 27> beside;
+            for (std::size_t p = range.begin(); p < range.end(); ++p) {
+                const openvdb::Coord c = openvdb::Coord::round(level_set_.worldToIndex(openvdb::Vec3d(points[p][0], points[p][1], points[p][2])));
+                std::size_t count = 0;
+                const Leaf* last = nullptr;
+                std::size_t number = 0;
+                for (int n = 0; n < 27; ++n) {
+                    const openvdb::Coord at = c.offsetBy(n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1);
+                    const Leaf* leaf = tree.probeConstLeaf(at);
+                    if (leaf == nullptr) continue;
+                    if (leaf != last) number = numbers.at(last = leaf);
+                    const Label label = parents_[labels_[number][Leaf::coordToOffset(at)]];
+                    if (std::find(beside.begin(), beside.begin() + std::ptrdiff_t(count), label) == beside.begin() + std::ptrdiff_t(count)) beside[count++] = label;
+                }
+                for (std::size_t n = 0; n < count; ++n) ++mine[beside[n]];
+            }
+        });
+        for (const std::vector<std::size_t>& some : counts)
+            for (std::size_t n = 0; n < all.size(); ++n) all[n] += some[n];
+        return all;
+    }
+
+    void change_sign(const std::vector<char>& goes, bool inside) {
+        const auto limit = float(0.5 * level_set_.voxelSize()[0]), now = inside ? limit : -limit;
+        for (std::size_t n = 0; n < leaves_.size(); ++n)
+            for (int v = 0; v < kVoxels; ++v)
+                if (goes[parents_[labels_[n][std::size_t(v)]]]) leaves_[n]->setValueOnly(openvdb::Index(v), now);
+        for (const auto& [key, row] : rows_)
+            for (const Gap& gap : row.gaps)
+                if (goes[parents_[gap.label]])
+                    for (int k = gap.begin; k < gap.end; ++k)
+                        level_set_.tree().addTile(1, {kDim * key.first, kDim * key.second, kDim * k}, inside ? level_set_.background() : -level_set_.background(), false);
+    }
+
+    FloatGrid& level_set_;
+    std::vector<Leaf*> leaves_;  // by origin
+    std::vector<std::array<Label, kVoxels>> labels_;
+    std::map<RowKey, Row> rows_;
+    std::vector<Label> parents_;
+    std::vector<char> is_inside_;
+    std::vector<std::size_t> surface_;  // active voxels of each
+};
+
+}  // namespace
+
+void drop_unmarked_pieces(FloatGrid& level_set, const std::vector<Vec3>& marks) {
+    for (const bool inside : {true, false}) {
+        const Pieces pieces = pieces_of(level_set, inside);
+        for (std::size_t n = 1; n < pieces.size(); ++n) {
+            if (double(pieces[n]->activeVoxelCount()) > kSmall * double(pieces[0]->activeVoxelCount())) continue;
+            if (has_mark(*pieces[n], level_set, marks)) continue;
+            erase(*pieces[n], level_set, inside);
+        }
+    }
+}
+
+std::size_t drop_bare_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, std::size_t least) {
+    // A cavity in a piece that goes is one no more.
+    const std::size_t pieces = Regions(level_set).drop(true, points, least);
+    return pieces + Regions(level_set).drop(false, points, least);
+}
+
+}  // namespace covol::detail

@@ -1,0 +1,167 @@
+// Orientation by what files tell of their points.
+#include "cloud/orientation/given_sides.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+
+#include "covol/cloud_surface.h"
+#include "covol/error.h"
+#include "support/clouds.h"
+#include "support/surface_samples.h"
+
+using namespace covol;
+
+namespace {
+
+test::SurfaceSample noisy(const test::Solid3& shape, std::size_t count, double spacings, unsigned seed) {
+    test::SurfaceSample s = shape.sample(count, seed);
+    test::add_noise(s, spacings * s.spacing(), seed + 100);
+    return s;
+}
+
+std::vector<Vec3> flipped(std::vector<Vec3> normals, double share, unsigned seed) {
+    std::mt19937 random(seed);
+    for (Vec3& n : normals)
+        if (random() < share * 4294967296.0) n = test::scaled(-1, n);
+    return normals;
+}
+
+std::vector<Vec3> garbage(std::size_t count, unsigned seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    std::vector<Vec3> all;
+    while (all.size() < count) all.push_back(test::unit({normal(random), normal(random), normal(random)}));
+    return all;
+}
+
+double share_wrong(const std::vector<Vec3>& found, const std::vector<Vec3>& truth) {
+    std::size_t wrong = 0;
+    for (std::size_t n = 0; n < truth.size(); ++n) wrong += !(test::dot(found[n], truth[n]) > 0);
+    return double(wrong) / double(truth.size());
+}
+
+CloudOrientation with_normals(const std::vector<Vec3>& points, const std::vector<Vec3>& normals) {
+    return orient_cloud(points, PointHints{normals, {}});
+}
+
+std::vector<Vec3> towards(const Vec3& sensor, const std::vector<Vec3>& points) {
+    std::vector<Vec3> all;
+    for (const Vec3& p : points) all.push_back(test::unit(test::sum(sensor, test::scaled(-1, p))));
+    return all;
+}
+
+}  // namespace
+
+TEST_CASE("good normals orient, flipped ones are mended, those that all point inwards are turned over") {
+    for (const test::Solid3& shape : {test::ball(1), test::torus(1, 0.35), test::table(0.07), test::block({0.7, 0.7, 0.05})})
+        for (unsigned seed = 1; seed <= 2; ++seed) {
+            const test::SurfaceSample s = noisy(shape, 5000, 0.3, seed);
+            const CloudOrientation good = with_normals(s.points, s.normals);
+            REQUIRE(good.points == s.points);
+            CHECK(good.hints.used);
+            CHECK(good.hints.normals == s.points.size());
+            CHECK(good.hints.agree > 0.99);
+            CHECK_FALSE(good.hints.inward);
+            CHECK(share_wrong(good.orientation.normals, s.normals) < 0.005);
+
+            const CloudOrientation mended = with_normals(s.points, flipped(s.normals, 0.2, seed));
+            CHECK(mended.hints.used);
+            CHECK(mended.hints.agree == Approx(0.8).margin(0.03));
+            CHECK(share_wrong(mended.orientation.normals, s.normals) < 0.01);
+
+            const CloudOrientation inward = with_normals(s.points, flipped(s.normals, 1, seed));
+            CHECK(inward.hints.used);
+            CHECK(inward.hints.inward);
+            CHECK(inward.orientation.normals == good.orientation.normals);
+        }
+}
+
+TEST_CASE("normals without a meaning change nothing") {
+    const test::SurfaceSample s = noisy(test::torus(1, 0.35), 4000, 0.3, 3);
+    const CloudOrientation own = orient_cloud(s.points);
+    const std::vector<Vec3> random = garbage(s.points.size(), 5), half = flipped(s.normals, 0.5, 6), up(s.points.size(), Vec3{0, 0, 1});
+    for (const auto& normals : {random, half, up}) {
+        const CloudOrientation cloud = with_normals(s.points, normals);
+        CHECK_FALSE(cloud.hints.used);
+        CHECK_FALSE(cloud.hints.why_not.empty());
+        CHECK(cloud.orientation.normals == own.orientation.normals);
+        CHECK(cloud.hints.agree == Approx(0.5).margin(0.06));
+    }
+    // Too few to go by.
+    std::vector<Vec3> few(s.points.size(), Vec3{0, 0, 0});
+    for (std::size_t n = 0; n < few.size(); n += 4) few[n] = s.normals[n];
+    const CloudOrientation cloud = with_normals(s.points, few);
+    CHECK_FALSE(cloud.hints.used);
+    CHECK(cloud.orientation.normals == own.orientation.normals);
+}
+
+TEST_CASE("a part that is turned as a whole is found by what the points say themselves") {
+    for (const test::Solid3& shape : {test::torus(1, 0.35), test::table(0.07)}) {
+        const test::SurfaceSample s = noisy(shape, 6000, 0.2, 4);
+        std::vector<Vec3> normals = s.normals;
+        std::size_t turned = 0;
+        for (std::size_t n = 0; n < normals.size(); ++n)
+            if (s.points[n][0] > 0.45) {
+                normals[n] = test::scaled(-1, normals[n]);
+                ++turned;
+            }
+        REQUIRE(double(turned) > 0.05 * double(normals.size()));
+        const CloudOrientation cloud = with_normals(s.points, normals);
+        CHECK_FALSE(cloud.hints.used);
+        CHECK(share_wrong(cloud.orientation.normals, s.normals) < 0.01);
+        CHECK(cloud.hints.foreseen > 0.9);  // each half alone finds nothing
+    }
+}
+
+TEST_CASE("a point without a normal takes the side of those around it") {
+    const test::SurfaceSample s = noisy(test::ball(1), 4000, 0.2, 5);
+    std::vector<Vec3> normals = s.normals;
+    for (std::size_t n = 0; n < normals.size(); n += 3) normals[n] = {0, 0, 0};
+    const CloudOrientation cloud = with_normals(s.points, normals);
+    CHECK(cloud.hints.used);
+    CHECK(cloud.hints.normals < s.points.size());
+    CHECK(share_wrong(cloud.orientation.normals, s.normals) < 0.001);
+}
+
+TEST_CASE("a sensor orients what it saw, and is not believed where it could not have seen the points") {
+    const test::SurfaceSample s = noisy(test::ball(1), 9000, 0.2, 6);
+    const Vec3 sensor{0, 0, 6};
+    test::SurfaceSample seen;
+    for (std::size_t n = 0; n < s.points.size(); ++n)
+        if (test::dot(s.normals[n], test::sum(sensor, test::scaled(-1, s.points[n]))) > 0.3) {
+            seen.points.push_back(s.points[n]);
+            seen.normals.push_back(s.normals[n]);
+        }
+    const CloudOrientation cloud = orient_cloud(seen.points, PointHints{{}, towards(sensor, seen.points)});
+    CHECK(cloud.hints.used);
+    CHECK(cloud.hints.from_sensor);
+    CHECK(cloud.hints.sensors == seen.points.size());
+    CHECK(share_wrong(cloud.orientation.normals, seen.normals) < 0.002);
+    // Half of the whole ball is hidden from anywhere.
+    const CloudOrientation whole = orient_cloud(s.points, PointHints{{}, towards(sensor, s.points)});
+    CHECK_FALSE(whole.hints.used);
+    CHECK(share_wrong(whole.orientation.normals, s.normals) < 0.001);
+}
+
+TEST_CASE("hints follow their points") {
+    const std::vector<Vec3> from{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {1, 0, 0}};
+    const PointHints hints{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {-1, 0, 0}}, {}};
+    const PointHints left = carried(hints, from, {{2.1, 0, 0}, {1, 0, 0}});
+    CHECK(left.normals == std::vector<Vec3>{{0, 0, 1}, {0, 1, 0}});
+    CHECK(left.to_sensor.empty());
+    CHECK(carried({}, from, from).normals.empty());
+    CHECK_THROWS_AS(carried(PointHints{{{1, 0, 0}}, {}}, from, from), Error);
+}
+
+TEST_CASE("given normals: the same bits for any number of threads") {
+    const test::SurfaceSample s = noisy(test::torus(1, 0.35), 3000, 1, 7);
+    const PointHints hints{flipped(s.normals, 0.1, 8), {}};
+    RunContext one, two;
+    one.threads = 1;
+    two.threads = 2;
+    const CloudOrientation a = orient_cloud(s.points, hints, one), b = orient_cloud(s.points, hints, two);
+    CHECK(a.orientation.normals == b.orientation.normals);
+    CHECK(a.hints.agree == b.hints.agree);
+    CHECK(a.hints.used == b.hints.used);
+}

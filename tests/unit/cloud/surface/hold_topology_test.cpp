@@ -1,0 +1,69 @@
+#include "cloud/surface/hold_topology.h"
+
+#include <openvdb/openvdb.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+
+#include "covol/mesh.h"
+#include "covol/surface.h"
+
+using namespace covol;
+
+namespace {
+
+constexpr int kSide = 24;
+
+Domain cube() {
+    Domain domain;
+    domain.max = {kSide - 1, kSide - 1, kSide - 1};
+    return domain;
+}
+
+/// Active everywhere; negative where inside(i, j, k).
+template <typename Inside>
+FloatGridPtr level_set(Inside inside) {
+    const FloatGridPtr grid = make_grid(cube(), 3.0F, "u");
+    auto at = grid->getAccessor();
+    for (int i = 0; i < kSide; ++i)
+        for (int j = 0; j < kSide; ++j)
+            for (int k = 0; k < kSide; ++k) at.setValue({i, j, k}, inside(i, j, k) ? -1.0F : 1.0F);
+    return grid;
+}
+
+bool is_border(int i, int j, int k) {
+    for (const int n : {i, j, k})
+        if (n < 2 || n > kSide - 3) return true;
+    return false;
+}
+
+double away(int i, int j, int k) {
+    const double middle = 0.5 * (kSide - 1);
+    return std::hypot(i - middle, j - middle, k - middle);
+}
+
+double off_torus(int i, int j, int k) {
+    const double middle = 0.5 * (kSide - 1);
+    return std::hypot(std::hypot(i - middle, j - middle) - 6, k - middle);
+}
+
+}  // namespace
+
+TEST_CASE("hold_topology: whatever the target is, pieces and handles stay those of the rough one") {
+    for (unsigned seed = 1; seed <= 8; ++seed) {
+        std::mt19937 random(seed);
+        const FloatGridPtr ball = level_set([](int i, int j, int k) { return away(i, j, k) < 7; });
+        const FloatGridPtr ring = level_set([](int i, int j, int k) { return off_torus(i, j, k) < 3; });
+        const FloatGridPtr noise = level_set([&](int i, int j, int k) { return !is_border(i, j, k) && random() % 2 == 0; });
+        for (const auto& [rough, genus] : {std::pair{ball, 0}, std::pair{ring, 1}}) {
+            const FloatGridPtr held = noise->deepCopy();
+            const std::size_t left = cloud::hold_topology(*rough, *held);
+            CHECK(left > 0);
+            const MeshMeasures m = measure(extract_mesh(*held));
+            CHECK(m.closed);
+            CHECK(m.components == 1);
+            CHECK(m.genus == genus);
+        }
+    }
+}

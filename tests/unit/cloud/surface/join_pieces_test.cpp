@@ -1,0 +1,83 @@
+#include "cloud/surface/join_pieces.h"
+
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "covol/surface.h"
+#include "support/clouds.h"
+#include "support/shapes.h"
+
+using namespace covol;
+
+namespace {
+
+constexpr double kVoxel = 0.05, kRadius = 0.6, kThin = 0.12, kApart = 0.2;
+const Vec3 kBody{-0.5, 0, 0};
+
+double ball(const Vec3& p, const Vec3& center, double radius) { return test::distance(p, center) - radius; }
+
+/// A body with a cavity, and a small ball whose surface is `gap` from the body's.
+Vec3 tip(double gap) { return {kBody[0] + kRadius + gap + kThin, 0, 0}; }
+FloatGridPtr torn(double gap, double tip_radius = kThin) {
+    const Vec3 at{tip(gap)[0] + tip_radius - kThin, 0, 0};
+    return test::start_grid(test::cube_domain(80, kVoxel), [&](const Vec3& p) {
+        return std::min(std::max(ball(p, kBody, kRadius), -ball(p, kBody, 0.2)), ball(p, at, tip_radius));
+    }, 3 * kVoxel);
+}
+
+/// On both, and on the part that is missing between them as far as it has any.
+std::vector<Vec3> points(double gap, bool between) {
+    std::vector<Vec3> all = test::sphere_cloud(400, kRadius, 1, kBody);
+    for (const Vec3& p : test::sphere_cloud(40, kThin, 2, tip(gap))) all.push_back(p);
+    const double begin = kBody[0] + kRadius;
+    for (double x = begin; between && x < begin + gap; x += 0.5 * kApart)
+        for (const double angle : {0.3, 2.4, 4.5}) all.push_back({x, kThin * std::cos(angle), kThin * std::sin(angle)});
+    return all;
+}
+
+}  // namespace
+
+TEST_CASE("a small piece is joined where points lie all along the gap, and nowhere else") {
+    for (const double gap : {1.5, 3.0}) {
+        INFO(gap << " apart");
+        const FloatGridPtr with = torn(gap * kApart), without = torn(gap * kApart), before = torn(gap * kApart);
+        REQUIRE(measure(extract_mesh(*with)).components == 3);  // the cavity is one
+        CHECK(cloud::join_pieces(*with, points(gap * kApart, true), kApart, {}) == 1);
+        const MeshMeasures joined = measure(extract_mesh(*with));
+        CHECK(joined.components == 2);
+        CHECK(joined.genus == 0);
+        CHECK(joined.closed);
+        // A rod about as thick as the points around it: no thicker than half of what they are apart.
+        const double grown = joined.volume - measure(extract_mesh(*before)).volume;
+        CHECK(grown > 0.3 * M_PI * 0.25 * kApart * kApart * gap * kApart);
+        CHECK(grown < 3 * M_PI * 0.25 * kApart * kApart * gap * kApart);
+        if (gap > 2) {
+            CHECK(cloud::join_pieces(*without, points(gap * kApart, false), kApart, {}) == 0);
+            CHECK(test::identical(*without, *before));
+        }
+    }
+    const double far = 4.5 * kApart;
+    CHECK(cloud::join_pieces(*torn(far), points(far, true), kApart, {}) == 0);
+}
+
+TEST_CASE("pieces that are not small stay for themselves, however close") {
+    const FloatGridPtr two = torn(kApart, 0.4), before = torn(kApart, 0.4);
+    CHECK(cloud::join_pieces(*two, points(kApart, true), kApart, {}) == 0);
+    CHECK(test::identical(*two, *before));
+}
+
+TEST_CASE("a piece is joined to one that was joined") {
+    // Three beads in a row; the last is far from the body.
+    const double gap = 1.5 * kApart;
+    const Vec3 second = tip(gap), third{second[0] + 2 * kThin + gap, 0, 0};
+    const FloatGridPtr beads = test::start_grid(test::cube_domain(80, kVoxel), [&](const Vec3& p) {
+        return std::min({ball(p, kBody, kRadius), ball(p, second, kThin), ball(p, third, kThin)});
+    }, 3 * kVoxel);
+    std::vector<Vec3> all = points(gap, true);
+    for (double x = second[0]; x < third[0]; x += 0.5 * kApart) all.push_back({x, 0, kThin});
+    CHECK(cloud::join_pieces(*beads, all, kApart, {}) == 2);
+    CHECK(measure(extract_mesh(*beads)).components == 1);
+}

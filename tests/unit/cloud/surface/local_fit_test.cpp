@@ -1,0 +1,290 @@
+#include "cloud/surface/local_fit.h"
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+
+#include "points/point_cells.h"
+#include "support/clouds.h"
+#include "support/surface_samples.h"
+
+using namespace covol;
+using namespace covol::cloud;
+
+namespace {
+
+OrientedCloud oriented(const test::SurfaceSample& s) {
+    return {s.points, s.normals, std::vector<float>(s.points.size(), 1.0F)};
+}
+
+/// Every so many of a cloud's points.
+OrientedCloud every(const OrientedCloud& cloud, std::size_t step) {
+    OrientedCloud some;
+    for (std::size_t n = 0; n < cloud.size(); n += step) {
+        some.points.push_back(cloud.points[n]);
+        some.normals.push_back(cloud.normals[n]);
+        some.counts.push_back(1);
+    }
+    return some;
+}
+
+double median(std::vector<double> v) {
+    std::sort(v.begin(), v.end());
+    return v[v.size() / 2];
+}
+
+/// How quadrics at a sample of a shape's points, moved by noise, fit the shape.
+struct Found {
+    double share = 0;      // of the nodes that have a quadric
+    double off = 0;        // root mean square of the feet's distance to the shape
+    double noise = 0, radius = 0, curvature = 0;  // medians
+    double off_beside = 0; // root mean square error of distance() half a radius beside and above the foot
+};
+
+Found fit_shape(const test::Solid3& shape, std::size_t count, double spacings, unsigned seed) {
+    test::SurfaceSample s = shape.sample(count, seed);
+    const double spacing = s.spacing();
+    test::add_noise(s, spacings * spacing, seed + 100);
+    const OrientedCloud cloud = oriented(s);
+    Found found;
+    std::vector<double> noise, radius, curvature;
+    double squares = 0, beside = 0;
+    for (const Quadric& q : fit_quadrics(every(cloud, 10), cloud, spacing, {})) {
+        if (!(q.radius > 0)) continue;
+        noise.push_back(q.noise);
+        radius.push_back(q.radius);
+        curvature.push_back(q.curvature());
+        squares += std::pow(shape.distance(q.foot()), 2);
+        const Vec3 x = test::sum(test::sum(q.foot(), test::scaled(spacing, q.axes[0])), test::scaled(spacing, q.axes[2]));
+        beside += std::pow(q.distance(x) - shape.distance(x), 2);
+    }
+    const double fitted = double(radius.size());
+    found.share = fitted / (double(count) / 10);
+    found.off = std::sqrt(squares / fitted);
+    found.off_beside = std::sqrt(beside / fitted);
+    found.noise = median(noise);
+    found.radius = median(radius);
+    found.curvature = median(curvature);
+    return found;
+}
+
+}  // namespace
+
+TEST_CASE("feet of quadrics lie far closer to the surface than the points do") {
+    for (const unsigned seed : {1, 2, 3})
+        for (const bool is_ball : {true, false}) {
+            const test::Solid3 shape = is_ball ? test::ball(1) : test::torus(1, 0.35);
+            const double area = is_ball ? 4 * M_PI : 4 * M_PI * M_PI * 0.35, spacing = std::sqrt(area / 8000);
+            const double curvature = is_ball ? 1 : 1 / 0.35;
+            double radius = 0;
+            for (const double spacings : {0.0, 0.1, 0.3, 0.6}) {
+                const Found f = fit_shape(shape, 8000, spacings, seed);
+                INFO((is_ball ? "ball" : "torus") << ", seed " << seed << ", noise of " << spacings << " spacings: off " << f.off / spacing
+                     << " spacings, beside " << f.off_beside / spacing << ", radius " << f.radius / spacing << ", curvature " << f.curvature / curvature);
+                CHECK(f.share > 0.99);
+                const double most = spacings > 0 ? 0.5 * spacings : 0.001;
+                CHECK(f.off < most * spacing);
+                CHECK(f.off_beside < (spacings > 0 ? 0.6 * spacings : 0.003) * spacing);
+                CHECK(f.curvature / curvature == Approx(1).margin(spacings > 0 ? 0.4 : 0.02));
+                // As wide as the noise asks for.
+                if (spacings > 0) CHECK(f.radius > 2.5 * spacing);
+                if (spacings == 0) radius = f.radius;
+                else if (spacings == 0.3) CHECK(f.radius > 2 * radius);
+                if (spacings == 0) CHECK(f.noise < 0.01 * spacing);
+            }
+        }
+}
+
+TEST_CASE("a quadric's distance, foot and curvature are those of its paraboloid") {
+    Quadric q;
+    q.origin = {1, 2, 3};
+    q.axes = {Vec3{0, 1, 0}, Vec3{0, 0, 1}, Vec3{1, 0, 0}};  // the normal is x
+    q.c = {0.5, 0, 0, 2, 0, -1};                              // x - 1 = 0.5 + 2 u^2 - v^2, u = y - 2, v = z - 3
+    CHECK(q.foot() == Vec3{1.5, 2, 3});
+    CHECK(q.distance({1.5, 2, 3}) == Approx(0).margin(1e-15));
+    CHECK(q.distance({1.7, 2, 3}) == Approx(0.2));
+    CHECK(q.distance({1.4, 2, 3}) == Approx(-0.1));
+    const double u = 0.3, v = -0.2, height = 0.5 + 2 * u * u - v * v;
+    CHECK(q.distance({1 + height, 2 + u, 3 + v}) == Approx(0).margin(1e-15));
+    const Vec3 normal = test::unit({1, -4 * u, 2 * v});
+    const Vec3 above = test::sum({1 + height, 2 + u, 3 + v}, test::scaled(1e-4, normal));
+    CHECK(q.distance(above) == Approx(1e-4).epsilon(0.01));
+    CHECK(q.curvature() == Approx(4));
+    q.c = {0, 0, 0, 1, 2, 1};  // (u + v)^2: curvature 4 along the diagonal, none across
+    CHECK(q.curvature() == Approx(4));
+}
+
+TEST_CASE("an exact paraboloid is found as it is") {
+    // Heights 0.3 u^2 - 0.2 uv + 0.1 v^2 over a plane that is not the nodes' own: their normals are tilted.
+    const auto height = [](double x, double y) { return 0.3 * x * x - 0.2 * x * y + 0.1 * y * y; };
+    OrientedCloud cloud;
+    for (Vec3 p : test::box_cloud(3000, {{-1, -1, 0}, {1, 1, 1}}, 4)) {
+        p[2] = height(p[0], p[1]);
+        cloud.points.push_back(p);
+        cloud.normals.push_back(test::unit({-0.6 * p[0] + 0.2 * p[1], 0.2 * p[0] - 0.2 * p[1], 1}));
+        cloud.counts.push_back(1);
+    }
+    const OrientedCloud node{{{0, 0, 0.01}}, {test::unit({0.3, -0.2, 1})}, {1}};
+    const double spacing = std::sqrt(4.0 / 3000);
+    const Quadric q = fit_quadrics(node, cloud, spacing, {}).front();
+    REQUIRE(q.radius > 0);
+    CHECK(test::dot(q.axes[2], {0, 0, 1}) > 0.999);
+    CHECK(q.radius >= q.least_radius);
+    double worst = 0;
+    for (const Vec3& p : test::box_cloud(100, {{-0.05, -0.05, 0}, {0.05, 0.05, 0}}, 5))
+        worst = std::max(worst, std::abs(q.distance({p[0], p[1], height(p[0], p[1])})));
+    CHECK(worst < 0.01 * spacing);
+    // 0.4 + sqrt(0.04 + 0.04)
+    CHECK(q.curvature() == Approx(0.4 + std::sqrt(0.08)).epsilon(0.05));
+}
+
+TEST_CASE("two sheets back to back do not mix") {
+    for (const unsigned seed : {1, 2, 3}) {
+        const std::size_t each = 3000;
+        const double spacing = std::sqrt(4.0 / each), apart = 2.5 * spacing;
+        OrientedCloud cloud;
+        std::mt19937 random(seed);
+        std::normal_distribution<double> off(0, 0.2 * spacing);
+        std::vector<Vec3> flat = test::box_cloud(int(2 * each), {{-1, -1, 0}, {1, 1, 0}}, seed);
+        for (std::size_t n = 0; n < flat.size(); ++n) {
+            const bool is_upper = n % 2;
+            cloud.points.push_back({flat[n][0], flat[n][1], (is_upper ? 0.5 : -0.5) * apart + off(random)});
+            cloud.normals.push_back({0, 0, is_upper ? 1.0 : -1.0});
+            cloud.counts.push_back(1);
+        }
+        const std::vector<Quadric> quadrics = fit_quadrics(cloud, cloud, spacing, {});
+        double squares = 0, widest = 0, cosines = 0;
+        std::size_t fitted = 0;
+        for (std::size_t n = 0; n < quadrics.size(); ++n) {
+            if (std::abs(flat[n][0]) > 0.6 || std::abs(flat[n][1]) > 0.6) continue;
+            const Quadric& q = quadrics[n];
+            REQUIRE(q.radius > 0);
+            REQUIRE(q.axes[2][2] * cloud.normals[n][2] > 0);
+            cosines += q.axes[2][2] * cloud.normals[n][2];
+            squares += std::pow(q.foot()[2] - (n % 2 ? 0.5 : -0.5) * apart, 2);
+            widest = std::max(widest, q.radius);
+            ++fitted;
+        }
+        INFO("seed " << seed << ": off by " << std::sqrt(squares / double(fitted)) / spacing << " spacings, widest " << widest / spacing
+                     << ", mean cosine " << cosines / double(fitted));
+        CHECK(cosines / double(fitted) > 0.96);
+        CHECK(std::sqrt(squares / double(fitted)) < 0.1 * spacing);
+        CHECK(widest > 2 * apart);  // they were in reach
+    }
+}
+
+TEST_CASE("no quadric where a normal is against those beside it") {
+    const OrientedCloud cloud = oriented(test::ball(1).sample(3000, 7));
+    const double spacing = std::sqrt(4 * M_PI / 3000);
+    OrientedCloud nodes = every(cloud, 50);
+    for (Vec3& n : nodes.normals) n = test::scaled(-1, n);
+    for (const Quadric& q : fit_quadrics(nodes, cloud, spacing, {})) CHECK(q.radius == 0);
+    CHECK(fit_quadrics({}, cloud, spacing, {}).empty());
+}
+
+TEST_CASE("quadrics do not depend on the number of threads") {
+    test::SurfaceSample s = test::torus(1, 0.35).sample(3000, 8);
+    test::add_noise(s, 0.3 * s.spacing(), 9);
+    std::vector<Quadric> of[2];
+    for (const int threads : {1, 2}) {
+        RunContext run;
+        run.threads = threads;
+        with_threads(run, [&] { of[threads - 1] = fit_quadrics(oriented(s), oriented(s), s.spacing(), run); });
+    }
+    for (std::size_t n = 0; n < of[0].size(); ++n) {
+        REQUIRE(of[0][n].c == of[1][n].c);
+        REQUIRE(of[0][n].axes == of[1][n].axes);
+        REQUIRE(of[0][n].radius == of[1][n].radius);
+    }
+}
+
+TEST_CASE("thinned: counts add up, the centre stays, both sides of a sheet stay apart") {
+    OrientedCloud cloud;
+    std::mt19937 random(10);
+    std::uniform_real_distribution<float> count(1, 5);
+    const double apart = 0.02;
+    for (const Vec3& p : test::box_cloud(4000, {{-1, -1, 0}, {1, 1, 0}}, 11)) {
+        const double side = cloud.size() % 2 ? 1 : -1;
+        cloud.points.push_back({p[0], p[1], 0.3 * p[0] + 0.5 * side * apart});
+        cloud.normals.push_back(test::unit({-0.3 * side, 0, side}));
+        cloud.counts.push_back(count(random));
+    }
+    const auto moments = [](const OrientedCloud& c, double side) {
+        std::array<double, 4> sum{};
+        for (std::size_t n = 0; n < c.size(); ++n) {
+            if (c.normals[n][2] * side <= 0) continue;
+            sum[3] += double(c.counts[n]);
+            for (int a = 0; a < 3; ++a) sum[a] += double(c.counts[n]) * c.points[n][a];
+        }
+        return sum;
+    };
+    const OrientedCloud thin = thinned(cloud, 0.2);
+    CHECK(thin.size() < 600);
+    CHECK(thin.size() >= 200);
+    CHECK(thin.normals.size() == thin.size());
+    CHECK(thin.counts.size() == thin.size());
+    for (const double side : {-1, 1}) {
+        const auto before = moments(cloud, side), after = moments(thin, side);
+        for (int a = 0; a < 4; ++a) CHECK(after[a] == Approx(before[a]).epsilon(1e-5).margin(1e-2));
+    }
+    for (std::size_t n = 0; n < thin.size(); ++n) {
+        REQUIRE(test::norm(thin.normals[n]) == Approx(1));
+        const double side = thin.normals[n][2] > 0 ? 1 : -1;
+        REQUIRE(thin.points[n][2] - 0.3 * thin.points[n][0] == Approx(0.5 * side * apart).margin(1e-9));
+    }
+    CHECK(thinned({}, 1).size() == 0);
+}
+
+TEST_CASE("thinned: one mean for each cell of a smooth surface, whichever way it is turned") {
+    const test::SurfaceSample s = test::ball(1).sample(5000, 12);
+    const OrientedCloud thin = thinned(oriented(s), 0.1);
+    // A mean lies no deeper than its cell's chord; normals close to a diagonal do not split a cell.
+    CHECK(thin.size() == PointCells(s.points, 0.1).cell_count());
+    for (std::size_t n = 0; n < thin.size(); ++n) {
+        REQUIRE(test::norm(thin.points[n]) > 1 - 0.1 * 0.1);
+        REQUIRE(test::dot(thin.normals[n], thin.points[n]) > 0.98);
+    }
+}
+
+TEST_CASE("noise along a bent surface does not draw the quadrics inwards") {
+    // Where a ball's points are moved by sigma along each axis, their mean height over a tangent plane is sigma^2 / R too low.
+    double bias = 0;
+    int count = 0;
+    const double sigma = 0.06;
+    for (const unsigned seed : {1, 2, 3}) {
+        test::SurfaceSample s = test::ball(1).sample(20000, seed);
+        const OrientedCloud nodes = every(oriented(s), 100);
+        const double spacing = s.spacing();
+        test::add_noise(s, sigma, seed + 10);
+        for (const Quadric& q : fit_quadrics(nodes, oriented(s), spacing, {})) {
+            if (!(q.radius > 0)) continue;
+            bias += std::sqrt(test::dot(q.foot(), q.foot())) - 1;
+            ++count;
+        }
+    }
+    INFO("bias " << bias / count / (sigma * sigma) << " sigma^2 / R over " << count);
+    REQUIRE(count > 400);
+    CHECK(std::abs(bias / count) < 0.4 * sigma * sigma);
+}
+
+TEST_CASE("where neighbourhoods are wide there are fewer quadrics, and none is far from any place") {
+    test::SurfaceSample s = test::ball(1).sample(40000, 1);
+    const double spacing = s.spacing(), edge = 1.2 * spacing;
+    const OrientedCloud places = oriented(s);
+    test::add_noise(s, spacing, 2);
+    std::size_t bare = 1000;
+    const std::vector<Quadric> quadrics = quadrics_over(places, oriented(s), edge, {spacing, spacing, 0}, bare, {});
+    CHECK(bare < 20);  // of 10,000 places
+    CHECK(double(quadrics.size()) < 0.5 * double(thinned(places, edge).size()));
+    std::vector<Vec3> feet;
+    for (const Quadric& q : quadrics) {
+        CHECK((q.apart == edge || q.apart == 2 * edge));
+        CHECK(q.radius > 0);
+        feet.push_back(q.foot());
+    }
+    double farthest = 0;
+    for (std::size_t n = 0; n < places.size(); n += 10) farthest = std::max(farthest, test::brute_force_distance(feet, places.points[n]));
+    CHECK(farthest < 3 * edge);
+    for (const Quadric& q : quadrics_over(places, places, edge, {spacing, 0, 0}, bare, {})) CHECK(q.apart == edge);
+}

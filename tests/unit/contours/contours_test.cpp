@@ -1,0 +1,567 @@
+#include "covol/contours.h"
+
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <random>
+
+#include "contours/contour_curve.h"
+#include "contours/slice_field.h"
+#include "covol/band.h"
+#include "covol/distance.h"
+#include "covol/error.h"
+#include "covol/start.h"
+#include "support/scratch.h"
+
+using namespace covol;
+
+namespace {
+
+const double kPi = std::acos(-1.0);
+
+/// Lines of marks in voxels of one image.
+class Drawing {
+public:
+    explicit Drawing(ImageGeometry geometry) : geometry_(std::move(geometry)) {
+        cloud_.space = PointSpace::Index;
+        cloud_.source = "marks.csv";
+    }
+
+    Drawing& add(const std::vector<Vec3>& marks, bool closed = true) {
+        MarkLine line;
+        line.begin = cloud_.points.size();
+        cloud_.points.insert(cloud_.points.end(), marks.begin(), marks.end());
+        line.end = cloud_.points.size();
+        line.closed = closed;
+        cloud_.lines.push_back(line);
+        return *this;
+    }
+    /// A circle of world radius r about a place of slice k; `axis` is the slices' normal.
+    Drawing& circle(double x, double y, double k, double r, int axis = 2, int count = 96) {
+        const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
+        std::vector<Vec3> marks;
+        for (int n = 0; n < count; ++n) {
+            Vec3 p;
+            p[axis] = k;
+            p[u] = x + r * std::cos(2 * kPi * n / count) / geometry_.spacing[u];
+            p[v] = y + r * std::sin(2 * kPi * n / count) / geometry_.spacing[v];
+            marks.push_back(p);
+        }
+        return add(marks);
+    }
+    Drawing& loose(const Vec3& mark) {
+        cloud_.points.push_back(mark);
+        return *this;
+    }
+
+    [[nodiscard]] Contours densify(double step, ContourCurve curve = ContourCurve::Lines, const RunContext& run = {}) const {
+        return covol::densify({cloud_}, &geometry_, {step, curve}, run);
+    }
+    [[nodiscard]] const ImageGeometry& geometry() const { return geometry_; }
+    [[nodiscard]] const PointCloud& cloud() const { return cloud_; }
+
+private:
+    ImageGeometry geometry_;
+    PointCloud cloud_;
+};
+
+/// Size, spacing and place differ along every axis, and the axes are turned against the world's.
+ImageGeometry turned_geometry() {
+    ImageGeometry g;
+    g.size = {80, 100, 80};
+    g.spacing = {0.5, 0.4, 1.0};
+    g.origin = {12, -31, 207};
+    const double c = std::cos(0.3), s = std::sin(0.3);
+    g.direction = {{{c, -s, 0}, {s, c, 0}, {0, 0, 1}}};
+    return g;
+}
+
+ImageGeometry cube(int size, double spacing = 1) {
+    ImageGeometry g;
+    g.size = {size, size, size};
+    g.spacing = {spacing, spacing, spacing};
+    return g;
+}
+
+double distance(const Vec3& a, const Vec3& b) { return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }
+
+double nearest(const Vec3& from, const std::vector<Vec3>& points) {
+    double best = std::numeric_limits<double>::max();
+    for (const Vec3& p : points) best = std::min(best, distance(from, p));
+    return best;
+}
+
+std::vector<Vec3> all_points(const Contours& c) {
+    std::vector<Vec3> points = c.along;
+    points.insert(points.end(), c.between.begin(), c.between.end());
+    return points;
+}
+
+/// By Riemann's sum over the box of the body.
+double volume(const ContourSolid& solid, double step) {
+    const WorldBox box = solid.box();
+    double count = 0;
+    for (double x = box.min[0] + step / 2; x < box.max[0]; x += step)
+        for (double y = box.min[1] + step / 2; y < box.max[1]; y += step)
+            for (double z = box.min[2] + step / 2; z < box.max[2]; z += step) count += solid.level({x, y, z}) < 0;
+    return count * step * step * step;
+}
+
+/// The largest distance from a place of the surface to its nearest point. Places are found on rays from `inside`.
+double widest_gap(const ContourSolid& solid, const std::vector<Vec3>& points, const Vec3& inside, double far) {
+    std::mt19937 random(5);
+    std::normal_distribution<double> normal;
+    double widest = 0;
+    for (int n = 0; n < 600; ++n) {
+        Vec3 d{normal(random), normal(random), normal(random)};
+        const double length = std::hypot(d[0], d[1], d[2]);
+        double low = 0, high = far;
+        for (int round = 0; round < 40; ++round) {
+            const double t = (low + high) / 2;
+            const bool in = solid.level({inside[0] + t * d[0] / length, inside[1] + t * d[1] / length, inside[2] + t * d[2] / length}) < 0;
+            (in ? low : high) = t;
+        }
+        widest = std::max(widest, nearest({inside[0] + low * d[0] / length, inside[1] + low * d[1] / length, inside[2] + low * d[2] / length}, points));
+    }
+    return widest;
+}
+
+/// What a flood from outside through {d > D} leaves, by band()'s own judgement.
+BandReport flood(const std::vector<Vec3>& points, double h, double D) {
+    const Domain domain = domain_of_box(bounding_box(points, D + 6 * h), h);
+    const FloatGridPtr d = covol::distance(points, domain, {D + 6 * h}).grid;
+    return band(*d, {D, {}}).report;
+}
+
+struct Warnings {
+    std::vector<std::string> lines;
+    RunContext run;
+    Warnings() {
+        run.log = [this](LogLevel level, const std::string& line) {
+            if (level == LogLevel::Warning) lines.push_back(line);
+        };
+    }
+};
+
+}  // namespace
+
+// ---- along the lines ------------------------------------------------------------------------------------------------
+
+TEST_CASE("an open line is joined along itself and encloses nothing") {
+    Drawing drawing(cube(40));
+    const std::vector<Vec3> marks{{3, 4, 10}, {13, 4, 10}, {13, 11, 10}};
+    const Contours c = drawing.add(marks, false).densify(0.5);
+    CHECK(c.solid == nullptr);
+    CHECK(c.between.empty());
+    CHECK((c.open == 1 && c.closed == 0 && c.slices == 0));
+    CHECK(c.marks == marks);
+    CHECK(c.along.size() == 20 + 14 + 1);  // 17 units of length in steps of 0.5, and the end
+    for (const Vec3& p : c.along) CHECK(std::min(std::abs(p[1] - 4), std::abs(p[0] - 13)) < 1e-12);
+    for (const Vec3& mark : marks) CHECK(nearest(mark, c.along) < 1e-12);
+    for (std::size_t n = 0; n + 1 < c.along.size(); ++n) CHECK(distance(c.along[n], c.along[n + 1]) <= 0.5 + 1e-12);
+}
+
+TEST_CASE("a closed line goes from its last mark to the first") {
+    Drawing drawing(cube(40));
+    const Contours c = drawing.add({{10, 10, 5}, {20, 10, 5}, {20, 20, 5}, {10, 20, 5}}).densify(1);
+    CHECK(c.along.size() == 40);
+    CHECK(nearest({10, 15, 5}, c.along) < 1e-12);
+    CHECK((c.closed == 1 && c.slices == 1));
+}
+
+TEST_CASE("points that belong to no line are marks") {
+    Drawing drawing(cube(40));
+    const Contours c = drawing.circle(20, 20, 10, 5).loose({2, 3, 4}).densify(1);
+    CHECK(nearest({2, 3, 4}, c.along) == 0);
+    CHECK(c.marks.size() == 97);
+}
+
+TEST_CASE("a spline through few marks of a circle keeps the radius where lines cut it") {
+    const double r = 12;
+    const auto radii = [&](ContourCurve curve) {
+        const Contours c = Drawing(cube(40)).circle(20, 20, 10, r, 2, 12).densify(0.25, curve);
+        double worst = 0;
+        for (const Vec3& p : c.along) worst = std::max(worst, std::abs(std::hypot(p[0] - 20, p[1] - 20) - r));
+        return worst;
+    };
+    CHECK(radii(ContourCurve::Lines) == Approx(r * (1 - std::cos(kPi / 12))).epsilon(0.01));
+    CHECK(radii(ContourCurve::Spline) < 0.2 * r * (1 - std::cos(kPi / 12)));
+}
+
+TEST_CASE("the centripetal curve passes through its marks and keeps to a straight line") {
+    const std::vector<Vec3> marks{{0, 0, 0}, {1, 0, 0}, {1.2, 2, 0}, {-1, 3, 0}};
+    for (const bool closed : {false, true}) {
+        const std::vector<Vec3> curve = detail::centripetal_curve(marks, closed, 0.1);
+        for (const Vec3& mark : marks) CHECK(nearest(mark, curve) < 1e-12);
+    }
+    for (const Vec3& p : detail::centripetal_curve({{0, 0, 0}, {1, 1, 0}, {5, 5, 0}, {6, 6, 0}}, false, 0.1)) CHECK(std::abs(p[0] - p[1]) < 1e-12);
+}
+
+// ---- within a slice -------------------------------------------------------------------------------------------------
+
+TEST_CASE("the signed distance to polygons is exact") {
+    const detail::Polygon outer{{0, 0}, {20, 0}, {20, 20}, {0, 20}}, inner{{5, 5}, {15, 5}, {15, 15}, {5, 15}};
+    const detail::SliceGrid grid{{-4, -4}, 0.5, 57, 57};
+    const std::vector<float> level = detail::signed_distance_of_polygons({outer, inner}, grid);
+    const auto box_distance = [](double x, double y, double low, double high) {
+        const double dx = std::max(low - x, x - high), dy = std::max(low - y, y - high);
+        return std::hypot(std::max(dx, 0.0), std::max(dy, 0.0)) + std::min(std::max(dx, dy), 0.0);
+    };
+    double worst = 0;
+    for (int j = 0; j < grid.ny; ++j)
+        for (int i = 0; i < grid.nx; ++i) {
+            const double x = -4 + 0.5 * i, y = -4 + 0.5 * j;
+            const double expected = std::max(box_distance(x, y, 0, 20), -box_distance(x, y, 5, 15));
+            worst = std::max(worst, std::abs(expected - double(level[std::size_t(j) * 57 + std::size_t(i)])));
+        }
+    CHECK(worst < 1e-5);
+}
+
+TEST_CASE("a polygon's moments do not depend on its direction, nor on the distance from the origin") {
+    for (const double at : {0.0, 1e6}) {
+        detail::Polygon triangle{{at, at}, {at + 6, at}, {at, at + 3}};
+        for (int turn = 0; turn < 2; ++turn) {
+            const detail::PolygonMoments m = detail::moments(triangle);
+            CHECK(m.area == Approx(9));
+            CHECK(m.centroid[0] - at == Approx(2));
+            CHECK(m.centroid[1] - at == Approx(1));
+            std::reverse(triangle.begin(), triangle.end());
+        }
+    }
+}
+
+TEST_CASE("a contour within another is a hole, one in the hole is not") {
+    Drawing drawing(cube(60));
+    for (int k = 20; k <= 30; ++k) drawing.circle(30, 30, k, 20).circle(30, 30, k, 12).circle(30, 30, k, 4);
+    const Contours c = drawing.densify(1);
+    for (const double k : {20.0, 23.5, 30.0}) {
+        CHECK(c.solid->level({30, 30, k}) < -3);
+        CHECK(c.solid->level({38, 30, k}) == Approx(4).margin(0.1));
+        CHECK(c.solid->level({30, 46, k}) == Approx(-4).margin(0.1));
+        CHECK(c.solid->level({30, 55, k}) == Approx(5).margin(0.1));
+    }
+    const std::vector<Vec3> seeds = c.solid->hole_seeds();
+    REQUIRE(seeds.size() == 11);
+    for (const Vec3& seed : seeds) CHECK(std::hypot(seed[0] - 30, seed[1] - 30) == Approx(8).margin(1));
+}
+
+TEST_CASE("several contours on a slice are several parts, which join where they meet") {
+    Drawing drawing(cube(60));
+    for (int k = 10; k <= 14; ++k) drawing.circle(18, 30, k, 8).circle(42, 30, k, 8);
+    for (int k = 15; k <= 20; ++k) drawing.circle(30, 30, k, 22);
+    const Contours c = drawing.densify(1);
+    CHECK(c.solid->level({18, 30, 12}) < 0);
+    CHECK(c.solid->level({42, 30, 12}) < 0);
+    CHECK(c.solid->level({30, 30, 12}) > 0);
+    CHECK(c.solid->level({30, 30, 17}) < 0);
+    CHECK(flood(all_points(c), 1, 1.5).leaks == false);
+}
+
+// ---- between slices -------------------------------------------------------------------------------------------------
+
+TEST_CASE("a cylinder's level is the distance to its wall in all three planes, in a turned image") {
+    for (const int axis : {0, 1, 2}) {
+        ImageGeometry g = turned_geometry();
+        std::swap(g.spacing[axis], g.spacing[2]);
+        const double r = 9, step = 0.4;
+        Drawing drawing(g);
+        for (int k = 20; k <= 30; ++k) drawing.circle(40, 45, k, r, axis);
+        const Contours c = drawing.densify(step);
+        INFO("axis " << axis);
+        REQUIRE(c.solid != nullptr);
+        CHECK(c.slices == 11);
+        CHECK(c.slice_distance == Approx(1));
+        const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
+        std::mt19937 random(3);
+        std::uniform_real_distribution<double> angle(0, 2 * kPi), radius(0.8 * r, 1.15 * r), height(20, 30);
+        for (int n = 0; n < 200; ++n) {
+            const double t = angle(random), rho = radius(random);
+            Vec3 p;
+            p[axis] = height(random);
+            p[u] = 40 + rho * std::cos(t) / g.spacing[u];
+            p[v] = 45 + rho * std::sin(t) / g.spacing[v];
+            CHECK(c.solid->level(g.index_to_world(p)) == Approx(rho - r).margin(0.02));
+        }
+        Vec3 middle;
+        middle[axis] = 25;
+        middle[u] = 40;
+        middle[v] = 45;
+        CHECK(widest_gap(*c.solid, all_points(c), g.index_to_world(middle), 30) < step);
+        // The slices are a world unit apart, with half of one in each dome: 10 + 2 * 1/2.
+        CHECK(volume(*c.solid, 0.5) == Approx(kPi * r * r * 11).epsilon(0.01));
+    }
+}
+
+TEST_CASE("steep walls, terraces and caps are closed") {
+    Drawing drawing(cube(80));
+    // A cone, and a disc whose neighbour is much smaller.
+    for (int k = 10; k <= 20; ++k) drawing.circle(40, 40, k, 30 - 2 * (k - 10));
+    for (int k = 21; k <= 30; ++k) drawing.circle(40, 40, k, 4);
+    const Contours c = drawing.densify(1);
+    CHECK(widest_gap(*c.solid, all_points(c), {40, 40, 14}, 60) < 1);
+    const BandReport all = flood(all_points(c), 1, 1.5);
+    CHECK_FALSE(all.leaks);
+    // The contours alone do leak, at the caps at least: the points between the slices are what closes them.
+    CHECK(flood(c.along, 1, 1.5).leaks);
+}
+
+TEST_CASE("between skipped slices a cone is a cone") {
+    const auto radius = [](double k) { return 4 + 0.4 * k; };
+    Drawing drawing(cube(80));
+    for (int k = 10; k <= 50; k += 5) drawing.circle(40, 40, k, radius(k));
+    const Contours c = drawing.densify(1);
+    CHECK(c.slice_distance == 5);
+    double worst = 0;
+    for (double k = 15; k <= 45; k += 0.5)
+        for (const double off : {-1.5, -0.5, 0.0, 1.0}) worst = std::max(worst, std::abs(c.solid->level({40 + radius(k) + off, 40, k}) - off));
+    CHECK(worst < 0.02);
+}
+
+TEST_CASE("between skipped slices an ellipsoid is met closer than by straight lines, and its poles are") {
+    const double a = 28, half = 30, gap = 6;
+    const auto radius = [&](double w) { return a * std::sqrt(std::max(0.0, 1 - w * w / (half * half))); };
+    Drawing drawing(cube(100));
+    for (double w = -27; w <= 27; w += gap) drawing.circle(50, 50, 50 + w, radius(w));
+    const Contours c = drawing.densify(1);
+    double cubic = 0, linear = 0;
+    for (double w = -27; w < 27; w += gap)
+        for (double t = 0.1; t < 1; t += 0.1) {
+            const double r = radius(w + t * gap);
+            cubic = std::max(cubic, std::abs(c.solid->level({50 + r, 50, 50 + w + t * gap})));
+            linear = std::max(linear, r - ((1 - t) * radius(w) + t * radius(w + gap)));
+        }
+    CHECK(linear > 0.7);
+    CHECK(cubic < 0.5 * linear);
+    // The poles lie 3 beyond the last slices; the area there is linear in w to first order.
+    for (const double sign : {-1.0, 1.0}) {
+        CHECK(c.solid->level({50, 50, 50 + sign * 29}) < 0);
+        CHECK(c.solid->level({50, 50, 50 + sign * 31}) > 0);
+    }
+    CHECK(volume(*c.solid, 1) == Approx(4 / 3.0 * kPi * a * a * half).epsilon(0.01));
+    CHECK_FALSE(flood(all_points(c), 1, 1.5).leaks);
+}
+
+TEST_CASE("what the next slice lacks ends in between") {
+    Drawing drawing(cube(60));
+    for (int k = 10; k <= 20; k += 5) drawing.circle(30, 30, k, 20).circle(30, 30, k, 6);  // a hole
+    for (int k = 25; k <= 40; k += 5) drawing.circle(30, 30, k, 20);
+    const Contours c = drawing.densify(1);
+    CHECK(c.solid->level({30, 30, 20}) > 0);
+    CHECK(c.solid->level({30, 30, 25}) < 0);
+    double ends = 20;
+    while (c.solid->level({30, 30, ends}) > 0) ends += 0.01;
+    CHECK((ends > 20.3 && ends < 24));
+    CHECK(c.solid->level({30 + 5.5, 30, 20.01}) > 0);
+    CHECK(c.solid->level({30 + 5.5, 30, ends}) < 0);
+    CHECK_FALSE(flood(all_points(c), 1, 1.5).leaks);
+}
+
+TEST_CASE("a single contour that moves by more than its width is carried along") {
+    Drawing drawing(cube(80));
+    for (int n = 0; n < 5; ++n) drawing.circle(15 + 12 * n, 40, 10 + 5 * n, 4);
+    Warnings warnings;
+    const Contours c = drawing.densify(1, ContourCurve::Lines, warnings.run);
+    REQUIRE(warnings.lines.size() == 1);
+    CHECK(warnings.lines[0].find("do not overlap") != std::string::npos);
+    // A sheared cylinder: halfway between two slices its centre is halfway between theirs.
+    CHECK(c.solid->level({21, 40, 12.5}) == Approx(-4).margin(0.1));
+    CHECK(c.solid->level({25, 40, 12.5}) == Approx(0).margin(0.1));
+    CHECK(c.solid->level({15, 40, 14.9}) > 0);
+    // The same for parts that cannot be told apart: they end.
+    Drawing several(cube(80));
+    several.circle(10, 20, 10, 5).circle(10, 50, 10, 5).circle(40, 20, 15, 5).circle(40, 50, 15, 5);
+    Warnings ended;
+    const Contours parts = several.densify(1, ContourCurve::Lines, ended.run);
+    REQUIRE(ended.lines.size() == 1);
+    CHECK(ended.lines[0].find("several contours and no overlap") != std::string::npos);
+    CHECK(parts.solid->level({25, 35, 12.5}) > 0);
+}
+
+TEST_CASE("slices need not be evenly spaced, nor lie on the image's") {
+    Drawing drawing(cube(60));
+    const std::vector<double> at{10, 11.5, 14.25, 20, 21, 30.5};
+    for (const double k : at) drawing.circle(30, 30, k, 10);
+    const Contours c = drawing.densify(1);
+    CHECK(c.slices == at.size());
+    for (double k = 10; k < 30.5; k += 0.7) CHECK(c.solid->level({40, 30, k}) == Approx(0).margin(0.02));
+    // Marks of one slice that differ by rounding alone are one slice.
+    Drawing shaken(cube(60));
+    shaken.circle(30, 30, 10, 12).circle(30, 30, 10.05, 6).circle(30, 30, 12, 12);
+    const Contours s = shaken.densify(1);
+    CHECK(s.slices == 2);
+    CHECK(s.solid->level({30, 30, 10}) > 0);
+}
+
+// ---- caps -----------------------------------------------------------------------------------------------------------
+
+TEST_CASE("a dome ends where the shrinking section would") {
+    // Areas of an ellipsoid's sections near its pole are linear in the height.
+    CHECK(cap_height(3, 9, 4, 4) == Approx(2));
+    CHECK(cap_height(3, 4, 4, 4) == 4);  // not beyond the next slice
+    CHECK(cap_height(3, 3, 4, 4) == 4);
+    CHECK(cap_height(5, 3, 4, 4) == 4);
+    CHECK(cap_height(3, 0, 4, 4) == 4);
+}
+
+TEST_CASE("one slice makes a lens, two slices a body") {
+    const Contours one = Drawing(cube(60)).circle(30, 30, 20, 10).densify(1);
+    CHECK(one.slices == 1);
+    CHECK(one.slice_distance == 1);
+    // Two paraboloids of height 1: half a cylinder each.
+    CHECK(volume(*one.solid, 0.2) == Approx(kPi * 100).epsilon(0.03));
+    CHECK(widest_gap(*one.solid, all_points(one), {30, 30, 20}, 30) < 1);
+    const Contours two = Drawing(cube(60)).circle(30, 30, 20, 10).circle(30, 30, 24, 10).densify(1);
+    CHECK(two.slices == 2);
+    CHECK(volume(*two.solid, 0.4) == Approx(kPi * 100 * 8).epsilon(0.02));
+    CHECK_FALSE(flood(all_points(two), 1, 1.5).leaks);
+}
+
+// ---- the body as a start --------------------------------------------------------------------------------------------
+
+TEST_CASE("may_meet never denies a ball that the surface crosses") {
+    Drawing drawing(turned_geometry());
+    for (int k = 15; k <= 45; k += 5) drawing.circle(38 + 0.3 * k, 45, k, 6 + 0.1 * k);
+    drawing.circle(38 + 0.3 * 25, 45, 25, 3);
+    const Contours c = drawing.densify(0.5);
+    const WorldBox box = c.solid->box();
+    std::mt19937 random(11);
+    std::uniform_real_distribution<double> unit(-0.1, 1.1), size(0.2, 4);
+    int crossed = 0, denied = 0;
+    for (int n = 0; n < 4000; ++n) {
+        Vec3 p;
+        for (int a = 0; a < 3; ++a) p[a] = box.min[a] + unit(random) * (box.max[a] - box.min[a]);
+        const double r = size(random);
+        const bool met = c.solid->may_meet(p, r);
+        bool inside = false, outside = false;
+        for (int probe = 0; probe < 30; ++probe) {
+            Vec3 q = p;
+            for (int a = 0; a < 3; ++a) q[a] += (2 * (unit(random) + 0.1) / 1.2 - 1) * r / std::sqrt(3.0);
+            (c.solid->level(q) < 0 ? inside : outside) = true;
+        }
+        if (inside && outside) {
+            ++crossed;
+            CHECK(met);
+        }
+        denied += !met;
+    }
+    CHECK(crossed > 200);
+    CHECK(denied > 500);
+}
+
+TEST_CASE("the start from a body has its volume, and holes stay open") {
+    Drawing drawing(cube(64, 0.5));
+    for (int k = 12; k <= 50; k += 2) drawing.circle(32, 32, k, 12).circle(32, 32, k, 5);
+    const Contours c = drawing.densify(0.5);
+    const Domain domain = domain_of_box(drawing.geometry().world_box(), 0.5);
+    const FloatGridPtr u = start_from_contours(domain, *c.solid);
+    CHECK(domain_of(*u) == domain);
+    double inside = 0;
+    for (int i = domain.min[0]; i <= domain.max[0]; ++i)
+        for (int j = domain.min[1]; j <= domain.max[1]; ++j)
+            for (int k = domain.min[2]; k <= domain.max[2]; ++k) {
+                const openvdb::Coord at(i, j, k);
+                const bool in = u->tree().getValue(at) < 0;
+                inside += in;
+                const double level = c.solid->level(domain.index_to_world({double(i), double(j), double(k)}));
+                if (std::abs(level) > 1e-4) CHECK(in == (level < 0));
+            }
+    CHECK(inside * 0.125 == Approx(kPi * (144 - 25) * 20).epsilon(0.02));
+}
+
+TEST_CASE("the points do not depend on the number of threads") {
+    Drawing drawing(turned_geometry());
+    for (int k = 10; k <= 50; k += 5) drawing.circle(38, 45, k, 5 + 0.1 * k).circle(38, 45, k, 2);
+    RunContext run;
+    run.threads = 1;
+    const Contours one = drawing.densify(0.5, ContourCurve::Spline, run);
+    for (const int threads : {2, 8}) {
+        run.threads = threads;
+        const Contours more = drawing.densify(0.5, ContourCurve::Spline, run);
+        CHECK(one.along == more.along);
+        CHECK(one.between == more.between);
+    }
+}
+
+// ---- hostile input --------------------------------------------------------------------------------------------------
+
+TEST_CASE("what is no contour is refused, and the message names it") {
+    CHECK(code_of([] { (void)densify({}, nullptr, {1}); }) == Errc::InvalidInput);
+    const Drawing loose = Drawing(cube(40)).loose({1, 2, 3});
+    CHECK(message_of([&] { (void)loose.densify(1); }).find("marks.csv: expected lines of marks") != std::string::npos);
+    for (const double step : {0.0, -1.0, std::nan(""), HUGE_VAL}) {
+        CHECK(code_of([&] { (void)Drawing(cube(40)).circle(20, 20, 5, 3).densify(step); }) == Errc::InvalidOptions);
+    }
+    const Drawing slanted = Drawing(cube(40)).add({{1, 2, 3}, {10, 2, 5}, {5, 9, 8}});
+    CHECK(message_of([&] { (void)slanted.densify(1); }).find("marks.csv: contour 1: expected marks on one slice") != std::string::npos);
+    const Drawing outside = Drawing(cube(40)).circle(20, 20, 5, 3).circle(38, 20, 6, 5);
+    const std::string why = message_of([&] { (void)outside.densify(1); });
+    CHECK(why.find("contour 2") != std::string::npos);
+    CHECK(why.find("outside the image") != std::string::npos);
+}
+
+TEST_CASE("one mark, two marks, marks on a line and marks that repeat") {
+    const Contours one = Drawing(cube(40)).add({{5, 6, 7}}).densify(1);
+    CHECK(one.solid == nullptr);
+    CHECK(one.along.size() == 1);
+    const Contours two = Drawing(cube(40)).add({{5, 6, 7}, {9, 6, 7}}).densify(1);
+    CHECK((two.open == 1 && two.closed == 0));
+    CHECK(two.along.size() == 5);
+    const Contours flat = Drawing(cube(40)).add({{5, 6, 7}, {9, 6, 7}, {15, 6, 7}}).densify(1);
+    CHECK(flat.solid == nullptr);
+    const Contours same = Drawing(cube(40)).add({{5, 6, 7}, {5, 6, 7}, {5, 6, 7}}).densify(1);
+    CHECK(same.solid == nullptr);
+    CHECK(same.along.size() == 1);
+    std::vector<Vec3> square{{5, 5, 7}, {15, 5, 7}, {15, 15, 7}, {5, 15, 7}};
+    const Contours plain = Drawing(cube(40)).add(square).densify(1);
+    square = {{5, 5, 7}, {5, 5, 7}, {15, 5, 7}, {15, 15, 7}, {15, 15, 7}, {15, 15, 7}, {5, 15, 7}, {5, 5, 7}};
+    for (const ContourCurve curve : {ContourCurve::Lines, ContourCurve::Spline}) {
+        const Contours repeated = Drawing(cube(40)).add(square).densify(1, curve);
+        for (const Vec3& p : all_points(repeated)) CHECK((std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2])));
+        if (curve == ContourCurve::Lines) CHECK(repeated.along == plain.along);
+    }
+}
+
+TEST_CASE("a contour that crosses itself encloses both of its lobes") {
+    const Contours c = Drawing(cube(60)).add({{10, 10, 5}, {40, 40, 5}, {40, 10, 5}, {10, 40, 5}}).densify(1);
+    CHECK(c.solid->level({13, 25, 5}) < 0);
+    CHECK(c.solid->level({37, 25, 5}) < 0);
+    CHECK(c.solid->level({25, 13, 5}) > 0);
+    CHECK(c.solid->level({25, 37, 5}) > 0);
+}
+
+TEST_CASE("a contour that is there twice counts once") {
+    Drawing drawing(cube(60));
+    for (int k = 10; k <= 14; ++k) drawing.circle(30, 30, k, 10).circle(30, 30, k, 10);
+    Warnings warnings;
+    const Contours c = drawing.densify(1, ContourCurve::Lines, warnings.run);
+    REQUIRE(c.solid != nullptr);
+    CHECK(c.solid->level({30, 30, 12}) == Approx(-10).margin(0.1));
+    REQUIRE(warnings.lines.size() == 1);
+    CHECK(warnings.lines[0].find("5 contours are there twice") != std::string::npos);
+}
+
+TEST_CASE("the slices are across the axis that most marks lie on; lines in other planes are marks") {
+    Drawing drawing(cube(60));
+    for (int k = 20; k <= 40; k += 4) drawing.circle(30, 30, k, 12, 1);
+    drawing.circle(30, 30, 30, 10, 0);
+    const Contours c = drawing.densify(1);
+    CHECK(c.summary.find("across y") != std::string::npos);
+    CHECK(c.slices == 6);
+    CHECK(c.closed == 7);
+    CHECK(nearest({30, 40, 30}, c.along) < 1e-9);
+    CHECK(c.solid->level({30, 30, 30}) < 0);
+}
+
+TEST_CASE("contours in the world need no image") {
+    Drawing drawing(cube(60));
+    for (int k = 10; k <= 20; ++k) drawing.circle(30, 30, k, 10);
+    PointCloud world = drawing.cloud();
+    world.space = PointSpace::World;
+    const Contours c = densify({world}, nullptr, {0.5});
+    CHECK(c.slices == 11);
+    CHECK(c.solid->level({40, 30, 14.5}) == Approx(0).margin(0.02));
+}

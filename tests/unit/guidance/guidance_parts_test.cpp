@@ -1,0 +1,88 @@
+// Parts of the image guidance: distances in a wide band, and pieces that a displacement tears off.
+#include <openvdb/openvdb.h>
+
+#include <catch2/catch.hpp>
+#include <algorithm>
+#include <cmath>
+
+#include "covol/start.h"
+#include "covol/surface.h"
+#include "guidance/wide_distance.h"
+#include "support/clouds.h"
+#include "support/shapes.h"
+#include "surface/pieces.h"
+
+using namespace covol;
+using covol::test::length;
+
+namespace {
+
+constexpr double kRadius = 16, kWidth = 12;
+
+Domain cube(int half, double h) {
+    Domain domain;
+    domain.voxel_size = h;
+    domain.min = {-half, -half, -half};
+    domain.max = {half, half, half};
+    return domain;
+}
+
+}  // namespace
+
+TEST_CASE("the wide distance to a sphere, and the sphere less an offset", "[guidance]") {
+    const double h = 0.5;
+    const Domain domain = cube(32, h);
+    const FloatGridPtr start = start_from_sphere(domain, {0, 0, 0}, kRadius * h);
+    const TriangleMesh mesh = extract_mesh(*start);
+    std::vector<Vec3> vertices;
+    for (const auto& v : mesh.vertices) vertices.push_back({v[0], v[1], v[2]});
+    const guidance::WideDistance wide(*start, vertices, domain, kWidth, {});
+    double most = 0;
+    std::int64_t count = 0;
+    for (auto value = wide.grid()->cbeginValueOn(); value; ++value) {
+        const openvdb::Vec3d x = wide.grid()->indexToWorld(value.getCoord());
+        most = std::max(most, std::abs(double(*value) - (x.length() - kRadius * h)) / h);
+        ++count;
+    }
+    // No foot is farther than sqrt(3) / 2 from a vertex, and no distance below 2.5 is one to a vertex.
+    CHECK(most < std::hypot(2.5, 0.5 * std::sqrt(3.0)) - 2.5 + 0.03);
+    // All voxels within the width, on both sides.
+    const double shell = 4.0 / 3 * M_PI * (std::pow(kRadius + kWidth, 3) - std::pow(kRadius - kWidth, 3));
+    CHECK(double(count) == Approx(shell).epsilon(0.02));
+    const auto accessor = wide.grid()->getConstAccessor();
+    CHECK(accessor.getValue(openvdb::Coord(0, 0, 0)) == Approx(-kWidth * h));
+    CHECK(accessor.getValue(openvdb::Coord(32, 32, 32)) == Approx(kWidth * h));
+
+    for (const double out : {-6.0, 4.0}) {
+        const FloatGridPtr moved = wide.less(std::vector<double>(mesh.vertices.size(), out * h));
+        CHECK(test::negative_volume(*moved) == Approx(4.0 / 3 * M_PI * std::pow((kRadius + out) * h, 3)).epsilon(0.02));
+    }
+}
+
+TEST_CASE("small pieces and cavities go where no mark is near", "[guidance]") {
+    const Domain domain = cube(32, 1);
+    const Vec3 speck{26, 0, 0}, bubble{0, -8, 0};
+    const auto made = [&] {
+        FloatGridPtr u = make_grid(domain, 40, "u");
+        auto accessor = u->getAccessor();
+        for (auto at = openvdb::CoordBBox(openvdb::Coord(-32), openvdb::Coord(32)).begin(); at; ++at) {
+            const Vec3 x{double((*at)[0]), double((*at)[1]), double((*at)[2])};
+            const double ball = length(x) - kRadius, small = length({x[0] - speck[0], x[1] - speck[1], x[2] - speck[2]}) - 1.5,
+                         hole = length({x[0] - bubble[0], x[1] - bubble[1], x[2] - bubble[2]}) - 1.5;
+            accessor.setValue(*at, float(std::max(std::min(ball, small), -hole)));
+        }
+        return u;
+    };
+    const auto sides = [&](const FloatGrid& u) {
+        const auto accessor = u.getConstAccessor();
+        return std::pair(accessor.getValue(openvdb::Coord(26, 0, 0)) < 0, accessor.getValue(openvdb::Coord(0, -8, 0)) >= 0);
+    };
+    const FloatGridPtr none = made();
+    REQUIRE(sides(*none) == std::pair(true, true));
+    detail::drop_unmarked_pieces(*none, {{0, 0, kRadius}});
+    CHECK(sides(*none) == std::pair(false, false));
+    CHECK(test::negative_volume(*none) == Approx(4.0 / 3 * M_PI * std::pow(kRadius, 3)).epsilon(0.02));
+    const FloatGridPtr marked = made();
+    detail::drop_unmarked_pieces(*marked, {{27.5, 0, 0}});
+    CHECK(sides(*marked) == std::pair(true, false));
+}

@@ -1,0 +1,78 @@
+#include "cli/file_kind.h"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <string_view>
+
+#include "covol/error.h"
+#include "covol/mesh_io.h"
+#include "covol/points.h"
+#include "covol/vdb_io.h"
+
+namespace covol::tool {
+namespace {
+
+std::string ending_of(const std::string& path) {
+    std::string end = std::filesystem::path(path).extension().string();
+    std::transform(end.begin(), end.end(), end.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+    return end;
+}
+
+template <std::size_t N>
+bool is_one_of(const std::string& end, const std::array<std::string_view, N>& list) {
+    return std::find(list.begin(), list.end(), end) != list.end();
+}
+
+constexpr std::array<std::string_view, 15> kPointEndings{".xyz",  ".csv",  ".tsv",       ".txt", ".pts",
+                                                         ".asc",  ".roi",  ".zip",       ".json", ".fcsv",
+                                                         ".annot", ".lmk", ".landmarks", ".pcd", ".las"};
+constexpr std::array<std::string_view, 2> kMeshEndings{".stl", ".glb"};
+constexpr std::array<std::string_view, 3> kSharedEndings{".ply", ".obj", ".off"};
+
+/// A file that is neither a mesh nor points is told as a broken mesh.
+bool holds_triangles(const std::string& path) {
+    try {
+        return !read_mesh(path).empty();
+    } catch (const Error& error) {
+        if (error.code() != Errc::InvalidInput) throw;
+        try {
+            (void)read_points(path);
+        } catch (const Error&) {
+            throw error;
+        }
+        return false;
+    }
+}
+
+}  // namespace
+
+FileKind kind_of_file(const std::string& path) {
+    const std::string end = ending_of(split_grid_name(path).path);
+    if (end == ".vdb") return FileKind::Vdb;
+    if (is_one_of(end, kPointEndings) || end == ".laz") return FileKind::Points;  // that LAZ is not read, its reader says
+    if (is_one_of(end, kMeshEndings)) return FileKind::Mesh;
+    if (is_one_of(end, kSharedEndings)) return holds_triangles(path) ? FileKind::Mesh : FileKind::Points;
+    return FileKind::Image;
+}
+
+FileKind kind_of_output(const std::string& path, FileKind like) {
+    const std::string end = ending_of(path);
+    if (end == ".vdb") return FileKind::Vdb;
+    if (is_one_of(end, kPointEndings)) return FileKind::Points;
+    if (is_one_of(end, kMeshEndings)) return FileKind::Mesh;
+    if (is_one_of(end, kSharedEndings)) return like == FileKind::Points ? FileKind::Points : FileKind::Mesh;
+    return FileKind::Image;
+}
+
+const char* to_string(FileKind kind) {
+    switch (kind) {
+        case FileKind::Vdb: return "vdb";
+        case FileKind::Image: return "image";
+        case FileKind::Mesh: return "mesh";
+        case FileKind::Points: break;
+    }
+    return "points";
+}
+
+}  // namespace covol::tool

@@ -1,0 +1,121 @@
+#include "cli/outputs.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include "covol/error.h"
+#include "covol/image.h"
+#include "covol/mesh_io.h"
+
+namespace covol::tool {
+namespace fs = std::filesystem;
+namespace {
+
+std::string lower_extension(const std::string& path) {
+    std::string end = fs::path(path).extension().string();
+    std::transform(end.begin(), end.end(), end.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+    return end;
+}
+
+void check_extension(const std::string& path, const std::vector<std::string>& known) {
+    if (std::find(known.begin(), known.end(), lower_extension(path)) != known.end()) return;
+    std::string list;
+    for (const std::string& end : known) list += (list.empty() ? "" : ", ") + end;
+    throw Error(Errc::InvalidOptions, path + ": expected a name that ends in " + list);
+}
+
+void check_ending(const std::string& path, OutputKind kind) {
+    switch (kind) {
+        case OutputKind::Vdb: return check_extension(path, {".vdb"});
+        case OutputKind::Image: return check_image_extension(path);
+        case OutputKind::Mesh: return check_mesh_extension(path);
+        case OutputKind::Points: return check_extension(path, {".xyz", ".csv", ".ply"});
+        case OutputKind::Picture: return check_extension(path, {".png"});
+        case OutputKind::Table: return check_extension(path, {".csv"});
+        case OutputKind::Text: return;
+    }
+}
+
+/// Something else than a file lies there, a device or a pipe: a file must not take its place.
+bool is_special(const fs::path& path) {
+    std::error_code status;
+    return fs::exists(path, status) && !fs::is_regular_file(path, status) && !fs::is_directory(path, status);
+}
+
+}  // namespace
+
+void Outputs::check(const std::string& flag, const std::string& path, OutputKind kind) {
+    if (path.empty()) return;
+    try {
+        check_ending(path, kind);
+    } catch (const Error& error) {
+        throw Error(error.code(), flag + ": " + error.what());
+    }
+    const fs::path target = fs::absolute(path).lexically_normal();
+    const fs::path folder = target.parent_path();
+    std::error_code status;
+    if (fs::is_directory(target, status)) throw Error(Errc::Io, flag + ": " + path + ": cannot write: it is a folder");
+    if (is_special(target)) {
+        if (kind == OutputKind::Text || kind == OutputKind::Table) return;
+        throw Error(Errc::Io, flag + ": " + path + ": cannot write: it is not a regular file");
+    }
+    for (const std::string& input : inputs_)
+        if (fs::equivalent(target, input, status))
+            throw Error(Errc::InvalidOptions, flag + ": " + path + ": is an input of this run; choose another name");
+    if (!fs::is_directory(folder, status))
+        throw Error(Errc::Io, flag + ": " + path + ": cannot write: the folder " + folder.string() + " does not exist");
+    if (::access(folder.c_str(), W_OK) != 0)
+        throw Error(Errc::Io, flag + ": " + path + ": cannot write: no permission to write in " + folder.string());
+    if (std::find(checked_.begin(), checked_.end(), target.string()) != checked_.end())
+        throw Error(Errc::InvalidOptions, flag + ": " + path + ": another output has the same name");
+    checked_.push_back(target.string());
+}
+
+void Outputs::add(const std::string& path, std::function<void(const std::string&)> write) {
+    if (!path.empty()) pending_.push_back({path, std::move(write)});
+}
+
+bool Outputs::write(const std::string& path, const std::function<void(const std::string&)>& write) {
+    if (path.empty()) return false;
+    write(path);
+    kept_.push_back(path);
+    return true;
+}
+
+void Outputs::commit() {
+    try {
+        for (const Pending& output : pending_) {
+            output.write(output.path);
+            written_.push_back(output.path);
+        }
+    } catch (...) {
+        rollback();
+        throw;
+    }
+    pending_.clear();
+}
+
+void Outputs::rollback() {
+    std::error_code ignored;
+    for (const std::string& path : written_) fs::remove(path, ignored);
+    written_.clear();
+}
+
+void write_text(const std::string& path, const std::string& text) {
+    const bool special = is_special(path);
+    const std::string temporary = special ? path : path + ".part";
+    std::ofstream file(temporary, std::ios::binary);
+    file << text;
+    file.close();
+    if (special && file) return;
+    if (special) throw Error(Errc::Io, path + ": cannot write");
+    if (file && std::rename(temporary.c_str(), path.c_str()) == 0) return;
+    std::remove(temporary.c_str());
+    throw Error(Errc::Io, path + ": cannot write");
+}
+
+}  // namespace covol::tool

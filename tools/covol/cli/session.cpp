@@ -1,0 +1,328 @@
+#include "cli/session.h"
+
+#include <csignal>
+#include <cmath>
+#include <filesystem>
+#include <iostream>
+
+#include "cli/arguments.h"
+#include "cli/profile.h"
+#include "covol/error.h"
+#include "covol/vdb_io.h"
+
+namespace covol::tool {
+namespace {
+
+// The only state that a signal handler may touch.
+std::atomic<bool> cancel_requested = false;
+std::atomic<bool> interrupted = false;
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+extern "C" void on_signal(int signal) {
+    interrupted = true;
+    cancel_requested = true;
+    std::signal(signal, SIG_DFL);  // a second one ends the program at once
+}
+
+/// One line: messages that list several problems are joined.
+std::string one_line(std::string text) {
+    while (!text.empty() && text.back() == '\n') text.pop_back();
+    for (std::size_t at = 0; (at = text.find('\n', at)) != std::string::npos;) text.replace(at, 1, "; ");
+    return text;
+}
+
+/// A configuration file holds the flags of the subcommand that runs, without a section or in [subcommand];
+/// sections of other subcommands are skipped.
+class CommandConfig : public CLI::ConfigTOML {
+public:
+    explicit CommandConfig(const CLI::App& app) : app_(app) {}
+    std::vector<CLI::ConfigItem> from_config(std::istream& input) const override {
+        const std::vector<const CLI::App*> chosen = app_.get_subcommands([](const CLI::App*) { return true; });
+        std::string command;
+        for (const CLI::App* sub : chosen)
+            if (app_.got_subcommand(const_cast<CLI::App*>(sub))) command = sub->get_name();
+        std::vector<CLI::ConfigItem> items;
+        for (CLI::ConfigItem& item : CLI::ConfigTOML::from_config(input)) {
+            if (item.name == "++" || item.name == "--") continue;  // marks of sections
+            const bool common = app_.get_option_no_throw("--" + item.name) != nullptr;
+            if (item.parents.empty() && !common) item.parents = {command};
+            if (item.parents.empty() || item.parents.front() == command) items.push_back(std::move(item));
+        }
+        return items;
+    }
+
+private:
+    const CLI::App& app_;
+};
+
+Json to_value(const std::string& text) {
+    if (text == "true") return true;
+    if (text == "false") return false;
+    char* end = nullptr;
+    const double value = std::strtod(text.c_str(), &end);
+    if (!text.empty() && *end == '\0' && std::isfinite(value)) {
+        if (value == std::floor(value) && std::abs(value) < 1e15) return static_cast<std::int64_t>(value);
+        return value;
+    }
+    return text;
+}
+
+/// The options as the user gave them, else their defaults; names as on the command line.
+Json options_of(const CLI::App& command) {
+    Json options = Json::object();
+    for (const CLI::Option* option : command.get_options()) {
+        std::string name = option->get_single_name();
+        if (name == "help" || name.empty()) continue;
+        if (option->count() == 0) {
+            if (!option->get_default_str().empty()) options[name] = to_value(option->get_default_str());
+            continue;
+        }
+        const std::vector<std::string>& given = option->results();
+        if (option->get_expected_max() > 1) {
+            Json list = Json::array();
+            for (const std::string& text : given) list.push_back(text);
+            options[name] = list;
+        } else {
+            options[name] = to_value(given.back());
+        }
+    }
+    return options;
+}
+
+/// Files that the command line names to be read: whatever exists under the value of an option that is no output. Values
+/// may begin with a structure's name or a kind of start, NAME=FILE and mesh:FILE.
+std::vector<std::string> inputs_of(const CLI::App& command) {
+    std::vector<std::string> inputs;
+    for (const CLI::Option* option : command.get_options()) {
+        if (option->get_type_name().starts_with("OUT")) continue;
+        for (const std::string& text : option->results())
+            for (const std::size_t begin : {std::size_t(0), text.find('=') + 1, text.find(':') + 1}) {
+                std::error_code status;
+                const std::string path = text.substr(begin);
+                if (std::filesystem::is_regular_file(path, status)) inputs.push_back(path);
+            }
+    }
+    return inputs;
+}
+
+/// A value that is empty, as from a shell's unset variable, is never meant.
+void expect_values(const CLI::App& app) {
+    for (const CLI::Option* option : app.get_options()) {
+        const std::vector<std::string>& given = option->results();
+        if (option->get_expected_min() > 0 && std::find(given.begin(), given.end(), "") != given.end())
+            throw UsageError(option->get_name() + ": expected a value, got ''");
+    }
+}
+
+constexpr std::uint64_t kUsablePercent = 95;  // of the free memory: beyond it the system would end us without a word
+constexpr int kMostThreads = 1024;  // TBB runs out of stacks long after
+
+}  // namespace
+
+int exit_code_of(Errc code) {
+    switch (code) {
+        case Errc::InvalidOptions:
+        case Errc::InvalidInput:
+        case Errc::Unsupported: return kBadInput;
+        case Errc::Io: return kIo;
+        case Errc::Numerical: return kNumerical;
+        case Errc::Cancelled: return kInterrupted;
+    }
+    return kDefect;
+}
+
+Session::Session() : app_("covol: segment 3D images with the help of a point cloud, on sparse OpenVDB grids") {
+    app_.name("covol");
+    app_.require_subcommand(1);
+    app_.set_version_flag("--version", std::string("covol ") + COVOL_VERSION);
+    add_common_flags();
+}
+
+void Session::add_common_flags() {
+    app_.add_option("--threads", threads_, "threads to use, 0 takes every core");
+    app_.add_flag("--profile", profile_, "print at the end where time and memory went");
+    app_.add_flag("--quiet", quiet_, "print nothing but results, warnings and errors");
+    app_.add_option("--json", json_path_, "write the report to this file, - is standard output")->type_name("FILE|-");
+    app_.add_option("--memory-limit", memory_limit_text_, "stop when more memory is needed, 8G for example [what is free]")
+        ->type_name("SIZE");
+    app_.add_option("--save-config", save_config_path_, "write the options of this run to a TOML file")
+        ->type_name("FILE")->configurable(false);
+    app_.set_config("--config", "", "read options from a TOML or INI file; the command line goes first")
+        ->type_name("FILE")->configurable(false);
+    app_.allow_config_extras(CLI::config_extras_mode::error);
+    app_.config_formatter(std::make_shared<CommandConfig>(app_));
+}
+
+CLI::App* Session::add_command(const std::string& name, const std::string& description, std::function<void()> body) {
+    CLI::App* command = app_.add_subcommand(name, description);
+    command->fallthrough();  // the common flags may follow the subcommand
+    command->footer("Every command also takes --threads, --quiet, --json, --memory-limit, --config and --save-config: "
+                    "see covol --help.");
+    bodies_[command] = std::move(body);
+    return command;
+}
+
+void Session::add_grid(const std::string& path, const FloatGridPtr& grid, bool half) {
+    const WriteVdbOptions options{half, metadata()};
+    outputs_.add(path, [grid, options](const std::string& to) { write_vdb(to, {grid}, options); });
+}
+
+int Session::main(int argc, char** argv) {
+    try {
+        app_.parse(argc, argv);
+        expect_values(app_);
+        expect_values(*app_.get_subcommands().front());
+    } catch (const CLI::ParseError& error) {
+        if (error.get_exit_code() == 0) return app_.exit(error);  // help and version
+        return fail(kUsage, error.what() + std::string("; see covol --help"));
+    } catch (const UsageError& error) {
+        return fail(kUsage, error.what());
+    } catch (const Error& error) {
+        return fail(exit_code_of(error.code()), error.what());
+    }
+    command_ = app_.get_subcommands().front();
+    return execute();
+}
+
+int Session::execute() {
+    std::signal(SIGINT, on_signal);
+    std::signal(SIGTERM, on_signal);
+    std::unique_ptr<MemoryGuard> guard;
+    try {
+        progress_ = std::make_unique<Progress>(quiet_);
+        if (threads_ < 0 || threads_ > kMostThreads)
+            throw Error(Errc::InvalidOptions, "--threads: expected 0 to " + std::to_string(kMostThreads) + ", got " +
+                                                  std::to_string(threads_));
+        run_.threads = threads_;
+        run_.cancel = &cancel_requested;
+        run_.progress = [this](const std::string& stage, double fraction) { progress_->update(stage, fraction); };
+        run_.log = [this](LogLevel level, const std::string& line) {
+            level == LogLevel::Warning ? warn(line) : note(line);
+        };
+        if (!memory_limit_text_.empty()) memory_limit_ = parse_bytes("--memory-limit", memory_limit_text_);
+        if (memory_limit_ == 0) memory_limit_ = available_memory() / 100 * kUsablePercent;
+        run_.memory_budget = memory_limit_;
+        guard = std::make_unique<MemoryGuard>(memory_limit_, cancel_requested);
+        outputs_.protect(inputs_of(*command_));
+        if (json_path_ != "-") outputs_.check("--json", json_path_, OutputKind::Text);
+        outputs_.check("--save-config", save_config_path_, OutputKind::Text);
+        start_report();
+        bodies_.at(command_)();
+        run_.check();
+        finish();
+        return exit_code_;
+    } catch (const UsageError& error) {
+        return fail(kUsage, error.what());
+    } catch (const Error& error) {
+        if (error.code() == Errc::Cancelled && guard && guard->tripped() && !interrupted)
+            return fail(kBadInput, "more memory is needed than " + memory_limit_name() + "; use a larger --voxel-size or a --roi");
+        return fail(exit_code_of(error.code()),
+                    error.code() == Errc::Cancelled ? interrupted_text() : error.what());
+    } catch (const std::bad_alloc&) {
+        return fail(kBadInput, "out of memory; use a larger --voxel-size or a --roi");
+    } catch (const std::exception& error) {
+        return fail(kDefect, std::string("internal error: ") + error.what());
+    }
+}
+
+void Session::start_report() {
+    report_["covol"] = COVOL_VERSION;
+    report_["command"] = command_->get_name();
+    report_["options"] = options_of(*command_);
+    report_["seconds"] = Json::object();
+}
+
+void Session::finish() {
+    const Stopwatch watch;
+    if (!save_config_path_.empty())
+        outputs_.add(save_config_path_, [this](const std::string& path) {
+            write_text(path, std::string("# covol ") + COVOL_VERSION + ", " + command_->get_name() + "\n" +
+                                 command_->config_to_str(false, true));
+        });
+    outputs_.commit();
+    add_seconds("write", watch.seconds());
+    add_seconds("total", watch.seconds());
+    report_["peak_rss_bytes"] = peak_rss();
+    try {
+        if (!json_path_.empty()) write_report(json_path_);
+    } catch (...) {
+        outputs_.rollback();
+        throw;
+    }
+    for (const std::string& path : outputs_.written()) note("wrote " + path);
+    if (profile_)
+        for (const std::string& line : profile_lines(report_)) progress_->line(line);
+    progress_->clear();
+}
+
+void Session::write_report(const std::string& path) const {
+    const std::string text = report_.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+    if (path == "-") {
+        std::cout << text << std::flush;
+        if (!std::cout) throw Error(Errc::Io, "standard output: cannot write");
+        return;
+    }
+    write_text(path, text);
+}
+
+std::string Session::interrupted_text() const {
+    return outputs_.kept().empty() ? "interrupted, nothing was written" : "interrupted; what was finished before stays";
+}
+
+int Session::fail(int code, const std::string& message) {
+    if (progress_) progress_->clear();
+    std::cerr << "covol: error: " << one_line(message) << std::endl;
+    return code;
+}
+
+void Session::note(const std::string& line) {
+    if (!quiet_) progress_->line("covol: " + line);
+}
+
+void Session::say(const std::string& line) { progress_->line(line); }
+
+void Session::warn(const std::string& line) {
+    // A file that is opened twice says the same twice.
+    for (const Json& said : report_["warnings"])
+        if (said == line) return;
+    progress_->line("covol: warning: " + line);
+    report_["warnings"].push_back(line);
+}
+
+std::map<std::string, std::string> Session::metadata() const {
+    Json options = report_.at("options");
+    options["command"] = report_.at("command");
+    const auto text = [](const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); };
+    std::map<std::string, std::string> facts{{"covol_version", COVOL_VERSION}, {"covol_options", text(options)}};
+    if (report_.contains("resolved")) facts["covol_resolved"] = text(report_.at("resolved"));
+    return facts;
+}
+
+std::vector<std::string> Session::comments() const {
+    std::vector<std::string> lines;
+    for (const auto& [key, value] : metadata()) lines.push_back(key + " " + value);
+    return lines;
+}
+
+std::string Session::comment() const {
+    std::string text;
+    for (const std::string& line : comments()) text += (text.empty() ? "" : "\n") + line;
+    return text;
+}
+
+void Session::require_memory(std::uint64_t bytes, const std::string& what) const {
+    if (memory_limit_ > 0 && bytes > memory_limit_)
+        throw Error(Errc::InvalidOptions, what + " alone needs " + std::to_string(bytes) + " bytes, more than " + memory_limit_name());
+}
+
+std::string Session::memory_limit_name() const {
+    return memory_limit_text_.empty() ? "this machine has free, " + std::to_string(memory_limit_ >> 20) + " MiB (--memory-limit sets another bound)"
+                                      : "--memory-limit " + memory_limit_text_;
+}
+
+void Session::add_seconds(const std::string& name, double seconds) {
+    Json& all = report_["seconds"];
+    all[name] = all.value(name, 0.0) + seconds;
+}
+
+}  // namespace covol::tool

@@ -1,0 +1,117 @@
+#pragma once
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <functional>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+
+#include "cli/memory.h"
+#include "cli/outputs.h"
+#include "cli/progress.h"
+#include "covol/error.h"
+#include "covol/fwd.h"
+#include "covol/image.h"
+#include "covol/run.h"
+
+namespace covol::tool {
+
+using Json = nlohmann::ordered_json;
+
+/// Exit codes of the program.
+enum ExitCode {
+    kDone = 0,
+    kDefect = 1,
+    kUsage = 2,
+    kBadInput = 3,
+    kIo = 4,
+    kNotSteady = 5,
+    kNumerical = 6,
+    kInterrupted = 130
+};
+
+[[nodiscard]] int exit_code_of(Errc code);
+
+/// What all subcommands share: the flags that every one takes, the run context, the outputs and the report.
+class Session {
+public:
+    Session();
+
+    /// A subcommand; `body` runs after the whole command line has been understood.
+    CLI::App* add_command(const std::string& name, const std::string& description, std::function<void()> body);
+
+    /// The same for a Job, to whose members the flags are bound: its run(session) is the body.
+    template <typename Job>
+    std::pair<std::shared_ptr<Job>, CLI::App*> add_job(const std::string& name, const std::string& description) {
+        const auto job = std::make_shared<Job>();
+        return {job, add_command(name, description, [job, this] { job->run(*this); })};
+    }
+
+    /// Parses, runs and writes. @returns the exit code.
+    int main(int argc, char** argv);
+
+    // For the bodies of subcommands.
+    [[nodiscard]] const RunContext& run() const noexcept { return run_; }
+    [[nodiscard]] Outputs& outputs() noexcept { return outputs_; }
+    /// Queues a .vdb file with one grid and the provenance. @param half  values as 16-bit floats
+    void add_grid(const std::string& path, const FloatGridPtr& grid, bool half);
+    /// The report that --json writes.
+    [[nodiscard]] Json& report() noexcept { return report_; }
+    /// Progress and remarks: silent with --quiet.
+    void note(const std::string& line);
+    /// The result that was asked for (info, compare, check): never silent.
+    void say(const std::string& line);
+    void warn(const std::string& line);
+    /// Provenance for the metadata of .vdb files: version, options, and the numbers that were used once they are known.
+    [[nodiscard]] std::map<std::string, std::string> metadata() const;
+    /// The same as comment lines for meshes and points.
+    [[nodiscard]] std::vector<std::string> comments() const;
+    [[nodiscard]] std::string comment() const;
+    /// Refuses early what cannot fit into --memory-limit, or into what is free: `bytes` for `what` are needed at least.
+    void require_memory(std::uint64_t bytes, const std::string& what) const;
+    /// Adds to seconds.<name> of the report.
+    void add_seconds(const std::string& name, double seconds);
+    /// The run went well, but ends with this exit code.
+    void set_exit_code(int code) { exit_code_ = code; }
+
+private:
+    void add_common_flags();
+    void parse(int argc, char** argv);
+    int execute();
+    void start_report();
+    void finish();
+    void write_report(const std::string& path) const;
+    int fail(int code, const std::string& message);
+    [[nodiscard]] std::string interrupted_text() const;
+    [[nodiscard]] std::string memory_limit_name() const;
+
+    CLI::App app_;
+    std::map<const CLI::App*, std::function<void()>> bodies_;
+    const CLI::App* command_ = nullptr;
+
+    int threads_ = 0;
+    bool quiet_ = false, profile_ = false;
+    std::string json_path_, save_config_path_, memory_limit_text_;
+    std::uint64_t memory_limit_ = 0;  ///< bytes: as given, else what the machine has free
+
+    RunContext run_;
+    std::unique_ptr<Progress> progress_;
+    Outputs outputs_;
+    Json report_;
+    int exit_code_ = kDone;
+};
+
+/// Seconds since construction.
+class Stopwatch {
+public:
+    [[nodiscard]] double seconds() const {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+    }
+
+private:
+    std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace covol::tool

@@ -1,0 +1,56 @@
+#include "cli/report.h"
+#include "commands/commands.h"
+#include "covol/band.h"
+#include "covol/error.h"
+#include "covol/vdb_io.h"
+#include "flags/bindings.h"
+
+namespace covol::tool {
+namespace {
+
+struct BandJob {
+    std::string distance_path, output;
+    PointFlags points;
+    TagFlags tag;
+    bool half = false;
+
+    double choose_distance(const Domain& domain, Session& session) const {
+        if (tag.tag_distance.given) return tag.tag_distance.resolve(domain.voxel_size, 0);
+        if (points.paths.empty()) throw UsageError("expected --tag-distance, or --points to choose it from");
+        const std::vector<Vec3> cloud = read_world_points(points, nullptr, session.run()).points;
+        const TagDistanceChoice choice =
+            choose_tag_distance(merge_close_points(cloud, 0), domain, tag.exterior_seeds, session.run());
+        const std::string line = std::to_string(choice.tag_distance) + " (" + choice.reason + ")";
+        session.note("tag_distance: " + line);
+        session.report()["automatic"]["tag_distance"] = line;
+        return choice.tag_distance;
+    }
+
+    void run(Session& session) const {
+        session.outputs().check("-o", output, OutputKind::Vdb);
+        const FloatGridPtr d = read_vdb(distance_path);
+        const double D = choose_distance(domain_of(*d), session);
+        const Stopwatch watch;
+        const BandResult result = band(*d, {D, tag.exterior_seeds}, session.run());
+        session.add_seconds("tag", watch.seconds());
+        session.report()["band"] = to_json(result.report);
+        session.note(std::to_string(result.report.active_voxels) + " active voxels, encloses " +
+                     std::to_string(result.report.enclosed_volume));
+        if (result.report.leaks) session.warn(result.report.leak());
+        session.add_grid(output, result.grid, half);
+    }
+};
+
+}  // namespace
+
+void add_band(Session& session) {
+    const auto [job, command] =
+        session.add_job<BandJob>("band", "Step 2: tag the inside, make the narrow band and the initial values");
+    command->add_option("distance", job->distance_path, "what `covol distance` wrote")->required()->type_name("DISTANCE.vdb");
+    command->add_option("-o,--output", job->output, "the grid 'band', .vdb")->required()->type_name("OUT.vdb");
+    job->tag.bind(*command);
+    job->points.bind(*command, "--points");
+    command->add_flag("--half", job->half, "store values as 16-bit floats");
+}
+
+}  // namespace covol::tool

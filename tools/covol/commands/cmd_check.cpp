@@ -1,0 +1,187 @@
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "cli/file_kind.h"
+#include "cli/report.h"
+#include "commands/commands.h"
+#include "covol/error.h"
+#include "covol/mesh_cleanup.h"
+#include "covol/surface.h"
+#include "covol/vdb_io.h"
+#include "flags/bindings.h"
+
+namespace covol::tool {
+namespace {
+
+constexpr double kLargeScene = 10000;  // beyond it Blender's default clipping hides an object
+constexpr double kSmallScene = 0.01;   // below it the default view shows a dot
+constexpr double kFlatVoxels = 3;      // an image whose spacings differ more is mostly interpolation along one axis
+constexpr double kFarPoint = 20;       // a nearest neighbour this many medians away is an outlier
+
+/// What would go wrong with a file elsewhere. Problems fail the check, remarks do not.
+class Findings {
+public:
+    explicit Findings(Session& session) : session_(session) { session.report()["findings"] = Json::array(); }
+    void problem(const std::string& text) { add("problem", text); ++problems_; }
+    void remark(const std::string& text) { add("remark", text); }
+    [[nodiscard]] int problems() const { return problems_; }
+
+private:
+    void add(const char* severity, const std::string& text) {
+        session_.say(std::string(severity) + ": " + text);
+        session_.report()["findings"].push_back({{"severity", severity}, {"text", text}});
+    }
+    Session& session_;
+    int problems_ = 0;
+};
+
+void check_extent(double extent, const std::string& what, Findings& findings) {
+    if (extent > kLargeScene)
+        findings.remark(what + " is " + std::to_string(extent) + " units wide: Blender and Houdini take a unit for a "
+                               "metre and clip it; write meshes with --unit-scale, or scale the object");
+    if (extent > 0 && extent < kSmallScene)
+        findings.remark(what + " is " + std::to_string(extent) + " units wide: Blender and Houdini take a unit for a "
+                               "metre and show a dot; write meshes with --unit-scale, or scale the object");
+}
+
+void check_measures(const TriangleMesh& mesh, const std::string& what, Findings& findings) {
+    const MeshMeasures m = measure(mesh);
+    if (!m.closed) findings.problem(what + " is not closed: printing, volumes and Boolean operations fail");
+    if (!m.manifold) findings.problem(what + " is not manifold: subdivision and simulation fail");
+    if (m.closed && m.volume < 0) findings.problem(what + " is inside out: normals point inward");
+    if (m.components > 1) findings.remark(what + " has " + std::to_string(m.components) + " pieces");
+}
+
+bool is_identifier(const std::string& name) {
+    return !name.empty() && !std::isdigit(static_cast<unsigned char>(name.front())) &&
+           std::all_of(name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) || c == '_'; });
+}
+
+void check_level_set(const std::string& path, const VdbGridInfo& info, const RunContext& run, Findings& findings) {
+    findings.remark("grid '" + info.name + "' is a level set: to render it as a volume, write a fog volume "
+                    "(--density) and give the renderer that");
+    const FloatGridPtr grid = read_vdb(path, info.name);
+    try {
+        check_measures(extract_mesh(*grid, {}, run), "the surface of grid '" + info.name + "'", findings);
+    } catch (const Error& error) {
+        if (error.code() == Errc::Cancelled) throw;
+        findings.problem("grid '" + info.name + "': " + error.what());
+    }
+}
+
+void check_grid(const std::string& path, const VdbGridInfo& g, const RunContext& run, Findings& findings) {
+    const std::string what = "grid '" + g.name + "'";
+    if (!is_identifier(g.name))
+        findings.remark(what + ": the name is no identifier: expressions in Houdini and Blender cannot address it");
+    if (!is_float_grid(g)) findings.remark(what + " holds " + g.type + ": covol and mesh tools read float grids only");
+    if (g.active_voxels == 0) {
+        findings.problem(what + " has no active voxel: nothing is drawn");
+        return;
+    }
+    if (!g.uniform) findings.problem(what + " has voxels that are no cubes: level-set tools refuse it");
+    if (!g.metadata.contains("file_bbox_min"))
+        findings.remark(what + " has no statistics metadata: viewers must load it to find its box");
+    for (const auto& [key, value] : g.metadata)
+        if (key == "creator" && value.starts_with("Houdini"))
+            findings.remark(what + ": its creator is Houdini: importers may turn its axes");
+    double extent = 0;
+    for (int a = 0; a < 3; ++a) extent = std::max(extent, (double(g.max[a]) - g.min[a] + 1) * g.voxel_size);
+    check_extent(extent, what, findings);
+    if (is_float_grid(g) && g.uniform && g.grid_class == "level set") check_level_set(path, g, run, findings);
+}
+
+void check_vdb(const std::string& path, const RunContext& run, Findings& findings) {
+    const std::vector<VdbGridInfo> grids = list_vdb(path);
+    if (grids.empty()) findings.problem("the file holds no grid");
+    std::set<std::string> names;
+    for (const VdbGridInfo& g : grids) {
+        if (!names.insert(g.name).second) findings.problem("two grids are called '" + g.name + "'");
+        check_grid(path, g, run, findings);
+    }
+}
+
+void check_image(const std::string& path, const ImageFlags& flags, const RunContext& run, Findings& findings) {
+    const Image image = flags.read(path, run);
+    const ImageGeometry& g = image.geometry();
+    const auto range = image.range();
+    if (range[0] == range[1]) findings.problem("all voxels are " + std::to_string(range[0]) + ": there is no edge");
+    if (g.unit.empty()) findings.remark("the file names no unit of length: lengths are in its own units");
+    const auto [least, most] = std::minmax_element(g.spacing.begin(), g.spacing.end());
+    if (*most > kFlatVoxels * *least)
+        findings.remark("voxels are " + std::to_string(*most / *least) + " times longer along one axis: between the "
+                        "slices the surface is interpolated");
+    if (!g.spacing_known)
+        findings.remark("the file does not know its spacing: 1 stands in for what is missing; see --spacing");
+    else if (g.spacing == Vec3{1, 1, 1})
+        findings.remark("spacing is 1, 1, 1: the file may not know its own; see --spacing");
+    if (!g.is_axis_aligned())
+        findings.remark("the image is rotated: TIFF cannot keep that, NRRD, NIfTI and MetaImage can");
+}
+
+void check_mesh_file(const std::string& path, Findings& findings) {
+    const TriangleMesh mesh = read_mesh(path);
+    check_measures(mesh, "the mesh", findings);
+    const int crossings = count_self_intersections(mesh);
+    if (crossings > 0) findings.problem("the mesh has " + std::to_string(crossings) + " self-intersections");
+    std::vector<Vec3> corners;
+    for (const auto& v : mesh.vertices) corners.push_back({v[0], v[1], v[2]});
+    const WorldBox box = bounding_box(corners);
+    double extent = 0;
+    for (int a = 0; a < 3; ++a) extent = std::max(extent, box.max[a] - box.min[a]);
+    check_extent(extent, "the mesh", findings);
+}
+
+void check_points(const std::string& path, const std::string& image_path, const ImageFlags& flags, const RunContext& run,
+                  Findings& findings) {
+    const PointCloud cloud = read_points(path);
+    const std::vector<Vec3> distinct = merge_close_points(cloud.points, 0);
+    if (distinct.size() < cloud.points.size())
+        findings.remark(std::to_string(cloud.points.size() - distinct.size()) + " points are exact duplicates");
+    if (distinct.size() < 4) {
+        findings.problem(std::to_string(distinct.size()) + " distinct points enclose no volume");
+    } else {
+        const SpacingStatistics s = nearest_neighbour_spacing(distinct);
+        if (s.max > kFarPoint * s.median)
+            findings.remark("a point lies " + std::to_string(s.max) + " from its nearest neighbour, the median is " +
+                            std::to_string(s.median) + ": it may be an outlier");
+    }
+    if (image_path.empty()) return;
+    const ImageGeometry geometry = read_image_geometry(image_path, flags.options, run);
+    try {
+        check_inside(cloud, geometry, run);
+    } catch (const Error& error) {
+        findings.problem(error.what());
+    }
+}
+
+void check(const std::string& path, const std::string& image_path, const ImageFlags& flags, Session& session) {
+    Findings findings(session);
+    const FileKind kind = kind_of_file(path);
+    session.report()["kind"] = to_string(kind);
+    switch (kind) {
+        case FileKind::Vdb: check_vdb(path, session.run(), findings); break;
+        case FileKind::Image: check_image(path, flags, session.run(), findings); break;
+        case FileKind::Mesh: check_mesh_file(path, findings); break;
+        case FileKind::Points: check_points(path, image_path, flags, session.run(), findings); break;
+    }
+    session.report()["problems"] = findings.problems();
+    session.say(path + ": " + (findings.problems() == 0 ? "no problem" : std::to_string(findings.problems()) + " problem(s)"));
+    if (findings.problems() > 0) session.set_exit_code(kBadInput);
+}
+
+}  // namespace
+
+void add_check(Session& session) {
+    const auto path = std::make_shared<std::string>();
+    const auto image = std::make_shared<std::string>();
+    const auto flags = std::make_shared<ImageFlags>();
+    CLI::App* command = session.add_command("check", "What would go wrong with a file in Blender, Houdini, Slicer or covol",
+                                            [path, image, flags, &session] { check(*path, *image, *flags, session); });
+    command->add_option("file", *path, ".vdb, image, mesh or points; exit code 3 when there is a problem")
+        ->required()->type_name("FILE");
+    command->add_option("--image", *image, "points: the image that they belong to")->type_name("IMAGE");
+    flags->bind(*command);
+}
+
+}  // namespace covol::tool

@@ -1,0 +1,116 @@
+#include <algorithm>
+
+#include "cli/file_kind.h"
+#include "cli/report.h"
+#include "commands/commands.h"
+#include "covol/error.h"
+#include "covol/vdb_io.h"
+#include "flags/bindings.h"
+#include "flags/cloud_flags.h"
+#include "jobs/image_grid.h"
+
+namespace covol::tool {
+namespace {
+
+OutputKind output_kind(FileKind kind) {
+    switch (kind) {
+        case FileKind::Vdb: return OutputKind::Vdb;
+        case FileKind::Image: return OutputKind::Image;
+        case FileKind::Mesh: return OutputKind::Mesh;
+        case FileKind::Points: break;
+    }
+    return OutputKind::Points;
+}
+
+struct ConvertJob {
+    std::string input, output, like, grid_name;
+    Length voxel_size;
+    ImageFlags image;
+    MeshFlags mesh;
+    PointFlags points;  ///< its options alone
+    CloudFlags cloud_flags;
+    bool half = false;
+
+    void image_to_vdb(Session& session) const {
+        const Image pixels = image.read(input, session.run());
+        const double finest = choose_voxel_size(&pixels, {}).voxel_size;
+        const double h = voxel_size.resolve(finest, finest);
+        const FloatGridPtr grid = to_grid(pixels, h, session.run());
+        session.report()["image"] = to_json(pixels.geometry());
+        session.report()["grid"] = {{"voxel_size", h}, {"domain", to_json(domain_of(*grid))}};
+        session.add_grid(output, grid, half);
+    }
+
+    void vdb_to_image(Session& session) const {
+        const FloatGridPtr grid = read_vdb(input, grid_name);
+        const ImageGeometry geometry = like.empty() ? geometry_of(*grid) : image.read_geometry(like, session.run());
+        session.require_memory(4 * std::uint64_t(geometry.size[0]) * geometry.size[1] * geometry.size[2], "the image");
+        const auto values = std::make_shared<std::vector<float>>(sample(*grid, geometry, session.run()));
+        session.report()["image"] = to_json(geometry);
+        session.outputs().add(output, [values, geometry](const std::string& path) {
+            write_image(path, geometry, values->data());
+        });
+    }
+
+    void convert_points(Session& session) const {
+        std::optional<ImageGeometry> geometry;
+        if (!like.empty()) geometry = read_image_geometry(like, image.options, session.run());
+        const PointCloud cloud = read_points(input, points.options);
+        std::vector<Vec3> world = to_world(cloud, geometry ? &*geometry : nullptr);
+        if (geometry) check_inside(cloud, *geometry, session.run());
+        session.note(input + ": " + std::to_string(world.size()) + " points, " + cloud.rule);
+        Json& report = session.report()["points"];
+        report = {{"count", world.size()}, {"rule", cloud.rule}};
+        if (cloud_flags.simplify.given && cloud_flags.simplify.in_voxels && !geometry)
+            throw UsageError("--simplify: a length in voxels needs --like IMAGE");
+        const double h = geometry ? *std::min_element(geometry->spacing.begin(), geometry->spacing.end()) : 1;
+        world = cloud_flags.clean(world, h, session.run(), report);
+        session.outputs().add(output, [world, comment = session.comment()](const std::string& path) {
+            write_points(path, world, comment);
+        });
+    }
+
+    void convert_mesh(Session& session) const {
+        const auto triangles = std::make_shared<TriangleMesh>(read_mesh(input));
+        session.report()["mesh"] = to_json(measure(*triangles));
+        session.outputs().add(output, [triangles, write = mesh.options(session)](const std::string& path) {
+            write_mesh(path, *triangles, write);
+        });
+    }
+
+    void run(Session& session) const {
+        const FileKind from = kind_of_file(input);
+        const FileKind to = kind_of_output(output, from);
+        session.outputs().check("OUT", output, output_kind(to));
+        mesh.check();
+        cloud_flags.check();
+        if (from == FileKind::Image && to == FileKind::Vdb) return image_to_vdb(session);
+        if (from == FileKind::Vdb && to == FileKind::Image) return vdb_to_image(session);
+        if (from == FileKind::Points && to == FileKind::Points) return convert_points(session);
+        if (from == FileKind::Mesh && to == FileKind::Mesh) return convert_mesh(session);
+        throw Error(Errc::Unsupported, std::string("convert: ") + input + " holds " + to_string(from) + ", " + output +
+                                           " would hold " + to_string(to) +
+                                           ": expected image and .vdb, points and points, or mesh and mesh; see also "
+                                           "covol mesh, mask and segment --init");
+    }
+};
+
+}  // namespace
+
+void add_convert(Session& session) {
+    const auto [job, command] =
+        session.add_job<ConvertJob>("convert", "Image to .vdb and back, points to points, mesh to mesh");
+    command->add_option("input", job->input, "the file to read")->required()->type_name("IN");
+    command->add_option("output", job->output, "the file to write")->required()->type_name("OUT");
+    command->add_option("--like", job->like, "image whose lattice the result gets, or that index points belong to")
+        ->type_name("IMAGE");
+    command->add_option("--grid", job->grid_name, "grid to take from a .vdb file [the first]")->type_name("NAME");
+    add_length(*command, "--voxel-size", job->voxel_size, "", "edge of the voxels of a .vdb file [smallest spacing]");
+    job->points.bind_options(*command);
+    job->cloud_flags.bind(*command, false);
+    job->mesh.bind(*command);
+    job->image.bind(*command);
+    command->add_flag("--half", job->half, "store values as 16-bit floats");
+}
+
+}  // namespace covol::tool

@@ -1,0 +1,67 @@
+#include "cli/report.h"
+#include "commands/commands.h"
+#include "covol/distance.h"
+#include "covol/error.h"
+#include "flags/bindings.h"
+
+namespace covol::tool {
+namespace {
+
+struct DistanceJob {
+    PointFlags points;
+    DomainFlags domain;
+    ImageFlags image;
+    Length max_distance;
+    std::string like, output;
+    bool half = false;
+
+    Domain make_domain(const ImageGeometry* geometry, const std::vector<Vec3>& cloud, double h, double radius) const {
+        if (domain.roi) return domain_of_box(*domain.roi, h);
+        if (geometry != nullptr) return domain_of_box(geometry->world_box(), h);
+        return domain_of_box(bounding_box(cloud, domain.margin.resolve(h, radius + h)), h);
+    }
+
+    double voxel_size(const ImageGeometry* geometry, const std::vector<Vec3>& cloud, Session& session) const {
+        if (geometry == nullptr || (domain.voxel_size.given && !domain.voxel_size.in_voxels))
+            return domain.resolve_voxel_size(nullptr, cloud, session);
+        const double finest = *std::min_element(geometry->spacing.begin(), geometry->spacing.end());
+        return domain.voxel_size.resolve(finest, finest);
+    }
+
+    void run(Session& session) const {
+        session.outputs().check("-o", output, OutputKind::Vdb);
+        std::optional<ImageGeometry> geometry;
+        if (!like.empty()) geometry = read_image_geometry(like, image.options, session.run());
+        const ImageGeometry* pointer = geometry ? &*geometry : nullptr;
+        const std::vector<Vec3> cloud = read_world_points(points, pointer, session.run()).points;
+        const double h = voxel_size(pointer, cloud, session);
+        const double radius = max_distance.resolve(h, 10 * h);
+        const Domain box = make_domain(pointer, cloud, h, radius);
+        const Stopwatch watch;
+        const DistanceResult result = distance(cloud, box, {radius}, session.run());
+        session.add_seconds("distance", watch.seconds());
+        session.report()["input"]["points"]["count"] = cloud.size();
+        session.report()["grid"] = {{"voxel_size", h},
+                                    {"active_voxels", result.report.active_voxels},
+                                    {"domain", to_json(box)}};
+        session.report()["distance"] = {{"max_distance", radius}, {"rounds", result.report.rounds}};
+        session.note(std::to_string(result.report.active_voxels) + " active voxels");
+        session.add_grid(output, result.grid, half);
+    }
+};
+
+}  // namespace
+
+void add_distance(Session& session) {
+    const auto [job, command] =
+        session.add_job<DistanceJob>("distance", "Step 1: distance to the points, in a tube around them");
+    job->points.bind(*command, "points")->required();
+    command->add_option("-o,--output", job->output, "the grid 'distance', .vdb")->required()->type_name("OUT.vdb");
+    add_length(*command, "--max-distance", job->max_distance, "10vx", "radius of the tube");
+    command->add_option("--like", job->like, "image whose box is the domain [the points' box]")->type_name("IMAGE");
+    job->domain.bind(*command, true);
+    job->image.bind(*command, false);
+    command->add_flag("--half", job->half, "store values as 16-bit floats");
+}
+
+}  // namespace covol::tool

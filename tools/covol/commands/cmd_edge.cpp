@@ -1,0 +1,47 @@
+#include "cli/report.h"
+#include "commands/commands.h"
+#include "covol/edge.h"
+#include "covol/vdb_io.h"
+#include "flags/bindings.h"
+
+namespace covol::tool {
+namespace {
+
+struct EdgeJob {
+    std::string image_path, band_path, output;
+    ImageFlags image;
+    EdgeFlags edge_flags;
+    bool half = false;
+
+    void run(Session& session) const {
+        session.outputs().check("-o", output, OutputKind::Vdb);
+        const FloatGridPtr topology = read_vdb(band_path);
+        const Domain domain = domain_of(*topology);
+        const double h = domain.voxel_size;
+        ReadImageOptions reading = image.options;
+        reading.roi = sampled_box(domain.world_box(), h);
+        const Image pixels = read_image(image_path, reading, session.run());
+        const Stopwatch watch;
+        const EdgeResult result = edge(pixels, *topology, edge_flags.resolve(h, h), session.run());
+        session.add_seconds("edge", watch.seconds());
+        session.report()["input"]["image"] = to_json(pixels.geometry());
+        session.report()["edge"] = to_json(result.report);
+        session.note("K = " + std::to_string(result.report.edge_k) + ": g = 1/2 at a gradient of " +
+                     std::to_string(result.report.edge_contrast));
+        session.add_grid(output, result.grid, half);
+    }
+};
+
+}  // namespace
+
+void add_edge(Session& session) {
+    const auto [job, command] = session.add_job<EdgeJob>("edge", "Step 3: the image's edge detector g on the band");
+    command->add_option("image", job->image_path, "3D image")->required()->type_name("IMAGE");
+    command->add_option("--band", job->band_path, "a grid whose active voxels get g")->required()->type_name("BAND.vdb");
+    command->add_option("-o,--output", job->output, "the grid 'edge', .vdb")->required()->type_name("OUT.vdb");
+    job->edge_flags.bind(*command);
+    job->image.bind(*command, false);
+    command->add_flag("--half", job->half, "store values as 16-bit floats");
+}
+
+}  // namespace covol::tool

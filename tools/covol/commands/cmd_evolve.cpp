@@ -1,0 +1,73 @@
+#include <openvdb/openvdb.h>
+
+#include "cli/report.h"
+#include "commands/commands.h"
+#include "covol/error.h"
+#include "covol/evolve.h"
+#include "covol/vdb_io.h"
+#include "flags/bindings.h"
+
+namespace covol::tool {
+namespace {
+
+struct EvolveJob {
+    std::string band_path, distance_path, edge_path, output;
+    EvolveFlags flags;
+    bool half = false;
+
+    /// A field that is not given has no weight.
+    EvolveOptions resolve(double h, Session& session) const {
+        EvolveOptions options = flags.resolve(h, EvolveOptions{});
+        if (distance_path.empty() && options.theta > 0) {
+            options.theta = 0;
+            session.note("theta: 0 (there is no --distance)");
+        }
+        if (edge_path.empty() && options.rho > 0) {
+            options.rho = 0;
+            session.note("rho: 0 (there is no --edge)");
+        }
+        return options;
+    }
+
+    void run(Session& session) const {
+        session.outputs().check("-o", output, OutputKind::Vdb);
+        const FloatGridPtr u = read_vdb(band_path);
+        const FloatGridPtr d = distance_path.empty() ? nullptr : read_vdb(distance_path);
+        const FloatGridPtr g = edge_path.empty() ? nullptr : read_vdb(edge_path);
+        const EvolveOptions options = resolve(domain_of(*u).voxel_size, session);
+        EvolveFields fields;
+        fields.distance = options.theta > 0 ? d.get() : nullptr;
+        fields.edge = options.rho > 0 ? g.get() : nullptr;
+        const Stopwatch watch;
+        const EvolveReport result = evolve(*u, fields, options, session.run());
+        session.run().check();
+        u->setName("u");
+        session.add_seconds("solve", watch.seconds());
+        session.report()["grid"] = {{"voxel_size", domain_of(*u).voxel_size},
+                                    {"active_voxels", result.active_voxels},
+                                    {"leaf_count", result.leaf_count}};
+        session.report()["solve"] = to_json(result);
+        session.note(std::to_string(result.steps) + " steps, " + to_string(result.stop_reason));
+        if (result.stop_reason == StopReason::MaxSteps)
+            session.warn("not steady after " + std::to_string(result.steps) + " steps");
+        if (flags.strict && result.stop_reason != StopReason::Steady) session.set_exit_code(kNotSteady);
+        session.add_grid(output, u, half);
+    }
+};
+
+}  // namespace
+
+void add_evolve(Session& session) {
+    const auto [job, command] =
+        session.add_job<EvolveJob>("evolve", "Step 4: move the level set to the structure's boundary");
+    command->add_option("band", job->band_path, "what `covol band` wrote, or the u of an earlier run")
+        ->required()->type_name("BAND.vdb");
+    command->add_option("-o,--output", job->output, "the grid u, .vdb")->required()->type_name("OUT.vdb");
+    command->add_option("--distance", job->distance_path, "what `covol distance` wrote")->type_name("DISTANCE.vdb");
+    command->add_option("--edge", job->edge_path, "what `covol edge` wrote")->type_name("EDGE.vdb");
+    job->flags.bind(*command, true);
+    command->add_flag("--follow", job->flags.options.follow, "the band follows the surface");
+    command->add_flag("--half", job->half, "store values as 16-bit floats");
+}
+
+}  // namespace covol::tool

@@ -1,0 +1,47 @@
+#include <algorithm>
+
+#include "cli/report.h"
+#include "commands/commands.h"
+#include "covol/error.h"
+#include "covol/surface.h"
+#include "flags/bindings.h"
+
+namespace covol::tool {
+namespace {
+
+struct MaskJob {
+    std::string input, like, output;
+    ImageFlags image;
+    int label = 1;
+
+    void run(Session& session) const {
+        session.outputs().check("-o", output, OutputKind::Image);
+        if (label < 1 || label > 255)
+            throw Error(Errc::InvalidOptions, "--label: expected 1 to 255, got " + std::to_string(label));
+        const FloatGridPtr level_set = read_vdb_level_set(input, session.run());
+        const ImageGeometry geometry = image.read_geometry(like, session.run());
+        const Stopwatch watch;
+        const auto labels = std::make_shared<std::vector<std::uint8_t>>(
+            rasterize(*level_set, geometry, static_cast<std::uint8_t>(label), session.run()));
+        session.add_seconds("mask", watch.seconds());
+        const auto inside = std::count_if(labels->begin(), labels->end(), [](std::uint8_t v) { return v != 0; });
+        session.report()["mask"] = {{"voxels", inside}, {"image", to_json(geometry)}};
+        session.note(std::to_string(inside) + " voxels inside");
+        session.outputs().add(output, [labels, geometry](const std::string& path) {
+            write_image(path, geometry, labels->data());
+        });
+    }
+};
+
+}  // namespace
+
+void add_mask(Session& session) {
+    const auto [job, command] = session.add_job<MaskJob>("mask", "Label image of a level set");
+    command->add_option("level_set", job->input, "a level set; of several in a file, :NAME picks one")->required()->type_name("IN.vdb[:NAME]");
+    command->add_option("--like", job->like, "image whose lattice the mask gets")->required()->type_name("IMAGE");
+    command->add_option("-o,--output", job->output, "label image")->required()->type_name("OUT.nrrd|.nii.gz|.tif|.mha");
+    command->add_option("--label", job->label, "value of the inside, 1 to 255")->capture_default_str();
+    job->image.bind(*command);
+}
+
+}  // namespace covol::tool

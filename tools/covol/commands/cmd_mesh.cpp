@@ -1,0 +1,92 @@
+#include "cli/report.h"
+#include "commands/commands.h"
+#include "covol/mesh_cleanup.h"
+#include "covol/mesh_relax.h"
+#include "covol/surface.h"
+#include "flags/bindings.h"
+
+namespace covol::tool {
+namespace {
+
+struct MeshJob {
+    std::string input, output;
+    Length isovalue, min_component, target_edge, adaptive;
+    int smooth = 0;
+    bool repair = false;
+    MeshFlags flags;
+
+    ExtractOptions extract_options(double h) const {
+        const double edge = min_component.resolve(h, 0);
+        return {isovalue.resolve(h, 0), edge * edge * edge};
+    }
+
+    void clean(TriangleMesh& mesh, const FloatGrid& level_set, double h, Session& session) const {
+        if (!repair && smooth == 0 && !target_edge.given && !adaptive.given) return;
+        CleanupOptions options;
+        options.target_edge = target_edge.resolve(h, 0);
+        options.adaptive = adaptive.resolve(h, 0);
+        options.smooth_iterations = smooth;
+        options.repair = repair;
+        const Stopwatch watch;
+        const CleanupReport done = clean_mesh(mesh, level_set, isovalue.resolve(h, 0), options, session.run());
+        session.add_seconds("clean", watch.seconds());
+        session.report()["cleanup"] = {{"self_intersections", done.self_intersections},
+                                       {"holes_filled", done.holes_filled},
+                                       {"intersection_free", done.intersection_free}};
+        const auto tell = [&](const char* step, const std::optional<CleanupStep>& made) {
+            if (!made) return;
+            const MeshDeviation change{made->change.max / h, made->change.mean / h};
+            session.report()["cleanup"][step] = {{"triangles", made->triangles},
+                                                 {"smallest_angle", made->smallest_angle},
+                                                 {"change_voxels", to_json(change)},
+                                                 {"deviation_voxels", to_json(made->deviation)}};
+            session.note(std::string(step) + ": " + mesh_line(made->triangles, made->smallest_angle, made->deviation) +
+                         "; off the mesh before: " + one_line(change));
+        };
+        tell("decimation", done.decimation);
+        tell("smoothing", done.smoothing);
+    }
+
+    void run(Session& session) const {
+        session.outputs().check("-o", output, OutputKind::Mesh);
+        flags.check();
+        const FloatGridPtr level_set = read_vdb_level_set(input, session.run());
+        const double h = domain_of(*level_set).voxel_size;
+        const Stopwatch watch;
+        TriangleMesh mesh = extract_mesh(*level_set, extract_options(h), session.run());
+        session.add_seconds("surface", watch.seconds());
+        if (mesh.triangles.empty())
+            throw Error(Errc::InvalidInput, input + ": nothing to mesh: no surface at this level, or all of it dropped");
+        const Stopwatch relaxing;
+        const RelaxReport relaxed = relax_mesh(mesh, *level_set, {extract_options(h).isovalue}, session.run());
+        session.add_seconds("relax", relaxing.seconds());
+        session.report()["mesh"] = to_json(relaxed);
+        session.note("mesh: " + mesh_line(relaxed.triangles, relaxed.smallest_angle, relaxed.deviation));
+        clean(mesh, *level_set, h, session);
+        const MeshMeasures measures = measure(mesh);
+        session.report()["surface"] = to_json(measures);
+        session.note("surface: " + one_line(measures));
+        session.outputs().add(output, [mesh = std::make_shared<TriangleMesh>(std::move(mesh)),
+                                       write = flags.options(session)](const std::string& path) {
+            write_mesh(path, *mesh, write);
+        });
+    }
+};
+
+}  // namespace
+
+void add_mesh(Session& session) {
+    const auto [job, command] = session.add_job<MeshJob>("mesh", "Triangles of a level set, and their cleanup");
+    command->add_option("level_set", job->input, "a level set; of several in a file, :NAME picks one")->required()->type_name("IN.vdb[:NAME]");
+    command->add_option("-o,--output", job->output, "closed, manifold, outward triangles")
+        ->required()->type_name("OUT.ply|.obj|.stl|.off|.glb");
+    add_length(*command, "--isovalue", job->isovalue, "0", "extract this level outside the surface");
+    add_length(*command, "--min-component", job->min_component, "", "drop pieces smaller than a cube of this edge");
+    add_length(*command, "--target-edge", job->target_edge, "", "decimate to about this edge length");
+    add_length(*command, "--adaptive", job->adaptive, "", "decimate as far as no triangle comes farther from the level set: large triangles where it is flat; at most 2vx");
+    command->add_option("--smooth", job->smooth, "steps of volume-keeping smoothing")->capture_default_str();
+    command->add_flag("--repair", job->repair, "resolve self-intersections, fill holes");
+    job->flags.bind(*command);
+}
+
+}  // namespace covol::tool

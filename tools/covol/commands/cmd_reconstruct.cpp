@@ -1,0 +1,14 @@
+#include "commands/commands.h"
+#include "jobs/segment_job.h"
+
+namespace covol::tool {
+
+void add_reconstruct(Session& session) {
+    const auto [job, command] =
+        session.add_job<SegmentJob>("reconstruct", "Points alone: the surface behind a point cloud");
+    job->evolve.options.rho = 0;
+    job->points.bind(*command, "points");
+    job->bind(*command, false);
+}
+
+}  // namespace covol::tool

@@ -1,0 +1,39 @@
+#include "cli/report.h"
+#include "commands/commands.h"
+#include "covol/surface.h"
+#include "covol/vdb_io.h"
+#include "flags/bindings.h"
+
+namespace covol::tool {
+namespace {
+
+struct SurfaceJob {
+    std::string input, output, density_path;
+    bool half = false;
+
+    void run(Session& session) const {
+        session.outputs().check("-o", output, OutputKind::Vdb);
+        session.outputs().check("--density", density_path, OutputKind::Vdb);
+        const FloatGridPtr u = read_vdb(input);
+        const Stopwatch watch;
+        const FloatGridPtr level_set = surface(*u, session.run());
+        session.add_seconds("surface", watch.seconds());
+        session.report()["grid"] = {{"voxel_size", domain_of(*level_set).voxel_size}};
+        const WriteVdbOptions vdb{half, session.metadata()};
+        session.outputs().add(output, [=](const std::string& path) { write_vdb(path, {level_set}, vdb); });
+        session.outputs().add(density_path, [=](const std::string& path) { write_vdb(path, {density(*level_set)}, vdb); });
+    }
+};
+
+}  // namespace
+
+void add_surface(Session& session) {
+    const auto [job, command] =
+        session.add_job<SurfaceJob>("surface", "Step 5: the zero level set as a true signed distance");
+    command->add_option("u", job->input, "what `covol evolve` wrote")->required()->type_name("U.vdb");
+    command->add_option("-o,--output", job->output, "the grid 'surface', .vdb")->required()->type_name("OUT.vdb");
+    command->add_option("--density", job->density_path, "the solid as a fog volume in [0,1]")->type_name("OUT.vdb");
+    command->add_flag("--half", job->half, "store values as 16-bit floats");
+}
+
+}  // namespace covol::tool

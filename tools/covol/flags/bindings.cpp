@@ -1,0 +1,298 @@
+#include "flags/bindings.h"
+
+#include <cmath>
+
+#include "covol/error.h"
+
+namespace covol::tool {
+namespace {
+
+void add_box(CLI::App& command, const std::string& flag, std::optional<WorldBox>& target,
+             const std::string& description) {
+    command.add_option_function<std::string>(
+               flag, [&target, flag](const std::string& text) { target = parse_box(flag, text); }, description)
+        ->type_name("X0,Y0,Z0,X1,Y1,Z1");
+}
+
+std::string to_text(double value) {
+    std::ostringstream text;
+    text << value;
+    return text.str();
+}
+
+CLI::Option* add_positive(CLI::App& command, const std::string& flag, double& target, const std::string& description) {
+    CLI::Option* option = command.add_option_function<double>(
+        flag,
+        [&target, flag](const double& value) {
+            if (!(value > 0) || !std::isfinite(value))
+                throw Error(Errc::InvalidOptions, flag + ": expected > 0, got " + to_text(value));
+            target = value;
+        },
+        description);
+    return option->type_name("NUMBER");
+}
+
+/// An optional weight; the library's own mark of "automatic", a negative number, is not for the command line.
+void add_share(CLI::App& command, const std::string& flag, std::optional<double>& target, const std::string& description) {
+    command.add_option_function<double>(
+               flag,
+               [&target, flag](const double& value) {
+                   if (!(value >= 0 && value <= 1))
+                       throw Error(Errc::InvalidOptions, flag + ": expected 0 to 1, got " + to_text(value));
+                   target = value;
+               },
+               description)
+        ->type_name("FLOAT");
+}
+
+}  // namespace
+
+CLI::Option* add_length(CLI::App& command, const std::string& flag, Length& target, const std::string& shown_default,
+                        const std::string& description) {
+    CLI::Option* option = command.add_option_function<std::string>(
+        flag, [&target, flag](const std::string& text) { target = parse_length(flag, text); }, description);
+    return option->type_name("LENGTH")->default_str(shown_default);
+}
+
+void add_vec3(CLI::App& command, const std::string& flag, std::vector<Vec3>& target, const std::string& description) {
+    command.add_option_function<std::vector<std::string>>(
+               flag,
+               [&target, flag](const std::vector<std::string>& texts) {
+                   target.clear();
+                   for (const std::string& text : texts) target.push_back(parse_vec3(flag, text));
+               },
+               description)
+        ->type_name("X,Y,Z")
+        ->allow_extra_args(false);
+}
+
+// ---- images and points ---------------------------------------------------------------------------------------------
+
+void ImageFlags::bind(CLI::App& command, bool with_roi, bool with_frame) {
+    command.add_option_function<std::string>(
+               "--spacing",
+               [this](const std::string& text) {
+                   options.spacing = parse_vec3("--spacing", text);
+                   for (const double s : options.spacing)
+                       if (!(s > 0)) throw Error(Errc::InvalidOptions, "--spacing: expected three numbers > 0, got " + text);
+               },
+               "voxel spacing, instead of the file's")
+        ->type_name("SX,SY,SZ");
+    const auto add_index = [&](const char* flag, int& target, const char* description) {
+        command.add_option(flag, target, description)->check(CLI::NonNegativeNumber.description(""))->type_name("N");
+    };
+    add_index("--channel", options.channel, "channel of an image that has several, from 0");
+    if (with_frame) add_index("--frame", options.frame, "time point of an image that has several, from 0");
+    if (with_roi) add_box(command, "--roi", options.roi, "take this box of the world only");
+}
+
+Image ImageFlags::read(const std::string& path, const RunContext& run) const {
+    const Image image = read_image(path, options, run);
+    return options.roi ? image.cropped() : image;
+}
+
+ImageGeometry ImageFlags::read_geometry(const std::string& path, const RunContext& run) const {
+    const ImageGeometry geometry = read_image_geometry(path, options, run);
+    return options.roi ? cropped(geometry, voxels_around(geometry, *options.roi)) : geometry;
+}
+
+WorldBox sampled_box(const WorldBox& box, double h) {
+    constexpr double kReach = 9;  // a leaf's 7 voxels, one for rounding the box up to voxels, one to spare
+    WorldBox grown = box;
+    for (int a = 0; a < 3; ++a) {
+        grown.min[a] -= kReach * h;
+        grown.max[a] += kReach * h;
+    }
+    return grown;
+}
+
+CLI::Option* PointFlags::bind(CLI::App& command, const std::string& flag) {
+    CLI::Option* option = command.add_option(flag, paths, "points: XYZ, CSV, PLY, OBJ, OFF, PCD, LAS; marks of Fiji, napari, 3D Slicer, ITK-SNAP")->type_name("FILE...");
+    bind_options(command);
+    return option;
+}
+
+void PointFlags::bind_options(CLI::App& command) {
+    add_choice(command, "--points-space", options.space,
+               {{"world", PointSpace::World},
+                {"ras", PointSpace::Ras},
+                {"index", PointSpace::Index},
+                {"index1", PointSpace::IndexOne},
+                {"local", PointSpace::Local}},
+               "coordinates are world units (LPS), the same in RAS, voxels from 0, voxels from 1, or lengths from the "
+               "first voxel [what the format says, else world]");
+    add_choice(command, "--points-order", options.order, {{"xyz", PointOrder::XYZ}, {"zyx", PointOrder::ZYX}},
+               "order of the coordinates [what the format says, else xyz]");
+    add_positive(command, "--points-scale", options.scale, "multiplies the points' lengths, 0.001 for micrometres to mm");
+    command.add_option("--points-channels", options.channels,
+                       "channels of the hyperstack that a Fiji multi-point was clicked in")
+        ->check(CLI::Range(1, 1000).description(""))
+        ->type_name("N");
+}
+
+namespace {
+
+/// Of the points that `all` ends with. Lists are made once a file has something for them.
+void add_hints(const PointCloud& cloud, const std::vector<Vec3>& world, WorldPoints& all) {
+    const std::size_t before = all.points.size() - world.size();
+    std::vector<Vec3>& normals = all.hints.normals;
+    std::vector<Vec3>& to_sensor = all.hints.to_sensor;
+    if (!cloud.normals.empty()) {
+        normals.resize(before);
+        normals.insert(normals.end(), cloud.normals.begin(), cloud.normals.end());
+    }
+    if (cloud.sensor) {
+        to_sensor.resize(before);
+        for (const Vec3& p : world) {
+            const Vec3 d{(*cloud.sensor)[0] - p[0], (*cloud.sensor)[1] - p[1], (*cloud.sensor)[2] - p[2]};
+            const double length = std::hypot(d[0], d[1], d[2]);
+            to_sensor.push_back(length > 0 ? Vec3{d[0] / length, d[1] / length, d[2] / length} : Vec3{0, 0, 0});
+        }
+    }
+    for (std::vector<Vec3>* list : {&normals, &to_sensor})
+        if (!list->empty()) list->resize(all.points.size());
+}
+
+}  // namespace
+
+WorldPoints read_world_points(const PointFlags& flags, const ImageGeometry* geometry, const RunContext& run) {
+    WorldPoints all;
+    for (const std::string& path : flags.paths) {
+        run.check();
+        const PointCloud cloud = read_points(path, flags.options);
+        const std::vector<Vec3> world = to_world(cloud, geometry);
+        if (geometry != nullptr) check_inside(cloud, *geometry, run);
+        all.points.insert(all.points.end(), world.begin(), world.end());
+        add_hints(cloud, world, all);
+        all.rules.push_back(cloud.rule);
+        run.info(path + ": " + std::to_string(world.size()) + " points" + (cloud.rule.empty() ? "" : ", " + cloud.rule));
+    }
+    return all;
+}
+
+// ---- model ---------------------------------------------------------------------------------------------------------
+
+void DomainFlags::bind(CLI::App& command, bool with_margin) {
+    add_length(command, "--voxel-size", voxel_size, "", "edge of the voxels [smallest spacing of image or points]");
+    add_box(command, "--roi", roi, "work in this box of the world only");
+    if (with_margin) add_length(command, "--margin", margin, "", "between the points and the domain's boundary [D + 6vx]");
+}
+
+double DomainFlags::resolve_voxel_size(const Image* image, const std::vector<Vec3>& points, Session& session) const {
+    if (voxel_size.given && !(voxel_size.value > 0))
+        throw Error(Errc::InvalidOptions, "--voxel-size: expected > 0, got " + to_text(voxel_size.value));
+    if (voxel_size.given && !voxel_size.in_voxels) return voxel_size.value;
+    const VoxelSizeChoice choice = choose_voxel_size(image, points);
+    const double h = voxel_size.resolve(choice.voxel_size, choice.voxel_size);
+    const std::string line =
+        to_text(h) + " (" + (voxel_size.given ? to_text(voxel_size.value) + " times " : "") + choice.reason + ")";
+    session.note("voxel_size: " + line);
+    session.report()["automatic"]["voxel_size"] = line;
+    return h;
+}
+
+void TagFlags::bind(CLI::App& command, bool names) {
+    add_length(command, "--tag-distance", tag_distance, "", "D: closes gaps between points up to 2D [from the points]");
+    const std::string flag = "--exterior-seed", what = "a position outside the structure, in a cavity say; repeatable";
+    if (!names) return add_vec3(command, flag, exterior_seeds, what);
+    command.add_option_function<std::vector<std::string>>(
+               flag,
+               [this, flag](const std::vector<std::string>& texts) {
+                   exterior_seeds.clear();
+                   named_seeds.clear();
+                   for (const std::string& text : texts) {
+                       const std::size_t colon = text.find(':');
+                       if (colon == std::string::npos)
+                           exterior_seeds.push_back(parse_vec3(flag, text));
+                       else
+                           named_seeds.emplace_back(text.substr(0, colon), parse_vec3(flag, text.substr(colon + 1)));
+                   }
+               },
+               what + "; with NAME: of that structure alone")
+        ->type_name("[NAME:]X,Y,Z")
+        ->allow_extra_args(false);
+}
+
+void EdgeFlags::bind(CLI::App& command) {
+    add_length(command, "--sigma", sigma, "", "presmoothing of the image [2vx after tagging, else 1vx]");
+    add_choice(command, "--edge-feature", options.feature,
+               {{"auto", EdgeFeature::Automatic}, {"slope", EdgeFeature::Slope}, {"bright-line", EdgeFeature::BrightLine},
+                {"dark-line", EdgeFeature::DarkLine}},
+               "what edges are: borders between darker and brighter, or bright or dark sheets such as membranes "
+               "[what the marks of contours lie on, else slope]");
+    CLI::Option* k = add_positive(command, "--edge-k", options.edge_k, "K in g = 1/(1 + K s^2) [see --edge-contrast]");
+    add_positive(command, "--edge-contrast", options.edge_contrast,
+                 "gradient, per world unit, or brightness of lines at which g = 1/2, of the image scaled to [0,1] "
+                 "[90 % percentile in the band, for lines a third of the median]")
+        ->excludes(k);
+}
+
+EdgeOptions EdgeFlags::resolve(double h, double otherwise) const {
+    EdgeOptions resolved = options;
+    resolved.sigma = sigma.resolve(h, otherwise);
+    return resolved;
+}
+
+void EvolveFlags::bind(CLI::App& command, bool with_image) {
+    command.add_option("--theta", options.theta, "weight of the points, 0 to 1")->capture_default_str();
+    if (with_image) command.add_option("--rho", options.rho, "weight of the image, 0 to 1")->capture_default_str();
+    add_length(command, "--delta", delta, "", "weight of curvature [0.5vx after tagging, else 1vx]");
+    add_length(command, "--tau", tau, "1vx and more", "time step; the flow's speed is 1 world unit per unit of time");
+    command.add_option("--epsilon", options.epsilon, "regularises the norm of grad u")->capture_default_str();
+    add_length(command, "--attraction-range", attraction_range, "",
+               "points pull fully up to half of it, not at all beyond; 0: unlimited "
+               "[8vx with an image, 5vx after starts other than tagging, else 0]");
+    if (with_image) {
+        command.add_option("--edge-epsilon", options.edge_epsilon, "regularises the norm of grad g")->capture_default_str();
+        add_share(command, "--image-yields", image_yields,
+                  "share of rho that fades close to points, on the attraction range's taper, 0 to 1 "
+                  "[1 after tagging, else 0]");
+        add_share(command, "--guess-weight", guess_weight,
+                  "share of theta that is left to what lies between marked slices, far from every mark, 0 to 1");
+    }
+    command.add_option("--max-steps", options.max_steps, "upper bound on time steps")->capture_default_str();
+    command.add_option("--tolerance", options.tolerance, "steady below this mean change, in voxels a step of 1vx")
+        ->capture_default_str();
+    command.add_option("--solver-tolerance", options.solver_tolerance, "a step's solve ends at this relative residual")
+        ->capture_default_str();
+    command.add_flag("--strict", strict, "exit code 5 when the flow is not steady at the end");
+}
+
+EvolveOptions EvolveFlags::resolve(double h, const EvolveOptions& otherwise) const {
+    EvolveOptions resolved = options;
+    resolved.delta = delta.resolve(h, otherwise.delta);
+    resolved.tau = tau.resolve(h, otherwise.tau);
+    resolved.attraction_range = attraction_range.resolve(h, otherwise.attraction_range);
+    resolved.image_yields = image_yields.value_or(otherwise.image_yields);
+    resolved.guess_weight = guess_weight.value_or(otherwise.guess_weight);
+    return resolved;
+}
+
+// ---- results -------------------------------------------------------------------------------------------------------
+
+void MeshFlags::bind(CLI::App& command) {
+    command.add_option_function<std::string>(
+               "--up", [this](const std::string& text) { y_up = text == "y"; }, "the mesh's axis that points up")
+        ->check(CLI::IsMember({"y", "z"}).description(""))
+        ->type_name("y|z")
+        ->default_str("z");
+    command.add_option("--unit-scale", unit_scale, "multiplies the mesh's coordinates, 0.001 for mm to m")
+        ->capture_default_str();
+}
+
+void MeshFlags::check() const {
+    if (!(unit_scale > 0) || !std::isfinite(unit_scale))
+        throw Error(Errc::InvalidOptions, "--unit-scale: expected > 0, got " + to_text(unit_scale));
+}
+
+WriteMeshOptions MeshFlags::options(const Session& session) const {
+    WriteMeshOptions write;
+    write.y_up = y_up;
+    write.unit_scale = unit_scale;
+    write.comments = session.comments();
+    return write;
+}
+
+bool is_float_grid(const VdbGridInfo& grid) { return grid.type == "Tree_float_5_4_3"; }
+
+}  // namespace covol::tool

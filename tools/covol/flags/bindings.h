@@ -1,0 +1,117 @@
+#pragma once
+#include <map>
+#include <string>
+#include <vector>
+
+#include "cli/arguments.h"
+#include "cli/session.h"
+#include "covol/mesh_io.h"
+#include "covol/pipeline.h"
+#include "covol/points.h"
+#include "covol/vdb_io.h"
+
+// Groups of flags that several subcommands share. Each binds to its own struct; lengths in voxels are resolved
+// once h is known.
+namespace covol::tool {
+
+/// An option that is a length; `what_else` is shown as its default.
+CLI::Option* add_length(CLI::App& command, const std::string& flag, Length& target, const std::string& shown_default,
+                        const std::string& description);
+
+/// An option that is one of several words, which configuration files keep as such.
+template <typename T>
+CLI::Option* add_choice(CLI::App& command, const std::string& flag, T& target, const std::map<std::string, T>& choices,
+                        const std::string& description) {
+    std::string names;
+    for (const auto& [name, value] : choices) names += (names.empty() ? "" : "|") + name;
+    return command
+        .add_option_function<std::string>(
+            flag, [&target, choices](const std::string& text) { target = choices.at(CLI::detail::to_lower(text)); }, description)
+        ->check(CLI::IsMember(choices, CLI::ignore_case).description(""))
+        ->type_name(names);
+}
+
+/// The image's own facts that the user corrects.
+struct ImageFlags {
+    ReadImageOptions options;
+    /// @param with_roi    --roi crops the image; commands with a domain have their own
+    /// @param with_frame  --frame takes one time point; commands that take several have their own
+    void bind(CLI::App& command, bool with_roi = true, bool with_frame = true);
+    /// The image, or the part of it that --roi names.
+    [[nodiscard]] Image read(const std::string& path, const RunContext& run) const;
+    /// The lattice of read()'s image.
+    [[nodiscard]] ImageGeometry read_geometry(const std::string& path, const RunContext& run) const;
+};
+
+/// `box` and what voxels of edge h around it may sample: leaves reach beyond a domain.
+[[nodiscard]] WorldBox sampled_box(const WorldBox& box, double h);
+
+struct PointFlags {
+    std::vector<std::string> paths;
+    ReadPointsOptions options;
+    /// `flag` is "--points", or a positional's name.
+    CLI::Option* bind(CLI::App& command, const std::string& flag);
+    /// How files are understood, without the files.
+    void bind_options(CLI::App& command);
+};
+
+/// Clouds read and moved to the world; with an image, points outside it are an error.
+struct WorldPoints {
+    std::vector<Vec3> points;
+    PointHints hints;                ///< of them
+    std::vector<std::string> rules;  ///< how each file was understood
+};
+[[nodiscard]] WorldPoints read_world_points(const PointFlags& flags, const ImageGeometry* geometry,
+                                            const RunContext& run);
+
+/// Where the domain lies and how fine it is.
+struct DomainFlags {
+    Length voxel_size, margin;
+    std::optional<WorldBox> roi;
+    void bind(CLI::App& command, bool with_margin);
+    /// h, where --voxel-size may be relative ("2vx") to the automatic one. Says which in `session`.
+    [[nodiscard]] double resolve_voxel_size(const Image* image, const std::vector<Vec3>& points, Session& session) const;
+};
+
+struct TagFlags {
+    Length tag_distance;
+    std::vector<Vec3> exterior_seeds;
+    std::vector<std::pair<std::string, Vec3>> named_seeds;  ///< of one structure among several
+    /// With `names`, seeds may be written name:x,y,z.
+    void bind(CLI::App& command, bool names = false);
+};
+
+struct EdgeFlags {
+    Length sigma;
+    EdgeOptions options;
+    void bind(CLI::App& command);
+    /// `otherwise` is sigma where none was given.
+    [[nodiscard]] EdgeOptions resolve(double h, double otherwise) const;
+};
+
+struct EvolveFlags {
+    Length delta, tau, attraction_range;
+    std::optional<double> image_yields, guess_weight;
+    EvolveOptions options;
+    bool strict = false;
+    /// Without an image there is no rho.
+    void bind(CLI::App& command, bool with_image);
+    /// What was not given is as in `otherwise`.
+    [[nodiscard]] EvolveOptions resolve(double h, const EvolveOptions& otherwise) const;
+};
+
+struct MeshFlags {
+    bool y_up = false;
+    double unit_scale = 1.0;
+    void bind(CLI::App& command);
+    /// Checks before the long work. @throws Error InvalidOptions.
+    void check() const;
+    [[nodiscard]] WriteMeshOptions options(const Session& session) const;
+};
+
+[[nodiscard]] bool is_float_grid(const VdbGridInfo& grid);
+
+/// A flag that is "x,y,z", once or many times.
+void add_vec3(CLI::App& command, const std::string& flag, std::vector<Vec3>& target, const std::string& description);
+
+}  // namespace covol::tool

@@ -1,0 +1,44 @@
+#include "flags/contour_flags.h"
+
+namespace covol::tool {
+
+void ContourFlags::bind(CLI::App& command, bool names) {
+    command.add_option("--contours", paths,
+                       std::string("ordered marks on slices (CSV slice,contour,x_px,y_px; napari shapes; Fiji selections): "
+                                   "joined, densified, and closed between the slices and beyond the last") +
+                           (names ? "; with names, ve=FILE exe=FILE, several structures" : ""))
+        ->type_name(names ? "[NAME=]FILE..." : "FILE...");
+    add_choice(command, "--contour-curve", curve, {{"lines", ContourCurve::Lines}, {"spline", ContourCurve::Spline}},
+               "how neighbouring marks are joined [spline]");
+    add_length(command, "--contour-thickness", thickness, "", "of a body whose contours all lie on one slice");
+}
+
+std::vector<PointCloud> ContourFlags::read(const ReadPointsOptions& reading, const ImageGeometry* geometry,
+                                           const RunContext& run) const {
+    std::vector<PointCloud> clouds;
+    for (const std::string& path : paths) {
+        run.check();
+        clouds.push_back(read_points(path, reading));
+        if (geometry != nullptr) check_inside(clouds.back(), *geometry, run);
+    }
+    return clouds;
+}
+
+std::shared_ptr<const Contours> ContourFlags::densify(const std::vector<PointCloud>& clouds, const ImageGeometry* geometry,
+                                                      double h, const RunContext& run, Json& report) const {
+    const auto contours = std::make_shared<Contours>(covol::densify(clouds, geometry, {h, curve, thickness.resolve(h, 0)}, run));
+    run.info("contours: " + contours->summary);
+    Json rules = Json::array();
+    for (const PointCloud& cloud : clouds) rules.push_back(cloud.rule);
+    report = {{"paths", paths},
+              {"rules", rules},
+              {"closed", contours->closed},
+              {"open", contours->open},
+              {"slices", contours->slices},
+              {"slice_distance", contours->slice_distance},
+              {"along", contours->along.size()},
+              {"between", contours->between.size()}};
+    return contours;
+}
+
+}  // namespace covol::tool

@@ -1,0 +1,43 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/session.h"
+#include "covol/evidence.h"
+#include "covol/mesh_io.h"
+#include "covol/pipeline.h"
+
+namespace covol::tool {
+
+/// What the surface rests on: --evidence and --suggest.
+struct EvidenceFlags {
+    std::string path;  ///< a table of the slices, .csv
+    int suggestions = 0;
+
+    void bind(CLI::App& command);
+    void check(Outputs& outputs, const std::string& path_of_this_run) const;
+    [[nodiscard]] bool wanted() const { return !path.empty() || suggestions > 0; }
+    /// Judges a result by its marks and the image's edges. The marks reach as far as the points' attraction does, or
+    /// 5 voxels where that is unlimited.
+    [[nodiscard]] Evidence judge(const SegmentResult& result, const std::vector<Vec3>& marks, const Image& image,
+                                 const RunContext& run) const;
+};
+
+/// Without the values at the vertices.
+[[nodiscard]] Json to_json(const Evidence& evidence);
+
+/// distance_to_marks and edge_strength, those that are known; nothing without evidence.
+[[nodiscard]] std::vector<VertexAttribute> vertex_attributes(const std::optional<Evidence>& evidence);
+
+/// Prints what share is unsupported, and the suggestions; `who` begins the lines.
+void tell(Session& session, const Evidence& evidence, const std::string& who = {});
+
+/// One surface in the table of slices.
+struct EvidenceOf {
+    std::string structure;
+    const Evidence* evidence;
+};
+[[nodiscard]] std::string evidence_csv(const std::vector<EvidenceOf>& surfaces);
+
+}  // namespace covol::tool

@@ -1,0 +1,75 @@
+#include "flags/guess_flags.h"
+
+#include <algorithm>
+
+#include "cli/file_kind.h"
+#include "covol/error.h"
+#include "covol/painted.h"
+
+namespace covol::tool {
+namespace {
+
+std::string list_of(const std::vector<LabelName>& labels) {
+    std::string text;
+    for (const LabelName& label : labels) text += (text.empty() ? "" : ", ") + std::to_string(label.label);
+    return text;
+}
+
+/// 1 where the label is.
+Image only(const Image& mask, int label) {
+    const auto [ni, nj, nk] = mask.geometry().size;
+    std::vector<std::uint8_t> values;
+    values.reserve(std::size_t(ni) * std::size_t(nj) * std::size_t(nk));
+    for (int k = 0; k < nk; ++k)
+        for (int j = 0; j < nj; ++j)
+            for (int i = 0; i < ni; ++i) values.push_back(mask.at(i, j, k) == label ? 1 : 0);
+    return Image::from_values(mask.geometry(), values.data());
+}
+
+}  // namespace
+
+void GuessFlags::bind(CLI::App& command) {
+    command.add_option("--guess", paths,
+                       "another tool's result, a mask, mesh or level set: points, contours and seeds correct it near them, "
+                       "everything else stays as it is; with NAME= of that structure")
+        ->type_name("[NAME=]FILE")
+        ->allow_extra_args(false);
+    command.add_option("--guess-label", label, "of a mask with several labels the one to correct; the others stay")
+        ->check(CLI::PositiveNumber.description(""))
+        ->type_name("LABEL");
+    add_length(command, "--guess-radius", radius, "",
+               "a mark acts on the guess at least so far around it [12vx, or two of the image's widest spacing; three times its "
+               "distance to the guess where that is more]");
+}
+
+Guess read_guess(const std::string& path, int label, const ImageGeometry& image, bool force, const RunContext& run) {
+    Guess guess;
+    guess.start.path = path;
+    switch (kind_of_file(path)) {
+        case FileKind::Vdb: guess.start.kind = Start::Kind::Vdb; return guess;
+        case FileKind::Mesh: guess.start.kind = Start::Kind::Mesh; return guess;
+        case FileKind::Points: throw Error(Errc::InvalidInput, "--guess: " + path + ": expected a mask, mesh or level set, got points");
+        case FileKind::Image: break;
+    }
+    guess.mask = placed_on(read_image(path, {}, RunContext{}), image, force);
+    const std::vector<LabelName> labels = painted_labels(*guess.mask);
+    if (label == 0 && labels.size() > 1)
+        throw Error(Errc::InvalidInput, "--guess: " + path + ": expected one label, got " + list_of(labels) + "; choose one by --guess-label");
+    guess.label = label != 0 ? label : labels.front().label;
+    if (std::none_of(labels.begin(), labels.end(), [&](const LabelName& l) { return l.label == guess.label; }))
+        throw Error(Errc::InvalidInput, "--guess-label: expected one of the labels of " + path + ", " + list_of(labels) + ", got " + std::to_string(guess.label));
+    guess.start.kind = Start::Kind::Mask;
+    guess.start.mask = std::make_shared<const Image>(only(*guess.mask, guess.label));
+    run.info("--guess " + path + ": label " + std::to_string(guess.label));
+    return guess;
+}
+
+Json to_json(const CorrectionReport& r) {
+    return {{"marks", r.marks},
+            {"seeds", r.seeds},
+            {"marks_to_guess", {{"mean", r.before_mean}, {"max", r.before_max}}},
+            {"marks_to_corrected", {{"mean", r.after_mean}, {"max", r.after_max}}},
+            {"radius", {{"least", r.least_radius}, {"largest", r.largest_radius}}}};
+}
+
+}  // namespace covol::tool

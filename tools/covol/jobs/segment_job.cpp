@@ -1,0 +1,243 @@
+#include "jobs/segment_job.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <sstream>
+
+#include "cli/report.h"
+#include "covol/error.h"
+#include "covol/surface.h"
+#include "covol/vdb_io.h"
+#include "jobs/marks.h"
+#include "jobs/structures_job.h"
+#include "jobs/timelapse_job.h"
+
+namespace covol::tool {
+namespace {
+
+/// A core that the points enclose is farther than D from all of them, and lies in their box.
+void check_tag_distance(double tag_distance, const std::vector<Vec3>& points) {
+    if (points.empty()) return;
+    const WorldBox box = bounding_box(points);
+    const double diagonal = std::hypot(box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]);
+    if (tag_distance <= diagonal) return;
+    std::ostringstream text;
+    text << "--tag-distance: " << tag_distance << " is more than the points' whole box measures, " << diagonal
+         << ": nothing that they enclose is that far from them";
+    throw Error(Errc::InvalidOptions, text.str());
+}
+
+}  // namespace
+
+SegmentOptions SegmentJob::resolve(double h) const {
+    SegmentOptions options;
+    options.voxel_size = h;
+    options.voxel_size_is_automatic = !domain.voxel_size.given;
+    options.roi = domain.roi;
+    options.margin = domain.margin.resolve(h, 0);
+    options.start = start;
+    options.model = model;
+    options.mark_precision = mark_precision.resolve(h, -1);
+    options.tag_distance = tag.tag_distance.resolve(h, 0);
+    if (tag.tag_distance.given && !(options.tag_distance > 0))
+        throw Error(Errc::InvalidOptions, "--tag-distance: expected > 0, got 0");
+    options.exterior_seeds = tag.exterior_seeds;
+    options.edge = edge.resolve(h, -1);
+    options.evolve = evolve.resolve(h, SegmentOptions::automatic_evolve());
+    options.coarse_levels = coarse_levels;
+    options.holes.policy = holes.policy;
+    options.holes.distance = hole_distance.resolve(h, 0);
+    if (hole_distance.given && !(options.holes.distance > 0))
+        throw Error(Errc::InvalidOptions, "--hole-distance: expected > 0, got 0");
+    options.correction.least_radius = guess.radius.resolve(h, 0);
+    const double side = min_component.resolve(h, 0);
+    options.extract.min_component_volume = side * side * side;
+    return options;
+}
+
+void SegmentJob::check_options() const {
+    const std::string why = resolve(1.0).why_invalid();
+    if (!why.empty()) throw Error(Errc::InvalidOptions, why);
+    cloud.check();
+}
+
+std::string SegmentJob::unused(const SegmentReport& report) const {
+    if (report.solve.steps > 0 || report.solve.stop_reason != StopReason::Steady) return {};
+    std::string flags;
+    const auto name = [&](bool given, const char* flag) {
+        if (given) flags += (flags.empty() ? "" : ", ") + std::string(flag);
+    };
+    name(evolve.delta.given, "--delta");
+    name(evolve.tau.given, "--tau");
+    name(evolve.attraction_range.given, "--attraction-range");
+    name(evolve.image_yields.has_value(), "--image-yields");
+    if (flags.empty()) return {};
+    return flags + " did nothing: the surface is a guess that marks and image hold, and nothing flowed; --model paper flows";
+}
+
+void SegmentJob::check_outputs(Outputs& outputs) const {
+    outputs.check("-o", output, OutputKind::Vdb);
+    outputs.check("--mask", mask_path, OutputKind::Image);
+    outputs.check("--mesh", mesh_path, OutputKind::Mesh);
+    outputs.check("--density", density_path, OutputKind::Vdb);
+    outputs.check("--fields", fields_path, OutputKind::Vdb);
+    outputs.check("--table", table_path, OutputKind::Table);
+    evidence.check(outputs, evidence.path);
+    mesh.check();
+}
+
+void SegmentJob::bind(CLI::App& command, bool with_image) {
+    command.add_option("-o,--output", output, "the surface as a level set, .vdb")->required()->type_name("OUT.vdb");
+    if (with_image) {
+        command.add_option("--mask", mask_path, "label image in the image's own geometry; .seg.nrrd for 3D Slicer")
+            ->type_name("OUT.nrrd|.nii.gz|.tif|.mha");
+        command.add_option("--table", table_path, "volume, area and fit of each structure and frame")->type_name("OUT.csv");
+        evidence.bind(command);
+        command.add_option_function<std::string>(
+                   "--frame", [this](const std::string& text) { frames = parse_frames("--frame", text); },
+                   "time points of the image, from 0; with several each starts from the one before")
+            ->type_name("all|N|A-B");
+    }
+    command.add_option("--mesh", mesh_path, "triangles")->type_name("OUT.ply|.obj|.stl|.off|.glb");
+    command.add_option("--density", density_path, "the solid as a fog volume in [0,1]")->type_name("OUT.vdb");
+    command.add_option("--fields", fields_path, "u, distance and edge, for a look inside")->type_name("OUT.vdb");
+    contours.bind(command, with_image);
+    if (with_image) painted.bind(command);
+    seeds.bind(command, with_image);
+    if (with_image) guess.bind(command);
+    cloud.bind(command, !with_image);
+    evolve.bind(command, with_image);
+    if (with_image) edge.bind(command);
+    tag.bind(command, with_image);
+    command.add_option_function<std::string>(
+               "--init", [this](const std::string& text) { start = parse_start("--init", text); },
+               "how the level set starts: auto, guess (through the marks with the least bending), cloud (many points without an image: "
+               "their own surface), tag, sphere:x,y,z,r, "
+               "box:x0,y0,z0,x1,y1,z1 (inside an object and without marks these grow to its edges), mesh:F, mask:F or vdb:F "
+               "(near its marks such a start is a guess that they correct)")
+        ->type_name("START")
+        ->default_str("auto");
+    add_choice(command, "--model", model, {{"guided", Model::Guided}, {"paper", Model::Paper}},
+               "what holds the surface where neither marks nor edges speak: a guess made from the marks, or curvature alone [guided]");
+    add_length(command, "--mark-precision", mark_precision, "", "standard deviation of a mark's place [0.3 of the image's spacing along each axis]");
+    domain.bind(command, !with_image);
+    command.add_option("--coarse-levels", coarse_levels, "levels of twice the voxel size, and so on, that the flow passes first; auto: 1 for a sphere or a box, else 0")
+        ->check(CLI::Range(0, 4).description(""))
+        ->type_name("N")
+        ->default_str("auto");
+    if (!with_image) {
+        add_choice(command, "--holes", holes.policy, {{"close", Holes::Close}, {"open", Holes::Open}, {"flat", Holes::Flat}},
+                   "where no points are, the surface goes on smoothly, or the mesh ends (the level set stays closed), or the flattest "
+                   "patch spans it, in both [close]");
+        add_length(command, "--hole-distance", hole_distance, "",
+                   "a hole is where the surface lies farther from all points [3 spacings where they are sparse, at least 3vx]");
+    }
+    add_length(command, "--min-component", min_component, "", "drop pieces of the mesh smaller than a cube of this edge");
+    command.add_flag("--half", half, "store values in .vdb files as 16-bit floats");
+    mesh.bind(command);
+    if (with_image) image.bind(command, false, false);
+}
+
+Image SegmentJob::read(const std::string& path, const ReadImageOptions& options, Session& session) const {
+    const Stopwatch reading;
+    ReadImageOptions needed = options;
+    if (domain.roi) {
+        const Vec3 spacing = read_image_geometry(path, options, session.run()).spacing;
+        const double finest = *std::min_element(spacing.begin(), spacing.end());
+        needed.roi = sampled_box(*domain.roi, domain.voxel_size.resolve(finest, finest));
+    }
+    session.require_memory(read_image_info(path, needed, session.run()).bytes_to_hold, "the image");
+    Image pixels = read_image(path, needed, session.run());
+    Json& input = session.report()["input"]["image"];
+    input = to_json(pixels.geometry());
+    input["path"] = path;
+    session.add_seconds("read", reading.seconds());
+    session.add_seconds("total", reading.seconds());
+    return pixels;
+}
+
+void SegmentJob::run(Session& session) const {
+    const auto has_name = [](const std::string& text) { return !split_name(text).name.empty(); };
+    bool names = false;
+    for (const std::vector<std::string>* texts : {&points.paths, &contours.paths, &seeds.inside, &seeds.outside})
+        names = names || std::any_of(texts->begin(), texts->end(), has_name);
+    if (names && images.empty()) throw UsageError("expected files without names: several structures need an image, see covol segment");
+    if (is_timelapse(*this)) return run_timelapse(*this, session);
+    if (names || !tag.named_seeds.empty() || !painted.paths.empty() || !guess.paths.empty()) return run_structures(*this, session);
+    run_one(session);
+}
+
+void SegmentJob::run_one(Session& session) const {
+    check_outputs(session.outputs());
+    check_options();
+
+    std::optional<Image> pixels;
+    if (!images.empty()) {
+        ReadImageOptions options = image.options;
+        if (frames.given) options.frame = frames.first;
+        pixels = read(images.front(), options, session);
+    }
+    Json& input = session.report()["input"];
+    const Stopwatch reading;
+    const ImageGeometry* geometry = pixels ? &pixels->geometry() : nullptr;
+    Marks marks = read_marks(points, contours, cloud, geometry, session.run());
+    session.add_seconds("read", reading.seconds());
+    session.add_seconds("total", reading.seconds());
+
+    const Image* pointer = pixels ? &*pixels : nullptr;
+    if (pointer == nullptr && marks.given.empty()) throw UsageError("expected an image, points or contours, got none");
+    const double h = domain.resolve_voxel_size(pointer, marks.given, session);
+    prepare(marks, cloud, contours, geometry, h, session, session.run());
+    input.update(marks.report);
+    SegmentOptions options = resolve(h);
+    check_tag_distance(options.tag_distance, marks.given);
+    options.contours = marks.contours;
+    options.hints = marks.hints;
+    const Seeds sides = read_seeds(seeds, points.options, geometry, h, session.run());
+    options.inside = sides.inside;
+    options.outside = sides.outside;
+    // Shared by the writers that run at the end.
+    const auto result = std::make_shared<SegmentResult>(segment(pointer, marks.points, options, session.run()));
+    input["points"]["densified"] = result->report.densified;
+    session.report().update(to_json(result->report), true);
+    add_seconds(session, result->report.seconds);
+    for (const std::string& line : summary(result->report)) session.note(line);
+    if (const std::string line = unused(result->report); !line.empty()) session.warn(line);
+    std::optional<Evidence> judged;
+    if (pixels && evidence.wanted()) {
+        judged = evidence.judge(*result, marks.given, *pixels, session.run());
+        session.report()["evidence"] = to_json(*judged);
+        tell(session, *judged);
+    }
+
+    WriteVdbOptions vdb{half, session.metadata()};
+    if (result->report.holes.policy == Holes::Open) vdb.metadata["covol_holes"] = "closed here; the mesh alone is open";
+    Outputs& outputs = session.outputs();
+    outputs.add(output, [=](const std::string& path) { write_vdb(path, {result->surface}, vdb); });
+    outputs.add(density_path, [=](const std::string& path) { write_vdb(path, {density(*result->surface)}, vdb); });
+    outputs.add(fields_path, [=](const std::string& path) {
+        std::vector<FloatGridPtr> grids{result->u};
+        for (const FloatGridPtr& field : {result->distance, result->edge})
+            if (field) grids.push_back(field);
+        write_vdb(path, grids, vdb);
+    });
+    WriteMeshOptions write = mesh.options(session);
+    write.attributes = vertex_attributes(judged);
+    if (!result->distance_to_points.empty()) write.attributes.push_back({"distance_to_points", result->distance_to_points});
+    outputs.add(mesh_path, [=](const std::string& path) { write_mesh(path, result->mesh, write); });
+    outputs.add(evidence.path, [=](const std::string& path) { write_text(path, evidence_csv({{"surface", &*judged}})); });
+    outputs.add(table_path, [=](const std::string& path) {
+        Table table(result_columns());
+        add_result(table.row(), "surface", 1, result->report);
+        write_text(path, table.text());
+    });
+    if (!mask_path.empty())
+        outputs.add(mask_path, [=, geometry = pixels->geometry(), &session](const std::string& path) {
+            write_image(path, geometry, rasterize(*result->surface, geometry, 1, session.run()).data());
+        });
+    if (evolve.strict && result->report.solve.stop_reason != StopReason::Steady) session.set_exit_code(kNotSteady);
+}
+
+}  // namespace covol::tool

@@ -1,0 +1,60 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "flags/bindings.h"
+#include "flags/cloud_flags.h"
+#include "flags/contour_flags.h"
+#include "flags/evidence_flags.h"
+#include "flags/guess_flags.h"
+#include "flags/painted_flags.h"
+#include "flags/seed_flags.h"
+
+namespace covol::tool {
+
+/// What `segment` and `reconstruct` share: they differ in the image alone.
+struct SegmentJob {
+    std::vector<std::string> images;  ///< none: points alone; several: the frames of a time-lapse
+    ImageFlags image;
+    PointFlags points;
+    ContourFlags contours;
+    PaintedFlags painted;
+    SeedFlags seeds;
+    GuessFlags guess;
+    CloudFlags cloud;
+    DomainFlags domain;
+    TagFlags tag;
+    EdgeFlags edge;
+    EvolveFlags evolve;
+    MeshFlags mesh;
+    Start start;
+    Model model = Model::Guided;
+    Length mark_precision;
+    int coarse_levels = SegmentOptions{}.coarse_levels;
+    HolesOptions holes;
+    Length hole_distance;
+    Length min_component;  ///< edge of a cube of the smallest volume that is kept
+    EvidenceFlags evidence;
+    FrameChoice frames;
+    std::string output, mask_path, mesh_path, density_path, fields_path, table_path;
+    bool half = false;
+
+    void bind(CLI::App& command, bool with_image);
+    /// One structure in one image here; several structures and time-lapses in files of their own.
+    void run(Session& session) const;
+
+    // For those.
+    [[nodiscard]] SegmentOptions resolve(double h) const;
+    /// Options that are wrong whatever h is are found before anything is read.
+    void check_options() const;
+    /// Which of the given flags had nothing to do; empty where all had.
+    [[nodiscard]] std::string unused(const SegmentReport& report) const;
+    /// The image; the report tells of it.
+    [[nodiscard]] Image read(const std::string& path, const ReadImageOptions& options, Session& session) const;
+
+private:
+    void run_one(Session& session) const;
+    void check_outputs(Outputs& outputs) const;
+};
+
+}  // namespace covol::tool

@@ -1,0 +1,224 @@
+#include "jobs/timelapse_job.h"
+
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+
+#include "covol/error.h"
+#include "jobs/structures_job.h"
+
+namespace covol::tool {
+namespace {
+
+bool parse_int(std::string_view text, int& value) {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    return error == std::errc() && end == text.data() + text.size() && value >= 0;
+}
+
+/// The {frame...} in a path: where it is and how many digits it asks for.
+struct Placeholder {
+    std::size_t begin = std::string::npos, length = 0;
+    int digits = 0;
+};
+
+Placeholder find_placeholder(const std::string& path) {
+    Placeholder found;
+    const std::size_t begin = path.find("{frame");
+    const std::size_t end = begin == std::string::npos ? begin : path.find('}', begin);
+    if (end == std::string::npos) return found;
+    std::string width = path.substr(begin + 6, end - begin - 6);
+    if (!width.empty()) {
+        if (width.back() == 'd') width.pop_back();
+        if (width.size() < 2 || width[0] != ':' || !parse_int(std::string_view(width).substr(1), found.digits) || found.digits > 9)
+            throw UsageError(path + ": expected {frame} or {frame:03d}, got " + path.substr(begin, end - begin + 1));
+    }
+    found.begin = begin;
+    found.length = end - begin + 1;
+    return found;
+}
+
+std::string padded(int number, int digits) {
+    std::string text = std::to_string(number);
+    if (int(text.size()) < digits) text.insert(0, std::size_t(digits) - text.size(), '0');
+    return text;
+}
+
+/// One image of the series.
+struct Frame {
+    std::string path;
+    ReadImageOptions options;
+    int number = 0;
+};
+
+std::vector<Frame> frames_of(const SegmentJob& job) {
+    std::vector<Frame> frames;
+    if (job.images.size() > 1) {
+        if (job.frames.given && !job.frames.is_one())
+            throw UsageError("--frame: expected one number with several images, which are the frames");
+        ReadImageOptions options = job.image.options;
+        if (job.frames.given) options.frame = job.frames.first;
+        for (const std::string& path : job.images) frames.push_back({path, options, int(frames.size())});
+        return frames;
+    }
+    const int count = read_image_info(job.images.front(), job.image.options).frames;
+    const int first = job.frames.all ? 0 : job.frames.first, last = job.frames.all ? count - 1 : job.frames.last;
+    if (last >= count)
+        throw Error(Errc::InvalidOptions, "--frame: frame " + std::to_string(last) + " does not exist: " + job.images.front() +
+                                              " has " + std::to_string(count));
+    for (int n = first; n <= last; ++n) {
+        frames.push_back({job.images.front(), job.image.options, n});
+        frames.back().options.frame = n;
+    }
+    return frames;
+}
+
+/// The series as it goes on.
+class TimeLapse {
+public:
+    TimeLapse(const SegmentJob& job, Session& session)
+        : job_(job), session_(session), inputs_(structures_of(job)), table_(columns()) {}
+
+    void run() {
+        if (!job_.painted.paths.empty() || !job_.guess.paths.empty())
+            throw UsageError("--painted, --guess: expected one image, got a time-lapse");
+        frames_ = frames_of(job_);
+        check();
+        starts_ = starts_of(job_, inputs_);
+        for (const Frame& frame : frames_) {
+            session_.run().check();
+            go(frame);
+        }
+        session_.report()["frames"] = reports_;
+        session_.outputs().add(job_.table_path, [text = table_.text()](const std::string& path) { write_text(path, text); });
+        if (failed_ == int(frames_.size()))
+            throw Error(first_error_, "no frame could be segmented; the first: " + first_message_);
+        if (failed_ > 0) {
+            session_.warn(std::to_string(failed_) + " of " + std::to_string(frames_.size()) + " frames failed");
+            session_.set_exit_code(exit_code_of(first_error_));
+        }
+    }
+
+private:
+    static std::vector<std::string> columns() {
+        std::vector<std::string> names = result_columns();
+        names.insert(names.begin(), "frame");
+        names.emplace_back("status");
+        return names;
+    }
+
+    [[nodiscard]] std::string tag(const Frame& frame) const {
+        return "_t" + padded(frame.number, std::max(3, int(std::to_string(frames_.back().number).size())));
+    }
+
+    void check() {
+        for (const Frame& frame : frames_) check_outputs(job_, inputs_, tag(frame), session_.outputs());
+        session_.outputs().check("--table", job_.table_path, OutputKind::Table);
+        job_.check_options();
+    }
+
+    /// The structures with this frame's marks: a file of its own where the name has {frame}, else the first frame's alone.
+    [[nodiscard]] std::vector<StructureInput> inputs_at(const Frame& frame) const {
+        std::vector<StructureInput> inputs = inputs_;
+        for (StructureInput& input : inputs) {
+            input.points.paths = paths_at(frame, input.points.paths);
+            input.contours.paths = paths_at(frame, input.contours.paths);
+        }
+        return inputs;
+    }
+
+    [[nodiscard]] std::vector<std::string> paths_at(const Frame& frame, const std::vector<std::string>& patterns) const {
+        std::vector<std::string> paths;
+        for (const std::string& path : patterns) {
+            if (!has_frame_pattern(path)) {
+                if (!started_) paths.push_back(path);
+                continue;
+            }
+            const std::string own = with_frame(path, frame.number);
+            // Marks may be missing once there is a surface to start from.
+            if (!started_ || std::filesystem::exists(own)) paths.push_back(own);
+        }
+        return paths;
+    }
+
+    void go(const Frame& frame) {
+        const std::string who = "frame " + std::to_string(frame.number);
+        const Stopwatch watch;
+        Json report{{"frame", frame.number}, {"image", frame.path}};
+        try {
+            const auto output = std::make_shared<StructuresOutput>(segment_frame(frame, who));
+            hand_over(job_, output, tag(frame), session_, [&](const std::string& path, auto write) {
+                if (session_.outputs().write(path, write)) session_.note("wrote " + path);
+            });
+            report["status"] = "ok";
+            report.update(to_json(*output));
+            for (std::size_t n = 0; n < output->structures.size(); ++n) {
+                const StructureOutput& s = output->structures[n];
+                add_result(table_.row() << frame.number, s.name.empty() ? s.grid : s.name, s.label, s.result.report);
+                table_ << "ok";
+                starts_[n].start = Start{};
+                starts_[n].start.kind = Start::Kind::Vdb;
+                starts_[n].start.level_set = s.result.surface;
+                starts_[n].delta = s.result.report.resolved.evolve.delta;
+            }
+            started_ = true;
+        } catch (const Error& error) {
+            if (error.code() == Errc::Cancelled) throw;
+            fail(who, error);
+            report["status"] = std::string("failed: ") + error.what();
+            table_.row() << frame.number;
+            for (std::size_t n = 0; n < result_columns().size(); ++n) table_ << "";
+            table_ << std::string("failed: ") + error.what();
+        }
+        report["wall_seconds"] = watch.seconds();
+        reports_.push_back(report);
+    }
+
+    StructuresOutput segment_frame(const Frame& frame, const std::string& who) {
+        session_.note(who + ": " + frame.path);
+        const Image image = job_.read(frame.path, frame.options, session_);
+        RunContext run = session_.run();
+        run.log = [this, who](LogLevel level, const std::string& line) {
+            level == LogLevel::Warning ? session_.warn(who + ": " + line) : session_.note(who + ": " + line);
+        };
+        return segment_structures(job_, inputs_at(frame), image, starts_, session_, run);
+    }
+
+    void fail(const std::string& who, const Error& error) {
+        if (failed_++ == 0) {
+            first_error_ = error.code();
+            first_message_ = error.what();
+        }
+        session_.warn(who + " failed: " + error.what());
+    }
+
+    const SegmentJob& job_;
+    Session& session_;
+    std::vector<StructureInput> inputs_;
+    std::vector<Frame> frames_;
+    std::vector<StructureStart> starts_;
+    bool started_ = false;  ///< a frame has succeeded
+    Json reports_ = Json::array();
+    Table table_;
+    int failed_ = 0;
+    Errc first_error_ = Errc::InvalidInput;
+    std::string first_message_;
+};
+
+}  // namespace
+
+bool has_frame_pattern(const std::string& path) { return find_placeholder(path).begin != std::string::npos; }
+
+std::string with_frame(const std::string& pattern, int frame) {
+    const Placeholder found = find_placeholder(pattern);
+    std::string path = pattern;
+    if (found.begin != std::string::npos) path.replace(found.begin, found.length, padded(frame, found.digits));
+    return path;
+}
+
+bool is_timelapse(const SegmentJob& job) {
+    return job.images.size() > 1 || (job.frames.given && !job.frames.is_one());
+}
+
+void run_timelapse(const SegmentJob& job, Session& session) { TimeLapse(job, session).run(); }
+
+}  // namespace covol::tool
