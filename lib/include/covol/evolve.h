@@ -21,7 +21,7 @@ struct EvolveOptions {
     double edge_epsilon = 0.02;     ///< ε in |∇g|_ε, Eq. (20): a slope of g per voxel; below it the pull fades.
     double attraction_range = 0.0;  ///< r, world units: the points pull fully up to r/2, not at all beyond r; 0: unlimited.
     double image_yields = 0.0;      ///< in [0,1]: share of ρ that fades close to marks, on the attraction range's taper.
-    double guess_weight = 1.0;      ///< in [0,1]: θ is this much of itself where no sure point is near, on the same taper.
+    double guess_weight = 1.0;      ///< in [0,1]: θ is this much of itself where no trusted mark is near, on the same taper.
     bool follow = false;            ///< the band follows the surface (starts other than tagging).
     int max_steps = 500;            ///< upper bound on time steps, >= 0
     double tolerance = 2e-3;        ///< steady when the zero crossings move less than tolerance * τ a step on the average,
@@ -52,8 +52,8 @@ struct EvolveReport {
 struct EvolveFields {
     const FloatGrid* distance = nullptr;  ///< d to the points, world units; where inactive the points do not pull
     const FloatGrid* edge = nullptr;      ///< g in (0,1]; where inactive the image does not pull
-    const FloatGrid* sure = nullptr;      ///< d to those points that are marks and no guess; the image yields to these
-                                          ///< alone; where inactive none is near; null: all are sure
+    const FloatGrid* trusted = nullptr;   ///< d to those points that are marks and no guess; the image yields to these
+                                          ///< alone; where inactive none is near; null: all are trusted
     /// With `follow`: called with u when its band reached voxels where a field is not known yet, so that the caller
     /// can extend it (and may replace the pointers above through `fields`).
     std::function<void(const FloatGrid& u, EvolveFields& fields)> extend;

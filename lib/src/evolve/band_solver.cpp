@@ -53,13 +53,13 @@ HaloField gather_field(const LeafBand& band, const FloatGrid& grid, Convert conv
     });
 }
 
-// The points' potential in voxels, weakened where no sure point is near. It is the potential that takes the weight, not
+// The points' potential in voxels, weakened where no trusted mark is near. It is the potential that takes the weight, not
 // its slope: beside the points, where d is small, the two are alike.
 HaloField gather_potential(const LeafBand& band, const EvolveFields& fields, const Taper& taper, double guess_weight, double h) {
-    const FloatGrid* sure = guess_weight < 1.0 ? fields.sure : nullptr;
-    if (sure == nullptr) return gather_field(band, *fields.distance, [&](float d) { return taper.potential(d) / h; });
+    const FloatGrid* trusted = guess_weight < 1.0 ? fields.trusted : nullptr;
+    if (trusted == nullptr) return gather_field(band, *fields.distance, [&](float d) { return taper.potential(d) / h; });
     return gather(band, *fields.distance, false, [&](const LeafNode* leaf, float, float* block) {
-        const LeafNode* near = leaf != nullptr ? sure->tree().probeConstLeaf(leaf->origin()) : nullptr;
+        const LeafNode* near = leaf != nullptr ? trusted->tree().probeConstLeaf(leaf->origin()) : nullptr;
         for (int n = 0; n < kLeafSize; ++n) {
             const double closeness = near != nullptr && near->isValueOn(n) ? taper(near->getValue(n)) : 0.0;
             const double weight = guess_weight + (1.0 - guess_weight) * closeness;
@@ -129,23 +129,23 @@ BandSolver::BandSolver(const FloatGrid& u, const EvolveFields& fields, const Evo
     rows_.resize(band_.size() * kRowBytes);
     active_counts_.resize(band_.size());
     for (std::size_t leaf = 0; leaf < band_.size(); ++leaf) active_counts_[leaf] = count_on(band_.active(leaf));
-    awake_.resize(band_.size());
-    for (std::size_t leaf = 0; leaf < band_.size(); ++leaf) awake_[leaf] = active_counts_[leaf] > 0;
-    unannounced_.assign(band_.size(), std::numeric_limits<float>::infinity());
+    leaf_active_.resize(band_.size());
+    for (std::size_t leaf = 0; leaf < band_.size(); ++leaf) leaf_active_[leaf] = active_counts_[leaf] > 0;
+    pending_motion_.assign(band_.size(), std::numeric_limits<float>::infinity());
     residuals_.assign(band_.size(), 0.0);
 }
 
-BandSolver::Rest BandSolver::take_rest() {
-    return {std::move(band_), std::move(awake_), std::move(unannounced_), std::move(motions_)};
+BandSolver::LeafStates BandSolver::take_leaf_states() {
+    return {std::move(band_), std::move(leaf_active_), std::move(pending_motion_), std::move(motions_)};
 }
 
-void BandSolver::sleep_on(const Rest& old, const std::vector<Coord>& changed) {
+void BandSolver::keep_inactive(const LeafStates& old, const std::vector<Coord>& changed) {
     tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
         const Coord& origin = band_.origin(leaf);
         const std::int32_t at = old.band.find(origin);
         if (at == old.band.none() || std::binary_search(changed.begin(), changed.end(), origin)) return;
-        awake_[leaf] = old.awake[at];
-        unannounced_[leaf] = old.unannounced[at];
+        leaf_active_[leaf] = old.active[at];
+        pending_motion_[leaf] = old.pending_motion[at];
         motions_[leaf] = old.motions[at];
     });
 }
@@ -161,9 +161,9 @@ void BandSolver::gather_fields(const EvolveFields& fields) {
         edge_ = gather_field(band_, *fields.edge, [](float g) { return g; });
         check_finite(band_, *edge_, "edge");
     }
-    const FloatGrid* sure = fields.sure != nullptr ? fields.sure : fields.distance;
-    if (options_.rho > 0 && options_.image_yields > 0 && sure != nullptr)
-        image_weight_ = gather(band_, *sure, false, [&](const LeafNode* leaf, float, float* block) {
+    const FloatGrid* trusted = fields.trusted != nullptr ? fields.trusted : fields.distance;
+    if (options_.rho > 0 && options_.image_yields > 0 && trusted != nullptr)
+        image_weight_ = gather(band_, *trusted, false, [&](const LeafNode* leaf, float, float* block) {
             for (int n = 0; n < kLeafSize; ++n)  // far from every mark where the distance is not known
                 block[n] = leaf != nullptr && leaf->isValueOn(n)
                                ? static_cast<float>(1.0 - options_.image_yields * taper(leaf->getValue(n)))
@@ -191,12 +191,12 @@ Motion BandSolver::step(double tau, Counts& counts) {
 void BandSolver::solve(double omega, double first, Counts& counts) {
     const double goal = std::max(options_.solver_tolerance * first, kRounding);
     double start = first;
-    bool ask_all = true;
+    bool visit_all = true;
     for (int visit = 0; visit * kInnerSweeps < options_.max_sweeps; ++visit) {
-        const double residual = sweep(static_cast<float>(omega), ask_all ? 0.0 : goal, counts);
+        const double residual = sweep(static_cast<float>(omega), visit_all ? 0.0 : goal, counts);
         if (visit == 0) start = std::max(first, residual);  // a guess that is worse than u^{n-1} is no divergence
-        ask_all = omega > 1.0 && !(residual <= kDiverged * start);
-        if (ask_all) {
+        visit_all = omega > 1.0 && !(residual <= kDiverged * start);
+        if (visit_all) {
             // Over-relaxation may fail where advection dominates; Gauss-Seidel converges on every M-matrix.
             omega = 1.0;
             restore_previous();
@@ -206,20 +206,20 @@ void BandSolver::solve(double omega, double first, Counts& counts) {
     }
 }
 
-void BandSolver::doze(const std::vector<float>& motion, double rest) {
+void BandSolver::update_active_leaves(const std::vector<float>& motion, double threshold) {
     std::vector<unsigned char> moved(band_.size() + 1, 0);
     for (std::size_t leaf = 0; leaf < band_.size(); ++leaf) {
-        unannounced_[leaf] += motion[leaf];
-        if (unannounced_[leaf] < rest) continue;
+        pending_motion_[leaf] += motion[leaf];
+        if (pending_motion_[leaf] < threshold) continue;
         moved[leaf] = 1;
-        unannounced_[leaf] = 0.0F;
+        pending_motion_[leaf] = 0.0F;
     }
     tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
-        unsigned char awake = moved[leaf];
-        for (const std::int32_t next : band_.neighbours(leaf)) awake |= moved[next];
-        // What sleeps does not change.
-        if (!awake) std::copy_n(field_.values.leaf(leaf), kLeafSize, previous_.leaf(leaf));
-        awake_[leaf] = awake && active_counts_[leaf] > 0;
+        unsigned char is_active = moved[leaf];
+        for (const std::int32_t next : band_.neighbours(leaf)) is_active |= moved[next];
+        // The values of inactive leaves are those of the step before, too.
+        if (!is_active) std::copy_n(field_.values.leaf(leaf), kLeafSize, previous_.leaf(leaf));
+        leaf_active_[leaf] = is_active && active_counts_[leaf] > 0;
     });
 }
 
@@ -233,10 +233,10 @@ void BandSolver::redistance(double clamp) {
     static_assert(LocalDistance::kCuts * sizeof(float) <= kRowBytes);
     const auto limit = static_cast<float>(clamp);
     has_previous_ = false;
-    LocalDistance local(band_, field_, awake_, domain_, limit, limit, {reinterpret_cast<float*>(rows_.data()), previous_.leaf(0)});
+    LocalDistance local(band_, field_, leaf_active_, domain_, limit, limit, {reinterpret_cast<float*>(rows_.data()), previous_.leaf(0)});
     local.compute();
     tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
-        if (!awake_[leaf]) return;
+        if (!leaf_active_[leaf]) return;
         float* u = field_.values.leaf(leaf);
         const float* d = local.settled(leaf);
         for (int n = 0; n < kLeafSize; ++n)
@@ -250,7 +250,7 @@ BandSolver::Rows BandSolver::assemble(const SchemeConstants& constants) {
     std::vector<float> largest(band_.size(), 0.0F);
     tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
         residuals_[leaf] = 0.0;
-        if (!awake_[leaf]) return;
+        if (!leaf_active_[leaf]) return;
         alignas(64) float u[kPaddedSize], phi[kPaddedSize], edge[kPaddedSize];
         const LeafBounds bounds(domain_, band_.origin(leaf));
         load_padded(field_, leaf, u);
@@ -285,8 +285,8 @@ double BandSolver::root_mean_square() const {
     return std::sqrt(sum / static_cast<double>(active_count_));
 }
 
-// Worth another visit: its own residual or one across a face is not down yet. goal = 0 asks for all.
-bool BandSolver::is_hot(std::size_t leaf, double goal) const {
+// Its own residual or one across a face is above the goal; goal = 0: all leaves are visited.
+bool BandSolver::is_unconverged(std::size_t leaf, double goal) const {
     if (goal == 0.0) return true;
     const double per_voxel = kLocalGoal * goal * kLocalGoal * goal;
     const auto above = [&](std::size_t n) { return residuals_[n] > per_voxel * active_counts_[n]; };
@@ -298,7 +298,7 @@ bool BandSolver::is_hot(std::size_t leaf, double goal) const {
     return false;
 }
 
-// Visits every leaf that is hot, even leaves first. @return root mean square residual over the band, voxels
+// Visits every leaf that has not converged, even leaves first. @return root mean square residual over the band, voxels
 double BandSolver::sweep(float omega, double goal, Counts& counts) {
     const SchemeKernels& kernel = kernels();
     const auto visit_range = [&](std::size_t begin, std::size_t end) {
@@ -306,7 +306,7 @@ double BandSolver::sweep(float omega, double goal, Counts& counts) {
             tbb::blocked_range<std::size_t>(begin, end, 8), std::int64_t(0),
             [&](const tbb::blocked_range<std::size_t>& range, std::int64_t visits) {
                 for (std::size_t leaf = range.begin(); leaf != range.end(); ++leaf) {
-                    if (!awake_[leaf] || !is_hot(leaf, goal)) continue;
+                    if (!leaf_active_[leaf] || !is_unconverged(leaf, goal)) continue;
                     const std::size_t next = std::min(leaf + 1, end - 1);
                     prefetch(star_of(field_, next));
                     residuals_[leaf] = kernel.relax(star_of(field_, leaf), previous_.leaf(leaf), rows(leaf), active(leaf), omega,
@@ -327,8 +327,8 @@ double BandSolver::sweep(float omega, double goal, Counts& counts) {
 Motion BandSolver::measure() {
     tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
         LeafMotion& motion = motions_[leaf];
-        if (!awake_[leaf]) {
-            motion = motion.at_rest();
+        if (!leaf_active_[leaf]) {
+            motion = motion.without_motion();
             return;
         }
         motion = motion_of(field_.values.leaf(leaf), previous_.leaf(leaf), true);
@@ -338,7 +338,7 @@ Motion BandSolver::measure() {
 
 void BandSolver::restore_previous() {
     tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
-        if (awake_[leaf]) std::copy_n(previous_.leaf(leaf), kLeafSize, field_.values.leaf(leaf));
+        if (leaf_active_[leaf]) std::copy_n(previous_.leaf(leaf), kLeafSize, field_.values.leaf(leaf));
     });
 }
 

@@ -17,8 +17,9 @@ namespace covol::detail {
 /// Eqs. (14)-(22). One step assembles the rows of every leaf from u^{n-1}, then visits the leaves in two colours,
 /// from 2 u^{n-1} - u^{n-2} on, until the residual is `solver_tolerance` of that of u^{n-1}. Values are in voxels, not world units.
 ///
-/// Work is done only where something happens. A leaf sleeps from when neither it nor a leaf next to it has moved by more than
-/// `rest` until one of those has; a leaf whose residual is down, with neighbours whose is, is not visited again in a solve.
+/// Work is done on active leaves only: a leaf becomes inactive once neither it nor any of the 26 around it has moved by more
+/// than a threshold, and active again once one of those has. Within a solve, a leaf that has converged, with neighbours
+/// across its faces that have, is not visited again.
 class BandSolver {
 public:
     struct Counts {
@@ -32,28 +33,29 @@ public:
     /// @throws Error InvalidInput (no active voxel; a value that is not finite).
     BandSolver(const FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options, const Domain& domain);
 
-    /// Who sleeps, and what the next step has to know of the steps before.
-    struct Rest {
+    /// Which leaves are active, and what the next step has to know of the steps before.
+    struct LeafStates {
         LeafBand band;
-        std::vector<unsigned char> awake;
-        std::vector<float> unannounced;  ///< motion that the neighbours have not been woken for, voxels
+        std::vector<unsigned char> active;
+        std::vector<float> pending_motion;  ///< not yet enough to make the leaves around active, voxels
         std::vector<LeafMotion> motions;
     };
     /// The solver is of no use afterwards.
-    [[nodiscard]] Rest take_rest();
-    /// Leaves that slept in a band before sleep on.
+    [[nodiscard]] LeafStates take_leaf_states();
+    /// Leaves that were inactive in the band before stay so.
     /// @param changed  sorted origins of leaves with other values than there
-    void sleep_on(const Rest& old, const std::vector<Coord>& changed);
+    void keep_inactive(const LeafStates& old, const std::vector<Coord>& changed);
 
-    /// One time step of length τ = tau * h on the leaves that are awake.
+    /// One time step of length τ = tau * h on the active leaves.
     Motion step(double tau, Counts& counts);
-    /// Decides who sleeps from here on: motion is announced to the neighbours once it has added up to `rest` voxels.
-    /// @param motion  of each leaf since the last call, voxels
-    void doze(const std::vector<float>& motion, double rest);
+    /// Decides which leaves are active from here on: those that have moved, and the 26 around each.
+    /// @param motion     of each leaf since the last call, voxels; it adds up over calls until it counts
+    /// @param threshold  voxels, from which it counts
+    void update_active_leaves(const std::vector<float>& motion, double threshold);
     /// max |u^n - u^{n-1}| of each leaf in the last step, voxels
     [[nodiscard]] std::vector<float> largest_changes() const;
-    [[nodiscard]] bool is_awake(std::size_t leaf) const { return awake_[leaf] != 0; }
-    /// Makes u on the leaves that are awake a distance again, clamped to `clamp` voxels; see LocalDistance.
+    [[nodiscard]] bool is_leaf_active(std::size_t leaf) const { return leaf_active_[leaf] != 0; }
+    /// Makes u on the active leaves a distance again, clamped to `clamp` voxels; see LocalDistance.
     void redistance(double clamp);
     /// Takes the last step back.
     void restore_previous();
@@ -74,7 +76,7 @@ private:
     void solve(double omega, double first, Counts& counts);
     double sweep(float omega, double goal, Counts& counts);
     [[nodiscard]] double root_mean_square() const;  ///< of the residuals, over the band, voxels
-    [[nodiscard]] bool is_hot(std::size_t leaf, double goal) const;
+    [[nodiscard]] bool is_unconverged(std::size_t leaf, double goal) const;
     Motion measure();
 
     [[nodiscard]] const unsigned long long* active(std::size_t leaf) const {
@@ -94,8 +96,8 @@ private:
     std::vector<std::byte, LargeAllocator<std::byte>> rows_;  // of each leaf; scratch between steps
     // One for each leaf:
     std::vector<int> active_counts_;
-    std::vector<unsigned char> awake_;
-    std::vector<float> unannounced_;
+    std::vector<unsigned char> leaf_active_;
+    std::vector<float> pending_motion_;
     std::vector<LeafMotion> motions_;
     std::vector<double> residuals_;  // squared, as seen by the last visit
 };

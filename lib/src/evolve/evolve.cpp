@@ -17,22 +17,22 @@
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "evolve/band_solver.h"
-#include "evolve/follow.h"
+#include "evolve/tracking.h"
 #include "evolve/motion.h"
 
 namespace covol {
 namespace {
 
-// A leaf rests when a step moves it by less than this share of the motion that counts as steady.
-constexpr double kRestShare = 0.2;
-constexpr int kCycle = 3;  // steps between two redistancings of a follower
+// A leaf becomes inactive when a step moves it by less than this share of the motion that counts as steady.
+constexpr double kInactiveShare = 0.2;
+constexpr int kCycle = 3;  // steps between two redistancings of a tracked band
 
 // An automatic time step grows while the surface moves by little, up to kLargestTau, and shrinks when it moves by much.
 constexpr double kSlowMotion = 0.1, kFastMotion = 0.4;  // voxels a step
 constexpr double kTauGrowth = 1.5, kLargestTau = 10.0;  // h
 
-double follow_clamp(const EvolveOptions& options) {
-    return options.rho > 0 ? kHalfWidthVoxels : detail::kFollowWidth;
+double tracking_clamp(const EvolveOptions& options) {
+    return options.rho > 0 ? kHalfWidthVoxels : detail::kTrackingWidth;
 }
 
 bool has_active(const FloatGrid& u) {
@@ -48,7 +48,7 @@ public:
         tau_ = options.tau < 0 ? 1.0 : options.tau / domain_.voxel_size;
         if (options.theta > 0) check_field(fields.distance, "distance", "theta");
         if (options.rho > 0) check_field(fields.edge, "edge", "rho");
-        if (options.follow) detail::follow_surface(u_, domain_, follow_clamp(options_), run_);
+        if (options.follow) detail::track_surface(u_, domain_, tracking_clamp(options_), run_);
         make_solver();
     }
 
@@ -73,7 +73,7 @@ public:
                 report_.stop_reason = StopReason::Vanished;
                 break;
             }
-            const double settled = options_.follow ? follow(motion.mean) : stay(motion.mean);
+            const double settled = options_.follow ? track(motion.mean) : keep_band(motion.mean);
             if (!solver_) {
                 report_.stop_reason = StopReason::Vanished;
                 return report_;
@@ -111,53 +111,53 @@ private:
     void make_solver() {
         solver_ = std::make_unique<detail::BandSolver>(u_, fields_, options_, domain_);
         if (!options_.follow) return;
-        departure_.remember(solver_->u(), solver_->band().size());
+        front_displacement_.remember(solver_->u(), solver_->band().size());
         marks_.resize(solver_->band().size());
     }
 
-    [[nodiscard]] double rest() const { return kRestShare * options_.tolerance * tau_; }
+    [[nodiscard]] double inactive_below() const { return kInactiveShare * options_.tolerance * tau_; }
 
     // A fixed band. @return how much the surface still moves, voxels a step
-    double stay(double motion) {
-        solver_->doze(solver_->largest_changes(), rest());
+    double keep_band(double motion) {
+        solver_->update_active_leaves(solver_->largest_changes(), inactive_below());
         return std::min(motion, net_motion_.per_step(solver_->u(), solver_->band().size()));
     }
 
-    // A band that follows. Advection turns the profile of u into a step, which creeps over the lattice: every few steps it is
-    // made a distance again. How far the surface has come is asked just before, from time to time at the same phase.
-    double follow(double motion) {
+    // Narrow-band tracking. Advection turns the profile of u into a step, which creeps over the lattice, so every few steps u is
+    // made a distance again. The front's displacement is measured just before that, at the same phase of each cycle.
+    double track(double motion) {
         if (report_.steps % kCycle != 0) return motion;
         std::vector<float> largest;
-        const double moved = ask_marks(largest);
-        const std::vector<std::size_t> left = departure_.left(solver_->u());
+        const double moved = measure_displacement(largest);
+        const std::vector<std::size_t> left = front_displacement_.leaves_left(solver_->u());
         if (left.empty())
-            solver_->redistance(follow_clamp(options_));
+            solver_->redistance(tracking_clamp(options_));
         else
             remake_band(left, largest);
-        // Only now, so that a leaf sleeps in the same phase as the others are in at the end.
-        if (solver_) solver_->doze(largest, kCycle * rest());
+        // Only now, so that a leaf becomes inactive in the phase in which the others are at the end.
+        if (solver_) solver_->update_active_leaves(largest, kCycle * inactive_below());
         return std::min(motion, moved / kCycle);
     }
 
-    // @param largest  out: of each leaf, the way of the crossing that moved most since the last marks, voxels
-    // @return the surface's mean way since then
-    double ask_marks(std::vector<float>& largest) {
+    // @param largest  out: of each leaf, the displacement of the crossing that moved most since the last call, voxels
+    // @return the front's mean displacement since then
+    double measure_displacement(std::vector<float>& largest) {
         const std::size_t leaves = solver_->band().size();
         std::vector<float> mean(leaves, 0.0F);
         largest.assign(leaves, 0.0F);
         tbb::parallel_for(std::size_t(0), leaves, [&](std::size_t leaf) {
-            if (!solver_->is_awake(leaf)) return;
-            const detail::CrossingMarks::Way moved = marks_.renew(leaf, solver_->u().leaf(leaf));
+            if (!solver_->is_leaf_active(leaf)) return;
+            const detail::CrossingMarks::Displacement moved = marks_.renew(leaf, solver_->u().leaf(leaf));
             largest[leaf] = static_cast<float>(moved.largest);
             mean[leaf] = static_cast<float>(moved.mean);
         });
-        double way = 0.0, crossings = 0.0;
+        double sum = 0.0, crossings = 0.0;
         for (std::size_t leaf = 0; leaf < leaves; ++leaf) {
             const auto count = static_cast<double>(marks_.count(leaf));
-            if (count > 0) way += mean[leaf] * count;
+            if (count > 0) sum += mean[leaf] * count;
             crossings += count;
         }
-        return crossings > 0 ? way / crossings : 0.0;
+        return crossings > 0 ? sum / crossings : 0.0;
     }
 
     // Leaves no solver where no surface is left. @param largest  in: of each leaf before; out: of each leaf now
@@ -165,27 +165,27 @@ private:
         std::vector<detail::Coord> stale;
         for (const std::size_t leaf : left) stale.push_back(solver_->band().origin(leaf));
         solver_->store(u_);
-        const detail::BandSolver::Rest rest = solver_->take_rest();
+        const detail::BandSolver::LeafStates states = solver_->take_leaf_states();
         solver_.reset();  // its memory first
-        const std::vector<detail::Coord> changed = detail::follow_surface_near(stale, u_, domain_, follow_clamp(options_));
+        const std::vector<detail::Coord> changed = detail::track_surface_near(stale, u_, domain_, tracking_clamp(options_));
         if (!has_active(u_)) return;
         if (fields_.extend) fields_.extend(u_, fields_);
         solver_ = std::make_unique<detail::BandSolver>(u_, fields_, options_, domain_);
-        solver_->sleep_on(rest, changed);
+        solver_->keep_inactive(states, changed);
         const detail::LeafBand& band = solver_->band();
         std::vector<std::int32_t> place(band.size()), same(band.size());
         for (std::size_t leaf = 0; leaf < band.size(); ++leaf) {
-            const std::int32_t at = rest.band.find(band.origin(leaf));
-            place[leaf] = at == rest.band.none() ? -1 : at;
+            const std::int32_t at = states.band.find(band.origin(leaf));
+            place[leaf] = at == states.band.none() ? -1 : at;
             same[leaf] = std::binary_search(changed.begin(), changed.end(), band.origin(leaf)) ? -1 : place[leaf];
         }
         std::vector<float> moved(band.size(), std::numeric_limits<float>::infinity());
         for (std::size_t leaf = 0; leaf < band.size(); ++leaf)
             if (place[leaf] >= 0) moved[leaf] = largest[place[leaf]];
         largest = std::move(moved);
-        departure_.remake(same, solver_->u());
+        front_displacement_.remake(same, solver_->u());
         marks_.remake(place);
-        solver_->redistance(follow_clamp(options_));
+        solver_->redistance(tracking_clamp(options_));
     }
 
     void adapt_tau(double motion) {
@@ -210,7 +210,7 @@ private:
     std::unique_ptr<detail::BandSolver> solver_;
     detail::BandSolver::Counts counts_;
     detail::NetMotion net_motion_;
-    detail::Departure departure_;
+    detail::FrontDisplacement front_displacement_;
     detail::CrossingMarks marks_;
     EvolveReport report_;
 };

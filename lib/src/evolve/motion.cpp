@@ -69,7 +69,7 @@ LeafMotion motion_of(const float* now, const float* before, bool is_active) {
             for (std::uint64_t bits = after[word] | first[word]; bits != 0; bits &= bits - 1) {
                 const int n = word << 6 | __builtin_ctzll(bits);
                 ++motion.edges;
-                motion.way += is_on(after, n) && is_on(first, n)
+                motion.displacement += is_on(after, n) && is_on(first, n)
                                   ? std::abs(crossing(now[n], now[n + step]) - crossing(before[n], before[n + step]))
                                   : 0.5;
             }
@@ -79,18 +79,18 @@ LeafMotion motion_of(const float* now, const float* before, bool is_active) {
 
 Motion total(const std::vector<LeafMotion>& leaves) {
     Motion motion;
-    double way = 0.0;
+    double displacement = 0.0;
     std::int64_t edges = 0;
     bool negative = false, positive = false;
     for (const LeafMotion& leaf : leaves) {
-        way += leaf.way;
+        displacement += leaf.displacement;
         edges += leaf.edges;
         negative |= leaf.negative;
         positive |= leaf.positive;
         motion.finite &= leaf.finite;
     }
     motion.crosses = negative && positive;
-    motion.mean = edges > 0 ? way / static_cast<double>(edges) : 0.0;
+    motion.mean = edges > 0 ? displacement / static_cast<double>(edges) : 0.0;
     return motion;
 }
 
@@ -110,7 +110,7 @@ double NetMotion::per_step(const LeafArray<float>& u, std::size_t leaves) {
     return kCrossingsPerVoxel * double(flips.flipped) / double(flips.crossed) / kWindow;
 }
 
-CrossingMarks::Way CrossingMarks::renew(std::size_t leaf, const float* u) {
+CrossingMarks::Displacement CrossingMarks::renew(std::size_t leaf, const float* u) {
     std::vector<Crossing> now;
     const LeafMask negative = negative_mask(u);
     for (int axis = 0; axis < 3; ++axis) {
@@ -125,9 +125,9 @@ CrossingMarks::Way CrossingMarks::renew(std::size_t leaf, const float* u) {
     Leaf& mark = leaves_[leaf];
     double sum = 0.0, largest = 0.0;
     int edges = 0;
-    const auto add = [&](double way) {
-        sum += way;
-        largest = std::max(largest, way);
+    const auto add = [&](double displacement) {
+        sum += displacement;
+        largest = std::max(largest, displacement);
         ++edges;
     };
     auto before = mark.crossings.begin();
@@ -142,7 +142,7 @@ CrossingMarks::Way CrossingMarks::renew(std::size_t leaf, const float* u) {
     const bool is_first = !mark.is_marked;
     mark = {std::move(now), true};
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
-    return is_first ? Way{kInfinity, kInfinity} : Way{edges > 0 ? sum / edges : 0.0, largest};
+    return is_first ? Displacement{kInfinity, kInfinity} : Displacement{edges > 0 ? sum / edges : 0.0, largest};
 }
 
 void CrossingMarks::remake(const std::vector<std::int32_t>& old_leaf) {
@@ -152,28 +152,28 @@ void CrossingMarks::remake(const std::vector<std::int32_t>& old_leaf) {
     leaves_ = std::move(leaves);
 }
 
-Departure::MadeFor::MadeFor(const float* values) : negative(negative_mask(values)), crossed(crossed_edges(negative)) {
+FrontDisplacement::Reference::Reference(const float* values) : negative(negative_mask(values)), crossed(crossed_edges(negative)) {
     for (int n = 0; n < kLeafSize; ++n) near[n >> 6] |= std::uint64_t(std::abs(values[n]) < kDeep) << (n & 63);
 }
 
-void Departure::remember(const LeafArray<float>& u, std::size_t leaves) {
-    made_for_.resize(leaves);
-    tbb::parallel_for(std::size_t(0), leaves, [&](std::size_t leaf) { made_for_[leaf] = MadeFor(u.leaf(leaf)); });
+void FrontDisplacement::remember(const LeafArray<float>& u, std::size_t leaves) {
+    references_.resize(leaves);
+    tbb::parallel_for(std::size_t(0), leaves, [&](std::size_t leaf) { references_[leaf] = Reference(u.leaf(leaf)); });
 }
 
-void Departure::remake(const std::vector<std::int32_t>& old_leaf, const LeafArray<float>& u) {
-    std::vector<MadeFor> made_for(old_leaf.size());
+void FrontDisplacement::remake(const std::vector<std::int32_t>& old_leaf, const LeafArray<float>& u) {
+    std::vector<Reference> references(old_leaf.size());
     tbb::parallel_for(std::size_t(0), old_leaf.size(), [&](std::size_t leaf) {
-        made_for[leaf] = old_leaf[leaf] >= 0 ? made_for_[old_leaf[leaf]] : MadeFor(u.leaf(leaf));
+        references[leaf] = old_leaf[leaf] >= 0 ? references_[old_leaf[leaf]] : Reference(u.leaf(leaf));
     });
-    made_for_ = std::move(made_for);
+    references_ = std::move(references);
 }
 
-std::vector<std::size_t> Departure::left(const LeafArray<float>& u) const {
+std::vector<std::size_t> FrontDisplacement::leaves_left(const LeafArray<float>& u) const {
     enum State : unsigned char { kStays, kLeaving, kLeft, kDeepDown };
-    std::vector<State> states(made_for_.size());
-    tbb::parallel_for(std::size_t(0), made_for_.size(), [&](std::size_t leaf) {
-        const MadeFor& made = made_for_[leaf];
+    std::vector<State> states(references_.size());
+    tbb::parallel_for(std::size_t(0), references_.size(), [&](std::size_t leaf) {
+        const Reference& made = references_[leaf];
         const LeafMask negative = negative_mask(u.leaf(leaf));
         int flips = 0;
         bool deep = false;
@@ -189,7 +189,7 @@ std::vector<std::size_t> Departure::left(const LeafArray<float>& u) const {
     std::size_t crossed = 0, left = 0;
     bool deep = false;
     for (std::size_t leaf = 0; leaf < states.size(); ++leaf) {
-        crossed += made_for_[leaf].crossed > 0;
+        crossed += references_[leaf].crossed > 0;
         left += states[leaf] >= kLeft;
         deep |= states[leaf] == kDeepDown;
         if (states[leaf] >= kLeaving) leaving.push_back(leaf);

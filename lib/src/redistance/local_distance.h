@@ -10,7 +10,7 @@ namespace covol::detail {
 
 /// How far the band of a moving surface reaches, in voxels: the 3 of the clamp and about two that the surface may move
 /// before the band is made again.
-inline constexpr double kFollowWidth = 5.0;
+inline constexpr double kTrackingWidth = 5.0;
 
 /// Distances to the zero level set of a field on some leaves of a band, up to a width, in voxels: Godunov's scheme with the
 /// surface's cuts through voxel edges as boundary. First order, a twentieth of the cost of looking for nearest points.

@@ -72,8 +72,8 @@ void doubt(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& 
 bool misses_marks(const Job& job, const FloatGrid& u) {
     const double beyond = std::min(off(job), 0.9 * double(u.background()));
     std::size_t far = 0;
-    for (const Vec3& mark : job.sure) far += std::abs(level_at(u, mark)) > beyond;
-    return double(far) > kMissedShare * double(job.sure.size());
+    for (const Vec3& mark : job.trusted) far += std::abs(level_at(u, mark)) > beyond;
+    return double(far) > kMissedShare * double(job.trusted.size());
 }
 
 }  // namespace covol::pipeline

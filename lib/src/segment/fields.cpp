@@ -110,11 +110,11 @@ double tube_for_start(Job& job) {
     return radius;
 }
 
-void compute_sure_distance(Job& job) {
+void compute_trusted_distance(Job& job) {
     const double range = job.options.evolve.attraction_range;
     if (job.rests() || !job.options.contours || !job.uses_points() || !job.uses_image() || range <= 0) return;
     Timed timed(job.report().seconds.distance);
-    job.sure_distance = distance(job.sure, job.domain(), {range + kTubeSlackVoxels * job.h()}, job.run).grid;
+    job.trusted_distance = distance(job.trusted, job.domain(), {range + kTubeSlackVoxels * job.h()}, job.run).grid;
 }
 
 void choose_edge_feature(Job& job) {

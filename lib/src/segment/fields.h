@@ -19,7 +19,7 @@ void compute_distance(Job& job, double radius, double reach = 0);
 [[nodiscard]] double tube_for_start(Job& job);
 
 /// Where the image acts, marks outweigh what lies between the slices of contours.
-void compute_sure_distance(Job& job);
+void compute_trusted_distance(Job& job);
 
 /// The marks of contours tell what the border looks like in this image.
 void choose_edge_feature(Job& job);

@@ -130,7 +130,7 @@ std::string why_vanished(const Job& job) {
 // A surface through the marks is moved to where the image shows, between them, what it shows at them.
 void ask_image(Job& job) {
     if (!job.uses_image() || job.origin == StartOrigin::Corrected) return;
-    const std::vector<Vec3>& marks = job.origin == StartOrigin::Guess ? job.on_surface : job.sure;
+    const std::vector<Vec3>& marks = job.origin == StartOrigin::Guess ? job.on_surface : job.trusted;
     GuidanceOptions options;
     if (job.options.mark_precision >= 0) options.mark_precision = job.options.mark_precision / kUniformDeviation;
     options.weight = job.options.evolve.rho;
@@ -160,7 +160,7 @@ void flow(Job& job) {
     EvolveFields fields;
     fields.distance = job.uses_points() ? job.result.distance.get() : nullptr;
     fields.edge = job.result.edge.get();
-    fields.sure = job.sure_distance.get();
+    fields.trusted = job.trusted_distance.get();
     if (job.options.evolve.follow)
         fields.extend = [&job](const FloatGrid& u, EvolveFields& f) { extend_edges(job, u, f); };
     SegmentReport& report = job.report();
@@ -179,7 +179,7 @@ bool has_vanished(const Job& job) { return job.result.report.solve.stop_reason =
 bool has_lost(const Job& job, const FloatGrid& start) {
     if (has_vanished(job)) return true;
     if (job.origin == StartOrigin::Grown) return inside_volume(*job.result.u) < kLeastOfGrown * inside_volume(start);
-    return mean_distance(job.sure, *job.result.u) > mean_distance(job.sure, start) + kLeavesVoxels * job.h();
+    return mean_distance(job.trusted, *job.result.u) > mean_distance(job.trusted, start) + kLeavesVoxels * job.h();
 }
 
 void check_flow(const Job& job) {

@@ -6,15 +6,15 @@ Job::Job(const Image* image_or_null, const std::vector<Vec3>& world_points, cons
          const RunContext& context)
     : image(image_or_null),
       points(world_points),
-      sure(world_points),
+      trusted(world_points),
       given(world_points),
       options(segment_options),
       run(context) {
     if (!options.contours) return;
     const Contours& contours = *options.contours;
     given.insert(given.end(), contours.marks.begin(), contours.marks.end());
-    sure.insert(sure.end(), contours.along.begin(), contours.along.end());
-    points = sure;
+    trusted.insert(trusted.end(), contours.along.begin(), contours.along.end());
+    points = trusted;
     points.insert(points.end(), contours.between.begin(), contours.between.end());
     report().densified = contours.along.size() + contours.between.size();
 }

@@ -31,7 +31,7 @@ struct Job {
 
     const Image* image;
     std::vector<Vec3> points;      ///< all that attract
-    std::vector<Vec3> sure;        ///< those of them that are no guess between slices
+    std::vector<Vec3> trusted;     ///< those of them that are no guess between slices
     std::vector<Vec3> given;       ///< as the caller has them
     std::vector<Vec3> marks;       ///< without contours: the same without duplicates, for the fit
     std::vector<Vec3> on_surface;  ///< of a guess: those points that do not lie in the cut at the image's end
@@ -43,7 +43,7 @@ struct Job {
     StartOrigin origin = StartOrigin::Given;
     std::optional<CloudOrientation> cloud;  ///< of points alone, many or asked for
     FloatGridPtr hold;             ///< the start that the surface may not leave, or null
-    FloatGridPtr sure_distance;    ///< to the sure points, or null
+    FloatGridPtr trusted_distance; ///< to the trusted marks, or null
 
     SegmentReport& report() { return result.report; }
     [[nodiscard]] const Domain& domain() const { return result.report.domain; }

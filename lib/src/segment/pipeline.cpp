@@ -48,7 +48,7 @@ void fall_back(Job& job, const FloatGridPtr& start) {
         job.choose("edge_feature", to_string(EdgeFeature::Slope), "along lines the surface left the marks: the body between them rests instead");
         return flow(job);
     }
-    if (!job.guided() || job.rests() || job.sure.size() < 4 || !job.uses_points()) return;
+    if (!job.guided() || job.rests() || job.trusted.size() < 4 || !job.uses_points()) return;
     if (!vanished && (job.origin == StartOrigin::Contours || !misses_marks(job, *job.result.u))) return;
     const FlowEnd before{job.result.u, job.origin, job.domain()};
     bool better = false;
@@ -88,7 +88,7 @@ void run_steps(Job& job) {
     choose_edge_feature(job);
     const std::optional<FineStart> without_coarse = pass_coarse_levels(job);
     find_edges(job);
-    compute_sure_distance(job);
+    compute_trusted_distance(job);
     solve(job, without_coarse);
     make_surface(job);
 }

@@ -22,10 +22,10 @@ void carry_beyond_image(Job& job) {
     }
 }
 
-/// Those of the sure points that are no contours'.
+/// Those of the trusted marks that are no contours'.
 std::vector<Vec3> loose_points(const Job& job) {
-    const auto loose = std::ptrdiff_t(job.sure.size() - job.options.contours->along.size());
-    return {job.sure.begin(), job.sure.begin() + loose};
+    const auto loose = std::ptrdiff_t(job.trusted.size() - job.options.contours->along.size());
+    return {job.trusted.begin(), job.trusted.begin() + loose};
 }
 
 /// Why the points are tagged after all, or null.

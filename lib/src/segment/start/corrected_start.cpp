@@ -34,7 +34,7 @@ std::string distances(const CorrectionReport& report) {
 
 void correct_start(Job& job) {
     Timed timed(job.report().seconds.tag);
-    const GuessCorrection correction = corrected(job, job.result.u, job.sure);
+    const GuessCorrection correction = corrected(job, job.result.u, job.trusted);
     job.result.u = correction.start(job.run);
     job.report().correction = correction.report();
     job.choose("correction", "of the start", distances(correction.report()));
@@ -46,7 +46,7 @@ void start_from_corrected_guess(Job& job) {
     Timed timed(job.report().seconds.tag);
     job.options.correction = correction(job);
     const FloatGridPtr guess = start_grid(*job.options.guess, job.domain(), job.run);
-    job.result.correction = std::make_shared<const GuessCorrection>(corrected(job, guess, job.options.contours ? job.sure : job.points));
+    job.result.correction = std::make_shared<const GuessCorrection>(corrected(job, guess, job.options.contours ? job.trusted : job.points));
     job.result.u = job.result.correction->start(job.run);
     const CorrectionReport& report = job.report().correction = job.result.correction->report();
     job.choose("start", "guess",

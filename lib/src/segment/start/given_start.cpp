@@ -61,9 +61,9 @@ void start_as_given(Job& job) {
     const bool is_rough = job.options.start.kind == Start::Kind::Sphere || job.options.start.kind == Start::Kind::Box;
     if (is_rough) grow_to_edges(job);
     if (!job.uses_points()) return;
-    if (job.guided() && !is_rough && job.sure.size() <= kMostGuessMarks && !misses_marks(job, *job.result.u)) {
+    if (job.guided() && !is_rough && job.trusted.size() <= kMostGuessMarks && !misses_marks(job, *job.result.u)) {
         correct_start(job);
-        job.on_surface = job.sure;
+        job.on_surface = job.trusted;
         job.origin = StartOrigin::Guess;
         return job.choose("start", "near its marks", "it is a guess that they correct, and nothing flows");
     }

@@ -20,7 +20,7 @@ void start_from_cloud(Job& job);
 /// The guess of the options, corrected by the marks and seeds.
 void start_from_corrected_guess(Job& job);
 
-/// Makes a start that passes most of the sure points pass all of them.
+/// Makes a start that passes most of the trusted marks pass all of them.
 void correct_start(Job& job);
 
 /// The sphere, box, mesh, mask or level set that the caller names. The band follows the surface.

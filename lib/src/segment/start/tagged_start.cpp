@@ -123,7 +123,7 @@ void drop_cap_marks(Job& job, const std::vector<detail::ImageFace>& faces) {
     };
     const auto dropped = std::count_if(job.marks.begin(), job.marks.end(), caps);
     std::erase_if(job.points, caps);
-    std::erase_if(job.sure, caps);
+    std::erase_if(job.trusted, caps);
     if (dropped > 0)
         job.choose("cap_marks", std::to_string(dropped),
                    "marks within the section on the image's end slices close the body there and do not pull");
@@ -151,7 +151,7 @@ bool start_from_cut_body(Job& job) {
         job.report().domain = widened(job.domain(), kBeyondVoxels);
         job.result.u = start_from_grid(job.domain(), *body->level_set, job.run);
         job.points.insert(job.points.end(), body->beyond.begin(), body->beyond.end());
-        job.sure.insert(job.sure.end(), body->beyond.begin(), body->beyond.end());
+        job.trusted.insert(job.trusted.end(), body->beyond.begin(), body->beyond.end());
     }
     job.choose("start", "cut body", how);
     if (job.options.tag_distance <= 0) job.choose("tag_distance", number(body->tag.tag_distance), body->tag.reason);

@@ -1,4 +1,4 @@
-#include "evolve/follow.h"
+#include "evolve/tracking.h"
 
 #include <openvdb/openvdb.h>
 #include <tbb/parallel_for.h>
@@ -14,7 +14,7 @@ namespace covol::detail {
 namespace {
 
 using LeafNode = FloatGrid::TreeType::LeafNodeType;
-constexpr float kWidth = float(kFollowWidth);
+constexpr float kWidth = float(kTrackingWidth);
 
 void clamp_values(FloatGrid::TreeType& tree, const LeafBand& band, float limit) {
     tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
@@ -29,7 +29,7 @@ void clamp_values(FloatGrid::TreeType& tree, const LeafBand& band, float limit) 
 
 }  // namespace
 
-std::vector<Coord> follow_surface_near(const std::vector<Coord>& stale, FloatGrid& u, const Domain& domain, double clamp) {
+std::vector<Coord> track_surface_near(const std::vector<Coord>& stale, FloatGrid& u, const Domain& domain, double clamp) {
     const auto limit = static_cast<float>(clamp), h = static_cast<float>(domain.voxel_size);
     // One more ring for what the leaves beyond say.
     const std::vector<Coord> changed = dilate_leaves(stale, 1, domain);
@@ -73,8 +73,8 @@ std::vector<Coord> follow_surface_near(const std::vector<Coord>& stale, FloatGri
     return changed;
 }
 
-void follow_surface(FloatGrid& u, const Domain& domain, double clamp, const RunContext& run) {
-    const FloatGridPtr next = redistance(u, domain, kFollowWidth, DomainEnd::Open, u.getName().c_str(), run);
+void track_surface(FloatGrid& u, const Domain& domain, double clamp, const RunContext& run) {
+    const FloatGridPtr next = redistance(u, domain, kTrackingWidth, DomainEnd::Open, u.getName().c_str(), run);
     const LeafBand band(*next);
     tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
         const LeafBounds bounds(domain, band.origin(leaf));
