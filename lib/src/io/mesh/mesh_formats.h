@@ -1,0 +1,40 @@
+#pragma once
+// A reader and a writer for each format of meshes.
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "io/mesh/mesh_output.h"
+#include "io/mesh/mesh_source.h"
+
+namespace covol::mesh_io {
+
+/// @param source  the file's text from its begin; errors say where in it
+/// @throws Error InvalidInput, Unsupported.
+[[nodiscard]] TriangleMesh read_ply(Source& source);
+[[nodiscard]] TriangleMesh read_obj(Source& source);
+[[nodiscard]] TriangleMesh read_off(Source& source);
+/// @param text  the whole file, whose size tells binary from ASCII
+[[nodiscard]] TriangleMesh read_stl(Source& source, std::string_view text);
+[[nodiscard]] TriangleMesh read_glb(Source& source, std::string_view text);
+
+void write_ply(Output& out, const Prepared& in);
+void write_obj(Output& out, const Prepared& in);
+void write_off(Output& out, const Prepared& in);
+void write_stl(Output& out, const Prepared& in);
+void write_glb(Output& out, const Prepared& in);
+
+/// One of several meshes in a file. @param first  the number of its first vertex in the file, from 1
+void write_obj_object(Output& out, const Prepared& in, std::uint64_t first);
+
+/// One mesh of a .glb file; without a name it has no material either.
+struct GlbPart {
+    const Prepared* in;
+    const NamedMesh* named;
+};
+
+/// @throws Error Unsupported (more than 4 GB).
+void write_glb_parts(Output& out, const std::vector<GlbPart>& parts, const std::vector<std::string>& comments);
+
+}  // namespace covol::mesh_io

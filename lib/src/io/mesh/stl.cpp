@@ -1,0 +1,115 @@
+// STL, ASCII and binary.
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <unordered_map>
+#include <vector>
+
+#include "covol/error.h"
+#include "io/mesh/mesh_formats.h"
+
+namespace covol::mesh_io {
+namespace {
+
+/// STL repeats a vertex in each of its triangles; equal positions become one.
+class StlBuilder {
+public:
+    explicit StlBuilder(const Source& source) : mesh_(source) {}
+    void corner(float x, float y, float z) {
+        const Key key{std::bit_cast<std::uint32_t>(x + 0.0F), std::bit_cast<std::uint32_t>(y + 0.0F),
+                      std::bit_cast<std::uint32_t>(z + 0.0F)};
+        const auto [at, is_new] = known_.try_emplace(key, std::uint32_t(mesh_.vertex_count()));
+        if (is_new) mesh_.vertex(x, y, z);
+        corners_.push_back(at->second);
+        if (corners_.size() == 3) {
+            mesh_.polygon(corners_);
+            corners_.clear();
+        }
+    }
+    TriangleMesh finish() { return mesh_.finish(); }
+
+private:
+    using Key = std::array<std::uint32_t, 3>;
+    struct Hash {
+        std::size_t operator()(const Key& k) const {
+            return ((k[0] * 0x9E3779B97F4A7C15ULL ^ k[1]) * 0x9E3779B97F4A7C15ULL ^ k[2]) * 0x9E3779B97F4A7C15ULL;
+        }
+    };
+    MeshBuilder mesh_;
+    std::unordered_map<Key, std::uint32_t, Hash> known_;
+    std::vector<std::uint32_t> corners_;
+};
+
+std::array<float, 3> triangle_normal(const TriangleMesh& mesh, const Face& t) {
+    const auto side = [&](int corner, int axis) {
+        return double(mesh.vertices[t[corner]][axis]) - mesh.vertices[t[0]][axis];
+    };
+    Vec3 n{};
+    for (int a = 0; a < 3; ++a) {
+        const int b = (a + 1) % 3, c = (a + 2) % 3;
+        n[a] = side(1, b) * side(2, c) - side(1, c) * side(2, b);
+    }
+    const double size = std::hypot(n[0], n[1], n[2]);
+    if (!(size > 0)) return {0, 0, 0};
+    return {float(n[0] / size), float(n[1] / size), float(n[2] / size)};
+}
+
+}  // namespace
+
+TriangleMesh read_stl(Source& source, std::string_view text) {
+    constexpr std::size_t kHeader = 84, kRecord = 50;
+    StlBuilder mesh(source);
+    std::uint32_t count = 0;
+    if (text.size() >= kHeader) std::memcpy(&count, text.data() + 80, 4);
+    const bool exact = text.size() >= kHeader && text.size() == kHeader + kRecord * std::uint64_t(count);
+    if (!exact && text.starts_with("solid")) {
+        while (!source.at_end()) {
+            std::string_view line = source.line();
+            if (next_word(line) != "vertex") continue;
+            Vec3 p{};
+            for (double& c : p) c = source.number<double>(line, "a coordinate");
+            mesh.corner(float(p[0]), float(p[1]), float(p[2]));
+        }
+        return mesh.finish();
+    }
+    if (text.size() < kHeader + kRecord * std::uint64_t(count) || text.size() < kHeader)
+        source.fail("the header promises " + std::to_string(count) + " triangles, the file of " + std::to_string(text.size()) +
+                    " bytes is too short");
+    source.bytes(kHeader);
+    for (std::uint32_t i = 0; i < count; ++i) {
+        std::array<float, 12> record{};  // normal, three corners
+        std::memcpy(record.data(), source.bytes(kRecord).data(), sizeof(record));
+        for (int k = 3; k < 12; k += 3) mesh.corner(record[k], record[k + 1], record[k + 2]);
+    }
+    return mesh.finish();
+}
+
+void write_stl(Output& out, const Prepared& in) {
+    if (in.binary) {
+        // A header that begins with "solid" would be taken for text.
+        std::array<char, 80> header{};
+        const std::string text = "covol" + (in.comments.empty() ? std::string() : ": " + in.comments.front());
+        std::copy_n(text.begin(), std::min(text.size(), header.size()), header.begin());
+        out.raw(header);
+        out.raw(std::uint32_t(in.mesh.triangles.size()));
+    } else {
+        out << "solid covol\n";
+    }
+    for (const Face& t : in.mesh.triangles) {
+        const auto normal = triangle_normal(in.mesh, t);
+        if (in.binary) {
+            out.raw(normal);
+            for (const std::uint32_t v : t) out.raw(in.mesh.vertices[v]);
+            out.raw(std::uint16_t(0));
+        } else {
+            out << "facet normal " << normal << "\n outer loop\n";
+            for (const std::uint32_t v : t) out << "  vertex " << in.mesh.vertices[v] << "\n";
+            out << " endloop\nendfacet\n";
+        }
+    }
+    if (!in.binary) out << "endsolid covol\n";
+}
+
+}  // namespace covol::mesh_io
