@@ -7,7 +7,8 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
-#include <deque>
+#include <limits>
+#include <queue>
 #include <vector>
 
 namespace covol::cloud {
@@ -21,6 +22,7 @@ constexpr double kHeldVoxels = 0.1;  // from the surface, of a voxel that keeps 
 struct Neighbourhood {
     std::array<Coord, 26> offset;
     std::array<std::uint32_t, 26> beside6{}, beside18{};
+    std::array<float, 26> length{};
     std::uint32_t faces = 0, faces_and_edges = 0;
 
     Neighbourhood() {
@@ -31,6 +33,7 @@ struct Neighbourhood {
                     if (i != 0 || j != 0 || k != 0) offset[n++] = Coord(i, j, k);
         for (std::size_t a = 0; a < 26; ++a) {
             const int axes = steps(offset[a], Coord(0, 0, 0));
+            length[a] = std::sqrt(float(axes));
             if (axes == 1) faces |= 1U << a;
             if (axes <= 2) faces_and_edges |= 1U << a;
             for (std::size_t b = 0; b < 26; ++b) {
@@ -81,6 +84,43 @@ bool is_simple(std::uint32_t inside) {
            is_one_piece(~inside & 0x3FFFFFFU, kAround.faces_and_edges, kAround.beside18, 2);
 }
 
+struct Waiting {
+    float depth;
+    Coord at;
+    bool operator<(const Waiting& other) const { return depth != other.depth ? depth < other.depth : other.at < at; }
+};
+
+/// How deep voxels lie below or above target's surface, in voxels, along chains of neighbours among them (Dijkstra): its
+/// values end with its band.
+FloatGrid::Ptr depth_of(const std::vector<Coord>& voxels, const FloatGrid& target) {
+    const FloatGrid::Ptr depth = FloatGrid::create(std::numeric_limits<float>::max());
+    auto depth_at = depth->getAccessor();
+    auto target_at = target.getConstAccessor();
+    const auto h = float(target.voxelSize()[0]);
+    std::priority_queue<Waiting> queue;  // the least depth last, so of its negative
+    for (const Coord& at : voxels) {
+        const float value = target_at.getValue(at);
+        bool is_beside = false;
+        for (std::uint32_t face = kAround.faces; face != 0; face &= face - 1)
+            is_beside |= (target_at.getValue(at + kAround.offset[std::size_t(__builtin_ctz(face))]) < 0) != (value < 0);
+        depth_at.setValueOn(at, is_beside ? std::abs(value) / h : std::numeric_limits<float>::max());
+        if (is_beside) queue.push({-std::abs(value) / h, at});
+    }
+    while (!queue.empty()) {
+        const auto [less, at] = queue.top();
+        queue.pop();
+        if (-less > depth_at.getValue(at)) continue;
+        for (std::size_t n = 0; n < 26; ++n) {
+            const Coord beside = at + kAround.offset[n];
+            const float here = kAround.length[n] - less;
+            if (!depth_at.isValueOn(beside) || depth_at.getValue(beside) <= here) continue;
+            depth_at.setValueOn(beside, here);
+            queue.push({-here, beside});
+        }
+    }
+    return depth;
+}
+
 }  // namespace
 
 std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target) {
@@ -88,25 +128,29 @@ std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target) {
     auto target_at = target.getAccessor();
     openvdb::MaskGrid kept;  // voxels that have rough's sign still, and not target's
     auto kept_at = kept.getAccessor();
-    std::deque<Coord> queue;
+    std::vector<Coord> found;
     const auto compare = [&](const Coord& at) {
         if ((rough_at.getValue(at) < 0) == (target_at.getValue(at) < 0) || kept_at.isValueOn(at)) return;
         kept_at.setValueOn(at);
-        queue.push_back(at);
+        found.push_back(at);
     };
     for (auto value = target.cbeginValueOn(); value; ++value)
         if (value.isVoxelValue()) compare(value.getCoord());
     for (auto value = rough.cbeginValueOn(); value; ++value)
         if (value.isVoxelValue()) compare(value.getCoord());
     // What lies between the two surfaces, far from both, is active in neither.
-    for (std::size_t n = 0; n < queue.size(); ++n)
+    for (std::size_t n = 0; n < found.size(); ++n)
         for (std::uint32_t face = kAround.faces; face != 0; face &= face - 1)
-            compare(Coord(queue[n]) + kAround.offset[std::size_t(__builtin_ctz(face))]);
-    std::sort(queue.begin(), queue.end());
-    std::size_t left = queue.size();
+            compare(Coord(found[n]) + kAround.offset[std::size_t(__builtin_ctz(face))]);
+    // The deepest first: what is left in the end, to keep two fronts apart, are the narrowest places.
+    const FloatGrid::Ptr depth = depth_of(found, target);
+    auto depth_at = depth->getConstAccessor();
+    std::priority_queue<Waiting> queue;
+    for (const Coord& at : found) queue.push({depth_at.getValue(at), at});
+    std::size_t left = found.size();
     while (!queue.empty()) {
-        const Coord at = queue.front();
-        queue.pop_front();
+        const Coord at = queue.top().at;
+        queue.pop();
         if (!kept_at.isValueOn(at)) continue;
         std::uint32_t inside = 0, waiting = 0;
         for (std::size_t n = 0; n < 26; ++n) {
@@ -118,7 +162,10 @@ std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target) {
         if (!is_simple(inside)) continue;
         kept_at.setValueOff(at);
         --left;
-        for (; waiting != 0; waiting &= waiting - 1) queue.push_back(at + kAround.offset[std::size_t(__builtin_ctz(waiting))]);
+        for (; waiting != 0; waiting &= waiting - 1) {
+            const Coord beside = at + kAround.offset[std::size_t(__builtin_ctz(waiting))];
+            queue.push({depth_at.getValue(beside), beside});
+        }
     }
     const auto small = float(kHeldVoxels * target.voxelSize()[0]);
     for (auto value = kept.cbeginValueOn(); value; ++value) {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/median.h"
 #include "base/vector.h"
 #include "cloud/surface/fit_kernel.h"
 #include "points/point_cells.h"
@@ -34,6 +35,7 @@ constexpr double kMostUnbent = 0.5;       // of the noise, that it is taken to h
 constexpr double kWidest = 2;             // of the nodes' cells: the first are so large
 constexpr double kWideOfApart = 7;        // the radius, of what its nodes are apart: there need not be more
 constexpr double kSameSheet = 0.7;        // cosine of the normals
+constexpr double kLone = 2.5;             // least radii, beside quadrics of points that lie closer; 2 to 4 give the same surfaces
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
@@ -247,6 +249,39 @@ OrientedCloud without_covered(const OrientedCloud& nodes, const std::vector<Quad
     return left;
 }
 
+/// Without those that a few points far from others made where others tell more: such a quadric reaches as far as its
+/// neighbourhood, and may be of another side.
+std::vector<Quadric> without_lone(const std::vector<Quadric>& quadrics) {
+    if (quadrics.empty()) return {};
+    std::vector<Vec3> feet;
+    std::vector<double> least;
+    for (const Quadric& q : quadrics) {
+        feet.push_back(q.foot());
+        least.push_back(q.least_radius);
+    }
+    const double usual = median(least);
+    const PointCells cells(feet, 2 * usual);
+    std::vector<char> lone(quadrics.size(), 0);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, quadrics.size(), 256), [&](const auto& part) {
+        std::vector<PointCells::Range> ranges;
+        for (std::size_t n = part.begin(); n < part.end(); ++n) {
+            const double r = least[n];
+            if (r <= kLone * usual) continue;
+            const Vec3& p = feet[n];
+            cells.find({{p[0] - r, p[1] - r, p[2] - r}, {p[0] + r, p[1] + r, p[2] + r}}, ranges);
+            for (const PointCells::Range& range : ranges)
+                for (std::uint32_t at = range.begin; at < range.end && !lone[n]; ++at) {
+                    const Vec3 to = minus(cells.sorted()[at], p);
+                    lone[n] = dot(to, to) < r * r && kLone * least[cells.order()[at]] < r;
+                }
+        }
+    });
+    std::vector<Quadric> left;
+    for (std::size_t n = 0; n < quadrics.size(); ++n)
+        if (!lone[n]) left.push_back(quadrics[n]);
+    return left;
+}
+
 }  // namespace
 
 double Quadric::distance(const Vec3& world) const {
@@ -345,7 +380,7 @@ std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCl
             all.push_back(q);
         }
     }
-    return all;
+    return without_lone(all);
 }
 
 }  // namespace covol::cloud

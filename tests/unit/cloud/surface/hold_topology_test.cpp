@@ -67,3 +67,18 @@ TEST_CASE("hold_topology: whatever the target is, pieces and handles stay those 
         }
     }
 }
+
+TEST_CASE("hold_topology: what keeps two pieces apart lies where the target is narrowest") {
+    const double middle = 0.5 * (kSide - 1);
+    for (const int narrow : {8, 12, 15}) {
+        // Two blocks and a bar between them, which is thinner in one place.
+        const auto bar = [&](int i, int j, int k) { return std::hypot(j - middle, k - middle) < (i == narrow ? 1.5 : 4); };
+        const FloatGridPtr target = level_set([&](int i, int j, int k) { return !is_border(i, j, k) && (i < 5 || i > 18 || bar(i, j, k)); });
+        const FloatGridPtr rough = level_set([&](int i, int j, int k) { return !is_border(i, j, k) && (i < 5 || i > 18); });
+        std::size_t least = 0;
+        for (int j = 0; j < kSide; ++j)
+            for (int k = 0; k < kSide; ++k) least += bar(narrow, j, k);
+        CHECK(cloud::hold_topology(*rough, *target) == least);
+        CHECK(measure(extract_mesh(*target)).components == 2);
+    }
+}

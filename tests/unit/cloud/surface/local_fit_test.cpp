@@ -288,3 +288,21 @@ TEST_CASE("where neighbourhoods are wide there are fewer quadrics, and none is f
     CHECK(farthest < 3 * edge);
     for (const Quadric& q : quadrics_over(places, places, edge, {spacing, 0, 0}, bare, {})) CHECK(q.apart == edge);
 }
+
+TEST_CASE("points far from all others make no quadrics beside those of a sheet") {
+    test::SurfaceSample s = test::ball(1).sample(8000, 1);
+    const double spacing = s.spacing();
+    OrientedCloud cloud = oriented(s);
+    std::mt19937 random(5);
+    for (int n = 0; n < 40; ++n) {
+        const std::size_t at = random() % 8000;
+        cloud.points.push_back(test::scaled(1.1, s.points[at]));
+        cloud.normals.push_back(s.normals[random() % 8000]);
+        cloud.counts.push_back(1);
+    }
+    std::size_t bare = 0;
+    double widest = 0;
+    for (const Quadric& q : quadrics_over(cloud, cloud, spacing, {spacing, 0}, bare, {})) widest = std::max(widest, q.least_radius);
+    INFO("widest " << widest << " spacing " << spacing);
+    CHECK(widest < 6 * spacing);
+}
