@@ -21,6 +21,7 @@ struct CloudReport {
     std::size_t dropped_pieces = 0;  ///< of the surface, that hardly a point rested on
     std::size_t joined_pieces = 0;   ///< small ones, joined to what is nearest along points
     std::size_t held_voxels = 0;     ///< that the indicator's topology holds, for it is simpler than the points' own
+    std::size_t layered = 0;         ///< Orientation::layered
     HintsReport hints;               ///< CloudOrientation::hints
 };
 

@@ -45,6 +45,7 @@ struct Orientation {
     double turned = 0;             ///< share of the points whose normal the last iteration turned by more than 90 degrees
     double off_half = 0;           ///< mean of the indicator over the points, less 1/2, absolute
     int iterations = 0;
+    std::size_t layered = 0;       ///< points of layers of a scan that lie below others: turned, and the surface need not pass them
 };
 
 /// Normals that agree with the indicator function which they make: from a first guess, which points away from where the

@@ -150,6 +150,7 @@ Json to_json(const SegmentReport& r) {
                          {"encloses", r.cloud.encloses},
                          {"averaged_within", r.cloud.radius},
                          {"stray_points", r.cloud.stray},
+                         {"layered_points", r.cloud.layered},
                          {"turned", r.cloud.turned},
                          {"iterations", r.cloud.iterations},
                          {"indicator_cell", r.cloud.indicator_cell},

@@ -9,6 +9,7 @@
 #include "base/vector.h"
 #include "cloud/orientation/areas.h"
 #include "cloud/orientation/indicator.h"
+#include "cloud/orientation/layers.h"
 #include "covol/points.h"
 #include "points/point_cells.h"
 
@@ -122,6 +123,8 @@ Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& s
     solve(coarse, points, result, kCyclesFromNothing);
     const double half = scale_to_half(coarse, points);
     for (double& area : result.areas) area *= half;
+    const std::vector<char> turned = turn_layers(coarse, points, free, between, result, run);
+    result.layered = std::size_t(std::count(turned.begin(), turned.end(), 1));
     result.indicator = make_indicator(coarse);
     run.check();
     WindingField fine(indicator_lattice(points, cells_along(points, kFineSpacings * between)));
@@ -134,7 +137,7 @@ Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& s
         const bool agrees = dot(falling, result.normals[n]) > 0;
         against += !agrees;
         if (agrees) result.normals[n] = falling;
-        screen[n] = agrees ? kScreening * result.areas[n] / (cell * cell) : 0;
+        screen[n] = agrees && !turned[n] ? kScreening * result.areas[n] / (cell * cell) : 0;
     }
     result.turned = double(against) / double(points.size());
     fine.start_from(coarse.indicator());

@@ -301,6 +301,7 @@ FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cl
         report.noise = cloud.scale.noise;
         report.stray = cloud.stray;
         report.encloses = cloud.encloses;
+        report.layered = orientation.layered;
         report.hints = cloud.hints;
         report.iterations = orientation.iterations;
         report.indicator_cell = orientation.indicator->cell();

@@ -51,6 +51,7 @@ void start_from_cloud(Job& job) {
                std::to_string(job.points.size()) + " points, " + number(report.spacing) + " apart, noise " + number(report.noise) + how);
     tell_of_hints(job, report.hints);
     if (report.stray > 0) job.choose("stray_points", std::to_string(report.stray), "far from all others and on no sheet: left out");
+    if (report.layered > 0) job.choose("layered_points", std::to_string(report.layered), "of layers below others, as of scans that do not quite fit: not passed");
     if (report.dropped_pieces > 0)
         job.run.info("cloud: " + std::to_string(report.dropped_pieces) + " pieces of the surface that hardly a point rested on left out");
     if (report.joined_pieces > 0)

@@ -1,0 +1,132 @@
+#include "cloud/orientation/layers.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/vector.h"
+#include "cloud/orientation/indicator.h"
+#include "points/point_cells.h"
+
+namespace covol::cloud {
+namespace {
+
+// Lengths are in the distance from which on points are not of one sheet.
+constexpr double kCell = 2;           // of the points that turn together
+constexpr double kFarthestLayer = 6;  // below the one that hides it
+constexpr double kMostAway = 0.2;     // of a patch's points, that are farther from the surface once they are turned
+constexpr double kBareCells = 2;      // of the indicator: surface without points as near is bare
+constexpr double kMostGain = 1.5;     // bare surface, of the patch's area: a cavity's far side is not much larger than its near one, a ring's hole is
+constexpr int kMostPatches = 12;      // each costs a solution
+constexpr std::size_t kLeastPoints = 12;
+
+using Patch = std::vector<std::uint32_t>;  // points
+
+/// Cells of points, and those of them that are opposed by what lies around them.
+class Opposed {
+public:
+    Opposed(const PointCells& cells, const std::vector<Vec3>& free, double between) : cells_(cells), opposed_(cells.cell_count()), beside_(cells.cell_count()) {
+        std::vector<Vec3> places, frees;
+        for (std::size_t c = 0; c < cells.cell_count(); ++c) {
+            places.push_back(cells.sorted()[cells.cell(c).begin]);
+            frees.push_back(free[cells.order()[cells.cell(c).begin]]);  // the same for all of a cell
+        }
+        const PointCells near(places, cells.edge());
+        const double reach = kFarthestLayer * between, touching = std::sqrt(6.0) * cells.edge();
+        tbb::parallel_for(std::size_t(0), places.size(), [&](std::size_t c) {
+            std::vector<PointCells::Range> ranges;
+            const Vec3& p = places[c];
+            near.find({{p[0] - reach, p[1] - reach, p[2] - reach}, {p[0] + reach, p[1] + reach, p[2] + reach}}, ranges);
+            Vec3 sum{0, 0, 0};
+            for (const PointCells::Range& range : ranges)
+                for (std::uint32_t at = range.begin; at < range.end; ++at) {
+                    const Vec3 to = minus(near.sorted()[at], p);
+                    const double squared = dot(to, to);
+                    if (squared <= reach * reach) sum = plus(sum, frees[near.order()[at]]);
+                    if (squared <= touching * touching) beside_[c].push_back(near.order()[at]);
+                }
+            opposed_[c] = dot(sum, frees[c]) < 0;
+        });
+    }
+
+    /// Connected ones, those with most points first.
+    [[nodiscard]] std::vector<Patch> patches() const {
+        std::vector<Patch> all;
+        std::vector<char> seen(opposed_.size(), 0);
+        for (std::uint32_t first = 0; first < opposed_.size(); ++first) {
+            if (!opposed_[first] || seen[first]) continue;
+            std::vector<std::uint32_t> connected{first};
+            seen[first] = 1;
+            for (std::size_t n = 0; n < connected.size(); ++n)
+                for (const std::uint32_t next : beside_[connected[n]])
+                    if (opposed_[next] && !seen[next]) {
+                        seen[next] = 1;
+                        connected.push_back(next);
+                    }
+            Patch& patch = all.emplace_back();
+            for (const std::uint32_t c : connected)
+                for (std::uint32_t at = cells_.cell(c).begin; at < cells_.cell(c).end; ++at) patch.push_back(cells_.order()[at]);
+        }
+        std::stable_sort(all.begin(), all.end(), [](const Patch& a, const Patch& b) { return a.size() > b.size(); });
+        return all;
+    }
+
+private:
+    const PointCells& cells_;
+    std::vector<char> opposed_;
+    std::vector<std::vector<std::uint32_t>> beside_;
+};
+
+/// The indicator's surface.
+struct Level {
+    Level(const WindingField& field, const PointCells& points) {
+        const double reach = kBareCells * field.indicator().lattice.cell;
+        make_indicator(field)->crossed([&](const WorldBox& box) {
+            middles.push_back(times(0.5, plus(box.min, box.max)));
+            bare += !points.any_within(middles.back(), reach);
+        });
+    }
+    std::vector<Vec3> middles;  // of the cells that it passes
+    std::ptrdiff_t bare = 0;
+};
+
+void turn(const Patch& patch, Orientation& orientation) {
+    for (const std::uint32_t n : patch) orientation.normals[n] = times(-1, orientation.normals[n]);
+}
+
+}  // namespace
+
+std::vector<char> turn_layers(WindingField& field, const std::vector<Vec3>& points, const std::vector<Vec3>& free, double between,
+                              Orientation& orientation, const RunContext& run) {
+    std::vector<char> turned(points.size(), 0);
+    const PointCells cells(points, kCell * between);
+    std::vector<Patch> patches = Opposed(cells, free, between).patches();
+    patches.resize(std::min<std::size_t>(patches.size(), kMostPatches));
+    const double cell = field.indicator().lattice.cell;
+    std::ptrdiff_t bare = Level(field, cells).bare;
+    for (const Patch& patch : patches) {
+        if (patch.size() < kLeastPoints) break;
+        run.check();
+        turn(patch, orientation);
+        WindingField now(field.indicator().lattice);
+        solve(now, points, orientation, kCyclesFromNothing);
+        scale_to_half(now, points);
+        const Level level(now, cells);
+        const PointCells surface(level.middles, kFarthestLayer * between);
+        const auto away = std::count_if(patch.begin(), patch.end(), [&](std::uint32_t n) { return !surface.any_within(points[n], kFarthestLayer * between); });
+        double area = 0;
+        for (const std::uint32_t n : patch) area += orientation.areas[n];
+        const double gain = double(bare - level.bare) * cell * cell;
+        if (!(gain > 0 && gain < kMostGain * area) || double(away) > kMostAway * double(patch.size())) {
+            turn(patch, orientation);
+            continue;
+        }
+        bare = level.bare;
+        field = std::move(now);
+        for (const std::uint32_t n : patch) turned[n] = 1;
+    }
+    return turned;
+}
+
+}  // namespace covol::cloud
