@@ -205,9 +205,7 @@ def part_sphere(bench):
     kind, size = "sphere-round", 100 if bench.quick else 260
     image, points = bench.phantom(kind, size)
     voxel = 2.6 / size
-    single_level = ("--tau", "1vx")
-    if "--coarse-levels" in Run([bench.covol, "segment", "--help"]).stdout:
-        single_level += ("--coarse-levels", "0")
+    single_level = ("--tau", "1vx", "--coarse-levels", "0")
     kinds = [("covol", "1vx", (), threads) for threads in THREADS]
     kinds += [("covol, delta 0.2 voxel", "0.2vx", (), threads) for threads in THREADS]
     kinds += [("covol, one level, tau = h", "1vx", single_level, 1), ("covol, image alone", "1vx", ("--theta", "0"), 2)]

@@ -134,11 +134,24 @@ int exit_code_of(Errc code) {
 Session::Session() : app_("covol: segment 3D images with the help of a point cloud, on sparse OpenVDB grids") {
     app_.name("covol");
     app_.require_subcommand(1);
-    app_.set_version_flag("--version", std::string("covol ") + COVOL_VERSION);
+    app_.formatter(help_);
+    app_.footer("covol COMMAND --help shows the options of a command.");
+    add_help_flags(app_);
+    app_.set_version_flag("--version", std::string("covol ") + COVOL_VERSION, "print the version");
+    app_.add_flag_callback("--describe-options", [this] { throw CLI::CallForVersion(help_->describe(app_), kDone); })
+        ->configurable(false)
+        ->group("");
     add_common_flags();
 }
 
+void Session::add_help_flags(CLI::App& app) {
+    in_group(app, Group::Help);
+    app.set_help_flag("-h,--help", "print the options that people need first");
+    app.set_help_all_flag("--help-all", "print all options");
+}
+
 void Session::add_common_flags() {
+    app_.option_defaults()->group("Options");
     app_.add_option("--threads", threads_, "threads to use, 0 takes every core");
     app_.add_flag("--profile", profile_, "print at the end where time and memory went");
     app_.add_flag("--quiet", quiet_, "print nothing but results, warnings and errors");
@@ -155,9 +168,9 @@ void Session::add_common_flags() {
 
 CLI::App* Session::add_command(const std::string& name, const std::string& description, std::function<void()> body) {
     CLI::App* command = app_.add_subcommand(name, description);
+    add_help_flags(*command);
     command->fallthrough();  // the common flags may follow the subcommand
-    command->footer("Every command also takes --threads, --quiet, --json, --memory-limit, --config and --save-config: "
-                    "see covol --help.");
+    command->footer("Every command also takes the options that covol --help lists: --threads, --quiet, --json and others.");
     bodies_[command] = std::move(body);
     return command;
 }
@@ -172,6 +185,7 @@ int Session::main(int argc, char** argv) {
         app_.parse(argc, argv);
         expect_values(app_);
         expect_values(*app_.get_subcommands().front());
+        forget_groups(*app_.get_subcommands().front());
     } catch (const CLI::ParseError& error) {
         if (error.get_exit_code() == 0) return app_.exit(error);  // help and version
         return fail(kUsage, error.what() + std::string("; see covol --help"));

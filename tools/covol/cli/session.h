@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "cli/help.h"
 #include "cli/memory.h"
 #include "cli/outputs.h"
 #include "cli/progress.h"
@@ -49,6 +50,9 @@ public:
         return {job, add_command(name, description, [job, this] { job->run(*this); })};
     }
 
+    /// What the help of a subcommand shows.
+    [[nodiscard]] Help& help() noexcept { return *help_; }
+
     /// Parses, runs and writes. @returns the exit code.
     int main(int argc, char** argv);
 
@@ -77,6 +81,7 @@ public:
     void set_exit_code(int code) { exit_code_ = code; }
 
 private:
+    static void add_help_flags(CLI::App& app);
     void add_common_flags();
     void parse(int argc, char** argv);
     int execute();
@@ -88,6 +93,7 @@ private:
     [[nodiscard]] std::string memory_limit_name() const;
 
     CLI::App app_;
+    std::shared_ptr<Help> help_ = std::make_shared<Help>();
     std::map<const CLI::App*, std::function<void()>> bodies_;
     const CLI::App* command_ = nullptr;
 

@@ -46,11 +46,15 @@ struct BandJob {
 void add_band(Session& session) {
     const auto [job, command] =
         session.add_job<BandJob>("band", "Step 2: tag the inside, make the narrow band and the initial values");
+    in_group(*command, Group::Input);
     command->add_option("distance", job->distance_path, "what `covol distance` wrote")->required()->type_name("DISTANCE.vdb");
+    in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "the grid 'band', .vdb")->required()->type_name("OUT.vdb");
     job->tag.bind(*command);
     job->points.bind(*command, "--points");
+    in_group(*command, Group::Output);
     command->add_flag("--half", job->half, "store values as 16-bit floats");
+    session.help().show_first(*command, {"--points", "--tag-distance", "--exterior-seed"});
 }
 
 }  // namespace covol::tool

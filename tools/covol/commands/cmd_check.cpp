@@ -178,6 +178,7 @@ void add_check(Session& session) {
     const auto flags = std::make_shared<ImageFlags>();
     CLI::App* command = session.add_command("check", "What would go wrong with a file in Blender, Houdini, Slicer or covol",
                                             [path, image, flags, &session] { check(*path, *image, *flags, session); });
+    in_group(*command, Group::Input);
     command->add_option("file", *path, ".vdb, image, mesh or points; exit code 3 when there is a problem")
         ->required()->type_name("FILE");
     command->add_option("--image", *image, "points: the image that they belong to")->type_name("IMAGE");

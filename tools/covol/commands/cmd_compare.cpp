@@ -87,6 +87,7 @@ struct CompareJob {
 void add_compare(Session& session) {
     const auto [job, command] = session.add_job<CompareJob>(
         "compare", "Overlap and distances of two solids: masks, meshes, .vdb, in any mix; or points and a surface");
+    in_group(*command, Group::Input);
     command->add_option("a", job->a, "label image, mesh, .vdb (:NAME picks a grid) or points")->required()->type_name("A");
     command->add_option("b", job->b, "label image, mesh, .vdb (:NAME picks a grid) or points")->required()->type_name("B");
     command->add_option("--label", job->label, "label of the masks, 0: any")->capture_default_str();

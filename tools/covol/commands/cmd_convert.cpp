@@ -100,17 +100,24 @@ struct ConvertJob {
 void add_convert(Session& session) {
     const auto [job, command] =
         session.add_job<ConvertJob>("convert", "Image to .vdb and back, points to points, mesh to mesh");
+    in_group(*command, Group::Input);
     command->add_option("input", job->input, "the file to read")->required()->type_name("IN");
+    in_group(*command, Group::Output);
     command->add_option("output", job->output, "the file to write")->required()->type_name("OUT");
+    in_group(*command, Group::Input);
     command->add_option("--like", job->like, "image whose lattice the result gets, or that index points belong to")
         ->type_name("IMAGE");
     command->add_option("--grid", job->grid_name, "grid to take from a .vdb file [the first]")->type_name("NAME");
+    in_group(*command, Group::Output);
     add_length(*command, "--voxel-size", job->voxel_size, "", "edge of the voxels of a .vdb file [smallest spacing]");
     job->points.bind_options(*command);
     job->cloud_flags.bind(*command, false);
     job->mesh.bind(*command);
     job->image.bind(*command);
+    in_group(*command, Group::Output);
     command->add_flag("--half", job->half, "store values as 16-bit floats");
+    session.help().show_first(*command, {"--like", "--grid", "--voxel-size", "--remove-outliers", "--simplify", "--smooth", "--up",
+                                         "--unit-scale", "--channel", "--frame"});
 }
 
 }  // namespace covol::tool

@@ -7,6 +7,8 @@
 namespace covol::tool {
 namespace {
 
+constexpr int kTubeVoxels = 10;  // radius where none is given
+
 struct DistanceJob {
     PointFlags points;
     DomainFlags domain;
@@ -35,7 +37,7 @@ struct DistanceJob {
         const ImageGeometry* pointer = geometry ? &*geometry : nullptr;
         const std::vector<Vec3> cloud = read_world_points(points, pointer, session.run()).points;
         const double h = voxel_size(pointer, cloud, session);
-        const double radius = max_distance.resolve(h, 10 * h);
+        const double radius = max_distance.resolve(h, kTubeVoxels * h);
         const Domain box = make_domain(pointer, cloud, h, radius);
         const Stopwatch watch;
         const DistanceResult result = distance(cloud, box, {radius}, session.run());
@@ -56,12 +58,16 @@ void add_distance(Session& session) {
     const auto [job, command] =
         session.add_job<DistanceJob>("distance", "Step 1: distance to the points, in a tube around them");
     job->points.bind(*command, "points")->required();
+    in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "the grid 'distance', .vdb")->required()->type_name("OUT.vdb");
-    add_length(*command, "--max-distance", job->max_distance, "10vx", "radius of the tube");
+    in_group(*command, Group::Domain);
+    add_length(*command, "--max-distance", job->max_distance, std::to_string(kTubeVoxels) + "vx", "radius of the tube");
     command->add_option("--like", job->like, "image whose box is the domain [the points' box]")->type_name("IMAGE");
     job->domain.bind(*command, true);
     job->image.bind(*command, false);
+    in_group(*command, Group::Output);
     command->add_flag("--half", job->half, "store values as 16-bit floats");
+    session.help().show_first(*command, {"--max-distance", "--like", "--voxel-size", "--roi"});
 }
 
 }  // namespace covol::tool

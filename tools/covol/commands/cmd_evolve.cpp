@@ -60,14 +60,20 @@ struct EvolveJob {
 void add_evolve(Session& session) {
     const auto [job, command] =
         session.add_job<EvolveJob>("evolve", "Step 4: move the level set to the structure's boundary");
+    in_group(*command, Group::Input);
     command->add_option("band", job->band_path, "what `covol band` wrote, or the u of an earlier run")
         ->required()->type_name("BAND.vdb");
+    in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "the grid u, .vdb")->required()->type_name("OUT.vdb");
+    in_group(*command, Group::Input);
     command->add_option("--distance", job->distance_path, "what `covol distance` wrote")->type_name("DISTANCE.vdb");
     command->add_option("--edge", job->edge_path, "what `covol edge` wrote")->type_name("EDGE.vdb");
-    job->flags.bind(*command, true);
+    job->flags.bind(*command, true, true);
     command->add_flag("--follow", job->flags.options.follow, "the band follows the surface");
+    in_group(*command, Group::Output);
     command->add_flag("--half", job->half, "store values as 16-bit floats");
+    session.help().show_first(*command, {"--distance", "--edge", "--theta", "--rho", "--delta", "--tau", "--attraction-range", "--max-steps",
+                                         "--tolerance", "--follow"});
 }
 
 }  // namespace covol::tool

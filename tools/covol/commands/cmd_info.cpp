@@ -156,6 +156,7 @@ void add_info(Session& session) {
     const auto points = std::make_shared<PointFlags>();
     CLI::App* command = session.add_command("info", "What is in a file: .vdb, image, mesh or points",
                                             [path, flags, points, &session] { describe(*path, *flags, *points, session); });
+    in_group(*command, Group::Input);
     command->add_option("file", *path, "the file")->required()->type_name("FILE");
     flags->bind(*command);
     points->bind_options(*command);

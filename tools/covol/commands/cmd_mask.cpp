@@ -37,8 +37,10 @@ struct MaskJob {
 
 void add_mask(Session& session) {
     const auto [job, command] = session.add_job<MaskJob>("mask", "Label image of a level set");
+    in_group(*command, Group::Input);
     command->add_option("level_set", job->input, "a level set; of several in a file, :NAME picks one")->required()->type_name("IN.vdb[:NAME]");
     command->add_option("--like", job->like, "image whose lattice the mask gets")->required()->type_name("IMAGE");
+    in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "label image")->required()->type_name("OUT.nrrd|.nii.gz|.tif|.mha");
     command->add_option("--label", job->label, "value of the inside, 1 to 255")->capture_default_str();
     job->image.bind(*command);

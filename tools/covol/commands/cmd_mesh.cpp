@@ -77,9 +77,12 @@ struct MeshJob {
 
 void add_mesh(Session& session) {
     const auto [job, command] = session.add_job<MeshJob>("mesh", "Triangles of a level set, and their cleanup");
+    in_group(*command, Group::Input);
     command->add_option("level_set", job->input, "a level set; of several in a file, :NAME picks one")->required()->type_name("IN.vdb[:NAME]");
+    in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "closed, manifold, outward triangles")
         ->required()->type_name("OUT.ply|.obj|.stl|.off|.glb");
+    in_group(*command, Group::MeshFiles);
     add_length(*command, "--isovalue", job->isovalue, "0", "extract this level outside the surface");
     add_length(*command, "--min-component", job->min_component, "", "drop pieces smaller than a cube of this edge");
     add_length(*command, "--target-edge", job->target_edge, "", "decimate to about this edge length");

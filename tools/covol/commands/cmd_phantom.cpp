@@ -49,10 +49,13 @@ void add_phantom(Session& session) {
     const auto [job, command] = session.add_job<PhantomJob>("phantom", "Test shapes with known truth");
     std::string kinds;
     for (const std::string& kind : phantom_kinds()) kinds += (kinds.empty() ? "" : ", ") + kind;
+    in_group(*command, Group::Input);
     command->add_option("kind", job->options.kind, kinds)->required()->type_name("KIND");
+    in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "the image")->required()->type_name("OUT.nrrd|.nii.gz|.tif|.mha");
     command->add_option("--points", job->points_path, "points on the true surface")->type_name("OUT.xyz|.csv|.ply");
     command->add_option("--labels", job->labels_path, "the true solid as a label image")->type_name("OUT");
+    in_group(*command, Group::Input);
     command->add_option("--size", job->options.size, "voxels along each axis")->capture_default_str();
     command->add_option("--count", job->options.point_count, "number of points")->capture_default_str();
     command->add_option("--noise", job->options.noise, "standard deviation, in units of the contrast")->capture_default_str();

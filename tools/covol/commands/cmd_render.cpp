@@ -32,10 +32,14 @@ struct RenderJob {
 void add_render(Session& session) {
     const auto [job, command] =
         session.add_job<RenderJob>("render", "A picture: the shaded surface, slices with its outline and the points");
+    in_group(*command, Group::Input);
     command->add_option("level_set", job->input, "a level set; of several in a file, :NAME picks one")->required()->type_name("IN.vdb[:NAME]");
+    in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "the picture")->required()->type_name("OUT.png");
+    in_group(*command, Group::Input);
     command->add_option("--image", job->image_path, "image for the slices")->type_name("IMAGE");
     job->points.bind(*command, "--points");
+    in_group(*command, Group::Output);
     command->add_option_function<std::string>(
                "--size",
                [job](const std::string& text) {
@@ -45,9 +49,10 @@ void add_render(Session& session) {
                },
                "of the picture, in pixels")
         ->type_name("WIDTHxHEIGHT")
-        ->default_str("1200x800");
+        ->default_str(std::to_string(job->options.width) + "x" + std::to_string(job->options.height));
     command->add_option("--slices", job->options.slices, "panels with slices")->capture_default_str();
     job->image.bind(*command);
+    session.help().show_first(*command, {"--image", "--points", "--size", "--slices", "--channel", "--frame", "--roi"});
 }
 
 }  // namespace covol::tool

@@ -14,12 +14,6 @@ void add_box(CLI::App& command, const std::string& flag, std::optional<WorldBox>
         ->type_name("X0,Y0,Z0,X1,Y1,Z1");
 }
 
-std::string to_text(double value) {
-    std::ostringstream text;
-    text << value;
-    return text.str();
-}
-
 CLI::Option* add_positive(CLI::App& command, const std::string& flag, double& target, const std::string& description) {
     CLI::Option* option = command.add_option_function<double>(
         flag,
@@ -47,6 +41,12 @@ void add_share(CLI::App& command, const std::string& flag, std::optional<double>
 
 }  // namespace
 
+std::string to_text(double value) {
+    std::ostringstream text;
+    text << value;
+    return text.str();
+}
+
 CLI::Option* add_length(CLI::App& command, const std::string& flag, Length& target, const std::string& shown_default,
                         const std::string& description) {
     CLI::Option* option = command.add_option_function<std::string>(
@@ -69,6 +69,7 @@ void add_vec3(CLI::App& command, const std::string& flag, std::vector<Vec3>& tar
 // ---- images and points ---------------------------------------------------------------------------------------------
 
 void ImageFlags::bind(CLI::App& command, bool with_roi, bool with_frame) {
+    in_group(command, Group::Input);
     command.add_option_function<std::string>(
                "--spacing",
                [this](const std::string& text) {
@@ -107,12 +108,14 @@ WorldBox sampled_box(const WorldBox& box, double h) {
 }
 
 CLI::Option* PointFlags::bind(CLI::App& command, const std::string& flag) {
+    in_group(command, Group::Marks);
     CLI::Option* option = command.add_option(flag, paths, "points: XYZ, CSV, PLY, OBJ, OFF, PCD, LAS; marks of Fiji, napari, 3D Slicer, ITK-SNAP")->type_name("FILE...");
     bind_options(command);
     return option;
 }
 
 void PointFlags::bind_options(CLI::App& command) {
+    in_group(command, Group::ReadingMarks);
     add_choice(command, "--points-space", options.space,
                {{"world", PointSpace::World},
                 {"ras", PointSpace::Ras},
@@ -173,7 +176,8 @@ WorldPoints read_world_points(const PointFlags& flags, const ImageGeometry* geom
 // ---- model ---------------------------------------------------------------------------------------------------------
 
 void DomainFlags::bind(CLI::App& command, bool with_margin) {
-    add_length(command, "--voxel-size", voxel_size, "", "edge of the voxels [smallest spacing of image or points]");
+    in_group(command, Group::Domain);
+    add_length(command, "--voxel-size", voxel_size, "", "edge of the voxels [the image's smallest spacing; without an image from the points]");
     add_box(command, "--roi", roi, "work in this box of the world only");
     if (with_margin) add_length(command, "--margin", margin, "", "between the points and the domain's boundary [D + 6vx]");
 }
@@ -192,8 +196,9 @@ double DomainFlags::resolve_voxel_size(const Image* image, const std::vector<Vec
 }
 
 void TagFlags::bind(CLI::App& command, bool names) {
+    in_group(command, Group::Start);
     add_length(command, "--tag-distance", tag_distance, "", "D: closes gaps between points up to 2D [from the points]");
-    const std::string flag = "--exterior-seed", what = "a position outside the structure, in a cavity say; repeatable";
+    const std::string flag = "--exterior-seed", what = "a position outside the structure, also in a cavity; repeatable";
     if (!names) return add_vec3(command, flag, exterior_seeds, what);
     command.add_option_function<std::vector<std::string>>(
                flag,
@@ -213,13 +218,14 @@ void TagFlags::bind(CLI::App& command, bool names) {
         ->allow_extra_args(false);
 }
 
-void EdgeFlags::bind(CLI::App& command) {
-    add_length(command, "--sigma", sigma, "", "presmoothing of the image [2vx after tagging, else 1vx]");
+void EdgeFlags::bind(CLI::App& command, bool alone) {
+    in_group(command, Group::Edges);
+    add_length(command, "--sigma", sigma, "", std::string("presmoothing of the image ") + (alone ? "[1vx]" : "[2vx after tagging, else 1vx]"));
     add_choice(command, "--edge-feature", options.feature,
                {{"auto", EdgeFeature::Automatic}, {"slope", EdgeFeature::Slope}, {"bright-line", EdgeFeature::BrightLine},
                 {"dark-line", EdgeFeature::DarkLine}},
-               "what edges are: borders between darker and brighter, or bright or dark sheets such as membranes "
-               "[what the marks of contours lie on, else slope]");
+               std::string("what edges are: borders between darker and brighter, or bright or dark sheets such as membranes ") +
+                   (alone ? "[slope]" : "[what the marks of contours lie on, else slope]"));
     CLI::Option* k = add_positive(command, "--edge-k", options.edge_k, "K in g = 1/(1 + K s^2) [see --edge-contrast]");
     add_positive(command, "--edge-contrast", options.edge_contrast,
                  "gradient, per world unit, or brightness of lines at which g = 1/2, of the image scaled to [0,1] "
@@ -233,28 +239,39 @@ EdgeOptions EdgeFlags::resolve(double h, double otherwise) const {
     return resolved;
 }
 
-void EvolveFlags::bind(CLI::App& command, bool with_image) {
+void EvolveFlags::bind(CLI::App& command, bool with_image, bool alone) {
+    in_group(command, Group::Flow);
     command.add_option("--theta", options.theta, "weight of the points, 0 to 1")->capture_default_str();
     if (with_image) command.add_option("--rho", options.rho, "weight of the image, 0 to 1")->capture_default_str();
-    add_length(command, "--delta", delta, "", "weight of curvature [0.5vx after tagging, else 1vx]");
+    add_length(command, "--delta", delta, "", std::string("weight of curvature ") + (alone ? "[1vx]" : "[0.5vx after tagging, else 1vx]"));
     add_length(command, "--tau", tau, "1vx and more", "time step; the flow's speed is 1 world unit per unit of time");
+    in_group(command, Group::Numerics);
     command.add_option("--epsilon", options.epsilon, "regularises the norm of grad u")->capture_default_str();
+    in_group(command, Group::Flow);
     add_length(command, "--attraction-range", attraction_range, "",
-               "points pull fully up to half of it, not at all beyond; 0: unlimited "
-               "[8vx with an image, 5vx after starts other than tagging, else 0]");
+               "points pull fully up to half of it, not at all beyond; 0: unlimited [" +
+                   (alone        ? to_text(options.attraction_range)
+                    : with_image ? "after tagging 8vx, and 0 with --rho 0; else 5vx"
+                                 : "0 after tagging, else 5vx") +
+                   "]");
     if (with_image) {
+        in_group(command, Group::Numerics);
         command.add_option("--edge-epsilon", options.edge_epsilon, "regularises the norm of grad g")->capture_default_str();
+        in_group(command, Group::Flow);
         add_share(command, "--image-yields", image_yields,
-                  "share of rho that fades close to points, on the attraction range's taper, 0 to 1 "
-                  "[1 after tagging, else 0]");
+                  "share of rho that fades close to points, on the attraction range's taper, 0 to 1 [" +
+                      (alone ? to_text(options.image_yields) : "1 after tagging, else 0") + "]");
         add_share(command, "--guess-weight", guess_weight,
-                  "share of theta that is left to what lies between marked slices, far from every mark, 0 to 1");
+                  "share of theta that is left to what lies between marked slices, far from every mark, 0 to 1 [" +
+                      to_text(options.guess_weight) + "]");
     }
     command.add_option("--max-steps", options.max_steps, "upper bound on time steps")->capture_default_str();
     command.add_option("--tolerance", options.tolerance, "steady below this mean change, in voxels a step of 1vx")
         ->capture_default_str();
+    in_group(command, Group::Numerics);
     command.add_option("--solver-tolerance", options.solver_tolerance, "a step's solve ends at this relative residual")
         ->capture_default_str();
+    in_group(command, Group::Flow);
     command.add_flag("--strict", strict, "exit code 5 when the flow is not steady at the end");
 }
 
@@ -271,6 +288,7 @@ EvolveOptions EvolveFlags::resolve(double h, const EvolveOptions& otherwise) con
 // ---- results -------------------------------------------------------------------------------------------------------
 
 void MeshFlags::bind(CLI::App& command) {
+    in_group(command, Group::MeshFiles);
     command.add_option_function<std::string>(
                "--up", [this](const std::string& text) { y_up = text == "y"; }, "the mesh's axis that points up")
         ->check(CLI::IsMember({"y", "z"}).description(""))

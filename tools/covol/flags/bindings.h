@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "cli/arguments.h"
+#include "cli/help.h"
 #include "cli/session.h"
 #include "covol/mesh_io.h"
 #include "covol/pipeline.h"
@@ -14,19 +15,26 @@
 // once h is known.
 namespace covol::tool {
 
-/// An option that is a length; `what_else` is shown as its default.
+/// A number as help and messages show it.
+[[nodiscard]] std::string to_text(double value);
+
+/// An option that is a length.
 CLI::Option* add_length(CLI::App& command, const std::string& flag, Length& target, const std::string& shown_default,
                         const std::string& description);
 
-/// An option that is one of several words, which configuration files keep as such.
+/// An option that is one of several words, which configuration files keep as such. Where the description names no automatic
+/// choice, in brackets at its end, help shows the value that `target` has now.
 template <typename T>
 CLI::Option* add_choice(CLI::App& command, const std::string& flag, T& target, const std::map<std::string, T>& choices,
                         const std::string& description) {
-    std::string names;
-    for (const auto& [name, value] : choices) names += (names.empty() ? "" : "|") + name;
+    std::string names, text = description;
+    for (const auto& [name, value] : choices) {
+        names += (names.empty() ? "" : "|") + name;
+        if (value == target && !description.ends_with(']')) text += " [" + name + "]";
+    }
     return command
         .add_option_function<std::string>(
-            flag, [&target, choices](const std::string& text) { target = choices.at(CLI::detail::to_lower(text)); }, description)
+            flag, [&target, choices](const std::string& word) { target = choices.at(CLI::detail::to_lower(word)); }, text)
         ->check(CLI::IsMember(choices, CLI::ignore_case).description(""))
         ->type_name(names);
 }
@@ -84,7 +92,8 @@ struct TagFlags {
 struct EdgeFlags {
     Length sigma;
     EdgeOptions options;
-    void bind(CLI::App& command);
+    /// @param alone  the single step, which knows of no marks
+    void bind(CLI::App& command, bool alone = false);
     /// `otherwise` is sigma where none was given.
     [[nodiscard]] EdgeOptions resolve(double h, double otherwise) const;
 };
@@ -94,8 +103,9 @@ struct EvolveFlags {
     std::optional<double> image_yields, guess_weight;
     EvolveOptions options;
     bool strict = false;
-    /// Without an image there is no rho.
-    void bind(CLI::App& command, bool with_image);
+    /// @param with_image  without one there is no rho
+    /// @param alone       the single step: what is automatic elsewhere is as in EvolveOptions
+    void bind(CLI::App& command, bool with_image, bool alone = false);
     /// What was not given is as in `otherwise`.
     [[nodiscard]] EvolveOptions resolve(double h, const EvolveOptions& otherwise) const;
 };

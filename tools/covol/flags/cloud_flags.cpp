@@ -30,8 +30,14 @@ std::string one_line(const CloudCleanupReport& r, const CloudCleanupOptions& opt
 }  // namespace
 
 void CloudFlags::bind(CLI::App& command, bool with_most) {
-    command.add_flag("--remove-outliers{3}", outlier_factor,
-                     "drop points whose distance to their 24 neighbours is more than 3 (or =FACTOR) times the cloud's mean");
+    in_group(command, Group::Clouds);
+    const CloudCleanupOptions lib;
+    const std::string factor = "3";
+    command
+        .add_flag("--remove-outliers{" + factor + "}", outlier_factor,
+                  "drop points whose distance to their " + std::to_string(lib.neighbours) + " neighbours is more than " + factor +
+                      " (or FACTOR) times the cloud's mean")
+        ->option_text("[=FACTOR]");
     if (with_most)
         command.add_option("--most-points", most_points, "of larger clouds so many points are used, evenly spread over the surface; 0: all")
             ->type_name("N")
@@ -39,7 +45,8 @@ void CloudFlags::bind(CLI::App& command, bool with_most) {
     add_length(command, "--simplify", simplify, "", "keep one point in each cell of this edge, 1vx for example");
     add_choice(command, "--smooth", smooth,
                {{"none", CloudSmoothing::None}, {"jets", CloudSmoothing::Jets}, {"wlop", CloudSmoothing::Wlop}},
-               "move the points to fitted quadrics, or make a quarter as many by projection, evenly spread");
+               "move the points to fitted quadrics (jets), or make " + to_text(lib.wlop_share) +
+                   " times as many by projection, evenly spread (wlop)");
 }
 
 std::vector<std::uint32_t> CloudFlags::used(const std::vector<Vec3>& points, const RunContext& run, Json& report) const {

@@ -3,14 +3,15 @@
 namespace covol::tool {
 
 void ContourFlags::bind(CLI::App& command, bool names) {
+    in_group(command, Group::Marks);
     command.add_option("--contours", paths,
-                       std::string("ordered marks on slices (CSV slice,contour,x_px,y_px; napari shapes; Fiji selections): "
-                                   "joined, densified, and closed between the slices and beyond the last") +
-                           (names ? "; with names, ve=FILE exe=FILE, several structures" : ""))
+                       std::string("ordered marks on slices: CSV (slice,contour,x_px,y_px), napari shapes, Fiji selections") +
+                           (names ? "; NAME= as for points" : ""))
         ->type_name(names ? "[NAME=]FILE..." : "FILE...");
+    in_group(command, Group::ReadingMarks);
     add_choice(command, "--contour-curve", curve, {{"lines", ContourCurve::Lines}, {"spline", ContourCurve::Spline}},
-               "how neighbouring marks are joined [spline]");
-    add_length(command, "--contour-thickness", thickness, "", "of a body whose contours all lie on one slice");
+               "how neighbouring marks are joined");
+    add_length(command, "--contour-thickness", thickness, "", "thickness of a body whose contours all lie on one slice");
 }
 
 std::vector<PointCloud> ContourFlags::read(const ReadPointsOptions& reading, const ImageGeometry* geometry,

@@ -23,6 +23,7 @@ std::string text_of(const Vec3& v, int decimals) {
 }  // namespace
 
 void EvidenceFlags::bind(CLI::App& command) {
+    in_group(command, Group::Output);
     command.add_option("--evidence", path,
                        "table of the slices: distances between surface and marks, surface that rests on neither marks nor edges")
         ->type_name("OUT.csv");

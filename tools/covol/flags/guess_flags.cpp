@@ -29,17 +29,19 @@ Image only(const Image& mask, int label) {
 }  // namespace
 
 void GuessFlags::bind(CLI::App& command) {
+    in_group(command, Group::Marks);
     command.add_option("--guess", paths,
-                       "another tool's result, a mask, mesh or level set: points, contours and seeds correct it near them, "
-                       "everything else stays as it is; with NAME= of that structure")
+                       "another tool's result, a mask, mesh or level set, that marks and seeds correct near them; what is "
+                       "farther away stays as it is")
         ->type_name("[NAME=]FILE")
         ->allow_extra_args(false);
+    in_group(command, Group::ReadingMarks);
     command.add_option("--guess-label", label, "of a mask with several labels the one to correct; the others stay")
         ->check(CLI::PositiveNumber.description(""))
         ->type_name("LABEL");
     add_length(command, "--guess-radius", radius, "",
-               "a mark acts on the guess at least so far around it [12vx, or two of the image's widest spacing; three times its "
-               "distance to the guess where that is more]");
+               "a mark acts on the guess at least so far around it [" + to_text(kCorrectionVoxels) +
+                   "vx, or two of the image's widest spacing; three times its distance to the guess where that is more]");
 }
 
 Guess read_guess(const std::string& path, int label, const ImageGeometry& image, bool force, const RunContext& run) {

@@ -5,10 +5,11 @@
 namespace covol::tool {
 
 void PaintedFlags::bind(CLI::App& command) {
+    in_group(command, Group::Marks);
     command.add_option("--painted", paths,
-                       "label images painted on some slices or in some places, one structure for each label (.seg.nrrd: with "
-                       "its segments' names); NAME=FILE: of that structure")
+                       "label images painted on some slices or in some places; each label is a structure")
         ->type_name("[NAME=]FILE...");
+    in_group(command, Group::ReadingMarks);
     command.add_option("--painted-outside", options.outside_label, "a label that was painted on what belongs to no structure")
         ->check(CLI::PositiveNumber.description(""))
         ->type_name("LABEL");

@@ -39,11 +39,11 @@ std::vector<Vec3> read_side(const std::string& flag, const std::vector<std::stri
 }  // namespace
 
 void SeedFlags::bind(CLI::App& command, bool names) {
-    const std::string more = std::string("files as for points, whose lines are scribbles, or a position in the world; repeatable") +
-                             (names ? "; with NAME= of that structure alone" : "");
+    in_group(command, Group::Marks);
+    const std::string more = ": a position, or a file as for points; repeatable";
     const char* type = names ? "[NAME=]FILE|X,Y,Z" : "FILE|X,Y,Z";
-    command.add_option("--inside", inside, "seeds inside the structure: " + more)->type_name(type)->allow_extra_args(false);
-    command.add_option("--outside", outside, "seeds outside of it, in cavities say: " + more)->type_name(type)->allow_extra_args(false);
+    command.add_option("--inside", inside, "seeds inside the structure" + more)->type_name(type)->allow_extra_args(false);
+    command.add_option("--outside", outside, "seeds outside of it, in cavities too" + more)->type_name(type)->allow_extra_args(false);
 }
 
 Seeds read_seeds(const SeedFlags& flags, const ReadPointsOptions& reading, const ImageGeometry* geometry, double step, const RunContext& run) {

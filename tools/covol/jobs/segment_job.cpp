@@ -89,20 +89,23 @@ void SegmentJob::check_outputs(Outputs& outputs) const {
 }
 
 void SegmentJob::bind(CLI::App& command, bool with_image) {
+    in_group(command, Group::Output);
     command.add_option("-o,--output", output, "the surface as a level set, .vdb")->required()->type_name("OUT.vdb");
     if (with_image) {
         command.add_option("--mask", mask_path, "label image in the image's own geometry; .seg.nrrd for 3D Slicer")
             ->type_name("OUT.nrrd|.nii.gz|.tif|.mha");
-        command.add_option("--table", table_path, "volume, area and fit of each structure and frame")->type_name("OUT.csv");
+        command.add_option("--table", table_path, "volume, area and fit of each structure and frame, as a table")->type_name("OUT.csv");
         evidence.bind(command);
+        in_group(command, Group::Input);
         command.add_option_function<std::string>(
                    "--frame", [this](const std::string& text) { frames = parse_frames("--frame", text); },
-                   "time points of the image, from 0; with several each starts from the one before")
+                   "time points of the image, from 0; of several, each starts from the one before")
             ->type_name("all|N|A-B");
+        in_group(command, Group::Output);
     }
-    command.add_option("--mesh", mesh_path, "triangles")->type_name("OUT.ply|.obj|.stl|.off|.glb");
+    command.add_option("--mesh", mesh_path, "the surface as closed, manifold, outward triangles")->type_name("OUT.ply|.obj|.stl|.off|.glb");
     command.add_option("--density", density_path, "the solid as a fog volume in [0,1]")->type_name("OUT.vdb");
-    command.add_option("--fields", fields_path, "u, distance and edge, for a look inside")->type_name("OUT.vdb");
+    command.add_option("--fields", fields_path, "u, and distance and edge where the flow had them")->type_name("OUT.vdb");
     contours.bind(command, with_image);
     if (with_image) painted.bind(command);
     seeds.bind(command, with_image);
@@ -119,22 +122,28 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
                "(near its marks such a start is a guess that they correct)")
         ->type_name("START")
         ->default_str("auto");
+    in_group(command, Group::Start);
     add_choice(command, "--model", model, {{"guided", Model::Guided}, {"paper", Model::Paper}},
-               "what holds the surface where neither marks nor edges speak: a guess made from the marks, or curvature alone [guided]");
+               "what holds the surface where neither marks nor edges speak: a guess made from the marks, or curvature alone");
+    in_group(command, Group::ReadingMarks);
     add_length(command, "--mark-precision", mark_precision, "", "standard deviation of a mark's place [0.3 of the image's spacing along each axis]");
     domain.bind(command, !with_image);
+    in_group(command, Group::Numerics);
     command.add_option("--coarse-levels", coarse_levels, "levels of twice the voxel size, and so on, that the flow passes first; auto: 1 for a sphere or a box, else 0")
         ->check(CLI::Range(0, 4).description(""))
         ->type_name("N")
         ->default_str("auto");
     if (!with_image) {
+        in_group(command, Group::Clouds);
         add_choice(command, "--holes", holes.policy, {{"close", Holes::Close}, {"open", Holes::Open}, {"flat", Holes::Flat}},
                    "where no points are, the surface goes on smoothly, or the mesh ends (the level set stays closed), or the flattest "
-                   "patch spans it, in both [close]");
+                   "patch spans it, in both");
         add_length(command, "--hole-distance", hole_distance, "",
                    "a hole is where the surface lies farther from all points [3 spacings where they are sparse, at least 3vx]");
     }
-    add_length(command, "--min-component", min_component, "", "drop pieces of the mesh smaller than a cube of this edge");
+    in_group(command, Group::MeshFiles);
+    add_length(command, "--min-component", min_component, "", "drop pieces of the mesh that are smaller than a cube of this edge");
+    in_group(command, Group::Output);
     command.add_flag("--half", half, "store values in .vdb files as 16-bit floats");
     mesh.bind(command);
     if (with_image) image.bind(command, false, false);

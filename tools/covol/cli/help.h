@@ -1,0 +1,49 @@
+#pragma once
+#include <CLI/CLI.hpp>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+// Help of the commands: options in groups, either those that people need first or all of them.
+namespace covol::tool {
+
+/// Groups of options, in the order in which help shows them.
+enum class Group { Input, Marks, ReadingMarks, Clouds, Output, MeshFiles, Start, Domain, Edges, Flow, Numerics, Help };
+
+/// Options that are added to `command` from here on stand in this group.
+void in_group(CLI::App& command, Group group);
+
+/// Groups are for help alone: CLI11 would sort the options of a configuration file by them.
+void forget_groups(CLI::App& command);
+
+/// An option as help shows it.
+struct OptionHelp {
+    std::string names;          ///< "-o, --output"; empty for a positional
+    std::string value;          ///< "OUT.vdb"; empty for a flag
+    std::string text;           ///< without the default
+    std::string default_value;  ///< what holds where it is not given, a number or words; empty: nothing
+    bool required = false;
+};
+[[nodiscard]] OptionHelp help_of(const CLI::Option& option);
+
+class Help : public CLI::FormatterBase {
+public:
+    /// What `--help` of this command shows beside the required options; `--help-all` shows all. Without this both do.
+    /// @param names  "--points", or a positional's name
+    void show_first(const CLI::App& command, const std::vector<std::string>& names);
+
+    [[nodiscard]] std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const override;
+
+    /// Every option of every command, in groups, as JSON: what the tables in docs/commands are made of.
+    [[nodiscard]] std::string describe(const CLI::App& program) const;
+
+private:
+    [[nodiscard]] bool is_shown(const CLI::App& command, const CLI::Option& option, bool all) const;
+    [[nodiscard]] std::string command_help(const CLI::App& command, const std::string& name, bool all) const;
+    [[nodiscard]] std::string program_help(const CLI::App& program, const std::string& name, bool all) const;
+
+    std::map<const CLI::App*, std::set<const CLI::Option*>> first_;
+};
+
+}  // namespace covol::tool
