@@ -446,7 +446,7 @@ def write_tables(results):
 
 
 def summary(results):
-    """What the README shows."""
+    """What docs/benchmarks.md shows."""
     blocks = []
     if found := read_results(results, "sphere"):
         machine, rows = found
@@ -473,13 +473,13 @@ def summary(results):
     return "\n".join(blocks)
 
 
-def update_readme(results):
-    readme = HERE.parent.parent / "README.md"
-    begin, end = "<!-- bench: written by tests/bench/run.sh --update-readme -->\n", "<!-- bench: end -->"
-    text = readme.read_text()
+def update_docs(results):
+    page = HERE.parent.parent / "docs/benchmarks.md"
+    begin, end = "<!-- bench: written by tests/bench/run.sh --update-docs -->\n", "<!-- bench: end -->"
+    text = page.read_text()
     head, rest = text.split(begin)
     _, tail = rest.split(end)
-    readme.write_text(head + begin + summary(results) + end + tail)
+    page.write_text(head + begin + summary(results) + end + tail)
 
 
 def main():
@@ -489,7 +489,7 @@ def main():
     parser.add_argument("--results", help="where tables and plot go [tests/bench/results; quick: build folder/quick]")
     parser.add_argument("--only", default=",".join(PARTS), help="parts to run, separated by commas; '' makes tables and plot again")
     parser.add_argument("--quick", action="store_true", help="small sizes, one repetition")
-    parser.add_argument("--update-readme", action="store_true", help="put the main tables into README.md")
+    parser.add_argument("--update-docs", action="store_true", help="put the main tables into docs/benchmarks.md")
     options = parser.parse_args()
     if options.results is None:
         options.results = pathlib.Path(options.build) / "quick" if options.quick else HERE / "results"
@@ -514,8 +514,8 @@ def main():
     results = pathlib.Path(options.results)
     write_tables(results)
     plots.draw(results / "speed.png", {part: read_results(results, part) for part in TITLES})
-    if options.update_readme:
-        update_readme(results)
+    if options.update_docs:
+        update_docs(results)
     print(f"wrote {results}/table.md and {results}/speed.png")
     return 1 if failed else 0
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds covol with its benchmarks, runs them, and writes tables (.csv, table.md) and speed.png into tests/bench/results.
 #
-#   bash tests/bench/run.sh [--quick] [--only PART,PART...] [--update-readme] ...     (--help lists the parts)
+#   bash tests/bench/run.sh [--quick] [--only PART,PART...] [--update-docs] ...     (--help lists the parts)
 #
 # The whole of it takes about a quarter of an hour on two idle cores; --quick about three minutes, for a look at the
 # machinery. Set COVOL_DATA to also run the jobs on larger data.

@@ -34,7 +34,7 @@ void add_surface(Session& session) {
     command->add_option("u", job->input, "what `covol evolve` wrote")->required()->type_name("U.vdb");
     in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "the grid 'surface', .vdb")->required()->type_name("OUT.vdb");
-    command->add_option("--density", job->density_path, "the solid as a fog volume in [0,1]")->type_name("OUT.vdb");
+    command->add_option("--density", job->density_path, "the solid as a fog volume, 0 to 1")->type_name("OUT.vdb");
     command->add_flag("--half", job->half, "store values as 16-bit floats");
 }
 

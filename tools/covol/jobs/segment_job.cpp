@@ -104,7 +104,7 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
         in_group(command, Group::Output);
     }
     command.add_option("--mesh", mesh_path, "the surface as closed, manifold, outward triangles")->type_name("OUT.ply|.obj|.stl|.off|.glb");
-    command.add_option("--density", density_path, "the solid as a fog volume in [0,1]")->type_name("OUT.vdb");
+    command.add_option("--density", density_path, "the solid as a fog volume, 0 to 1")->type_name("OUT.vdb");
     command.add_option("--fields", fields_path, "u, and distance and edge where the flow had them")->type_name("OUT.vdb");
     contours.bind(command, with_image);
     if (with_image) painted.bind(command);

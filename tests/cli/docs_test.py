@@ -1,0 +1,84 @@
+"""The commands in README.md and docs run as they are printed, and the names of options in them exist. Standard library only.
+
+    COVOL=build/bin/covol python3 -m unittest tests/cli/docs_test.py
+
+Blocks that begin with ```bash are run, those of a page one after the other, in a folder that holds the sample data and an empty
+folder out; the program is found as covol. Other blocks are only read. They make the pictures that the page shows: with COVOL_PICTURES
+set to a folder, these are put there.
+"""
+import json
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+COVOL = pathlib.Path(os.environ.get("COVOL", "build/bin/covol")).resolve()
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md")), ROOT / "houdini_free_examples/README.md"]
+
+
+def blocks(page, language=None):
+    found = re.findall(r"^```(\w*)\n(.*?)^```$", page.read_text(), re.M | re.S)
+    return [text for name, text in found if language is None or name == language]
+
+
+class Pages(unittest.TestCase):
+    def run_page(self, page):
+        folder = pathlib.Path(tempfile.mkdtemp(prefix="covol-docs-"))
+        self.addCleanup(shutil.rmtree, folder)
+        for name in ("houdini_free_examples", "tests"):
+            (folder / name).symlink_to(ROOT / name)
+        for name in ("bin", "out"):
+            (folder / name).mkdir()
+        (folder / "bin/covol").symlink_to(COVOL)
+        path = f"{folder / 'bin'}:/usr/bin:{os.environ['PATH']}"
+        for block in blocks(page, "bash"):
+            done = subprocess.run(["bash", "-euo", "pipefail", "-c", block], capture_output=True, text=True, timeout=300, cwd=folder,
+                                  env={**os.environ, "PATH": path})
+            self.assertEqual(done.returncode, 0, f"{block}\n{done.stdout}\n{done.stderr}")
+        for picture in re.findall(r"\]\([./]*pictures/([\w.]+)\)", page.read_text()):
+            made = folder / "out" / picture
+            self.assertTrue(made.exists(), f"{page.relative_to(ROOT)}: no command makes {picture}")
+            if "COVOL_PICTURES" in os.environ:
+                shutil.copyfile(made, pathlib.Path(os.environ["COVOL_PICTURES"]) / picture)
+
+    def test_pictures_are_small_and_shown(self):
+        shown = {name for page in PAGES for name in re.findall(r"pictures/([\w.]+\.png)", page.read_text())}
+        for picture in (ROOT / "docs/pictures").iterdir():
+            self.assertLessEqual(picture.stat().st_size, 60_000, picture.name)
+            self.assertIn(picture.name, shown)
+
+    def test_options_exist(self):
+        described = json.loads(subprocess.run([COVOL, "--describe-options"], capture_output=True, text=True, check=True).stdout)
+        names = lambda groups: {name for g in groups for o in g["options"] for name in o["names"].split(", ")}
+        common = names(described["common"])
+        options = {c["name"]: names(c["groups"]) | common for c in described["commands"]}
+        every = set().union(*options.values())
+        for page in PAGES:
+            for block in blocks(page):
+                for line in re.sub(r"\\\n", " ", block).splitlines():
+                    if command := re.match(r"\s*covol (\w+)", line):
+                        for flag in re.findall(r"(?<=\s)--?[a-z][\w-]*", line.split("#")[0]):
+                            self.assertIn(flag, options[command[1]], f"{page.relative_to(ROOT)}: {line}")
+            prose = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.M | re.S)
+            for flag in re.findall(r"(?<=`)--[a-z][\w-]*", prose):
+                if page.name not in ("benchmarks.md", "CONTRIBUTING.md"):  # which name options of other programs, too
+                    self.assertIn(flag, every, f"{page.relative_to(ROOT)}")
+
+    def test_links_lead_somewhere(self):
+        for page in PAGES:
+            for target in re.findall(r"\]\(([^)#\s]+)(?:#[\w-]*)?\)", page.read_text()):
+                if not target.startswith("http"):
+                    self.assertTrue((page.parent / target).exists(), f"{page.relative_to(ROOT)}: {target}")
+
+
+for path in PAGES:
+    if blocks(path, "bash"):
+        name = "test_" + re.sub(r"\W", "_", str(path.relative_to(ROOT).with_suffix("")))
+        setattr(Pages, name, lambda self, path=path: self.run_page(path))
+
+if __name__ == "__main__":
+    unittest.main()
