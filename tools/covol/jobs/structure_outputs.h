@@ -1,0 +1,57 @@
+#pragma once
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/table.h"
+#include "covol/structures.h"
+#include "flags/evidence_flags.h"
+#include "jobs/segment_job.h"
+#include "jobs/structure_inputs.h"
+
+// What came out for each structure, and the files and reports that it goes to.
+namespace covol::tool {
+
+/// What came out for one.
+struct StructureOutput {
+    std::string name, grid;
+    std::vector<Vec3> marks;  ///< as they were clicked
+    Json input;               ///< of the report
+    SegmentResult result;
+    std::optional<Evidence> evidence;
+    int label = 0;                           ///< in the mask
+    std::optional<CorrectedMask> corrected;  ///< of a guess that is a mask in the image's geometry
+};
+
+/// All structures of one image, disjoint.
+struct StructuresOutput {
+    ImageGeometry geometry;
+    std::vector<StructureOutput> structures;
+    Json overlaps = Json::array();
+    [[nodiscard]] std::vector<std::string> names() const;
+    [[nodiscard]] std::vector<int> labels() const;
+};
+
+/// Their surfaces.
+[[nodiscard]] std::vector<Structure> solids(const StructuresOutput& output);
+
+/// One file for each output that was asked for, `tag` ("_t003", say) in front of their endings.
+using Sink = std::function<void(const std::string& path, std::function<void(const std::string& path)> write)>;
+void hand_over(const SegmentJob& job, const std::shared_ptr<const StructuresOutput>& output, const std::string& tag,
+               Session& session, const Sink& sink);
+/// Checks those names. @throws Error as Outputs::check().
+void check_outputs(const SegmentJob& job, const std::vector<StructureInput>& inputs, const std::string& tag, Outputs& outputs);
+
+/// {"structures": [...], "overlaps": [...]}, or the fields of the only one that has no name.
+[[nodiscard]] Json to_json(const StructuresOutput& output);
+
+/// The table's columns for a structure's result, and their values.
+[[nodiscard]] std::vector<std::string> result_columns();
+void add_result(Table& table, const std::string& name, int label, const SegmentReport& report);
+
+/// "out.ply", "_ve" -> "out_ve.ply"; endings of two parts (.nii.gz, .seg.nrrd) stay whole.
+[[nodiscard]] std::string with_suffix(const std::string& path, const std::string& suffix);
+
+}  // namespace covol::tool
