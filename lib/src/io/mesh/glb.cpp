@@ -41,8 +41,7 @@ private:
     };
 
     [[noreturn]] void unsupported(const std::string& what) const {
-        throw Error(Errc::Unsupported, "read_mesh: " + source_.path() + ": " + what + " is not read; export plain triangles without compression, "
-                                       "or .ply, .obj or .stl");
+        source_.unsupported(what + " is not read; export plain triangles without compression, or .ply, .obj or .stl");
     }
 
     void read_chunks() {
@@ -93,8 +92,8 @@ private:
         for (const Json& node : list("nodes"))
             for (const char* key : {"matrix", "translation", "rotation", "scale"})
                 if (node.is_object() && node.contains(key))
-                    throw Error(Errc::Unsupported, "read_mesh: " + source_.path() + ": a node with a " + key +
-                                                       " is not read; apply the objects' transforms before the export");
+                    source_.unsupported(std::string("a node with a ") + key +
+                                        " is not read; apply the objects' transforms before the export");
     }
 
     Accessor accessor(const Json& number, const char* type, std::uint64_t components) const {
@@ -132,7 +131,7 @@ private:
             for (std::uint64_t n = 0; n < data.count; ++n) {
                 std::array<float, 3> p{};
                 std::memcpy(p.data(), data.bytes.data() + n * data.stride, sizeof(p));
-                builder_.vertex(p[0], p[1], p[2]);
+                builder_.vertex({p[0], p[1], p[2]});
             }
         }
         return {known->second, data.count};
@@ -148,7 +147,7 @@ private:
                 source_.fail("a triangle refers to vertex " + std::to_string(vertex) + " of " + std::to_string(count));
             corners.push_back(std::uint32_t(first + vertex));
             if (corners.size() < 3) return;
-            builder_.polygon(corners);
+            builder_.face(corners);
             corners.clear();
         };
         if (!primitive.contains("indices")) {

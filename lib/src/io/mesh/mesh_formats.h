@@ -1,20 +1,22 @@
 #pragma once
-// A reader and a writer for each format of meshes.
+// A reader and a writer for each format of meshes; clouds are read from PLY, OBJ and OFF by the same readers.
 #include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "io/mesh/mesh_builder.h"
 #include "io/mesh/mesh_output.h"
 #include "io/mesh/mesh_source.h"
 
 namespace covol::mesh_io {
 
+/// Counts of the file are checked against its size before the receiver hears of them.
 /// @param source  the file's text from its begin; errors say where in it
-/// @throws Error InvalidInput, Unsupported.
-[[nodiscard]] TriangleMesh read_ply(Source& source);
-[[nodiscard]] TriangleMesh read_obj(Source& source);
-[[nodiscard]] TriangleMesh read_off(Source& source);
+/// @throws Error InvalidInput, Unsupported; what the receiver throws.
+void read_ply(Source& source, Receiver& receiver);
+void read_obj(Source& source, Receiver& receiver);
+void read_off(Source& source, Receiver& receiver);
 /// @param text  the whole file, whose size tells binary from ASCII
 [[nodiscard]] TriangleMesh read_stl(Source& source, std::string_view text);
 [[nodiscard]] TriangleMesh read_glb(Source& source, std::string_view text);

@@ -139,12 +139,17 @@ TriangleMesh read_mesh(const std::string& path) {
     if (!is_mesh_name(path))
         throw Error(Errc::Unsupported, "read_mesh: " + path + ": expected a name that ends in .ply, .obj, .stl, .off or .glb, got '" + end + "'");
     const std::string text = read_file(path);
-    Source source(path, text);
-    TriangleMesh mesh = end == ".ply"   ? read_ply(source)
-                        : end == ".obj" ? read_obj(source)
+    Source source("read_mesh", path, text);
+    const auto built = [&](void (*read)(Source&, Receiver&)) {
+        MeshBuilder builder(source);
+        read(source, builder);
+        return builder.finish();
+    };
+    TriangleMesh mesh = end == ".ply"   ? built(read_ply)
+                        : end == ".obj" ? built(read_obj)
                         : end == ".stl" ? read_stl(source, text)
                         : end == ".glb" ? read_glb(source, text)
-                                        : read_off(source);
+                                        : built(read_off);
     if (mesh.empty()) throw Error(Errc::InvalidInput, "read_mesh: " + path + ": the file has no triangle");
     return mesh;
 }

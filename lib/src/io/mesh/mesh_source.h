@@ -1,134 +1,106 @@
 #pragma once
-// What the readers of mesh files share.
-#include <array>
-#include <charconv>
+// What the readers of mesh files share: where they read from, and whom they tell what the file holds.
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <optional>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
+#include "base/text.h"
 #include "covol/error.h"
-#include "covol/mesh.h"
+#include "covol/fwd.h"
 
 namespace covol::mesh_io {
-
-using Face = std::array<std::uint32_t, 3>;
-
-inline std::string_view next_word(std::string_view& line) {
-    const auto is_space = [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; };
-    std::size_t begin = 0;
-    while (begin < line.size() && is_space(line[begin])) ++begin;
-    std::size_t end = begin;
-    while (end < line.size() && !is_space(line[end])) ++end;
-    const std::string_view word = line.substr(begin, end - begin);
-    line.remove_prefix(end);
-    return word;
-}
-
-template <typename T>
-std::optional<T> to_number(std::string_view word) {
-    if (!word.empty() && word.front() == '+') word.remove_prefix(1);
-    T value{};
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error != std::errc() || end != word.data() + word.size()) return std::nullopt;
-    return value;
-}
 
 /// A file in memory, read line by line or byte by byte; knows where it is for messages.
 class Source {
 public:
-    Source(const std::string& path, std::string_view text) : path_(path), rest_(text) {}
+    /// @param reader  the function that messages begin with; path and text must outlive this
+    Source(const char* reader, const std::string& path, std::string_view text) : reader_(reader), path_(path), lines_(text) {}
 
-    [[nodiscard]] const std::string& path() const { return path_; }
-    [[nodiscard]] bool at_end() const { return rest_.empty(); }
-    [[nodiscard]] std::size_t bytes_left() const { return rest_.size(); }
+    [[nodiscard]] bool at_end() const { return lines_.rest().empty(); }
+    [[nodiscard]] std::size_t bytes_left() const { return lines_.rest().size(); }
+    [[nodiscard]] std::string_view rest() const { return lines_.rest(); }
 
+    /// Blanks at both ends are removed.
     std::string_view line() {
-        if (rest_.empty()) fail("unexpected end of the file");
-        const std::size_t end = rest_.find('\n');
-        std::string_view line = rest_.substr(0, end);
-        rest_.remove_prefix(end == std::string_view::npos ? rest_.size() : end + 1);
-        ++line_;
-        if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+        std::string_view line;
+        if (!lines_.next(line)) fail("unexpected end of the file");
         return line;
     }
 
-    /// The next line that is neither blank nor a comment, without its comment.
+    /// The next line that is neither blank nor a comment, without its comment; false at the end of the file.
+    bool next_content(std::string_view& line) { return lines_.next_content(line); }
     std::string_view content_line() {
-        for (;;) {
-            const std::string_view text = line();
-            const std::string_view content = text.substr(0, text.find('#'));
-            if (content.find_first_not_of(" \t") != std::string_view::npos) return content;
-        }
+        std::string_view line;
+        if (!lines_.next_content(line)) fail("unexpected end of the file");
+        return line;
     }
 
+    /// From here on messages name no line.
     std::string_view bytes(std::size_t count) {
-        if (count > rest_.size()) fail("the file is cut off");
-        const std::string_view result = rest_.substr(0, count);
-        rest_.remove_prefix(count);
+        is_text_ = false;
+        if (count > bytes_left()) fail("the file is cut off");
+        const std::string_view result = lines_.rest().substr(0, count);
+        lines_.skip(count);
         return result;
     }
 
     template <typename T>
     T number(std::string_view& line, const char* what) {
-        const std::string_view word = next_word(line);
-        const auto value = to_number<T>(word);
-        if (!value)
-            fail(std::string("expected ") + what + ", got " +
-                 (word.empty() ? "the end of the line" : "'" + std::string(word.substr(0, 40)) + "'"));
+        const std::string_view word = detail::next_word(line);
+        const auto value = detail::to_number<T>(word);
+        if (!value) fail(std::string("expected ") + what + ", got " + (word.empty() ? "the end of the line" : detail::quote(word)));
         return *value;
     }
 
-    [[noreturn]] void fail(const std::string& what) const {
-        throw Error(Errc::InvalidInput, "read_mesh: " + path_ + (line_ > 0 ? ":" + std::to_string(line_) : "") + ": " + what);
+    /// The first three numbers of what is left of a line.
+    Vec3 three_numbers(std::string_view line) {
+        Vec3 p{};
+        for (std::size_t a = 0; a < 3; ++a) {
+            if (detail::trim(line).empty()) fail("expected 3 numbers, got " + std::to_string(a));
+            p[a] = number<double>(line, "a number");
+        }
+        return p;
     }
 
+    void check_finite(std::uint64_t vertex, double x, double y, double z) const {
+        if (!std::isfinite(x) || !std::isfinite(y) || !std::isfinite(z))
+            fail("vertex " + std::to_string(vertex) + ": expected finite numbers, got coordinates that are not finite");
+    }
+
+    [[noreturn]] void fail(const std::string& what) const { fail(Errc::InvalidInput, what); }
+    [[noreturn]] void unsupported(const std::string& what) const { fail(Errc::Unsupported, what); }
+
 private:
-    const std::string path_;
-    std::string_view rest_;
-    std::size_t line_ = 0;
+    [[noreturn]] void fail(Errc code, const std::string& what) const {
+        const std::string line = is_text_ && lines_.number() > 0 ? ":" + std::to_string(lines_.number()) : "";
+        throw Error(code, std::string(reader_) + ": " + path_ + line + ": " + what);
+    }
+
+    const char* reader_;
+    const std::string& path_;
+    detail::Lines lines_;
+    bool is_text_ = true;
 };
 
-/// Collects vertices and polygons, and checks them.
-class MeshBuilder {
+/// Takes what a file holds, in the file's order: read_mesh() makes triangles of it, read_points() a cloud. What it does
+/// not want is not looked at beyond where it ends.
+class Receiver {
 public:
-    explicit MeshBuilder(const Source& source) : source_(source) {}
-
-    void reserve_vertices(std::size_t count) { mesh_.vertices.reserve(count); }
-    [[nodiscard]] std::size_t vertex_count() const { return mesh_.vertices.size(); }
-
-    void vertex(double x, double y, double z) {
-        const std::array<float, 3> p{float(x), float(y), float(z)};
-        if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2]))
-            source_.fail("vertex " + std::to_string(vertex_count()) + ": coordinates that are not finite");
-        if (vertex_count() >= std::numeric_limits<std::uint32_t>::max()) source_.fail("more than 2^32 vertices");
-        mesh_.vertices.push_back(p);
-    }
-
-    /// A fan; pieces with a repeated corner have no area and are left out.
-    void polygon(const std::vector<std::uint32_t>& corners) {
-        for (std::size_t i = 2; i < corners.size(); ++i)
-            if (corners[0] != corners[i - 1] && corners[i - 1] != corners[i] && corners[i] != corners[0])
-                mesh_.triangles.push_back({corners[0], corners[i - 1], corners[i]});
-    }
-
-    /// Faces may come before the vertices that they name, so their numbers are checked here.
-    TriangleMesh finish() {
-        for (const Face& t : mesh_.triangles)
-            for (const std::uint32_t v : t)
-                if (v >= vertex_count())
-                    source_.fail("a face refers to vertex " + std::to_string(v) + " (from 0), the file has " +
-                                 std::to_string(vertex_count()));
-        return std::move(mesh_);
-    }
-
-private:
-    const Source& source_;
-    TriangleMesh mesh_;
+    virtual ~Receiver() = default;
+    [[nodiscard]] virtual bool wants_faces() const { return false; }
+    [[nodiscard]] virtual bool wants_normals() const { return false; }
+    /// So many at most; the file has room for them.
+    virtual void expect_vertices(std::size_t count, bool with_normals) = 0;
+    virtual void vertex(const Vec3& position) = 0;
+    /// The next vertex's that has none yet; any length.
+    virtual void normal(const Vec3&) {}
+    /// A face gives a vertex another normal than the one of its number.
+    virtual void mixed_normals() {}
+    /// May name vertices that are yet to come, or that there are not.
+    virtual void face(const std::vector<std::uint32_t>&) {}
 };
 
 inline std::uint32_t to_index(const Source& source, double value) {

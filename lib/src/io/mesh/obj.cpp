@@ -1,5 +1,4 @@
-// OBJ, its polygons as fans.
-#include <optional>
+// OBJ: vertices, their normals, polygons.
 #include <string>
 #include <vector>
 
@@ -8,30 +7,62 @@
 
 namespace covol::mesh_io {
 
-TriangleMesh read_obj(Source& source) {
-    MeshBuilder mesh(source);
+using detail::next_word, detail::quote, detail::to_number;
+
+namespace {
+
+/// Whether a face gives a vertex another normal than the one of the same number.
+bool mixes_normals(std::string_view corners) {
+    for (std::string_view corner = next_word(corners); !corner.empty(); corner = next_word(corners)) {
+        const std::size_t first = corner.find('/'), last = corner.rfind('/');
+        if (first != last && corner.substr(0, first) != corner.substr(last + 1)) return true;
+    }
+    return false;
+}
+
+/// The numbers of a face's vertices, from 0. @param count  of the vertices before it
+void read_corners(const Source& source, std::string_view line, std::int64_t count, std::vector<std::uint32_t>& corners) {
+    corners.clear();
+    for (std::string_view word = next_word(line); !word.empty() && word[0] != '#'; word = next_word(line)) {
+        const auto number = to_number<std::int64_t>(word.substr(0, word.find('/')));
+        // From 1, or from the end when negative.
+        if (!number || *number == 0) source.fail("expected the number of a vertex, got " + quote(word));
+        corners.push_back(to_index(source, double(*number > 0 ? *number - 1 : count + *number)));
+    }
+    if (corners.size() < 3) source.fail("expected a face of at least 3 vertices, got " + std::to_string(corners.size()));
+}
+
+/// 0 of what is no direction.
+Vec3 direction(std::string_view line) {
+    Vec3 n{};
+    for (double& c : n) {
+        const std::string_view word = next_word(line);
+        if (word.empty()) return {0, 0, 0};
+        c = to_number(word).value_or(0);
+    }
+    return n;
+}
+
+}  // namespace
+
+void read_obj(Source& source, Receiver& receiver) {
+    std::int64_t vertices = 0;
     std::vector<std::uint32_t> corners;
     while (!source.at_end()) {
         std::string_view line = source.line();
         const std::string_view key = next_word(line);
         if (key == "v") {
-            Vec3 p{};
-            for (double& c : p) c = source.number<double>(line, "a coordinate");
-            mesh.vertex(p[0], p[1], p[2]);
+            receiver.vertex(source.three_numbers(line));
+            ++vertices;
+        } else if (key == "vn" && receiver.wants_normals()) {
+            receiver.normal(direction(line));
         } else if (key == "f") {
-            corners.clear();
-            for (std::string_view word = next_word(line); !word.empty() && word[0] != '#'; word = next_word(line)) {
-                const auto number = to_number<std::int64_t>(word.substr(0, word.find('/')));
-                // From 1, or from the end when negative.
-                if (!number || *number == 0)
-                    source.fail("expected the number of a vertex, got '" + std::string(word.substr(0, 40)) + "'");
-                corners.push_back(to_index(source, double(*number > 0 ? *number - 1 : std::int64_t(mesh.vertex_count()) + *number)));
-            }
-            if (corners.size() < 3) source.fail("expected a face of at least 3 vertices, got " + std::to_string(corners.size()));
-            mesh.polygon(corners);
+            if (receiver.wants_normals() && mixes_normals(line)) receiver.mixed_normals();
+            if (!receiver.wants_faces()) continue;
+            read_corners(source, line, vertices, corners);
+            receiver.face(corners);
         }
     }
-    return mesh.finish();
 }
 
 void write_obj_object(Output& out, const Prepared& in, std::uint64_t first) {

@@ -1,4 +1,5 @@
-// OFF, its polygons as fans.
+// OFF, as Geomview writes it with colours or normals beside the coordinates.
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -7,37 +8,58 @@
 
 namespace covol::mesh_io {
 
-TriangleMesh read_off(Source& source) {
+using detail::lower, detail::next_word, detail::quote, detail::to_number, detail::trim;
+
+namespace {
+
+/// The counts may follow on the same line; what is left of it.
+std::string_view read_key(Source& source) {
     std::string_view line = source.content_line();
     const std::string_view key = next_word(line);
-    if (key != "OFF" && key != "COFF" && key != "NOFF" && key != "CNOFF")
-        source.fail("expected 'OFF' in the first line, got '" + std::string(key.substr(0, 40)) + "'");
-    if (line.find_first_not_of(" \t") == std::string_view::npos) line = source.content_line();
-    const auto vertices = source.number<std::uint64_t>(line, "the number of vertices");
-    const auto faces = source.number<std::uint64_t>(line, "the number of faces");
-    // "0 0 0" and its line's end are the shortest vertex, a face is no shorter than "0".
-    if (vertices > (source.bytes_left() + 1) / 6 || faces > (source.bytes_left() + 1) / 2)
-        source.fail("the header promises " + std::to_string(vertices) + " vertices and " + std::to_string(faces) +
-                    " faces, more than the file has room for");
-    MeshBuilder mesh(source);
-    mesh.reserve_vertices(vertices);
-    for (std::uint64_t i = 0; i < vertices; ++i) {
-        line = source.content_line();
-        Vec3 p{};
-        for (double& c : p) c = source.number<double>(line, "a coordinate");
-        mesh.vertex(p[0], p[1], p[2]);
+    if (!lower(key).ends_with("off")) source.fail("expected 'OFF' in the first line, got " + quote(key));
+    // A small n before OFF stands for n dimensions, a capital one for normals.
+    if (key.find('4') != std::string_view::npos || key.ends_with("nOFF"))
+        source.unsupported("expected three coordinates, got " + quote(key));
+    std::string_view rest = line;
+    if (lower(next_word(rest)) == "binary") source.unsupported("expected an ascii OFF, got a binary one");
+    return trim(line);
+}
+
+/// @param fewest_bytes  that one of them takes
+std::size_t read_count(const Source& source, std::string_view& line, const std::string& what, std::size_t fewest_bytes) {
+    const std::string_view word = next_word(line);
+    const auto count = to_number(word);
+    if (!count) source.fail("expected the number of " + what + ", got " + (word.empty() ? "the end of the line" : quote(word)));
+    // One too many is told where the file ends.
+    if (!(*count >= 0) || *count != std::floor(*count) || *count > double(source.bytes_left() / fewest_bytes + 1))
+        source.fail("expected no more than the file has room for, a file of this size cannot hold " + quote(word) + " " + what);
+    return std::size_t(*count);
+}
+
+}  // namespace
+
+void read_off(Source& source, Receiver& receiver) {
+    std::string_view line = read_key(source);
+    if (line.empty()) line = source.content_line();
+    const std::size_t vertices = read_count(source, line, "vertices", sizeof("0 0 0\n") - 1);
+    const std::size_t faces = receiver.wants_faces() ? read_count(source, line, "faces", sizeof("0\n") - 1) : 0;
+    receiver.expect_vertices(vertices, false);
+    for (std::size_t i = 0; i < vertices; ++i) {
+        if (!source.next_content(line))
+            source.fail("unexpected end of the file: expected " + std::to_string(vertices) + " vertices, got " + std::to_string(i) +
+                        "; the file is truncated");
+        receiver.vertex(source.three_numbers(line));
     }
     std::vector<std::uint32_t> corners;
-    for (std::uint64_t i = 0; i < faces; ++i) {
+    for (std::size_t i = 0; i < faces; ++i) {
         line = source.content_line();
         const auto count = source.number<std::uint64_t>(line, "the number of a face's vertices");
         if (count > line.size()) source.fail("a face of " + std::to_string(count) + " vertices in a shorter line");
         corners.clear();
         for (std::uint64_t k = 0; k < count; ++k)
             corners.push_back(to_index(source, source.number<double>(line, "the number of a vertex")));
-        mesh.polygon(corners);
+        receiver.face(corners);
     }
-    return mesh.finish();
 }
 
 void write_off(Output& out, const Prepared& in) {

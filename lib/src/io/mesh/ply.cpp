@@ -1,31 +1,41 @@
 // PLY: ASCII and both byte orders, with elements and properties of any kind beside the mesh.
 #include <algorithm>
-#include <cmath>
-#include <cstring>
+#include <bit>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "base/load.h"
 #include "covol/error.h"
 #include "io/mesh/mesh_formats.h"
 
 namespace covol::mesh_io {
+
+using detail::load, detail::lower, detail::next_word, detail::quote, detail::to_number;
+
 namespace {
 
-struct PlyType {
-    char kind;  ///< 'i'nteger, 'u'nsigned, 'f'loat
-    int size;
-};
+enum class PlyType { Int8, UInt8, Int16, UInt16, Int32, UInt32, Float, Double };
 struct PlyProperty {
-    std::string name;
-    PlyType type;
+    std::string name;  ///< in lower case
+    PlyType type = PlyType::Float;
     std::optional<PlyType> count;  ///< of a list
 };
 struct PlyElement {
     std::string name;
     std::uint64_t count = 0;
     std::vector<PlyProperty> properties;
+
+    [[nodiscard]] bool has_list() const {
+        return std::any_of(properties.begin(), properties.end(), [](const PlyProperty& p) { return p.count.has_value(); });
+    }
+    /// A property's place among all; their number where there is none of that name that is no list.
+    [[nodiscard]] std::size_t number_named(std::string_view wanted) const {
+        const auto at = std::find_if(properties.begin(), properties.end(),
+                                     [&](const PlyProperty& p) { return p.name == wanted && !p.count; });
+        return std::size_t(at - properties.begin());
+    }
 };
 enum class PlyFormat { Ascii, Little, Big };
 
@@ -33,155 +43,286 @@ PlyType ply_type(const Source& source, std::string_view name) {
     static constexpr struct {
         std::string_view name;
         PlyType type;
-    } kTypes[] = {{"char", {'i', 1}},  {"int8", {'i', 1}},   {"uchar", {'u', 1}},   {"uint8", {'u', 1}},
-                  {"short", {'i', 2}}, {"int16", {'i', 2}},  {"ushort", {'u', 2}},  {"uint16", {'u', 2}},
-                  {"int", {'i', 4}},   {"int32", {'i', 4}},  {"uint", {'u', 4}},    {"uint32", {'u', 4}},
-                  {"float", {'f', 4}}, {"float32", {'f', 4}}, {"double", {'f', 8}}, {"float64", {'f', 8}}};
+    } kTypes[] = {{"char", PlyType::Int8},     {"int8", PlyType::Int8},     {"uchar", PlyType::UInt8},   {"uint8", PlyType::UInt8},
+                  {"short", PlyType::Int16},   {"int16", PlyType::Int16},   {"ushort", PlyType::UInt16}, {"uint16", PlyType::UInt16},
+                  {"int", PlyType::Int32},     {"int32", PlyType::Int32},   {"uint", PlyType::UInt32},   {"uint32", PlyType::UInt32},
+                  {"float", PlyType::Float},   {"float32", PlyType::Float}, {"double", PlyType::Double}, {"float64", PlyType::Double}};
     for (const auto& known : kTypes)
         if (known.name == name) return known.type;
-    source.fail("unknown PLY type '" + std::string(name.substr(0, 40)) + "'");
+    source.fail("expected a PLY type such as float or uchar, got " + quote(name));
+}
+
+std::size_t size_of(PlyType type) {
+    switch (type) {
+        case PlyType::Int8:
+        case PlyType::UInt8: return 1;
+        case PlyType::Int16:
+        case PlyType::UInt16: return 2;
+        case PlyType::Double: return 8;
+        default: return 4;
+    }
+}
+
+double load_as(PlyType type, const char* data, bool swap) {
+    switch (type) {
+        case PlyType::Int8: return load<std::int8_t>(data, swap);
+        case PlyType::UInt8: return load<std::uint8_t>(data, swap);
+        case PlyType::Int16: return load<std::int16_t>(data, swap);
+        case PlyType::UInt16: return load<std::uint16_t>(data, swap);
+        case PlyType::Int32: return load<std::int32_t>(data, swap);
+        case PlyType::UInt32: return load<std::uint32_t>(data, swap);
+        case PlyType::Float: return load<float>(data, swap);
+        case PlyType::Double: break;
+    }
+    return load<double>(data, swap);
 }
 
 class PlyReader {
 public:
-    explicit PlyReader(Source& source) : source_(source) {}
+    PlyReader(Source& source, Receiver& receiver) : source_(source), receiver_(receiver) {}
 
-    TriangleMesh read() {
+    void read() {
         read_header();
-        MeshBuilder mesh(source_);
         for (const PlyElement& element : elements_) {
-            check_size(element);
-            if (element.name == "vertex") read_vertices(element, mesh);
-            else if (element.name == "face") read_faces(element, mesh);
-            else for_each_row(element, [](std::size_t, const std::vector<double>&) {}, [] {});
+            if (element.name == "vertex") read_vertices(element);
+            else if (element.name == "face" && receiver_.wants_faces()) read_faces(element);
+            else for_each_row(element, 0, [] {});
         }
-        return mesh.finish();
     }
 
 private:
+    /// Where a property stands in the row at hand: its first word, or its first byte, behind the length of a list.
+    struct Place {
+        std::size_t at = 0, count = 1;
+    };
+
     void read_header() {
         if (source_.line() != "ply") source_.fail("expected 'ply' in the first line");
+        std::optional<PlyFormat> format;
         for (;;) {
             std::string_view line = source_.line();
             const std::string_view key = next_word(line);
-            if (key == "end_header") return;
-            if (key == "format") {
-                const std::string_view name = next_word(line);
-                if (name == "ascii") format_ = PlyFormat::Ascii;
-                else if (name == "binary_little_endian") format_ = PlyFormat::Little;
-                else if (name == "binary_big_endian") format_ = PlyFormat::Big;
-                else source_.fail("unknown PLY format '" + std::string(name.substr(0, 40)) + "'");
-            } else if (key == "element") {
-                PlyElement element;
-                element.name = next_word(line);
-                element.count = source_.number<std::uint64_t>(line, "the element's count");
-                elements_.push_back(element);
-            } else if (key == "property") {
-                if (elements_.empty()) source_.fail("a property before any element");
-                PlyProperty property;
-                std::string_view type = next_word(line);
-                if (type == "list") {
-                    property.count = ply_type(source_, next_word(line));
-                    type = next_word(line);
-                }
-                property.type = ply_type(source_, type);
-                property.name = next_word(line);
-                elements_.back().properties.push_back(property);
-            } else if (key != "comment" && key != "obj_info") {
-                source_.fail("unknown PLY header line '" + std::string(key.substr(0, 40)) + "'");
-            }
+            if (key == "end_header") break;
+            if (key == "format") format = format_named(next_word(line));
+            else if (key == "element") add_element(line);
+            else if (key == "property") add_property(line);
+            else if (!key.empty() && key != "comment" && key != "obj_info") source_.fail("unknown PLY header line " + quote(key));
         }
+        if (!format) source_.fail("expected a line 'format' in the PLY header, got none");
+        format_ = *format;
+        swap_ = (format_ == PlyFormat::Big) != (std::endian::native == std::endian::big);
+    }
+
+    [[nodiscard]] PlyFormat format_named(std::string_view name) const {
+        if (name == "ascii") return PlyFormat::Ascii;
+        if (name == "binary_little_endian") return PlyFormat::Little;
+        if (name == "binary_big_endian") return PlyFormat::Big;
+        source_.fail("unknown PLY format " + quote(name));
+    }
+
+    void add_element(std::string_view line) {
+        PlyElement element;
+        element.name = next_word(line);
+        element.count = source_.number<std::uint64_t>(line, "the element's count");
+        elements_.push_back(element);
+    }
+
+    void add_property(std::string_view line) {
+        if (elements_.empty()) source_.fail("a property before any element");
+        PlyProperty property;
+        std::string_view type = next_word(line);
+        if (type == "list") {
+            property.count = ply_type(source_, next_word(line));
+            type = next_word(line);
+        }
+        property.type = ply_type(source_, type);
+        property.name = lower(next_word(line));
+        elements_.back().properties.push_back(property);
     }
 
     /// Refuses counts that the rest of the file has no room for, before any memory is taken.
-    void check_size(const PlyElement& element) const {
-        std::uint64_t least = 0;
-        for (const PlyProperty& property : element.properties)
-            least += format_ == PlyFormat::Ascii ? 2 : std::uint64_t(property.count ? property.count->size : property.type.size);
-        // The last line of a text may lack its end.
-        if (least > 0 && element.count > (source_.bytes_left() + 1) / least)
-            source_.fail("the header promises " + std::to_string(element.count) + " of element '" + element.name +
-                         "', the file has room for at most " + std::to_string((source_.bytes_left() + 1) / least));
+    /// @param wanted  as of for_each_row()
+    void check_size(const PlyElement& element, std::size_t wanted) const {
+        std::uint64_t least = 0, room = source_.bytes_left();
+        if (format_ == PlyFormat::Ascii) {
+            least = 2 * std::max<std::uint64_t>(wanted, 1);
+            ++room;  // the last line may lack its end
+        } else {
+            for (const PlyProperty& property : element.properties) least += size_of(property.count.value_or(property.type));
+        }
+        if (!element.properties.empty() && element.count > room / least)
+            source_.fail("the header promises " + std::to_string(element.count) + " of element " + quote(element.name) +
+                         ", the file has room for at most " + std::to_string(room / least) + "; it is truncated");
     }
 
-    double value(PlyType type, std::string_view& line) {
-        if (format_ == PlyFormat::Ascii) return source_.number<double>(line, "a number");
-        std::array<char, 8> raw{};
-        std::memcpy(raw.data(), source_.bytes(std::size_t(type.size)).data(), std::size_t(type.size));
-        if (format_ == PlyFormat::Big) std::reverse(raw.begin(), raw.begin() + type.size);
-        const auto as = [&](auto number) {
-            std::memcpy(&number, raw.data(), sizeof(number));
-            return double(number);
-        };
-        if (type.kind == 'f') return type.size == 4 ? as(float{}) : as(double{});
-        if (type.kind == 'i') return type.size == 1 ? as(std::int8_t{}) : type.size == 2 ? as(std::int16_t{}) : as(std::int32_t{});
-        return type.size == 1 ? as(std::uint8_t{}) : type.size == 2 ? as(std::uint16_t{}) : as(std::uint32_t{});
+    [[noreturn]] void fail_cut_off(const PlyElement& element, std::uint64_t got) const {
+        source_.fail("the file is cut off: expected " + std::to_string(element.count) + " of element " + quote(element.name) +
+                     ", got " + std::to_string(got) + "; it is truncated");
     }
 
-    /// Calls visit(property, values) for each property of each row, then end() for the row.
-    template <typename Visit, typename End>
-    void for_each_row(const PlyElement& element, const Visit& visit, const End& end) {
-        std::vector<double> values;
-        for (std::uint64_t row = 0; !element.properties.empty() && row < element.count; ++row) {
-            std::string_view line = format_ == PlyFormat::Ascii ? source_.line() : std::string_view();
-            for (std::size_t p = 0; p < element.properties.size(); ++p) {
-                const PlyProperty& property = element.properties[p];
-                const double count = property.count ? value(*property.count, line) : 1;
-                if (!(count >= 0 && count <= double(source_.bytes_left() + line.size())))
-                    source_.fail("a list of " + std::to_string(count) + " entries");
-                values.clear();
-                for (std::size_t i = 0; i < std::size_t(count); ++i) values.push_back(value(property.type, line));
-                visit(p, values);
+    /// Calls visit() for each row, for which value() and values() then hold.
+    /// @param wanted  that many properties, from the first, have to be there in the lines of a text; a row that lacks
+    ///                others is let pass unless it is the last, which tells that the file ends early
+    template <typename Visit>
+    void for_each_row(const PlyElement& element, std::size_t wanted, const Visit& visit) {
+        if (element.properties.empty()) return;
+        check_size(element, wanted);
+        places_.assign(element.properties.size(), {});
+        if (format_ == PlyFormat::Ascii) for_each_line(element, wanted, visit);
+        else if (element.has_list()) for_each_record_with_lists(element, visit);
+        else for_each_record(element, visit);
+    }
+
+    template <typename Visit>
+    void for_each_line(const PlyElement& element, std::size_t wanted, const Visit& visit) {
+        for (std::uint64_t row = 0; row < element.count; ++row) {
+            std::string_view line;
+            while (line.empty()) {
+                if (source_.at_end()) fail_cut_off(element, row);
+                line = source_.line();
             }
-            end();
+            detail::split(line, ' ', words_);
+            find_words(element, wanted, row + 1 == element.count);
+            visit();
         }
     }
 
-    void read_vertices(const PlyElement& element, MeshBuilder& mesh) {
-        std::array<std::size_t, 3> column{};
-        for (int a = 0; a < 3; ++a) {
+    void find_words(const PlyElement& element, std::size_t wanted, bool is_last) {
+        std::size_t at = 0;
+        for (std::size_t p = 0; p < element.properties.size(); ++p) {
+            Place& place = places_[p] = {at, 1};
+            if (element.properties[p].count && at < words_.size()) {
+                const auto count = to_number(words_[at]);
+                if (!count) source_.fail("expected a number, got " + quote(words_[at]));
+                const std::size_t left = words_.size() - at - 1;
+                if (!(*count >= 0 && *count <= double(left))) {
+                    if (is_last && p >= wanted)
+                        source_.fail("the last of " + std::to_string(element.count) + " of element " + quote(element.name) +
+                                     " ends early; the file is truncated");
+                    if (p < wanted)
+                        source_.fail("a list of " + quote(words_[at]) + " entries, its line has " + std::to_string(left) + " left");
+                }
+                place = {at + 1, std::size_t(std::clamp(*count, 0.0, double(left)))};
+            }
+            at = place.at + place.count;
+            if (p < wanted && at > words_.size())
+                source_.fail("expected " + std::to_string(at) + " numbers, got " + std::to_string(words_.size()));
+        }
+    }
+
+    /// All of one size, for which check_size() has found the room.
+    template <typename Visit>
+    void for_each_record(const PlyElement& element, const Visit& visit) {
+        std::size_t bytes = 0;
+        for (std::size_t p = 0; p < element.properties.size(); ++p) {
+            places_[p].at = bytes;
+            bytes += size_of(element.properties[p].type);
+        }
+        row_ = source_.bytes(element.count * bytes).data();
+        for (std::uint64_t row = 0; row < element.count; ++row, row_ += bytes) visit();
+    }
+
+    template <typename Visit>
+    void for_each_record_with_lists(const PlyElement& element, const Visit& visit) {
+        const std::string_view rest = source_.rest();
+        std::size_t at = 0;
+        for (std::uint64_t row = 0; row < element.count; ++row) {
+            row_ = rest.data() + at;
+            const std::size_t bytes = find_bytes(element, rest.size() - at);
+            if (bytes == 0) fail_cut_off(element, row);
+            visit();
+            at += bytes;
+        }
+        source_.bytes(at);
+    }
+
+    /// @return what the row takes; 0 where that is more than there are bytes left
+    std::size_t find_bytes(const PlyElement& element, std::size_t left) {
+        std::size_t at = 0;
+        for (std::size_t p = 0; p < element.properties.size(); ++p) {
+            const PlyProperty& property = element.properties[p];
+            const std::size_t size = size_of(property.type);
+            std::size_t count = 1;
+            if (property.count) {
+                const std::size_t head = size_of(*property.count);
+                if (head > left - at) return 0;
+                const double entries = load_as(*property.count, row_ + at, swap_);
+                at += head;
+                if (!(entries >= 0 && entries * double(size) <= double(left - at))) return 0;
+                count = std::size_t(entries);
+            }
+            if (count * size > left - at) return 0;
+            places_[p] = {at, count};
+            at += count * size;
+        }
+        return at;
+    }
+
+    /// Of a property's entry of that number; nothing of a word that is no number.
+    [[nodiscard]] std::optional<double> find_value(const PlyElement& element, std::size_t p, std::size_t entry = 0) const {
+        const PlyType type = element.properties[p].type;
+        if (format_ != PlyFormat::Ascii) return load_as(type, row_ + places_[p].at + entry * size_of(type), swap_);
+        return to_number(words_[places_[p].at + entry]);
+    }
+    [[nodiscard]] double value(const PlyElement& element, std::size_t p, std::size_t entry = 0) const {
+        const auto found = find_value(element, p, entry);
+        if (!found) source_.fail("expected a number, got " + quote(words_[places_[p].at + entry]));
+        return *found;
+    }
+
+    void read_vertices(const PlyElement& element) {
+        std::array<std::size_t, 3> position{}, normal{};
+        std::size_t wanted = 0;
+        for (std::size_t a = 0; a < 3; ++a) {
             const std::string name(1, char('x' + a));
-            const auto at = std::find_if(element.properties.begin(), element.properties.end(),
-                                         [&](const PlyProperty& p) { return p.name == name && !p.count; });
-            if (at == element.properties.end()) source_.fail("the vertices have no property '" + name + "'");
-            column[a] = std::size_t(at - element.properties.begin());
+            position[a] = element.number_named(name);
+            normal[a] = element.number_named("n" + name);
+            if (position[a] == element.properties.size())
+                source_.fail("expected a vertex property '" + name + "' of one number, the vertices have no property '" + name + "' of that kind");
+            wanted = std::max(wanted, position[a] + 1);
         }
-        mesh.reserve_vertices(element.count);
-        Vec3 position{};
-        for_each_row(
-            element,
-            [&](std::size_t p, const std::vector<double>& values) {
-                for (int a = 0; a < 3; ++a)
-                    if (column[a] == p) position[a] = values[0];
-            },
-            [&] { mesh.vertex(position[0], position[1], position[2]); });
+        const std::size_t last_normal = *std::max_element(normal.begin(), normal.end());
+        const bool has_normals = receiver_.wants_normals() && last_normal < element.properties.size();
+        if (has_normals) wanted = std::max(wanted, last_normal + 1);
+        check_size(element, wanted);
+        receiver_.expect_vertices(element.count, has_normals);
+        for_each_row(element, wanted, [&] {
+            receiver_.vertex({value(element, position[0]), value(element, position[1]), value(element, position[2])});
+            if (!has_normals) return;
+            Vec3 direction{};
+            for (std::size_t a = 0; a < 3; ++a) direction[a] = find_value(element, normal[a]).value_or(0);
+            receiver_.normal(direction);
+        });
     }
 
-    void read_faces(const PlyElement& element, MeshBuilder& mesh) {
+    void read_faces(const PlyElement& element) {
         const auto at = std::find_if(element.properties.begin(), element.properties.end(), [](const PlyProperty& p) {
             return p.count && (p.name == "vertex_indices" || p.name == "vertex_index");
         });
         if (at == element.properties.end() && element.count > 0) source_.fail("the faces have no list 'vertex_indices'");
         const auto list = std::size_t(at - element.properties.begin());
         std::vector<std::uint32_t> corners;
-        for_each_row(
-            element,
-            [&](std::size_t p, const std::vector<double>& values) {
-                if (p != list) return;
-                corners.clear();
-                for (const double v : values) corners.push_back(to_index(source_, v));
-            },
-            [&] { mesh.polygon(corners); });
+        for_each_row(element, list + 1, [&] {
+            corners.clear();
+            for (std::size_t i = 0; i < places_[list].count; ++i) corners.push_back(to_index(source_, value(element, list, i)));
+            receiver_.face(corners);
+        });
     }
 
     Source& source_;
+    Receiver& receiver_;
     PlyFormat format_ = PlyFormat::Ascii;
+    bool swap_ = false;
     std::vector<PlyElement> elements_;
+    // the row at hand
+    std::vector<std::string_view> words_;
+    const char* row_ = nullptr;
+    std::vector<Place> places_;
 };
 
 }  // namespace
 
-TriangleMesh read_ply(Source& source) { return PlyReader(source).read(); }
+void read_ply(Source& source, Receiver& receiver) { PlyReader(source, receiver).read(); }
 
 void write_ply(Output& out, const Prepared& in) {
     out << "ply\nformat " << (in.binary ? "binary_little_endian" : "ascii") << " 1.0\n";

@@ -21,10 +21,10 @@ public:
         const Key key{std::bit_cast<std::uint32_t>(x + 0.0F), std::bit_cast<std::uint32_t>(y + 0.0F),
                       std::bit_cast<std::uint32_t>(z + 0.0F)};
         const auto [at, is_new] = known_.try_emplace(key, std::uint32_t(mesh_.vertex_count()));
-        if (is_new) mesh_.vertex(x, y, z);
+        if (is_new) mesh_.vertex({x, y, z});
         corners_.push_back(at->second);
         if (corners_.size() == 3) {
-            mesh_.polygon(corners_);
+            mesh_.face(corners_);
             corners_.clear();
         }
     }
@@ -67,9 +67,8 @@ TriangleMesh read_stl(Source& source, std::string_view text) {
     if (!exact && text.starts_with("solid")) {
         while (!source.at_end()) {
             std::string_view line = source.line();
-            if (next_word(line) != "vertex") continue;
-            Vec3 p{};
-            for (double& c : p) c = source.number<double>(line, "a coordinate");
+            if (detail::next_word(line) != "vertex") continue;
+            const Vec3 p = source.three_numbers(line);
             mesh.corner(float(p[0]), float(p[1]), float(p[2]));
         }
         return mesh.finish();
@@ -77,10 +76,9 @@ TriangleMesh read_stl(Source& source, std::string_view text) {
     if (text.size() < kHeader + kRecord * std::uint64_t(count) || text.size() < kHeader)
         source.fail("the header promises " + std::to_string(count) + " triangles, the file of " + std::to_string(text.size()) +
                     " bytes is too short");
-    source.bytes(kHeader);
     for (std::uint32_t i = 0; i < count; ++i) {
         std::array<float, 12> record{};  // normal, three corners
-        std::memcpy(record.data(), source.bytes(kRecord).data(), sizeof(record));
+        std::memcpy(record.data(), text.data() + kHeader + std::size_t(i) * kRecord, sizeof(record));
         for (int k = 3; k < 12; k += 3) mesh.corner(record[k], record[k + 1], record[k + 2]);
     }
     return mesh.finish();

@@ -1,24 +1,13 @@
 #pragma once
-#include <algorithm>
-#include <array>
 #include <bit>
 #include <cstdint>
-#include <cstring>
 #include <string>
 #include <string_view>
 
+#include "base/load.h"
 #include "io/points/point_text.h"
 
 namespace covol::detail {
-
-/// The number that begins at `data`. @param swap  its byte order is not this machine's
-template <typename T>
-[[nodiscard]] T load(const char* data, bool swap) {
-    std::array<char, sizeof(T)> bytes;
-    std::memcpy(bytes.data(), data, sizeof(T));
-    if (swap) std::reverse(bytes.begin(), bytes.end());
-    return std::bit_cast<T>(bytes);
-}
 
 /// A file's bytes, never read beyond their end.
 class Bytes {

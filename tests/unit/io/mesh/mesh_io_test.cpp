@@ -9,6 +9,7 @@
 #include <random>
 
 #include "covol/error.h"
+#include "covol/points.h"
 
 using namespace covol;
 namespace fs = std::filesystem;
@@ -176,7 +177,7 @@ TEST_CASE("broken and hostile files give one clear error") {
     check_refused(folder.file("a.ply", ascii + "element face 1\n" + face + "end_header\n3 0 1 2\n"), "refers to vertex 0");
     check_refused(folder.file("a.ply", ascii + "element face 1\n" + face + "end_header\n3 0 1 -2\n"), "number of a vertex");
     check_refused(folder.file("a.ply", ascii + "element face 1\n" + face + "end_header\n1e18 0 1 2\n"), "a list of");
-    check_refused(folder.file("a.obj", "v 0 0\n"), "a.obj:1: expected a coordinate, got the end of the line");
+    check_refused(folder.file("a.obj", "v 0 0\n"), "a.obj:1: expected 3 numbers, got 2");
     check_refused(folder.file("a.obj", "v 0 0 0\nf 1 2 3\n"), "refers to vertex 1");
     check_refused(folder.file("a.obj", "v 0 0 0\nf 1 -2 1\n"), "number of a vertex");
     check_refused(folder.file("a.obj", "v 0 0 0\n"), "no triangle");
@@ -186,6 +187,51 @@ TEST_CASE("broken and hostile files give one clear error") {
     check_refused(folder.file("a.stl", "abc"), "too short");
     check_refused(folder.file("a.stl", std::string(80, 'x') + "\xff\xff\xff\xff"), "too short");
     check_refused(folder.file("a.stl", "solid x\nvertex 1 2\n"), "a.stl:2");
+}
+
+TEST_CASE("a file is the same to those who want its mesh and to those who want its points") {
+    const Folder folder;
+    const auto message_of = [](const auto& read) -> std::string {
+        try {
+            read();
+        } catch (const Error& error) {
+            const std::string message = error.what();
+            return message.substr(message.find(':'));  // behind the function's name
+        }
+        return "was read";
+    };
+    const std::string vertex = "element vertex 3\nproperty float x\nproperty float Y\nproperty uchar red\nproperty double z\n";
+    const std::string ply = "\n\nply\nformat ascii 1.0\n" + vertex + "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+    const struct {
+        const char* name;
+        std::string text;
+    } good[] = {{"a.ply", ply.substr(2) + "0 0 what 0\n\n1 0 9 0\n0 1 9 0\n3 0 1 2\n"},
+                {"mac.obj", "v 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3\r"},
+                {"bom.off", "\xEF\xBB\xBFSTCNoff 3 1\n0 0 0 7\n1 0 0 7\n0 1 0 7\n3 0 1 2\n"}};
+    for (const auto& file : good) {
+        INFO(file.name);
+        const std::string path = folder.file(file.name, file.text);
+        CHECK(read_mesh(path).vertices == std::vector<std::array<float, 3>>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
+        CHECK(read_points(path).points == std::vector<Vec3>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
+    }
+    const struct {
+        const char* name;
+        std::string text;
+    } bad[] = {{"a.ply", ply},
+               {"a.ply", ply.substr(2) + "0 0\n"},
+               {"a.ply", ply.substr(2) + "0 0 0 0\n1 0 0 0\n0 1 0 nan\n3 0 1 2\n"},
+               {"a.ply", ply.substr(2) + "0 0 0 0\n1 0 0 0\n0 1 0 0\n"},
+               {"a.ply", "ply\n" + vertex + "end_header\n0 0 0 0\n1 0 0 0\n0 1 0 0\n"},
+               {"a.obj", "v 0 0 0\nv 1 nan 0\n"},
+               {"a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n"},
+               {"a.off", "nOFF\n4\n1 0 0\n0 0 0 0\n"},
+               {"a.off", "OFF BINARY\n"}};
+    for (const auto& file : bad) {
+        const std::string path = folder.file(file.name, file.text), as_mesh = message_of([&] { (void)read_mesh(path); });
+        INFO(as_mesh);
+        CHECK(as_mesh != "was read");
+        CHECK(message_of([&] { (void)read_points(path); }) == as_mesh);
+    }
 }
 
 TEST_CASE("files with random damage are read or refused, never worse") {
