@@ -48,7 +48,7 @@ void for_nearest(const PointCells& cells, double spacing, std::size_t count, Vis
             if (!wanted(n)) continue;
             const Vec3& p = cells.sorted()[n];
             for (double r = kFirstRadius * spacing; r > 0; r *= 2) {
-                cells.find({{p[0] - r, p[1] - r, p[2] - r}, {p[0] + r, p[1] + r, p[2] + r}}, ranges);
+                cells.find(p, r, ranges);
                 near.clear();
                 for (const PointCells::Range& range : ranges)
                     for (std::uint32_t m = range.begin; m < range.end; ++m) {

@@ -91,14 +91,18 @@ void PointCells::find(const WorldBox& box, std::vector<Range>& ranges) const {
         }
 }
 
-bool PointCells::any_within(const Vec3& place, double reach) const {
+void PointCells::find(const Vec3& place, double reach, std::vector<Range>& ranges) const {
     WorldBox box;
     for (int a = 0; a < 3; ++a) {
         box.min[a] = place[a] - reach;
         box.max[a] = place[a] + reach;
     }
-    std::vector<Range> ranges;
     find(box, ranges);
+}
+
+bool PointCells::any_within(const Vec3& place, double reach) const {
+    std::vector<Range> ranges;
+    find(place, reach, ranges);
     return std::any_of(ranges.begin(), ranges.end(), [&](const Range& range) {
         return std::any_of(sorted_.begin() + range.begin, sorted_.begin() + range.end, [&](const Vec3& p) {
             const Vec3 to = minus(p, place);

@@ -28,6 +28,8 @@ public:
     /// Ranges of sorted positions that hold all points of the box (and others of the cells it touches); `ranges` is
     /// overwritten.
     void find(const WorldBox& box, std::vector<Range>& ranges) const;
+    /// Of the cube that reaches so far from the place on each side.
+    void find(const Vec3& place, double reach, std::vector<Range>& ranges) const;
     [[nodiscard]] bool any_within(const Vec3& place, double reach) const;
 
 private:

@@ -117,6 +117,20 @@ TEST_CASE("the ranges of a box hold all of its points, and each at most once") {
         }
 }
 
+TEST_CASE("the ranges around a place are those of the box around it") {
+    const std::vector<Vec3> points = test::box_cloud(300, {{-1, -1, -1}, {1, 1, 1}}, 6);
+    const PointCells cells(points, 0.25);
+    std::vector<PointCells::Range> around, in_box;
+    for (const double reach : {0.0, 0.1, 3.0})
+        for (const Vec3& p : points) {
+            cells.find(p, reach, around);
+            cells.find({{p[0] - reach, p[1] - reach, p[2] - reach}, {p[0] + reach, p[1] + reach, p[2] + reach}}, in_box);
+            REQUIRE(around.size() == in_box.size());
+            for (std::size_t n = 0; n < around.size(); ++n)
+                CHECK((around[n].begin == in_box[n].begin && around[n].end == in_box[n].end));
+        }
+}
+
 TEST_CASE("cells grow where the box is long beside them; no point makes no cell") {
     std::vector<Vec3> points = test::box_cloud(300, {{-1, -1, -1}, {1, 1, 1}}, 4);
     points.push_back({1e9, -1e9, 0});

@@ -47,7 +47,7 @@ struct Around {
 
 Around look_around(const cloud::PointCells& cells, const Vec3& at, double radius) {
     std::vector<cloud::PointCells::Range> ranges;
-    cells.find({{at[0] - radius, at[1] - radius, at[2] - radius}, {at[0] + radius, at[1] + radius, at[2] + radius}}, ranges);
+    cells.find(at, radius, ranges);
     std::vector<Eigen::Vector3d> near;
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();

@@ -172,9 +172,7 @@ private:
         std::vector<std::vector<std::uint32_t>> beside(cells.cell_count());
         std::vector<PointCells::Range> ranges;
         for (std::uint32_t cell = 0; cell < cells.cell_count(); ++cell) {
-            const Vec3& p = cells.sorted()[cells.cell(cell).begin];
-            const double r = cells.edge();
-            cells.find({{p[0] - r, p[1] - r, p[2] - r}, {p[0] + r, p[1] + r, p[2] + r}}, ranges);
+            cells.find(cells.sorted()[cells.cell(cell).begin], cells.edge(), ranges);
             for (const PointCells::Range& range : ranges)
                 for (std::uint32_t at = range.begin; at < range.end; at = cells.cell(cell_of[at]).end)
                     if (cell_of[at] != cell) beside[cell].push_back(cell_of[at]);

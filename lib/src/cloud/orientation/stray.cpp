@@ -41,7 +41,7 @@ bool is_lonely(const PointCells& cells, std::size_t n, double distance, std::vec
     // Most have it beside them in their cell.
     if (has_company(n - std::min(n, kBeside), std::min(n + kBeside, cells.sorted().size()))) return false;
     found = 0;
-    cells.find({{p[0] - distance, p[1] - distance, p[2] - distance}, {p[0] + distance, p[1] + distance, p[2] + distance}}, ranges);
+    cells.find(p, distance, ranges);
     return std::none_of(ranges.begin(), ranges.end(), [&](const PointCells::Range& range) { return has_company(range.begin, range.end); });
 }
 

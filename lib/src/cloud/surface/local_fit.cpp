@@ -142,12 +142,7 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
     std::vector<Seen> seen;
     int majority = -1;
     for (const Level& level : levels) {
-        WorldBox box;
-        for (int a = 0; a < 3; ++a) {
-            box.min[a] = point[a] - level.radius;
-            box.max[a] = point[a] + level.radius;
-        }
-        level.cells.find(box, scratch.ranges);
+        level.cells.find(point, level.radius, scratch.ranges);
         if (majority < 0) {
             majority = is_of_majority(level, point, normal, scratch.ranges);
             best.least_radius = level.radius;
@@ -230,7 +225,7 @@ OrientedCloud without_covered(const OrientedCloud& nodes, const std::vector<Quad
         std::vector<PointCells::Range> ranges;
         for (std::size_t n = part.begin(); n < part.end(); ++n) {
             const Vec3& p = nodes.points[n];
-            cells.find({{p[0] - reach, p[1] - reach, p[2] - reach}, {p[0] + reach, p[1] + reach, p[2] + reach}}, ranges);
+            cells.find(p, reach, ranges);
             for (const PointCells::Range& range : ranges)
                 for (std::uint32_t at = range.begin; at < range.end && !covered[n]; ++at) {
                     const Quadric& q = quadrics[cells.order()[at]];
