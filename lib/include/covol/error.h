@@ -17,11 +17,13 @@ enum class Errc {
 /// The one exception type that covol throws.
 ///
 /// Messages say where, what, what was expected and what was found:
-/// `read_points: cloud.xyz:18: expected 3 numbers, got 2`.
+/// `read_points: cloud.xyz:18: expected 3 numbers, got 2`. Where an option would help they name its field, as option_names.h tells.
 class Error : public std::runtime_error {
 public:
     Error(Errc code, const std::string& message) : std::runtime_error(message), code_(code) {}
     [[nodiscard]] Errc code() const noexcept { return code_; }
+    /// The first field of options that the message names, `tag_distance` say; empty where it names none.
+    [[nodiscard]] std::string option() const;
 
 private:
     Errc code_;

@@ -70,8 +70,8 @@ struct PointCloud {
 /// Tries the usual mistakes where a point lies outside the image: order of the axes, voxels for world units and the
 /// reverse, voxels counted from 1, RAS for LPS, an origin left out, micrometres for millimetres, and two of them.
 /// Where all lie inside, warns through `run` when another reading is far more plausible, or the image has no spacing.
-/// @throws Error InvalidInput when a point lies outside: how many of how many, both boxes, and the options
-///         (--points-space, --points-order, --points-scale, --points-channels, --spacing) that would mend it.
+/// @throws Error InvalidInput when a point lies outside: how many of how many, both boxes, and the fields of
+///         ReadPointsOptions, or the image's spacing, that would mend it.
 void check_inside(const PointCloud& cloud, const ImageGeometry& geometry, const RunContext& run = {});
 
 /// Exact duplicates, and points closer than `cell` / 2 in the same cell of a lattice of edge `cell`, become one.

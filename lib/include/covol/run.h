@@ -15,7 +15,7 @@ struct RunContext {
     /// Called from the calling thread with a stage's name and its fraction done in [0,1].
     std::function<void(const std::string& stage, double fraction)> progress;
 
-    /// Called with one line of text; automatic choices come as Info.
+    /// Called with one line of text; automatic choices come as Info. Lines name options as messages of errors do.
     std::function<void(LogLevel, const std::string& line)> log;
 
     /// Set from anywhere (a signal handler, say) to make the computation throw Errc::Cancelled

@@ -129,7 +129,7 @@ void Densifier::check_inside(const Line& line) const {
     text << "densify: " << line.name << ": " << outside << " of " << line.index.size()
          << " marks lie outside the image, the first at voxel (" << (*first)[0] << ", " << (*first)[1] << ", " << (*first)[2]
          << ") of " << geometry_.size[0] << " x " << geometry_.size[1] << " x " << geometry_.size[2]
-         << "; check --points-space, --points-order and --spacing";
+         << "; check `space`, `order` and `spacing`";
     throw Error(Errc::InvalidInput, text.str());
 }
 

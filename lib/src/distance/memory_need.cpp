@@ -75,7 +75,7 @@ void require(const BytesAt& bytes_at, double voxel_size, const char* where, cons
     std::ostringstream text;
     text.precision(2);
     text << where << ": a voxel size of " << voxel_size << " needs about " << gigabytes(needed) << " GiB of memory, "
-         << gigabytes(budget) << " GiB may be used; use a larger one, such as " << fits << " (--voxel-size), or a smaller domain (--roi)";
+         << gigabytes(budget) << " GiB may be used; use a larger one, such as " << fits << " (`voxel_size`), or a smaller domain (`roi`)";
     throw Error(Errc::InvalidOptions, text.str());
 }
 

@@ -192,7 +192,7 @@ EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions
     }
     if (!(report.low < report.high))
         throw Error(Errc::InvalidInput, "edge: " + image.path() + ": every voxel has the value " + std::to_string(report.low) +
-                                            ", there is no edge to find; segment with the points alone (--rho 0)");
+                                            ", there is no edge to find; segment with the points alone (`rho = 0`)");
     with_threads(run, [&] {
         Window window = sample_window(image, topology, domain, report.sigma, report);
         smooth(window, domain, report.sigma, run);

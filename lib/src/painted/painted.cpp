@@ -387,7 +387,7 @@ Image placed_on(const Image& labels, const ImageGeometry& image, bool force) {
     throw Error(Errc::InvalidInput, "placed_on: " + labels.path() + ": " + std::to_string(outside) + " of " + std::to_string(painted) +
                                         " painted voxels lie outside the image, the first at " + to_text(first) + "; the labels reach from " +
                                         box_text(own.world_box()) + ", the image from " + box_text(image.world_box()) +
-                                        "; check --spacing, or save the labels with the image's geometry");
+                                        "; check `spacing`, or save the labels with the image's geometry");
 }
 
 }  // namespace covol

@@ -122,9 +122,9 @@ std::string why_vanished(const Job& job) {
         if (job.image == nullptr) return detail::why_nothing_held(job.points, job.options.tag_distance, encloses);
         if (!encloses)
             return "the points enclose nothing and nothing held it; where the structure is cut off by the image's end mark the cut "
-                   "too, or give a --tag-distance beyond its radius; or draw --contours, or choose another start (--init)";
+                   "too, or give a `tag_distance` beyond its radius; or draw `contours`, or choose another start (`start`)";
     }
-    return "nothing held it; lower --delta, or start closer to the edges (--init)";
+    return "nothing held it; lower `delta`, or start closer to the edges (`start`)";
 }
 
 // A surface through the marks is moved to where the image shows, between them, what it shows at them.

@@ -39,8 +39,8 @@ std::string why_nothing_held(const std::vector<Vec3>& points, double tag_distanc
     std::ostringstream text;
     text.precision(3);
     if (encloses && !is_flat) {
-        text << "the points hold it too loosely at the tag distance " << tag_distance << "; try --tag-distance "
-             << kWiderTag * tag_distance << ", a lower --delta, or more points";
+        text << "the points hold it too loosely at the tag distance " << tag_distance << "; try `tag_distance = "
+             << kWiderTag * tag_distance << "`, a lower `delta`, or more points";
         return text.str();
     }
     const WorldBox box = bounding_box(points);
@@ -49,10 +49,10 @@ std::string why_nothing_held(const std::vector<Vec3>& points, double tag_distanc
     const double layer = std::min(kLayerSpacings * nearest_neighbour_spacing(points).mean, 0.5 * std::hypot(side[0], side[1], side[2]));
     text << (is_line ? "the points lie on a line" : is_flat ? "the points lie in a plane" : "the points enclose nothing")
          << " and nothing held it; add points on the sides that are missing";
-    if (!is_flat) text << ", or try --init cloud";
+    if (!is_flat) text << ", or try `start = Cloud`";
     const double hull = kHull * *std::max_element(side.begin(), side.end());
-    if (!is_flat && tag_distance < hull) text << "; if they surround a body on all sides, try --tag-distance " << hull;
-    text << "; for a closed layer around them give --max-steps 0 --tag-distance " << layer << " --voxel-size " << layer / kLayerVoxels;
+    if (!is_flat && tag_distance < hull) text << "; if they surround a body on all sides, try `tag_distance = " << hull << "`";
+    text << "; for a closed layer around them give `max_steps = 0, tag_distance = " << layer << ", voxel_size = " << layer / kLayerVoxels << "`";
     return text.str();
 }
 

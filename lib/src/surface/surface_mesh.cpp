@@ -413,7 +413,7 @@ TriangleMesh extract_mesh(const FloatGrid& surface, const ExtractOptions& option
         if (mesh.empty()) {
             std::ostringstream text;
             text << "extract_mesh: every piece of the surface is smaller than min_component_volume, " << options.min_component_volume
-                 << "; all of it has " << whole << ", as a cube of edge " << std::cbrt(whole) << "; use a smaller --min-component";
+                 << "; all of it has " << whole << ", as a cube of edge " << std::cbrt(whole) << "; use a smaller `min_component_volume`";
             throw Error(Errc::InvalidInput, text.str());
         }
     }

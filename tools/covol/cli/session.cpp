@@ -6,6 +6,7 @@
 #include <iostream>
 
 #include "cli/arguments.h"
+#include "cli/option_names.h"
 #include "cli/profile.h"
 #include "covol/error.h"
 #include "covol/vdb_io.h"
@@ -285,17 +286,18 @@ std::string Session::interrupted_text() const {
 
 int Session::fail(int code, const std::string& message) {
     if (progress_) progress_->clear();
-    std::cerr << "covol: error: " << one_line(message) << std::endl;
+    std::cerr << "covol: error: " << one_line(with_flags(message)) << std::endl;
     return code;
 }
 
 void Session::note(const std::string& line) {
-    if (!quiet_) progress_->line("covol: " + line);
+    if (!quiet_) progress_->line("covol: " + with_flags(line));
 }
 
 void Session::say(const std::string& line) { progress_->line(line); }
 
-void Session::warn(const std::string& line) {
+void Session::warn(const std::string& message) {
+    const std::string line = with_flags(message);
     // A file that is opened twice says the same twice.
     for (const Json& said : report_["warnings"])
         if (said == line) return;

@@ -63,11 +63,12 @@ public:
     void add_grid(const std::string& path, const FloatGridPtr& grid, bool half);
     /// The report that --json writes.
     [[nodiscard]] Json& report() noexcept { return report_; }
+    // note() and warn() put flags for the options that a line of the library names.
     /// Progress and remarks: silent with --quiet.
     void note(const std::string& line);
     /// The result that was asked for (info, compare, check): never silent.
     void say(const std::string& line);
-    void warn(const std::string& line);
+    void warn(const std::string& message);
     /// Provenance for the metadata of .vdb files: version, options, and the numbers that were used once they are known.
     [[nodiscard]] std::map<std::string, std::string> metadata() const;
     /// The same as comment lines for meshes and points.

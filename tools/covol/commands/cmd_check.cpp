@@ -3,6 +3,7 @@
 #include <set>
 
 #include "cli/file_kind.h"
+#include "cli/option_names.h"
 #include "cli/report.h"
 #include "commands/commands.h"
 #include "covol/error.h"
@@ -66,7 +67,7 @@ void check_level_set(const std::string& path, const VdbGridInfo& info, const Run
         check_measures(extract_mesh(*grid, {}, run), "the surface of grid '" + info.name + "'", findings);
     } catch (const Error& error) {
         if (error.code() == Errc::Cancelled) throw;
-        findings.problem("grid '" + info.name + "': " + error.what());
+        findings.problem("grid '" + info.name + "': " + with_flags(error.what()));
     }
 }
 
@@ -151,7 +152,7 @@ void check_points(const std::string& path, const std::string& image_path, const 
     try {
         check_inside(cloud, geometry, run);
     } catch (const Error& error) {
-        findings.problem(error.what());
+        findings.problem(with_flags(error.what()));
     }
 }
 

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <filesystem>
 
+#include "cli/option_names.h"
 #include "covol/error.h"
 #include "jobs/structures_job.h"
 
@@ -164,10 +165,11 @@ private:
         } catch (const Error& error) {
             if (error.code() == Errc::Cancelled) throw;
             fail(who, error);
-            report["status"] = std::string("failed: ") + error.what();
+            const std::string status = "failed: " + with_flags(error.what());
+            report["status"] = status;
             table_.row() << frame.number;
             for (std::size_t n = 0; n < result_columns().size(); ++n) table_ << "";
-            table_ << std::string("failed: ") + error.what();
+            table_ << status;
         }
         report["wall_seconds"] = watch.seconds();
         reports_.push_back(report);

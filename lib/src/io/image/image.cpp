@@ -77,7 +77,7 @@ void warn_of_spacing(const std::string& path, const ImageInfo& info, const RunCo
         if (!info.spacing_known[a]) axes += (axes.empty() ? "" : ", ") + std::string(1, "xyz"[a]);
     if (axes.empty()) return;
     run.warn(path + ": the file states no spacing along " + axes + ": 1 stands in for it, and lengths, volumes and shapes "
-                    "may be wrong; --spacing sx,sy,sz gives it");
+                    "may be wrong; `spacing = sx,sy,sz` gives it");
 }
 
 /// The user's corrections, and the last checks.
@@ -109,7 +109,7 @@ std::uint64_t choose(const std::string& path, const std::string& what, int wante
         for (std::size_t n = 0; n < names.size(); ++n)
             list += (n == 0 ? "" : ", ") + std::to_string(n) + (names[n].empty() ? "" : " (" + names[n] + ")");
     }
-    const std::string choice = "; choose " + list + " with --" + what;
+    const std::string choice = "; choose " + list + " with `" + what + "`";
     if (wanted < 0)
         throw read_error(Errc::Unsupported, path, "expected one " + what + ", got " + std::to_string(count) + choice);
     throw read_error(Errc::InvalidOptions, path, what + " " + std::to_string(wanted) + " does not exist" + choice);

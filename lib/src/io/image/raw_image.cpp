@@ -355,7 +355,7 @@ std::shared_ptr<void> allocate_pixels(const std::string& path, std::uint64_t pix
     const auto refuse = [&] {
         return read_error(Errc::Unsupported, path, "the image needs " + std::to_string(bytes >> 20) +
                                                        " MiB, this machine has " + std::to_string(memory >> 20) +
-                                                       " MiB; choose a part with --roi, or downsample it");
+                                                       " MiB; choose a part with `roi`, or downsample it");
     };
     if (bytes > memory) throw refuse();
     // malloc leaves the pages untouched until the reader fills them.

@@ -95,7 +95,7 @@ std::vector<Vec3> to_world(const PointCloud& cloud, const ImageGeometry* geometr
     if (geometry == nullptr)
         throw Error(Errc::InvalidInput, "to_world: " + cloud.source +
                                             ": the points are in an image's own frame, and there is no image; give one, "
-                                            "or --points-space world for points in lengths");
+                                            "or `space = World` for points in lengths");
     std::vector<Vec3> world;
     world.reserve(cloud.points.size());
     for (const Vec3& p : cloud.points) world.push_back(detail::to_world(cloud.space, p, *geometry));

@@ -14,16 +14,16 @@ namespace {
 struct Reading {
     ReadPointsOptions options;
     int changes = 0;     ///< how many things are read otherwise than now
-    std::string advice;  ///< the options that ask for it
+    std::string advice;  ///< the options that ask for it, as messages name them
 };
 
-const char* flag_of(PointSpace space) {
+const char* advice_of(PointSpace space) {
     switch (space) {
-        case PointSpace::Index: return "--points-space index";
-        case PointSpace::IndexOne: return "--points-space index1";
-        case PointSpace::Ras: return "--points-space ras";
-        case PointSpace::Local: return "--points-space local";
-        default: return "--points-space world";
+        case PointSpace::Index: return "space = Index";
+        case PointSpace::IndexOne: return "space = IndexOne";
+        case PointSpace::Ras: return "space = Ras";
+        case PointSpace::Local: return "space = Local";
+        default: return "space = World";
     }
 }
 
@@ -178,15 +178,15 @@ private:
         Reading reading{options, 0, ""};
         const auto change = [&](const std::string& advice) {
             ++reading.changes;
-            reading.advice += (reading.advice.empty() ? "" : " ") + advice;
+            reading.advice += (reading.advice.empty() ? "" : ", ") + advice;
         };
-        if (options.space != now_.space) change(flag_of(options.space));
-        if (options.order != now_.order) change(options.order == PointOrder::ZYX ? "--points-order zyx" : "--points-order xyz");
-        if (options.channels != now_.channels) change("--points-channels " + std::to_string(options.channels));
+        if (options.space != now_.space) change(advice_of(options.space));
+        if (options.order != now_.order) change(options.order == PointOrder::ZYX ? "order = ZYX" : "order = XYZ");
+        if (options.channels != now_.channels) change("channels = " + std::to_string(options.channels));
         if (options.scale != now_.scale && !in_voxels(options)) {
-            std::ostringstream flag;
-            flag << "--points-scale " << options.scale;
-            change(flag.str());
+            std::ostringstream scale;
+            scale << "scale = " << options.scale;
+            change(scale.str());
         }
         if (reading.changes > 0 && reading.changes <= kMostChanges) list.push_back(reading);
     }
@@ -207,9 +207,9 @@ private:
 std::string advice_of(const Checker& checker, const std::vector<Reading>& remedies, bool spacing_known) {
     std::string text;
     for (const Reading& reading : remedies)
-        text += (text.empty() ? "; " : ", or ") + reading.advice + " would bring them inside (" + checker.name(reading) + ")";
+        text += (text.empty() ? "; `" : ", or `") + reading.advice + "` would bring them inside (" + checker.name(reading) + ")";
     if (remedies.size() > 1) text += "; more than one reading fits: look which one is meant";
-    if (!spacing_known) text += "; the image states no spacing, --spacing sx,sy,sz gives it";
+    if (!spacing_known) text += "; the image states no spacing, `spacing = sx,sy,sz` gives it";
     return text;
 }
 
@@ -224,10 +224,10 @@ void check_inside(const PointCloud& cloud, const ImageGeometry& geometry, const 
                                             advice_of(checker, checker.remedies(), geometry.spacing_known));
     if (!geometry.spacing_known && cloud.space != PointSpace::Index)
         run.warn(cloud.source + ": the points are in world units, and the image states no spacing, so that a voxel counts as 1: "
-                                "--spacing sx,sy,sz gives it, or --points-space index if the points are voxels");
+                                "`spacing = sx,sy,sz` gives it, or `space = Index` if the points are voxels");
     for (const Reading& reading : checker.more_plausible())
-        run.warn(cloud.source + ": the points lie inside the image, but " + reading.advice +
-                 " would put them on voxel centres: is it that " + checker.name(reading) + "?");
+        run.warn(cloud.source + ": the points lie inside the image, but `" + reading.advice +
+                 "` would put them on voxel centres: is it that " + checker.name(reading) + "?");
 }
 
 }  // namespace covol

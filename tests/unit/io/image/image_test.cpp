@@ -294,7 +294,7 @@ TEST_CASE("one channel and frame of a hyperstack is chosen") {
     CHECK(read_error(path).find("expected one channel, got 2") != std::string::npos);
     ReadImageOptions options;
     options.channel = 1;
-    CHECK(read_error(path, options).find("choose 0 to 1 with --frame") != std::string::npos);
+    CHECK(read_error(path, options).find("choose 0 to 1 with `frame`") != std::string::npos);
     options.frame = 1;
     Image image = read_image(path, options);
     CHECK(image.geometry().size == Index3{20, 17, 3});
@@ -361,7 +361,7 @@ TEST_CASE("unusable images end in one line that says why") {
     }
     says(read_error(scratch.write("a.jpg", "x")), "expected a name ending in");
     says(read_error(make_tiff<std::uint8_t>(scratch.path("rgb.tif"), {8, SAMPLEFORMAT_UINT, 3}, number)),
-         "expected one channel, got 3; choose 0 (red), 1 (green), 2 (blue) with --channel");
+         "expected one channel, got 3; choose 0 (red), 1 (green), 2 (blue) with `channel`");
     TiffFormat one_page;
     one_page.pages = 1;
     says(read_error(make_tiff<std::uint8_t>(scratch.path("flat.tif"), one_page, number)),
@@ -377,7 +377,7 @@ TEST_CASE("unusable images end in one line that says why") {
                                       std::string(24, 'a'))),
          "expected one channel, got 3");
     says(read_error(scratch.write("4d.nrrd", header + "dimension: 4\nsizes: 2 2 2 3\n\n" + std::string(24, 'a'))),
-         "expected one frame, got 3; choose 0 to 2 with --frame");
+         "expected one frame, got 3; choose 0 to 2 with `frame`");
     says(read_error(scratch.write("huge.nrrd", header + "dimension: 3\nsizes: 100000 100000 100000\n\nabc")),
          "cannot hold");
     says(read_error(scratch.write("shear.nrrd", header + "dimension: 3\nsizes: 2 2 2\nspace dimension: 3\n"
