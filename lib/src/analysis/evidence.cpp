@@ -11,6 +11,7 @@
 #include <cmath>
 #include <map>
 
+#include "base/valid.h"
 #include "covol/distance.h"
 #include "covol/error.h"
 #include "covol/points.h"
@@ -279,19 +280,16 @@ private:
 }  // namespace
 
 std::string EvidenceOptions::why_invalid() const {
-    std::string why;
-    const auto expect = [&](bool ok, const char* field, const char* expected, double got) {
-        if (!ok) why += std::string(why.empty() ? "" : "\n") + field + ": expected " + expected + ", got " + std::to_string(got);
-    };
-    expect(reach > 0 && std::isfinite(reach), "reach", "> 0", reach);
-    expect(weak_edge > 0 && weak_edge < 1, "weak_edge", "> 0 and < 1", weak_edge);
-    expect(suggestions >= 0, "suggestions", ">= 0", suggestions);
-    return why;
+    detail::FieldChecks checks;
+    checks.expect_positive("reach", reach);
+    checks.expect(weak_edge > 0 && weak_edge < 1, "weak_edge", "> 0 and < 1", weak_edge);
+    checks.expect_not_negative("suggestions", suggestions);
+    return checks.lines();
 }
 
 Evidence evidence(const TriangleMesh& mesh, const std::vector<Vec3>& marks, const FloatGrid* edge,
                   const ImageGeometry& geometry, const EvidenceOptions& options, const RunContext& run) {
-    if (const std::string why = options.why_invalid(); !why.empty()) throw Error(Errc::InvalidOptions, "evidence: " + why);
+    detail::require_valid(options, "evidence");
     if (mesh.empty()) throw Error(Errc::InvalidInput, "evidence: expected a surface, got an empty mesh");
     Evidence result;
     with_threads(run, [&] { result = Judge(mesh, marks, geometry, options, run).go(edge); });

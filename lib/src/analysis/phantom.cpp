@@ -7,9 +7,8 @@
 #include <functional>
 #include <numbers>
 #include <random>
-#include <sstream>
 
-#include "covol/error.h"
+#include "base/valid.h"
 
 namespace covol {
 namespace {
@@ -157,14 +156,13 @@ std::string joined_kinds() {
 }  // namespace
 
 std::string PhantomOptions::why_invalid() const {
-    std::ostringstream lines;
+    detail::FieldChecks checks;
     const std::vector<std::string> kinds = phantom_kinds();
-    if (std::find(kinds.begin(), kinds.end(), kind) == kinds.end())
-        lines << "kind: expected one of " << joined_kinds() << ", got '" << kind << "'\n";
-    if (size < 16 || size > 2048) lines << "size: expected 16 to 2048, got " << size << '\n';
-    if (point_count < 0) lines << "point_count: expected >= 0, got " << point_count << '\n';
-    if (!(noise >= 0) || !std::isfinite(noise)) lines << "noise: expected >= 0, got " << noise << '\n';
-    return lines.str();
+    checks.expect(std::find(kinds.begin(), kinds.end(), kind) != kinds.end(), "kind", "one of " + joined_kinds(), "'" + kind + "'");
+    checks.expect(size >= 16 && size <= 2048, "size", "16 to 2048", size);
+    checks.expect_not_negative("point_count", point_count);
+    checks.expect_not_negative("noise", noise);
+    return checks.lines();
 }
 
 std::vector<std::string> phantom_kinds() {
@@ -174,8 +172,7 @@ std::vector<std::string> phantom_kinds() {
 }
 
 Phantom make_phantom(const PhantomOptions& options) {
-    if (const std::string why = options.why_invalid(); !why.empty())
-        throw Error(Errc::InvalidOptions, "make_phantom: " + why.substr(0, why.find('\n')));
+    detail::require_valid(options, "make_phantom");
     const std::vector<Shape> all = shapes();
     const Shape& shape = *std::find_if(all.begin(), all.end(), [&](const Shape& s) { return s.name == options.kind; });
 

@@ -12,6 +12,7 @@
 #include <memory>
 
 #include "base/file.h"
+#include "base/valid.h"
 #include "covol/error.h"
 
 namespace covol {
@@ -160,19 +161,16 @@ void draw_slice(const FloatGrid& surface, const Image& image, const std::vector<
 }  // namespace
 
 std::string RenderOptions::why_invalid() const {
-    std::string why;
-    const auto expect = [&](bool ok, const char* field, const char* expected, int got) {
-        if (!ok) why += std::string(why.empty() ? "" : "\n") + field + ": expected " + expected + ", got " + std::to_string(got);
-    };
-    expect(width >= 64 && width <= 16384, "width", "64 to 16384", width);
-    expect(height >= 64 && height <= 16384, "height", "64 to 16384", height);
-    expect(slices >= 0 && slices <= 16, "slices", "0 to 16", slices);
-    return why;
+    detail::FieldChecks checks;
+    checks.expect(width >= 64 && width <= 16384, "width", "64 to 16384", width);
+    checks.expect(height >= 64 && height <= 16384, "height", "64 to 16384", height);
+    checks.expect(slices >= 0 && slices <= 16, "slices", "0 to 16", slices);
+    return checks.lines();
 }
 
 Picture render(const FloatGrid& surface, const Image* image, const std::vector<Vec3>& points, const RenderOptions& options,
                const RunContext& run) {
-    if (const std::string why = options.why_invalid(); !why.empty()) throw Error(Errc::InvalidOptions, "render: " + why);
+    detail::require_valid(options, "render");
     Picture picture{options.width, options.height, std::vector<std::uint8_t>(3 * std::size_t(options.width) * options.height, 255)};
     const int slices = image != nullptr ? options.slices : 0;
     const int left = (options.width - kGap) / 2, right = options.width - left - kGap;

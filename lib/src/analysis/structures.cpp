@@ -13,6 +13,7 @@
 #include <set>
 #include <sstream>
 
+#include "base/valid.h"
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "covol/surface.h"
@@ -58,8 +59,7 @@ public:
 
 private:
     void check_input() const {
-        if (const std::string why = options_.why_invalid(); !why.empty())
-            throw Error(Errc::InvalidOptions, "separate: " + why);
+        detail::require_valid(options_, "separate");
         if (structures_.empty()) throw Error(Errc::InvalidInput, "separate: expected a structure, got none");
         std::set<std::string> names;
         for (const Structure& s : structures_) {
@@ -340,11 +340,10 @@ private:
 }  // namespace
 
 std::string SeparateOptions::why_invalid() const {
-    std::string why;
-    if (!std::isfinite(gap)) why = "gap: expected a number, got " + std::to_string(gap);
-    if (!(nested_share > 0.5 && nested_share <= 1))
-        why += std::string(why.empty() ? "" : "\n") + "nested_share: expected > 0.5 and <= 1, got " + std::to_string(nested_share);
-    return why;
+    detail::FieldChecks checks;
+    checks.expect_finite("gap", gap);
+    checks.expect(nested_share > 0.5 && nested_share <= 1, "nested_share", "> 0.5 and <= 1", nested_share);
+    return checks.lines();
 }
 
 SeparateResult separate(const std::vector<Structure>& structures, const SeparateOptions& options, const RunContext& run) {

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "base/number.h"
+#include "base/valid.h"
 #include "contours/contour_curve.h"
 #include "contours/contour_solid.h"
 #include "covol/error.h"
@@ -362,14 +363,15 @@ void Densifier::summarise() {
 }  // namespace
 
 std::string ContourOptions::why_invalid() const {
-    if (!(step > 0 && std::isfinite(step))) return "step: expected > 0, got " + detail::number(step);
-    if (!(thickness >= 0 && std::isfinite(thickness))) return "thickness: expected >= 0, got " + detail::number(thickness);
-    return {};
+    detail::FieldChecks checks;
+    checks.expect_positive("step", step);
+    checks.expect_not_negative("thickness", thickness);
+    return checks.lines();
 }
 
 Contours densify(const std::vector<PointCloud>& clouds, const ImageGeometry* geometry, const ContourOptions& options,
                  const RunContext& run) {
-    if (const std::string why = options.why_invalid(); !why.empty()) throw Error(Errc::InvalidOptions, "densify: " + why);
+    detail::require_valid(options, "densify");
     Contours result;
     with_threads(run, [&] { result = Densifier(geometry, options, run).go(clouds); });
     return result;

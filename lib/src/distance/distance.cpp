@@ -6,6 +6,7 @@
 #include <cmath>
 #include <memory>
 
+#include "base/valid.h"
 #include "covol/error.h"
 #include "distance/memory_need.h"
 #include "distance/nearest.h"
@@ -51,14 +52,14 @@ std::unique_ptr<Leaf> make_leaf(const detail::NearestField& field, const detail:
 }  // namespace
 
 std::string DistanceOptions::why_invalid() const {
-    if (max_distance > 0 && std::isfinite(max_distance)) return {};
-    return "max_distance: expected > 0, got " + std::to_string(max_distance);
+    detail::FieldChecks checks;
+    checks.expect_positive("max_distance", max_distance);
+    return checks.lines();
 }
 
 DistanceResult distance(const std::vector<Vec3>& points, const Domain& domain, const DistanceOptions& options,
                         const RunContext& run) {
-    if (const std::string why = options.why_invalid(); !why.empty())
-        throw Error(Errc::InvalidOptions, "distance: " + why);
+    detail::require_valid(options, "distance");
     if (domain.voxel_count() == 0) throw Error(Errc::InvalidInput, "distance: the domain is empty");
     const std::vector<Vec3> positions = to_index_space(points, domain);
     detail::require_tube_memory(points, domain, {options.max_distance, 0, false}, "distance", run);

@@ -8,8 +8,8 @@
 #include <array>
 #include <cmath>
 #include <iterator>
-#include <sstream>
 
+#include "base/valid.h"
 #include "covol/error.h"
 #include "grid/halo.h"
 #include "scheme/scheme.h"
@@ -162,20 +162,17 @@ const char* to_string(EdgeFeature feature) {
 }
 
 std::string EdgeOptions::why_invalid() const {
-    std::ostringstream lines;
-    const auto expect = [&](bool ok, const char* field, const char* expected, double got) {
-        if (!ok) lines << (lines.tellp() > 0 ? "\n" : "") << field << ": expected " << expected << ", got " << got;
-    };
-    expect(std::isfinite(sigma), "sigma", "a finite number", sigma);
-    expect(edge_k >= 0 && std::isfinite(edge_k), "edge_k", ">= 0", edge_k);
-    expect(edge_contrast >= 0 && std::isfinite(edge_contrast), "edge_contrast", ">= 0", edge_contrast);
-    expect(contrast_percentile >= 0 && contrast_percentile < 1, "contrast_percentile", "between 0 and 1", contrast_percentile);
-    expect(std::isfinite(low) && std::isfinite(high) && low <= high, "low", "<= high", low);
-    return lines.str();
+    detail::FieldChecks checks;
+    checks.expect_finite("sigma", sigma);
+    checks.expect_not_negative("edge_k", edge_k);
+    checks.expect_not_negative("edge_contrast", edge_contrast);
+    checks.expect(contrast_percentile >= 0 && contrast_percentile < 1, "contrast_percentile", "between 0 and 1", contrast_percentile);
+    checks.expect(std::isfinite(low) && std::isfinite(high) && low <= high, "low", "<= high", low);
+    return checks.lines();
 }
 
 EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions& options, const RunContext& run) {
-    if (const std::string why = options.why_invalid(); !why.empty()) throw Error(Errc::InvalidOptions, "edge: " + why);
+    detail::require_valid(options, "edge");
     if (topology.activeVoxelCount() == 0) throw Error(Errc::InvalidInput, "edge: expected active voxels in the band, got none");
     const Domain domain = domain_of(topology);
     EdgeResult result;

@@ -11,9 +11,9 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <sstream>
 #include <utility>
 
+#include "base/valid.h"
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "evolve/band_solver.h"
@@ -215,32 +215,24 @@ private:
     EvolveReport report_;
 };
 
-void expect(std::string& lines, bool ok, const char* field, const char* expected, double got) {
-    if (ok) return;
-    std::ostringstream line;
-    line << (lines.empty() ? "" : "\n") << field << ": expected " << expected << ", got " << got;
-    lines += line.str();
-}
-
 }  // namespace
 
 std::string EvolveOptions::why_invalid() const {
-    std::string lines;
-    const auto unit = [](double x) { return x >= 0 && x <= 1; };
-    expect(lines, unit(theta), "theta", "0 to 1", theta);
-    expect(lines, unit(rho), "rho", "0 to 1", rho);
-    expect(lines, std::isfinite(delta), "delta", "a finite number", delta);
-    expect(lines, std::isfinite(tau) && tau != 0, "tau", "> 0", tau);
-    expect(lines, epsilon > 0 && std::isfinite(epsilon), "epsilon", "> 0", epsilon);
-    expect(lines, edge_epsilon > 0 && std::isfinite(edge_epsilon), "edge_epsilon", "> 0", edge_epsilon);
-    expect(lines, attraction_range >= 0 && std::isfinite(attraction_range), "attraction_range", ">= 0", attraction_range);
-    expect(lines, unit(image_yields), "image_yields", "0 to 1", image_yields);
-    expect(lines, unit(guess_weight), "guess_weight", "0 to 1", guess_weight);
-    expect(lines, max_steps >= 0, "max_steps", ">= 0", max_steps);
-    expect(lines, tolerance >= 0 && std::isfinite(tolerance), "tolerance", ">= 0", tolerance);
-    expect(lines, solver_tolerance > 0 && solver_tolerance < 1, "solver_tolerance", "between 0 and 1", solver_tolerance);
-    expect(lines, max_sweeps >= 1, "max_sweeps", ">= 1", max_sweeps);
-    return lines;
+    detail::FieldChecks checks;
+    checks.expect_share("theta", theta);
+    checks.expect_share("rho", rho);
+    checks.expect_finite("delta", delta);
+    checks.expect(std::isfinite(tau) && tau != 0, "tau", "> 0", tau);
+    checks.expect_positive("epsilon", epsilon);
+    checks.expect_positive("edge_epsilon", edge_epsilon);
+    checks.expect_not_negative("attraction_range", attraction_range);
+    checks.expect_share("image_yields", image_yields);
+    checks.expect_share("guess_weight", guess_weight);
+    checks.expect_not_negative("max_steps", max_steps);
+    checks.expect_not_negative("tolerance", tolerance);
+    checks.expect(solver_tolerance > 0 && solver_tolerance < 1, "solver_tolerance", "between 0 and 1", solver_tolerance);
+    checks.expect(max_sweeps >= 1, "max_sweeps", ">= 1", max_sweeps);
+    return checks.lines();
 }
 
 const char* to_string(StopReason reason) {
@@ -255,7 +247,7 @@ const char* to_string(StopReason reason) {
 }
 
 EvolveReport evolve(FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options, const RunContext& run) {
-    if (const std::string why = options.why_invalid(); !why.empty()) throw Error(Errc::InvalidOptions, "evolve: " + why);
+    detail::require_valid(options, "evolve");
     EvolveReport report;
     with_threads(run, [&] {
         u.tree().voxelizeActiveTiles();

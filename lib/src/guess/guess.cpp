@@ -5,7 +5,7 @@
 #include <memory>
 #include <utility>
 
-#include "covol/error.h"
+#include "base/valid.h"
 #include "covol/start.h"
 #include "guess/marks_surface.h"
 
@@ -121,7 +121,7 @@ bool can_enclose(const std::vector<Vec3>& marks) { return guess::span_space(mark
 
 Guess guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks, const GuessOptions& options, GuessReport& report,
                        const RunContext& run) {
-    if (const std::string why = options.why_invalid(); !why.empty()) throw Error(Errc::InvalidOptions, "guess: " + why);
+    detail::require_valid(options, "guess");
     Guess result;
     with_threads(run, [&] {
         result.marks = without_cut_marks(marks, options, run);

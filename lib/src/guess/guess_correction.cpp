@@ -8,9 +8,8 @@
 #include <atomic>
 #include <cmath>
 #include <numeric>
-#include <sstream>
 
-#include "base/number.h"
+#include "base/valid.h"
 #include "base/wendland.h"
 #include "covol/error.h"
 #include "covol/start.h"
@@ -245,19 +244,15 @@ FloatGridPtr GuessCorrection::start(const RunContext& run) const {
 }
 
 std::string CorrectionOptions::why_invalid() const {
-    std::string why;
-    const auto expect = [&](double value, const char* field) {
-        if (!(std::isfinite(value) && value >= 0))
-            why += std::string(why.empty() ? "" : "\n") + field + ": expected >= 0, got " + detail::number(value);
-    };
-    expect(precision, "precision");
-    expect(least_radius, "least_radius");
-    return why;
+    detail::FieldChecks checks;
+    checks.expect_not_negative("precision", precision);
+    checks.expect_not_negative("least_radius", least_radius);
+    return checks.lines();
 }
 
 GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>& marks, const std::vector<Vec3>& inside,
                               const std::vector<Vec3>& outside, const CorrectionOptions& options, const RunContext& run) {
-    if (const std::string why = options.why_invalid(); !why.empty()) throw Error(Errc::InvalidOptions, "correct_guess: " + why);
+    detail::require_valid(options, "correct_guess");
     auto data = std::make_shared<GuessCorrection::Data>(guess);
     with_threads(run, [&] {
         const double h = guess->voxelSize()[0];

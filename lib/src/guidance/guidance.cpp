@@ -11,8 +11,8 @@
 #include <map>
 #include <optional>
 
+#include "base/valid.h"
 #include "covol/domain.h"
-#include "covol/error.h"
 #include "covol/start.h"
 #include "covol/surface.h"
 #include "guidance/learning.h"
@@ -450,23 +450,16 @@ void GuidanceReport::add(const GuidanceReport& pass, bool moved) {
 }
 
 std::string GuidanceOptions::why_invalid() const {
-    std::string why;
-    const auto expect = [&why](bool ok, const std::string& what, double got) {
-        if (ok) return;
-        std::string number = std::to_string(got);
-        number.erase(number.find_last_not_of('0') + 1);
-        if (!number.empty() && number.back() == '.') number.pop_back();
-        why += (why.empty() ? "" : "\n") + what + ", got " + number;
-    };
-    expect(std::isfinite(mark_precision), "mark_precision: expected a number", mark_precision);
-    expect(std::isfinite(range), "range: expected a number", range);
-    expect(weight >= 0 && weight <= 1, "weight: expected 0 to 1", weight);
-    return why;
+    detail::FieldChecks checks;
+    checks.expect_finite("mark_precision", mark_precision);
+    checks.expect_finite("range", range);
+    checks.expect_share("weight", weight);
+    return checks.lines();
 }
 
 FloatGridPtr guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const Image& image, const GuidanceOptions& options,
                    GuidanceReport& report, const RunContext& run) {
-    if (const std::string why = options.why_invalid(); !why.empty()) throw Error(Errc::InvalidOptions, "guide: " + why);
+    detail::require_valid(options, "guide");
     report = {};
     FloatGridPtr result;
     with_threads(run, [&] {

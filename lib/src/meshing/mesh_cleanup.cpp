@@ -18,6 +18,7 @@
 #include <functional>
 #include <vector>
 
+#include "base/valid.h"
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "covol/mesh_relax.h"
@@ -245,13 +246,11 @@ void check_indices(const TriangleMesh& mesh, const char* where) {
 }  // namespace
 
 std::string CleanupOptions::why_invalid() const {
-    std::string why;
-    if (!(target_edge >= 0) || !std::isfinite(target_edge))
-        why += "target_edge: expected >= 0, got " + std::to_string(target_edge) + "\n";
-    if (!(adaptive >= 0) || !std::isfinite(adaptive)) why += "adaptive: expected >= 0, got " + std::to_string(adaptive) + "\n";
-    if (smooth_iterations < 0)
-        why += "smooth_iterations: expected >= 0, got " + std::to_string(smooth_iterations) + "\n";
-    return why;
+    detail::FieldChecks checks;
+    checks.expect_not_negative("target_edge", target_edge);
+    checks.expect_not_negative("adaptive", adaptive);
+    checks.expect_not_negative("smooth_iterations", smooth_iterations);
+    return checks.lines();
 }
 
 int count_self_intersections(const TriangleMesh& mesh) {
@@ -272,7 +271,7 @@ namespace {
 
 CleanupReport clean(const Work& work) {
     const auto& [mesh, level_set, isovalue, options, run] = work;
-    if (const std::string why = options.why_invalid(); !why.empty()) throw Error(Errc::InvalidOptions, "clean_mesh: " + why);
+    detail::require_valid(options, "clean_mesh");
     if (options.adaptive > 0 && (level_set == nullptr || options.adaptive > 2 * work.voxel_size()))
         throw Error(Errc::InvalidOptions, level_set == nullptr ? std::string("clean_mesh: adaptive: expected the level set of the mesh, got none")
                                                                : "clean_mesh: adaptive: expected at most two voxels, " + std::to_string(2 * work.voxel_size()) +

@@ -9,7 +9,7 @@
 #include <numeric>
 #include <optional>
 
-#include "covol/error.h"
+#include "base/valid.h"
 #include "covol/mesh_relax.h"
 #include "mesh/corner_table.h"
 #include "meshing/contacts.h"
@@ -352,15 +352,15 @@ private:
 }  // namespace meshing
 
 std::string RelaxOptions::why_invalid() const {
-    std::string why;
-    if (!std::isfinite(isovalue)) why += "isovalue: expected a finite number, got " + std::to_string(isovalue) + "\n";
-    if (rounds < 0) why += "rounds: expected >= 0, got " + std::to_string(rounds) + "\n";
-    if (!(tolerance >= 0)) why += "tolerance: expected >= 0, got " + std::to_string(tolerance) + "\n";
-    return why;
+    detail::FieldChecks checks;
+    checks.expect_finite("isovalue", isovalue);
+    checks.expect_not_negative("rounds", rounds);
+    checks.expect(tolerance >= 0, "tolerance", ">= 0", tolerance);
+    return checks.lines();
 }
 
 RelaxReport relax_mesh(TriangleMesh& mesh, const FloatGrid& level_set, const RelaxOptions& options, const RunContext& run) {
-    if (const std::string why = options.why_invalid(); !why.empty()) throw Error(Errc::InvalidOptions, "relax_mesh: " + why);
+    detail::require_valid(options, "relax_mesh");
     RelaxReport report;
     if (mesh.empty()) return report;
     with_threads(run, [&] {

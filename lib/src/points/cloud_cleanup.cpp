@@ -13,6 +13,7 @@
 #include <functional>
 #include <utility>
 
+#include "base/valid.h"
 #include "covol/error.h"
 #include "covol/points.h"
 
@@ -143,23 +144,19 @@ std::vector<Vec3> clean(const std::vector<Vec3>& points, const CloudCleanupOptio
 }  // namespace
 
 std::string CloudCleanupOptions::why_invalid() const {
-    std::string why;
-    const auto expect = [&](bool good, const std::string& field, const std::string& range, double got) {
-        if (!good) why += (why.empty() ? "" : "\n") + field + ": expected " + range + ", got " + std::to_string(got);
-    };
-    expect(outlier_factor == 0 || (outlier_factor >= 1 && std::isfinite(outlier_factor)), "outlier_factor", "0 or >= 1",
-           outlier_factor);
-    expect(simplify >= 0 && std::isfinite(simplify), "simplify", ">= 0", simplify);
-    expect(wlop_share > 0 && wlop_share <= 1, "wlop_share", "in (0,1]", wlop_share);
-    expect(wlop_radius >= 0 && std::isfinite(wlop_radius), "wlop_radius", ">= 0", wlop_radius);
-    expect(neighbours >= 6, "neighbours", ">= 6", neighbours);
-    return why;
+    detail::FieldChecks checks;
+    checks.expect(outlier_factor == 0 || (outlier_factor >= 1 && std::isfinite(outlier_factor)), "outlier_factor", "0 or >= 1",
+                  outlier_factor);
+    checks.expect_not_negative("simplify", simplify);
+    checks.expect(wlop_share > 0 && wlop_share <= 1, "wlop_share", "in (0,1]", wlop_share);
+    checks.expect_not_negative("wlop_radius", wlop_radius);
+    checks.expect(neighbours >= 6, "neighbours", ">= 6", neighbours);
+    return checks.lines();
 }
 
 std::vector<Vec3> clean_cloud(const std::vector<Vec3>& points, const CloudCleanupOptions& options, const RunContext& run,
                               CloudCleanupReport* report) {
-    if (const std::string why = options.why_invalid(); !why.empty())
-        throw Error(Errc::InvalidOptions, "clean_cloud: " + why);
+    detail::require_valid(options, "clean_cloud");
     for (const Vec3& p : points)
         if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2]))
             throw Error(Errc::InvalidInput, "clean_cloud: expected finite points");

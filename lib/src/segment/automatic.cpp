@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/valid.h"
 #include "covol/error.h"
 #include "covol/scan_noise.h"
 
@@ -92,8 +93,7 @@ void try_cloud(Job& job) {
 }  // namespace
 
 void check_input(Job& job) {
-    const std::string why = job.options.why_invalid();
-    if (!why.empty()) throw Error(Errc::InvalidOptions, "segment: " + why);
+    detail::require_valid(job.options, "segment");
     if (job.image == nullptr && job.points.empty())
         throw Error(Errc::InvalidInput, "segment: expected an image or points, got neither");
     if (job.starts_from_marks() && job.points.empty())

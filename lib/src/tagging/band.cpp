@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "base/number.h"
+#include "base/valid.h"
 #include "covol/error.h"
 #include "redistance/signed_distance.h"
 #include "tagging/tagging.h"
@@ -124,8 +125,9 @@ BandResult make(const FloatGrid& distance, const BandOptions& options, const Run
 }  // namespace
 
 std::string BandOptions::why_invalid() const {
-    if (tag_distance > 0 && std::isfinite(tag_distance)) return {};
-    return "tag_distance: expected > 0, got " + std::to_string(tag_distance);
+    detail::FieldChecks checks;
+    checks.expect_positive("tag_distance", tag_distance);
+    return checks.lines();
 }
 
 std::string BandReport::leak() const {
@@ -134,8 +136,7 @@ std::string BandReport::leak() const {
 }
 
 BandResult band(const FloatGrid& distance, const BandOptions& options, const RunContext& run) {
-    if (const std::string why = options.why_invalid(); !why.empty())
-        throw Error(Errc::InvalidOptions, "band: " + why);
+    detail::require_valid(options, "band");
     if (distance.tree().leafCount() == 0)
         throw Error(Errc::InvalidInput, "band: expected a distance grid with active voxels, got none: no point lies near the domain");
     BandResult result;
