@@ -45,6 +45,7 @@ struct Orientation {
     double turned = 0;             ///< share of the points whose normal the last iteration turned by more than 90 degrees
     double off_half = 0;           ///< mean of the indicator over the points, less 1/2, absolute
     int iterations = 0;
+    std::size_t mended = 0;        ///< normals that did not stand on the sheet of points on which they are, on its outer side
     std::size_t layered = 0;       ///< points of layers of a scan that lie below others: turned, and the surface need not pass them
 };
 

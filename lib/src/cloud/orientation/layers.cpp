@@ -37,7 +37,7 @@ public:
         tbb::parallel_for(std::size_t(0), places.size(), [&](std::size_t c) {
             std::vector<PointCells::Range> ranges;
             const Vec3& p = places[c];
-            near.find({{p[0] - reach, p[1] - reach, p[2] - reach}, {p[0] + reach, p[1] + reach, p[2] + reach}}, ranges);
+            near.find(p, reach, ranges);
             Vec3 sum{0, 0, 0};
             for (const PointCells::Range& range : ranges)
                 for (std::uint32_t at = range.begin; at < range.end; ++at) {

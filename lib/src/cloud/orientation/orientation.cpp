@@ -12,6 +12,7 @@
 #include "cloud/orientation/given_sides.h"
 #include "cloud/orientation/indicator.h"
 #include "cloud/orientation/stray.h"
+#include "cloud/orientation/torn.h"
 #include "cloud/orientation/views.h"
 #include "covol/error.h"
 #include "covol/points.h"
@@ -49,6 +50,7 @@ constexpr double kOffHalf = 0.02;   // that the indicator's mean over the points
 constexpr double kOffWeight = 2;    // of more than that, among tries: walls that run into each other turn less than those that waver
 constexpr double kSampledPerCell = 4;  // points that iterate, on the surface in a lattice cell's square
 constexpr double kSampleSpacings = 4;  // edge of the cells that they are taken from
+constexpr double kSharp = 0.2;  // noise, of the spacing: below it the nearest points tell the sheet that they are on
 constexpr int kStrayRounds = 3;
 constexpr double kManyStray = 0.005;  // of the points
 // Of given normals: with opposite ones beside them, and against an orientation that settled. Good ones have less than 0.001
@@ -85,6 +87,12 @@ public:
         turn_patches(field, result, run);
         if (stage.is_last) turn(field, result, kLastCycles);
         last_.emplace(std::move(field));
+    }
+
+    /// @param spacing  of the points
+    void mend(double spacing, Orientation& result) {
+        result.mended = cloud::mend_torn(points_, spacing, result.normals);
+        if (result.mended > 0) solve(*last_, result, kLastCycles);
     }
 
     [[nodiscard]] WindingField& last() { return *last_; }
@@ -294,6 +302,7 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
         const double first = first_cell(scale);
         const double cell = cloud::indicator_lattice(points, cloud::cells_along(points, first)).cell;
         const double share = kSampledPerCell * scale.spacing * scale.spacing / (cell * cell);
+        const bool is_sharp = scale.noise < kSharp * scale.spacing;
         const Sample sample(points, scale.spacing, std::size_t(std::max(1.0, 1 / share)));
         std::vector<std::pair<int, double>> tried;
         for (const Try& attempt : kTries) {
@@ -304,6 +313,7 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
             now.areas = sample.areas;
             Iteration iteration(sample.points);
             for (const Stage& stage : {Stage{cells * 2 / 3, 12, false, attempt.enclosed}, Stage{cells, 8, true, kSurelyEnclosed}}) iteration.run(stage, now, run);
+            if (is_sharp) iteration.mend(scale.spacing * std::sqrt(double(sample.step)), now);
             now.indicator = cloud::make_indicator(iteration.last());
             now.off_half = std::abs(cloud::mean_at(iteration.last(), sample.points) - 0.5);
             if (tried.size() == 1 || doubt(now) < doubt(best)) best = std::move(now);
@@ -313,6 +323,7 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
         best.areas = sample.all_areas();
         for (double& area : best.areas) area *= half;
         best.normals = normals_of(*best.indicator, points, kSurelyEnclosed);
+        if (best.mended > 0) best.mended = cloud::mend_torn(points, scale.spacing, best.normals);
     });
     return best;
 }

@@ -263,7 +263,7 @@ std::vector<Quadric> without_lone(const std::vector<Quadric>& quadrics) {
             const double r = least[n];
             if (r <= kLone * usual) continue;
             const Vec3& p = feet[n];
-            cells.find({{p[0] - r, p[1] - r, p[2] - r}, {p[0] + r, p[1] + r, p[2] + r}}, ranges);
+            cells.find(p, r, ranges);
             for (const PointCells::Range& range : ranges)
                 for (std::uint32_t at = range.begin; at < range.end && !lone[n]; ++at) {
                     const Vec3 to = minus(cells.sorted()[at], p);

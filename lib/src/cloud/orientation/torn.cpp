@@ -1,0 +1,154 @@
+#include "cloud/orientation/torn.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+#include "base/vector.h"
+#include "points/neighbours.h"
+#include "points/point_cells.h"
+
+namespace covol::cloud {
+namespace {
+
+constexpr std::size_t kNeighbours = 12;
+constexpr double kFlat = 0.06;      // the least variance of the neighbours, of the middle one
+constexpr double kUpright = 0.5;    // cosine between a normal and its sheet's
+constexpr double kSameSheet = 0.9;  // cosine between sheets' normals
+
+/// Sheets at the points, and which points beside each other are on the same one.
+class Sheets {
+public:
+    Sheets(const std::vector<Vec3>& points, double spacing) : axes_(points.size()), beside_(points.size()) {
+        const PointCells cells(points, kFirstRadius * spacing);
+        for_nearest(cells, spacing, kNeighbours, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
+            for (std::size_t n = 0; n < kNeighbours; ++n) beside_[point][n] = n < near.size() ? cells.order()[near[n].at] : point;
+            if (near.size() < kNeighbours) return;
+            const auto [sum, squares] = moments_of(cells, points[point], near);
+            const double count = double(near.size()) + 1;  // the point itself
+            const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> shape(squares / count - sum * sum.transpose() / (count * count));
+            if (shape.eigenvalues()[0] > kFlat * shape.eigenvalues()[1]) return;
+            const Eigen::Vector3d axis = shape.eigenvectors().col(0);
+            axes_[point] = {axis[0], axis[1], axis[2]};
+        });
+    }
+
+    [[nodiscard]] std::size_t size() const { return axes_.size(); }
+    /// The sheet's normal, of either sign; 0 where there is none.
+    [[nodiscard]] const Vec3& axis(std::size_t n) const { return axes_[n]; }
+    /// visit(neighbour) for those on the same sheet.
+    template <typename Visit>
+    void for_beside(std::size_t n, Visit visit) const {
+        for (const std::uint32_t other : beside_[n])
+            if (other != n && std::abs(dot(axes_[n], axes_[other])) > kSameSheet) visit(other);
+    }
+
+private:
+    std::vector<Vec3> axes_;
+    std::vector<std::array<std::uint32_t, kNeighbours>> beside_;
+};
+
+/// @return how many
+std::size_t set_upright(const Sheets& sheets, std::vector<Vec3>& normals) {
+    std::vector<char> is_lying(sheets.size(), 0);
+    std::vector<std::uint32_t> lying;
+    for (std::uint32_t n = 0; n < sheets.size(); ++n) {
+        const double squared = dot(sheets.axis(n), sheets.axis(n));
+        if (!(squared > 0) || std::abs(dot(sheets.axis(n), normals[n])) >= kUpright) continue;
+        is_lying[n] = 1;
+        lying.push_back(n);
+    }
+    const std::size_t all = lying.size();
+    // Each round those of whose neighbours most tell the side.
+    for (std::size_t before = all + 1; !lying.empty() && lying.size() < before;) {
+        before = lying.size();
+        std::vector<std::pair<std::uint32_t, Vec3>> mended;
+        for (const std::uint32_t n : lying) {
+            int told = 0, untold = 0;
+            double side = 0;
+            sheets.for_beside(n, [&](std::uint32_t other) {
+                ++(is_lying[other] ? untold : told);
+                if (!is_lying[other]) side += dot(normals[other], sheets.axis(n));
+            });
+            if (told > 0 && told >= untold) mended.emplace_back(n, times(side < 0 ? -1.0 : 1.0, sheets.axis(n)));
+        }
+        for (const auto& [n, normal] : mended) {
+            normals[n] = normal;
+            is_lying[n] = 0;
+        }
+        std::erase_if(lying, [&](std::uint32_t n) { return !is_lying[n]; });
+    }
+    return all - lying.size();
+}
+
+/// Parts of sheets whose normals go on from one point to the next.
+class Parts {
+public:
+    explicit Parts(std::size_t count) : parent_(count), size_(count, 1) { std::iota(parent_.begin(), parent_.end(), 0U); }
+    [[nodiscard]] std::uint32_t of(std::uint32_t n) {
+        while (parent_[n] != n) n = parent_[n] = parent_[parent_[n]];
+        return n;
+    }
+    [[nodiscard]] std::size_t size(std::uint32_t part) const { return size_[part]; }
+    void join(std::uint32_t a, std::uint32_t b) {
+        a = of(a);
+        b = of(b);
+        if (a == b) return;
+        if (size_[a] < size_[b]) std::swap(a, b);
+        parent_[b] = a;
+        size_[a] += size_[b];
+    }
+
+private:
+    std::vector<std::uint32_t> parent_;
+    std::vector<std::size_t> size_;
+};
+
+/// @return how many
+std::size_t turn_smaller(const Sheets& sheets, std::vector<Vec3>& normals) {
+    Parts parts(sheets.size());
+    // By the sheets' normals: from tilted one to tilted one a seam could be crossed.
+    const auto side = [&](std::uint32_t n) { return dot(sheets.axis(n), normals[n]); };
+    const auto meets = [&](std::uint32_t n, std::uint32_t other) { return side(n) * side(other) * dot(sheets.axis(n), sheets.axis(other)); };
+    for (std::uint32_t n = 0; n < sheets.size(); ++n)
+        sheets.for_beside(n, [&](std::uint32_t other) {
+            if (meets(n, other) > 0) parts.join(n, other);
+        });
+    // How often two parts meet back to front.
+    std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> seams;
+    for (std::uint32_t n = 0; n < sheets.size(); ++n)
+        sheets.for_beside(n, [&](std::uint32_t other) {
+            if (const auto a = parts.of(n), b = parts.of(other); a != b && meets(n, other) < 0) ++seams[{a, b}];
+        });
+    // Each to the larger one that it meets most often.
+    std::map<std::uint32_t, std::pair<std::size_t, std::uint32_t>> turned;
+    for (const auto& [pair, count] : seams) {
+        const auto [a, b] = pair;
+        if (parts.size(a) < parts.size(b) && count > turned[a].first) turned[a] = {count, b};
+    }
+    std::erase_if(turned, [](const auto& t) { return t.second.first == 0; });
+    std::size_t count = 0;
+    for (std::uint32_t n = 0; n < sheets.size(); ++n) {
+        // A part within one that is turned itself goes over twice.
+        int times_turned = 0;
+        for (auto at = turned.find(parts.of(n)); at != turned.end(); at = turned.find(at->second.second)) ++times_turned;
+        if (times_turned % 2 == 0) continue;
+        normals[n] = times(-1, normals[n]);
+        ++count;
+    }
+    return count;
+}
+
+}  // namespace
+
+std::size_t mend_torn(const std::vector<Vec3>& points, double spacing, std::vector<Vec3>& normals) {
+    if (points.size() <= kNeighbours) return 0;
+    const Sheets sheets(points, spacing);
+    const std::size_t upright = set_upright(sheets, normals);
+    return upright + turn_smaller(sheets, normals);
+}
+
+}  // namespace covol::cloud
