@@ -44,7 +44,8 @@ int main(int argc, char** argv) {
 
         // 2. Tagging: what a flood from outside cannot reach is inside. u starts as a clamped signed distance.
         covol::BandResult tagged = covol::band(*d.grid, {D, {}});
-        if (tagged.report.leaks) std::printf("the points leave gaps; D = %g would hold\n", tagged.report.holding_distance);
+        if (tagged.report.leaks)
+            std::printf("the points leave gaps; D = %g would hold\n", tagged.report.holding_distance);
 
         // 3. The edge detector, only where the band is.
         const covol::EdgeResult g = covol::edge(image, *tagged.grid);

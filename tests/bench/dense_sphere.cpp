@@ -5,8 +5,8 @@
 //               [--octant 1] [--steps N | --max-steps N] [--mesh OUT.ply]
 //
 // The start is the signed distance to the sphere of radius R around the origin, clamped to 3 voxels. V is in voxels.
-// --steps N makes N steps and leaves the stop rule aside. --octant 1 solves in the octant x, y, z > 0 alone, an eighth of the
-// work: the shapes are symmetric, and the domain's boundary mirrors. One line of JSON goes to stdout.
+// --steps N makes N steps and leaves the stop rule aside. --octant 1 solves in the octant x, y, z > 0 alone, an eighth
+// of the work: the shapes are symmetric, and the domain's boundary mirrors. One line of JSON goes to stdout.
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
@@ -57,9 +57,8 @@ Problem make_problem(const bench::Arguments& arguments) {
     p.options.attraction_range = h * arguments.number("range", 5);
     p.options.solver_tolerance = 1e-3;
 
-    p.u = test::sample(p.domain, [&](const Vec3& x) {
-        return test::clamp_to(test::length(x) - radius, kHalfWidthVoxels * h);
-    });
+    p.u = test::sample(p.domain,
+                       [&](const Vec3& x) { return test::clamp_to(test::length(x) - radius, kHalfWidthVoxels * h); });
     p.edge = dense_image(image, p.domain, arguments.number("low", 0), arguments.number("high", 255));
     const double sigma = h * arguments.number("sigma", 1), time = 0.5 * sigma * sigma;
     test::dense_heat(p.edge, time, std::max(1, int(std::ceil(time / (0.5 * h * h) - 1e-9))));
@@ -98,7 +97,8 @@ private:
                         const bool after = (now[p] < 0) != (now[q] < 0), first = (before[p] < 0) != (before[q] < 0);
                         if (!after && !first) continue;
                         ++edges_;
-                        way += after && first ? std::abs(crossing(now[p], now[q]) - crossing(before[p], before[q])) : 0.5;
+                        way +=
+                            after && first ? std::abs(crossing(now[p], now[q]) - crossing(before[p], before[q])) : 0.5;
                     }
         return edges_ > 0 ? way / double(edges_) : 0;
     }
@@ -132,7 +132,8 @@ int run(const bench::Arguments& arguments) {
     const bench::Stopwatch setup;
     Problem p = make_problem(arguments);
     const double setup_wall = setup.wall();
-    const int fixed = int(arguments.number("steps", 0)), most = fixed > 0 ? fixed : int(arguments.number("max-steps", 500));
+    const int fixed = int(arguments.number("steps", 0)),
+              most = fixed > 0 ? fixed : int(arguments.number("max-steps", 500));
     const std::vector<char> active = test::all_active(p.u);
     StopRule rule(arguments.number("tolerance", 2e-3));
     const double tau_in_voxels = p.options.tau / p.domain.voxel_size;

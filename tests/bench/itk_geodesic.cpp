@@ -85,8 +85,7 @@ void write_result(const std::string& path, const Input& input, const Volume& lev
     test::DenseField u(n[0], n[1], n[2], input.domain.voxel_size);
     for (int i = 0; i < n[0]; ++i)
         for (int j = 0; j < n[1]; ++j)
-            for (int k = 0; k < n[2]; ++k)
-                u.at(i, j, k) = input.domain.voxel_size * level_set.GetPixel({i, j, k});
+            for (int k = 0; k < n[2]; ++k) u.at(i, j, k) = input.domain.voxel_size * level_set.GetPixel({i, j, k});
     bench::write_zero_level(path, input.domain, u, 3 * input.domain.voxel_size);
 }
 

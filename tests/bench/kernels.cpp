@@ -121,10 +121,8 @@ constexpr double kFloat = sizeof(float), kRows = 6 * sizeof(Share);
 constexpr Kernel kKernels[] = {
     {"assemble", assemble, 3 * kFloat + kFloat + kRows},  // u, phi, edge; u before; rows
     {"relax_1", relax<1>, 2 * kFloat + kRows + kFloat},   // u, u before, rows; u
-    {"relax_2", relax<2>, 2 * kFloat + kRows + kFloat},
-    {"heat_2", heat, 3 * kFloat},
-    {"mean_gradient", mean_gradient, 2 * kFloat},
-    {"motion", motion, 2 * kFloat},
+    {"relax_2", relax<2>, 2 * kFloat + kRows + kFloat},  {"heat_2", heat, 3 * kFloat},
+    {"mean_gradient", mean_gradient, 2 * kFloat},        {"motion", motion, 2 * kFloat},
 };
 
 /// Two colours as in a step, so that no leaf reads what another thread writes.
@@ -151,12 +149,12 @@ bool register_all() {
         for (const SchemeKernels* set : available_kernels())
             for (const auto& [where, side, threads] :
                  {std::tuple{"cache", kSmallSide, 1}, {"memory", kLargeSide, 1}, {"memory", kLargeSide, 2}}) {
-                const std::string name =
-                    std::string("kernel/") + kernel.name + '/' + set->name + '/' + where + '/' + std::to_string(threads);
-                benchmark::RegisterBenchmark(
-                    name.c_str(), [&kernel, set, side = side, threads = threads](benchmark::State& state) {
-                        run_on(state, kernel, *set, side, threads);
-                    })
+                const std::string name = std::string("kernel/") + kernel.name + '/' + set->name + '/' + where + '/' +
+                                         std::to_string(threads);
+                benchmark::RegisterBenchmark(name.c_str(),
+                                             [&kernel, set, side = side, threads = threads](benchmark::State& state) {
+                                                 run_on(state, kernel, *set, side, threads);
+                                             })
                     ->UseRealTime()
                     ->MeasureProcessCPUTime();
             }

@@ -1,5 +1,5 @@
-// Every stage per active voxel, on 1 and 2 threads: one time step of the solver, then the others. COVOL_SIMD chooses the
-// instruction set. Names are stage/threads.
+// Every stage per active voxel, on 1 and 2 threads: one time step of the solver, then the others. COVOL_SIMD chooses
+// the instruction set. Names are stage/threads.
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetSphere.h>
 #include <tbb/parallel_for.h>
@@ -57,7 +57,8 @@ struct Scene {
         using Position = openvdb::Vec3d;
         u = field_on(*sphere, [](const Position&, float d) { return std::clamp(d, -3.0F, 3.0F); });
         distance = field_on(*sphere, [](const Position&, float d) { return std::abs(d + 1.0F); });
-        edge = field_on(*sphere, [](const Position& x, float) { return 0.5 + 0.4 * std::sin(0.3 * (x[0] + x[1] - x[2])); });
+        edge = field_on(*sphere,
+                        [](const Position& x, float) { return 0.5 + 0.4 * std::sin(0.3 * (x[0] + x[1] - x[2])); });
     }
     static const Scene& get() {
         static const Scene scene;
@@ -102,8 +103,8 @@ void time_step(benchmark::State& state) {
     constexpr int kSteps = kManySteps - kFewSteps;
     const double voxels = double(many.active_voxels), leaf_voxels = 512.0 * double(many.leaf_count);
     const double visits = double(many.leaf_visits - few.leaf_visits) / double(many.leaf_count) / kSteps;
-    // Each once: assembly reads u, u before, phi and edge and writes the guess and six rows; a visit reads u, u before and the
-    // rows and writes u; the motion reads u and u before.
+    // Each once: assembly reads u, u before, phi and edge and writes the guess and six rows; a visit reads u, u before
+    // and the rows and writes u; the motion reads u and u before.
     const double bytes = (4 * 4 + 4 + 12) + visits * (4 + 4 + 12 + 4) + 4 * 2;
     count_voxels(state, voxels * kSteps, bytes * leaf_voxels / voxels);
     state.counters["cpu_per_voxel"] = cpu / voxels / kSteps;  // the benchmark's own would count both runs whole
@@ -175,8 +176,7 @@ void write_stage(benchmark::State& state) {
     const Phantoms& p = Phantoms::get();
     const std::string path =
         std::filesystem::temp_directory_path() / ("covol_bench_" + std::to_string(::getpid()) + ".vdb");
-    for (auto _ : state)
-        with_threads(on(state), [&] { write_vdb(path, {p.surface}); });
+    for (auto _ : state) with_threads(on(state), [&] { write_vdb(path, {p.surface}); });
     std::remove(path.c_str());
     count_voxels(state, double(p.surface->activeVoxelCount()));
 }

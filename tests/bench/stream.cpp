@@ -23,10 +23,11 @@ void triad(benchmark::State& state, int threads) {
     tbb::task_arena arena(threads);
     for (auto _ : state)
         arena.execute([&] {
-            tbb::parallel_for(tbb::blocked_range<std::size_t>(0, kFloats, kChunk),
-                              [to = a.data(), x = b.data(), y = c.data()](const tbb::blocked_range<std::size_t>& range) {
-                                  for (std::size_t n = range.begin(); n != range.end(); ++n) to[n] = x[n] + 3.0F * y[n];
-                              });
+            tbb::parallel_for(
+                tbb::blocked_range<std::size_t>(0, kFloats, kChunk),
+                [to = a.data(), x = b.data(), y = c.data()](const tbb::blocked_range<std::size_t>& range) {
+                    for (std::size_t n = range.begin(); n != range.end(); ++n) to[n] = x[n] + 3.0F * y[n];
+                });
         });
     count_voxels(state, double(kFloats), 3 * sizeof(float));
 }

@@ -18,7 +18,7 @@ std::vector<Vec3> random_cloud(unsigned seed) {
         case 0: return sphere_cloud(count, 6.0, seed);
         case 1: return box_cloud(count, {{-7, -7, -7}, {7, 7, 7}}, seed);
         case 2: return box_cloud(count, {{-7, -7, 1}, {7, 7, 1.001}}, seed);  // a sheet
-        default: return box_cloud(count, {{-9, -9, -9}, {-3, 9, 9}}, seed);  // partly outside the domain
+        default: return box_cloud(count, {{-9, -9, -9}, {-3, 9, 9}}, seed);   // partly outside the domain
     }
 }
 

@@ -1,4 +1,5 @@
-// Meshes of random solids: closed, 2-manifold, outward, free of self-intersections, without slivers, of the level set's topology.
+// Meshes of random solids: closed, 2-manifold, outward, free of self-intersections, without slivers, of the level set's
+// topology.
 #include <catch2/catch.hpp>
 #include <cstdio>
 #include <map>
@@ -32,7 +33,8 @@ public:
         if (!first) at->second = std::min(at->second, value);
     }
     void print(const char* what) const {
-        for (const auto& [kind, value] : least_) std::printf("%s: %s at least %.1f degrees\n", what, kind.c_str(), value);
+        for (const auto& [kind, value] : least_)
+            std::printf("%s: %s at least %.1f degrees\n", what, kind.c_str(), value);
     }
 
 private:
@@ -54,15 +56,18 @@ TEST_CASE("200 random solids: relaxed meshes are proper, have the topology of th
         const RelaxReport report = relax_mesh(mesh, *solid.level_set);
         check_proper(mesh, before);
         // Parts thinner than the lattice resolves have no room for triangles as large as voxels.
-        if (solid.resolved) CHECK(report.smallest_angle >= 20);
-        else CHECK(report.smallest_angle >= report.smallest_angle_before);
+        if (solid.resolved)
+            CHECK(report.smallest_angle >= 20);
+        else
+            CHECK(report.smallest_angle >= report.smallest_angle_before);
         CHECK(report.deviation.mean < deviation.mean + 0.02);
         worst.add(solid.name, report.smallest_angle);
         most = std::max(most, report.deviation.max - deviation.max);
         mean = std::max(mean, report.deviation.mean);
     }
     worst.print("relaxed, 1st percentile of the smallest angles");
-    std::printf("mean distance from the level set at most %.3f voxels; the largest grows by %.3f at most\n", mean, most);
+    std::printf("mean distance from the level set at most %.3f voxels; the largest grows by %.3f at most\n", mean,
+                most);
 }
 
 TEST_CASE("200 random solids: decimated meshes are proper and keep the topology") {

@@ -57,8 +57,8 @@ struct DenseOptions {
     double edge_epsilon = 1e-3;     ///< slope of g per voxel
     double attraction_range = 0.0;  ///< 0: unlimited
     double image_yields = 0.0;
-    double solver_tolerance =
-        1e-10;  ///< a solve ends when no Gauss-Seidel correction exceeds this share of the first sweep's
+    /// a solve ends when no Gauss-Seidel correction exceeds this share of the first sweep's
+    double solver_tolerance = 1e-10;
     int max_sweeps = 100000;
     PrintedForm printed;
 };

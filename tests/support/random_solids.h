@@ -62,11 +62,17 @@ private:
             if (size > 0.1 && size < 1) return {v[0] / size, v[1] / size, v[2] / size};
         }
     }
-    Vec3 place(double reach) { return {middle_[0] + uniform(-reach, reach), middle_[1] + uniform(-reach, reach), middle_[2] + uniform(-reach, reach)}; }
+    Vec3 place(double reach) {
+        return {middle_[0] + uniform(-reach, reach), middle_[1] + uniform(-reach, reach),
+                middle_[2] + uniform(-reach, reach)};
+    }
 
     /// A sum of plane waves of these lengths in voxels, over the root mean square of its slope.
     Shape waves(double shortest, double longest) {
-        struct Wave { Vec3 k; double phase, weight; };
+        struct Wave {
+            Vec3 k;
+            double phase, weight;
+        };
         std::vector<Wave> all;
         double slope = 0;
         for (int n = 0; n < 8; ++n) {
@@ -83,7 +89,9 @@ private:
     }
 
     Shape within(double radius, Shape shape) {
-        return [shape = std::move(shape), radius, c = middle_](const Vec3& p) { return std::max(shape(p), norm(minus(p, c)) - radius); };
+        return [shape = std::move(shape), radius, c = middle_](const Vec3& p) {
+            return std::max(shape(p), norm(minus(p, c)) - radius);
+        };
     }
 
     Shape primitive(bool thin) {
@@ -100,14 +108,16 @@ private:
                 const Vec3 f{d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2], d[0] * e[1] - d[1] * e[0]};
                 return [=](const Vec3& p) {
                     const Vec3 q = minus(p, c);
-                    return std::max({std::abs(dot(q, d)) - r, std::abs(dot(q, e)) - size, std::abs(dot(q, f)) - 0.8 * size});
+                    return std::max(
+                        {std::abs(dot(q, d)) - r, std::abs(dot(q, e)) - size, std::abs(dot(q, f)) - 0.8 * size});
                 };
             }
             case 2:  // a torus
                 return [=](const Vec3& p) {
                     const Vec3 q = minus(p, c);
                     const double up = dot(q, d);
-                    return std::hypot(std::sqrt(std::max(0.0, dot(q, q) - up * up)) - size, up) - std::min(r, 0.6 * size);
+                    return std::hypot(std::sqrt(std::max(0.0, dot(q, q) - up * up)) - size, up) -
+                           std::min(r, 0.6 * size);
                 };
             default:  // a capsule
                 return [=](const Vec3& p) {
@@ -124,7 +134,9 @@ private:
         for (int n = 0; n < parts; ++n) {
             Shape part = primitive(thin);
             const bool cut = pick(0, 2) == 0;
-            all = [all, part, cut](const Vec3& p) { return cut ? std::max(all(p), -part(p)) : std::min(all(p), part(p)); };
+            all = [all, part, cut](const Vec3& p) {
+                return cut ? std::max(all(p), -part(p)) : std::min(all(p), part(p));
+            };
         }
         return all;
     }
@@ -134,7 +146,9 @@ private:
         const Vec3 c = place(2), d = direction();
         if (pick(0, 1) == 0) return [=](const Vec3& p) { return std::abs(norm(minus(p, c)) - r) - half; };
         const Shape bent = waves(15, 40);
-        return [=](const Vec3& p) { return std::max(std::abs(dot(minus(p, c), d) + 2 * bent(p)) - half, norm(minus(p, c)) - r); };
+        return [=](const Vec3& p) {
+            return std::max(std::abs(dot(minus(p, c), d) + 2 * bent(p)) - half, norm(minus(p, c)) - r);
+        };
     }
 
     /// Balls and boxes whose surfaces pass through lattice points, exactly or nearly.
@@ -147,7 +161,10 @@ private:
             const Vec3 q = minus(p, c);
             const double box = std::max({std::abs(q[0]), std::abs(q[1]), std::abs(q[2])}) - r;
             const double cross = std::abs(q[0]) + std::abs(q[1]) + std::abs(q[2]) - r;
-            const double value = kind == 0 ? norm(q) - r : kind == 1 ? box : kind == 2 ? cross : std::max(box, 4 - norm(q));
+            const double value = kind == 0   ? norm(q) - r
+                                 : kind == 1 ? box
+                                 : kind == 2 ? cross
+                                             : std::max(box, 4 - norm(q));
             return std::round(value / ground) * ground + off;
         };
     }
@@ -158,7 +175,8 @@ private:
         for (int i = domain_.min[0]; i <= domain_.max[0]; ++i)
             for (int j = domain_.min[1]; j <= domain_.max[1]; ++j)
                 for (int k = domain_.min[2]; k <= domain_.max[2]; ++k)
-                    accessor.setValue({i, j, k}, float(h_ * std::clamp(shape({double(i), double(j), double(k)}), -3.0, 3.0)));
+                    accessor.setValue({i, j, k},
+                                      float(h_ * std::clamp(shape({double(i), double(j), double(k)}), -3.0, 3.0)));
         return grid;
     }
 

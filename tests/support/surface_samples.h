@@ -59,14 +59,17 @@ inline SurfaceSample sample_surface(const SignedDistance& f, const WorldBox& box
 inline void add_noise(SurfaceSample& sample, double sigma, unsigned seed) {
     std::mt19937 random(seed);
     std::normal_distribution<double> off(0, sigma);
-    for (std::size_t n = 0; n < sample.points.size(); ++n) sample.points[n] = sum(sample.points[n], scaled(off(random), sample.normals[n]));
+    for (std::size_t n = 0; n < sample.points.size(); ++n)
+        sample.points[n] = sum(sample.points[n], scaled(off(random), sample.normals[n]));
 }
 
 /// A shape and a box around it.
 struct Solid3 {
     SignedDistance distance;
     WorldBox box;
-    [[nodiscard]] SurfaceSample sample(std::size_t count, unsigned seed) const { return sample_surface(distance, box, count, seed); }
+    [[nodiscard]] SurfaceSample sample(std::size_t count, unsigned seed) const {
+        return sample_surface(distance, box, count, seed);
+    }
 };
 
 inline Solid3 ball(double radius) {
@@ -77,13 +80,15 @@ inline Solid3 ball(double radius) {
 /// Around z.
 inline Solid3 torus(double around, double tube) {
     const double r = around + tube + 0.02, z = tube + 0.02;
-    return {[around, tube](const Vec3& p) { return std::hypot(std::hypot(p[0], p[1]) - around, p[2]) - tube; }, {{-r, -r, -z}, {r, r, z}}};
+    return {[around, tube](const Vec3& p) { return std::hypot(std::hypot(p[0], p[1]) - around, p[2]) - tube; },
+            {{-r, -r, -z}, {r, r, z}}};
 }
 
 /// A ball with a cavity in its middle.
 inline Solid3 shell(double outer, double inner) {
     const double r = outer + 0.02;
-    return {[outer, inner](const Vec3& p) { return std::max(norm(p) - outer, inner - norm(p)); }, {{-r, -r, -r}, {r, r, r}}};
+    return {[outer, inner](const Vec3& p) { return std::max(norm(p) - outer, inner - norm(p)); },
+            {{-r, -r, -r}, {r, r, r}}};
 }
 
 /// A box around the origin.
@@ -97,7 +102,8 @@ inline Solid3 block(const Vec3& half) {
         }
         return norm(beyond) + std::min(0.0, most);
     };
-    return {distance, {{-half[0] - 0.02, -half[1] - 0.02, -half[2] - 0.02}, {half[0] + 0.02, half[1] + 0.02, half[2] + 0.02}}};
+    return {distance,
+            {{-half[0] - 0.02, -half[1] - 0.02, -half[2] - 0.02}, {half[0] + 0.02, half[1] + 0.02, half[2] + 0.02}}};
 }
 
 /// All within `radius` of the segment from a to b.
@@ -112,7 +118,8 @@ inline Solid3 table(double leg) {
     const auto distance = [leg](const Vec3& p) {
         double least = capsule(p, {-0.5, 0, 0}, {0.5, 0, 0}, 0.3);
         for (const double x : {-0.55, 0.55})
-            for (const double y : {-0.15, 0.15}) least = std::min(least, capsule(p, {x, y, 0}, {1.3 * x, 2 * y, -0.9}, leg));
+            for (const double y : {-0.15, 0.15})
+                least = std::min(least, capsule(p, {x, y, 0}, {1.3 * x, 2 * y, -0.9}, leg));
         return least;
     };
     return {distance, {{-0.85, -0.4, -1}, {0.85, 0.4, 0.35}}};

@@ -8,8 +8,8 @@
 namespace covol {
 
 struct BandOptions {
-    double tag_distance = 0.0;          ///< D, world units; > 0.
-    std::vector<Vec3> exterior_seeds;   ///< world positions that are outside, in cavities say
+    double tag_distance = 0.0;         ///< D, world units; > 0.
+    std::vector<Vec3> exterior_seeds;  ///< world positions that are outside, in cavities say
     [[nodiscard]] std::string why_invalid() const;
 };
 
@@ -42,18 +42,20 @@ struct TagDistanceChoice {
 /// above the saddle that closes the main cores. Without a core that stands out, 1.8 times the mean spacing.
 /// @throws Error InvalidInput.
 [[nodiscard]] TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Domain& domain,
-                                                    const std::vector<Vec3>& exterior_seeds, const RunContext& run = {});
+                                                    const std::vector<Vec3>& exterior_seeds,
+                                                    const RunContext& run = {});
 
 /// Tagging. Exterior is what a flood from the domain's boundary and the exterior seeds reaches through {d > D};
 /// u0 is the signed distance to the tagged surface clamped to [-3h, 3h] (negative inside) on the band {d <= D + 3h}.
 /// Leaks are reported, never thrown.
 /// @param distance  from distance(), with max_distance >= D + 3h.
-/// @throws Error InvalidOptions, InvalidInput (the tube is too narrow; an exterior seed outside the domain or at d <= D).
+/// @throws Error InvalidOptions, InvalidInput (the tube is too narrow; an exterior seed outside the domain or at d <=
+/// D).
 [[nodiscard]] BandResult band(const FloatGrid& distance, const BandOptions& options, const RunContext& run = {});
 
-/// The closing of a tagged body by a ball: what a ball of radius D that rolls outside the tagged surface of `band` cannot
-/// reach with its far side, that is, the exterior grown back by D. Its surface touches the points; a signed distance
-/// clamped to 5 voxels. Null where nothing would be left.
+/// The closing of a tagged body by a ball: what a ball of radius D that rolls outside the tagged surface of `band`
+/// cannot reach with its far side, that is, the exterior grown back by D. Its surface touches the points; a signed
+/// distance clamped to 5 voxels. Null where nothing would be left.
 [[nodiscard]] FloatGridPtr closing(const FloatGrid& band, double tag_distance, const RunContext& run = {});
 
 }  // namespace covol

@@ -21,8 +21,8 @@ using Clip = std::vector<HalfSpace>;
 /// The image's own box, half a voxel beyond the last centres; turned as the image is.
 [[nodiscard]] Clip clip_at(const ImageGeometry& geometry);
 
-/// Stores the clip as metadata ("covol_clip_0", ...). surface() closes the solid there by a flat cap; extract_mesh() puts
-/// caps along the lattice exactly on it, with sharp edges; rasterize() ends there.
+/// Stores the clip as metadata ("covol_clip_0", ...). surface() closes the solid there by a flat cap; extract_mesh()
+/// puts caps along the lattice exactly on it, with sharp edges; rasterize() ends there.
 void set_clip(FloatGrid& grid, const Clip& clip);
 /// What set_clip stored, or an empty one.
 [[nodiscard]] Clip clip_of(const FloatGrid& grid);

@@ -11,19 +11,20 @@ namespace covol {
 enum class CloudSmoothing {
     None,
     Jets,  ///< each point moves to a quadric fitted to its neighbours (Cazals and Pouget 2005)
-    Wlop   ///< weighted locally optimal projection (Huang et al. 2009): evens out the density too, outliers matter little
+    Wlop   ///< weighted locally optimal projection (Huang et al. 2009): evens out the density too, outliers matter
+           ///< little
 };
 
 /// What clean_cloud() does, in this order; every step is off unless asked for.
 struct CloudCleanupOptions {
-    bool duplicates = true;       ///< Exact duplicates become one.
-    double outlier_factor = 0;    ///< > 0: points whose root mean square distance to `neighbours` others exceeds this
-                                  ///< many times the cloud's mean distance to them go, until none is left; >= 1.
-    double simplify = 0;          ///< > 0: one point stays in each cell of a lattice of this edge, world units.
+    bool duplicates = true;     ///< Exact duplicates become one.
+    double outlier_factor = 0;  ///< > 0: points whose root mean square distance to `neighbours` others exceeds this
+                                ///< many times the cloud's mean distance to them go, until none is left; >= 1.
+    double simplify = 0;        ///< > 0: one point stays in each cell of a lattice of this edge, world units.
     CloudSmoothing smooth = CloudSmoothing::None;
-    double wlop_share = 0.25;     ///< Of the points, that WLOP makes anew, in (0,1].
-    double wlop_radius = 0;       ///< Of WLOP's neighbourhoods, world units; 0: 2.5 mean spacings of the new points.
-    int neighbours = 24;          ///< For outliers and jets, >= 6.
+    double wlop_share = 0.25;  ///< Of the points, that WLOP makes anew, in (0,1].
+    double wlop_radius = 0;    ///< Of WLOP's neighbourhoods, world units; 0: 2.5 mean spacings of the new points.
+    int neighbours = 24;       ///< For outliers and jets, >= 6.
 
     /// Whether anything but duplicates is asked for.
     [[nodiscard]] bool any() const { return outlier_factor > 0 || simplify > 0 || smooth != CloudSmoothing::None; }

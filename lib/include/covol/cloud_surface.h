@@ -9,15 +9,15 @@ namespace covol {
 
 /// What surface_from_cloud() found out about the points.
 struct CloudReport {
-    double spacing = 0;        ///< CloudScale::spacing
-    double turned = 0;         ///< Orientation::turned
-    double noise = 0;          ///< standard deviation of the points from the surface, median
-    double radius = 0;         ///< of the neighbourhoods that were averaged, median
-    int iterations = 0;        ///< of the orientation
-    bool encloses = true;      ///< CloudOrientation::encloses
-    double indicator_cell = 0; ///< of its finest lattice
-    std::size_t stray = 0;     ///< points far from all surfaces, left out
-    std::size_t bare_nodes = 0;  ///< places with points that are no sheet: the indicator alone tells of the surface
+    double spacing = 0;              ///< CloudScale::spacing
+    double turned = 0;               ///< Orientation::turned
+    double noise = 0;                ///< standard deviation of the points from the surface, median
+    double radius = 0;               ///< of the neighbourhoods that were averaged, median
+    int iterations = 0;              ///< of the orientation
+    bool encloses = true;            ///< CloudOrientation::encloses
+    double indicator_cell = 0;       ///< of its finest lattice
+    std::size_t stray = 0;           ///< points far from all surfaces, left out
+    std::size_t bare_nodes = 0;      ///< places with points that are no sheet: the indicator alone tells of the surface
     std::size_t dropped_pieces = 0;  ///< of the surface, that hardly a point rested on
     std::size_t joined_pieces = 0;   ///< small ones, joined to what is nearest along points
     std::size_t held_voxels = 0;     ///< that the indicator's topology holds, for it is simpler than the points' own
@@ -28,10 +28,11 @@ struct CloudReport {
 /// The closed surface behind points without normals, as a start (negative inside).
 ///
 /// Near the points, oriented by the indicator function that they make themselves (orient_cloud()), the level set is the
-/// signed distance to local quadrics, fitted to neighbourhoods as wide as their noise asks for, blended (implicit moving
-/// least squares; Kolluri, Provably good moving least squares, ACM Trans. Algorithms 4(2), 2008; Ohtake and others,
-/// Multi-level partition of unity implicits, 2003); where there are no points it is the indicator's. Of points that enclose
-/// nothing it is the screened indicator. Where the indicator has fewer pieces and handles its topology is held.
+/// signed distance to local quadrics, fitted to neighbourhoods as wide as their noise asks for, blended (implicit
+/// moving least squares; Kolluri, Provably good moving least squares, ACM Trans. Algorithms 4(2), 2008; Ohtake and
+/// others, Multi-level partition of unity implicits, 2003); where there are no points it is the indicator's. Of points
+/// that enclose nothing it is the screened indicator. Where the indicator has fewer pieces and handles its topology is
+/// held.
 /// @throws Error InvalidInput (no surface), Cancelled.
 [[nodiscard]] FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cloud, CloudReport& report,
                                               const RunContext& run = {});

@@ -62,13 +62,13 @@ private:
 
 /// Marks on slices, made dense enough to hold a level set.
 struct Contours {
-    std::vector<Vec3> marks;    ///< as they were clicked, world units
-    std::vector<Vec3> along;    ///< on the lines through them, the marks included
-    std::vector<Vec3> between;  ///< on the interpolated surface between slices and on the caps: a guess
+    std::vector<Vec3> marks;                    ///< as they were clicked, world units
+    std::vector<Vec3> along;                    ///< on the lines through them, the marks included
+    std::vector<Vec3> between;                  ///< on the interpolated surface between slices and on the caps: a guess
     std::shared_ptr<const ContourSolid> solid;  ///< null without a closed contour
     std::size_t closed = 0, open = 0;           ///< lines
-    std::size_t slices = 0;     ///< with closed contours
-    bool flat = false;          ///< all marks lie on one of several slices, and no thickness was given: the body is a guess
+    std::size_t slices = 0;                     ///< with closed contours
+    bool flat = false;  ///< all marks lie on one of several slices, and no thickness was given: the body is a guess
     double slice_distance = 0;  ///< between neighbouring ones of them, the median; world units
     std::string summary;        ///< one line for people
 };

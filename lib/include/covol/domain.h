@@ -38,7 +38,8 @@ struct Domain {
 /// The fewest voxels of edge h whose union covers `box`, centred on it.
 /// A box that is a whole number of voxels is matched exactly, so that an isotropic image's
 /// voxels are the domain's voxels.
-/// @throws Error InvalidOptions (h <= 0, not finite), InvalidInput (an empty box, or more than 2^30 voxels along an axis).
+/// @throws Error InvalidOptions (h <= 0, not finite), InvalidInput (an empty box, or more than 2^30 voxels along an
+/// axis).
 [[nodiscard]] Domain domain_of_box(const WorldBox& box, double voxel_size);
 
 /// The same lattice with `layers` more voxels on every side.

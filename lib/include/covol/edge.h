@@ -13,8 +13,9 @@ namespace covol {
 enum class EdgeFeature {
     Automatic,   ///< edge() takes Slope; segment() asks the marks of contours, see feature_at()
     Slope,       ///< s = |∇G_σ * I| per world unit: borders between darker and brighter, the paper's
-    BrightLine,  ///< s = G_σ * I: bright sheets such as stained membranes, whose middle has no slope and its sides have two
-    DarkLine     ///< s = 1 - G_σ * I
+    BrightLine,  ///< s = G_σ * I: bright sheets such as stained membranes, whose middle has no slope and its sides have
+                 ///< two
+    DarkLine  ///< s = 1 - G_σ * I
 };
 
 /// "auto", "slope", "bright-line", "dark-line"
@@ -22,20 +23,21 @@ enum class EdgeFeature {
 
 struct EdgeOptions {
     EdgeFeature feature = EdgeFeature::Automatic;
-    double sigma = -1.0;              ///< σ >= 0, world units: presmoothing; < 0 picks 1 voxel.
-    double edge_k = 0.0;              ///< K > 0 in g = 1/(1+K s^2), 0: see edge_contrast.
-    double edge_contrast = 0.0;       ///< s at which g = 1/2, i.e. K = 1/s^2; 0 picks a percentile of s in the band.
-    double contrast_percentile = 0.0; ///< that percentile, in (0,1); 0 picks 0.9 for slopes, and for lines a third
-                                      ///< of the median: g then goes by relative brightness, as contrast that varies needs
-    double low = 0.0, high = 0.0;     ///< intensities mapped to 0 and 1; equal: the image's 0.5 % and 99.5 % percentiles.
+    double sigma = -1.0;         ///< σ >= 0, world units: presmoothing; < 0 picks 1 voxel.
+    double edge_k = 0.0;         ///< K > 0 in g = 1/(1+K s^2), 0: see edge_contrast.
+    double edge_contrast = 0.0;  ///< s at which g = 1/2, i.e. K = 1/s^2; 0 picks a percentile of s in the band.
+    /// that percentile, in (0,1); 0 picks 0.9 for slopes, and for lines a third of the median: g then goes by relative
+    /// brightness, as contrast that varies needs
+    double contrast_percentile = 0.0;
+    double low = 0.0, high = 0.0;  ///< intensities mapped to 0 and 1; equal: the image's 0.5 % and 99.5 % percentiles.
     [[nodiscard]] std::string why_invalid() const;
 };
 
 struct EdgeReport {
-    double sigma = 0;           ///< world units
-    double edge_k = 0;          ///< K as used
-    double edge_contrast = 0;   ///< 1/sqrt(K)
-    double low = 0, high = 0;   ///< as used
+    double sigma = 0;          ///< world units
+    double edge_k = 0;         ///< K as used
+    double edge_contrast = 0;  ///< 1/sqrt(K)
+    double low = 0, high = 0;  ///< as used
 };
 
 struct EdgeResult {
@@ -62,7 +64,7 @@ struct MarkedFeature {
 /// @param places   world units
 /// @param normals  outward unit vectors; as many
 /// @param reach    how far beside a place its sides are looked at, world units
-[[nodiscard]] MarkedFeature feature_at(const Image& image, const std::vector<Vec3>& places, const std::vector<Vec3>& normals,
-                                       double reach);
+[[nodiscard]] MarkedFeature feature_at(const Image& image, const std::vector<Vec3>& places,
+                                       const std::vector<Vec3>& normals, double reach);
 
 }  // namespace covol

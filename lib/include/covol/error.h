@@ -17,7 +17,8 @@ enum class Errc {
 /// The one exception type that covol throws.
 ///
 /// Messages say where, what, what was expected and what was found:
-/// `read_points: cloud.xyz:18: expected 3 numbers, got 2`. Where an option would help they name its field, as option_names.h tells.
+/// `read_points: cloud.xyz:18: expected 3 numbers, got 2`. Where an option would help they name its field, as
+/// option_names.h tells.
 class Error : public std::runtime_error {
 public:
     Error(Errc code, const std::string& message) : std::runtime_error(message), code_(code) {}

@@ -11,9 +11,10 @@ namespace covol {
 
 /// What a surface rests on, and where new marks would help most.
 struct EvidenceOptions {
-    double reach = 0.0;      ///< world units, > 0: the surface within this of a mark rests on the marks
-    double weak_edge = 0.25; ///< in (0,1): where the edge strength 1 − g is below this the image does not hold the surface
-    int suggestions = 0;     ///< how many slices to name, >= 0
+    double reach = 0.0;  ///< world units, > 0: the surface within this of a mark rests on the marks
+    /// in (0,1): where the edge strength 1 − g is below this the image does not hold the surface
+    double weak_edge = 0.25;
+    int suggestions = 0;  ///< how many slices to name, >= 0
     [[nodiscard]] std::string why_invalid() const;
 };
 
@@ -31,8 +32,9 @@ struct SliceEvidence {
 /// A slice where marks would help, and the place in it where they would help most.
 struct Suggestion {
     int slice = 0;
-    double area = 0;       ///< unsupported surface that marks along the outline there would reach, beyond earlier suggestions
-    Vec3 index{0, 0, 0};   ///< voxels of the image
+    /// unsupported surface that marks along the outline there would reach, beyond earlier suggestions
+    double area = 0;
+    Vec3 index{0, 0, 0};  ///< voxels of the image
     Vec3 world{0, 0, 0};
 };
 
@@ -55,7 +57,8 @@ struct Evidence {
 /// @param edge   g from edge(), or null; background 1
 /// @throws Error InvalidOptions; InvalidInput (an empty mesh).
 [[nodiscard]] Evidence evidence(const TriangleMesh& mesh, const std::vector<Vec3>& marks, const FloatGrid* edge,
-                                const ImageGeometry& geometry, const EvidenceOptions& options, const RunContext& run = {});
+                                const ImageGeometry& geometry, const EvidenceOptions& options,
+                                const RunContext& run = {});
 
 /// Share of a surface's area that lies farther than `reach` from every point: where the points do not determine it.
 /// @param distance  to the points; its background, for what lies beyond its tube, is at least `reach`

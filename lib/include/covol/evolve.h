@@ -12,22 +12,24 @@ namespace covol {
 /// What changes the result of evolve(). Symbols and equation numbers are the paper's; lengths are in world
 /// units, the unit of the voxel size h; the flow's speed is 1 world unit per unit of time.
 struct EvolveOptions {
-    double theta = 1.0;             ///< θ in [0,1]: weight of the pull towards the points, Eq. (3).
-    double rho = 1.0;               ///< ρ in [0,1]: weight of the pull towards image edges, Eq. (3).
-    double delta = -1.0;            ///< δ >= 0: weight of curvature, Eq. (1), world units; < 0 picks 1 voxel.
-    double tau = -1.0;              ///< τ > 0: time step; < 0 picks h (one voxel at unit speed), and more while the surface moves slowly, unless an image
-                                  ///< alone decides.
-    double epsilon = 1e-2;          ///< ε > 0: regularises |∇u|, Eqs. (13)-(14); dimensionless.
-    double edge_epsilon = 0.02;     ///< ε in |∇g|_ε, Eq. (20): a slope of g per voxel; below it the pull fades.
-    double attraction_range = 0.0;  ///< r, world units: the points pull fully up to r/2, not at all beyond r; 0: unlimited.
-    double image_yields = 0.0;      ///< in [0,1]: share of ρ that fades close to marks, on the attraction range's taper.
-    double guess_weight = 1.0;      ///< in [0,1]: θ is this much of itself where no trusted mark is near, on the same taper.
-    bool follow = false;            ///< the band follows the surface (starts other than tagging).
-    int max_steps = 500;            ///< upper bound on time steps, >= 0
-    double tolerance = 2e-3;        ///< steady when the zero crossings move less than tolerance * τ a step on the average,
-                                    ///< or when over 10 steps fewer voxels than that changed sign
-    double solver_tolerance = 1e-3; ///< a step's solve ends at this residual, relative to that of u before
-    int max_sweeps = 200;           ///< upper bound on a step's sweeps
+    double theta = 1.0;   ///< θ in [0,1]: weight of the pull towards the points, Eq. (3).
+    double rho = 1.0;     ///< ρ in [0,1]: weight of the pull towards image edges, Eq. (3).
+    double delta = -1.0;  ///< δ >= 0: weight of curvature, Eq. (1), world units; < 0 picks 1 voxel.
+    double tau = -1.0;  ///< τ > 0: time step; < 0 picks h (one voxel at unit speed), and more while the surface moves
+                        ///< slowly, unless an image alone decides.
+    double epsilon = 1e-2;       ///< ε > 0: regularises |∇u|, Eqs. (13)-(14); dimensionless.
+    double edge_epsilon = 0.02;  ///< ε in |∇g|_ε, Eq. (20): a slope of g per voxel; below it the pull fades.
+    /// r, world units: the points pull fully up to r/2, not at all beyond r; 0: unlimited.
+    double attraction_range = 0.0;
+    double image_yields = 0.0;  ///< in [0,1]: share of ρ that fades close to marks, on the attraction range's taper.
+    /// in [0,1]: θ is this much of itself where no trusted mark is near, on the same taper.
+    double guess_weight = 1.0;
+    bool follow = false;      ///< the band follows the surface (starts other than tagging).
+    int max_steps = 500;      ///< upper bound on time steps, >= 0
+    double tolerance = 2e-3;  ///< steady when the zero crossings move less than tolerance * τ a step on the average,
+                              ///< or when over 10 steps fewer voxels than that changed sign
+    double solver_tolerance = 1e-3;  ///< a step's solve ends at this residual, relative to that of u before
+    int max_sweeps = 200;            ///< upper bound on a step's sweeps
     [[nodiscard]] std::string why_invalid() const;
 };
 
@@ -38,11 +40,11 @@ enum class StopReason { NotRun, Steady, MaxSteps, Cancelled, Vanished };
 struct EvolveReport {
     StopReason stop_reason = StopReason::NotRun;
     int steps = 0;
-    double last_change = 0;            ///< as in EvolveOptions::tolerance, voxels
+    double last_change = 0;  ///< as in EvolveOptions::tolerance, voxels
     double sweeps_per_step = 0;
-    std::int64_t leaf_visits = 0;      ///< leaves swept, over all steps and sweeps
+    std::int64_t leaf_visits = 0;        ///< leaves swept, over all steps and sweeps
     std::int64_t leaf_visits_saved = 0;  ///< visits to leaves where nothing happened, that were left out
-    std::int64_t active_voxels = 0;    ///< at the end
+    std::int64_t active_voxels = 0;      ///< at the end
     std::int64_t leaf_count = 0;
     double seconds_assembly = 0;
     double seconds_sweeps = 0;
@@ -64,7 +66,8 @@ struct EvolveFields {
 ///
 /// @param u  in/out, world units; active voxels are the band; u < 0 inside; inactive voxels keep their values.
 /// @pre   all grids share one transform: uniform voxel size and a translation (domain_of()).
-/// @post  without `follow`, u keeps its topology; with it u gets a new tree (accessors become invalid); values do not depend on the number of threads;
+/// @post  without `follow`, u keeps its topology; with it u gets a new tree (accessors become invalid); values do not
+/// depend on the number of threads;
 ///        without `follow`, min u0 <= u <= max u0.
 /// @throws Error  InvalidOptions, InvalidInput (no active voxel; transforms differ; a value that is not finite; a
 ///                needed field is null), Numerical (u is left at the step before).

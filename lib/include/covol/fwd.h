@@ -10,12 +10,17 @@
 namespace openvdb {
 OPENVDB_USE_VERSION_NAMESPACE
 namespace OPENVDB_VERSION_NAME {
-template <typename> class Grid;
+template <typename>
+class Grid;
 namespace tree {
-template <typename> class Tree;
-template <typename> class RootNode;
-template <typename, std::uint32_t> class InternalNode;
-template <typename, std::uint32_t> class LeafNode;
+template <typename>
+class Tree;
+template <typename>
+class RootNode;
+template <typename, std::uint32_t>
+class InternalNode;
+template <typename, std::uint32_t>
+class LeafNode;
 }  // namespace tree
 }  // namespace OPENVDB_VERSION_NAME
 }  // namespace openvdb
@@ -23,12 +28,12 @@ template <typename, std::uint32_t> class LeafNode;
 namespace covol {
 
 /// openvdb::FloatGrid: 8^3 leaves, the type of every field in covol.
-using FloatGrid = openvdb::Grid<openvdb::tree::Tree<openvdb::tree::RootNode<openvdb::tree::InternalNode<
-    openvdb::tree::InternalNode<openvdb::tree::LeafNode<float, 3>, 4>, 5>>>>;
+using FloatGrid = openvdb::Grid<openvdb::tree::Tree<openvdb::tree::RootNode<
+    openvdb::tree::InternalNode<openvdb::tree::InternalNode<openvdb::tree::LeafNode<float, 3>, 4>, 5>>>>;
 using FloatGridPtr = std::shared_ptr<FloatGrid>;
 
-using Vec3 = std::array<double, 3>;      ///< x, y, z
-using Index3 = std::array<std::int32_t, 3>;  ///< i, j, k
+using Vec3 = std::array<double, 3>;                    ///< x, y, z
+using Index3 = std::array<std::int32_t, 3>;            ///< i, j, k
 using Matrix3 = std::array<std::array<double, 3>, 3>;  ///< rows
 
 }  // namespace covol

@@ -14,7 +14,8 @@ namespace covol {
 inline constexpr double kUniformDeviation = 0.3;
 
 struct GuessOptions {
-    /// Standard deviation of a mark along three directions, as world vectors (an image's axes, times a share of its spacing).
+    /// Standard deviation of a mark along three directions, as world vectors (an image's axes, times a share of its
+    /// spacing).
     std::array<Vec3, 3> deviation{};
     std::vector<Vec3> inside, outside;  ///< places whose side is known
     /// The world's end: where the body is cut off. Marks in the cut are told from marks on the surface.
@@ -23,11 +24,11 @@ struct GuessOptions {
 };
 
 struct GuessReport {
-    std::size_t marks = 0;      ///< that hold the surface
-    std::size_t cut_marks = 0;  ///< that lie in the cut, inside the body: left out
-    std::size_t patches = 0;    ///< surfaces of a part of the marks; 0: one of all of them
+    std::size_t marks = 0;        ///< that hold the surface
+    std::size_t cut_marks = 0;    ///< that lie in the cut, inside the body: left out
+    std::size_t patches = 0;      ///< surfaces of a part of the marks; 0: one of all of them
     std::size_t wrong_seeds = 0;  ///< places of GuessOptions that lie on the wrong side in spite of all
-    std::string summary;        ///< one line for people
+    std::string summary;          ///< one line for people
 };
 
 /// Whether marks can have a body between them: at least four, not all in one plane.
@@ -40,7 +41,8 @@ struct Guess {
 
 /// A guess of the surface from few marks: through them it bends least (variational implicit surface, see
 /// lib/src/guess/variational.h). No density of marks is asked for.
-/// @throws Error InvalidOptions; InvalidInput (fewer than four distinct marks, all in one plane, nothing inside the domain).
+/// @throws Error InvalidOptions; InvalidInput (fewer than four distinct marks, all in one plane, nothing inside the
+/// domain).
 [[nodiscard]] Guess guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks, const GuessOptions& options,
                                      GuessReport& report, const RunContext& run = {});
 

@@ -11,8 +11,8 @@
 
 namespace covol {
 
-/// Within so many voxels a mark acts on a guess, however little it moves it. Five masks, ten marks: Dice from 4, 8, 12 and 16
-/// voxels differs by 0.00, 0.015, 0.035, 0.03 and 0.04, and 12 is within 0.015 of the best of each.
+/// Within so many voxels a mark acts on a guess, however little it moves it. Five masks, ten marks: Dice from 4, 8, 12
+/// and 16 voxels differs by 0.00, 0.015, 0.035, 0.03 and 0.04, and 12 is within 0.015 of the best of each.
 inline constexpr double kCorrectionVoxels = 12.0;
 
 struct CorrectionOptions {
@@ -23,10 +23,10 @@ struct CorrectionOptions {
 };
 
 struct CorrectionReport {
-    std::size_t marks = 0, seeds = 0;                 ///< that act: seeds only where the guess had them on the wrong side
-    double before_mean = 0, before_max = 0;           ///< distances of the marks to the guess, world units
-    double after_mean = 0, after_max = 0;             ///< to the corrected surface
-    double least_radius = 0, largest_radius = 0;      ///< within which marks act, world units
+    std::size_t marks = 0, seeds = 0;             ///< that act: seeds only where the guess had them on the wrong side
+    double before_mean = 0, before_max = 0;       ///< distances of the marks to the guess, world units
+    double after_mean = 0, after_max = 0;         ///< to the corrected surface
+    double least_radius = 0, largest_radius = 0;  ///< within which marks act, world units
 };
 
 /// A mask after a correction, in its own geometry.
@@ -51,8 +51,8 @@ public:
     /// Of the guess; negative inside.
     [[nodiscard]] double guess(const Vec3& world) const;
     [[nodiscard]] const CorrectionReport& report() const;
-    /// Voxels where c is 0, and those whose side stays the same, keep their value to the bit. Of the others those of value 0
-    /// that come in get `label`, those with `label` that go out get 0, and voxels of other labels stay.
+    /// Voxels where c is 0, and those whose side stays the same, keep their value to the bit. Of the others those of
+    /// value 0 that come in get `label`, those with `label` that go out get 0, and voxels of other labels stay.
     /// @throws Error InvalidInput (values that are no whole numbers).
     [[nodiscard]] CorrectedMask apply(const Image& mask, int label, const RunContext& run = {}) const;
     /// The corrected surface as a start on the guess's lattice: a signed distance, clamped.

@@ -11,28 +11,32 @@ namespace covol {
 
 /// What changes the result of guide(); lengths in world units.
 struct GuidanceOptions {
-    double mark_precision = -1;  ///< a mark lies within half of this of the border it means, along each axis; < 0: one voxel of the image
-    double range = -1;           ///< how far from the guess the border is looked for; < 0: by the distance to the marks
-    double weight = 1;           ///< in [0,1]: share of what the image says that counts; 0 leaves the guess as it is
+    /// a mark lies within half of this of the border it means, along each axis; < 0: one voxel of the image
+    double mark_precision = -1;
+    double range = -1;  ///< how far from the guess the border is looked for; < 0: by the distance to the marks
+    double weight = 1;  ///< in [0,1]: share of what the image says that counts; 0 leaves the guess as it is
     /// Empty when usable, else one line for each bad field: "weight: expected 0 to 1, got 2".
     [[nodiscard]] std::string why_invalid() const;
 };
 
 /// What guide() saw and did. The defaults say that nothing ran.
 struct GuidanceReport {
-    bool used = false;           ///< the image had a say
-    std::string reason;          ///< why it had none, in plain words
-    MarkedFeature feature;       ///< what the image has at the marks
-    double inside = 0, border = 0, outside = 0;  ///< median intensities two voxels inside of the marks, there, two voxels outside
-    double sigma = 0;            ///< presmoothing, the one that foretold the marks best
-    bool local = false;          ///< the profile was learnt place by place
-    double gain = 0;             ///< what the image adds to the log-likelihood of a mark that it was not learnt from, nats
-    double image_error = 0;      ///< how far off the border the image alone would lie (rms, an upper estimate, at the marks)
+    bool used = false;      ///< the image had a say
+    std::string reason;     ///< why it had none, in plain words
+    MarkedFeature feature;  ///< what the image has at the marks
+    double inside = 0, border = 0,
+           outside = 0;  ///< median intensities two voxels inside of the marks, there, two voxels outside
+    double sigma = 0;    ///< presmoothing, the one that foretold the marks best
+    bool local = false;  ///< the profile was learnt place by place
+    double gain = 0;     ///< what the image adds to the log-likelihood of a mark that it was not learnt from, nats
+    /// how far off the border the image alone would lie (rms, an upper estimate, at the marks)
+    double image_error = 0;
     double guess_error = 0;      ///< how far off the border the guess lies (rms, a lower estimate)
     double confident_share = 0;  ///< of the area, where the image says more than the guess
     double mean_offset = 0;      ///< by area, outward > 0
     double max_offset = 0;       ///< of |offset|, in one pass
-    int passes = 0;              ///< times that the image was asked: again where it erred less than the guess; what else stands here is of the last one
+    int passes = 0;  ///< times that the image was asked: again where it erred less than the guess; what else stands
+                     ///< here is of the last one
 
     /// One more pass, which may not have moved anything.
     void add(const GuidanceReport& pass, bool moved);

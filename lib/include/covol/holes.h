@@ -30,38 +30,40 @@ struct BoundaryLoop {
 
 struct HolesReport {
     Holes policy = Holes::Close;
-    double distance = 0;              ///< as used
-    double share = 0;                 ///< of the closed surface's area: what was trimmed, or made flat
-    double closed_volume = 0;         ///< of segment() alone: of the level set, where the mesh is open and has none; else 0
+    double distance = 0;       ///< as used
+    double share = 0;          ///< of the closed surface's area: what was trimmed, or made flat
+    double closed_volume = 0;  ///< of segment() alone: of the level set, where the mesh is open and has none; else 0
     std::size_t dropped_pieces = 0;   ///< between holes, too small to stay
     std::vector<BoundaryLoop> loops;  ///< of the holes
 };
 
-/// A distance from which on points are missing: three spacings where they lie sparsely (the 95 % nearest neighbour), and three
-/// voxels. Of points spread evenly at random hardly a gap is as wide (one of 10^12 discs of that radius is empty).
+/// A distance from which on points are missing: three spacings where they lie sparsely (the 95 % nearest neighbour),
+/// and three voxels. Of points spread evenly at random hardly a gap is as wide (one of 10^12 discs of that radius is
+/// empty).
 [[nodiscard]] double hole_distance(const std::vector<Vec3>& points, double voxel_size);
 
 /// At each vertex, to the nearest point. @pre there is a point
-[[nodiscard]] std::vector<float> distances_to_points(const TriangleMesh& mesh, const std::vector<Vec3>& points, const RunContext& run = {});
+[[nodiscard]] std::vector<float> distances_to_points(const TriangleMesh& mesh, const std::vector<Vec3>& points,
+                                                     const RunContext& run = {});
 
 /// Share of the area that lies farther than `distance` from every point, of the distances at the vertices.
 [[nodiscard]] double share_beyond(const TriangleMesh& mesh, const std::vector<float>& distances, double distance);
 
-/// Takes away what lies farther than `distance` from all points, back to the last of them: all that is closer than that to
-/// such a place. So a ball of that radius rolls along the rim, which is as smooth as it. Triangles are cut along the line,
-/// vertices close to it moved onto it, and pieces smaller than the ball's disc left out.
+/// Takes away what lies farther than `distance` from all points, back to the last of them: all that is closer than that
+/// to such a place. So a ball of that radius rolls along the rim, which is as smooth as it. Triangles are cut along the
+/// line, vertices close to it moved onto it, and pieces smaller than the ball's disc left out.
 /// @param mesh       closed, manifold, outward
 /// @param to_points  distances_to_points()
 /// @param slack      of the rim beyond the last points, world units, < distance
 /// @return 2-manifold with boundary, outward; the mesh itself where there is no hole
 /// @throws Error InvalidInput where nothing is left.
-[[nodiscard]] TriangleMesh trimmed(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack,
-                                   HolesReport& report, const RunContext& run = {});
+[[nodiscard]] TriangleMesh trimmed(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance,
+                                   double slack, HolesReport& report, const RunContext& run = {});
 
 /// The same cut, with the surface of least area in each hole instead of what was there (Pinkall and Polthier, Computing
-/// discrete minimal surfaces and their conjugates, Experimental Mathematics 2, 1993). It may pass through itself: a level set
-/// made from it does not.
-[[nodiscard]] TriangleMesh flattened(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack,
-                                     HolesReport& report, const RunContext& run = {});
+/// discrete minimal surfaces and their conjugates, Experimental Mathematics 2, 1993). It may pass through itself: a
+/// level set made from it does not.
+[[nodiscard]] TriangleMesh flattened(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance,
+                                     double slack, HolesReport& report, const RunContext& run = {});
 
 }  // namespace covol

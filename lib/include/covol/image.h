@@ -16,12 +16,12 @@ namespace covol {
 /// Where an image's voxels lie in the world, as ITK has it (LPS):
 /// world = origin + direction * diag(spacing) * (i,j,k), voxel centres at integers.
 struct ImageGeometry {
-    Index3 size{0, 0, 0};         ///< voxels along i, j, k
-    Vec3 spacing{1, 1, 1};        ///< world units, > 0
-    Vec3 origin{0, 0, 0};         ///< world position of the centre of voxel (0,0,0)
+    Index3 size{0, 0, 0};                                  ///< voxels along i, j, k
+    Vec3 spacing{1, 1, 1};                                 ///< world units, > 0
+    Vec3 origin{0, 0, 0};                                  ///< world position of the centre of voxel (0,0,0)
     Matrix3 direction{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};  ///< columns are the axes i, j, k; orthonormal
-    std::string unit;             ///< "um", "mm", ... or empty when the file does not say
-    bool spacing_known = true;    ///< false: the file states no spacing, and 1 stands in for what is missing
+    std::string unit;                                      ///< "um", "mm", ... or empty when the file does not say
+    bool spacing_known = true;  ///< false: the file states no spacing, and 1 stands in for what is missing
 
     [[nodiscard]] Vec3 index_to_world(const Vec3& index) const;
     [[nodiscard]] Vec3 world_to_index(const Vec3& world) const;
@@ -57,8 +57,8 @@ struct ReadImageOptions {
 /// A scalar 3D image in the file's own pixel type (a byte stays a byte).
 ///
 /// Its geometry is always the whole image's; with ReadImageOptions::roi only a box of voxels is held. Large files that
-/// keep their pixels as they are in memory are mapped, not read: only what is touched takes memory. Such a file must not
-/// be made shorter while the image lives.
+/// keep their pixels as they are in memory are mapped, not read: only what is touched takes memory. Such a file must
+/// not be made shorter while the image lives.
 class Image {
 public:
     [[nodiscard]] const ImageGeometry& geometry() const noexcept { return geometry_; }
@@ -104,7 +104,7 @@ private:
     PixelType type_ = PixelType::Float;
     std::string path_;
     VoxelBox held_;
-    std::shared_ptr<const void> data_;           // voxel held_.min
+    std::shared_ptr<const void> data_;             // voxel held_.min
     std::array<std::int64_t, 3> stride_{1, 0, 0};  // pixels from a voxel to the next along i, j, k
     bool mapped_ = false;
 };
@@ -113,15 +113,15 @@ private:
 struct ImageInfo {
     ImageGeometry geometry;
     PixelType type = PixelType::Float;
-    std::string format;                             ///< "ImageJ TIFF", "NIfTI-1", ...
-    std::string axis_order;                         ///< the file's, fastest first: "XYCZT"
-    int channels = 1;                               ///< chosen from by ReadImageOptions::channel
-    int frames = 1;                                 ///< chosen from by ReadImageOptions::frame
-    std::vector<std::string> channel_names;         ///< empty, or one for each channel
+    std::string format;                      ///< "ImageJ TIFF", "NIfTI-1", ...
+    std::string axis_order;                  ///< the file's, fastest first: "XYCZT"
+    int channels = 1;                        ///< chosen from by ReadImageOptions::channel
+    int frames = 1;                          ///< chosen from by ReadImageOptions::frame
+    std::vector<std::string> channel_names;  ///< empty, or one for each channel
     std::array<bool, 3> spacing_known{true, true, true};
     /// Header fields that were used, and their values as they stand there.
     std::vector<std::pair<std::string, std::string>> fields;
-    std::uint64_t bytes_to_hold = 0;                ///< memory that read_image() takes; 0 where it maps the file
+    std::uint64_t bytes_to_hold = 0;  ///< memory that read_image() takes; 0 where it maps the file
 };
 
 /// Reads a 3D image: TIFF (ImageJ, OME and tifffile descriptions understood; BigTIFF, tiles, several files), NRRD,

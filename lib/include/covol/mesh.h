@@ -16,12 +16,12 @@ struct TriangleMesh {
 
 /// Facts about a mesh; volume and genus are meant for closed meshes.
 struct MeshMeasures {
-    double volume = 0;       ///< signed; positive when oriented outward
+    double volume = 0;  ///< signed; positive when oriented outward
     double area = 0;
-    int components = 0;      ///< edge-connected
-    int genus = 0;           ///< total over all components, from Euler's characteristic; -1 when not closed
-    bool closed = false;     ///< every edge belongs to exactly two triangles of opposite direction
-    bool manifold = false;   ///< closed or not, each vertex's triangles form one fan and no edge has more than two
+    int components = 0;     ///< edge-connected
+    int genus = 0;          ///< total over all components, from Euler's characteristic; -1 when not closed
+    bool closed = false;    ///< every edge belongs to exactly two triangles of opposite direction
+    bool manifold = false;  ///< closed or not, each vertex's triangles form one fan and no edge has more than two
 };
 [[nodiscard]] MeshMeasures measure(const TriangleMesh& mesh);
 

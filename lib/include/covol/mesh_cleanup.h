@@ -9,19 +9,20 @@ namespace covol {
 
 struct CleanupOptions {
     double target_edge = 0.0;  ///< > 0: decimate to about this edge length (world units)
-    /// > 0: decimate as far as no triangle comes farther from the level set than this (world units, at most two voxels): flat
-    /// parts get large triangles; with target_edge, no farther than that. Needs the level set.
+    /// > 0: decimate as far as no triangle comes farther from the level set than this (world units, at most two
+    /// voxels): flat parts get large triangles; with target_edge, no farther than that. Needs the level set.
     double adaptive = 0.0;
-    int smooth_iterations = 0; ///< tangential + normal (Taubin-like, volume keeping) smoothing steps
-    bool repair = true;        ///< resolve self-intersections and non-manifold spots, fill holes
+    int smooth_iterations = 0;  ///< tangential + normal (Taubin-like, volume keeping) smoothing steps
+    bool repair = true;         ///< resolve self-intersections and non-manifold spots, fill holes
     [[nodiscard]] std::string why_invalid() const;
 };
 /// What a step has made of a mesh.
 struct CleanupStep {
     std::int64_t triangles = 0;
     double smallest_angle = 0;  ///< degrees: 1st percentile of the triangles' smallest angles
-    MeshDeviation change;       ///< world units: from the mesh before, both ways, of the vertices and the middles of triangles
-    MeshDeviation deviation;    ///< voxels: from the level set, 0 where there is none
+    MeshDeviation
+        change;  ///< world units: from the mesh before, both ways, of the vertices and the middles of triangles
+    MeshDeviation deviation;  ///< voxels: from the level set, 0 where there is none
 };
 struct CleanupReport {
     int self_intersections = 0;  ///< pairs found before repair
@@ -29,14 +30,14 @@ struct CleanupReport {
     bool closed = false, manifold = false, intersection_free = false;  ///< afterwards
     std::optional<CleanupStep> decimation, smoothing;
 };
-/// Makes a mesh closed, manifold, outward and free of self-intersections, in place (CGAL, OpenMesh). Decimation and smoothing leave
-/// vertices where they are whose move would let triangles touch.
+/// Makes a mesh closed, manifold, outward and free of self-intersections, in place (CGAL, OpenMesh). Decimation and
+/// smoothing leave vertices where they are whose move would let triangles touch.
 /// @throws Error InvalidOptions, InvalidInput (a mesh that is not manifold, and is to be decimated without repair).
 CleanupReport clean_mesh(TriangleMesh& mesh, const CleanupOptions& options = {}, const RunContext& run = {});
 
 /// The same for a mesh of a level set: decimated triangles are relaxed on it (relax_mesh()).
-CleanupReport clean_mesh(TriangleMesh& mesh, const FloatGrid& level_set, double isovalue = 0.0, const CleanupOptions& options = {},
-                         const RunContext& run = {});
+CleanupReport clean_mesh(TriangleMesh& mesh, const FloatGrid& level_set, double isovalue = 0.0,
+                         const CleanupOptions& options = {}, const RunContext& run = {});
 
 /// Pairs of triangles that have a point in common beyond the vertices and the edge that they share.
 [[nodiscard]] int count_self_intersections(const TriangleMesh& mesh);

@@ -40,7 +40,8 @@ void write_meshes(const std::string& path, const std::vector<NamedMesh>& meshes,
 /// What write_meshes() can write, by the name alone.
 [[nodiscard]] bool holds_several_meshes(const std::string& path);
 
-/// PLY, OBJ, STL, OFF, binary glTF (all its meshes as one); polygons are split into triangles. Sizes are checked before memory is taken.
+/// PLY, OBJ, STL, OFF, binary glTF (all its meshes as one); polygons are split into triangles. Sizes are checked before
+/// memory is taken.
 /// @throws Error Io, InvalidInput, Unsupported.
 [[nodiscard]] TriangleMesh read_mesh(const std::string& path);
 

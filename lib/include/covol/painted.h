@@ -23,8 +23,8 @@ struct PaintedOptions {
 
 /// A label of a painted image.
 struct LabelName {
-    int label = 0;     ///< > 0
-    std::string name;  ///< the file's own (3D Slicer's segments), else "label3"
+    int label = 0;       ///< > 0
+    std::string name;    ///< the file's own (3D Slicer's segments), else "label3"
     bool named = false;  ///< by the file
 };
 

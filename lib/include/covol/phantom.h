@@ -16,7 +16,7 @@ struct PhantomOptions {
     [[nodiscard]] std::string why_invalid() const;
 };
 struct Phantom {
-    Image image;                       ///< uint8, contrast 0..255
+    Image image;  ///< uint8, contrast 0..255
     std::vector<Vec3> points;
     std::vector<std::uint8_t> labels;  ///< the solid, in the image's lattice, i fastest
 };

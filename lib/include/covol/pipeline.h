@@ -25,42 +25,45 @@ namespace covol {
 
 /// How the level set starts.
 struct Start {
-    /// Auto: a guess from the marks where there are few of them (see SegmentOptions::model); more, without an image, are
-    /// a Cloud (surface_from_cloud()), with one they are tagged.
+    /// Auto: a guess from the marks where there are few of them (see SegmentOptions::model); more, without an image,
+    /// are a Cloud (surface_from_cloud()), with one they are tagged.
     enum class Kind { Auto, Guess, Cloud, Tag, Sphere, Box, Mesh, Mask, Vdb } kind = Kind::Auto;
-    Vec3 center{0, 0, 0};  ///< Sphere
-    double radius = 0;     ///< Sphere
-    WorldBox box;          ///< Box
-    std::string path;      ///< Mesh, Mask, Vdb
-    FloatGridPtr level_set;  ///< Vdb: one in memory, instead of the file
+    Vec3 center{0, 0, 0};               ///< Sphere
+    double radius = 0;                  ///< Sphere
+    WorldBox box;                       ///< Box
+    std::string path;                   ///< Mesh, Mask, Vdb
+    FloatGridPtr level_set;             ///< Vdb: one in memory, instead of the file
     std::shared_ptr<const Image> mask;  ///< Mask: likewise
 };
 
 /// What holds the surface where neither marks nor edges speak.
 enum class Model {
-    Guided,  ///< a guess: the surface through the marks that bends least, or the body between contours; the image moves it
-             ///< where it shows the border that it has at the marks
+    Guided,  ///< a guess: the surface through the marks that bends least, or the body between contours; the image moves
+             ///< it where it shows the border that it has at the marks
     Paper    ///< curvature alone, Eq. (1) as it is printed
 };
 [[nodiscard]] const char* to_string(Model model);
 
 struct SegmentOptions {
     Model model = Model::Guided;
-    double mark_precision = -1.0;       ///< standard deviation of a mark's place, world units; < 0: 0.3 of the image's spacing along each axis
-    double voxel_size = 0.0;            ///< h, world units; 0: see choose_voxel_size()
-    bool voxel_size_is_automatic = false;  ///< it is choose_voxel_size()'s: points that enclose nothing may be given another
-    std::optional<WorldBox> roi;        ///< the domain, instead of the image's box
-    double margin = 0.0;                ///< points alone: between points and domain boundary; 0 picks D + 6 voxels
+    /// standard deviation of a mark's place, world units; < 0: 0.3 of the image's spacing along each axis
+    double mark_precision = -1.0;
+    double voxel_size = 0.0;  ///< h, world units; 0: see choose_voxel_size()
+    /// it is choose_voxel_size()'s: points that enclose nothing may be given another
+    bool voxel_size_is_automatic = false;
+    std::optional<WorldBox> roi;  ///< the domain, instead of the image's box
+    double margin = 0.0;          ///< points alone: between points and domain boundary; 0 picks D + 6 voxels
     Start start;
-    /// Another tool's result (Mesh, Mask or Vdb): corrected by the marks and seeds near them, and no flow. `start` is then
-    /// not used.
+    /// Another tool's result (Mesh, Mask or Vdb): corrected by the marks and seeds near them, and no flow. `start` is
+    /// then not used.
     std::optional<Start> guess;
     CorrectionOptions correction;
     /// Marks on slices, densified with step h: their points join the others, those between the slices as guesses. With
-    /// closed contours the start `Tag` is the body that they enclose, unless other points lie far from it or an exterior
-    /// seed lies inside it: then all points are tagged, and each hole that inner contours leave is an exterior seed.
+    /// closed contours the start `Tag` is the body that they enclose, unless other points lie far from it or an
+    /// exterior seed lies inside it: then all points are tagged, and each hole that inner contours leave is an exterior
+    /// seed.
     std::shared_ptr<const Contours> contours;
-    PointHints hints;  ///< of the points as they are given; for a cloud
+    PointHints hints;                   ///< of the points as they are given; for a cloud
     std::vector<Vec3> inside, outside;  ///< seeds: positions whose side is known, world units
     double tag_distance = 0.0;          ///< D; 0: automatic
     std::vector<Vec3> exterior_seeds;
@@ -69,8 +72,9 @@ struct SegmentOptions {
     /// 5 voxels after the other starts. Their `follow` is set by the pipeline too.
     EvolveOptions evolve = automatic_evolve();
     ExtractOptions extract;
-    HolesOptions holes;      ///< of points without an image
-    int coarse_levels = -1;  ///< levels of voxel size 2h, 4h, ... that the flow passes first; -1: 1 for a sphere or a box, else 0
+    HolesOptions holes;  ///< of points without an image
+    /// levels of voxel size 2h, 4h, ... that the flow passes first; -1: 1 for a sphere or a box, else 0
+    int coarse_levels = -1;
     [[nodiscard]] std::string why_invalid() const;
 
     /// EvolveOptions with an automatic attraction range.
@@ -78,7 +82,9 @@ struct SegmentOptions {
 };
 
 struct SegmentReport {
-    struct Seconds { double read = 0, distance = 0, tag = 0, coarse = 0, edge = 0, solve = 0, surface = 0, write = 0, total = 0; } seconds;
+    struct Seconds {
+        double read = 0, distance = 0, tag = 0, coarse = 0, edge = 0, solve = 0, surface = 0, write = 0, total = 0;
+    } seconds;
     struct CoarseLevel {
         double voxel_size = 0;
         int steps = 0;
@@ -88,11 +94,11 @@ struct SegmentReport {
     std::vector<CoarseLevel> coarse;  ///< the coarsest first
     Domain domain;
     std::int64_t active_voxels = 0, leaf_count = 0;
-    std::size_t point_count = 0;        ///< given, marks of contours included
-    std::size_t densified = 0;          ///< points made from contours
-    GuessReport guess;                  ///< where the start was one
-    CloudReport cloud;                  ///< likewise
-    GuidanceReport guidance;            ///< what the image said to a guess
+    std::size_t point_count = 0;  ///< given, marks of contours included
+    std::size_t densified = 0;    ///< points made from contours
+    GuessReport guess;            ///< where the start was one
+    CloudReport cloud;            ///< likewise
+    GuidanceReport guidance;      ///< what the image said to a guess
     TagDistanceChoice tag;
     BandReport band;
     EdgeReport edge;
@@ -103,24 +109,24 @@ struct SegmentReport {
     /// Marks farther from the surface than two voxels of the image: wrong, or a part of the structure that is missing.
     struct MarksOff {
         std::size_t count = 0;
-        double beyond = 0;            ///< world units
-        double farthest = 0;          ///< world units
+        double beyond = 0;    ///< world units
+        double farthest = 0;  ///< world units
         Vec3 farthest_world{0, 0, 0};
         Vec3 farthest_index{0, 0, 0};  ///< voxels of the image; without one as farthest_world
     } marks_off;
     std::vector<std::string> warnings;  ///< what a person has to look at, in plain words
     SeedCheck seeds;
-    CorrectionReport correction;  ///< of SegmentOptions::guess
+    CorrectionReport correction;      ///< of SegmentOptions::guess
     double share_without_points = 0;  ///< of the closed surface's area: farther than holes.distance from every point
-    HolesReport holes;  ///< of points without an image; distance 0: none
-    SegmentOptions resolved;  ///< what was used: every automatic choice replaced by its value
+    HolesReport holes;                ///< of points without an image; distance 0: none
+    SegmentOptions resolved;          ///< what was used: every automatic choice replaced by its value
     std::map<std::string, std::string> automatic;  ///< each automatic choice and its reason
 };
 
 struct SegmentResult {
     FloatGridPtr u, distance, edge, surface;
     TriangleMesh mesh;
-    std::vector<float> distance_to_points;  ///< at its vertices; of points without an image
+    std::vector<float> distance_to_points;              ///< at its vertices; of points without an image
     std::shared_ptr<const GuessCorrection> correction;  ///< of SegmentOptions::guess
     SegmentReport report;
 };
@@ -132,7 +138,8 @@ struct VoxelSizeChoice {
     double voxel_size = 0;
     std::string reason;  ///< one line for people
 };
-[[nodiscard]] VoxelSizeChoice choose_voxel_size(const Image* image, const std::vector<Vec3>& world_points, bool tagged = false);
+[[nodiscard]] VoxelSizeChoice choose_voxel_size(const Image* image, const std::vector<Vec3>& world_points,
+                                                bool tagged = false);
 
 /// The main job: image and points together (either may be absent: null, empty).
 /// @throws Error as the single steps; InvalidInput when there is neither.

@@ -13,12 +13,12 @@ namespace covol {
 
 enum class PointSpace {
     Unstated,
-    World,    ///< the image's physical space, LPS where it is anatomical
-    Index,    ///< voxels of the image, from 0, centres at integers
-    Ras,      ///< world, with x and y towards right and anterior: both signs are turned on reading
-    IndexOne, ///< voxels counted from 1: 1 is taken away on reading
-    Local,    ///< lengths along the image's axes from the centre of voxel 0: the origin is left out, as Fiji does
-    Slices    ///< x and y as in Local, z a slice from 0 (Fiji's Results)
+    World,     ///< the image's physical space, LPS where it is anatomical
+    Index,     ///< voxels of the image, from 0, centres at integers
+    Ras,       ///< world, with x and y towards right and anterior: both signs are turned on reading
+    IndexOne,  ///< voxels counted from 1: 1 is taken away on reading
+    Local,     ///< lengths along the image's axes from the centre of voxel 0: the origin is left out, as Fiji does
+    Slices     ///< x and y as in Local, z a slice from 0 (Fiji's Results)
 };
 enum class PointOrder { Unstated, XYZ, ZYX };
 
@@ -41,13 +41,14 @@ struct MarkLine {
 struct PointCloud {
     std::vector<Vec3> points;
     std::vector<MarkLine> lines;  ///< what the file says of their order; empty for loose points
-    std::vector<Vec3> normals;    ///< unit, one for each point, 0 where the file has none that is a direction; empty: no normals
-    std::optional<Vec3> sensor;   ///< where a scan was taken from; both in World alone
+    std::vector<Vec3>
+        normals;  ///< unit, one for each point, 0 where the file has none that is a direction; empty: no normals
+    std::optional<Vec3> sensor;            ///< where a scan was taken from; both in World alone
     PointSpace space = PointSpace::World;  ///< World, Index, Local or Slices
     ReadPointsOptions reading;             ///< how the file's coordinates became these
     bool stated = false;                   ///< the format or the caller said so; else `reading` is a guess
-    std::string source;  ///< path, for messages
-    std::string rule;    ///< how coordinates were understood, one line for people
+    std::string source;                    ///< path, for messages
+    std::string rule;                      ///< how coordinates were understood, one line for people
 };
 
 /// Reads, by the name's end:
@@ -56,8 +57,8 @@ struct PointCloud {
 /// - .roi, .zip: Fiji's selections. .mrk.json, .fcsv: 3D Slicer. .annot: ITK-SNAP. .landmarks, .lmk: Convert3D
 /// - .ply (ascii, both binary byte orders), .obj, .off: their vertices. .pcd, .las: scans
 /// Normals: nx, ny, nz of PLY and of columns, columns 4 to 6 of six without names where all are unit vectors, normal_x,
-/// normal_y, normal_z of PCD, vn of an OBJ that has one for each vertex. The sensor: VIEWPOINT of a PCD that is organised or
-/// says another one than 0 0 0, which writers put where they know none.
+/// normal_y, normal_z of PCD, vn of an OBJ that has one for each vertex. The sensor: VIEWPOINT of a PCD that is
+/// organised or says another one than 0 0 0, which writers put where they know none.
 ///
 /// Each format's own coordinate rule is applied and told in `rule`; the options go before it.
 /// @throws Error Io, InvalidInput (with path:line: text instead of numbers, NaN, truncated, no point), Unsupported.
@@ -78,14 +79,14 @@ void check_inside(const PointCloud& cloud, const ImageGeometry& geometry, const 
 /// The first of each stays; the order stays. cell = 0 removes exact duplicates only.
 [[nodiscard]] std::vector<Vec3> merge_close_points(const std::vector<Vec3>& points, double cell);
 
-/// Indices of points along a Z curve through 1024^3 cells of their box: those that follow each other lie close. Of more than
-/// `most`, so many of them, evenly out of that order: the cloud thins by the same share everywhere.
+/// Indices of points along a Z curve through 1024^3 cells of their box: those that follow each other lie close. Of more
+/// than `most`, so many of them, evenly out of that order: the cloud thins by the same share everywhere.
 /// @throws Error InvalidOptions (most = 0), InvalidInput (2^32 points and more).
 [[nodiscard]] std::vector<std::uint32_t> spatial_order(const std::vector<Vec3>& points, std::size_t most);
 
 /// Spacing of a cloud, from nearest neighbours of a fixed subsample (world units).
 struct SpacingStatistics {
-    double mean = 0;    ///< mean distance to the nearest other point
+    double mean = 0;  ///< mean distance to the nearest other point
     double median = 0;
     double p95 = 0;
     double max = 0;

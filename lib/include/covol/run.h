@@ -22,10 +22,13 @@ struct RunContext {
     /// or, where partial results are useful, return early and say so.
     const std::atomic<bool>* cancel = nullptr;
 
-    /// Bytes that may be taken; 0: no bound. What is sure to need more is refused before it takes any (Errc::InvalidOptions).
+    /// Bytes that may be taken; 0: no bound. What is sure to need more is refused before it takes any
+    /// (Errc::InvalidOptions).
     std::uint64_t memory_budget = 0;
 
-    [[nodiscard]] bool cancelled() const noexcept { return cancel != nullptr && cancel->load(std::memory_order_relaxed); }
+    [[nodiscard]] bool cancelled() const noexcept {
+        return cancel != nullptr && cancel->load(std::memory_order_relaxed);
+    }
     void info(const std::string& line) const;
     void warn(const std::string& line) const;
     void report(const std::string& stage, double fraction) const;

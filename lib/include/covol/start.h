@@ -18,7 +18,8 @@ namespace covol {
 /// Voxels of the mask above 0 are inside.
 [[nodiscard]] FloatGridPtr start_from_mask(const Domain& domain, const Image& mask, const RunContext& run = {});
 /// The body between closed contours.
-[[nodiscard]] FloatGridPtr start_from_contours(const Domain& domain, const ContourSolid& solid, const RunContext& run = {});
+[[nodiscard]] FloatGridPtr start_from_contours(const Domain& domain, const ContourSolid& solid,
+                                               const RunContext& run = {});
 /// Fills values at from + n * step, n < count (world units): negative inside.
 using LevelRow = std::function<void(const Vec3& from, const Vec3& step, int count, double* values)>;
 /// The parts of a function's zero level set that pass near the seeds; its scale does not matter.
@@ -31,6 +32,7 @@ using LevelRow = std::function<void(const Vec3& from, const Vec3& step, int coun
 [[nodiscard]] FloatGridPtr start_from_seeds(const Domain& domain, const std::vector<Vec3>& inside,
                                             const std::vector<Vec3>& outside, const RunContext& run = {});
 /// Any level-set-like grid (negative inside), resampled onto the domain.
-[[nodiscard]] FloatGridPtr start_from_grid(const Domain& domain, const FloatGrid& level_set, const RunContext& run = {});
+[[nodiscard]] FloatGridPtr start_from_grid(const Domain& domain, const FloatGrid& level_set,
+                                           const RunContext& run = {});
 
 }  // namespace covol

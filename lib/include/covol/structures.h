@@ -46,10 +46,11 @@ struct SeparateResult {
 /// With φ_i the signed distances and m = min over j≠i of φ_j, a voxel where φ_i + m is below 0 (an overlap), or below
 /// the gap's width and between the two (∇φ_i·∇φ_j < 0), gets φ_i' = (φ_i − m)/2: the new interface is the middle
 /// surface φ_i = φ_j, and φ_i' = −φ_j' beside it. Where overlaps are deep the distances are computed as deep. A solid
-/// inside another one is carved out instead: φ' = max(φ_outer, −φ_inner). Changed surfaces are redistanced by surface().
-/// The result does not depend on the structures' order or on the number of threads.
+/// inside another one is carved out instead: φ' = max(φ_outer, −φ_inner). Changed surfaces are redistanced by
+/// surface(). The result does not depend on the structures' order or on the number of threads.
 ///
-/// @throws Error InvalidOptions; InvalidInput (names empty or not unique; grids whose transforms differ; two that are the
+/// @throws Error InvalidOptions; InvalidInput (names empty or not unique; grids whose transforms differ; two that are
+/// the
 ///               same solid; one of which nothing is left).
 [[nodiscard]] SeparateResult separate(const std::vector<Structure>& structures, const SeparateOptions& options = {},
                                       const RunContext& run = {});

@@ -16,12 +16,13 @@ namespace covol {
 [[nodiscard]] FloatGridPtr density(const FloatGrid& surface);
 
 struct ExtractOptions {
-    double isovalue = 0.0;          ///< world units
+    double isovalue = 0.0;              ///< world units
     double min_component_volume = 0.0;  ///< world units^3; smaller pieces are dropped; 0 keeps all
 };
 
 /// Closed, manifold, outward triangles of the zero level set, in world units.
-[[nodiscard]] TriangleMesh extract_mesh(const FloatGrid& surface, const ExtractOptions& options = {}, const RunContext& run = {});
+[[nodiscard]] TriangleMesh extract_mesh(const FloatGrid& surface, const ExtractOptions& options = {},
+                                        const RunContext& run = {});
 
 /// Label image in the given geometry (i fastest): `label` where the voxel's centre is inside, else 0.
 [[nodiscard]] std::vector<std::uint8_t> rasterize(const FloatGrid& surface, const ImageGeometry& geometry,
@@ -30,8 +31,10 @@ struct ExtractOptions {
 /// Distances from points to the zero level set (world units), exact to the extracted triangles.
 struct FitStatistics {
     double mean = 0, p95 = 0, max = 0;
-    double bias = 0;  ///< of segment() alone: mean of the signed distances; > 0 where the points lie outside, and the surface is too small
+    double bias = 0;  ///< of segment() alone: mean of the signed distances; > 0 where the points lie outside, and the
+                      ///< surface is too small
 };
-[[nodiscard]] FitStatistics points_to_surface(const std::vector<Vec3>& points, const TriangleMesh& mesh, const RunContext& run = {});
+[[nodiscard]] FitStatistics points_to_surface(const std::vector<Vec3>& points, const TriangleMesh& mesh,
+                                              const RunContext& run = {});
 
 }  // namespace covol

@@ -20,17 +20,18 @@
 namespace covol {
 namespace {
 
-constexpr int kMeshLatticeVoxels = 256;            // along the longest side, where only meshes are compared
-constexpr std::int64_t kSlabVoxels = 1 << 26;      // voxels held at a time
+constexpr int kMeshLatticeVoxels = 256;        // along the longest side, where only meshes are compared
+constexpr std::int64_t kSlabVoxels = 1 << 26;  // voxels held at a time
 constexpr double kMaxLatticeVoxels = 1e12;
-constexpr double kMaxSamples = 4e6;                // on a surface
+constexpr double kMaxSamples = 4e6;  // on a surface
 
 double voxel_volume(const ImageGeometry& g) { return g.spacing[0] * g.spacing[1] * g.spacing[2]; }
 double smallest_spacing(const ImageGeometry& g) { return std::min({g.spacing[0], g.spacing[1], g.spacing[2]}); }
 
 bool is_label(double value, int label) { return label == 0 ? value != 0 : value == label; }
 
-// ------------------------------------------------------------------------------------------------------ masks' surfaces
+// ------------------------------------------------------------------------------------------------------ masks'
+// surfaces
 
 /// The boundary between a mask's voxels, at half value, in the world.
 class MaskSurface {
@@ -86,7 +87,8 @@ private:
     }
 
     [[nodiscard]] bool is_inside(const openvdb::Coord& c) const {
-        return c.x() < size_[0] && c.y() < size_[1] && c.z() < size_[2] && is_label(mask_.at(c.x(), c.y(), c.z()), label_);
+        return c.x() < size_[0] && c.y() < size_[1] && c.z() < size_[2] &&
+               is_label(mask_.at(c.x(), c.y(), c.z()), label_);
     }
 
     static double determinant(const Matrix3& m) {
@@ -140,7 +142,8 @@ void fill_from_mask(const Image& mask, int label, const ImageGeometry& slab, Vox
 /// closed surface is crossed a consistent number of times.
 class MeshRows {
 public:
-    MeshRows(const TriangleMesh& mesh, const ImageGeometry& lattice) : mesh_(mesh), triangles_of_(lattice.size[2] + 1, 0) {
+    MeshRows(const TriangleMesh& mesh, const ImageGeometry& lattice)
+        : mesh_(mesh), triangles_of_(lattice.size[2] + 1, 0) {
         for (const auto& v : mesh.vertices) points_.push_back(lattice.world_to_index({v[0], v[1], v[2]}));
         // Triangles by the slices that they reach.
         for_each_slice(lattice.size[2], [&](std::uint32_t, int k) { ++triangles_of_[k + 1]; });
@@ -155,7 +158,8 @@ public:
         const Index3& size = slab.geometry.size;
         std::vector<std::uint8_t> open(std::size_t(size[2]), 0);
         tbb::parallel_for(0, size[2], [&](int k) {
-            open[k] = !fill_slice(slab.first + k, size, out.data() + std::size_t(k) * std::size_t(size[0]) * std::size_t(size[1]));
+            open[k] = !fill_slice(slab.first + k, size,
+                                  out.data() + std::size_t(k) * std::size_t(size[0]) * std::size_t(size[1]));
         });
         if (std::find(open.begin(), open.end(), 1) != open.end())
             throw Error(Errc::InvalidInput, "compare: a mesh is not closed, so it has no inside; repair it first");
@@ -166,7 +170,9 @@ private:
         int row;
         double x;
         int direction;
-        friend bool operator<(const Crossing& a, const Crossing& b) { return a.row != b.row ? a.row < b.row : a.x < b.x; }
+        friend bool operator<(const Crossing& a, const Crossing& b) {
+            return a.row != b.row ? a.row < b.row : a.x < b.x;
+        }
     };
     struct Range {
         double low, high;
@@ -231,7 +237,8 @@ private:
             if (row_ends || winding == 0) continue;
             const int begin = int(std::max(0.0, std::ceil(crossings[n].x)));
             const int end = int(std::min(double(size[0]), std::ceil(crossings[n + 1].x)));
-            for (int i = begin; i < end; ++i) out[std::size_t(crossings[n].row) * std::size_t(size[0]) + std::size_t(i)] = 1;
+            for (int i = begin; i < end; ++i)
+                out[std::size_t(crossings[n].row) * std::size_t(size[0]) + std::size_t(i)] = 1;
         }
         return true;
     }
@@ -242,13 +249,15 @@ private:
     std::vector<std::uint32_t> order_;
 };
 
-// ------------------------------------------------------------------------------------------------------------- one solid
+// ------------------------------------------------------------------------------------------------------------- one
+// solid
 
 class Shape {
 public:
     Shape(const Solid& solid, const char* name, const RunContext& run) : solid_(solid) {
         if (int(solid.mask.has_value()) + int(solid.mesh.has_value()) + int(solid.level_set != nullptr) != 1)
-            throw Error(Errc::InvalidInput, std::string("compare: solid ") + name + ": expected one of mask, mesh and level set");
+            throw Error(Errc::InvalidInput,
+                        std::string("compare: solid ") + name + ": expected one of mask, mesh and level set");
         if (solid.mask) {
             own_surface_ = MaskSurface(*solid.mask, solid.label).extract(run);
             lattice_ = solid.mask->geometry();
@@ -260,8 +269,10 @@ public:
             lattice_->origin = domain.origin;
         }
         if (surface().empty())
-            throw Error(Errc::InvalidInput, std::string("compare: solid ") + name + " is empty" +
-                                                (solid.mask && solid.label != 0 ? ": no voxel has label " + std::to_string(solid.label) : ""));
+            throw Error(
+                Errc::InvalidInput,
+                std::string("compare: solid ") + name + " is empty" +
+                    (solid.mask && solid.label != 0 ? ": no voxel has label " + std::to_string(solid.label) : ""));
     }
 
     [[nodiscard]] const TriangleMesh& surface() const { return solid_.mesh ? *solid_.mesh : own_surface_; }
@@ -282,9 +293,12 @@ public:
         if (solid_.mesh) rows_.emplace(*solid_.mesh, lattice);
     }
     void fill(const Slab& slab, Voxels& out, const RunContext& run) const {
-        if (solid_.mask) fill_from_mask(*solid_.mask, solid_.label, slab.geometry, out);
-        else if (solid_.mesh) rows_->fill(slab, out);
-        else out = rasterize(*solid_.level_set, slab.geometry, 1, run);
+        if (solid_.mask)
+            fill_from_mask(*solid_.mask, solid_.label, slab.geometry, out);
+        else if (solid_.mesh)
+            rows_->fill(slab, out);
+        else
+            out = rasterize(*solid_.level_set, slab.geometry, 1, run);
     }
 
 private:
@@ -324,9 +338,12 @@ ImageGeometry common_lattice(const Shape& a, const Shape& b) {
         return voxel_volume(*p.lattice()) <= voxel_volume(*q.lattice()) ? *p.lattice() : *q.lattice();
     };
     ImageGeometry lattice;
-    if (a.is_mask() == b.is_mask() && a.lattice() && b.lattice()) lattice = finer(a, b);
-    else if (a.is_mask() || !b.lattice()) lattice = a.lattice().value_or(ImageGeometry{});
-    else lattice = *b.lattice();
+    if (a.is_mask() == b.is_mask() && a.lattice() && b.lattice())
+        lattice = finer(a, b);
+    else if (a.is_mask() || !b.lattice())
+        lattice = a.lattice().value_or(ImageGeometry{});
+    else
+        lattice = *b.lattice();
     if (!a.lattice() && !b.lattice()) {
         const WorldBox box = box_of(a, b, [](const Vec3& p) { return p; });
         const double longest = std::max({box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]});
@@ -381,7 +398,8 @@ void compare_overlap(Shape& a, Shape& b, const ImageGeometry& lattice, const Run
 
 // ---------------------------------------------------------------------------------------------------------- distances
 
-/// Points on a surface, each with the area that it stands for; the mesh's vertices have none, but count for the maximum.
+/// Points on a surface, each with the area that it stands for; the mesh's vertices have none, but count for the
+/// maximum.
 struct Samples {
     std::vector<Vec3> points;
     std::vector<double> areas;
@@ -396,7 +414,9 @@ Samples sample_surface(const TriangleMesh& mesh, double spacing) {
     }
     for (const auto& t : mesh.triangles) {
         const Vec3 a{samples.points[t[0]]}, b{samples.points[t[1]]}, c{samples.points[t[2]]};
-        const auto length = [](const Vec3& p, const Vec3& q) { return std::hypot(q[0] - p[0], q[1] - p[1], q[2] - p[2]); };
+        const auto length = [](const Vec3& p, const Vec3& q) {
+            return std::hypot(q[0] - p[0], q[1] - p[1], q[2] - p[2]);
+        };
         const double ab = length(a, b), bc = length(b, c), ca = length(c, a);
         const double half = (ab + bc + ca) / 2;
         const double area = std::sqrt(std::max(0.0, half * (half - ab) * (half - bc) * (half - ca)));
@@ -423,7 +443,8 @@ void append_distances(const TriangleMesh& from, const TriangleMesh& to, double s
     for (std::size_t i = 0; i < away.size(); ++i) distances.emplace_back(away[i], samples.areas[i]);
 }
 
-void compare_surfaces(const TriangleMesh& a, const TriangleMesh& b, double spacing, const RunContext& run, CompareReport& report) {
+void compare_surfaces(const TriangleMesh& a, const TriangleMesh& b, double spacing, const RunContext& run,
+                      CompareReport& report) {
     std::vector<std::pair<double, double>> distances;
     append_distances(a, b, spacing, distances);
     run.report("distances", 0.5);

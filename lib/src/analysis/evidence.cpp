@@ -46,7 +46,8 @@ std::vector<float> strengths_on(const TriangleMesh& mesh, const FloatGrid* edge)
     std::vector<float> result(mesh.vertices.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, result.size(), 1024), [&](const auto& range) {
         const auto accessor = edge->getConstAccessor();
-        const openvdb::tools::GridSampler<FloatGrid::ConstAccessor, openvdb::tools::BoxSampler> g(accessor, edge->transform());
+        const openvdb::tools::GridSampler<FloatGrid::ConstAccessor, openvdb::tools::BoxSampler> g(accessor,
+                                                                                                  edge->transform());
         for (std::size_t v = range.begin(); v != range.end(); ++v) {
             const auto& x = mesh.vertices[v];
             result[v] = std::clamp(1.0F - g.wsSample(openvdb::Vec3d(x[0], x[1], x[2])), 0.0F, 1.0F);
@@ -57,7 +58,7 @@ std::vector<float> strengths_on(const TriangleMesh& mesh, const FloatGrid* edge)
 
 /// One triangle of the surface, as the slices see it.
 struct Piece {
-    Vec3 center;      ///< world
+    Vec3 center;                   ///< world
     std::array<double, 3> levels;  ///< the corners' third image index, ascending
     double area;
     double to_marks;  ///< 0 without marks
@@ -126,7 +127,12 @@ private:
         const auto mean = [&](const auto& values) {
             return values.empty() ? 0.0 : (double(values[t[0]]) + values[t[1]] + values[t[2]]) / 3;
         };
-        Piece p{{}, {levels_[t[0]], levels_[t[1]], levels_[t[2]]}, triangle_area(a, b, c), mean(result_.distance_to_marks), mean(result_.edge_strength), false};
+        Piece p{{},
+                {levels_[t[0]], levels_[t[1]], levels_[t[2]]},
+                triangle_area(a, b, c),
+                mean(result_.distance_to_marks),
+                mean(result_.edge_strength),
+                false};
         std::sort(p.levels.begin(), p.levels.end());
         for (int axis = 0; axis < 3; ++axis) p.center[axis] = (a[axis] + b[axis] + c[axis]) / 3;
         p.unsupported = (marks_.empty() || p.to_marks > options_.reach) && p.strength < options_.weak_edge;
@@ -206,7 +212,8 @@ private:
     }
 
     /// For each slice the unsupported pieces that lie within the reach of its outline.
-    [[nodiscard]] std::vector<std::vector<std::uint32_t>> coverage(const std::vector<std::vector<Vec3>>& outline) const {
+    [[nodiscard]] std::vector<std::vector<std::uint32_t>> coverage(
+        const std::vector<std::vector<Vec3>>& outline) const {
         std::vector<std::uint32_t> wanting;
         for (std::size_t n = 0; n < pieces_.size(); ++n)
             if (pieces_[n].unsupported) wanting.push_back(static_cast<std::uint32_t>(n));
@@ -247,7 +254,8 @@ private:
         }
     }
 
-    /// The point of the outline with the most of the pieces' area around it; of many points and pieces a sample decides.
+    /// The point of the outline with the most of the pieces' area around it; of many points and pieces a sample
+    /// decides.
     [[nodiscard]] Vec3 place(const std::vector<Vec3>& outline, const std::vector<std::uint32_t>& covered) const {
         constexpr std::size_t kSample = 2000;
         const std::size_t step = covered.size() / kSample + 1, stride = outline.size() / kSample + 1;
@@ -321,12 +329,15 @@ double share_without_points(const TriangleMesh& mesh, const FloatGrid& distance,
                 }
                 return sum;
             },
-            [](const Areas& a, const Areas& b) { return Areas{a.total + b.total, a.bare + b.bare}; });
+            [](const Areas& a, const Areas& b) {
+                return Areas{a.total + b.total, a.bare + b.bare};
+            });
     });
     return areas.total > 0 ? areas.bare / areas.total : 0.0;
 }
 
-double share_without_points(const TriangleMesh& mesh, const std::vector<Vec3>& points, double reach, const RunContext& run) {
+double share_without_points(const TriangleMesh& mesh, const std::vector<Vec3>& points, double reach,
+                            const RunContext& run) {
     if (points.empty() || mesh.empty()) return 0;
     const Domain domain = domain_of_box(bounding_box(points, reach), reach / 3);
     return share_without_points(mesh, *distance(points, domain, {reach}, run).grid, reach, run);

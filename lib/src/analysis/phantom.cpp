@@ -13,9 +13,9 @@
 namespace covol {
 namespace {
 
-constexpr double kHalfSide = 1.3;                   ///< of the domain, a cube centred on the origin
+constexpr double kHalfSide = 1.3;  ///< of the domain, a cube centred on the origin
 constexpr double kPi = std::numbers::pi;
-const double kShellRadius = std::sqrt(3.0) / 2.0;   // the paper's spheres, section 5
+const double kShellRadius = std::sqrt(3.0) / 2.0;  // the paper's spheres, section 5
 constexpr double kShellThickness = 0.04;
 constexpr double kContrast = 255.0;
 
@@ -53,9 +53,9 @@ double gaussian(std::uint64_t seed, std::uint64_t index) {
 /// What makes a kind of phantom.
 struct Shape {
     const char* name;
-    std::function<double(const Vec3&)> distance;           ///< to the true surface, negative inside
-    std::function<double(const Vec3&, double h)> intensity; ///< of the voxel there, in [0,1]
-    std::function<Vec3(Random&)> point;                     ///< on the true surface
+    std::function<double(const Vec3&)> distance;             ///< to the true surface, negative inside
+    std::function<double(const Vec3&, double h)> intensity;  ///< of the voxel there, in [0,1]
+    std::function<Vec3(Random&)> point;                      ///< on the true surface
 };
 
 /// A bright solid; the share of a voxel that lies inside is taken from the distance at its centre.
@@ -123,27 +123,32 @@ std::vector<Shape> shapes() {
     constexpr Vec3 kBox = {0.9, 0.7, 0.5};
     constexpr Vec3 kTwinCenter = {0.55, 0.1, 0.05};
     const auto twin_distance = [=](const Vec3& p, int side) {
-        return length({p[0] - side * kTwinCenter[0], p[1] - side * kTwinCenter[1], p[2] - side * kTwinCenter[2]}) - kTwin;
+        return length({p[0] - side * kTwinCenter[0], p[1] - side * kTwinCenter[1], p[2] - side * kTwinCenter[2]}) -
+               kTwin;
     };
     return {
-        solid("sphere", [=](const Vec3& p) { return length(p) - kRadius; },
-              [=](Random& random) { return random.on_sphere(kRadius); }),
-        solid("torus",
-              [=](const Vec3& p) { return std::hypot(std::hypot(p[0], p[1]) - kMajor, p[2]) - kMinor; },
-              [=](Random& random) { return point_on_torus(kMajor, kMinor, random); }),
-        solid("box", [=](const Vec3& p) { return distance_to_box(p, kBox); },
-              [=](Random& random) { return point_on_box(kBox, random); }),
-        solid("two-spheres",
-              [=](const Vec3& p) { return std::min(twin_distance(p, 1), twin_distance(p, -1)); },
-              [=](Random& random) {
-                  const double side = random.uniform() < 0.5 ? -1 : 1;
-                  Vec3 p = random.on_sphere(kTwin);
-                  for (int a = 0; a < 3; ++a) p[a] += side * kTwinCenter[a];
-                  return p;
-              }),
+        solid(
+            "sphere", [=](const Vec3& p) { return length(p) - kRadius; },
+            [=](Random& random) { return random.on_sphere(kRadius); }),
+        solid(
+            "torus", [=](const Vec3& p) { return std::hypot(std::hypot(p[0], p[1]) - kMajor, p[2]) - kMinor; },
+            [=](Random& random) { return point_on_torus(kMajor, kMinor, random); }),
+        solid(
+            "box", [=](const Vec3& p) { return distance_to_box(p, kBox); },
+            [=](Random& random) { return point_on_box(kBox, random); }),
+        solid(
+            "two-spheres", [=](const Vec3& p) { return std::min(twin_distance(p, 1), twin_distance(p, -1)); },
+            [=](Random& random) {
+                const double side = random.uniform() < 0.5 ? -1 : 1;
+                Vec3 p = random.on_sphere(kTwin);
+                for (int a = 0; a < 3; ++a) p[a] += side * kTwinCenter[a];
+                return p;
+            }),
         sphere_with_holes("sphere-round", [](double a, double b) { return a * a + b * b <= 0.30 * 0.30; }),
-        sphere_with_holes("sphere-square", [](double a, double b) { return std::max(std::abs(a), std::abs(b)) <= 0.25; }),
-        sphere_with_holes("sphere-slit", [](double a, double b) { return std::abs(a) <= 0.308 && std::abs(b) <= 0.11; }),
+        sphere_with_holes("sphere-square",
+                          [](double a, double b) { return std::max(std::abs(a), std::abs(b)) <= 0.25; }),
+        sphere_with_holes("sphere-slit",
+                          [](double a, double b) { return std::abs(a) <= 0.308 && std::abs(b) <= 0.11; }),
     };
 }
 
@@ -158,7 +163,8 @@ std::string joined_kinds() {
 std::string PhantomOptions::why_invalid() const {
     detail::FieldChecks checks;
     const std::vector<std::string> kinds = phantom_kinds();
-    checks.expect(std::find(kinds.begin(), kinds.end(), kind) != kinds.end(), "kind", "one of " + joined_kinds(), "'" + kind + "'");
+    checks.expect(std::find(kinds.begin(), kinds.end(), kind) != kinds.end(), "kind", "one of " + joined_kinds(),
+                  "'" + kind + "'");
     checks.expect(size >= 16 && size <= 2048, "size", "16 to 2048", size);
     checks.expect_not_negative("point_count", point_count);
     checks.expect_not_negative("noise", noise);

@@ -50,7 +50,8 @@ private:
 /// World box of the voxels inside.
 openvdb::BBoxd solid_box(const FloatGrid& surface) {
     const openvdb::CoordBBox box = surface.evalActiveVoxelBoundingBox();
-    if (box.empty()) throw Error(Errc::InvalidInput, "render: grid '" + surface.getName() + "': expected active voxels, got none");
+    if (box.empty())
+        throw Error(Errc::InvalidInput, "render: grid '" + surface.getName() + "': expected active voxels, got none");
     return surface.transform().indexToWorld(openvdb::BBoxd(box.min().asVec3d(), box.max().asVec3d()));
 }
 
@@ -70,7 +71,8 @@ void draw_surface(const FloatGrid& surface, const Vec& to_eye, const Panel& pane
     const Vec right = Vec(0, 0, 1).cross(to_eye).unit(), up = to_eye.cross(right).unit();
     double half_width = 0, half_height = 0;
     for (int c = 0; c < 8; ++c) {
-        const Vec corner(c & 1 ? box.max()[0] : box.min()[0], c & 2 ? box.max()[1] : box.min()[1], c & 4 ? box.max()[2] : box.min()[2]);
+        const Vec corner(c & 1 ? box.max()[0] : box.min()[0], c & 2 ? box.max()[1] : box.min()[1],
+                         c & 4 ? box.max()[2] : box.min()[2]);
         half_width = std::max(half_width, std::abs((corner - center).dot(right)));
         half_height = std::max(half_height, std::abs((corner - center).dot(up)));
     }
@@ -85,7 +87,8 @@ void draw_surface(const FloatGrid& surface, const Vec& to_eye, const Panel& pane
                 for (int s = 0; s < kSupersample * kSupersample; ++s) {
                     const double px = x + (s % kSupersample + 0.5) / kSupersample - 0.5 * panel.width();
                     const double py = 0.5 * panel.height() - y - (s / kSupersample + 0.5) / kSupersample;
-                    const openvdb::math::Ray<double> ray(center + pixel * (px * right + py * up) + distance * to_eye, -to_eye);
+                    const openvdb::math::Ray<double> ray(center + pixel * (px * right + py * up) + distance * to_eye,
+                                                         -to_eye);
                     Vec hit, normal;
                     sum += local.intersectsWS(ray, hit, normal) ? shade(normal, right, up, to_eye) : kBackground;
                 }
@@ -101,8 +104,9 @@ struct IndexRange {
 IndexRange covered(const ImageGeometry& geometry, const openvdb::BBoxd& box) {
     IndexRange range{{1e300, 1e300, 1e300}, {-1e300, -1e300, -1e300}};
     for (int c = 0; c < 8; ++c) {
-        const Vec3 index = geometry.world_to_index({c & 1 ? box.max()[0] : box.min()[0], c & 2 ? box.max()[1] : box.min()[1],
-                                                    c & 4 ? box.max()[2] : box.min()[2]});
+        const Vec3 index =
+            geometry.world_to_index({c & 1 ? box.max()[0] : box.min()[0], c & 2 ? box.max()[1] : box.min()[1],
+                                     c & 4 ? box.max()[2] : box.min()[2]});
         for (int a = 0; a < 3; ++a) {
             range.min[a] = std::min(range.min[a], index[a]);
             range.max[a] = std::max(range.max[a], index[a]);
@@ -150,7 +154,8 @@ void draw_slice(const FloatGrid& surface, const Image& image, const std::vector<
             const double outline = std::clamp(kOutlineWidth + 0.5 - away, 0.0, 1.0);
             color = (1 - outline) * color + outline * kOutline;
             for (const auto& dot : dots) {
-                const double in = std::clamp(kDotRadius + 0.5 - std::hypot(x + 0.5 - dot[0], y + 0.5 - dot[1]), 0.0, 1.0);
+                const double in =
+                    std::clamp(kDotRadius + 0.5 - std::hypot(x + 0.5 - dot[0], y + 0.5 - dot[1]), 0.0, 1.0);
                 color = (1 - in) * color + in * kDot;
             }
             panel.set(x, y, color);
@@ -168,10 +173,11 @@ std::string RenderOptions::why_invalid() const {
     return checks.lines();
 }
 
-Picture render(const FloatGrid& surface, const Image* image, const std::vector<Vec3>& points, const RenderOptions& options,
-               const RunContext& run) {
+Picture render(const FloatGrid& surface, const Image* image, const std::vector<Vec3>& points,
+               const RenderOptions& options, const RunContext& run) {
     detail::require_valid(options, "render");
-    Picture picture{options.width, options.height, std::vector<std::uint8_t>(3 * std::size_t(options.width) * options.height, 255)};
+    Picture picture{options.width, options.height,
+                    std::vector<std::uint8_t>(3 * std::size_t(options.width) * options.height, 255)};
     const int slices = image != nullptr ? options.slices : 0;
     const int left = (options.width - kGap) / 2, right = options.width - left - kGap;
     with_threads(run, [&] {

@@ -64,9 +64,11 @@ private:
         std::set<std::string> names;
         for (const Structure& s : structures_) {
             if (s.name.empty() || !names.insert(s.name).second)
-                throw Error(Errc::InvalidInput, "separate: expected unique names, got " + quoted(s.name) + " twice or empty");
+                throw Error(Errc::InvalidInput,
+                            "separate: expected unique names, got " + quoted(s.name) + " twice or empty");
             if (!s.surface || s.surface->transform() != structures_.front().surface->transform())
-                throw Error(Errc::InvalidInput, "separate: " + quoted(s.name) + " and " + quoted(structures_.front().name) +
+                throw Error(Errc::InvalidInput, "separate: " + quoted(s.name) + " and " +
+                                                    quoted(structures_.front().name) +
                                                     ": expected grids with one transform");
         }
     }
@@ -103,7 +105,8 @@ private:
                 if (share >= options_.nested_share) {
                     if (in_a == in_b)
                         throw Error(Errc::InvalidInput, "separate: " + quoted(structures_[a].name) + " and " +
-                                                            quoted(structures_[b].name) + " are the same solid: " + percent(share) +
+                                                            quoted(structures_[b].name) +
+                                                            " are the same solid: " + percent(share) +
                                                             " of their voxels are common; mark each by its own points");
                     overlap.inner = in_a < in_b ? a : b;
                 }
@@ -140,7 +143,8 @@ private:
             run_.check();
             // All alike, or a shallow distance would lose against a deep one.
             for (FloatGridPtr& phi : phi_)
-                phi = detail::redistance(*phi, domain_of(*phi), 2 * width / h_, detail::DomainEnd::Closed, "surface", run_);
+                phi = detail::redistance(*phi, domain_of(*phi), 2 * width / h_, detail::DomainEnd::Closed, "surface",
+                                         run_);
         }
     }
 
@@ -279,7 +283,8 @@ void add_label(const std::vector<std::uint8_t>& solid, std::uint8_t label, std::
 /// Decides the voxels that two structures claim, and those that none does where two touch.
 class Arbiter {
 public:
-    Arbiter(const std::vector<Structure>& structures, const ImageGeometry& geometry, const std::vector<std::uint8_t>& claims)
+    Arbiter(const std::vector<Structure>& structures, const ImageGeometry& geometry,
+            const std::vector<std::uint8_t>& claims)
         : structures_(structures), geometry_(geometry), claims_(claims), distances_(structures) {
         touching_ = 0.5F * static_cast<float>(structures.front().surface->voxelSize()[0]);
     }
@@ -324,7 +329,8 @@ private:
             if (c[face / 2] < 0 || c[face / 2] >= geometry_.size[face / 2]) continue;
             const std::uint8_t label = claims_[at(c[0], c[1], c[2])];
             if (label == 0 || label == kContested) continue;
-            if (std::find(found.begin(), found.end(), std::size_t(label - 1)) == found.end()) found.push_back(label - 1);
+            if (std::find(found.begin(), found.end(), std::size_t(label - 1)) == found.end())
+                found.push_back(label - 1);
         }
         std::sort(found.begin(), found.end());
         return found;
@@ -346,7 +352,8 @@ std::string SeparateOptions::why_invalid() const {
     return checks.lines();
 }
 
-SeparateResult separate(const std::vector<Structure>& structures, const SeparateOptions& options, const RunContext& run) {
+SeparateResult separate(const std::vector<Structure>& structures, const SeparateOptions& options,
+                        const RunContext& run) {
     SeparateResult result;
     with_threads(run, [&] { result = Separation(structures, options, run).go(); });
     return result;
@@ -355,7 +362,8 @@ SeparateResult separate(const std::vector<Structure>& structures, const Separate
 std::vector<std::uint8_t> label_image(const std::vector<Structure>& structures, const ImageGeometry& geometry,
                                       const RunContext& run) {
     if (structures.size() >= kContested)
-        throw Error(Errc::InvalidInput, "label_image: expected at most 254 structures, got " + std::to_string(structures.size()));
+        throw Error(Errc::InvalidInput,
+                    "label_image: expected at most 254 structures, got " + std::to_string(structures.size()));
     const auto [ni, nj, nk] = geometry.size;
     std::vector<std::uint8_t> claims(std::size_t(ni) * std::size_t(nj) * std::size_t(nk), 0);
     if (structures.empty()) return claims;
@@ -397,17 +405,17 @@ std::vector<std::string> grid_names(const std::vector<std::string>& names) {
 std::array<std::uint8_t, 3> structure_color(std::size_t n) {
     // Paul Tol's "bright" scheme and then "muted" ones: told apart by colour-blind readers too.
     static constexpr std::array<std::array<std::uint8_t, 3>, 12> kColors{{{68, 119, 170},
-                                                                           {238, 102, 119},
-                                                                           {34, 136, 51},
-                                                                           {204, 187, 68},
-                                                                           {102, 204, 238},
-                                                                           {170, 51, 119},
-                                                                           {238, 119, 51},
-                                                                           {0, 153, 136},
-                                                                           {136, 34, 85},
-                                                                           {153, 153, 51},
-                                                                           {51, 34, 136},
-                                                                           {187, 187, 187}}};
+                                                                          {238, 102, 119},
+                                                                          {34, 136, 51},
+                                                                          {204, 187, 68},
+                                                                          {102, 204, 238},
+                                                                          {170, 51, 119},
+                                                                          {238, 119, 51},
+                                                                          {0, 153, 136},
+                                                                          {136, 34, 85},
+                                                                          {153, 153, 51},
+                                                                          {51, 34, 136},
+                                                                          {187, 187, 187}}};
     return kColors[n % kColors.size()];
 }
 
@@ -430,10 +438,11 @@ std::vector<std::pair<std::string, std::string>> slicer_segments(const std::vect
                     e.max[a] = std::max(e.max[a], here[a]);
                 }
             }
-    std::vector<std::pair<std::string, std::string>> fields{{"Segmentation_ContainedRepresentationNames", "Binary labelmap|"},
-                                                            {"Segmentation_MasterRepresentation", "Binary labelmap"},
-                                                            {"Segmentation_SourceRepresentation", "Binary labelmap"},
-                                                            {"Segmentation_ReferenceImageExtentOffset", "0 0 0"}};
+    std::vector<std::pair<std::string, std::string>> fields{
+        {"Segmentation_ContainedRepresentationNames", "Binary labelmap|"},
+        {"Segmentation_MasterRepresentation", "Binary labelmap"},
+        {"Segmentation_SourceRepresentation", "Binary labelmap"},
+        {"Segmentation_ReferenceImageExtentOffset", "0 0 0"}};
     for (std::size_t n = 0; n < names.size(); ++n) {
         const std::string key = "Segment" + std::to_string(n) + "_";
         std::ostringstream color, extent;
@@ -442,8 +451,7 @@ std::vector<std::pair<std::string, std::string>> slicer_segments(const std::vect
         color << rgb[0] / 255.0 << " " << rgb[1] / 255.0 << " " << rgb[2] / 255.0;
         const Extent& e = extents[n];
         // Slicer writes an empty segment's extent as 0 -1.
-        for (int a = 0; a < 3; ++a)
-            extent << (a == 0 ? "" : " ") << (e.max[a] < 0 ? 0 : e.min[a]) << " " << e.max[a];
+        for (int a = 0; a < 3; ++a) extent << (a == 0 ? "" : " ") << (e.max[a] < 0 ? 0 : e.min[a]) << " " << e.max[a];
         for (const auto& [field, value] : std::vector<std::pair<std::string, std::string>>{
                  {"ID", grid_names({names[n], {}})[0]},
                  {"Name", names[n]},
@@ -471,8 +479,8 @@ std::string itksnap_labels(const std::vector<std::string>& names, const std::vec
         const auto rgb = structure_color(n);
         std::string name = names[n];
         std::replace(name.begin(), name.end(), '"', '\'');
-        text << "    " << (values.empty() ? int(n) + 1 : values[n]) << "   " << int(rgb[0]) << "  " << int(rgb[1]) << "  " << int(rgb[2])
-             << "        1  1  1    \"" << name << "\"\n";
+        text << "    " << (values.empty() ? int(n) + 1 : values[n]) << "   " << int(rgb[0]) << "  " << int(rgb[1])
+             << "  " << int(rgb[2]) << "        1  1  1    \"" << name << "\"\n";
     }
     return text.str();
 }

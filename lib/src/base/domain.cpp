@@ -63,7 +63,8 @@ Domain domain_of_box(const WorldBox& box, double voxel_size) {
     for (int a = 0; a < 3; ++a) {
         const double length = box.max[a] - box.min[a];
         if (!(length > 0) || !std::isfinite(length))
-            throw Error(Errc::InvalidInput, "domain_of_box: expected a box with a positive extent, got " + to_text(box));
+            throw Error(Errc::InvalidInput,
+                        "domain_of_box: expected a box with a positive extent, got " + to_text(box));
         // A tolerance keeps a box of exactly n voxels at n in spite of rounding.
         const double cells = std::max(1.0, std::ceil(length / voxel_size - 1e-6 * std::max(1.0, length / voxel_size)));
         if (cells > kMaxVoxelsPerAxis)

@@ -11,8 +11,9 @@
 
 namespace covol::detail {
 
-/// Memory for arrays that are walked leaf by leaf: aligned to cache lines, and from some megabytes on to huge pages, which
-/// the kernel is asked for. A sweep then rarely waits for address translation, and the first touch costs one fault in 2 MiB.
+/// Memory for arrays that are walked leaf by leaf: aligned to cache lines, and from some megabytes on to huge pages,
+/// which the kernel is asked for. A sweep then rarely waits for address translation, and the first touch costs one
+/// fault in 2 MiB.
 template <typename T>
 struct LargeAllocator {
     using value_type = T;

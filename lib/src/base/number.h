@@ -14,6 +14,8 @@ inline std::string number(double value) {
 }
 
 /// A place as messages show it.
-inline std::string to_text(const Vec3& p) { return "(" + number(p[0]) + ", " + number(p[1]) + ", " + number(p[2]) + ")"; }
+inline std::string to_text(const Vec3& p) {
+    return "(" + number(p[0]) + ", " + number(p[1]) + ", " + number(p[2]) + ")";
+}
 
 }  // namespace covol::detail

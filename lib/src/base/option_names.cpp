@@ -21,7 +21,8 @@ std::optional<std::vector<NamedOption>> parse(std::string_view text) {
         NamedOption option{std::string(one.substr(0, sign)), ""};
         if (sign != std::string_view::npos) option.value = one.substr(sign + kBeforeValue.size());
         const auto is_of_name = [](char c) { return (c >= 'a' && c <= 'z') || c == '_'; };
-        if (option.field.empty() || !std::all_of(option.field.begin(), option.field.end(), is_of_name)) return std::nullopt;
+        if (option.field.empty() || !std::all_of(option.field.begin(), option.field.end(), is_of_name))
+            return std::nullopt;
         if (sign != std::string_view::npos && option.value.empty()) return std::nullopt;
         options.push_back(std::move(option));
         more = end != std::string_view::npos;
@@ -39,8 +40,10 @@ void walk(std::string_view message, const Text& text, const Options& options) {
         if (end == std::string_view::npos) return text(message);
         text(message.substr(0, begin));
         const auto named = parse(message.substr(begin + 1, end - begin - 1));
-        if (named) options(*named);
-        else text(message.substr(begin, end - begin));  // its second mark may be the first of a pair
+        if (named)
+            options(*named);
+        else
+            text(message.substr(begin, end - begin));  // its second mark may be the first of a pair
         message.remove_prefix(named ? end + 1 : end);
     }
 }
@@ -49,15 +52,19 @@ void walk(std::string_view message, const Text& text, const Options& options) {
 
 std::vector<NamedOption> named_options(const std::string& message) {
     std::vector<NamedOption> all;
-    walk(message, [](std::string_view) {}, [&](const auto& named) { all.insert(all.end(), named.begin(), named.end()); });
+    walk(
+        message, [](std::string_view) {},
+        [&](const auto& named) { all.insert(all.end(), named.begin(), named.end()); });
     return all;
 }
 
 std::string with_names(const std::string& message, const std::function<std::string(const NamedOption&)>& name) {
     std::string result;
-    walk(message, [&](std::string_view text) { result += text; }, [&](const auto& named) {
-        for (std::size_t n = 0; n < named.size(); ++n) result += (n == 0 ? "" : " ") + name(named[n]);
-    });
+    walk(
+        message, [&](std::string_view text) { result += text; },
+        [&](const auto& named) {
+            for (std::size_t n = 0; n < named.size(); ++n) result += (n == 0 ? "" : " ") + name(named[n]);
+        });
     return result;
 }
 

@@ -26,7 +26,8 @@ void with_threads(const RunContext& run, const std::function<void()>& work) {
         return;
     }
     // The arena bounds the work; the control lets it have more threads than there are cores.
-    const tbb::global_control allow(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(run.threads));
+    const tbb::global_control allow(tbb::global_control::max_allowed_parallelism,
+                                    static_cast<std::size_t>(run.threads));
     tbb::task_arena arena(run.threads);
     arena.execute([&] { work(); });
 }

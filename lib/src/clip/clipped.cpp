@@ -15,7 +15,7 @@ namespace {
 
 using Accessor = FloatGrid::ConstAccessor;
 
-constexpr double kLeastCell = 0.1;     // voxels: a layer closer to the face than this is moved onto it
+constexpr double kLeastCell = 0.1;      // voxels: a layer closer to the face than this is moved onto it
 constexpr float kSameDistance = 1e-3F;  // voxels: a distance that is the face's own
 constexpr int kProjections = 8;         // onto the planes in turn; boxes need one
 
@@ -96,12 +96,14 @@ public:
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, origins.size(), 16), [&](const auto& range) {
             const DomainSampler sample(grid_, domain_);
             const Accessor accessor = grid_.getConstAccessor();
-            for (std::size_t n = range.begin(); n != range.end(); ++n) evaluate(origins[n], sample, accessor, results[n]);
+            for (std::size_t n = range.begin(); n != range.end(); ++n)
+                evaluate(origins[n], sample, accessor, results[n]);
         });
         for (std::size_t n = 0; n < origins.size(); ++n) {
             // A tile that stays one needs no leaf.
             if (!any_on(results[n].active) && grid_.tree().probeConstLeaf(origins[n]) == nullptr &&
-                grid_.tree().getValue(origins[n]) == results[n].values[0]) continue;
+                grid_.tree().getValue(origins[n]) == results[n].values[0])
+                continue;
             auto* leaf = grid_.tree().touchLeaf(origins[n]);
             std::copy_n(results[n].values.data(), kLeafSize, leaf->buffer().data());
             auto mask = leaf->valueMask();
@@ -153,7 +155,8 @@ private:
     [[nodiscard]] std::vector<Coord> blocks() const {
         std::vector<Coord> solid;
         for (auto leaf = grid_.tree().cbeginLeaf(); leaf; ++leaf)
-            if (near_clip(openvdb::CoordBBox(leaf->origin(), leaf->origin().offsetBy(kLeafDim - 1)))) solid.push_back(leaf->origin());
+            if (near_clip(openvdb::CoordBBox(leaf->origin(), leaf->origin().offsetBy(kLeafDim - 1))))
+                solid.push_back(leaf->origin());
         auto tile = grid_.tree().cbeginValueAll();
         tile.setMaxDepth(FloatGrid::TreeType::ValueAllCIter::LEAF_DEPTH - 1);
         for (; tile; ++tile) {
@@ -197,7 +200,12 @@ private:
 class Restorer {
 public:
     Restorer(const FloatGrid& surface, const LatticeClip& clip, const Clip& planes, FaceLayer layer)
-        : grid_(surface.deepCopy()), clip_(clip), planes_(planes), domain_(domain_of(surface)), layer_(layer), width_(surface.background()) {}
+        : grid_(surface.deepCopy()),
+          clip_(clip),
+          planes_(planes),
+          domain_(domain_of(surface)),
+          layer_(layer),
+          width_(surface.background()) {}
 
     std::optional<Uncut> run() {
         Uncut result;
@@ -244,7 +252,8 @@ private:
                         accessor.setValueOnly(voxel, wall[n]);
                     }
                     for (int n = 0; n < layers; ++n) {
-                        const auto end = float(std::clamp(wall[0] + (first + n) * (wall[0] - wall[1]), -double(width_), double(width_)));
+                        const auto end = float(
+                            std::clamp(wall[0] + (first + n) * (wall[0] - wall[1]), -double(width_), double(width_)));
                         at[axis] = beyond - n * inward;
                         accessor.setValueOnly(at, end);
                         meets = meets || end < 0;
@@ -260,14 +269,17 @@ private:
         std::array<bool, kDepth> hidden;
         for (int n = 0; n < kDepth; ++n, at[axis] += inward) {
             wall[n] = accessor.getValue(at);
-            const double depth = depth_in(planes_, domain_.index_to_world({double(at[0]), double(at[1]), double(at[2])}));
+            const double depth =
+                depth_in(planes_, domain_.index_to_world({double(at[0]), double(at[1]), double(at[2])}));
             hidden[n] = depth < 0 && std::abs(wall[n] - depth) < kSameDistance * domain_.voxel_size;
         }
         if (!hidden[0]) return wall;
         int seen = 1;
         while (seen < kDepth && hidden[seen]) ++seen;
         const bool known = seen < kDepth && wall[seen] > -width_;
-        const float slope = known && seen + 1 < kDepth && !hidden[seen + 1] && wall[seen + 1] > -width_ ? wall[seen] - wall[seen + 1] : 0.0F;
+        const float slope = known && seen + 1 < kDepth && !hidden[seen + 1] && wall[seen + 1] > -width_
+                                ? wall[seen] - wall[seen + 1]
+                                : 0.0F;
         for (int n = 0; n < std::min(seen, kDepth); ++n)
             wall[n] = known ? std::clamp(wall[seen] + float(seen - n) * slope, -width_, wall[n]) : -width_;
         return wall;

@@ -23,11 +23,13 @@ struct LatticeClip {
     [[nodiscard]] int face_layer(int axis, bool upper) const;
     /// Layers from the face's on lie on the face, all others where they are.
     [[nodiscard]] double position(int axis, int layer) const;
-    [[nodiscard]] bool on_face(int axis, int layer) const { return position(axis, layer) == low[axis] || position(axis, layer) == high[axis]; }
+    [[nodiscard]] bool on_face(int axis, int layer) const {
+        return position(axis, layer) == low[axis] || position(axis, layer) == high[axis];
+    }
 };
 
-/// A clipped solid's distance with the cut undone near its faces, and carried on beyond: what the wall is there. Interpolation
-/// of the clipped distance rounds the edges of the cut; that of this one, clipped again, does not.
+/// A clipped solid's distance with the cut undone near its faces, and carried on beyond: what the wall is there.
+/// Interpolation of the clipped distance rounds the edges of the cut; that of this one, clipped again, does not.
 struct Uncut {
     FloatGridPtr distance;
     LatticeClip clip;

@@ -32,7 +32,8 @@ std::vector<Vec3> carried_on(const std::vector<Vec3>& points, const std::vector<
     for (const ImageFace& face : faces)
         for (const Vec3& p : points)
             if (on_end_slice(face, p))
-                for (double by = face.spacing; by < length + face.spacing; by += face.spacing) beyond.push_back(moved(p, face.plane.normal, by));
+                for (double by = face.spacing; by < length + face.spacing; by += face.spacing)
+                    beyond.push_back(moved(p, face.plane.normal, by));
     return beyond;
 }
 
@@ -42,7 +43,8 @@ std::vector<Vec3> mirrored(const std::vector<Vec3>& points, const std::vector<Im
     for (const ImageFace& face : faces) {
         if (std::none_of(points.begin(), points.end(), [&](const Vec3& p) { return face.depth(p) < reach; })) continue;
         const std::size_t before = all.size();
-        for (std::size_t n = 0; n < before; ++n) all.push_back(moved(all[n], face.plane.normal, 2 * face.depth(all[n])));
+        for (std::size_t n = 0; n < before; ++n)
+            all.push_back(moved(all[n], face.plane.normal, 2 * face.depth(all[n])));
     }
     return {all.begin() + std::ptrdiff_t(points.size()), all.end()};
 }

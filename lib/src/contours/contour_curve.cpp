@@ -61,7 +61,8 @@ std::vector<Vec3> centripetal_curve(const std::vector<Vec3>& marks, bool closed,
     for (std::ptrdiff_t n = 0; n + 1 < count + (closed ? 1 : 0); ++n) {
         const std::array<Vec3, 4> p{at(n - 1), at(n), at(n + 1), at(n + 2)};
         const int parts = pieces(distance(p[1], p[2]), step);
-        for (int part = 0; part < parts; ++part) curve.push_back(part == 0 ? p[1] : catmull_rom(p, double(part) / parts));
+        for (int part = 0; part < parts; ++part)
+            curve.push_back(part == 0 ? p[1] : catmull_rom(p, double(part) / parts));
     }
     if (!closed) curve.push_back(marks.back());
     return curve;

@@ -5,7 +5,8 @@
 
 namespace covol::detail {
 
-/// The marks, and between neighbours so many points of the straight line that none is farther than `step` from the next.
+/// The marks, and between neighbours so many points of the straight line that none is farther than `step` from the
+/// next.
 [[nodiscard]] std::vector<Vec3> subdivide(const std::vector<Vec3>& marks, bool closed, double step);
 
 /// Vertices on the centripetal Catmull-Rom curve through the marks, about `step` apart. Fewer than three marks are

@@ -24,7 +24,8 @@ namespace {
 double dome(double radius, double t) { return t < 1 ? radius * (1 - std::sqrt(1 - t)) : radius; }
 
 /// The slope at a node from the secants on both sides, which span `left` and `right`: their weighted harmonic mean, 0
-/// where they differ in sign (Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5, 1984), so that cubics do not overshoot.
+/// where they differ in sign (Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5, 1984), so that cubics do not
+/// overshoot.
 double monotone_slope(double secant_left, double left, double secant_right, double right) {
     if (!(secant_left * secant_right > 0)) return 0;
     const double a = 2 * right + left, b = right + 2 * left;
@@ -45,7 +46,11 @@ public:
     Interval(const ContourSolid::Data& data, Kind kind, std::size_t n) : data_(data), kind_(kind), n_(n) {}
 
     double begin() const { return kind_ == Kind::Below ? slice().w - slice().cap : slice().w; }
-    double end() const { return kind_ == Kind::Between ? data_.slices[n_ + 1].w : kind_ == Kind::Above ? slice().w + slice().cap : slice().w; }
+    double end() const {
+        return kind_ == Kind::Between ? data_.slices[n_ + 1].w
+               : kind_ == Kind::Above ? slice().w + slice().cap
+                                      : slice().w;
+    }
 
     double level(double x, double y, double w) const {
         if (kind_ != Kind::Between && slice().open) return carried_on(x, y, std::abs(w - slice().w));
@@ -68,7 +73,8 @@ public:
         if (kind_ != Kind::Between && slice().open) {
             // Neither section's level changes faster than the position does.
             const double height = slice().cap + radius, share = height / std::abs(slice().w - inner().w);
-            return {std::min(here, carried_on(x, y, height)) - (1 + 2 * share) * radius, std::numeric_limits<double>::max()};
+            return {std::min(here, carried_on(x, y, height)) - (1 + 2 * share) * radius,
+                    std::numeric_limits<double>::max()};
         }
         if (kind_ != Kind::Between) return {here - radius, std::numeric_limits<double>::max()};
         const double there = data_.slices[n_ + 1].at(data_.grid, x, y);
@@ -126,7 +132,8 @@ bool Interval::may_cross(int i, int j) const {
             const bool here = slice().level[node] < 0;
             bool there = kind_ == Kind::Between ? data_.slices[n_ + 1].level[node] < 0 : here;
             if (kind_ != Kind::Between && slice().open)
-                there = carried_on(grid.origin[0] + grid.cell * (i + di), grid.origin[1] + grid.cell * (j + dj), slice().cap) < 0;
+                there = carried_on(grid.origin[0] + grid.cell * (i + di), grid.origin[1] + grid.cell * (j + dj),
+                                   slice().cap) < 0;
             inside |= here || there;
             outside |= !here || !there;
         }
@@ -144,9 +151,11 @@ void Interval::append_surface(double step, std::vector<Vec3>& points) const {
             for (int layer = 0; layer < layers; ++layer) {
                 const double w = begin() + dw * layer;
                 const double here = level(x, y, w);
-                const std::array<double, 3> next{level(x + grid.cell, y, w), level(x, y + grid.cell, w), level(x, y, w + dw)};
+                const std::array<double, 3> next{level(x + grid.cell, y, w), level(x, y + grid.cell, w),
+                                                 level(x, y, w + dw)};
                 if ((next[0] < 0) == (here < 0) && (next[1] < 0) == (here < 0) && (next[2] < 0) == (here < 0)) continue;
-                const std::array<double, 3> slope{(next[0] - here) / grid.cell, (next[1] - here) / grid.cell, (next[2] - here) / dw};
+                const std::array<double, 3> slope{(next[0] - here) / grid.cell, (next[1] - here) / grid.cell,
+                                                  (next[2] - here) / dw};
                 int axis = 0;
                 for (int a = 1; a < 3; ++a)
                     if (std::abs(slope[a]) > std::abs(slope[axis])) axis = a;
@@ -195,7 +204,8 @@ std::vector<Vec2> deepest_in_holes(const std::vector<float>& level, const SliceG
                 at_border = true;
                 continue;  // beyond a row along the border nothing is left to tell
             }
-            for (const std::ptrdiff_t to : {std::ptrdiff_t(-1), std::ptrdiff_t(1), -std::ptrdiff_t(grid.nx), std::ptrdiff_t(grid.nx)}) {
+            for (const std::ptrdiff_t to :
+                 {std::ptrdiff_t(-1), std::ptrdiff_t(1), -std::ptrdiff_t(grid.nx), std::ptrdiff_t(grid.nx)}) {
                 const auto other = std::size_t(std::ptrdiff_t(node) + to);
                 if (seen[other] || level[other] < 0) continue;
                 seen[other] = 1;
@@ -233,9 +243,11 @@ bool ContourSolid::may_meet(const Vec3& center, double radius) const {
         high = std::max(high, most);
     };
     const auto& slices = data_->slices;
-    if (p[2] + radius < slices.front().w - slices.front().cap || p[2] - radius > slices.back().w + slices.back().cap) return false;
+    if (p[2] + radius < slices.front().w - slices.front().cap || p[2] - radius > slices.back().w + slices.back().cap)
+        return false;
     include(interval_at(*data_, p[2] - radius));
-    auto above = std::upper_bound(slices.begin(), slices.end(), p[2] - radius, [](double value, const SolidSlice& s) { return value < s.w; });
+    auto above = std::upper_bound(slices.begin(), slices.end(), p[2] - radius,
+                                  [](double value, const SolidSlice& s) { return value < s.w; });
     for (; above != slices.end() && above->w < p[2] + radius; ++above) include(interval_at(*data_, above->w));
     return low < 0 && high >= 0;
 }

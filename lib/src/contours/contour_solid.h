@@ -31,11 +31,11 @@ struct SolidSlice {
     double w = 0;              ///< where it lies along the normal
     std::vector<float> level;  ///< signed distance within the plane, on the grid
     std::size_t polygons = 0;
-    double area = 0;           ///< inside
-    double depth = 0;          ///< of the deepest node inside
-    double cap = 0;            ///< height of the dome, on the first and the last slice; of what goes on where there is none
-    bool open = false;         ///< no dome: the image ends here, and the body goes on beyond it as its sections tell
-    Vec2 shift{0, 0};          ///< to the next slice's section, where the two do not overlap
+    double area = 0;    ///< inside
+    double depth = 0;   ///< of the deepest node inside
+    double cap = 0;     ///< height of the dome, on the first and the last slice; of what goes on where there is none
+    bool open = false;  ///< no dome: the image ends here, and the body goes on beyond it as its sections tell
+    Vec2 shift{0, 0};   ///< to the next slice's section, where the two do not overlap
 
     [[nodiscard]] double at(const SliceGrid& grid, double x, double y) const { return sample_slice(level, grid, x, y); }
 };

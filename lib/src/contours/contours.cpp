@@ -20,19 +20,19 @@ using detail::SliceFrame;
 using detail::SolidSlice;
 using detail::Vec2;
 
-constexpr double kSameSlice = 0.1;          // voxels; marks of one slice may differ by this
-constexpr double kSameSliceOfExtent = 1e-4; // without an image: of the line's extent
-constexpr std::size_t kMaxNodes = 64u << 20; // of all slices' grids together: 256 MB; a coarser grid beyond
+constexpr double kSameSlice = 0.1;            // voxels; marks of one slice may differ by this
+constexpr double kSameSliceOfExtent = 1e-4;   // without an image: of the line's extent
+constexpr std::size_t kMaxNodes = 64u << 20;  // of all slices' grids together: 256 MB; a coarser grid beyond
 constexpr double kMarginCells = 2;
-constexpr double kSideCells = 10;            // the same across the slices: the end of it lies where nothing is computed
-constexpr double kOpenCells = 6;             // that a body goes on beyond the image's end: more than a band's half width
+constexpr double kSideCells = 10;  // the same across the slices: the end of it lies where nothing is computed
+constexpr double kOpenCells = 6;   // that a body goes on beyond the image's end: more than a band's half width
 
 constexpr const char* kAxisNames[3] = {"x", "y", "z"};
 
 struct Line {
     std::vector<Vec3> index;  ///< marks as voxels
     bool closed = true;
-    std::string name;         ///< for messages: file, and the line's own name
+    std::string name;  ///< for messages: file, and the line's own name
     std::array<bool, 3> constant{false, false, false};
 };
 
@@ -49,14 +49,18 @@ std::vector<Vec3> without_repeats(const std::vector<Vec3>& marks, bool closed) {
 class Densifier {
 public:
     Densifier(const ImageGeometry* geometry, const ContourOptions& options, const RunContext& run)
-        : geometry_(geometry != nullptr ? *geometry : ImageGeometry{}), has_image_(geometry != nullptr), options_(options), run_(run) {}
+        : geometry_(geometry != nullptr ? *geometry : ImageGeometry{}),
+          has_image_(geometry != nullptr),
+          options_(options),
+          run_(run) {}
 
     Contours go(const std::vector<PointCloud>& clouds) {
         for (const PointCloud& cloud : clouds) read(cloud);
         if (lines_.empty())
-            throw Error(Errc::InvalidInput, "densify: " + (clouds.empty() ? std::string("no file") : clouds.front().source) +
-                                                ": expected lines of marks (slice, contour, x, y; shapes; selections), got "
-                                                "loose points; give those as points");
+            throw Error(Errc::InvalidInput,
+                        "densify: " + (clouds.empty() ? std::string("no file") : clouds.front().source) +
+                            ": expected lines of marks (slice, contour, x, y; shapes; selections), got "
+                            "loose points; give those as points");
         choose_plane();
         join_lines();
         make_solid();
@@ -128,8 +132,8 @@ void Densifier::check_inside(const Line& line) const {
     if (outside == 0) return;
     std::ostringstream text;
     text << "densify: " << line.name << ": " << outside << " of " << line.index.size()
-         << " marks lie outside the image, the first at voxel (" << (*first)[0] << ", " << (*first)[1] << ", " << (*first)[2]
-         << ") of " << geometry_.size[0] << " x " << geometry_.size[1] << " x " << geometry_.size[2]
+         << " marks lie outside the image, the first at voxel (" << (*first)[0] << ", " << (*first)[1] << ", "
+         << (*first)[2] << ") of " << geometry_.size[0] << " x " << geometry_.size[1] << " x " << geometry_.size[2]
          << "; check `space`, `order` and `spacing`";
     throw Error(Errc::InvalidInput, text.str());
 }
@@ -167,7 +171,8 @@ void Densifier::choose_plane() {
     frame_ = {geometry_, best};
 }
 
-/// Where a contour runs along a side of the image, in its last row of voxels, the image cuts the section: it goes on beyond.
+/// Where a contour runs along a side of the image, in its last row of voxels, the image cuts the section: it goes on
+/// beyond.
 std::vector<Vec3> Densifier::carried_beyond_sides(std::vector<Vec3> curve) const {
     for (int side = 0; side < 4; ++side) {
         const int a = side / 2, axis = a == 0 ? frame_.x_axis() : frame_.y_axis();
@@ -209,7 +214,8 @@ void Densifier::join_lines() {
                                       ? detail::centripetal_curve(marks, line.closed, options_.step)
                                       : marks;
         if (has_image_ && line.closed && line.constant[frame_.axis]) curve = carried_beyond_sides(curve);
-        for (const Vec3& p : detail::subdivide(curve, line.closed, options_.step)) result_.along.push_back(frame_.to_world(p));
+        for (const Vec3& p : detail::subdivide(curve, line.closed, options_.step))
+            result_.along.push_back(frame_.to_world(p));
         ++(line.closed ? result_.closed : result_.open);
         if (!line.closed || !line.constant[frame_.axis]) continue;
         Polygon polygon;
@@ -224,7 +230,9 @@ void Densifier::drop_repeated_loops() {
     const auto last = std::unique(loops_.begin(), loops_.end());
     const auto repeated = loops_.end() - last;
     loops_.erase(last, loops_.end());
-    if (repeated > 0) run_.warn("contours: " + std::to_string(repeated) + " contours are there twice, with the same marks; they count once");
+    if (repeated > 0)
+        run_.warn("contours: " + std::to_string(repeated) +
+                  " contours are there twice, with the same marks; they count once");
 }
 
 void Densifier::make_solid() {
@@ -266,10 +274,12 @@ void Densifier::fill_slices(ContourSolid::Data& data, const std::vector<std::vec
                     low[a] = std::min(low[a], p[a]);
                     high[a] = std::max(high[a], p[a]);
                 }
-    const double nodes = (high[0] - low[0]) * (high[1] - low[1]) / (options_.step * options_.step) * double(polygons.size());
+    const double nodes =
+        (high[0] - low[0]) * (high[1] - low[1]) / (options_.step * options_.step) * double(polygons.size());
     const double cell = options_.step * std::max(1.0, std::sqrt(nodes / double(kMaxNodes)));
     if (cell > options_.step)
-        run_.info("contours: slices are filled on a grid of " + detail::number(cell) + ", coarser than the voxels, to bound memory");
+        run_.info("contours: slices are filled on a grid of " + detail::number(cell) +
+                  ", coarser than the voxels, to bound memory");
     data.grid.cell = cell;
     data.grid.origin = {low[0] - kMarginCells * cell, low[1] - kMarginCells * cell};
     data.grid.nx = int((high[0] - low[0]) / cell + 2 * kMarginCells) + 2;
@@ -304,15 +314,18 @@ void Densifier::link_slices(ContourSolid::Data& data, const std::vector<std::vec
             ++ended;
             continue;
         }
-        const Vec2 here = detail::moments(polygons[n][0]).centroid, there = detail::moments(polygons[n + 1][0]).centroid;
+        const Vec2 here = detail::moments(polygons[n][0]).centroid,
+                   there = detail::moments(polygons[n + 1][0]).centroid;
         data.slices[n].shift = {there[0] - here[0], there[1] - here[1]};
         ++carried;
     }
     if (carried > 0)
-        run_.warn("contours: " + std::to_string(carried) + " pairs of neighbouring slices have contours that do not overlap; "
+        run_.warn("contours: " + std::to_string(carried) +
+                  " pairs of neighbouring slices have contours that do not overlap; "
                   "they are joined along the line between their centroids. Mark more slices there if that is wrong");
     if (ended > 0)
-        run_.warn("contours: " + std::to_string(ended) + " pairs of neighbouring slices have several contours and no overlap; "
+        run_.warn("contours: " + std::to_string(ended) +
+                  " pairs of neighbouring slices have several contours and no overlap; "
                   "the parts end between them. Mark more slices there if that is wrong");
 }
 
@@ -330,10 +343,13 @@ void Densifier::cap_ends(ContourSolid::Data& data) {
     const auto cap = [&](std::size_t end, std::size_t before) {
         const bool alone = end == before, first = end < before;
         const double distance = std::abs(slices[end].w - slices[before].w);
-        slices[end].cap = std::max(cap_height(slices[end].area, alone ? 0 : slices[before].area, distance, gap), 1e-3 * gap);
+        slices[end].cap =
+            std::max(cap_height(slices[end].area, alone ? 0 : slices[before].area, distance, gap), 1e-3 * gap);
         if (!has_image_ || alone) return;
-        // On the image's last slice, or where the next one to be marked would lie beyond it and the sections do not end before.
-        const double left = first ? slices[end].w + 0.5 * spacing : (geometry_.size[frame_.axis] - 0.5) * spacing - slices[end].w;
+        // On the image's last slice, or where the next one to be marked would lie beyond it and the sections do not end
+        // before.
+        const double left =
+            first ? slices[end].w + 0.5 * spacing : (geometry_.size[frame_.axis] - 0.5) * spacing - slices[end].w;
         const double shrinks_by = slices[before].area - slices[end].area;
         const double ends_after = shrinks_by > 0 ? distance * slices[end].area / shrinks_by : 2 * gap;
         slices[end].open = left < spacing || (left <= gap && left < ends_after);
@@ -342,7 +358,8 @@ void Densifier::cap_ends(ContourSolid::Data& data) {
     if (slices.size() == 1) {
         cap(0, 0);
         if (options_.thickness > 0) slices[0].cap = 0.5 * options_.thickness;
-        const bool only_plane = std::all_of(lines_.begin(), lines_.end(), [&](const Line& l) { return l.constant[frame_.axis]; });
+        const bool only_plane =
+            std::all_of(lines_.begin(), lines_.end(), [&](const Line& l) { return l.constant[frame_.axis]; });
         const bool one_slice = has_image_ && geometry_.size[frame_.axis] == 1;
         result_.flat = !(options_.thickness > 0) && only_plane && !one_slice && !has_loose_;
         return;
@@ -353,9 +370,11 @@ void Densifier::cap_ends(ContourSolid::Data& data) {
 
 void Densifier::summarise() {
     std::ostringstream text;
-    text << result_.marks.size() << " marks on " << result_.closed << " closed and " << result_.open << " open contours";
+    text << result_.marks.size() << " marks on " << result_.closed << " closed and " << result_.open
+         << " open contours";
     if (result_.solid)
-        text << ", " << result_.slices << " slices across " << kAxisNames[frame_.axis] << ", " << result_.slice_distance << " apart";
+        text << ", " << result_.slices << " slices across " << kAxisNames[frame_.axis] << ", " << result_.slice_distance
+             << " apart";
     text << ": " << result_.along.size() << " points along them, " << result_.between.size() << " between";
     result_.summary = text.str();
 }

@@ -26,7 +26,8 @@ std::vector<Vec3> seeds_of(const PointCloud& cloud, const ImageGeometry* geometr
     for (const MarkLine& line : cloud.lines) {
         if (line.begin >= line.end || line.end > world.size()) continue;
         std::fill(in_line.begin() + std::ptrdiff_t(line.begin), in_line.begin() + std::ptrdiff_t(line.end), 1);
-        const std::vector<Vec3> marks(world.begin() + std::ptrdiff_t(line.begin), world.begin() + std::ptrdiff_t(line.end));
+        const std::vector<Vec3> marks(world.begin() + std::ptrdiff_t(line.begin),
+                                      world.begin() + std::ptrdiff_t(line.end));
         for (const Vec3& p : detail::subdivide(marks, line.closed && marks.size() >= 3, step)) seeds.push_back(p);
     }
     for (std::size_t n = 0; n < world.size(); ++n)
@@ -43,7 +44,8 @@ std::string SeedCheck::warning() const {
     return text.str();
 }
 
-SeedCheck check_seeds(const FloatGrid& surface, const std::vector<Vec3>& inside, const std::vector<Vec3>& outside, double slack) {
+SeedCheck check_seeds(const FloatGrid& surface, const std::vector<Vec3>& inside, const std::vector<Vec3>& outside,
+                      double slack) {
     SeedCheck check;
     check.inside = inside.size();
     check.outside = outside.size();

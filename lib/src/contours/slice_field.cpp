@@ -38,7 +38,10 @@ std::vector<Edge> edges_of(const std::vector<Polygon>& polygons, const SliceGrid
 class Sweep {
 public:
     Sweep(const std::vector<Edge>& edges, const SliceGrid& grid)
-        : edges_(edges), grid_(grid), distance_(grid.size(), std::numeric_limits<float>::max()), edge_(grid.size(), -1) {}
+        : edges_(edges),
+          grid_(grid),
+          distance_(grid.size(), std::numeric_limits<float>::max()),
+          edge_(grid.size(), -1) {}
 
     std::vector<float> run() {
         for (std::size_t n = 0; n < edges_.size(); ++n) seed(std::int32_t(n));
@@ -81,7 +84,8 @@ private:
         const bool has_other = other >= 0 && other < grid_.ny;
         for (int i = 0; i < grid_.nx; ++i) {
             if (has_other)
-                for (int k = std::max(i - 1, 0); k <= std::min(i + 1, grid_.nx - 1); ++k) offer(i, j, edge_[at(k, other)]);
+                for (int k = std::max(i - 1, 0); k <= std::min(i + 1, grid_.nx - 1); ++k)
+                    offer(i, j, edge_[at(k, other)]);
             if (i > 0) offer(i, j, edge_[at(i - 1, j)]);
         }
         for (int i = grid_.nx - 2; i >= 0; --i) offer(i, j, edge_[at(i + 1, j)]);

@@ -19,13 +19,17 @@ struct SliceGrid {
 /// Signed distance to the polygons at the grid's nodes (i fastest), negative where the even-odd rule over all of them
 /// says inside. Exact beside the polygons; elsewhere the distance to the nearest edge that two sweeps over the grid
 /// found, which is the nearest one nearly everywhere.
-[[nodiscard]] std::vector<float> signed_distance_of_polygons(const std::vector<Polygon>& polygons, const SliceGrid& grid);
+[[nodiscard]] std::vector<float> signed_distance_of_polygons(const std::vector<Polygon>& polygons,
+                                                             const SliceGrid& grid);
 
 /// Bilinear; beyond the grid the value at its border plus the distance to it.
 [[nodiscard]] double sample_slice(const std::vector<float>& values, const SliceGrid& grid, double x, double y);
 
 /// Area by the shoelace formula, and the centroid; a polygon without area has its vertices' mean.
-struct PolygonMoments { double area = 0; Vec2 centroid{0, 0}; };
+struct PolygonMoments {
+    double area = 0;
+    Vec2 centroid{0, 0};
+};
 [[nodiscard]] PolygonMoments moments(const Polygon& polygon);
 
 }  // namespace covol::detail

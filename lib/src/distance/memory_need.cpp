@@ -15,21 +15,22 @@ namespace covol::detail {
 namespace {
 
 // Measured: peak memory over voxels.
-constexpr double kTubeBytes = 12;   ///< for each voxel of a distance tube
-constexpr double kBandBytes = 200;  ///< for each active voxel of a band that is solved on
-constexpr double kCoarseVoxels = 1e6;   // on which volumes are measured
-constexpr double kBandVoxels = 10;      // a band that follows, with the leaves that it cuts, is this wide
-constexpr double kLeafVoxels = 4;       // a tube's leaves reach this far beyond it on the mean
-constexpr double kGrowth = 1.02;        // of the voxel size, while one is sought that fits
+constexpr double kTubeBytes = 12;      ///< for each voxel of a distance tube
+constexpr double kBandBytes = 200;     ///< for each active voxel of a band that is solved on
+constexpr double kCoarseVoxels = 1e6;  // on which volumes are measured
+constexpr double kBandVoxels = 10;     // a band that follows, with the leaves that it cuts, is this wide
+constexpr double kLeafVoxels = 4;      // a tube's leaves reach this far beyond it on the mean
+constexpr double kGrowth = 1.02;       // of the voxel size, while one is sought that fits
 constexpr double kBaseBytes = 8e7;     // of a program that has done nothing yet
 constexpr double kDoubt = 1.2;         // estimates were up to this much too high
-constexpr double kComfort = 0.8;        // share of the budget that the proposed one takes
+constexpr double kComfort = 0.8;       // share of the budget that the proposed one takes
 constexpr int kMostGrowths = 2000;
 
 /// Volume of {d <= r} by r, on a grid that is coarse enough for any domain.
 class CloudVolume {
 public:
-    CloudVolume(const std::vector<Vec3>& points, const Domain& domain, const RunContext& run) : points_(double(points.size())) {
+    CloudVolume(const std::vector<Vec3>& points, const Domain& domain, const RunContext& run)
+        : points_(double(points.size())) {
         const WorldBox box = domain.world_box();
         double volume = 1, diagonal = 0;
         for (int a = 0; a < 3; ++a) {
@@ -69,13 +70,15 @@ using BytesAt = std::function<double(double voxel_size)>;
 
 void require(const BytesAt& bytes_at, double voxel_size, const char* where, const RunContext& run) {
     const double budget = double(run.memory_budget), needed = bytes_at(voxel_size);
-    if (!(needed > kDoubt * budget) || kComfort * budget <= kBaseBytes) return;  // a bound that no voxel size would keep
+    if (!(needed > kDoubt * budget) || kComfort * budget <= kBaseBytes)
+        return;  // a bound that no voxel size would keep
     double fits = voxel_size;
     for (int n = 0; n < kMostGrowths && bytes_at(fits) > kComfort * budget; ++n) fits *= kGrowth;
     std::ostringstream text;
     text.precision(2);
     text << where << ": a voxel size of " << voxel_size << " needs about " << gigabytes(needed) << " GiB of memory, "
-         << gigabytes(budget) << " GiB may be used; use a larger one, such as " << fits << " (`voxel_size`), or a smaller domain (`roi`)";
+         << gigabytes(budget) << " GiB may be used; use a larger one, such as " << fits
+         << " (`voxel_size`), or a smaller domain (`roi`)";
     throw Error(Errc::InvalidOptions, text.str());
 }
 
@@ -90,7 +93,11 @@ void require_tube_memory(const std::vector<Vec3>& points, const Domain& domain, 
         [&](double h) {
             const double radius = need.reach + need.voxels * h;
             double bytes = kTubeBytes * volume(radius + kLeafVoxels * h);
-            if (need.solved) bytes = std::max(bytes, kBandBytes * std::min(volume(radius), kBandVoxels * h * volume.area(std::max(need.reach, 0.5 * kBandVoxels * h))));
+            if (need.solved)
+                bytes = std::max(
+                    bytes,
+                    kBandBytes * std::min(volume(radius),
+                                          kBandVoxels * h * volume.area(std::max(need.reach, 0.5 * kBandVoxels * h))));
             return kBaseBytes + bytes / (h * h * h);
         },
         domain.voxel_size, where, run);

@@ -13,7 +13,8 @@ struct TubeNeed {
     bool solved = false;  ///< a band within it is solved on
 };
 
-/// Refuses a tube that does not fit into run.memory_budget, before memory is taken for it; free where all of the domain fits.
+/// Refuses a tube that does not fit into run.memory_budget, before memory is taken for it; free where all of the domain
+/// fits.
 /// @param where  the caller's name, for messages.
 /// @throws Error InvalidOptions that says about how much is needed, and with which voxel size it would fit.
 void require_tube_memory(const std::vector<Vec3>& points, const Domain& domain, const TubeNeed& need, const char* where,

@@ -109,12 +109,12 @@ void Sweeper::take(const std::vector<Vec3>& points, const char* where) {
     box_ = wide;
     for (int a = 0; a < 3; ++a)
         if ((std::int64_t(box_.max()[a]) - box_.min()[a]) / kLeafDim + 4 > kMaxLeavesPerAxis)
-            throw Error(Errc::InvalidInput, std::string(where) + ": the domain has " +
-                                                std::to_string(std::int64_t(box_.max()[a]) - box_.min()[a] + 1) +
-                                                " voxels along an axis, expected at most 2^24; use a larger voxel size");
+            throw Error(Errc::InvalidInput,
+                        std::string(where) + ": the domain has " +
+                            std::to_string(std::int64_t(box_.max()[a]) - box_.min()[a] + 1) +
+                            " voxels along an axis, expected at most 2^24; use a larger voxel size");
     std::vector<std::pair<Key, std::int32_t>> order(kept.size());
-    for (std::size_t n = 0; n < kept.size(); ++n)
-        order[n] = {key(leaf_origin(voxel_of(points[kept[n]]))), kept[n]};
+    for (std::size_t n = 0; n < kept.size(); ++n) order[n] = {key(leaf_origin(voxel_of(points[kept[n]]))), kept[n]};
     tbb::parallel_sort(order.begin(), order.end());
     field.points.reserve(order.size());
     field.source.reserve(order.size());

@@ -28,9 +28,10 @@ struct NearestField {
 /// Sweeps point indices through the tube of `radius` voxels around the points, within `box`.
 ///
 /// Every leaf that the tube meets is there; voxels further away than `radius` may hold a point that is not the nearest.
-/// Leaves of equal parity in I, J and K are swept in parallel, since none of them reads another; a leaf is visited again
-/// when a neighbour has changed the voxels next to it.
-/// @param points  index space, finite. Points outside `box` count: the tube is followed outside of it where they need it.
+/// Leaves of equal parity in I, J and K are swept in parallel, since none of them reads another; a leaf is visited
+/// again when a neighbour has changed the voxels next to it.
+/// @param points  index space, finite. Points outside `box` count: the tube is followed outside of it where they need
+/// it.
 /// @param where   the caller's name, for messages.
 /// @throws Error InvalidInput when the box is longer than 2^24 voxels; Cancelled.
 [[nodiscard]] NearestField nearest_points(const std::vector<Vec3>& points, const CoordBBox& box, double radius,

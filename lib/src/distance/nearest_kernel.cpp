@@ -40,8 +40,11 @@ struct Row {
         return dx * dx + dy * dy + dz * dz;
     }
     COVOL_INLINE Row(const NearestBlock& b, int at_i, int at_j)
-        : i(Float8{} + float(at_i)), j(Float8{} + float(at_j)), k{0, 1, 2, 3, 4, 5, 6, 7},
-          p(load_points(b, NearestBlock::offset(at_i, at_j, 0))), squared(distance_to(p)) {}
+        : i(Float8{} + float(at_i)),
+          j(Float8{} + float(at_j)),
+          k{0, 1, 2, 3, 4, 5, 6, 7},
+          p(load_points(b, NearestBlock::offset(at_i, at_j, 0))),
+          squared(distance_to(p)) {}
     COVOL_INLINE void offer(const Points8& q) {
         const Float8 s = distance_to(q);
         const Int8 nearer = s < squared;
@@ -138,7 +141,7 @@ COVOL_INLINE Points8 load_points(const NearestBlock& b, int at, int stride) {
 COVOL_INLINE bool face_has_news(const NearestBlock& b, float reach, const int (&normal)[3], const int (&row)[3],
                                 const int (&along)[3]) {
     constexpr int kStride[3] = {NearestBlock::kSlice, NearestBlock::kRow, 1};
-    const auto stride = [&](const int (&v)[3]) { return v[0] * kStride[0] + v[1] * kStride[1] + v[2] * kStride[2]; };
+    const auto stride = [&](const int(&v)[3]) { return v[0] * kStride[0] + v[1] * kStride[1] + v[2] * kStride[2]; };
     const int outward = stride(normal), next_row = stride(row), next = stride(along);
     const Float8 lanes{0, 1, 2, 3, 4, 5, 6, 7};
     Int8 news{};
@@ -165,8 +168,10 @@ COVOL_CLONES unsigned faces_with_news(const NearestBlock& b, float reach) {
     constexpr int kI[3] = {1, 0, 0}, kJ[3] = {0, 1, 0}, kK[3] = {0, 0, 1};
     constexpr int kDown[3][3] = {{-1, 0, 0}, {0, -1, 0}, {0, 0, -1}};
     return unsigned(face_has_news(b, reach, kDown[0], kJ, kK)) | unsigned(face_has_news(b, reach, kI, kJ, kK)) << 1 |
-           unsigned(face_has_news(b, reach, kDown[1], kI, kK)) << 2 | unsigned(face_has_news(b, reach, kJ, kI, kK)) << 3 |
-           unsigned(face_has_news(b, reach, kDown[2], kI, kJ)) << 4 | unsigned(face_has_news(b, reach, kK, kI, kJ)) << 5;
+           unsigned(face_has_news(b, reach, kDown[1], kI, kK)) << 2 |
+           unsigned(face_has_news(b, reach, kJ, kI, kK)) << 3 |
+           unsigned(face_has_news(b, reach, kDown[2], kI, kJ)) << 4 |
+           unsigned(face_has_news(b, reach, kK, kI, kJ)) << 5;
 }
 
 COVOL_CLONES void sweep_nearest(NearestBlock& block) {

@@ -25,9 +25,9 @@ using detail::kPaddedSize;
 using detail::LeafBand;
 using detail::LeafBounds;
 
-constexpr double kHaloSigmas = 3.0;      // beyond it smoothing carries nothing worth computing
-constexpr double kLargestHeatStep = 0.5; // h²; shorter steps make the kernel rounder, more like a Gaussian
-constexpr double kHeatTolerance = 1e-4;  // relative residual
+constexpr double kHaloSigmas = 3.0;       // beyond it smoothing carries nothing worth computing
+constexpr double kLargestHeatStep = 0.5;  // h²; shorter steps make the kernel rounder, more like a Gaussian
+constexpr double kHeatTolerance = 1e-4;   // relative residual
 constexpr int kMaxHeatSweeps = 100;
 constexpr int kInnerSweeps = 2;
 constexpr double kSlopePercentile = 0.9;
@@ -49,9 +49,11 @@ LeafBounds known_bounds(const Domain& domain, const LeafBand& band, std::size_t 
     for (int a = 0; a < 3; ++a) {
         int step[3] = {0, 0, 0};
         step[a] = -1;
-        if (n[detail::neighbour_slot(step[0], step[1], step[2])] == band.none()) bounds.lo[a] = std::max(bounds.lo[a], 0);
+        if (n[detail::neighbour_slot(step[0], step[1], step[2])] == band.none())
+            bounds.lo[a] = std::max(bounds.lo[a], 0);
         step[a] = 1;
-        if (n[detail::neighbour_slot(step[0], step[1], step[2])] == band.none()) bounds.hi[a] = std::min(bounds.hi[a], 7);
+        if (n[detail::neighbour_slot(step[0], step[1], step[2])] == band.none())
+            bounds.hi[a] = std::min(bounds.hi[a], 7);
     }
     return bounds;
 }
@@ -90,14 +92,15 @@ void for_each_padded(const Window& window, const Domain& domain, Work work) {
     });
 }
 
-// One visit of a leaf in an implicit heat step. Where the domain or the window ends in it or next to it, the faces there
-// are closed.
+// One visit of a leaf in an implicit heat step. Where the domain or the window ends in it or next to it, the faces
+// there are closed.
 double relax_heat(const detail::LeafStar& values, const float* before, float t, float omega, const LeafBounds& bounds) {
     const detail::SchemeKernels& kernels = detail::kernels();
     if (!bounds.cuts()) return kernels.heat(values, before, t, omega, kInnerSweeps);
     static constexpr std::array<unsigned long long, 8> kAll = {~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL};
     alignas(64) detail::Share rows[6 * kLeafSize];
-    std::fill(std::begin(rows), std::end(rows), static_cast<detail::Share>(detail::kShareUnit * t / (1.0F + 6.0F * t) + 0.5F));
+    std::fill(std::begin(rows), std::end(rows),
+              static_cast<detail::Share>(detail::kShareUnit * t / (1.0F + 6.0F * t) + 0.5F));
     detail::close_faces(rows, bounds.lo, bounds.hi);
     return kernels.relax(values, before, rows, kAll.data(), omega, kInnerSweeps, {});
 }
@@ -118,8 +121,8 @@ void smooth(Window& window, const Domain& domain, double sigma, const RunContext
         double first = 0.0;
         for (int sweep = 0; sweep < kMaxHeatSweeps; ++sweep) {
             const auto visit = [&](std::size_t leaf) {
-                residuals[leaf] = relax_heat(detail::star_of(window.image, leaf), before.leaf(leaf), static_cast<float>(t), omega,
-                                             known_bounds(domain, window.band, leaf));
+                residuals[leaf] = relax_heat(detail::star_of(window.image, leaf), before.leaf(leaf),
+                                             static_cast<float>(t), omega, known_bounds(domain, window.band, leaf));
             };
             // Leaves of one colour share no face.
             tbb::parallel_for(std::size_t(0), window.band.odd_begin(), visit);
@@ -166,14 +169,16 @@ std::string EdgeOptions::why_invalid() const {
     checks.expect_finite("sigma", sigma);
     checks.expect_not_negative("edge_k", edge_k);
     checks.expect_not_negative("edge_contrast", edge_contrast);
-    checks.expect(contrast_percentile >= 0 && contrast_percentile < 1, "contrast_percentile", "between 0 and 1", contrast_percentile);
+    checks.expect(contrast_percentile >= 0 && contrast_percentile < 1, "contrast_percentile", "between 0 and 1",
+                  contrast_percentile);
     checks.expect(std::isfinite(low) && std::isfinite(high) && low <= high, "low", "<= high", low);
     return checks.lines();
 }
 
 EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions& options, const RunContext& run) {
     detail::require_valid(options, "edge");
-    if (topology.activeVoxelCount() == 0) throw Error(Errc::InvalidInput, "edge: expected active voxels in the band, got none");
+    if (topology.activeVoxelCount() == 0)
+        throw Error(Errc::InvalidInput, "edge: expected active voxels in the band, got none");
     const Domain domain = domain_of(topology);
     EdgeResult result;
     EdgeReport& report = result.report;
@@ -188,7 +193,8 @@ EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions
         }
     }
     if (!(report.low < report.high))
-        throw Error(Errc::InvalidInput, "edge: " + image.path() + ": every voxel has the value " + std::to_string(report.low) +
+        throw Error(Errc::InvalidInput, "edge: " + image.path() + ": every voxel has the value " +
+                                            std::to_string(report.low) +
                                             ", there is no edge to find; segment with the points alone (`rho = 0`)");
     with_threads(run, [&] {
         Window window = sample_window(image, topology, domain, report.sigma, report);
@@ -219,9 +225,10 @@ EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions
         if (options.edge_k > 0) report.edge_contrast = 1.0 / std::sqrt(options.edge_k);
         if (!(report.edge_contrast > 0)) report.edge_contrast = automatic_contrast(*result.grid, options, is_line);
         if (!(report.edge_contrast > 0))
-            throw Error(Errc::InvalidInput, "edge: " + image.path() +
-                                                ": constant wherever the band lies, there is no edge to find; check that the "
-                                                "points lie on the image's structure");
+            throw Error(Errc::InvalidInput,
+                        "edge: " + image.path() +
+                            ": constant wherever the band lies, there is no edge to find; check that the "
+                            "points lie on the image's structure");
         report.edge_k = 1.0 / (report.edge_contrast * report.edge_contrast);
         const auto k = static_cast<float>(report.edge_k);
         for (auto leaf = result.grid->tree().beginLeaf(); leaf; ++leaf)
@@ -230,7 +237,8 @@ EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions
     return result;
 }
 
-MarkedFeature feature_at(const Image& image, const std::vector<Vec3>& places, const std::vector<Vec3>& normals, double reach) {
+MarkedFeature feature_at(const Image& image, const std::vector<Vec3>& places, const std::vector<Vec3>& normals,
+                         double reach) {
     const auto value_at = [&](const Vec3& x) {
         Domain one;
         one.origin = x;

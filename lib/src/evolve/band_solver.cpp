@@ -20,7 +20,7 @@ namespace {
 using LeafNode = FloatGrid::TreeType::LeafNodeType;
 using Clock = std::chrono::steady_clock;
 
-constexpr int kInnerSweeps = 2;  // the second costs a fifth and saves a third of the visits
+constexpr int kInnerSweeps = 2;     // the second costs a fifth and saves a third of the visits
 constexpr double kRounding = 5e-7;  // voxels; a residual below this is noise of single precision
 constexpr double kMaxOmega = 1.9;
 constexpr double kDiverged = 10.0;  // growth of the residual at which over-relaxation is given up
@@ -49,22 +49,26 @@ template <typename Convert>
 HaloField gather_field(const LeafBand& band, const FloatGrid& grid, Convert convert) {
     return gather(band, grid, false, [&](const LeafNode* leaf, float, float* block) {
         for (int n = 0; n < kLeafSize; ++n)
-            block[n] = leaf != nullptr && leaf->isValueOn(n) ? static_cast<float>(convert(leaf->getValue(n))) : kUnknown;
+            block[n] =
+                leaf != nullptr && leaf->isValueOn(n) ? static_cast<float>(convert(leaf->getValue(n))) : kUnknown;
     });
 }
 
-// The points' potential in voxels, weakened where no trusted mark is near. It is the potential that takes the weight, not
-// its slope: beside the points, where d is small, the two are alike.
-HaloField gather_potential(const LeafBand& band, const EvolveFields& fields, const Taper& taper, double guess_weight, double h) {
+// The points' potential in voxels, weakened where no trusted mark is near. It is the potential that takes the weight,
+// not its slope: beside the points, where d is small, the two are alike.
+HaloField gather_potential(const LeafBand& band, const EvolveFields& fields, const Taper& taper, double guess_weight,
+                           double h) {
     const FloatGrid* trusted = guess_weight < 1.0 ? fields.trusted : nullptr;
-    if (trusted == nullptr) return gather_field(band, *fields.distance, [&](float d) { return taper.potential(d) / h; });
+    if (trusted == nullptr)
+        return gather_field(band, *fields.distance, [&](float d) { return taper.potential(d) / h; });
     return gather(band, *fields.distance, false, [&](const LeafNode* leaf, float, float* block) {
         const LeafNode* near = leaf != nullptr ? trusted->tree().probeConstLeaf(leaf->origin()) : nullptr;
         for (int n = 0; n < kLeafSize; ++n) {
             const double closeness = near != nullptr && near->isValueOn(n) ? taper(near->getValue(n)) : 0.0;
             const double weight = guess_weight + (1.0 - guess_weight) * closeness;
-            block[n] = leaf != nullptr && leaf->isValueOn(n) ? static_cast<float>(weight * taper.potential(leaf->getValue(n)) / h)
-                                                             : kUnknown;
+            block[n] = leaf != nullptr && leaf->isValueOn(n)
+                           ? static_cast<float>(weight * taper.potential(leaf->getValue(n)) / h)
+                           : kUnknown;
         }
     });
 }
@@ -92,8 +96,8 @@ void check_finite(const LeafBand& band, const HaloField& field, const char* what
         if (!is_on(band.active(first), n) || std::isfinite(value)) continue;
         const Coord at = band.origin(first).offsetBy(n >> 6, (n >> 3) & 7, n & 7);
         std::ostringstream text;
-        text << "evolve: " << what << ": expected finite values, got " << value << " at voxel (" << at.x() << ", " << at.y()
-             << ", " << at.z() << ")";
+        text << "evolve: " << what << ": expected finite values, got " << value << " at voxel (" << at.x() << ", "
+             << at.y() << ", " << at.z() << ")";
         throw Error(Errc::InvalidInput, text.str());
     }
 }
@@ -112,7 +116,8 @@ SchemeConstants constants_for(const EvolveOptions& options, double h, double tau
 
 }  // namespace
 
-BandSolver::BandSolver(const FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options, const Domain& domain)
+BandSolver::BandSolver(const FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options,
+                       const Domain& domain)
     : options_(options), domain_(domain), band_(u), active_count_(band_.active_count()) {
     if (active_count_ == 0) throw Error(Errc::InvalidInput, "evolve: expected active voxels in u, got none");
     const auto scale = static_cast<float>(1.0 / domain_.voxel_size);
@@ -233,7 +238,8 @@ void BandSolver::redistance(double clamp) {
     static_assert(LocalDistance::kCuts * sizeof(float) <= kRowBytes);
     const auto limit = static_cast<float>(clamp);
     has_previous_ = false;
-    LocalDistance local(band_, field_, leaf_active_, domain_, limit, limit, {reinterpret_cast<float*>(rows_.data()), previous_.leaf(0)});
+    LocalDistance local(band_, field_, leaf_active_, domain_, limit, limit,
+                        {reinterpret_cast<float*>(rows_.data()), previous_.leaf(0)});
     local.compute();
     tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
         if (!leaf_active_[leaf]) return;
@@ -309,8 +315,9 @@ double BandSolver::sweep(float omega, double goal, Counts& counts) {
                     if (!leaf_active_[leaf] || !is_unconverged(leaf, goal)) continue;
                     const std::size_t next = std::min(leaf + 1, end - 1);
                     prefetch(star_of(field_, next));
-                    residuals_[leaf] = kernel.relax(star_of(field_, leaf), previous_.leaf(leaf), rows(leaf), active(leaf), omega,
-                                                    kInnerSweeps, {previous_.leaf(next), rows(next)});
+                    residuals_[leaf] =
+                        kernel.relax(star_of(field_, leaf), previous_.leaf(leaf), rows(leaf), active(leaf), omega,
+                                     kInnerSweeps, {previous_.leaf(next), rows(next)});
                     ++visits;
                 }
                 return visits;

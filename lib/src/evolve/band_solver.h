@@ -13,13 +13,14 @@
 
 namespace covol::detail {
 
-/// What is fixed for one band: u_p + Σ_q a_pq (u_q - u_p) = u_p^{n-1}, a_pq = (τ/h³) min(v_pq, 0) - (τδ/h²) M_p W_pq <= 0,
-/// Eqs. (14)-(22). One step assembles the rows of every leaf from u^{n-1}, then visits the leaves in two colours,
-/// from 2 u^{n-1} - u^{n-2} on, until the residual is `solver_tolerance` of that of u^{n-1}. Values are in voxels, not world units.
+/// What is fixed for one band: u_p + Σ_q a_pq (u_q - u_p) = u_p^{n-1}, a_pq = (τ/h³) min(v_pq, 0) - (τδ/h²) M_p W_pq <=
+/// 0, Eqs. (14)-(22). One step assembles the rows of every leaf from u^{n-1}, then visits the leaves in two colours,
+/// from 2 u^{n-1} - u^{n-2} on, until the residual is `solver_tolerance` of that of u^{n-1}. Values are in voxels, not
+/// world units.
 ///
-/// Work is done on active leaves only: a leaf becomes inactive once neither it nor any of the 26 around it has moved by more
-/// than a threshold, and active again once one of those has. Within a solve, a leaf that has converged, with neighbours
-/// across its faces that have, is not visited again.
+/// Work is done on active leaves only: a leaf becomes inactive once neither it nor any of the 26 around it has moved by
+/// more than a threshold, and active again once one of those has. Within a solve, a leaf that has converged, with
+/// neighbours across its faces that have, is not visited again.
 class BandSolver {
 public:
     struct Counts {

@@ -17,8 +17,8 @@
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "evolve/band_solver.h"
-#include "evolve/tracking.h"
 #include "evolve/motion.h"
+#include "evolve/tracking.h"
 
 namespace covol {
 namespace {
@@ -63,8 +63,9 @@ public:
             if (!motion.finite) {
                 solver_->restore_previous();
                 solver_->store(u_);
-                throw Error(Errc::Numerical, "evolve: step " + std::to_string(report_.steps + 1) +
-                                                 ": a value that is not finite appeared; u is as after the step before");
+                throw Error(Errc::Numerical,
+                            "evolve: step " + std::to_string(report_.steps + 1) +
+                                ": a value that is not finite appeared; u is as after the step before");
             }
             ++report_.steps;
             report_.last_change = motion.mean;
@@ -98,14 +99,15 @@ public:
 private:
     void check_field(const FloatGrid* field, const char* name, const char* weight) const {
         if (field == nullptr)
-            throw Error(Errc::InvalidInput, std::string("evolve: ") + weight + " > 0 needs the " + name + " grid, got none");
+            throw Error(Errc::InvalidInput,
+                        std::string("evolve: ") + weight + " > 0 needs the " + name + " grid, got none");
         const Domain other = domain_of(*field);
         const double h = domain_.voxel_size;
         double apart = std::abs(other.voxel_size - h);
         for (int a = 0; a < 3; ++a) apart = std::max(apart, std::abs(other.origin[a] - domain_.origin[a]));
         if (apart > 1e-6 * h)
-            throw Error(Errc::InvalidInput, std::string("evolve: expected one transform for all grids, but that of ") + name +
-                                                " differs from u's");
+            throw Error(Errc::InvalidInput, std::string("evolve: expected one transform for all grids, but that of ") +
+                                                name + " differs from u's");
     }
 
     void make_solver() {
@@ -123,8 +125,9 @@ private:
         return std::min(motion, net_motion_.per_step(solver_->u(), solver_->band().size()));
     }
 
-    // Narrow-band tracking. Advection turns the profile of u into a step, which creeps over the lattice, so every few steps u is
-    // made a distance again. The front's displacement is measured just before that, at the same phase of each cycle.
+    // Narrow-band tracking. Advection turns the profile of u into a step, which creeps over the lattice, so every few
+    // steps u is made a distance again. The front's displacement is measured just before that, at the same phase of
+    // each cycle.
     double track(double motion) {
         if (report_.steps % kCycle != 0) return motion;
         std::vector<float> largest;
@@ -167,7 +170,8 @@ private:
         solver_->store(u_);
         const detail::BandSolver::LeafStates states = solver_->take_leaf_states();
         solver_.reset();  // its memory first
-        const std::vector<detail::Coord> changed = detail::track_surface_near(stale, u_, domain_, tracking_clamp(options_));
+        const std::vector<detail::Coord> changed =
+            detail::track_surface_near(stale, u_, domain_, tracking_clamp(options_));
         if (!has_active(u_)) return;
         if (fields_.extend) fields_.extend(u_, fields_);
         solver_ = std::make_unique<detail::BandSolver>(u_, fields_, options_, domain_);
@@ -230,7 +234,8 @@ std::string EvolveOptions::why_invalid() const {
     checks.expect_share("guess_weight", guess_weight);
     checks.expect_not_negative("max_steps", max_steps);
     checks.expect_not_negative("tolerance", tolerance);
-    checks.expect(solver_tolerance > 0 && solver_tolerance < 1, "solver_tolerance", "between 0 and 1", solver_tolerance);
+    checks.expect(solver_tolerance > 0 && solver_tolerance < 1, "solver_tolerance", "between 0 and 1",
+                  solver_tolerance);
     checks.expect(max_sweeps >= 1, "max_sweeps", ">= 1", max_sweeps);
     return checks.lines();
 }

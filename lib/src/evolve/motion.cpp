@@ -69,9 +69,10 @@ LeafMotion motion_of(const float* now, const float* before, bool is_active) {
             for (std::uint64_t bits = after[word] | first[word]; bits != 0; bits &= bits - 1) {
                 const int n = word << 6 | __builtin_ctzll(bits);
                 ++motion.edges;
-                motion.displacement += is_on(after, n) && is_on(first, n)
-                                  ? std::abs(crossing(now[n], now[n + step]) - crossing(before[n], before[n + step]))
-                                  : 0.5;
+                motion.displacement +=
+                    is_on(after, n) && is_on(first, n)
+                        ? std::abs(crossing(now[n], now[n + step]) - crossing(before[n], before[n + step]))
+                        : 0.5;
             }
     }
     return motion;
@@ -152,7 +153,8 @@ void CrossingMarks::remake(const std::vector<std::int32_t>& old_leaf) {
     leaves_ = std::move(leaves);
 }
 
-FrontDisplacement::Reference::Reference(const float* values) : negative(negative_mask(values)), crossed(crossed_edges(negative)) {
+FrontDisplacement::Reference::Reference(const float* values)
+    : negative(negative_mask(values)), crossed(crossed_edges(negative)) {
     for (int n = 0; n < kLeafSize; ++n) near[n >> 6] |= std::uint64_t(std::abs(values[n]) < kDeep) << (n & 63);
 }
 

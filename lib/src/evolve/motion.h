@@ -23,8 +23,8 @@ struct LeafMotion {
     }
 };
 
-/// An edge that is crossed before and after counts with the distance between the two crossings, one that is crossed only
-/// once with half an edge. Unlike the change of u this is 0 for a profile that grows steeper without moving.
+/// An edge that is crossed before and after counts with the distance between the two crossings, one that is crossed
+/// only once with half an edge. Unlike the change of u this is 0 for a profile that grows steeper without moving.
 [[nodiscard]] LeafMotion motion_of(const float* now, const float* before, bool is_active);
 
 /// The whole band's motion in a step.
@@ -38,13 +38,14 @@ struct Motion {
 /// Edges that a surface of one voxel's area crosses, on the average over its directions.
 inline constexpr double kCrossingsPerVoxel = 1.5;
 
-/// Net motion of the front: from the number of voxels that changed sign over a window of steps. Next to an edge of the image
-/// crossings oscillate by a few hundredths of a voxel around their place; the motion per step then stays above the tolerance,
-/// but the net motion falls below it.
+/// Net motion of the front: from the number of voxels that changed sign over a window of steps. Next to an edge of the
+/// image crossings oscillate by a few hundredths of a voxel around their place; the motion per step then stays above
+/// the tolerance, but the net motion falls below it.
 class NetMotion {
 public:
     static constexpr int kWindow = 10;  ///< steps
-    /// Called once a step. @return mean motion per step over the last window, voxels; infinity while a window is not complete
+    /// Called once a step. @return mean motion per step over the last window, voxels; infinity while a window is not
+    /// complete
     double per_step(const LeafArray<float>& u, std::size_t leaves);
 
 private:
@@ -77,9 +78,9 @@ private:
     std::vector<Leaf> leaves_;
 };
 
-/// The rebuild criterion of a tracked band: the front's displacement in a leaf since the band was made there. The leaf is due
-/// once it exceeds three quarters of a voxel on the mean, counted by voxels that changed sign, or once the front has passed a
-/// voxel that was 2 voxels deep.
+/// The rebuild criterion of a tracked band: the front's displacement in a leaf since the band was made there. The leaf
+/// is due once it exceeds three quarters of a voxel on the mean, counted by voxels that changed sign, or once the front
+/// has passed a voxel that was 2 voxels deep.
 class FrontDisplacement {
 public:
     void remember(const LeafArray<float>& u, std::size_t leaves);

@@ -29,7 +29,8 @@ void clamp_values(FloatGrid::TreeType& tree, const LeafBand& band, float limit) 
 
 }  // namespace
 
-std::vector<Coord> track_surface_near(const std::vector<Coord>& stale, FloatGrid& u, const Domain& domain, double clamp) {
+std::vector<Coord> track_surface_near(const std::vector<Coord>& stale, FloatGrid& u, const Domain& domain,
+                                      double clamp) {
     const auto limit = static_cast<float>(clamp), h = static_cast<float>(domain.voxel_size);
     // One more ring for what the leaves beyond say.
     const std::vector<Coord> changed = dilate_leaves(stale, 1, domain);
@@ -67,7 +68,8 @@ std::vector<Coord> track_surface_near(const std::vector<Coord>& stale, FloatGrid
         for (int n = 0; n < kLeafSize; ++n) {
             const float value = h * std::min(local.settled(leaf)[n], limit);
             nodes[leaf]->setValueOnly(n, before[n] < 0.0F ? -value : value);
-            nodes[leaf]->setActiveState(n, local.distance(leaf)[n] < kWidth && bounds.contains(n >> 6, n >> 3 & 7, n & 7));
+            nodes[leaf]->setActiveState(n,
+                                        local.distance(leaf)[n] < kWidth && bounds.contains(n >> 6, n >> 3 & 7, n & 7));
         }
     });
     return changed;

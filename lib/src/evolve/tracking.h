@@ -9,8 +9,8 @@
 
 namespace covol::detail {
 
-/// Re-makes u as the signed distance to its zero level set, clamped to `clamp` voxels (at most kTrackingWidth), in a band
-/// of kTrackingWidth voxels inside the domain.
+/// Re-makes u as the signed distance to its zero level set, clamped to `clamp` voxels (at most kTrackingWidth), in a
+/// band of kTrackingWidth voxels inside the domain.
 ///
 /// Under curvature alone a profile flattens at its clamp and that drags the surface (a sphere then lost first order),
 /// so it wants the whole width. Under advection it grows into a step as high as the clamp, and a higher step creeps
@@ -18,9 +18,11 @@ namespace covol::detail {
 /// @throws Error InvalidInput when u has no zero level set.
 void track_surface(FloatGrid& u, const Domain& domain, double clamp, const RunContext& run);
 
-/// The same for the leaves `stale` only, where the front has moved too far within the band: the band and the values of these
-/// leaves and of the 26 around each are made again, to first order by Godunov's scheme; all other values keep their bits.
+/// The same for the leaves `stale` only, where the front has moved too far within the band: the band and the values of
+/// these leaves and of the 26 around each are made again, to first order by Godunov's scheme; all other values keep
+/// their bits.
 /// @return the leaves that may have changed, sorted; some may be gone from u
-std::vector<Coord> track_surface_near(const std::vector<Coord>& stale, FloatGrid& u, const Domain& domain, double clamp);
+std::vector<Coord> track_surface_near(const std::vector<Coord>& stale, FloatGrid& u, const Domain& domain,
+                                      double clamp);
 
 }  // namespace covol::detail

@@ -4,13 +4,14 @@
 
 // The 256 cases of marching cubes as closed loops of edge vertices, derived instead of typed in.
 //
-// Each face of a cube is cut by segments that depend on the signs of its four corners alone, so the two cubes that share
-// a face agree. On a face with two inside corners on a diagonal both are cut off: inside is 6-connected, outside
+// Each face of a cube is cut by segments that depend on the signs of its four corners alone, so the two cubes that
+// share a face agree. On a face with two inside corners on a diagonal both are cut off: inside is 6-connected, outside
 // 18-connected. Tracing the segments around a cube gives loops; each is filled by a fan of triangles around one of its
 // vertices. Why the surface is a closed manifold without self-intersection for every input:
 // - a vertex lies strictly inside its edge, belongs to one loop in each of the four cubes around the edge, and a face
 //   segment to the two cubes around its face: closed, one umbrella for each vertex;
-// - an apex is taken only where none of its diagonals lies in a face. Then the fan meets the faces in its segments alone,
+// - an apex is taken only where none of its diagonals lies in a face. Then the fan meets the faces in its segments
+// alone,
 //   and as the faces of a cube that miss the apex are seen from it without overlap, a fan does not intersect itself;
 // - two loops of one cube are separated by a plane: with inside corners cut off, different loops belong to inside
 //   corners that no edge joins, or (one case) to two opposite outside corners.

@@ -37,7 +37,8 @@ LeafBand::LeafBand(const FloatGrid& grid) {
 }
 
 LeafBand::LeafBand(std::vector<Coord> origins) : origins_(std::move(origins)) {
-    const auto middle = std::stable_partition(origins_.begin(), origins_.end(), [](const Coord& o) { return !is_odd(o); });
+    const auto middle =
+        std::stable_partition(origins_.begin(), origins_.end(), [](const Coord& o) { return !is_odd(o); });
     odd_begin_ = static_cast<std::size_t>(middle - origins_.begin());
     active_.resize(origins_.size(), LeafMask{});
     index();
@@ -115,7 +116,8 @@ std::vector<Coord> dilate_leaves(const std::vector<Coord>& origins, int rings, c
         grown.erase(std::unique(grown.begin(), grown.end()), grown.end());
         result.swap(grown);
     }
-    result.erase(std::remove_if(result.begin(), result.end(), [&](const Coord& o) { return !touches(o); }), result.end());
+    result.erase(std::remove_if(result.begin(), result.end(), [&](const Coord& o) { return !touches(o); }),
+                 result.end());
     return result;
 }
 

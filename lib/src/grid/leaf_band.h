@@ -89,9 +89,7 @@ public:
     [[nodiscard]] std::size_t leaves() const noexcept { return leaves_; }
     /// Leaves and extra blocks.
     [[nodiscard]] std::size_t blocks() const noexcept { return values_.size() / kLeafSize; }
-    void fill_block(std::size_t block, T value) {
-        std::fill_n(values_.data() + block * kLeafSize, kLeafSize, value);
-    }
+    void fill_block(std::size_t block, T value) { std::fill_n(values_.data() + block * kLeafSize, kLeafSize, value); }
 
 private:
     std::size_t leaves_ = 0;
@@ -105,7 +103,8 @@ void import_values(const FloatGrid& grid, const LeafBand& band, LeafArray<float>
 [[nodiscard]] FloatGridPtr export_grid(const LeafBand& band, const LeafArray<float>& values, const Domain& domain,
                                        float background, const char* name);
 
-/// Leaves, sorted and unique, within `rings` leaves (26-neighbourhood) of the given ones, kept where they touch the domain.
+/// Leaves, sorted and unique, within `rings` leaves (26-neighbourhood) of the given ones, kept where they touch the
+/// domain.
 [[nodiscard]] std::vector<Coord> dilate_leaves(const std::vector<Coord>& origins, int rings, const Domain& domain);
 
 /// The domain's voxels, both ends inclusive.

@@ -104,8 +104,7 @@ LeafColumns::LeafColumns(const LeafBand& band, const CoordBBox& domain, Extent e
 CoordBBox LeafColumns::voxels(const Piece& piece) const {
     const int width = hi_.y() - lo_.y() + 1;
     const int i = (lo_.x() + piece.column / width) * kLeafDim, j = (lo_.y() + piece.column % width) * kLeafDim;
-    return {Coord(i, j, piece.begin * kLeafDim),
-            Coord(i + kLeafDim - 1, j + kLeafDim - 1, piece.end * kLeafDim - 1)};
+    return {Coord(i, j, piece.begin * kLeafDim), Coord(i + kLeafDim - 1, j + kLeafDim - 1, piece.end * kLeafDim - 1)};
 }
 
 std::int32_t LeafColumns::find_in(std::int32_t column, std::int32_t k) const {
@@ -193,8 +192,7 @@ Flood flood(const LeafColumns& columns, const LeafBand& band, const std::vector<
         const std::int32_t leaf = pieces[number].leaf;
         if (leaf >= 0) spread(result.leaves[leaf], open[leaf]);
         columns.for_each_neighbour(number, [&](std::int32_t other, int di, int dj, int dk) {
-            const LeafMask there =
-                leaf < 0 ? face_of(-di, -dj, -dk) : across(result.leaves[leaf], di, dj, dk);
+            const LeafMask there = leaf < 0 ? face_of(-di, -dj, -dk) : across(result.leaves[leaf], di, dj, dk);
             if (pieces[other].leaf >= 0)
                 enter_leaf(other, there);
             else if (any_on(there))

@@ -8,13 +8,14 @@ namespace covol::detail {
 
 /// A band's leaves and the gaps between them, column by column along k: the whole space in O(leaves + columns) pieces.
 ///
-/// The columns span the whole domain, or the leaves' box, one leaf wider where it does not end at the domain's boundary.
+/// The columns span the whole domain, or the leaves' box, one leaf wider where it does not end at the domain's
+/// boundary.
 class LeafColumns {
 public:
     /// A leaf, or a run of leaf-sized blocks without a leaf. k in leaf units, half-open.
     struct Piece {
         std::int32_t begin, end;
-        std::int32_t leaf;    ///< -1: a run
+        std::int32_t leaf;  ///< -1: a run
         std::int32_t column;
     };
 
@@ -61,8 +62,8 @@ private:
 
 /// What a flood has reached.
 struct Flood {
-    std::vector<LeafMask> leaves;   ///< by leaf
-    std::vector<bool> pieces;       ///< by piece; of runs only
+    std::vector<LeafMask> leaves;  ///< by leaf
+    std::vector<bool> pieces;      ///< by piece; of runs only
 };
 
 /// Floods the open voxels, through faces, from the columns' border and from the `seeds`.

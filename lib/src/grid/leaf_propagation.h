@@ -11,8 +11,8 @@
 namespace covol::detail {
 
 /// The voxels of a leaf next to marked voxels in direction `axis` (0..2), `sign` (-1 or 1): bit p is set when the
-/// voxel p + sign * e_axis is marked. `mask` marks voxels of the leaf itself, `halo` those of the leaf next to it in that direction
-/// (pass an empty mask for either to leave it out).
+/// voxel p + sign * e_axis is marked. `mask` marks voxels of the leaf itself, `halo` those of the leaf next to it in
+/// that direction (pass an empty mask for either to leave it out).
 inline LeafMask looking_at(const LeafMask& mask, const LeafMask& halo, int axis, int sign) {
     constexpr std::uint64_t kFirstK = 0x0101010101010101ULL;  // voxels with k = 0
     constexpr std::uint64_t kLastK = kFirstK << 7;
@@ -24,9 +24,7 @@ inline LeafMask looking_at(const LeafMask& mask, const LeafMask& halo, int axis,
                 result[i] = from < 0 ? halo[7] : from > 7 ? halo[0] : mask[from];
                 break;
             }
-            case 1:
-                result[i] = sign > 0 ? mask[i] >> 8 | halo[i] << 56 : mask[i] << 8 | halo[i] >> 56;
-                break;
+            case 1: result[i] = sign > 0 ? mask[i] >> 8 | halo[i] << 56 : mask[i] << 8 | halo[i] >> 56; break;
             default:
                 result[i] = sign > 0 ? (mask[i] & ~kFirstK) >> 1 | (halo[i] & kFirstK) << 7
                                      : (mask[i] & ~kLastK) << 1 | (halo[i] & kLastK) >> 7;
@@ -55,8 +53,8 @@ int propagate(const LeafBand& band, std::vector<LeafMask>& changed, const RunCon
             LeafMask next{};
             for (int axis = 0; axis < 3; ++axis)
                 for (int sign = -1; sign <= 1; sign += 2) {
-                    const std::int32_t across =
-                        band.neighbours(leaf)[neighbour_slot(axis == 0 ? sign : 0, axis == 1 ? sign : 0, axis == 2 ? sign : 0)];
+                    const std::int32_t across = band.neighbours(
+                        leaf)[neighbour_slot(axis == 0 ? sign : 0, axis == 1 ? sign : 0, axis == 2 ? sign : 0)];
                     const LeafMask& halo = first && across != band.none() ? changed[across] : kNone;
                     const LeafMask look = looking_at(front, halo, axis, sign);
                     const int shift = axis == 0 ? 6 : axis == 1 ? 3 : 0;

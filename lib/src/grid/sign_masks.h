@@ -32,7 +32,8 @@ inline LeafMask sign_changes(const LeafMask& negative, int axis) {
     for (int word = 0; word < 8; ++word) changes[word] ^= negative[word];
     // The last voxels along the axis have no next one here.
     if (axis == 0) changes[7] = 0;
-    for (std::uint64_t& word : changes) word &= axis == 1 ? ~std::uint64_t(0) >> 8 : axis == 2 ? 0x7f7f7f7f7f7f7f7fULL : ~0ULL;
+    for (std::uint64_t& word : changes)
+        word &= axis == 1 ? ~std::uint64_t(0) >> 8 : axis == 2 ? 0x7f7f7f7f7f7f7f7fULL : ~0ULL;
     return changes;
 }
 

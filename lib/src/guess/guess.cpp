@@ -12,8 +12,8 @@
 namespace covol {
 namespace {
 
-constexpr double kInsideVoxels = 1.5;      // within the section by more: in the cut
-constexpr double kLeastSlope = 0.05;       // a section whose body ends right beyond it
+constexpr double kInsideVoxels = 1.5;  // within the section by more: in the cut
+constexpr double kLeastSlope = 0.05;   // a section whose body ends right beyond it
 constexpr int kCutRounds = 2;
 constexpr int kSeedRounds = 4;
 constexpr std::size_t kLeastOutline = 8;  // marks off the cuts, to say what is inside of them
@@ -34,7 +34,8 @@ double deviation_along(const GuessOptions& options, int axis) {
 /// The axis across the world's end that a mark is so close to that it may lie in the cut; -1: none.
 int end_beside(const Vec3& mark, const GuessOptions& options) {
     for (int a = 0; a < 3; ++a) {
-        const double near = 4 * deviation_along(options, a);  // half a voxel from its centre to its end, and what the hand is off
+        // half a voxel from its centre to its end, and what the hand is off
+        const double near = 4 * deviation_along(options, a);
         if (mark[a] < options.end->min[a] + near || mark[a] > options.end->max[a] - near) return a;
     }
     return -1;
@@ -88,13 +89,15 @@ double within_section(const guess::MarksSurface& body, const Vec3& mark, int acr
 }
 
 /// Marks in the cut lie inside the section of the body that the others mark: the surface need not pass them.
-std::vector<Vec3> without_cut_marks(const std::vector<Vec3>& marks, const GuessOptions& options, const RunContext& run) {
+std::vector<Vec3> without_cut_marks(const std::vector<Vec3>& marks, const GuessOptions& options,
+                                    const RunContext& run) {
     if (!options.end) return marks;
     std::vector<Vec3> sure, doubtful;
     for (const Vec3& mark : marks) (end_beside(mark, options) >= 0 ? doubtful : sure).push_back(mark);
     if (doubtful.empty() || sure.size() < kLeastOutline || !guess::span_space(sure)) return marks;
     std::vector<Vec3> held = sure, before;
-    for (int round = 0; round < kCutRounds && held != before; ++round) {  // those on its outline tell better where the section ends
+    for (int round = 0; round < kCutRounds && held != before;
+         ++round) {  // those on its outline tell better where the section ends
         const guess::MarksSurface body(imprecise(held, options), run);
         before = std::exchange(held, sure);
         for (const Vec3& mark : doubtful) {
@@ -119,8 +122,8 @@ std::string GuessOptions::why_invalid() const {
 
 bool can_enclose(const std::vector<Vec3>& marks) { return guess::span_space(marks); }
 
-Guess guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks, const GuessOptions& options, GuessReport& report,
-                       const RunContext& run) {
+Guess guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks, const GuessOptions& options,
+                       GuessReport& report, const RunContext& run) {
     detail::require_valid(options, "guess");
     Guess result;
     with_threads(run, [&] {
@@ -135,7 +138,10 @@ Guess guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks, con
         report.wrong_seeds = count_wrong(*surface, options);
         result.u = start_from_level(
             domain, result.marks,
-            [&](const Vec3& from, const Vec3& step, int count, double* values) { surface->row(from, step, count, values); }, run);
+            [&](const Vec3& from, const Vec3& step, int count, double* values) {
+                surface->row(from, step, count, values);
+            },
+            run);
     });
     report.summary = std::to_string(report.marks) + " marks, the surface through them that bends least";
     if (report.patches > 0) report.summary += ", in " + std::to_string(report.patches) + " overlapping parts";

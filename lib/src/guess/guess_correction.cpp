@@ -42,7 +42,8 @@ public:
 
     [[nodiscard]] double at(const Vec3& world) const {
         const double near = double(openvdb::tools::BoxSampler::sample(
-            guess_->getConstAccessor(), guess_->transform().worldToIndex(openvdb::Vec3d(world[0], world[1], world[2]))));
+            guess_->getConstAccessor(),
+            guess_->transform().worldToIndex(openvdb::Vec3d(world[0], world[1], world[2]))));
         if (std::abs(near) < exact_) return near;
         return std::copysign(std::max(exact_, std::sqrt(surface_.nearest(world))), near);
     }
@@ -92,17 +93,24 @@ struct Target {
 
 /// Heights of equal bumps at the targets that give the wanted shifts, up to noise: (K + noise I) heights = shifts.
 std::vector<double> solve(const std::vector<Target>& targets, double radius, double noise) {
-    struct Entry { std::size_t column; double value; };
+    struct Entry {
+        std::size_t column;
+        double value;
+    };
     const std::size_t count = targets.size();
     std::vector<std::vector<Entry>> rows(count);
     tbb::parallel_for(std::size_t(0), count, [&](std::size_t n) {
         for (std::size_t m = 0; m < count; ++m) {
-            const double k = detail::wendland(std::sqrt(detail::squared_distance(targets[n].at, targets[m].at)) / radius) + (n == m ? noise : 0.0);
+            const double k =
+                detail::wendland(std::sqrt(detail::squared_distance(targets[n].at, targets[m].at)) / radius) +
+                (n == m ? noise : 0.0);
             if (k > 0) rows[n].push_back({m, k});
         }
     });
     // Conjugate gradients: the matrix is symmetric and positive definite.
-    const auto dot = [](const std::vector<double>& a, const std::vector<double>& b) { return std::inner_product(a.begin(), a.end(), b.begin(), 0.0); };
+    const auto dot = [](const std::vector<double>& a, const std::vector<double>& b) {
+        return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+    };
     std::vector<double> x(count, 0), r(count), p, q(count);
     for (std::size_t n = 0; n < count; ++n) r[n] = targets[n].shift;
     p = r;
@@ -153,7 +161,8 @@ void add_bumps(std::vector<Bump>& bumps, const std::vector<Target>& targets, dou
             ++now;
         }
         for (std::size_t n = 0; n + now < group.size(); ++n) group[n].shift -= sum_of(bumps, group[n].at);
-        // How far off the guess is where it is off: many marks that it meets are no reason to take another one for noise.
+        // How far off the guess is where it is off: many marks that it meets are no reason to take another one for
+        // noise.
         const double noise = fourth > 0 ? precision * precision * square / fourth : 1.0;
         const std::vector<double> heights = solve(group, radius, noise);
         for (std::size_t n = 0; n < group.size(); ++n)
@@ -227,15 +236,19 @@ FloatGridPtr GuessCorrection::start(const RunContext& run) const {
     for (const openvdb::Coord& origin : origins) leaves.push_back(field->tree().touchLeaf(origin));
     with_threads(run, [&] {
         tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t n) {
-            const Vec3 middle = domain.index_to_world({leaves[n]->origin().x() + 3.5, leaves[n]->origin().y() + 3.5, leaves[n]->origin().z() + 3.5});
+            const Vec3 middle = domain.index_to_world(
+                {leaves[n]->origin().x() + 3.5, leaves[n]->origin().y() + 3.5, leaves[n]->origin().z() + 3.5});
             std::vector<Bump> near;
             for (const Bump& b : data_->bumps)
-                if (std::sqrt(detail::squared_distance(b.center, middle)) < b.radius + 3.5 * std::sqrt(3.0) * domain.voxel_size) near.push_back(b);
+                if (std::sqrt(detail::squared_distance(b.center, middle)) <
+                    b.radius + 3.5 * std::sqrt(3.0) * domain.voxel_size)
+                    near.push_back(b);
             for (openvdb::Index at = 0; at < Leaf::SIZE; ++at) {
                 const openvdb::Coord c = leaves[n]->offsetToGlobalCoord(at);
                 const Vec3 world = domain.index_to_world({double(c.x()), double(c.y()), double(c.z())});
                 const double move = sum_of(near, world);
-                if (move != 0) leaves[n]->setValueOn(at, float(std::clamp(data_->distance.at(world) - move, -clamp, clamp)));
+                if (move != 0)
+                    leaves[n]->setValueOn(at, float(std::clamp(data_->distance.at(world) - move, -clamp, clamp)));
             }
         });
     });
@@ -250,8 +263,9 @@ std::string CorrectionOptions::why_invalid() const {
     return checks.lines();
 }
 
-GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>& marks, const std::vector<Vec3>& inside,
-                              const std::vector<Vec3>& outside, const CorrectionOptions& options, const RunContext& run) {
+GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>& marks,
+                              const std::vector<Vec3>& inside, const std::vector<Vec3>& outside,
+                              const CorrectionOptions& options, const RunContext& run) {
     detail::require_valid(options, "correct_guess");
     auto data = std::make_shared<GuessCorrection::Data>(guess);
     with_threads(run, [&] {
@@ -330,7 +344,8 @@ CorrectedMask GuessCorrection::apply(const Image& mask, int label, const RunCont
         });
     });
     run.check();
-    if (broken) throw Error(Errc::InvalidInput, "correct_guess: " + mask.path() + ": expected a label image of whole numbers");
+    if (broken)
+        throw Error(Errc::InvalidInput, "correct_guess: " + mask.path() + ": expected a label image of whole numbers");
     result.added = added;
     result.removed = removed;
     result.reached = reached;

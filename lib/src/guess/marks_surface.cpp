@@ -14,12 +14,12 @@ namespace covol::guess {
 namespace {
 
 // Time, not accuracy, sets these: the whole takes the cube of its number of marks, a part the cube of its own.
-constexpr std::size_t kOriented = 100;  // marks whose normals are searched for from nothing
-constexpr std::size_t kWhole = 300;     // marks of the whole
-constexpr std::size_t kPatchMarks = 48; // marks of a part
-constexpr std::size_t kCoreMarks = 12;  // of these, nearest to its centre, need no part of their own
+constexpr std::size_t kOriented = 100;   // marks whose normals are searched for from nothing
+constexpr std::size_t kWhole = 300;      // marks of the whole
+constexpr std::size_t kPatchMarks = 48;  // marks of a part
+constexpr std::size_t kCoreMarks = 12;   // of these, nearest to its centre, need no part of their own
 constexpr double kVarianceStep = 4, kLeastFactor = 1e-3;
-constexpr double kWholeWeight = 1e-3;   // of the whole, among parts that weigh 1 at their centres
+constexpr double kWholeWeight = 1e-3;  // of the whole, among parts that weigh 1 at their centres
 
 double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
@@ -44,10 +44,12 @@ std::vector<std::size_t> spread_out(const std::vector<Vec3>& points, std::size_t
 }
 
 /// The part of the marks with these numbers, with the variance along the normals where these are known.
-Constraints part_of(const ImpreciseMarks& all, const std::vector<std::size_t>& chosen, const std::vector<Vec3>& normals) {
+Constraints part_of(const ImpreciseMarks& all, const std::vector<std::size_t>& chosen,
+                    const std::vector<Vec3>& normals) {
     Constraints part;
-    const double mean_variance =
-        (dot(all.deviation[0], all.deviation[0]) + dot(all.deviation[1], all.deviation[1]) + dot(all.deviation[2], all.deviation[2])) / 3;
+    const double mean_variance = (dot(all.deviation[0], all.deviation[0]) + dot(all.deviation[1], all.deviation[1]) +
+                                  dot(all.deviation[2], all.deviation[2])) /
+                                 3;
     for (const std::size_t n : chosen) {
         part.marks.push_back(all.marks[n]);
         part.variance.push_back(normals.empty() ? mean_variance : all.variance_along(normals[n]));
@@ -63,7 +65,8 @@ std::vector<Vec3> at(const std::vector<Vec3>& all, const std::vector<std::size_t
 
 std::vector<Vec3> normals_of(const VariationalSurface& surface, const std::vector<Vec3>& marks) {
     std::vector<Vec3> normals(marks.size());
-    tbb::parallel_for(std::size_t(0), marks.size(), [&](std::size_t n) { normals[n] = unit(surface.gradient(marks[n])); });
+    tbb::parallel_for(std::size_t(0), marks.size(),
+                      [&](std::size_t n) { normals[n] = unit(surface.gradient(marks[n])); });
     return normals;
 }
 
@@ -80,7 +83,8 @@ double mean_value(const VariationalSurface& surface, const Constraints& part) {
 /// Those nearest to one of them, itself first, by distance.
 std::vector<std::size_t> nearest(const std::vector<Vec3>& points, std::size_t to, std::size_t count) {
     std::vector<std::pair<double, std::size_t>> by_distance(points.size());
-    for (std::size_t n = 0; n < points.size(); ++n) by_distance[n] = {detail::squared_distance(points[n], points[to]), n};
+    for (std::size_t n = 0; n < points.size(); ++n)
+        by_distance[n] = {detail::squared_distance(points[n], points[to]), n};
     count = std::min(count, points.size());
     std::partial_sort(by_distance.begin(), by_distance.begin() + std::ptrdiff_t(count), by_distance.end());
     std::vector<std::size_t> chosen(count);
@@ -94,10 +98,11 @@ struct LikeliestVariance {
     std::unique_ptr<VariationalSurface> surface;  ///< with it
 };
 
-/// Exact marks are likelier by a factor of sqrt(kVarianceStep) each with a variance that is kVarianceStep times smaller;
-/// a step is taken where they show half of that. (What is said is never enlarged: a surface that is truly rough looks
-/// like imprecise marks.)
-LikeliestVariance likeliest_variance(const VariationalSurface& said, const ImpreciseMarks& marks, const std::vector<std::size_t>& chosen,
+/// Exact marks are likelier by a factor of sqrt(kVarianceStep) each with a variance that is kVarianceStep times
+/// smaller; a step is taken where they show half of that. (What is said is never enlarged: a surface that is truly
+/// rough looks like imprecise marks.)
+LikeliestVariance likeliest_variance(const VariationalSurface& said, const ImpreciseMarks& marks,
+                                     const std::vector<std::size_t>& chosen,
                                      const std::function<Constraints(Constraints)>& complete, const RunContext& run) {
     const std::vector<Vec3> normals = normals_of(said, marks.marks);
     const auto with = [&](double factor) {
@@ -172,8 +177,9 @@ void MarksSurface::make_patches(const ImpreciseMarks& marks, const RunContext& r
             part.known_value.push_back(whole_->value(mark) - offset_);
             part.known_gradient.push_back(whole_->gradient(mark));
         }
-        made[p] = std::make_unique<Patch>(Patch{marks.marks[places[p].center], places[p].radius,
-                                                VariationalSurface(part, at(normals, places[p].marks), whole_->amplitude())});
+        made[p] =
+            std::make_unique<Patch>(Patch{marks.marks[places[p].center], places[p].radius,
+                                          VariationalSurface(part, at(normals, places[p].marks), whole_->amplitude())});
     });
     run.check();
     for (auto& patch : made) patches_.push_back(std::move(*patch));

@@ -12,7 +12,7 @@ namespace covol::guess {
 struct ImpreciseMarks {
     std::vector<Vec3> marks;
     std::array<Vec3, 3> deviation{};
-    std::vector<Vec3> seeds;        ///< places that are inside (value < 0) or outside
+    std::vector<Vec3> seeds;  ///< places that are inside (value < 0) or outside
     std::vector<double> seed_value;
 
     const WorldBox* world = nullptr;  ///< beyond its end nothing is known; may be null
@@ -20,9 +20,9 @@ struct ImpreciseMarks {
     [[nodiscard]] double variance_along(const Vec3& unit) const;
 };
 
-/// The surface of least energy through any number of marks: one VariationalSurface through all of them where they are few;
-/// else one through a spread-out part of them, and around each place another one through its neighbours, blended by
-/// weights that add up to one (partition of unity). What the whole knows, the side, is passed on to the parts; where
+/// The surface of least energy through any number of marks: one VariationalSurface through all of them where they are
+/// few; else one through a spread-out part of them, and around each place another one through its neighbours, blended
+/// by weights that add up to one (partition of unity). What the whole knows, the side, is passed on to the parts; where
 /// there are no marks near the whole goes on alone.
 class MarksSurface {
 public:
@@ -37,7 +37,7 @@ public:
 private:
     struct Patch {
         Vec3 center;
-        double radius;  ///< the weight's support
+        double radius;             ///< the weight's support
         VariationalSurface added;  ///< to the whole
     };
     void make_patches(const ImpreciseMarks& marks, const RunContext& run);

@@ -4,7 +4,8 @@
 
 namespace covol::guess {
 
-COVOL_CLONES void triharmonic_sum(const TriharmonicSum& sum, const double* x, const double* y, const double* z, double* out) {
+COVOL_CLONES void triharmonic_sum(const TriharmonicSum& sum, const double* x, const double* y, const double* z,
+                                  double* out) {
     double total[kTriharmonicLanes] = {};
     for (std::size_t j = 0; j < sum.count; ++j) {
         const double a = sum.a[j], bx = 3 * sum.bx[j], by = 3 * sum.by[j], bz = 3 * sum.bz[j];

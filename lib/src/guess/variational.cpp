@@ -21,11 +21,11 @@ using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
 using Point = Eigen::Vector3d;
 
-constexpr int kPolynomial = 4;       // 1, x, y, z: what the energy does not see
-constexpr int kModes = 3;            // of the energy, tried as directions of the normals
+constexpr int kPolynomial = 4;  // 1, x, y, z: what the energy does not see
+constexpr int kModes = 3;       // of the energy, tried as directions of the normals
 constexpr int kSubspace = 6, kSubspaceSteps = 12;
 constexpr double kLocalShares[] = {0.5, 0.25, 0.125};
-constexpr double kLeastLocal = 6;    // neighbours, to have a middle
+constexpr double kLeastLocal = 6;  // neighbours, to have a middle
 constexpr int kDirections = 64;
 constexpr double kAround[] = {1.15, 1.5};  // of the farthest mark
 constexpr int kLeastEnergySteps = 500;
@@ -179,7 +179,8 @@ Gradients descend(const Matrix& H, const Vector& c, const Vector& first) {
     parameter.epsilon = 1e-5;
     parameter.past = 5;
     parameter.delta = 1e-6;
-    lbfgs(size, y, nullptr, energy_of, nullptr, &problem, &parameter);  // its best point so far is of use whatever it says
+    lbfgs(size, y, nullptr, energy_of, nullptr, &problem,
+          &parameter);  // its best point so far is of use whatever it says
     Gradients found;
     found.unit = unit_vectors(Eigen::Map<const Vector>(y, size));
     lbfgs_free(y);
@@ -205,7 +206,8 @@ Matrix flattest_modes(const Matrix& H, const Vector& outward) {
     return space * small.eigenvectors();
 }
 
-Expansion expansion(const HermiteSystem& system, const Vector& values, const Vector& gradients, const std::vector<Point>& nodes) {
+Expansion expansion(const HermiteSystem& system, const Vector& values, const Vector& gradients,
+                    const std::vector<Point>& nodes) {
     Vector basis;
     Eigen::Vector4d polynomial;
     system.weights(values, gradients, basis, polynomial);
@@ -228,7 +230,8 @@ using Inside = std::function<bool(const Point& in_unit_ball)>;
 bool has_one_sign_around(const std::vector<Point>& nodes, Index marks, const Expansion& f, const Inside& in_world) {
     // Marks with a variance of 1 along each axis lie in a ball.
     Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-    for (Index n = 0; n < marks; ++n) spread += nodes[std::size_t(n)] * nodes[std::size_t(n)].transpose() / double(marks);
+    for (Index n = 0; n < marks; ++n)
+        spread += nodes[std::size_t(n)] * nodes[std::size_t(n)].transpose() / double(marks);
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread);
     const Eigen::Matrix3d from_ball = axes.operatorSqrt(), to_ball = axes.operatorInverseSqrt();
     double reach = 0;
@@ -266,13 +269,14 @@ Vector away_from_neighbours(const std::vector<Point>& nodes, Index marks, double
     return directions;
 }
 
-/// Of first guesses the one that ends at the least energy. A body ends: where some ends have one sign all around, far from
-/// the marks, the others are no bodies.
-Gradients least_energy(const HermiteSystem& system, const Vector& values, const Vector& c, const std::vector<Point>& nodes, Index marks,
-                       const Vector& outward, const Inside& in_world) {
+/// Of first guesses the one that ends at the least energy. A body ends: where some ends have one sign all around, far
+/// from the marks, the others are no bodies.
+Gradients least_energy(const HermiteSystem& system, const Vector& values, const Vector& c,
+                       const std::vector<Point>& nodes, Index marks, const Vector& outward, const Inside& in_world) {
     std::vector<Gradients> ends{descend(system.energy(), c, outward)};
     for (const double share : kLocalShares)
-        if (share * double(marks) >= kLeastLocal) ends.push_back(descend(system.energy(), c, away_from_neighbours(nodes, marks, share)));
+        if (share * double(marks) >= kLeastLocal)
+            ends.push_back(descend(system.energy(), c, away_from_neighbours(nodes, marks, share)));
     const Matrix modes = flattest_modes(system.energy(), outward);
     for (Index k = 0; k < std::min<Index>(kModes, modes.cols()); ++k)
         ends.push_back(descend(system.energy(), c, modes.col(k)));
@@ -369,7 +373,8 @@ VariationalSurface::VariationalSurface(const Constraints& given, const std::vect
         if (round > 0)
             found = descend(system.energy(), c, found.unit);
         else
-            found = normals.empty() ? least_energy(system, values, c, nodes, marks, outward, in_world) : descend(system.energy(), c, known);
+            found = normals.empty() ? least_energy(system, values, c, nodes, marks, outward, in_world)
+                                    : descend(system.energy(), c, known);
         if (round + 1 == rounds) f_ = expansion(system, values, found.unit - before, nodes);
         if (amplitude > 0) continue;
         unit_amplitude = std::max((found.energy + constant) / system.freedom(), 1e-12);

@@ -17,8 +17,8 @@ struct Constraints {
     std::vector<double> seed_value;
     /// Beyond its end nothing is known of the body, it may go on. Null: the world has no end.
     const WorldBox* world = nullptr;
-    /// What is known of f beforehand at the marks, its value and its gradient: the energy is that of what f adds to it, and
-    /// value() leaves it out. Empty: nothing.
+    /// What is known of f beforehand at the marks, its value and its gradient: the energy is that of what f adds to it,
+    /// and value() leaves it out. Empty: nothing.
     std::vector<double> known_value;
     std::vector<Vec3> known_gradient;
 };
@@ -44,11 +44,14 @@ struct Expansion {
 /// value given the marks: energy over its degrees of freedom.
 class VariationalSurface {
 public:
-    /// @param normals  a first guess of the gradients' directions, or empty: then several are tried (the flattest modes of the
+    /// @param normals  a first guess of the gradients' directions, or empty: then several are tried (the flattest modes
+    /// of the
     ///                 energy, and away from the centroid)
-    /// @param amplitude  variance of f per length: f is as likely as amplitude * |x|^3 is its covariance; 0: from the marks
+    /// @param amplitude  variance of f per length: f is as likely as amplitude * |x|^3 is its covariance; 0: from the
+    /// marks
     /// @throws Error InvalidInput (fewer than four distinct marks, or all in one plane); Numerical.
-    explicit VariationalSurface(const Constraints& constraints, const std::vector<Vec3>& normals = {}, double amplitude = 0);
+    explicit VariationalSurface(const Constraints& constraints, const std::vector<Vec3>& normals = {},
+                                double amplitude = 0);
 
     /// About a distance beside the marks; negative inside (the side that does not reach to infinity).
     [[nodiscard]] double value(const Vec3& at) const;

@@ -8,10 +8,11 @@
 namespace covol::guidance {
 namespace {
 
-constexpr int kFarSteps = 4 * kStepsPerVoxel;  // beyond the border's own profile, as far as inside and outside are learnt
-constexpr double kDepthBlur = 1.4;             // steps: a mark's jitter, and samples closer than a voxel are no two samples
+// beyond the border's own profile, as far as inside and outside are learnt
+constexpr int kFarSteps = 4 * kStepsPerVoxel;
+constexpr double kDepthBlur = 1.4;  // steps: a mark's jitter, and samples closer than a voxel are no two samples
 constexpr double kLevelBlur = 1.0;
-constexpr double kBelief = 2.0;                // places' worth of belief in the more general counts
+constexpr double kBelief = 2.0;  // places' worth of belief in the more general counts
 
 /// Gaussian blur of rows of `count` values that lie `stride` apart; ends keep their mass.
 void blur(double* values, int count, int stride, double sigma) {
@@ -20,7 +21,8 @@ void blur(double* values, int count, int stride, double sigma) {
     for (int n = -radius; n <= radius; ++n) kernel[n + radius] = std::exp(-0.5 * n * n / (sigma * sigma));
     for (int n = 0; n < count; ++n) {
         double total = 0;
-        for (int m = std::max(n - radius, 0); m <= std::min(n + radius, count - 1); ++m) total += kernel[m - n + radius];
+        for (int m = std::max(n - radius, 0); m <= std::min(n + radius, count - 1); ++m)
+            total += kernel[m - n + radius];
         for (int m = std::max(n - radius, 0); m <= std::min(n + radius, count - 1); ++m)
             out[m] += values[n * stride] * kernel[m - n + radius] / total;
     }
@@ -42,7 +44,8 @@ BorderProfile::BorderProfile(std::vector<MarkedPlace> places) : places_(std::mov
         const PatchProfile& p = place.profile;
         const int middle = int(std::lround(place.offset));
         for (int row = 0; row < p.rows; ++row)
-            for (int s = std::max(p.lo, middle - kBorderSteps - kFarSteps); s <= std::min(p.hi, middle + kBorderSteps + kFarSteps); ++s)
+            for (int s = std::max(p.lo, middle - kBorderSteps - kFarSteps);
+                 s <= std::min(p.hi, middle + kBorderSteps + kFarSteps); ++s)
                 all.push_back(p.values[std::size_t(row) * p.steps() + s - p.lo]);
     }
     std::sort(all.begin(), all.end());
@@ -73,12 +76,15 @@ BorderProfile::Counts BorderProfile::count(const MarkedPlace& place) const {
                 const double weight = (n == 0 ? 1 - part : part) / p.rows;
                 if (std::abs(depth) <= kBorderSteps)
                     c.border[std::size_t(depth + kBorderSteps) * kLevels + level] += weight;
-                if (depth < -kBorderSteps / 2 && depth >= -kBorderSteps - kFarSteps) c.inside[level] += weight / kFarSteps;
-                if (depth > kBorderSteps / 2 && depth <= kBorderSteps + kFarSteps) c.outside[level] += weight / kFarSteps;
+                if (depth < -kBorderSteps / 2 && depth >= -kBorderSteps - kFarSteps)
+                    c.inside[level] += weight / kFarSteps;
+                if (depth > kBorderSteps / 2 && depth <= kBorderSteps + kFarSteps)
+                    c.outside[level] += weight / kFarSteps;
             }
         }
     for (int level = 0; level < kLevels; ++level) blur(c.border.data() + level, kDepths, kLevels, kDepthBlur);
-    for (int depth = 0; depth < kDepths; ++depth) blur(c.border.data() + std::size_t(depth) * kLevels, kLevels, 1, kLevelBlur);
+    for (int depth = 0; depth < kDepths; ++depth)
+        blur(c.border.data() + std::size_t(depth) * kLevels, kLevels, 1, kLevelBlur);
     blur(c.inside.data(), kLevels, 1, kLevelBlur);
     blur(c.outside.data(), kLevels, 1, kLevelBlur);
     return c;
@@ -97,7 +103,8 @@ void BorderProfile::normalise(Counts& c, const Counts* base) {
     const auto mix = [](double* values, const double* prior, double belief) {
         double total = 0;
         for (int level = 0; level < kLevels; ++level) total += values[level];
-        for (int level = 0; level < kLevels; ++level) values[level] = (values[level] + belief * prior[level]) / (total + belief);
+        for (int level = 0; level < kLevels; ++level)
+            values[level] = (values[level] + belief * prior[level]) / (total + belief);
     };
     std::vector<double> prior(kLevels, 1.0 / kLevels);
     mix(c.inside.data(), base ? base->inside.data() : prior.data(), kBelief);
@@ -105,7 +112,8 @@ void BorderProfile::normalise(Counts& c, const Counts* base) {
     for (int depth = 0; depth < kDepths; ++depth) {
         double* row = c.border.data() + std::size_t(depth) * kLevels;
         const double out = std::clamp(0.5 + double(depth - kBorderSteps) / (2.0 * kStepsPerVoxel), 0.0, 1.0);
-        for (int level = 0; level < kLevels; ++level) prior[level] = (1 - out) * c.inside[level] + out * c.outside[level];
+        for (int level = 0; level < kLevels; ++level)
+            prior[level] = (1 - out) * c.inside[level] + out * c.outside[level];
         mix(row, base ? base->border.data() + std::size_t(depth) * kLevels : prior.data(), kBelief);
     }
 }
@@ -142,7 +150,8 @@ void BorderTable::likelihood(const PatchProfile& p, int first, std::vector<doubl
         }
         for (std::size_t n = 0; n < out.size(); ++n) {
             const int at = first + int(n) - p.lo;
-            const int begin = std::clamp(at - kBorderSteps, 0, steps), end = std::clamp(at + kBorderSteps + 1, 0, steps);
+            const int begin = std::clamp(at - kBorderSteps, 0, steps),
+                      end = std::clamp(at + kBorderSteps + 1, 0, steps);
             double sum = in_sum[begin] + out_sum[steps] - out_sum[end];
             for (int s = begin; s < end; ++s) sum += border[std::size_t(s - at + kBorderSteps) * kLevels + level[s]];
             out[n] += sum / (double(p.rows) * kStepsPerVoxel);

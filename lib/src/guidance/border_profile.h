@@ -18,8 +18,8 @@ struct PatchProfile {
     int lo = 0, hi = -1;
     bool image_ends_below = false, image_ends_above = false;  ///< why it is no longer: the border may lie beyond
     int rows = 0;
-    std::vector<float> values;          ///< row by row
-    std::vector<std::uint8_t> levels;   ///< the same as levels of brightness
+    std::vector<float> values;         ///< row by row
+    std::vector<std::uint8_t> levels;  ///< the same as levels of brightness
     [[nodiscard]] int steps() const { return hi - lo + 1; }
     [[nodiscard]] bool empty() const { return rows == 0; }
 };
@@ -36,8 +36,8 @@ struct BorderTable {
     std::vector<float> border;           ///< [depth + kBorderSteps][level]
     std::vector<float> inside, outside;  ///< [level]
 
-    /// Log-likelihood of each offset first .. first + out.size() - 1 (steps), per voxel of the image, up to a constant; mean over rows.
-    /// An offset beyond the profile says that all of the profile lies on one side of the border.
+    /// Log-likelihood of each offset first .. first + out.size() - 1 (steps), per voxel of the image, up to a constant;
+    /// mean over rows. An offset beyond the profile says that all of the profile lies on one side of the border.
     void likelihood(const PatchProfile& profile, int first, std::vector<double>& out) const;
 };
 
@@ -47,7 +47,8 @@ public:
     explicit BorderProfile(std::vector<MarkedPlace> places);
     void to_levels(PatchProfile& profile) const;
     /// From all places, weighted by `weights`, shrunk towards the counts of `base` (may be null).
-    [[nodiscard]] BorderTable table(const std::vector<double>& weights, const std::vector<double>* base_weights = nullptr) const;
+    [[nodiscard]] BorderTable table(const std::vector<double>& weights,
+                                    const std::vector<double>* base_weights = nullptr) const;
     [[nodiscard]] const std::vector<MarkedPlace>& places() const { return places_; }
 
 private:

@@ -32,7 +32,7 @@ constexpr double kWidth = 14.0;           // voxels to both sides of the surface
 constexpr double kLongestOffset = 12.0;   // voxels in one iteration
 constexpr double kPatchWidth = 2.0;       // voxels
 constexpr double kPatchesPerSpacing = 4;  // offsets that vary within a fourth of the marks' spacing are not sought
-constexpr double kSides = 3.0;             // voxels beside a mark, to tell lines from steps
+constexpr double kSides = 3.0;            // voxels beside a mark, to tell lines from steps
 constexpr int kNormalRounds = 6;          // of averaging, about two voxels
 constexpr std::array<double, 3> kSigmas{0.5, 1.0, 2.0};  // voxels
 constexpr std::size_t kFewestMarks = 8, kMostMarks = 400;
@@ -143,7 +143,8 @@ void Guide::cut_surface() {
         width_ = width;
         patches_ = make_patches(mesh, image_.geometry(), width, kNormalRounds);
         to_mark_.resize(patches_.size());
-        tbb::parallel_for(std::size_t(0), patches_.size(), [&](std::size_t i) { to_mark_[i] = std::sqrt(tree.nearest(patches_.centers[i])); });
+        tbb::parallel_for(std::size_t(0), patches_.size(),
+                          [&](std::size_t i) { to_mark_[i] = std::sqrt(tree.nearest(patches_.centers[i])); });
         // Points spread at random with one in each s^2 are s / 2 away in the mean.
         spacing_ = std::max(2 * mean(to_mark_), 2 * h_);
     };
@@ -186,7 +187,8 @@ bool Guide::place_marks(bool first) {
         on_.push_back(mark);
     }
     if (on_.size() < kFewestMarks) {
-        report_.reason = "only " + std::to_string(on_.size()) + " places of the guess have marks near them; the image's border cannot be learnt";
+        report_.reason = "only " + std::to_string(on_.size()) +
+                         " places of the guess have marks near them; the image's border cannot be learnt";
         return false;
     }
     double residual2 = 0;
@@ -210,7 +212,8 @@ void Guide::set_ranges() {
     std::vector<double> reach(count), broad2(count);
     tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
         for (std::uint32_t n = patches_.first[i]; n < patches_.first[i + 1]; ++n)
-            home_[i] -= value_at(*start_, domain_, patches_.places[patches_.members[n]]) / (patches_.first[i + 1] - patches_.first[i]);
+            home_[i] -= value_at(*start_, domain_, patches_.places[patches_.members[n]]) /
+                        (patches_.first[i + 1] - patches_.first[i]);
         reach[i] = std::min(0.5 * to_mark_[i] + 2 * patches_.voxel[i], kLongestOffset * h_);
         broad2[i] = squared(0.5 * reach[i]);
     });
@@ -334,7 +337,8 @@ std::vector<double> Guide::local_error2(const Word& word) const {
     tbb::parallel_for(std::size_t(0), result.size(), [&](std::size_t i) {
         double sum = kBeliefInAll * all, total = kBeliefInAll;
         for (std::size_t n = 0; n < on_.size(); ++n) {
-            const double weight = std::exp(-0.5 * detail::squared_distance(on_[n].at, patches_.centers[i]) / squared(spacing_));
+            const double weight =
+                std::exp(-0.5 * detail::squared_distance(on_[n].at, patches_.centers[i]) / squared(spacing_));
             sum += weight * word.off2[n];
             total += weight;
         }
@@ -395,7 +399,8 @@ void Guide::weigh(bool first) {
             rest[mark.patch] = mark.residual - offset_[mark.patch];
             precision[mark.patch] = misfit_ / (squared(mark.deviation) + squared(0.1 * h_));
         }
-        const OffsetField::Fit to_marks = field.fit(zero, left, std::vector<OffsetEvidence>(count), rest, precision, nullptr);
+        const OffsetField::Fit to_marks =
+            field.fit(zero, left, std::vector<OffsetEvidence>(count), rest, precision, nullptr);
         for (std::size_t i = 0; i < count; ++i) offset_[i] += options_.weight * to_marks.offset[i];
     }
     report_.image_error = std::sqrt(chosen.error2);
@@ -417,7 +422,8 @@ std::vector<double> Guide::on_vertices(const std::vector<double>& offset) const 
         const std::uint32_t own = patches_.patch[v];
         double sum = 0, total = 0;
         const auto add = [&](std::uint32_t i) {
-            const double weight = std::exp(-detail::squared_distance(patches_.places[v], patches_.centers[i]) / squared(width_)) + 1e-12;
+            const double weight =
+                std::exp(-detail::squared_distance(patches_.places[v], patches_.centers[i]) / squared(width_)) + 1e-12;
             sum += weight * offset[i];
             total += weight;
         };
@@ -457,8 +463,8 @@ std::string GuidanceOptions::why_invalid() const {
     return checks.lines();
 }
 
-FloatGridPtr guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const Image& image, const GuidanceOptions& options,
-                   GuidanceReport& report, const RunContext& run) {
+FloatGridPtr guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const Image& image,
+                   const GuidanceOptions& options, GuidanceReport& report, const RunContext& run) {
     detail::require_valid(options, "guide");
     report = {};
     FloatGridPtr result;

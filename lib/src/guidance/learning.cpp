@@ -124,7 +124,8 @@ PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, cons
         for (const int side : {-1, 1})
             for (int s = 1; s <= reach; ++s) {
                 const double away = s * step;
-                const Vec3 at{x[0] + side * away * normal[0], x[1] + side * away * normal[1], x[2] + side * away * normal[2]};
+                const Vec3 at{x[0] + side * away * normal[0], x[1] + side * away * normal[1],
+                              x[2] + side * away * normal[2]};
                 // Beyond the middle of a gap or of the body another part of the surface is nearer.
                 if (side * sampled(accessor, scene.domain, at) < 0.7 * away - h) break;
                 if (!image.sample(at, row.values[std::size_t(reach + side * s)])) {
@@ -153,8 +154,8 @@ PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, cons
     return profile;
 }
 
-Lesson::Lesson(const Scene& scene, const std::vector<PatchMark>& marks, const SmoothImage& image, double guess_deviation,
-               double prior_deviation, double apart)
+Lesson::Lesson(const Scene& scene, const std::vector<PatchMark>& marks, const SmoothImage& image,
+               double guess_deviation, double prior_deviation, double apart)
     : profile_(places_of(scene, marks, image, guess_deviation)) {
     gain_ = -std::numeric_limits<double>::infinity();
     test(scene, marks, prior_deviation, apart, false);
@@ -165,12 +166,14 @@ Lesson::Lesson(const Scene& scene, const std::vector<PatchMark>& marks, const Sm
     const std::vector<double> all(marks.size(), 1.0);
     tables_.resize(local_ ? marks.size() : 1);
     tbb::parallel_for(std::size_t(0), tables_.size(), [&](std::size_t n) {
-        tables_[n] = local_ ? profile_.table(around(profile_, profile_.places()[n].at, radius_), &all) : profile_.table(all);
+        tables_[n] =
+            local_ ? profile_.table(around(profile_, profile_.places()[n].at, radius_), &all) : profile_.table(all);
     });
 }
 
 /// Foretells each mark by the profile of the others; keeps what does it better than what is there.
-void Lesson::test(const Scene& scene, const std::vector<PatchMark>& marks, double prior_deviation, double apart, bool local) {
+void Lesson::test(const Scene& scene, const std::vector<PatchMark>& marks, double prior_deviation, double apart,
+                  bool local) {
     std::vector<BorderTable> tables(marks.size());
     std::vector<Likelihood> likelihoods(marks.size());
     tbb::parallel_for(std::size_t(0), marks.size(), [&](std::size_t n) {
@@ -198,10 +201,12 @@ void Lesson::test(const Scene& scene, const std::vector<PatchMark>& marks, doubl
             const OffsetEvidence e = density(likelihoods[n].values, likelihoods[n].first * step, step, trust);
             // The density of the mark: the border's, under prior and image, blurred by the mark's error; against the
             // same without the image.
-            const double prior2 = prior_deviation * prior_deviation, mark2 = std::pow(std::max(marks[n].deviation, 0.5 * step), 2);
+            const double prior2 = prior_deviation * prior_deviation,
+                         mark2 = std::pow(std::max(marks[n].deviation, 0.5 * step), 2);
             double mean, variance;
             const double mass = moments(e, 0, prior2, mean, variance);
-            const double near = moments(e, marks[n].residual * prior2 / (prior2 + mark2), prior2 * mark2 / (prior2 + mark2), mean, variance);
+            const double near = moments(e, marks[n].residual * prior2 / (prior2 + mark2),
+                                        prior2 * mark2 / (prior2 + mark2), mean, variance);
             const double gain = std::log(std::max(near, 1e-6) / std::max(mass, 1e-6));
             sum += gain;
             squares += gain * gain;
@@ -251,7 +256,8 @@ double Lesson::brightness(int steps) const {
         const int at = int(std::lround(place.offset)) + steps;
         if (at < place.profile.lo || at > place.profile.hi) continue;
         for (int row = 0; row < place.profile.rows; ++row)
-            values.push_back(place.profile.values[std::size_t(row) * place.profile.steps() + std::size_t(at - place.profile.lo)]);
+            values.push_back(
+                place.profile.values[std::size_t(row) * place.profile.steps() + std::size_t(at - place.profile.lo)]);
     }
     return values.empty() ? 0 : median(values);
 }

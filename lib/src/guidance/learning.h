@@ -57,7 +57,8 @@ public:
     [[nodiscard]] double brightness(int steps) const;
 
 private:
-    void test(const Scene& scene, const std::vector<PatchMark>& marks, double prior_deviation, double apart, bool local);
+    void test(const Scene& scene, const std::vector<PatchMark>& marks, double prior_deviation, double apart,
+              bool local);
 
     BorderProfile profile_;
     std::vector<BorderTable> tables_, held_out_;  // by place, or one for all; by place

@@ -21,7 +21,8 @@ struct OffsetField::System {
 
 // A Matern field of smoothness 1 (F. Lindgren, H. Rue, J. Lindström 2011): (kappa^2 - Laplace) f = white noise, on the
 // patches as finite volumes. Its variance is 1 / (4 pi kappa^2 tau^2).
-OffsetField::OffsetField(const Patches& patches, double range) : patches_(patches), system_(std::make_unique<System>()) {
+OffsetField::OffsetField(const Patches& patches, double range)
+    : patches_(patches), system_(std::make_unique<System>()) {
     const std::size_t count = patches.size();
     const double kappa = std::sqrt(8.0) / range;
     std::vector<double> diagonal(count);
@@ -73,7 +74,8 @@ OffsetField::Fit OffsetField::fit(const std::vector<double>& mean, const std::ve
                                   const std::vector<double>& fixed_precision, const std::vector<double>* shift) const {
     const std::size_t count = patches_.size();
     Fit result{mean, std::vector<double>(count, 0.0), {}};
-    const bool asked = std::any_of(evidence.begin(), evidence.end(), [](const OffsetEvidence& e) { return !e.density.empty(); });
+    const bool asked =
+        std::any_of(evidence.begin(), evidence.end(), [](const OffsetEvidence& e) { return !e.density.empty(); });
     Eigen::VectorXd inverse_deviation(count), prior_mean(count);
     for (std::size_t i = 0; i < count; ++i) {
         inverse_deviation[Eigen::Index(i)] = 1 / deviation[i];
@@ -86,7 +88,8 @@ OffsetField::Fit OffsetField::fit(const std::vector<double>& mean, const std::ve
         // What the others say about a patch: the field's value there, the surer the more they know.
         for (std::size_t i = 0; i < count; ++i) {
             believed[i] = 1 / (deviation[i] * deviation[i]) + fixed_precision[i];
-            for (const std::uint32_t j : patches_.neighbours[i]) believed[i] += 0.5 * (result.precision[j] + fixed_precision[j]);
+            for (const std::uint32_t j : patches_.neighbours[i])
+                believed[i] += 0.5 * (result.precision[j] + fixed_precision[j]);
         }
         tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
             if (evidence[i].density.empty()) return;

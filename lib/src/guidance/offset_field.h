@@ -8,8 +8,8 @@ namespace covol::guidance {
 
 /// Where a patch's border may be by the image: a density over offsets, relative to that of an image that says nothing.
 struct OffsetEvidence {
-    double first = 0, step = 1;   ///< offsets first + n * step, world units
-    std::vector<float> density;   ///< mean 1; empty: nothing known
+    double first = 0, step = 1;  ///< offsets first + n * step, world units
+    std::vector<float> density;  ///< mean 1; empty: nothing known
 };
 
 /// A smooth random field of offsets on the patches, with the guess as its mean.

@@ -51,7 +51,8 @@ void smooth_normals(std::vector<Vec3>& normals, const Rows& rows, int rounds) {
 double voxel_along(const ImageGeometry& g, const Vec3& d) {
     double sum = 0;
     for (int a = 0; a < 3; ++a) {
-        const double along = (d[0] * g.direction[0][a] + d[1] * g.direction[1][a] + d[2] * g.direction[2][a]) * g.spacing[a];
+        const double along =
+            (d[0] * g.direction[0][a] + d[1] * g.direction[1][a] + d[2] * g.direction[2][a]) * g.spacing[a];
         sum += along * along;
     }
     return std::sqrt(sum);
@@ -100,7 +101,8 @@ Patches make_patches(const TriangleMesh& mesh, const ImageGeometry& g, double wi
     for (const auto& t : mesh.triangles) {
         const Vec3 &a = p.places[t[0]], &b = p.places[t[1]], &c = p.places[t[2]];
         const Vec3 u{b[0] - a[0], b[1] - a[1], b[2] - a[2]}, w{c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-        const double area = 0.5 * std::hypot(u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]);
+        const double area =
+            0.5 * std::hypot(u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]);
         for (int n = 0; n < 3; ++n) vertex_area[t[n]] += area / 3;
     }
     p.centers.assign(patches, {0, 0, 0});
@@ -126,8 +128,12 @@ Patches make_patches(const TriangleMesh& mesh, const ImageGeometry& g, double wi
     for (std::size_t v = 0; v < count; ++v)
         for (std::uint32_t n = rows.first[v]; n < rows.first[v + 1]; ++n) {
             const std::uint32_t a = p.patch[v], b = p.patch[rows.other[n]];
-            if (a < b) crossing.emplace_back(a, b, float(std::sqrt(detail::squared_distance(p.places[v], p.places[rows.other[n]]))));
-            if (b < a) crossing.emplace_back(b, a, float(std::sqrt(detail::squared_distance(p.places[v], p.places[rows.other[n]]))));
+            if (a < b)
+                crossing.emplace_back(a, b,
+                                      float(std::sqrt(detail::squared_distance(p.places[v], p.places[rows.other[n]]))));
+            if (b < a)
+                crossing.emplace_back(b, a,
+                                      float(std::sqrt(detail::squared_distance(p.places[v], p.places[rows.other[n]]))));
         }
     std::sort(crossing.begin(), crossing.end());
     for (std::size_t n = 0; n < crossing.size(); ++n) {

@@ -16,7 +16,7 @@ struct Patches {
     std::vector<std::uint32_t> first, members;  ///< patch p has the vertices members[first[p] .. first[p+1])
     std::vector<Vec3> centers, directions;      ///< mean place, mean normal
     std::vector<double> area;
-    std::vector<double> voxel;                  ///< the image's voxel along the normal, world units
+    std::vector<double> voxel;  ///< the image's voxel along the normal, world units
     struct Border {
         std::uint32_t a, b;
         double length, distance;

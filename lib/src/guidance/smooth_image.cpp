@@ -19,7 +19,8 @@ SmoothImage::SmoothImage(const Image& image, const WorldBox& box, double sigma) 
     const ImageGeometry& g = image.geometry();
     Vec3 lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
     for (int c = 0; c < 8; ++c) {
-        const Vec3 at = g.world_to_index({c & 1 ? box.max[0] : box.min[0], c & 2 ? box.max[1] : box.min[1], c & 4 ? box.max[2] : box.min[2]});
+        const Vec3 at = g.world_to_index(
+            {c & 1 ? box.max[0] : box.min[0], c & 2 ? box.max[1] : box.min[1], c & 4 ? box.max[2] : box.min[2]});
         for (int a = 0; a < 3; ++a) {
             lo[a] = std::min(lo[a], at[a]);
             hi[a] = std::max(hi[a], at[a]);
@@ -29,7 +30,8 @@ SmoothImage::SmoothImage(const Image& image, const WorldBox& box, double sigma) 
     for (int a = 0; a < 3; ++a) {
         const double halo = kKernelSigmas * sigma / g.spacing[a] + 1;
         first[a] = int(std::floor(std::clamp(lo[a] - halo, double(image.held().min[a]), double(image.held().max[a]))));
-        const int last = int(std::ceil(std::clamp(hi[a] + halo, double(image.held().min[a]), double(image.held().max[a]))));
+        const int last =
+            int(std::ceil(std::clamp(hi[a] + halo, double(image.held().min[a]), double(image.held().max[a]))));
         if (hi[a] < image.held().min[a] || lo[a] > image.held().max[a]) return;
         size_[a] = last - first[a] + 1;
     }
@@ -67,10 +69,12 @@ void SmoothImage::smooth(int axis, double sigma) {
         for (int n1 = 0; n1 < size_[a1]; ++n1) {
             float* base = values_.data() + n1 * stride1 + n2 * stride2;
             const auto at = [&](int n) { return base[std::size_t(std::clamp(n, 0, count - 1)) * stride]; };
-            // Beyond the end it goes on as it came: were its last value repeated, a body that grows inward from there would seem
-            // to be as wide at the end as it is a little before it.
+            // Beyond the end it goes on as it came: were its last value repeated, a body that grows inward from there
+            // would seem to be as wide at the end as it is a little before it.
             for (int n = -radius; n < count + radius; ++n)
-                line[n + radius] = n < 0 ? 2 * at(0) - at(-n) : n >= count ? 2 * at(count - 1) - at(2 * (count - 1) - n) : at(n);
+                line[n + radius] = n < 0        ? 2 * at(0) - at(-n)
+                                   : n >= count ? 2 * at(count - 1) - at(2 * (count - 1) - n)
+                                                : at(n);
             for (int n = 0; n < count; ++n) {
                 float value = 0;
                 for (int k = 0; k <= 2 * radius; ++k) value += kernel[k] * line[n + k];

@@ -22,9 +22,9 @@ private:
 
     Matrix3 to_index_{};
     Vec3 offset_{};
-    Index3 size_{0, 0, 0};      // of the part
-    Vec3 low_{}, high_{};       // of the image, in indices of the part
-    std::vector<float> values_; // i fastest
+    Index3 size_{0, 0, 0};       // of the part
+    Vec3 low_{}, high_{};        // of the image, in indices of the part
+    std::vector<float> values_;  // i fastest
 };
 
 }  // namespace covol::guidance

@@ -6,7 +6,6 @@
 
 #include <cmath>
 
-
 namespace covol::guidance {
 namespace {
 
@@ -30,9 +29,10 @@ std::vector<Leaf*> touched(FloatGrid& grid, const detail::NearestField& nearest)
 
 }  // namespace
 
-WideDistance::WideDistance(const FloatGrid& start, const std::vector<Vec3>& vertices, const Domain& domain, double width,
-                           const RunContext& run)
-    : nearest_(detail::nearest_points(to_index(domain, vertices), detail::box_of(domain), width, "guide", run)), grid_(start.deepCopy()) {
+WideDistance::WideDistance(const FloatGrid& start, const std::vector<Vec3>& vertices, const Domain& domain,
+                           double width, const RunContext& run)
+    : nearest_(detail::nearest_points(to_index(domain, vertices), detail::box_of(domain), width, "guide", run)),
+      grid_(start.deepCopy()) {
     const double h = domain.voxel_size;
     const auto own = float(kOwnVoxels * h), far = float(width * h);
     openvdb::tools::changeLevelSetBackground(grid_->tree(), far);
@@ -61,7 +61,8 @@ FloatGridPtr WideDistance::less(const std::vector<double>& by_vertex) const {
         float* values = leaves[n]->buffer().data();
         for (auto value = leaves[n]->cbeginValueOn(); value; ++value) {
             const std::int32_t nearest = leaf.nearest[value.pos()];
-            if (nearest >= 0) values[value.pos()] -= float(by_vertex[std::size_t(nearest_.source[std::size_t(nearest)])]);
+            if (nearest >= 0)
+                values[value.pos()] -= float(by_vertex[std::size_t(nearest_.source[std::size_t(nearest)])]);
         }
     });
     return result;

@@ -11,8 +11,8 @@ namespace {
 using Point = std::array<float, 3>;
 using Triangle = std::array<std::uint32_t, 3>;
 
-constexpr float kClose = 0.3F;         // of an edge: a vertex that close to the line is moved onto it
-constexpr double kLeastCosine = 0.5;   // between a triangle before and after
+constexpr float kClose = 0.3F;        // of an edge: a vertex that close to the line is moved onto it
+constexpr double kLeastCosine = 0.5;  // between a triangle before and after
 constexpr int kUndoRounds = 4;
 
 Point between(const Point& a, const Point& b, float t) {
@@ -101,7 +101,8 @@ private:
         if (a > b) std::swap(a, b);
         const auto [at, is_new] = crossings_.try_emplace({a, b}, std::uint32_t(cut_.mesh.vertices.size()));
         if (is_new)
-            cut_.mesh.vertices.push_back(between(cut_.mesh.vertices[a], cut_.mesh.vertices[b], values_[a] / (values_[a] - values_[b])));
+            cut_.mesh.vertices.push_back(
+                between(cut_.mesh.vertices[a], cut_.mesh.vertices[b], values_[a] / (values_[a] - values_[b])));
         return at->second;
     }
 
@@ -163,7 +164,9 @@ void part_fans(TriangleMesh& mesh) {
 
 }  // namespace
 
-CutMesh cut_along(const TriangleMesh& mesh, std::vector<float> values) { return Splitter(mesh, std::move(values)).result(); }
+CutMesh cut_along(const TriangleMesh& mesh, std::vector<float> values) {
+    return Splitter(mesh, std::move(values)).result();
+}
 
 TriangleMesh kept_part(const CutMesh& cut) {
     TriangleMesh part{cut.mesh.vertices, {}};

@@ -16,14 +16,17 @@
 namespace covol {
 namespace {
 
-constexpr double kFar = 3;              // spacings, and voxels
-constexpr double kSmoothing = 0.5;      // of the distance: wiggles of the rim shorter than about three times that go
-constexpr float kStep = 0.5F;           // of smoothing, towards the neighbours' mean
-constexpr double kP95OfSpacing = 0.976; // nearest neighbour of points spread evenly at random, their spacing being 1 / sqrt(density)
+constexpr double kFar = 3;          // spacings, and voxels
+constexpr double kSmoothing = 0.5;  // of the distance: wiggles of the rim shorter than about three times that go
+constexpr float kStep = 0.5F;       // of smoothing, towards the neighbours' mean
+// nearest neighbour of points spread evenly at random, their spacing being 1 / sqrt(density)
+constexpr double kP95OfSpacing = 0.976;
 
 using Triangle = std::array<std::uint32_t, 3>;
 
-Vec3 place(const TriangleMesh& mesh, std::uint32_t v) { return {mesh.vertices[v][0], mesh.vertices[v][1], mesh.vertices[v][2]}; }
+Vec3 place(const TriangleMesh& mesh, std::uint32_t v) {
+    return {mesh.vertices[v][0], mesh.vertices[v][1], mesh.vertices[v][2]};
+}
 
 double area_of(const TriangleMesh& mesh, const Triangle& t) {
     const Vec3 a = place(mesh, t[0]), b = place(mesh, t[1]), c = place(mesh, t[2]);
@@ -73,8 +76,8 @@ private:
     std::vector<std::uint32_t> parent_;
 };
 
-/// The triangles that go, and those that stay: what a ball of the distance's radius does not reach whose middle is where
-/// points are missing.
+/// The triangles that go, and those that stay: what a ball of the distance's radius does not reach whose middle is
+/// where points are missing.
 class HoleFinder {
 public:
     HoleFinder(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack)
@@ -110,7 +113,8 @@ private:
                 if (!(to_points_[a] > far) || to_points_[b] > far) continue;
                 const double share = double(to_points_[a] - far) / double(to_points_[a] - to_points_[b]);
                 const Vec3 p = place(mesh_, a), q = place(mesh_, b);
-                places.push_back({p[0] + share * (q[0] - p[0]), p[1] + share * (q[1] - p[1]), p[2] + share * (q[2] - p[2])});
+                places.push_back(
+                    {p[0] + share * (q[0] - p[0]), p[1] + share * (q[1] - p[1]), p[2] + share * (q[2] - p[2])});
             }
         return places;
     }
@@ -122,7 +126,8 @@ private:
         const detail::KdTree tree(bare);
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, values.size(), 1024), [&](const auto& range) {
             for (std::size_t v = range.begin(); v != range.end(); ++v)
-                values[v] = float(std::min(std::sqrt(tree.nearest(place(mesh_, std::uint32_t(v)))), 2 * reach_) - reach_);
+                values[v] =
+                    float(std::min(std::sqrt(tree.nearest(place(mesh_, std::uint32_t(v)))), 2 * reach_) - reach_);
         });
         smooth(mesh_, kSmoothing * distance_, values);
         return values;
@@ -158,13 +163,15 @@ private:
     double distance_, reach_;
 };
 
-void check(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack, const char* function) {
+void check(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack,
+           const char* function) {
     if (to_points.size() != mesh.vertices.size())
-        throw Error(Errc::InvalidInput, std::string(function) + ": expected a distance for each of " + std::to_string(mesh.vertices.size()) +
-                                            " vertices, got " + std::to_string(to_points.size()));
+        throw Error(Errc::InvalidInput, std::string(function) + ": expected a distance for each of " +
+                                            std::to_string(mesh.vertices.size()) + " vertices, got " +
+                                            std::to_string(to_points.size()));
     if (!(distance > 0) || !(slack >= 0) || !(slack < distance))
-        throw Error(Errc::InvalidOptions, std::string(function) + ": expected 0 <= slack < distance, got " + std::to_string(slack) + " and " +
-                                              std::to_string(distance));
+        throw Error(Errc::InvalidOptions, std::string(function) + ": expected 0 <= slack < distance, got " +
+                                              std::to_string(slack) + " and " + std::to_string(distance));
 }
 
 holes::CutMesh cut_holes(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack,
@@ -173,8 +180,9 @@ holes::CutMesh cut_holes(const TriangleMesh& mesh, const std::vector<float>& to_
     holes::CutMesh cut;
     with_threads(run, [&] { cut = HoleFinder(mesh, to_points, distance, slack).find(report, run); });
     if (std::find(cut.kept.begin(), cut.kept.end(), 1) == cut.kept.end())
-        throw Error(Errc::InvalidInput, std::string(function) + ": no part of the surface is within " + std::to_string(distance) +
-                                            " of points all around; a hole is what lies farther: give a larger distance");
+        throw Error(Errc::InvalidInput,
+                    std::string(function) + ": no part of the surface is within " + std::to_string(distance) +
+                        " of points all around; a hole is what lies farther: give a larger distance");
     return cut;
 }
 
@@ -186,12 +194,14 @@ double hole_distance(const std::vector<Vec3>& points, double voxel_size) {
     return kFar * std::max(voxel_size, nearest_neighbour_spacing(points).p95 / kP95OfSpacing);
 }
 
-std::vector<float> distances_to_points(const TriangleMesh& mesh, const std::vector<Vec3>& points, const RunContext& run) {
+std::vector<float> distances_to_points(const TriangleMesh& mesh, const std::vector<Vec3>& points,
+                                       const RunContext& run) {
     std::vector<float> result(mesh.vertices.size());
     with_threads(run, [&] {
         const detail::KdTree tree(points);
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, result.size(), 1024), [&](const auto& range) {
-            for (std::size_t v = range.begin(); v != range.end(); ++v) result[v] = float(std::sqrt(tree.nearest(place(mesh, std::uint32_t(v)))));
+            for (std::size_t v = range.begin(); v != range.end(); ++v)
+                result[v] = float(std::sqrt(tree.nearest(place(mesh, std::uint32_t(v)))));
         });
     });
     return result;
@@ -230,19 +240,20 @@ std::vector<BoundaryLoop> boundary_loops(const TriangleMesh& mesh) {
         }
         loops.push_back(loop);
     }
-    std::sort(loops.begin(), loops.end(), [](const BoundaryLoop& a, const BoundaryLoop& b) { return a.length > b.length; });
+    std::sort(loops.begin(), loops.end(),
+              [](const BoundaryLoop& a, const BoundaryLoop& b) { return a.length > b.length; });
     return loops;
 }
 
-TriangleMesh trimmed(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack, HolesReport& report,
-                     const RunContext& run) {
+TriangleMesh trimmed(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack,
+                     HolesReport& report, const RunContext& run) {
     const holes::CutMesh cut = cut_holes(mesh, to_points, distance, slack, report, run, "trimmed");
     report.policy = Holes::Open;
     return report.share > 0 ? holes::kept_part(cut) : mesh;
 }
 
-TriangleMesh flattened(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack, HolesReport& report,
-                       const RunContext& run) {
+TriangleMesh flattened(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack,
+                       HolesReport& report, const RunContext& run) {
     holes::CutMesh cut = cut_holes(mesh, to_points, distance, slack, report, run, "flattened");
     TriangleMesh result;
     with_threads(run, [&] {
@@ -254,7 +265,8 @@ TriangleMesh flattened(const TriangleMesh& mesh, const std::vector<float>& to_po
         Parts patches(cut, false);
         for (std::uint32_t v = 0; v < fixed.size(); ++v)
             if (fixed[v]) spans[patches.root(v)] = 1;
-        std::erase_if(cut.mesh.triangles, [&](const Triangle& t) { return !fixed[t[0]] && !spans[patches.root(t[0])]; });
+        std::erase_if(cut.mesh.triangles,
+                      [&](const Triangle& t) { return !fixed[t[0]] && !spans[patches.root(t[0])]; });
         for (std::uint32_t v = 0; v < fixed.size(); ++v) fixed[v] = fixed[v] || !spans[patches.root(v)];
         holes::span_membrane(cut.mesh, fixed, run);
         result = std::move(cut.mesh);

@@ -44,7 +44,8 @@ void span_membrane(TriangleMesh& mesh, const std::vector<char>& fixed, const Run
             for (int k = 0; k < 3; ++k) {
                 const std::uint32_t a = t[(k + 1) % 3], b = t[(k + 2) % 3];
                 if (fixed[a] && fixed[b]) continue;
-                const Eigen::Vector3d tip = at.row(t[k]), u = at.row(a).transpose() - tip, v = at.row(b).transpose() - tip;
+                const Eigen::Vector3d tip = at.row(t[k]), u = at.row(a).transpose() - tip,
+                                      v = at.row(b).transpose() - tip;
                 // At first all edges are springs: that spreads the vertices of a bulge over what it is to become.
                 const double w = round == 0 ? 1 : std::clamp(cotangent(u, v), kLeastWeight, kMostWeight);
                 edges += (u - v).norm();

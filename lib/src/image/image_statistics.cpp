@@ -60,7 +60,8 @@ const T* Image::row(int j, int k) const {
 std::uint64_t Image::slice_bytes() const {
     // from the first held pixel to the last
     const Index3 n = held_.size();
-    return (std::uint64_t(stride_[1]) * std::uint64_t(n[1] - 1) + std::uint64_t(stride_[0]) * std::uint64_t(n[0] - 1) + 1) *
+    return (std::uint64_t(stride_[1]) * std::uint64_t(n[1] - 1) + std::uint64_t(stride_[0]) * std::uint64_t(n[0] - 1) +
+            1) *
            detail::pixel_bytes(type_);
 }
 

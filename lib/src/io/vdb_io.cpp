@@ -297,7 +297,8 @@ FloatGridPtr read_vdb_level_set(const std::string& path, const RunContext& run) 
         if (level_sets.size() > 1) {
             std::string list;
             for (const std::string& name : level_sets) list += (list.empty() ? "" : ", ") + name;
-            run.warn(path + ": '" + chosen + "' is taken of the level sets " + list + "; name one: " + path + ":" + level_sets.back());
+            run.warn(path + ": '" + chosen + "' is taken of the level sets " + list + "; name one: " + path + ":" +
+                     level_sets.back());
         }
     }
     const FloatGridPtr grid = read_vdb(path, chosen);
@@ -316,7 +317,8 @@ std::vector<VdbGridInfo> list_vdb(const std::string& given) {
         for (std::size_t n = 0; n < reader.size(); ++n)
             if (name.empty() || reader.name(n) == name) list.push_back(describe(reader, n));
         if (list.empty() && !name.empty())
-            throw Error(Errc::InvalidInput, "list_vdb: " + path + ": expected a grid named '" + name + "', got " + list_grids(reader));
+            throw Error(Errc::InvalidInput,
+                        "list_vdb: " + path + ": expected a grid named '" + name + "', got " + list_grids(reader));
         return list;
     });
 }

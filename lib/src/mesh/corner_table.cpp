@@ -11,7 +11,10 @@
 namespace covol::meshing {
 
 CornerTable::CornerTable(std::vector<Triangle>& triangles, std::size_t vertices)
-    : triangles_(triangles), opposite_(3 * triangles.size(), kNone), corner_of_(vertices, kNone), on_boundary_(vertices, 0) {
+    : triangles_(triangles),
+      opposite_(3 * triangles.size(), kNone),
+      corner_of_(vertices, kNone),
+      on_boundary_(vertices, 0) {
     // Sides in the order of the vertex that they leave.
     const auto corners = std::uint32_t(opposite_.size());
     std::vector<std::uint32_t> first(vertices + 1, 0), leaving(corners);
@@ -24,7 +27,8 @@ CornerTable::CornerTable(std::vector<Triangle>& triangles, std::size_t vertices)
     }
     std::atomic<std::uint32_t> twice = kNone;
     tbb::parallel_for(std::uint32_t(0), corners, [&](std::uint32_t c) {
-        const std::uint32_t from = vertex(previous(c)), to = vertex(next(c));  // the side, as the other triangle runs it
+        const std::uint32_t from = vertex(previous(c)),
+                            to = vertex(next(c));  // the side, as the other triangle runs it
         for (std::uint32_t n = first[from]; n < first[from + 1]; ++n) {
             if (vertex(next(leaving[n])) != to) continue;
             if (opposite_[c] != kNone) twice = c;
@@ -34,8 +38,11 @@ CornerTable::CornerTable(std::vector<Triangle>& triangles, std::size_t vertices)
             if (vertex(next(leaving[n])) == from && leaving[n] != next(c)) twice = c;
     });
     if (twice != kNone)
-        throw Error(Errc::InvalidInput, "expected a manifold mesh of one orientation, got several triangles on a side of the edge between the vertices " +
-                                            std::to_string(vertex(next(twice))) + " and " + std::to_string(vertex(previous(twice))) + "; repair it first");
+        throw Error(Errc::InvalidInput,
+                    "expected a manifold mesh of one orientation, got several triangles on a side of the edge between "
+                    "the vertices " +
+                        std::to_string(vertex(next(twice))) + " and " + std::to_string(vertex(previous(twice))) +
+                        "; repair it first");
     for (std::uint32_t c = 0; c < corners; ++c) {
         if (opposite_[c] != kNone) continue;
         on_boundary_[vertex(next(c))] = on_boundary_[vertex(previous(c))] = 1;

@@ -7,8 +7,9 @@
 
 namespace covol::meshing {
 
-/// Who is next to whom in a manifold mesh, closed or with boundary. Corner 3 t + k is corner k of triangle t; `opposite` is the
-/// corner on the other side of the edge that a corner faces (Rossignac and others, Corner table, 1999).
+/// Who is next to whom in a manifold mesh, closed or with boundary. Corner 3 t + k is corner k of triangle t;
+/// `opposite` is the corner on the other side of the edge that a corner faces (Rossignac and others, Corner table,
+/// 1999).
 class CornerTable {
 public:
     static constexpr std::uint32_t kNone = ~std::uint32_t(0);
@@ -24,7 +25,9 @@ public:
     [[nodiscard]] const std::vector<Triangle>& triangles() const { return triangles_; }
     [[nodiscard]] std::size_t vertices() const { return corner_of_.size(); }
     [[nodiscard]] bool is_boundary(std::uint32_t v) const { return on_boundary_[v] != 0; }
-    [[nodiscard]] bool is_closed() const { return std::find(on_boundary_.begin(), on_boundary_.end(), 1) == on_boundary_.end(); }
+    [[nodiscard]] bool is_closed() const {
+        return std::find(on_boundary_.begin(), on_boundary_.end(), 1) == on_boundary_.end();
+    }
     /// A corner at the vertex, kNone where no triangle is; around a boundary vertex the first against the clock.
     [[nodiscard]] std::uint32_t corner_of(std::uint32_t v) const { return corner_of_[v]; }
 
@@ -50,11 +53,11 @@ public:
     /// Undoes flip(corner).
     void unflip(std::uint32_t corner);
 
-    /// Whether the edge that the corner faces can be drawn together with the mesh staying manifold and of the same topology:
-    /// no vertex but the two beside the edge is next to both of its ends.
+    /// Whether the edge that the corner faces can be drawn together with the mesh staying manifold and of the same
+    /// topology: no vertex but the two beside the edge is next to both of its ends.
     [[nodiscard]] bool can_collapse(std::uint32_t corner) const;
-    /// Draws the edge from vertex(next(corner)) to vertex(previous(corner)) together in the former; the latter and two triangles
-    /// go: is_gone(). @pre can_collapse(corner)
+    /// Draws the edge from vertex(next(corner)) to vertex(previous(corner)) together in the former; the latter and two
+    /// triangles go: is_gone(). @pre can_collapse(corner)
     void collapse(std::uint32_t corner);
     [[nodiscard]] bool is_gone(std::uint32_t triangle) const { return triangles_[triangle][0] == kNone; }
 

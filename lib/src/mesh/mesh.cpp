@@ -54,7 +54,9 @@ std::uint32_t next_corner(std::uint32_t corner) { return corner % 3 == 2 ? corne
 template <typename Visit>
 void for_each_edge(const TriangleMesh& mesh, const Visit& visit) {
     const auto corners = std::uint32_t(3 * mesh.triangles.size());
-    const auto low = [&](std::uint32_t c) { return std::min(corner_vertex(mesh, c), corner_vertex(mesh, next_corner(c))); };
+    const auto low = [&](std::uint32_t c) {
+        return std::min(corner_vertex(mesh, c), corner_vertex(mesh, next_corner(c)));
+    };
     std::vector<std::uint32_t> first(mesh.vertices.size() + 1, 0);
     for (std::uint32_t c = 0; c < corners; ++c)
         if (!is_degenerate(mesh.triangles[c / 3])) ++first[low(c) + 1];
@@ -93,7 +95,8 @@ MeshMeasures measure(const TriangleMesh& mesh) {
     std::vector<bool> used(mesh.vertices.size(), false);
     for (const auto& t : mesh.triangles) {
         m.volume += six_volumes(mesh, t, origin) / 6;
-        m.area += length(cross(minus(point(mesh, t[1]), point(mesh, t[0])), minus(point(mesh, t[2]), point(mesh, t[0])))) / 2;
+        m.area +=
+            length(cross(minus(point(mesh, t[1]), point(mesh, t[0])), minus(point(mesh, t[2]), point(mesh, t[0])))) / 2;
         degenerate = degenerate || is_degenerate(t);
         for (const std::uint32_t v : t) used[v] = true;
     }

@@ -26,7 +26,9 @@ inline Position to_position(const Vec3& p) { return {float(p[0]), float(p[1]), f
 
 /// Twice the area, along the outward normal.
 inline Vec3 area_normal(const Vec3& a, const Vec3& b, const Vec3& c) { return cross(minus(b, a), minus(c, a)); }
-inline Vec3 area_normal(const Positions& p, const Triangle& t) { return area_normal(to_vec3(p[t[0]]), to_vec3(p[t[1]]), to_vec3(p[t[2]])); }
+inline Vec3 area_normal(const Positions& p, const Triangle& t) {
+    return area_normal(to_vec3(p[t[0]]), to_vec3(p[t[1]]), to_vec3(p[t[2]]));
+}
 
 /// The cosine of the smallest of a triangle's angles, 1 for a degenerate one: smaller is better.
 inline double worst_cosine(const Vec3& a, const Vec3& b, const Vec3& c) {

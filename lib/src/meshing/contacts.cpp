@@ -12,7 +12,8 @@
 namespace covol::meshing {
 namespace {
 
-/// Rounding of a product of three lengths, of differences of single-precision numbers in double precision, is far below this.
+/// Rounding of a product of three lengths, of differences of single-precision numbers in double precision, is far below
+/// this.
 constexpr double kRounding = 1e-13;
 constexpr double kFacing = 0.05;  // cosine: triangles of a single sheet look so far its way, at least
 
@@ -46,8 +47,8 @@ bool apart_distinct(const Vec3* s, const Vec3* t, double size) {
     return false;
 }
 
-/// Corner 0 is shared, at 0: whether a plane through it has the other two corners of each on its own side, where at most one of
-/// each lies in the plane, and these two in different directions.
+/// Corner 0 is shared, at 0: whether a plane through it has the other two corners of each on its own side, where at
+/// most one of each lies in the plane, and these two in different directions.
 bool apart_at_corner(const Vec3* s, const Vec3* t, double size) {
     const double margin = kRounding * size * size * size;
     const auto side = [&](const Vec3& axis, const Vec3& p) { return dot(axis, p); };
@@ -66,9 +67,13 @@ bool apart_at_corner(const Vec3* s, const Vec3* t, double size) {
     for (int i = 1; i < 3; ++i) {  // across one triangle's plane along one of its sides
         const Vec3 across_s = cross(ns, s[i]), across_t = cross(nt, t[i]);
         const double a = side(across_s, s[3 - i]), b1 = side(across_s, t[1]), b2 = side(across_s, t[2]);
-        if ((a > 0 && b1 < -margin * size && b2 < -margin * size) || (a < 0 && b1 > margin * size && b2 > margin * size)) return true;
+        if ((a > 0 && b1 < -margin * size && b2 < -margin * size) ||
+            (a < 0 && b1 > margin * size && b2 > margin * size))
+            return true;
         const double b = side(across_t, t[3 - i]), a1 = side(across_t, s[1]), a2 = side(across_t, s[2]);
-        if ((b > 0 && a1 < -margin * size && a2 < -margin * size) || (b < 0 && a1 > margin * size && a2 > margin * size)) return true;
+        if ((b > 0 && a1 < -margin * size && a2 < -margin * size) ||
+            (b < 0 && a1 > margin * size && a2 > margin * size))
+            return true;
     }
     return false;
 }
@@ -112,10 +117,13 @@ bool are_apart(const Positions& positions, const Triangle& s, const Triangle& t)
         q[k] = minus(to_vec3(positions[second[k]]), origin);
         for (int a = 0; a < 3; ++a) size = std::max({size, std::abs(p[k][a]), std::abs(q[k][a])});
     }
-    return shared == 0 ? apart_distinct(p, q, size) : shared == 1 ? apart_at_corner(p, q, size) : apart_at_side(p, q, size);
+    return shared == 0   ? apart_distinct(p, q, size)
+           : shared == 1 ? apart_at_corner(p, q, size)
+                         : apart_at_side(p, q, size);
 }
 
-ContactFinder::ContactFinder(const Positions& positions, const std::vector<Triangle>& triangles) : positions_(&positions), triangles_(&triangles) {
+ContactFinder::ContactFinder(const Positions& positions, const std::vector<Triangle>& triangles)
+    : positions_(&positions), triangles_(&triangles) {
     rebuild();
 }
 
@@ -202,19 +210,23 @@ void ContactFinder::grow(std::uint32_t triangle) {
 }
 
 std::uint64_t ContactFinder::key_of(const Position& p, int dx, int dy, int dz) const {
-    const auto cell = [&](int a, int shift) { return std::uint64_t(std::int64_t(std::floor((p[a] - cell_origin_[a]) / cell_size_)) + shift + (1 << 20)); };
+    const auto cell = [&](int a, int shift) {
+        return std::uint64_t(std::int64_t(std::floor((p[a] - cell_origin_[a]) / cell_size_)) + shift + (1 << 20));
+    };
     return cell(0, dx) << 42 | cell(1, dy) << 21 | cell(2, dz);
 }
 
 const ContactFinder::Cell* ContactFinder::cell_at(std::uint64_t key) const {
-    const auto at = std::lower_bound(cells_.begin(), cells_.end(), key, [](const Cell& cell, std::uint64_t k) { return cell.key < k; });
+    const auto at = std::lower_bound(cells_.begin(), cells_.end(), key,
+                                     [](const Cell& cell, std::uint64_t k) { return cell.key < k; });
     return at != cells_.end() && at->key == key ? &*at : nullptr;
 }
 
 void ContactFinder::find_single_sheets() {
     const auto middle = [&](std::size_t place) {
         const Box& box = triangle_boxes_[place];
-        return Position{0.5F * (box.low[0] + box.high[0]), 0.5F * (box.low[1] + box.high[1]), 0.5F * (box.low[2] + box.high[2])};
+        return Position{0.5F * (box.low[0] + box.high[0]), 0.5F * (box.low[1] + box.high[1]),
+                        0.5F * (box.low[2] + box.high[2])};
     };
     cells_.clear();
     if (order_.empty()) return;
@@ -222,14 +234,16 @@ void ContactFinder::find_single_sheets() {
     for (const Box& box : triangle_boxes_)
         for (int a = 0; a < 3; ++a) cell_size_ = std::max(cell_size_, box.high[a] - box.low[a]);
     cell_origin_ = boxes_[0].low;
-    const float whole = std::max({boxes_[0].high[0] - boxes_[0].low[0], boxes_[0].high[1] - boxes_[0].low[1], boxes_[0].high[2] - boxes_[0].low[2]});
+    const float whole = std::max({boxes_[0].high[0] - boxes_[0].low[0], boxes_[0].high[1] - boxes_[0].low[1],
+                                  boxes_[0].high[2] - boxes_[0].low[2]});
     if (!(cell_size_ > 1e-5F * whole)) return;  // cells past counting
-    cell_size_ *= 1.001F;  // for the rounding of the middles
+    cell_size_ *= 1.001F;                       // for the rounding of the middles
     std::vector<std::pair<std::uint64_t, std::uint32_t>> keyed;
     keyed.reserve(order_.size());
     for (std::size_t n = 0; n < order_.size(); ++n)
         if ((*triangles_)[order_[n]][0] < positions_->size()) keyed.emplace_back(0, std::uint32_t(n));
-    tbb::parallel_for(std::size_t(0), keyed.size(), [&](std::size_t n) { keyed[n].first = key_of(middle(keyed[n].second)); });
+    tbb::parallel_for(std::size_t(0), keyed.size(),
+                      [&](std::size_t n) { keyed[n].first = key_of(middle(keyed[n].second)); });
     tbb::parallel_sort(keyed.begin(), keyed.end());
     std::vector<std::size_t> starts;
     for (std::size_t n = 0; n < keyed.size(); ++n)
@@ -276,7 +290,8 @@ std::vector<ContactFinder::Pair> ContactFinder::contacts(bool was_free) {
     std::vector<std::uint8_t> single(order_.size(), 0);
     tbb::parallel_for(std::size_t(0), single.size(), [&](std::size_t n) {
         const Box& box = triangle_boxes_[n];
-        const Vec3 direction = single_sheet({0.5F * (box.low[0] + box.high[0]), 0.5F * (box.low[1] + box.high[1]), 0.5F * (box.low[2] + box.high[2])});
+        const Vec3 direction = single_sheet(
+            {0.5F * (box.low[0] + box.high[0]), 0.5F * (box.low[1] + box.high[1]), 0.5F * (box.low[2] + box.high[2])});
         single[n] = dot(direction, direction) > 0;
     });
     tbb::enumerable_thread_specific<std::vector<Pair>> found;
@@ -285,14 +300,17 @@ std::vector<ContactFinder::Pair> ContactFinder::contacts(bool was_free) {
         std::vector<std::size_t> close;
         for (std::size_t run = range.begin(); run < range.end(); ++run) {
             const std::size_t begin = run * kRun, end = std::min((run + 1) * kRun, order_.size());
-            if (begin >= end || std::all_of(single.begin() + std::ptrdiff_t(begin), single.begin() + std::ptrdiff_t(end), [](auto s) { return s != 0; })) continue;
+            if (begin >= end || std::all_of(single.begin() + std::ptrdiff_t(begin),
+                                            single.begin() + std::ptrdiff_t(end), [](auto s) { return s != 0; }))
+                continue;
             close.clear();
             descend(boxes_[runs_ - 1 + run], run, [&](std::size_t place) {
                 if (single[place] == 0) close.push_back(place);
             });
             for (std::size_t n = begin; n < end; ++n)
                 for (const std::size_t other : close)
-                    if (single[n] == 0 && other > n && meet(triangle_boxes_[n], triangle_boxes_[other])) add_contact(order_[n], order_[other], mine);
+                    if (single[n] == 0 && other > n && meet(triangle_boxes_[n], triangle_boxes_[other]))
+                        add_contact(order_[n], order_[other], mine);
         }
     });
     return gathered(found);
@@ -321,7 +339,8 @@ bool ContactFinder::would_touch(const std::vector<Change>& changed, const std::a
     };
     for (const Change& change : changed) {
         bool touching = false;
-        near(change.corners, [&](std::uint32_t t) { touching = touching || (stays(t) && !apart(change.corners, (*triangles_)[t])); });
+        near(change.corners,
+             [&](std::uint32_t t) { touching = touching || (stays(t) && !apart(change.corners, (*triangles_)[t])); });
         if (touching) return true;
     }
     return false;
@@ -331,9 +350,9 @@ bool ContactFinder::look_along_sheet(const std::vector<Change>& changed, const P
     constexpr double kAlong = 0.3;  // cosine
     const Vec3 direction = single_sheet(around);
     return dot(direction, direction) > 0 && std::all_of(changed.begin(), changed.end(), [&](const Change& change) {
-        const Vec3 n = area_normal(*positions_, change.corners);
-        return dot(n, direction) > kAlong * length(n);
-    });
+               const Vec3 n = area_normal(*positions_, change.corners);
+               return dot(n, direction) > kAlong * length(n);
+           });
 }
 
 }  // namespace covol::meshing

@@ -9,9 +9,9 @@
 
 namespace covol::meshing {
 
-/// Whether two triangles are sure to have nothing in common beyond the corners and the side that they share: a plane is found
-/// that separates them by more than rounding can be wrong. Of triangles that only just miss each other it may not be.
-/// Triangles that share a side are apart unless folded flat onto each other.
+/// Whether two triangles are sure to have nothing in common beyond the corners and the side that they share: a plane is
+/// found that separates them by more than rounding can be wrong. Of triangles that only just miss each other it may not
+/// be. Triangles that share a side are apart unless folded flat onto each other.
 [[nodiscard]] bool are_apart(const Positions& positions, const Triangle& s, const Triangle& t);
 
 /// Finds triangles that touch: boxes around runs of triangles that lie close to each other, in a tree.
@@ -25,9 +25,10 @@ public:
     /// Once positions, or corners of triangles, have changed.
     void update();
 
-    /// Pairs of triangles that are not sure to be apart, each once, lower number first, sorted; those that are gone (a corner
-    /// that is no vertex) touch nothing.
-    /// @param was_free  whether the mesh is one of a closed surface without contacts whose vertices have moved by less than a
+    /// Pairs of triangles that are not sure to be apart, each once, lower number first, sorted; those that are gone (a
+    /// corner that is no vertex) touch nothing.
+    /// @param was_free  whether the mesh is one of a closed surface without contacts whose vertices have moved by less
+    /// than a
     ///                  triangle: single sheets need no look then.
     [[nodiscard]] std::vector<Pair> contacts(bool was_free);
     /// The same, of pairs with one of these; sorted, unique.
@@ -35,9 +36,10 @@ public:
 
     /// The same once most have changed, or many are gone: puts them in order anew.
     void rebuild();
-    /// Finds where the surface is a single sheet: in cells as large as a triangle, whose neighbours have no triangle that looks away
-    /// from their common direction. A line in this direction can pass a closed surface without contacts only once there, so
-    /// that nothing touches (as the normal cones of Volino and Magnenat-Thalmann, Efficient self-collision detection, 1994).
+    /// Finds where the surface is a single sheet: in cells as large as a triangle, whose neighbours have no triangle
+    /// that looks away from their common direction. A line in this direction can pass a closed surface without contacts
+    /// only once there, so that nothing touches (as the normal cones of Volino and Magnenat-Thalmann, Efficient
+    /// self-collision detection, 1994).
     void find_single_sheets();
     /// The common direction where the last find_single_sheets() found a single sheet around a point; 0 where not.
     [[nodiscard]] Vec3 single_sheet(const Position& p) const;
@@ -51,10 +53,12 @@ public:
     };
     /// Whether, once these have changed and two others are gone, one of them would touch another triangle.
     [[nodiscard]] bool would_touch(const std::vector<Change>& changed, const std::array<std::uint32_t, 2>& gone) const;
-    /// Whether there is a single sheet around a point, as the last find_single_sheets() has found it, and these look its way.
+    /// Whether there is a single sheet around a point, as the last find_single_sheets() has found it, and these look
+    /// its way.
     [[nodiscard]] bool look_along_sheet(const std::vector<Change>& changed, const Position& around) const;
 
-    /// Calls visit(number) for the triangles whose boxes may meet that of a triangle with these corners, which need not be in the mesh.
+    /// Calls visit(number) for the triangles whose boxes may meet that of a triangle with these corners, which need not
+    /// be in the mesh.
     template <typename Visit>
     void near(const Triangle& t, const Visit& visit) const {
         descend(box_of(t), 0, [&](std::size_t place) { visit(order_[place]); });
@@ -84,8 +88,8 @@ private:
     const Positions* positions_ = nullptr;
     const std::vector<Triangle>* triangles_ = nullptr;
     std::vector<std::uint32_t> order_, place_;  ///< the triangles along the tree's leaves, and where each is
-    std::vector<Box> boxes_;          ///< of a binary tree: node n has the children 2 n + 1 and 2 n + 2
-    std::vector<Box> triangle_boxes_; ///< in the tree's order
+    std::vector<Box> boxes_;                    ///< of a binary tree: node n has the children 2 n + 1 and 2 n + 2
+    std::vector<Box> triangle_boxes_;           ///< in the tree's order
     struct Cell {
         std::uint64_t key;
         Vec3 direction;
@@ -95,7 +99,7 @@ private:
     std::vector<Cell> cells_;  ///< sorted
     Position cell_origin_{};
     float cell_size_ = 1;
-    std::size_t runs_ = 1;            ///< leaves of the tree, a power of two
+    std::size_t runs_ = 1;  ///< leaves of the tree, a power of two
 };
 
 /// Calls visit(place in the order) for the triangles whose boxes meet this one, from a run on.

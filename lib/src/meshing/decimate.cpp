@@ -20,15 +20,16 @@ namespace {
 /// Weight of an edge's length, to the fourth power, against squared distances from planes times areas.
 constexpr double kRoundness = 3e-3;
 constexpr double kTurn = 0.5;  // cosine: a triangle may not turn farther
-/// Collapses that make a triangle with a smaller angle than that of the cosine, 23, 14 and 6 degrees, and than there was, cost so
-/// many times as much.
+/// Collapses that make a triangle with a smaller angle than that of the cosine, 23, 14 and 6 degrees, and than there
+/// was, cost so many times as much.
 struct Needle {
     double cosine;
     float factor;
 };
 constexpr Needle kNeedles[] = {{0.92, 10}, {0.97, 100}, {0.995, std::numeric_limits<float>::infinity()}};
-constexpr double kAdaptiveNeedle = 0.945;  // 19 degrees: with a tolerance the goal is good triangles, not few, and none may have less
-constexpr int kPasses = 3;                 // a collapse that was in another's way is asked for again in the next
+// 19 degrees: with a tolerance the goal is good triangles, not few, and none may have less
+constexpr double kAdaptiveNeedle = 0.945;
+constexpr int kPasses = 3;  // a collapse that was in another's way is asked for again in the next
 
 struct Traits : OpenMesh::DefaultTraitsDouble {
     VertexAttributes(OpenMesh::Attributes::Status);
@@ -37,7 +38,8 @@ struct Traits : OpenMesh::DefaultTraitsDouble {
     FaceAttributes(OpenMesh::Attributes::Status);
 };
 
-/// The decimater asks is_collapse_ok() of each edge before it looks at its priority, and again right before it collapses the edge.
+/// The decimater asks is_collapse_ok() of each edge before it looks at its priority, and again right before it
+/// collapses the edge.
 class HalfEdges : public OpenMesh::TriMesh_ArrayKernelT<Traits> {
 public:
     std::function<bool(HalfedgeHandle)> is_chosen;
@@ -47,10 +49,12 @@ public:
 
 /// Faces and vertices have the numbers of the triangles and vertices until the garbage is collected, which we never do.
 void build(HalfEdges& edges, const TriangleMesh& mesh) {
-    // Quadrics are differences of squares, and costs go with the fourth power of the size, in single precision: near 0, of about 1.
+    // Quadrics are differences of squares, and costs go with the fourth power of the size, in single precision: near 0,
+    // of about 1.
     const Vec3 middle = to_vec3(mesh.vertices[mesh.triangles.front()[0]]);
     double area = 0;
-    for (const Triangle& t : mesh.triangles) area += length(area_normal(mesh.vertices, t)) / double(mesh.triangles.size());
+    for (const Triangle& t : mesh.triangles)
+        area += length(area_normal(mesh.vertices, t)) / double(mesh.triangles.size());
     const double scale = area > 0 ? 1 / std::sqrt(area) : 1.0;
     edges.reserve(mesh.vertices.size(), 3 * mesh.triangles.size() / 2, mesh.triangles.size());
     for (const Position& v : mesh.vertices) {
@@ -64,8 +68,9 @@ void build(HalfEdges& edges, const TriangleMesh& mesh) {
     }
 }
 
-/// What decides on collapses: OpenMesh's quadrics, the shorter edges first of those that cost the same, and no collapse that would
-/// let a vertex leave a face of a clip, turn a triangle, make a needle of it, move it off the level set or let it touch another.
+/// What decides on collapses: OpenMesh's quadrics, the shorter edges first of those that cost the same, and no collapse
+/// that would let a vertex leave a face of a clip, turn a triangle, make a needle of it, move it off the level set or
+/// let it touch another.
 class SafeQuadric : public OpenMesh::Decimater::ModQuadricT<HalfEdges> {
 public:
     using Quadric = OpenMesh::Decimater::ModQuadricT<HalfEdges>;
@@ -75,7 +80,8 @@ public:
     DECIMATER_MODNAME(SafeQuadric)
 
     /// @param trust  whether it is enough, where the finder has found a single sheet, that triangles look its way.
-    void begin(TriangleMesh& mesh, const CornerTable& table, const Surface* surface, const DecimateGoal& goal, bool trust, const RunContext& run) {
+    void begin(TriangleMesh& mesh, const CornerTable& table, const Surface* surface, const DecimateGoal& goal,
+               bool trust, const RunContext& run) {
         mesh_ = &mesh;
         goal_ = goal;
         run_ = &run;
@@ -143,8 +149,8 @@ private:
         return std::uint32_t(handle.idx());
     }
 
-    /// The decimater asks for all edges that leave a vertex, one after the other, to queue the cheapest; and for that one again when
-    /// its turn has come.
+    /// The decimater asks for all edges that leave a vertex, one after the other, to queue the cheapest; and for that
+    /// one again when its turn has come.
     bool is_chosen(HalfEdges::HalfedgeHandle edge) {
         const auto lost = mesh().from_vertex_handle(edge);
         const bool again = asked_ == number(lost);
@@ -168,7 +174,8 @@ private:
             const std::uint8_t kept = holds_[number(info.v1)];
             if ((kept & (kFixed | kChamfer)) || (holds_[lost] & ~kept)) continue;
             const double square = (info.p1 - info.p0).sqrnorm();
-            candidates_.push_back({std::max(0.0F, Quadric::collapse_priority(info)) + float(kRoundness * square * square), edge});
+            candidates_.push_back(
+                {std::max(0.0F, Quadric::collapse_priority(info)) + float(kRoundness * square * square), edge});
         }
         for (auto& [cost, edge] : candidates_) {
             gather(edge);
@@ -185,8 +192,8 @@ private:
         }
     }
 
-    /// The neighbours' neighbours may have changed, and triangles that are not next to it come in its way; then this vertex is looked
-    /// at with more care next time, which most do not need.
+    /// The neighbours' neighbours may have changed, and triangles that are not next to it come in its way; then this
+    /// vertex is looked at with more care next time, which most do not need.
     bool is_free_still(HalfEdges::HalfedgeHandle edge) {
         if (!mesh().keeps_topology(edge)) return false;
         gather(edge);
@@ -204,7 +211,9 @@ private:
         for (const auto side : edges.voh_range(lost)) {
             const std::uint32_t t = number(edges.face_handle(side));
             if (t == gone_[0] || t == gone_[1]) continue;
-            changed_.push_back({t, {number(kept), number(edges.to_vertex_handle(side)), number(edges.to_vertex_handle(edges.next_halfedge_handle(side)))}});
+            changed_.push_back({t,
+                                {number(kept), number(edges.to_vertex_handle(side)),
+                                 number(edges.to_vertex_handle(edges.next_halfedge_handle(side)))}});
         }
     }
 
@@ -228,10 +237,12 @@ private:
     }
 
     [[nodiscard]] bool leaves_surface(std::uint32_t lost) {
-        return goal_.tolerance > 0 && std::any_of(changed_.begin(), changed_.end(), [&](const ContactFinder::Change& change) {
-            const Triangle& t = change.corners;
-            return !(holds_[lost] & holds_[t[1]] & holds_[t[2]] & kFaces) && level_->is_farther(at(t[0]), at(t[1]), at(t[2]), goal_.tolerance);
-        });
+        return goal_.tolerance > 0 &&
+               std::any_of(changed_.begin(), changed_.end(), [&](const ContactFinder::Change& change) {
+                   const Triangle& t = change.corners;
+                   return !(holds_[lost] & holds_[t[1]] & holds_[t[2]] & kFaces) &&
+                          level_->is_farther(at(t[0]), at(t[1]), at(t[2]), goal_.tolerance);
+               });
     }
 
     [[nodiscard]] bool touches(HalfEdges::HalfedgeHandle edge) {
@@ -246,14 +257,14 @@ private:
     std::optional<Level> level_;
     std::vector<std::uint8_t> holds_;
     bool trust_ = false;
-    std::size_t left_ = 0, refreshed_ = 0;  // triangles: now, and when the finder was put in order
-    std::uint32_t asked_ = kNobody;         // the vertex whose edges the decimater asks for
-    bool queued_ = false;                   // whether it has had the chosen one
+    std::size_t left_ = 0, refreshed_ = 0;           // triangles: now, and when the finder was put in order
+    std::uint32_t asked_ = kNobody;                  // the vertex whose edges the decimater asks for
+    bool queued_ = false;                            // whether it has had the chosen one
     std::vector<HalfEdges::HalfedgeHandle> chosen_;  // that leaves each vertex; none where no collapse is possible
     std::vector<float> cost_;                        // of that collapse
     std::vector<std::pair<float, HalfEdges::HalfedgeHandle>> candidates_;
-    std::vector<std::uint8_t> careful_;              // whether the collapse chosen before had something in its way
-    std::vector<ContactFinder::Change> changed_;     // by the collapse that is looked at
+    std::vector<std::uint8_t> careful_;           // whether the collapse chosen before had something in its way
+    std::vector<ContactFinder::Change> changed_;  // by the collapse that is looked at
     std::array<std::uint32_t, 2> gone_{};
 };
 
@@ -280,8 +291,10 @@ bool decimate(TriangleMesh& mesh, const Surface* surface, const DecimateGoal& go
 void decimate(TriangleMesh& mesh, const Surface* surface, const DecimateGoal& goal, const RunContext& run) {
     if (mesh.triangles.size() <= goal.triangles) return;
     TriangleMesh work = mesh;
-    if (decimate(work, surface, goal, true, run)) mesh = std::move(work);
-    else decimate(mesh, surface, goal, false, run);  // each collapse is checked
+    if (decimate(work, surface, goal, true, run))
+        mesh = std::move(work);
+    else
+        decimate(mesh, surface, goal, false, run);  // each collapse is checked
     remove_gone(mesh.triangles, mesh.vertices);
 }
 

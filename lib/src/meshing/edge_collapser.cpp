@@ -12,7 +12,8 @@ bool EdgeCollapser::look(std::uint32_t corner) {
     for (const std::uint32_t v : {kept_, lost_})
         table_.around(v, [&](std::uint32_t c) {
             if (c / 3 != going_[0] && c / 3 != going_[1])
-                left_.push_back({c / 3, v, table_.vertex(CornerTable::next(c)), table_.vertex(CornerTable::previous(c))});
+                left_.push_back(
+                    {c / 3, v, table_.vertex(CornerTable::next(c)), table_.vertex(CornerTable::previous(c))});
         });
     return true;
 }

@@ -8,11 +8,13 @@
 
 namespace covol::meshing {
 
-/// Draws edges together, one after the other, where that leaves the mesh manifold, of its topology and free of contacts.
+/// Draws edges together, one after the other, where that leaves the mesh manifold, of its topology and free of
+/// contacts.
 class EdgeCollapser {
 public:
     /// All three are kept by reference, and changed by collapse().
-    EdgeCollapser(CornerTable& table, Positions& positions, ContactFinder& finder) : table_(table), positions_(positions), finder_(finder) {}
+    EdgeCollapser(CornerTable& table, Positions& positions, ContactFinder& finder)
+        : table_(table), positions_(positions), finder_(finder) {}
 
     /// A triangle that a collapse leaves, with the corner that moves.
     struct Left {
@@ -28,8 +30,8 @@ public:
     [[nodiscard]] const std::vector<Left>& left() const { return left_; }
     [[nodiscard]] const std::array<std::uint32_t, 2>& going() const { return going_; }
 
-    /// Draws the edge together in a point unless a triangle would touch another that it does not share a corner with, or
-    /// more of one that it does. @return whether it was. @pre look() was true, and nothing has changed since.
+    /// Draws the edge together in a point unless a triangle would touch another that it does not share a corner with,
+    /// or more of one that it does. @return whether it was. @pre look() was true, and nothing has changed since.
     bool collapse(const Position& there);
 
 private:

@@ -10,16 +10,17 @@
 namespace covol::meshing {
 namespace {
 
-constexpr int kSteps = 6;           // of Newton's method
-constexpr double kConverged = 1e-4;   // voxels
-constexpr double kLongest = 0.5;    // voxels, a step
-constexpr double kReach = 1.0;      // voxels, all steps
-constexpr double kFlat = 0.05;      // of the slope that a distance has: no direction to go
+constexpr int kSteps = 6;            // of Newton's method
+constexpr double kConverged = 1e-4;  // voxels
+constexpr double kLongest = 0.5;     // voxels, a step
+constexpr double kReach = 1.0;       // voxels, all steps
+constexpr double kFlat = 0.05;       // of the slope that a distance has: no direction to go
 constexpr double kLeastSlope = 0.5;  // of a distance: between two walls it has none
-constexpr double kSampling = 0.75;  // voxels
-constexpr double kNearFace = 0.01;  // voxels: twice extract_mesh()'s chamfer
+constexpr double kSampling = 0.75;   // voxels
+constexpr double kNearFace = 0.01;   // voxels: twice extract_mesh()'s chamfer
 
-/// Calls visit(point) for points of a triangle at most `step` apart: its middle and those of its sides where it is not larger.
+/// Calls visit(point) for points of a triangle at most `step` apart: its middle and those of its sides where it is not
+/// larger.
 template <typename Visit>
 void for_each_sample(const Vec3& a, const Vec3& b, const Vec3& c, double step, const Visit& visit) {
     const double longest = std::max({length(minus(b, a)), length(minus(c, b)), length(minus(a, c))});
@@ -32,7 +33,8 @@ void for_each_sample(const Vec3& a, const Vec3& b, const Vec3& c, double step, c
     visit(plus(plus(a, 1.0 / 3, minus(b, a)), 1.0 / 3, minus(c, a)));
 }
 
-/// The smaller of two bends, none where they differ in sign: across a crease the distance has no bend that holds on both sides.
+/// The smaller of two bends, none where they differ in sign: across a crease the distance has no bend that holds on
+/// both sides.
 double gentler(double a, double b) {
     if (a * b <= 0) return 0;
     return std::abs(a) < std::abs(b) ? a : b;
@@ -43,7 +45,8 @@ double gentler(double a, double b) {
 Level::Level(const FloatGrid& grid, const detail::LatticeClip& clip, double isovalue)
     : accessor_(grid.getConstAccessor()), clip_(clip), domain_(domain_of(grid)), isovalue_(isovalue) {
     for (int a = 0; a < 3; ++a) {
-        face_[a] = {float(domain_.origin[a] + domain_.voxel_size * clip_.low[a]), float(domain_.origin[a] + domain_.voxel_size * clip_.high[a])};
+        face_[a] = {float(domain_.origin[a] + domain_.voxel_size * clip_.low[a]),
+                    float(domain_.origin[a] + domain_.voxel_size * clip_.high[a])};
         clipped_ = clipped_ || std::isfinite(face_[a][0]) || std::isfinite(face_[a][1]);
     }
 }
@@ -89,7 +92,9 @@ void Level::look_at(Cell& cell) const {
         fill([&](int x, int y, int z) { return accessor_.getValue(base.offsetBy(x, y, z)); });
     }
     for (int c = 0; c < 8; ++c) cell.corner[c] = v[1 + (c >> 2)][1 + (c >> 1 & 1)][1 + (c & 1)];
-    const auto bend = [](double before, double from, double to, double after) { return gentler(before - 2 * from + to, from - 2 * to + after); };
+    const auto bend = [](double before, double from, double to, double after) {
+        return gentler(before - 2 * from + to, from - 2 * to + after);
+    };
     for (int q = 0; q < 4; ++q) {
         const int s = 1 + (q >> 1), t = 1 + (q & 1);
         cell.bend[0][q] = bend(v[0][s][t], v[1][s][t], v[2][s][t], v[3][s][t]);
@@ -115,10 +120,12 @@ Level::Sample Level::sample(const Vec3& world) const {
         slope_z[c] = v[2 * c + 1] - v[2 * c];
         along_z[c] = v[2 * c] + t[2] * slope_z[c];
     }
-    const double low = along_z[0] + t[1] * (along_z[1] - along_z[0]), high = along_z[2] + t[1] * (along_z[3] - along_z[2]);
+    const double low = along_z[0] + t[1] * (along_z[1] - along_z[0]),
+                 high = along_z[2] + t[1] * (along_z[3] - along_z[2]);
     double value = low + t[0] * (high - low);
     Vec3 slope{high - low, (1 - t[0]) * (along_z[1] - along_z[0]) + t[0] * (along_z[3] - along_z[2]),
-               (1 - t[0]) * ((1 - t[1]) * slope_z[0] + t[1] * slope_z[1]) + t[0] * ((1 - t[1]) * slope_z[2] + t[1] * slope_z[3])};
+               (1 - t[0]) * ((1 - t[1]) * slope_z[0] + t[1] * slope_z[1]) +
+                   t[0] * ((1 - t[1]) * slope_z[2] + t[1] * slope_z[3])};
 
     for (int a = 0; a < 3; ++a) {  // less t (1 - t) / 2 of the second differences along each axis
         const int b = a == 0 ? 1 : 0, c = a == 2 ? 1 : 2;
@@ -163,7 +170,8 @@ double Level::distance(const Vec3& world) const {
 
 bool Level::is_farther(const Vec3& a, const Vec3& b, const Vec3& c, double voxels) const {
     bool farther = false;
-    for_each_sample(a, b, c, kSampling * voxel_size(), [&](const Vec3& p) { farther = farther || distance(p) > voxels * voxel_size(); });
+    for_each_sample(a, b, c, kSampling * voxel_size(),
+                    [&](const Vec3& p) { farther = farther || distance(p) > voxels * voxel_size(); });
     return farther;
 }
 
@@ -176,13 +184,16 @@ unsigned Level::faces(const Position& p) const {
 bool Level::on_chamfer(const Position& p) const {
     int near = 0;
     for (int a = 0; a < 3; ++a)
-        near += std::abs(p[a] - face_[a][0]) < kNearFace * domain_.voxel_size || std::abs(p[a] - face_[a][1]) < kNearFace * domain_.voxel_size;
+        near += std::abs(p[a] - face_[a][0]) < kNearFace * domain_.voxel_size ||
+                std::abs(p[a] - face_[a][1]) < kNearFace * domain_.voxel_size;
     return near > 1;
 }
 
 Surface::Surface(const FloatGrid& level_set, double isovalue)
     : whole_(isovalue == 0 ? detail::uncut(level_set, detail::FaceLayer::OnFace) : std::nullopt),
-      grid_(whole_ ? *whole_->distance : level_set), clip_(whole_ ? whole_->clip : detail::LatticeClip{}), isovalue_(isovalue) {}
+      grid_(whole_ ? *whole_->distance : level_set),
+      clip_(whole_ ? whole_->clip : detail::LatticeClip{}),
+      isovalue_(isovalue) {}
 
 MeshDeviation Surface::deviation(const TriangleMesh& mesh) const {
     struct Sum {
@@ -196,8 +207,11 @@ MeshDeviation Surface::deviation(const TriangleMesh& mesh) const {
         Sum& sum = sums[piece];
         for (std::size_t n = piece * kPiece; n < std::min((piece + 1) * kPiece, mesh.triangles.size()); ++n) {
             const Triangle& t = mesh.triangles[n];
-            if ((level.faces(mesh.vertices[t[0]]) & level.faces(mesh.vertices[t[1]]) & level.faces(mesh.vertices[t[2]])) != 0) continue;
-            const Vec3 a = to_vec3(mesh.vertices[t[0]]), b = to_vec3(mesh.vertices[t[1]]), c = to_vec3(mesh.vertices[t[2]]);
+            if ((level.faces(mesh.vertices[t[0]]) & level.faces(mesh.vertices[t[1]]) &
+                 level.faces(mesh.vertices[t[2]])) != 0)
+                continue;
+            const Vec3 a = to_vec3(mesh.vertices[t[0]]), b = to_vec3(mesh.vertices[t[1]]),
+                       c = to_vec3(mesh.vertices[t[2]]);
             double distances = 0;
             int count = 0;
             for_each_sample(a, b, c, kSampling * level.voxel_size(), [&](const Vec3& p) {
@@ -222,7 +236,9 @@ std::vector<std::uint8_t> holds_of(const CornerTable& table, const Positions& po
     for (std::size_t v = 0; v < faces.size(); ++v) faces[v] = std::uint8_t(level.faces(positions[v]));
     tbb::parallel_for(std::uint32_t(0), std::uint32_t(holds.size()), [&](std::uint32_t v) {
         bool within = faces[v] != 0;
-        table.around(v, [&](std::uint32_t c) { within = within && (faces[table.vertex(CornerTable::next(c))] & faces[v]) == faces[v]; });
+        table.around(v, [&](std::uint32_t c) {
+            within = within && (faces[table.vertex(CornerTable::next(c))] & faces[v]) == faces[v];
+        });
         holds[v] = faces[v];
         if (!within) holds[v] |= kOnLevel;
         if (level.on_chamfer(positions[v])) holds[v] |= kChamfer;

@@ -16,24 +16,24 @@
 
 namespace covol::meshing {
 
-/// The surface of which extract_mesh() takes points on the lattice's edges: where the interpolation of a grid has a value, cut off
-/// at the faces of a clip. Within a cell the trilinear interpolant is corrected by the second differences along its edges, so
-/// that it is of the third order: a trilinear one cuts off up to h^2/8 of the curvature along each axis. One object for each
-/// thread.
+/// The surface of which extract_mesh() takes points on the lattice's edges: where the interpolation of a grid has a
+/// value, cut off at the faces of a clip. Within a cell the trilinear interpolant is corrected by the second
+/// differences along its edges, so that it is of the third order: a trilinear one cuts off up to h^2/8 of the curvature
+/// along each axis. One object for each thread.
 class Level {
 public:
     /// @param grid  kept by reference. @param clip  where the grid has layers that stand for the faces of a cut.
     Level(const FloatGrid& grid, const detail::LatticeClip& clip, double isovalue);
 
     struct Sample {
-        double value = 0;   ///< above the isovalue, world units; < 0 inside
+        double value = 0;  ///< above the isovalue, world units; < 0 inside
         Vec3 gradient{};
     };
     [[nodiscard]] Sample sample(const Vec3& world) const;
     [[nodiscard]] double voxel_size() const { return domain_.voxel_size; }
 
-    /// The point of the surface found from a point along the gradient, within a voxel or so; none where there is none. A
-    /// coordinate of which `held` has the bit stays.
+    /// The point of the surface found from a point along the gradient, within a voxel or so; none where there is none.
+    /// A coordinate of which `held` has the bit stays.
     [[nodiscard]] std::optional<Vec3> project(const Vec3& world, unsigned held = 0) const;
     /// How far a point is from the surface, to the first order, world units.
     [[nodiscard]] double distance(const Vec3& world) const;
@@ -43,7 +43,8 @@ public:
 
     /// A bit for each axis along which a point lies on a face of the clip.
     [[nodiscard]] unsigned faces(const Position& p) const;
-    /// Whether the clip has a face, and the point is so close to two of them that it belongs to the chamfer between them.
+    /// Whether the clip has a face, and the point is so close to two of them that it belongs to the chamfer between
+    /// them.
     [[nodiscard]] bool on_chamfer(const Position& p) const;
 
 private:
@@ -85,12 +86,13 @@ private:
 
 /// What a vertex lies on, and has to stay on when it moves.
 enum Hold : std::uint8_t {
-    kFaces = 7,      ///< a bit for each axis: on a face of the clip across it
-    kOnLevel = 8,    ///< where the grid has its value; on a face that is its rim
-    kChamfer = 16,   ///< between two faces of the clip: does not move by itself
-    kFixed = 32      ///< on the mesh's boundary, or in no triangle: stays
+    kFaces = 7,     ///< a bit for each axis: on a face of the clip across it
+    kOnLevel = 8,   ///< where the grid has its value; on a face that is its rim
+    kChamfer = 16,  ///< between two faces of the clip: does not move by itself
+    kFixed = 32     ///< on the mesh's boundary, or in no triangle: stays
 };
 
-[[nodiscard]] std::vector<std::uint8_t> holds_of(const CornerTable& table, const Positions& positions, const Level& level);
+[[nodiscard]] std::vector<std::uint8_t> holds_of(const CornerTable& table, const Positions& positions,
+                                                 const Level& level);
 
 }  // namespace covol::meshing

@@ -162,13 +162,14 @@ MeshDeviation change_of(const TriangleMesh& before, const TriangleMesh& after) {
 }
 
 CleanupStep step_report(const Work& work, const TriangleMesh& before) {
-    CleanupStep step{std::int64_t(work.mesh.triangles.size()), smallest_angle(work.mesh), change_of(before, work.mesh), {}};
+    CleanupStep step{
+        std::int64_t(work.mesh.triangles.size()), smallest_angle(work.mesh), change_of(before, work.mesh), {}};
     if (work.level_set != nullptr) step.deviation = deviation_from(*work.level_set, work.mesh, work.isovalue, work.run);
     return step;
 }
 
-/// A round solid with vertices on its surface loses volume by the chords; an even offset along the normals brings it back.
-/// What lies on the faces of a clip stays there.
+/// A round solid with vertices on its surface loses volume by the chords; an even offset along the normals brings it
+/// back. What lies on the faces of a clip stays there.
 void keep_volume(TriangleMesh& mesh, const MeshMeasures& before, const meshing::Surface* surface) {
     const MeshMeasures after = measure(mesh);
     if (!before.closed || !after.closed || !(after.area > 0)) return;
@@ -239,8 +240,8 @@ void check_indices(const TriangleMesh& mesh, const char* where) {
     for (const auto& t : mesh.triangles)
         for (const std::uint32_t v : t)
             if (v >= mesh.vertices.size())
-                throw Error(Errc::InvalidInput, std::string(where) + ": a triangle refers to vertex " + std::to_string(v) +
-                                                    " of " + std::to_string(mesh.vertices.size()));
+                throw Error(Errc::InvalidInput, std::string(where) + ": a triangle refers to vertex " +
+                                                    std::to_string(v) + " of " + std::to_string(mesh.vertices.size()));
 }
 
 }  // namespace
@@ -256,7 +257,8 @@ std::string CleanupOptions::why_invalid() const {
 int count_self_intersections(const TriangleMesh& mesh) {
     check_indices(mesh, "count_self_intersections");
     // Most pairs are apart by far; exact predicates decide on the others.
-    const std::vector<meshing::ContactFinder::Pair> pairs = meshing::ContactFinder(mesh.vertices, mesh.triangles).contacts(false);
+    const std::vector<meshing::ContactFinder::Pair> pairs =
+        meshing::ContactFinder(mesh.vertices, mesh.triangles).contacts(false);
     return tbb::parallel_reduce(
         tbb::blocked_range<std::size_t>(0, pairs.size()), 0,
         [&](const auto& range, int count) {
@@ -273,9 +275,11 @@ CleanupReport clean(const Work& work) {
     const auto& [mesh, level_set, isovalue, options, run] = work;
     detail::require_valid(options, "clean_mesh");
     if (options.adaptive > 0 && (level_set == nullptr || options.adaptive > 2 * work.voxel_size()))
-        throw Error(Errc::InvalidOptions, level_set == nullptr ? std::string("clean_mesh: adaptive: expected the level set of the mesh, got none")
-                                                               : "clean_mesh: adaptive: expected at most two voxels, " + std::to_string(2 * work.voxel_size()) +
-                                                                     ", got " + std::to_string(options.adaptive));
+        throw Error(Errc::InvalidOptions,
+                    level_set == nullptr
+                        ? std::string("clean_mesh: adaptive: expected the level set of the mesh, got none")
+                        : "clean_mesh: adaptive: expected at most two voxels, " +
+                              std::to_string(2 * work.voxel_size()) + ", got " + std::to_string(options.adaptive));
     check_indices(mesh, "clean_mesh");
     CleanupReport report;
     with_threads(run, [&] {
@@ -320,7 +324,8 @@ CleanupReport clean_mesh(TriangleMesh& mesh, const CleanupOptions& options, cons
     return clean({mesh, nullptr, 0.0, options, run});
 }
 
-CleanupReport clean_mesh(TriangleMesh& mesh, const FloatGrid& level_set, double isovalue, const CleanupOptions& options, const RunContext& run) {
+CleanupReport clean_mesh(TriangleMesh& mesh, const FloatGrid& level_set, double isovalue, const CleanupOptions& options,
+                         const RunContext& run) {
     return clean({mesh, &level_set, isovalue, options, run});
 }
 

@@ -37,10 +37,12 @@ public:
         triangles_.reserve(end - begin);
         for (std::size_t n = begin; n < end; ++n) {
             const auto& t = mesh.triangles[n];
-            triangles_.emplace_back(to_cgal(mesh.vertices[t[0]]), to_cgal(mesh.vertices[t[1]]), to_cgal(mesh.vertices[t[2]]));
+            triangles_.emplace_back(to_cgal(mesh.vertices[t[0]]), to_cgal(mesh.vertices[t[1]]),
+                                    to_cgal(mesh.vertices[t[2]]));
         }
         tree_.insert(triangles_.begin(), triangles_.end());
-        // A tree of the vertices, for first guesses, would cost as much as all queries: the point before has a better one.
+        // A tree of the vertices, for first guesses, would cost as much as all queries: the point before has a better
+        // one.
         tree_.do_not_accelerate_distance_queries();
         tree_.build();  // now, for queries from many threads must find it finished
     }
@@ -57,8 +59,8 @@ private:
 }  // namespace
 
 std::vector<double> distances_to(const TriangleMesh& mesh, const std::vector<Vec3>& points) {
-    // Several trees of triangles that follow each other, and so mostly lie close: CGAL builds a tree on one thread, and the
-    // faster the smaller it is. Each more costs a query a look at its root.
+    // Several trees of triangles that follow each other, and so mostly lie close: CGAL builds a tree on one thread, and
+    // the faster the smaller it is. Each more costs a query a look at its root.
     constexpr std::size_t kTriangles = 1 << 17;
     const std::size_t count = mesh.triangles.size();
     std::vector<std::unique_ptr<TriangleTree>> trees((count + kTriangles - 1) / kTriangles);

@@ -22,22 +22,28 @@ namespace meshing {
 namespace {
 
 constexpr int kMovesPerRound = 5;
-constexpr double kStep = 0.7;        // of the way to the middle of the neighbours
-constexpr double kSameSide = 0.3;    // cosine: a triangle may not turn farther in a move
-constexpr double kSmooth = 0.5;      // cosine: farther than this neighbours are not turned into each other
-constexpr double kDrop = 0.5;        // of a tangential move: what the projection may add to it
-constexpr double kGain = 1e-3;       // of a cosine: below this an edge is not worth turning
-constexpr double kPoor = 0.85;       // cosine of an angle, 32 degrees: what is better needs no second round
-constexpr double kSliver = 0.9;      // cosine of an angle, 26 degrees: below it a triangle's shortest side is drawn together
-constexpr double kShort = 0.5;       // voxels: longer sides are not
-constexpr double kOffLevel = 0.1;    // voxels: a turned edge may leave the level set so far, or as far as before; ends that meet so far
+constexpr double kStep = 0.7;      // of the way to the middle of the neighbours
+constexpr double kSameSide = 0.3;  // cosine: a triangle may not turn farther in a move
+constexpr double kSmooth = 0.5;    // cosine: farther than this neighbours are not turned into each other
+constexpr double kDrop = 0.5;      // of a tangential move: what the projection may add to it
+constexpr double kGain = 1e-3;     // of a cosine: below this an edge is not worth turning
+constexpr double kPoor = 0.85;     // cosine of an angle, 32 degrees: what is better needs no second round
+// cosine of an angle, 26 degrees: below it a triangle's shortest side is drawn together
+constexpr double kSliver = 0.9;
+constexpr double kShort = 0.5;  // voxels: longer sides are not
+// voxels: a turned edge may leave the level set so far, or as far as before; ends that meet so far
+constexpr double kOffLevel = 0.1;
 
 class Relaxer {
 public:
     Relaxer(TriangleMesh& mesh, const Surface& surface, double tolerance, const RunContext& run)
-        : mesh_(mesh), table_(mesh.triangles, mesh.vertices.size()), finder_(mesh.vertices, mesh.triangles),
+        : mesh_(mesh),
+          table_(mesh.triangles, mesh.vertices.size()),
+          finder_(mesh.vertices, mesh.triangles),
           levels_([&surface] { return surface.level(); }),
-          holds_(holds_of(table_, mesh.vertices, levels_.local())), tolerance_(tolerance), run_(run) {}
+          holds_(holds_of(table_, mesh.vertices, levels_.local())),
+          tolerance_(tolerance),
+          run_(run) {}
 
     /// The first round concerns the whole mesh, the others what is still badly shaped.
     void relax(int rounds, RelaxReport& report) {
@@ -59,12 +65,13 @@ public:
     }
 
 private:
-    /// Chooses the corners of triangles worse than this, the vertices next to them, and the triangles around all these; all
-    /// where `poor` is above 1.
+    /// Chooses the corners of triangles worse than this, the vertices next to them, and the triangles around all these;
+    /// all where `poor` is above 1.
     void choose(double poor) {
         std::vector<std::uint8_t> vertex(mesh_.vertices.size(), poor > 1), triangle(mesh_.triangles.size(), 0);
         if (poor <= 1) {
-            tbb::parallel_for(std::size_t(0), triangle.size(), [&](std::size_t t) { triangle[t] = is_worse(std::uint32_t(t), poor); });
+            tbb::parallel_for(std::size_t(0), triangle.size(),
+                              [&](std::size_t t) { triangle[t] = is_worse(std::uint32_t(t), poor); });
             for (std::size_t t = 0; t < triangle.size(); ++t) {
                 if (triangle[t] == 0) continue;
                 for (const std::uint32_t v : mesh_.triangles[t]) {
@@ -78,18 +85,22 @@ private:
             if (vertex[v] != 0 && table_.corner_of(v) != CornerTable::kNone) vertices_.push_back(v);
         scope_.clear();
         for (std::uint32_t t = 0; t < triangle.size(); ++t)
-            if (!table_.is_gone(t) && std::any_of(mesh_.triangles[t].begin(), mesh_.triangles[t].end(), [&](std::uint32_t v) { return vertex[v] != 0; }))
+            if (!table_.is_gone(t) && std::any_of(mesh_.triangles[t].begin(), mesh_.triangles[t].end(),
+                                                  [&](std::uint32_t v) { return vertex[v] != 0; }))
                 scope_.push_back(t);
     }
 
     [[nodiscard]] Vec3 at(std::uint32_t v) const { return to_vec3(mesh_.vertices[v]); }
-    [[nodiscard]] unsigned face_of(std::uint32_t a, std::uint32_t b, std::uint32_t c) const { return holds_[a] & holds_[b] & holds_[c] & kFaces; }
+    [[nodiscard]] unsigned face_of(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
+        return holds_[a] & holds_[b] & holds_[c] & kFaces;
+    }
 
     /// Whether turning the edge that the corner faces widens the smallest angle and leaves the surface as it is.
     [[nodiscard]] bool worth_flipping(std::uint32_t corner) const {
         const std::uint32_t across = table_.opposite(corner);
         if (across == CornerTable::kNone) return false;
-        const std::uint32_t a = table_.vertex(CornerTable::next(corner)), b = table_.vertex(CornerTable::previous(corner));
+        const std::uint32_t a = table_.vertex(CornerTable::next(corner)),
+                            b = table_.vertex(CornerTable::previous(corner));
         const std::uint32_t v = table_.vertex(corner), w = table_.vertex(across);
         const Vec3 pa = at(a), pb = at(b), pv = at(v), pw = at(w);
         const double now = std::max(worst_cosine(pv, pa, pb), worst_cosine(pw, pb, pa));
@@ -104,7 +115,8 @@ private:
         if (face != 0) return table_.can_flip(corner);
         const Level& level = levels_.local();
         const double off = std::abs(level.sample(plus(pv, 0.5, minus(pw, pv))).value);
-        if (off > kOffLevel * level.voxel_size() && off > std::abs(level.sample(plus(pa, 0.5, minus(pb, pa))).value)) return false;
+        if (off > kOffLevel * level.voxel_size() && off > std::abs(level.sample(plus(pa, 0.5, minus(pb, pa))).value))
+            return false;
         if (tolerance_ > 0 && (is_off(pv, pa, pw, 0) || is_off(pw, pb, pv, 0))) return false;
         return table_.can_flip(corner);
     }
@@ -131,7 +143,8 @@ private:
             const std::uint32_t o = table_.opposite(c);
             table_.flip(c);
             turned.push_back({c, o});
-            for (const std::uint32_t side : {c, CornerTable::previous(c), o, CornerTable::previous(o)}) queue.push_back(side);
+            for (const std::uint32_t side : {c, CornerTable::previous(c), o, CornerTable::previous(o)})
+                queue.push_back(side);
         }
         return turned;
     }
@@ -193,7 +206,8 @@ private:
     /// Whether a move turns the triangle over, or moves it off the surface.
     [[nodiscard]] bool spoilt(const Triangle& t, const Positions& before, const Positions& after) const {
         if (is_turned(t, before, after, kSameSide)) return true;
-        return tolerance_ > 0 && has_moved(t, before, after) && is_off(to_vec3(after[t[0]]), to_vec3(after[t[1]]), to_vec3(after[t[2]]), face_of(t[0], t[1], t[2]));
+        return tolerance_ > 0 && has_moved(t, before, after) &&
+               is_off(to_vec3(after[t[0]]), to_vec3(after[t[1]]), to_vec3(after[t[2]]), face_of(t[0], t[1], t[2]));
     }
     /// Whether a triangle lies farther off the surface than it may; of one on a face of the clip no.
     [[nodiscard]] bool is_off(const Vec3& a, const Vec3& b, const Vec3& c, unsigned face) const {
@@ -215,18 +229,20 @@ private:
     void take_back(const Positions& before, std::vector<Flip>& turned) {
         finder_.update();
         const bool all = 20 * scope_.size() > mesh_.triangles.size();  // cheaper then
-        std::vector<ContactFinder::Pair> contacts = all ? finder_.contacts(table_.is_closed()) : finder_.contacts_of(touched(turned));
+        std::vector<ContactFinder::Pair> contacts =
+            all ? finder_.contacts(table_.is_closed()) : finder_.contacts_of(touched(turned));
         while (!contacts.empty()) {
             std::vector<std::uint32_t> moved, still;
             for (const auto& [s, t] : contacts) {
-                const bool any_moved = has_moved(mesh_.triangles[s], before, mesh_.vertices) || has_moved(mesh_.triangles[t], before, mesh_.vertices);
+                const bool any_moved = has_moved(mesh_.triangles[s], before, mesh_.vertices) ||
+                                       has_moved(mesh_.triangles[t], before, mesh_.vertices);
                 for (const std::uint32_t n : {s, t}) (any_moved ? moved : still).push_back(n);
             }
             std::vector<std::uint32_t> changed = undo_flips(still, turned);
             moved.insert(moved.end(), changed.begin(), changed.end());
-            const std::vector<std::uint32_t> more = restore_all(table_, moved, before, mesh_.vertices, [&](std::uint32_t t) {
-                return spoilt(mesh_.triangles[t], before, mesh_.vertices);
-            });
+            const std::vector<std::uint32_t> more =
+                restore_all(table_, moved, before, mesh_.vertices,
+                            [&](std::uint32_t t) { return spoilt(mesh_.triangles[t], before, mesh_.vertices); });
             changed.insert(changed.end(), more.begin(), more.end());
             finder_.update();
             contacts = finder_.contacts_of(changed);
@@ -244,8 +260,8 @@ private:
         return all;
     }
 
-    /// Draws the shortest sides of slivers together: those that moves cannot widen, for they stand on an edge of the solid that
-    /// is narrower than a triangle. @return how many
+    /// Draws the shortest sides of slivers together: those that moves cannot widen, for they stand on an edge of the
+    /// solid that is narrower than a triangle. @return how many
     std::size_t collapse_slivers() {
         finder_.update();
         std::deque<std::uint32_t> queue;
@@ -275,7 +291,8 @@ private:
         std::uint32_t best = 3 * t;
         double least = std::numeric_limits<double>::max();
         for (std::uint32_t c = 3 * t; c < 3 * t + 3; ++c) {
-            const double size = length(minus(at(table_.vertex(CornerTable::next(c))), at(table_.vertex(CornerTable::previous(c)))));
+            const double size =
+                length(minus(at(table_.vertex(CornerTable::next(c))), at(table_.vertex(CornerTable::previous(c)))));
             if (size >= least) continue;
             least = size;
             best = c;
@@ -291,11 +308,14 @@ private:
         std::vector<Position> points;
         if ((all & kFixed) || length(minus(to_vec3(pa), to_vec3(pb))) > kShort * level.voxel_size()) return points;
         Position goal;
-        for (int k = 0; k < 3; ++k) goal[k] = holds_[a] >> k & 1 ? pa[k] : holds_[b] >> k & 1 ? pb[k] : 0.5F * (pa[k] + pb[k]);
-        if ((all & kChamfer) || (holds_[a] == holds_[b] && !(all & kOnLevel))) points.push_back(goal);
+        for (int k = 0; k < 3; ++k)
+            goal[k] = holds_[a] >> k & 1 ? pa[k] : holds_[b] >> k & 1 ? pb[k] : 0.5F * (pa[k] + pb[k]);
+        if ((all & kChamfer) || (holds_[a] == holds_[b] && !(all & kOnLevel)))
+            points.push_back(goal);
         else if (holds_[a] == holds_[b]) {
             const auto found = level.project(to_vec3(goal), all & kFaces);
-            if (found && length(minus(*found, to_vec3(goal))) < kOffLevel * level.voxel_size()) points.push_back(to_position(*found));
+            if (found && length(minus(*found, to_vec3(goal))) < kOffLevel * level.voxel_size())
+                points.push_back(to_position(*found));
             for (int k = 0; k < 3 && !points.empty(); ++k)
                 if (all >> k & 1) points.back()[k] = goal[k];
         }
@@ -328,7 +348,9 @@ private:
                 const double before = shape_of(t.number), after = worst_cosine(p, next, previous);
                 slivers -= int(after > kSliver);
                 narrowest = std::max(narrowest, after);
-                worse = worse || (tolerance_ > 0 && is_off(p, next, previous, holds_[t.mover] & holds_[t.next] & holds_[t.previous] & kFaces));
+                worse = worse ||
+                        (tolerance_ > 0 &&
+                         is_off(p, next, previous, holds_[t.mover] & holds_[t.next] & holds_[t.previous] & kFaces));
                 worse = worse || !(dot(was, is) > (before > kSliver ? 0.0 : kSameSide) * length(was) * length(is));
             }
             if (worse || slivers <= 0 || narrowest > narrowest_before || !edge.collapse(there)) continue;
@@ -344,7 +366,7 @@ private:
     mutable tbb::enumerable_thread_specific<Level> levels_;
     std::vector<std::uint8_t> holds_;
     std::vector<std::uint32_t> vertices_, scope_;  // chosen: to be moved, and the triangles around them, sorted
-    const double tolerance_;  // voxels; 0: none
+    const double tolerance_;                       // voxels; 0: none
     const RunContext& run_;
 };
 
@@ -359,7 +381,8 @@ std::string RelaxOptions::why_invalid() const {
     return checks.lines();
 }
 
-RelaxReport relax_mesh(TriangleMesh& mesh, const FloatGrid& level_set, const RelaxOptions& options, const RunContext& run) {
+RelaxReport relax_mesh(TriangleMesh& mesh, const FloatGrid& level_set, const RelaxOptions& options,
+                       const RunContext& run) {
     detail::require_valid(options, "relax_mesh");
     RelaxReport report;
     if (mesh.empty()) return report;
@@ -375,7 +398,8 @@ RelaxReport relax_mesh(TriangleMesh& mesh, const FloatGrid& level_set, const Rel
     return report;
 }
 
-MeshDeviation deviation_from(const FloatGrid& level_set, const TriangleMesh& mesh, double isovalue, const RunContext& run) {
+MeshDeviation deviation_from(const FloatGrid& level_set, const TriangleMesh& mesh, double isovalue,
+                             const RunContext& run) {
     MeshDeviation deviation;
     with_threads(run, [&] { deviation = meshing::Surface(level_set, isovalue).deviation(mesh); });
     return deviation;

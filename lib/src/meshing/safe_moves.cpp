@@ -6,7 +6,8 @@
 
 namespace covol::meshing {
 
-std::vector<std::uint32_t> restore(const CornerTable& table, const std::vector<std::uint32_t>& some, const Positions& before, Positions& after) {
+std::vector<std::uint32_t> restore(const CornerTable& table, const std::vector<std::uint32_t>& some,
+                                   const Positions& before, Positions& after) {
     std::vector<std::uint32_t> changed;
     for (const std::uint32_t t : some)
         for (const std::uint32_t v : table.triangles()[t]) {
@@ -39,10 +40,12 @@ std::size_t move_where_free(TriangleMesh& mesh, const Positions& goal) {
         finder.update();
         contacts = finder.contacts_of(changed);
         std::erase_if(contacts, [&](const ContactFinder::Pair& pair) {
-            return !has_moved(mesh.triangles[pair.first], before, mesh.vertices) && !has_moved(mesh.triangles[pair.second], before, mesh.vertices);
+            return !has_moved(mesh.triangles[pair.first], before, mesh.vertices) &&
+                   !has_moved(mesh.triangles[pair.second], before, mesh.vertices);
         });
     }
-    return std::transform_reduce(before.begin(), before.end(), mesh.vertices.begin(), std::size_t(0), std::plus<>(), std::equal_to<>());
+    return std::transform_reduce(before.begin(), before.end(), mesh.vertices.begin(), std::size_t(0), std::plus<>(),
+                                 std::equal_to<>());
 }
 
 }  // namespace covol::meshing

@@ -37,15 +37,17 @@ template <typename Bad>
 }
 
 /// Moves the corners of these triangles back. @return the triangles that this changes, sorted
-std::vector<std::uint32_t> restore(const CornerTable& table, const std::vector<std::uint32_t>& some, const Positions& before, Positions& after);
+std::vector<std::uint32_t> restore(const CornerTable& table, const std::vector<std::uint32_t>& some,
+                                   const Positions& before, Positions& after);
 
-/// Moves the corners of these triangles back, and of those around them that are bad then, until none is. bad(number) may not
-/// hold of a triangle that has not moved. @return the triangles that this changes
+/// Moves the corners of these triangles back, and of those around them that are bad then, until none is. bad(number)
+/// may not hold of a triangle that has not moved. @return the triangles that this changes
 template <typename Bad>
-std::vector<std::uint32_t> restore_all(const CornerTable& table, const std::vector<std::uint32_t>& some, const Positions& before, Positions& after,
-                                       const Bad& bad) {
+std::vector<std::uint32_t> restore_all(const CornerTable& table, const std::vector<std::uint32_t>& some,
+                                       const Positions& before, Positions& after, const Bad& bad) {
     std::vector<std::uint32_t> all, now = restore(table, some, before, after);
-    for (; !now.empty(); now = restore(table, those(now, bad), before, after)) all.insert(all.end(), now.begin(), now.end());
+    for (; !now.empty(); now = restore(table, those(now, bad), before, after))
+        all.insert(all.end(), now.begin(), now.end());
     return all;
 }
 

@@ -19,9 +19,9 @@ struct Slice {
 /// two neighbours; voxels that touch at a corner are apart. The inside lies to the left.
 [[nodiscard]] std::vector<detail::Polygon> pixel_outlines(const Slice& slice);
 
-/// A line through the middle of a staircase: each coordinate is fitted by a quadratic over its neighbours along the line
-/// (Savitzky and Golay, Anal. Chem. 36, 1964), which leaves circles where they are. No vertex moves by more than half
-/// a voxel along either axis.
+/// A line through the middle of a staircase: each coordinate is fitted by a quadratic over its neighbours along the
+/// line (Savitzky and Golay, Anal. Chem. 36, 1964), which leaves circles where they are. No vertex moves by more than
+/// half a voxel along either axis.
 [[nodiscard]] detail::Polygon smoothed(const detail::Polygon& outline);
 
 /// The outlines of a slice that is part of an image: smoothed as if the paint went on beyond the image's end on the

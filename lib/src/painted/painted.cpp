@@ -52,8 +52,8 @@ std::string count_text(std::size_t count, const char* what) {
 
 [[noreturn]] void bad_value(const Image& labels, const Index3& at) {
     std::ostringstream text;
-    text << "painted_labels: " << labels.path() << ": expected whole numbers >= 0, got " << labels.at(at[0], at[1], at[2]) << " at voxel "
-         << to_text(at) << "; is it a label image?";
+    text << "painted_labels: " << labels.path() << ": expected whole numbers >= 0, got "
+         << labels.at(at[0], at[1], at[2]) << " at voxel " << to_text(at) << "; is it a label image?";
     throw Error(Errc::InvalidInput, text.str());
 }
 
@@ -96,7 +96,8 @@ std::map<int, VoxelBox> boxes_of(const Image& labels) {
 /// The paint of one label in its box.
 class Paint {
 public:
-    Paint(const Image& labels, int label, const VoxelBox& box) : box_(box), n_(box.size()), image_(labels.geometry().size) {
+    Paint(const Image& labels, int label, const VoxelBox& box)
+        : box_(box), n_(box.size()), image_(labels.geometry().size) {
         inside_.resize(std::size_t(n_[0]) * std::size_t(n_[1]) * std::size_t(n_[2]));
         tbb::parallel_for(0, n_[2], [&](int k) {
             for (int j = 0; j < n_[1]; ++j)
@@ -143,7 +144,8 @@ public:
             for (p[1] = 0; p[1] < n_[1]; ++p[1])
                 for (p[0] = 0; p[0] < n_[0]; ++p[0])
                     if (inside_[at(p)] && !is_enclosed(p))
-                        found.push_back({double(box_.min[0] + p[0]), double(box_.min[1] + p[1]), double(box_.min[2] + p[2])});
+                        found.push_back(
+                            {double(box_.min[0] + p[0]), double(box_.min[1] + p[1]), double(box_.min[2] + p[2])});
         return found;
     }
 
@@ -171,11 +173,11 @@ private:
 
 /// What the slices across one axis hold.
 struct AxisPaint {
-    std::vector<int> areas;   ///< slices with an area
-    std::vector<int> painted; ///< with any paint
-    std::vector<char> small;  ///< by painted slice: patches that are neither areas nor strokes, alone
-    int widest = 0;           ///< voxels
-    int longest_run = 0;      ///< of neighbouring slices with an area
+    std::vector<int> areas;    ///< slices with an area
+    std::vector<int> painted;  ///< with any paint
+    std::vector<char> small;   ///< by painted slice: patches that are neither areas nor strokes, alone
+    int widest = 0;            ///< voxels
+    int longest_run = 0;       ///< of neighbouring slices with an area
 };
 
 AxisPaint look_across(const Paint& paint, int axis) {
@@ -208,7 +210,8 @@ bool is_sliced(const AxisPaint& paint, int axis, const ImageGeometry& geometry) 
     if (paint.longest_run == 1) return true;
     const auto [x, y] = Paint::plane(axis);
     const double across = std::max(geometry.spacing[x], geometry.spacing[y]) * paint.widest;
-    return kThinRun * paint.longest_run <= paint.widest && kThinRun * paint.longest_run * geometry.spacing[axis] <= across;
+    return kThinRun * paint.longest_run <= paint.widest &&
+           kThinRun * paint.longest_run * geometry.spacing[axis] <= across;
 }
 
 /// Small patches alone in their slice, away from other paint: the tip of what tapers.
@@ -256,8 +259,9 @@ void summarise(PaintedLabel& label, std::size_t scribbled) {
     std::ostringstream text;
     text << "label " << label.label << ": " << count_text(label.voxels, "voxel");
     for (const PaintedView& view : label.views)
-        text << "; " << count_text(view.slices.size(), "slice") << " across " << kAxisNames[view.axis] << " (" << list_text(view.slices)
-             << ") taken as painted as a whole, with " << count_text(view.outlines.lines.size(), "outline");
+        text << "; " << count_text(view.slices.size(), "slice") << " across " << kAxisNames[view.axis] << " ("
+             << list_text(view.slices) << ") taken as painted as a whole, with "
+             << count_text(view.outlines.lines.size(), "outline");
     if (scribbled > 0)
         text << "; " << (label.views.empty() ? "" : "the other ") << count_text(scribbled, "voxel")
              << " taken as scribbles: inside, and outside of the other labels";
@@ -301,10 +305,12 @@ std::vector<LabelName> painted_labels(const Image& labels) {
     const std::map<int, std::string> names = painted::segment_names(labels.path());
     for (const auto& [label, box] : boxes_of(labels)) {
         const auto named = names.find(label);
-        found.push_back({label, named != names.end() ? named->second : "label" + std::to_string(label), named != names.end()});
+        found.push_back(
+            {label, named != names.end() ? named->second : "label" + std::to_string(label), named != names.end()});
     }
     if (found.empty())
-        throw Error(Errc::InvalidInput, "painted_labels: " + labels.path() + ": expected painted voxels, got 0 everywhere in " +
+        throw Error(Errc::InvalidInput, "painted_labels: " + labels.path() +
+                                            ": expected painted voxels, got 0 everywhere in " +
                                             size_text(labels.geometry().size));
     return found;
 }
@@ -319,7 +325,8 @@ Painted understand_painted(const Image& labels, const std::vector<LabelName>& na
             std::string list;
             for (const auto& [label, box] : boxes) list += (list.empty() ? "" : ", ") + std::to_string(label);
             throw Error(Errc::InvalidInput, "understand_painted: " + labels.path() + ": expected the outside label " +
-                                                std::to_string(options.outside_label) + " among its labels, got " + list);
+                                                std::to_string(options.outside_label) + " among its labels, got " +
+                                                list);
         }
         for (const LabelName& name : names) {
             run.check();
@@ -354,8 +361,9 @@ Image placed_on(const Image& labels, const ImageGeometry& image, bool force) {
     if (!own.spacing_known || force) {
         if (own.size == image.size) return labels.placed(image);
         if (!own.spacing_known)
-            throw Error(Errc::InvalidInput, "placed_on: " + labels.path() + ": expected as many voxels as the image, " + size_text(image.size) +
-                                                ", for the file states no spacing; got " + size_text(own.size) +
+            throw Error(Errc::InvalidInput, "placed_on: " + labels.path() + ": expected as many voxels as the image, " +
+                                                size_text(image.size) + ", for the file states no spacing; got " +
+                                                size_text(own.size) +
                                                 "; save it with the image's geometry, as NRRD or NIfTI");
     }
     std::mutex guard;
@@ -381,13 +389,15 @@ Image placed_on(const Image& labels, const ImageGeometry& image, bool force) {
     if (outside == 0) return labels;
     const auto box_text = [](const WorldBox& box) {
         std::ostringstream text;
-        text << "(" << box.min[0] << ", " << box.min[1] << ", " << box.min[2] << ") to (" << box.max[0] << ", " << box.max[1] << ", " << box.max[2] << ")";
+        text << "(" << box.min[0] << ", " << box.min[1] << ", " << box.min[2] << ") to (" << box.max[0] << ", "
+             << box.max[1] << ", " << box.max[2] << ")";
         return text.str();
     };
-    throw Error(Errc::InvalidInput, "placed_on: " + labels.path() + ": " + std::to_string(outside) + " of " + std::to_string(painted) +
-                                        " painted voxels lie outside the image, the first at " + to_text(first) + "; the labels reach from " +
-                                        box_text(own.world_box()) + ", the image from " + box_text(image.world_box()) +
-                                        "; check `spacing`, or save the labels with the image's geometry");
+    throw Error(Errc::InvalidInput,
+                "placed_on: " + labels.path() + ": " + std::to_string(outside) + " of " + std::to_string(painted) +
+                    " painted voxels lie outside the image, the first at " + to_text(first) +
+                    "; the labels reach from " + box_text(own.world_box()) + ", the image from " +
+                    box_text(image.world_box()) + "; check `spacing`, or save the labels with the image's geometry");
 }
 
 }  // namespace covol

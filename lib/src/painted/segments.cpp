@@ -25,7 +25,8 @@ std::map<int, std::string> segment_names(const std::string& path) {
         if (key == "LabelValue") label_of[segment] = std::atoi(line.c_str() + value + 2);
     }
     for (const auto& [segment, label] : label_of)
-        if (const auto name = name_of.find(segment); label > 0 && name != name_of.end() && !name->second.empty()) names[label] = name->second;
+        if (const auto name = name_of.find(segment); label > 0 && name != name_of.end() && !name->second.empty())
+            names[label] = name->second;
     return names;
 }
 

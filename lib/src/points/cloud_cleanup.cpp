@@ -32,8 +32,9 @@ constexpr std::size_t kFewest = 7;  // points that say anything about a neighbou
 class Cleaner {
     /// Called by CGAL, possibly from a thread of its own: false stops it.
     [[nodiscard]] auto parameters() const {
-        return CGAL::parameters::point_map(PointMap()).callback(
-            std::function<bool(double)>([this](double) { return !run_.cancelled(); }));
+        return CGAL::parameters::point_map(PointMap()).callback(std::function<bool(double)>([this](double) {
+            return !run_.cancelled();
+        }));
     }
 
 public:
@@ -91,11 +92,13 @@ public:
         constexpr unsigned kRing = 6;
         double radius = options_.wlop_radius;
         if (radius == 0)
-            radius = kRings * CGAL::compute_average_spacing<Tag>(entries_, kRing, parameters()) / std::sqrt(options_.wlop_share);
+            radius = kRings * CGAL::compute_average_spacing<Tag>(entries_, kRing, parameters()) /
+                     std::sqrt(options_.wlop_share);
         run_.check();
         std::vector<Point> points;
-        CGAL::wlop_simplify_and_regularize_point_set<Tag>(entries_, std::back_inserter(points),
-                                                          parameters().select_percentage(100 * options_.wlop_share).neighbor_radius(radius));
+        CGAL::wlop_simplify_and_regularize_point_set<Tag>(
+            entries_, std::back_inserter(points),
+            parameters().select_percentage(100 * options_.wlop_share).neighbor_radius(radius));
         run_.check();
         std::erase_if(points, [](const Point& p) { return !is_finite(p); });
         entries_.clear();
@@ -121,7 +124,9 @@ private:
         std::sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) { return a.second < b.second; });
         return removed;
     }
-    static bool is_finite(const Point& p) { return std::isfinite(p.x()) && std::isfinite(p.y()) && std::isfinite(p.z()); }
+    static bool is_finite(const Point& p) {
+        return std::isfinite(p.x()) && std::isfinite(p.y()) && std::isfinite(p.z());
+    }
 
     const CloudCleanupOptions& options_;
     const RunContext& run_;
@@ -145,8 +150,8 @@ std::vector<Vec3> clean(const std::vector<Vec3>& points, const CloudCleanupOptio
 
 std::string CloudCleanupOptions::why_invalid() const {
     detail::FieldChecks checks;
-    checks.expect(outlier_factor == 0 || (outlier_factor >= 1 && std::isfinite(outlier_factor)), "outlier_factor", "0 or >= 1",
-                  outlier_factor);
+    checks.expect(outlier_factor == 0 || (outlier_factor >= 1 && std::isfinite(outlier_factor)), "outlier_factor",
+                  "0 or >= 1", outlier_factor);
     checks.expect_not_negative("simplify", simplify);
     checks.expect(wlop_share > 0 && wlop_share <= 1, "wlop_share", "in (0,1]", wlop_share);
     checks.expect_not_negative("wlop_radius", wlop_radius);
@@ -154,8 +159,8 @@ std::string CloudCleanupOptions::why_invalid() const {
     return checks.lines();
 }
 
-std::vector<Vec3> clean_cloud(const std::vector<Vec3>& points, const CloudCleanupOptions& options, const RunContext& run,
-                              CloudCleanupReport* report) {
+std::vector<Vec3> clean_cloud(const std::vector<Vec3>& points, const CloudCleanupOptions& options,
+                              const RunContext& run, CloudCleanupReport* report) {
     detail::require_valid(options, "clean_cloud");
     for (const Vec3& p : points)
         if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2]))

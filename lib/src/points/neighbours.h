@@ -14,9 +14,11 @@ namespace covol::cloud {
 inline constexpr double kFirstRadius = 2, kMostRadius = 40;  // neighbours are looked for within, spacings
 
 struct Neighbour {
-    double squared;  ///< distance
+    double squared;    ///< distance
     std::uint32_t at;  ///< sorted position
-    friend bool operator<(const Neighbour& a, const Neighbour& b) { return a.squared != b.squared ? a.squared < b.squared : a.at < b.at; }
+    friend bool operator<(const Neighbour& a, const Neighbour& b) {
+        return a.squared != b.squared ? a.squared < b.squared : a.at < b.at;
+    }
 };
 
 /// Sums over neighbours, of where they lie from a point.
@@ -24,7 +26,8 @@ struct Moments {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
 };
-[[nodiscard]] inline Moments moments_of(const PointCells& cells, const Vec3& point, const std::vector<Neighbour>& near) {
+[[nodiscard]] inline Moments moments_of(const PointCells& cells, const Vec3& point,
+                                        const std::vector<Neighbour>& near) {
     Moments moments;
     for (const Neighbour& other : near) {
         const Vec3& q = cells.sorted()[other.at];
@@ -35,8 +38,8 @@ struct Moments {
     return moments;
 }
 
-/// visit(point, neighbours), from several threads, for each point as it was given: its `count` nearest others, the nearest
-/// first; fewer where the points end, or lie farther than 40 spacings.
+/// visit(point, neighbours), from several threads, for each point as it was given: its `count` nearest others, the
+/// nearest first; fewer where the points end, or lie farther than 40 spacings.
 /// @param cells   of an edge of about two spacings
 /// @param wanted  (sorted position) -> whether that point is visited
 template <typename Visit, typename Wanted>
@@ -56,7 +59,8 @@ void for_nearest(const PointCells& cells, double spacing, std::size_t count, Vis
                         const double x = q[0] - p[0], y = q[1] - p[1], z = q[2] - p[2], d2 = x * x + y * y + z * z;
                         if (d2 <= r * r && m != n) near.push_back({d2, m});
                     }
-                if (near.size() >= count || near.size() + 1 >= cells.sorted().size() || r > kMostRadius * spacing) break;
+                if (near.size() >= count || near.size() + 1 >= cells.sorted().size() || r > kMostRadius * spacing)
+                    break;
             }
             const std::size_t kept = std::min(count, near.size());
             std::partial_sort(near.begin(), near.begin() + std::ptrdiff_t(kept), near.end());

@@ -60,7 +60,10 @@ void PointCells::index_rows() {
     const std::int64_t count = count_[0] * count_[1];
     if (count > kMostRowsPerCell * std::int64_t(keys_.size())) return;
     rows_.assign(std::size_t(count) + 1, 0);
-    for (const std::uint64_t k : keys_) ++rows_[std::size_t((k >> (2 * kKeyBits)) * std::uint64_t(count_[1]) + (k >> kKeyBits & ((1U << kKeyBits) - 1))) + 1];
+    for (const std::uint64_t k : keys_)
+        ++rows_[std::size_t((k >> (2 * kKeyBits)) * std::uint64_t(count_[1]) +
+                            (k >> kKeyBits & ((1U << kKeyBits) - 1))) +
+                1];
     for (std::size_t n = 1; n < rows_.size(); ++n) rows_[n] += rows_[n - 1];
 }
 
@@ -87,7 +90,9 @@ void PointCells::find(const WorldBox& box, std::vector<Range>& ranges) const {
             }
             const auto from = std::lower_bound(begin, end, key(i, j, first[2]));
             const auto to = std::upper_bound(from, end, key(i, j, last[2]));
-            if (from != to) ranges.push_back({starts_[std::size_t(from - keys_.begin())], starts_[std::size_t(to - keys_.begin())]});
+            if (from != to)
+                ranges.push_back(
+                    {starts_[std::size_t(from - keys_.begin())], starts_[std::size_t(to - keys_.begin())]});
         }
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-// Points sorted into cubic cells, so that all in a box are a few contiguous ranges. No tree, no pointers: sorting is all
-// that it costs, for any number of points.
+// Points sorted into cubic cells, so that all in a box are a few contiguous ranges. No tree, no pointers: sorting is
+// all that it costs, for any number of points.
 #include <cstdint>
 #include <vector>
 
@@ -10,7 +10,9 @@ namespace covol::cloud {
 
 class PointCells {
 public:
-    struct Range { std::uint32_t begin, end; };
+    struct Range {
+        std::uint32_t begin, end;
+    };
 
     /// @param edge  of a cell, > 0; grown where the points' box would have more than 2^20 cells along an axis.
     /// At most 2^32 - 1 points.
@@ -38,10 +40,10 @@ private:
 
     double edge_;
     Vec3 lowest_;
-    std::array<std::int64_t, 3> count_;   // cells along each axis
+    std::array<std::int64_t, 3> count_;  // cells along each axis
     std::vector<std::uint32_t> order_, starts_;
-    std::vector<std::uint64_t> keys_;     // of the cells, ascending
-    std::vector<std::uint32_t> rows_;     // along k, the first of each in keys_; empty where most would be, too
+    std::vector<std::uint64_t> keys_;  // of the cells, ascending
+    std::vector<std::uint32_t> rows_;  // along k, the first of each in keys_; empty where most would be, too
     std::vector<Vec3> sorted_;
 };
 

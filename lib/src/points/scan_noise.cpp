@@ -1,5 +1,5 @@
-// Planes fitted to neighbourhoods of a scan (principal components; Hoppe et al. 1992): how far points lie from them, and
-// their projection (a moving average of order one).
+// Planes fitted to neighbourhoods of a scan (principal components; Hoppe et al. 1992): how far points lie from them,
+// and their projection (a moving average of order one).
 #include "covol/scan_noise.h"
 
 #include <tbb/parallel_for.h>
@@ -16,7 +16,8 @@ namespace covol {
 namespace {
 
 constexpr double kThinShare = 0.35;  // voxels, of the mean distance to the local plane
-constexpr double kCleanShare = 0.25;  // where larger ones bend; scans as thick as their spacing are wide have 0.3 to 0.45
+// where larger ones bend; scans as thick as their spacing are wide have 0.3 to 0.45
+constexpr double kCleanShare = 0.25;
 constexpr double kPlaneVoxels = 2.5, kGrowth = 1.25;
 constexpr int kCoarsest = 7;
 constexpr std::size_t kSamples = 3000, kLeastNeighbours = 6;

@@ -55,7 +55,8 @@ std::vector<Vec3> merge_close_points(const std::vector<Vec3>& points, double cel
 std::vector<std::uint32_t> spatial_order(const std::vector<Vec3>& points, std::size_t most) {
     if (most == 0) throw Error(Errc::InvalidOptions, "spatial_order: most: expected > 0, got 0");
     if (points.size() > std::numeric_limits<std::uint32_t>::max())
-        throw Error(Errc::InvalidInput, "spatial_order: expected fewer than 2^32 points, got " + std::to_string(points.size()));
+        throw Error(Errc::InvalidInput,
+                    "spatial_order: expected fewer than 2^32 points, got " + std::to_string(points.size()));
     if (points.empty()) return {};
     constexpr int kBits = 10;
     const WorldBox box = bounding_box(points);

@@ -19,7 +19,7 @@ Point cross(const Point& a, const Point& b) {
     return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-constexpr int kSide = kLeafDim + 1;                                ///< voxels along an edge of a leaf's cells
+constexpr int kSide = kLeafDim + 1;                                 ///< voxels along an edge of a leaf's cells
 constexpr float kOutside = std::numeric_limits<float>::infinity();  ///< stands for a voxel outside the domain
 
 constexpr int cell_voxel(int i, int j, int k) { return (i * kSide + j) * kSide + k; }
@@ -77,8 +77,8 @@ private:
         const std::array<int, 3> n = {side[0] ? 1 : kLeafDim, side[1] ? 1 : kLeafDim, side[2] ? 1 : kLeafDim};
         for (int i = 0; i < n[0]; ++i)
             for (int j = 0; j < n[1]; ++j) {
-                float* to = values_.data() +
-                            cell_voxel(i + side[0] * kLeafDim, j + side[1] * kLeafDim, side[2] * kLeafDim);
+                float* to =
+                    values_.data() + cell_voxel(i + side[0] * kLeafDim, j + side[1] * kLeafDim, side[2] * kLeafDim);
                 if (buffer)
                     std::copy_n(buffer + leaf_offset(i, j, 0), n[2], to);
                 else

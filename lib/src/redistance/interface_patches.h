@@ -22,11 +22,12 @@ struct Patch {
     std::uint32_t count;
 };
 
-/// The zero level set of linear interpolation along the voxel edges, cell by cell. Cells of a leaf have their first voxel there.
+/// The zero level set of linear interpolation along the voxel edges, cell by cell. Cells of a leaf have their first
+/// voxel there.
 struct InterfacePatches {
-    std::vector<Coord> leaves;                     ///< sorted origins of the leaves with patches
-    std::vector<std::uint32_t> first;              ///< leaf i has the patches [first[i], first[i+1])
-    std::vector<Patch> patches;                    ///< ordered by leaf, then by cell
+    std::vector<Coord> leaves;         ///< sorted origins of the leaves with patches
+    std::vector<std::uint32_t> first;  ///< leaf i has the patches [first[i], first[i+1])
+    std::vector<Patch> patches;        ///< ordered by leaf, then by cell
     std::vector<std::array<float, 3>> vertices;
 
     [[nodiscard]] PatchFan fan(const Patch& patch) const {
@@ -43,6 +44,7 @@ enum class DomainEnd {
 };
 
 /// Finds them; negative is inside.
-[[nodiscard]] InterfacePatches find_interface(const FloatGrid& u, const Domain& domain, DomainEnd end, const RunContext& run);
+[[nodiscard]] InterfacePatches find_interface(const FloatGrid& u, const Domain& domain, DomainEnd end,
+                                              const RunContext& run);
 
 }  // namespace covol::detail

@@ -27,7 +27,14 @@ void load_u(const HaloField& u, const LeafBand& band, const Domain& domain, std:
 
 LocalDistance::LocalDistance(const LeafBand& band, const HaloField& u, const std::vector<unsigned char>& zone,
                              const Domain& domain, float clamp, float width, Scratch scratch)
-    : band_(band), u_(u), zone_(zone), domain_(domain), clamp_(clamp), width_(width), far_(1, width, 0), scratch_(scratch) {}
+    : band_(band),
+      u_(u),
+      zone_(zone),
+      domain_(domain),
+      clamp_(clamp),
+      width_(width),
+      far_(1, width, 0),
+      scratch_(scratch) {}
 
 void LocalDistance::compute() {
     tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) { start(leaf); });
@@ -41,7 +48,8 @@ void LocalDistance::start(std::size_t leaf) {
     float* d = distances(leaf);
     if (!zone_[leaf]) {
         const float* value = u_.values.leaf(leaf);
-        for (int n = 0; n < kLeafSize; ++n) d[n] = std::abs(value[n]) < kUnclamped * clamp_ ? std::abs(value[n]) : width_;
+        for (int n = 0; n < kLeafSize; ++n)
+            d[n] = std::abs(value[n]) < kUnclamped * clamp_ ? std::abs(value[n]) : width_;
         return;
     }
     std::fill_n(d, kLeafSize, width_);

@@ -12,14 +12,15 @@ namespace covol::detail {
 /// before the band is made again.
 inline constexpr double kTrackingWidth = 5.0;
 
-/// Distances to the zero level set of a field on some leaves of a band, up to a width, in voxels: Godunov's scheme with the
-/// surface's cuts through voxel edges as boundary. First order, a twentieth of the cost of looking for nearest points.
+/// Distances to the zero level set of a field on some leaves of a band, up to a width, in voxels: Godunov's scheme with
+/// the surface's cuts through voxel edges as boundary. First order, a twentieth of the cost of looking for nearest
+/// points.
 class LocalDistance {
 public:
     static constexpr std::size_t kCuts = 3 * kLeafSize;  ///< floats for each leaf
     struct Scratch {
-        float* cuts;       ///< kCuts for each leaf to compute
-        float* distances;  ///< kLeafSize for each leaf
+        float* cuts;                           ///< kCuts for each leaf to compute
+        float* distances;                      ///< kLeafSize for each leaf
         const std::uint32_t* place = nullptr;  ///< of a leaf among `cuts`; null: the leaf's own number
     };
 
@@ -28,14 +29,14 @@ public:
     /// @param clamp    |u| from there on says nothing
     /// @param width    how far to go, voxels
     /// @param scratch  nothing in it is read
-    LocalDistance(const LeafBand& band, const HaloField& u, const std::vector<unsigned char>& zone, const Domain& domain,
-                  float clamp, float width, Scratch scratch);
+    LocalDistance(const LeafBand& band, const HaloField& u, const std::vector<unsigned char>& zone,
+                  const Domain& domain, float clamp, float width, Scratch scratch);
     void compute();
 
     /// The width where the surface is farther.
     [[nodiscard]] const float* distance(std::size_t leaf) const { return scratch_.distances + leaf * kLeafSize; }
-    /// The same, but next to the surface |u| is only scaled: by one factor for a voxel and those across the edges that the
-    /// surface cuts, so that it hardly moves (D. Hartmann, M. Meinke, W. Schroeder 2010, scheme CR-1).
+    /// The same, but next to the surface |u| is only scaled: by one factor for a voxel and those across the edges that
+    /// the surface cuts, so that it hardly moves (D. Hartmann, M. Meinke, W. Schroeder 2010, scheme CR-1).
     [[nodiscard]] const float* settled(std::size_t leaf) const { return cut(leaf); }
 
 private:

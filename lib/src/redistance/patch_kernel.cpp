@@ -27,11 +27,12 @@ COVOL_INLINE Real unit(Real x) {
     return x < 1.0F ? x : Real{} + 1.0F;
 }
 
-// The nearest point lies in a triangle, on a spoke between two, or on the outline. One source for a float and for eight.
+// The nearest point lies in a triangle, on a spoke between two, or on the outline. One source for a float and for
+// eight.
 template <typename Real>
 COVOL_INLINE Hit<Real> nearest_of(const PatchFan& fan, const Real (&arm)[3]) {
     Real within = Real{} + std::numeric_limits<float>::infinity(), outline = within;
-    const auto keep_least = [](Real& least, Real squared) __attribute__((always_inline)) {
+    const auto keep_least = [](Real & least, Real squared) __attribute__((always_inline)) {
         least = squared < least ? squared : least;
     };
     const Real first = dot(arm, fan.triangles[0].from);
@@ -51,7 +52,8 @@ COVOL_INLINE Hit<Real> nearest_of(const PatchFan& fan, const Real (&arm)[3]) {
 
         const Real side[3] = {arm[0] - t.from[0], arm[1] - t.from[1], arm[2] - t.from[2]};
         const Real on_edge = unit(dot(side, t.edge) * t.inverse_edge);
-        const Real rest[3] = {side[0] - on_edge * t.edge[0], side[1] - on_edge * t.edge[1], side[2] - on_edge * t.edge[2]};
+        const Real rest[3] = {side[0] - on_edge * t.edge[0], side[1] - on_edge * t.edge[1],
+                              side[2] - on_edge * t.edge[2]};
         keep_least(outline, rest[0] * rest[0] + rest[1] * rest[1] + rest[2] * rest[2]);
         from = to;
     }
@@ -88,7 +90,8 @@ PatchFan::PatchFan(const float* axis_of, const float* center, const std::array<f
             to[k] = next[k] - center[k];
             t.edge[k] = next[k] - vertices[n][k];
         }
-        for (int k = 0; k < 3; ++k) t.normal[k] = t.from[(k + 1) % 3] * to[(k + 2) % 3] - t.from[(k + 2) % 3] * to[(k + 1) % 3];
+        for (int k = 0; k < 3; ++k)
+            t.normal[k] = t.from[(k + 1) % 3] * to[(k + 2) % 3] - t.from[(k + 2) % 3] * to[(k + 1) % 3];
         t.from_from = product(t.from, t.from), t.from_to = product(t.from, to), t.to_to = product(to, to);
         t.area = product(t.normal, t.normal);
         const auto inverse = [](float square) { return square > 0 ? 1 / square : 0.0F; };
@@ -105,7 +108,8 @@ PatchHit nearest_on(const PatchFan& fan, const float arm[3]) {
 }
 
 // Lanes lie along the axis that the polygon faces most: the cylinder's section moves from lane to lane by the slope.
-COVOL_CLONES void offer_patch(const PatchFan& fan, const PatchCylinder& cylinder, std::int32_t index, const PatchLeaf& leaf) {
+COVOL_CLONES void offer_patch(const PatchFan& fan, const PatchCylinder& cylinder, std::int32_t index,
+                              const PatchLeaf& leaf) {
     constexpr int kStride[3] = {64, 8, 1};
     const auto size = [&](int a) { return std::abs(fan.axis[a]); };
     const int m = size(0) >= size(1) ? (size(0) >= size(2) ? 0 : 2) : (size(1) >= size(2) ? 1 : 2);
@@ -113,7 +117,8 @@ COVOL_CLONES void offer_patch(const PatchFan& fan, const PatchCylinder& cylinder
     if (fan.axis[m] == 0) return;
     const float slope_u = fan.axis[u] / fan.axis[m], slope_v = fan.axis[v] / fan.axis[m];
     const float radius = cylinder.radius;
-    const float half = cylinder.half_width * size(m) + radius * std::sqrt(std::max(0.0F, 1 - fan.axis[m] * fan.axis[m]));
+    const float half =
+        cylinder.half_width * size(m) + radius * std::sqrt(std::max(0.0F, 1 - fan.axis[m] * fan.axis[m]));
     const Float8 lane = {0, 1, 2, 3, 4, 5, 6, 7};
     const Float8 along = lane - cylinder.center[m];
     const Positions at_u(cylinder.center[u] + along * slope_u, radius * std::sqrt(1 + slope_u * slope_u));
@@ -133,7 +138,8 @@ COVOL_CLONES void offer_patch(const PatchFan& fan, const PatchCylinder& cylinder
             arm[u] = pu - cylinder.center[u];
             arm[v] = pv - cylinder.center[v];
             const Hit<Float8> hit = nearest_of(fan, arm);
-            const Int8 voxel = __builtin_convertvector(lane * float(kStride[m]) + pu * float(kStride[u]) + pv * float(kStride[v]), Int8);
+            const Int8 voxel = __builtin_convertvector(
+                lane * float(kStride[m]) + pu * float(kStride[u]) + pv * float(kStride[v]), Int8);
             for (int n = 0; n < 8; ++n)
                 if (here[n]) leaf.offer(voxel[n], {hit.squared[n], hit.is_interior[n] != 0}, index);
         }

@@ -13,7 +13,7 @@ struct PatchFan {
         float from[3];  ///< the first vertex, from the centre
         float edge[3];  ///< from the first to the second vertex
         float normal[3];
-        float from_from, from_to, to_to;    ///< products of the vertices' arms
+        float from_from, from_to, to_to;   ///< products of the vertices' arms
         float area;                        ///< the normal's square; 0 where there is none
         float inverse_area;                ///< infinite where there is none
         float inverse_from, inverse_edge;  ///< of squared lengths; 0 where there is none
@@ -27,8 +27,8 @@ struct PatchFan {
 };
 
 struct PatchHit {
-    float squared;    ///< distance
-    bool is_interior; ///< the nearest point lies within the polygon, not on its outline
+    float squared;     ///< distance
+    bool is_interior;  ///< the nearest point lies within the polygon, not on its outline
 };
 
 /// @param arm  from the polygon's centre to the point that asks
@@ -41,9 +41,9 @@ struct PatchCylinder {
     float half_width;  ///< no voxel farther away asks
 };
 struct PatchLeaf {
-    float* squared;             ///< 512 squared distances
-    std::int32_t* patch;        ///< whose they are
-    std::uint64_t* interior;    ///< 512 bits, PatchHit::is_interior
+    float* squared;           ///< 512 squared distances
+    std::int32_t* patch;      ///< whose they are
+    std::uint64_t* interior;  ///< 512 bits, PatchHit::is_interior
 
     /// Voxel p takes the patch `index` where that is nearer than the one it has. @return whether it did
     bool offer(int p, const PatchHit& hit, std::int32_t index) const {

@@ -58,7 +58,8 @@ public:
         std::vector<LeafMask> beside(band_.size());
         tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) { beside[leaf] = beside_creases(leaf); });
         propagate(band_, beside, run, [this](std::size_t leaf, int p, std::size_t other, int q) {
-            return !(is_on(interior_[leaf], p) && is_on(interior_[other], q)) && try_patch(leaf, p, patch_.leaf(other)[q]);
+            return !(is_on(interior_[leaf], p) && is_on(interior_[other], q)) &&
+                   try_patch(leaf, p, patch_.leaf(other)[q]);
         });
     }
 
@@ -81,7 +82,8 @@ private:
     void seed(std::size_t leaf) {
         const Coord origin = band_.origin(leaf);
         for (int n = 0; n < 27; ++n) {
-            const Coord from = origin.offsetBy((n / 9 - 1) * kLeafDim, (n / 3 % 3 - 1) * kLeafDim, (n % 3 - 1) * kLeafDim);
+            const Coord from =
+                origin.offsetBy((n / 9 - 1) * kLeafDim, (n / 3 % 3 - 1) * kLeafDim, (n % 3 - 1) * kLeafDim);
             const auto at = std::lower_bound(interface_.leaves.begin(), interface_.leaves.end(), from);
             if (at == interface_.leaves.end() || *at != from) continue;
             const std::size_t m = static_cast<std::size_t>(at - interface_.leaves.begin());
@@ -114,8 +116,8 @@ private:
         LeafMask result = own;
         for (int axis = 0; axis < 3; ++axis)
             for (int sign = -1; sign <= 1; sign += 2) {
-                const std::int32_t across =
-                    band_.neighbours(leaf)[neighbour_slot(axis == 0 ? sign : 0, axis == 1 ? sign : 0, axis == 2 ? sign : 0)];
+                const std::int32_t across = band_.neighbours(
+                    leaf)[neighbour_slot(axis == 0 ? sign : 0, axis == 1 ? sign : 0, axis == 2 ? sign : 0)];
                 const LeafMask look = looking_at(own, across != band_.none() ? outside(across) : kNone, axis, sign);
                 for (int word = 0; word < 8; ++word) result[word] |= look[word];
             }
@@ -133,7 +135,8 @@ private:
     std::vector<LeafMask> interior_;  ///< voxels whose nearest point lies within their patch
 };
 
-/// Bit p: voxel p of the leaf is inside. Beyond an open end of the domain a voxel has the sign of the nearest one within.
+/// Bit p: voxel p of the leaf is inside. Beyond an open end of the domain a voxel has the sign of the nearest one
+/// within.
 LeafMask inside_mask(const FloatGrid::ConstAccessor& accessor, const Coord& origin, const openvdb::CoordBBox& domain,
                      DomainEnd end) {
     LeafMask inside{};
@@ -155,8 +158,8 @@ LeafMask inside_mask(const FloatGrid::ConstAccessor& accessor, const Coord& orig
     return inside;
 }
 
-// The flood passes over leaves whose voxels are all active. Their signs are known; where the band ends at an open end of the
-// domain it would guess them wrong.
+// The flood passes over leaves whose voxels are all active. Their signs are known; where the band ends at an open end
+// of the domain it would guess them wrong.
 void fill_tiles(FloatGrid::TreeType& tree) {
     using Leaf = FloatGrid::TreeType::LeafNodeType;
     std::vector<Leaf*> leaves;
@@ -175,12 +178,14 @@ void fill_tiles(FloatGrid::TreeType& tree) {
 FloatGridPtr redistance(const FloatGrid& u, const Domain& domain, double half_width, DomainEnd end, const char* name,
                         const RunContext& run) {
     if (!(u.background() > 0))
-        throw Error(Errc::InvalidInput, std::string(name) + ": grid '" + u.getName() + "': expected a background > 0 (outside), got " +
+        throw Error(Errc::InvalidInput, std::string(name) + ": grid '" + u.getName() +
+                                            "': expected a background > 0 (outside), got " +
                                             std::to_string(u.background()));
     const InterfacePatches interface = find_interface(u, domain, end, run);
     if (interface.patches.empty())
-        throw Error(Errc::InvalidInput, std::string(name) + ": grid '" + u.getName() +
-                                            "' has no zero crossing: nothing in the domain is inside, or nothing outside");
+        throw Error(Errc::InvalidInput,
+                    std::string(name) + ": grid '" + u.getName() +
+                        "' has no zero crossing: nothing in the domain is inside, or nothing outside");
     LeafBand band(band_leaves(interface, half_width));
     NearestPatches nearest(interface, band, half_width);
     nearest.find(run);

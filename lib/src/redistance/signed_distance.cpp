@@ -29,7 +29,8 @@ struct Field {
     const std::vector<LeafMask>& valid;  // voxels that take part
     std::vector<LeafMask> inside;        // phi < 0, of those
 
-    /// phi of voxel (i,j,k) of a leaf's frame, at most one outside the leaf along one axis; nothing where it takes no part.
+    /// phi of voxel (i,j,k) of a leaf's frame, at most one outside the leaf along one axis; nothing where it takes no
+    /// part.
     [[nodiscard]] std::optional<float> at(std::size_t leaf, int i, int j, int k) const {
         const int slot = neighbour_slot(i >> 3, j >> 3, k >> 3);
         const std::int32_t there = slot == 13 ? std::int32_t(leaf) : band.neighbours(leaf)[slot];
@@ -48,8 +49,10 @@ LeafMask beside_interface(const Field& field, std::size_t leaf) {
             const int slot = neighbour_slot(axis == 0 ? sign : 0, axis == 1 ? sign : 0, axis == 2 ? sign : 0);
             const std::int32_t across = field.band.neighbours(leaf)[slot];
             const bool has_neighbour = across != field.band.none();
-            const LeafMask inside = looking_at(field.inside[leaf], has_neighbour ? field.inside[across] : kNone, axis, sign);
-            const LeafMask valid = looking_at(field.valid[leaf], has_neighbour ? field.valid[across] : kNone, axis, sign);
+            const LeafMask inside =
+                looking_at(field.inside[leaf], has_neighbour ? field.inside[across] : kNone, axis, sign);
+            const LeafMask valid =
+                looking_at(field.valid[leaf], has_neighbour ? field.valid[across] : kNone, axis, sign);
             for (int word = 0; word < 8; ++word)
                 result[word] |= (field.inside[leaf][word] ^ inside[word]) & valid[word] & field.valid[leaf][word];
         }
@@ -108,10 +111,10 @@ float distance_to_foot(const Foot& foot, const Coord& voxel) {
 
 /// The interface, seen from the voxels beside it.
 struct Interface {
-    std::vector<LeafMask> inside;  ///< by leaf: phi < 0
-    std::vector<LeafMask> beside;  ///< by leaf: voxels with a foot
-    std::vector<Foot> feet;        ///< by leaf, then by voxel
-    std::vector<float> distances;  ///< of those voxels
+    std::vector<LeafMask> inside;    ///< by leaf: phi < 0
+    std::vector<LeafMask> beside;    ///< by leaf: voxels with a foot
+    std::vector<Foot> feet;          ///< by leaf, then by voxel
+    std::vector<float> distances;    ///< of those voxels
     std::vector<std::size_t> first;  ///< foot of each leaf
 
     [[nodiscard]] std::vector<Vec3> points() const {
@@ -121,7 +124,8 @@ struct Interface {
     }
 };
 
-Interface find_interface(const LeafBand& band, const LeafArray<float>& phi, const std::vector<LeafMask>& inside_domain) {
+Interface find_interface(const LeafBand& band, const LeafArray<float>& phi,
+                         const std::vector<LeafMask>& inside_domain) {
     Field field{band, phi, inside_domain, std::vector<LeafMask>(band.size(), LeafMask{})};
     tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
         for (int at = 0; at < kLeafSize; ++at)
@@ -170,7 +174,8 @@ LeafArray<float> signed_distance(const LeafBand& band, const LeafArray<float>& p
         const std::int32_t leaf = band.find(nearest.origin);
         if (leaf == band.none()) return;
         for (int at = 0; at < kLeafSize; ++at) {
-            if (nearest.nearest[at] < 0 || !is_on(inside_domain[leaf], at) || is_on(interface.beside[leaf], at)) continue;
+            if (nearest.nearest[at] < 0 || !is_on(inside_domain[leaf], at) || is_on(interface.beside[leaf], at))
+                continue;
             const Foot& foot = interface.feet[tube.source[nearest.nearest[at]]];
             const float distance = distance_to_foot(foot, nearest.origin.offsetBy(at >> 6, at >> 3 & 7, at & 7));
             float& u = result.leaf(leaf)[at];
@@ -191,8 +196,9 @@ FloatGridPtr make_band(const LeafBand& band, const LeafColumns& columns, const L
     for (std::size_t n = 0; n < columns.pieces().size(); ++n) {
         if (!interior[n]) continue;
         const CoordBBox box = columns.voxels(columns.pieces()[n]);
-        grid->tree().sparseFill({Coord::maxComponent(box.min(), limit.min()), Coord::minComponent(box.max(), limit.max())},
-                                -outside, false);
+        grid->tree().sparseFill(
+            {Coord::maxComponent(box.min(), limit.min()), Coord::minComponent(box.max(), limit.max())}, -outside,
+            false);
     }
     std::vector<std::unique_ptr<Leaf>> leaves(band.size());
     std::vector<char> is_interior(band.size(), 0);

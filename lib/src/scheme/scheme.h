@@ -4,7 +4,8 @@
 // The co-volume scheme on one leaf of 8^3 voxels: plain functions on arrays, no OpenVDB types.
 //
 // Units: u and d are in voxels, tau in h, delta in h, so that h does not appear. A padded buffer holds a leaf and one
-// layer around it: 10 x 10 rows of 16 floats, the row's voxels -1..8 at 3..12, so that no load of 8 crosses a cache line.
+// layer around it: 10 x 10 rows of 16 floats, the row's voxels -1..8 at 3..12, so that no load of 8 crosses a cache
+// line.
 //
 // scheme_kernels.cpp is compiled once for each instruction set; kernels() picks at run time.
 namespace covol::detail {
@@ -20,11 +21,12 @@ enum Face { kMinusI, kPlusI, kMinusJ, kPlusJ, kMinusK, kPlusK };
 /// Marks a value of d or g that is not known; no pull acts across a face with one.
 inline constexpr float kUnknown = -1.0F;
 
-/// A coefficient of a row, 0 to 1, in units of 1/kShareUnit: in half a float's memory, for that is what a sweep waits for.
+/// A coefficient of a row, 0 to 1, in units of 1/kShareUnit: in half a float's memory, for that is what a sweep waits
+/// for.
 using Share = unsigned short;
 inline constexpr int kShareUnit = 65535;
-/// Where a leaf's rows have the share of face f of voxel n: eight voxels along k side by side, face after face, so that a
-/// sweep reads one stream.
+/// Where a leaf's rows have the share of face f of voxel n: eight voxels along k side by side, face after face, so that
+/// a sweep reads one stream.
 inline constexpr int share_at(int f, int n) { return (n >> 3) * 48 + f * 8 + (n & 7); }
 
 /// A leaf's own 512 values and those of the leaves across its faces, by Face.
@@ -39,12 +41,12 @@ struct NextRows {
 };
 
 struct SchemeConstants {
-    float tau;           ///< τ/h
-    float theta;         ///< θ
-    float rho;           ///< ρ
-    float curvature;     ///< τδ/h²
-    float epsilon2;      ///< ε² of |∇u|
-    float edge_epsilon2; ///< ε² of |∇g|, per voxel
+    float tau;            ///< τ/h
+    float theta;          ///< θ
+    float rho;            ///< ρ
+    float curvature;      ///< τδ/h²
+    float epsilon2;       ///< ε² of |∇u|
+    float edge_epsilon2;  ///< ε² of |∇g|, per voxel
 };
 
 /// What the rows of a leaf are like.
@@ -57,7 +59,8 @@ struct SchemeKernels {
     const char* name;  ///< "avx2", ...
 
     /// Coefficients from u^{n-1}: Eqs. (13)-(17), (19)-(22), divided by the row's diagonal, c[q] = -a_pq / a_pp >= 0,
-    /// so that a row reads u_p = b_p + Σ_q c[q] (u_q - b_p), b = u^{n-1}. Each is right to half a unit, and their sum is less than 1.
+    /// so that a row reads u_p = b_p + Σ_q c[q] (u_q - b_p), b = u^{n-1}. Each is right to half a unit, and their sum
+    /// is less than 1.
     /// @param u      padded, with edges and corners
     /// @param phi    padded (faces), potential of the points' pull; null without
     /// @param g      padded (faces), edge detector; null without
@@ -71,8 +74,8 @@ struct SchemeKernels {
     /// `inner` SOR sweeps in four colours in place over a leaf's rows of eight with an active voxel.
     /// @param next  b and c of the leaf that comes next, to be asked from memory meanwhile
     /// @return Σ (Gauss-Seidel value - u)² seen during the first sweep
-    double (*relax)(const LeafStar& u, const float* b, const Share* c, const unsigned long long* active, float omega, int inner,
-                    const NextRows& next);
+    double (*relax)(const LeafStar& u, const float* b, const Share* c, const unsigned long long* active, float omega,
+                    int inner, const NextRows& next);
 
     /// As relax, for u_p - t Σ_q (u_q - u_p) = b_p on every voxel: one step of the implicit heat equation.
     double (*heat)(const LeafStar& u, const float* b, float t, float omega, int inner);
@@ -80,8 +83,8 @@ struct SchemeKernels {
     /// Mean over the 24 tetrahedra of |∇u|, per voxel; 512 values. @param u padded, with edges and corners
     void (*mean_gradient)(const float* u, float* out);
 
-    /// Godunov's upwind scheme for |∇d| = 1 in a leaf, in voxels: Gauss-Seidel in four orders of the rows until no value
-    /// falls by more than `tolerance` (R. Zhao 2005, with a surface that cuts voxel edges as boundary).
+    /// Godunov's upwind scheme for |∇d| = 1 in a leaf, in voxels: Gauss-Seidel in four orders of the rows until no
+    /// value falls by more than `tolerance` (R. Zhao 2005, with a surface that cuts voxel edges as boundary).
     /// @param d    padded (faces), >= 0; values only fall; the halo is not written
     /// @param cut  3 x 512, by axis: 1/s where the surface cuts an edge of the voxel along it, s in (0,1] away; else 0
     /// @return     whether a value fell by more than `tolerance`

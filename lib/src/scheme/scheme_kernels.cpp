@@ -76,10 +76,10 @@ inline FaceSums face_sums(Lanes p, Lanes q, Lanes z00, Lanes z10, Lanes z01, Lan
 
 /// What the faces of a leaf add up to.
 struct Faces {
-    alignas(64) float weight_i[9 * 64];    // face (i,j,k) between voxels i-1 and i
-    alignas(64) float weight_j[8 * 9 * 8]; // (i,j,k), between j-1 and j
-    alignas(64) float weight_k[64 * kRow]; // (i,j,k), between k-1 and k; rows of 16
-    alignas(64) float norm[512];           // Σ_24 |∇u_T| of each voxel
+    alignas(64) float weight_i[9 * 64];     // face (i,j,k) between voxels i-1 and i
+    alignas(64) float weight_j[8 * 9 * 8];  // (i,j,k), between j-1 and j
+    alignas(64) float weight_k[64 * kRow];  // (i,j,k), between k-1 and k; rows of 16
+    alignas(64) float norm[512];            // Σ_24 |∇u_T| of each voxel
 };
 
 inline void add(float* to, Lanes what) { store(to, load(to) + what); }
@@ -147,9 +147,7 @@ struct Star {
         q[kMinusK] = load(row - 1), q[kPlusK] = load(row + 1);
     }
     /// q - p, or 0 where either is unknown
-    [[nodiscard]] Lanes difference(int face) const {
-        return (q[face] >= 0.0F) & (p >= 0.0F) ? q[face] - p : Lanes{};
-    }
+    [[nodiscard]] Lanes difference(int face) const { return (q[face] >= 0.0F) & (p >= 0.0F) ? q[face] - p : Lanes{}; }
 };
 
 // velocity[f] = v_pq / h², Eqs. (17), (20).
@@ -174,8 +172,8 @@ inline Lanes lanes_of(unsigned bits) {
     return ((LaneBits{} + int(bits)) & kBit) != 0 ? broadcast(1.0F) : Lanes{};
 }
 
-/// a * scale, rounded alike for all faces, so that what is symmetric stays so. A row that rounds up to 1 or more gets one
-/// unit less on each face.
+/// a * scale, rounded alike for all faces, so that what is symmetric stays so. A row that rounds up to 1 or more gets
+/// one unit less on each face.
 inline void store_shares(const Lanes a[6], Lanes scale, Share* c) {
     LaneBits share[6], total = LaneBits{};
     for (int f = 0; f < 6; ++f) {
@@ -230,7 +228,9 @@ RowFacts assemble(const float* u, const float* phi, const float* g, const float*
 /// u_p = known + minus (u_{k-1} - old) + plus (u_{k+1} - old) for a row of eight along k.
 struct RowEquation {
     Lanes known, minus, plus, old;
-    [[nodiscard]] Lanes value(Lanes before, Lanes after) const { return known + (minus * (before - old) + plus * (after - old)); }
+    [[nodiscard]] Lanes value(Lanes before, Lanes after) const {
+        return known + (minus * (before - old) + plus * (after - old));
+    }
 };
 
 /// The rows of eight around row (i,j) of a leaf, across its faces too.
@@ -270,8 +270,8 @@ inline double relax_rows(const LeafStar& u, RowMask rows, float omega, int inner
     return sum(residual);
 }
 
-double relax(const LeafStar& u, const float* b, const Share* c, const unsigned long long* active, float omega, int inner,
-             const NextRows& next) {
+double relax(const LeafStar& u, const float* b, const Share* c, const unsigned long long* active, float omega,
+             int inner, const NextRows& next) {
     return relax_rows(u, active_rows(active), omega, inner, [b, c, next](const RowStar& beside, int row) {
         constexpr float kUnit = 1.0F / kShareUnit;
         __builtin_prefetch(next.c + share_at(0, row));
@@ -290,7 +290,8 @@ double heat(const LeafStar& u, const float* b, float t, float omega, int inner) 
     const float scale = 1.0F / (1.0F + 6.0F * t);
     const Lanes side = broadcast(scale * t);
     return relax_rows(u, ~RowMask{0}, omega, inner, [b, t, scale, side](const RowStar& beside, int row) {
-        const Lanes across = (load(beside.minus_i) + load(beside.plus_i)) + (load(beside.minus_j) + load(beside.plus_j));
+        const Lanes across =
+            (load(beside.minus_i) + load(beside.plus_i)) + (load(beside.minus_j) + load(beside.plus_j));
         return RowEquation{scale * (load(b + row) + t * across), side, side, Lanes{}};
     });
 }

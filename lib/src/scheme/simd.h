@@ -9,7 +9,7 @@
 namespace covol::detail {
 namespace {
 
-typedef float Lanes __attribute__((vector_size(32)));                        // 8 floats
+typedef float Lanes __attribute__((vector_size(32)));                              // 8 floats
 typedef float LooseLanes __attribute__((vector_size(32), aligned(4), may_alias));  // the same at any address
 typedef unsigned short LooseShorts __attribute__((vector_size(16), aligned(2), may_alias));
 typedef int LaneBits __attribute__((vector_size(32)));
@@ -25,7 +25,9 @@ inline Lanes load_shares(const unsigned short* p) {
 #endif
     return __builtin_convertvector(whole, Lanes);
 }
-inline void store(unsigned short* p, LaneBits v) { *reinterpret_cast<LooseShorts*>(p) = __builtin_convertvector(v, LooseShorts); }
+inline void store(unsigned short* p, LaneBits v) {
+    *reinterpret_cast<LooseShorts*>(p) = __builtin_convertvector(v, LooseShorts);
+}
 /// v[k-1], and at k = 0 of `edge`.
 inline Lanes shifted_up(Lanes v, Lanes edge) { return __builtin_shufflevector(v, edge, 8, 0, 1, 2, 3, 4, 5, 6); }
 /// v[k+1], and at k = 7 of `edge`.

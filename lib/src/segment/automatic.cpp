@@ -11,15 +11,16 @@ namespace covol {
 namespace pipeline {
 namespace {
 
-constexpr double kFewPoints = 1000;  // fewer get a voxel size at which their surface has as many voxels as this many would
-constexpr double kViewVoxel = 0.5;    // cells of the indicator, for a cloud that encloses nothing
-constexpr double kCloudNoise = 0.6;   // voxels of a cloud, in standard deviations of its points
+// fewer get a voxel size at which their surface has as many voxels as this many would
+constexpr double kFewPoints = 1000;
+constexpr double kViewVoxel = 0.5;         // cells of the indicator, for a cloud that encloses nothing
+constexpr double kCloudNoise = 0.6;        // voxels of a cloud, in standard deviations of its points
 constexpr double kSameSeedVoxels = 1e-3;   // seeds closer than this are one position
 constexpr double kMergeVoxels = 0.25;      // points closer than this do not move the surface apart
 constexpr double kAttractionVoxels = 5.0;  // automatic range of the points after starts other than tagging
 constexpr double kTagDeltaVoxels = 0.5, kTagSigmaVoxels = 2.0;  // measured as kTagAttractionVoxels
-constexpr double kScanRadiusVoxels = 2.5;  // layers of a scan within it are averaged
-constexpr double kNoisyShare = 0.3;        // of a voxel: a layer of points thicker than this is averaged
+constexpr double kScanRadiusVoxels = 2.5;                       // layers of a scan within it are averaged
+constexpr double kNoisyShare = 0.3;  // of a voxel: a layer of points thicker than this is averaged
 
 // A thick layer of points, or several beside each other, has its surface in the middle.
 void average_noise(Job& job) {
@@ -62,10 +63,12 @@ void choose_start(Job& job) {
     Start::Kind& kind = job.options.start.kind;
     if (kind != Start::Kind::Auto || !job.starts_from_marks()) return;
     kind = Start::Kind::Tag;
-    if (!job.guided() || job.options.contours || job.options.tag_distance > 0 || job.points.size() > kMostGuessMarks) return;
+    if (!job.guided() || job.options.contours || job.options.tag_distance > 0 || job.points.size() > kMostGuessMarks)
+        return;
     if (job.image == nullptr && !can_enclose(job.points)) return;  // a layer: tagging tells what it needs
     kind = Start::Kind::Guess;
-    job.choose("start", "guess", std::to_string(job.points.size()) + " marks, at most " + std::to_string(kMostGuessMarks));
+    job.choose("start", "guess",
+               std::to_string(job.points.size()) + " marks, at most " + std::to_string(kMostGuessMarks));
 }
 
 // Points without an image that enclose something tell inside from outside themselves.
@@ -73,14 +76,17 @@ void try_cloud(Job& job) {
     Start::Kind& kind = job.options.start.kind;
     const bool asked = kind == Start::Kind::Cloud;
     if (!job.starts_from_marks() || !(asked || kind == Start::Kind::Auto)) return;
-    if (asked && job.image != nullptr) throw Error(Errc::InvalidOptions, "segment: the start 'cloud' is for points without an image");
+    if (asked && job.image != nullptr)
+        throw Error(Errc::InvalidOptions, "segment: the start 'cloud' is for points without an image");
     const SegmentOptions& o = job.options;
-    const bool has_seeds = !o.exterior_seeds.empty() || !job.hole_seeds.empty() || !o.inside.empty() || !o.outside.empty();
-    if (!asked && (!job.guided() || o.contours || o.tag_distance > 0 || has_seeds || job.image != nullptr || !job.uses_points() ||
-                   job.points.size() <= kMostGuessMarks || !can_enclose(job.points)))
+    const bool has_seeds =
+        !o.exterior_seeds.empty() || !job.hole_seeds.empty() || !o.inside.empty() || !o.outside.empty();
+    if (!asked && (!job.guided() || o.contours || o.tag_distance > 0 || has_seeds || job.image != nullptr ||
+                   !job.uses_points() || job.points.size() <= kMostGuessMarks || !can_enclose(job.points)))
         return;
     Timed timed(job.report().seconds.tag);
-    job.cloud = orient_cloud(job.points, job.points.size() == job.given.size() ? job.options.hints : PointHints{}, job.run);
+    job.cloud =
+        orient_cloud(job.points, job.points.size() == job.given.size() ? job.options.hints : PointHints{}, job.run);
     kind = Start::Kind::Cloud;
     if (job.cloud->encloses || !job.options.voxel_size_is_automatic) return;
     // The indicator is all that there is to see.
@@ -97,8 +103,9 @@ void check_input(Job& job) {
     if (job.image == nullptr && job.points.empty())
         throw Error(Errc::InvalidInput, "segment: expected an image or points, got neither");
     if (job.starts_from_marks() && job.points.empty())
-        throw Error(Errc::InvalidInput, "segment: the start 'tag' expects points, got none; give points, contours or "
-                                        "seeds inside, or choose another start (sphere, box, mesh, mask or vdb)");
+        throw Error(Errc::InvalidInput,
+                    "segment: the start 'tag' expects points, got none; give points, contours or "
+                    "seeds inside, or choose another start (sphere, box, mesh, mask or vdb)");
     check_sides(job.options.inside, job.options.outside, kSameSeedVoxels * job.h());
     job.report().point_count = job.given.size();
     EvolveOptions& evolve = job.options.evolve;
@@ -130,7 +137,8 @@ void choose_values(Job& job) {
     const double delta_voxels = marked ? kTagDeltaVoxels : 1.0;
     const bool chooses_delta = evolve.delta < 0;
     if (chooses_delta) evolve.delta = delta_voxels * h;
-    if (job.options.guess || ((job.guesses() || job.is_cloud()) && job.guided() && job.uses_points())) return;  // nothing flows; a later frame may
+    if (job.options.guess || ((job.guesses() || job.is_cloud()) && job.guided() && job.uses_points()))
+        return;  // nothing flows; a later frame may
     if (chooses_delta) job.choose("delta", number(evolve.delta), number(delta_voxels) + " voxels");
     if (evolve.tau < 0) job.choose("tau", number(h), "1 voxel at unit speed; longer while the surface moves slowly");
     if (options.edge.sigma < 0 && job.uses_image()) {
@@ -160,16 +168,19 @@ VoxelSizeChoice choose_voxel_size(const Image* image, const std::vector<Vec3>& w
     if (!tagged && distinct.size() > pipeline::kMostGuessMarks) {
         const CloudScale scale = cloud_scale(distinct);
         const double h = kCloudNoise * scale.noise;
-        if (h > scale.nearest) return {h, number(kCloudNoise) + " times the noise of the points, " + number(scale.noise)};
+        if (h > scale.nearest)
+            return {h, number(kCloudNoise) + " times the noise of the points, " + number(scale.noise)};
         return {scale.nearest, kNearest};
     }
     const double spacing = nearest_neighbour_spacing(distinct).median;
     const ScanVoxelSize scan = scan_voxel_size(distinct, spacing);
     if (scan.voxel_size <= spacing) {
-        // A surface of few points is so few spacings wide that in voxels as large as they are curvature would outweigh them.
+        // A surface of few points is so few spacings wide that in voxels as large as they are curvature would outweigh
+        // them.
         const double finer = std::sqrt(double(distinct.size()) / kFewPoints);
         if (finer >= 1) return {spacing, kNearest};
-        return {finer * spacing, "finer than the median distance between neighbouring points, " + number(spacing) + ", for there are few"};
+        return {finer * spacing, "finer than the median distance between neighbouring points, " + number(spacing) +
+                                     ", for there are few"};
     }
     return {scan.voxel_size, "points lie " + number(scan.thickness) +
                                  " from their local plane on the mean, noise wider than their median distance " +

@@ -4,7 +4,8 @@
 
 namespace covol::pipeline {
 
-inline constexpr std::size_t kMostGuessMarks = 4000;  // of a guess, or of a start that they correct: more take long, and are dense
+// of a guess, or of a start that they correct: more take long, and are dense
+inline constexpr std::size_t kMostGuessMarks = 4000;
 
 /// The automatic range of the points after tagging with an image: what is farther from marks is the image's.
 /// Measured on brain, spleen and nucleus with 300 points each; see the README's table.

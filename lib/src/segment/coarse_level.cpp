@@ -76,7 +76,9 @@ std::string run_coarse(Job& job, const FloatGrid& start, const Domain& fine) {
 
 std::optional<FineStart> pass_coarse_levels(Job& job) {
     int& levels = job.options.coarse_levels;
-    if (levels < 0) levels = knows_nothing(job.options.start.kind) && job.origin != StartOrigin::Grown && is_large(job.domain()) ? 1 : 0;
+    if (levels < 0)
+        levels =
+            knows_nothing(job.options.start.kind) && job.origin != StartOrigin::Grown && is_large(job.domain()) ? 1 : 0;
     if (levels == 0 || job.hold || job.rests() || job.origin == StartOrigin::Contours) return {};
     Job coarse(job.image, job.points, coarsened(job.options), job.run);
     coarse.origin = job.origin;

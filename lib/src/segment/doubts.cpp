@@ -9,11 +9,11 @@
 namespace covol::pipeline {
 namespace {
 
-constexpr double kOffVoxels = 2.0;      // of the image, along its longest edge: no hand is so far off
+constexpr double kOffVoxels = 2.0;  // of the image, along its longest edge: no hand is so far off
 constexpr double kBiasVoxels = 0.25;
-constexpr double kBiasErrors = 4.0;     // standard errors of the mean
-constexpr double kOffNoise = 4.0;       // standard deviations of a cloud: that far off there is something else
-constexpr double kMissedShare = 0.1;    // of the marks
+constexpr double kBiasErrors = 4.0;   // standard errors of the mean
+constexpr double kOffNoise = 4.0;     // standard deviations of a cloud: that far off there is something else
+constexpr double kMissedShare = 0.1;  // of the marks
 
 double off(const Job& job) {
     double edge = job.h();
@@ -24,7 +24,8 @@ double off(const Job& job) {
 
 std::string place(const Job& job, const SegmentReport::MarksOff& marks) {
     if (job.image == nullptr) return "at " + detail::to_text(marks.farthest_world);
-    return "on slice " + std::to_string(std::lround(marks.farthest_index[2])) + ", at voxel " + detail::to_text(marks.farthest_index);
+    return "on slice " + std::to_string(std::lround(marks.farthest_index[2])) + ", at voxel " +
+           detail::to_text(marks.farthest_index);
 }
 
 void find_marks_off(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& distances) {
@@ -39,8 +40,8 @@ void find_marks_off(Job& job, const std::vector<Vec3>& marks, const std::vector<
     if (job.image != nullptr) found.farthest_index = job.image->geometry().world_to_index(found.farthest_world);
     if (found.count == 0) return;
     job.warn(std::to_string(found.count) + " of " + std::to_string(marks.size()) + " marks lie more than " +
-             number(found.beyond) + " off the surface, the farthest " + number(found.farthest) + " " + place(job, found) +
-             ": look there whether the mark is wrong, or mark more beside it");
+             number(found.beyond) + " off the surface, the farthest " + number(found.farthest) + " " +
+             place(job, found) + ": look there whether the mark is wrong, or mark more beside it");
 }
 
 void find_bias(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& distances) {
@@ -53,7 +54,9 @@ void find_bias(Job& job, const std::vector<Vec3>& marks, const std::vector<doubl
     const auto count = double(marks.size());
     const double bias = sum / count, error = std::sqrt(std::max(0.0, squares / count - bias * bias) / count);
     job.report().fit.bias = bias;
-    if (std::abs(bias) < kBiasVoxels * std::max(job.h(), job.report().cloud.noise) || std::abs(bias) < kBiasErrors * error) return;
+    if (std::abs(bias) < kBiasVoxels * std::max(job.h(), job.report().cloud.noise) ||
+        std::abs(bias) < kBiasErrors * error)
+        return;
     job.warn("the marks lie " + number(std::abs(bias) / job.h()) + " voxels " + (bias > 0 ? "outside" : "inside") +
              " the surface on the mean: it is too " + (bias > 0 ? "small" : "large"));
 }
@@ -61,7 +64,8 @@ void find_bias(Job& job, const std::vector<Vec3>& marks, const std::vector<doubl
 }  // namespace
 
 double level_at(const FloatGrid& u, const Vec3& world) {
-    return openvdb::tools::BoxSampler::sample(u.getConstAccessor(), u.worldToIndex(openvdb::Vec3d(world[0], world[1], world[2])));
+    return openvdb::tools::BoxSampler::sample(u.getConstAccessor(),
+                                              u.worldToIndex(openvdb::Vec3d(world[0], world[1], world[2])));
 }
 
 void doubt(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& distances) {

@@ -69,7 +69,8 @@ Vec3 gradient(const ContourSolid& body, const Vec3& at, double h) {
 }
 
 /// How far beside the marks a side is that is still inside: across a thin body the other wall would be taken for it.
-double reach_within(const ContourSolid& body, const std::vector<Vec3>& places, const std::vector<Vec3>& normals, double reach, double least) {
+double reach_within(const ContourSolid& body, const std::vector<Vec3>& places, const std::vector<Vec3>& normals,
+                    double reach, double least) {
     for (; reach > least; reach *= 0.75) {
         std::size_t inside = 0;
         for (std::size_t n = 0; n < places.size(); ++n) {
@@ -86,7 +87,8 @@ double reach_within(const ContourSolid& body, const std::vector<Vec3>& places, c
 
 void compute_distance(Job& job, double radius, double reach) {
     Timed timed(job.report().seconds.distance);
-    detail::require_tube_memory(job.points, job.domain(), {reach, (radius - reach) / job.h(), true}, "segment", job.run);
+    detail::require_tube_memory(job.points, job.domain(), {reach, (radius - reach) / job.h(), true}, "segment",
+                                job.run);
     RunContext checked = job.run;
     checked.memory_budget = 0;  // distance() need not estimate it again
     job.result.distance = distance(job.points, job.domain(), {radius}, checked).grid;
@@ -131,7 +133,8 @@ void choose_edge_feature(Job& job) {
         places.push_back(along[n]);
         normals.push_back(normal);
     }
-    const double reach = reach_within(*job.body(), places, normals, kSidesSigmas * std::max(edge.sigma, job.h()), job.h());
+    const double reach =
+        reach_within(*job.body(), places, normals, kSidesSigmas * std::max(edge.sigma, job.h()), job.h());
     const MarkedFeature found = feature_at(*job.image, places, normals, reach);
     edge.feature = found.feature;
     const std::string line = "at the marks the image is " + number(std::abs(found.line)) +

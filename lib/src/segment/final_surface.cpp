@@ -17,7 +17,8 @@ namespace covol::pipeline {
 namespace {
 
 constexpr double kWarnWithoutPoints = 0.02;  // share of the area
-constexpr double kRimSlack = 1.0 / 6;        // of the distance between points and a hole: half a spacing, where it is automatic
+constexpr double kRimSlack =
+    1.0 / 6;  // of the distance between points and a hole: half a spacing, where it is automatic
 constexpr std::size_t kLoopsToTell = 8;
 
 /// Where a solid ends whatever the marks say: the image's box, and the region of interest.
@@ -59,7 +60,8 @@ void treat_holes(Job& job) {
     std::vector<float>& distances = job.result.distance_to_points;
     const std::vector<Vec3>& points = job.cloud ? job.cloud->points : job.points;  // without stray ones
     const HolesOptions& options = job.options.holes;
-    const double automatic = hole_distance(points, job.h()), distance = options.distance > 0 ? options.distance : automatic;
+    const double automatic = hole_distance(points, job.h()),
+                 distance = options.distance > 0 ? options.distance : automatic;
     const double slack = kRimSlack * std::min(automatic, distance);
     distances = distances_to_points(mesh, points, job.run);
     report.share_without_points = share_beyond(mesh, distances, distance);
@@ -101,23 +103,27 @@ void make_surface(Job& job) {
     std::vector<double> distances;
     const std::vector<Vec3>& marks = job.options.contours ? job.given : job.marks;
     tbb::parallel_invoke([&] { report.surface = measure(job.result.mesh); },
-                         [&] { if (!job.points.empty()) distances = detail::distances_to(job.result.mesh, marks); });
+                         [&] {
+                             if (!job.points.empty()) distances = detail::distances_to(job.result.mesh, marks);
+                         });
     if (report.holes.closed_volume > 0) report.surface.volume = report.holes.closed_volume;
     if (!distances.empty()) {
         report.fit = detail::statistics_of(distances);
         doubt(job, marks, distances);
     }
     if (job.origin == StartOrigin::Guess && report.surface.components > 1)
-        job.warn("the surface through the marks falls into " + std::to_string(report.surface.components) +
-                 " pieces: where they are one body, mark between them; several bodies are better marked each by itself");
+        job.warn(
+            "the surface through the marks falls into " + std::to_string(report.surface.components) +
+            " pieces: where they are one body, mark between them; several bodies are better marked each by itself");
     report.seeds = check_seeds(*job.result.surface, job.options.inside, job.options.outside);
     if (const std::string warning = report.seeds.warning(); !warning.empty()) job.warn("seeds: " + warning);
     if (report.share_without_points > kWarnWithoutPoints)
-        job.warn(number(std::round(1000 * report.share_without_points) / 10) +
-                     " % of the surface lie farther than " + number(report.holes.distance) + " from every point: " +
-                     (report.holes.policy == Holes::Close ? "there curvature alone closes it"
-                      : report.holes.policy == Holes::Flat ? "there flat patches close it"
-                                                           : "there the mesh is open, the level set closed by curvature alone"));
+        job.warn(number(std::round(1000 * report.share_without_points) / 10) + " % of the surface lie farther than " +
+                 number(report.holes.distance) + " from every point: " +
+                 (report.holes.policy == Holes::Close ? "there curvature alone closes it"
+                  : report.holes.policy == Holes::Flat
+                      ? "there flat patches close it"
+                      : "there the mesh is open, the level set closed by curvature alone"));
 }
 
 }  // namespace covol::pipeline

@@ -16,8 +16,8 @@ namespace {
 constexpr double kApproachTau = 3.0;  // time steps of the points' own approach, in tau
 constexpr int kApproachSteps = 40;
 constexpr double kApproachTolerance = 0.01;
-constexpr double kHoldDepth = 0.75;   // voxels that the surface may sink below a start that is held
-constexpr double kLeastOfGrown = 0.5;  // of its volume: a flow that leaves less has lost the edges
+constexpr double kHoldDepth = 0.75;     // voxels that the surface may sink below a start that is held
+constexpr double kLeastOfGrown = 0.5;   // of its volume: a flow that leaves less has lost the edges
 constexpr double kLeavesVoxels = 0.25;  // farther from its marks than the start: what flowed has left them
 constexpr int kHoldSteps = 2;
 constexpr double kHoldTolerance = 0.01;  // voxels a step
@@ -121,8 +121,10 @@ std::string why_vanished(const Job& job) {
         const bool encloses = report.tag.reason.empty() ? !report.band.leaks : report.tag.encloses;
         if (job.image == nullptr) return detail::why_nothing_held(job.points, job.options.tag_distance, encloses);
         if (!encloses)
-            return "the points enclose nothing and nothing held it; where the structure is cut off by the image's end mark the cut "
-                   "too, or give a `tag_distance` beyond its radius; or draw `contours`, or choose another start (`start`)";
+            return "the points enclose nothing and nothing held it; where the structure is cut off by the image's end "
+                   "mark the cut "
+                   "too, or give a `tag_distance` beyond its radius; or draw `contours`, or choose another start "
+                   "(`start`)";
     }
     return "nothing held it; lower `delta`, or start closer to the edges (`start`)";
 }

@@ -42,8 +42,8 @@ struct Job {
     SegmentResult result;
     StartOrigin origin = StartOrigin::Given;
     std::optional<CloudOrientation> cloud;  ///< of points alone, many or asked for
-    FloatGridPtr hold;             ///< the start that the surface may not leave, or null
-    FloatGridPtr trusted_distance; ///< to the trusted marks, or null
+    FloatGridPtr hold;                      ///< the start that the surface may not leave, or null
+    FloatGridPtr trusted_distance;          ///< to the trusted marks, or null
 
     SegmentReport& report() { return result.report; }
     [[nodiscard]] const Domain& domain() const { return result.report.domain; }
@@ -61,15 +61,17 @@ struct Job {
     [[nodiscard]] bool guesses() const { return options.start.kind == Start::Kind::Guess && starts_from_marks(); }
     [[nodiscard]] bool is_cloud() const { return options.start.kind == Start::Kind::Cloud && starts_from_marks(); }
     [[nodiscard]] bool guided() const { return options.model == Model::Guided; }
-    /// Stained sheets run on beside and across the border that contours mark, and guidance by the profile alone cannot tell
-    /// them apart; the edge detector of lines, with the body as a guess, can.
+    /// Stained sheets run on beside and across the border that contours mark, and guidance by the profile alone cannot
+    /// tell them apart; the edge detector of lines, with the body as a guess, can.
     [[nodiscard]] bool follows_lines() const {
         return origin == StartOrigin::Contours && uses_image() && options.edge.feature > EdgeFeature::Slope;
     }
-    /// The start, or where the image moved it, is the surface: nothing pulls it off the marks, and no curvature shrinks it.
+    /// The start, or where the image moved it, is the surface: nothing pulls it off the marks, and no curvature shrinks
+    /// it.
     [[nodiscard]] bool rests() const {
         if (origin == StartOrigin::Corrected) return true;
-        const bool from_marks = origin == StartOrigin::Guess || origin == StartOrigin::Contours || origin == StartOrigin::Cloud;
+        const bool from_marks =
+            origin == StartOrigin::Guess || origin == StartOrigin::Contours || origin == StartOrigin::Cloud;
         return from_marks && guided() && uses_points() && !follows_lines();
     }
     /// Between closed contours, or null.

@@ -1,6 +1,6 @@
 // segment(): the steps in their order. Each is a module beside this file or in start/, and works on one Job.
-#include "covol/error.h"
 #include "covol/pipeline.h"
+#include "covol/error.h"
 
 #include <openvdb/openvdb.h>
 
@@ -45,7 +45,8 @@ void fall_back(Job& job, const FloatGridPtr& start) {
         if (job.origin == StartOrigin::Grown)
             return job.warn("the flow closed what had grown to the image's edges: this is that start itself");
         job.options.edge.feature = EdgeFeature::Slope;
-        job.choose("edge_feature", to_string(EdgeFeature::Slope), "along lines the surface left the marks: the body between them rests instead");
+        job.choose("edge_feature", to_string(EdgeFeature::Slope),
+                   "along lines the surface left the marks: the body between them rests instead");
         return flow(job);
     }
     if (!job.guided() || job.rests() || job.trusted.size() < 4 || !job.uses_points()) return;

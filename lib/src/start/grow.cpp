@@ -16,19 +16,19 @@ namespace {
 
 using openvdb::Coord;
 
-constexpr double kLeastPad = 12;             // voxels around the start that are looked at first
+constexpr double kLeastPad = 12;  // voxels around the start that are looked at first
 constexpr std::size_t kMostVoxels = 24u << 20;
-constexpr double kLeastSpread = 0.01;        // of the image's range: differences below it say nothing
-constexpr double kUnlike = 4;                // spreads of the start's surface: a voxel inside that differs more is not like it
-constexpr double kUnlikeShare = 0.03;        // of the inside: more of them, and the start holds something already
-constexpr double kSpeedSpreads = 2;          // a difference at which the front's speed is a half
+constexpr double kLeastSpread = 0.01;  // of the image's range: differences below it say nothing
+constexpr double kUnlike = 4;  // spreads of the start's surface: a voxel inside that differs more is not like it
+constexpr double kUnlikeShare = 0.03;  // of the inside: more of them, and the start holds something already
+constexpr double kSpeedSpreads = 2;    // a difference at which the front's speed is a half
 constexpr double kLeastSpeed = 1e-4;
-constexpr double kAtHand = 0.5;              // of the best front's edge: a start with as much lies at an edge
-constexpr double kClear = 0.3;               // spreads: a mean change across the front that noise does not make
-constexpr double kErrors = 4;                // standard errors of a front's mean change
-constexpr double kPassed = 0.5;              // of the best: the front has left the edge ...
-constexpr double kPassedGrowth = 2;          // ... and holds so many times the volume
-constexpr double kSmallCavity = 0.01;        // of the region: what the front has gone around and left out
+constexpr double kAtHand = 0.5;        // of the best front's edge: a start with as much lies at an edge
+constexpr double kClear = 0.3;         // spreads: a mean change across the front that noise does not make
+constexpr double kErrors = 4;          // standard errors of a front's mean change
+constexpr double kPassed = 0.5;        // of the best: the front has left the edge ...
+constexpr double kPassedGrowth = 2;    // ... and holds so many times the volume
+constexpr double kSmallCavity = 0.01;  // of the region: what the front has gone around and left out
 
 double median_of(std::vector<float>& values) {
     const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
@@ -52,7 +52,9 @@ Spread spread_of(std::vector<float> values) {
 class Box {
 public:
     Box(const Coord& min, const Coord& max) : min_(min), size_(max - min + Coord(1)) {}
-    [[nodiscard]] std::size_t count() const { return std::size_t(size_[0]) * std::size_t(size_[1]) * std::size_t(size_[2]); }
+    [[nodiscard]] std::size_t count() const {
+        return std::size_t(size_[0]) * std::size_t(size_[1]) * std::size_t(size_[2]);
+    }
     [[nodiscard]] Coord at(std::size_t n) const {
         const auto k = int(n % std::size_t(size_[2])), j = int(n / std::size_t(size_[2]) % std::size_t(size_[1])),
                    i = int(n / std::size_t(size_[2]) / std::size_t(size_[1]));
@@ -93,7 +95,8 @@ void Box::blur(std::vector<float>& values, double sigma) const {
             for (int n = 0; n < length; ++n) {
                 double value = 0;
                 for (int m = -reach; m <= reach; ++m)
-                    value += weight[std::size_t(m + reach)] * double(values[start + std::size_t(std::clamp(n + m, 0, length - 1)) * step]);
+                    value += weight[std::size_t(m + reach)] *
+                             double(values[start + std::size_t(std::clamp(n + m, 0, length - 1)) * step]);
                 result[start + std::size_t(n) * step] = float(value / sum);
             }
         }
@@ -119,14 +122,18 @@ public:
         }
         if (inside.empty() || shell.empty()) return "it holds no voxel";
         std::sort(all.begin(), all.end());
-        const double range = double(all[std::size_t(0.995 * double(all.size() - 1))]) - double(all[std::size_t(0.005 * double(all.size() - 1))]);
+        const double range = double(all[std::size_t(0.995 * double(all.size() - 1))]) -
+                             double(all[std::size_t(0.005 * double(all.size() - 1))]);
         if (!(range > 0)) return "the image is the same everywhere";
         inside_ = spread_of(inside);
         inside_.width = std::max(inside_.width, kLeastSpread * range);
         Spread surface = spread_of(shell);
         surface.width = std::max({surface.width, inside_.width, 2 * kLeastSpread * range});
-        const auto unlike = std::count_if(inside.begin(), inside.end(), [&](float v) { return std::abs(v - surface.middle) > kUnlike * surface.width; });
-        if (double(unlike) > kUnlikeShare * double(inside.size())) return "the image inside it is not as it is on its surface";
+        const auto unlike = std::count_if(inside.begin(), inside.end(), [&](float v) {
+            return std::abs(v - surface.middle) > kUnlike * surface.width;
+        });
+        if (double(unlike) > kUnlikeShare * double(inside.size()))
+            return "the image inside it is not as it is on its surface";
         return {};
     }
 
@@ -153,7 +160,9 @@ public:
                 best_edge_ = edge();
                 best_count_ = order_.size();
             }
-            if (edge() < kPassed * best_edge_ && double(order_.size()) > kPassedGrowth * double(best_count_) && is_clear()) break;
+            if (edge() < kPassed * best_edge_ && double(order_.size()) > kPassedGrowth * double(best_count_) &&
+                is_clear())
+                break;
             if (order_.size() % 65536 == 0) run.check();
         }
     }
@@ -176,7 +185,9 @@ public:
         for (std::size_t n = 0; n < best_count_; ++n) {
             const Coord at = box_.at(order_[n]);
             for (int a = 0; a < 3; ++a)
-                if ((at[a] == box_.min()[a] && at[a] > domain.min[a]) || (at[a] == box_.max()[a] && at[a] < domain.max[a])) return true;
+                if ((at[a] == box_.min()[a] && at[a] > domain.min[a]) ||
+                    (at[a] == box_.max()[a] && at[a] < domain.max[a]))
+                    return true;
         }
         return false;
     }
@@ -257,7 +268,9 @@ private:
     struct Waiting {
         float time;
         std::uint32_t voxel;
-        bool operator<(const Waiting& other) const { return time > other.time || (time == other.time && voxel > other.voxel); }
+        bool operator<(const Waiting& other) const {
+            return time > other.time || (time == other.time && voxel > other.voxel);
+        }
     };
 
     const Box& box_;
@@ -309,8 +322,8 @@ GrownStart grow_to_edges(const Image& image, const FloatGrid& start, double sigm
         if (!front.is_clear()) return {nullptr, "no position of the front has a clear edge"};
         if (front.starts_at_edge()) return {nullptr, "it lies at an edge already"};
         return {level_set_of(box, front.region(), domain, run),
-                "from " + number(1 / front.growth()) + " of the volume: the image changes by " + number(front.best_edge() / front.spread()) +
-                    " times its spread inside, a voxel, across the front"};
+                "from " + number(1 / front.growth()) + " of the volume: the image changes by " +
+                    number(front.best_edge() / front.spread()) + " times its spread inside, a voxel, across the front"};
     }
 }
 

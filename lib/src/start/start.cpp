@@ -117,7 +117,8 @@ std::vector<Coord> leaves_crossed_from(const Domain& domain, const std::vector<V
     for (const Vec3& seed : seeds) {
         const Vec3 at = domain.world_to_index(seed);
         const Coord center = Coord::floor(openvdb::Vec3d(at[0], at[1], at[2])) & ~(kLeafDim - 1);
-        for (int n = 0; n < 27; ++n) visit(center.offsetBy((n / 9 - 1) * kLeafDim, (n / 3 % 3 - 1) * kLeafDim, (n % 3 - 1) * kLeafDim));
+        for (int n = 0; n < 27; ++n)
+            visit(center.offsetBy((n / 9 - 1) * kLeafDim, (n / 3 % 3 - 1) * kLeafDim, (n % 3 - 1) * kLeafDim));
     }
     while (!front.empty()) {
         run.check();
@@ -128,7 +129,9 @@ std::vector<Coord> leaves_crossed_from(const Domain& domain, const std::vector<V
         tbb::parallel_for(std::size_t(0), now.size(), [&](std::size_t n) {
             std::array<float, kSide * kSide * kSide> values;
             sample(now[n], now[n].offsetBy(kLeafDim), values.data());
-            const auto negative = [&](int i, int j, int k) { return values[std::size_t((i * kSide + j) * kSide + k)] < 0; };
+            const auto negative = [&](int i, int j, int k) {
+                return values[std::size_t((i * kSide + j) * kSide + k)] < 0;
+            };
             std::array<bool, 6> mixed{};
             bool any = false;
             for (int a = 0; a < kSide; ++a)
@@ -195,8 +198,8 @@ private:
     std::array<openvdb::Vec3d, 3> along_;
 };
 
-/// False where all values in the box have one sign. Boxes that hold more voxels than a leaf with its next layer would take longer
-/// than what they may save.
+/// False where all values in the box have one sign. Boxes that hold more voxels than a leaf with its next layer would
+/// take longer than what they may save.
 bool may_cross(const FloatGrid& grid, const openvdb::CoordBBox& box) {
     if (box.volume() > 9 * 9 * 9) return true;
     const auto accessor = grid.getConstAccessor();
@@ -241,7 +244,9 @@ FloatGridPtr start_from_sphere(const Domain& domain, const Vec3& center, double 
                        {center[0] + reach, center[1] + reach, center[2] + reach}};
     return start_from_distance(
         domain, box,
-        [&](const Vec3& x) { return length({x[0] - center[0], x[1] - center[1], x[2] - center[2]}) - radius; },
+        [&](const Vec3& x) {
+            return length({x[0] - center[0], x[1] - center[1], x[2] - center[2]}) - radius;
+        },
         "start_from_sphere");
 }
 
@@ -285,7 +290,8 @@ FloatGridPtr start_from_mask(const Domain& domain, const Image& mask, const RunC
                 for (int j = lo.y(); j <= hi.y(); ++j)
                     for (int k = lo.z(); k <= hi.z(); ++k, ++n)
                         // The image repeats its border beyond its end; the mask ends there.
-                        values[n] = values[n] > 0 && contains(geometry, domain.index_to_world({double(i), double(j), double(k)}))
+                        values[n] = values[n] > 0 &&
+                                            contains(geometry, domain.index_to_world({double(i), double(j), double(k)}))
                                         ? 0.5F - values[n]
                                         : 0.5F;
         };
@@ -299,7 +305,8 @@ FloatGridPtr start_from_contours(const Domain& domain, const ContourSolid& solid
     FloatGridPtr result;
     with_threads(run, [&] {
         const std::vector<Coord> near = filter(leaves_in(domain, solid.box()), [&](const Coord& o) {
-            return solid.may_meet(domain.index_to_world({o.x() + 4.0, o.y() + 4.0, o.z() + 4.0}), kLeafRadius * domain.voxel_size);
+            return solid.may_meet(domain.index_to_world({o.x() + 4.0, o.y() + 4.0, o.z() + 4.0}),
+                                  kLeafRadius * domain.voxel_size);
         });
         const Sampler sample = [&](const Coord& lo, const Coord& hi, float* values) {
             for (int i = lo.x(); i <= hi.x(); ++i)
@@ -312,7 +319,8 @@ FloatGridPtr start_from_contours(const Domain& domain, const ContourSolid& solid
     return result;
 }
 
-FloatGridPtr start_from_level(const Domain& domain, const std::vector<Vec3>& seeds, const LevelRow& level, const RunContext& run) {
+FloatGridPtr start_from_level(const Domain& domain, const std::vector<Vec3>& seeds, const LevelRow& level,
+                              const RunContext& run) {
     FloatGridPtr result;
     with_threads(run, [&] {
         const double h = domain.voxel_size;
@@ -325,7 +333,8 @@ FloatGridPtr start_from_level(const Domain& domain, const std::vector<Vec3>& see
                     for (int k = 0; k < count; ++k) *values++ = float(row[std::size_t(k)]);
                 }
         };
-        result = start_from_field(domain, leaves_crossed_from(domain, seeds, sample, run), sample, "start_from_level", run);
+        result =
+            start_from_field(domain, leaves_crossed_from(domain, seeds, sample, run), sample, "start_from_level", run);
     });
     return result;
 }
@@ -347,7 +356,8 @@ FloatGridPtr start_from_grid(const Domain& domain, const FloatGrid& level_set, c
         candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
         const ToSource to_source(domain, level_set.transform());
         const std::optional<Coord> shift = to_source.shift();
-        candidates = filter(candidates, [&](const Coord& o) { return may_cross(level_set, to_source.box(o, o.offsetBy(kLeafDim))); });
+        candidates = filter(
+            candidates, [&](const Coord& o) { return may_cross(level_set, to_source.box(o, o.offsetBy(kLeafDim))); });
         const Sampler sample = [&](const Coord& lo, const Coord& hi, float* values) {
             const auto accessor = level_set.getConstAccessor();
             for (int i = lo.x(); i <= hi.x(); ++i)

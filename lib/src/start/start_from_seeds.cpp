@@ -59,13 +59,15 @@ FloatGridPtr start_from_seeds(const Domain& domain, const std::vector<Vec3>& ins
                               const RunContext& run) {
     if (inside.empty()) throw Error(Errc::InvalidInput, "start_from_seeds: expected seeds inside, got none");
     if (std::none_of(inside.begin(), inside.end(), [&](const Vec3& seed) { return domain.contains(seed); }))
-        throw Error(Errc::InvalidInput, "start_from_seeds: expected seeds inside the domain, got none of " + std::to_string(inside.size()) + " there");
+        throw Error(Errc::InvalidInput, "start_from_seeds: expected seeds inside the domain, got none of " +
+                                            std::to_string(inside.size()) + " there");
     const double h = domain.voxel_size;
     FloatGridPtr field;
     with_threads(run, [&] {
         const detail::KdTree in(inside), out(outside);
         // A voxel and a half is the least that voxels can hold.
-        const double reach = std::max({usual_half_gap(outside, in, kHalfWidthVoxels * h), joining_radius(inside) + h, 1.5 * h});
+        const double reach =
+            std::max({usual_half_gap(outside, in, kHalfWidthVoxels * h), joining_radius(inside) + h, 1.5 * h});
         field = make_grid(domain, float(kHalfWidthVoxels * h), "seeds");
         const WorldBox box = bounding_box(inside, reach + 2 * h);
         const Vec3 low = domain.world_to_index(box.min), high = domain.world_to_index(box.max);

@@ -44,7 +44,8 @@ bool has_mark(const openvdb::MaskGrid& piece, const FloatGrid& level_set, const 
 void erase(const openvdb::MaskGrid& piece, FloatGrid& level_set, bool inside) {
     const auto limit = float(0.5 * level_set.voxelSize()[0]);
     auto accessor = level_set.getAccessor();
-    for (auto value = piece.cbeginValueOn(); value; ++value) accessor.setValue(value.getCoord(), inside ? limit : -limit);
+    for (auto value = piece.cbeginValueOn(); value; ++value)
+        accessor.setValue(value.getCoord(), inside ? limit : -limit);
 }
 
 /// The regions of equal sign, 6-connected, of all that lies between the leaves too.
@@ -54,24 +55,27 @@ public:
 
     explicit Regions(FloatGrid& level_set) : level_set_(level_set) {
         for (auto leaf = level_set.tree().beginLeaf(); leaf; ++leaf) leaves_.push_back(&*leaf);
-        std::sort(leaves_.begin(), leaves_.end(), [](const Leaf* x, const Leaf* y) { return x->origin() < y->origin(); });
+        std::sort(leaves_.begin(), leaves_.end(),
+                  [](const Leaf* x, const Leaf* y) { return x->origin() < y->origin(); });
         label_leaves();
         find_gaps();
         join();
         for (Label n = 0; n < parents_.size(); ++n) parents_[n] = root(n);
         surface_.assign(parents_.size(), 0);
         for (std::size_t n = 0; n < leaves_.size(); ++n)
-            for (auto value = leaves_[n]->cbeginValueOn(); value; ++value) ++surface_[parents_[labels_[n][value.pos()]]];
+            for (auto value = leaves_[n]->cbeginValueOn(); value; ++value)
+                ++surface_[parents_[labels_[n][value.pos()]]];
     }
 
-    /// Of one sign, those that fewer than `least` points rest on, without the largest and what lies around everything, get
-    /// the other sign. @return how many
+    /// Of one sign, those that fewer than `least` points rest on, without the largest and what lies around everything,
+    /// get the other sign. @return how many
     std::size_t drop(bool inside, const std::vector<Vec3>& points, std::size_t least) {
         std::vector<Label> roots;
         for (Label n = 0; n < parents_.size(); ++n)
             if (parents_[n] == n && is_inside_[n] == inside && surface_[n] > 0) roots.push_back(n);
         if (roots.size() < 2) return 0;
-        const Label main = *std::max_element(roots.begin(), roots.end(), [&](Label x, Label y) { return surface_[x] < surface_[y]; });
+        const Label main =
+            *std::max_element(roots.begin(), roots.end(), [&](Label x, Label y) { return surface_[x] < surface_[y]; });
         const std::vector<std::size_t> resting = resting_points(points);
         std::vector<char> goes(parents_.size(), 0);
         std::size_t count = 0;
@@ -89,7 +93,10 @@ private:
     static constexpr int kDim = 8, kVoxels = 512;
     static constexpr Label kAround = 0;
     /// Blocks of 8^3 along k without a leaf, from the first to before the last.
-    struct Gap { int begin, end; Label label; };
+    struct Gap {
+        int begin, end;
+        Label label;
+    };
     struct Row {
         std::size_t first, last;  // leaves
         std::vector<Gap> gaps;
@@ -165,9 +172,12 @@ private:
                 int from = low[2] - 1;
                 const auto add_gap = [&](int to) {
                     if (from < to)
-                        row.gaps.push_back({from, to, new_label(values.getValue({kDim * i, kDim * j, kDim * from}) < 0)});
+                        row.gaps.push_back(
+                            {from, to, new_label(values.getValue({kDim * i, kDim * j, kDim * from}) < 0)});
                 };
-                for (; next < leaves_.size() && leaves_[next]->origin().x() == kDim * i && leaves_[next]->origin().y() == kDim * j; ++next) {
+                for (; next < leaves_.size() && leaves_[next]->origin().x() == kDim * i &&
+                       leaves_[next]->origin().y() == kDim * j;
+                     ++next) {
                     const int k = leaves_[next]->origin().z() / kDim;
                     add_gap(k);
                     from = k + 1;
@@ -175,7 +185,8 @@ private:
                 row.last = next;
                 add_gap(high[2] + 2);
                 for (const Gap& gap : row.gaps)
-                    if (!is_inside_[gap.label] && (i < low[0] || i > high[0] || j < low[1] || j > high[1] || gap.begin < low[2] || gap.end > high[2] + 1))
+                    if (!is_inside_[gap.label] && (i < low[0] || i > high[0] || j < low[1] || j > high[1] ||
+                                                   gap.begin < low[2] || gap.end > high[2] + 1))
                         unite(kAround, gap.label);
                 rows_.emplace(RowKey{i, j}, std::move(row));
             }
@@ -183,12 +194,16 @@ private:
 
     void join() {
         for (const auto& [key, row] : rows_)
-            for (const auto& [axis, other] : {std::pair{0, rows_.find({key.first + 1, key.second})}, std::pair{1, rows_.find({key.first, key.second + 1})}}) {
+            for (const auto& [axis, other] : {std::pair{0, rows_.find({key.first + 1, key.second})},
+                                              std::pair{1, rows_.find({key.first, key.second + 1})}}) {
                 if (other == rows_.end()) continue;
                 for (std::size_t x = 0, y = 0; x < row.gaps.size() && y < other->second.gaps.size();) {
                     const Gap &one = row.gaps[x], &two = other->second.gaps[y];
                     if (std::max(one.begin, two.begin) < std::min(one.end, two.end)) unite_equal(one.label, two.label);
-                    if (one.end < two.end) ++x; else ++y;
+                    if (one.end < two.end)
+                        ++x;
+                    else
+                        ++y;
                 }
                 join_faces(row, other->second, axis);
                 join_to_gaps(row, other->second.gaps, axis, true);
@@ -214,10 +229,14 @@ private:
     static void for_face(int axis, bool upper, Visit visit) {
         const int stride = axis == 0 ? 64 : axis == 1 ? 8 : 1, u = axis == 0 ? 8 : 64, v = axis == 2 ? 8 : 1;
         for (int a = 0; a < kDim; ++a)
-            for (int b = 0; b < kDim; ++b) visit(std::size_t(a * u + b * v + (upper ? (kDim - 1) * stride : 0)), std::size_t(a * u + b * v + (upper ? 0 : (kDim - 1) * stride)));
+            for (int b = 0; b < kDim; ++b)
+                visit(std::size_t(a * u + b * v + (upper ? (kDim - 1) * stride : 0)),
+                      std::size_t(a * u + b * v + (upper ? 0 : (kDim - 1) * stride)));
     }
     void join_face(std::size_t lower, std::size_t upper, int axis) {
-        for_face(axis, true, [&](std::size_t here, std::size_t there) { unite_equal(labels_[lower][here], labels_[upper][there]); });
+        for_face(axis, true, [&](std::size_t here, std::size_t there) {
+            unite_equal(labels_[lower][here], labels_[upper][there]);
+        });
     }
     void join_to_gap(std::size_t leaf, int axis, bool upper, const Gap& gap) {
         for_face(axis, upper, [&](std::size_t here, std::size_t) { unite_equal(labels_[leaf][here], gap.label); });
@@ -250,7 +269,8 @@ private:
             const auto tree = level_set_.getConstAccessor();
             std::array<Label, 27> beside;
             for (std::size_t p = range.begin(); p < range.end(); ++p) {
-                const openvdb::Coord c = openvdb::Coord::round(level_set_.worldToIndex(openvdb::Vec3d(points[p][0], points[p][1], points[p][2])));
+                const openvdb::Coord c = openvdb::Coord::round(
+                    level_set_.worldToIndex(openvdb::Vec3d(points[p][0], points[p][1], points[p][2])));
                 std::size_t count = 0;
                 const Leaf* last = nullptr;
                 std::size_t number = 0;
@@ -260,7 +280,9 @@ private:
                     if (leaf == nullptr) continue;
                     if (leaf != last) number = numbers.at(last = leaf);
                     const Label label = parents_[labels_[number][Leaf::coordToOffset(at)]];
-                    if (std::find(beside.begin(), beside.begin() + std::ptrdiff_t(count), label) == beside.begin() + std::ptrdiff_t(count)) beside[count++] = label;
+                    if (std::find(beside.begin(), beside.begin() + std::ptrdiff_t(count), label) ==
+                        beside.begin() + std::ptrdiff_t(count))
+                        beside[count++] = label;
                 }
                 for (std::size_t n = 0; n < count; ++n) ++mine[beside[n]];
             }
@@ -279,7 +301,8 @@ private:
             for (const Gap& gap : row.gaps)
                 if (goes[parents_[gap.label]])
                     for (int k = gap.begin; k < gap.end; ++k)
-                        level_set_.tree().addTile(1, {kDim * key.first, kDim * key.second, kDim * k}, inside ? level_set_.background() : -level_set_.background(), false);
+                        level_set_.tree().addTile(1, {kDim * key.first, kDim * key.second, kDim * k},
+                                                  inside ? level_set_.background() : -level_set_.background(), false);
     }
 
     FloatGrid& level_set_;

@@ -28,7 +28,8 @@ public:
         : accessor_(grid.getConstAccessor()), certain_(1.8F * static_cast<float>(grid.voxelSize()[0])) {}
 
     /// Sets out[n] to the label for the positions from + n * step (index space), n < count, that are inside.
-    void fill(const openvdb::Vec3d& from, const openvdb::Vec3d& step, int count, std::uint8_t label, std::uint8_t* out) {
+    void fill(const openvdb::Vec3d& from, const openvdb::Vec3d& step, int count, std::uint8_t label,
+              std::uint8_t* out) {
         for (int n = 0; n < count;) {
             const openvdb::Vec3d at = from + double(n) * step;
             const Coord base = Coord::floor(at);
@@ -99,10 +100,13 @@ FloatGridPtr clipped_surface(const FloatGrid& u, const Domain& domain, const Cli
     const Domain wide = whole ? widened(domain, detail::kCarriedOn - 1) : domain;
     FloatGridPtr wall;
     try {
-        wall = detail::redistance(whole ? *whole->distance : u, wide, kHalfWidthVoxels, detail::DomainEnd::Open, "surface", run);
+        wall = detail::redistance(whole ? *whole->distance : u, wide, kHalfWidthVoxels, detail::DomainEnd::Open,
+                                  "surface", run);
     } catch (const Error& error) {
         const openvdb::CoordBBox all({wide.min[0], wide.min[1], wide.min[2]}, {wide.max[0], wide.max[1], wide.max[2]});
-        if (error.code() != Errc::InvalidInput || !(u.tree().getValue({domain.min[0], domain.min[1], domain.min[2]}) < 0)) throw;
+        if (error.code() != Errc::InvalidInput ||
+            !(u.tree().getValue({domain.min[0], domain.min[1], domain.min[2]}) < 0))
+            throw;
         const auto width = static_cast<float>(kHalfWidthVoxels * domain.voxel_size);
         wall = make_grid(wide, width, "surface");
         wall->fill(all, -width, false);
@@ -120,8 +124,9 @@ FloatGridPtr surface(const FloatGrid& u, const RunContext& run) {
     FloatGridPtr result;
     const Clip clip = clip_of(u);
     with_threads(run, [&] {
-        result = clip.empty() ? detail::redistance(u, domain, kHalfWidthVoxels, detail::DomainEnd::Closed, "surface", run)
-                              : clipped_surface(u, domain, clip, run);
+        result = clip.empty()
+                     ? detail::redistance(u, domain, kHalfWidthVoxels, detail::DomainEnd::Closed, "surface", run)
+                     : clipped_surface(u, domain, clip, run);
     });
     return result;
 }
@@ -153,7 +158,9 @@ std::vector<std::uint8_t> rasterize(const FloatGrid& surface, const ImageGeometr
                 std::uint8_t* row = labels.data() + (std::size_t(k) * nj + j) * ni;
                 sampler.fill(to_index(0, j, k), step, ni, label, row);
                 for (int i = 0; i < ni && !all_within; ++i)
-                    if (row[i] != 0 && detail::depth_in(clip, geometry.index_to_world({double(i), double(j), double(k)})) > 0) row[i] = 0;
+                    if (row[i] != 0 &&
+                        detail::depth_in(clip, geometry.index_to_world({double(i), double(j), double(k)})) > 0)
+                        row[i] = 0;
             }
         });
     });

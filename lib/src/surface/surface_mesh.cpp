@@ -38,9 +38,9 @@ struct Block {
     const float* values = nullptr;  ///< null: `tile` everywhere
     float tile = 0;
     LeafMask inside{};
-    std::array<std::uint32_t, 8> next{};      ///< block at origin + 8 (dx,dy,dz), slot 4 dx + 2 dy + dz
-    std::array<LeafMask, 3> cut{};            ///< voxels whose edge along each axis the surface cuts
-    std::array<std::uint16_t, 24> rank{};     ///< cut edges before word w of axis a, slot 8 a + w
+    std::array<std::uint32_t, 8> next{};   ///< block at origin + 8 (dx,dy,dz), slot 4 dx + 2 dy + dz
+    std::array<LeafMask, 3> cut{};         ///< voxels whose edge along each axis the surface cuts
+    std::array<std::uint16_t, 24> rank{};  ///< cut edges before word w of axis a, slot 8 a + w
     std::uint32_t vertex_count = 0, triangle_count = 0;
     std::uint64_t first_vertex = 0, first_triangle = 0;
 
@@ -62,9 +62,10 @@ public:
     MarchingCubes(const FloatGrid& grid, const detail::LatticeClip& clip, double isovalue, const RunContext& run)
         : grid_(grid), clip_(clip), domain_(domain_of(grid)), isovalue_(float(isovalue)), run_(run) {
         if (!(grid.background() >= isovalue_))
-            throw Error(Errc::InvalidInput, "extract_mesh: grid '" + grid.getName() + "': expected a background above the isovalue " +
-                                                std::to_string(isovalue_) + ", got " + std::to_string(grid.background()) +
-                                                "; the surface would not be closed");
+            throw Error(Errc::InvalidInput,
+                        "extract_mesh: grid '" + grid.getName() + "': expected a background above the isovalue " +
+                            std::to_string(isovalue_) + ", got " + std::to_string(grid.background()) +
+                            "; the surface would not be closed");
     }
 
     TriangleMesh extract() {
@@ -78,7 +79,8 @@ public:
         TriangleMesh mesh = allocate();
         tbb::parallel_for(std::size_t(0), block_count_, [&](std::size_t b) { place_vertices(blocks_[b], mesh); });
         if (not_a_number_)
-            throw Error(Errc::InvalidInput, "extract_mesh: grid '" + grid_.getName() + "': a value next to the surface is not finite");
+            throw Error(Errc::InvalidInput,
+                        "extract_mesh: grid '" + grid_.getName() + "': a value next to the surface is not finite");
         run_.report("mesh", 0.7);
         run_.check();
         tbb::parallel_for(std::size_t(0), block_count_, [&](std::size_t b) { connect(blocks_[b], mesh); });
@@ -153,7 +155,8 @@ private:
             for (int axis = 0; axis < 3; ++axis)
                 for (const bool above : {false, true}) {
                     openvdb::CoordBBox rim = box;
-                    rim.min()[axis] = rim.max()[axis] = above ? box.max()[axis] + 1 : box.min()[axis] - detail::kLeafDim;
+                    rim.min()[axis] = rim.max()[axis] =
+                        above ? box.max()[axis] + 1 : box.min()[axis] - detail::kLeafDim;
                     for (int i = rim.min()[0]; i <= rim.max()[0]; i += detail::kLeafDim)
                         for (int j = rim.min()[1]; j <= rim.max()[1]; j += detail::kLeafDim)
                             for (int k = rim.min()[2]; k <= rim.max()[2]; k += detail::kLeafDim) {
@@ -177,7 +180,8 @@ private:
                     const Coord step(n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1);
                     const Coord origin = blocks_[b].origin + Coord(step.x() * 8, step.y() * 8, step.z() * 8);
                     if (n == 13 || accessor.probeConstLeaf(origin) != nullptr) continue;
-                    if (rim_differs(blocks_[b].inside, step, is_inside(accessor.getValue(origin)))) mine.push_back(origin);
+                    if (rim_differs(blocks_[b].inside, step, is_inside(accessor.getValue(origin))))
+                        mine.push_back(origin);
                 }
         });
         for (const auto& some : found) needed.insert(needed.end(), some.begin(), some.end());
@@ -282,13 +286,14 @@ private:
 
     /// Meshes hold single-precision coordinates: a voxel has to be many of their steps wide.
     void check_precision(const Block& block) const {
-        const Vec3 p = domain_.index_to_world(
-            {double(block.origin.x()), double(block.origin.y()), double(block.origin.z())});
+        const Vec3 p =
+            domain_.index_to_world({double(block.origin.x()), double(block.origin.y()), double(block.origin.z())});
         for (const double c : p)
             if (domain_.voxel_size < 16 * std::abs(c) * std::numeric_limits<float>::epsilon())
-                throw Error(Errc::Unsupported,
-                            "extract_mesh: coordinates near " + std::to_string(c) + " are too far from 0 for a voxel size of " +
-                                std::to_string(domain_.voxel_size) + " in single precision; move the data to the origin");
+                throw Error(Errc::Unsupported, "extract_mesh: coordinates near " + std::to_string(c) +
+                                                   " are too far from 0 for a voxel size of " +
+                                                   std::to_string(domain_.voxel_size) +
+                                                   " in single precision; move the data to the origin");
     }
 
     void place_vertices(const Block& block, TriangleMesh& mesh) {
@@ -312,7 +317,8 @@ private:
         const Coord voxel = block.origin.offsetBy(local[0], local[1], local[2]);
         const double from = clip_.position(axis, voxel[axis]), to = clip_.position(axis, voxel[axis] + 1);
         const bool on_cap = from == to;  // beyond a face
-        for (int c = 0; c < 3; ++c) position[c] = to_world(c, clip_.position(c, voxel[c]) + (on_cap && c != axis ? chamfer(c, voxel[c]) : 0.0));
+        for (int c = 0; c < 3; ++c)
+            position[c] = to_world(c, clip_.position(c, voxel[c]) + (on_cap && c != axis ? chamfer(c, voxel[c]) : 0.0));
         if (on_cap) return position;
         const float next = to_world(axis, to);
         const float exact = to_world(axis, from + (to - from) * std::clamp(t, kEdgeMargin, 1 - kEdgeMargin));
@@ -362,7 +368,8 @@ private:
     }
 
     /// The allowed apex with the shortest diagonals.
-    static int best_apex(const detail::CubeLoop& loop, const std::array<std::uint32_t, 12>& ring, const TriangleMesh& mesh) {
+    static int best_apex(const detail::CubeLoop& loop, const std::array<std::uint32_t, 12>& ring,
+                         const TriangleMesh& mesh) {
         int best = std::countr_zero(loop.apexes);
         if (loop.size == 3) return best;
         float least = std::numeric_limits<float>::max();
@@ -397,9 +404,9 @@ private:
 
 TriangleMesh extract_mesh(const FloatGrid& surface, const ExtractOptions& options, const RunContext& run) {
     if (!std::isfinite(options.isovalue) || !(options.min_component_volume >= 0))
-        throw Error(Errc::InvalidOptions, "extract_mesh: expected a finite isovalue and min_component_volume >= 0, got " +
-                                              std::to_string(options.isovalue) + " and " +
-                                              std::to_string(options.min_component_volume));
+        throw Error(Errc::InvalidOptions,
+                    "extract_mesh: expected a finite isovalue and min_component_volume >= 0, got " +
+                        std::to_string(options.isovalue) + " and " + std::to_string(options.min_component_volume));
     TriangleMesh mesh;
     with_threads(run, [&] {
         std::optional<detail::Uncut> whole;
@@ -412,8 +419,9 @@ TriangleMesh extract_mesh(const FloatGrid& surface, const ExtractOptions& option
         remove_small_components(mesh, options.min_component_volume);
         if (mesh.empty()) {
             std::ostringstream text;
-            text << "extract_mesh: every piece of the surface is smaller than min_component_volume, " << options.min_component_volume
-                 << "; all of it has " << whole << ", as a cube of edge " << std::cbrt(whole) << "; use a smaller `min_component_volume`";
+            text << "extract_mesh: every piece of the surface is smaller than min_component_volume, "
+                 << options.min_component_volume << "; all of it has " << whole << ", as a cube of edge "
+                 << std::cbrt(whole) << "; use a smaller `min_component_volume`";
             throw Error(Errc::InvalidInput, text.str());
         }
     }

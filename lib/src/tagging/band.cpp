@@ -1,5 +1,5 @@
-// Tagging: what a flood from outside cannot reach through {d > D} is inside ("3D image segmentation supported by a point
-// cloud", section 3). The flood takes blocks without a leaf as a whole and works on 512-bit masks in the leaves.
+// Tagging: what a flood from outside cannot reach through {d > D} is inside ("3D image segmentation supported by a
+// point cloud", section 3). The flood takes blocks without a leaf as a whole and works on 512-bit masks in the leaves.
 #include "covol/band.h"
 
 #include <tbb/parallel_for.h>
@@ -36,7 +36,9 @@ void test_for_leaks(const Tube& tube, const Tagging& tagging, double limit, cons
         report.leaks = closes_at(tag_distance + h);
     } else {
         // A thin body whose core a smaller D still finds is closed; without one there are only walls.
-        const auto has_core_at = [&](double share) { return detail::tag(tube, float(share * tag_distance), seeds).has_core(h); };
+        const auto has_core_at = [&](double share) {
+            return detail::tag(tube, float(share * tag_distance), seeds).has_core(h);
+        };
         report.leaks = !has_core_at(0.85) && !has_core_at(0.7) && !has_core_at(0.55);
     }
     if (!report.leaks) return;
@@ -53,8 +55,9 @@ std::vector<Coord> seed_voxels(const FloatGrid& distance, const Domain& domain, 
     for (const Vec3& seed : options.exterior_seeds) {
         if (!domain.contains(seed)) {
             const WorldBox box = domain.world_box();
-            throw Error(Errc::InvalidInput, "band: exterior seed " + to_text(seed) + ": expected a position in the domain " +
-                                                to_text(box.min) + " to " + to_text(box.max));
+            throw Error(Errc::InvalidInput, "band: exterior seed " + to_text(seed) +
+                                                ": expected a position in the domain " + to_text(box.min) + " to " +
+                                                to_text(box.max));
         }
         const Vec3 index = domain.world_to_index(seed);
         Coord voxel;
@@ -63,9 +66,9 @@ std::vector<Coord> seed_voxels(const FloatGrid& distance, const Domain& domain, 
         const float d = distance.tree().getValue(voxel);
         if (distance.tree().isValueOn(voxel) && !(double(d) > options.tag_distance)) {
             std::ostringstream s;
-            s << "band: exterior seed " << to_text(seed) << ": expected further from the points than the tag distance D = "
-              << options.tag_distance << ", got d = " << d
-              << "; move the seed to the middle of the cavity, or use a smaller tag distance";
+            s << "band: exterior seed " << to_text(seed)
+              << ": expected further from the points than the tag distance D = " << options.tag_distance
+              << ", got d = " << d << "; move the seed to the middle of the cavity, or use a smaller tag distance";
             throw Error(Errc::InvalidInput, s.str());
         }
         voxels.push_back(voxel);
@@ -73,8 +76,8 @@ std::vector<Coord> seed_voxels(const FloatGrid& distance, const Domain& domain, 
     return voxels;
 }
 
-/// u0 in voxels. On the exterior's side d - D is the distance to the tagged surface; inside it has to be measured, since
-/// there the other side of a wall, and the cores, have the same d.
+/// u0 in voxels. On the exterior's side d - D is the distance to the tagged surface; inside it has to be measured,
+/// since there the other side of a wall, and the cores, have the same d.
 LeafArray<float> initial_values(const Tube& tube, const Tagging& tagging, const LeafArray<float>& level,
                                 const RunContext& run) {
     LeafArray<float> u = detail::signed_distance(tube.band, level, tube.inside_domain, tube.box, kWidth, run);
@@ -132,13 +135,15 @@ std::string BandOptions::why_invalid() const {
 
 std::string BandReport::leak() const {
     return "the points leave gaps wider than the tag distance " + detail::number(tag_distance) +
-           (holding_distance > 0 ? "; it would hold at " + detail::number(holding_distance) : "; no tag distance that holds was found");
+           (holding_distance > 0 ? "; it would hold at " + detail::number(holding_distance)
+                                 : "; no tag distance that holds was found");
 }
 
 BandResult band(const FloatGrid& distance, const BandOptions& options, const RunContext& run) {
     detail::require_valid(options, "band");
     if (distance.tree().leafCount() == 0)
-        throw Error(Errc::InvalidInput, "band: expected a distance grid with active voxels, got none: no point lies near the domain");
+        throw Error(Errc::InvalidInput,
+                    "band: expected a distance grid with active voxels, got none: no point lies near the domain");
     BandResult result;
     with_threads(run, [&] { result = make(distance, options, run); });
     return result;

@@ -21,8 +21,8 @@ FloatGridPtr closing(const FloatGrid& band, double tag_distance, const RunContex
     std::vector<Vec3> surface(tagged.patches.size());
     for (std::size_t n = 0; n < surface.size(); ++n) {
         const detail::Patch& p = tagged.patches[n];
-        surface[n] = domain.index_to_world({p.origin[0] + double(p.center[0]), p.origin[1] + double(p.center[1]),
-                                            p.origin[2] + double(p.center[2])});
+        surface[n] = domain.index_to_world(
+            {p.origin[0] + double(p.center[0]), p.origin[1] + double(p.center[1]), p.origin[2] + double(p.center[2])});
     }
     // Inside the tagged body D - d is the signed distance to the closing; outside it anything positive will do.
     const FloatGridPtr grown = distance(surface, domain, {tag_distance + reach}, run).grid;
@@ -39,7 +39,8 @@ FloatGridPtr closing(const FloatGrid& band, double tag_distance, const RunContex
     grown->tree().root().setBackground(static_cast<float>(reach), false);
     openvdb::tools::signedFloodFill(grown->tree());
     FloatGridPtr closed;
-    with_threads(run, [&] { closed = detail::redistance(*grown, domain, kHalfWidth, detail::DomainEnd::Open, "band", run); });
+    with_threads(
+        run, [&] { closed = detail::redistance(*grown, domain, kHalfWidth, detail::DomainEnd::Open, "band", run); });
     return closed;
 }
 

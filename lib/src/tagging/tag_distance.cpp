@@ -23,12 +23,12 @@ namespace {
 using detail::Coord;
 using detail::kLeafSize;
 
-constexpr double kClearRatio = 2.0;          ///< peak / saddle of a core that is a structure, not a pocket in a wall
-constexpr double kSignificantRatio = 1.25;   ///< the same for a core that takes a large share of the cloud
-constexpr double kLargeShare = 0.1;          ///< of the cloud's area
-constexpr double kImportantShare = 0.1;      ///< of the most important core's volume: a core that D has to hold
-constexpr double kStructureShare = 0.25;     ///< of the cloud's area: less is pockets of a cloud without an inside
-constexpr std::int64_t kCoarseVoxels = 200'000;      ///< on the first grid
+constexpr double kClearRatio = 2.0;         ///< peak / saddle of a core that is a structure, not a pocket in a wall
+constexpr double kSignificantRatio = 1.25;  ///< the same for a core that takes a large share of the cloud
+constexpr double kLargeShare = 0.1;         ///< of the cloud's area
+constexpr double kImportantShare = 0.1;     ///< of the most important core's volume: a core that D has to hold
+constexpr double kStructureShare = 0.25;    ///< of the cloud's area: less is pockets of a cloud without an inside
+constexpr std::int64_t kCoarseVoxels = 200'000;     ///< on the first grid
 constexpr std::int64_t kMaxTubeVoxels = 1'500'000;  ///< on the last grid
 constexpr double kBucketsPerVoxel = 16;
 
@@ -46,7 +46,7 @@ struct Core {
 struct Analysis {
     std::vector<Core> cores;
     double cloud_volume(double distance) const;  ///< of {d <= distance}
-    std::vector<std::int64_t> histogram;  ///< tube voxels by bucket
+    std::vector<std::int64_t> histogram;         ///< tube voxels by bucket
     std::int64_t tube_voxels = 0;
 };
 
@@ -181,8 +181,10 @@ void Sweep::enter_runs() {
     const auto& pieces = columns_.pieces();
     for (std::int32_t n = 0; n < std::int32_t(pieces.size()); ++n) {
         if (pieces[n].leaf >= 0) continue;
-        const bool has_seed = std::any_of(seeds_.begin(), seeds_.end(), [&](const Coord& s) { return columns_.find(s) == n; });
-        std::int32_t root = columns_.at_border(pieces[n]) ? components_.find(kExterior) : components_.create(radius_, has_seed);
+        const bool has_seed =
+            std::any_of(seeds_.begin(), seeds_.end(), [&](const Coord& s) { return columns_.find(s) == n; });
+        std::int32_t root =
+            columns_.at_border(pieces[n]) ? components_.find(kExterior) : components_.create(radius_, has_seed);
         run_label_[n] = root;
         const std::int64_t blocks = pieces[n].end - pieces[n].begin;
         components_.grow(root, blocks * kLeafSize, 0);
@@ -254,7 +256,8 @@ void Sweep::enter_voxel(std::int32_t node) {
     label_.leaf(leaf)[at] = root;
     // Beyond the boundary lies the exterior: a voxel there is a gap like any other. A seed only says what its core is.
     if (at_boundary) components_.merge(root, components_.find(kExterior), d, is_beyond);
-    if (std::find(seeds_.begin(), seeds_.end(), voxel) != seeds_.end()) components_.mark_exterior(components_.find(root));
+    if (std::find(seeds_.begin(), seeds_.end(), voxel) != seeds_.end())
+        components_.mark_exterior(components_.find(root));
 }
 
 /// The grid to analyse on: the points' box, as far as it lies in the domain, and two voxels around it.
@@ -273,7 +276,7 @@ Domain analysis_domain(const std::vector<Vec3>& points, const Domain& domain, do
 /// Distance at which the main cores are closed, voxels; 0 when nothing but pockets is enclosed.
 struct Verdict {
     double saddle = 0;
-    double peak = 0;      ///< of the most important core
+    double peak = 0;  ///< of the most important core
     int cores = 0;
 };
 
@@ -328,8 +331,9 @@ TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Dom
             choice.tag_distance = std::max(1.05 * verdict.saddle * a + 0.5 * a, 1.5 * h);
             choice.encloses = true;
             reason.str({});
-            reason << "closes " << verdict.cores << (verdict.cores == 1 ? " core" : " cores") << " whose largest gap has radius "
-                   << verdict.saddle * a << " (inner radius " << verdict.peak * a << "), seen on a grid of " << a;
+            reason << "closes " << verdict.cores << (verdict.cores == 1 ? " core" : " cores")
+                   << " whose largest gap has radius " << verdict.saddle * a << " (inner radius " << verdict.peak * a
+                   << "), seen on a grid of " << a;
         }
         const double finer = std::max(h, 0.5 * a);
         const bool is_resolved = verdict.cores > 0 && verdict.saddle >= 2.5;

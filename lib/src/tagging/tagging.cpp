@@ -92,8 +92,8 @@ LeafArray<float> signed_level(const Tube& tube, const Tagging& tagging) {
     tbb::parallel_for(std::size_t(0), tube.band.size(), [&](std::size_t leaf) {
         for (int at = 0; at < kLeafSize; ++at) {
             const float level = (tube.d.leaf(leaf)[at] - tagging.distance) / h;
-            phi.leaf(leaf)[at] = is_on(tagging.exterior.leaves[leaf], at) ? std::max(level, 0.0F)
-                                                                          : -std::max(std::abs(level), 1e-6F);
+            phi.leaf(leaf)[at] =
+                is_on(tagging.exterior.leaves[leaf], at) ? std::max(level, 0.0F) : -std::max(std::abs(level), 1e-6F);
         }
     });
     return phi;

@@ -27,8 +27,8 @@ struct Tagging {
     float distance = 0;          ///< D
     std::vector<LeafMask> open;  ///< d > D, in the domain
     Flood exterior;
-    std::int64_t enclosed = 0;   ///< voxels that the flood did not reach
-    std::int64_t core = 0;       ///< those of them with d > D
+    std::int64_t enclosed = 0;  ///< voxels that the flood did not reach
+    std::int64_t core = 0;      ///< those of them with d > D
 
     /// The core, taken as one ball, is a structure and not a pocket in a wall of thickness D.
     [[nodiscard]] bool has_core(double voxel_size) const;

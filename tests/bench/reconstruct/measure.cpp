@@ -74,7 +74,9 @@ std::vector<Sample> sample(const Triangles& triangles) {
     return found;
 }
 
-double mean(const std::vector<double>& numbers) { return std::accumulate(numbers.begin(), numbers.end(), 0.0) / double(numbers.size()); }
+double mean(const std::vector<double>& numbers) {
+    return std::accumulate(numbers.begin(), numbers.end(), 0.0) / double(numbers.size());
+}
 
 double largest(const std::vector<double>& numbers) { return *std::max_element(numbers.begin(), numbers.end()); }
 
@@ -88,7 +90,8 @@ OneWay one_way(const Triangles& from, const Tree& to) {
     for (const Sample& s : sample(from)) {
         const auto [nearest, triangle] = to.closest_point_and_primitive(s.p);
         found.lengths.push_back(std::sqrt((nearest - s.p).squared_length()));
-        found.angles.push_back(180 / std::numbers::pi * std::acos(std::min(1.0, std::abs(s.normal * unit_normal(*triangle)))));
+        found.angles.push_back(180 / std::numbers::pi *
+                               std::acos(std::min(1.0, std::abs(s.normal * unit_normal(*triangle)))));
     }
     return found;
 }
@@ -113,8 +116,8 @@ private:
     std::vector<std::size_t> parent_;
 };
 
-/// Of the triangles by their indices. Genus: from V - E + F = 2 components - 2 genus - boundary loops, where the mesh is a manifold
-/// (no edge of more than two triangles, no two fans at a vertex).
+/// Of the triangles by their indices. Genus: from V - E + F = 2 components - 2 genus - boundary loops, where the mesh
+/// is a manifold (no edge of more than two triangles, no two fans at a vertex).
 json topology(const Ply& ply) {
     struct Edge {
         std::uint32_t a, b;              // a < b
@@ -127,7 +130,8 @@ json topology(const Ply& ply) {
             const auto a = ply.triangles[t][k], b = ply.triangles[t][(k + 1) % 3];
             edges.push_back(a < b ? Edge{a, b, from, to} : Edge{b, a, to, from});
         }
-    std::sort(edges.begin(), edges.end(), [](const Edge& x, const Edge& y) { return std::tie(x.a, x.b) < std::tie(y.a, y.b); });
+    std::sort(edges.begin(), edges.end(),
+              [](const Edge& x, const Edge& y) { return std::tie(x.a, x.b) < std::tie(y.a, y.b); });
 
     Sets fans(3 * ply.triangles.size()), pieces(ply.points.size()), loops(ply.points.size());
     std::size_t edge_count = 0, open = 0, crowded = 0;
@@ -209,7 +213,8 @@ json measure_points(const Ply& mesh, const Ply& points) {
     for (const Sample& s : sample(triangles)) to.push_back(std::sqrt(Neighbours(cloud, s.p, 1).begin()->second));
     json report = distances(to, from, diagonal(points));
     const double spacing = spacing_of(cloud);
-    report["beyond_points"] = 100 * double(std::count_if(to.begin(), to.end(), [=](double d) { return d > 3 * spacing; })) / double(samples);
+    report["beyond_points"] =
+        100 * double(std::count_if(to.begin(), to.end(), [=](double d) { return d > 3 * spacing; })) / double(samples);
     report.update(topology(mesh));
     return report;
 }

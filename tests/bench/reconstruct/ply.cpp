@@ -8,9 +8,10 @@
 
 namespace {
 
-const std::map<std::string, int> size_of = {
-    {"char", 1}, {"uchar", 1}, {"short", 2}, {"ushort", 2}, {"int", 4}, {"uint", 4}, {"float", 4}, {"double", 8},
-    {"int8", 1}, {"uint8", 1}, {"int16", 2}, {"uint16", 2}, {"int32", 4}, {"uint32", 4}, {"float32", 4}, {"float64", 8}};
+const std::map<std::string, int> size_of = {{"char", 1},  {"uchar", 1},  {"short", 2},   {"ushort", 2},
+                                            {"int", 4},   {"uint", 4},   {"float", 4},   {"double", 8},
+                                            {"int8", 1},  {"uint8", 1},  {"int16", 2},   {"uint16", 2},
+                                            {"int32", 4}, {"uint32", 4}, {"float32", 4}, {"float64", 8}};
 
 struct Property {
     std::string name, type, type_of_count;  // no type_of_count: a number, else a list

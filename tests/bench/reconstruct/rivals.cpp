@@ -1,5 +1,6 @@
-// What covol reconstruct is measured with and compared with: CGAL's reconstructions, normals, and a measure. See `rivals` without
-// arguments. Points and meshes are PLY files. Where a rival has a knob its default here is what CGAL's manual uses.
+// What covol reconstruct is measured with and compared with: CGAL's reconstructions, normals, and a measure. See
+// `rivals` without arguments. Points and meshes are PLY files. Where a rival has a knob its default here is what CGAL's
+// manual uses.
 #include <CGAL/Advancing_front_surface_reconstruction.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Scale_space_reconstruction_3/Jet_smoother.h>
@@ -90,7 +91,8 @@ Ply poisson(const Ply& given, const Options&) {
     for (std::size_t n = 0; n < places.size(); ++n)
         points.emplace_back(places[n], Vector(given.normals[n][0], given.normals[n][1], given.normals[n][2]));
     Mesh mesh;
-    if (!CGAL::poisson_surface_reconstruction_delaunay(points.begin(), points.end(), PointMap(), NormalMap(), mesh, spacing(places)))
+    if (!CGAL::poisson_surface_reconstruction_delaunay(points.begin(), points.end(), PointMap(), NormalMap(), mesh,
+                                                       spacing(places)))
         throw std::runtime_error("poisson: found no surface");
     return ply_of(mesh);
 }
@@ -132,7 +134,10 @@ struct Method {
 };
 
 const std::map<std::string, Method> methods = {
-    {"normals", {normals, {{"k", 18}}, "jets over k neighbours, oriented along a minimum spanning tree; unoriented points are dropped"}},
+    {"normals",
+     {normals,
+      {{"k", 18}},
+      "jets over k neighbours, oriented along a minimum spanning tree; unoriented points are dropped"}},
     {"poisson", {poisson, {}, "from points with normals"}},
     {"scale-space", {scale_space, {{"scales", 4}, {"smoothed", 0}}, "--smoothed 1: through the smoothed points"}},
     {"advancing-front", {advancing_front, {}, "through the points"}},

@@ -31,7 +31,8 @@ FloatGridPtr sphere_grid(const Vec3& centre, double radius, double h) {
         for (int j = -n; j <= n; ++j)
             for (int k = -n; k <= n; ++k) {
                 const openvdb::Coord at(int(middle[0]) + i, int(middle[1]) + j, int(middle[2]) + k);
-                const double d = distance(domain.index_to_world({double(at.x()), double(at.y()), double(at.z())}), centre) - radius;
+                const double d =
+                    distance(domain.index_to_world({double(at.x()), double(at.y()), double(at.z())}), centre) - radius;
                 if (d < 3 * h) accessor.setValue(at, float(std::max(d, -3 * h)));
             }
     return grid;
@@ -82,7 +83,8 @@ TEST_CASE("shifted spheres have the analytic overlap and distances, as level set
     const Solid a = level_set({0, 0, 0}, r, h), b = level_set({shift, 0, 0}, r, h);
     const double whole = 4.0 / 3 * kPi * r * r * r;
     const double common = kPi * (4 * r + shift) * std::pow(2 * r - shift, 2) / 12;
-    // A sphere's point at angle t from the axis is |sqrt(1 + s^2 - 2 s cos t) - 1| from the other; over cos t in [-1,1]:
+    // A sphere's point at angle t from the axis is |sqrt(1 + s^2 - 2 s cos t) - 1| from the other; over cos t in
+    // [-1,1]:
     double mean = 0;
     for (int i = 0; i < 1000; ++i)
         mean += std::abs(std::sqrt(r * r + shift * shift - 2 * shift * r * (-1 + (i + 0.5) / 500)) - r) / 1000;
@@ -101,7 +103,8 @@ TEST_CASE("shifted spheres have the analytic overlap and distances, as level set
 TEST_CASE("concentric spheres: every distance is the difference of the radii") {
     const CompareReport report = compare(level_set({1, 2, 3}, 1.0, 0.05), level_set({1, 2, 3}, 0.8, 0.04));
     CHECK(report.dice == Approx(2 * 0.512 / 1.512).margin(0.003));
-    for (const double d : {report.hausdorff, report.hausdorff95, report.mean_distance}) CHECK(d == Approx(0.2).margin(0.002));
+    for (const double d : {report.hausdorff, report.hausdorff95, report.mean_distance})
+        CHECK(d == Approx(0.2).margin(0.002));
 }
 
 TEST_CASE("a solid equals itself, and mesh and level set of one solid agree") {

@@ -39,7 +39,9 @@ std::vector<Vec3> lower_half(double off = 0) {
     const double golden = M_PI * (3 - std::sqrt(5.0));
     for (int n = 0; n < count; ++n) {
         const double z = 1 - (2 * n + 1.0) / count, r = std::sqrt(1 - z * z);
-        if (z <= 0) marks.push_back({(kR + off) * r * std::cos(golden * n), (kR + off) * r * std::sin(golden * n), (kR + off) * z});
+        if (z <= 0)
+            marks.push_back(
+                {(kR + off) * r * std::cos(golden * n), (kR + off) * r * std::sin(golden * n), (kR + off) * z});
     }
     return marks;
 }

@@ -47,7 +47,8 @@ TEST_CASE("a slice shows the image, the outline where the surface is, and the po
     const Domain domain = domain_of_box(phantom.image.geometry().world_box(), phantom.image.geometry().spacing[0]);
     const WorldBox box = domain.world_box();
     const double radius = 0.2 * (box.max[0] - box.min[0]);
-    const Vec3 center = {0.5 * (box.min[0] + box.max[0]), 0.5 * (box.min[1] + box.max[1]), 0.5 * (box.min[2] + box.max[2])};
+    const Vec3 center = {0.5 * (box.min[0] + box.max[0]), 0.5 * (box.min[1] + box.max[1]),
+                         0.5 * (box.min[2] + box.max[2])};
     const FloatGridPtr sphere = surface(*start_from_sphere(domain, center, radius));
     RenderOptions options;
     options.width = 404, options.height = 200, options.slices = 1;

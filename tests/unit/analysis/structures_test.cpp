@@ -15,9 +15,7 @@ namespace {
 
 constexpr double kH = 0.5;
 
-Domain space(int half = 32) {
-    return {kH, {0.1, -0.05, 0.02}, {-half, -half, -half}, {half, half, half}};
-}
+Domain space(int half = 32) { return {kH, {0.1, -0.05, 0.02}, {-half, -half, -half}, {half, half, half}}; }
 
 struct Ball {
     Vec3 center;
@@ -116,7 +114,9 @@ TEST_CASE("A gap narrower than a voxel closes in its middle, a wider one stays")
         const openvdb::Vec3d x = surfaces[0]->transform().worldToIndex(openvdb::Vec3d(gap / 2, 0, 0));
         const openvdb::Coord low(int(std::floor(x[0])), int(std::round(x[1])), int(std::round(x[2])));
         const double t = x[0] - low[0];
-        const auto along = [&](const auto& phi) { return (1 - t) * phi.getValue(low) + t * phi.getValue(low.offsetBy(1, 0, 0)); };
+        const auto along = [&](const auto& phi) {
+            return (1 - t) * phi.getValue(low) + t * phi.getValue(low.offsetBy(1, 0, 0));
+        };
         CHECK(std::abs(along(in_a)) < 0.1 * kH);
         CHECK(std::abs(along(in_b)) < 0.1 * kH);
     }
@@ -261,8 +261,8 @@ TEST_CASE("Names become identifiers") {
 
 TEST_CASE("Segment metadata names labels, colours and extents") {
     std::vector<std::uint8_t> labels(4 * 3 * 2, 0);
-    labels[1] = 1;            // (1,0,0)
-    labels[12 + 4 + 2] = 1;   // (2,1,1)
+    labels[1] = 1;           // (1,0,0)
+    labels[12 + 4 + 2] = 1;  // (2,1,1)
     const auto fields = slicer_segments({"ve", "ex e"}, labels, {4, 3, 2});
     const auto at = [&](const std::string& key) {
         for (const auto& [name, value] : fields)
@@ -277,6 +277,6 @@ TEST_CASE("Segment metadata names labels, colours and extents") {
     CHECK(at("Segment1_Extent") == "0 -1 0 -1 0 -1");
     CHECK(at("Segment0_Layer") == "0");
     CHECK(at("Segment0_Color") == "0.266667 0.466667 0.666667");
-    CHECK_THAT(itksnap_labels({"ve", "a \"b\""}), Catch::Contains("    1   68  119  170        1  1  1    \"ve\"\n") &&
-                                                      Catch::Contains("\"a 'b'\""));
+    CHECK_THAT(itksnap_labels({"ve", "a \"b\""}),
+               Catch::Contains("    1   68  119  170        1  1  1    \"ve\"\n") && Catch::Contains("\"a 'b'\""));
 }

@@ -10,7 +10,8 @@ namespace {
 
 /// As a form would: "[field]" or "[field: value]".
 std::string in_form(const std::string& message) {
-    return with_names(message, [](const NamedOption& o) { return "[" + o.field + (o.value.empty() ? "" : ": " + o.value) + "]"; });
+    return with_names(
+        message, [](const NamedOption& o) { return "[" + o.field + (o.value.empty() ? "" : ": " + o.value) + "]"; });
 }
 
 }  // namespace
@@ -27,14 +28,18 @@ TEST_CASE("options that a message names are found, with their values, and replac
 }
 
 TEST_CASE("other text between backquotes stays as it is") {
-    for (const char* text : {"", "no option", "what `covol band` wrote", "`Roi`", "``", "`", "a `b", "`x = `` y", "cells`7.tif: `z9`"}) {
+    for (const char* text :
+         {"", "no option", "what `covol band` wrote", "`Roi`", "``", "`", "a `b", "`x = `` y", "cells`7.tif: `z9`"}) {
         CHECK(in_form(text) == text);
         CHECK(named_options(text).empty());
     }
-    CHECK(in_form("its name has a ` in it; choose a part with `roi`") == "its name has a ` in it; choose a part with [roi]");
+    CHECK(in_form("its name has a ` in it; choose a part with `roi`") ==
+          "its name has a ` in it; choose a part with [roi]");
 }
 
 TEST_CASE("an error tells the option that would help") {
-    CHECK(Error(Errc::InvalidInput, "segment: the surface vanished; lower `delta`, or give a `tag_distance`").option() == "delta");
+    CHECK(
+        Error(Errc::InvalidInput, "segment: the surface vanished; lower `delta`, or give a `tag_distance`").option() ==
+        "delta");
     CHECK(Error(Errc::Io, "a.vdb: no such file").option().empty());
 }

@@ -46,9 +46,9 @@ struct Cut {
     std::string name;
     Vec3 spacing;
     double h;
-    double share;   // of the body's extent along the cut axis that is left
-    bool two;       // faces of two axes
-    bool turned;    // the image's axes point the other way
+    double share;  // of the body's extent along the cut axis that is left
+    bool two;      // faces of two axes
+    bool turned;   // the image's axes point the other way
 };
 
 /// A body around the origin's neighbourhood in an image whose faces leave a share of it.
@@ -68,7 +68,8 @@ Scene scene_of(const Cut& cut, const Vec3& radii) {
         const bool is_cut = a == 2 || (cut.two && a == 0);
         // Two deep cuts would leave a sliver.
         const double left = a == 2 ? cut.share : std::max(cut.share, 0.5);
-        const double low = is_cut ? -radii[a] + 2 * radii[a] * (1 - left) : -radii[a] - 5 * cut.spacing[a] + off[a] * cut.spacing[a];
+        const double low =
+            is_cut ? -radii[a] + 2 * radii[a] * (1 - left) : -radii[a] - 5 * cut.spacing[a] + off[a] * cut.spacing[a];
         const int n = int(std::ceil((radii[a] + 5 * cut.spacing[a] - low) / cut.spacing[a]));
         scene.geometry.size[a] = n;
         scene.geometry.origin[a] = low + 0.5 * cut.spacing[a];
@@ -111,7 +112,8 @@ double area_at(const TriangleMesh& mesh, double z, double tolerance) {
     double area = 0;
     for (const auto& t : mesh.triangles) {
         const auto &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
-        if (std::abs(a[2] - z) > tolerance || std::abs(b[2] - z) > tolerance || std::abs(c[2] - z) > tolerance) continue;
+        if (std::abs(a[2] - z) > tolerance || std::abs(b[2] - z) > tolerance || std::abs(c[2] - z) > tolerance)
+            continue;
         area += 0.5 * std::abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
     }
     return area;
@@ -137,7 +139,8 @@ TEST_CASE("a solid that the image cuts ends at the image's box: mesh, cap, mask 
     for (const Vec3& radii : {Vec3{14, 14, 14}, Vec3{14, 11, 17}, Vec3{27, 19, 22}})
         for (const Cut& cut : cuts()) {
             const Scene scene = scene_of(cut, radii);
-            INFO(cut.name << ", " << 100 * cut.share << " % left" << (cut.two ? " along two axes" : "") << ", radii " << radii[0] << " " << radii[1] << " " << radii[2]);
+            INFO(cut.name << ", " << 100 * cut.share << " % left" << (cut.two ? " along two axes" : "") << ", radii "
+                          << radii[0] << " " << radii[1] << " " << radii[2]);
             const Clip clip = clip_at(scene.geometry);
             const WorldBox box = scene.geometry.world_box();
             const Domain domain = domain_of_box(box, cut.h);
@@ -153,13 +156,16 @@ TEST_CASE("a solid that the image cuts ends at the image's box: mesh, cap, mask 
             for (const auto& v : mesh.vertices)
                 for (int a = 0; a < 3; ++a) {
                     REQUIRE(v[a] >= box.min[a] - 1e-5 * cut.h);
-                    INFO("axis " << a << " at " << v[0] << " " << v[1] << " " << v[2] << " box " << box.min[a] << " to " << box.max[a]);
+                    INFO("axis " << a << " at " << v[0] << " " << v[1] << " " << v[2] << " box " << box.min[a] << " to "
+                                 << box.max[a]);
                     REQUIRE(v[a] <= box.max[a] + 1e-5 * cut.h);
                 }
             const Truth truth = measure_truth(scene);
             const double coarse = cut.h / std::min({radii[0], radii[1], radii[2]});
-            const double chords = (cut.share < 0.5 ? 1.0 : 0.7) * coarse * coarse;  // what chords lose of a ball, and more of its cap
-            const double volume = m.volume / truth.volume - 1, cap = area_at(mesh, box.min[2], 1e-5 * cut.h) / truth.cap_area - 1;
+            // what chords lose of a ball, and more of its cap
+            const double chords = (cut.share < 0.5 ? 1.0 : 0.7) * coarse * coarse;
+            const double volume = m.volume / truth.volume - 1,
+                         cap = area_at(mesh, box.min[2], 1e-5 * cut.h) / truth.cap_area - 1;
             CHECK(std::abs(volume) < 0.003 + chords);
             CHECK(std::abs(cap) < 0.005 + 2 * chords);
             // The label image is the truth's, but for voxels whose centre is beside the wall.
@@ -176,7 +182,8 @@ TEST_CASE("a solid that the image cuts ends at the image's box: mesh, cap, mask 
                     if (std::abs(d) > 0.25 * cut.h) REQUIRE(label == (d < 0));
                 }
             CHECK(std::abs(marked - expected) <= 0.03 * expected);
-            // A level set without the metadata, as other programs see it: only the cut's edge is rounded, by less than a voxel.
+            // A level set without the metadata, as other programs see it: only the cut's edge is rounded, by less than
+            // a voxel.
             const FloatGridPtr plain = solid->deepCopy();
             set_clip(*plain, {});
             const TriangleMesh rounded = extract_mesh(*plain);
@@ -189,8 +196,8 @@ TEST_CASE("a solid that the image cuts ends at the image's box: mesh, cap, mask 
             worst_slice = std::max(worst_slice, std::abs(marked / expected - 1));
             worst_grid = std::max(worst_grid, std::abs(without));
         }
-    std::printf("cut bodies: worst volume %.4f, cap %.4f, end slice %.4f; volume from the plain level set %.4f\n", worst_volume, worst_cap,
-                worst_slice, worst_grid);
+    std::printf("cut bodies: worst volume %.4f, cap %.4f, end slice %.4f; volume from the plain level set %.4f\n",
+                worst_volume, worst_cap, worst_slice, worst_grid);
 }
 
 TEST_CASE("the clip survives a .vdb file, and a surface of a clipped surface is the same solid") {
@@ -228,7 +235,8 @@ TEST_CASE("a turned image cuts along its own faces") {
     for (const auto& v : mesh.vertices) {
         double beyond = -1e9;
         for (const HalfSpace& plane : clip)
-            beyond = std::max(beyond, plane.normal[0] * v[0] + plane.normal[1] * v[1] + plane.normal[2] * v[2] - plane.offset);
+            beyond = std::max(beyond,
+                              plane.normal[0] * v[0] + plane.normal[1] * v[1] + plane.normal[2] * v[2] - plane.offset);
         CHECK(beyond < 0.02);
         on_face += std::abs(beyond) < 1e-3;
     }

@@ -58,7 +58,8 @@ public:
         return *this;
     }
 
-    [[nodiscard]] Contours densify(double step, ContourCurve curve = ContourCurve::Lines, const RunContext& run = {}) const {
+    [[nodiscard]] Contours densify(double step, ContourCurve curve = ContourCurve::Lines,
+                                   const RunContext& run = {}) const {
         return covol::densify({cloud_}, &geometry_, {step, curve}, run);
     }
     [[nodiscard]] const ImageGeometry& geometry() const { return geometry_; }
@@ -122,10 +123,13 @@ double widest_gap(const ContourSolid& solid, const std::vector<Vec3>& points, co
         double low = 0, high = far;
         for (int round = 0; round < 40; ++round) {
             const double t = (low + high) / 2;
-            const bool in = solid.level({inside[0] + t * d[0] / length, inside[1] + t * d[1] / length, inside[2] + t * d[2] / length}) < 0;
+            const bool in = solid.level({inside[0] + t * d[0] / length, inside[1] + t * d[1] / length,
+                                         inside[2] + t * d[2] / length}) < 0;
             (in ? low : high) = t;
         }
-        widest = std::max(widest, nearest({inside[0] + low * d[0] / length, inside[1] + low * d[1] / length, inside[2] + low * d[2] / length}, points));
+        widest = std::max(widest, nearest({inside[0] + low * d[0] / length, inside[1] + low * d[1] / length,
+                                           inside[2] + low * d[2] / length},
+                                          points));
     }
     return widest;
 }
@@ -198,7 +202,8 @@ TEST_CASE("the centripetal curve passes through its marks and keeps to a straigh
         const std::vector<Vec3> curve = detail::centripetal_curve(marks, closed, 0.1);
         for (const Vec3& mark : marks) CHECK(nearest(mark, curve) < 1e-12);
     }
-    for (const Vec3& p : detail::centripetal_curve({{0, 0, 0}, {1, 1, 0}, {5, 5, 0}, {6, 6, 0}}, false, 0.1)) CHECK(std::abs(p[0] - p[1]) < 1e-12);
+    for (const Vec3& p : detail::centripetal_curve({{0, 0, 0}, {1, 1, 0}, {5, 5, 0}, {6, 6, 0}}, false, 0.1))
+        CHECK(std::abs(p[0] - p[1]) < 1e-12);
 }
 
 // ---- within a slice -------------------------------------------------------------------------------------------------
@@ -317,7 +322,8 @@ TEST_CASE("between skipped slices a cone is a cone") {
     CHECK(c.slice_distance == 5);
     double worst = 0;
     for (double k = 15; k <= 45; k += 0.5)
-        for (const double off : {-1.5, -0.5, 0.0, 1.0}) worst = std::max(worst, std::abs(c.solid->level({40 + radius(k) + off, 40, k}) - off));
+        for (const double off : {-1.5, -0.5, 0.0, 1.0})
+            worst = std::max(worst, std::abs(c.solid->level({40 + radius(k) + off, 40, k}) - off));
     CHECK(worst < 0.02);
 }
 
@@ -496,7 +502,8 @@ TEST_CASE("what is no contour is refused, and the message names it") {
         CHECK(code_of([&] { (void)Drawing(cube(40)).circle(20, 20, 5, 3).densify(step); }) == Errc::InvalidOptions);
     }
     const Drawing slanted = Drawing(cube(40)).add({{1, 2, 3}, {10, 2, 5}, {5, 9, 8}});
-    CHECK(message_of([&] { (void)slanted.densify(1); }).find("marks.csv: contour 1: expected marks on one slice") != std::string::npos);
+    CHECK(message_of([&] { (void)slanted.densify(1); }).find("marks.csv: contour 1: expected marks on one slice") !=
+          std::string::npos);
     const Drawing outside = Drawing(cube(40)).circle(20, 20, 5, 3).circle(38, 20, 6, 5);
     const std::string why = message_of([&] { (void)outside.densify(1); });
     CHECK(why.find("contour 2") != std::string::npos);
@@ -520,7 +527,8 @@ TEST_CASE("one mark, two marks, marks on a line and marks that repeat") {
     square = {{5, 5, 7}, {5, 5, 7}, {15, 5, 7}, {15, 15, 7}, {15, 15, 7}, {15, 15, 7}, {5, 15, 7}, {5, 5, 7}};
     for (const ContourCurve curve : {ContourCurve::Lines, ContourCurve::Spline}) {
         const Contours repeated = Drawing(cube(40)).add(square).densify(1, curve);
-        for (const Vec3& p : all_points(repeated)) CHECK((std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2])));
+        for (const Vec3& p : all_points(repeated))
+            CHECK((std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2])));
         if (curve == ContourCurve::Lines) CHECK(repeated.along == plain.along);
     }
 }

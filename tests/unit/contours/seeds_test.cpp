@@ -21,7 +21,8 @@ Domain cube(int n) {
 }
 
 double value_at(const FloatGrid& grid, const Vec3& p) {
-    return double(openvdb::tools::BoxSampler::sample(grid.tree(), grid.transform().worldToIndex(openvdb::Vec3d(p[0], p[1], p[2]))));
+    return double(openvdb::tools::BoxSampler::sample(grid.tree(),
+                                                     grid.transform().worldToIndex(openvdb::Vec3d(p[0], p[1], p[2]))));
 }
 
 }  // namespace
@@ -57,8 +58,12 @@ TEST_CASE("seeds inside are joined, and alone they are small", "[seeds]") {
 }
 
 TEST_CASE("seeds inside that are none", "[seeds]") {
-    CHECK(message_of([] { (void)start_from_seeds(cube(8), {}, {{1, 1, 1}}); }).find("expected seeds inside, got none") != std::string::npos);
-    CHECK(message_of([] { (void)start_from_seeds(cube(8), {{100, 0, 0}}, {}); }).find("expected seeds inside the domain") != std::string::npos);
+    CHECK(message_of([] {
+              (void)start_from_seeds(cube(8), {}, {{1, 1, 1}});
+          }).find("expected seeds inside, got none") != std::string::npos);
+    CHECK(message_of([] {
+              (void)start_from_seeds(cube(8), {{100, 0, 0}}, {});
+          }).find("expected seeds inside the domain") != std::string::npos);
 }
 
 TEST_CASE("seeds on the wrong side of a surface", "[seeds]") {
@@ -77,5 +82,7 @@ TEST_CASE("seeds on the wrong side of a surface", "[seeds]") {
 
 TEST_CASE("a position has one side", "[seeds]") {
     check_sides({{1, 2, 3}}, {{1, 2, 3.1}}, 0.01);
-    CHECK(message_of([] { check_sides({{1, 2, 3}}, {{5, 5, 5}, {1, 2, 3}}, 0.01); }).find("got (1, 2, 3) inside and outside") != std::string::npos);
+    CHECK(message_of([] {
+              check_sides({{1, 2, 3}}, {{5, 5, 5}, {1, 2, 3}}, 0.01);
+          }).find("got (1, 2, 3) inside and outside") != std::string::npos);
 }

@@ -43,7 +43,9 @@ TEST_CASE("a single point has a ball around it") {
     check_against_brute_force({{0.01, 9.99, 5}}, kCube, 3.1);
 }
 
-TEST_CASE("a few points share the tube") { check_against_brute_force(box_cloud(7, {{0, 0, 0}, {10, 10, 10}}, 1), kCube, 2.5); }
+TEST_CASE("a few points share the tube") {
+    check_against_brute_force(box_cloud(7, {{0, 0, 0}, {10, 10, 10}}, 1), kCube, 2.5);
+}
 
 TEST_CASE("duplicates change nothing") {
     const std::vector<Vec3> once = box_cloud(5, {{2, 2, 2}, {8, 8, 8}}, 2);

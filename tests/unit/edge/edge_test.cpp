@@ -235,8 +235,9 @@ MarkedFeature feature_on_sheet(const Image& image) {
 
 TEST_CASE("g of a line is least in its middle, g of a slope on its sides") {
     const Domain domain = cube_domain(40, kH);
-    const Image bright = image_on(domain, sheet), dark = image_on(domain, [](const Vec3& x) { return 1 - sheet(x); });
-    const FloatGridPtr where = topology_where(domain, [](const Vec3& x) { return std::abs(x[0]) < 4 && std::abs(x[1]) < 2 && std::abs(x[2]) < 2; });
+    const Image bright = image_on(domain, sheet), dark = image_on(domain, [](const Vec3&x) { return 1 - sheet(x); });
+    const FloatGridPtr where = topology_where(
+        domain, [](const Vec3& x) { return std::abs(x[0]) < 4 && std::abs(x[1]) < 2 && std::abs(x[2]) < 2; });
     EdgeOptions o = options(0.5, 4);
     const auto least = [&](const Image& image, EdgeFeature feature) {
         o.feature = feature;
@@ -279,8 +280,10 @@ TEST_CASE("marks tell lines from borders, and both from noise") {
     CHECK(bright.feature == EdgeFeature::BrightLine);
     CHECK(bright.line == Approx(0.6).margin(0.05));
     CHECK(std::abs(bright.step) < 0.02);
-    CHECK(feature_on_sheet(image_on(domain, [](const Vec3& x) { return 1 - sheet(x); })).feature == EdgeFeature::DarkLine);
-    const MarkedFeature border = feature_on_sheet(image_on(domain, [](const Vec3& x) { return x[0] > kSheetAt ? 0.2 : 0.9; }));
+    CHECK(feature_on_sheet(image_on(domain, [](const Vec3& x) { return 1 - sheet(x); })).feature ==
+          EdgeFeature::DarkLine);
+    const MarkedFeature border =
+        feature_on_sheet(image_on(domain, [](const Vec3& x) { return x[0] > kSheetAt ? 0.2 : 0.9; }));
     CHECK(border.feature == EdgeFeature::Slope);
     CHECK(border.step == Approx(-0.35).margin(0.02));
     // A line on a border is a line where it stands out from both sides.

@@ -240,12 +240,14 @@ TEST_CASE("leaves that sleep leave the surface where it would be") {
         for (const Crossing& c : here) {
             double nearest = 1;
             for (const Crossing& d : there)
-                nearest = std::min(nearest, length({c.position[0] - d.position[0], c.position[1] - d.position[1], c.position[2] - d.position[2]}));
+                nearest = std::min(nearest, length({c.position[0] - d.position[0], c.position[1] - d.position[1],
+                                                    c.position[2] - d.position[2]}));
             worst = std::max(worst, nearest);
         }
         CHECK(worst < 0.01 * kH);
         std::printf("sleeping leaves, %s: %.0f %% of the visits, surface apart by at most %.1e h\n",
-                    follow ? "following band" : "fixed band", 100.0 * double(some.leaf_visits) / double(all.leaf_visits), worst / kH);
+                    follow ? "following band" : "fixed band",
+                    100.0 * double(some.leaf_visits) / double(all.leaf_visits), worst / kH);
     }
 }
 

@@ -34,16 +34,20 @@ Image ball_mask(double radius, int value = 1, int other_plane = -1) {
     for (int k = 0; k < kSize; ++k)
         for (int j = 0; j < kSize; ++j)
             for (int i = 0; i < kSize; ++i)
-                values.push_back(length({double(i), double(j), double(k)}) < radius ? std::uint8_t(value) : i == other_plane ? 9 : 0);
+                values.push_back(length({double(i), double(j), double(k)}) < radius ? std::uint8_t(value)
+                                 : i == other_plane                                 ? 9
+                                                                                    : 0);
     return Image::from_values(geometry, values.data());
 }
 
 double value_at(const FloatGrid& grid, const Vec3& p) {
-    return double(openvdb::tools::BoxSampler::sample(grid.tree(), grid.transform().worldToIndex(openvdb::Vec3d(p[0], p[1], p[2]))));
+    return double(openvdb::tools::BoxSampler::sample(grid.tree(),
+                                                     grid.transform().worldToIndex(openvdb::Vec3d(p[0], p[1], p[2]))));
 }
 
 Vec3 at(double radius, double theta, double phi) {
-    return {kMiddle[0] + radius * std::sin(theta) * std::cos(phi), kMiddle[1] + radius * std::sin(theta) * std::sin(phi), kMiddle[2] + radius * std::cos(theta)};
+    return {kMiddle[0] + radius * std::sin(theta) * std::cos(phi),
+            kMiddle[1] + radius * std::sin(theta) * std::sin(phi), kMiddle[2] + radius * std::cos(theta)};
 }
 
 }  // namespace
@@ -71,8 +75,10 @@ TEST_CASE("marks on the guess leave it alone, and hold it beside others", "[gues
     CHECK(std::abs(correct_guess(guess, {on}, {}, {}).shift(on)) < 0.1);
     // One bump, three times as wide as the mark is off; d: from mark to mark.
     const GuessCorrection one = correct_guess(guess, {off}, {}, {});
-    const double d = std::sqrt(std::pow(on[0] - off[0], 2) + std::pow(on[1] - off[1], 2) + std::pow(on[2] - off[2], 2)), t = d / 15;
-    CHECK(one.shift(on) == Approx(one.shift(off) * std::pow(1 - t, 4) * (4 * t + 1)).epsilon(0.05));  // and a narrower one for what that left
+    const double d = std::sqrt(std::pow(on[0] - off[0], 2) + std::pow(on[1] - off[1], 2) + std::pow(on[2] - off[2], 2)),
+                 t = d / 15;
+    CHECK(one.shift(on) == Approx(one.shift(off) * std::pow(1 - t, 4) * (4 * t + 1))
+                               .epsilon(0.05));  // and a narrower one for what that left
     const GuessCorrection both = correct_guess(guess, {on, off}, {}, {});
     CHECK(both.report().after_max < 0.5);
     CHECK(std::abs(both.shift(on)) < 0.5);
@@ -96,7 +102,8 @@ TEST_CASE("many marks of another surface give that surface", "[guess]") {
     const FloatGridPtr start = correction.start();
     double worst = 0;
     for (double theta = 0.1; theta < 3.1; theta += 0.2)
-        for (double phi = 0; phi < 6.2; phi += 0.4) worst = std::max(worst, std::abs(value_at(*start, at(radius(theta), theta, phi))));
+        for (double phi = 0; phi < 6.2; phi += 0.4)
+            worst = std::max(worst, std::abs(value_at(*start, at(radius(theta), theta, phi))));
     CHECK(worst < within);
 }
 
@@ -148,5 +155,6 @@ TEST_CASE("options of a correction", "[guess]") {
     options.precision = -1;
     options.least_radius = -2;
     CHECK(options.why_invalid() == "precision: expected >= 0, got -1\nleast_radius: expected >= 0, got -2");
-    CHECK(code_of([&] { (void)correct_guess(start_from_sphere(cube(), kMiddle, kRadius), {}, {}, {}, options); }) == Errc::InvalidOptions);
+    CHECK(code_of([&] { (void)correct_guess(start_from_sphere(cube(), kMiddle, kRadius), {}, {}, {}, options); }) ==
+          Errc::InvalidOptions);
 }

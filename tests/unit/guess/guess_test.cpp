@@ -43,7 +43,9 @@ Shape ellipsoid(const char* name, const Vec3& r) {
                 const double l = level(x);
                 return l * (l - 1) / length({x[0] / (r[0] * r[0]), x[1] / (r[1] * r[1]), x[2] / (r[2] * r[2])});
             },
-            4.0 / 3 * kPi * r[0] * r[1] * r[2], r[0] == r[2] ? 0.05 : 0.2, r[0] == r[2] ? 0.005 : 0.03};
+            4.0 / 3 * kPi * r[0] * r[1] * r[2],
+            r[0] == r[2] ? 0.05 : 0.2,
+            r[0] == r[2] ? 0.005 : 0.03};
 }
 
 Shape torus(double R, double r) {
@@ -55,7 +57,10 @@ Shape torus(double R, double r) {
                     if (share(random) < ring) return Vec3{ring * std::cos(u), ring * std::sin(u), r * std::sin(v)};
                 }
             },
-            [R, r](const Vec3& x) { return std::hypot(std::hypot(x[0], x[1]) - R, x[2]) - r; }, 2 * kPi * kPi * R * r * r, 0.7, 0.12};
+            [R, r](const Vec3& x) { return std::hypot(std::hypot(x[0], x[1]) - R, x[2]) - r; },
+            2 * kPi * kPi * R * r * r,
+            0.7,
+            0.12};
 }
 
 std::vector<Vec3> draw(const Shape& shape, int count, unsigned seed) {
@@ -95,8 +100,8 @@ TEST_CASE("exact points are met without bias, however few") {
                 for (const unsigned seed : {1u, 2u}) {
                     if (count == 3000 && seed > 1) continue;
                     const Bias bias = bias_of(shape, draw(shape, count, seed), precision(spacing));
-                    INFO(shape.name << ", " << count << " points, seed " << seed << ", spacing " << spacing[2] << ": mean "
-                                    << bias.mean << " voxels, volume " << bias.volume);
+                    INFO(shape.name << ", " << count << " points, seed " << seed << ", spacing " << spacing[2]
+                                    << ": mean " << bias.mean << " voxels, volume " << bias.volume);
                     CHECK(std::abs(bias.mean) <= (count == 50 ? shape.bias_of_50 : 0.02));
                     CHECK(std::abs(bias.volume - 1) <= (count == 50 ? shape.volume_of_50 : 0.005));
                 }
@@ -105,7 +110,9 @@ TEST_CASE("exact points are met without bias, however few") {
 TEST_CASE("what encloses nothing is refused with a reason") {
     const Domain domain = cube_domain(40, 1.0);
     GuessReport report;
-    const auto guess = [&](const std::vector<Vec3>& marks) { return guess_from_marks(domain, marks, precision({1, 1, 1}), report).u; };
+    const auto guess = [&](const std::vector<Vec3>& marks) {
+        return guess_from_marks(domain, marks, precision({1, 1, 1}), report).u;
+    };
     CHECK_THROWS_WITH(guess({{0, 0, 0}, {5, 0, 0}, {0, 5, 0}}), Catch::Contains("at least 4 marks"));
     std::vector<Vec3> ring;
     for (int n = 0; n < 20; ++n) ring.push_back({10 * std::cos(0.3 * n), 10 * std::sin(0.3 * n), 2});

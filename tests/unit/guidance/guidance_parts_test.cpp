@@ -1,8 +1,8 @@
 // Parts of the image guidance: distances in a wide band, and pieces that a displacement tears off.
 #include <openvdb/openvdb.h>
 
-#include <catch2/catch.hpp>
 #include <algorithm>
+#include <catch2/catch.hpp>
 #include <cmath>
 
 #include "covol/start.h"
@@ -67,7 +67,8 @@ TEST_CASE("small pieces and cavities go where no mark is near", "[guidance]") {
         auto accessor = u->getAccessor();
         for (auto at = openvdb::CoordBBox(openvdb::Coord(-32), openvdb::Coord(32)).begin(); at; ++at) {
             const Vec3 x{double((*at)[0]), double((*at)[1]), double((*at)[2])};
-            const double ball = length(x) - kRadius, small = length({x[0] - speck[0], x[1] - speck[1], x[2] - speck[2]}) - 1.5,
+            const double ball = length(x) - kRadius,
+                         small = length({x[0] - speck[0], x[1] - speck[1], x[2] - speck[2]}) - 1.5,
                          hole = length({x[0] - bubble[0], x[1] - bubble[1], x[2] - bubble[2]}) - 1.5;
             accessor.setValue(*at, float(std::max(std::min(ball, small), -hole)));
         }
@@ -75,7 +76,8 @@ TEST_CASE("small pieces and cavities go where no mark is near", "[guidance]") {
     };
     const auto sides = [&](const FloatGrid& u) {
         const auto accessor = u.getConstAccessor();
-        return std::pair(accessor.getValue(openvdb::Coord(26, 0, 0)) < 0, accessor.getValue(openvdb::Coord(0, -8, 0)) >= 0);
+        return std::pair(accessor.getValue(openvdb::Coord(26, 0, 0)) < 0,
+                         accessor.getValue(openvdb::Coord(0, -8, 0)) >= 0);
     };
     const FloatGridPtr none = made();
     REQUIRE(sides(*none) == std::pair(true, true));

@@ -32,14 +32,16 @@ ImageGeometry lattice(double along_z = 1) {
 }
 
 /// Brightness at a place, with Gaussian noise.
-Image picture(const ImageGeometry& g, const std::function<double(const Vec3&)>& brightness, double noise, unsigned seed = 1) {
+Image picture(const ImageGeometry& g, const std::function<double(const Vec3&)>& brightness, double noise,
+              unsigned seed = 1) {
     std::mt19937 random(seed);
     std::normal_distribution<double> normal(0, noise > 0 ? noise : 1);
     std::vector<float> values;
     for (int k = 0; k < g.size[2]; ++k)
         for (int j = 0; j < g.size[1]; ++j)
             for (int i = 0; i < g.size[0]; ++i)
-                values.push_back(float(brightness(g.index_to_world({double(i), double(j), double(k)})) + (noise > 0 ? normal(random) : 0.0)));
+                values.push_back(float(brightness(g.index_to_world({double(i), double(j), double(k)})) +
+                                       (noise > 0 ? normal(random) : 0.0)));
     return Image::from_values(g, values.data());
 }
 
@@ -74,7 +76,9 @@ FloatGridPtr level_set(const Domain& d, const std::function<double(const Vec3&)>
     return start_from_grid(d, *grid);
 }
 
-struct Radius { double mean, rms, largest; };
+struct Radius {
+    double mean, rms, largest;
+};
 
 /// Of the surface about the origin, less `radius`: mean, root mean square, largest deviation.
 Radius radius_of(const FloatGrid& grid, double radius) {
@@ -112,7 +116,8 @@ FloatGridPtr wavy_sphere(const Domain& d, const std::vector<Vec3>& marks, double
 
 TEST_CASE("Between the marks the border of a noisy bright ball is found") {
     const ImageGeometry g = lattice();
-    const Image image = picture(g, [](const Vec3& x) { return 100 - 60 * step_at(length(x) - kRadius); }, 20);
+    const Image image = picture(
+        g, [](const Vec3& x) { return 100 - 60 * step_at(length(x) - kRadius); }, 20);
     for (const int count : {20, 60}) {
         const std::vector<Vec3> marks = marks_on_sphere(count, kRadius);
         const FloatGridPtr guess = wavy_sphere(domain_of_image(g), marks, 1.5);
@@ -128,7 +133,8 @@ TEST_CASE("Between the marks the border of a noisy bright ball is found") {
 
 TEST_CASE("A guess that is off by three voxels between 20 marks is brought home") {
     const ImageGeometry g = lattice();
-    const Image image = picture(g, [](const Vec3& x) { return 100 - 60 * step_at(length(x) - kRadius); }, 10);
+    const Image image = picture(
+        g, [](const Vec3& x) { return 100 - 60 * step_at(length(x) - kRadius); }, 10);
     const std::vector<Vec3> marks = marks_on_sphere(20, kRadius);
     const FloatGridPtr guess = wavy_sphere(domain_of_image(g), marks, 3);
     GuidanceReport report;
@@ -144,7 +150,8 @@ TEST_CASE("An image that shows nothing leaves the guess as it is") {
     const FloatGridPtr guess = wavy_sphere(domain_of_image(g), marks, 1.5);
     const double before = radius_of(*guess, kRadius).rms;
     for (unsigned seed = 1; seed <= 5; ++seed) {
-        const Image image = picture(g, [](const Vec3&) { return 50; }, 20, seed);
+        const Image image = picture(
+            g, [](const Vec3&) { return 50; }, 20, seed);
         GuidanceReport report;
         const FloatGridPtr target = guide(*guess, marks, image, {}, report);
         INFO("seed " << seed << ", gain " << report.gain << ", image error " << report.image_error);
@@ -152,7 +159,10 @@ TEST_CASE("An image that shows nothing leaves the guess as it is") {
         if (!report.used) CHECK_FALSE(report.reason.empty());
     }
     GuidanceReport report;
-    const FloatGridPtr target = guide(*guess, marks, picture(g, [](const Vec3&) { return 50; }, 0), {}, report);
+    const FloatGridPtr target = guide(*guess, marks,
+                                      picture(
+                                          g, [](const Vec3&) { return 50; }, 0),
+                                      {}, report);
     CHECK_FALSE(report.used);
     CHECK(radius_of(*target, kRadius).rms == Approx(before).epsilon(0.01));
 }
@@ -174,7 +184,8 @@ TEST_CASE("A stained membrane is found, bright or dark, whatever lies beside it"
 TEST_CASE("The border is where the marks have it, not where the slope is steepest") {
     // The marks lie one and a half voxels outside of the ball's edge.
     const ImageGeometry g = lattice();
-    const Image image = picture(g, [](const Vec3& x) { return 100 - 60 * step_at((length(x) - kRadius + 1.5) / 2); }, 5);
+    const Image image = picture(
+        g, [](const Vec3& x) { return 100 - 60 * step_at((length(x) - kRadius + 1.5) / 2); }, 5);
     const std::vector<Vec3> marks = marks_on_sphere(60, kRadius);
     const FloatGridPtr guess = wavy_sphere(domain_of_image(g), marks, 1.5);
     GuidanceReport report;
@@ -205,7 +216,8 @@ TEST_CASE("A second structure nearby does not draw the surface to itself") {
 
 TEST_CASE("Slices five voxels apart: the ball is found along them too") {
     const ImageGeometry g = lattice(5);
-    const Image image = picture(g, [](const Vec3& x) { return 100 - 60 * step_at(length(x) - kRadius); }, 10);
+    const Image image = picture(
+        g, [](const Vec3& x) { return 100 - 60 * step_at(length(x) - kRadius); }, 10);
     const std::vector<Vec3> marks = marks_on_sphere(40, kRadius, 0.25);
     const FloatGridPtr guess = wavy_sphere(domain_of_image(g), marks, 2);
     GuidanceReport report;
@@ -215,7 +227,8 @@ TEST_CASE("Slices five voxels apart: the ball is found along them too") {
 
 TEST_CASE("Guidance gives the same bits for any number of threads") {
     const ImageGeometry g = lattice();
-    const Image image = picture(g, [](const Vec3& x) { return 100 - 60 * step_at(length(x) - kRadius); }, 20);
+    const Image image = picture(
+        g, [](const Vec3& x) { return 100 - 60 * step_at(length(x) - kRadius); }, 20);
     const std::vector<Vec3> marks = marks_on_sphere(60, kRadius);
     const FloatGridPtr guess = wavy_sphere(domain_of_image(g), marks, 1.5);
     std::vector<FloatGridPtr> results;
@@ -240,7 +253,8 @@ TEST_CASE("Guidance says what is wrong with its options") {
     options.weight = 2;
     CHECK(options.why_invalid().find("weight: expected 0 to 1, got 2") == 0);
     const ImageGeometry g = lattice();
-    const Image image = picture(g, [](const Vec3& x) { return length(x); }, 0);
+    const Image image = picture(
+        g, [](const Vec3& x) { return length(x); }, 0);
     const FloatGridPtr guess = start_from_sphere(domain_of_image(g), {0, 0, 0}, 10);
     GuidanceReport report;
     CHECK_THROWS_AS(guide(*guess, marks_on_sphere(20, 10), image, options, report), Error);

@@ -82,10 +82,12 @@ struct Trial {
     HolesReport report;
 };
 template <typename Function>
-Trial treat(Function function, const TriangleMesh& mesh, const std::vector<Vec3>& points, double slack_share = 1.0 / 6) {
+Trial treat(Function function, const TriangleMesh& mesh, const std::vector<Vec3>& points,
+            double slack_share = 1.0 / 6) {
     Trial result;
     const double distance = hole_distance(points, 0.01);
-    result.mesh = function(mesh, distances_to_points(mesh, points), distance, slack_share * distance, result.report, RunContext{});
+    result.mesh = function(mesh, distances_to_points(mesh, points), distance, slack_share * distance, result.report,
+                           RunContext{});
     return result;
 }
 
@@ -135,7 +137,8 @@ TEST_CASE("a cut parts the area where it should, and leaves no slivers") {
 
 TEST_CASE("where two fans of a part meet in a vertex it becomes two") {
     // A square of four triangles around a centre; two opposite ones stay.
-    const TriangleMesh square{{{0, 0, 0}, {1, 1, 0}, {-1, 1, 0}, {-1, -1, 0}, {1, -1, 0}}, {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}}};
+    const TriangleMesh square{{{0, 0, 0}, {1, 1, 0}, {-1, 1, 0}, {-1, -1, 0}, {1, -1, 0}},
+                              {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}}};
     const TriangleMesh part = holes::kept_part({square, {1, 0, 1, 0}});
     CHECK(part.triangles.size() == 2);
     CHECK(part.vertices.size() == 6);
@@ -163,7 +166,8 @@ TEST_CASE("the membrane between two rings is a catenoid, over a flat rim a plane
         }
     holes::span_membrane(tube, fixed, {});
     double worst = 0;
-    for (const auto& v : tube.vertices) worst = std::max(worst, std::abs(double(std::hypot(v[0], v[1])) / std::cosh(double(v[2])) - 1));
+    for (const auto& v : tube.vertices)
+        worst = std::max(worst, std::abs(double(std::hypot(v[0], v[1])) / std::cosh(double(v[2])) - 1));
     CHECK(worst < 0.004);
     CHECK(measure(tube).area == Approx(kPi * (1 + std::sinh(1.0))).epsilon(0.004));
 
@@ -203,8 +207,9 @@ TEST_CASE("a sphere with holes is cut at the last points, whatever the draw") {
                 const auto& b = open.mesh.vertices[t[1]];
                 const auto& c = open.mesh.vertices[t[2]];
                 for (int k = 0; k < 3; ++k)
-                    up += a[k] * ((double(b[(k + 1) % 3]) - a[(k + 1) % 3]) * (double(c[(k + 2) % 3]) - a[(k + 2) % 3]) -
-                                  (double(b[(k + 2) % 3]) - a[(k + 2) % 3]) * (double(c[(k + 1) % 3]) - a[(k + 1) % 3]));
+                    up +=
+                        a[k] * ((double(b[(k + 1) % 3]) - a[(k + 1) % 3]) * (double(c[(k + 2) % 3]) - a[(k + 2) % 3]) -
+                                (double(b[(k + 2) % 3]) - a[(k + 2) % 3]) * (double(c[(k + 1) % 3]) - a[(k + 1) % 3]));
                 inward += !(up > 0);
             }
             CHECK(inward == 0);

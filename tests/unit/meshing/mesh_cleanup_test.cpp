@@ -22,8 +22,8 @@ TriangleMesh sphere(int n, float radius, float x0 = 0) {
     for (int i = 1; i < n; ++i)
         for (int j = 0; j < m; ++j) {
             const double a = kPi * i / n, b = 2 * kPi * j / m;
-            mesh.vertices.push_back({x0 + radius * float(std::sin(a) * std::cos(b)), radius * float(std::sin(a) * std::sin(b)),
-                                     radius * float(std::cos(a))});
+            mesh.vertices.push_back({x0 + radius * float(std::sin(a) * std::cos(b)),
+                                     radius * float(std::sin(a) * std::sin(b)), radius * float(std::cos(a))});
         }
     mesh.vertices.push_back({x0, 0, -radius});
     const auto at = [&](int i, int j) {

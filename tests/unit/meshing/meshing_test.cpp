@@ -38,8 +38,10 @@ void check_table(const CornerTable& table, std::vector<Triangle> triangles) {
     CHECK(wrong == 0);
     std::size_t astray = 0;
     for (std::uint32_t v = 0; v < table.vertices(); ++v) {
-        astray += table.valence(v) != fresh.valence(v) || (fresh.valence(v) > 0 && table.vertex(table.corner_of(v)) != v);
-        astray += table.is_boundary(v) && fresh.valence(v) > 0 && table.opposite(CornerTable::previous(table.corner_of(v))) != CornerTable::kNone;
+        astray +=
+            table.valence(v) != fresh.valence(v) || (fresh.valence(v) > 0 && table.vertex(table.corner_of(v)) != v);
+        astray += table.is_boundary(v) && fresh.valence(v) > 0 &&
+                  table.opposite(CornerTable::previous(table.corner_of(v))) != CornerTable::kNone;
     }
     CHECK(astray == 0);
 }
@@ -105,7 +107,8 @@ TEST_CASE("no contact of random triangles is missed, and few are seen where ther
         TriangleMesh pair;
         const int shared = n % 3;
         const bool flat = n / 3 % 3 == 0;
-        for (int v = 0; v < 6 - shared; ++v) pair.vertices.push_back({uniform(random), uniform(random), flat ? 0.5F : uniform(random)});
+        for (int v = 0; v < 6 - shared; ++v)
+            pair.vertices.push_back({uniform(random), uniform(random), flat ? 0.5F : uniform(random)});
         const std::array<Triangle, 3> second{Triangle{3, 4, 5}, Triangle{3, 0, 4}, Triangle{1, 0, 3}};
         pair.triangles = {{0, 1, 2}, second[std::size_t(shared)]};
         const bool touch = count_self_intersections(pair) > 0;
@@ -123,9 +126,11 @@ TEST_CASE("contacts of a tangled mesh are those that exact predicates find") {
     for (const unsigned seed : {0U, 1U, 7U}) {
         TriangleMesh mesh = solid_mesh(seed);
         INFO("seed " << seed);
-        CHECK(ContactFinder(mesh.vertices, mesh.triangles).contacts(false).size() <= 2);  // extracted triangles can be as small as doubt
+        // extracted triangles can be as small as doubt
+        CHECK(ContactFinder(mesh.vertices, mesh.triangles).contacts(false).size() <= 2);
         std::mt19937 random(seed);
-        std::normal_distribution<float> shift(0, float(std::sqrt(measure(mesh).area / double(mesh.triangles.size()))) * 0.4F);
+        std::normal_distribution<float> shift(
+            0, float(std::sqrt(measure(mesh).area / double(mesh.triangles.size()))) * 0.4F);
         for (auto& v : mesh.vertices)
             for (float& c : v) c += shift(random);
         const auto contacts = ContactFinder(mesh.vertices, mesh.triangles).contacts(false);
@@ -147,7 +152,8 @@ TEST_CASE("moves are taken back where triangles would touch, and only there") {
     const Positions before = mesh.vertices;
     Positions goal = before;
     std::mt19937 random(2);
-    std::normal_distribution<float> shift(0, float(std::sqrt(measure(mesh).area / double(mesh.triangles.size()))) * 0.2F);
+    std::normal_distribution<float> shift(0,
+                                          float(std::sqrt(measure(mesh).area / double(mesh.triangles.size()))) * 0.2F);
     for (auto& v : goal)
         for (float& c : v) c += shift(random);
     TriangleMesh tangled = mesh;
@@ -158,7 +164,8 @@ TEST_CASE("moves are taken back where triangles would touch, and only there") {
     CHECK(measure(mesh).closed);
     CHECK(stay > 0);
     CHECK(stay < before.size());
-    for (std::size_t v = 0; v < before.size(); ++v) CHECK((mesh.vertices[v] == before[v] || mesh.vertices[v] == goal[v]));
+    for (std::size_t v = 0; v < before.size(); ++v)
+        CHECK((mesh.vertices[v] == before[v] || mesh.vertices[v] == goal[v]));
 }
 
 TEST_CASE("a mesh with a boundary keeps it, and relaxes within") {

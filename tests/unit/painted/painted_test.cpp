@@ -60,7 +60,9 @@ Image painting(const ImageGeometry& geometry, const Label& label) {
     return Image::from_values(geometry, values.data());
 }
 
-bool in_ball(int i, int j, int k, double middle, double r) { return std::hypot(i - middle, std::hypot(j - middle, k - middle)) < r; }
+bool in_ball(int i, int j, int k, double middle, double r) {
+    return std::hypot(i - middle, std::hypot(j - middle, k - middle)) < r;
+}
 
 Painted understood(const Image& image, const PaintedOptions& options = {}) {
     return understand_painted(image, painted_labels(image), options);
@@ -107,7 +109,8 @@ TEST_CASE("a staircase becomes a straight line", "[painted]") {
 }
 
 TEST_CASE("no vertex of an outline moves by more than half a voxel", "[painted]") {
-    const Slice comb = slice_of(40, 40, [](int i, int j) { return j > 3 && j < 36 && i > 3 && i < 36 && ((i / 3) % 2 == 0 || j < 8); });
+    const Slice comb = slice_of(
+        40, 40, [](int i, int j) { return j > 3 && j < 36 && i > 3 && i < 36 && ((i / 3) % 2 == 0 || j < 8); });
     for (const Polygon& rough : painted::pixel_outlines(comb)) {
         const Polygon line = painted::smoothed(rough);
         REQUIRE(line.size() == rough.size());
@@ -124,7 +127,9 @@ TEST_CASE("outlines run around the inside, holes the other way, corners apart", 
     REQUIRE(ring.size() == 2);
     CHECK(signed_area(ring[0]) > 0);
     CHECK(signed_area(ring[1]) < 0);
-    CHECK(painted::pixel_outlines(slice_of(4, 4, [](int i, int j) { return (i == 1 && j == 1) || (i == 2 && j == 2); })).size() == 2);
+    CHECK(painted::pixel_outlines(slice_of(4, 4, [](int i, int j) {
+              return (i == 1 && j == 1) || (i == 2 && j == 2);
+          })).size() == 2);
     CHECK(painted::pixel_outlines(slice_of(3, 3, [](int, int) { return false; })).empty());
 }
 
@@ -142,7 +147,10 @@ TEST_CASE("an outline is cut at the image's end, half a voxel beyond the last ce
 
 TEST_CASE("strokes are long and thin", "[painted]") {
     const auto bar = [](int width, int length) {
-        return painted::patches(slice_of(length + 4, width + 4, [&](int i, int j) { return i >= 2 && j >= 2 && i < length + 2 && j < width + 2; })).at(0);
+        return painted::patches(
+                   slice_of(length + 4, width + 4,
+                            [&](int i, int j) { return i >= 2 && j >= 2 && i < length + 2 && j < width + 2; }))
+            .at(0);
     };
     for (const int width : {1, 2, 3, 4}) {
         CHECK(bar(width, 14 * width).stroke);
@@ -179,21 +187,26 @@ TEST_CASE("slices that lie apart were painted as a whole", "[painted]") {
 }
 
 TEST_CASE("slices of several axes, and runs that are thin", "[painted]") {
-    const Label cross = [](int i, int j, int k) { return (k % 6 == 2 || j == 20) && in_ball(i, j, k, 19.5, 15) ? 1 : 0; };
+    const Label cross = [](int i, int j, int k) {
+        return (k % 6 == 2 || j == 20) && in_ball(i, j, k, 19.5, 15) ? 1 : 0;
+    };
     const Painted crossed = understood(painting(lattice({40, 40, 40}), cross));
     REQUIRE(crossed.labels[0].views.size() == 2);
     CHECK(crossed.labels[0].views[0].axis == 2);
     CHECK(crossed.labels[0].views[1].axis == 1);
     CHECK(crossed.labels[0].views[1].slices == std::vector<int>{20});
     CHECK(crossed.labels[0].inside.empty());
-    const Painted runs = understood(painting(lattice({40, 40, 40}), [](int i, int j, int k) { return k % 8 < 2 && in_ball(i, j, k, 19.5, 15) ? 1 : 0; }));
+    const Painted runs = understood(painting(
+        lattice({40, 40, 40}), [](int i, int j, int k) { return k % 8 < 2 && in_ball(i, j, k, 19.5, 15) ? 1 : 0; }));
     REQUIRE(runs.labels[0].views.size() == 1);
     CHECK(runs.labels[0].views[0].slices.size() == 8);
 }
 
 TEST_CASE("paint in places is a scribble", "[painted]") {
     const Label ball = [](int i, int j, int k) { return in_ball(i, j, k, 19.5, 5) ? 1 : 0; };
-    const Label stroke = [](int i, int j, int k) { return k == 12 && std::abs(j - 10 - i / 4) <= 1 && i > 3 && i < 36 ? 1 : 0; };
+    const Label stroke = [](int i, int j, int k) {
+        return k == 12 && std::abs(j - 10 - i / 4) <= 1 && i > 3 && i < 36 ? 1 : 0;
+    };
     for (const Label& label : {ball, stroke}) {
         const Image image = painting(lattice({40, 40, 40}), label);
         const Painted result = understood(image);
@@ -209,7 +222,11 @@ TEST_CASE("paint in places is a scribble", "[painted]") {
     CHECK(understood(painting(lattice({40, 40, 40}), ball)).labels[0].inside.size() < 400);
     PaintedOptions scribbles;
     scribbles.as = PaintedAs::Scribbles;
-    CHECK(understood(painting(lattice({40, 40, 40}), [](int i, int j, int k) { return k == 20 && in_ball(i, j, k, 19.5, 9) ? 1 : 0; }), scribbles).labels[0].views.empty());
+    CHECK(understood(painting(lattice({40, 40, 40}),
+                              [](int i, int j, int k) { return k == 20 && in_ball(i, j, k, 19.5, 9) ? 1 : 0; }),
+                     scribbles)
+              .labels[0]
+              .views.empty());
 }
 
 TEST_CASE("slices with strokes beside slices painted as a whole", "[painted]") {
@@ -236,16 +253,20 @@ TEST_CASE("several labels, and one for the outside", "[painted]") {
     CHECK(result.labels[1].label == 5);
     CHECK(result.outside.size() == 4 * 2 * 40);
     options.outside_label = 4;
-    CHECK(message_of([&] { (void)understood(image, options); }).find("expected the outside label 4 among its labels, got 3, 5, 9") != std::string::npos);
+    CHECK(message_of([&] {
+              (void)understood(image, options);
+          }).find("expected the outside label 4 among its labels, got 3, 5, 9") != std::string::npos);
 }
 
 TEST_CASE("label images that say nothing", "[painted]") {
-    CHECK(message_of([] { (void)painted_labels(painting(lattice({4, 5, 6}), [](int, int, int) { return 0; })); })
-              .find("expected painted voxels, got 0 everywhere in 4 x 5 x 6") != std::string::npos);
+    CHECK(message_of([] {
+              (void)painted_labels(painting(lattice({4, 5, 6}), [](int, int, int) { return 0; }));
+          }).find("expected painted voxels, got 0 everywhere in 4 x 5 x 6") != std::string::npos);
     std::vector<float> values(27, 0.0F);
     values[13] = 0.5F;
-    CHECK(message_of([&] { (void)painted_labels(Image::from_values(lattice({3, 3, 3}), values.data())); })
-              .find("expected whole numbers >= 0, got 0.5 at voxel (1, 1, 1)") != std::string::npos);
+    CHECK(message_of([&] {
+              (void)painted_labels(Image::from_values(lattice({3, 3, 3}), values.data()));
+          }).find("expected whole numbers >= 0, got 0.5 at voxel (1, 1, 1)") != std::string::npos);
 }
 
 TEST_CASE("paint lies on the image", "[painted]") {
@@ -257,16 +278,22 @@ TEST_CASE("paint lies on the image", "[painted]") {
     CHECK(placed_on(painting(lattice({10, 10, 10}), one), image).geometry().spacing[2] == 1);
     CHECK(placed_on(painting(lattice({10, 10, 10}), one), image, true).geometry().spacing[2] == 2);
     unknown.size = {9, 10, 10};
-    CHECK(message_of([&] { (void)placed_on(painting(unknown, [](int, int, int) { return 1; }), image); }).find("expected as many voxels as the image") != std::string::npos);
+    CHECK(message_of([&] {
+              (void)placed_on(painting(unknown, [](int, int, int) { return 1; }), image);
+          }).find("expected as many voxels as the image") != std::string::npos);
     ImageGeometry moved = lattice({10, 10, 10});
     moved.origin = {5, 0, 0};
-    CHECK(message_of([&] { (void)placed_on(painting(moved, one), image); }).find("100 of 100 painted voxels lie outside the image, the first at (9, 0, 0)") != std::string::npos);
+    CHECK(message_of([&] {
+              (void)placed_on(painting(moved, one), image);
+          }).find("100 of 100 painted voxels lie outside the image, the first at (9, 0, 0)") != std::string::npos);
 }
 
 TEST_CASE("names of 3D Slicer's segments", "[painted]") {
     const Scratch scratch;
-    const std::string path = scratch.write("a.seg.nrrd", "NRRD0004\ntype: unsigned char\nSegment0_ID:=Segment_1\nSegment0_LabelValue:=4\n"
-                                                         "Segment0_Name:=left kidney\r\nSegment1_Name:=spleen\nSegment1_LabelValue:=2\n\nSegment2_Name:=pixels");
+    const std::string path = scratch.write(
+        "a.seg.nrrd",
+        "NRRD0004\ntype: unsigned char\nSegment0_ID:=Segment_1\nSegment0_LabelValue:=4\n"
+        "Segment0_Name:=left kidney\r\nSegment1_Name:=spleen\nSegment1_LabelValue:=2\n\nSegment2_Name:=pixels");
     CHECK(painted::segment_names(path) == std::map<int, std::string>{{2, "spleen"}, {4, "left kidney"}});
     CHECK(painted::segment_names(scratch.path("none.nrrd")).empty());
     CHECK(painted::segment_names("mask.tif").empty());

@@ -1,5 +1,5 @@
-#include <catch2/catch.hpp>
 #include <atomic>
+#include <catch2/catch.hpp>
 #include <cmath>
 #include <random>
 
@@ -51,7 +51,8 @@ TEST_CASE("far points go, points of the surface stay in their order") {
     std::vector<Vec3> points = good;
     std::mt19937 random(2);
     std::uniform_real_distribution<double> uniform(2, 40);
-    for (int n = 0; n < 25; ++n) points.insert(points.begin() + n * 70, {uniform(random), uniform(random), -uniform(random)});
+    for (int n = 0; n < 25; ++n)
+        points.insert(points.begin() + n * 70, {uniform(random), uniform(random), -uniform(random)});
     CloudCleanupReport report;
     const std::vector<Vec3> cleaned = clean_cloud(points, with_outliers(3), {}, &report);
     CHECK(cleaned == good);
@@ -64,7 +65,8 @@ TEST_CASE("far points go, points of the surface stay in their order") {
 
 TEST_CASE("one point stays in each cell") {
     std::vector<Vec3> points;
-    for (int n = 0; n < 3000; ++n) points.push_back({0.01 * (n % 30) + 0.005, 0.01 * (n / 30 % 10) + 0.005, 0.01 * (n / 300) + 0.005});
+    for (int n = 0; n < 3000; ++n)
+        points.push_back({0.01 * (n % 30) + 0.005, 0.01 * (n / 30 % 10) + 0.005, 0.01 * (n / 300) + 0.005});
     CloudCleanupOptions options;
     options.simplify = 0.1;
     CloudCleanupReport report;

@@ -25,7 +25,8 @@ std::vector<Named> clouds(int count, unsigned seed) {
     const std::vector<Vec3> spread = test::box_cloud(count, {{-1, -1, -1}, {1, 1, 1}}, seed);
     std::vector<Vec3> clustered = spread, doubled = spread, flat = spread, line = spread;
     for (std::size_t n = 0; n < spread.size(); ++n) {
-        if (n % 4) for (int a = 0; a < 3; ++a) clustered[n][a] = 0.3 * double(n % 3) + 0.001 * spread[n][a];
+        if (n % 4)
+            for (int a = 0; a < 3; ++a) clustered[n][a] = 0.3 * double(n % 3) + 0.001 * spread[n][a];
         if (n % 2) doubled[n] = doubled[n - 1];
         flat[n][2] = 0.7;
         line[n][0] = line[n][2] = -3;
@@ -33,8 +34,10 @@ std::vector<Named> clouds(int count, unsigned seed) {
     // On the borders of cells.
     std::vector<Vec3> lattice;
     for (int n = 0; n < count; ++n) lattice.push_back({0.25 * (n % 8), 0.25 * (n / 8 % 8), 0.25 * (n / 64)});
-    return {{"spread", spread}, {"clustered", clustered}, {"doubled", doubled}, {"flat", flat},
-            {"line", line}, {"lattice", lattice}, {"one", {{1, 2, 3}}}, {"one place", std::vector<Vec3>(20, Vec3{4, 5, 6})}};
+    return {{"spread", spread},   {"clustered", clustered},
+            {"doubled", doubled}, {"flat", flat},
+            {"line", line},       {"lattice", lattice},
+            {"one", {{1, 2, 3}}}, {"one place", std::vector<Vec3>(20, Vec3{4, 5, 6})}};
 }
 
 bool in(const Vec3& p, const WorldBox& box) {
@@ -124,7 +127,8 @@ TEST_CASE("the ranges around a place are those of the box around it") {
     for (const double reach : {0.0, 0.1, 3.0})
         for (const Vec3& p : points) {
             cells.find(p, reach, around);
-            cells.find({{p[0] - reach, p[1] - reach, p[2] - reach}, {p[0] + reach, p[1] + reach, p[2] + reach}}, in_box);
+            cells.find({{p[0] - reach, p[1] - reach, p[2] - reach}, {p[0] + reach, p[1] + reach, p[2] + reach}},
+                       in_box);
             REQUIRE(around.size() == in_box.size());
             for (std::size_t n = 0; n < around.size(); ++n)
                 CHECK((around[n].begin == in_box[n].begin && around[n].end == in_box[n].end));
@@ -155,7 +159,8 @@ TEST_CASE("the nearest neighbours are brute force's") {
             const double spacing = 0.15;
             const PointCells cells(points, kFirstRadius * spacing);
             std::vector<std::vector<Neighbour>> found(points.size());
-            for_nearest(cells, spacing, count, [&](std::uint32_t point, const std::vector<Neighbour>& near) { found[point] = near; });
+            for_nearest(cells, spacing, count,
+                        [&](std::uint32_t point, const std::vector<Neighbour>& near) { found[point] = near; });
             for (std::size_t n = 0; n < points.size(); ++n) {
                 INFO(name << ", " << count << " neighbours, point " << n);
                 std::vector<double> all;
@@ -180,7 +185,7 @@ TEST_CASE("the nearest neighbours are brute force's") {
 TEST_CASE("neighbours are looked for within 40 spacings at least, not without end") {
     std::vector<Vec3> points;
     for (int n = 0; n < 20; ++n) points.push_back({0.1 * n, 0, 0});
-    points.push_back({1.9 + 3.9, 0, 0});    // 39 spacings from the last
+    points.push_back({1.9 + 3.9, 0, 0});  // 39 spacings from the last
     points.push_back({-1000, 0, 0});
     const PointCells cells(points, 0.2);
     std::vector<std::vector<Neighbour>> found(points.size());

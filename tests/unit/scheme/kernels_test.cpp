@@ -100,7 +100,8 @@ TEST_CASE("coefficients are those of the scheme, on every instruction set") {
     for (const SchemeKernels* set : available_kernels()) {
         INFO(set->name);
         LeafRows c;
-        const float largest = set->assemble(u.data(), phi.data(), g.data(), nullptr, kAllActive.data(), kConstants, c.data()).largest;
+        const float largest =
+            set->assemble(u.data(), phi.data(), g.data(), nullptr, kAllActive.data(), kConstants, c.data()).largest;
         double worst = 0.0, largest_plain = 0.0;
         for (int n = 0; n < 512; ++n) {
             const Rows row = plain_row(u, &phi, &g, kConstants, n >> 6, n >> 3 & 7, n & 7);
@@ -179,7 +180,8 @@ TEST_CASE("inactive voxels and closed faces stay out of the system") {
             if (is_closed || !on) REQUIRE(closed(f, n) == 0.0F);
         }
         // undo the division by the diagonal 1 + S: S = c/(1-Σc), and what is kept of S is the same in both
-        if (on && j <= 6) REQUIRE(sum_closed / (1 - sum_closed) == Approx(kept / (1 - sum_open)).epsilon(1e-3).margin(1e-6));
+        if (on && j <= 6)
+            REQUIRE(sum_closed / (1 - sum_closed) == Approx(kept / (1 - sum_open)).epsilon(1e-3).margin(1e-6));
     }
 }
 
@@ -221,7 +223,8 @@ TEST_CASE("relaxation converges to the solution of the rows") {
         Blocks blocks(u);
         const double first = set->relax(blocks.star(), b.data(), c.data(), kAllActive.data(), 1.5F, 2, {});
         double last = first;
-        for (int sweep = 0; sweep < 100; ++sweep) last = set->relax(blocks.star(), b.data(), c.data(), kAllActive.data(), 1.5F, 2, {});
+        for (int sweep = 0; sweep < 100; ++sweep)
+            last = set->relax(blocks.star(), b.data(), c.data(), kAllActive.data(), 1.5F, 2, {});
         Padded x = u;
         blocks.copy_to(x);
         CHECK(last < 1e-10 * first);
@@ -230,8 +233,7 @@ TEST_CASE("relaxation converges to the solution of the rows") {
             const int i = n >> 6, j = n >> 3 & 7, k = n & 7;
             double value = b[n];
             for (int f = 0; f < 6; ++f)
-                value += c(f, n) *
-                         (double(x[padded(i + kSteps[f][0], j + kSteps[f][1], k + kSteps[f][2])]) - b[n]);
+                value += c(f, n) * (double(x[padded(i + kSteps[f][0], j + kSteps[f][1], k + kSteps[f][2])]) - b[n]);
             worst = std::max(worst, std::abs(value - x[padded(i, j, k)]));
         }
         CHECK(worst < 1e-5);
@@ -244,14 +246,16 @@ TEST_CASE("assembly tells the residual at the values before") {
     active[3] = 0x00ff12ff00ff34ffULL;
     for (const SchemeKernels* set : available_kernels()) {
         LeafRows c;
-        const double told = set->assemble(u.data(), nullptr, nullptr, nullptr, active.data(), kConstants, c.data()).residual;
+        const double told =
+            set->assemble(u.data(), nullptr, nullptr, nullptr, active.data(), kConstants, c.data()).residual;
         double squares = 0.0;
         for (int n = 0; n < 512; ++n) {
             if ((active[n >> 6] >> (n & 63) & 1) == 0) continue;
             const int i = n >> 6, j = n >> 3 & 7, k = n & 7;
             double pull = 0.0;
             for (int f = 0; f < 6; ++f)
-                pull += c(f, n) * (double(u[padded(i + kSteps[f][0], j + kSteps[f][1], k + kSteps[f][2])]) - u[padded(i, j, k)]);
+                pull += c(f, n) *
+                        (double(u[padded(i + kSteps[f][0], j + kSteps[f][1], k + kSteps[f][2])]) - u[padded(i, j, k)]);
             squares += pull * pull;
         }
         CHECK(told == Approx(squares).epsilon(1e-3));

@@ -76,7 +76,8 @@ Rows assemble_leaf(const detail::SchemeKernels& kernels, const DenseField& u, co
                          g != nullptr ? pg.values.data() : nullptr, nullptr, bits.data(), constants, shares.data());
     rows.largest = facts.largest;
     for (int f = 0; f < 6; ++f)
-        for (int n = 0; n < kLeafSize; ++n) rows.c[f * kLeafSize + n] = float(shares[detail::share_at(f, n)]) / detail::kShareUnit;
+        for (int n = 0; n < kLeafSize; ++n)
+            rows.c[f * kLeafSize + n] = float(shares[detail::share_at(f, n)]) / detail::kShareUnit;
     return rows;
 }
 

@@ -44,7 +44,8 @@ Image ball_image(double spacing) {
 
 double mean_radius(const TriangleMesh& mesh) {
     double sum = 0;
-    for (const auto& v : mesh.vertices) sum += std::sqrt(double(v[0]) * v[0] + double(v[1]) * v[1] + double(v[2]) * v[2]);
+    for (const auto& v : mesh.vertices)
+        sum += std::sqrt(double(v[0]) * v[0] + double(v[1]) * v[1] + double(v[2]) * v[2]);
     return sum / static_cast<double>(mesh.vertices.size());
 }
 
@@ -97,7 +98,8 @@ TEST_CASE("segment: an unlimited attraction reaches from a far start to the poin
     options.start.radius = kRadius + 4;
     options.margin = 8;
     options.evolve.attraction_range = 0;
-    options.evolve.delta = 0.1 * options.voxel_size;  // the points are a voxel apart: more and curvature wins between them
+    // the points are a voxel apart: more and curvature wins between them
+    options.evolve.delta = 0.1 * options.voxel_size;
     const SegmentResult result = segment(nullptr, sphere_points(1200), options);
     CHECK(result.report.automatic.count("distance_tube") == 1);
     CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.1 * options.voxel_size);
@@ -185,7 +187,8 @@ TEST_CASE("choose_voxel_size: image before points, median spacing of distinct po
     const Image image = ball_image(2.0);
     CHECK(choose_voxel_size(&image, {{0, 0, 0}}).voxel_size == 2.0);
     // Three distinct points: as many voxels as a thousand would have.
-    CHECK(choose_voxel_size(nullptr, {{0, 0, 0}, {3, 0, 0}, {0, 0, 0}, {6, 0, 0}}).voxel_size == Approx(3 * std::sqrt(3.0 / 1000)));
+    CHECK(choose_voxel_size(nullptr, {{0, 0, 0}, {3, 0, 0}, {0, 0, 0}, {6, 0, 0}}).voxel_size ==
+          Approx(3 * std::sqrt(3.0 / 1000)));
     std::vector<Vec3> plate;
     for (int i = 0; i < 40; ++i)
         for (int j = 0; j < 25; ++j) plate.push_back({3.0 * i, 3.0 * j, 0});

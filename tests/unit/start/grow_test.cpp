@@ -52,10 +52,12 @@ TEST_CASE("a sphere inside a clean object, bright or dark, grows to its edges wh
     for (const double inside : {180.0, 20.0})
         for (const double noise : {0.0, 10.0, 30.0})
             for (const Vec3& off : {Vec3{0, 0, 0}, Vec3{6, 0, 0}, Vec3{-3, 4, 6}}) {
-                INFO("inside " << inside << ", noise " << noise << ", seed off by " << off[0] << " " << off[1] << " " << off[2]);
+                INFO("inside " << inside << ", noise " << noise << ", seed off by " << off[0] << " " << off[1] << " "
+                               << off[2]);
                 const Image image = image_of(50, ellipsoid(center, radii), inside, noise, 3);
                 const Domain domain = domain_of_box(image.geometry().world_box(), 1);
-                const FloatGridPtr seed = start_from_sphere(domain, {center[0] + off[0], center[1] + off[1], center[2] + off[2]}, 3.5);
+                const FloatGridPtr seed =
+                    start_from_sphere(domain, {center[0] + off[0], center[1] + off[1], center[2] + off[2]}, 3.5);
                 const detail::GrownStart grown = detail::grow_to_edges(image, *seed, 1, {});
                 INFO(grown.why);
                 REQUIRE(grown.level_set);
@@ -69,6 +71,7 @@ TEST_CASE("a start around an object, at an edge or in an empty image stays as it
     const Domain domain = domain_of_box(image.geometry().world_box(), 1);
     CHECK_FALSE(detail::grow_to_edges(image, *start_from_sphere(domain, center, 16), 1, {}).level_set);
     CHECK_FALSE(detail::grow_to_edges(image, *start_from_sphere(domain, center, 10), 1, {}).level_set);
-    const Image empty = image_of(50, [](const Vec3&) { return 1.0; }, 180, 5, 1);
+    const Image empty = image_of(
+        50, [](const Vec3&) { return 1.0; }, 180, 5, 1);
     CHECK_FALSE(detail::grow_to_edges(empty, *start_from_sphere(domain, center, 6), 1, {}).level_set);
 }

@@ -66,8 +66,10 @@ TEST_CASE("all 256 cubes with random values give closed manifold surfaces withou
     for (int inside = 1; inside < 256; ++inside) {
         FloatGridPtr grid = make_grid({}, 1.0F, "surface");
         for (int c = 0; c < 8; ++c)
-            if (inside >> c & 1) grid->tree().setValue({c >> 2, c >> 1 & 1, c & 1}, -size(random));
-            else grid->tree().setValue({c >> 2, c >> 1 & 1, c & 1}, size(random));
+            if (inside >> c & 1)
+                grid->tree().setValue({c >> 2, c >> 1 & 1, c & 1}, -size(random));
+            else
+                grid->tree().setValue({c >> 2, c >> 1 & 1, c & 1}, size(random));
         INFO("inside corners " << inside);
         check_solid(extract_mesh(*grid));
     }
@@ -116,13 +118,13 @@ TEST_CASE("a sphere has its volume, area and genus, and its vertices lie on it")
 
     ExtractOptions larger;
     larger.isovalue = 0.5 * h;
-    CHECK(measure(extract_mesh(*grid, larger)).volume == Approx(4.0 / 3 * kPi * std::pow(r + 0.5 * h, 3)).epsilon(0.01));
+    CHECK(measure(extract_mesh(*grid, larger)).volume ==
+          Approx(4.0 / 3 * kPi * std::pow(r + 0.5 * h, 3)).epsilon(0.01));
 }
 
 TEST_CASE("a torus has genus 1") {
-    const auto grid = dense_grid(16, 0.1, {0, 0, 0}, [](const Vec3& p) {
-        return std::hypot(std::hypot(p[0], p[1]) - 1.0, p[2]) - 0.4;
-    });
+    const auto grid = dense_grid(16, 0.1, {0, 0, 0},
+                                 [](const Vec3& p) { return std::hypot(std::hypot(p[0], p[1]) - 1.0, p[2]) - 0.4; });
     const TriangleMesh mesh = extract_mesh(*grid);
     check_solid(mesh);
     CHECK(measure(mesh).genus == 1);
@@ -154,9 +156,9 @@ TEST_CASE("small components are dropped on demand") {
 
 TEST_CASE("inside tiles without a rim of leaves are closed too") {
     FloatGridPtr grid = make_grid({}, 1.0F, "surface");
-    grid->tree().addTile(1, {0, 0, 0}, -1.0F, false);       // 8^3
-    grid->tree().addTile(1, {8, 8, 0}, -1.0F, true);        // touches the first in an edge
-    grid->tree().addTile(2, {256, 0, 0}, -1.0F, false);     // 128^3
+    grid->tree().addTile(1, {0, 0, 0}, -1.0F, false);    // 8^3
+    grid->tree().addTile(1, {8, 8, 0}, -1.0F, true);     // touches the first in an edge
+    grid->tree().addTile(2, {256, 0, 0}, -1.0F, false);  // 128^3
     grid->tree().setValue({-1, -1, 8}, -0.5F);
     const TriangleMesh mesh = extract_mesh(*grid);
     const MeshMeasures m = measure(mesh);
@@ -167,9 +169,8 @@ TEST_CASE("inside tiles without a rim of leaves are closed too") {
 }
 
 TEST_CASE("the mesh does not depend on the number of threads") {
-    const auto grid = dense_grid(20, 0.1, {0, 0, 0}, [](const Vec3& p) {
-        return std::sin(4 * p[0]) + std::sin(5 * p[1]) + std::sin(6 * p[2]);
-    });
+    const auto grid = dense_grid(
+        20, 0.1, {0, 0, 0}, [](const Vec3& p) { return std::sin(4 * p[0]) + std::sin(5 * p[1]) + std::sin(6 * p[2]); });
     RunContext run;
     run.threads = 1;
     const TriangleMesh reference = extract_mesh(*grid, {}, run);

@@ -24,9 +24,12 @@ double ball(const Vec3& p, const Vec3& center, double radius) { return test::dis
 
 /// A ball of radius 0.8 with a small cavity, and a small ball: a band.
 FloatGridPtr solid(const Vec3& second) {
-    return test::start_grid(test::cube_domain(80, kVoxel), [&](const Vec3& p) {
-        return std::min(std::max(ball(p, {0, 0, 0}, 0.8), -ball(p, kCavity, kSmall)), ball(p, second, kSmall));
-    }, 3 * kVoxel);
+    return test::start_grid(
+        test::cube_domain(80, kVoxel),
+        [&](const Vec3& p) {
+            return std::min(std::max(ball(p, {0, 0, 0}, 0.8), -ball(p, kCavity, kSmall)), ball(p, second, kSmall));
+        },
+        3 * kVoxel);
 }
 
 std::vector<Vec3> joined(std::vector<Vec3> a, const std::vector<Vec3>& b) {
@@ -36,7 +39,9 @@ std::vector<Vec3> joined(std::vector<Vec3> a, const std::vector<Vec3>& b) {
 
 int components(const FloatGrid& grid) { return measure(extract_mesh(grid)).components; }
 
-std::vector<Vec3> on_small(const Vec3& center, double off = 0) { return test::sphere_cloud(40, kSmall + off, 2, center); }
+std::vector<Vec3> on_small(const Vec3& center, double off = 0) {
+    return test::sphere_cloud(40, kSmall + off, 2, center);
+}
 const std::vector<Vec3> on_main = test::sphere_cloud(500, 0.8, 1);
 
 }  // namespace
@@ -80,7 +85,8 @@ TEST_CASE("the right piece goes, the rest keeps its surface") {
         double farthest = 0;
         for (const auto& v : mesh.vertices) {
             const Vec3 p{v[0], v[1], v[2]};
-            farthest = std::max(farthest, std::min(std::abs(ball(p, {0, 0, 0}, 0.8)), std::abs(ball(p, kCavity, kSmall))));
+            farthest =
+                std::max(farthest, std::min(std::abs(ball(p, {0, 0, 0}, 0.8)), std::abs(ball(p, kCavity, kSmall))));
         }
         CHECK(farthest < 0.2 * kVoxel);
     }
@@ -89,7 +95,8 @@ TEST_CASE("the right piece goes, the rest keeps its surface") {
 TEST_CASE("points a voxel off a piece lie on it, those three voxels off do not") {
     for (const auto& [off, stays] : {std::pair{0.9, true}, std::pair{-0.9, true}, std::pair{3.0, false}}) {
         const FloatGridPtr grid = solid(kBeside);
-        detail::drop_bare_pieces(*grid, joined(joined(on_main, on_small(kCavity)), on_small(kBeside, off * kVoxel)), 30);
+        detail::drop_bare_pieces(*grid, joined(joined(on_main, on_small(kCavity)), on_small(kBeside, off * kVoxel)),
+                                 30);
         INFO(off << " voxels");
         CHECK((components(*grid) == 3) == stays);
     }

@@ -37,7 +37,8 @@ FloatGridPtr waves(const Domain& domain, unsigned seed) {
     double p[6];
     for (double& x : p) x = phase(random);
     return field(domain, [&](const Vec3& x) {
-        return std::sin(2.1 * x[0] + p[0]) * std::cos(1.7 * x[1] + p[1]) + std::sin(1.9 * x[1] + p[2]) * std::cos(2.3 * x[2] + p[3]) +
+        return std::sin(2.1 * x[0] + p[0]) * std::cos(1.7 * x[1] + p[1]) +
+               std::sin(1.9 * x[1] + p[2]) * std::cos(2.3 * x[2] + p[3]) +
                std::sin(2.0 * x[2] + p[4]) * std::cos(1.8 * x[0] + p[5]) - 0.3;
     });
 }
@@ -50,7 +51,8 @@ struct Point {
     [[nodiscard]] double dot(const Point& o) const { return x * o.x + y * o.y + z * o.z; }
 };
 
-/// Squared distance to a triangle, by the regions of its vertices, edges and inside (Ericson, Real-Time Collision Detection, 5.1.5).
+/// Squared distance to a triangle, by the regions of its vertices, edges and inside (Ericson, Real-Time Collision
+/// Detection, 5.1.5).
 double to_triangle(const Point& p, const Point& a, const Point& b, const Point& c) {
     const auto square = [&](const Point& q) { return (p - q).dot(p - q); };
     const Point ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
@@ -69,14 +71,16 @@ double to_triangle(const Point& p, const Point& a, const Point& b, const Point& 
 double nearest_by_search(const detail::InterfacePatches& patches, const Coord& at) {
     double best = 1e9;
     for (const detail::Patch& patch : patches.patches) {
-        const Point p{double(at[0] - patch.origin[0]), double(at[1] - patch.origin[1]), double(at[2] - patch.origin[2])};
+        const Point p{double(at[0] - patch.origin[0]), double(at[1] - patch.origin[1]),
+                      double(at[2] - patch.origin[2])};
         const auto vertex = [&](std::uint32_t n) {
             const auto& v = patches.vertices[patch.first + n % patch.count];
             return Point{v[0], v[1], v[2]};
         };
         const Point center{patch.center[0], patch.center[1], patch.center[2]};
         if ((p - center).dot(p - center) > 25 + best) continue;
-        for (std::uint32_t n = 0; n < patch.count; ++n) best = std::min(best, to_triangle(p, center, vertex(n), vertex(n + 1)));
+        for (std::uint32_t n = 0; n < patch.count; ++n)
+            best = std::min(best, to_triangle(p, center, vertex(n), vertex(n + 1)));
     }
     return std::sqrt(best);
 }
@@ -139,10 +143,12 @@ TEST_CASE("eight voxels at a time and one by one find the same distance to a pat
         for (std::size_t a = 0; a < 3; ++a) e[a] = (a == least ? 1.0F : 0.0F) - axis[least] * axis[a];
         const float scale = 1 / std::sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
         for (float& a : e) a *= scale;
-        for (std::size_t a = 0; a < 3; ++a) f[a] = axis[(a + 1) % 3] * e[(a + 2) % 3] - axis[(a + 2) % 3] * e[(a + 1) % 3];
+        for (std::size_t a = 0; a < 3; ++a)
+            f[a] = axis[(a + 1) % 3] * e[(a + 2) % 3] - axis[(a + 2) % 3] * e[(a + 1) % 3];
         for (std::size_t v = 0; v < ring.size(); ++v)
             for (std::size_t a = 0; a < 3; ++a)
-                ring[v][a] = 0.6F * (std::cos(1.2566F * float(v)) * e[a] + std::sin(1.2566F * float(v)) * f[a]) + 0.2F * unit(random);
+                ring[v][a] = 0.6F * (std::cos(1.2566F * float(v)) * e[a] + std::sin(1.2566F * float(v)) * f[a]) +
+                             0.2F * unit(random);
         for (const auto& v : ring)
             for (std::size_t a = 0; a < 3; ++a) center[a] += v[a] / 5;
         const detail::PatchFan fan(axis.data(), center.data(), ring.data(), 5);
@@ -214,7 +220,8 @@ TEST_CASE("a field without a crossing, and one whose outside is not positive, ar
 }
 
 TEST_CASE("fog is 1 deep inside, 0 outside, and rises across the inner half of the band") {
-    const FloatGridPtr level_set = surface(*field(kDomain, [](const Vec3& x) { return std::hypot(x[0], x[1], x[2]) - 5; }));
+    const FloatGridPtr level_set =
+        surface(*field(kDomain, [](const Vec3& x) { return std::hypot(x[0], x[1], x[2]) - 5; }));
     const FloatGridPtr fog = density(*level_set);
     CHECK(fog->getGridClass() == openvdb::GRID_FOG_VOLUME);
     CHECK(fog->getName() == "density");
@@ -226,7 +233,9 @@ TEST_CASE("fog is 1 deep inside, 0 outside, and rises across the inner half of t
 
 TEST_CASE("a label image has the label where the voxel's centre is inside, in any geometry") {
     const Vec3 center{0.31, -0.27, 0.44};
-    const auto off = [&](const Vec3& x) { return std::hypot(x[0] - center[0], x[1] - center[1], x[2] - center[2]) - 5; };
+    const auto off = [&](const Vec3& x) {
+        return std::hypot(x[0] - center[0], x[1] - center[1], x[2] - center[2]) - 5;
+    };
     const FloatGridPtr level_set = surface(*field(kDomain, off));
     ImageGeometry geometry;
     geometry.size = {33, 29, 21};

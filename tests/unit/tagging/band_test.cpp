@@ -232,7 +232,8 @@ TEST_CASE("the tag distance is chosen from the cloud") {
         CHECK(report.core_volume > 0.5 * (ball(26) - ball(12)));
     }
     SECTION("a sheet has no inside: the spacing decides, and the reason says so") {
-        const TagDistanceChoice choice = choose_tag_distance(box_cloud(4000, {{-25, -25, 0}, {25, 25, 0.01}}, 6), kDomain, {});
+        const TagDistanceChoice choice =
+            choose_tag_distance(box_cloud(4000, {{-25, -25, 0}, {25, 25, 0.01}}, 6), kDomain, {});
         CHECK(choice.reason.find("spacing") != std::string::npos);
         CHECK(choice.tag_distance == Approx(1.5));  // at least; 1.8 times 0.4 is less
     }

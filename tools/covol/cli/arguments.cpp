@@ -87,7 +87,10 @@ Start parse_start(const std::string& flag, const std::string& text) {
     const std::string kind = text.substr(0, colon);
     const std::string rest = colon == std::string::npos ? "" : text.substr(colon + 1);
     if (colon == std::string::npos && (kind == "auto" || kind == "guess" || kind == "cloud" || kind == "tag")) {
-        start.kind = kind == "auto" ? Start::Kind::Auto : kind == "guess" ? Start::Kind::Guess : kind == "cloud" ? Start::Kind::Cloud : Start::Kind::Tag;
+        start.kind = kind == "auto"    ? Start::Kind::Auto
+                     : kind == "guess" ? Start::Kind::Guess
+                     : kind == "cloud" ? Start::Kind::Cloud
+                                       : Start::Kind::Tag;
         return start;
     }
     if (kind == "sphere") {
@@ -135,7 +138,8 @@ Named split_name(const std::string& text) {
     const std::size_t at = text.find('=');
     // A folder's name may hold '=' too; names of structures hold no slash.
     std::error_code status;
-    const bool has_name = at != std::string::npos && at > 0 && text.find('/') >= at && !std::filesystem::exists(text, status);
+    const bool has_name =
+        at != std::string::npos && at > 0 && text.find('/') >= at && !std::filesystem::exists(text, status);
     return has_name ? Named{text.substr(0, at), text.substr(at + 1)} : Named{"", text};
 }
 
@@ -150,7 +154,8 @@ std::uint64_t parse_bytes(const std::string& flag, const std::string& text) {
         if (rest.size() != 1 || power == std::string::npos) bad_text(flag, expected, text);
         value *= std::pow(1024.0, static_cast<double>(power + 1));
     }
-    if (!(value >= 1) || value > 1e18) throw Error(Errc::InvalidOptions, flag + ": expected " + expected + ", got " + text);
+    if (!(value >= 1) || value > 1e18)
+        throw Error(Errc::InvalidOptions, flag + ": expected " + expected + ", got " + text);
     return static_cast<std::uint64_t>(value);
 }
 

@@ -24,9 +24,9 @@ bool is_one_of(const std::string& end, const std::array<std::string_view, N>& li
     return std::find(list.begin(), list.end(), end) != list.end();
 }
 
-constexpr std::array<std::string_view, 15> kPointEndings{".xyz",  ".csv",  ".tsv",       ".txt", ".pts",
-                                                         ".asc",  ".roi",  ".zip",       ".json", ".fcsv",
-                                                         ".annot", ".lmk", ".landmarks", ".pcd", ".las"};
+constexpr std::array<std::string_view, 15> kPointEndings{".xyz",   ".csv", ".tsv",       ".txt",  ".pts",
+                                                         ".asc",   ".roi", ".zip",       ".json", ".fcsv",
+                                                         ".annot", ".lmk", ".landmarks", ".pcd",  ".las"};
 constexpr std::array<std::string_view, 2> kMeshEndings{".stl", ".glb"};
 constexpr std::array<std::string_view, 3> kSharedEndings{".ply", ".obj", ".off"};
 
@@ -50,7 +50,8 @@ bool holds_triangles(const std::string& path) {
 FileKind kind_of_file(const std::string& path) {
     const std::string end = ending_of(split_grid_name(path).path);
     if (end == ".vdb") return FileKind::Vdb;
-    if (is_one_of(end, kPointEndings) || end == ".laz") return FileKind::Points;  // that LAZ is not read, its reader says
+    if (is_one_of(end, kPointEndings) || end == ".laz")
+        return FileKind::Points;  // that LAZ is not read, its reader says
     if (is_one_of(end, kMeshEndings)) return FileKind::Mesh;
     if (is_one_of(end, kSharedEndings)) return holds_triangles(path) ? FileKind::Mesh : FileKind::Points;
     return FileKind::Image;

@@ -11,8 +11,8 @@ constexpr std::size_t kColumn = 30;  // where texts begin
 constexpr std::size_t kWidth = 100;  // of a line
 
 // In the order of Group.
-constexpr std::array kGroupNames{"Input",      "Marks",  "How marks are read", "Point clouds", "Output",   "Mesh",
-                                 "Start",      "Domain", "Image edges",        "Flow",         "Numerics", "Help"};
+constexpr std::array kGroupNames{"Input", "Marks",  "How marks are read", "Point clouds", "Output",   "Mesh",
+                                 "Start", "Domain", "Image edges",        "Flow",         "Numerics", "Help"};
 
 /// `left`, then `text` in a column of its own, broken between words.
 std::string entry(const std::string& left, const std::string& text) {
@@ -64,16 +64,18 @@ std::string usage(const CLI::App& command, const std::string& name) {
     std::string text = "Usage: " + name;
     for (const CLI::Option* option : command.get_options([](const CLI::Option* o) { return o->get_positional(); }))
         text += option->get_required() ? " " + option->get_type_name() : " [" + option->get_type_name() + "]";
-    for (const CLI::Option* option : command.get_options([](const CLI::Option* o) { return !o->get_positional() && o->get_required(); }))
-        text += (option->get_snames().empty() ? " --" + option->get_lnames().front() : " -" + option->get_snames().front()) + " " +
-                option->get_type_name();
+    for (const CLI::Option* option :
+         command.get_options([](const CLI::Option* o) { return !o->get_positional() && o->get_required(); }))
+        text += (option->get_snames().empty() ? " --" + option->get_lnames().front()
+                                              : " -" + option->get_snames().front()) +
+                " " + option->get_type_name();
     return text + " [OPTIONS]\n";
 }
 
 nlohmann::ordered_json to_json(const CLI::Option& option, bool first) {
     const OptionHelp help = help_of(option);
-    return {{"names", help.names},       {"value", help.value}, {"text", help.text}, {"default", help.default_value},
-            {"required", help.required}, {"first", first}};
+    return {{"names", help.names},           {"value", help.value},       {"text", help.text},
+            {"default", help.default_value}, {"required", help.required}, {"first", first}};
 }
 
 }  // namespace
@@ -93,7 +95,9 @@ OptionHelp help_of(const CLI::Option& option) {
     if (!option.get_option_text().empty())
         help.value = option.get_option_text();
     else if (option.get_type_size() != 0)
-        help.value = option.get_type_name() == "FLOAT" ? "NUMBER" : option.get_type_name() == "INT" ? "N" : option.get_type_name();
+        help.value = option.get_type_name() == "FLOAT" ? "NUMBER"
+                     : option.get_type_name() == "INT" ? "N"
+                                                       : option.get_type_name();
     help.text = option.get_description();
     help.default_value = option.get_default_str();
     // An automatic choice ends the description, in brackets.
@@ -140,12 +144,14 @@ std::string Help::command_help(const CLI::App& command, const std::string& name,
 
 std::string Help::program_help(const CLI::App& program, const std::string& name, bool all) const {
     std::string text = program.get_description() + "\n\nUsage: " + name + " COMMAND [OPTIONS]\n\nCommands:\n";
-    for (const CLI::App* command : program.get_subcommands({})) text += entry(command->get_name(), command->get_description());
+    for (const CLI::App* command : program.get_subcommands({}))
+        text += entry(command->get_name(), command->get_description());
     text += section("Options of every command", options_in(program, "Options"));
     text += section(kGroupNames[std::size_t(Group::Help)], options_in(program, kGroupNames[std::size_t(Group::Help)]));
     if (!all) return text + "\n" + program.get_footer() + "\n";
     for (const CLI::App* command : program.get_subcommands({}))
-        text += "\n\n" + name + " " + command->get_name() + "\n" + command_help(*command, name + " " + command->get_name(), false);
+        text += "\n\n" + name + " " + command->get_name() + "\n" +
+                command_help(*command, name + " " + command->get_name(), false);
     return text;
 }
 
@@ -155,7 +161,8 @@ std::string Help::describe(const CLI::App& program) const {
         Json groups = Json::array();
         const auto add = [&](const char* group) {
             Json list = Json::array();
-            for (const CLI::Option* option : options_in(command, group)) list.push_back(to_json(*option, is_shown(command, *option, false)));
+            for (const CLI::Option* option : options_in(command, group))
+                list.push_back(to_json(*option, is_shown(command, *option, false)));
             if (!list.empty()) groups.push_back({{"name", group}, {"options", list}});
         };
         add("Options");
@@ -164,7 +171,9 @@ std::string Help::describe(const CLI::App& program) const {
     };
     Json commands = Json::array();
     for (const CLI::App* command : program.get_subcommands({}))
-        commands.push_back({{"name", command->get_name()}, {"description", command->get_description()}, {"groups", groups_of(*command)}});
+        commands.push_back({{"name", command->get_name()},
+                            {"description", command->get_description()},
+                            {"groups", groups_of(*command)}});
     return Json{{"common", groups_of(program)}, {"commands", commands}}.dump(2);
 }
 

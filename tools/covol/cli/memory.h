@@ -14,8 +14,8 @@ namespace covol::tool {
 /// Memory that this process can still take, bytes: of the machine and of its control group; 0 where nobody says.
 [[nodiscard]] std::uint64_t available_memory();
 
-/// Watches the memory that this process holds (without mapped files, which the system takes back) and sets `cancel` when it
-/// passes the limit.
+/// Watches the memory that this process holds (without mapped files, which the system takes back) and sets `cancel`
+/// when it passes the limit.
 class MemoryGuard {
 public:
     /// limit = 0: no guard.

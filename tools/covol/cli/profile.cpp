@@ -32,18 +32,21 @@ void add_stages(const Json& seconds, std::vector<std::string>& lines) {
 
 void add_solve(const Json& result, double peak, std::vector<std::string>& lines) {
     for (const Json& level : result.value("coarse", Json::array()))
-        lines.push_back(format("coarse level %g: %d steps, %.0f active voxels%s%s", level.value("voxel_size", 0.0), level.value("steps", 0),
-                               level.value("active_voxels", 0.0), level.contains("left_out") ? "; left out: " : "",
+        lines.push_back(format("coarse level %g: %d steps, %.0f active voxels%s%s", level.value("voxel_size", 0.0),
+                               level.value("steps", 0), level.value("active_voxels", 0.0),
+                               level.contains("left_out") ? "; left out: " : "",
                                level.value("left_out", std::string()).c_str()));
     if (!result.contains("solve") || !result.contains("grid")) return;
     const Json& solve = result.at("solve");
     const double voxels = result.at("grid").value("active_voxels", 0.0), steps = solve.value("steps", 0.0);
-    lines.push_back(format("%.0f active voxels in %.0f leaves%s", voxels, result.at("grid").value("leaf_count", 0.0),
-                           peak > 0 && voxels > 0 ? format("; %.0f bytes of peak memory for each", peak / voxels).c_str() : ""));
+    lines.push_back(
+        format("%.0f active voxels in %.0f leaves%s", voxels, result.at("grid").value("leaf_count", 0.0),
+               peak > 0 && voxels > 0 ? format("; %.0f bytes of peak memory for each", peak / voxels).c_str() : ""));
     if (!(steps > 0) || !(voxels > 0)) return;
     const double visits = solve.value("leaf_visits", 0.0), saved = solve.value("leaf_visits_saved", 0.0);
-    lines.push_back(format("%.0f steps (%s) of %.1f sweeps, %.0f leaf visits, %.1f %% saved", steps, solve.value("stop_reason", "").c_str(),
-                           solve.value("sweeps_per_step", 0.0), visits, visits + saved > 0 ? 100 * saved / (visits + saved) : 0.0));
+    lines.push_back(format("%.0f steps (%s) of %.1f sweeps, %.0f leaf visits, %.1f %% saved", steps,
+                           solve.value("stop_reason", "").c_str(), solve.value("sweeps_per_step", 0.0), visits,
+                           visits + saved > 0 ? 100 * saved / (visits + saved) : 0.0));
     lines.push_back(format("for each active voxel and step: assembly %.1f ns, sweeps %.1f ns",
                            1e9 * solve.value("seconds_assembly", 0.0) / voxels / steps,
                            1e9 * solve.value("seconds_sweeps", 0.0) / voxels / steps));

@@ -26,12 +26,14 @@ Json to_json(const Domain& d) {
 }
 
 Json to_json(const BandReport& r) {
-    return {{"tag_distance", r.tag_distance},   {"enclosed_volume", r.enclosed_volume}, {"core_volume", r.core_volume},
-            {"leaks", r.leaks},                 {"holding_distance", r.holding_distance}, {"active_voxels", r.active_voxels}};
+    return {{"tag_distance", r.tag_distance},         {"enclosed_volume", r.enclosed_volume},
+            {"core_volume", r.core_volume},           {"leaks", r.leaks},
+            {"holding_distance", r.holding_distance}, {"active_voxels", r.active_voxels}};
 }
 
 Json to_json(const EdgeReport& r) {
-    return {{"sigma", r.sigma}, {"edge_k", r.edge_k}, {"edge_contrast", r.edge_contrast}, {"low", r.low}, {"high", r.high}};
+    return {
+        {"sigma", r.sigma}, {"edge_k", r.edge_k}, {"edge_contrast", r.edge_contrast}, {"low", r.low}, {"high", r.high}};
 }
 
 Json to_json(const EvolveReport& r) {
@@ -59,13 +61,18 @@ Json to_json(const MeshMeasures& m) {
 Json to_json(const MeshDeviation& d) { return {{"mean", d.mean}, {"max", d.max}}; }
 
 Json to_json(const RelaxReport& r) {
-    return {{"triangles", r.triangles}, {"smallest_angle", r.smallest_angle}, {"deviation_voxels", to_json(r.deviation)}};
+    return {
+        {"triangles", r.triangles}, {"smallest_angle", r.smallest_angle}, {"deviation_voxels", to_json(r.deviation)}};
 }
 
 Json to_json(const FitStatistics& f) { return {{"mean", f.mean}, {"p95", f.p95}, {"max", f.max}}; }
 
 Json to_json(const SeedCheck& s) {
-    Json json{{"inside", s.inside}, {"outside", s.outside}, {"wrong", s.wrong()}, {"wrong_inside", s.wrong_inside}, {"wrong_outside", s.wrong_outside}};
+    Json json{{"inside", s.inside},
+              {"outside", s.outside},
+              {"wrong", s.wrong()},
+              {"wrong_inside", s.wrong_inside},
+              {"wrong_outside", s.wrong_outside}};
     if (s.wrong() > 0) json["first_wrong"] = to_json(s.first);
     return json;
 }
@@ -123,9 +130,10 @@ Json to_json(const SegmentReport& r) {
     if (r.marks_off.beyond > 0)
         json["fit"]["marks_off"] = {{"count", r.marks_off.count},
                                     {"beyond", r.marks_off.beyond},
-                                    {"farthest", {{"distance", r.marks_off.farthest},
-                                                  {"world", to_json(r.marks_off.farthest_world)},
-                                                  {"index", to_json(r.marks_off.farthest_index)}}}};
+                                    {"farthest",
+                                     {{"distance", r.marks_off.farthest},
+                                      {"world", to_json(r.marks_off.farthest_world)},
+                                      {"index", to_json(r.marks_off.farthest_index)}}}};
     if (r.guidance.used || !r.guidance.reason.empty())
         json["guidance"] = {{"used", r.guidance.used},
                             {"reason", r.guidance.reason},
@@ -159,8 +167,9 @@ Json to_json(const SegmentReport& r) {
                          {"joined_pieces", r.cloud.joined_pieces},
                          {"held_voxels", r.cloud.held_voxels}};
     if (const HintsReport& h = r.cloud.hints; h.normals + h.sensors > 0) {
-        json["cloud"]["normals"] = {{"given", h.normals}, {"sensor_given", h.sensors}, {"used", h.used}, {"from_sensor", h.from_sensor},
-                                    {"inward", h.inward}, {"foreseen", h.foreseen},    {"agree", h.agree}};
+        json["cloud"]["normals"] = {
+            {"given", h.normals}, {"sensor_given", h.sensors}, {"used", h.used},  {"from_sensor", h.from_sensor},
+            {"inward", h.inward}, {"foreseen", h.foreseen},    {"agree", h.agree}};
         if (!h.why_not.empty()) json["cloud"]["normals"]["why_not"] = h.why_not;
     }
     if (r.holes.distance > 0) {
@@ -170,7 +179,8 @@ Json to_json(const SegmentReport& r) {
                          {"share", r.holes.share},
                          {"dropped_pieces", r.holes.dropped_pieces},
                          {"loops", Json::array()}};
-        for (const BoundaryLoop& loop : r.holes.loops) json["holes"]["loops"].push_back({{"length", loop.length}, {"edges", loop.edges}});
+        for (const BoundaryLoop& loop : r.holes.loops)
+            json["holes"]["loops"].push_back({{"length", loop.length}, {"edges", loop.edges}});
     }
     if (r.seeds.inside + r.seeds.outside > 0) json["seeds"] = to_json(r.seeds);
     if (r.share_without_points > 0) json["fit"]["surface_without_points"] = r.share_without_points;
@@ -189,13 +199,14 @@ void add_seconds(Session& session, const SegmentReport::Seconds& seconds) {
 
 std::vector<std::string> summary(const SegmentReport& r) {
     std::ostringstream text;
-    text << std::setprecision(4) << r.active_voxels << " active voxels of " << r.domain.voxel_size << ", " << r.solve.steps
-         << " steps (" << to_string(r.solve.stop_reason) << "), " << r.seconds.total << " s";
-    std::vector<std::string> lines{text.str(), "surface: " + one_line(r.surface), "mesh: " + mesh_line(r.mesh.triangles, r.mesh.smallest_angle, r.mesh.deviation)};
+    text << std::setprecision(4) << r.active_voxels << " active voxels of " << r.domain.voxel_size << ", "
+         << r.solve.steps << " steps (" << to_string(r.solve.stop_reason) << "), " << r.seconds.total << " s";
+    std::vector<std::string> lines{text.str(), "surface: " + one_line(r.surface),
+                                   "mesh: " + mesh_line(r.mesh.triangles, r.mesh.smallest_angle, r.mesh.deviation)};
     if (r.point_count == 0) return lines;
     text.str("");
-    text << "points to surface: mean " << r.fit.mean << ", 95 % " << r.fit.p95 << ", max " << r.fit.max
-         << ", bias " << r.fit.bias;
+    text << "points to surface: mean " << r.fit.mean << ", 95 % " << r.fit.p95 << ", max " << r.fit.max << ", bias "
+         << r.fit.bias;
     lines.push_back(text.str());
     return lines;
 }

@@ -1,7 +1,7 @@
 #include "cli/session.h"
 
-#include <csignal>
 #include <cmath>
+#include <csignal>
 #include <filesystem>
 #include <iostream>
 
@@ -116,7 +116,7 @@ void expect_values(const CLI::App& app) {
 }
 
 constexpr std::uint64_t kUsablePercent = 95;  // of the free memory: beyond it the system would end us without a word
-constexpr int kMostThreads = 1024;  // TBB runs out of stacks long after
+constexpr int kMostThreads = 1024;            // TBB runs out of stacks long after
 
 }  // namespace
 
@@ -157,12 +157,15 @@ void Session::add_common_flags() {
     app_.add_flag("--profile", profile_, "print at the end where time and memory went");
     app_.add_flag("--quiet", quiet_, "print nothing but results, warnings and errors");
     app_.add_option("--json", json_path_, "write the report to this file, - is standard output")->type_name("FILE|-");
-    app_.add_option("--memory-limit", memory_limit_text_, "stop when more memory is needed, 8G for example [what is free]")
+    app_.add_option("--memory-limit", memory_limit_text_,
+                    "stop when more memory is needed, 8G for example [what is free]")
         ->type_name("SIZE");
     app_.add_option("--save-config", save_config_path_, "write the options of this run to a TOML file")
-        ->type_name("FILE")->configurable(false);
+        ->type_name("FILE")
+        ->configurable(false);
     app_.set_config("--config", "", "read options from a TOML or INI file; the command line goes first")
-        ->type_name("FILE")->configurable(false);
+        ->type_name("FILE")
+        ->configurable(false);
     app_.allow_config_extras(CLI::config_extras_mode::error);
     app_.config_formatter(std::make_shared<CommandConfig>(app_));
 }
@@ -171,7 +174,8 @@ CLI::App* Session::add_command(const std::string& name, const std::string& descr
     CLI::App* command = app_.add_subcommand(name, description);
     add_help_flags(*command);
     command->fallthrough();  // the common flags may follow the subcommand
-    command->footer("Every command also takes the options that covol --help lists: --threads, --quiet, --json and others.");
+    command->footer(
+        "Every command also takes the options that covol --help lists: --threads, --quiet, --json and others.");
     bodies_[command] = std::move(body);
     return command;
 }
@@ -230,9 +234,9 @@ int Session::execute() {
         return fail(kUsage, error.what());
     } catch (const Error& error) {
         if (error.code() == Errc::Cancelled && guard && guard->tripped() && !interrupted)
-            return fail(kBadInput, "more memory is needed than " + memory_limit_name() + "; use a larger --voxel-size or a --roi");
-        return fail(exit_code_of(error.code()),
-                    error.code() == Errc::Cancelled ? interrupted_text() : error.what());
+            return fail(kBadInput,
+                        "more memory is needed than " + memory_limit_name() + "; use a larger --voxel-size or a --roi");
+        return fail(exit_code_of(error.code()), error.code() == Errc::Cancelled ? interrupted_text() : error.what());
     } catch (const std::bad_alloc&) {
         return fail(kBadInput, "out of memory; use a larger --voxel-size or a --roi");
     } catch (const std::exception& error) {
@@ -328,11 +332,13 @@ std::string Session::comment() const {
 
 void Session::require_memory(std::uint64_t bytes, const std::string& what) const {
     if (memory_limit_ > 0 && bytes > memory_limit_)
-        throw Error(Errc::InvalidOptions, what + " alone needs " + std::to_string(bytes) + " bytes, more than " + memory_limit_name());
+        throw Error(Errc::InvalidOptions,
+                    what + " alone needs " + std::to_string(bytes) + " bytes, more than " + memory_limit_name());
 }
 
 std::string Session::memory_limit_name() const {
-    return memory_limit_text_.empty() ? "this machine has free, " + std::to_string(memory_limit_ >> 20) + " MiB (--memory-limit sets another bound)"
+    return memory_limit_text_.empty() ? "this machine has free, " + std::to_string(memory_limit_ >> 20) +
+                                            " MiB (--memory-limit sets another bound)"
                                       : "--memory-limit " + memory_limit_text_;
 }
 

@@ -35,7 +35,8 @@ Table& Table::operator<<(const std::string& field) {
 Table& Table::operator<<(double number) {
     if (!std::isfinite(number)) return *this << std::string();
     std::array<char, 32> digits;
-    const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number, std::chars_format::general, 7).ptr;
+    const auto end =
+        std::to_chars(digits.data(), digits.data() + digits.size(), number, std::chars_format::general, 7).ptr;
     return *this << std::string(digits.data(), end);
 }
 

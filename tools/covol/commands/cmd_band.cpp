@@ -47,7 +47,9 @@ void add_band(Session& session) {
     const auto [job, command] =
         session.add_job<BandJob>("band", "Step 2: tag the inside, make the narrow band and the initial values");
     in_group(*command, Group::Input);
-    command->add_option("distance", job->distance_path, "what `covol distance` wrote")->required()->type_name("DISTANCE.vdb");
+    command->add_option("distance", job->distance_path, "what `covol distance` wrote")
+        ->required()
+        ->type_name("DISTANCE.vdb");
     in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "the grid 'band', .vdb")->required()->type_name("OUT.vdb");
     job->tag.bind(*command);

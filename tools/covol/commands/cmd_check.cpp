@@ -24,7 +24,10 @@ constexpr double kFarPoint = 20;       // a nearest neighbour this many medians 
 class Findings {
 public:
     explicit Findings(Session& session) : session_(session) { session.report()["findings"] = Json::array(); }
-    void problem(const std::string& text) { add("problem", text); ++problems_; }
+    void problem(const std::string& text) {
+        add("problem", text);
+        ++problems_;
+    }
     void remark(const std::string& text) { add("remark", text); }
     [[nodiscard]] int problems() const { return problems_; }
 
@@ -39,11 +42,13 @@ private:
 
 void check_extent(double extent, const std::string& what, Findings& findings) {
     if (extent > kLargeScene)
-        findings.remark(what + " is " + std::to_string(extent) + " units wide: Blender and Houdini take a unit for a "
-                               "metre and clip it; write meshes with --unit-scale, or scale the object");
+        findings.remark(what + " is " + std::to_string(extent) +
+                        " units wide: Blender and Houdini take a unit for a "
+                        "metre and clip it; write meshes with --unit-scale, or scale the object");
     if (extent > 0 && extent < kSmallScene)
-        findings.remark(what + " is " + std::to_string(extent) + " units wide: Blender and Houdini take a unit for a "
-                               "metre and show a dot; write meshes with --unit-scale, or scale the object");
+        findings.remark(what + " is " + std::to_string(extent) +
+                        " units wide: Blender and Houdini take a unit for a "
+                        "metre and show a dot; write meshes with --unit-scale, or scale the object");
 }
 
 void check_measures(const TriangleMesh& mesh, const std::string& what, Findings& findings) {
@@ -60,7 +65,8 @@ bool is_identifier(const std::string& name) {
 }
 
 void check_level_set(const std::string& path, const VdbGridInfo& info, const RunContext& run, Findings& findings) {
-    findings.remark("grid '" + info.name + "' is a level set: to render it as a volume, write a fog volume "
+    findings.remark("grid '" + info.name +
+                    "' is a level set: to render it as a volume, write a fog volume "
                     "(--density) and give the renderer that");
     const FloatGridPtr grid = read_vdb(path, info.name);
     try {
@@ -110,7 +116,8 @@ void check_image(const std::string& path, const ImageFlags& flags, const RunCont
     if (g.unit.empty()) findings.remark("the file names no unit of length: lengths are in its own units");
     const auto [least, most] = std::minmax_element(g.spacing.begin(), g.spacing.end());
     if (*most > kFlatVoxels * *least)
-        findings.remark("voxels are " + std::to_string(*most / *least) + " times longer along one axis: between the "
+        findings.remark("voxels are " + std::to_string(*most / *least) +
+                        " times longer along one axis: between the "
                         "slices the surface is interpolated");
     if (!g.spacing_known)
         findings.remark("the file does not know its spacing: 1 stands in for what is missing; see --spacing");
@@ -133,8 +140,8 @@ void check_mesh_file(const std::string& path, Findings& findings) {
     check_extent(extent, "the mesh", findings);
 }
 
-void check_points(const std::string& path, const std::string& image_path, const ImageFlags& flags, const RunContext& run,
-                  Findings& findings) {
+void check_points(const std::string& path, const std::string& image_path, const ImageFlags& flags,
+                  const RunContext& run, Findings& findings) {
     const PointCloud cloud = read_points(path);
     const std::vector<Vec3> distinct = merge_close_points(cloud.points, 0);
     if (distinct.size() < cloud.points.size())
@@ -167,7 +174,8 @@ void check(const std::string& path, const std::string& image_path, const ImageFl
         case FileKind::Points: check_points(path, image_path, flags, session.run(), findings); break;
     }
     session.report()["problems"] = findings.problems();
-    session.say(path + ": " + (findings.problems() == 0 ? "no problem" : std::to_string(findings.problems()) + " problem(s)"));
+    session.say(path + ": " +
+                (findings.problems() == 0 ? "no problem" : std::to_string(findings.problems()) + " problem(s)"));
     if (findings.problems() > 0) session.set_exit_code(kBadInput);
 }
 
@@ -177,11 +185,13 @@ void add_check(Session& session) {
     const auto path = std::make_shared<std::string>();
     const auto image = std::make_shared<std::string>();
     const auto flags = std::make_shared<ImageFlags>();
-    CLI::App* command = session.add_command("check", "What would go wrong with a file in Blender, Houdini, Slicer or covol",
-                                            [path, image, flags, &session] { check(*path, *image, *flags, session); });
+    CLI::App* command =
+        session.add_command("check", "What would go wrong with a file in Blender, Houdini, Slicer or covol",
+                            [path, image, flags, &session] { check(*path, *image, *flags, session); });
     in_group(*command, Group::Input);
     command->add_option("file", *path, ".vdb, image, mesh or points; exit code 3 when there is a problem")
-        ->required()->type_name("FILE");
+        ->required()
+        ->type_name("FILE");
     command->add_option("--image", *image, "points: the image that they belong to")->type_name("IMAGE");
     flags->bind(*command);
 }

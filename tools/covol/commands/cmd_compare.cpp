@@ -77,7 +77,8 @@ struct CompareJob {
         const FitStatistics fit = points_to_surface(points, surface_of(solid_path, session.run()), session.run());
         session.report()["fit"]["points_to_surface"] = to_json(fit);
         std::ostringstream text;
-        text << std::setprecision(6) << "points to surface: mean " << fit.mean << ", 95 % " << fit.p95 << ", max " << fit.max;
+        text << std::setprecision(6) << "points to surface: mean " << fit.mean << ", 95 % " << fit.p95 << ", max "
+             << fit.max;
         session.say(text.str());
     }
 };
@@ -88,8 +89,12 @@ void add_compare(Session& session) {
     const auto [job, command] = session.add_job<CompareJob>(
         "compare", "Overlap and distances of two solids: masks, meshes, .vdb, in any mix; or points and a surface");
     in_group(*command, Group::Input);
-    command->add_option("a", job->a, "label image, mesh, .vdb (:NAME picks a grid) or points")->required()->type_name("A");
-    command->add_option("b", job->b, "label image, mesh, .vdb (:NAME picks a grid) or points")->required()->type_name("B");
+    command->add_option("a", job->a, "label image, mesh, .vdb (:NAME picks a grid) or points")
+        ->required()
+        ->type_name("A");
+    command->add_option("b", job->b, "label image, mesh, .vdb (:NAME picks a grid) or points")
+        ->required()
+        ->type_name("B");
     command->add_option("--label", job->label, "label of the masks, 0: any")->capture_default_str();
     command->add_option("--label-b", job->label_b, "label of B, where it differs");
     job->image.bind(*command);

@@ -47,9 +47,8 @@ struct ConvertJob {
         session.require_memory(4 * std::uint64_t(geometry.size[0]) * geometry.size[1] * geometry.size[2], "the image");
         const auto values = std::make_shared<std::vector<float>>(sample(*grid, geometry, session.run()));
         session.report()["image"] = to_json(geometry);
-        session.outputs().add(output, [values, geometry](const std::string& path) {
-            write_image(path, geometry, values->data());
-        });
+        session.outputs().add(
+            output, [values, geometry](const std::string& path) { write_image(path, geometry, values->data()); });
     }
 
     void convert_points(Session& session) const {
@@ -116,8 +115,8 @@ void add_convert(Session& session) {
     job->image.bind(*command);
     in_group(*command, Group::Output);
     command->add_flag("--half", job->half, "store values as 16-bit floats");
-    session.help().show_first(*command, {"--like", "--grid", "--voxel-size", "--remove-outliers", "--simplify", "--smooth", "--up",
-                                         "--unit-scale", "--channel", "--frame"});
+    session.help().show_first(*command, {"--like", "--grid", "--voxel-size", "--remove-outliers", "--simplify",
+                                         "--smooth", "--up", "--unit-scale", "--channel", "--frame"});
 }
 
 }  // namespace covol::tool

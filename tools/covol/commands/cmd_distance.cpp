@@ -43,9 +43,8 @@ struct DistanceJob {
         const DistanceResult result = distance(cloud, box, {radius}, session.run());
         session.add_seconds("distance", watch.seconds());
         session.report()["input"]["points"]["count"] = cloud.size();
-        session.report()["grid"] = {{"voxel_size", h},
-                                    {"active_voxels", result.report.active_voxels},
-                                    {"domain", to_json(box)}};
+        session.report()["grid"] = {
+            {"voxel_size", h}, {"active_voxels", result.report.active_voxels}, {"domain", to_json(box)}};
         session.report()["distance"] = {{"max_distance", radius}, {"rounds", result.report.rounds}};
         session.note(std::to_string(result.report.active_voxels) + " active voxels");
         session.add_grid(output, result.grid, half);

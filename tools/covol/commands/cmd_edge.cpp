@@ -38,7 +38,9 @@ void add_edge(Session& session) {
     const auto [job, command] = session.add_job<EdgeJob>("edge", "Step 3: the image's edge detector g on the band");
     in_group(*command, Group::Input);
     command->add_option("image", job->image_path, "3D image")->required()->type_name("IMAGE");
-    command->add_option("--band", job->band_path, "a grid whose active voxels get g")->required()->type_name("BAND.vdb");
+    command->add_option("--band", job->band_path, "a grid whose active voxels get g")
+        ->required()
+        ->type_name("BAND.vdb");
     in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "the grid 'edge', .vdb")->required()->type_name("OUT.vdb");
     job->edge_flags.bind(*command, true);

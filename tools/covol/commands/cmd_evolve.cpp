@@ -62,7 +62,8 @@ void add_evolve(Session& session) {
         session.add_job<EvolveJob>("evolve", "Step 4: move the level set to the structure's boundary");
     in_group(*command, Group::Input);
     command->add_option("band", job->band_path, "what `covol band` wrote, or the u of an earlier run")
-        ->required()->type_name("BAND.vdb");
+        ->required()
+        ->type_name("BAND.vdb");
     in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "the grid u, .vdb")->required()->type_name("OUT.vdb");
     in_group(*command, Group::Input);
@@ -72,8 +73,8 @@ void add_evolve(Session& session) {
     command->add_flag("--follow", job->flags.options.follow, "the band follows the surface");
     in_group(*command, Group::Output);
     command->add_flag("--half", job->half, "store values as 16-bit floats");
-    session.help().show_first(*command, {"--distance", "--edge", "--theta", "--rho", "--delta", "--tau", "--attraction-range", "--max-steps",
-                                         "--tolerance", "--follow"});
+    session.help().show_first(*command, {"--distance", "--edge", "--theta", "--rho", "--delta", "--tau",
+                                         "--attraction-range", "--max-steps", "--tolerance", "--follow"});
 }
 
 }  // namespace covol::tool

@@ -48,7 +48,8 @@ void describe_vdb(const std::string& path, Session& session) {
 /// Which way an axis of the image runs in the world: "+x", or its cosines.
 std::string axis_text(const ImageGeometry& g, int axis) {
     for (int w = 0; w < 3; ++w)
-        if (std::abs(g.direction[w][axis]) > 1 - 1e-6) return std::string(g.direction[w][axis] > 0 ? "+" : "-") + "xyz"[w];
+        if (std::abs(g.direction[w][axis]) > 1 - 1e-6)
+            return std::string(g.direction[w][axis] > 0 ? "+" : "-") + "xyz"[w];
     std::ostringstream text;
     text << std::setprecision(3) << "(" << g.direction[0][axis] << ", " << g.direction[1][axis] << ", "
          << g.direction[2][axis] << ")";
@@ -62,8 +63,9 @@ Json range_of(const std::string& path, ReadImageOptions options, int channel, co
     const auto range = read_image(path, options, session.run()).range();
     const bool named = std::size_t(channel) < info.channel_names.size();
     std::ostringstream text;
-    text << (info.channels > 1 ? "channel " + std::to_string(channel) + (named ? " " + info.channel_names[channel] : "") + ": "
-                               : "values: ")
+    text << (info.channels > 1
+                 ? "channel " + std::to_string(channel) + (named ? " " + info.channel_names[channel] : "") + ": "
+                 : "values: ")
          << range[0] << " to " << range[1] << (info.frames > 1 ? ", frame " + std::to_string(options.frame) : "");
     session.say(text.str());
     return {range[0], range[1]};
@@ -75,11 +77,11 @@ void describe_image(const std::string& path, const ImageFlags& flags, Session& s
     const ImageGeometry& g = info.geometry;
     std::ostringstream text;
     text << info.format << ", " << triple(g.size) << " voxels, " << to_string(info.type) << ", " << info.channels
-         << " channel(s), " << info.frames << " frame(s), stored as " << info.axis_order << "\nspacing " << triple(g.spacing)
-         << " " << (g.unit.empty() ? "(no unit)" : g.unit) << (g.spacing_known ? "" : " (not known)") << ", origin "
-         << triple(g.origin) << "\naxes: i runs along " << axis_text(g, 0) << ", j along " << axis_text(g, 1) << ", k along "
-         << axis_text(g, 2) << " of the world (LPS), which goes from " << triple(g.world_box().min) << " to "
-         << triple(g.world_box().max);
+         << " channel(s), " << info.frames << " frame(s), stored as " << info.axis_order << "\nspacing "
+         << triple(g.spacing) << " " << (g.unit.empty() ? "(no unit)" : g.unit)
+         << (g.spacing_known ? "" : " (not known)") << ", origin " << triple(g.origin) << "\naxes: i runs along "
+         << axis_text(g, 0) << ", j along " << axis_text(g, 1) << ", k along " << axis_text(g, 2)
+         << " of the world (LPS), which goes from " << triple(g.world_box().min) << " to " << triple(g.world_box().max);
     for (const auto& [field, value] : info.fields) text << "\n  " << field << ": " << value;
     session.say(text.str());
 
@@ -116,7 +118,8 @@ void describe_points(const std::string& path, const PointFlags& flags, Session& 
     const WorldBox box = bounding_box(cloud.points);
     const std::vector<Vec3> distinct = merge_close_points(cloud.points, 0);
     std::ostringstream text;
-    const auto closed = std::count_if(cloud.lines.begin(), cloud.lines.end(), [](const MarkLine& l) { return l.closed; });
+    const auto closed =
+        std::count_if(cloud.lines.begin(), cloud.lines.end(), [](const MarkLine& l) { return l.closed; });
     text << cloud.points.size() << " points, " << distinct.size() << " distinct, " << cloud.rule;
     if (!cloud.lines.empty()) text << "\n" << cloud.lines.size() << " lines, " << closed << " of them closed";
     text << "\nfrom " << triple(box.min) << " to " << triple(box.max);
@@ -129,8 +132,8 @@ void describe_points(const std::string& path, const PointFlags& flags, Session& 
               {"box", to_json(box)}};
     if (distinct.size() > 1) {
         const SpacingStatistics s = nearest_neighbour_spacing(distinct);
-        text << "\ndistance to the nearest other point: median " << s.median << ", mean " << s.mean << ", 95 % " << s.p95
-             << ", max " << s.max;
+        text << "\ndistance to the nearest other point: median " << s.median << ", mean " << s.mean << ", 95 % "
+             << s.p95 << ", max " << s.max;
         report["spacing"] = {{"median", s.median}, {"mean", s.mean}, {"p95", s.p95}, {"max", s.max}};
     }
     session.say(text.str());
@@ -154,8 +157,9 @@ void add_info(Session& session) {
     const auto path = std::make_shared<std::string>();
     const auto flags = std::make_shared<ImageFlags>();
     const auto points = std::make_shared<PointFlags>();
-    CLI::App* command = session.add_command("info", "What is in a file: .vdb, image, mesh or points",
-                                            [path, flags, points, &session] { describe(*path, *flags, *points, session); });
+    CLI::App* command =
+        session.add_command("info", "What is in a file: .vdb, image, mesh or points",
+                            [path, flags, points, &session] { describe(*path, *flags, *points, session); });
     in_group(*command, Group::Input);
     command->add_option("file", *path, "the file")->required()->type_name("FILE");
     flags->bind(*command);

@@ -27,9 +27,8 @@ struct MaskJob {
         const auto inside = std::count_if(labels->begin(), labels->end(), [](std::uint8_t v) { return v != 0; });
         session.report()["mask"] = {{"voxels", inside}, {"image", to_json(geometry)}};
         session.note(std::to_string(inside) + " voxels inside");
-        session.outputs().add(output, [labels, geometry](const std::string& path) {
-            write_image(path, geometry, labels->data());
-        });
+        session.outputs().add(
+            output, [labels, geometry](const std::string& path) { write_image(path, geometry, labels->data()); });
     }
 };
 
@@ -38,7 +37,9 @@ struct MaskJob {
 void add_mask(Session& session) {
     const auto [job, command] = session.add_job<MaskJob>("mask", "Label image of a level set");
     in_group(*command, Group::Input);
-    command->add_option("level_set", job->input, "a level set; of several in a file, :NAME picks one")->required()->type_name("IN.vdb[:NAME]");
+    command->add_option("level_set", job->input, "a level set; of several in a file, :NAME picks one")
+        ->required()
+        ->type_name("IN.vdb[:NAME]");
     command->add_option("--like", job->like, "image whose lattice the mask gets")->required()->type_name("IMAGE");
     in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "label image")->required()->type_name("OUT.nrrd|.nii.gz|.tif|.mha");

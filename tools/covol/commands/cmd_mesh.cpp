@@ -56,7 +56,8 @@ struct MeshJob {
         TriangleMesh mesh = extract_mesh(*level_set, extract_options(h), session.run());
         session.add_seconds("surface", watch.seconds());
         if (mesh.triangles.empty())
-            throw Error(Errc::InvalidInput, input + ": nothing to mesh: no surface at this level, or all of it dropped");
+            throw Error(Errc::InvalidInput,
+                        input + ": nothing to mesh: no surface at this level, or all of it dropped");
         const Stopwatch relaxing;
         const RelaxReport relaxed = relax_mesh(mesh, *level_set, {extract_options(h).isovalue}, session.run());
         session.add_seconds("relax", relaxing.seconds());
@@ -66,10 +67,9 @@ struct MeshJob {
         const MeshMeasures measures = measure(mesh);
         session.report()["surface"] = to_json(measures);
         session.note("surface: " + one_line(measures));
-        session.outputs().add(output, [mesh = std::make_shared<TriangleMesh>(std::move(mesh)),
-                                       write = flags.options(session)](const std::string& path) {
-            write_mesh(path, *mesh, write);
-        });
+        session.outputs().add(
+            output, [mesh = std::make_shared<TriangleMesh>(std::move(mesh)),
+                     write = flags.options(session)](const std::string& path) { write_mesh(path, *mesh, write); });
     }
 };
 
@@ -78,15 +78,20 @@ struct MeshJob {
 void add_mesh(Session& session) {
     const auto [job, command] = session.add_job<MeshJob>("mesh", "Triangles of a level set, and their cleanup");
     in_group(*command, Group::Input);
-    command->add_option("level_set", job->input, "a level set; of several in a file, :NAME picks one")->required()->type_name("IN.vdb[:NAME]");
+    command->add_option("level_set", job->input, "a level set; of several in a file, :NAME picks one")
+        ->required()
+        ->type_name("IN.vdb[:NAME]");
     in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "closed, manifold, outward triangles")
-        ->required()->type_name("OUT.ply|.obj|.stl|.off|.glb");
+        ->required()
+        ->type_name("OUT.ply|.obj|.stl|.off|.glb");
     in_group(*command, Group::MeshFiles);
     add_length(*command, "--isovalue", job->isovalue, "0", "extract this level outside the surface");
     add_length(*command, "--min-component", job->min_component, "", "drop pieces smaller than a cube of this edge");
     add_length(*command, "--target-edge", job->target_edge, "", "decimate to about this edge length");
-    add_length(*command, "--adaptive", job->adaptive, "", "decimate as far as no triangle comes farther from the level set: large triangles where it is flat; at most 2vx");
+    add_length(*command, "--adaptive", job->adaptive, "",
+               "decimate as far as no triangle comes farther from the level set: large triangles where it is flat; at "
+               "most 2vx");
     command->add_option("--smooth", job->smooth, "steps of volume-keeping smoothing")->capture_default_str();
     command->add_flag("--repair", job->repair, "resolve self-intersections, fill holes");
     job->flags.bind(*command);

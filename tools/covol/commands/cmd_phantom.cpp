@@ -58,7 +58,8 @@ void add_phantom(Session& session) {
     in_group(*command, Group::Input);
     command->add_option("--size", job->options.size, "voxels along each axis")->capture_default_str();
     command->add_option("--count", job->options.point_count, "number of points")->capture_default_str();
-    command->add_option("--noise", job->options.noise, "standard deviation, in units of the contrast")->capture_default_str();
+    command->add_option("--noise", job->options.noise, "standard deviation, in units of the contrast")
+        ->capture_default_str();
     command->add_option("--seed", job->options.seed, "of the random numbers")->capture_default_str();
 }
 

@@ -9,8 +9,8 @@ void add_reconstruct(Session& session) {
     job->evolve.options.rho = 0;
     job->points.bind(*command, "points");
     job->bind(*command, false);
-    session.help().show_first(*command, {"points", "--mesh", "--inside", "--remove-outliers", "--most-points", "--simplify", "--smooth",
-                                         "--holes", "--voxel-size"});
+    session.help().show_first(*command, {"points", "--mesh", "--inside", "--remove-outliers", "--most-points",
+                                         "--simplify", "--smooth", "--holes", "--voxel-size"});
 }
 
 }  // namespace covol::tool

@@ -7,16 +7,19 @@ void add_segment(Session& session) {
     const auto [job, command] =
         session.add_job<SegmentJob>("segment", "Image and points together: the surface of a structure");
     in_group(*command, Group::Input);
-    command->add_option("image", job->images, "3D image: TIFF, NRRD, NIfTI, MetaImage, DICOM, MRC, HDF5, .vdb; several are a time-lapse")
+    command
+        ->add_option("image", job->images,
+                     "3D image: TIFF, NRRD, NIfTI, MetaImage, DICOM, MRC, HDF5, .vdb; several are a time-lapse")
         ->required()
         ->type_name("IMAGE...");
     job->points.bind(*command, "--points")
-        ->description("marks on the surface: tables, marks of Fiji, napari, 3D Slicer and ITK-SNAP, clouds; with names, "
-                      "ve=FILE exe=FILE, several structures")
+        ->description(
+            "marks on the surface: tables, marks of Fiji, napari, 3D Slicer and ITK-SNAP, clouds; with names, "
+            "ve=FILE exe=FILE, several structures")
         ->type_name("[NAME=]FILE...");
     job->bind(*command, true);
-    session.help().show_first(*command, {"--points", "--contours", "--painted", "--inside", "--outside", "--guess", "--mask", "--mesh",
-                                         "--suggest", "--frame", "--rho", "--voxel-size"});
+    session.help().show_first(*command, {"--points", "--contours", "--painted", "--inside", "--outside", "--guess",
+                                         "--mask", "--mesh", "--suggest", "--frame", "--rho", "--voxel-size"});
 }
 
 }  // namespace covol::tool

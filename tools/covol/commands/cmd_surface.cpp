@@ -21,7 +21,8 @@ struct SurfaceJob {
         session.report()["grid"] = {{"voxel_size", domain_of(*level_set).voxel_size}};
         const WriteVdbOptions vdb{half, session.metadata()};
         session.outputs().add(output, [=](const std::string& path) { write_vdb(path, {level_set}, vdb); });
-        session.outputs().add(density_path, [=](const std::string& path) { write_vdb(path, {density(*level_set)}, vdb); });
+        session.outputs().add(density_path,
+                              [=](const std::string& path) { write_vdb(path, {density(*level_set)}, vdb); });
     }
 };
 

@@ -9,8 +9,9 @@ namespace {
 
 void add_box(CLI::App& command, const std::string& flag, std::optional<WorldBox>& target,
              const std::string& description) {
-    command.add_option_function<std::string>(
-               flag, [&target, flag](const std::string& text) { target = parse_box(flag, text); }, description)
+    command
+        .add_option_function<std::string>(
+            flag, [&target, flag](const std::string& text) { target = parse_box(flag, text); }, description)
         ->type_name("X0,Y0,Z0,X1,Y1,Z1");
 }
 
@@ -27,15 +28,17 @@ CLI::Option* add_positive(CLI::App& command, const std::string& flag, double& ta
 }
 
 /// An optional weight; the library's own mark of "automatic", a negative number, is not for the command line.
-void add_share(CLI::App& command, const std::string& flag, std::optional<double>& target, const std::string& description) {
-    command.add_option_function<double>(
-               flag,
-               [&target, flag](const double& value) {
-                   if (!(value >= 0 && value <= 1))
-                       throw Error(Errc::InvalidOptions, flag + ": expected 0 to 1, got " + to_text(value));
-                   target = value;
-               },
-               description)
+void add_share(CLI::App& command, const std::string& flag, std::optional<double>& target,
+               const std::string& description) {
+    command
+        .add_option_function<double>(
+            flag,
+            [&target, flag](const double& value) {
+                if (!(value >= 0 && value <= 1))
+                    throw Error(Errc::InvalidOptions, flag + ": expected 0 to 1, got " + to_text(value));
+                target = value;
+            },
+            description)
         ->type_name("FLOAT");
 }
 
@@ -55,13 +58,14 @@ CLI::Option* add_length(CLI::App& command, const std::string& flag, Length& targ
 }
 
 void add_vec3(CLI::App& command, const std::string& flag, std::vector<Vec3>& target, const std::string& description) {
-    command.add_option_function<std::vector<std::string>>(
-               flag,
-               [&target, flag](const std::vector<std::string>& texts) {
-                   target.clear();
-                   for (const std::string& text : texts) target.push_back(parse_vec3(flag, text));
-               },
-               description)
+    command
+        .add_option_function<std::vector<std::string>>(
+            flag,
+            [&target, flag](const std::vector<std::string>& texts) {
+                target.clear();
+                for (const std::string& text : texts) target.push_back(parse_vec3(flag, text));
+            },
+            description)
         ->type_name("X,Y,Z")
         ->allow_extra_args(false);
 }
@@ -70,14 +74,16 @@ void add_vec3(CLI::App& command, const std::string& flag, std::vector<Vec3>& tar
 
 void ImageFlags::bind(CLI::App& command, bool with_roi, bool with_frame) {
     in_group(command, Group::Input);
-    command.add_option_function<std::string>(
-               "--spacing",
-               [this](const std::string& text) {
-                   options.spacing = parse_vec3("--spacing", text);
-                   for (const double s : options.spacing)
-                       if (!(s > 0)) throw Error(Errc::InvalidOptions, "--spacing: expected three numbers > 0, got " + text);
-               },
-               "voxel spacing, instead of the file's")
+    command
+        .add_option_function<std::string>(
+            "--spacing",
+            [this](const std::string& text) {
+                options.spacing = parse_vec3("--spacing", text);
+                for (const double s : options.spacing)
+                    if (!(s > 0))
+                        throw Error(Errc::InvalidOptions, "--spacing: expected three numbers > 0, got " + text);
+            },
+            "voxel spacing, instead of the file's")
         ->type_name("SX,SY,SZ");
     const auto add_index = [&](const char* flag, int& target, const char* description) {
         command.add_option(flag, target, description)->check(CLI::NonNegativeNumber.description(""))->type_name("N");
@@ -109,7 +115,11 @@ WorldBox sampled_box(const WorldBox& box, double h) {
 
 CLI::Option* PointFlags::bind(CLI::App& command, const std::string& flag) {
     in_group(command, Group::Marks);
-    CLI::Option* option = command.add_option(flag, paths, "points: XYZ, CSV, PLY, OBJ, OFF, PCD, LAS; marks of Fiji, napari, 3D Slicer, ITK-SNAP")->type_name("FILE...");
+    CLI::Option* option =
+        command
+            .add_option(flag, paths,
+                        "points: XYZ, CSV, PLY, OBJ, OFF, PCD, LAS; marks of Fiji, napari, 3D Slicer, ITK-SNAP")
+            ->type_name("FILE...");
     bind_options(command);
     return option;
 }
@@ -126,9 +136,11 @@ void PointFlags::bind_options(CLI::App& command) {
                "first voxel [what the format says, else world]");
     add_choice(command, "--points-order", options.order, {{"xyz", PointOrder::XYZ}, {"zyx", PointOrder::ZYX}},
                "order of the coordinates [what the format says, else xyz]");
-    add_positive(command, "--points-scale", options.scale, "multiplies the points' lengths, 0.001 for micrometres to mm");
-    command.add_option("--points-channels", options.channels,
-                       "channels of the hyperstack that a Fiji multi-point was clicked in")
+    add_positive(command, "--points-scale", options.scale,
+                 "multiplies the points' lengths, 0.001 for micrometres to mm");
+    command
+        .add_option("--points-channels", options.channels,
+                    "channels of the hyperstack that a Fiji multi-point was clicked in")
         ->check(CLI::Range(1, 1000).description(""))
         ->type_name("N");
 }
@@ -168,7 +180,8 @@ WorldPoints read_world_points(const PointFlags& flags, const ImageGeometry* geom
         all.points.insert(all.points.end(), world.begin(), world.end());
         add_hints(cloud, world, all);
         all.rules.push_back(cloud.rule);
-        run.info(path + ": " + std::to_string(world.size()) + " points" + (cloud.rule.empty() ? "" : ", " + cloud.rule));
+        run.info(path + ": " + std::to_string(world.size()) + " points" +
+                 (cloud.rule.empty() ? "" : ", " + cloud.rule));
     }
     return all;
 }
@@ -177,9 +190,11 @@ WorldPoints read_world_points(const PointFlags& flags, const ImageGeometry* geom
 
 void DomainFlags::bind(CLI::App& command, bool with_margin) {
     in_group(command, Group::Domain);
-    add_length(command, "--voxel-size", voxel_size, "", "edge of the voxels [the image's smallest spacing; without an image from the points]");
+    add_length(command, "--voxel-size", voxel_size, "",
+               "edge of the voxels [the image's smallest spacing; without an image from the points]");
     add_box(command, "--roi", roi, "work in this box of the world only");
-    if (with_margin) add_length(command, "--margin", margin, "", "between the points and the domain's boundary [D + 6vx]");
+    if (with_margin)
+        add_length(command, "--margin", margin, "", "between the points and the domain's boundary [D + 6vx]");
 }
 
 double DomainFlags::resolve_voxel_size(const Image* image, const std::vector<Vec3>& points, Session& session) const {
@@ -200,31 +215,36 @@ void TagFlags::bind(CLI::App& command, bool names) {
     add_length(command, "--tag-distance", tag_distance, "", "D: closes gaps between points up to 2D [from the points]");
     const std::string flag = "--exterior-seed", what = "a position outside the structure, also in a cavity; repeatable";
     if (!names) return add_vec3(command, flag, exterior_seeds, what);
-    command.add_option_function<std::vector<std::string>>(
-               flag,
-               [this, flag](const std::vector<std::string>& texts) {
-                   exterior_seeds.clear();
-                   named_seeds.clear();
-                   for (const std::string& text : texts) {
-                       const std::size_t colon = text.find(':');
-                       if (colon == std::string::npos)
-                           exterior_seeds.push_back(parse_vec3(flag, text));
-                       else
-                           named_seeds.emplace_back(text.substr(0, colon), parse_vec3(flag, text.substr(colon + 1)));
-                   }
-               },
-               what + "; with NAME: of that structure alone")
+    command
+        .add_option_function<std::vector<std::string>>(
+            flag,
+            [this, flag](const std::vector<std::string>& texts) {
+                exterior_seeds.clear();
+                named_seeds.clear();
+                for (const std::string& text : texts) {
+                    const std::size_t colon = text.find(':');
+                    if (colon == std::string::npos)
+                        exterior_seeds.push_back(parse_vec3(flag, text));
+                    else
+                        named_seeds.emplace_back(text.substr(0, colon), parse_vec3(flag, text.substr(colon + 1)));
+                }
+            },
+            what + "; with NAME: of that structure alone")
         ->type_name("[NAME:]X,Y,Z")
         ->allow_extra_args(false);
 }
 
 void EdgeFlags::bind(CLI::App& command, bool alone) {
     in_group(command, Group::Edges);
-    add_length(command, "--sigma", sigma, "", std::string("presmoothing of the image ") + (alone ? "[1vx]" : "[2vx after tagging, else 1vx]"));
+    add_length(command, "--sigma", sigma, "",
+               std::string("presmoothing of the image ") + (alone ? "[1vx]" : "[2vx after tagging, else 1vx]"));
     add_choice(command, "--edge-feature", options.feature,
-               {{"auto", EdgeFeature::Automatic}, {"slope", EdgeFeature::Slope}, {"bright-line", EdgeFeature::BrightLine},
+               {{"auto", EdgeFeature::Automatic},
+                {"slope", EdgeFeature::Slope},
+                {"bright-line", EdgeFeature::BrightLine},
                 {"dark-line", EdgeFeature::DarkLine}},
-               std::string("what edges are: borders between darker and brighter, or bright or dark sheets such as membranes ") +
+               std::string(
+                   "what edges are: borders between darker and brighter, or bright or dark sheets such as membranes ") +
                    (alone ? "[slope]" : "[what the marks of contours lie on, else slope]"));
     CLI::Option* k = add_positive(command, "--edge-k", options.edge_k, "K in g = 1/(1 + K s^2) [see --edge-contrast]");
     add_positive(command, "--edge-contrast", options.edge_contrast,
@@ -243,7 +263,8 @@ void EvolveFlags::bind(CLI::App& command, bool with_image, bool alone) {
     in_group(command, Group::Flow);
     command.add_option("--theta", options.theta, "weight of the points, 0 to 1")->capture_default_str();
     if (with_image) command.add_option("--rho", options.rho, "weight of the image, 0 to 1")->capture_default_str();
-    add_length(command, "--delta", delta, "", std::string("weight of curvature ") + (alone ? "[1vx]" : "[0.5vx after tagging, else 1vx]"));
+    add_length(command, "--delta", delta, "",
+               std::string("weight of curvature ") + (alone ? "[1vx]" : "[0.5vx after tagging, else 1vx]"));
     add_length(command, "--tau", tau, "1vx and more", "time step; the flow's speed is 1 world unit per unit of time");
     in_group(command, Group::Numerics);
     command.add_option("--epsilon", options.epsilon, "regularises the norm of grad u")->capture_default_str();
@@ -256,7 +277,8 @@ void EvolveFlags::bind(CLI::App& command, bool with_image, bool alone) {
                    "]");
     if (with_image) {
         in_group(command, Group::Numerics);
-        command.add_option("--edge-epsilon", options.edge_epsilon, "regularises the norm of grad g")->capture_default_str();
+        command.add_option("--edge-epsilon", options.edge_epsilon, "regularises the norm of grad g")
+            ->capture_default_str();
         in_group(command, Group::Flow);
         add_share(command, "--image-yields", image_yields,
                   "share of rho that fades close to points, on the attraction range's taper, 0 to 1 [" +
@@ -289,8 +311,9 @@ EvolveOptions EvolveFlags::resolve(double h, const EvolveOptions& otherwise) con
 
 void MeshFlags::bind(CLI::App& command) {
     in_group(command, Group::MeshFiles);
-    command.add_option_function<std::string>(
-               "--up", [this](const std::string& text) { y_up = text == "y"; }, "the mesh's axis that points up")
+    command
+        .add_option_function<std::string>(
+            "--up", [this](const std::string& text) { y_up = text == "y"; }, "the mesh's axis that points up")
         ->check(CLI::IsMember({"y", "z"}).description(""))
         ->type_name("y|z")
         ->default_str("z");

@@ -22,8 +22,8 @@ namespace covol::tool {
 CLI::Option* add_length(CLI::App& command, const std::string& flag, Length& target, const std::string& shown_default,
                         const std::string& description);
 
-/// An option that is one of several words, which configuration files keep as such. Where the description names no automatic
-/// choice, in brackets at its end, help shows the value that `target` has now.
+/// An option that is one of several words, which configuration files keep as such. Where the description names no
+/// automatic choice, in brackets at its end, help shows the value that `target` has now.
 template <typename T>
 CLI::Option* add_choice(CLI::App& command, const std::string& flag, T& target, const std::map<std::string, T>& choices,
                         const std::string& description) {
@@ -34,7 +34,8 @@ CLI::Option* add_choice(CLI::App& command, const std::string& flag, T& target, c
     }
     return command
         .add_option_function<std::string>(
-            flag, [&target, choices](const std::string& word) { target = choices.at(CLI::detail::to_lower(word)); }, text)
+            flag, [&target, choices](const std::string& word) { target = choices.at(CLI::detail::to_lower(word)); },
+            text)
         ->check(CLI::IsMember(choices, CLI::ignore_case).description(""))
         ->type_name(names);
 }
@@ -78,7 +79,8 @@ struct DomainFlags {
     std::optional<WorldBox> roi;
     void bind(CLI::App& command, bool with_margin);
     /// h, where --voxel-size may be relative ("2vx") to the automatic one. Says which in `session`.
-    [[nodiscard]] double resolve_voxel_size(const Image* image, const std::vector<Vec3>& points, Session& session) const;
+    [[nodiscard]] double resolve_voxel_size(const Image* image, const std::vector<Vec3>& points,
+                                            Session& session) const;
 };
 
 struct TagFlags {

@@ -11,8 +11,14 @@ namespace covol::tool {
 namespace {
 
 Json to_json(const CloudCleanupReport& r) {
-    return {{"given", r.given},         {"duplicates", r.duplicates}, {"outliers", r.outliers},     {"outlier_passes", r.outlier_passes},
-            {"simplified", r.simplified}, {"smoothed", r.smoothed},   {"mean_shift", r.mean_shift}, {"max_shift", r.max_shift},
+    return {{"given", r.given},
+            {"duplicates", r.duplicates},
+            {"outliers", r.outliers},
+            {"outlier_passes", r.outlier_passes},
+            {"simplified", r.simplified},
+            {"smoothed", r.smoothed},
+            {"mean_shift", r.mean_shift},
+            {"max_shift", r.max_shift},
             {"kept", r.kept}};
 }
 
@@ -35,11 +41,13 @@ void CloudFlags::bind(CLI::App& command, bool with_most) {
     const std::string factor = "3";
     command
         .add_flag("--remove-outliers{" + factor + "}", outlier_factor,
-                  "drop points whose distance to their " + std::to_string(lib.neighbours) + " neighbours is more than " + factor +
-                      " (or FACTOR) times the cloud's mean")
+                  "drop points whose distance to their " + std::to_string(lib.neighbours) +
+                      " neighbours is more than " + factor + " (or FACTOR) times the cloud's mean")
         ->option_text("[=FACTOR]");
     if (with_most)
-        command.add_option("--most-points", most_points, "of larger clouds so many points are used, evenly spread over the surface; 0: all")
+        command
+            .add_option("--most-points", most_points,
+                        "of larger clouds so many points are used, evenly spread over the surface; 0: all")
             ->type_name("N")
             ->default_str(std::to_string(most_points));
     add_length(command, "--simplify", simplify, "", "keep one point in each cell of this edge, 1vx for example");
@@ -49,11 +57,14 @@ void CloudFlags::bind(CLI::App& command, bool with_most) {
                    " times as many by projection, evenly spread (wlop)");
 }
 
-std::vector<std::uint32_t> CloudFlags::used(const std::vector<Vec3>& points, const RunContext& run, Json& report) const {
-    std::vector<std::uint32_t> order = spatial_order(points, most_points > 0 ? most_points : std::numeric_limits<std::size_t>::max());
+std::vector<std::uint32_t> CloudFlags::used(const std::vector<Vec3>& points, const RunContext& run,
+                                            Json& report) const {
+    std::vector<std::uint32_t> order =
+        spatial_order(points, most_points > 0 ? most_points : std::numeric_limits<std::size_t>::max());
     if (order.size() < points.size()) {
         report["thinned_to"] = order.size();
-        run.info("cloud: " + std::to_string(order.size()) + " of " + std::to_string(points.size()) + " points used, evenly spread; --most-points 0 takes all");
+        run.info("cloud: " + std::to_string(order.size()) + " of " + std::to_string(points.size()) +
+                 " points used, evenly spread; --most-points 0 takes all");
     }
     return order;
 }
@@ -71,7 +82,8 @@ void CloudFlags::check() const {
     if (!why.empty()) throw Error(Errc::InvalidOptions, why);
 }
 
-std::vector<Vec3> CloudFlags::clean(const std::vector<Vec3>& points, double h, const RunContext& run, Json& report) const {
+std::vector<Vec3> CloudFlags::clean(const std::vector<Vec3>& points, double h, const RunContext& run,
+                                    Json& report) const {
     const CloudCleanupOptions options = resolve(h);
     if (!options.any()) return points;
     CloudCleanupReport done;

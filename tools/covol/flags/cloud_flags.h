@@ -19,11 +19,13 @@ struct CloudFlags {
     void bind(CLI::App& command, bool with_most);
     /// @throws Error InvalidOptions for what is wrong whatever h is.
     void check() const;
-    /// Which points of a cloud without an image are used, sorted in space; says so where these are not all of them, and puts
-    /// it into `report` as "thinned_to".
-    [[nodiscard]] std::vector<std::uint32_t> used(const std::vector<Vec3>& points, const RunContext& run, Json& report) const;
+    /// Which points of a cloud without an image are used, sorted in space; says so where these are not all of them, and
+    /// puts it into `report` as "thinned_to".
+    [[nodiscard]] std::vector<std::uint32_t> used(const std::vector<Vec3>& points, const RunContext& run,
+                                                  Json& report) const;
     /// The cloud as asked for; says what was done, and puts it into `report` as "cleanup".
-    [[nodiscard]] std::vector<Vec3> clean(const std::vector<Vec3>& points, double h, const RunContext& run, Json& report) const;
+    [[nodiscard]] std::vector<Vec3> clean(const std::vector<Vec3>& points, double h, const RunContext& run,
+                                          Json& report) const;
 
 private:
     [[nodiscard]] CloudCleanupOptions resolve(double h) const;

@@ -4,14 +4,17 @@ namespace covol::tool {
 
 void ContourFlags::bind(CLI::App& command, bool names) {
     in_group(command, Group::Marks);
-    command.add_option("--contours", paths,
-                       std::string("ordered marks on slices: CSV (slice,contour,x_px,y_px), napari shapes, Fiji selections") +
-                           (names ? "; NAME= as for points" : ""))
+    command
+        .add_option(
+            "--contours", paths,
+            std::string("ordered marks on slices: CSV (slice,contour,x_px,y_px), napari shapes, Fiji selections") +
+                (names ? "; NAME= as for points" : ""))
         ->type_name(names ? "[NAME=]FILE..." : "FILE...");
     in_group(command, Group::ReadingMarks);
     add_choice(command, "--contour-curve", curve, {{"lines", ContourCurve::Lines}, {"spline", ContourCurve::Spline}},
                "how neighbouring marks are joined");
-    add_length(command, "--contour-thickness", thickness, "", "thickness of a body whose contours all lie on one slice");
+    add_length(command, "--contour-thickness", thickness, "",
+               "thickness of a body whose contours all lie on one slice");
 }
 
 std::vector<PointCloud> ContourFlags::read(const ReadPointsOptions& reading, const ImageGeometry* geometry,
@@ -25,9 +28,11 @@ std::vector<PointCloud> ContourFlags::read(const ReadPointsOptions& reading, con
     return clouds;
 }
 
-std::shared_ptr<const Contours> ContourFlags::densify(const std::vector<PointCloud>& clouds, const ImageGeometry* geometry,
-                                                      double h, const RunContext& run, Json& report) const {
-    const auto contours = std::make_shared<Contours>(covol::densify(clouds, geometry, {h, curve, thickness.resolve(h, 0)}, run));
+std::shared_ptr<const Contours> ContourFlags::densify(const std::vector<PointCloud>& clouds,
+                                                      const ImageGeometry* geometry, double h, const RunContext& run,
+                                                      Json& report) const {
+    const auto contours =
+        std::make_shared<Contours>(covol::densify(clouds, geometry, {h, curve, thickness.resolve(h, 0)}, run));
     run.info("contours: " + contours->summary);
     Json rules = Json::array();
     for (const PointCloud& cloud : clouds) rules.push_back(cloud.rule);

@@ -21,8 +21,9 @@ struct ContourFlags {
     [[nodiscard]] std::vector<PointCloud> read(const ReadPointsOptions& reading, const ImageGeometry* geometry,
                                                const RunContext& run) const;
     /// With step h. Says what came of it, and fills the report's input.contours.
-    [[nodiscard]] std::shared_ptr<const Contours> densify(const std::vector<PointCloud>& clouds, const ImageGeometry* geometry,
-                                                          double h, const RunContext& run, Json& report) const;
+    [[nodiscard]] std::shared_ptr<const Contours> densify(const std::vector<PointCloud>& clouds,
+                                                          const ImageGeometry* geometry, double h,
+                                                          const RunContext& run, Json& report) const;
 };
 
 }  // namespace covol::tool

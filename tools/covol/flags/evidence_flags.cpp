@@ -12,7 +12,7 @@ namespace covol::tool {
 namespace {
 
 constexpr double kReachVoxels = 5.0;  // of marks whose attraction is unlimited
-constexpr double kWeakLine = 0.93;  // 1 - g where the image is 1.2 times as bright as the band's median
+constexpr double kWeakLine = 0.93;    // 1 - g where the image is 1.2 times as bright as the band's median
 
 std::string text_of(const Vec3& v, int decimals) {
     std::ostringstream text;
@@ -24,16 +24,20 @@ std::string text_of(const Vec3& v, int decimals) {
 
 void EvidenceFlags::bind(CLI::App& command) {
     in_group(command, Group::Output);
-    command.add_option("--evidence", path,
-                       "table of the slices: distances between surface and marks, surface that rests on neither marks nor edges")
+    command
+        .add_option(
+            "--evidence", path,
+            "table of the slices: distances between surface and marks, surface that rests on neither marks nor edges")
         ->type_name("OUT.csv");
-    command.add_option("--suggest", suggestions, "name the N slices where new marks would help most, and where in them")
+    command
+        .add_option("--suggest", suggestions, "name the N slices where new marks would help most, and where in them")
         ->type_name("N");
 }
 
 void EvidenceFlags::check(Outputs& outputs, const std::string& path_of_this_run) const {
     outputs.check("--evidence", path_of_this_run, OutputKind::Table);
-    if (suggestions < 0) throw Error(Errc::InvalidOptions, "--suggest: expected >= 0, got " + std::to_string(suggestions));
+    if (suggestions < 0)
+        throw Error(Errc::InvalidOptions, "--suggest: expected >= 0, got " + std::to_string(suggestions));
 }
 
 Evidence EvidenceFlags::judge(const SegmentResult& result, const std::vector<Vec3>& marks, const Image& image,
@@ -60,7 +64,8 @@ Json to_json(const Evidence& e) {
                           {"marks", s.marks},
                           {"marks_to_surface", {{"mean", s.marks_mean}, {"max", s.marks_max}}}});
     for (const Suggestion& s : e.suggestions)
-        suggestions.push_back({{"slice", s.slice}, {"area", s.area}, {"index", to_json(s.index)}, {"world", to_json(s.world)}});
+        suggestions.push_back(
+            {{"slice", s.slice}, {"area", s.area}, {"index", to_json(s.index)}, {"world", to_json(s.world)}});
     return {{"reach", e.reach},
             {"weak_edge", e.weak_edge},
             {"area", e.area},
@@ -80,8 +85,8 @@ std::vector<VertexAttribute> vertex_attributes(const std::optional<Evidence>& ev
 void tell(Session& session, const Evidence& e, const std::string& who) {
     std::ostringstream text;
     text << who << std::setprecision(3) << 100 * e.unsupported_area / e.area
-         << " % of the surface rests on neither marks nor edges (farther than " << e.reach << " from marks, edge strength below "
-         << e.weak_edge << ")";
+         << " % of the surface rests on neither marks nor edges (farther than " << e.reach
+         << " from marks, edge strength below " << e.weak_edge << ")";
     session.note(text.str());
     for (const Suggestion& s : e.suggestions) {
         text.str("");

@@ -30,18 +30,20 @@ Image only(const Image& mask, int label) {
 
 void GuessFlags::bind(CLI::App& command) {
     in_group(command, Group::Marks);
-    command.add_option("--guess", paths,
-                       "another tool's result, a mask, mesh or level set, that marks and seeds correct near them; what is "
-                       "farther away stays as it is")
+    command
+        .add_option("--guess", paths,
+                    "another tool's result, a mask, mesh or level set, that marks and seeds correct near them; what is "
+                    "farther away stays as it is")
         ->type_name("[NAME=]FILE")
         ->allow_extra_args(false);
     in_group(command, Group::ReadingMarks);
     command.add_option("--guess-label", label, "of a mask with several labels the one to correct; the others stay")
         ->check(CLI::PositiveNumber.description(""))
         ->type_name("LABEL");
-    add_length(command, "--guess-radius", radius, "",
-               "a mark acts on the guess at least so far around it [" + to_text(kCorrectionVoxels) +
-                   "vx, or two of the image's widest spacing; three times its distance to the guess where that is more]");
+    add_length(
+        command, "--guess-radius", radius, "",
+        "a mark acts on the guess at least so far around it [" + to_text(kCorrectionVoxels) +
+            "vx, or two of the image's widest spacing; three times its distance to the guess where that is more]");
 }
 
 Guess read_guess(const std::string& path, int label, const ImageGeometry& image, bool force, const RunContext& run) {
@@ -50,16 +52,19 @@ Guess read_guess(const std::string& path, int label, const ImageGeometry& image,
     switch (kind_of_file(path)) {
         case FileKind::Vdb: guess.start.kind = Start::Kind::Vdb; return guess;
         case FileKind::Mesh: guess.start.kind = Start::Kind::Mesh; return guess;
-        case FileKind::Points: throw Error(Errc::InvalidInput, "--guess: " + path + ": expected a mask, mesh or level set, got points");
+        case FileKind::Points:
+            throw Error(Errc::InvalidInput, "--guess: " + path + ": expected a mask, mesh or level set, got points");
         case FileKind::Image: break;
     }
     guess.mask = placed_on(read_image(path, {}, RunContext{}), image, force);
     const std::vector<LabelName> labels = painted_labels(*guess.mask);
     if (label == 0 && labels.size() > 1)
-        throw Error(Errc::InvalidInput, "--guess: " + path + ": expected one label, got " + list_of(labels) + "; choose one by --guess-label");
+        throw Error(Errc::InvalidInput, "--guess: " + path + ": expected one label, got " + list_of(labels) +
+                                            "; choose one by --guess-label");
     guess.label = label != 0 ? label : labels.front().label;
     if (std::none_of(labels.begin(), labels.end(), [&](const LabelName& l) { return l.label == guess.label; }))
-        throw Error(Errc::InvalidInput, "--guess-label: expected one of the labels of " + path + ", " + list_of(labels) + ", got " + std::to_string(guess.label));
+        throw Error(Errc::InvalidInput, "--guess-label: expected one of the labels of " + path + ", " +
+                                            list_of(labels) + ", got " + std::to_string(guess.label));
     guess.start.kind = Start::Kind::Mask;
     guess.start.mask = std::make_shared<const Image>(only(*guess.mask, guess.label));
     run.info("--guess " + path + ": label " + std::to_string(guess.label));

@@ -25,7 +25,8 @@ struct Guess {
     int label = 1;              ///< what is inside
 };
 /// @throws Error InvalidInput (several labels and none chosen: lists them; outside of the image).
-[[nodiscard]] Guess read_guess(const std::string& path, int label, const ImageGeometry& image, bool force, const RunContext& run);
+[[nodiscard]] Guess read_guess(const std::string& path, int label, const ImageGeometry& image, bool force,
+                               const RunContext& run);
 
 [[nodiscard]] Json to_json(const CorrectionReport& report);
 

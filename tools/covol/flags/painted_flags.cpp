@@ -6,16 +6,20 @@ namespace covol::tool {
 
 void PaintedFlags::bind(CLI::App& command) {
     in_group(command, Group::Marks);
-    command.add_option("--painted", paths,
-                       "label images painted on some slices or in some places; each label is a structure")
+    command
+        .add_option("--painted", paths,
+                    "label images painted on some slices or in some places; each label is a structure")
         ->type_name("[NAME=]FILE...");
     in_group(command, Group::ReadingMarks);
-    command.add_option("--painted-outside", options.outside_label, "a label that was painted on what belongs to no structure")
+    command
+        .add_option("--painted-outside", options.outside_label,
+                    "a label that was painted on what belongs to no structure")
         ->check(CLI::PositiveNumber.description(""))
         ->type_name("LABEL");
     add_choice(command, "--painted-as", options.as,
                {{"auto", PaintedAs::Automatic}, {"slices", PaintedAs::Slices}, {"scribbles", PaintedAs::Scribbles}},
-               "slices: those that hold paint show the whole cross-section; scribbles: paint says what is inside [by the paint itself]");
+               "slices: those that hold paint show the whole cross-section; scribbles: paint says what is inside [by "
+               "the paint itself]");
 }
 
 std::vector<std::shared_ptr<const PaintedFile>> PaintedFlags::read(const RunContext& run) const {
@@ -23,13 +27,15 @@ std::vector<std::shared_ptr<const PaintedFile>> PaintedFlags::read(const RunCont
     for (const std::string& text : paths) {
         run.check();
         const Named named = split_name(text);
-        auto file = std::make_shared<PaintedFile>(PaintedFile{named.value, named.name, read_image(named.value, {}, RunContext{}), {}});
+        auto file = std::make_shared<PaintedFile>(
+            PaintedFile{named.value, named.name, read_image(named.value, {}, RunContext{}), {}});
         for (LabelName& label : painted_labels(file->image))
             if (label.label != options.outside_label) file->labels.push_back(std::move(label));
         if (!named.name.empty()) {
             if (file->labels.size() > 1)
                 throw UsageError("--painted: " + text + ": expected one label in a file with a name, got " +
-                                 std::to_string(file->labels.size()) + "; leave the name out, each label is a structure");
+                                 std::to_string(file->labels.size()) +
+                                 "; leave the name out, each label is a structure");
             for (LabelName& label : file->labels) label.name = named.name;
         }
         files.push_back(std::move(file));
@@ -37,7 +43,8 @@ std::vector<std::shared_ptr<const PaintedFile>> PaintedFlags::read(const RunCont
     return files;
 }
 
-Painted PaintedFlags::understand(const PaintedFile& file, const ImageGeometry& image, bool force, const RunContext& run) const {
+Painted PaintedFlags::understand(const PaintedFile& file, const ImageGeometry& image, bool force,
+                                 const RunContext& run) const {
     Painted painted = understand_painted(placed_on(file.image, image, force), file.labels, options, run);
     for (const PaintedLabel& label : painted.labels) run.info(file.path + ": " + label.summary);
     if (options.outside_label != 0)
@@ -48,8 +55,14 @@ Painted PaintedFlags::understand(const PaintedFile& file, const ImageGeometry& i
 Json to_json(const PaintedLabel& label) {
     Json views = Json::array();
     for (const PaintedView& view : label.views)
-        views.push_back({{"axis", std::string(1, "xyz"[view.axis])}, {"slices", view.slices}, {"outlines", view.outlines.lines.size()}});
-    return {{"label", label.label}, {"voxels", label.voxels}, {"slices", views}, {"scribbled", label.inside.size()}, {"understood", label.summary}};
+        views.push_back({{"axis", std::string(1, "xyz"[view.axis])},
+                         {"slices", view.slices},
+                         {"outlines", view.outlines.lines.size()}});
+    return {{"label", label.label},
+            {"voxels", label.voxels},
+            {"slices", views},
+            {"scribbled", label.inside.size()},
+            {"understood", label.summary}};
 }
 
 }  // namespace covol::tool

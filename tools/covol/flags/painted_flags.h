@@ -25,7 +25,8 @@ struct PaintedFlags {
     [[nodiscard]] std::vector<std::shared_ptr<const PaintedFile>> read(const RunContext& run) const;
     /// In the image's space, understood. Says what was understood.
     /// @param force  --spacing was given: label images of as many voxels take it over
-    [[nodiscard]] Painted understand(const PaintedFile& file, const ImageGeometry& image, bool force, const RunContext& run) const;
+    [[nodiscard]] Painted understand(const PaintedFile& file, const ImageGeometry& image, bool force,
+                                     const RunContext& run) const;
 };
 
 /// What the report tells of one label.

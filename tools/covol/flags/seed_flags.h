@@ -18,8 +18,9 @@ struct SeedFlags {
 struct Seeds {
     std::vector<Vec3> inside, outside;
 };
-/// Lines in files are scribbles, taken at points no farther apart than `step`. With an image, seeds outside it are an error.
-[[nodiscard]] Seeds read_seeds(const SeedFlags& flags, const ReadPointsOptions& reading, const ImageGeometry* geometry, double step,
-                               const RunContext& run);
+/// Lines in files are scribbles, taken at points no farther apart than `step`. With an image, seeds outside it are an
+/// error.
+[[nodiscard]] Seeds read_seeds(const SeedFlags& flags, const ReadPointsOptions& reading, const ImageGeometry* geometry,
+                               double step, const RunContext& run);
 
 }  // namespace covol::tool

@@ -15,8 +15,8 @@ void take(std::vector<Vec3>& list, const std::vector<std::uint32_t>& which) {
 
 }  // namespace
 
-Marks read_marks(const PointFlags& points, const ContourFlags& contours, const CloudFlags& cloud, const ImageGeometry* geometry,
-                 const RunContext& run) {
+Marks read_marks(const PointFlags& points, const ContourFlags& contours, const CloudFlags& cloud,
+                 const ImageGeometry* geometry, const RunContext& run) {
     Marks marks;
     WorldPoints read = read_world_points(points, geometry, run);
     Json& report = marks.report["points"] = {{"densified", 0}, {"paths", points.paths}, {"rules", read.rules}};
@@ -38,8 +38,8 @@ Marks read_marks(const PointFlags& points, const ContourFlags& contours, const C
     return marks;
 }
 
-void prepare(Marks& marks, const CloudFlags& cloud, const ContourFlags& contours, const ImageGeometry* geometry, double h,
-             Session& session, const RunContext& run) {
+void prepare(Marks& marks, const CloudFlags& cloud, const ContourFlags& contours, const ImageGeometry* geometry,
+             double h, Session& session, const RunContext& run) {
     std::vector<Vec3> cleaned = cloud.clean(marks.points, h, run, marks.report["points"]);
     if (cleaned != marks.points) marks.hints = carried(marks.hints, marks.points, cleaned);
     marks.points = std::move(cleaned);

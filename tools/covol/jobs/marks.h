@@ -12,20 +12,21 @@ namespace covol::tool {
 
 /// The marks of one structure: what its files hold, and what segment() takes once h is known.
 struct Marks {
-    std::vector<Vec3> given;          ///< all of them as they were clicked, world units; cleaned by prepare()
-    std::vector<Vec3> points;         ///< those that are no contours
-    PointHints hints;                 ///< of those
-    std::vector<PointCloud> drawn;    ///< contours
+    std::vector<Vec3> given;                   ///< all of them as they were clicked, world units; cleaned by prepare()
+    std::vector<Vec3> points;                  ///< those that are no contours
+    PointHints hints;                          ///< of those
+    std::vector<PointCloud> drawn;             ///< contours
     std::shared_ptr<const Contours> contours;  ///< null before densify(), and without a file
-    Json report;                      ///< {"points": {...}, "contours": {...}}
+    Json report;                               ///< {"points": {...}, "contours": {...}}
 };
 
-/// Reads both kinds of files. With an image, marks outside it are an error; without one, points are sorted in space and thinned.
+/// Reads both kinds of files. With an image, marks outside it are an error; without one, points are sorted in space and
+/// thinned.
 [[nodiscard]] Marks read_marks(const PointFlags& points, const ContourFlags& contours, const CloudFlags& cloud,
                                const ImageGeometry* geometry, const RunContext& run);
 
 /// Cleans the points, and densifies the contours with step h.
-void prepare(Marks& marks, const CloudFlags& cloud, const ContourFlags& contours, const ImageGeometry* geometry, double h,
-             Session& session, const RunContext& run);
+void prepare(Marks& marks, const CloudFlags& cloud, const ContourFlags& contours, const ImageGeometry* geometry,
+             double h, Session& session, const RunContext& run);
 
 }  // namespace covol::tool

@@ -17,7 +17,8 @@ const Painted& PaintReader::of(const StructureInput::Paint& paint, const RunCont
 const PaintedLabel& PaintReader::label_of(const StructureInput::Paint& paint, const RunContext& run) {
     for (const PaintedLabel& label : of(paint, run).labels)
         if (label.label == paint.label) return label;
-    throw Error(Errc::InvalidInput, "--painted: " + paint.file->path + ": label " + std::to_string(paint.label) + " is not there");
+    throw Error(Errc::InvalidInput,
+                "--painted: " + paint.file->path + ": label " + std::to_string(paint.label) + " is not there");
 }
 
 void PaintReader::add_outlines(const StructureInput& input, Marks& marks, const RunContext& run) {
@@ -30,7 +31,8 @@ void PaintReader::add_outlines(const StructureInput& input, Marks& marks, const 
         }
 }
 
-std::shared_ptr<const Contours> PaintReader::own_contours(const StructureInput& input, const Marks& marks, double h, const RunContext& run) {
+std::shared_ptr<const Contours> PaintReader::own_contours(const StructureInput& input, const Marks& marks, double h,
+                                                          const RunContext& run) {
     if (input.paint.size() != 1 || !marks.drawn.empty()) return nullptr;
     const PaintedLabel& label = label_of(input.paint.front(), run);
     if (label.views.empty()) return nullptr;
@@ -39,7 +41,8 @@ std::shared_ptr<const Contours> PaintReader::own_contours(const StructureInput& 
     return contours;
 }
 
-void PaintReader::add_seeds(const std::vector<StructureInput>& inputs, std::size_t own, SegmentOptions& options, const RunContext& run) {
+void PaintReader::add_seeds(const std::vector<StructureInput>& inputs, std::size_t own, SegmentOptions& options,
+                            const RunContext& run) {
     for (std::size_t n = 0; n < inputs.size(); ++n)
         for (const StructureInput::Paint& paint : inputs[n].paint) {
             const std::vector<Vec3>& seeds = label_of(paint, run).inside;

@@ -17,10 +17,11 @@ public:
     /// Outlines in the world, to be joined with contours from files.
     void add_outlines(const StructureInput& input, Marks& marks, const RunContext& run);
     /// The only view of the only file, which needs no common lattice; or null.
-    [[nodiscard]] std::shared_ptr<const Contours> own_contours(const StructureInput& input, const Marks& marks, double h,
-                                                               const RunContext& run);
+    [[nodiscard]] std::shared_ptr<const Contours> own_contours(const StructureInput& input, const Marks& marks,
+                                                               double h, const RunContext& run);
     /// @param own  which of the inputs the options are for
-    void add_seeds(const std::vector<StructureInput>& inputs, std::size_t own, SegmentOptions& options, const RunContext& run);
+    void add_seeds(const std::vector<StructureInput>& inputs, std::size_t own, SegmentOptions& options,
+                   const RunContext& run);
     [[nodiscard]] Json report(const StructureInput& input, const RunContext& run);
 
 private:

@@ -74,7 +74,8 @@ std::string SegmentJob::unused(const SegmentReport& report) const {
     name(evolve.attraction_range.given, "--attraction-range");
     name(evolve.image_yields.has_value(), "--image-yields");
     if (flags.empty()) return {};
-    return flags + " did nothing: the surface is a guess that marks and image hold, and nothing flowed; --model paper flows";
+    return flags +
+           " did nothing: the surface is a guess that marks and image hold, and nothing flowed; --model paper flows";
 }
 
 void SegmentJob::check_outputs(Outputs& outputs) const {
@@ -94,18 +95,22 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
     if (with_image) {
         command.add_option("--mask", mask_path, "label image in the image's own geometry; .seg.nrrd for 3D Slicer")
             ->type_name("OUT.nrrd|.nii.gz|.tif|.mha");
-        command.add_option("--table", table_path, "volume, area and fit of each structure and frame, as a table")->type_name("OUT.csv");
+        command.add_option("--table", table_path, "volume, area and fit of each structure and frame, as a table")
+            ->type_name("OUT.csv");
         evidence.bind(command);
         in_group(command, Group::Input);
-        command.add_option_function<std::string>(
-                   "--frame", [this](const std::string& text) { frames = parse_frames("--frame", text); },
-                   "time points of the image, from 0; of several, each starts from the one before")
+        command
+            .add_option_function<std::string>(
+                "--frame", [this](const std::string& text) { frames = parse_frames("--frame", text); },
+                "time points of the image, from 0; of several, each starts from the one before")
             ->type_name("all|N|A-B");
         in_group(command, Group::Output);
     }
-    command.add_option("--mesh", mesh_path, "the surface as closed, manifold, outward triangles")->type_name("OUT.ply|.obj|.stl|.off|.glb");
+    command.add_option("--mesh", mesh_path, "the surface as closed, manifold, outward triangles")
+        ->type_name("OUT.ply|.obj|.stl|.off|.glb");
     command.add_option("--density", density_path, "the solid as a fog volume, 0 to 1")->type_name("OUT.vdb");
-    command.add_option("--fields", fields_path, "u, and distance and edge where the flow had them")->type_name("OUT.vdb");
+    command.add_option("--fields", fields_path, "u, and distance and edge where the flow had them")
+        ->type_name("OUT.vdb");
     contours.bind(command, with_image);
     if (with_image) painted.bind(command);
     seeds.bind(command, with_image);
@@ -114,35 +119,47 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
     evolve.bind(command, with_image);
     if (with_image) edge.bind(command);
     tag.bind(command, with_image);
-    command.add_option_function<std::string>(
-               "--init", [this](const std::string& text) { start = parse_start("--init", text); },
-               "how the level set starts: auto, guess (through the marks with the least bending), cloud (many points without an image: "
-               "their own surface), tag, sphere:x,y,z,r, "
-               "box:x0,y0,z0,x1,y1,z1 (inside an object and without marks these grow to its edges), mesh:F, mask:F or vdb:F "
-               "(near its marks such a start is a guess that they correct)")
+    command
+        .add_option_function<std::string>(
+            "--init", [this](const std::string& text) { start = parse_start("--init", text); },
+            "how the level set starts: auto, guess (through the marks with the least bending), cloud (many points "
+            "without an image: "
+            "their own surface), tag, sphere:x,y,z,r, "
+            "box:x0,y0,z0,x1,y1,z1 (inside an object and without marks these grow to its edges), mesh:F, mask:F or "
+            "vdb:F "
+            "(near its marks such a start is a guess that they correct)")
         ->type_name("START")
         ->default_str("auto");
     in_group(command, Group::Start);
-    add_choice(command, "--model", model, {{"guided", Model::Guided}, {"paper", Model::Paper}},
-               "what holds the surface where neither marks nor edges speak: a guess made from the marks, or curvature alone");
+    add_choice(
+        command, "--model", model, {{"guided", Model::Guided}, {"paper", Model::Paper}},
+        "what holds the surface where neither marks nor edges speak: a guess made from the marks, or curvature alone");
     in_group(command, Group::ReadingMarks);
-    add_length(command, "--mark-precision", mark_precision, "", "standard deviation of a mark's place [0.3 of the image's spacing along each axis]");
+    add_length(command, "--mark-precision", mark_precision, "",
+               "standard deviation of a mark's place [0.3 of the image's spacing along each axis]");
     domain.bind(command, !with_image);
     in_group(command, Group::Numerics);
-    command.add_option("--coarse-levels", coarse_levels, "levels of twice the voxel size, and so on, that the flow passes first; auto: 1 for a sphere or a box, else 0")
+    command
+        .add_option("--coarse-levels", coarse_levels,
+                    "levels of twice the voxel size, and so on, that the flow passes first; auto: 1 for a sphere or a "
+                    "box, else 0")
         ->check(CLI::Range(0, 4).description(""))
         ->type_name("N")
         ->default_str("auto");
     if (!with_image) {
         in_group(command, Group::Clouds);
-        add_choice(command, "--holes", holes.policy, {{"close", Holes::Close}, {"open", Holes::Open}, {"flat", Holes::Flat}},
-                   "where no points are, the surface goes on smoothly, or the mesh ends (the level set stays closed), or the flattest "
+        add_choice(command, "--holes", holes.policy,
+                   {{"close", Holes::Close}, {"open", Holes::Open}, {"flat", Holes::Flat}},
+                   "where no points are, the surface goes on smoothly, or the mesh ends (the level set stays closed), "
+                   "or the flattest "
                    "patch spans it, in both");
         add_length(command, "--hole-distance", hole_distance, "",
-                   "a hole is where the surface lies farther from all points [3 spacings where they are sparse, at least 3vx]");
+                   "a hole is where the surface lies farther from all points [3 spacings where they are sparse, at "
+                   "least 3vx]");
     }
     in_group(command, Group::MeshFiles);
-    add_length(command, "--min-component", min_component, "", "drop pieces of the mesh that are smaller than a cube of this edge");
+    add_length(command, "--min-component", min_component, "",
+               "drop pieces of the mesh that are smaller than a cube of this edge");
     in_group(command, Group::Output);
     command.add_flag("--half", half, "store values in .vdb files as 16-bit floats");
     mesh.bind(command);
@@ -172,9 +189,11 @@ void SegmentJob::run(Session& session) const {
     bool names = false;
     for (const std::vector<std::string>* texts : {&points.paths, &contours.paths, &seeds.inside, &seeds.outside})
         names = names || std::any_of(texts->begin(), texts->end(), has_name);
-    if (names && images.empty()) throw UsageError("expected files without names: several structures need an image, see covol segment");
+    if (names && images.empty())
+        throw UsageError("expected files without names: several structures need an image, see covol segment");
     if (is_timelapse(*this)) return run_timelapse(*this, session);
-    if (names || !tag.named_seeds.empty() || !painted.paths.empty() || !guess.paths.empty()) return run_structures(*this, session);
+    if (names || !tag.named_seeds.empty() || !painted.paths.empty() || !guess.paths.empty())
+        return run_structures(*this, session);
     run_one(session);
 }
 
@@ -234,9 +253,12 @@ void SegmentJob::run_one(Session& session) const {
     });
     WriteMeshOptions write = mesh.options(session);
     write.attributes = vertex_attributes(judged);
-    if (!result->distance_to_points.empty()) write.attributes.push_back({"distance_to_points", result->distance_to_points});
+    if (!result->distance_to_points.empty())
+        write.attributes.push_back({"distance_to_points", result->distance_to_points});
     outputs.add(mesh_path, [=](const std::string& path) { write_mesh(path, result->mesh, write); });
-    outputs.add(evidence.path, [=](const std::string& path) { write_text(path, evidence_csv({{"surface", &*judged}})); });
+    outputs.add(evidence.path, [=](const std::string& path) {
+        write_text(path, evidence_csv({{"surface", &*judged}}));
+    });
     outputs.add(table_path, [=](const std::string& path) {
         Table table(result_columns());
         add_result(table.row(), "surface", 1, result->report);

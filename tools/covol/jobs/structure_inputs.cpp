@@ -38,7 +38,8 @@ void number_labels(std::vector<StructureInput>& inputs) {
 
 /// The structure that a text NAME=... belongs to.
 StructureInput& owner_of(std::vector<StructureInput>& inputs, const std::string& flag, const std::string& name) {
-    const auto at = std::find_if(inputs.begin(), inputs.end(), [&](const StructureInput& input) { return input.name == name; });
+    const auto at =
+        std::find_if(inputs.begin(), inputs.end(), [&](const StructureInput& input) { return input.name == name; });
     if (at == inputs.end()) throw UsageError(flag + ": no structure is called '" + name + "'");
     return *at;
 }
@@ -55,21 +56,26 @@ void share_seeds(std::vector<StructureInput>& inputs, const std::string& flag, c
     }
 }
 
-void add_paint(std::vector<StructureInput>& inputs, const std::vector<std::shared_ptr<const PaintedFile>>& painted, const SegmentJob& job) {
+void add_paint(std::vector<StructureInput>& inputs, const std::vector<std::shared_ptr<const PaintedFile>>& painted,
+               const SegmentJob& job) {
     std::size_t labels = 0;
     bool named = false;
     for (const auto& file : painted) {
         labels += file->labels.size();
         named = named || !file->name.empty();
     }
-    const bool one = labels == 1 && !named && (inputs.size() == 1 ? inputs.front().name.empty() : inputs.empty() && !painted.front()->labels.front().named);
+    const bool one =
+        labels == 1 && !named &&
+        (inputs.size() == 1 ? inputs.front().name.empty() : inputs.empty() && !painted.front()->labels.front().named);
     for (const auto& file : painted)
-        for (const LabelName& label : file->labels) find_or_add(inputs, one ? "" : label.name, job).paint.push_back({file, label.label});
+        for (const LabelName& label : file->labels)
+            find_or_add(inputs, one ? "" : label.name, job).paint.push_back({file, label.label});
 }
 
 }  // namespace
 
-std::vector<StructureInput> structures_of(const SegmentJob& job, const std::vector<std::shared_ptr<const PaintedFile>>& painted) {
+std::vector<StructureInput> structures_of(const SegmentJob& job,
+                                          const std::vector<std::shared_ptr<const PaintedFile>>& painted) {
     std::vector<StructureInput> inputs;
     for (const std::string& text : job.points.paths) {
         const Named file = split_name(text);
@@ -83,7 +89,8 @@ std::vector<StructureInput> structures_of(const SegmentJob& job, const std::vect
     for (const std::string& text : job.guess.paths) {
         const Named file = split_name(text);
         StructureInput& input = find_or_add(inputs, file.name, job);
-        if (!input.guess.empty()) throw UsageError("--guess: expected one file for a structure, got " + input.guess + " and " + file.value);
+        if (!input.guess.empty())
+            throw UsageError("--guess: expected one file for a structure, got " + input.guess + " and " + file.value);
         input.guess = file.value;
     }
     for (const std::string& text : job.seeds.inside)
@@ -94,14 +101,17 @@ std::vector<StructureInput> structures_of(const SegmentJob& job, const std::vect
             const std::string first = !input.points.paths.empty()     ? input.points.paths.front()
                                       : !input.contours.paths.empty() ? input.contours.paths.front()
                                                                       : input.guess;
-            throw UsageError("--points, --contours: expected a name for every file when one has a name (ve=FILE) or several "
-                             "labels are painted, got none for " + first);
+            throw UsageError(
+                "--points, --contours: expected a name for every file when one has a name (ve=FILE) or several "
+                "labels are painted, got none for " +
+                first);
         }
     share_seeds(inputs, "--inside", job.seeds.inside, &SeedFlags::inside);
     share_seeds(inputs, "--outside", job.seeds.outside, &SeedFlags::outside);
     number_labels(inputs);
     for (StructureInput& input : inputs) input.exterior_seeds = job.tag.exterior_seeds;
-    for (const auto& [name, seed] : job.tag.named_seeds) owner_of(inputs, "--exterior-seed", name).exterior_seeds.push_back(seed);
+    for (const auto& [name, seed] : job.tag.named_seeds)
+        owner_of(inputs, "--exterior-seed", name).exterior_seeds.push_back(seed);
     return inputs;
 }
 
@@ -115,7 +125,8 @@ std::vector<StructureStart> starts_of(const SegmentJob& job, const std::vector<S
     std::vector<StructureStart> starts(inputs.size(), {job.start});
     if (inputs.size() == 1 || job.start.kind <= Start::Kind::Tag) return starts;
     if (job.start.kind != Start::Kind::Vdb)
-        throw UsageError("--init: several structures cannot start from one shape; expected tag, or vdb:FILE with a grid for each");
+        throw UsageError(
+            "--init: several structures cannot start from one shape; expected tag, or vdb:FILE with a grid for each");
     const std::vector<std::string> grids = grid_names(names_of(inputs));
     for (std::size_t n = 0; n < starts.size(); ++n) starts[n].start.level_set = read_vdb(job.start.path, grids[n]);
     return starts;

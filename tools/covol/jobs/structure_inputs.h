@@ -5,7 +5,8 @@
 
 #include "jobs/segment_job.h"
 
-// What the command line gives for each structure: `--points NAME=FILE`, `--contours NAME=FILE`, labels of `--painted FILE`.
+// What the command line gives for each structure: `--points NAME=FILE`, `--contours NAME=FILE`, labels of `--painted
+// FILE`.
 namespace covol::tool {
 
 /// A structure as the command line gives it.
@@ -28,8 +29,8 @@ struct StructureInput {
 /// The structures of a run, in the order in which their names come first: those of --points, --contours, --painted,
 /// --guess, --inside. A single painted label without a name of its own belongs to marks that have none.
 /// @throws UsageError when some marks have names and others have none, or a seed names nobody.
-[[nodiscard]] std::vector<StructureInput> structures_of(const SegmentJob& job,
-                                                        const std::vector<std::shared_ptr<const PaintedFile>>& painted = {});
+[[nodiscard]] std::vector<StructureInput> structures_of(
+    const SegmentJob& job, const std::vector<std::shared_ptr<const PaintedFile>>& painted = {});
 
 [[nodiscard]] std::vector<std::string> names_of(const std::vector<StructureInput>& inputs);
 

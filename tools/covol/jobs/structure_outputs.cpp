@@ -49,8 +49,8 @@ std::map<std::string, std::string> metadata_of(const StructuresOutput& output, c
     return metadata;
 }
 
-void hand_over_meshes(const SegmentJob& job, const std::shared_ptr<const StructuresOutput>& output, const std::string& path,
-                      const Session& session, const Sink& sink) {
+void hand_over_meshes(const SegmentJob& job, const std::shared_ptr<const StructuresOutput>& output,
+                      const std::string& path, const Session& session, const Sink& sink) {
     if (path.empty()) return;
     const WriteMeshOptions options = job.mesh.options(session);
     if (output->structures.size() > 1 && holds_several_meshes(path)) {
@@ -80,13 +80,14 @@ void write_labels(const std::string& file, const ImageGeometry& geometry, const 
     write_image(file, geometry, bytes.data(), metadata);
 }
 
-void hand_over_labels(const std::shared_ptr<const StructuresOutput>& output, const std::string& path, const RunContext& run,
-                      const Sink& sink) {
+void hand_over_labels(const std::shared_ptr<const StructuresOutput>& output, const std::string& path,
+                      const RunContext& run, const Sink& sink) {
     if (path.empty()) return;
     const bool has_names = !output->structures.front().name.empty();
     sink(path, [output, run, has_names](const std::string& file) {
         const std::vector<int> label_of = output->labels();
-        if (const StructureOutput& only = output->structures.front(); output->structures.size() == 1 && only.corrected) {
+        if (const StructureOutput& only = output->structures.front();
+            output->structures.size() == 1 && only.corrected) {
             std::vector<std::pair<std::string, std::string>> segments;
             std::vector<std::uint8_t> own;
             for (const std::int32_t value : only.corrected->values) own.push_back(value == only.label ? 1 : 0);
@@ -102,7 +103,9 @@ void hand_over_labels(const std::shared_ptr<const StructuresOutput>& output, con
                                : std::vector<std::pair<std::string, std::string>>{});
     });
     if (has_names && !is_nrrd(path))
-        sink(labels_path(path), [output](const std::string& file) { write_text(file, itksnap_labels(output->names(), output->labels())); });
+        sink(labels_path(path), [output](const std::string& file) {
+            write_text(file, itksnap_labels(output->names(), output->labels()));
+        });
 }
 
 Json report_of(const StructureOutput& s) {
@@ -110,7 +113,8 @@ Json report_of(const StructureOutput& s) {
     json.update(to_json(s.result.report));
     if (s.result.correction) json["correction"] = to_json(s.result.report.correction);
     if (s.corrected)
-        json["correction"]["mask"] = {{"added", s.corrected->added}, {"removed", s.corrected->removed}, {"reached", s.corrected->reached}};
+        json["correction"]["mask"] = {
+            {"added", s.corrected->added}, {"removed", s.corrected->removed}, {"reached", s.corrected->reached}};
     if (s.evidence) json["evidence"] = to_json(*s.evidence);
     return json;
 }
@@ -145,7 +149,8 @@ std::vector<Structure> solids(const StructuresOutput& output) {
     return result;
 }
 
-void check_outputs(const SegmentJob& job, const std::vector<StructureInput>& inputs, const std::string& tag, Outputs& outputs) {
+void check_outputs(const SegmentJob& job, const std::vector<StructureInput>& inputs, const std::string& tag,
+                   Outputs& outputs) {
     const auto tagged = [&](const std::string& path) { return path.empty() ? path : with_suffix(path, tag); };
     outputs.check("-o", tagged(job.output), OutputKind::Vdb);
     outputs.check("--mask", tagged(job.mask_path), OutputKind::Image);
@@ -156,8 +161,10 @@ void check_outputs(const SegmentJob& job, const std::vector<StructureInput>& inp
     job.evidence.check(outputs, tagged(job.evidence.path));
     job.mesh.check();
     const std::string mesh = tagged(job.mesh_path);
-    if (inputs.size() == 1 || mesh.empty() || holds_several_meshes(mesh)) return outputs.check("--mesh", mesh, OutputKind::Mesh);
-    for (const std::string& grid : grid_names(names_of(inputs))) outputs.check("--mesh", with_suffix(mesh, "_" + grid), OutputKind::Mesh);
+    if (inputs.size() == 1 || mesh.empty() || holds_several_meshes(mesh))
+        return outputs.check("--mesh", mesh, OutputKind::Mesh);
+    for (const std::string& grid : grid_names(names_of(inputs)))
+        outputs.check("--mesh", with_suffix(mesh, "_" + grid), OutputKind::Mesh);
 }
 
 void hand_over(const SegmentJob& job, const std::shared_ptr<const StructuresOutput>& output, const std::string& tag,
@@ -172,7 +179,8 @@ void hand_over(const SegmentJob& job, const std::shared_ptr<const StructuresOutp
     sink(tagged(job.density_path), [output, vdb](const std::string& file) {
         std::vector<FloatGridPtr> grids;
         for (const StructureOutput& s : output->structures)
-            grids.push_back(named(density(*s.result.surface), output->structures.size() > 1 ? "density_" + s.grid : "density"));
+            grids.push_back(
+                named(density(*s.result.surface), output->structures.size() > 1 ? "density_" + s.grid : "density"));
         write_vdb(file, grids, vdb);
     });
     sink(tagged(job.fields_path), [output, vdb](const std::string& file) { write_vdb(file, fields_of(*output), vdb); });
@@ -180,13 +188,15 @@ void hand_over(const SegmentJob& job, const std::shared_ptr<const StructuresOutp
     hand_over_labels(output, tagged(job.mask_path), session.run(), sink);
     sink(tagged(job.evidence.path), [output](const std::string& file) {
         std::vector<EvidenceOf> surfaces;
-        for (const StructureOutput& s : output->structures) surfaces.push_back({s.name.empty() ? s.grid : s.name, &*s.evidence});
+        for (const StructureOutput& s : output->structures)
+            surfaces.push_back({s.name.empty() ? s.grid : s.name, &*s.evidence});
         write_text(file, evidence_csv(surfaces));
     });
 }
 
 Json to_json(const StructuresOutput& output) {
-    if (output.structures.size() == 1 && output.structures.front().name.empty()) return report_of(output.structures.front());
+    if (output.structures.size() == 1 && output.structures.front().name.empty())
+        return report_of(output.structures.front());
     Json list = Json::array();
     for (const StructureOutput& s : output.structures) {
         const auto color = structure_color(list.size());
@@ -198,8 +208,8 @@ Json to_json(const StructuresOutput& output) {
 }
 
 std::vector<std::string> result_columns() {
-    return {"structure", "label", "volume", "area", "components", "genus", "closed", "fit_mean", "fit_p95", "fit_max",
-            "steps", "stop_reason", "seconds"};
+    return {"structure", "label",   "volume",  "area",  "components",  "genus",  "closed",
+            "fit_mean",  "fit_p95", "fit_max", "steps", "stop_reason", "seconds"};
 }
 
 void add_result(Table& table, const std::string& name, int label, const SegmentReport& r) {
@@ -208,7 +218,9 @@ void add_result(Table& table, const std::string& name, int label, const SegmentR
     if (r.point_count > 0)
         table << r.fit.mean << r.fit.p95 << r.fit.max;
     else
-        table << "" << "" << "";
+        table << ""
+              << ""
+              << "";
     table << r.solve.steps << to_string(r.solve.stop_reason) << r.seconds.total;
 }
 

@@ -42,7 +42,8 @@ using Sink = std::function<void(const std::string& path, std::function<void(cons
 void hand_over(const SegmentJob& job, const std::shared_ptr<const StructuresOutput>& output, const std::string& tag,
                Session& session, const Sink& sink);
 /// Checks those names. @throws Error as Outputs::check().
-void check_outputs(const SegmentJob& job, const std::vector<StructureInput>& inputs, const std::string& tag, Outputs& outputs);
+void check_outputs(const SegmentJob& job, const std::vector<StructureInput>& inputs, const std::string& tag,
+                   Outputs& outputs);
 
 /// {"structures": [...], "overlaps": [...]}, or the fields of the only one that has no name.
 [[nodiscard]] Json to_json(const StructuresOutput& output);

@@ -26,7 +26,8 @@ RunContext speaking_for(const std::string& name, const RunContext& run) {
 bool is_same_lattice(const ImageGeometry& a, const ImageGeometry& b) {
     if (a.size != b.size) return false;
     const double slack = 1e-3 * *std::min_element(b.spacing.begin(), b.spacing.end());
-    for (const Vec3& corner : {Vec3{0, 0, 0}, Vec3{double(a.size[0]), 0, 0}, Vec3{0, double(a.size[1]), 0}, Vec3{0, 0, double(a.size[2])}}) {
+    for (const Vec3& corner :
+         {Vec3{0, 0, 0}, Vec3{double(a.size[0]), 0, 0}, Vec3{0, double(a.size[1]), 0}, Vec3{0, 0, double(a.size[2])}}) {
         const Vec3 p = a.index_to_world(corner), q = b.index_to_world(corner);
         if (std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]) > slack) return false;
     }
@@ -38,7 +39,8 @@ void separate_all(StructuresOutput& output, const SegmentOptions& options, const
     if (output.structures.size() < 2) return;
     const SeparateResult separated = separate(solids(output), {}, run);
     for (const StructureOverlap& overlap : separated.report.overlaps) {
-        Json entry{{"structures", {output.structures[overlap.a].name, output.structures[overlap.b].name}}, {"volume", overlap.volume}};
+        Json entry{{"structures", {output.structures[overlap.a].name, output.structures[overlap.b].name}},
+                   {"volume", overlap.volume}};
         if (overlap.inner) entry["inner"] = output.structures[*overlap.inner].name;
         output.overlaps.push_back(entry);
     }
@@ -65,8 +67,9 @@ void summarise(const StructuresOutput& output, Session& session) {
 
 }  // namespace
 
-StructuresOutput segment_structures(const SegmentJob& job, const std::vector<StructureInput>& inputs, const Image& image,
-                                    const std::vector<StructureStart>& starts, Session& session, const RunContext& run) {
+StructuresOutput segment_structures(const SegmentJob& job, const std::vector<StructureInput>& inputs,
+                                    const Image& image, const std::vector<StructureStart>& starts, Session& session,
+                                    const RunContext& run) {
     StructuresOutput output;
     output.geometry = image.geometry();
     const double h = job.domain.resolve_voxel_size(&image, {}, session);
@@ -119,7 +122,8 @@ StructuresOutput segment_structures(const SegmentJob& job, const std::vector<Str
             if (!job.mask_path.empty() && is_same_lattice(guess->mask->geometry(), image.geometry()))
                 s.corrected = s.result.correction->apply(*guess->mask, guess->label, own);
             else if (!job.mask_path.empty())
-                own.warn("--guess: " + inputs[n].guess + " does not lie on the image's voxels; the mask is made from the corrected surface");
+                own.warn("--guess: " + inputs[n].guess +
+                         " does not lie on the image's voxels; the mask is made from the corrected surface");
         }
         add_seconds(session, s.result.report.seconds);
         output.structures.push_back(std::move(s));
@@ -130,12 +134,14 @@ StructuresOutput segment_structures(const SegmentJob& job, const std::vector<Str
     for (StructureOutput& s : output.structures) {
         s.result.surface->setName(s.grid);
         if (job.evidence.wanted()) s.evidence = job.evidence.judge(s.result, s.marks, image, run);
-        if (job.evolve.strict && s.result.report.solve.stop_reason != StopReason::Steady) session.set_exit_code(kNotSteady);
+        if (job.evolve.strict && s.result.report.solve.stop_reason != StopReason::Steady)
+            session.set_exit_code(kNotSteady);
     }
     session.add_seconds("total", separating.seconds());
     summarise(output, session);
     for (const StructureOutput& one : output.structures)
-        if (const std::string line = job.unused(one.result.report); !line.empty()) session.warn((one.name.empty() ? "" : one.name + ": ") + line);
+        if (const std::string line = job.unused(one.result.report); !line.empty())
+            session.warn((one.name.empty() ? "" : one.name + ": ") + line);
     return output;
 }
 
@@ -153,10 +159,12 @@ void run_structures(const SegmentJob& job, Session& session) {
     const auto output =
         std::make_shared<StructuresOutput>(segment_structures(job, inputs, image, starts, session, session.run()));
     session.report().update(to_json(*output), true);
-    hand_over(job, output, "", session, [&](const std::string& path, auto write) { outputs.add(path, std::move(write)); });
+    hand_over(job, output, "", session,
+              [&](const std::string& path, auto write) { outputs.add(path, std::move(write)); });
     outputs.add(job.table_path, [output](const std::string& file) {
         Table table(result_columns());
-        for (const StructureOutput& s : output->structures) add_result(table.row(), s.name.empty() ? s.grid : s.name, s.label, s.result.report);
+        for (const StructureOutput& s : output->structures)
+            add_result(table.row(), s.name.empty() ? s.grid : s.name, s.label, s.result.report);
         write_text(file, table.text());
     });
 }

@@ -9,8 +9,8 @@ namespace covol::tool {
 
 /// Segments each structure and separates them. The starts are in the structures' order.
 [[nodiscard]] StructuresOutput segment_structures(const SegmentJob& job, const std::vector<StructureInput>& inputs,
-                                                  const Image& image, const std::vector<StructureStart>& starts, Session& session,
-                                                  const RunContext& run);
+                                                  const Image& image, const std::vector<StructureStart>& starts,
+                                                  Session& session, const RunContext& run);
 
 /// The job: one image, several structures, from files to files.
 void run_structures(const SegmentJob& job, Session& session);

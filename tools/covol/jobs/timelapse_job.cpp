@@ -30,7 +30,8 @@ Placeholder find_placeholder(const std::string& path) {
     std::string width = path.substr(begin + 6, end - begin - 6);
     if (!width.empty()) {
         if (width.back() == 'd') width.pop_back();
-        if (width.size() < 2 || width[0] != ':' || !parse_int(std::string_view(width).substr(1), found.digits) || found.digits > 9)
+        if (width.size() < 2 || width[0] != ':' || !parse_int(std::string_view(width).substr(1), found.digits) ||
+            found.digits > 9)
             throw UsageError(path + ": expected {frame} or {frame:03d}, got " + path.substr(begin, end - begin + 1));
     }
     found.begin = begin;
@@ -64,8 +65,8 @@ std::vector<Frame> frames_of(const SegmentJob& job) {
     const int count = read_image_info(job.images.front(), job.image.options).frames;
     const int first = job.frames.all ? 0 : job.frames.first, last = job.frames.all ? count - 1 : job.frames.last;
     if (last >= count)
-        throw Error(Errc::InvalidOptions, "--frame: frame " + std::to_string(last) + " does not exist: " + job.images.front() +
-                                              " has " + std::to_string(count));
+        throw Error(Errc::InvalidOptions, "--frame: frame " + std::to_string(last) + " does not exist: " +
+                                              job.images.front() + " has " + std::to_string(count));
     for (int n = first; n <= last; ++n) {
         frames.push_back({job.images.front(), job.image.options, n});
         frames.back().options.frame = n;
@@ -90,7 +91,8 @@ public:
             go(frame);
         }
         session_.report()["frames"] = reports_;
-        session_.outputs().add(job_.table_path, [text = table_.text()](const std::string& path) { write_text(path, text); });
+        session_.outputs().add(job_.table_path,
+                               [text = table_.text()](const std::string& path) { write_text(path, text); });
         if (failed_ == int(frames_.size()))
             throw Error(first_error_, "no frame could be segmented; the first: " + first_message_);
         if (failed_ > 0) {
@@ -117,7 +119,8 @@ private:
         job_.check_options();
     }
 
-    /// The structures with this frame's marks: a file of its own where the name has {frame}, else the first frame's alone.
+    /// The structures with this frame's marks: a file of its own where the name has {frame}, else the first frame's
+    /// alone.
     [[nodiscard]] std::vector<StructureInput> inputs_at(const Frame& frame) const {
         std::vector<StructureInput> inputs = inputs_;
         for (StructureInput& input : inputs) {
@@ -127,7 +130,8 @@ private:
         return inputs;
     }
 
-    [[nodiscard]] std::vector<std::string> paths_at(const Frame& frame, const std::vector<std::string>& patterns) const {
+    [[nodiscard]] std::vector<std::string> paths_at(const Frame& frame,
+                                                    const std::vector<std::string>& patterns) const {
         std::vector<std::string> paths;
         for (const std::string& path : patterns) {
             if (!has_frame_pattern(path)) {
@@ -217,9 +221,7 @@ std::string with_frame(const std::string& pattern, int frame) {
     return path;
 }
 
-bool is_timelapse(const SegmentJob& job) {
-    return job.images.size() > 1 || (job.frames.given && !job.frames.is_one());
-}
+bool is_timelapse(const SegmentJob& job) { return job.images.size() > 1 || (job.frames.given && !job.frames.is_one()); }
 
 void run_timelapse(const SegmentJob& job, Session& session) { TimeLapse(job, session).run(); }
 

@@ -19,7 +19,8 @@ constexpr int kRadii = 14;
 constexpr double kGrowth = 1.4142135623730951;
 constexpr double kFirstSpacings = 3.0;  // the first radius, in median distances to the nearest point
 constexpr double kCellRadii = 2;        // edge of the cells that points are sorted into, in first radii
-constexpr double kSheet = 0.15;         // standard deviation from the quadric, of the radius; points that fill a ball have 0.45
+// standard deviation from the quadric, of the radius; points that fill a ball have 0.45
+constexpr double kSheet = 0.15;
 constexpr double kWorse = 1.05;
 
 /// Standard deviation of points from the quadric over the plane of the last two axes that fits them best.
@@ -62,7 +63,8 @@ Around look_around(const cloud::PointCells& cells, const Vec3& at, double radius
         }
     if (near.size() < kLeast) return {};
     const double count = double(near.size());
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares / count - sum * sum.transpose() / (count * count));
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares / count -
+                                                              sum * sum.transpose() / (count * count));
     return {count, radius * off_quadric(near, axes.eigenvectors())};
 }
 
@@ -86,7 +88,8 @@ CloudScale cloud_scale(const std::vector<Vec3>& points, const RunContext& run) {
     for (int n = 0; n < kRadii; ++n, radius *= kGrowth) {
         run.check();
         std::vector<Around> around((points.size() + step - 1) / step);
-        tbb::parallel_for(std::size_t(0), around.size(), [&](std::size_t m) { around[m] = look_around(cells, points[m * step], radius); });
+        tbb::parallel_for(std::size_t(0), around.size(),
+                          [&](std::size_t m) { around[m] = look_around(cells, points[m * step], radius); });
         std::erase_if(around, [](const Around& a) { return a.count == 0; });
         if (2 * around.size() * step < points.size()) continue;  // too few neighbours yet
         const double noise = median_of(around, [](const Around& a) { return a.noise; });

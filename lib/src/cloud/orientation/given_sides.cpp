@@ -22,21 +22,24 @@ namespace {
 constexpr double kLeastTold = 0.5;       // of the points
 constexpr double kLeastForeseen = 0.65;  // of normals without a meaning half
 constexpr double kLeastFreeViews = 0.7;  // a body hides at least half of itself from a wrong place
-constexpr double kVoteSpacings = 2;      // cells of the lattice on which points judge each other: about four points each
+constexpr double kVoteSpacings = 2;  // cells of the lattice on which points judge each other: about four points each
 constexpr int kTurns = 3;
-constexpr double kSpeaksAgainst = 0.1;   // of the indicator's step over a cell
-constexpr int kSmoothings = 2;           // of normals that noise has mixed
-constexpr std::size_t kBeside = 8;       // neighbours
+constexpr double kSpeaksAgainst = 0.1;           // of the indicator's step over a cell
+constexpr int kSmoothings = 2;                   // of normals that noise has mixed
+constexpr std::size_t kBeside = 8;               // neighbours
 constexpr double kFlat = 0.3, kOpposite = -0.5;  // sines and cosines of normals beside each other
-constexpr double kPlaneNoises = 4;       // radius of the neighbourhood that a plane is fitted to
+constexpr double kPlaneNoises = 4;               // radius of the neighbourhood that a plane is fitted to
 constexpr double kLeastNeighbours = 12, kMostNeighbours = 100;
 
 std::size_t count_told(const std::vector<Vec3>& directions) {
-    return std::size_t(std::count_if(directions.begin(), directions.end(), [](const Vec3& d) { return d != Vec3{0, 0, 0}; }));
+    return std::size_t(std::count_if(directions.begin(), directions.end(), [](const Vec3& d) {
+        return d != Vec3{0, 0, 0};
+    }));
 }
 
 /// Of local planes, on the side of `towards`.
-std::vector<Vec3> plane_normals(const std::vector<Vec3>& points, const std::vector<Vec3>& towards, const CloudScale& scale) {
+std::vector<Vec3> plane_normals(const std::vector<Vec3>& points, const std::vector<Vec3>& towards,
+                                const CloudScale& scale) {
     const double radius = kPlaneNoises * scale.noise / scale.spacing;  // spacings
     const auto count = std::size_t(std::clamp(M_PI * radius * radius, kLeastNeighbours, kMostNeighbours));
     const PointCells cells(points, kFirstRadius * scale.spacing);
@@ -56,7 +59,8 @@ std::vector<Vec3> plane_normals(const std::vector<Vec3>& points, const std::vect
 class Jury {
 public:
     Jury(const std::vector<Vec3>& points, std::vector<Vec3> normals, const CloudScale& scale)
-        : points_(points), field_(indicator_lattice(points, cells_along(points, kVoteSpacings * std::max(scale.spacing, scale.noise)))) {
+        : points_(points),
+          field_(indicator_lattice(points, cells_along(points, kVoteSpacings * std::max(scale.spacing, scale.noise)))) {
         voice_.normals = std::move(normals);
         voice_.areas = areas_of(points, scale.spacing);
     }
@@ -78,7 +82,8 @@ public:
         return double(agree) / double(std::max<std::size_t>(count_told(voice_.normals), 1));
     }
 
-    /// Turns single normals that all around speak against; those without one take the direction in which the indicator falls.
+    /// Turns single normals that all around speak against; those without one take the direction in which the indicator
+    /// falls.
     void settle() {
         for (int n = 0; n < kTurns; ++n) {
             listen(std::vector<char>(points_.size(), 1));
@@ -91,7 +96,8 @@ public:
             if (turned == 0) break;
         }
         for (std::size_t p = 0; p < points_.size(); ++p)
-            if (voice_.normals[p] == Vec3{0, 0, 0}) voice_.normals[p] = unit(times(-1, field_.indicator().at(points_[p]).gradient));
+            if (voice_.normals[p] == Vec3{0, 0, 0})
+                voice_.normals[p] = unit(times(-1, field_.indicator().at(points_[p]).gradient));
     }
 
     [[nodiscard]] Orientation& voice() { return voice_; }
@@ -118,15 +124,17 @@ private:
     Orientation voice_;
 };
 
-/// Share of the points that have a neighbour beside, not above them, whose normal points to the other side: where a part is
-/// turned as a whole its rim has.
+/// Share of the points that have a neighbour beside, not above them, whose normal points to the other side: where a
+/// part is turned as a whole its rim has.
 double torn(const std::vector<Vec3>& points, const std::vector<Vec3>& normals, double spacing) {
     const PointCells cells(points, kFirstRadius * spacing);
     std::vector<char> is_torn(points.size(), 0);
     for_nearest(cells, spacing, kBeside, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
         for (const Neighbour& other : near) {
             const double up = dot(minus(cells.sorted()[other.at], points[point]), normals[point]);
-            if (up * up < kFlat * kFlat * other.squared && dot(normals[point], normals[cells.order()[other.at]]) < kOpposite) is_torn[point] = 1;
+            if (up * up < kFlat * kFlat * other.squared &&
+                dot(normals[point], normals[cells.order()[other.at]]) < kOpposite)
+                is_torn[point] = 1;
         }
     });
     return double(std::count(is_torn.begin(), is_torn.end(), 1)) / double(points.size());
@@ -142,7 +150,8 @@ void find_indicator(WindingField& field, const std::vector<Vec3>& points, Orient
 }
 
 /// @param given  normals; @return whether they are used
-bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, const CloudScale& scale, double cell, GivenSides& result) {
+bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, const CloudScale& scale, double cell,
+         GivenSides& result) {
     result.given = given;
     Jury jury(points, given, scale);
     result.report.foreseen = jury.foreseen(result.report);
@@ -159,7 +168,8 @@ bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, const 
     own.turned = 1 - agreeing(points, own.normals, own, false);
     // Noise that carries points across a thin part leaves them with the other side's normals.
     for (int n = 0; own.turned > kFewTurned && n < kSmoothings; ++n) {
-        for (std::size_t p = 0; p < points.size(); ++p) own.normals[p] = unit(times(-1, own.indicator->at(points[p]).gradient));
+        for (std::size_t p = 0; p < points.size(); ++p)
+            own.normals[p] = unit(times(-1, own.indicator->at(points[p]).gradient));
         if (n + 1 < kSmoothings) find_indicator(field, points, own);
     }
     result.report.used = true;
@@ -168,22 +178,27 @@ bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, const 
 
 }  // namespace
 
-double agreeing(const std::vector<Vec3>& points, const std::vector<Vec3>& given, const Orientation& orientation, bool turned_over) {
+double agreeing(const std::vector<Vec3>& points, const std::vector<Vec3>& given, const Orientation& orientation,
+                bool turned_over) {
     if (given.empty()) return 0;
     std::vector<char> agrees(points.size());
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
-        agrees[n] = (dot(given[n], orientation.indicator->at(points[n]).gradient) < 0) != turned_over && given[n] != Vec3{0, 0, 0};
+        agrees[n] = (dot(given[n], orientation.indicator->at(points[n]).gradient) < 0) != turned_over &&
+                    given[n] != Vec3{0, 0, 0};
     });
     return double(std::count(agrees.begin(), agrees.end(), 1)) / double(std::max<std::size_t>(count_told(given), 1));
 }
 
-GivenSides given_sides(const std::vector<Vec3>& points, const PointHints& hints, const CloudScale& scale, double cell, const RunContext& run) {
+GivenSides given_sides(const std::vector<Vec3>& points, const PointHints& hints, const CloudScale& scale, double cell,
+                       const RunContext& run) {
     GivenSides result;
     if (points.size() < 4 || !(scale.spacing > 0)) return result;
     result.report.normals = count_told(hints.normals);
     result.report.sensors = count_told(hints.to_sensor);
     const auto least = kLeastTold * double(points.size());
-    if (double(result.report.normals) >= least && result.report.normals > 0 && use(points, hints.normals, scale, cell, result)) return result;
+    if (double(result.report.normals) >= least && result.report.normals > 0 &&
+        use(points, hints.normals, scale, cell, result))
+        return result;
     run.check();
     if (double(result.report.sensors) < least || result.report.sensors == 0) return result;
     if (share_free(points, hints.to_sensor, scale) < kLeastFreeViews) {
@@ -199,8 +214,8 @@ GivenSides given_sides(const std::vector<Vec3>& points, const PointHints& hints,
 PointHints carried(const PointHints& hints, const std::vector<Vec3>& from, const std::vector<Vec3>& to) {
     for (const auto* list : {&hints.normals, &hints.to_sensor})
         if (!list->empty() && list->size() != from.size())
-            throw Error(Errc::InvalidInput, "carried: expected a hint for each of " + std::to_string(from.size()) + " points, got " +
-                                                std::to_string(list->size()));
+            throw Error(Errc::InvalidInput, "carried: expected a hint for each of " + std::to_string(from.size()) +
+                                                " points, got " + std::to_string(list->size()));
     if (hints.normals.empty() && hints.to_sensor.empty()) return {};
     std::vector<std::pair<Vec3, std::size_t>> places;
     places.reserve(from.size());
@@ -210,7 +225,8 @@ PointHints carried(const PointHints& hints, const std::vector<Vec3>& from, const
     PointHints result;
     for (const Vec3& p : to) {
         const Vec3 nearest = tree.nearest_point(p);
-        const std::size_t n = std::lower_bound(places.begin(), places.end(), std::pair{nearest, std::size_t(0)})->second;
+        const std::size_t n =
+            std::lower_bound(places.begin(), places.end(), std::pair{nearest, std::size_t(0)})->second;
         if (!hints.normals.empty()) result.normals.push_back(hints.normals[n]);
         if (!hints.to_sensor.empty()) result.to_sensor.push_back(hints.to_sensor[n]);
     }

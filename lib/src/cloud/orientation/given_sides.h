@@ -13,16 +13,17 @@ struct GivenSides {
     double torn = 0;          ///< share of the points with an opposite normal beside them on their own sheet
 };
 
-/// Normals as they are given, or those of local planes on the side from which the sensor saw them. Whether they are to be
-/// believed the two halves of the points tell each other: each half's indicator function has to fall in the direction of
-/// the other half's normals. Where nearly all are right they stay as they are; single ones are turned where all around them
-/// speak against them.
+/// Normals as they are given, or those of local planes on the side from which the sensor saw them. Whether they are to
+/// be believed the two halves of the points tell each other: each half's indicator function has to fall in the
+/// direction of the other half's normals. Where nearly all are right they stay as they are; single ones are turned
+/// where all around them speak against them.
 /// @param hints  of the points
 /// @param cell   of the indicator's lattice, world units
-[[nodiscard]] GivenSides given_sides(const std::vector<Vec3>& points, const PointHints& hints, const CloudScale& scale, double cell,
-                                     const RunContext& run);
+[[nodiscard]] GivenSides given_sides(const std::vector<Vec3>& points, const PointHints& hints, const CloudScale& scale,
+                                     double cell, const RunContext& run);
 
 /// Share of the given ones, turned over where all are, that fall in with the orientation's indicator; 0 of none.
-[[nodiscard]] double agreeing(const std::vector<Vec3>& points, const std::vector<Vec3>& given, const Orientation& orientation, bool turned_over);
+[[nodiscard]] double agreeing(const std::vector<Vec3>& points, const std::vector<Vec3>& given,
+                              const Orientation& orientation, bool turned_over);
 
 }  // namespace covol::cloud

@@ -37,7 +37,8 @@ void Indicator::crossed(const std::function<void(const WorldBox&)>& visit) const
                 const std::size_t at = std::size_t(i) * up_i + std::size_t(j) * up_j + std::size_t(k);
                 int inside = 0;
                 for (int corner = 0; corner < 8; ++corner)
-                    inside += values[at + (corner & 4 ? up_i : 0) + (corner & 2 ? up_j : 0) + (corner & 1 ? 1 : 0)] > 0.5F;
+                    inside +=
+                        values[at + (corner & 4 ? up_i : 0) + (corner & 2 ? up_j : 0) + (corner & 1 ? 1 : 0)] > 0.5F;
                 if (inside == 0 || inside == 8) continue;
                 const Vec3 low{l.origin[0] + i * l.cell, l.origin[1] + j * l.cell, l.origin[2] + k * l.cell};
                 visit({low, {low[0] + l.cell, low[1] + l.cell, low[2] + l.cell}});
@@ -56,11 +57,14 @@ int cells_along(const std::vector<Vec3>& points, double cell) {
     return std::clamp(int(longest_side(bounding_box(points)) * (1 + 2 * kBeyond) / cell), kLeastCells, kMostCells);
 }
 
-Lattice indicator_lattice(const std::vector<Vec3>& points, int cells) { return lattice_around(bounding_box(points), kBeyond, cells); }
+Lattice indicator_lattice(const std::vector<Vec3>& points, int cells) {
+    return lattice_around(bounding_box(points), kBeyond, cells);
+}
 
 double scale_to_half(WindingField& field, const std::vector<Vec3>& points) {
     std::vector<double> values(points.size());
-    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) { values[n] = std::abs(field.indicator().value_at(points[n])); });
+    tbb::parallel_for(std::size_t(0), points.size(),
+                      [&](std::size_t n) { values[n] = std::abs(field.indicator().value_at(points[n])); });
     const double half = median(std::move(values));
     if (!(half > 0)) return 1;
     field.multiply(0.5 / half);
@@ -69,7 +73,8 @@ double scale_to_half(WindingField& field, const std::vector<Vec3>& points) {
 
 double mean_at(const WindingField& field, const std::vector<Vec3>& points) {
     std::vector<double> values(points.size());
-    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) { values[n] = field.indicator().value_at(points[n]); });
+    tbb::parallel_for(std::size_t(0), points.size(),
+                      [&](std::size_t n) { values[n] = field.indicator().value_at(points[n]); });
     return std::accumulate(values.begin(), values.end(), 0.0) / double(points.size());
 }
 
@@ -84,16 +89,19 @@ double share_bare(const Indicator& indicator, const std::vector<Vec3>& points, d
 }
 
 std::shared_ptr<const Indicator> make_indicator(const WindingField& field) {
-    return std::make_shared<const Indicator>(std::make_unique<const Indicator::Values>(Indicator::Values{field.indicator()}));
+    return std::make_shared<const Indicator>(
+        std::make_unique<const Indicator::Values>(Indicator::Values{field.indicator()}));
 }
 
 void solve(WindingField& field, const std::vector<Vec3>& points, const Orientation& orientation, int cycles) {
     std::vector<Vec3> vectors(points.size());
-    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) { vectors[n] = times(orientation.areas[n], orientation.normals[n]); });
+    tbb::parallel_for(std::size_t(0), points.size(),
+                      [&](std::size_t n) { vectors[n] = times(orientation.areas[n], orientation.normals[n]); });
     field.solve(points, vectors, cycles);
 }
 
-std::shared_ptr<const Indicator> indicator_of(const std::vector<Vec3>& points, const Orientation& orientation, double cell) {
+std::shared_ptr<const Indicator> indicator_of(const std::vector<Vec3>& points, const Orientation& orientation,
+                                              double cell) {
     WindingField field(indicator_lattice(points, cells_along(points, cell)));
     solve(field, points, orientation, kCyclesFromNothing);
     scale_to_half(field, points);

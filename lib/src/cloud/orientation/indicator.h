@@ -27,6 +27,7 @@ double scale_to_half(WindingField& field, const std::vector<Vec3>& points);
 [[nodiscard]] std::shared_ptr<const Indicator> make_indicator(const WindingField& field);
 
 /// The indicator of normals as they are, on cells of another size.
-[[nodiscard]] std::shared_ptr<const Indicator> indicator_of(const std::vector<Vec3>& points, const Orientation& orientation, double cell);
+[[nodiscard]] std::shared_ptr<const Indicator> indicator_of(const std::vector<Vec3>& points,
+                                                            const Orientation& orientation, double cell);
 
 }  // namespace covol::cloud

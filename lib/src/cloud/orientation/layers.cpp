@@ -17,8 +17,9 @@ constexpr double kCell = 2;           // of the points that turn together
 constexpr double kFarthestLayer = 6;  // below the one that hides it
 constexpr double kMostAway = 0.2;     // of a patch's points, that are farther from the surface once they are turned
 constexpr double kBareCells = 2;      // of the indicator: surface without points as near is bare
-constexpr double kMostGain = 1.5;     // bare surface, of the patch's area: a cavity's far side is not much larger than its near one, a ring's hole is
-constexpr int kMostPatches = 12;      // each costs a solution
+constexpr double kMostGain = 1.5;  // bare surface, of the patch's area: a cavity's far side is not much larger than its
+                                   // near one, a ring's hole is
+constexpr int kMostPatches = 12;   // each costs a solution
 constexpr std::size_t kLeastPoints = 12;
 
 using Patch = std::vector<std::uint32_t>;  // points
@@ -26,7 +27,8 @@ using Patch = std::vector<std::uint32_t>;  // points
 /// Cells of points, and those of them that are opposed by what lies around them.
 class Opposed {
 public:
-    Opposed(const PointCells& cells, const std::vector<Vec3>& free, double between) : cells_(cells), opposed_(cells.cell_count()), beside_(cells.cell_count()) {
+    Opposed(const PointCells& cells, const std::vector<Vec3>& free, double between)
+        : cells_(cells), opposed_(cells.cell_count()), beside_(cells.cell_count()) {
         std::vector<Vec3> places, frees;
         for (std::size_t c = 0; c < cells.cell_count(); ++c) {
             places.push_back(cells.sorted()[cells.cell(c).begin]);
@@ -66,7 +68,8 @@ public:
                     }
             Patch& patch = all.emplace_back();
             for (const std::uint32_t c : connected)
-                for (std::uint32_t at = cells_.cell(c).begin; at < cells_.cell(c).end; ++at) patch.push_back(cells_.order()[at]);
+                for (std::uint32_t at = cells_.cell(c).begin; at < cells_.cell(c).end; ++at)
+                    patch.push_back(cells_.order()[at]);
         }
         std::stable_sort(all.begin(), all.end(), [](const Patch& a, const Patch& b) { return a.size() > b.size(); });
         return all;
@@ -97,8 +100,8 @@ void turn(const Patch& patch, Orientation& orientation) {
 
 }  // namespace
 
-std::vector<char> turn_layers(WindingField& field, const std::vector<Vec3>& points, const std::vector<Vec3>& free, double between,
-                              Orientation& orientation, const RunContext& run) {
+std::vector<char> turn_layers(WindingField& field, const std::vector<Vec3>& points, const std::vector<Vec3>& free,
+                              double between, Orientation& orientation, const RunContext& run) {
     std::vector<char> turned(points.size(), 0);
     const PointCells cells(points, kCell * between);
     std::vector<Patch> patches = Opposed(cells, free, between).patches();
@@ -114,7 +117,9 @@ std::vector<char> turn_layers(WindingField& field, const std::vector<Vec3>& poin
         scale_to_half(now, points);
         const Level level(now, cells);
         const PointCells surface(level.middles, kFarthestLayer * between);
-        const auto away = std::count_if(patch.begin(), patch.end(), [&](std::uint32_t n) { return !surface.any_within(points[n], kFarthestLayer * between); });
+        const auto away = std::count_if(patch.begin(), patch.end(), [&](std::uint32_t n) {
+            return !surface.any_within(points[n], kFarthestLayer * between);
+        });
         double area = 0;
         for (const std::uint32_t n : patch) area += orientation.areas[n];
         const double gain = double(bare - level.bare) * cell * cell;

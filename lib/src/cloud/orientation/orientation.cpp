@@ -21,19 +21,19 @@
 namespace covol {
 namespace {
 
+using cloud::dot;
 using cloud::Lattice;
 using cloud::LatticeField;
 using cloud::PointCells;
-using cloud::WindingField;
-using cloud::dot;
 using cloud::unit;
+using cloud::WindingField;
 
-constexpr double kPatchCells = 2;        // edge of the cells over which the indicator is averaged
-constexpr double kPatchOff = 0.12;       // from 1/2, of a patch that may be turned
+constexpr double kPatchCells = 2;   // edge of the cells over which the indicator is averaged
+constexpr double kPatchOff = 0.12;  // from 1/2, of a patch that may be turned
 constexpr int kPatchRounds = 4, kPatchCycles = 2, kAfterTurning = 3;
-constexpr double kFewStayed = 0.002;     // of the points, in patches that stay turned: those left may turn to and fro
-constexpr int kFirstPasses = 12;         // of smoothing, for the first guess
-constexpr double kSteady = 1e-4;         // the normals' mean change, 1 - cosine
+constexpr double kFewStayed = 0.002;  // of the points, in patches that stay turned: those left may turn to and fro
+constexpr int kFirstPasses = 12;      // of smoothing, for the first guess
+constexpr double kSteady = 1e-4;      // the normals' mean change, 1 - cosine
 // chi at a point beyond which another part encloses it already. Noise brings points there that are none of these.
 constexpr double kEnclosed = 0.9, kSurelyEnclosed = 1.2;
 constexpr int kCycles = 1, kLastCycles = 4;  // of multigrid
@@ -44,21 +44,23 @@ struct Try {
     double cell;      // of those
     double enclosed;  // on the first lattice
 };
-constexpr Try kTries[] = {{1, kEnclosed}, {1, kSurelyEnclosed}, {0.67, kSurelyEnclosed}, {1.5, kSurelyEnclosed}, {0.44, kEnclosed}, {2.25, kSurelyEnclosed}};
+constexpr Try kTries[] = {{1, kEnclosed},         {1, kSurelyEnclosed}, {0.67, kSurelyEnclosed},
+                          {1.5, kSurelyEnclosed}, {0.44, kEnclosed},    {2.25, kSurelyEnclosed}};
 constexpr double kLeastSpacings = 0.5;
-constexpr double kOffHalf = 0.02;   // that the indicator's mean over the points may differ from 1/2
-constexpr double kOffWeight = 2;    // of more than that, among tries: walls that run into each other turn less than those that waver
+constexpr double kOffHalf = 0.02;  // that the indicator's mean over the points may differ from 1/2
+// of more than that, among tries: walls that run into each other turn less than those that waver
+constexpr double kOffWeight = 2;
 constexpr double kSampledPerCell = 4;  // points that iterate, on the surface in a lattice cell's square
 constexpr double kSampleSpacings = 4;  // edge of the cells that they are taken from
 constexpr double kSharp = 0.2;  // noise, of the spacing: below it the nearest points tell the sheet that they are on
 constexpr int kStrayRounds = 3;
 constexpr double kManyStray = 0.005;  // of the points
-// Of given normals: with opposite ones beside them, and against an orientation that settled. Good ones have less than 0.001
-// without noise and 0.005 at any, those of which a part is turned as a whole more than 0.01 and 0.1.
+// Of given normals: with opposite ones beside them, and against an orientation that settled. Good ones have less than
+// 0.001 without noise and 0.005 at any, those of which a part is turned as a whole more than 0.01 and 0.1.
 constexpr double kFewTorn = 0.002, kContradicted = 0.03;
-// Whether points enclose a solid. Where they lie all around it its surface rests on them: of closed shapes less than 0.01 of
-// it is bare, however noisy they are, of scans of one side 0.14 to 0.4. Of a shape of which a part is missing, up to 0.2, the
-// normals settle all the same: doubts up to 0.013, of the scans from 0.026 to 0.19.
+// Whether points enclose a solid. Where they lie all around it its surface rests on them: of closed shapes less than
+// 0.01 of it is bare, however noisy they are, of scans of one side 0.14 to 0.4. Of a shape of which a part is missing,
+// up to 0.2, the normals settle all the same: doubts up to 0.013, of the scans from 0.026 to 0.19.
 constexpr double kSettled = 0.014, kBare = 0.05, kBareReach = 2;
 
 /// A lattice and what is done on it.
@@ -127,12 +129,14 @@ private:
             cosine[n] = dot(normal, result.normals[n]);
             if (dot(normal, normal) > 0) result.normals[n] = normal;
         });
-        result.turned = double(std::count_if(cosine.begin(), cosine.end(), [](double c) { return c < 0; })) / double(count);
+        result.turned =
+            double(std::count_if(cosine.begin(), cosine.end(), [](double c) { return c < 0; })) / double(count);
         return 1 - std::accumulate(cosine.begin(), cosine.end(), 0.0) / double(count);
     }
 
-    /// Where the indicator is not 1/2 on the mean over a patch, the patch may be turned as a whole, and stay so: it makes its
-    /// own normals. Each such patch is turned to try, all at once, and stays turned where that brings it closer to 1/2.
+    /// Where the indicator is not 1/2 on the mean over a patch, the patch may be turned as a whole, and stay so: it
+    /// makes its own normals. Each such patch is turned to try, all at once, and stays turned where that brings it
+    /// closer to 1/2.
     void turn_patches(WindingField& field, Orientation& result, const RunContext& run) {
         const PointCells cells(points_, kPatchCells * field.indicator().lattice.cell);
         const std::vector<std::vector<std::uint32_t>> beside = neighbours_of(cells);
@@ -154,13 +158,16 @@ private:
             for (std::size_t cell = 0; cell < patch.size(); ++cell) {
                 if (patch[cell] < 0) continue;
                 const auto [begin, end] = cells.cell(cell);
-                gain[std::size_t(patch[cell])] += double(end - begin) * (off[cell] * off[cell] - turned[cell] * turned[cell]);
+                gain[std::size_t(patch[cell])] +=
+                    double(end - begin) * (off[cell] * off[cell] - turned[cell] * turned[cell]);
             }
             double stayed = 0;
             for_points_of(cells, [&](std::size_t cell, std::uint32_t point) {
                 if (patch[cell] < 0) return;
-                if (gain[std::size_t(patch[cell])] > 0) ++stayed;
-                else result.normals[point] = before[point];
+                if (gain[std::size_t(patch[cell])] > 0)
+                    ++stayed;
+                else
+                    result.normals[point] = before[point];
             });
             for (int n = 0; n < kAfterTurning; ++n) turn(field, result, kPatchCycles);
             if (stayed < kFewStayed * double(points_.size())) return;
@@ -170,7 +177,8 @@ private:
     template <typename Visit>
     static void for_points_of(const PointCells& cells, Visit visit) {
         for (std::size_t cell = 0; cell < cells.cell_count(); ++cell)
-            for (std::uint32_t at = cells.cell(cell).begin; at < cells.cell(cell).end; ++at) visit(cell, cells.order()[at]);
+            for (std::uint32_t at = cells.cell(cell).begin; at < cells.cell(cell).end; ++at)
+                visit(cell, cells.order()[at]);
     }
 
     static std::vector<std::vector<std::uint32_t>> neighbours_of(const PointCells& cells) {
@@ -201,9 +209,12 @@ private:
     }
 
     /// Connected cells that are off to the same side; -1: not off.
-    static std::vector<int> patches_of(const PointCells& cells, const std::vector<std::vector<std::uint32_t>>& beside, const std::vector<double>& off) {
+    static std::vector<int> patches_of(const PointCells& cells, const std::vector<std::vector<std::uint32_t>>& beside,
+                                       const std::vector<double>& off) {
         std::vector<int> patch(cells.cell_count(), -1);
-        const auto side = [&](std::size_t cell) { return std::abs(off[cell]) < kPatchOff ? 0 : off[cell] < 0 ? -1 : 1; };
+        const auto side = [&](std::size_t cell) {
+            return std::abs(off[cell]) < kPatchOff ? 0 : off[cell] < 0 ? -1 : 1;
+        };
         int count = 0;
         std::vector<std::uint32_t> front;
         for (std::uint32_t first = 0; first < patch.size(); ++first) {
@@ -229,7 +240,8 @@ private:
     std::optional<WindingField> last_;
 };
 
-/// Outward, by the indicator: down its slope where it is between outside and inside, up where another part encloses the point.
+/// Outward, by the indicator: down its slope where it is between outside and inside, up where another part encloses the
+/// point.
 std::vector<Vec3> normals_of(const Indicator& indicator, const std::vector<Vec3>& points, double enclosed) {
     std::vector<Vec3> normals(points.size());
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
@@ -240,27 +252,34 @@ std::vector<Vec3> normals_of(const Indicator& indicator, const std::vector<Vec3>
     return normals;
 }
 
-double first_cell(const CloudScale& scale) { return std::max(kCellSpacings * scale.spacing, kCellNoises * scale.noise); }
+double first_cell(const CloudScale& scale) {
+    return std::max(kCellSpacings * scale.spacing, kCellNoises * scale.noise);
+}
 
 /// Parts that are turned as a whole go on turning, or lie where the indicator is not 1/2.
-double doubt(const Orientation& o, double weight = kOffWeight) { return o.turned + weight * std::max(0.0, o.off_half - kOffHalf); }
+double doubt(const Orientation& o, double weight = kOffWeight) {
+    return o.turned + weight * std::max(0.0, o.off_half - kOffHalf);
+}
 bool is_settled(const Orientation& o) { return doubt(o, 1) < cloud::kFewTurned; }
 
 bool does_enclose(const CloudOrientation& cloud) {
     const double reach = kBareReach * std::max(cloud.scale.spacing, cloud.scale.noise);
-    return doubt(cloud.orientation) < kSettled || cloud::share_bare(*cloud.orientation.indicator, cloud.points, reach) < kBare;
+    return doubt(cloud.orientation) < kSettled ||
+           cloud::share_bare(*cloud.orientation.indicator, cloud.points, reach) < kBare;
 }
 
 /// Every few points of those that lie together, and what each stands for.
 struct Sample {
-    Sample(const std::vector<Vec3>& all, double spacing, std::size_t every) : step(every), order(cloud::PointCells(all, kSampleSpacings * spacing).order()) {
+    Sample(const std::vector<Vec3>& all, double spacing, std::size_t every)
+        : step(every), order(cloud::PointCells(all, kSampleSpacings * spacing).order()) {
         for (std::size_t n = step / 2; n < order.size(); n += step) points.push_back(all[order[n]]);
         areas = cloud::areas_of(points, spacing * std::sqrt(double(step)));
     }
     /// Of all points.
     [[nodiscard]] std::vector<double> all_areas() const {
         std::vector<double> all(order.size());
-        for (std::size_t n = 0; n < order.size(); ++n) all[order[n]] = areas[std::min(n / step, areas.size() - 1)] / double(step);
+        for (std::size_t n = 0; n < order.size(); ++n)
+            all[order[n]] = areas[std::min(n / step, areas.size() - 1)] / double(step);
         return all;
     }
     std::size_t step;
@@ -294,8 +313,10 @@ void choose_orientation(CloudOrientation& cloud, const PointHints& hints, const 
 }  // namespace
 
 Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run) {
-    if (points.size() < 4) throw Error(Errc::InvalidInput, "orient: expected at least 4 points, got " + std::to_string(points.size()));
-    if (!(longest_side(bounding_box(points)) > 0) || !(scale.spacing > 0)) throw Error(Errc::InvalidInput, "orient: all points lie at one place");
+    if (points.size() < 4)
+        throw Error(Errc::InvalidInput, "orient: expected at least 4 points, got " + std::to_string(points.size()));
+    if (!(longest_side(bounding_box(points)) > 0) || !(scale.spacing > 0))
+        throw Error(Errc::InvalidInput, "orient: all points lie at one place");
     Orientation best;
     with_threads(run, [&] {
         // Noise is hard to tell from thin parts: where normals go on turning a finer lattice may hold them.
@@ -306,20 +327,24 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
         const Sample sample(points, scale.spacing, std::size_t(std::max(1.0, 1 / share)));
         std::vector<std::pair<int, double>> tried;
         for (const Try& attempt : kTries) {
-            const int cells = cloud::cells_along(points, std::max(first * attempt.cell, kLeastSpacings * scale.spacing));
+            const int cells =
+                cloud::cells_along(points, std::max(first * attempt.cell, kLeastSpacings * scale.spacing));
             if (std::count(tried.begin(), tried.end(), std::pair{cells, attempt.enclosed}) > 0) continue;
             tried.emplace_back(cells, attempt.enclosed);
             Orientation now;
             now.areas = sample.areas;
             Iteration iteration(sample.points);
-            for (const Stage& stage : {Stage{cells * 2 / 3, 12, false, attempt.enclosed}, Stage{cells, 8, true, kSurelyEnclosed}}) iteration.run(stage, now, run);
+            for (const Stage& stage :
+                 {Stage{cells * 2 / 3, 12, false, attempt.enclosed}, Stage{cells, 8, true, kSurelyEnclosed}})
+                iteration.run(stage, now, run);
             if (is_sharp) iteration.mend(scale.spacing * std::sqrt(double(sample.step)), now);
             now.indicator = cloud::make_indicator(iteration.last());
             now.off_half = std::abs(cloud::mean_at(iteration.last(), sample.points) - 0.5);
             if (tried.size() == 1 || doubt(now) < doubt(best)) best = std::move(now);
             if (is_settled(best)) break;
         }
-        const double half = std::accumulate(best.areas.begin(), best.areas.end(), 0.0) / std::accumulate(sample.areas.begin(), sample.areas.end(), 0.0);
+        const double half = std::accumulate(best.areas.begin(), best.areas.end(), 0.0) /
+                            std::accumulate(sample.areas.begin(), sample.areas.end(), 0.0);
         best.areas = sample.all_areas();
         for (double& area : best.areas) area *= half;
         best.normals = normals_of(*best.indicator, points, kSurelyEnclosed);
@@ -328,7 +353,9 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
     return best;
 }
 
-CloudOrientation orient_cloud(const std::vector<Vec3>& points, const RunContext& run) { return orient_cloud(points, {}, run); }
+CloudOrientation orient_cloud(const std::vector<Vec3>& points, const RunContext& run) {
+    return orient_cloud(points, {}, run);
+}
 
 CloudOrientation orient_cloud(const std::vector<Vec3>& points, const PointHints& hints, const RunContext& run) {
     CloudOrientation cloud;

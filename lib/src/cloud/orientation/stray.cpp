@@ -13,16 +13,20 @@ namespace {
 
 constexpr std::size_t kNeighbours = 8, kSamples = 20000, kBeside = 16;
 constexpr double kCellNoises = 0.5;  // a layer as thick as several of the points' spacings has few in a cell of theirs
-constexpr double kFar = 2.5;        // times the median distance to the eighth neighbour
-constexpr double kOffPlane = 0.25;  // standard deviation of the neighbours, or the point's own distance, of that to the eighth
+constexpr double kFar = 2.5;         // times the median distance to the eighth neighbour
+// standard deviation of the neighbours, or the point's own distance, of that to the eighth
+constexpr double kOffPlane = 0.25;
 
 /// Of a sample of the points.
 double usual_reach(const PointCells& cells, double spacing) {
     const std::size_t count = cells.sorted().size(), step = std::max<std::size_t>(1, count / kSamples);
     std::vector<double> reach(count, -1);
-    for_nearest(cells, spacing, kNeighbours,
-                [&](std::uint32_t point, const std::vector<Neighbour>& near) { reach[point] = near.size() < kNeighbours ? 1e300 : std::sqrt(near.back().squared); },
-                [&](std::size_t n) { return n % step == 0; });
+    for_nearest(
+        cells, spacing, kNeighbours,
+        [&](std::uint32_t point, const std::vector<Neighbour>& near) {
+            reach[point] = near.size() < kNeighbours ? 1e300 : std::sqrt(near.back().squared);
+        },
+        [&](std::size_t n) { return n % step == 0; });
     std::erase(reach, -1);
     return median(std::move(reach));
 }
@@ -42,7 +46,8 @@ bool is_lonely(const PointCells& cells, std::size_t n, double distance, std::vec
     if (has_company(n - std::min(n, kBeside), std::min(n + kBeside, cells.sorted().size()))) return false;
     found = 0;
     cells.find(p, distance, ranges);
-    return std::none_of(ranges.begin(), ranges.end(), [&](const PointCells::Range& range) { return has_company(range.begin, range.end); });
+    return std::none_of(ranges.begin(), ranges.end(),
+                        [&](const PointCells::Range& range) { return has_company(range.begin, range.end); });
 }
 
 }  // namespace
@@ -59,18 +64,22 @@ std::vector<char> find_stray(const std::vector<Vec3>& points, const CloudScale& 
         for (std::size_t n = some.begin(); n < some.end(); ++n) lonely[n] = is_lonely(cells, n, far_reach, ranges);
     });
     run.check();
-    for_nearest(cells, scale.spacing, kNeighbours, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
-        stray[point] = 1;
-        if (near.size() < kNeighbours) return;
-        const auto [whole, squares] = moments_of(cells, points[point], near);
-        const double count = double(near.size());
-        const Eigen::Vector3d mean = whole / count;
-        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares / count - mean * mean.transpose());
-        const double deviation = std::sqrt(std::max(0.0, axes.eigenvalues()[0])), reach = std::sqrt(near.back().squared);
-        // The farther the neighbours, the flatter they have to lie.
-        const double off = std::max(deviation, std::abs(axes.eigenvectors().col(0).dot(mean))) / reach;
-        stray[point] = off * reach / far_reach > kOffPlane;
-    }, [&](std::size_t n) { return lonely[n] != 0; });
+    for_nearest(
+        cells, scale.spacing, kNeighbours,
+        [&](std::uint32_t point, const std::vector<Neighbour>& near) {
+            stray[point] = 1;
+            if (near.size() < kNeighbours) return;
+            const auto [whole, squares] = moments_of(cells, points[point], near);
+            const double count = double(near.size());
+            const Eigen::Vector3d mean = whole / count;
+            const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares / count - mean * mean.transpose());
+            const double deviation = std::sqrt(std::max(0.0, axes.eigenvalues()[0])),
+                         reach = std::sqrt(near.back().squared);
+            // The farther the neighbours, the flatter they have to lie.
+            const double off = std::max(deviation, std::abs(axes.eigenvectors().col(0).dot(mean))) / reach;
+            stray[point] = off * reach / far_reach > kOffPlane;
+        },
+        [&](std::size_t n) { return lonely[n] != 0; });
     return stray;
 }
 

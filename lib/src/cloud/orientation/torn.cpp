@@ -25,11 +25,13 @@ public:
     Sheets(const std::vector<Vec3>& points, double spacing) : axes_(points.size()), beside_(points.size()) {
         const PointCells cells(points, kFirstRadius * spacing);
         for_nearest(cells, spacing, kNeighbours, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
-            for (std::size_t n = 0; n < kNeighbours; ++n) beside_[point][n] = n < near.size() ? cells.order()[near[n].at] : point;
+            for (std::size_t n = 0; n < kNeighbours; ++n)
+                beside_[point][n] = n < near.size() ? cells.order()[near[n].at] : point;
             if (near.size() < kNeighbours) return;
             const auto [sum, squares] = moments_of(cells, points[point], near);
             const double count = double(near.size()) + 1;  // the point itself
-            const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> shape(squares / count - sum * sum.transpose() / (count * count));
+            const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> shape(squares / count -
+                                                                       sum * sum.transpose() / (count * count));
             if (shape.eigenvalues()[0] > kFlat * shape.eigenvalues()[1]) return;
             const Eigen::Vector3d axis = shape.eigenvectors().col(0);
             axes_[point] = {axis[0], axis[1], axis[2]};
@@ -87,7 +89,9 @@ std::size_t set_upright(const Sheets& sheets, std::vector<Vec3>& normals) {
 /// Parts of sheets whose normals go on from one point to the next.
 class Parts {
 public:
-    explicit Parts(std::size_t count) : parent_(count), size_(count, 1) { std::iota(parent_.begin(), parent_.end(), 0U); }
+    explicit Parts(std::size_t count) : parent_(count), size_(count, 1) {
+        std::iota(parent_.begin(), parent_.end(), 0U);
+    }
     [[nodiscard]] std::uint32_t of(std::uint32_t n) {
         while (parent_[n] != n) n = parent_[n] = parent_[parent_[n]];
         return n;
@@ -112,7 +116,9 @@ std::size_t turn_smaller(const Sheets& sheets, std::vector<Vec3>& normals) {
     Parts parts(sheets.size());
     // By the sheets' normals: from tilted one to tilted one a seam could be crossed.
     const auto side = [&](std::uint32_t n) { return dot(sheets.axis(n), normals[n]); };
-    const auto meets = [&](std::uint32_t n, std::uint32_t other) { return side(n) * side(other) * dot(sheets.axis(n), sheets.axis(other)); };
+    const auto meets = [&](std::uint32_t n, std::uint32_t other) {
+        return side(n) * side(other) * dot(sheets.axis(n), sheets.axis(other));
+    };
     for (std::uint32_t n = 0; n < sheets.size(); ++n)
         sheets.for_beside(n, [&](std::uint32_t other) {
             if (meets(n, other) > 0) parts.join(n, other);
@@ -134,7 +140,8 @@ std::size_t turn_smaller(const Sheets& sheets, std::vector<Vec3>& normals) {
     for (std::uint32_t n = 0; n < sheets.size(); ++n) {
         // A part within one that is turned itself goes over twice.
         int times_turned = 0;
-        for (auto at = turned.find(parts.of(n)); at != turned.end(); at = turned.find(at->second.second)) ++times_turned;
+        for (auto at = turned.find(parts.of(n)); at != turned.end(); at = turned.find(at->second.second))
+            ++times_turned;
         if (times_turned % 2 == 0) continue;
         normals[n] = times(-1, normals[n]);
         ++count;

@@ -7,10 +7,11 @@
 
 namespace covol::cloud {
 
-/// Where the lattice is as fine as the points, parts of a sheet can end with normals in all directions or turned over: each
-/// agrees with the indicator that they make, which is torn there. Where the nearest points are flat, for there is hardly any
-/// noise, the sheet itself tells: a normal far from the sheet's is set upright, to the side of the good ones beside it, from
-/// these inwards; and of two parts of a sheet whose normals meet back to front the smaller one is turned over.
+/// Where the lattice is as fine as the points, parts of a sheet can end with normals in all directions or turned over:
+/// each agrees with the indicator that they make, which is torn there. Where the nearest points are flat, for there is
+/// hardly any noise, the sheet itself tells: a normal far from the sheet's is set upright, to the side of the good ones
+/// beside it, from these inwards; and of two parts of a sheet whose normals meet back to front the smaller one is
+/// turned over.
 /// @param spacing  of the points
 /// @param normals  in/out, unit or 0
 /// @return how many were mended

@@ -42,7 +42,8 @@ std::vector<Vec3> directions() {
 /// The cells with points, as a dense mask.
 class Occupied {
 public:
-    Occupied(const std::vector<Vec3>& points, double cell) : box_(bounding_box(points)), cell_(std::max(cell, longest_side(box_) / kMostViewCells)) {
+    Occupied(const std::vector<Vec3>& points, double cell)
+        : box_(bounding_box(points)), cell_(std::max(cell, longest_side(box_) / kMostViewCells)) {
         std::size_t all = 1;
         for (std::size_t a = 0; a < 3; ++a) {
             count_[a] = std::ptrdiff_t((box_.max[int(a)] - box_.min[int(a)]) / cell_) + 1;
@@ -56,7 +57,8 @@ public:
 
     [[nodiscard]] bool is_free(const Vec3& from, const Vec3& direction) const {
         for (double t = kFirstStep;; ++t) {
-            const std::ptrdiff_t at = index({from[0] + t * cell_ * direction[0], from[1] + t * cell_ * direction[1], from[2] + t * cell_ * direction[2]});
+            const std::ptrdiff_t at = index({from[0] + t * cell_ * direction[0], from[1] + t * cell_ * direction[1],
+                                             from[2] + t * cell_ * direction[2]});
             if (at < 0) return true;
             if (full_[std::size_t(at)]) return false;
         }
@@ -106,7 +108,9 @@ double share_free(const std::vector<Vec3>& points, const std::vector<Vec3>& dire
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
         free[n] = directions[n] != Vec3{0, 0, 0} && occupied.is_free(points[n], directions[n]);
     });
-    const auto told = std::count_if(directions.begin(), directions.end(), [](const Vec3& d) { return d != Vec3{0, 0, 0}; });
+    const auto told = std::count_if(directions.begin(), directions.end(), [](const Vec3& d) {
+        return d != Vec3{0, 0, 0};
+    });
     return double(std::count(free.begin(), free.end(), 1)) / double(std::max<std::ptrdiff_t>(told, 1));
 }
 

@@ -4,17 +4,20 @@
 
 namespace covol::cloud {
 
-/// For each point the mean of the directions in which the view from its cell is free, no other cell with points being in the
-/// way (the ray votes of Mullen and others, Signing the unsigned, SGP 2010); zero where it sees nothing.
+/// For each point the mean of the directions in which the view from its cell is free, no other cell with points being
+/// in the way (the ray votes of Mullen and others, Signing the unsigned, SGP 2010); zero where it sees nothing.
 /// @param cell  edge of the cells, as wide as a sheet of points needs to have no holes
 [[nodiscard]] std::vector<Vec3> free_directions(const std::vector<Vec3>& points, double cell);
 
-/// Share of the points from which nothing is in the way in a direction of their own; those without one, 0, do not count.
-[[nodiscard]] double share_free(const std::vector<Vec3>& points, const std::vector<Vec3>& directions, const CloudScale& scale);
+/// Share of the points from which nothing is in the way in a direction of their own; those without one, 0, do not
+/// count.
+[[nodiscard]] double share_free(const std::vector<Vec3>& points, const std::vector<Vec3>& directions,
+                                const CloudScale& scale);
 
-/// Normals towards where each point can be seen from, and their indicator, solved for once. `screened` is the indicator that
-/// is drawn to 1/2 at the points as well (Kazhdan and Hoppe, Screened Poisson surface reconstruction, ACM Trans. Graph.
-/// 32(3), 2013): closer to them, with more handles where layers of the scan differ.
-[[nodiscard]] Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run);
+/// Normals towards where each point can be seen from, and their indicator, solved for once. `screened` is the indicator
+/// that is drawn to 1/2 at the points as well (Kazhdan and Hoppe, Screened Poisson surface reconstruction, ACM Trans.
+/// Graph. 32(3), 2013): closer to them, with more handles where layers of the scan differ.
+[[nodiscard]] Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& scale,
+                                          const RunContext& run);
 
 }  // namespace covol::cloud

@@ -11,8 +11,8 @@
 namespace covol::cloud {
 namespace {
 
-constexpr int kCoarsening = 16;    // of the finest lattice, by halving
-constexpr int kSweeps = 1;         // before and after each correction
+constexpr int kCoarsening = 16;  // of the finest lattice, by halving
+constexpr int kSweeps = 1;       // before and after each correction
 constexpr int kCoarsestSweeps = 16;
 
 using Float4 = float __attribute__((vector_size(16)));
@@ -44,7 +44,8 @@ Float4 load(const float* p) {
 double sum_of(Float4 v) { return double((v[0] + v[1]) + (v[2] + v[3])); }
 
 struct Strides {
-    explicit Strides(const Lattice& l) : i(std::size_t(l.nodes[1]) * std::size_t(l.nodes[2])), j(std::size_t(l.nodes[2])) {}
+    explicit Strides(const Lattice& l)
+        : i(std::size_t(l.nodes[1]) * std::size_t(l.nodes[2])), j(std::size_t(l.nodes[2])) {}
     [[nodiscard]] RowStrides row() const { return {std::ptrdiff_t(i), std::ptrdiff_t(j)}; }
     [[nodiscard]] std::size_t inner() const { return j - 2; }  // nodes of a row
     std::size_t i, j;
@@ -59,32 +60,38 @@ void for_rows(const Lattice& l, Visit visit) {
     });
 }
 
-const float* row_of(const std::vector<float>& values, std::size_t at) { return values.empty() ? nullptr : values.data() + at; }
+const float* row_of(const std::vector<float>& values, std::size_t at) {
+    return values.empty() ? nullptr : values.data() + at;
+}
 
 /// Gauss-Seidel in red and black order: (6 + screen) u - sum of neighbours = right.
 void sweep(const Lattice& l, std::vector<float>& u, const std::vector<float>& right, const std::vector<float>& screen) {
     const Strides s(l);
     for (int colour = 0; colour < 2; ++colour)
         for_rows(l, [&](int i, int j, std::size_t row) {
-            sweep_row(u.data() + row + 1, right.data() + row + 1, row_of(screen, row + 1), s.row(), s.inner(), std::size_t((i + j + colour) & 1));
+            sweep_row(u.data() + row + 1, right.data() + row + 1, row_of(screen, row + 1), s.row(), s.inner(),
+                      std::size_t((i + j + colour) & 1));
         });
 }
 
-void find_residual(const Lattice& l, const std::vector<float>& u, const std::vector<float>& right, const std::vector<float>& screen,
-                   std::vector<float>& residual) {
+void find_residual(const Lattice& l, const std::vector<float>& u, const std::vector<float>& right,
+                   const std::vector<float>& screen, std::vector<float>& residual) {
     const Strides s(l);
     for_rows(l, [&](int, int, std::size_t row) {
-        residual_row(u.data() + row + 1, right.data() + row + 1, row_of(screen, row + 1), s.row(), s.inner(), residual.data() + row + 1);
+        residual_row(u.data() + row + 1, right.data() + row + 1, row_of(screen, row + 1), s.row(), s.inner(),
+                     residual.data() + row + 1);
     });
 }
 
 /// Full weighting; the right-hand side holds integrals over hats, whose sum over a coarser hat is this one's.
-void restrict_to(const Lattice& fine, const std::vector<float>& residual, const Lattice& coarse, std::vector<float>& right) {
+void restrict_to(const Lattice& fine, const std::vector<float>& residual, const Lattice& coarse,
+                 std::vector<float>& right) {
     const Strides s(fine);
     for_rows(coarse, [&](int i, int j, std::size_t row) {
         thread_local std::vector<float> sums;
         sums.resize(s.inner());
-        restrict_row(residual.data() + std::size_t(2 * i) * s.i + std::size_t(2 * j) * s.j + 1, s.row(), s.inner(), sums.data());
+        restrict_row(residual.data() + std::size_t(2 * i) * s.i + std::size_t(2 * j) * s.j + 1, s.row(), s.inner(),
+                     sums.data());
         for (std::size_t k = 1; k + 1 < std::size_t(coarse.nodes[2]); ++k)
             // The stencil is h times the weak form's, and h doubles.
             right[row + k] = 0.5F * (0.5F * (sums[2 * k - 2] + sums[2 * k]) + sums[2 * k - 1]);
@@ -129,7 +136,8 @@ public:
         const std::size_t slabs = std::size_t(l.nodes[0]) / kSlab + 1;
         std::vector<std::uint32_t> slab(points.size());
         tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
-            slab[n] = std::uint32_t(std::clamp((points[n][0] - l.origin[0]) / l.cell, 0.0, double(l.nodes[0] - 1)) / kSlab);
+            slab[n] =
+                std::uint32_t(std::clamp((points[n][0] - l.origin[0]) / l.cell, 0.0, double(l.nodes[0] - 1)) / kSlab);
         });
         starts_.assign(slabs + 1, 0);
         for (const std::uint32_t s : slab) ++starts_[s + 1];
@@ -189,7 +197,8 @@ double LatticeField::value_at(const Vec3& world) const {
     Float4 sum{};
     for (std::size_t i = 0; i < 4; ++i) {
         const float* row = values.data() + b.first + i * s.i;
-        sum += b.w[0][i] * (b.w[1][0] * load(row) + b.w[1][1] * load(row + s.j) + b.w[1][2] * load(row + 2 * s.j) + b.w[1][3] * load(row + 3 * s.j));
+        sum += b.w[0][i] * (b.w[1][0] * load(row) + b.w[1][1] * load(row + s.j) + b.w[1][2] * load(row + 2 * s.j) +
+                            b.w[1][3] * load(row + 3 * s.j));
     }
     return sum_of(sum * b.w[2]);
 }
@@ -211,7 +220,8 @@ LatticeField::Sample LatticeField::at(const Vec3& world) const {
         along_j += b.w[0][i] * slope;
     }
     return {sum_of(sum * b.w[2]),
-            {sum_of(along_i * b.w[2]) / lattice.cell, sum_of(along_j * b.w[2]) / lattice.cell, sum_of(sum * b.d[2]) / lattice.cell}};
+            {sum_of(along_i * b.w[2]) / lattice.cell, sum_of(along_j * b.w[2]) / lattice.cell,
+             sum_of(sum * b.d[2]) / lattice.cell}};
 }
 
 LatticeField spread(const Lattice& lattice, const std::vector<Vec3>& points, const std::vector<double>& values) {
@@ -264,7 +274,8 @@ void WindingField::solve(const std::vector<Vec3>& points, const std::vector<Vec3
     const double area = 1 / (l.cell * l.cell);
     SlabOrder(l, points).add(finest.right, [&](const Spline& b, std::size_t n, std::size_t i, std::size_t j) {
         const float x = float(area * vectors[n][0]), y = float(area * vectors[n][1]), z = float(area * vectors[n][2]);
-        return -((x * b.d[0][i] * b.w[1][j] + y * b.w[0][i] * b.d[1][j]) * b.w[2] + (z * b.w[0][i] * b.w[1][j]) * b.d[2]);
+        return -((x * b.d[0][i] * b.w[1][j] + y * b.w[0][i] * b.d[1][j]) * b.w[2] +
+                 (z * b.w[0][i] * b.w[1][j]) * b.d[2]);
     });
     for (std::size_t n = 0; n < finest.screen.size(); ++n) finest.right[n] += 0.5F * finest.screen[n];
     for (int n = 0; n < cycles; ++n) cycle(0);
@@ -275,7 +286,8 @@ void WindingField::start_from(const LatticeField& other) {
     const Lattice& l = u.lattice;
     for_rows(l, [&](int i, int j, std::size_t row) {
         for (int k = 1; k + 1 < l.nodes[2]; ++k)
-            u.values[row + std::size_t(k)] = float(other.value_at({l.origin[0] + i * l.cell, l.origin[1] + j * l.cell, l.origin[2] + k * l.cell}));
+            u.values[row + std::size_t(k)] =
+                float(other.value_at({l.origin[0] + i * l.cell, l.origin[1] + j * l.cell, l.origin[2] + k * l.cell}));
     });
 }
 
@@ -283,7 +295,8 @@ void WindingField::screen(const std::vector<Vec3>& points, const std::vector<dou
     levels_.front().screen = spread(levels_.front().solution.lattice, points, weights).values;
     for (std::size_t n = 1; n < levels_.size(); ++n) {
         levels_[n].screen.assign(levels_[n].right.size(), 0.0F);
-        restrict_to(levels_[n - 1].solution.lattice, levels_[n - 1].screen, levels_[n].solution.lattice, levels_[n].screen);
+        restrict_to(levels_[n - 1].solution.lattice, levels_[n - 1].screen, levels_[n].solution.lattice,
+                    levels_[n].screen);
     }
 }
 

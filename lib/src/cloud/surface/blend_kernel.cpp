@@ -46,39 +46,43 @@ COVOL_CLONES void blend(const BlendPiece* pieces, std::size_t count, float h, Bl
         const BlendPiece& p = pieces[n];
         const Float8 up = z - p.foot[2], up2 = up * up;
         const float scale = 1 / (p.reach * p.reach);
-        for_rows(p, h, [&](int i, int j, float beside) __attribute__((always_inline)) {
-            const int row = 8 * i + j;
-            const Float8 share = (up2 + beside) * scale;
-            Float8& least = at(leaf.share.data(), row);
-            Int8& nearest = reinterpret_cast<Int8*>(leaf.nearest.data())[row];
-            const Int8 nearer = (share < least) & (share < 1.0F);
-            least = nearer ? share : least;
-            nearest = nearer ? Int8{} + std::int32_t(n) : nearest;
-        });
+        for_rows(
+            p, h, [&](int i, int j, float beside) __attribute__((always_inline)) {
+                const int row = 8 * i + j;
+                const Float8 share = (up2 + beside) * scale;
+                Float8& least = at(leaf.share.data(), row);
+                Int8& nearest = reinterpret_cast<Int8*>(leaf.nearest.data())[row];
+                const Int8 nearer = (share < least) & (share < 1.0F);
+                least = nearer ? share : least;
+                nearest = nearer ? Int8{} + std::int32_t(n) : nearest;
+            });
     }
     for (std::size_t v = 0; v < 512; ++v)
-        for (std::size_t a = 0; a < 3; ++a) leaf.normal[a][v] = leaf.nearest[v] < 0 ? 0.0F : pieces[leaf.nearest[v]].axes[2][a];
+        for (std::size_t a = 0; a < 3; ++a)
+            leaf.normal[a][v] = leaf.nearest[v] < 0 ? 0.0F : pieces[leaf.nearest[v]].axes[2][a];
     for (std::size_t n = 0; n < count; ++n) {
         const BlendPiece& p = pieces[n];
         const Float8 up = z - p.foot[2], up2 = up * up, to_z = z - p.origin[2];
         const float scale = 1 / (p.reach * p.reach);
-        for_rows(p, h, [&](int i, int j, float beside) __attribute__((always_inline)) {
-            const int row = 8 * i + j;
-            const Float8 share = (up2 + beside) * scale;
-            const Float8 same = at(leaf.normal[0].data(), row) * p.axes[2][0] + at(leaf.normal[1].data(), row) * p.axes[2][1] +
-                                at(leaf.normal[2].data(), row) * p.axes[2][2];
-            const Int8 counts = (share < 1.0F) & (same > 0.0F);
-            if (!detail::any(counts)) return;
-            const float x = h * float(i) - p.origin[0], y = h * float(j) - p.origin[1];
-            const Float8 u = p.axes[0][0] * x + p.axes[0][1] * y + p.axes[0][2] * to_z;
-            const Float8 v = p.axes[1][0] * x + p.axes[1][1] * y + p.axes[1][2] * to_z;
-            const Float8 t = p.axes[2][0] * x + p.axes[2][1] * y + p.axes[2][2] * to_z;
-            const Float8 height = p.c[0] + u * (p.c[1] + u * p.c[3] + v * p.c[4]) + v * (p.c[2] + v * p.c[5]);
-            const Float8 du = p.c[1] + 2 * u * p.c[3] + v * p.c[4], dv = p.c[2] + 2 * v * p.c[5] + u * p.c[4];
-            const Float8 near = 1 - share, weight = counts ? near * near : Float8{};
-            at(leaf.sum.data(), row) += weight * (t - height) / square_root(1 + du * du + dv * dv);
-            at(leaf.weight.data(), row) += weight;
-        });
+        for_rows(
+            p, h, [&](int i, int j, float beside) __attribute__((always_inline)) {
+                const int row = 8 * i + j;
+                const Float8 share = (up2 + beside) * scale;
+                const Float8 same = at(leaf.normal[0].data(), row) * p.axes[2][0] +
+                                    at(leaf.normal[1].data(), row) * p.axes[2][1] +
+                                    at(leaf.normal[2].data(), row) * p.axes[2][2];
+                const Int8 counts = (share < 1.0F) & (same > 0.0F);
+                if (!detail::any(counts)) return;
+                const float x = h * float(i) - p.origin[0], y = h * float(j) - p.origin[1];
+                const Float8 u = p.axes[0][0] * x + p.axes[0][1] * y + p.axes[0][2] * to_z;
+                const Float8 v = p.axes[1][0] * x + p.axes[1][1] * y + p.axes[1][2] * to_z;
+                const Float8 t = p.axes[2][0] * x + p.axes[2][1] * y + p.axes[2][2] * to_z;
+                const Float8 height = p.c[0] + u * (p.c[1] + u * p.c[3] + v * p.c[4]) + v * (p.c[2] + v * p.c[5]);
+                const Float8 du = p.c[1] + 2 * u * p.c[3] + v * p.c[4], dv = p.c[2] + 2 * v * p.c[5] + u * p.c[4];
+                const Float8 near = 1 - share, weight = counts ? near * near : Float8{};
+                at(leaf.sum.data(), row) += weight * (t - height) / square_root(1 + du * du + dv * dv);
+                at(leaf.weight.data(), row) += weight;
+            });
     }
 }
 

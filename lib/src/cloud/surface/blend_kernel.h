@@ -1,6 +1,6 @@
 #pragma once
-// Quadrics blended over the voxels of one leaf, eight at a time. Lengths are world units in the frame of the leaf's first
-// voxel, voxel (i, j, k) of 8^3 at index 64 i + 8 j + k.
+// Quadrics blended over the voxels of one leaf, eight at a time. Lengths are world units in the frame of the leaf's
+// first voxel, voxel (i, j, k) of 8^3 at index 64 i + 8 j + k.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -14,8 +14,8 @@ struct BlendPiece {
 
 struct BlendLeaf {
     static constexpr float kNone = 1e30F;
-    alignas(32) std::array<float, 512> share;    ///< squared distance from the nearest foot over its squared reach
-    alignas(32) std::array<std::int32_t, 512> nearest;  ///< its piece; -1: none reaches the voxel
+    alignas(32) std::array<float, 512> share;  ///< squared distance from the nearest foot over its squared reach
+    alignas(32) std::array<std::int32_t, 512> nearest;         ///< its piece; -1: none reaches the voxel
     alignas(32) std::array<std::array<float, 512>, 3> normal;  ///< of the nearest piece
     alignas(32) std::array<float, 512> sum, weight;  ///< of the signed distances to those on the nearest one's side
 };

@@ -38,14 +38,15 @@ constexpr double kReachOfRadius = 0.35;   // of the one that it was fitted to
 constexpr double kMostOfRadius = 0.8;     // beyond it the quadric was never fitted
 constexpr double kMostOfCurvature = 0.7;  // of the smallest radius of curvature
 constexpr double kLeastReachVoxels = 1.5;
-constexpr double kBesideOfLeast = 0.75;   // of the smallest neighbourhood: beyond it, sideways, there should be others
-constexpr double kBesideOfApart = 2;      // of what nodes are apart
-constexpr double kTrusted = 0.6;          // of the reach; beyond, the indicator takes over
-constexpr double kSlope = 0.4;            // of the indicator at the surface, per cell
-constexpr double kNodeVoxels = 0.75;      // distance of quadrics
-constexpr double kMostNoises = 3;         // that their nodes may be moved
-constexpr int kLevelSteps = 2;            // of Newton's method
-// Points on a piece of its own; at least as many as on a ball of the noise's radius, for noise makes such pieces of nothing.
+constexpr double kBesideOfLeast = 0.75;  // of the smallest neighbourhood: beyond it, sideways, there should be others
+constexpr double kBesideOfApart = 2;     // of what nodes are apart
+constexpr double kTrusted = 0.6;         // of the reach; beyond, the indicator takes over
+constexpr double kSlope = 0.4;           // of the indicator at the surface, per cell
+constexpr double kNodeVoxels = 0.75;     // distance of quadrics
+constexpr double kMostNoises = 3;        // that their nodes may be moved
+constexpr int kLevelSteps = 2;           // of Newton's method
+// Points on a piece of its own; at least as many as on a ball of the noise's radius, for noise makes such pieces of
+// nothing.
 constexpr double kLeastResting = 12, kLeastRestingShare = 1e-3;
 constexpr double kCoarseSpacings = 2.4;  // cells of an indicator for points with gaps
 constexpr double kFarSpacings = 3, kOpenShare = 0.05;
@@ -59,8 +60,10 @@ public:
         for (const std::uint32_t n : cells_.order()) {
             const Quadric& q = quadrics_[n];
             sorted.push_back(q);
-            const double wanted = std::max({kReachVoxels * h, kReachOfLeast * q.least_radius, kReachOfRadius * q.radius});
-            reach_.push_back(float(std::max(kLeastReachVoxels * h, std::min({wanted, kMostOfRadius * q.radius, kMostOfCurvature / q.curvature()}))));
+            const double wanted =
+                std::max({kReachVoxels * h, kReachOfLeast * q.least_radius, kReachOfRadius * q.radius});
+            reach_.push_back(float(std::max(kLeastReachVoxels * h, std::min({wanted, kMostOfRadius * q.radius,
+                                                                             kMostOfCurvature / q.curvature()}))));
             longest_ = std::max(longest_, double(reach_.back()));
         }
         quadrics_ = std::move(sorted);
@@ -118,7 +121,8 @@ std::vector<Coord> leaves_of(const Pieces& pieces, const Indicator& indicator, c
         add(low, high);
         if (leaves.size() > 1000000) settle();
     }
-    indicator.crossed([&](const WorldBox& box) { add(domain.world_to_index(box.min), domain.world_to_index(box.max)); });
+    indicator.crossed(
+        [&](const WorldBox& box) { add(domain.world_to_index(box.min), domain.world_to_index(box.max)); });
     settle();
     return leaves;
 }
@@ -126,7 +130,8 @@ std::vector<Coord> leaves_of(const Pieces& pieces, const Indicator& indicator, c
 /// Fills one leaf.
 class Blend {
 public:
-    Blend(const Pieces& pieces, const Indicator& indicator, const Domain& domain) : pieces_(pieces), indicator_(indicator), domain_(domain) {}
+    Blend(const Pieces& pieces, const Indicator& indicator, const Domain& domain)
+        : pieces_(pieces), indicator_(indicator), domain_(domain) {}
 
     void fill(Leaf& leaf) {
         const double h = domain_.voxel_size;
@@ -141,11 +146,14 @@ public:
             const std::size_t n = std::size_t(at);
             if (leaf_.nearest[n] >= 0) {
                 own = std::clamp(double(leaf_.sum[n] / leaf_.weight[n]), -limit, limit);
-                trust = faded(std::sqrt(double(leaf_.share[n]))) * faded(beside(pieces_of_near_[std::size_t(leaf_.nearest[n])], place(origin, at)));
+                trust = faded(std::sqrt(double(leaf_.share[n]))) *
+                        faded(beside(pieces_of_near_[std::size_t(leaf_.nearest[n])], place(origin, at)));
             }
             double value = trust * own;
             if (trust < 1)
-                value += (1 - trust) * std::clamp((0.5 - indicator_.inside(place(origin, at))) * indicator_.cell() / kSlope, -limit, limit);
+                value +=
+                    (1 - trust) * std::clamp((0.5 - indicator_.inside(place(origin, at))) * indicator_.cell() / kSlope,
+                                             -limit, limit);
             leaf.setValueOn(openvdb::Index(at), float(value));
         }
     }
@@ -157,18 +165,20 @@ private:
         return 1 - beyond * beyond * (3 - 2 * beyond);
     }
 
-    /// How far a place lies beside the nearest foot, not above it, as a share of what points lie apart: where the surface
-    /// goes on there is a nearer one.
+    /// How far a place lies beside the nearest foot, not above it, as a share of what points lie apart: where the
+    /// surface goes on there is a nearer one.
     [[nodiscard]] double beside(std::size_t piece, const Vec3& world) const {
         const Quadric& q = pieces_[piece];
         const Vec3 to = cloud::minus(world, pieces_.foot(piece));
         const double up = dot(to, q.axes[2]);
-        const double expected = std::max({kBesideOfLeast * q.least_radius, kLeastReachVoxels * domain_.voxel_size, kBesideOfApart * q.apart});
+        const double expected = std::max(
+            {kBesideOfLeast * q.least_radius, kLeastReachVoxels * domain_.voxel_size, kBesideOfApart * q.apart});
         return std::sqrt(std::max(0.0, dot(to, to) - up * up)) / expected;
     }
 
     [[nodiscard]] Vec3 place(const Coord& origin, int at) const {
-        return domain_.index_to_world({double(origin.x() + (at >> 6)), double(origin.y() + (at >> 3 & 7)), double(origin.z() + (at & 7))});
+        return domain_.index_to_world(
+            {double(origin.x() + (at >> 6)), double(origin.y() + (at >> 3 & 7)), double(origin.z() + (at & 7))});
     }
 
     /// The pieces that may reach the voxels of the box, in its frame.
@@ -209,8 +219,10 @@ private:
     cloud::BlendLeaf leaf_;
 };
 
-/// The pieces' distance where they act, what the indicator's level 1/2 says of it elsewhere; not yet a level set's band.
-FloatGridPtr level_set_of(const Pieces& pieces, const Indicator& indicator, const Domain& domain, const RunContext& run) {
+/// The pieces' distance where they act, what the indicator's level 1/2 says of it elsewhere; not yet a level set's
+/// band.
+FloatGridPtr level_set_of(const Pieces& pieces, const Indicator& indicator, const Domain& domain,
+                          const RunContext& run) {
     const FloatGridPtr field = make_grid(domain, float(kHalfWidthVoxels * domain.voxel_size), "u");
     std::vector<Leaf*> leaves;
     for (const Coord& origin : leaves_of(pieces, indicator, domain)) leaves.push_back(field->tree().touchLeaf(origin));
@@ -256,11 +268,12 @@ struct TopologyOf {
 
 /// Whether some of the surface is far from all points.
 bool is_open(const FloatGrid& level_set, const CloudOrientation& cloud, const RunContext& run) {
-    return share_without_points(extract_mesh(level_set, {}, run), cloud.points, kFarSpacings * cloud.scale.spacing, run) > kOpenShare;
+    return share_without_points(extract_mesh(level_set, {}, run), cloud.points, kFarSpacings * cloud.scale.spacing,
+                                run) > kOpenShare;
 }
 
-/// The points where the indicator has its surface, as far as noise can have brought them from there: else there would be nodes
-/// all through the layer that they fill.
+/// The points where the indicator has its surface, as far as noise can have brought them from there: else there would
+/// be nodes all through the layer that they fill.
 OrientedCloud near_level(OrientedCloud points, const CloudOrientation& cloud) {
     const double most = kMostNoises * cloud.scale.noise;
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
@@ -279,7 +292,8 @@ OrientedCloud near_level(OrientedCloud points, const CloudOrientation& cloud) {
 
 std::vector<Quadric> quadrics_of(const CloudOrientation& cloud, double h, CloudReport& report, const RunContext& run) {
     const OrientedCloud points{cloud.points, cloud.orientation.normals, std::vector<float>(cloud.points.size(), 1.0F)};
-    std::vector<Quadric> quadrics = cloud::quadrics_over(near_level(points, cloud), points, kNodeVoxels * h, cloud.scale, report.bare_nodes, run);
+    std::vector<Quadric> quadrics =
+        cloud::quadrics_over(near_level(points, cloud), points, kNodeVoxels * h, cloud.scale, report.bare_nodes, run);
     std::vector<double> noise, radius;
     for (const Quadric& q : quadrics) {
         noise.push_back(q.noise);
@@ -292,7 +306,8 @@ std::vector<Quadric> quadrics_of(const CloudOrientation& cloud, double h, CloudR
 
 }  // namespace
 
-FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cloud, CloudReport& report, const RunContext& run) {
+FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cloud, CloudReport& report,
+                                const RunContext& run) {
     FloatGridPtr result;
     with_threads(run, [&] {
         const double h = domain.voxel_size;
@@ -313,12 +328,15 @@ FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cl
             const Pieces pieces(quadrics_of(cloud, h, report, run), h);
             result = level_set_of(pieces, *orientation.indicator, domain, run);
         }
-        const double share = cloud.encloses ? kLeastRestingShare : kLeastRestingOpen, noises = report.noise / report.spacing;
-        const auto least = std::size_t(std::max({kLeastResting, share * double(cloud.points.size()), 4 * M_PI * noises * noises}));
+        const double share = cloud.encloses ? kLeastRestingShare : kLeastRestingOpen,
+                     noises = report.noise / report.spacing;
+        const auto least =
+            std::size_t(std::max({kLeastResting, share * double(cloud.points.size()), 4 * M_PI * noises * noises}));
         report.dropped_pieces = detail::drop_bare_pieces(*result, cloud.points, least);
         // Before the indicator's topology is held, for it may have lost torn parts, and after, for it may tear others.
         const auto join = [&] {
-            const std::size_t joined = cloud::join_pieces(*result, cloud.points, std::max(report.spacing, report.noise), run);
+            const std::size_t joined =
+                cloud::join_pieces(*result, cloud.points, std::max(report.spacing, report.noise), run);
             report.joined_pieces += joined;
             return joined > 0;
         };
@@ -327,7 +345,9 @@ FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cl
         topology.hold(*result, *orientation.indicator, report);
         // Where the points leave gaps, what surrounds a gap makes small handles on a lattice as fine as they are.
         if (topology.own.all > 1 && !orientation.screened && is_open(*result, cloud, run))
-            topology.hold(*result, *cloud::indicator_of(cloud.points, orientation, kCoarseSpacings * cloud.scale.spacing), report);
+            topology.hold(*result,
+                          *cloud::indicator_of(cloud.points, orientation, kCoarseSpacings * cloud.scale.spacing),
+                          report);
         if (topology.own.pieces > 1) join();
         result = start_from_grid(domain, *result, run);
     });

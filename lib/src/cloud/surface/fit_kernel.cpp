@@ -33,7 +33,8 @@ void FitPoints::fill_up() {
 COVOL_CLONES FitSums fit_sums(const FitPoints& points) {
     Double4 m[15] = {}, h[6] = {}, squares{}, nears{}, near_squares{};
     for (std::size_t n = 0; n < points.size; n += kFitLanes) {
-        const Double4 u = load(points.u, n), v = load(points.v, n), t = load(points.t, n), count = load(points.count, n);
+        const Double4 u = load(points.u, n), v = load(points.v, n), t = load(points.t, n),
+                      count = load(points.count, n);
         const Double4 uu = u * u, uv = u * v, vv = v * v, inside = 1 - uu - vv - t * t, near = inside * inside;
         const Double4 w = count * near, wuu = w * uu, wuv = w * uv, wvv = w * vv, wt = w * t;
         m[0] += w;

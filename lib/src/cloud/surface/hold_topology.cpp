@@ -66,15 +66,17 @@ std::uint32_t beside(std::uint32_t front, const std::array<std::uint32_t, 26>& n
     return all;
 }
 
-/// Whether the voxels of the set that are next to the centre hang together by paths of at most `steps` from there, and there
-/// are any.
+/// Whether the voxels of the set that are next to the centre hang together by paths of at most `steps` from there, and
+/// there are any.
 bool is_one_piece(std::uint32_t set, std::uint32_t next, const std::array<std::uint32_t, 26>& neighbours, int steps) {
     const std::uint32_t touching = set & next;
     if (touching == 0) return false;
     std::uint32_t within = touching;
     for (int n = 1; n < steps; ++n) within |= beside(within, neighbours) & set;
     std::uint32_t reached = 0;
-    for (std::uint32_t front = touching & (~touching + 1); front != 0; front = beside(front, neighbours) & within & ~reached) reached |= front;
+    for (std::uint32_t front = touching & (~touching + 1); front != 0;
+         front = beside(front, neighbours) & within & ~reached)
+        reached |= front;
     return (touching & ~reached) == 0;
 }
 
@@ -90,8 +92,8 @@ struct Waiting {
     bool operator<(const Waiting& other) const { return depth != other.depth ? depth < other.depth : other.at < at; }
 };
 
-/// How deep voxels lie below or above target's surface, in voxels, along chains of neighbours among them (Dijkstra): its
-/// values end with its band.
+/// How deep voxels lie below or above target's surface, in voxels, along chains of neighbours among them (Dijkstra):
+/// its values end with its band.
 FloatGrid::Ptr depth_of(const std::vector<Coord>& voxels, const FloatGrid& target) {
     const FloatGrid::Ptr depth = FloatGrid::create(std::numeric_limits<float>::max());
     auto depth_at = depth->getAccessor();

@@ -6,10 +6,11 @@
 namespace covol::cloud {
 
 /// Gives `target` the topology of `rough`, a level set of the same lattice: starting from rough's sign each voxel takes
-/// target's while that leaves all pieces, cavities and handles as they are (simple points: Bertrand and Malandain, A new
-/// characterization of three-dimensional simple points, Pattern Recognition Letters 15, 1994; Han, Xu and Prince, A topology
-/// preserving level set method, IEEE PAMI 25, 2003). Inside is 6-connected, outside 18-connected, as extract_mesh() joins
-/// voxels. The deepest voxels of target turn first, so that cuts and fillings lie where it is narrowest. Both are active near their surface and signed everywhere.
+/// target's while that leaves all pieces, cavities and handles as they are (simple points: Bertrand and Malandain, A
+/// new characterization of three-dimensional simple points, Pattern Recognition Letters 15, 1994; Han, Xu and Prince, A
+/// topology preserving level set method, IEEE PAMI 25, 2003). Inside is 6-connected, outside 18-connected, as
+/// extract_mesh() joins voxels. The deepest voxels of target turn first, so that cuts and fillings lie where it is
+/// narrowest. Both are active near their surface and signed everywhere.
 /// @return the number of voxels that keep rough's sign; their value is small
 std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target);
 

@@ -19,11 +19,11 @@
 namespace covol::cloud {
 namespace {
 
-constexpr double kSmall = 0.1;       // of the largest piece's volume
-constexpr double kMostGap = 4;       // of what points are apart
-constexpr double kNear = 1.0;       // of it: a place of the gap without a point as near is one where the surface ends
-constexpr double kAround = 1;        // of it: points that tell how thick the part is
-constexpr double kThickest = 0.5;    // of it: what is thicker does not tear
+constexpr double kSmall = 0.1;     // of the largest piece's volume
+constexpr double kMostGap = 4;     // of what points are apart
+constexpr double kNear = 1.0;      // of it: a place of the gap without a point as near is one where the surface ends
+constexpr double kAround = 1;      // of it: points that tell how thick the part is
+constexpr double kThickest = 0.5;  // of it: what is thicker does not tear
 
 struct Gap {
     double length = std::numeric_limits<double>::infinity();
@@ -53,10 +53,13 @@ std::vector<Piece> pieces_of(const TriangleMesh& mesh) {
     for (const auto& t : mesh.triangles)
         for (const std::uint32_t v : {t[1], t[2]}) parent[root(v)] = root(t[0]);
     std::map<std::uint32_t, Piece> pieces;
-    for (std::uint32_t v = 0; v < parent.size(); ++v) pieces[root(v)].surface.push_back(meshing::to_vec3(mesh.vertices[v]));
+    for (std::uint32_t v = 0; v < parent.size(); ++v)
+        pieces[root(v)].surface.push_back(meshing::to_vec3(mesh.vertices[v]));
     for (const auto& t : mesh.triangles) {
         Piece& piece = pieces[root(t[0])];
-        const auto corner = [&](std::size_t n) { return minus(meshing::to_vec3(mesh.vertices[t[n]]), piece.surface.front()); };
+        const auto corner = [&](std::size_t n) {
+            return minus(meshing::to_vec3(mesh.vertices[t[n]]), piece.surface.front());
+        };
         piece.volume += dot(corner(0), cross(corner(1), corner(2))) / 6;
     }
     std::vector<Piece> solid;
@@ -92,7 +95,8 @@ void fill(FloatGrid& level_set, const Gap& gap, double radius) {
     for (int i = int(std::floor(low[0])); i <= high[0]; ++i)
         for (int j = int(std::floor(low[1])); j <= high[1]; ++j)
             for (int k = int(std::floor(low[2])); k <= high[2]; ++k) {
-                const double distance = std::sqrt(squared_from(gap, domain.index_to_world({double(i), double(j), double(k)}))) - radius;
+                const double distance =
+                    std::sqrt(squared_from(gap, domain.index_to_world({double(i), double(j), double(k)}))) - radius;
                 const openvdb::Coord at(i, j, k);
                 if (distance < double(values.getValue(at))) values.setValueOn(at, float(distance));
             }
@@ -102,10 +106,12 @@ void fill(FloatGrid& level_set, const Gap& gap, double radius) {
 
 std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, double apart, const RunContext& run) {
     std::vector<Piece> pieces = pieces_of(extract_mesh(level_set, {}, run));
-    const auto first_small = std::find_if(pieces.begin(), pieces.end(), [&](const Piece& p) { return p.volume < kSmall * pieces.front().volume; });
+    const auto first_small = std::find_if(pieces.begin(), pieces.end(),
+                                          [&](const Piece& p) { return p.volume < kSmall * pieces.front().volume; });
     if (first_small == pieces.end()) return 0;
     std::vector<Vec3> large;
-    for (auto piece = pieces.begin(); piece != first_small; ++piece) large.insert(large.end(), piece->surface.begin(), piece->surface.end());
+    for (auto piece = pieces.begin(); piece != first_small; ++piece)
+        large.insert(large.end(), piece->surface.begin(), piece->surface.end());
     std::vector<Piece> small(std::make_move_iterator(first_small), std::make_move_iterator(pieces.end()));
     const detail::KdTree whole(std::move(large));
     for (Piece& piece : small) piece.meet(whole);
@@ -116,13 +122,15 @@ std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, d
     const auto goes_on = [&](const Gap& gap) {
         const int steps = 1 + int(2 * gap.length / voxel);
         for (int n = 0; n <= steps; ++n)
-            if (!cells.any_within(plus(gap.from, times(double(n) / steps, minus(gap.to, gap.from))), kNear * apart)) return false;
+            if (!cells.any_within(plus(gap.from, times(double(n) / steps, minus(gap.to, gap.from))), kNear * apart))
+                return false;
         return true;
     };
     std::size_t joined = 0;
     while (!small.empty()) {
         run.check();
-        const auto next = std::min_element(small.begin(), small.end(), [](const Piece& a, const Piece& b) { return a.gap.length < b.gap.length; });
+        const auto next = std::min_element(small.begin(), small.end(),
+                                           [](const Piece& a, const Piece& b) { return a.gap.length < b.gap.length; });
         const Gap gap = next->gap;
         if (!(gap.length <= kMostGap * apart)) break;
         if (!goes_on(gap)) {
@@ -133,7 +141,8 @@ std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, d
         cells.find(box_around(gap, kAround * apart), ranges);
         for (const PointCells::Range& range : ranges)
             for (std::uint32_t n = range.begin; n < range.end; ++n)
-                if (const double off = std::sqrt(squared_from(gap, cells.sorted()[n])); off < kAround * apart) around.push_back(off);
+                if (const double off = std::sqrt(squared_from(gap, cells.sorted()[n])); off < kAround * apart)
+                    around.push_back(off);
         fill(level_set, gap, std::max(std::min(median(std::move(around)), kThickest * apart), voxel));
         ++joined;
         const detail::KdTree own(std::move(next->surface));

@@ -7,9 +7,11 @@
 
 namespace covol::cloud {
 
-/// Joins small pieces of a solid to what is nearest to them, where points lie all along the gap: parts as thin as the points
-/// are apart tear. What is less than a tenth of the largest piece is small; others stay for themselves, however close.
-/// @param level_set  active near its surface and signed everywhere; values where something was joined are of the right sign,
+/// Joins small pieces of a solid to what is nearest to them, where points lie all along the gap: parts as thin as the
+/// points are apart tear. What is less than a tenth of the largest piece is small; others stay for themselves, however
+/// close.
+/// @param level_set  active near its surface and signed everywhere; values where something was joined are of the right
+/// sign,
 ///                   but no distances
 /// @param apart  what points of one surface are apart, and off it: their spacing or noise
 /// @return how many were joined

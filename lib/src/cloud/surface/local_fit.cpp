@@ -17,25 +17,27 @@ namespace {
 
 constexpr int kLevels = 9;
 constexpr double kGrowth = 1.4142135623730951;
-constexpr double kFirstSpacings = 2.0;    // radius of the first: about 12 points
-constexpr double kThinnedShare = 0.2;     // of the radius: points closer are averaged first
+constexpr double kFirstSpacings = 2.0;  // radius of the first: about 12 points
+constexpr double kThinnedShare = 0.2;   // of the radius: points closer are averaged first
 constexpr std::size_t kLeastPoints = 9;
-constexpr double kSheetShare = 0.3;       // noise, of the radius; points that fill a ball have 0.45
-constexpr double kAgreement = 1.5;        // standard deviations; 1 to 2 change the errors by a tenth
-constexpr double kMisfitGrowth = 1.13;     // beyond it the fit itself is off
+constexpr double kSheetShare = 0.3;     // noise, of the radius; points that fill a ball have 0.45
+constexpr double kAgreement = 1.5;      // standard deviations; 1 to 2 change the errors by a tenth
+constexpr double kMisfitGrowth = 1.13;  // beyond it the fit itself is off
 constexpr double kRidge = 1e-4;
-constexpr double kSheetHeight = 0.15;     // of the radius: what is farther off the plane may be another sheet
-constexpr double kMostHeight = 0.4;       // of the radius: a foot farther from its node is no sheet's
-constexpr double kLeastCosine = 0.4;      // between the normal as it was oriented and as it is fitted
-constexpr double kLeastSpread = 0.16;     // standard deviation along any direction, of the radius; where points fill the disc 0.35
-constexpr double kMostOffCentre = 0.33;   // of the points' mean, of the radius: half a disc has 0.29, what lies beyond a sheet's end more
-constexpr double kMostGrowth = 2.9;       // of the radius, until the points are a sheet
-constexpr double kLeastMajority = 5;      // points
-constexpr double kMostUnbent = 0.5;       // of the noise, that it is taken to have lowered the points
-constexpr double kWidest = 2;             // of the nodes' cells: the first are so large
-constexpr double kWideOfApart = 7;        // the radius, of what its nodes are apart: there need not be more
-constexpr double kSameSheet = 0.7;        // cosine of the normals
-constexpr double kLone = 2.5;             // least radii, beside quadrics of points that lie closer; 2 to 4 give the same surfaces
+constexpr double kSheetHeight = 0.15;  // of the radius: what is farther off the plane may be another sheet
+constexpr double kMostHeight = 0.4;    // of the radius: a foot farther from its node is no sheet's
+constexpr double kLeastCosine = 0.4;   // between the normal as it was oriented and as it is fitted
+// standard deviation along any direction, of the radius; where points fill the disc 0.35
+constexpr double kLeastSpread = 0.16;
+// of the points' mean, of the radius: half a disc has 0.29, what lies beyond a sheet's end more
+constexpr double kMostOffCentre = 0.33;
+constexpr double kMostGrowth = 2.9;   // of the radius, until the points are a sheet
+constexpr double kLeastMajority = 5;  // points
+constexpr double kMostUnbent = 0.5;   // of the noise, that it is taken to have lowered the points
+constexpr double kWidest = 2;         // of the nodes' cells: the first are so large
+constexpr double kWideOfApart = 7;    // the radius, of what its nodes are apart: there need not be more
+constexpr double kSameSheet = 0.7;    // cosine of the normals
+constexpr double kLone = 2.5;  // least radii, beside quadrics of points that lie closer; 2 to 4 give the same surfaces
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
@@ -70,7 +72,7 @@ struct Level {
     }
     double radius;
     PointCells cells;
-    std::vector<Vec3> normals;   // in the cells' order
+    std::vector<Vec3> normals;  // in the cells' order
     std::vector<float> counts;
 };
 
@@ -93,7 +95,7 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
     if (near.size < kLeastPoints) return result;
     near.fill_up();
     const FitSums sums = fit_sums(near);
-    constexpr int kMoment[6][6] = {{0, 1, 2, 3, 4, 5},   {1, 3, 4, 6, 7, 8},    {2, 4, 5, 7, 8, 9},
+    constexpr int kMoment[6][6] = {{0, 1, 2, 3, 4, 5},    {1, 3, 4, 6, 7, 8},    {2, 4, 5, 7, 8, 9},
                                    {3, 6, 7, 10, 11, 12}, {4, 7, 8, 11, 12, 13}, {5, 8, 9, 12, 13, 14}};
     Matrix6 m;
     for (int a = 0; a < 6; ++a)
@@ -102,7 +104,8 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
     const double sum = sums.moments[0];
     if (std::hypot(m(0, 1), m(0, 2)) > kMostOffCentre * sum) return result;
     // Narrow bodies seen from the side: across them the quadric knows nothing beyond its points.
-    const double uu = m(1, 1) / sum - m(0, 1) * m(0, 1) / (sum * sum), vv = m(2, 2) / sum - m(0, 2) * m(0, 2) / (sum * sum),
+    const double uu = m(1, 1) / sum - m(0, 1) * m(0, 1) / (sum * sum),
+                 vv = m(2, 2) / sum - m(0, 2) * m(0, 2) / (sum * sum),
                  uv = m(1, 2) / sum - m(0, 1) * m(0, 2) / (sum * sum);
     if (0.5 * (uu + vv) - std::hypot(0.5 * (uu - vv), uv) < kLeastSpread * kLeastSpread) return result;
     for (int d = 3; d < 6; ++d) m(d, d) += kRidge * sum;
@@ -122,7 +125,8 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
 }
 
 /// Whether most points beside this one on its own sheet have a normal like it; -1: too few to tell.
-int is_of_majority(const Level& level, const Vec3& origin, const Vec3& normal, const std::vector<PointCells::Range>& ranges) {
+int is_of_majority(const Level& level, const Vec3& origin, const Vec3& normal,
+                   const std::vector<PointCells::Range>& ranges) {
     const double r2 = level.radius * level.radius, height = kSheetHeight * level.radius;
     double same = 0, opposite = 0;
     for (const PointCells::Range& range : ranges)
@@ -138,7 +142,9 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
     Quadric best;
     best.origin = point;
     best.axes = frame_of(normal);
-    struct Seen { double height, deviation, misfit; };
+    struct Seen {
+        double height, deviation, misfit;
+    };
     std::vector<Seen> seen;
     int majority = -1;
     for (const Level& level : levels) {
@@ -157,24 +163,30 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
         if (seen.empty()) {
             // Over the plane that it tells itself.
             Vec3 tilted;
-            for (int a = 0; a < 3; ++a) tilted[a] = best.axes[2][a] - now.c[1] * best.axes[0][a] - now.c[2] * best.axes[1][a];
+            for (int a = 0; a < 3; ++a)
+                tilted[a] = best.axes[2][a] - now.c[1] * best.axes[0][a] - now.c[2] * best.axes[1][a];
             const std::array<Vec3, 3> before = best.axes;
             best.axes = frame_of(unit(tilted));
             const Fit again = fit(level, point, best.axes, scratch);
-            if (again.good) now = again; else best.axes = before;
+            if (again.good)
+                now = again;
+            else
+                best.axes = before;
         }
         const bool agrees = std::all_of(seen.begin(), seen.end(), [&](const Seen& s) {
             return std::abs(s.height - now.c[0]) <= kAgreement * s.deviation && now.misfit <= kMisfitGrowth * s.misfit;
         });
         if (!agrees) break;
-        if (seen.empty() && (std::abs(now.c[0]) > kMostHeight * level.radius || dot(best.axes[2], normal) < kLeastCosine)) return best;
+        if (seen.empty() &&
+            (std::abs(now.c[0]) > kMostHeight * level.radius || dot(best.axes[2], normal) < kLeastCosine))
+            return best;
         if (seen.empty()) best.noise = now.noise;  // wider, it has the surface's own shape in it
         seen.push_back({now.c[0], now.deviation, now.misfit});
         best.c = now.c;
         best.radius = level.radius;
     }
-    // Noise along the surface brings points here from where it lies lower, or higher: their mean height is off by half the
-    // variance times the Laplacian.
+    // Noise along the surface brings points here from where it lies lower, or higher: their mean height is off by half
+    // the variance times the Laplacian.
     const double lower = best.noise * best.noise * (best.c[3] + best.c[5]), most = kMostUnbent * best.noise;
     best.c[0] -= std::clamp(lower, -most, most);
     return best;
@@ -201,7 +213,8 @@ public:
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, nodes.size(), 256), [&](const auto& range) {
             if (run.cancelled()) return;
             Scratch& mine = scratch.local();
-            for (std::size_t n = range.begin(); n < range.end(); ++n) result[n] = choose(levels_, nodes.points[n], nodes.normals[n], mine);
+            for (std::size_t n = range.begin(); n < range.end(); ++n)
+                result[n] = choose(levels_, nodes.points[n], nodes.normals[n], mine);
         });
         run.check();
         return result;
@@ -301,7 +314,10 @@ Vec3 Quadric::foot() const {
 
 OrientedCloud thinned(const OrientedCloud& cloud, double edge) {
     const PointCells cells(cloud.points, edge);
-    struct Mean { Vec3 point{0, 0, 0}, normal{0, 0, 0}; double count = 0; };
+    struct Mean {
+        Vec3 point{0, 0, 0}, normal{0, 0, 0};
+        double count = 0;
+    };
     const auto add_cell = [&](std::size_t n, OrientedCloud& result) {
         std::array<Mean, 6> means;  // by the direction that is closest to the normal's
         const auto [begin, end] = cells.cell(n);
@@ -332,7 +348,8 @@ OrientedCloud thinned(const OrientedCloud& cloud, double edge) {
                 }
         for (const Mean& mean : means) {
             if (!(mean.count > 0) || !(dot(mean.normal, mean.normal) > 0)) continue;
-            result.points.push_back({mean.point[0] / mean.count, mean.point[1] / mean.count, mean.point[2] / mean.count});
+            result.points.push_back(
+                {mean.point[0] / mean.count, mean.point[1] / mean.count, mean.point[2] / mean.count});
             result.normals.push_back(unit(mean.normal));
             result.counts.push_back(float(mean.count));
         }
@@ -340,7 +357,8 @@ OrientedCloud thinned(const OrientedCloud& cloud, double edge) {
     constexpr std::size_t kCells = 4096;
     std::vector<OrientedCloud> parts((cells.cell_count() + kCells - 1) / kCells);
     tbb::parallel_for(std::size_t(0), parts.size(), [&](std::size_t part) {
-        for (std::size_t n = part * kCells; n < std::min(cells.cell_count(), (part + 1) * kCells); ++n) add_cell(n, parts[part]);
+        for (std::size_t n = part * kCells; n < std::min(cells.cell_count(), (part + 1) * kCells); ++n)
+            add_cell(n, parts[part]);
     });
     OrientedCloud result;
     for (const OrientedCloud& part : parts) {
@@ -351,17 +369,19 @@ OrientedCloud thinned(const OrientedCloud& cloud, double edge) {
     return result;
 }
 
-std::vector<Quadric> fit_quadrics(const OrientedCloud& nodes, const OrientedCloud& cloud, double spacing, const RunContext& run) {
+std::vector<Quadric> fit_quadrics(const OrientedCloud& nodes, const OrientedCloud& cloud, double spacing,
+                                  const RunContext& run) {
     return Fitter(cloud, spacing, run).fit(nodes, run);
 }
 
-std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCloud& cloud, double edge, const CloudScale& scale,
-                                   std::size_t& bare, const RunContext& run) {
+std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCloud& cloud, double edge,
+                                   const CloudScale& scale, std::size_t& bare, const RunContext& run) {
     const Fitter fitter(cloud, scale.spacing, run);
     std::vector<Quadric> all;
     bare = 0;
     for (const double times : {kWidest, 1.0}) {
-        // Where noise is less, wide neighbourhoods are those of flat parts: they tell less about what lies beside these.
+        // Where noise is less, wide neighbourhoods are those of flat parts: they tell less about what lies beside
+        // these.
         if (times > 1 && scale.noise < scale.spacing) continue;
         const double apart = times * edge;
         OrientedCloud nodes = thinned(places, apart);

@@ -1,6 +1,6 @@
 #pragma once
-// Pieces of the surface behind an oriented cloud: quadrics over neighbourhoods as wide as the noise asks for and the shape
-// allows.
+// Pieces of the surface behind an oriented cloud: quadrics over neighbourhoods as wide as the noise asks for and the
+// shape allows.
 #include <array>
 #include <vector>
 
@@ -25,29 +25,29 @@ struct Quadric {
     Vec3 origin;
     std::array<Vec3, 3> axes;  ///< u, v and the normal, outward
     std::array<double, 6> c;
-    double radius = 0;         ///< of the neighbourhood that it was fitted to
-    double least_radius = 0;   ///< of the smallest that tells anything
-    double noise = 0;          ///< standard deviation of the points from it, along each axis
-    double apart = 0;          ///< edge of the cells that its node and those beside it were taken from
+    double radius = 0;        ///< of the neighbourhood that it was fitted to
+    double least_radius = 0;  ///< of the smallest that tells anything
+    double noise = 0;         ///< standard deviation of the points from it, along each axis
+    double apart = 0;         ///< edge of the cells that its node and those beside it were taken from
     /// First-order signed distance, > 0 outside.
     [[nodiscard]] double distance(const Vec3& world) const;
     [[nodiscard]] double curvature() const;  ///< the larger one at the foot, absolute, nearly
-    [[nodiscard]] Vec3 foot() const;  ///< above the origin
+    [[nodiscard]] Vec3 foot() const;         ///< above the origin
 };
 
 /// Quadrics at the nodes, by weighted least squares. The neighbourhood is the largest of a geometric sequence whose fit
 /// agrees with those of all smaller ones up to noise (Lepski, Theory Probab. Appl. 35, 1990, for points: Wang and Mitra
-/// 2004, Goldenshluger and Nemirovski 1997): wide where noise has to be averaged, narrow at edges and tips. What noise of the
-/// same size along the surface bends is straightened: it lowers the mean height of points by half its variance times the
-/// Laplacian.
+/// 2004, Goldenshluger and Nemirovski 1997): wide where noise has to be averaged, narrow at edges and tips. What noise
+/// of the same size along the surface bends is straightened: it lowers the mean height of points by half its variance
+/// times the Laplacian.
 /// @param nodes    where; their normals say which side of a sheet they are on
 /// @param spacing  mean distance of neighbours on the surface, of `cloud`'s points as they were measured
 /// @return as many as there are nodes; radius 0 where no neighbourhood is a sheet
 [[nodiscard]] std::vector<Quadric> fit_quadrics(const OrientedCloud& nodes, const OrientedCloud& cloud, double spacing,
                                                 const RunContext& run);
 
-/// Quadrics all over a cloud, as fit_quadrics() makes them: at nodes taken from cells of the given edge, or of twice as much
-/// where the neighbourhoods are so wide, for noise wants it, that more nodes would tell the same.
+/// Quadrics all over a cloud, as fit_quadrics() makes them: at nodes taken from cells of the given edge, or of twice as
+/// much where the neighbourhoods are so wide, for noise wants it, that more nodes would tell the same.
 /// @param places  the cloud's points, moved to about where the surface is; the nodes are means of them
 /// @param scale   of the cloud's points
 /// @param bare    how many nodes have none

@@ -1,5 +1,6 @@
-// DICOM slice by slice: plain pixels are read here, compressed ones and files of several frames through ITK's GDCM reader.
-// Series are put together here too: ITK's own helper neither says what lies in a folder nor finds a missing slice.
+// DICOM slice by slice: plain pixels are read here, compressed ones and files of several frames through ITK's GDCM
+// reader. Series are put together here too: ITK's own helper neither says what lies in a folder nor finds a missing
+// slice.
 #include <gdcmTrace.h>
 #include <itkGDCMImageIO.h>
 
@@ -35,9 +36,9 @@ struct Slice {
     Matrix3 direction{};
     unsigned components = 1;
     bool spacing_known = true;
-    bool plain = false;           ///< read here: the fields below
-    PixelPlace place;             ///< slope and intercept are the rescaling
-    int unused_bits = 0;          ///< of each stored number, the upper ones
+    bool plain = false;   ///< read here: the fields below
+    PixelPlace place;     ///< slope and intercept are the rescaling
+    int unused_bits = 0;  ///< of each stored number, the upper ones
     double position = 0;  ///< along the series' normal
 };
 
@@ -68,11 +69,13 @@ PixelType rescaled_type(const PixelPlace& place, int stored_bits) {
 
 /// A file with plain pixels and one frame. Without orientation and position it lies at 0.
 void fill_plain(const DicomHeader& header, const std::string& unusable, Slice& slice) {
-    const int allocated = int(header.integer(kAllocated).value_or(0)), stored = int(header.integer(kStored).value_or(0));
+    const int allocated = int(header.integer(kAllocated).value_or(0)),
+              stored = int(header.integer(kStored).value_or(0));
     const bool is_signed = header.integer(kSigned).value_or(0) == 1;
     slice.plain = true;
     slice.components = header.integer(kSamples).value_or(1);
-    slice.size = {std::int32_t(header.integer(kColumns).value_or(0)), std::int32_t(header.integer(kRows).value_or(0)), 1};
+    slice.size = {std::int32_t(header.integer(kColumns).value_or(0)), std::int32_t(header.integer(kRows).value_or(0)),
+                  1};
     slice.unused_bits = allocated - stored;
     PixelPlace& place = slice.place;
     place.path = slice.path;
@@ -198,8 +201,8 @@ public:
         if (single) {
             const std::vector<char> stored = decode(slices_.front());
             for (int k = request.box.min[2]; k <= request.box.max[2]; ++k)
-                out = copy(slices_.front(), stored.data(), std::uint64_t(k) * std::uint64_t(size[0]) * std::uint64_t(size[1]),
-                           request, out);
+                out = copy(slices_.front(), stored.data(),
+                           std::uint64_t(k) * std::uint64_t(size[0]) * std::uint64_t(size[1]), request, out);
         } else {
             for (int k = request.box.min[2]; k <= request.box.max[2]; ++k) {
                 run.check();
@@ -215,20 +218,24 @@ private:
         const Slice& first = slices_.front();
         for (const Slice& slice : slices_) {
             if (slices_.size() > 1 && slice.size[2] != 1)
-                throw read_error(Errc::Unsupported, path_, "the series has several files with several frames each; give one of them");
+                throw read_error(Errc::Unsupported, path_,
+                                 "the series has several files with several frames each; give one of them");
             bool same = slice.size == first.size && slice.components == first.components;
             for (int a = 0; a < 3; ++a)
-                for (int b = 0; b < 2; ++b) same = same && std::abs(slice.direction[a][b] - first.direction[a][b]) < 1e-3;
+                for (int b = 0; b < 2; ++b)
+                    same = same && std::abs(slice.direction[a][b] - first.direction[a][b]) < 1e-3;
             if (!same)
-                throw read_error(Errc::Unsupported, path_, "the slices of the series differ in size or orientation: " +
-                                                               fs::path(first.path).filename().string() + " and " +
-                                                               fs::path(slice.path).filename().string());
+                throw read_error(Errc::Unsupported, path_,
+                                 "the slices of the series differ in size or orientation: " +
+                                     fs::path(first.path).filename().string() + " and " +
+                                     fs::path(slice.path).filename().string());
         }
     }
 
     void set_single(const Slice& slice) {
         ImageGeometry& g = info_.geometry;
-        g.size = require_3d(path_, {std::uint64_t(slice.size[0]), std::uint64_t(slice.size[1]), std::uint64_t(slice.size[2])});
+        g.size = require_3d(path_,
+                            {std::uint64_t(slice.size[0]), std::uint64_t(slice.size[1]), std::uint64_t(slice.size[2])});
         g.spacing = slice.spacing;
         g.origin = slice.origin;
         g.direction = slice.direction;
@@ -275,7 +282,8 @@ private:
             text << "expected slices at even distances, got " << gaps[k] << " between "
                  << fs::path(slices_[k].path).filename().string() << " and "
                  << fs::path(slices_[k + 1].path).filename().string() << " where the others have " << usual
-                 << (gaps[k] > 0 ? ": a slice is missing" : ": several volumes in one series; put one into a folder of its own");
+                 << (gaps[k] > 0 ? ": a slice is missing"
+                                 : ": several volumes in one series; put one into a folder of its own");
             throw read_error(Errc::InvalidInput, path_, text.str());
         }
     }
@@ -325,7 +333,8 @@ private:
         });
     }
 
-    char* copy(const Slice& slice, const char* stored, std::uint64_t first, const PixelRequest& request, char* out) const {
+    char* copy(const Slice& slice, const char* stored, std::uint64_t first, const PixelRequest& request,
+               char* out) const {
         const Index3 n = request.box.size();
         with_pixel_type(slice.type, [&](auto from) {
             with_pixel_type(info_.type, [&](auto to) {
@@ -334,7 +343,8 @@ private:
                 auto* target = reinterpret_cast<To*>(out);
                 for (int j = request.box.min[1]; j <= request.box.max[1]; ++j)
                     for (int i = request.box.min[0]; i <= request.box.max[0]; ++i) {
-                        const std::uint64_t pixel = first + std::uint64_t(j) * std::uint64_t(slice.size[0]) + std::uint64_t(i);
+                        const std::uint64_t pixel =
+                            first + std::uint64_t(j) * std::uint64_t(slice.size[0]) + std::uint64_t(i);
                         *target++ = static_cast<To>(source[pixel * slice.components + request.channel]);
                     }
             });
@@ -367,10 +377,11 @@ std::unique_ptr<ImageFile> open_dicom(const std::string& path, const RunContext&
     if (series.size() > 1) {
         std::string list;
         for (const auto& [uid, slices] : series)
-            list += (list.empty() ? "" : "; ") + std::to_string(slices.size()) + " slices of " + slices.front().description +
-                    " (" + fs::path(slices.front().path).filename().string() + ")";
-        throw read_error(Errc::Unsupported, path, "expected one DICOM series, got " + std::to_string(series.size()) + ": " +
-                                                      list + "; give the file of the one that is wanted");
+            list += (list.empty() ? "" : "; ") + std::to_string(slices.size()) + " slices of " +
+                    slices.front().description + " (" + fs::path(slices.front().path).filename().string() + ")";
+        throw read_error(Errc::Unsupported, path,
+                         "expected one DICOM series, got " + std::to_string(series.size()) + ": " + list +
+                             "; give the file of the one that is wanted");
     }
     return std::make_unique<DicomSeries>(path, series.begin()->second);
 }

@@ -105,10 +105,12 @@ private:
     /// The numbers of the image pixel module fit each other.
     [[nodiscard]] bool describes_pixels() const {
         const auto number = [&](std::uint32_t tag) { return header_.integer(tag).value_or(kUndefined); };
-        const std::uint32_t allocated = number(kBitsAllocated), stored = number(kBitsStored), samples = number(kSamples);
-        return (samples == 1 || samples == 3 || samples == 4) && (allocated == 8 || allocated == 16 || allocated == 32) &&
-               stored > 0 && stored <= allocated && number(kHighBit) + 1 == stored && number(kRepresentation) <= 1 &&
-               number(kRows) > 0 && number(kRows) < kUndefined && number(kColumns) > 0 && number(kColumns) < kUndefined;
+        const std::uint32_t allocated = number(kBitsAllocated), stored = number(kBitsStored),
+                            samples = number(kSamples);
+        return (samples == 1 || samples == 3 || samples == 4) &&
+               (allocated == 8 || allocated == 16 || allocated == 32) && stored > 0 && stored <= allocated &&
+               number(kHighBit) + 1 == stored && number(kRepresentation) <= 1 && number(kRows) > 0 &&
+               number(kRows) < kUndefined && number(kColumns) > 0 && number(kColumns) < kUndefined;
     }
     /// The elements up to `end`, or up to an item's end.
     bool walk(std::uint64_t end, bool in_item, int depth) {
@@ -196,7 +198,8 @@ std::vector<double> DicomHeader::numbers(std::uint32_t tag) const {
 std::optional<std::uint32_t> DicomHeader::integer(std::uint32_t tag) const {
     const auto found = values.find(tag);
     if (found == values.end() || found->second.size() != 2) return std::nullopt;
-    const auto first = static_cast<unsigned char>(found->second[0]), second = static_cast<unsigned char>(found->second[1]);
+    const auto first = static_cast<unsigned char>(found->second[0]),
+               second = static_cast<unsigned char>(found->second[1]);
     return big_endian ? std::uint32_t(first) << 8 | second : std::uint32_t(second) << 8 | first;
 }
 

@@ -20,8 +20,9 @@ using detail::ImageFile;
 using detail::PixelRequest;
 using detail::read_error;
 
-constexpr const char* kReadable = ".tif, .tiff, .nrrd, .nhdr, .nii, .nii.gz, .mha, .mhd, .mrc, .map, .h5, .dcm or .vdb, "
-                                  "or a folder with a DICOM series";
+constexpr const char* kReadable =
+    ".tif, .tiff, .nrrd, .nhdr, .nii, .nii.gz, .mha, .mhd, .mrc, .map, .h5, .dcm or .vdb, "
+    "or a folder with a DICOM series";
 
 bool is_one_of(const std::string& text, std::initializer_list<const char*> list) {
     return std::any_of(list.begin(), list.end(), [&](const char* known) { return text == known; });
@@ -32,8 +33,9 @@ void check_geometry(const std::string& path, const ImageGeometry& g) {
     constexpr double kTolerance = 1e-3;
     for (int a = 0; a < 3; ++a) {
         if (!(g.spacing[a] > 0) || !std::isfinite(g.spacing[a]))
-            throw detail::read_error(Errc::InvalidInput, path, "expected a positive spacing, got " +
-                                                std::to_string(g.spacing[a]) + " along axis " + std::to_string(a));
+            throw detail::read_error(Errc::InvalidInput, path,
+                                     "expected a positive spacing, got " + std::to_string(g.spacing[a]) +
+                                         " along axis " + std::to_string(a));
         if (!std::isfinite(g.origin[a]))
             throw Error(Errc::InvalidInput, "read_image: " + path + ": the origin is not finite");
         for (int b = 0; b <= a; ++b) {
@@ -76,8 +78,9 @@ void warn_of_spacing(const std::string& path, const ImageInfo& info, const RunCo
     for (int a = 0; a < 3; ++a)
         if (!info.spacing_known[a]) axes += (axes.empty() ? "" : ", ") + std::string(1, "xyz"[a]);
     if (axes.empty()) return;
-    run.warn(path + ": the file states no spacing along " + axes + ": 1 stands in for it, and lengths, volumes and shapes "
-                    "may be wrong; `spacing = sx,sy,sz` gives it");
+    run.warn(path + ": the file states no spacing along " + axes +
+             ": 1 stands in for it, and lengths, volumes and shapes "
+             "may be wrong; `spacing = sx,sy,sz` gives it");
 }
 
 /// The user's corrections, and the last checks.
@@ -128,12 +131,14 @@ PixelRequest choose_pixels(const std::string& path, const ImageInfo& info, const
 // ---------------------------------------------------------------------------------------------- geometry
 
 Vec3 ImageGeometry::index_to_world(const Vec3& index) const {
-    const Vec3 moved = detail::multiply(direction, {index[0] * spacing[0], index[1] * spacing[1], index[2] * spacing[2]});
+    const Vec3 moved =
+        detail::multiply(direction, {index[0] * spacing[0], index[1] * spacing[1], index[2] * spacing[2]});
     return {origin[0] + moved[0], origin[1] + moved[1], origin[2] + moved[2]};
 }
 
 Vec3 ImageGeometry::world_to_index(const Vec3& world) const {
-    const Vec3 moved = detail::multiply(detail::inverse(direction), {world[0] - origin[0], world[1] - origin[1], world[2] - origin[2]});
+    const Vec3 moved = detail::multiply(detail::inverse(direction),
+                                        {world[0] - origin[0], world[1] - origin[1], world[2] - origin[2]});
     return {moved[0] / spacing[0], moved[1] / spacing[1], moved[2] / spacing[2]};
 }
 
@@ -214,7 +219,8 @@ const char* to_string(PixelType type) {
 }
 
 double Image::at(int i, int j, int k) const {
-    const std::int64_t n = stride_[0] * (i - held_.min[0]) + stride_[1] * (j - held_.min[1]) + stride_[2] * (k - held_.min[2]);
+    const std::int64_t n =
+        stride_[0] * (i - held_.min[0]) + stride_[1] * (j - held_.min[1]) + stride_[2] * (k - held_.min[2]);
     return detail::with_pixel_type(
         type_, [&](auto pixel) { return double(static_cast<const decltype(pixel)*>(data_.get())[n]); });
 }
@@ -228,8 +234,8 @@ Image Image::cropped() const {
 
 Image Image::placed(const ImageGeometry& geometry) const {
     if (geometry.size != geometry_.size)
-        throw Error(Errc::InvalidInput, "placed: " + path_ + ": expected " + detail::size_text(geometry.size) + " voxels, got " +
-                                            detail::size_text(geometry_.size));
+        throw Error(Errc::InvalidInput, "placed: " + path_ + ": expected " + detail::size_text(geometry.size) +
+                                            " voxels, got " + detail::size_text(geometry_.size));
     Image moved = *this;
     moved.geometry_ = geometry;
     return moved;

@@ -127,11 +127,33 @@ void read_text_header(const TextHeader& header, ImageInfo& info) {
     info.geometry.unit = normal_unit(unit);
     const bool known = !header.value_of({"spacings", "space directions", "elementspacing", "elementsize"}).empty();
     info.spacing_known = {known, known, known};
-    for (const char* key :
-         {"type", "elementtype", "sizes", "dimsize", "elementnumberofchannels", "kinds", "spacings", "space directions",
-          "elementspacing", "elementsize", "space origin", "offset", "position", "origin", "space", "transformmatrix",
-          "orientation", "rotation", "space units", "units", "distanceunits", "unit", "encoding", "compresseddata",
-          "data file", "datafile", "elementdatafile"})
+    for (const char* key : {"type",
+                            "elementtype",
+                            "sizes",
+                            "dimsize",
+                            "elementnumberofchannels",
+                            "kinds",
+                            "spacings",
+                            "space directions",
+                            "elementspacing",
+                            "elementsize",
+                            "space origin",
+                            "offset",
+                            "position",
+                            "origin",
+                            "space",
+                            "transformmatrix",
+                            "orientation",
+                            "rotation",
+                            "space units",
+                            "units",
+                            "distanceunits",
+                            "unit",
+                            "encoding",
+                            "compresseddata",
+                            "data file",
+                            "datafile",
+                            "elementdatafile"})
         if (const std::string found = header.value(key); !found.empty()) info.fields.emplace_back(key, found);
 }
 
@@ -166,7 +188,8 @@ public:
         const auto size = load<std::int32_t>(bytes_.data(), false), swapped = load<std::int32_t>(bytes_.data(), true);
         constexpr std::int32_t kVersion2 = 540;
         if (size == kVersion2 || swapped == kVersion2)
-            throw Error(Errc::Unsupported, "read_image: " + begin.path + ": NIfTI-2 is not read; convert it to NIfTI-1");
+            throw Error(Errc::Unsupported,
+                        "read_image: " + begin.path + ": NIfTI-2 is not read; convert it to NIfTI-1");
         swap_ = size != std::int32_t(bytes_.size());
         if (swap_ && swapped != std::int32_t(bytes_.size())) throw Error(Errc::InvalidInput, unusable);
     }
@@ -250,7 +273,8 @@ std::optional<PixelPlace> nrrd_pixels(const std::string& path, const TextHeader&
     if (lower(file).rfind("list", 0) == 0 || file.find('%') != std::string::npos || file.find(' ') != std::string::npos)
         return std::nullopt;
     if (!header.value_of({"line skip", "lineskip", "byte skip", "byteskip"}).empty()) return std::nullopt;
-    if (channels > 1 && (header.value("kinds").empty() || header.says("kinds", "domain") || header.says("kinds", "space")))
+    if (channels > 1 &&
+        (header.value("kinds").empty() || header.says("kinds", "domain") || header.says("kinds", "space")))
         return std::nullopt;
     place.path = file.empty() ? path : (fs::path(path).parent_path() / file).string();
     place.file_offset = file.empty() ? header.end : 0;
@@ -270,7 +294,10 @@ class ItkFile : public ImageFile {
 public:
     ItkFile(std::string path, std::string unusable, ImageInfo info, itk::ImageIOBase::Pointer io, bool in_boxes,
             std::uint64_t file_bytes)
-        : path_(std::move(path)), unusable_(std::move(unusable)), io_(std::move(io)), in_boxes_(in_boxes),
+        : path_(std::move(path)),
+          unusable_(std::move(unusable)),
+          io_(std::move(io)),
+          in_boxes_(in_boxes),
           file_bytes_(file_bytes) {
         info_ = std::move(info);
     }
@@ -289,7 +316,8 @@ public:
         }
         const auto channels = std::uint64_t(info_.channels);
         const std::uint64_t frame = voxel_count(box.size()) * channels;
-        const std::shared_ptr<void> data = allocate_pixels(path_, frame * std::uint64_t(info_.frames), info_.type, file_bytes_);
+        const std::shared_ptr<void> data =
+            allocate_pixels(path_, frame * std::uint64_t(info_.frames), info_.type, file_bytes_);
         io_->SetIORegion(region);
         const QuietHdf5 quiet;
         with_itk(Errc::InvalidInput, unusable_, [&] { io_->Read(data.get()); });
@@ -398,9 +426,10 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path) {
     if (place) return open_placed(path, info, *place);
     constexpr std::uint64_t kMostPixels = std::uint64_t(1) << 48;
     if (std::uint64_t(info.channels) * std::uint64_t(info.frames) > kMostPixels / voxel_count(info.geometry.size))
-        throw read_error(Errc::InvalidInput, path, "the header claims " + size_text(info.geometry.size) + " voxels of " +
-                                                       std::to_string(info.channels) + " channels and " +
-                                                       std::to_string(info.frames) + " frames");
+        throw read_error(Errc::InvalidInput, path,
+                         "the header claims " + size_text(info.geometry.size) + " voxels of " +
+                             std::to_string(info.channels) + " channels and " + std::to_string(info.frames) +
+                             " frames");
     const bool detached = header && !header->data_file().empty();
     return std::make_unique<ItkFile>(path, unusable, info, io, is_hdf5, detached ? 0 : fs::file_size(path));
 }

@@ -54,8 +54,8 @@ void set_type(const std::string& path, const Header& header, ImageInfo& info, Pi
         case 0: {
             // Signed by the standard; before it, and in IMOD's files unless a flag says otherwise, unsigned.
             const bool imod = header.integer(kImodStamp) == kImod;
-            const bool is_unsigned = imod ? (header.integer(kImodFlags) & 1) == 0
-                                          : header.number(kLeast) >= 0 && header.number(kMost) > 127;
+            const bool is_unsigned =
+                imod ? (header.integer(kImodFlags) & 1) == 0 : header.number(kLeast) >= 0 && header.number(kMost) > 127;
             place.type = is_unsigned ? PixelType::UInt8 : PixelType::Int8;
             break;
         }
@@ -67,8 +67,8 @@ void set_type(const std::string& path, const Header& header, ImageInfo& info, Pi
             place.half = true;
             break;
         default:
-            throw read_error(Errc::Unsupported, path, "expected MRC mode 0, 1, 2, 6 or 12, got mode " +
-                                                          std::to_string(header.integer(kMode)));
+            throw read_error(Errc::Unsupported, path,
+                             "expected MRC mode 0, 1, 2, 6 or 12, got mode " + std::to_string(header.integer(kMode)));
     }
     info.type = place.type;
 }
@@ -84,7 +84,8 @@ std::array<int, 3> axes_of(const std::string& path, const Header& header) {
     // old programs leave zeros
     if (axes == std::array<int, 3>{-1, -1, -1}) return {0, 1, 2};
     if (seen != 7)
-        throw read_error(Errc::InvalidInput, path, "expected MAPC, MAPR and MAPS to be 1, 2 and 3 in some order; damaged");
+        throw read_error(Errc::InvalidInput, path,
+                         "expected MAPC, MAPR and MAPS to be 1, 2 and 3 in some order; damaged");
     return axes;
 }
 
@@ -99,7 +100,8 @@ void set_geometry(const std::string& path, const Header& header, ImageInfo& info
         has_origin = has_origin || geometry.origin[w] != 0;
         const float angle = header.number(kAngles + 4 * w);
         if (angle != 0 && !(std::abs(angle - 90) < 0.01F))
-            throw read_error(Errc::Unsupported, path, "expected a cell with right angles, got " + std::to_string(angle));
+            throw read_error(Errc::Unsupported, path,
+                             "expected a cell with right angles, got " + std::to_string(angle));
     }
     std::string order;
     for (int a = 0; a < 3; ++a) {

@@ -166,7 +166,8 @@ void convert(const PixelPlace& place, const void* stored, std::uint64_t step, st
 
 class PlacedFile : public ImageFile {
 public:
-    PlacedFile(std::string path, const ImageInfo& info, PixelPlace place) : path_(std::move(path)), place_(std::move(place)) {
+    PlacedFile(std::string path, const ImageInfo& info, PixelPlace place)
+        : path_(std::move(path)), place_(std::move(place)) {
         info_ = info;
         const Index3& size = info_.geometry.size;
         components_ = std::uint64_t(info_.channels);
@@ -186,8 +187,9 @@ public:
 
 private:
     [[nodiscard]] Error damaged() const {
-        return read_error(Errc::InvalidInput, path_, "damaged or truncated" +
-                          (place_.path == path_ ? std::string() : ", or its data file " + place_.path + " is"));
+        return read_error(Errc::InvalidInput, path_,
+                          "damaged or truncated" +
+                              (place_.path == path_ ? std::string() : ", or its data file " + place_.path + " is"));
     }
 
     void check_file_size() const {
@@ -196,8 +198,8 @@ private:
         if (status) throw read_error(Errc::Io, path_, "its data file " + place_.path + " cannot be opened");
         const Index3& size = info_.geometry.size;
         // in floating point: sizes of a damaged header may overflow
-        const double wanted = double(size[0]) * size[1] * size[2] * double(components_) * info_.frames *
-                              double(place_.stored_bytes());
+        const double wanted =
+            double(size[0]) * size[1] * size[2] * double(components_) * info_.frames * double(place_.stored_bytes());
         const double there = place_.packed ? double(file_bytes) * kMaxCompression
                                            : double(file_bytes) - double(place_.file_offset) - double(place_.skip);
         if (wanted > there)
@@ -222,7 +224,8 @@ private:
 
     [[nodiscard]] Pixels map(const PixelRequest& request) const {
         const VoxelBox& box = request.box;
-        const std::uint64_t begin = place_.file_offset + frame_begin(request) + std::uint64_t(box.min[2]) * slice_bytes_;
+        const std::uint64_t begin =
+            place_.file_offset + frame_begin(request) + std::uint64_t(box.min[2]) * slice_bytes_;
         const auto slab = map_file(place_.path, begin, std::uint64_t(box.size()[2]) * slice_bytes_);
         const char* first = static_cast<const char*>(slab.get()) + std::uint64_t(box.min[1]) * row_bytes_ +
                             (std::uint64_t(box.min[0]) * components_ + request.channel) * place_.stored_bytes();
@@ -254,7 +257,8 @@ private:
                 convert(place_, rows.data() + std::uint64_t(j) * row_bytes_ + first, components_, std::uint64_t(n[0]),
                         info_.type, out);
         }
-        const bool to_the_end = box == whole_box(info_.geometry.size) && request.frame + 1 == std::uint64_t(info_.frames);
+        const bool to_the_end =
+            box == whole_box(info_.geometry.size) && request.frame + 1 == std::uint64_t(info_.frames);
         if (to_the_end && !stream.checksum_fits()) throw damaged();
         return {data, dense_strides(n), false};
     }
@@ -280,9 +284,9 @@ std::shared_ptr<const void> map_file(const std::string& path, std::uint64_t offs
     const auto page = std::uint64_t(::sysconf(_SC_PAGESIZE));
     const std::uint64_t before = offset % page;
     const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-    void* begin = file < 0 ? MAP_FAILED
-                           : ::mmap(nullptr, bytes + before, PROT_READ, MAP_PRIVATE, file,
-                                    static_cast<off_t>(offset - before));
+    void* begin =
+        file < 0 ? MAP_FAILED
+                 : ::mmap(nullptr, bytes + before, PROT_READ, MAP_PRIVATE, file, static_cast<off_t>(offset - before));
     if (file >= 0) ::close(file);
     if (begin == MAP_FAILED) throw read_error(Errc::Io, path, "cannot be mapped into memory");
     ::madvise(begin, bytes + before, MADV_RANDOM);  // what lies around a touched row is not wanted
@@ -348,14 +352,14 @@ std::shared_ptr<void> allocate_pixels(const std::string& path, std::uint64_t pix
     const std::uint64_t bytes = pixels * pixel_bytes(type);
     const bool overflow = pixels > std::numeric_limits<std::uint64_t>::max() / 8;
     if (overflow || (file_bytes > 0 && bytes / kMaxCompression > file_bytes))
-        throw read_error(Errc::InvalidInput, path, "the header claims " + std::to_string(pixels) +
-                                                       " voxels, which a file of " + std::to_string(file_bytes) +
-                                                       " bytes cannot hold; it is damaged or truncated");
+        throw read_error(Errc::InvalidInput, path,
+                         "the header claims " + std::to_string(pixels) + " voxels, which a file of " +
+                             std::to_string(file_bytes) + " bytes cannot hold; it is damaged or truncated");
     const std::uint64_t memory = std::uint64_t(::sysconf(_SC_PHYS_PAGES)) * std::uint64_t(::sysconf(_SC_PAGESIZE));
     const auto refuse = [&] {
-        return read_error(Errc::Unsupported, path, "the image needs " + std::to_string(bytes >> 20) +
-                                                       " MiB, this machine has " + std::to_string(memory >> 20) +
-                                                       " MiB; choose a part with `roi`, or downsample it");
+        return read_error(Errc::Unsupported, path,
+                          "the image needs " + std::to_string(bytes >> 20) + " MiB, this machine has " +
+                              std::to_string(memory >> 20) + " MiB; choose a part with `roi`, or downsample it");
     };
     if (bytes > memory) throw refuse();
     // malloc leaves the pages untouched until the reader fills them.

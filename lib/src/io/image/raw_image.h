@@ -95,9 +95,9 @@ struct PixelPlace {
     bool swap = false;              ///< the other byte order
     bool half = false;              ///< 16-bit floats, told as Float
     PixelType type = PixelType::UInt8;
-    double slope = 1;               ///< pixel = slope * stored + intercept
+    double slope = 1;  ///< pixel = slope * stored + intercept
     double intercept = 0;
-    std::uint64_t frame_gap = 0;    ///< unpacked bytes between frames
+    std::uint64_t frame_gap = 0;  ///< unpacked bytes between frames
 
     [[nodiscard]] std::uint64_t stored_bytes() const { return half ? 2 : pixel_bytes(type); }
     [[nodiscard]] bool as_stored() const { return !swap && !half && slope == 1 && intercept == 0; }

@@ -67,7 +67,8 @@ std::unique_ptr<Tiff> open_for_reading(const std::string& path) {
     const std::uint64_t bytes = std::filesystem::file_size(path, status);
     if (status) throw read_error(Errc::Io, path, "no such file");
     auto tiff = std::make_unique<Tiff>(path, "r", std::max(kLeastLimit, 4 * bytes));
-    if (tiff->get() == nullptr) throw tiff->error(Errc::InvalidInput, "read_image: " + path + ": not a usable TIFF file");
+    if (tiff->get() == nullptr)
+        throw tiff->error(Errc::InvalidInput, "read_image: " + path + ": not a usable TIFF file");
     return tiff;
 }
 
@@ -98,10 +99,12 @@ std::optional<std::uint64_t> pixels_in_one_piece(const Tiff& tiff, const Page& p
     if (tiff.tag<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE) != COMPRESSION_NONE) return std::nullopt;
     if (tiff.tag<std::uint16_t>(TIFFTAG_FILLORDER, FILLORDER_MSB2LSB) != FILLORDER_MSB2LSB) return std::nullopt;
     if (TIFFIsTiled(tiff.get()) != 0 || page.samples != 1) return std::nullopt;
-    const std::uint64_t rows = std::min<std::uint64_t>(tiff.tag<std::uint32_t>(TIFFTAG_ROWSPERSTRIP, page.height), page.height);
+    const std::uint64_t rows =
+        std::min<std::uint64_t>(tiff.tag<std::uint32_t>(TIFFTAG_ROWSPERSTRIP, page.height), page.height);
     const std::uint64_t first = TIFFGetStrileOffset(tiff.get(), 0);
     for (std::uint64_t strip = 1; rows > 0 && strip * rows < page.height; ++strip)
-        if (TIFFGetStrileOffset(tiff.get(), static_cast<std::uint32_t>(strip)) != first + strip * rows * page.row_bytes())
+        if (TIFFGetStrileOffset(tiff.get(), static_cast<std::uint32_t>(strip)) !=
+            first + strip * rows * page.row_bytes())
             return std::nullopt;
     return rows > 0 && first > 0 ? std::optional(first) : std::nullopt;
 }
@@ -125,7 +128,8 @@ public:
     bool read(char* out) {
         // A tile may be larger than the page, but not absurdly so.
         constexpr std::uint64_t kSlack = 65536;
-        if (width_ == 0 || height_ == 0 || width_ > page_.width + kSlack || height_ > page_.height + kSlack) return false;
+        if (width_ == 0 || height_ == 0 || width_ > page_.width + kSlack || height_ > page_.height + kSlack)
+            return false;
         const std::uint64_t block_bytes = width_ * height_ * samples_ * bytes_;
         const tmsize_t told = tiled_ ? TIFFTileSize(tiff_.get()) : TIFFStripSize(tiff_.get());
         if (told < 0 || std::uint64_t(told) != block_bytes) return false;
@@ -150,7 +154,8 @@ private:
         }
         const std::uint64_t rows = std::min<std::uint64_t>(height_, page_.height - y);
         const auto want = static_cast<tmsize_t>(rows * width_ * samples_ * bytes_);
-        return TIFFReadEncodedStrip(tiff_.get(), TIFFComputeStrip(tiff_.get(), row, plane), block_.data(), want) == want;
+        return TIFFReadEncodedStrip(tiff_.get(), TIFFComputeStrip(tiff_.get(), row, plane), block_.data(), want) ==
+               want;
     }
 
     /// The part of the block at (x, y) that lies in the box.
@@ -166,7 +171,8 @@ private:
             if (samples_ == 1)
                 std::memcpy(to, from, (x1 - x0) * bytes_);
             else
-                for (std::uint64_t n = 0; n < x1 - x0; ++n) std::memcpy(to + n * bytes_, from + n * samples_ * bytes_, bytes_);
+                for (std::uint64_t n = 0; n < x1 - x0; ++n)
+                    std::memcpy(to + n * bytes_, from + n * samples_ * bytes_, bytes_);
         }
     }
 
@@ -291,8 +297,10 @@ private:
         turn_to(plane.file);
         if (plane.page >= pages_.size() || !pages_[plane.page].same_kind(kind_)) throw damaged(plane);
         const Page& page = pages_[plane.page];
-        if (TIFFSetSubDirectory(tiff_->get(), page.offset) != 1 || !current_page(*tiff_).same_kind(page)) throw damaged(plane);
-        if (!PageReader(*tiff_, page, request.box, kind_.samples > 1 ? request.channel : 0).read(out)) throw damaged(plane);
+        if (TIFFSetSubDirectory(tiff_->get(), page.offset) != 1 || !current_page(*tiff_).same_kind(page))
+            throw damaged(plane);
+        if (!PageReader(*tiff_, page, request.box, kind_.samples > 1 ? request.channel : 0).read(out))
+            throw damaged(plane);
     }
 
     void read_contiguous(std::uint64_t number, const PixelRequest& request, char* out) const {
@@ -300,7 +308,8 @@ private:
         const std::uint64_t width = pixel_bytes(info_.type), row = std::uint64_t(box.size()[0]) * width;
         std::ifstream raw(path_, std::ios::binary);
         for (std::int32_t j = box.min[1]; j <= box.max[1]; ++j, out += row) {
-            raw.seekg(static_cast<std::streamoff>(contiguous_ + number * kind_.bytes() + std::uint64_t(j) * kind_.row_bytes() +
+            raw.seekg(static_cast<std::streamoff>(contiguous_ + number * kind_.bytes() +
+                                                  std::uint64_t(j) * kind_.row_bytes() +
                                                   std::uint64_t(box.min[0]) * width));
             if (!raw.read(out, static_cast<std::streamsize>(row)))
                 throw damaged({0, static_cast<std::uint32_t>(number)});
@@ -312,12 +321,14 @@ private:
     [[nodiscard]] bool may_map(const PixelRequest& request) const {
         return is_worth_mapping(std::uint64_t(request.box.size()[2]) * kind_.bytes()) && stack_.files.size() == 1 &&
                kind_.samples == 1 && TIFFIsByteSwapped(tiff_->get()) == 0 &&
-               (contiguous_ > 0 || tiff_->tag<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE) == COMPRESSION_NONE);
+               (contiguous_ > 0 ||
+                tiff_->tag<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE) == COMPRESSION_NONE);
     }
 
     [[nodiscard]] std::optional<std::uint64_t> pixels_of(const TiffStack::Plane& plane) const {
         if (contiguous_ > 0) return contiguous_ + plane.page * kind_.bytes();
-        if (plane.page >= pages_.size() || TIFFSetSubDirectory(tiff_->get(), pages_[plane.page].offset) != 1) throw damaged(plane);
+        if (plane.page >= pages_.size() || TIFFSetSubDirectory(tiff_->get(), pages_[plane.page].offset) != 1)
+            throw damaged(plane);
         return pixels_in_one_piece(*tiff_, kind_);
     }
 
@@ -335,7 +346,8 @@ private:
         for (std::size_t n = 1; n < begins.size(); ++n)
             if (begins[n] < begins[n - 1] || begins[n] - begins[n - 1] != step) return std::nullopt;
         const std::uint64_t bytes = begins.back() + kind_.bytes() - begins.front();
-        if (begins.back() + kind_.bytes() > std::filesystem::file_size(path_)) return std::nullopt;  // read() says where
+        if (begins.back() + kind_.bytes() > std::filesystem::file_size(path_))
+            return std::nullopt;  // read() says where
         const auto slab = map_file(path_, begins.front(), bytes);
         const char* first = static_cast<const char*>(slab.get()) + std::uint64_t(box.min[1]) * kind_.row_bytes() +
                             std::uint64_t(box.min[0]) * width;
@@ -344,9 +356,9 @@ private:
 
     std::string path_;
     std::unique_ptr<Tiff> tiff_;
-    std::uint32_t open_ = 0;     ///< which of stack_.files tiff_ is
-    Page kind_;                  ///< the first page; all others are alike
-    std::vector<Page> pages_;    ///< of the open file; empty for a single directory
+    std::uint32_t open_ = 0;        ///< which of stack_.files tiff_ is
+    Page kind_;                     ///< the first page; all others are alike
+    std::vector<Page> pages_;       ///< of the open file; empty for a single directory
     std::uint64_t contiguous_ = 0;  ///< where the pixels begin of a stack with a single directory
     TiffStack stack_;
 };

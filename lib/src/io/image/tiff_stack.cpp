@@ -58,7 +58,8 @@ void read_resolution(const TiffFacts& facts, TiffStack& stack) {
     }
 }
 
-// ---- ImageJ ----------------------------------------------------------------------------------------------------------
+// ---- ImageJ
+// ----------------------------------------------------------------------------------------------------------
 
 /// The value of `key=` in ImageJ's description, one key a line.
 std::string imagej_value(const std::string& description, const std::string& key) {
@@ -84,7 +85,8 @@ void read_imagej(const TiffFacts& facts, TiffStack& stack) {
     stack.slices = at_least_one(slices);
     if (slices.empty() && stack.channels * stack.frames == 1) stack.slices = facts.pages;
 
-    std::array<std::string, 3> units{normal_unit(value("unit")), normal_unit(value("yunit")), normal_unit(value("zunit"))};
+    std::array<std::string, 3> units{normal_unit(value("unit")), normal_unit(value("yunit")),
+                                     normal_unit(value("zunit"))};
     constexpr int kInch = 2, kCentimetre = 3;
     if (units[0].empty() && facts.resolution_unit == kInch) units[0] = "inch";
     if (units[0].empty() && facts.resolution_unit == kCentimetre) units[0] = "cm";
@@ -103,7 +105,8 @@ void read_imagej(const TiffFacts& facts, TiffStack& stack) {
         if (const double voxel = to_number(origin[a]); voxel != 0) stack.origin[a] = -voxel * stack.spacing[a];
 }
 
-// ---- tifffile --------------------------------------------------------------------------------------------------------
+// ---- tifffile
+// --------------------------------------------------------------------------------------------------------
 
 /// tifffile's own description: {"shape": [58, 512, 512], "axes": "ZYX", "spacing": 1.0, "unit": "um"}.
 /// @returns whether it is one.
@@ -140,13 +143,15 @@ bool read_tifffile(const TiffFacts& facts, TiffStack& stack) {
             stack.fields.emplace_back("spacing", std::to_string(depth));
         }
     }
-    if (json.contains("unit") && json.at("unit").is_string()) stack.unit = normal_unit(json.at("unit").get<std::string>());
+    if (json.contains("unit") && json.at("unit").is_string())
+        stack.unit = normal_unit(json.at("unit").get<std::string>());
     // Without a resolution tifffile writes 1/1.
     if (facts.resolution[0] != 1.0F && facts.resolution_unit == 1) read_resolution(facts, stack);
     return true;
 }
 
-// ---- OME -------------------------------------------------------------------------------------------------------------
+// ---- OME
+// -------------------------------------------------------------------------------------------------------------
 
 struct XmlTag {
     std::string name;  ///< without a namespace
@@ -161,8 +166,9 @@ struct XmlTag {
 
 std::string decode_entities(const std::string& text) {
     static constexpr std::pair<const char*, const char*> kEntities[] = {
-        {"amp;", "&"},     {"lt;", "<"},          {"gt;", ">"},          {"quot;", "\""},     {"apos;", "'"},
-        {"#181;", "\xC2\xB5"}, {"#xB5;", "\xC2\xB5"}, {"#xb5;", "\xC2\xB5"}, {"#956;", "\xCE\xBC"}, {"#197;", "\xC3\x85"}};
+        {"amp;", "&"},         {"lt;", "<"},          {"gt;", ">"},          {"quot;", "\""},
+        {"apos;", "'"},        {"#181;", "\xC2\xB5"}, {"#xB5;", "\xC2\xB5"}, {"#xb5;", "\xC2\xB5"},
+        {"#956;", "\xCE\xBC"}, {"#197;", "\xC3\x85"}};
     std::string out;
     for (std::size_t at = 0; at < text.size(); ++at) {
         out += text[at];
@@ -205,7 +211,9 @@ private:
     }
     std::string word() {
         const std::size_t begin = at_;
-        while (at_ < text_.size() && !is_space(text_[at_]) && text_[at_] != '=' && text_[at_] != '>' && text_[at_] != '/') ++at_;
+        while (at_ < text_.size() && !is_space(text_[at_]) && text_[at_] != '=' && text_[at_] != '>' &&
+               text_[at_] != '/')
+            ++at_;
         const std::string name = text_.substr(begin, at_ - begin);
         return name.substr(name.rfind(':') == std::string::npos ? 0 : name.rfind(':') + 1);
     }
@@ -300,7 +308,8 @@ public:
         name_files(data);
         for (const TiffData& block : data) {
             if (block.z >= stack_.slices || block.c >= stack_.channels || block.t >= stack_.frames)
-                throw read_error(Errc::InvalidInput, facts_.path, "its OME-XML names a plane beyond SizeZ, SizeC or SizeT");
+                throw read_error(Errc::InvalidInput, facts_.path,
+                                 "its OME-XML names a plane beyond SizeZ, SizeC or SizeT");
             const std::uint32_t file = number_of(block.file);
             const std::uint64_t first = stack_.number(block.z, block.c, block.t);
             const std::uint64_t page = to_count(block.ifd, 0);
@@ -372,7 +381,8 @@ void read_ome(const TiffFacts& facts, TiffStack& stack) {
         units[a] = unit.empty() ? "um" : normal_unit(unit);  // the OME schema's default
     }
     if (stack.spacing[0] > 0) unify_units(stack, units);
-    const bool named = std::any_of(ome.channels.begin(), ome.channels.end(), [](const std::string& n) { return !n.empty(); });
+    const bool named =
+        std::any_of(ome.channels.begin(), ome.channels.end(), [](const std::string& n) { return !n.empty(); });
     if (named && ome.channels.size() == stack.channels) stack.channel_names = ome.channels;
     if (stack.slices > kMostPlanes || stack.channels > kMostPlanes || stack.frames > kMostPlanes ||
         stack.slices * stack.channels > kMostPlanes || stack.slices * stack.channels * stack.frames > kMostPlanes)

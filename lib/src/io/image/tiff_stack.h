@@ -38,10 +38,10 @@ struct TiffStack {
 /// What is known of the file itself.
 struct TiffFacts {
     std::string path;
-    std::string description;             ///< tag 270 of the first page
-    std::uint64_t pages = 0;             ///< full-resolution ones
-    std::array<float, 2> resolution{};   ///< pixels per unit along x and y; 0: none
-    int resolution_unit = 1;             ///< 1: none, 2: inch, 3: cm
+    std::string description;            ///< tag 270 of the first page
+    std::uint64_t pages = 0;            ///< full-resolution ones
+    std::array<float, 2> resolution{};  ///< pixels per unit along x and y; 0: none
+    int resolution_unit = 1;            ///< 1: none, 2: inch, 3: cm
     /// Counts the pages of another file of the same image. @throws Error.
     std::function<std::uint64_t(const std::string& path)> count_pages;
 };

@@ -33,7 +33,8 @@ void write_tiff(const std::string& path, const ImageGeometry& geometry, PixelTyp
     // ImageJ tells the origin in voxels, as the voxel that lies at 0.
     for (std::size_t a = 0; a < 3; ++a)
         if (geometry.spacing_known && geometry.is_axis_aligned() && geometry.origin[a] != 0)
-            description += std::string(1, "xyz"[a]) + "origin=" + shortest(-geometry.origin[a] / geometry.spacing[a]) + "\n";
+            description +=
+                std::string(1, "xyz"[a]) + "origin=" + shortest(-geometry.origin[a] / geometry.spacing[a]) + "\n";
     if (!geometry.unit.empty()) description += "unit=" + geometry.unit + "\n";
     const int format = with_pixel_type(type, [](auto pixel) {
         using T = decltype(pixel);

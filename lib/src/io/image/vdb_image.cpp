@@ -18,7 +18,8 @@ public:
         const std::string title = "grid '" + grid_->getName() + "'";
         if (box.empty()) throw read_error(Errc::InvalidInput, path_, title + " has no active voxel");
         const auto& transform = grid_->transform();
-        if (!transform.isLinear()) throw read_error(Errc::Unsupported, path_, title + " has a transform that is not linear");
+        if (!transform.isLinear())
+            throw read_error(Errc::Unsupported, path_, title + " has a transform that is not linear");
         first_ = box.min();
         std::uint64_t size[3];
         for (int a = 0; a < 3; ++a) size[a] = std::uint64_t(std::int64_t(box.max()[a]) - box.min()[a] + 1);
@@ -44,8 +45,9 @@ public:
     Pixels read(const PixelRequest& request, const RunContext& run) override {
         const Index3 n = request.box.size();
         if (voxel_count(n) / kSparsest > grid_->activeVoxelCount())
-            throw read_error(Errc::Unsupported, path_, "the box of the grid's active voxels is " + size_text(n) +
-                                                           ", nearly all of it empty; choose a part with `roi`");
+            throw read_error(Errc::Unsupported, path_,
+                             "the box of the grid's active voxels is " + size_text(n) +
+                                 ", nearly all of it empty; choose a part with `roi`");
         const std::shared_ptr<void> data = allocate_pixels(path_, voxel_count(n), PixelType::Float, 0);
         const openvdb::Coord first = first_.offsetBy(request.box.min[0], request.box.min[1], request.box.min[2]);
         tbb::parallel_for(0, n[2], [&](int k) {

@@ -54,7 +54,8 @@ private:
         const std::uint32_t version = word(source_.bytes(4)), total = word(source_.bytes(4));
         if (version != 2) unsupported("version " + std::to_string(version) + " of glTF");
         if (total != text_.size())
-            source_.fail("the header promises " + std::to_string(total) + " bytes, the file has " + std::to_string(text_.size()));
+            source_.fail("the header promises " + std::to_string(total) + " bytes, the file has " +
+                         std::to_string(text_.size()));
         const std::uint32_t json_bytes = word(source_.bytes(4));
         if (source_.bytes(4) != "JSON") source_.fail("expected a chunk of JSON first");
         json_ = Json::parse(source_.bytes(json_bytes), nullptr, false);
@@ -75,16 +76,18 @@ private:
     }
     const Json& item(const char* key, const Json& number) const {
         const Json& all = list(key);
-        if (!number.is_number_unsigned() || number.get<std::uint64_t>() >= all.size() || !all[number.get<std::uint64_t>()].is_object())
+        if (!number.is_number_unsigned() || number.get<std::uint64_t>() >= all.size() ||
+            !all[number.get<std::uint64_t>()].is_object())
             source_.fail("there is no " + number.dump().substr(0, 40) + " among its " + key);
         return all[number.get<std::uint64_t>()];
     }
     /// A length or a place in the binary chunk: no larger than that, so that sums of a few cannot overflow.
     std::uint64_t size(const Json& object, const char* key, std::uint64_t otherwise) const {
         const Json value = member(object, key, otherwise);
-        if (!value.is_number_unsigned() || value.get<std::uint64_t>() > std::max<std::uint64_t>(binary_.size(), 1 << 16))
-            source_.fail(std::string(key) + ": expected at most the " + std::to_string(binary_.size()) + " bytes there are, got " +
-                         value.dump().substr(0, 40));
+        if (!value.is_number_unsigned() ||
+            value.get<std::uint64_t>() > std::max<std::uint64_t>(binary_.size(), 1 << 16))
+            source_.fail(std::string(key) + ": expected at most the " + std::to_string(binary_.size()) +
+                         " bytes there are, got " + value.dump().substr(0, 40));
         return value.get<std::uint64_t>();
     }
 
@@ -101,15 +104,18 @@ private:
         if (json.contains("sparse") || !json.contains("bufferView")) unsupported("an accessor without data of its own");
         if (member(json, "type", nullptr) != type) source_.fail(std::string("expected an accessor of type ") + type);
         const Json& view = item("bufferViews", json.at("bufferView"));
-        if (size(view, "buffer", 0) != 0 || item("buffers", 0U).contains("uri")) unsupported("a buffer in another file");
+        if (size(view, "buffer", 0) != 0 || item("buffers", 0U).contains("uri"))
+            unsupported("a buffer in another file");
         Accessor result;
         result.component = size(json, "componentType", 0);
         const std::uint64_t width = components * (result.component == 5121 ? 1 : result.component == 5123 ? 2 : 4);
         result.count = size(json, "count", 0);
         result.stride = size(view, "byteStride", width);
-        const std::uint64_t begin = size(view, "byteOffset", 0), length = size(view, "byteLength", 0), offset = size(json, "byteOffset", 0);
+        const std::uint64_t begin = size(view, "byteOffset", 0), length = size(view, "byteLength", 0),
+                            offset = size(json, "byteOffset", 0);
         if (begin + length > binary_.size() || offset > length || result.stride < width ||
-            (result.count > 0 && (length - offset < width || (length - offset - width) / result.stride < result.count - 1)))
+            (result.count > 0 &&
+             (length - offset < width || (length - offset - width) / result.stride < result.count - 1)))
             source_.fail("an accessor reaches beyond its data; the file is damaged");
         result.bytes = binary_.substr(begin + offset, length - offset);
         return result;
@@ -156,7 +162,8 @@ private:
         }
         const Accessor data = accessor(primitive.at("indices"), "SCALAR", 1);
         const bool is_known = data.component == 5121 || data.component == 5123 || data.component == 5125;
-        if (!is_known) source_.fail("expected indices of type 5121, 5123 or 5125, got " + std::to_string(data.component));
+        if (!is_known)
+            source_.fail("expected indices of type 5121, 5123 or 5125, got " + std::to_string(data.component));
         const std::size_t width = data.component == 5121 ? 1 : data.component == 5123 ? 2 : 4;
         take(data, width);
         for (std::uint64_t n = 0; n < data.count; ++n) {
@@ -187,7 +194,8 @@ std::uint64_t describe_glb(const std::vector<GlbPart>& parts, nlohmann::json& js
     constexpr int kFloat = 5126, kUInt32 = 5125, kVertexData = 34962, kIndexData = 34963;
     std::uint64_t offset = 0;
     const auto add_view = [&](std::uint64_t length, int target) {
-        json["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", offset}, {"byteLength", length}, {"target", target}});
+        json["bufferViews"].push_back(
+            {{"buffer", 0}, {"byteOffset", offset}, {"byteLength", length}, {"target", target}});
         offset += length;
         return json["bufferViews"].size() - 1;
     };
@@ -203,12 +211,20 @@ std::uint64_t describe_glb(const std::vector<GlbPart>& parts, nlohmann::json& js
         const std::uint64_t bytes = 12 * std::uint64_t(mesh.vertices.size());
         nlohmann::json& accessors = json["accessors"];
         const std::size_t first = 3 * n;
-        accessors.push_back({{"bufferView", add_view(bytes, kVertexData)}, {"componentType", kFloat},
-                             {"count", mesh.vertices.size()}, {"type", "VEC3"}, {"min", low}, {"max", high}});
-        accessors.push_back({{"bufferView", add_view(bytes, kVertexData)}, {"componentType", kFloat},
-                             {"count", mesh.vertices.size()}, {"type", "VEC3"}});
+        accessors.push_back({{"bufferView", add_view(bytes, kVertexData)},
+                             {"componentType", kFloat},
+                             {"count", mesh.vertices.size()},
+                             {"type", "VEC3"},
+                             {"min", low},
+                             {"max", high}});
+        accessors.push_back({{"bufferView", add_view(bytes, kVertexData)},
+                             {"componentType", kFloat},
+                             {"count", mesh.vertices.size()},
+                             {"type", "VEC3"}});
         accessors.push_back({{"bufferView", add_view(12 * std::uint64_t(mesh.triangles.size()), kIndexData)},
-                             {"componentType", kUInt32}, {"count", 3 * mesh.triangles.size()}, {"type", "SCALAR"}});
+                             {"componentType", kUInt32},
+                             {"count", 3 * mesh.triangles.size()},
+                             {"type", "SCALAR"}});
         nlohmann::json primitive{{"attributes", {{"POSITION", first}, {"NORMAL", first + 1}}}, {"indices", first + 2}};
         nlohmann::json node{{"mesh", n}};
         if (parts[n].named != nullptr) {
@@ -229,8 +245,9 @@ TriangleMesh read_glb(Source& source, std::string_view text) { return GlbReader(
 
 /// glTF 2.0 in one file: a JSON chunk that describes the binary chunk.
 void write_glb_parts(Output& out, const std::vector<GlbPart>& parts, const std::vector<std::string>& comments) {
-    nlohmann::json json{{"asset", {{"version", "2.0"}, {"generator", "covol " COVOL_VERSION}, {"extras", {{"comments", comments}}}}},
-                        {"scene", 0}};
+    nlohmann::json json{
+        {"asset", {{"version", "2.0"}, {"generator", "covol " COVOL_VERSION}, {"extras", {{"comments", comments}}}}},
+        {"scene", 0}};
     const std::uint64_t binary_bytes = describe_glb(parts, json);
     json["buffers"] = {{{"byteLength", binary_bytes}}};
     Output text;

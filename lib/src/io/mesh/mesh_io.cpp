@@ -30,7 +30,8 @@ std::string read_file(const std::string& path) {
 
 std::vector<std::string> one_line_each(std::vector<std::string> comments) {
     for (std::string& comment : comments)
-        std::replace_if(comment.begin(), comment.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
+        std::replace_if(
+            comment.begin(), comment.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
     return comments;
 }
 
@@ -38,8 +39,8 @@ void check_references(const TriangleMesh& mesh) {
     for (const Face& t : mesh.triangles)
         for (const std::uint32_t v : t)
             if (v >= mesh.vertices.size())
-                throw Error(Errc::InvalidInput, "write_mesh: a triangle refers to vertex " + std::to_string(v) + " of " +
-                                                    std::to_string(mesh.vertices.size()));
+                throw Error(Errc::InvalidInput, "write_mesh: a triangle refers to vertex " + std::to_string(v) +
+                                                    " of " + std::to_string(mesh.vertices.size()));
 }
 
 void check_attribute(const VertexAttribute& attribute, const TriangleMesh& mesh) {
@@ -47,13 +48,15 @@ void check_attribute(const VertexAttribute& attribute, const TriangleMesh& mesh)
     if (name.empty() || std::any_of(name.begin(), name.end(), [](unsigned char c) { return c <= ' '; }))
         throw Error(Errc::InvalidInput, "write_mesh: expected an attribute's name of one word, got '" + name + "'");
     if (attribute.values.size() != mesh.vertices.size())
-        throw Error(Errc::InvalidInput, "write_mesh: attribute " + name + ": expected " + std::to_string(mesh.vertices.size()) +
-                                            " values, one for each vertex, got " + std::to_string(attribute.values.size()));
+        throw Error(Errc::InvalidInput,
+                    "write_mesh: attribute " + name + ": expected " + std::to_string(mesh.vertices.size()) +
+                        " values, one for each vertex, got " + std::to_string(attribute.values.size()));
 }
 
 Prepared prepare(const TriangleMesh& mesh, const WriteMeshOptions& options) {
     if (!(options.unit_scale > 0) || !std::isfinite(options.unit_scale))
-        throw Error(Errc::InvalidOptions, "write_mesh: unit_scale: expected > 0, got " + std::to_string(options.unit_scale));
+        throw Error(Errc::InvalidOptions,
+                    "write_mesh: unit_scale: expected > 0, got " + std::to_string(options.unit_scale));
     check_references(mesh);
     for (const VertexAttribute& attribute : options.attributes) check_attribute(attribute, mesh);
     Prepared result{mesh, {}, one_line_each(options.comments), options.attributes, options.binary};
@@ -71,12 +74,14 @@ Writer writer_of(const std::string& path) {
     static constexpr struct {
         std::string_view extension;
         Writer writer;
-    } kWriters[] = {{".ply", write_ply}, {".obj", write_obj}, {".stl", write_stl}, {".off", write_off}, {".glb", write_glb}};
+    } kWriters[] = {
+        {".ply", write_ply}, {".obj", write_obj}, {".stl", write_stl}, {".off", write_off}, {".glb", write_glb}};
     const std::string end = detail::extension(path);
     for (const auto& known : kWriters)
         if (known.extension == end) return known.writer;
-    throw Error(Errc::InvalidOptions,
-                "write_mesh: " + path + ": expected a name that ends in .ply, .obj, .stl, .off or .glb, got '" + end + "'");
+    throw Error(
+        Errc::InvalidOptions,
+        "write_mesh: " + path + ": expected a name that ends in .ply, .obj, .stl, .off or .glb, got '" + end + "'");
 }
 
 void save(const std::string& path, const Output& out) {
@@ -137,7 +142,9 @@ bool is_mesh_name(const std::string& path) {
 TriangleMesh read_mesh(const std::string& path) {
     const std::string end = detail::extension(path);
     if (!is_mesh_name(path))
-        throw Error(Errc::Unsupported, "read_mesh: " + path + ": expected a name that ends in .ply, .obj, .stl, .off or .glb, got '" + end + "'");
+        throw Error(
+            Errc::Unsupported,
+            "read_mesh: " + path + ": expected a name that ends in .ply, .obj, .stl, .off or .glb, got '" + end + "'");
     const std::string text = read_file(path);
     Source source("read_mesh", path, text);
     const auto built = [&](void (*read)(Source&, Receiver&)) {

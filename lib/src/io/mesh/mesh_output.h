@@ -44,7 +44,9 @@ private:
     std::string data_;
 };
 
-inline Output& operator<<(Output& out, const std::array<float, 3>& p) { return out << p[0] << " " << p[1] << " " << p[2]; }
+inline Output& operator<<(Output& out, const std::array<float, 3>& p) {
+    return out << p[0] << " " << p[1] << " " << p[2];
+}
 
 /// What every format needs: placed vertices, their normals, one-line comments.
 struct Prepared {

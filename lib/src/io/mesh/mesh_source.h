@@ -17,7 +17,8 @@ namespace covol::mesh_io {
 class Source {
 public:
     /// @param reader  the function that messages begin with; path and text must outlive this
-    Source(const char* reader, const std::string& path, std::string_view text) : reader_(reader), path_(path), lines_(text) {}
+    Source(const char* reader, const std::string& path, std::string_view text)
+        : reader_(reader), path_(path), lines_(text) {}
 
     [[nodiscard]] bool at_end() const { return lines_.rest().empty(); }
     [[nodiscard]] std::size_t bytes_left() const { return lines_.rest().size(); }
@@ -51,7 +52,9 @@ public:
     T number(std::string_view& line, const char* what) {
         const std::string_view word = detail::next_word(line);
         const auto value = detail::to_number<T>(word);
-        if (!value) fail(std::string("expected ") + what + ", got " + (word.empty() ? "the end of the line" : detail::quote(word)));
+        if (!value)
+            fail(std::string("expected ") + what + ", got " +
+                 (word.empty() ? "the end of the line" : detail::quote(word)));
         return *value;
     }
 

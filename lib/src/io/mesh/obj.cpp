@@ -21,7 +21,8 @@ bool mixes_normals(std::string_view corners) {
 }
 
 /// The numbers of a face's vertices, from 0. @param count  of the vertices before it
-void read_corners(const Source& source, std::string_view line, std::int64_t count, std::vector<std::uint32_t>& corners) {
+void read_corners(const Source& source, std::string_view line, std::int64_t count,
+                  std::vector<std::uint32_t>& corners) {
     corners.clear();
     for (std::string_view word = next_word(line); !word.empty() && word[0] != '#'; word = next_word(line)) {
         const auto number = to_number<std::int64_t>(word.substr(0, word.find('/')));
@@ -29,7 +30,8 @@ void read_corners(const Source& source, std::string_view line, std::int64_t coun
         if (!number || *number == 0) source.fail("expected the number of a vertex, got " + quote(word));
         corners.push_back(to_index(source, double(*number > 0 ? *number - 1 : count + *number)));
     }
-    if (corners.size() < 3) source.fail("expected a face of at least 3 vertices, got " + std::to_string(corners.size()));
+    if (corners.size() < 3)
+        source.fail("expected a face of at least 3 vertices, got " + std::to_string(corners.size()));
 }
 
 /// 0 of what is no direction.

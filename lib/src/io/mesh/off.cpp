@@ -26,13 +26,16 @@ std::string_view read_key(Source& source) {
 }
 
 /// @param fewest_bytes  that one of them takes
-std::size_t read_count(const Source& source, std::string_view& line, const std::string& what, std::size_t fewest_bytes) {
+std::size_t read_count(const Source& source, std::string_view& line, const std::string& what,
+                       std::size_t fewest_bytes) {
     const std::string_view word = next_word(line);
     const auto count = to_number(word);
-    if (!count) source.fail("expected the number of " + what + ", got " + (word.empty() ? "the end of the line" : quote(word)));
+    if (!count)
+        source.fail("expected the number of " + what + ", got " + (word.empty() ? "the end of the line" : quote(word)));
     // One too many is told where the file ends.
     if (!(*count >= 0) || *count != std::floor(*count) || *count > double(source.bytes_left() / fewest_bytes + 1))
-        source.fail("expected no more than the file has room for, a file of this size cannot hold " + quote(word) + " " + what);
+        source.fail("expected no more than the file has room for, a file of this size cannot hold " + quote(word) +
+                    " " + what);
     return std::size_t(*count);
 }
 
@@ -46,8 +49,8 @@ void read_off(Source& source, Receiver& receiver) {
     receiver.expect_vertices(vertices, false);
     for (std::size_t i = 0; i < vertices; ++i) {
         if (!source.next_content(line))
-            source.fail("unexpected end of the file: expected " + std::to_string(vertices) + " vertices, got " + std::to_string(i) +
-                        "; the file is truncated");
+            source.fail("unexpected end of the file: expected " + std::to_string(vertices) + " vertices, got " +
+                        std::to_string(i) + "; the file is truncated");
         receiver.vertex(source.three_numbers(line));
     }
     std::vector<std::uint32_t> corners;

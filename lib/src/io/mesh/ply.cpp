@@ -28,7 +28,8 @@ struct PlyElement {
     std::vector<PlyProperty> properties;
 
     [[nodiscard]] bool has_list() const {
-        return std::any_of(properties.begin(), properties.end(), [](const PlyProperty& p) { return p.count.has_value(); });
+        return std::any_of(properties.begin(), properties.end(),
+                           [](const PlyProperty& p) { return p.count.has_value(); });
     }
     /// A property's place among all; their number where there is none of that name that is no list.
     [[nodiscard]] std::size_t number_named(std::string_view wanted) const {
@@ -43,10 +44,12 @@ PlyType ply_type(const Source& source, std::string_view name) {
     static constexpr struct {
         std::string_view name;
         PlyType type;
-    } kTypes[] = {{"char", PlyType::Int8},     {"int8", PlyType::Int8},     {"uchar", PlyType::UInt8},   {"uint8", PlyType::UInt8},
-                  {"short", PlyType::Int16},   {"int16", PlyType::Int16},   {"ushort", PlyType::UInt16}, {"uint16", PlyType::UInt16},
-                  {"int", PlyType::Int32},     {"int32", PlyType::Int32},   {"uint", PlyType::UInt32},   {"uint32", PlyType::UInt32},
-                  {"float", PlyType::Float},   {"float32", PlyType::Float}, {"double", PlyType::Double}, {"float64", PlyType::Double}};
+    } kTypes[] = {{"char", PlyType::Int8},     {"int8", PlyType::Int8},     {"uchar", PlyType::UInt8},
+                  {"uint8", PlyType::UInt8},   {"short", PlyType::Int16},   {"int16", PlyType::Int16},
+                  {"ushort", PlyType::UInt16}, {"uint16", PlyType::UInt16}, {"int", PlyType::Int32},
+                  {"int32", PlyType::Int32},   {"uint", PlyType::UInt32},   {"uint32", PlyType::UInt32},
+                  {"float", PlyType::Float},   {"float32", PlyType::Float}, {"double", PlyType::Double},
+                  {"float64", PlyType::Double}};
     for (const auto& known : kTypes)
         if (known.name == name) return known.type;
     source.fail("expected a PLY type such as float or uchar, got " + quote(name));
@@ -84,9 +87,12 @@ public:
     void read() {
         read_header();
         for (const PlyElement& element : elements_) {
-            if (element.name == "vertex") read_vertices(element);
-            else if (element.name == "face" && receiver_.wants_faces()) read_faces(element);
-            else for_each_row(element, 0, [] {});
+            if (element.name == "vertex")
+                read_vertices(element);
+            else if (element.name == "face" && receiver_.wants_faces())
+                read_faces(element);
+            else
+                for_each_row(element, 0, [] {});
         }
     }
 
@@ -103,10 +109,14 @@ private:
             std::string_view line = source_.line();
             const std::string_view key = next_word(line);
             if (key == "end_header") break;
-            if (key == "format") format = format_named(next_word(line));
-            else if (key == "element") add_element(line);
-            else if (key == "property") add_property(line);
-            else if (!key.empty() && key != "comment" && key != "obj_info") source_.fail("unknown PLY header line " + quote(key));
+            if (key == "format")
+                format = format_named(next_word(line));
+            else if (key == "element")
+                add_element(line);
+            else if (key == "property")
+                add_property(line);
+            else if (!key.empty() && key != "comment" && key != "obj_info")
+                source_.fail("unknown PLY header line " + quote(key));
         }
         if (!format) source_.fail("expected a line 'format' in the PLY header, got none");
         format_ = *format;
@@ -148,7 +158,8 @@ private:
             least = 2 * std::max<std::uint64_t>(wanted, 1);
             ++room;  // the last line may lack its end
         } else {
-            for (const PlyProperty& property : element.properties) least += size_of(property.count.value_or(property.type));
+            for (const PlyProperty& property : element.properties)
+                least += size_of(property.count.value_or(property.type));
         }
         if (!element.properties.empty() && element.count > room / least)
             source_.fail("the header promises " + std::to_string(element.count) + " of element " + quote(element.name) +
@@ -156,8 +167,8 @@ private:
     }
 
     [[noreturn]] void fail_cut_off(const PlyElement& element, std::uint64_t got) const {
-        source_.fail("the file is cut off: expected " + std::to_string(element.count) + " of element " + quote(element.name) +
-                     ", got " + std::to_string(got) + "; it is truncated");
+        source_.fail("the file is cut off: expected " + std::to_string(element.count) + " of element " +
+                     quote(element.name) + ", got " + std::to_string(got) + "; it is truncated");
     }
 
     /// Calls visit() for each row, for which value() and values() then hold.
@@ -168,9 +179,12 @@ private:
         if (element.properties.empty()) return;
         check_size(element, wanted);
         places_.assign(element.properties.size(), {});
-        if (format_ == PlyFormat::Ascii) for_each_line(element, wanted, visit);
-        else if (element.has_list()) for_each_record_with_lists(element, visit);
-        else for_each_record(element, visit);
+        if (format_ == PlyFormat::Ascii)
+            for_each_line(element, wanted, visit);
+        else if (element.has_list())
+            for_each_record_with_lists(element, visit);
+        else
+            for_each_record(element, visit);
     }
 
     template <typename Visit>
@@ -197,10 +211,11 @@ private:
                 const std::size_t left = words_.size() - at - 1;
                 if (!(*count >= 0 && *count <= double(left))) {
                     if (is_last && p >= wanted)
-                        source_.fail("the last of " + std::to_string(element.count) + " of element " + quote(element.name) +
-                                     " ends early; the file is truncated");
+                        source_.fail("the last of " + std::to_string(element.count) + " of element " +
+                                     quote(element.name) + " ends early; the file is truncated");
                     if (p < wanted)
-                        source_.fail("a list of " + quote(words_[at]) + " entries, its line has " + std::to_string(left) + " left");
+                        source_.fail("a list of " + quote(words_[at]) + " entries, its line has " +
+                                     std::to_string(left) + " left");
                 }
                 place = {at + 1, std::size_t(std::clamp(*count, 0.0, double(left)))};
             }
@@ -259,7 +274,8 @@ private:
     }
 
     /// Of a property's entry of that number; nothing of a word that is no number.
-    [[nodiscard]] std::optional<double> find_value(const PlyElement& element, std::size_t p, std::size_t entry = 0) const {
+    [[nodiscard]] std::optional<double> find_value(const PlyElement& element, std::size_t p,
+                                                   std::size_t entry = 0) const {
         const PlyType type = element.properties[p].type;
         if (format_ != PlyFormat::Ascii) return load_as(type, row_ + places_[p].at + entry * size_of(type), swap_);
         return to_number(words_[places_[p].at + entry]);
@@ -278,7 +294,8 @@ private:
             position[a] = element.number_named(name);
             normal[a] = element.number_named("n" + name);
             if (position[a] == element.properties.size())
-                source_.fail("expected a vertex property '" + name + "' of one number, the vertices have no property '" + name + "' of that kind");
+                source_.fail("expected a vertex property '" + name +
+                             "' of one number, the vertices have no property '" + name + "' of that kind");
             wanted = std::max(wanted, position[a] + 1);
         }
         const std::size_t last_normal = *std::max_element(normal.begin(), normal.end());
@@ -299,12 +316,14 @@ private:
         const auto at = std::find_if(element.properties.begin(), element.properties.end(), [](const PlyProperty& p) {
             return p.count && (p.name == "vertex_indices" || p.name == "vertex_index");
         });
-        if (at == element.properties.end() && element.count > 0) source_.fail("the faces have no list 'vertex_indices'");
+        if (at == element.properties.end() && element.count > 0)
+            source_.fail("the faces have no list 'vertex_indices'");
         const auto list = std::size_t(at - element.properties.begin());
         std::vector<std::uint32_t> corners;
         for_each_row(element, list + 1, [&] {
             corners.clear();
-            for (std::size_t i = 0; i < places_[list].count; ++i) corners.push_back(to_index(source_, value(element, list, i)));
+            for (std::size_t i = 0; i < places_[list].count; ++i)
+                corners.push_back(to_index(source_, value(element, list, i)));
             receiver_.face(corners);
         });
     }
@@ -330,7 +349,8 @@ void write_ply(Output& out, const Prepared& in) {
     out << "element vertex " << std::uint64_t(in.mesh.vertices.size()) << "\n";
     for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) out << "property float " << name << "\n";
     for (const VertexAttribute& attribute : in.attributes) out << "property float " << attribute.name << "\n";
-    out << "element face " << std::uint64_t(in.mesh.triangles.size()) << "\nproperty list uchar uint vertex_indices\nend_header\n";
+    out << "element face " << std::uint64_t(in.mesh.triangles.size())
+        << "\nproperty list uchar uint vertex_indices\nend_header\n";
     for (std::size_t v = 0; v < in.mesh.vertices.size(); ++v) {
         if (in.binary) {
             out.raw(in.mesh.vertices[v]);

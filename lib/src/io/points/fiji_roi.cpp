@@ -21,7 +21,7 @@ constexpr int kSubPixel = 128;  // of the options
 constexpr std::uint64_t kHeader = 64;
 
 const char* name_of(int type) {
-    static constexpr const char* kNames[] = {"polygon",  "rectangle", "oval",     "line",   "freeline", "polyline",
+    static constexpr const char* kNames[] = {"polygon", "rectangle", "oval",   "line",  "freeline", "polyline",
                                              "nothing", "freehand",  "traced", "angle", "point"};
     return kNames[type];
 }
@@ -80,7 +80,8 @@ private:
     }
     [[nodiscard]] double real(std::uint64_t offset) const {
         const double value = bytes_.at<float>(offset);
-        if (!std::isfinite(value)) fail(path_, "ROI " + quote(name_) + ": expected finite coordinates, got NaN or infinity");
+        if (!std::isfinite(value))
+            fail(path_, "ROI " + quote(name_) + ": expected finite coordinates, got NaN or infinity");
         return value;
     }
 
@@ -154,7 +155,8 @@ private:
     void add_rectangle(PointTable& table) const {
         const auto [x, y, width, height] = box();
         const double x0 = x - 0.5, y0 = y - 0.5, z = required_slice();
-        add_line(table, {{x0, y0, z}, {x0 + width, y0, z}, {x0 + width, y0 + height, z}, {x0, y0 + height, z}}, true, name_);
+        add_line(table, {{x0, y0, z}, {x0 + width, y0, z}, {x0 + width, y0 + height, z}, {x0, y0 + height, z}}, true,
+                 name_);
     }
 
     void add_oval(PointTable& table) const {
@@ -186,7 +188,8 @@ private:
             const double segment = real(kHeader + 4 * n++);
             if (segment == 4) continue;  // close: every outline here is closed
             if (segment != 0 && segment != 1 && segment != 2 && segment != 3)
-                fail(path_, "ROI " + quote(name_) + ": expected a path segment of type 0 to 4, got " + std::to_string(segment));
+                fail(path_, "ROI " + quote(name_) + ": expected a path segment of type 0 to 4, got " +
+                                std::to_string(segment));
             const std::uint64_t points = segment < 2 ? 1 : std::uint64_t(segment);
             if (2 * points > count - n) fail(path_, "ROI " + quote(name_) + ": its path is cut short");
             std::vector<Vec3> given;

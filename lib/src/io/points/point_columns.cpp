@@ -22,7 +22,7 @@ struct Columns {
     std::array<std::size_t, 3> at{0, 1, 2};
     PointSpace space = PointSpace::Unstated;
     PointOrder order = PointOrder::Unstated;
-    bool slice_from_one = false;        ///< the third column counts slices from 1
+    bool slice_from_one = false;  ///< the third column counts slices from 1
     std::optional<std::array<std::size_t, 3>> normal;
     bool normal_is_guess = false;       ///< the columns have no names
     std::vector<std::size_t> line;      ///< rows that agree in these columns are one line
@@ -112,8 +112,8 @@ std::optional<Columns> find_napari(const Header& header) {
 }
 
 void find_lines(const Header& header, const std::optional<std::size_t>& slice, Columns& columns) {
-    for (const auto& [name, closed] : {std::pair{"contour", true}, {"polygon", true}, {"curve", true},
-                                       {"polyline", false}, {"path", false}}) {
+    for (const auto& [name, closed] :
+         {std::pair{"contour", true}, {"polygon", true}, {"curve", true}, {"polyline", false}, {"path", false}}) {
         const auto column = header.find(name);
         if (!column) continue;
         if (slice) columns.line.push_back(*slice);
@@ -166,7 +166,8 @@ void sort_by_place(Line& line) {
     if (line.places.size() != line.points.size()) return;
     std::vector<std::size_t> order(line.points.size());
     std::iota(order.begin(), order.end(), 0);
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return line.places[a] < line.places[b]; });
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t a, std::size_t b) { return line.places[a] < line.places[b]; });
     std::vector<Vec3> sorted;
     for (const std::size_t n : order) sorted.push_back(line.points[n]);
     line.points = std::move(sorted);

@@ -49,12 +49,16 @@ PointTable refuse_laz(const std::string& path, const std::string&) {
 }
 
 const std::vector<Format>& formats() {
-    static const std::vector<Format> list{
-        {".xyz", parse_blanks},      {".txt", parse_blanks},      {".pts", parse_blanks},  {".asc", parse_blanks},
-        {".csv", parse_table},       {".tsv", parse_table},       {".ply", parse_ply},     {".obj", parse_obj},
-        {".off", parse_off},         {".roi", parse_one_roi},     {".zip", parse_roi_zip}, {".json", parse_markups},
-        {".fcsv", parse_fcsv},       {".landmarks", parse_landmarks}, {".lmk", parse_landmarks},
-        {".annot", parse_annotations}, {".pcd", parse_pcd},       {".las", parse_las},     {".laz", refuse_laz}};
+    static const std::vector<Format> list{{".xyz", parse_blanks},    {".txt", parse_blanks},
+                                          {".pts", parse_blanks},    {".asc", parse_blanks},
+                                          {".csv", parse_table},     {".tsv", parse_table},
+                                          {".ply", parse_ply},       {".obj", parse_obj},
+                                          {".off", parse_off},       {".roi", parse_one_roi},
+                                          {".zip", parse_roi_zip},   {".json", parse_markups},
+                                          {".fcsv", parse_fcsv},     {".landmarks", parse_landmarks},
+                                          {".lmk", parse_landmarks}, {".annot", parse_annotations},
+                                          {".pcd", parse_pcd},       {".las", parse_las},
+                                          {".laz", refuse_laz}};
     return list;
 }
 
@@ -68,7 +72,8 @@ std::vector<Vec3> ellipse(const Vec3& centre, const Vec3& u, const Vec3& v) {
     std::vector<Vec3> points;
     for (int n = 0; n < count; ++n) {
         const double angle = 2 * std::numbers::pi * n / count, c = std::cos(angle), s = std::sin(angle);
-        points.push_back({centre[0] + c * u[0] + s * v[0], centre[1] + c * u[1] + s * v[1], centre[2] + c * u[2] + s * v[2]});
+        points.push_back(
+            {centre[0] + c * u[0] + s * v[0], centre[1] + c * u[1] + s * v[1], centre[2] + c * u[2] + s * v[2]});
     }
     return points;
 }
@@ -92,8 +97,8 @@ PointTable read_point_table(const std::string& path) {
     if (format == list.end()) {
         std::string known;
         for (const Format& f : list) known += (known.empty() ? "" : ", ") + std::string(f.ending);
-        throw Error(Errc::Unsupported,
-                    "read_points: " + path + ": expected a name ending in one of " + known + ", got '" + extension + "'");
+        throw Error(Errc::Unsupported, "read_points: " + path + ": expected a name ending in one of " + known +
+                                           ", got '" + extension + "'");
     }
     const std::string content = read_text(path);
     if (content.empty()) fail(path, "the file is empty");

@@ -11,7 +11,7 @@ namespace covol::detail {
 struct PointTable {
     std::vector<Vec3> points;
     std::vector<MarkLine> lines;
-    std::vector<Vec3> normals;   ///< none, or one for each point, by normal_of()
+    std::vector<Vec3> normals;  ///< none, or one for each point, by normal_of()
     std::optional<Vec3> sensor;
     PointSpace space = PointSpace::Unstated;
     PointOrder order = PointOrder::Unstated;

@@ -27,7 +27,8 @@ struct PcdHeader {
     std::vector<PcdField> fields;
     std::uint64_t points = 0;
     std::optional<Vec3> viewpoint;
-    bool is_organised = false;  ///< rows of pixels: a camera's frame, with the camera at its origin unless it says otherwise
+    /// rows of pixels: a camera's frame, with the camera at its origin unless it says otherwise
+    bool is_organised = false;
     std::string data;
 
     [[nodiscard]] std::uint64_t stride() const {
@@ -116,8 +117,9 @@ double pcd_value(const std::string& path, const char* data, const PcdField& fiel
     if (field.type == 'I' && field.size == 2) return load<std::int16_t>(data, kSwap);
     if (field.type == 'U' && field.size == 4) return load<std::uint32_t>(data, kSwap);
     if (field.type == 'U' && field.size == 2) return load<std::uint16_t>(data, kSwap);
-    throw Error(Errc::Unsupported, "read_points: " + path + ": field " + quote(field.name) + ": expected 4 or 8 bytes of type F, got " +
-                                       std::to_string(field.size) + " of " + field.type);
+    throw Error(Errc::Unsupported, "read_points: " + path + ": field " + quote(field.name) +
+                                       ": expected 4 or 8 bytes of type F, got " + std::to_string(field.size) + " of " +
+                                       field.type);
 }
 
 /// Marc Lehmann's LZF: literal runs and references into what was written. False when damaged.
@@ -157,7 +159,8 @@ void add_valid(PointTable& table, const std::vector<double>& values, std::size_t
     if (values.size() == 6) table.normals.push_back(normal_of({values[3], values[4], values[5]}));
 }
 
-void read_pcd_ascii(const std::string& path, const PcdHeader& header, Lines& lines, PointTable& table, std::size_t& invalid) {
+void read_pcd_ascii(const std::string& path, const PcdHeader& header, Lines& lines, PointTable& table,
+                    std::size_t& invalid) {
     const std::vector<std::size_t> at = pcd_columns(path, header);
     std::vector<std::size_t> column(at.size(), 0);
     std::vector<double> values(at.size());
@@ -167,7 +170,8 @@ void read_pcd_ascii(const std::string& path, const PcdHeader& header, Lines& lin
     std::vector<string_view> words;
     for (std::uint64_t n = 0; n < header.points;) {
         if (!lines.next(line))
-            fail(path, "expected " + std::to_string(header.points) + " points, got " + std::to_string(n) + "; the file is truncated");
+            fail(path, "expected " + std::to_string(header.points) + " points, got " + std::to_string(n) +
+                           "; the file is truncated");
         if (line.empty()) continue;
         ++n;
         split(line, ' ', words);
@@ -186,8 +190,8 @@ void read_pcd_binary(const std::string& path, const PcdHeader& header, string_vi
     const std::vector<std::size_t> at = pcd_columns(path, header);
     const std::uint64_t stride = header.stride();
     if (header.points > data.size() / std::max<std::uint64_t>(stride, 1))
-        fail(path, "expected " + std::to_string(header.points) + " points of " + std::to_string(stride) + " bytes, got " +
-                       std::to_string(data.size()) + " bytes; the file is truncated");
+        fail(path, "expected " + std::to_string(header.points) + " points of " + std::to_string(stride) +
+                       " bytes, got " + std::to_string(data.size()) + " bytes; the file is truncated");
     std::vector<std::uint64_t> offset(at.size(), 0);
     std::vector<double> values(at.size());
     for (std::size_t a = 0; a < at.size(); ++a)
@@ -229,9 +233,11 @@ PointTable parse_pcd(const std::string& path, const std::string& bytes) {
     else if (header.data == "binary_compressed")
         read_pcd_binary(path, header, unpack_pcd(path, header, lines.rest()), true, table, invalid);
     else
-        throw Error(Errc::Unsupported, "read_points: " + path + ": expected DATA ascii, binary or binary_compressed, got " +
-                                           quote(header.data));
-    if (header.viewpoint && (header.is_organised || *header.viewpoint != Vec3{0, 0, 0})) table.sensor = header.viewpoint;
+        throw Error(
+            Errc::Unsupported,
+            "read_points: " + path + ": expected DATA ascii, binary or binary_compressed, got " + quote(header.data));
+    if (header.viewpoint && (header.is_organised || *header.viewpoint != Vec3{0, 0, 0}))
+        table.sensor = header.viewpoint;
     table.rule = "points of a PCD (" + header.data + ")";
     if (invalid > 0) table.rule += ", " + std::to_string(invalid) + " invalid ones left out";
     return table;
@@ -259,7 +265,8 @@ PointTable parse_las(const std::string& path, const std::string& content) {
     for (std::uint64_t a = 0; a < 3; ++a) {
         scale[a] = bytes.at<double>(131 + 8 * a);
         offset[a] = bytes.at<double>(155 + 8 * a);
-        if (!std::isfinite(scale[a]) || !std::isfinite(offset[a]) || std::abs(scale[a]) > 1e200 || std::abs(offset[a]) > 1e200)
+        if (!std::isfinite(scale[a]) || !std::isfinite(offset[a]) || std::abs(scale[a]) > 1e200 ||
+            std::abs(offset[a]) > 1e200)
             fail(path, "expected a finite scale and offset");
     }
     PointTable table;

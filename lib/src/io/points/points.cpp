@@ -73,8 +73,7 @@ PointCloud read_points(const std::string& path, const ReadPointsOptions& options
     cloud.stated = (options.space != PointSpace::Unstated || table.space != PointSpace::Unstated) &&
                    (options.order != PointOrder::Unstated || table.order != PointOrder::Unstated);
     cloud.reading = {first_stated(options.space, table.space, PointSpace::World),
-                     first_stated(options.order, table.order, PointOrder::XYZ), options.scale,
-                     options.channels};
+                     first_stated(options.order, table.order, PointOrder::XYZ), options.scale, options.channels};
     cloud.space = detail::space_after(cloud.reading.space);
     cloud.points = std::move(table.points);
     for (Vec3& p : cloud.points) p = detail::read_as(cloud.reading, p);
@@ -93,9 +92,10 @@ PointCloud read_points(const std::string& path, const ReadPointsOptions& options
 std::vector<Vec3> to_world(const PointCloud& cloud, const ImageGeometry* geometry) {
     if (cloud.space == PointSpace::World) return cloud.points;
     if (geometry == nullptr)
-        throw Error(Errc::InvalidInput, "to_world: " + cloud.source +
-                                            ": the points are in an image's own frame, and there is no image; give one, "
-                                            "or `space = World` for points in lengths");
+        throw Error(Errc::InvalidInput,
+                    "to_world: " + cloud.source +
+                        ": the points are in an image's own frame, and there is no image; give one, "
+                        "or `space = World` for points in lengths");
     std::vector<Vec3> world;
     world.reserve(cloud.points.size());
     for (const Vec3& p : cloud.points) world.push_back(detail::to_world(cloud.space, p, *geometry));

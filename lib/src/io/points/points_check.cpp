@@ -37,7 +37,8 @@ std::string name_of(const Reading& reading, const ReadPointsOptions& now) {
             case PointSpace::IndexOne: add("they are voxels counted from 1"); break;
             case PointSpace::Ras: add("they are in RAS, the image is in LPS"); break;
             case PointSpace::Local: add("they leave out the image's origin"); break;
-            default: add(now.space == PointSpace::Ras ? "they are in LPS, not in RAS" : "they are world units, not voxels");
+            default:
+                add(now.space == PointSpace::Ras ? "they are in LPS, not in RAS" : "they are world units, not voxels");
         }
     if (reading.options.scale != now.scale) add("their unit is another than the image's (micrometre, millimetre)");
     if (reading.options.channels != now.channels) add("their slices count the channels of a hyperstack");
@@ -46,7 +47,8 @@ std::string name_of(const Reading& reading, const ReadPointsOptions& now) {
 
 class Checker {
 public:
-    Checker(const PointCloud& cloud, const ImageGeometry& geometry) : cloud_(cloud), geometry_(geometry), now_(cloud.reading) {
+    Checker(const PointCloud& cloud, const ImageGeometry& geometry)
+        : cloud_(cloud), geometry_(geometry), now_(cloud.reading) {
         if (now_.space == PointSpace::Unstated) now_.space = cloud.space;  // a cloud that no file gave
         if (now_.order == PointOrder::Unstated) now_.order = PointOrder::XYZ;
         world_ = to_world(cloud, &geometry);
@@ -65,9 +67,12 @@ public:
     /// whatever is made small enough fits.
     [[nodiscard]] std::vector<Reading> remedies() const {
         std::vector<Reading> found;
-        const auto rank = [&](const Reading& r) { return std::pair(r.options.scale != now_.scale && !in_voxels(r.options), r.changes); };
+        const auto rank = [&](const Reading& r) {
+            return std::pair(r.options.scale != now_.scale && !in_voxels(r.options), r.changes);
+        };
         std::vector<Reading> candidates = others();
-        std::stable_sort(candidates.begin(), candidates.end(), [&](const Reading& a, const Reading& b) { return rank(a) < rank(b); });
+        std::stable_sort(candidates.begin(), candidates.end(),
+                         [&](const Reading& a, const Reading& b) { return rank(a) < rank(b); });
         for (const Reading& reading : candidates) {
             if (!found.empty() && rank(reading) > rank(found.front())) break;
             if (rank(reading).first && is_speck(reading)) continue;
@@ -75,9 +80,8 @@ public:
         }
         // Voxels counted from 1 are told only where counting from 0 does not do.
         const auto has = [&](PointSpace space, PointOrder order) {
-            return std::any_of(found.begin(), found.end(), [&](const Reading& r) {
-                return r.options.space == space && r.options.order == order;
-            });
+            return std::any_of(found.begin(), found.end(),
+                               [&](const Reading& r) { return r.options.space == space && r.options.order == order; });
         };
         std::erase_if(found, [&](const Reading& r) {
             return r.options.space == PointSpace::IndexOne && has(PointSpace::Index, r.options.order);
@@ -96,7 +100,8 @@ public:
         std::vector<Reading> best;
         int most = axes;
         for (const Reading& reading : others()) {
-            if (reading.options.scale != now_.scale || reading.options.space == PointSpace::IndexOne || !fits(reading)) continue;
+            if (reading.options.scale != now_.scale || reading.options.space == PointSpace::IndexOne || !fits(reading))
+                continue;
             const int count = axes_on_centres(reading.options);
             if (count > most) {
                 most = count;
@@ -117,7 +122,8 @@ private:
 
     /// A cloud point's position if it were read otherwise.
     [[nodiscard]] Vec3 place(const ReadPointsOptions& reading, const Vec3& point) const {
-        return detail::to_world(detail::space_after(reading.space), detail::read_as(reading, detail::undo(now_, point)), geometry_);
+        return detail::to_world(detail::space_after(reading.space), detail::read_as(reading, detail::undo(now_, point)),
+                                geometry_);
     }
 
     [[nodiscard]] bool fits(const Reading& reading) const {
@@ -156,9 +162,10 @@ private:
         if (now_.channels != 1) return list;  // a slice cannot be undone
         const bool lengths = !in_voxels(now_);
         const bool shifted = geometry_.origin != Vec3{0, 0, 0} || !geometry_.is_axis_aligned();
-        for (const PointSpace space : {PointSpace::World, PointSpace::Index, PointSpace::IndexOne, PointSpace::Ras, PointSpace::Local,
-                                       PointSpace::Slices}) {
-            if ((space == PointSpace::Slices && now_.space != space) || (space == PointSpace::Local && !shifted)) continue;
+        for (const PointSpace space : {PointSpace::World, PointSpace::Index, PointSpace::IndexOne, PointSpace::Ras,
+                                       PointSpace::Local, PointSpace::Slices}) {
+            if ((space == PointSpace::Slices && now_.space != space) || (space == PointSpace::Local && !shifted))
+                continue;
             const bool voxels = in_voxels({space});
             for (const PointOrder order : {PointOrder::XYZ, PointOrder::ZYX})
                 for (const double scale : {1.0, 1e3, 1e-3}) {
@@ -168,8 +175,10 @@ private:
         }
         constexpr int kMostChannels = 6;
         if (!lengths)
-            for (int channels = 2; channels <= kMostChannels; ++channels) add(list, {now_.space, now_.order, now_.scale, channels});
-        std::stable_sort(list.begin(), list.end(), [](const Reading& a, const Reading& b) { return a.changes < b.changes; });
+            for (int channels = 2; channels <= kMostChannels; ++channels)
+                add(list, {now_.space, now_.order, now_.scale, channels});
+        std::stable_sort(list.begin(), list.end(),
+                         [](const Reading& a, const Reading& b) { return a.changes < b.changes; });
         return list;
     }
 
@@ -193,8 +202,8 @@ private:
 
     static std::string text_of(const WorldBox& box) {
         std::ostringstream s;
-        s << "(" << box.min[0] << ", " << box.min[1] << ", " << box.min[2] << ") to (" << box.max[0] << ", " << box.max[1]
-          << ", " << box.max[2] << ")";
+        s << "(" << box.min[0] << ", " << box.min[1] << ", " << box.min[2] << ") to (" << box.max[0] << ", "
+          << box.max[1] << ", " << box.max[2] << ")";
         return s.str();
     }
 
@@ -207,7 +216,8 @@ private:
 std::string advice_of(const Checker& checker, const std::vector<Reading>& remedies, bool spacing_known) {
     std::string text;
     for (const Reading& reading : remedies)
-        text += (text.empty() ? "; `" : ", or `") + reading.advice + "` would bring them inside (" + checker.name(reading) + ")";
+        text += (text.empty() ? "; `" : ", or `") + reading.advice + "` would bring them inside (" +
+                checker.name(reading) + ")";
     if (remedies.size() > 1) text += "; more than one reading fits: look which one is meant";
     if (!spacing_known) text += "; the image states no spacing, `spacing = sx,sy,sz` gives it";
     return text;
@@ -220,11 +230,13 @@ void check_inside(const PointCloud& cloud, const ImageGeometry& geometry, const 
     const std::size_t outside = checker.count_outside();
     if (outside > 0)
         throw Error(Errc::InvalidInput, "check_inside: " + cloud.source + ": " + std::to_string(outside) + " of " +
-                                            std::to_string(cloud.points.size()) + " points lie outside the image: " + checker.boxes() +
+                                            std::to_string(cloud.points.size()) +
+                                            " points lie outside the image: " + checker.boxes() +
                                             advice_of(checker, checker.remedies(), geometry.spacing_known));
     if (!geometry.spacing_known && cloud.space != PointSpace::Index)
-        run.warn(cloud.source + ": the points are in world units, and the image states no spacing, so that a voxel counts as 1: "
-                                "`spacing = sx,sy,sz` gives it, or `space = Index` if the points are voxels");
+        run.warn(cloud.source +
+                 ": the points are in world units, and the image states no spacing, so that a voxel counts as 1: "
+                 "`spacing = sx,sy,sz` gives it, or `space = Index` if the points are voxels");
     for (const Reading& reading : checker.more_plausible())
         run.warn(cloud.source + ": the points lie inside the image, but `" + reading.advice +
                  "` would put them on voxel centres: is it that " + checker.name(reading) + "?");

@@ -25,7 +25,8 @@ void turn(std::vector<Vec3>& points) {
 }
 
 Vec3 to_point(const std::string& path, const Json& position) {
-    if (!position.is_array() || position.size() != 3) fail(path, "expected a position of 3 numbers in each control point");
+    if (!position.is_array() || position.size() != 3)
+        fail(path, "expected a position of 3 numbers in each control point");
     Vec3 point;
     for (std::size_t a = 0; a < 3; ++a) {
         if (!position[a].is_number()) fail(path, "expected a position of 3 numbers in each control point");
@@ -118,13 +119,15 @@ PointTable parse_fcsv(const std::string& path, const std::string& text) {
         Vec3 point;
         for (std::size_t a = 0; a < 3; ++a) {
             if (at[a] >= fields.size())
-                fail(path, lines.number(), "expected " + std::to_string(at[a] + 1) + " columns, got " + std::to_string(fields.size()));
+                fail(path, lines.number(),
+                     "expected " + std::to_string(at[a] + 1) + " columns, got " + std::to_string(fields.size()));
             point[a] = to_coordinate(path, lines.number(), fields[at[a]]);
         }
         table.points.push_back(point);
     }
     table.space = to_space(path, system);
-    table.rule = std::string("3D Slicer fiducials, CoordinateSystem ") + (stated ? "stated" : "not stated, RAS as in old files");
+    table.rule =
+        std::string("3D Slicer fiducials, CoordinateSystem ") + (stated ? "stated" : "not stated, RAS as in old files");
     return table;
 }
 
@@ -149,8 +152,7 @@ PointTable parse_landmarks(const std::string& path, const std::string& text) {
 }
 
 PointTable parse_annotations(const std::string& path, const std::string& text) {
-    if (text.find("ITK-SNAP Annotation File") == std::string::npos)
-        fail(path, "expected an ITK-SNAP annotation file");
+    if (text.find("ITK-SNAP Annotation File") == std::string::npos) fail(path, "expected an ITK-SNAP annotation file");
     PointTable table;
     table.space = PointSpace::Index;
     table.order = PointOrder::XYZ;

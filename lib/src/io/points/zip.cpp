@@ -46,7 +46,8 @@ Entry read_entry(const Bytes& bytes, std::uint64_t at, const std::string& path) 
 std::string inflate(const Entry& entry, std::string_view packed, const std::string& path) {
     std::string content(entry.size, '\0');
     z_stream stream{};
-    if (inflateInit2(&stream, -MAX_WBITS) != Z_OK) throw Error(Errc::Io, "read_points: " + path + ": zlib does not start");
+    if (inflateInit2(&stream, -MAX_WBITS) != Z_OK)
+        throw Error(Errc::Io, "read_points: " + path + ": zlib does not start");
     stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(packed.data()));
     stream.avail_in = static_cast<uInt>(packed.size());
     stream.next_out = reinterpret_cast<Bytef*>(content.data());

@@ -10,9 +10,10 @@
 namespace covol::pipeline {
 namespace {
 
-constexpr double kReachSpacings = 3.0;  // that the start may lie off the points
+constexpr double kReachSpacings = 3.0;    // that the start may lie off the points
 constexpr double kWarnDisagreeing = 0.1;  // of given normals
-constexpr double kMarginShare = 0.1;  // of the longest side, beyond the points: where they leave holes the surface bulges
+// of the longest side, beyond the points: where they leave holes the surface bulges
+constexpr double kMarginShare = 0.1;
 
 void tell_of_hints(Job& job, const HintsReport& hints) {
     if (hints.normals + hints.sensors == 0) return;
@@ -20,10 +21,12 @@ void tell_of_hints(Job& job, const HintsReport& hints) {
     if (!hints.used)
         return job.warn(std::string(normals ? "the normals" : "the sensor") + " of the points' file not used: " +
                         (hints.why_not.empty() ? "most points have none" : hints.why_not));
-    job.choose("normals", normals ? "as given" : "by the sensor", number(std::round(1000 * hints.agree) / 10) + " % agree with the result" +
-                                    (hints.inward ? ", after all were turned over, for they pointed inwards" : ""));
+    job.choose("normals", normals ? "as given" : "by the sensor",
+               number(std::round(1000 * hints.agree) / 10) + " % agree with the result" +
+                   (hints.inward ? ", after all were turned over, for they pointed inwards" : ""));
     if (1 - hints.agree > kWarnDisagreeing)
-        job.warn(number(std::round(1000 * (1 - hints.agree)) / 10) + " % of the normals that are " + (normals ? "given" : "made by the sensor") + " point to the wrong side");
+        job.warn(number(std::round(1000 * (1 - hints.agree)) / 10) + " % of the normals that are " +
+                 (normals ? "given" : "made by the sensor") + " point to the wrong side");
 }
 
 }  // namespace
@@ -31,7 +34,8 @@ void tell_of_hints(Job& job, const HintsReport& hints) {
 void start_from_cloud(Job& job) {
     job.origin = StartOrigin::Cloud;
     job.options.evolve.follow = true;
-    job.report().domain = job.domain_with_chosen_margin(kMarginShare * longest_side(bounding_box(job.points)) + kMarginVoxels * job.h());
+    job.report().domain =
+        job.domain_with_chosen_margin(kMarginShare * longest_side(bounding_box(job.points)) + kMarginVoxels * job.h());
     CloudReport& report = job.report().cloud;
     {
         Timed timed(job.report().seconds.tag);
@@ -41,21 +45,29 @@ void start_from_cloud(Job& job) {
         double& range = job.options.evolve.attraction_range;
         if (job.has_automatic_range) {
             range = kReachSpacings * std::max(report.spacing, job.h());
-            job.choose("attraction_range", number(range), "the start touches the points, and where there are none nothing should pull");
+            job.choose("attraction_range", number(range),
+                       "the start touches the points, and where there are none nothing should pull");
         }
         if (!report.encloses) job.hold = job.result.u->deepCopy();
         compute_distance(job, tube_for_start(job));
     }
-    const std::string how = report.encloses ? "; averaged within " + number(report.radius) : "; they enclose nothing: inside is what they hide";
+    const std::string how = report.encloses ? "; averaged within " + number(report.radius)
+                                            : "; they enclose nothing: inside is what they hide";
     job.choose("start", "cloud",
-               std::to_string(job.points.size()) + " points, " + number(report.spacing) + " apart, noise " + number(report.noise) + how);
+               std::to_string(job.points.size()) + " points, " + number(report.spacing) + " apart, noise " +
+                   number(report.noise) + how);
     tell_of_hints(job, report.hints);
-    if (report.stray > 0) job.choose("stray_points", std::to_string(report.stray), "far from all others and on no sheet: left out");
-    if (report.layered > 0) job.choose("layered_points", std::to_string(report.layered), "of layers below others, as of scans that do not quite fit: not passed");
+    if (report.stray > 0)
+        job.choose("stray_points", std::to_string(report.stray), "far from all others and on no sheet: left out");
+    if (report.layered > 0)
+        job.choose("layered_points", std::to_string(report.layered),
+                   "of layers below others, as of scans that do not quite fit: not passed");
     if (report.dropped_pieces > 0)
-        job.run.info("cloud: " + std::to_string(report.dropped_pieces) + " pieces of the surface that hardly a point rested on left out");
+        job.run.info("cloud: " + std::to_string(report.dropped_pieces) +
+                     " pieces of the surface that hardly a point rested on left out");
     if (report.joined_pieces > 0)
-        job.run.info("cloud: " + std::to_string(report.joined_pieces) + " small pieces of the surface joined to what is nearest, points lie between");
+        job.run.info("cloud: " + std::to_string(report.joined_pieces) +
+                     " small pieces of the surface joined to what is nearest, points lie between");
     if (report.held_voxels > 0)
         job.run.info("cloud: its handles and pieces are those of the points' indicator function, which has fewer; " +
                      std::to_string(report.held_voxels) + " voxels held");

@@ -10,8 +10,8 @@
 namespace covol::pipeline {
 namespace {
 
-/// A body that goes on beyond the image is followed a little there: at the image's end itself the flow would turn its wall
-/// to a right angle.
+/// A body that goes on beyond the image is followed a little there: at the image's end itself the flow would turn its
+/// wall to a right angle.
 void carry_beyond_image(Job& job) {
     Domain& domain = job.report().domain;
     const WorldBox body = job.body()->box(), box = domain.world_box();
@@ -33,7 +33,8 @@ const char* why_tag(const Job& job, const std::vector<Vec3>& loose) {
     for (const Vec3& seed : job.options.exterior_seeds)
         if (job.body()->level(seed) < 0) return "an exterior seed lies inside the contours";
     // Between slices, and beyond the last, the body may be that wrong.
-    const double far = std::max(kTagAttractionVoxels * job.h(), job.guided() ? job.options.contours->slice_distance : 0.0);
+    const double far =
+        std::max(kTagAttractionVoxels * job.h(), job.guided() ? job.options.contours->slice_distance : 0.0);
     for (const Vec3& point : loose)
         if (std::abs(job.body()->level(point)) > far) return "points lie far from the contours' body";
     return nullptr;
@@ -51,7 +52,8 @@ bool start_from_contours(Job& job) {
     }
     if (job.options.contours->flat && loose.empty())
         throw Error(Errc::InvalidInput,
-                    "segment: all contours lie on one slice, which tells nothing of how thick the body is; mark a second slice, "
+                    "segment: all contours lie on one slice, which tells nothing of how thick the body is; mark a "
+                    "second slice, "
                     "or give its `thickness`");
     job.choose("start", "contours", "the body between the contours; what inner contours enclose is outside");
     job.origin = StartOrigin::Contours;

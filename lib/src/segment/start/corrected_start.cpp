@@ -8,7 +8,7 @@
 namespace covol::pipeline {
 namespace {
 
-constexpr double kRadiusSpacings = 2.0; // a mark on a slice tells of the next one
+constexpr double kRadiusSpacings = 2.0;  // a mark on a slice tells of the next one
 
 CorrectionOptions correction(const Job& job) {
     CorrectionOptions options = job.options.correction;
@@ -16,7 +16,8 @@ CorrectionOptions correction(const Job& job) {
     options.least_radius = kCorrectionVoxels * job.h();
     if (job.image != nullptr) {
         const Vec3& spacing = job.image->geometry().spacing;
-        options.least_radius = std::max(options.least_radius, kRadiusSpacings * *std::max_element(spacing.begin(), spacing.end()));
+        options.least_radius =
+            std::max(options.least_radius, kRadiusSpacings * *std::max_element(spacing.begin(), spacing.end()));
     }
     return options;
 }
@@ -26,8 +27,8 @@ GuessCorrection corrected(const Job& job, const FloatGridPtr& guess, const std::
 }
 
 std::string distances(const CorrectionReport& report) {
-    return "from the marks to it: mean " + number(report.before_mean) + ", max " + number(report.before_max) + ", corrected " +
-           number(report.after_mean) + ", " + number(report.after_max);
+    return "from the marks to it: mean " + number(report.before_mean) + ", max " + number(report.before_max) +
+           ", corrected " + number(report.after_mean) + ", " + number(report.after_max);
 }
 
 }  // namespace
@@ -46,7 +47,8 @@ void start_from_corrected_guess(Job& job) {
     Timed timed(job.report().seconds.tag);
     job.options.correction = correction(job);
     const FloatGridPtr guess = start_grid(*job.options.guess, job.domain(), job.run);
-    job.result.correction = std::make_shared<const GuessCorrection>(corrected(job, guess, job.options.contours ? job.trusted : job.points));
+    job.result.correction =
+        std::make_shared<const GuessCorrection>(corrected(job, guess, job.options.contours ? job.trusted : job.points));
     job.result.u = job.result.correction->start(job.run);
     const CorrectionReport& report = job.report().correction = job.result.correction->report();
     job.choose("start", "guess",

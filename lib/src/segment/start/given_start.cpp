@@ -26,7 +26,8 @@ FloatGridPtr start_grid(const Start& start, const Domain& domain, const RunConte
         case Start::Kind::Sphere: return start_from_sphere(domain, start.center, start.radius);
         case Start::Kind::Box: return start_from_box(domain, start.box);
         case Start::Kind::Mesh: return start_from_mesh(domain, read_mesh(start.path), run);
-        case Start::Kind::Mask: return start_from_mask(domain, start.mask ? *start.mask : read_image(start.path, {}, run), run);
+        case Start::Kind::Mask:
+            return start_from_mask(domain, start.mask ? *start.mask : read_image(start.path, {}, run), run);
         case Start::Kind::Vdb:
             return start_from_grid(domain, start.level_set ? *start.level_set : *read_level_set(start.path), run);
         case Start::Kind::Auto:

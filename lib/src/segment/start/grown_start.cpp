@@ -20,7 +20,8 @@ void grow_to_edges(Job& job) {
     job.result.u = grown.level_set;
     if (job.report().automatic.count("delta") == 0) return;
     job.options.evolve.delta = kGrownDeltaVoxels * job.h();
-    job.choose("delta", number(job.options.evolve.delta), number(kGrownDeltaVoxels) + " voxels: the start lies at the edges");
+    job.choose("delta", number(job.options.evolve.delta),
+               number(kGrownDeltaVoxels) + " voxels: the start lies at the edges");
 }
 
 }  // namespace covol::pipeline

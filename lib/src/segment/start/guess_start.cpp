@@ -18,7 +18,8 @@ std::array<Vec3, 3> deviation(const Job& job) {
             continue;
         }
         const ImageGeometry& geometry = job.image->geometry();
-        for (int row = 0; row < 3; ++row) axes[a][row] = kUniformDeviation * geometry.spacing[a] * geometry.direction[row][a];
+        for (int row = 0; row < 3; ++row)
+            axes[a][row] = kUniformDeviation * geometry.spacing[a] * geometry.direction[row][a];
     }
     return axes;
 }
@@ -43,8 +44,8 @@ void start_from_guess(Job& job) {
     options.outside = job.options.outside;
     options.outside.insert(options.outside.end(), job.options.exterior_seeds.begin(), job.options.exterior_seeds.end());
     if (job.image != nullptr || job.options.roi) options.end = job.domain().world_box();
-    // A body that the image cuts goes on beyond it: at the image's end itself its wall would be closed, and the image asked
-    // about a cap. The clip at the end makes the cut.
+    // A body that the image cuts goes on beyond it: at the image's end itself its wall would be closed, and the image
+    // asked about a cap. The clip at the end makes the cut.
     if (job.image != nullptr && !job.options.roi) job.report().domain = widened(job.domain(), kBeyondVoxels);
     {
         Timed timed(job.report().seconds.tag);

@@ -12,8 +12,9 @@ void start_from_seeds(Job& job) {
         job.result.u = covol::start_from_seeds(job.domain(), job.options.inside, job.options.outside, job.run);
     }
     job.choose("start", "seeds",
-               job.options.outside.empty() ? "there are no marks, and no seeds outside: a little around the seeds inside"
-                                           : "there are no marks: halfway between seeds inside and outside");
+               job.options.outside.empty()
+                   ? "there are no marks, and no seeds outside: a little around the seeds inside"
+                   : "there are no marks: halfway between seeds inside and outside");
     if (job.options.outside.empty()) grow_to_edges(job);
 }
 

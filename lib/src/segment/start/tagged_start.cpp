@@ -15,8 +15,9 @@ namespace {
 
 constexpr double kCloseFromVoxels = 5.0;  // a tag distance beyond this starts from the closing instead
 constexpr double kCapDepthVoxels = 2.5;   // a mark on an end slice that lies deeper in the start is none of the outline
-constexpr double kBeyondVoxels = 6.0;     // that a cut body goes on beyond the image, for a band at a right angle to the face
-constexpr double kMirrorSpacings = 4.0;   // of the points, beyond which none of them tells of a cut
+// that a cut body goes on beyond the image, for a band at a right angle to the face
+constexpr double kBeyondVoxels = 6.0;
+constexpr double kMirrorSpacings = 4.0;  // of the points, beyond which none of them tells of a cut
 
 std::vector<Vec3> all_seeds(const Job& job) {
     std::vector<Vec3> seeds = job.options.exterior_seeds;
@@ -55,12 +56,13 @@ void start_from_closing(Job& job, double D) {
     if (!closed) return;
     job.result.u = closed;
     job.options.evolve.follow = true;
-    job.choose("start", "closing",
-               "of the tagged surface by a ball of radius D, for D is wider than " + number(kCloseFromVoxels) +
-                   " voxels");
+    job.choose(
+        "start", "closing",
+        "of the tagged surface by a ball of radius D, for D is wider than " + number(kCloseFromVoxels) + " voxels");
 }
 
-// ---- bodies that the image cuts off ------------------------------------------------------------------------------------
+// ---- bodies that the image cuts off
+// ------------------------------------------------------------------------------------
 
 /// On the same lattice, as large as all the points need, and some layers more.
 Domain around(Domain domain, const std::vector<Vec3>& points, int layers) {
@@ -90,7 +92,9 @@ std::optional<CutBody> tag_with(Job& job, const std::vector<Vec3>& beyond) {
     CutBody body{.beyond = beyond, .level_set = nullptr, .band = {}, .tag = {}};
     body.tag.tag_distance = job.options.tag_distance;
     if (body.tag.tag_distance <= 0) {
-        body.tag = choose_tag_distance(closed, around(job.domain(), closed, 0.25 * longest_side(bounding_box(closed)) + kMarginVoxels * h), all_seeds(job), job.run);
+        body.tag = choose_tag_distance(
+            closed, around(job.domain(), closed, 0.25 * longest_side(bounding_box(closed)) + kMarginVoxels * h),
+            all_seeds(job), job.run);
         if (!body.tag.encloses) return {};
     }
     const double D = body.tag.tag_distance;
@@ -108,7 +112,8 @@ std::optional<CutBody> tag_with(Job& job, const std::vector<Vec3>& beyond) {
 bool encloses_alone(const Job& job) {
     const double D = job.options.tag_distance;
     if (D <= 0) return choose_tag_distance(job.points, job.domain(), all_seeds(job), job.run).encloses;
-    return !band(*distance(job.points, job.domain(), {D + band_slack(job)}, job.run).grid, {D, all_seeds(job)}, job.run).report.leaks;
+    return !band(*distance(job.points, job.domain(), {D + band_slack(job)}, job.run).grid, {D, all_seeds(job)}, job.run)
+                .report.leaks;
 }
 
 /// Marks within the section on an end slice, and those that carry them on, say that the body goes on there; a surface
@@ -118,7 +123,8 @@ void drop_cap_marks(Job& job, const std::vector<detail::ImageFace>& faces) {
     const auto level = job.result.u->getConstAccessor();
     const auto caps = [&](const Vec3& p) {
         const Vec3 at = job.domain().world_to_index(p);
-        return std::any_of(faces.begin(), faces.end(), [&](const auto& face) { return face.depth(p) <= face.spacing; }) &&
+        return std::any_of(faces.begin(), faces.end(),
+                           [&](const auto& face) { return face.depth(p) <= face.spacing; }) &&
                level.getValue(openvdb::Coord::round(openvdb::Vec3d(at[0], at[1], at[2]))) < -deep;
     };
     const auto dropped = std::count_if(job.marks.begin(), job.marks.end(), caps);
@@ -133,7 +139,9 @@ void drop_cap_marks(Job& job, const std::vector<detail::ImageFace>& faces) {
 bool start_from_cut_body(Job& job) {
     if (job.image == nullptr || job.options.roi) return false;
     const std::vector<detail::ImageFace> faces = detail::faces_of(job.image->geometry());
-    const auto is_at_end = [&](const Vec3& p) { return std::any_of(faces.begin(), faces.end(), [&](const auto& f) { return detail::on_end_slice(f, p); }); };
+    const auto is_at_end = [&](const Vec3& p) {
+        return std::any_of(faces.begin(), faces.end(), [&](const auto& f) { return detail::on_end_slice(f, p); });
+    };
     const bool has_ends = std::any_of(job.points.begin(), job.points.end(), is_at_end);
     std::optional<CutBody> body;
     const char* how = "their section on the image's end slices goes on beyond it";
@@ -143,7 +151,8 @@ bool start_from_cut_body(Job& job) {
         if (has_ends) body = tag_with(job, detail::carried_on(job.points, faces, kBeyondVoxels * job.h()));
         if (!body) {
             how = "with their mirror image beyond the image's end they enclose a body";
-            const std::vector<Vec3> images = detail::mirrored(job.points, faces, kMirrorSpacings * nearest_neighbour_spacing(job.points).median);
+            const std::vector<Vec3> images =
+                detail::mirrored(job.points, faces, kMirrorSpacings * nearest_neighbour_spacing(job.points).median);
             if (!images.empty() && !encloses_alone(job)) body = tag_with(job, images);
         }
         if (!body) return false;

@@ -54,7 +54,8 @@ std::vector<Vec3> towards(const Vec3& sensor, const std::vector<Vec3>& points) {
 }  // namespace
 
 TEST_CASE("good normals orient, flipped ones are mended, those that all point inwards are turned over") {
-    for (const test::Solid3& shape : {test::ball(1), test::torus(1, 0.35), test::table(0.07), test::block({0.7, 0.7, 0.05})})
+    for (const test::Solid3& shape :
+         {test::ball(1), test::torus(1, 0.35), test::table(0.07), test::block({0.7, 0.7, 0.05})})
         for (unsigned seed = 1; seed <= 2; ++seed) {
             const test::SurfaceSample s = noisy(shape, 5000, 0.3, seed);
             const CloudOrientation good = with_normals(s.points, s.normals);
@@ -80,7 +81,8 @@ TEST_CASE("good normals orient, flipped ones are mended, those that all point in
 TEST_CASE("normals without a meaning change nothing") {
     const test::SurfaceSample s = noisy(test::torus(1, 0.35), 4000, 0.3, 3);
     const CloudOrientation own = orient_cloud(s.points);
-    const std::vector<Vec3> random = garbage(s.points.size(), 5), half = flipped(s.normals, 0.5, 6), up(s.points.size(), Vec3{0, 0, 1});
+    const std::vector<Vec3> random = garbage(s.points.size(), 5), half = flipped(s.normals, 0.5, 6),
+                            up(s.points.size(), Vec3{0, 0, 1});
     for (const auto& normals : {random, half, up}) {
         const CloudOrientation cloud = with_normals(s.points, normals);
         CHECK_FALSE(cloud.hints.used);

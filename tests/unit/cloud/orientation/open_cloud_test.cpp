@@ -26,8 +26,8 @@ std::vector<Vec3> bowl(int count, unsigned seed) {
     return points;
 }
 
-// A torus whose tube (radius 0.35 around a circle of radius 1) was seen from outside only on half of its way, from inside on
-// the other half: it encloses nothing.
+// A torus whose tube (radius 0.35 around a circle of radius 1) was seen from outside only on half of its way, from
+// inside on the other half: it encloses nothing.
 std::vector<Vec3> half_seen_torus(int count, double noise, unsigned seed) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> angle(-kPi, kPi);
@@ -35,7 +35,7 @@ std::vector<Vec3> half_seen_torus(int count, double noise, unsigned seed) {
     std::vector<Vec3> points;
     while (int(points.size()) < count) {
         const double around = angle(random), tube = angle(random);
-        const bool faces_out = std::abs(tube) < 0.62 * kPi, faces_in = std::abs(tube) > 0.38 * kPi;
+        const bool faces_out = std::abs(tube)<0.62 * kPi, faces_in = std::abs(tube)> 0.38 * kPi;
         if (around > 0 ? !faces_out : !faces_in) continue;
         const double r = 0.35 + off(random), away = 1 + r * std::cos(tube);
         points.push_back({away * std::cos(around), away * std::sin(around), r * std::sin(tube)});
@@ -51,7 +51,8 @@ TEST_CASE("a bowl becomes a solid with a lid, not a skin") {
     for (unsigned seed = 1; seed <= 3; ++seed) {
         const CloudOrientation cloud = orient_cloud(bowl(4000, seed));
         CloudReport report;
-        const TriangleMesh mesh = extract_mesh(*surface_from_cloud(domain_of_box({{-1.5, -1.5, -1.5}, {1.5, 1.5, 1.5}}, 0.05), cloud, report));
+        const TriangleMesh mesh = extract_mesh(
+            *surface_from_cloud(domain_of_box({{-1.5, -1.5, -1.5}, {1.5, 1.5, 1.5}}, 0.05), cloud, report));
         const MeshMeasures m = measure(mesh);
         CHECK(m.closed);
         CHECK(m.components == 1);

@@ -61,8 +61,8 @@ std::vector<Shape> shapes() {
     return {{"ball", test::ball(1), 2500},
             {"torus", test::torus(1, 0.35), 4000},
             {"shell with a cavity", test::shell(1, 0.5), 4000},
-            {"thin plate", test::block({0.8, 0.5, 0.05}), 4000},   // 4 spacings thick
-            {"body on thin legs", test::table(0.06), 5000}};       // legs 4 spacings thick
+            {"thin plate", test::block({0.8, 0.5, 0.05}), 4000},  // 4 spacings thick
+            {"body on thin legs", test::table(0.06), 5000}};      // legs 4 spacings thick
 }
 
 }  // namespace
@@ -75,8 +75,9 @@ TEST_CASE("cloud_scale: spacing and noise of a plane and a sphere") {
                 const double spacing = s.spacing();
                 test::add_noise(s, spacings * spacing, seed + 10);
                 const CloudScale scale = cloud_scale(s.points);
-                INFO("seed " << seed << (is_plane ? ", plane" : ", sphere") << ", noise of " << spacings << " spacings; found "
-                             << scale.spacing / spacing << " of the spacing, " << scale.noise / (spacings * spacing) << " of the noise");
+                INFO("seed " << seed << (is_plane ? ", plane" : ", sphere") << ", noise of " << spacings
+                             << " spacings; found " << scale.spacing / spacing << " of the spacing, "
+                             << scale.noise / (spacings * spacing) << " of the noise");
                 CHECK(scale.spacing / spacing == Approx(1).margin(0.12));
                 CHECK(scale.noise / (spacings * spacing) == Approx(1).margin(0.1));
             }
@@ -96,7 +97,8 @@ TEST_CASE("cloud_scale: hardly any noise where there is none, lengths follow the
 
 TEST_CASE("orient: the normals of closed shapes point outward, into cavities too") {
     for (const Shape& shape : shapes())
-        for (const auto& [spacings, seed] : std::vector<std::pair<double, unsigned>>{{0, 1}, {kNoise, 2}, {kNoise, 3}}) {
+        for (const auto& [spacings, seed] :
+             std::vector<std::pair<double, unsigned>>{{0, 1}, {kNoise, 2}, {kNoise, 3}}) {
             const test::SurfaceSample s = noisy(shape.solid, shape.count, spacings, seed);
             const Orientation o = orient(s.points, cloud_scale(s.points));
             REQUIRE(o.normals.size() == s.points.size());
@@ -104,8 +106,10 @@ TEST_CASE("orient: the normals of closed shapes point outward, into cavities too
             double area = 0, off_unit = 0;
             for (const double a : o.areas) area += a;
             for (const Vec3& n : o.normals) off_unit = std::max(off_unit, std::abs(test::norm(n) - 1));
-            INFO(shape.name << ", noise of " << spacings << " spacings, seed " << seed << ": wrong " << share_wrong(o.normals, s.normals)
-                            << ", mean cosine " << mean_cosine(o.normals, s.normals) << ", turned " << o.turned << ", area " << area / s.area);
+            INFO(shape.name << ", noise of " << spacings << " spacings, seed " << seed << ": wrong "
+                            << share_wrong(o.normals, s.normals) << ", mean cosine "
+                            << mean_cosine(o.normals, s.normals) << ", turned " << o.turned << ", area "
+                            << area / s.area);
             CHECK(share_wrong(o.normals, s.normals) < (spacings > 0 ? 0.007 : 0.001));
             CHECK(mean_cosine(o.normals, s.normals) > (spacings > 0 ? 0.91 : 0.95));
             CHECK(o.turned < 0.004);
@@ -126,7 +130,8 @@ TEST_CASE("orient: the indicator is 1 in the solid and 0 elsewhere; its level pa
     CHECK(worst_in < 0.2);
     CHECK(worst_out < 0.2);
     double slope = 0;
-    for (const Vec3& x : s.points) slope -= test::dot(o.indicator->at(x).gradient, test::normal_of(shape.distance, x)) / 4000;
+    for (const Vec3& x : s.points)
+        slope -= test::dot(o.indicator->at(x).gradient, test::normal_of(shape.distance, x)) / 4000;
     CHECK(slope > 0.2 / o.indicator->cell());
 
     std::vector<WorldBox> crossed;
@@ -140,7 +145,8 @@ TEST_CASE("orient: the indicator is 1 in the solid and 0 elsewhere; its level pa
     for (std::size_t n = 0; n < s.points.size(); n += 10) {
         const Vec3& p = s.points[n];
         CHECK(std::any_of(crossed.begin(), crossed.end(), [&](const WorldBox& box) {
-            return test::norm(test::sum(test::scaled(0.5, test::sum(box.min, box.max)), test::scaled(-1, p))) < 3 * o.indicator->cell();
+            return test::norm(test::sum(test::scaled(0.5, test::sum(box.min, box.max)), test::scaled(-1, p))) <
+                   3 * o.indicator->cell();
         }));
     }
 }
@@ -183,7 +189,8 @@ TEST_CASE("orient_cloud leaves out points spread through space, and none of a su
         if (std::string(shape.name) != "thin plate") continue;
         for (const unsigned seed : {1, 2}) {
             const test::SurfaceSample s = noisy(shape.solid, shape.count, kNoise, seed);
-            const std::vector<Vec3> spread = test::box_cloud(int(0.03 * double(shape.count)), bounding_box(s.points, 0.3), seed + 7);
+            const std::vector<Vec3> spread =
+                test::box_cloud(int(0.03 * double(shape.count)), bounding_box(s.points, 0.3), seed + 7);
             std::vector<Vec3> all = s.points;
             all.insert(all.end(), spread.begin(), spread.end());
             const CloudOrientation cloud = orient_cloud(all);
@@ -193,11 +200,13 @@ TEST_CASE("orient_cloud leaves out points spread through space, and none of a su
             double lost = 0, far = 0, far_kept = 0;
             for (const Vec3& p : s.points) lost += !kept.count(p);
             for (const Vec3& p : spread) {
-                if (std::abs(shape.solid.distance(p)) < 4 * s.spacing()) continue;  // beside the surface they may pass for it
+                if (std::abs(shape.solid.distance(p)) < 4 * s.spacing())
+                    continue;  // beside the surface they may pass for it
                 ++far;
                 far_kept += kept.count(p);
             }
-            INFO(shape.name << ", seed " << seed << ": lost " << lost << " of the surface, kept " << far_kept << " of " << far << " far from it");
+            INFO(shape.name << ", seed " << seed << ": lost " << lost << " of the surface, kept " << far_kept << " of "
+                            << far << " far from it");
             REQUIRE(far > 50);
             CHECK(far_kept < 0.25 * far);
             CHECK(lost < 0.001 * double(shape.count));

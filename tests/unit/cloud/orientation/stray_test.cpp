@@ -27,8 +27,8 @@ TEST_CASE("points spread through space are stray, a surface's are not") {
         for (const Vec3& p : test::box_cloud(400, {{-3, -3, -3}, {3, 3, 3}}, seed + 20))
             if (shape.distance(p) > 6 * s.spacing()) points.push_back(p);
         const std::vector<char> stray = find_stray(points, {s.spacing(), 0, 0}, {});
-        INFO("seed " << seed << ": " << count(stray, 0, 4000) << " of the surface, " << count(stray, 4000, points.size()) << " of "
-                     << points.size() - 4000);
+        INFO("seed " << seed << ": " << count(stray, 0, 4000) << " of the surface, "
+                     << count(stray, 4000, points.size()) << " of " << points.size() - 4000);
         CHECK(count(stray, 0, 4000) <= 4);
         CHECK(double(count(stray, 4000, points.size())) > 0.95 * double(points.size() - 4000));
     }

@@ -32,11 +32,14 @@ Charged sphere(int count, double radius, const Vec3& center = {0, 0, 0}) {
 
 double largest_difference(const LatticeField& a, const LatticeField& b) {
     double largest = 0;
-    for (std::size_t n = 0; n < a.values.size(); ++n) largest = std::max(largest, double(std::abs(a.values[n] - b.values[n])));
+    for (std::size_t n = 0; n < a.values.size(); ++n)
+        largest = std::max(largest, double(std::abs(a.values[n] - b.values[n])));
     return largest;
 }
 
-Vec3 node(const Lattice& l, int i, int j, int k) { return {l.origin[0] + i * l.cell, l.origin[1] + j * l.cell, l.origin[2] + k * l.cell}; }
+Vec3 node(const Lattice& l, int i, int j, int k) {
+    return {l.origin[0] + i * l.cell, l.origin[1] + j * l.cell, l.origin[2] + k * l.cell};
+}
 
 template <typename Visit>
 void for_nodes(const Lattice& l, Visit visit) {
@@ -94,7 +97,8 @@ TEST_CASE("splines are exact on linear functions, and their gradient is that of 
             Vec3 low = x, high = x;
             low[a] -= step;
             high[a] += step;
-            REQUIRE(waves.at(x).gradient[a] == Approx((waves.at(high).value - waves.at(low).value) / (2 * step)).margin(1e-4));
+            REQUIRE(waves.at(x).gradient[a] ==
+                    Approx((waves.at(high).value - waves.at(low).value) / (2 * step)).margin(1e-4));
         }
     }
     // Beyond the lattice as at its end.
@@ -122,8 +126,10 @@ TEST_CASE("the density of points keeps their number and their centre, smoothed o
         CHECK(count == Approx(500).epsilon(1e-4));
         for (int a = 0; a < 3; ++a) CHECK(mean[a] == Approx(center[a]).margin(1e-4));
         // Each pass adds half a cell squared to the variance along each axis.
-        if (passes > 0) CHECK(squares / 500 == Approx(spread + 1.5 * passes * l.cell * l.cell).epsilon(1e-3));
-        else spread = squares / 500;
+        if (passes > 0)
+            CHECK(squares / 500 == Approx(spread + 1.5 * passes * l.cell * l.cell).epsilon(1e-3));
+        else
+            spread = squares / 500;
     }
 }
 
@@ -144,7 +150,8 @@ TEST_CASE("the indicator of a sphere is 1 inside, 0 outside, 1/2 on it, and rise
             const Vec3 g = at(1).gradient;
             least_cosine = std::min(least_cosine, -test::dot(g, direction) / test::norm(g));
         }
-        INFO(cells << " cells: in " << worst_in << " out " << worst_out << " on " << worst_on << " cosine " << least_cosine);
+        INFO(cells << " cells: in " << worst_in << " out " << worst_out << " on " << worst_on << " cosine "
+                   << least_cosine);
         CHECK(worst_in < 0.02);
         CHECK(worst_out < 0.02);
         CHECK(worst_on < 0.06);
@@ -165,7 +172,8 @@ TEST_CASE("the indicator steps by 1 across a surface that encloses nothing") {
     const double cell = field.indicator().lattice.cell;
     // Away from both sides the harmonic part changes, too: of a disc's by about the distance over the radius.
     for (const double r : {2.0, 3.0}) {
-        const double step = field.indicator().at({0, 0, -1 + r * cell}).value - field.indicator().at({0, 0, -1 - r * cell}).value;
+        const double step =
+            field.indicator().at({0, 0, -1 + r * cell}).value - field.indicator().at({0, 0, -1 - r * cell}).value;
         CHECK(step > 1 - 2 * r * cell);
         CHECK(step < 1.02);
     }
@@ -196,8 +204,8 @@ TEST_CASE("each V-cycle leaves a fraction of the error") {
 TEST_CASE("a coarser solution is a good first guess for a finer one") {
     const Charged s = sphere(4000, 1);
     const WorldBox box = bounding_box(s.points);
-    WindingField coarse(lattice_around(box, 0.2, 32)), exact(lattice_around(box, 0.2, 48)), fresh(lattice_around(box, 0.2, 48)),
-        guessed(lattice_around(box, 0.2, 48));
+    WindingField coarse(lattice_around(box, 0.2, 32)), exact(lattice_around(box, 0.2, 48)),
+        fresh(lattice_around(box, 0.2, 48)), guessed(lattice_around(box, 0.2, 48));
     coarse.solve(s.points, s.vectors, 12);
     exact.solve(s.points, s.vectors, 30);
     guessed.start_from(coarse.indicator());
@@ -207,7 +215,8 @@ TEST_CASE("a coarser solution is a good first guess for a finer one") {
     CHECK(inside < 0.02);
     fresh.solve(s.points, s.vectors, 1);
     guessed.solve(s.points, s.vectors, 1);
-    CHECK(largest_difference(guessed.indicator(), exact.indicator()) < 0.7 * largest_difference(fresh.indicator(), exact.indicator()));
+    CHECK(largest_difference(guessed.indicator(), exact.indicator()) <
+          0.7 * largest_difference(fresh.indicator(), exact.indicator()));
 }
 
 TEST_CASE("the indicator is linear in the areas; multiply scales it; turned normals change its sign") {

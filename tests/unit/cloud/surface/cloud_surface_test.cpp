@@ -50,15 +50,17 @@ const Domain kDomain = domain_of_box({{-1.5, -1.5, -1.5}, {1.5, 1.5, 1.5}}, 0.06
 }  // namespace
 
 TEST_CASE("surface_from_cloud: closed, of the right genus and volume, closer to the shape than the points") {
-    for (const Shape& shape : {Shape{"ball", test::ball(1), 4.0 / 3 * M_PI, 0}, Shape{"torus", test::torus(1, 0.35), 2 * M_PI * M_PI * 0.35 * 0.35, 1}})
+    for (const Shape& shape : {Shape{"ball", test::ball(1), 4.0 / 3 * M_PI, 0},
+                               Shape{"torus", test::torus(1, 0.35), 2 * M_PI * M_PI * 0.35 * 0.35, 1}})
         for (const auto& [spacings, seed] : std::vector<std::pair<double, unsigned>>{{0, 1}, {0.3, 2}, {0.3, 3}}) {
             test::SurfaceSample s = shape.solid.sample(4000, seed);
             const double spacing = s.spacing();
             test::add_noise(s, spacings * spacing, seed + 50);
             const Result r = surface_of(s.points, 0.7 * spacing);
             const MeshMeasures m = measure(r.mesh);
-            INFO(shape.name << ", noise of " << spacings << " spacings, seed " << seed << ": off " << off(r.mesh, shape.solid) / spacing
-                            << " spacings, volume " << m.volume / shape.volume << " of the shape's");
+            INFO(shape.name << ", noise of " << spacings << " spacings, seed " << seed << ": off "
+                            << off(r.mesh, shape.solid) / spacing << " spacings, volume " << m.volume / shape.volume
+                            << " of the shape's");
             CHECK(m.closed);
             CHECK(m.manifold);
             CHECK(m.components == 1);
@@ -76,7 +78,8 @@ TEST_CASE("surface_from_cloud: closed, of the right genus and volume, closer to 
 TEST_CASE("surface_from_cloud: a cavity stays one, thin legs stay whole") {
     const test::Solid3 shell = test::shell(1, 0.5), table = test::table(0.08);
     const test::SurfaceSample on_shell = shell.sample(4000, 4), on_table = table.sample(4000, 4);
-    const Result hollow = surface_of(on_shell.points, 0.7 * on_shell.spacing()), legs = surface_of(on_table.points, 0.7 * on_table.spacing());
+    const Result hollow = surface_of(on_shell.points, 0.7 * on_shell.spacing()),
+                 legs = surface_of(on_table.points, 0.7 * on_table.spacing());
     const MeshMeasures of_hollow = measure(hollow.mesh), of_legs = measure(legs.mesh);
     CHECK(of_hollow.closed);
     CHECK(of_hollow.components == 2);

@@ -55,7 +55,8 @@ TEST_CASE("hold_topology: whatever the target is, pieces and handles stay those 
         std::mt19937 random(seed);
         const FloatGridPtr ball = level_set([](int i, int j, int k) { return away(i, j, k) < 7; });
         const FloatGridPtr ring = level_set([](int i, int j, int k) { return off_torus(i, j, k) < 3; });
-        const FloatGridPtr noise = level_set([&](int i, int j, int k) { return !is_border(i, j, k) && random() % 2 == 0; });
+        const FloatGridPtr noise =
+            level_set([&](int i, int j, int k) { return !is_border(i, j, k) && random() % 2 == 0; });
         for (const auto& [rough, genus] : {std::pair{ball, 0}, std::pair{ring, 1}}) {
             const FloatGridPtr held = noise->deepCopy();
             const std::size_t left = cloud::hold_topology(*rough, *held);
@@ -72,9 +73,13 @@ TEST_CASE("hold_topology: what keeps two pieces apart lies where the target is n
     const double middle = 0.5 * (kSide - 1);
     for (const int narrow : {8, 12, 15}) {
         // Two blocks and a bar between them, which is thinner in one place.
-        const auto bar = [&](int i, int j, int k) { return std::hypot(j - middle, k - middle) < (i == narrow ? 1.5 : 4); };
-        const FloatGridPtr target = level_set([&](int i, int j, int k) { return !is_border(i, j, k) && (i < 5 || i > 18 || bar(i, j, k)); });
-        const FloatGridPtr rough = level_set([&](int i, int j, int k) { return !is_border(i, j, k) && (i < 5 || i > 18); });
+        const auto bar = [&](int i, int j, int k) {
+            return std::hypot(j - middle, k - middle) < (i == narrow ? 1.5 : 4);
+        };
+        const FloatGridPtr target =
+            level_set([&](int i, int j, int k) { return !is_border(i, j, k) && (i < 5 || i > 18 || bar(i, j, k)); });
+        const FloatGridPtr rough =
+            level_set([&](int i, int j, int k) { return !is_border(i, j, k) && (i < 5 || i > 18); });
         std::size_t least = 0;
         for (int j = 0; j < kSide; ++j)
             for (int k = 0; k < kSide; ++k) least += bar(narrow, j, k);

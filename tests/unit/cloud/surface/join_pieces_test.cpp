@@ -23,9 +23,12 @@ double ball(const Vec3& p, const Vec3& center, double radius) { return test::dis
 Vec3 tip(double gap) { return {kBody[0] + kRadius + gap + kThin, 0, 0}; }
 FloatGridPtr torn(double gap, double tip_radius = kThin) {
     const Vec3 at{tip(gap)[0] + tip_radius - kThin, 0, 0};
-    return test::start_grid(test::cube_domain(80, kVoxel), [&](const Vec3& p) {
-        return std::min(std::max(ball(p, kBody, kRadius), -ball(p, kBody, 0.2)), ball(p, at, tip_radius));
-    }, 3 * kVoxel);
+    return test::start_grid(
+        test::cube_domain(80, kVoxel),
+        [&](const Vec3& p) {
+            return std::min(std::max(ball(p, kBody, kRadius), -ball(p, kBody, 0.2)), ball(p, at, tip_radius));
+        },
+        3 * kVoxel);
 }
 
 /// On both, and on the part that is missing between them as far as it has any.
@@ -73,9 +76,12 @@ TEST_CASE("a piece is joined to one that was joined") {
     // Three beads in a row; the last is far from the body.
     const double gap = 1.5 * kApart;
     const Vec3 second = tip(gap), third{second[0] + 2 * kThin + gap, 0, 0};
-    const FloatGridPtr beads = test::start_grid(test::cube_domain(80, kVoxel), [&](const Vec3& p) {
-        return std::min({ball(p, kBody, kRadius), ball(p, second, kThin), ball(p, third, kThin)});
-    }, 3 * kVoxel);
+    const FloatGridPtr beads = test::start_grid(
+        test::cube_domain(80, kVoxel),
+        [&](const Vec3& p) {
+            return std::min({ball(p, kBody, kRadius), ball(p, second, kThin), ball(p, third, kThin)});
+        },
+        3 * kVoxel);
     std::vector<Vec3> all = points(gap, true);
     for (double x = second[0]; x < third[0]; x += 0.5 * kApart) all.push_back({x, 0, kThin});
     CHECK(cloud::join_pieces(*beads, all, kApart, {}) == 2);

@@ -36,10 +36,10 @@ double median(std::vector<double> v) {
 
 /// How quadrics at a sample of a shape's points, moved by noise, fit the shape.
 struct Found {
-    double share = 0;      // of the nodes that have a quadric
-    double off = 0;        // root mean square of the feet's distance to the shape
+    double share = 0;                             // of the nodes that have a quadric
+    double off = 0;                               // root mean square of the feet's distance to the shape
     double noise = 0, radius = 0, curvature = 0;  // medians
-    double off_beside = 0; // root mean square error of distance() half a radius beside and above the foot
+    double off_beside = 0;  // root mean square error of distance() half a radius beside and above the foot
 };
 
 Found fit_shape(const test::Solid3& shape, std::size_t count, double spacings, unsigned seed) {
@@ -56,7 +56,8 @@ Found fit_shape(const test::Solid3& shape, std::size_t count, double spacings, u
         radius.push_back(q.radius);
         curvature.push_back(q.curvature());
         squares += std::pow(shape.distance(q.foot()), 2);
-        const Vec3 x = test::sum(test::sum(q.foot(), test::scaled(spacing, q.axes[0])), test::scaled(spacing, q.axes[2]));
+        const Vec3 x =
+            test::sum(test::sum(q.foot(), test::scaled(spacing, q.axes[0])), test::scaled(spacing, q.axes[2]));
         beside += std::pow(q.distance(x) - shape.distance(x), 2);
     }
     const double fitted = double(radius.size());
@@ -80,8 +81,10 @@ TEST_CASE("feet of quadrics lie far closer to the surface than the points do") {
             double radius = 0;
             for (const double spacings : {0.0, 0.1, 0.3, 0.6}) {
                 const Found f = fit_shape(shape, 8000, spacings, seed);
-                INFO((is_ball ? "ball" : "torus") << ", seed " << seed << ", noise of " << spacings << " spacings: off " << f.off / spacing
-                     << " spacings, beside " << f.off_beside / spacing << ", radius " << f.radius / spacing << ", curvature " << f.curvature / curvature);
+                INFO((is_ball ? "ball" : "torus")
+                     << ", seed " << seed << ", noise of " << spacings << " spacings: off " << f.off / spacing
+                     << " spacings, beside " << f.off_beside / spacing << ", radius " << f.radius / spacing
+                     << ", curvature " << f.curvature / curvature);
                 CHECK(f.share > 0.99);
                 const double most = spacings > 0 ? 0.5 * spacings : 0.001;
                 CHECK(f.off < most * spacing);
@@ -89,8 +92,10 @@ TEST_CASE("feet of quadrics lie far closer to the surface than the points do") {
                 CHECK(f.curvature / curvature == Approx(1).margin(spacings > 0 ? 0.4 : 0.02));
                 // As wide as the noise asks for.
                 if (spacings > 0) CHECK(f.radius > 2.5 * spacing);
-                if (spacings == 0) radius = f.radius;
-                else if (spacings == 0.3) CHECK(f.radius > 2 * radius);
+                if (spacings == 0)
+                    radius = f.radius;
+                else if (spacings == 0.3)
+                    CHECK(f.radius > 2 * radius);
                 if (spacings == 0) CHECK(f.noise < 0.01 * spacing);
             }
         }
@@ -100,7 +105,7 @@ TEST_CASE("a quadric's distance, foot and curvature are those of its paraboloid"
     Quadric q;
     q.origin = {1, 2, 3};
     q.axes = {Vec3{0, 1, 0}, Vec3{0, 0, 1}, Vec3{1, 0, 0}};  // the normal is x
-    q.c = {0.5, 0, 0, 2, 0, -1};                              // x - 1 = 0.5 + 2 u^2 - v^2, u = y - 2, v = z - 3
+    q.c = {0.5, 0, 0, 2, 0, -1};                             // x - 1 = 0.5 + 2 u^2 - v^2, u = y - 2, v = z - 3
     CHECK(q.foot() == Vec3{1.5, 2, 3});
     CHECK(q.distance({1.5, 2, 3}) == Approx(0).margin(1e-15));
     CHECK(q.distance({1.7, 2, 3}) == Approx(0.2));
@@ -166,8 +171,8 @@ TEST_CASE("two sheets back to back do not mix") {
             widest = std::max(widest, q.radius);
             ++fitted;
         }
-        INFO("seed " << seed << ": off by " << std::sqrt(squares / double(fitted)) / spacing << " spacings, widest " << widest / spacing
-                     << ", mean cosine " << cosines / double(fitted));
+        INFO("seed " << seed << ": off by " << std::sqrt(squares / double(fitted)) / spacing << " spacings, widest "
+                     << widest / spacing << ", mean cosine " << cosines / double(fitted));
         CHECK(cosines / double(fitted) > 0.96);
         CHECK(std::sqrt(squares / double(fitted)) < 0.1 * spacing);
         CHECK(widest > 2 * apart);  // they were in reach
@@ -248,7 +253,8 @@ TEST_CASE("thinned: one mean for each cell of a smooth surface, whichever way it
 }
 
 TEST_CASE("noise along a bent surface does not draw the quadrics inwards") {
-    // Where a ball's points are moved by sigma along each axis, their mean height over a tangent plane is sigma^2 / R too low.
+    // Where a ball's points are moved by sigma along each axis, their mean height over a tangent plane is sigma^2 / R
+    // too low.
     double bias = 0;
     int count = 0;
     const double sigma = 0.06;
@@ -284,7 +290,8 @@ TEST_CASE("where neighbourhoods are wide there are fewer quadrics, and none is f
         feet.push_back(q.foot());
     }
     double farthest = 0;
-    for (std::size_t n = 0; n < places.size(); n += 10) farthest = std::max(farthest, test::brute_force_distance(feet, places.points[n]));
+    for (std::size_t n = 0; n < places.size(); n += 10)
+        farthest = std::max(farthest, test::brute_force_distance(feet, places.points[n]));
     CHECK(farthest < 3 * edge);
     for (const Quadric& q : quadrics_over(places, places, edge, {spacing, 0, 0}, bare, {})) CHECK(q.apart == edge);
 }
@@ -302,7 +309,8 @@ TEST_CASE("points far from all others make no quadrics beside those of a sheet")
     }
     std::size_t bare = 0;
     double widest = 0;
-    for (const Quadric& q : quadrics_over(cloud, cloud, spacing, {spacing, 0}, bare, {})) widest = std::max(widest, q.least_radius);
+    for (const Quadric& q : quadrics_over(cloud, cloud, spacing, {spacing, 0}, bare, {}))
+        widest = std::max(widest, q.least_radius);
     INFO("widest " << widest << " spacing " << spacing);
     CHECK(widest < 6 * spacing);
 }

@@ -217,7 +217,8 @@ TEST_CASE("a float grid of a .vdb file is an image on the box of its active voxe
     domain.max = {3, 3, 3};
     const FloatGridPtr a = make_grid(domain, 7.0F, "a"), b = make_grid(domain, 0.0F, "b");
     write_vdb(scratch.path("empty.vdb"), {a});
-    CHECK(message_of([&] { (void)read_image(scratch.path("empty.vdb")); }).find("no active voxel") != std::string::npos);
+    CHECK(message_of([&] { (void)read_image(scratch.path("empty.vdb")); }).find("no active voxel") !=
+          std::string::npos);
     CHECK(message_of([&] { (void)read_image(scratch.path("empty.vdb") + ":x"); }).find("x") != std::string::npos);
 }
 
@@ -226,13 +227,18 @@ TEST_CASE("damaged MRC and DICOM files end in an Error, never in a crash") {
     fuzz_image(scratch, scratch.write("f.mrc", mrc(1)));
     const std::string slice = dicom(0);
     // a file of its own: its series has one slice, which is an Error; what counts is that reading ends
-    fuzz(scratch, scratch.write("d.dcm", slice), [](const std::string& bad) { (void)read_image(bad); }, 200, slice.size());
+    fuzz(
+        scratch, scratch.write("d.dcm", slice), [](const std::string& bad) { (void)read_image(bad); }, 200,
+        slice.size());
     const std::string folder = scratch.path("series");
     write_series(folder);
-    fuzz(scratch, folder + "/9.dcm", [&](const std::string& bad) {
-        std::filesystem::copy_file(bad, folder + "/9.dcm", std::filesystem::copy_options::overwrite_existing);
-        (void)read_image(folder);
-    }, 60, slice.size() - 84);
+    fuzz(
+        scratch, folder + "/9.dcm",
+        [&](const std::string& bad) {
+            std::filesystem::copy_file(bad, folder + "/9.dcm", std::filesystem::copy_options::overwrite_existing);
+            (void)read_image(folder);
+        },
+        60, slice.size() - 84);
 }
 
 TEST_CASE("damaged HDF5 files end in an Error, never in a crash", "[hdf5]") {

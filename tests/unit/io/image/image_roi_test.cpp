@@ -20,7 +20,8 @@ ImageGeometry lattice() {
 std::vector<std::uint8_t> values() {
     std::vector<std::uint8_t> all;
     std::uint32_t state = 1;
-    for (int n = 0; n < 40 * 33 * 17; ++n) all.push_back(static_cast<std::uint8_t>((state = state * 1664525U + 1013904223U) >> 24));
+    for (int n = 0; n < 40 * 33 * 17; ++n)
+        all.push_back(static_cast<std::uint8_t>((state = state * 1664525U + 1013904223U) >> 24));
     return all;
 }
 
@@ -77,14 +78,16 @@ TEST_CASE("samples beyond the part that is held are an error, beyond the image t
     CHECK_THROWS_AS(part.sample(frame, {8, 0, 0}, {8, 0, 0}, out), Error);
     CHECK_THROWS_AS(part.sample(frame, {0, 0, 20}, {0, 0, 20}, out), Error);
     options.roi = WorldBox{{0, 0, 0}, {1, 1, 1}};
-    CHECK(message_of([&] { (void)read_image(scratch.path("a.nrrd"), options); }).find("outside the image") != std::string::npos);
+    CHECK(message_of([&] { (void)read_image(scratch.path("a.nrrd"), options); }).find("outside the image") !=
+          std::string::npos);
 }
 
 TEST_CASE("a file too large to read is mapped, and only what the box needs is asked for") {
     const Scratch scratch;
     // 3 GiB of nothing on the disk, one voxel set
     constexpr std::uint64_t kSize = 1448;
-    const std::string header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 1448 1448 1448\nspacings: 1 1 2\nencoding: raw\n\n";
+    const std::string header =
+        "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 1448 1448 1448\nspacings: 1 1 2\nencoding: raw\n\n";
     const std::string path = scratch.write("big.nrrd", header);
     std::filesystem::resize_file(path, header.size() + kSize * kSize * kSize);
     {

@@ -147,10 +147,12 @@ TEST_CASE("PLY of other programs: big-endian bytes, doubles, other properties an
 TEST_CASE("OBJ with slashes, negative numbers and groups; OFF with colours and comments") {
     const Folder folder;
     const TriangleMesh obj = read_mesh(folder.file("a.obj",
-        "# c\no thing\nv 0 0 0\nv +1 0 0 1.0\nv 1e0 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\ns off\nf 1/1/1 2//1 3/1 # c\nf -4 -2 -1\n"));
+                                                   "# c\no thing\nv 0 0 0\nv +1 0 0 1.0\nv 1e0 1 0\nv 0 1 0\nvt 0 "
+                                                   "0\nvn 0 0 1\ns off\nf 1/1/1 2//1 3/1 # c\nf -4 -2 -1\n"));
     CHECK(obj.triangles.size() == 2);
     CHECK(measure(obj).area == Approx(1));
-    const TriangleMesh off = read_mesh(folder.file("a.off", "COFF 4 1 0\n# c\n0 0 0 255 0 0 1\n1 0 0\n\n1 1 0\n0 1 0\n4 0 1 2 3 0.5 0.5 0.5"));
+    const TriangleMesh off = read_mesh(
+        folder.file("a.off", "COFF 4 1 0\n# c\n0 0 0 255 0 0 1\n1 0 0\n\n1 1 0\n0 1 0\n4 0 1 2 3 0.5 0.5 0.5"));
     CHECK(measure(off).area == Approx(1));
 }
 
@@ -165,17 +167,24 @@ TEST_CASE("broken and hostile files give one clear error") {
     check_refused(folder.file("a.ply", ""), "end of the file");
     check_refused(folder.file("a.ply", "plx\n"), "expected 'ply'");
     for (const std::string& format : {ascii, binary}) {
-        check_refused(folder.file("a.ply", format + "element vertex 1000000000000\n" + vertex + "end_header\n0 0 0\n"), "room for at most");
-        check_refused(folder.file("a.ply", format + "element vertex 18446744073709551615\n" + vertex + "end_header\n0 0 0\n"), "room");
+        check_refused(folder.file("a.ply", format + "element vertex 1000000000000\n" + vertex + "end_header\n0 0 0\n"),
+                      "room for at most");
+        check_refused(
+            folder.file("a.ply", format + "element vertex 18446744073709551615\n" + vertex + "end_header\n0 0 0\n"),
+            "room");
         check_refused(folder.file("a.ply", format + "element face 99999999\n" + face + "end_header\n0 0 0\n"), "room");
     }
-    check_refused(folder.file("a.ply", ascii + "element vertex 99999999999999999999999\n" + vertex + "end_header\n"), ":3: expected");
+    check_refused(folder.file("a.ply", ascii + "element vertex 99999999999999999999999\n" + vertex + "end_header\n"),
+                  ":3: expected");
     check_refused(folder.file("a.ply", ascii + "element vertex 1000000000000\nend_header\n0 0 0\n"), "no property 'x'");
     check_refused(folder.file("a.ply", ascii + "element x 1000000000000\nend_header\n"), "no triangle");
-    check_refused(folder.file("a.ply", ascii + "element vertex 1\n" + vertex + "end_header\n0 zero 0\n"), ":8: expected a number, got 'zero'");
+    check_refused(folder.file("a.ply", ascii + "element vertex 1\n" + vertex + "end_header\n0 zero 0\n"),
+                  ":8: expected a number, got 'zero'");
     check_refused(folder.file("a.ply", ascii + "element vertex 1\n" + vertex + "end_header\n0 nan 0\n"), "not finite");
-    check_refused(folder.file("a.ply", ascii + "element face 1\n" + face + "end_header\n3 0 1 2\n"), "refers to vertex 0");
-    check_refused(folder.file("a.ply", ascii + "element face 1\n" + face + "end_header\n3 0 1 -2\n"), "number of a vertex");
+    check_refused(folder.file("a.ply", ascii + "element face 1\n" + face + "end_header\n3 0 1 2\n"),
+                  "refers to vertex 0");
+    check_refused(folder.file("a.ply", ascii + "element face 1\n" + face + "end_header\n3 0 1 -2\n"),
+                  "number of a vertex");
     check_refused(folder.file("a.ply", ascii + "element face 1\n" + face + "end_header\n1e18 0 1 2\n"), "a list of");
     check_refused(folder.file("a.obj", "v 0 0\n"), "a.obj:1: expected 3 numbers, got 2");
     check_refused(folder.file("a.obj", "v 0 0 0\nf 1 2 3\n"), "refers to vertex 1");
@@ -200,8 +209,10 @@ TEST_CASE("a file is the same to those who want its mesh and to those who want i
         }
         return "was read";
     };
-    const std::string vertex = "element vertex 3\nproperty float x\nproperty float Y\nproperty uchar red\nproperty double z\n";
-    const std::string ply = "\n\nply\nformat ascii 1.0\n" + vertex + "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+    const std::string vertex =
+        "element vertex 3\nproperty float x\nproperty float Y\nproperty uchar red\nproperty double z\n";
+    const std::string ply =
+        "\n\nply\nformat ascii 1.0\n" + vertex + "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
     const struct {
         const char* name;
         std::string text;
@@ -227,7 +238,8 @@ TEST_CASE("a file is the same to those who want its mesh and to those who want i
                {"a.off", "nOFF\n4\n1 0 0\n0 0 0 0\n"},
                {"a.off", "OFF BINARY\n"}};
     for (const auto& file : bad) {
-        const std::string path = folder.file(file.name, file.text), as_mesh = message_of([&] { (void)read_mesh(path); });
+        const std::string path = folder.file(file.name, file.text),
+                          as_mesh = message_of([&] { (void)read_mesh(path); });
         INFO(as_mesh);
         CHECK(as_mesh != "was read");
         CHECK(message_of([&] { (void)read_points(path); }) == as_mesh);
@@ -277,7 +289,8 @@ TEST_CASE("Attributes are float properties of a PLY's vertices") {
         const std::string path = folder.file(binary ? "b.ply" : "a.ply");
         write_mesh(path, tetrahedron(), options);
         const std::string text = text_of(path);
-        CHECK_THAT(text, Catch::Contains("property float nz\nproperty float distance_to_marks\nproperty float edge_strength\n"));
+        CHECK_THAT(text, Catch::Contains(
+                             "property float nz\nproperty float distance_to_marks\nproperty float edge_strength\n"));
         const TriangleMesh back = read_mesh(path);
         CHECK(back.vertices == tetrahedron().vertices);
         CHECK(back.triangles == tetrahedron().triangles);
@@ -345,8 +358,8 @@ std::string glb_of(std::string json, std::string binary) {
         const auto number = std::uint32_t(value);
         return std::string(reinterpret_cast<const char*>(&number), 4);
     };
-    return "glTF" + word(2) + word(28 + json.size() + binary.size()) + word(json.size()) + "JSON" + json + word(binary.size()) +
-           std::string("BIN\0", 4) + binary;
+    return "glTF" + word(2) + word(28 + json.size() + binary.size()) + word(json.size()) + "JSON" + json +
+           word(binary.size()) + std::string("BIN\0", 4) + binary;
 }
 
 template <typename T>
@@ -378,12 +391,14 @@ TEST_CASE("glb of other programs: interleaved vertices, short indices, shared po
     const TriangleMesh mesh = read_mesh(folder.file("a.glb", glb_of(json, binary)));
     CHECK(mesh.vertices == std::vector<std::array<float, 3>>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}});
     CHECK(mesh.triangles == std::vector<std::array<std::uint32_t, 3>>{{0, 2, 1}, {0, 1, 3}});
-    const TriangleMesh bare = read_mesh(folder.file("b.glb", glb_of(replaced(json, R"("POSITION":0},"indices":2)", R"("POSITION":3})"), binary)));
+    const TriangleMesh bare = read_mesh(
+        folder.file("b.glb", glb_of(replaced(json, R"("POSITION":0},"indices":2)", R"("POSITION":3})"), binary)));
     REQUIRE(bare.vertices.size() == 7);
     CHECK(bare.triangles[1] == std::array<std::uint32_t, 3>{4, 5, 6});
     CHECK(bare.vertices[4] == std::array<float, 3>{1, 0, 0});
 
-    const auto refused = [&](const std::string& what, const std::string& with, const std::string& says, Errc code = Errc::InvalidInput) {
+    const auto refused = [&](const std::string& what, const std::string& with, const std::string& says,
+                             Errc code = Errc::InvalidInput) {
         check_refused(folder.file("c.glb", glb_of(replaced(json, what, with), binary)), says, code);
     };
     refused(R"("count":4)", R"("count":5)", "beyond its data");
@@ -394,7 +409,8 @@ TEST_CASE("glb of other programs: interleaved vertices, short indices, shared po
     refused(R"("POSITION":0)", R"("POSITION":9)", "there is no 9 among its accessors");
     refused(R"("mode":4)", R"("mode":1)", "not of triangles", Errc::Unsupported);
     refused(R"("mesh":0)", R"("mesh":0,"scale":[2,2,2])", "a node with a scale", Errc::Unsupported);
-    refused(R"("nodes")", R"("extensionsRequired":["KHR_draco_mesh_compression"],"nodes")", "KHR_draco", Errc::Unsupported);
+    refused(R"("nodes")", R"("extensionsRequired":["KHR_draco_mesh_compression"],"nodes")", "KHR_draco",
+            Errc::Unsupported);
     refused(R"("byteLength":76)", R"("byteLength":76,"uri":"a.bin")", "another file", Errc::Unsupported);
     // The same indices over and over.
     std::string many;

@@ -1,7 +1,7 @@
 #include <zlib.h>
 
-#include <catch2/catch.hpp>
 #include <array>
+#include <catch2/catch.hpp>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -54,8 +54,17 @@ private:
 
 // ---- Fiji
 
-enum RoiType : std::uint8_t { kPolygon = 0, kRectangle = 1, kOval = 2, kLine = 3, kFreeLine = 4, kPolyline = 5, kFreehand = 7,
-                              kTraced = 8, kPoint = 10 };
+enum RoiType : std::uint8_t {
+    kPolygon = 0,
+    kRectangle = 1,
+    kOval = 2,
+    kLine = 3,
+    kFreeLine = 4,
+    kPolyline = 5,
+    kFreehand = 7,
+    kTraced = 8,
+    kPoint = 10
+};
 
 struct RoiSpec {
     RoiType type = kPolygon;
@@ -74,7 +83,10 @@ std::string roi(const RoiSpec& spec) {
     const float left = has_box ? spec.box[0] : 5, top = has_box ? spec.box[1] : 6;
     Writer w(true);
     w.put(std::string("Iout")).put(std::int16_t(228)).put(std::uint8_t(spec.type)).put(std::uint8_t(0));
-    w.put(std::int16_t(top)).put(std::int16_t(left)).put(std::int16_t(top + spec.box[3])).put(std::int16_t(left + spec.box[2]));
+    w.put(std::int16_t(top))
+        .put(std::int16_t(left))
+        .put(std::int16_t(top + spec.box[3]))
+        .put(std::int16_t(left + spec.box[2]));
     w.put(std::uint16_t(n));
     if (has_box && spec.sub_pixel)
         for (const float v : spec.box) w.put(v);
@@ -118,17 +130,30 @@ std::string zip(const std::vector<std::pair<std::string, std::string>>& files, b
         const auto crc = std::uint32_t(crc32(0, reinterpret_cast<const Bytef*>(content.data()), uInt(content.size())));
         directory.put(std::uint32_t(0x02014b50)).put(std::uint16_t(20)).put(std::uint16_t(20)).put(std::uint16_t(0));
         directory.put(std::uint16_t(deflate ? 8 : 0)).put(std::uint32_t(0)).put(crc).put(std::uint32_t(packed.size()));
-        directory.put(std::uint32_t(content.size())).put(std::uint16_t(name.size())).put(std::uint16_t(0)).put(std::uint16_t(0));
-        directory.put(std::uint16_t(0)).put(std::uint16_t(0)).put(std::uint32_t(0)).put(std::uint32_t(w.size())).put(name);
+        directory.put(std::uint32_t(content.size()))
+            .put(std::uint16_t(name.size()))
+            .put(std::uint16_t(0))
+            .put(std::uint16_t(0));
+        directory.put(std::uint16_t(0))
+            .put(std::uint16_t(0))
+            .put(std::uint32_t(0))
+            .put(std::uint32_t(w.size()))
+            .put(name);
         // sizes that follow the data (bit 3), as Java writes them: only the directory has them
-        w.put(std::uint32_t(0x04034b50)).put(std::uint16_t(20)).put(std::uint16_t(8)).put(std::uint16_t(deflate ? 8 : 0));
+        w.put(std::uint32_t(0x04034b50))
+            .put(std::uint16_t(20))
+            .put(std::uint16_t(8))
+            .put(std::uint16_t(deflate ? 8 : 0));
         w.put(std::uint32_t(0)).put(std::uint32_t(0)).put(std::uint32_t(0)).put(std::uint32_t(0));
         w.put(std::uint16_t(name.size())).put(std::uint16_t(0)).put(name).put(packed);
         w.put(std::uint32_t(0x08074b50)).put(crc).put(std::uint32_t(packed.size())).put(std::uint32_t(content.size()));
     }
     const std::size_t begin = w.size();
     w.put(directory.text()).put(std::uint32_t(0x06054b50)).put(std::uint32_t(0)).put(std::uint16_t(files.size()));
-    w.put(std::uint16_t(files.size())).put(std::uint32_t(directory.size())).put(std::uint32_t(begin)).put(std::uint16_t(0));
+    w.put(std::uint16_t(files.size()))
+        .put(std::uint32_t(directory.size()))
+        .put(std::uint32_t(begin))
+        .put(std::uint16_t(0));
     return w.text();
 }
 
@@ -168,9 +193,11 @@ std::string lzf(const std::string& in) {
 }
 
 std::string pcd(const std::vector<Vec3>& points, const std::string& data) {
-    std::string text = "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS intensity x y z tag\nSIZE 2 4 8 4 1\n"
-                       "TYPE U F F F U\nCOUNT 1 1 1 1 3\nWIDTH " + std::to_string(points.size()) +
-                       "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + std::to_string(points.size()) + "\nDATA " + data + "\n";
+    std::string text =
+        "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS intensity x y z tag\nSIZE 2 4 8 4 1\n"
+        "TYPE U F F F U\nCOUNT 1 1 1 1 3\nWIDTH " +
+        std::to_string(points.size()) + "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + std::to_string(points.size()) +
+        "\nDATA " + data + "\n";
     if (data == "ascii") {
         for (const Vec3& p : points)
             text += "7 " + std::to_string(p[0]) + " " + std::to_string(p[1]) + " " + std::to_string(p[2]) + " 1 2 3\n";
@@ -178,7 +205,8 @@ std::string pcd(const std::vector<Vec3>& points, const std::string& data) {
     }
     Writer w(false);
     if (data == "binary") {
-        for (const Vec3& p : points) w.put(std::uint16_t(7)).put(float(p[0])).put(p[1]).put(float(p[2])).put(std::string("abc"));
+        for (const Vec3& p : points)
+            w.put(std::uint16_t(7)).put(float(p[0])).put(p[1]).put(float(p[2])).put(std::string("abc"));
         return text + w.text();
     }
     for (std::size_t n = 0; n < points.size(); ++n) w.put(std::uint16_t(7));
@@ -270,12 +298,14 @@ RoiSpec outline(RoiType type, int slice) {
 }
 
 std::string markups(const std::vector<Vec3>& points, const std::string& type, const std::string& system) {
-    std::string text = R"({"@schema": "https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/Resources/Schema/markups-schema-v1.0.3.json#",
- "markups": [{"type": ")" + type + R"(", "coordinateSystem": ")" + system + R"(", "coordinateUnits": "mm", "controlPoints": [
+    std::string text =
+        R"({"@schema": "https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/Resources/Schema/markups-schema-v1.0.3.json#",
+ "markups": [{"type": ")" +
+        type + R"(", "coordinateSystem": ")" + system + R"(", "coordinateUnits": "mm", "controlPoints": [
  {"id": "0", "label": "not yet", "position": [0, 0, 0], "positionStatus": "undefined"})";
     for (const Vec3& p : points)
-        text += ",\n {\"id\": \"1\", \"label\": \"F-1\", \"position\": [" + std::to_string(p[0]) + ", " + std::to_string(p[1]) + ", " +
-                std::to_string(p[2]) + "], \"positionStatus\": \"defined\"}";
+        text += ",\n {\"id\": \"1\", \"label\": \"F-1\", \"position\": [" + std::to_string(p[0]) + ", " +
+                std::to_string(p[1]) + ", " + std::to_string(p[2]) + "], \"positionStatus\": \"defined\"}";
     return text + "]}]}";
 }
 
@@ -304,20 +334,29 @@ std::vector<File> all_formats() {
         {"b.csv", "slice,contour,x_px,y_px\n" + rows(kIndex, "Z,0,X,Y"), "lines by slice and contour"},
         {"napari.csv", "index,axis-0,axis-1,axis-2\n" + rows(kIndex, "#,Z,Y,X"), "napari points, as z, y, x in voxels"},
         {"napari4.csv", "index,axis-0,axis-1,axis-2,axis-3\n" + rows(kIndex, "#,0,Z,Y,X"), "napari points"},
-        {"shapes.csv", "index,shape-type,vertex-index,axis-0,axis-1,axis-2\n" + rows(kIndex, "0,path,#,Z,Y,X"), "napari shapes"},
+        {"shapes.csv", "index,shape-type,vertex-index,axis-0,axis-1,axis-2\n" + rows(kIndex, "0,path,#,Z,Y,X"),
+         "napari shapes"},
         {"Results.csv", " ,Area,Mean,X,Y,Ch,Slice\n" + rows(fiji, "#,0,7,X,Y,1,Z"), "Fiji Results, slices from 1"},
         {"multi.roi", roi(multi_point()), "Fiji ROIs (1 point), slices from 1"},
-        {"set.zip", zip({{"a.roi", roi(outline(kPolygon, 3))}, {"readme.txt", "no ROI"}, {"b.roi", roi(by_name)}}), "1 polygon, 1 traced"},
+        {"set.zip", zip({{"a.roi", roi(outline(kPolygon, 3))}, {"readme.txt", "no ROI"}, {"b.roi", roi(by_name)}}),
+         "1 polygon, 1 traced"},
         {"stored.zip", zip({{"multi.roi", roi(multi_point())}}, false), "1 point"},
         {"lps.mrk.json", markups(world, "Fiducial", "LPS"), "3D Slicer markups (Fiducial), as x, y, z in world units"},
         {"ras.mrk.json", markups(ras, "ClosedCurve", "RAS"), "RAS turned to LPS"},
-        {"old.fcsv", "# Markups fiducial file version = 4.6\n# CoordinateSystem = 0\n" + fcsv + rows(ras, "m#,X,Y,Z,0,0,0,1,1,1,0,F-1,,"), "RAS turned to LPS"},
-        {"new.fcsv", "# CoordinateSystem = LPS\n" + fcsv + rows(world, "#,X,Y,Z,0,0,0,1,1,1,0,\"F, 1\",,"), "stated, as x, y, z in world units"},
-        {"older.fcsv", "# columns = label,x,y,z,sel,vis\n" + rows(ras, "F,X,Y,Z,1,1"), "not stated, RAS as in old files"},
+        {"old.fcsv",
+         "# Markups fiducial file version = 4.6\n# CoordinateSystem = 0\n" + fcsv +
+             rows(ras, "m#,X,Y,Z,0,0,0,1,1,1,0,F-1,,"),
+         "RAS turned to LPS"},
+        {"new.fcsv", "# CoordinateSystem = LPS\n" + fcsv + rows(world, "#,X,Y,Z,0,0,0,1,1,1,0,\"F, 1\",,"),
+         "stated, as x, y, z in world units"},
+        {"older.fcsv", "# columns = label,x,y,z,sel,vis\n" + rows(ras, "F,X,Y,Z,1,1"),
+         "not stated, RAS as in old files"},
         {"c3d.landmarks", rows(ras, "X Y Z 1"), "Convert3D"},
         {"named.lmk", rows(ras, "tip X Y Z"), "RAS turned to LPS"},
-        {"snap.annot", "<entry key=\"Format\" value=\"ITK-SNAP Annotation File\" />\n" +
-             rows(moved(kIndex, {1, 1, 1}, {0.5, 0.5, 0.5}), "<entry key=\"Pos\" value=\"X Y Z\" />"), "ITK-SNAP"},
+        {"snap.annot",
+         "<entry key=\"Format\" value=\"ITK-SNAP Annotation File\" />\n" +
+             rows(moved(kIndex, {1, 1, 1}, {0.5, 0.5, 0.5}), "<entry key=\"Pos\" value=\"X Y Z\" />"),
+         "ITK-SNAP"},
         {"ascii.pcd", pcd(world, "ascii"), "PCD (ascii)"},
         {"binary.pcd", pcd(world, "binary"), "PCD (binary)"},
         {"packed.pcd", pcd(world, "binary_compressed"), "PCD (binary_compressed)"},
@@ -325,7 +364,10 @@ std::vector<File> all_formats() {
         {"b.las", las(world, 4, 6), "LAS 1.4 (format 6)"},
         {"a.obj", rows(world, "v X Y Z"), "OBJ"},
         {"a.off", "OFF\n4 0 0\n" + rows(world, "X Y Z"), "OFF"},
-        {"a.ply", "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nend_header\n" + rows(world, "X Y Z"), "PLY"},
+        {"a.ply",
+         "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nend_header\n" +
+             rows(world, "X Y Z"),
+         "PLY"},
     };
 }
 
@@ -398,7 +440,9 @@ TEST_CASE("Fiji's areas, lines and points have their own lattice") {
             const double shift = area ? -0.5 : 0;
             REQUIRE(cloud.lines.size() == 1);
             CHECK(cloud.lines[0].closed == area);
-            CHECK(cloud.points == std::vector<Vec3>{{10 + shift, 20 + shift, 3}, {14 + shift, 20 + shift, 3}, {14 + shift, 26 + shift, 3}});
+            CHECK(cloud.points == std::vector<Vec3>{{10 + shift, 20 + shift, 3},
+                                                    {14 + shift, 20 + shift, 3},
+                                                    {14 + shift, 26 + shift, 3}});
         }
     }
     spec.xy.clear();
@@ -411,7 +455,8 @@ TEST_CASE("Fiji's areas, lines and points have their own lattice") {
         const PointCloud oval = read(spec);
         CHECK(oval.lines.at(0).closed);
         CHECK(oval.points.size() >= 16);
-        for (const Vec3& p : oval.points) CHECK(std::pow((p[0] - 12.5) / 3, 2) + std::pow((p[1] - 23.5) / 4, 2) == Approx(1));
+        for (const Vec3& p : oval.points)
+            CHECK(std::pow((p[0] - 12.5) / 3, 2) + std::pow((p[1] - 23.5) / 4, 2) == Approx(1));
     }
     spec.type = kLine;
     CHECK(read(spec).points == std::vector<Vec3>{{10, 20, 3}, {6, 8, 3}});  // both ends, by pixel centres
@@ -462,11 +507,14 @@ TEST_CASE("markups give lines, their own names and nothing that is not placed") 
     CHECK(cloud.lines[0].name == "rim");
     CHECK_FALSE(cloud.lines[1].closed);
     CHECK(cloud.points == std::vector<Vec3>{{-1, -2, 3}, {-4, -5, 6}, {-7, -8, 9}, {-1, -1, 1}});
-    says(read_error(scratch, "a.json", "{\"markups\": [{\"coordinateSystem\": \"IJK\", \"controlPoints\": [{\"position\": [1,2,3]}]}]}"),
+    says(read_error(scratch, "a.json",
+                    "{\"markups\": [{\"coordinateSystem\": \"IJK\", \"controlPoints\": [{\"position\": [1,2,3]}]}]}"),
          "expected the coordinate system RAS or LPS, got 'IJK'");
     says(read_error(scratch, "a.json", "{\"markups\": 3}"), "found no list 'markups'");
-    says(read_error(scratch, "a.json", "{\"markups\": [{\"controlPoints\": [{\"position\": [1,2]}]}]}"), "expected a position of 3 numbers");
-    says(read_error(scratch, "a.json", "{\"markups\": [{\"controlPoints\": [{\"position\": [1,2,1e999]}]}]}"), "a.json: not the JSON");
+    says(read_error(scratch, "a.json", "{\"markups\": [{\"controlPoints\": [{\"position\": [1,2]}]}]}"),
+         "expected a position of 3 numbers");
+    says(read_error(scratch, "a.json", "{\"markups\": [{\"controlPoints\": [{\"position\": [1,2,1e999]}]}]}"),
+         "a.json: not the JSON");
     says(read_error(scratch, "a.json", std::string(100000, '[')), "a.json: not the JSON");
     says(read_error(scratch, "a.json", "{\"markups\": [{\"type\": 5, \"controlPoints\": 7}]}"), "a.json: not the JSON");
 }
@@ -475,15 +523,18 @@ TEST_CASE("scans: invalid points are left out, compressed and newer files refuse
     const Scratch scratch;
     const double nan = std::numeric_limits<double>::quiet_NaN();
     for (const char* data : {"ascii", "binary", "binary_compressed"}) {
-        const PointCloud cloud = read_points(scratch.write("a.pcd", pcd({{1, 2, 3}, {nan, nan, nan}, {4, 5, 6}}, data)));
+        const PointCloud cloud =
+            read_points(scratch.write("a.pcd", pcd({{1, 2, 3}, {nan, nan, nan}, {4, 5, 6}}, data)));
         CHECK(cloud.points == std::vector<Vec3>{{1, 2, 3}, {4, 5, 6}});
         says(cloud.rule, "1 invalid ones left out");
     }
     says(read_error(scratch, "a.laz", "LASF"), "LAZ is not read; unpack it");
     says(read_error(scratch, "a.las", las({{1, 2, 3}}, 2, 0x80 | 1)), "its compressed form LAZ");
     says(read_error(scratch, "a.las", las({{1, 2, 3}}, 5)), "expected LAS 1.0 to 1.4, got 1.5");
-    says(read_error(scratch, "a.las", las({{1, 2, 3}}, 2).substr(0, 250)), "expected 1 points of 28 bytes from byte 237");
-    says(read_error(scratch, "a.pcd", "FIELDS x y\nSIZE 4 4\nTYPE F F\nCOUNT 1 1\nPOINTS 1\nDATA ascii\n1 2\n"), "expected a field 'z'");
+    says(read_error(scratch, "a.las", las({{1, 2, 3}}, 2).substr(0, 250)),
+         "expected 1 points of 28 bytes from byte 237");
+    says(read_error(scratch, "a.pcd", "FIELDS x y\nSIZE 4 4\nTYPE F F\nCOUNT 1 1\nPOINTS 1\nDATA ascii\n1 2\n"),
+         "expected a field 'z'");
     const std::string whole = pcd({{1, 2, 3}, {4, 5, 6}}, "binary");
     says(read_error(scratch, "a.pcd", whole.substr(0, whole.size() - 1)), "truncated");
     says(read_error(scratch, "a.pcd", "FIELDS x y z\nPOINTS 999999999999\nDATA binary\nabc"), "truncated");
@@ -511,7 +562,9 @@ TEST_CASE("damaged files of every format end in an Error, never in a crash") {
     const Scratch scratch;
     for (const File& file : all_formats()) {
         INFO(file.name);
-        const FuzzCounts counts = fuzz(scratch, scratch.write(file.name, file.content), [](const std::string& path) { (void)read_points(path); }, 15);
+        const FuzzCounts counts = fuzz(
+            scratch, scratch.write(file.name, file.content), [](const std::string& path) { (void)read_points(path); },
+            15);
         CHECK(counts.flipped > 0);
     }
 }

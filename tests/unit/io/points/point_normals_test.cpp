@@ -30,14 +30,16 @@ void check_normal(const Vec3& found, const Vec3& expected) {
 }
 
 std::string ply(const std::string& format, int count, const std::string& properties, const std::string& data) {
-    return "ply\nformat " + format + " 1.0\nelement vertex " + std::to_string(count) + "\n" + properties + "end_header\n" + data;
+    return "ply\nformat " + format + " 1.0\nelement vertex " + std::to_string(count) + "\n" + properties +
+           "end_header\n" + data;
 }
 
 const std::string kPosition = "property float x\nproperty float y\nproperty float z\n";
 const std::string kNormal = "property float nx\nproperty float ny\nproperty float nz\n";
 
 std::string pcd(const std::string& viewpoint, int width, int height, const std::string& rows) {
-    return "VERSION 0.7\nFIELDS x y z normal_x normal_y normal_z\nSIZE 4 4 4 4 4 4\nTYPE F F F F F F\nCOUNT 1 1 1 1 1 1\nWIDTH " +
+    return "VERSION 0.7\nFIELDS x y z normal_x normal_y normal_z\nSIZE 4 4 4 4 4 4\nTYPE F F F F F F\nCOUNT 1 1 1 1 1 "
+           "1\nWIDTH " +
            std::to_string(width) + "\nHEIGHT " + std::to_string(height) + "\n" + viewpoint + "DATA ascii\n" + rows;
 }
 
@@ -45,7 +47,8 @@ std::string pcd(const std::string& viewpoint, int width, int height, const std::
 
 TEST_CASE("PLY: normals are unit, and 0 where the file has no direction") {
     const std::string text = "0 0 0 0 0 2\n1 0 0 0 0 0\n2 0 0 nan 0 1\n3 0 0 3 0 4\n4 0 0 what 0 0\n";
-    const std::string binary = floats({0, 0, 0, 0, 0, 2, 1, 0, 0, 0, 0, 0, 2, 0, 0, kNan, 0, 1, 3, 0, 0, 3, 0, 4, 4, 0, 0, 0, 0, 0});
+    const std::string binary =
+        floats({0, 0, 0, 0, 0, 2, 1, 0, 0, 0, 0, 0, 2, 0, 0, kNan, 0, 1, 3, 0, 0, 3, 0, 4, 4, 0, 0, 0, 0, 0});
     for (const PointCloud& cloud : {read("a.ply", ply("ascii", 5, kPosition + kNormal, text)),
                                     read("b.ply", ply("binary_little_endian", 5, kPosition + kNormal, binary))}) {
         REQUIRE(cloud.points.size() == 5);
@@ -60,9 +63,11 @@ TEST_CASE("PLY: normals are unit, and 0 where the file has no direction") {
 }
 
 TEST_CASE("PLY: two of three components are no normals, and a list before them shifts them") {
-    const PointCloud two = read("a.ply", ply("ascii", 1, kPosition + "property float nx\nproperty float nz\n", "0 0 0 1 1\n"));
+    const PointCloud two =
+        read("a.ply", ply("ascii", 1, kPosition + "property float nx\nproperty float nz\n", "0 0 0 1 1\n"));
     CHECK(two.normals.empty());
-    const PointCloud shifted = read("b.ply", ply("ascii", 1, "property list uchar int ids\n" + kPosition + kNormal, "2 7 8 1 2 3 0 1 0\n"));
+    const PointCloud shifted =
+        read("b.ply", ply("ascii", 1, "property list uchar int ids\n" + kPosition + kNormal, "2 7 8 1 2 3 0 1 0\n"));
     CHECK(shifted.points.front() == Vec3{1, 2, 3});
     check_normal(shifted.normals.at(0), {0, 1, 0});
     const std::string cut = floats({0, 0, 0, 0, 0, 1, 1, 0, 0, 0});
@@ -91,10 +96,10 @@ TEST_CASE("columns: normals by name, or six columns of which the last three are 
     REQUIRE(six.normals.size() == 3);
     check_normal(six.normals[0], {0, 0.6, -0.8});
     CHECK(six.normals[1] == kNone);
-    CHECK(read("b.xyz", "0 0 0 255 128 0\n1 0 0 255 255 255\n").normals.empty());     // colours
+    CHECK(read("b.xyz", "0 0 0 255 128 0\n1 0 0 255 255 255\n").normals.empty());  // colours
     CHECK(read("c.xyz", "0 0 0 0.2 0.5 0.1\n1 0 0 1 0 0\n").normals.empty());
-    CHECK(read("d.xyz", "0 0 0 0 0 1 9\n1 0 0 0 0 1 9\n").normals.empty());           // seven columns say nothing
-    CHECK(read("e.xyz", "0 0 0 0 0 1\n1 0 0\n").normals.at(1) == kNone);              // a short row has none
+    CHECK(read("d.xyz", "0 0 0 0 0 1 9\n1 0 0 0 0 1 9\n").normals.empty());  // seven columns say nothing
+    CHECK(read("e.xyz", "0 0 0 0 0 1\n1 0 0\n").normals.at(1) == kNone);     // a short row has none
 }
 
 TEST_CASE("OBJ: one normal for each vertex, of the same number") {

@@ -47,7 +47,8 @@ std::vector<Vec3> marks() {
     std::vector<Vec3> points;
     for (int slice = 4; slice < 16; slice += 2)
         for (int n = 0; n < 24; ++n)
-            points.push_back({60.3 + 30.2 * std::cos(0.2618 * n), 45.1 + 25.3 * std::sin(0.2618 * n) + 0.37 * slice, double(slice)});
+            points.push_back(
+                {60.3 + 30.2 * std::cos(0.2618 * n), 45.1 + 25.3 * std::sin(0.2618 * n) + 0.37 * slice, double(slice)});
     return points;
 }
 
@@ -79,9 +80,11 @@ TEST_CASE("each usual mistake is named with the option that mends it") {
     says(advice({{3, 70, 90}}, PointSpace::Index), "; `order = ZYX` would bring");
     says(advice({{100, 80, 20}}, PointSpace::Index), "; `space = IndexOne` would bring");
     // the positions of a multi-point in a hyperstack of two channels
-    says(advice({{15, 70, 39}}, PointSpace::Index), "`channels = 2` would bring them inside (their slices count the channels");
+    says(advice({{15, 70, 39}}, PointSpace::Index),
+         "`channels = 2` would bring them inside (their slices count the channels");
     geometry.origin = {500, 600, 700};
-    says(advice({{5, 4, 10}, {1, 1, 1}}), "`space = Local` would bring them inside (they leave out the image's origin)");
+    says(advice({{5, 4, 10}, {1, 1, 1}}),
+         "`space = Local` would bring them inside (they leave out the image's origin)");
 }
 
 TEST_CASE("readings that fit equally well are all told") {
@@ -98,7 +101,8 @@ TEST_CASE("an image without spacing is asked for it where points are lengths") {
     geometry.spacing = {1, 1, 1};
     geometry.spacing_known = false;
     says(verdict(cloud_of({{500, 90, 90}, {-3000, 3, 3}}), geometry), "`spacing = sx,sy,sz`");
-    says(verdict(cloud_of({{5, 9, 9}}), geometry), "[cloud.csv: the points are in world units, and the image states no spacing");
+    says(verdict(cloud_of({{5, 9, 9}}), geometry),
+         "[cloud.csv: the points are in world units, and the image states no spacing");
     CHECK(verdict(cloud_of({{5, 9, 9}}, PointSpace::Index), geometry).empty());
 }
 
@@ -144,14 +148,17 @@ TEST_CASE("what the advice asks for, reads the file rightly") {
         for (std::size_t n = 0; n < world.size(); ++n)
             for (int a = 0; a < 3; ++a) REQUIRE(back[n][a] == Approx(world[n][a]));
     };
-    check({PointSpace::Unstated, PointOrder::ZYX}, "`order = ZYX`", [](const Vec3& p) { return Vec3{p[2], p[1], p[0]}; });
+    check({PointSpace::Unstated, PointOrder::ZYX}, "`order = ZYX`", [](const Vec3& p) {
+        return Vec3{p[2], p[1], p[0]};
+    });
     check({PointSpace::Index}, "`space = Index`", [&](const Vec3& p) { return geometry.world_to_index(p); });
     check({PointSpace::Ras}, "`space = Ras`", [](const Vec3& p) { return Vec3{-p[0], -p[1], p[2]}; });
     check({PointSpace::Local}, "`space = Local`", [&](const Vec3& p) {
         return Vec3{p[0] - geometry.origin[0], p[1] - geometry.origin[1], p[2] - geometry.origin[2]};
     });
-    check({PointSpace::Unstated, PointOrder::Unstated, 1e-3}, "`scale = 0.001`",
-          [](const Vec3& p) { return Vec3{1e3 * p[0], 1e3 * p[1], 1e3 * p[2]}; });
+    check({PointSpace::Unstated, PointOrder::Unstated, 1e-3}, "`scale = 0.001`", [](const Vec3& p) {
+        return Vec3{1e3 * p[0], 1e3 * p[1], 1e3 * p[2]};
+    });
     check({PointSpace::Index, PointOrder::ZYX}, "`space = Index, order = ZYX`", [&](const Vec3& p) {
         const Vec3 i = geometry.world_to_index(p);
         return Vec3{i[2], i[1], i[0]};

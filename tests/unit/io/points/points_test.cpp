@@ -132,8 +132,9 @@ TEST_CASE("contours of slices are ordered, closed lines") {
 
 TEST_CASE("napari shapes are lines, closed or open by their type") {
     const Scratch scratch;
-    const PointCloud cloud = read_points(scratch.write(
-        "shapes.csv", "index,shape-type,vertex-index,axis-0,axis-1,axis-2\n"
+    const PointCloud cloud = read_points(
+        scratch.write("shapes.csv",
+                      "index,shape-type,vertex-index,axis-0,axis-1,axis-2\n"
                       "0.0,polygon,0.0,5.0,2.0,1.0\n0.0,polygon,2.0,5.0,6.0,4.0\n0.0,polygon,1.0,5.0,2.0,4.0\n"
                       "1.0,path,0.0,6.0,2.0,1.0\n1.0,path,1.0,6.0,2.0,4.0\n1.0,path,2.0,6.0,9.0,4.0\n"
                       "2.0,line,0.0,7.0,2.0,1.0\n2.0,line,1.0,7.0,2.0,4.0\n"
@@ -231,22 +232,21 @@ TEST_CASE("errors name the file, the line, what was expected and what was found"
 TEST_CASE("a PLY whose faces are cut off is truncated, though all its vertices are there") {
     const Scratch scratch;
     const auto is_cut_off = [&](const std::string& whole, std::size_t missing) {
-        return read_error(scratch, "a.ply", whole.substr(0, whole.size() - missing)).find("truncated") != std::string::npos;
+        return read_error(scratch, "a.ply", whole.substr(0, whole.size() - missing)).find("truncated") !=
+               std::string::npos;
     };
     const std::string ascii =
         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
         "element face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 2 1 0\n";
     CHECK(read_points(scratch.write("whole.ply", ascii)).points.size() == 3);
-    for (const std::size_t missing : {3, 5, 8, 10, 16})
-        CHECK(is_cut_off(ascii, missing));
+    for (const std::size_t missing : {3, 5, 8, 10, 16}) CHECK(is_cut_off(ascii, missing));
     std::string binary =
         "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
         "element face 2\nproperty list uchar int vertex_indices\nend_header\n";
     binary += bytes(1.0F, false) + bytes(2.0F, false) + bytes(3.0F, false);
     for (int face = 0; face < 2; ++face) binary += '\3' + std::string(12, '\0');
     CHECK(read_points(scratch.write("whole.ply", binary)).points.size() == 1);
-    for (std::size_t missing = 1; missing <= 26; ++missing)
-        CHECK(is_cut_off(binary, missing));
+    for (std::size_t missing = 1; missing <= 26; ++missing) CHECK(is_cut_off(binary, missing));
 }
 
 TEST_CASE("damaged point files end in an Error, never in a crash") {
@@ -334,9 +334,11 @@ TEST_CASE("points sorted in space follow their neighbours, and thin by the same 
     REQUIRE(some.size() == 3000);
     for (int octant = 0; octant < 8; ++octant) {
         const auto is_in = [&](std::uint32_t n) {
-            return (points[n][0] > 0.5) == bool(octant & 1) && (points[n][1] > 0.5) == bool(octant & 2) && (points[n][2] > 0.5) == bool(octant & 4);
+            return (points[n][0] > 0.5) == bool(octant & 1) && (points[n][1] > 0.5) == bool(octant & 2) &&
+                   (points[n][2] > 0.5) == bool(octant & 4);
         };
-        const double before = double(std::count_if(all.begin(), all.end(), is_in)), after = double(std::count_if(some.begin(), some.end(), is_in));
+        const double before = double(std::count_if(all.begin(), all.end(), is_in)),
+                     after = double(std::count_if(some.begin(), some.end(), is_in));
         CHECK(after / before == Approx(0.15).margin(0.003));  // drawn at random: 0.006
     }
     std::sort(order.begin(), order.end());
