@@ -82,7 +82,7 @@ TEST_CASE("evolve(): a shrinking sphere, first order in h or better") {
     }
 }
 
-TEST_CASE("evolve() with a band that follows the sphere stays within a quarter of a voxel") {
+TEST_CASE("evolve() with a tracked band: a shrinking sphere, first order in h and within a quarter of a voxel") {
     // Values frozen on the band's border hold the surface back when sqrt(δτ) comes near the band's width, hence τ ~ h²;
     // making the band again moves it inwards by about h²/10 of its curvature. Neither vanishes against h.
     for (const double share : {0.25, 1.0}) {
@@ -95,7 +95,7 @@ TEST_CASE("evolve() with a band that follows the sphere stays within a quarter o
             o.follow = true;
             evolve(*u, {}, o);
             const double error = radius_error(domain, to_dense(domain, *u), kEnd);
-            print_order(share == 1.0 ? "evolve, following band, tau = h^2" : "evolve, following band, tau = h^2/4", h,
+            print_order(share == 1.0 ? "evolve, tracked band, tau = h^2" : "evolve, tracked band, tau = h^2/4", h,
                         error, previous);
             CHECK(error < 0.25 * h);
             previous = error;

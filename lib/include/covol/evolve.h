@@ -56,6 +56,9 @@ struct EvolveFields {
     const FloatGrid* edge = nullptr;      ///< g in (0,1]; where inactive the image does not pull
     const FloatGrid* trusted = nullptr;   ///< d to those points that are marks and no guess; the image yields to these
                                           ///< alone; where inactive none is near; null: all are trusted
+    /// A level set that the surface may not sink below: after each step u <= obstacle, world units, so that
+    /// {obstacle < 0} stays inside. Beyond its leaves its background holds; null: none.
+    const FloatGrid* obstacle = nullptr;
     /// With `follow`: called with u when its band reached voxels where a field is not known yet, so that the caller
     /// can extend it (and may replace the pointers above through `fields`).
     std::function<void(const FloatGrid& u, EvolveFields& fields)> extend;

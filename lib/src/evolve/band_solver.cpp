@@ -166,6 +166,13 @@ void BandSolver::gather_fields(const EvolveFields& fields) {
         edge_ = gather_field(band_, *fields.edge, [](float g) { return g; });
         check_finite(band_, *edge_, "edge");
     }
+    if (fields.obstacle != nullptr) {
+        const auto scale = static_cast<float>(1.0 / domain_.voxel_size);
+        obstacle_ = gather(band_, *fields.obstacle, false, [scale](const LeafNode* leaf, float tile, float* block) {
+            for (int n = 0; n < kLeafSize; ++n) block[n] = scale * (leaf != nullptr ? leaf->getValue(n) : tile);
+        });
+        check_finite(band_, *obstacle_, "obstacle");
+    }
     const FloatGrid* trusted = fields.trusted != nullptr ? fields.trusted : fields.distance;
     if (options_.rho > 0 && options_.image_yields > 0 && trusted != nullptr)
         image_weight_ = gather(band_, *trusted, false, [&](const LeafNode* leaf, float, float* block) {
@@ -188,8 +195,20 @@ Motion BandSolver::step(double tau, Counts& counts) {
     const double row = std::min(rows.largest, regular_row);
     const double jacobi = row / (1.0 + row);
     solve(std::min(kMaxOmega, 2.0 / (1.0 + std::sqrt(1.0 - jacobi * jacobi))), rows.residual, counts);
+    hold_to_obstacle();
     counts.seconds_sweeps += seconds_since(solve_start);
     return measure();
+}
+
+void BandSolver::hold_to_obstacle() {
+    if (!obstacle_) return;
+    tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
+        if (!leaf_active_[leaf]) return;
+        float* u = field_.values.leaf(leaf);
+        const float* highest = obstacle_->values.leaf(leaf);
+        for (int n = 0; n < kLeafSize; ++n)
+            if (is_on(band_.active(leaf), n)) u[n] = std::min(u[n], highest[n]);
+    });
 }
 
 // @param first  residual at u^{n-1}
@@ -248,6 +267,7 @@ void BandSolver::redistance(double clamp) {
         for (int n = 0; n < kLeafSize; ++n)
             if (is_on(band_.active(leaf), n)) u[n] = u[n] < 0.0F ? -std::min(d[n], limit) : std::min(d[n], limit);
     });
+    hold_to_obstacle();
 }
 
 // Steps resemble each other: the solve begins where the last one would lead to.

@@ -48,6 +48,7 @@ public:
         tau_ = options.tau < 0 ? 1.0 : options.tau / domain_.voxel_size;
         if (options.theta > 0) check_field(fields.distance, "distance", "theta");
         if (options.rho > 0) check_field(fields.edge, "edge", "rho");
+        if (fields.obstacle != nullptr) check_transform(*fields.obstacle, "obstacle");
         if (options.follow) detail::track_surface(u_, domain_, tracking_clamp(options_), run_);
         make_solver();
     }
@@ -101,7 +102,11 @@ private:
         if (field == nullptr)
             throw Error(Errc::InvalidInput,
                         std::string("evolve: ") + weight + " > 0 needs the " + name + " grid, got none");
-        const Domain other = domain_of(*field);
+        check_transform(*field, name);
+    }
+
+    void check_transform(const FloatGrid& field, const char* name) const {
+        const Domain other = domain_of(field);
         const double h = domain_.voxel_size;
         double apart = std::abs(other.voxel_size - h);
         for (int a = 0; a < 3; ++a) apart = std::max(apart, std::abs(other.origin[a] - domain_.origin[a]));

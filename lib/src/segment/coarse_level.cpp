@@ -79,7 +79,7 @@ std::optional<FineStart> pass_coarse_levels(Job& job) {
     if (levels < 0)
         levels =
             knows_nothing(job.options.start.kind) && job.origin != StartOrigin::Grown && is_large(job.domain()) ? 1 : 0;
-    if (levels == 0 || job.hold || job.rests() || job.origin == StartOrigin::Contours) return {};
+    if (levels == 0 || job.obstacle || job.rests() || job.origin == StartOrigin::Contours) return {};
     Job coarse(job.image, job.points, coarsened(job.options), job.run);
     coarse.origin = job.origin;
     const std::string why_not = run_coarse(coarse, *job.result.u, job.domain());

@@ -16,11 +16,8 @@ namespace {
 constexpr double kApproachTau = 3.0;  // time steps of the points' own approach, in tau
 constexpr int kApproachSteps = 40;
 constexpr double kApproachTolerance = 0.01;
-constexpr double kHoldDepth = 0.75;     // voxels that the surface may sink below a start that is held
 constexpr double kLeastOfGrown = 0.5;   // of its volume: a flow that leaves less has lost the edges
 constexpr double kLeavesVoxels = 0.25;  // farther from its marks than the start: what flowed has left them
-constexpr int kHoldSteps = 2;
-constexpr double kHoldTolerance = 0.01;  // voxels a step
 
 /// What the steps before cost goes to the total; the rest of it stays the later steps'.
 void add(const EvolveReport& before, EvolveReport& total) {
@@ -48,55 +45,10 @@ EvolveReport approach(Job& job, EvolveFields fields) {
     return evolve(*job.result.u, fields, alone, job.run);
 }
 
-void hold_up(FloatGrid& u, const FloatGrid& hold, double h) {
-    const auto start = hold.getConstAccessor();
-    const auto depth = static_cast<float>(kHoldDepth * h);
-    for (auto leaf = u.tree().beginLeaf(); leaf; ++leaf)
-        for (auto value = leaf->beginValueOn(); value; ++value)
-            value.setValue(std::min(*value, start.getValue(value.getCoord()) + depth));
-}
-
-/// Of u, over the voxels beside the surface, voxels.
-double mean_motion(const FloatGrid& before, const FloatGrid& after, double h) {
-    const auto old = before.getConstAccessor();
-    double sum = 0;
-    std::int64_t count = 0;
-    for (auto leaf = after.tree().cbeginLeaf(); leaf; ++leaf)
-        for (auto value = leaf->cbeginValueOn(); value; ++value)
-            if (std::abs(*value) < h) {
-                sum += std::abs(*value - old.getValue(value.getCoord()));
-                ++count;
-            }
-    return count > 0 ? sum / (double(count) * h) : 0.0;
-}
-
-// Where a scan has no points its surface rests on nothing, and would slide along the walls that have some: it may not
-// sink deeper below the solid that it started from than a share of a voxel.
-EvolveReport evolve_held(Job& job, const EvolveFields& fields) {
-    FloatGrid& u = *job.result.u;
-    EvolveReport total;
-    EvolveOptions few = job.options.evolve;
-    for (int left = few.max_steps; left > 0 && total.stop_reason != StopReason::Vanished; left -= kHoldSteps) {
-        const FloatGridPtr before = u.deepCopy();
-        few.max_steps = std::min(left, kHoldSteps);
-        EvolveReport round = evolve(u, fields, few, job.run);
-        hold_up(u, *job.hold, job.h());
-        add(total, round);
-        total = round;
-        total.last_change = mean_motion(*before, u, job.h()) / few.max_steps;
-        if (total.stop_reason != StopReason::Vanished && total.last_change < kHoldTolerance) {
-            total.stop_reason = StopReason::Steady;
-            break;
-        }
-    }
-    return total;
-}
-
 EvolveReport approach_and_evolve(Job& job, const EvolveFields& fields) {
     const EvolveReport before = approach(job, fields);
     if (before.stop_reason == StopReason::Vanished) return before;
-    EvolveReport solved =
-        job.hold ? evolve_held(job, fields) : evolve(*job.result.u, fields, job.options.evolve, job.run);
+    EvolveReport solved = evolve(*job.result.u, fields, job.options.evolve, job.run);
     add(before, solved);
     return solved;
 }
@@ -163,6 +115,7 @@ void flow(Job& job) {
     fields.distance = job.uses_points() ? job.result.distance.get() : nullptr;
     fields.edge = job.result.edge.get();
     fields.trusted = job.trusted_distance.get();
+    fields.obstacle = job.obstacle.get();
     if (job.options.evolve.follow)
         fields.extend = [&job](const FloatGrid& u, EvolveFields& f) { extend_edges(job, u, f); };
     SegmentReport& report = job.report();

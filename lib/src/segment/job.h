@@ -42,7 +42,7 @@ struct Job {
     SegmentResult result;
     StartOrigin origin = StartOrigin::Given;
     std::optional<CloudOrientation> cloud;  ///< of points alone, many or asked for
-    FloatGridPtr hold;                      ///< the start that the surface may not leave, or null
+    FloatGridPtr obstacle;                  ///< of the flow, EvolveFields::obstacle, or null
     FloatGridPtr trusted_distance;          ///< to the trusted marks, or null
 
     SegmentReport& report() { return result.report; }

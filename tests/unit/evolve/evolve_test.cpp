@@ -215,26 +215,26 @@ TEST_CASE("it stops when it is steady, and says so") {
     for (const Crossing& c : zero_crossings(p.domain, end)) CHECK(length(c.position) == Approx(3.0).margin(0.5 * kH));
 }
 
-TEST_CASE("leaves that sleep leave the surface where it would be") {
-    // The points' sphere touches the start on one side: there it rests long before the other side arrives.
+TEST_CASE("inactive leaves leave the surface where it would be") {
+    // The points' sphere touches the start on one side: there it is steady long before the other side arrives.
     const Vec3 target{4, 0, 0};
     Problem p = whole_cube(48, kH, [](const Vec3& x) { return clamp_to(length(x) - 9.5, 3 * kH); });
     set_distance(p, [&](const Vec3& x) { return std::abs(length({x[0] - target[0], x[1], x[2]}) - 5.5); });
     p.options.delta = 0.1 * kH;
     for (const bool follow : {false, true}) {
-        INFO((follow ? "a band that follows" : "a fixed band"));
+        INFO((follow ? "a tracked band" : "a fixed band"));
         EvolveOptions o = evolve_options(p.options, 60);
         o.follow = follow;
         o.solver_tolerance = EvolveOptions{}.solver_tolerance;
-        o.tolerance = 4e-3;  // so much counts as rest that some sleep
-        const FloatGridPtr asleep = start_of(p), awake = start_of(p);
-        const EvolveReport some = evolve(*asleep, Fields(p).get(), o);
-        o.tolerance = 0;  // nothing ever rests
+        o.tolerance = 4e-3;  // so much counts as steady that some become inactive
+        const FloatGridPtr some_active = start_of(p), all_active = start_of(p);
+        const EvolveReport some = evolve(*some_active, Fields(p).get(), o);
+        o.tolerance = 0;  // none ever becomes inactive
         o.max_steps = some.steps;
-        const EvolveReport all = evolve(*awake, Fields(p).get(), o);
+        const EvolveReport all = evolve(*all_active, Fields(p).get(), o);
         if (follow) CHECK(some.leaf_visits < all.leaf_visits);
-        const auto here = zero_crossings(p.domain, to_dense(p.domain, *asleep));
-        const auto there = zero_crossings(p.domain, to_dense(p.domain, *awake));
+        const auto here = zero_crossings(p.domain, to_dense(p.domain, *some_active));
+        const auto there = zero_crossings(p.domain, to_dense(p.domain, *all_active));
         REQUIRE(here.size() > 1000);
         double worst = 0;
         for (const Crossing& c : here) {
@@ -245,9 +245,9 @@ TEST_CASE("leaves that sleep leave the surface where it would be") {
             worst = std::max(worst, nearest);
         }
         CHECK(worst < 0.01 * kH);
-        std::printf("sleeping leaves, %s: %.0f %% of the visits, surface apart by at most %.1e h\n",
-                    follow ? "following band" : "fixed band",
-                    100.0 * double(some.leaf_visits) / double(all.leaf_visits), worst / kH);
+        std::printf("inactive leaves, %s: %.0f %% of the visits, surface apart by at most %.1e h\n",
+                    follow ? "tracked band" : "fixed band", 100.0 * double(some.leaf_visits) / double(all.leaf_visits),
+                    worst / kH);
     }
 }
 
@@ -259,6 +259,30 @@ TEST_CASE("a surface that shrinks away has vanished") {
     CHECK(report.stop_reason == StopReason::Vanished);
     CHECK(report.steps < 100);
     CHECK(zero_crossings(p.domain, to_dense(p.domain, *u)).empty());
+}
+
+TEST_CASE("a surface that shrinks comes to rest on an obstacle") {
+    constexpr double kRadius = 2.0;
+    Problem p = whole_cube(20, kH, [](const Vec3& x) { return clamp_to(length(x) - 3.5, 3 * kH); });
+    const FloatGridPtr obstacle = start_grid(
+        p.domain, [](const Vec3& x) { return length(x) - kRadius; }, 3 * kH);
+    for (const bool follow : {false, true}) {
+        INFO((follow ? "a tracked band" : "a fixed band"));
+        EvolveOptions o = evolve_options(p.options, 300);
+        o.theta = 0;
+        o.delta = kH;
+        o.follow = follow;
+        o.tolerance = 1e-3;
+        EvolveFields fields;
+        fields.obstacle = obstacle.get();
+        const FloatGridPtr u = start_of(p);
+        CHECK(evolve(*u, fields, o).stop_reason == StopReason::Steady);
+        const auto crossings = zero_crossings(p.domain, to_dense(p.domain, *u));
+        REQUIRE(crossings.size() > 100);
+        for (const Crossing& c : crossings) CHECK(length(c.position) == Approx(kRadius).margin(0.1 * kH));
+        // without it nothing is left
+        CHECK(evolve(*start_of(p), {}, o).stop_reason == StopReason::Vanished);
+    }
 }
 
 TEST_CASE("cancelled between steps, u holds the last whole one") {

@@ -58,8 +58,7 @@ void read_resolution(const TiffFacts& facts, TiffStack& stack) {
     }
 }
 
-// ---- ImageJ
-// ----------------------------------------------------------------------------------------------------------
+// ---- ImageJ -------------------------------------------------------------------------------------------------------
 
 /// The value of `key=` in ImageJ's description, one key a line.
 std::string imagej_value(const std::string& description, const std::string& key) {
@@ -105,8 +104,7 @@ void read_imagej(const TiffFacts& facts, TiffStack& stack) {
         if (const double voxel = to_number(origin[a]); voxel != 0) stack.origin[a] = -voxel * stack.spacing[a];
 }
 
-// ---- tifffile
-// --------------------------------------------------------------------------------------------------------
+// ---- tifffile -----------------------------------------------------------------------------------------------------
 
 /// tifffile's own description: {"shape": [58, 512, 512], "axes": "ZYX", "spacing": 1.0, "unit": "um"}.
 /// @returns whether it is one.
@@ -150,8 +148,7 @@ bool read_tifffile(const TiffFacts& facts, TiffStack& stack) {
     return true;
 }
 
-// ---- OME
-// -------------------------------------------------------------------------------------------------------------
+// ---- OME ----------------------------------------------------------------------------------------------------------
 
 struct XmlTag {
     std::string name;  ///< without a namespace

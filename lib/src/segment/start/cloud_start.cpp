@@ -14,6 +14,15 @@ constexpr double kReachSpacings = 3.0;    // that the start may lie off the poin
 constexpr double kWarnDisagreeing = 0.1;  // of given normals
 // of the longest side, beyond the points: where they leave holes the surface bulges
 constexpr double kMarginShare = 0.1;
+constexpr double kHoldDepth = 0.75;  // voxels that the surface may sink below the start where the points enclose nothing
+
+// Where a scan has no points its surface rests on nothing, and would slide along the walls that have some.
+FloatGridPtr raised(const FloatGrid& start, double depth) {
+    FloatGridPtr obstacle = start.deepCopy();
+    for (auto leaf = obstacle->tree().beginLeaf(); leaf; ++leaf)
+        for (auto value = leaf->beginValueAll(); value; ++value) value.setValue(float(*value + depth));
+    return obstacle;
+}
 
 void tell_of_hints(Job& job, const HintsReport& hints) {
     if (hints.normals + hints.sensors == 0) return;
@@ -48,7 +57,7 @@ void start_from_cloud(Job& job) {
             job.choose("attraction_range", number(range),
                        "the start touches the points, and where there are none nothing should pull");
         }
-        if (!report.encloses) job.hold = job.result.u->deepCopy();
+        if (!report.encloses) job.obstacle = raised(*job.result.u, kHoldDepth * job.h());
         compute_distance(job, tube_for_start(job));
     }
     const std::string how = report.encloses ? "; averaged within " + number(report.radius)

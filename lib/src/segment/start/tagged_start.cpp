@@ -61,8 +61,7 @@ void start_from_closing(Job& job, double D) {
         "of the tagged surface by a ball of radius D, for D is wider than " + number(kCloseFromVoxels) + " voxels");
 }
 
-// ---- bodies that the image cuts off
-// ------------------------------------------------------------------------------------
+// ---- bodies that the image cuts off -------------------------------------------------------------------------------
 
 /// On the same lattice, as large as all the points need, and some layers more.
 Domain around(Domain domain, const std::vector<Vec3>& points, int layers) {
