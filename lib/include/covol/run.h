@@ -10,7 +10,8 @@ enum class LogLevel { Info, Warning };
 
 /// How a computation runs, as opposed to what it computes: nothing in here changes a result.
 struct RunContext {
-    int threads = 0;  ///< Threads to use; 0 takes every core.
+    int threads =
+        0;  ///< At most so many work, as far as there are cores; 0: those of the caller's TBB arena, all cores.
 
     /// Called from the calling thread with a stage's name and its fraction done in [0,1].
     std::function<void(const std::string& stage, double fraction)> progress;
@@ -36,7 +37,8 @@ struct RunContext {
     void check() const;
 };
 
-/// Runs `work` on run.threads threads (every TBB loop inside it, OpenVDB's own included).
+/// Runs `work` on at most run.threads threads (every TBB loop inside it, OpenVDB's own included): in a TBB arena of its
+/// own, or in the one that the caller is in where that is as wide. What `work` throws passes through.
 void with_threads(const RunContext& run, const std::function<void()>& work);
 
 }  // namespace covol
