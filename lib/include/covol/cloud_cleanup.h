@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/fwd.h"
 #include "covol/run.h"
 
@@ -29,7 +30,7 @@ struct CloudCleanupOptions {
     /// Whether anything but duplicates is asked for.
     [[nodiscard]] bool any() const { return outlier_factor > 0 || simplify > 0 || smooth != CloudSmoothing::None; }
     /// Empty when usable, else one line for each bad field.
-    [[nodiscard]] std::string why_invalid() const;
+    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 
 struct CloudCleanupReport {
@@ -48,7 +49,8 @@ struct CloudCleanupReport {
 /// new ones. The same bits for any number of threads.
 /// @param report  may be null
 /// @throws Error InvalidOptions, InvalidInput (a value that is not finite), Numerical (CGAL refuses), Cancelled.
-[[nodiscard]] std::vector<Vec3> clean_cloud(const std::vector<Vec3>& points, const CloudCleanupOptions& options,
-                                            const RunContext& run = {}, CloudCleanupReport* report = nullptr);
+[[nodiscard]] COVOL_API std::vector<Vec3> clean_cloud(const std::vector<Vec3>& points,
+                                                      const CloudCleanupOptions& options, const RunContext& run = {},
+                                                      CloudCleanupReport* report = nullptr);
 
 }  // namespace covol

@@ -1,6 +1,7 @@
 #pragma once
 #include <optional>
 
+#include "covol/api.h"
 #include "covol/fwd.h"
 #include "covol/image.h"
 #include "covol/mesh.h"
@@ -23,9 +24,9 @@ struct Solid {
     FloatGridPtr level_set;
 };
 /// By the name's end: images, meshes, .vdb (as read_vdb_level_set chooses).
-[[nodiscard]] Solid read_solid(const std::string& path, int label = 0, const RunContext& run = {});
+[[nodiscard]] COVOL_API Solid read_solid(const std::string& path, int label = 0, const RunContext& run = {});
 
 /// Overlap on the finer of both lattices (a mask's own voxels when one is a mask), distances between surfaces.
-[[nodiscard]] CompareReport compare(const Solid& a, const Solid& b, const RunContext& run = {});
+[[nodiscard]] COVOL_API CompareReport compare(const Solid& a, const Solid& b, const RunContext& run = {});
 
 }  // namespace covol

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/domain.h"
 #include "covol/image.h"
 #include "covol/points.h"
@@ -20,7 +21,7 @@ struct ContourOptions {
     double step = 0.0;  ///< largest distance between neighbouring points, world units, > 0; the voxel size h
     ContourCurve curve = ContourCurve::Spline;
     double thickness = 0.0;  ///< of a body that is marked on a single slice, world units; 0: not known
-    [[nodiscard]] std::string why_invalid() const;
+    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 
 /// The body that closed contours on parallel slices enclose: shape-based interpolation.
@@ -34,19 +35,19 @@ struct ContourOptions {
 class ContourSolid {
 public:
     struct Data;
-    explicit ContourSolid(std::shared_ptr<const Data> data);
+    COVOL_API explicit ContourSolid(std::shared_ptr<const Data> data);
 
     /// Negative inside; a signed distance within the plane on a slice, of the same order elsewhere (world units).
-    [[nodiscard]] double level(const Vec3& world) const;
+    [[nodiscard]] COVOL_API double level(const Vec3& world) const;
     /// False only where the surface does not meet the ball.
-    [[nodiscard]] bool may_meet(const Vec3& center, double radius) const;
+    [[nodiscard]] COVOL_API bool may_meet(const Vec3& center, double radius) const;
     /// Holds the body.
-    [[nodiscard]] WorldBox box() const;
+    [[nodiscard]] COVOL_API WorldBox box() const;
     /// Points of the surface between the slices and on the domes, in world units; one for each lattice line of the
     /// slices' grid that crosses the surface along the axis which its normal is closest to.
-    [[nodiscard]] std::vector<Vec3> surface_points(double step, const RunContext& run = {}) const;
+    [[nodiscard]] COVOL_API std::vector<Vec3> surface_points(double step, const RunContext& run = {}) const;
     /// One position deep inside each hole of each slice.
-    [[nodiscard]] std::vector<Vec3> hole_seeds() const;
+    [[nodiscard]] COVOL_API std::vector<Vec3> hole_seeds() const;
 
 private:
     std::shared_ptr<const Data> data_;
@@ -58,7 +59,7 @@ private:
 /// @param area, before  of the last slice and of the one before it, 0 when there is none
 /// @param distance      between those two
 /// @param gap           usual distance between marked slices
-[[nodiscard]] double cap_height(double area, double before, double distance, double gap);
+[[nodiscard]] COVOL_API double cap_height(double area, double before, double distance, double gap);
 
 /// Marks on slices, made dense enough to hold a level set.
 struct Contours {
@@ -82,7 +83,7 @@ struct Contours {
 /// @param geometry  of the image; null: the clouds are in world units and the slices lie across a world axis.
 /// @throws Error InvalidOptions; InvalidInput (no line; a line in none of the planes; a line outside the image: both
 ///         name it).
-[[nodiscard]] Contours densify(const std::vector<PointCloud>& clouds, const ImageGeometry* geometry,
-                               const ContourOptions& options, const RunContext& run = {});
+[[nodiscard]] COVOL_API Contours densify(const std::vector<PointCloud>& clouds, const ImageGeometry* geometry,
+                                         const ContourOptions& options, const RunContext& run = {});
 
 }  // namespace covol

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/domain.h"
 #include "covol/image.h"
 #include "covol/run.h"
@@ -19,7 +20,7 @@ enum class EdgeFeature {
 };
 
 /// "auto", "slope", "bright-line", "dark-line"
-[[nodiscard]] const char* to_string(EdgeFeature feature);
+[[nodiscard]] COVOL_API const char* to_string(EdgeFeature feature);
 
 struct EdgeOptions {
     EdgeFeature feature = EdgeFeature::Automatic;
@@ -30,7 +31,7 @@ struct EdgeOptions {
     /// brightness, as contrast that varies needs
     double contrast_percentile = 0.0;
     double low = 0.0, high = 0.0;  ///< intensities mapped to 0 and 1; equal: the image's 0.5 % and 99.5 % percentiles.
-    [[nodiscard]] std::string why_invalid() const;
+    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 
 struct EdgeReport {
@@ -49,8 +50,8 @@ struct EdgeResult {
 /// The image is sampled there and in a halo, normalised, smoothed by the implicit heat equation over time σ²/2, and
 /// |∇I| is the mean over the 24 tetrahedra of each voxel.
 /// @throws Error InvalidOptions, InvalidInput (no active voxel; the image is constant).
-[[nodiscard]] EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions& options = {},
-                              const RunContext& run = {});
+[[nodiscard]] COVOL_API EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions& options = {},
+                                        const RunContext& run = {});
 
 /// What the image has where people mark a border, on the average over many places.
 struct MarkedFeature {
@@ -64,7 +65,7 @@ struct MarkedFeature {
 /// @param places   world units
 /// @param normals  outward unit vectors; as many
 /// @param reach    how far beside a place its sides are looked at, world units
-[[nodiscard]] MarkedFeature feature_at(const Image& image, const std::vector<Vec3>& places,
-                                       const std::vector<Vec3>& normals, double reach);
+[[nodiscard]] COVOL_API MarkedFeature feature_at(const Image& image, const std::vector<Vec3>& places,
+                                                 const std::vector<Vec3>& normals, double reach);
 
 }  // namespace covol

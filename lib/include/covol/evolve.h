@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/fwd.h"
 #include "covol/run.h"
 
@@ -30,12 +31,12 @@ struct EvolveOptions {
                               ///< or when over 10 steps fewer voxels than that changed sign
     double solver_tolerance = 1e-3;  ///< a step's solve ends at this residual, relative to that of u before
     int max_sweeps = 200;            ///< upper bound on a step's sweeps
-    [[nodiscard]] std::string why_invalid() const;
+    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 
 /// Why evolve() returned. In every case u holds the last whole step.
 enum class StopReason { NotRun, Steady, MaxSteps, Cancelled, Vanished };
-[[nodiscard]] const char* to_string(StopReason reason);
+[[nodiscard]] COVOL_API const char* to_string(StopReason reason);
 
 struct EvolveReport {
     StopReason stop_reason = StopReason::NotRun;
@@ -71,7 +72,7 @@ struct EvolveFields {
 ///        without `follow`, min u0 <= u <= max u0.
 /// @throws Error  InvalidOptions, InvalidInput (no active voxel; transforms differ; a value that is not finite; a
 ///                needed field is null), Numerical (u is left at the step before).
-EvolveReport evolve(FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options = {},
-                    const RunContext& run = {});
+COVOL_API EvolveReport evolve(FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options = {},
+                              const RunContext& run = {});
 
 }  // namespace covol

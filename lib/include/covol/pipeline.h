@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/band.h"
 #include "covol/cloud_surface.h"
 #include "covol/contours.h"
@@ -42,7 +43,7 @@ enum class Model {
              ///< it where it shows the border that it has at the marks
     Paper    ///< curvature alone, Eq. (1) as it is printed
 };
-[[nodiscard]] const char* to_string(Model model);
+[[nodiscard]] COVOL_API const char* to_string(Model model);
 
 struct SegmentOptions {
     Model model = Model::Guided;
@@ -75,10 +76,10 @@ struct SegmentOptions {
     HolesOptions holes;  ///< of points without an image
     /// levels of voxel size 2h, 4h, ... that the flow passes first; -1: 1 for a sphere or a box, else 0
     int coarse_levels = -1;
-    [[nodiscard]] std::string why_invalid() const;
+    [[nodiscard]] COVOL_API std::string why_invalid() const;
 
     /// EvolveOptions with an automatic attraction range.
-    [[nodiscard]] static EvolveOptions automatic_evolve();
+    [[nodiscard]] COVOL_API static EvolveOptions automatic_evolve();
 };
 
 struct SegmentReport {
@@ -138,12 +139,12 @@ struct VoxelSizeChoice {
     double voxel_size = 0;
     std::string reason;  ///< one line for people
 };
-[[nodiscard]] VoxelSizeChoice choose_voxel_size(const Image* image, const std::vector<Vec3>& world_points,
-                                                bool tagged = false);
+[[nodiscard]] COVOL_API VoxelSizeChoice choose_voxel_size(const Image* image, const std::vector<Vec3>& world_points,
+                                                          bool tagged = false);
 
 /// The main job: image and points together (either may be absent: null, empty).
 /// @throws Error as the single steps; InvalidInput when there is neither.
-[[nodiscard]] SegmentResult segment(const Image* image, const std::vector<Vec3>& world_points,
-                                    const SegmentOptions& options = {}, const RunContext& run = {});
+[[nodiscard]] COVOL_API SegmentResult segment(const Image* image, const std::vector<Vec3>& world_points,
+                                              const SegmentOptions& options = {}, const RunContext& run = {});
 
 }  // namespace covol

@@ -4,6 +4,8 @@
 #include <functional>
 #include <string>
 
+#include "covol/api.h"
+
 namespace covol {
 
 enum class LogLevel { Info, Warning };
@@ -30,15 +32,15 @@ struct RunContext {
     [[nodiscard]] bool cancelled() const noexcept {
         return cancel != nullptr && cancel->load(std::memory_order_relaxed);
     }
-    void info(const std::string& line) const;
-    void warn(const std::string& line) const;
-    void report(const std::string& stage, double fraction) const;
+    COVOL_API void info(const std::string& line) const;
+    COVOL_API void warn(const std::string& line) const;
+    COVOL_API void report(const std::string& stage, double fraction) const;
     /// @throws Error Cancelled when cancelled().
-    void check() const;
+    COVOL_API void check() const;
 };
 
 /// Runs `work` on at most run.threads threads (every TBB loop inside it, OpenVDB's own included): in a TBB arena of its
 /// own, or in the one that the caller is in where that is as wide. What `work` throws passes through.
-void with_threads(const RunContext& run, const std::function<void()>& work);
+COVOL_API void with_threads(const RunContext& run, const std::function<void()>& work);
 
 }  // namespace covol
