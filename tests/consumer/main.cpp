@@ -14,9 +14,9 @@
 #include "covol/vdb_io.h"
 
 int main() {
-    const covol::Domain domain = covol::domain_of_box({{-2, -2, -2}, {2, 2, 2}}, 0.1);
+    const covol::Domain domain = covol::make_domain({{-2, -2, -2}, {2, 2, 2}}, 0.1);
     const covol::FloatGridPtr start = covol::start_from_sphere(domain, {0, 0, 0}, 1.0);
-    const covol::TriangleMesh mesh = covol::extract_mesh(*covol::surface(*start));
+    const covol::TriangleMesh mesh = covol::extract_mesh(*covol::extract_surface(*start));
     const covol::MeshMeasures measures = covol::measure(mesh);
     const double expected = 4.0 / 3.0 * std::acos(-1.0);
     std::printf("volume %.4f of %.4f, %s\n", measures.volume, expected, measures.closed ? "closed" : "open");

@@ -49,15 +49,16 @@ struct TagDistanceChoice {
 /// Tagging. Exterior is what a flood from the domain's boundary and the exterior seeds reaches through {d > D};
 /// u0 is the signed distance to the tagged surface clamped to [-3h, 3h] (negative inside) on the band {d <= D + 3h}.
 /// Leaks are reported, never thrown.
-/// @param distance  from distance(), with max_distance >= D + 3h.
+/// @param distance  from compute_distance(), with max_distance >= D + 3h.
 /// @throws Error InvalidOptions, InvalidInput (the tube is too narrow; an exterior seed outside the domain or at d <=
 /// D).
-[[nodiscard]] COVOL_API BandResult band(const FloatGrid& distance, const BandOptions& options,
-                                        const RunContext& run = {});
+[[nodiscard]] COVOL_API BandResult tag_interior(const FloatGrid& distance, const BandOptions& options,
+                                                const RunContext& run = {});
 
 /// The closing of a tagged body by a ball: what a ball of radius D that rolls outside the tagged surface of `band`
 /// cannot reach with its far side, that is, the exterior grown back by D. Its surface touches the points; a signed
 /// distance clamped to 5 voxels. Null where nothing would be left.
-[[nodiscard]] COVOL_API FloatGridPtr closing(const FloatGrid& band, double tag_distance, const RunContext& run = {});
+[[nodiscard]] COVOL_API FloatGridPtr close_by_ball(const FloatGrid& band, double tag_distance,
+                                                   const RunContext& run = {});
 
 }  // namespace covol

@@ -31,7 +31,7 @@ struct ContourOptions {
 /// interpolated (Raya and Udupa, IEEE TMI 9, 1990) by cubics (Herman, Zheng and Bucholtz, IEEE CG&A 12, 1992) that do
 /// not overshoot, so a hole or a part that the next slice lacks ends in between. Where two single contours do not
 /// overlap at all, they are carried along the line between their centroids. Beyond the first and the last slice the
-/// body ends in a dome, a paraboloid over a disc; see cap_height().
+/// body ends in a dome, a paraboloid over a disc; see compute_cap_height().
 class ContourSolid {
 public:
     struct Data;
@@ -59,7 +59,7 @@ private:
 /// @param area, before  of the last slice and of the one before it, 0 when there is none
 /// @param distance      between those two
 /// @param gap           usual distance between marked slices
-[[nodiscard]] COVOL_API double cap_height(double area, double before, double distance, double gap);
+[[nodiscard]] COVOL_API double compute_cap_height(double area, double before, double distance, double gap);
 
 /// Marks on slices, made dense enough to hold a level set.
 struct Contours {
@@ -80,10 +80,12 @@ struct Contours {
 /// The plane of a line is found from its marks: an index coordinate that is constant along it. The body is built from
 /// the plane with the most marks; lines in other planes, and open lines, are joined along themselves only. Points that
 /// belong to no line count as marks. A closed line of fewer than three distinct marks is taken as open.
-/// @param geometry  of the image; null: the clouds are in world units and the slices lie across a world axis.
 /// @throws Error InvalidOptions; InvalidInput (no line; a line in none of the planes; a line outside the image: both
 ///         name it).
-[[nodiscard]] COVOL_API Contours densify(const std::vector<PointCloud>& clouds, const ImageGeometry* geometry,
+[[nodiscard]] COVOL_API Contours densify(const std::vector<PointCloud>& clouds, const ImageGeometry& geometry,
                                          const ContourOptions& options, const RunContext& run = {});
+/// Clouds in world units without an image: the slices lie across a world axis.
+[[nodiscard]] COVOL_API Contours densify(const std::vector<PointCloud>& clouds, const ContourOptions& options,
+                                         const RunContext& run = {});
 
 }  // namespace covol

@@ -29,7 +29,7 @@ struct DistanceResult {
 /// nearest one. Values do not depend on the number of threads.
 /// @param points  world positions, finite, at least one; points outside the domain count too.
 /// @throws Error InvalidOptions, InvalidInput.
-[[nodiscard]] COVOL_API DistanceResult distance(const std::vector<Vec3>& points, const Domain& domain,
-                                                const DistanceOptions& options, const RunContext& run = {});
+[[nodiscard]] COVOL_API DistanceResult compute_distance(const std::vector<Vec3>& points, const Domain& domain,
+                                                        const DistanceOptions& options, const RunContext& run = {});
 
 }  // namespace covol

@@ -41,7 +41,7 @@ struct Domain {
 /// voxels are the domain's voxels.
 /// @throws Error InvalidOptions (h <= 0, not finite), InvalidInput (an empty box, or more than 2^30 voxels along an
 /// axis).
-[[nodiscard]] COVOL_API Domain domain_of_box(const WorldBox& box, double voxel_size);
+[[nodiscard]] COVOL_API Domain make_domain(const WorldBox& box, double voxel_size);
 
 /// The same lattice with `layers` more voxels on every side.
 [[nodiscard]] COVOL_API Domain widened(Domain domain, int layers);

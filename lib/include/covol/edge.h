@@ -12,7 +12,7 @@ namespace covol {
 
 /// What an edge is: s in g(s), Eq. (2), of the image normalised to [0,1].
 enum class EdgeFeature {
-    Automatic,   ///< edge() takes Slope; segment() asks the marks of contours, see feature_at()
+    Automatic,   ///< detect_edges() takes Slope; segment() asks the marks of contours, see detect_feature()
     Slope,       ///< s = |∇G_σ * I| per world unit: borders between darker and brighter, the paper's
     BrightLine,  ///< s = G_σ * I: bright sheets such as stained membranes, whose middle has no slope and its sides have
                  ///< two
@@ -50,8 +50,8 @@ struct EdgeResult {
 /// The image is sampled there and in a halo, normalised, smoothed by the implicit heat equation over time σ²/2, and
 /// |∇I| is the mean over the 24 tetrahedra of each voxel.
 /// @throws Error InvalidOptions, InvalidInput (no active voxel; the image is constant).
-[[nodiscard]] COVOL_API EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions& options = {},
-                                        const RunContext& run = {});
+[[nodiscard]] COVOL_API EdgeResult detect_edges(const Image& image, const FloatGrid& topology,
+                                                const EdgeOptions& options = {}, const RunContext& run = {});
 
 /// What the image has where people mark a border, on the average over many places.
 struct MarkedFeature {
@@ -65,7 +65,7 @@ struct MarkedFeature {
 /// @param places   world units
 /// @param normals  outward unit vectors; as many
 /// @param reach    how far beside a place its sides are looked at, world units
-[[nodiscard]] COVOL_API MarkedFeature feature_at(const Image& image, const std::vector<Vec3>& places,
-                                                 const std::vector<Vec3>& normals, double reach);
+[[nodiscard]] COVOL_API MarkedFeature detect_feature(const Image& image, const std::vector<Vec3>& places,
+                                                     const std::vector<Vec3>& normals, double reach);
 
 }  // namespace covol

@@ -36,7 +36,7 @@ struct MeshDeviation {
 [[nodiscard]] COVOL_API double smallest_angle(const TriangleMesh& mesh);
 
 /// Unit normals at the vertices, weighted by angle.
-[[nodiscard]] COVOL_API std::vector<std::array<float, 3>> vertex_normals(const TriangleMesh& mesh);
+[[nodiscard]] COVOL_API std::vector<std::array<float, 3>> compute_vertex_normals(const TriangleMesh& mesh);
 
 /// Drops unreferenced vertices and triangles of a component whose |volume| is below `min_volume`.
 COVOL_API void remove_small_components(TriangleMesh& mesh, double min_volume);

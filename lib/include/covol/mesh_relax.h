@@ -37,7 +37,7 @@ COVOL_API RelaxReport relax_mesh(TriangleMesh& mesh, const FloatGrid& level_set,
 
 /// The distances of a mesh's points, less than a voxel apart, from a level set, to the first order; caps of a clip left
 /// out.
-[[nodiscard]] COVOL_API MeshDeviation deviation_from(const FloatGrid& level_set, const TriangleMesh& mesh,
-                                                     double isovalue = 0.0, const RunContext& run = {});
+[[nodiscard]] COVOL_API MeshDeviation measure_deviation(const FloatGrid& level_set, const TriangleMesh& mesh,
+                                                        double isovalue = 0.0, const RunContext& run = {});
 
 }  // namespace covol

@@ -17,7 +17,7 @@ struct CloudScale {
     double nearest = 0;  ///< median distance to the nearest other point
 };
 /// From quadrics through neighbourhoods of a sample of the points: that radius at which they are most of a sheet.
-[[nodiscard]] COVOL_API CloudScale cloud_scale(const std::vector<Vec3>& points, const RunContext& run = {});
+[[nodiscard]] COVOL_API CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext& run = {});
 
 /// The indicator function of a solid: about 1 inside and 0 outside, smooth over a few cells; nearest node beyond its
 /// lattice. Thread-safe.
@@ -96,8 +96,8 @@ struct CloudOrientation {
     bool encloses = true;   ///< else the normals are those of what was seen from outside
     HintsReport hints;
 };
-/// cloud_scale(), without stray points, and orient(); where normals go on turning there, the points hardly enclose
-/// anything, as scans of some sides do: then each normal points to where its point can be seen from.
+/// measure_cloud_scale(), without stray points, and orient(); where normals go on turning there, the points hardly
+/// enclose anything, as scans of some sides do: then each normal points to where its point can be seen from.
 [[nodiscard]] COVOL_API CloudOrientation orient_cloud(const std::vector<Vec3>& points, const RunContext& run = {});
 /// The same, by normals and sensors where they are consistent: half of them has to foresee the sides of the other half,
 /// and an orientation that settles without them may not contradict them in whole parts. A sensor gives each point the

@@ -22,6 +22,6 @@ struct Phantom {
     std::vector<std::uint8_t> labels;  ///< the solid, in the image's lattice, i fastest
 };
 [[nodiscard]] COVOL_API Phantom make_phantom(const PhantomOptions& options);
-[[nodiscard]] COVOL_API std::vector<std::string> phantom_kinds();
+[[nodiscard]] COVOL_API std::vector<std::string> list_phantom_kinds();
 
 }  // namespace covol

@@ -133,18 +133,26 @@ struct SegmentResult {
 };
 
 /// h and how it was found: the image's smallest spacing, or for points alone the median distance to the nearest other
-/// point, coarser where the scan is noisy (cloud_scale(); for tagging scan_voxel_size()), finer by sqrt(n / 1000) for
-/// n < 1000 points. @throws Error InvalidInput when there is neither, or fewer than two distinct points.
+/// point, coarser where the scan is noisy (measure_cloud_scale(); for tagging choose_scan_voxel_size()), finer by
+/// sqrt(n / 1000) for n < 1000 points. @throws Error InvalidInput when there are fewer than two distinct points.
 struct VoxelSizeChoice {
     double voxel_size = 0;
     std::string reason;  ///< one line for people
 };
-[[nodiscard]] COVOL_API VoxelSizeChoice choose_voxel_size(const Image* image, const std::vector<Vec3>& world_points,
-                                                          bool tagged = false);
+[[nodiscard]] COVOL_API VoxelSizeChoice choose_voxel_size(const Image& image);
+[[nodiscard]] COVOL_API VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool tagged = false);
 
-/// The main job: image and points together (either may be absent: null, empty).
-/// @throws Error as the single steps; InvalidInput when there is neither.
-[[nodiscard]] COVOL_API SegmentResult segment(const Image* image, const std::vector<Vec3>& world_points,
+/// The main job: image and points together.
+/// @throws Error as the single steps.
+[[nodiscard]] COVOL_API SegmentResult segment(const Image& image, const std::vector<Vec3>& world_points,
                                               const SegmentOptions& options = {}, const RunContext& run = {});
+/// An image alone: SegmentOptions::start says where the surface is, or contours, seeds or a guess do.
+/// @throws Error also InvalidInput (tagging without points).
+[[nodiscard]] COVOL_API SegmentResult segment(const Image& image, const SegmentOptions& options = {},
+                                              const RunContext& run = {});
+/// Points alone.
+/// @throws Error as the single steps; InvalidInput when there is no point, contour or start.
+[[nodiscard]] COVOL_API SegmentResult reconstruct(const std::vector<Vec3>& world_points,
+                                                  const SegmentOptions& options = {}, const RunContext& run = {});
 
 }  // namespace covol

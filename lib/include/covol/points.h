@@ -66,8 +66,9 @@ struct PointCloud {
 [[nodiscard]] COVOL_API PointCloud read_points(const std::string& path, const ReadPointsOptions& options = {});
 
 /// World positions; points in voxels or on slices are mapped by the image's geometry.
-/// @throws Error InvalidInput when points need the image and `geometry` is null.
-[[nodiscard]] COVOL_API std::vector<Vec3> to_world(const PointCloud& cloud, const ImageGeometry* geometry);
+[[nodiscard]] COVOL_API std::vector<Vec3> to_world(const PointCloud& cloud, const ImageGeometry& geometry);
+/// @throws Error InvalidInput when points need an image.
+[[nodiscard]] COVOL_API std::vector<Vec3> to_world(const PointCloud& cloud);
 
 /// Tries the usual mistakes where a point lies outside the image: order of the axes, voxels for world units and the
 /// reverse, voxels counted from 1, RAS for LPS, an origin left out, micrometres for millimetres, and two of them.
@@ -83,7 +84,7 @@ COVOL_API void check_inside(const PointCloud& cloud, const ImageGeometry& geomet
 /// Indices of points along a Z curve through 1024^3 cells of their box: those that follow each other lie close. Of more
 /// than `most`, so many of them, evenly out of that order: the cloud thins by the same share everywhere.
 /// @throws Error InvalidOptions (most = 0), InvalidInput (2^32 points and more).
-[[nodiscard]] COVOL_API std::vector<std::uint32_t> spatial_order(const std::vector<Vec3>& points, std::size_t most);
+[[nodiscard]] COVOL_API std::vector<std::uint32_t> order_spatially(const std::vector<Vec3>& points, std::size_t most);
 
 /// Spacing of a cloud, from nearest neighbours of a fixed subsample (world units).
 struct SpacingStatistics {
@@ -93,7 +94,7 @@ struct SpacingStatistics {
     double max = 0;
 };
 /// @pre no exact duplicates
-[[nodiscard]] COVOL_API SpacingStatistics nearest_neighbour_spacing(const std::vector<Vec3>& points);
+[[nodiscard]] COVOL_API SpacingStatistics measure_spacing(const std::vector<Vec3>& points);
 
 /// Writes .xyz, .csv or binary .ply by the name's end; whole or not at all.
 COVOL_API void write_points(const std::string& path, const std::vector<Vec3>& points, const std::string& comment = {});

@@ -22,9 +22,12 @@ struct RenderOptions {
     [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 
-/// The shaded surface (OpenVDB's ray tracer) and, with an image, slices with the surface's outline and the points.
-[[nodiscard]] COVOL_API Picture render(const FloatGrid& surface, const Image* image, const std::vector<Vec3>& points,
+/// The shaded surface (OpenVDB's ray tracer), and slices of the image with the surface's outline and the points.
+[[nodiscard]] COVOL_API Picture render(const FloatGrid& surface, const Image& image, const std::vector<Vec3>& points,
                                        const RenderOptions& options = {}, const RunContext& run = {});
+/// The shaded surface from two sides.
+[[nodiscard]] COVOL_API Picture render(const FloatGrid& surface, const RenderOptions& options = {},
+                                       const RunContext& run = {});
 
 /// Whole or not at all. @throws Error Io.
 COVOL_API void write_png(const std::string& path, const Picture& picture);

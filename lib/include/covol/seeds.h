@@ -13,7 +13,10 @@ namespace covol {
 
 /// Positions inside or outside of a structure as a file gives them: loose points as they are, lines (scribbles) with
 /// points between their marks, no farther apart than `step`; closed lines are closed. World units.
-[[nodiscard]] COVOL_API std::vector<Vec3> seeds_of(const PointCloud& cloud, const ImageGeometry* geometry, double step);
+[[nodiscard]] COVOL_API std::vector<Vec3> collect_seeds(const PointCloud& cloud, const ImageGeometry& geometry,
+                                                        double step);
+/// @throws Error InvalidInput when points need an image.
+[[nodiscard]] COVOL_API std::vector<Vec3> collect_seeds(const PointCloud& cloud, double step);
 
 /// Seeds against a surface.
 struct SeedCheck {

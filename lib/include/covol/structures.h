@@ -16,7 +16,7 @@ namespace covol {
 /// One of several solids.
 struct Structure {
     std::string name;      ///< what people call it; not empty, unique
-    FloatGridPtr surface;  ///< as surface() makes it: a signed distance, negative inside
+    FloatGridPtr surface;  ///< as extract_surface() makes it: a signed distance, negative inside
 };
 
 struct SeparateOptions {
@@ -48,7 +48,7 @@ struct SeparateResult {
 /// the gap's width and between the two (∇φ_i·∇φ_j < 0), gets φ_i' = (φ_i − m)/2: the new interface is the middle
 /// surface φ_i = φ_j, and φ_i' = −φ_j' beside it. Where overlaps are deep the distances are computed as deep. A solid
 /// inside another one is carved out instead: φ' = max(φ_outer, −φ_inner). Changed surfaces are redistanced by
-/// surface(). The result does not depend on the structures' order or on the number of threads.
+/// extract_surface(). The result does not depend on the structures' order or on the number of threads.
 ///
 /// @throws Error InvalidOptions; InvalidInput (names empty or not unique; grids whose transforms differ; two that are
 /// the
@@ -60,12 +60,12 @@ struct SeparateResult {
 /// A centre that rounding puts into two solids, or into none where two touch, belongs to the nearer one (of equals, to
 /// the one whose name comes first).
 /// @throws Error InvalidInput (more than 254 structures).
-[[nodiscard]] COVOL_API std::vector<std::uint8_t> label_image(const std::vector<Structure>& structures,
-                                                              const ImageGeometry& geometry,
-                                                              const RunContext& run = {});
+[[nodiscard]] COVOL_API std::vector<std::uint8_t> make_label_image(const std::vector<Structure>& structures,
+                                                                   const ImageGeometry& geometry,
+                                                                   const RunContext& run = {});
 
 /// Identifiers for grids, [A-Za-z_][A-Za-z0-9_]*, unique. One structure is called "surface", as everywhere in covol.
-[[nodiscard]] COVOL_API std::vector<std::string> grid_names(const std::vector<std::string>& names);
+[[nodiscard]] COVOL_API std::vector<std::string> make_grid_names(const std::vector<std::string>& names);
 
 /// A colour for structure n, red, green and blue in [0,255]; the first twelve differ clearly.
 [[nodiscard]] COVOL_API std::array<std::uint8_t, 3> structure_color(std::size_t n);
@@ -74,12 +74,12 @@ struct SeparateResult {
 /// 1, 2, ... and extents.
 /// @param labels  n + 1 where structure n is
 /// @param values  the label values that the file has instead; empty: 1, 2, ...
-[[nodiscard]] COVOL_API std::vector<std::pair<std::string, std::string>> slicer_segments(
+[[nodiscard]] COVOL_API std::vector<std::pair<std::string, std::string>> make_slicer_segments(
     const std::vector<std::string>& names, const std::vector<std::uint8_t>& labels, const Index3& size,
     const std::vector<int>& values = {});
 
 /// ITK-SNAP's label description file for labels 1, 2, ..., or those of `values`
-[[nodiscard]] COVOL_API std::string itksnap_labels(const std::vector<std::string>& names,
-                                                   const std::vector<int>& values = {});
+[[nodiscard]] COVOL_API std::string make_itksnap_labels(const std::vector<std::string>& names,
+                                                        const std::vector<int>& values = {});
 
 }  // namespace covol

@@ -11,10 +11,10 @@ namespace covol {
 
 /// The zero level set of u as a true signed distance: class GRID_LEVEL_SET, half width 3 voxels, name "surface".
 /// Where the solid reaches the domain's boundary it is closed there. @throws Error InvalidInput (no zero crossing).
-[[nodiscard]] COVOL_API FloatGridPtr surface(const FloatGrid& u, const RunContext& run = {});
+[[nodiscard]] COVOL_API FloatGridPtr extract_surface(const FloatGrid& u, const RunContext& run = {});
 
 /// Fog volume in [0,1] of a level set: class GRID_FOG_VOLUME, name "density".
-[[nodiscard]] COVOL_API FloatGridPtr density(const FloatGrid& surface);
+[[nodiscard]] COVOL_API FloatGridPtr to_fog_volume(const FloatGrid& surface);
 
 struct ExtractOptions {
     double isovalue = 0.0;              ///< world units
@@ -35,7 +35,7 @@ struct FitStatistics {
     double bias = 0;  ///< of segment() alone: mean of the signed distances; > 0 where the points lie outside, and the
                       ///< surface is too small
 };
-[[nodiscard]] COVOL_API FitStatistics points_to_surface(const std::vector<Vec3>& points, const TriangleMesh& mesh,
-                                                        const RunContext& run = {});
+[[nodiscard]] COVOL_API FitStatistics measure_fit(const std::vector<Vec3>& points, const TriangleMesh& mesh,
+                                                  const RunContext& run = {});
 
 }  // namespace covol

@@ -175,10 +175,11 @@ std::string EdgeOptions::why_invalid() const {
     return checks.lines();
 }
 
-EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions& options, const RunContext& run) {
-    detail::require_valid(options, "edge");
+EdgeResult detect_edges(const Image& image, const FloatGrid& topology, const EdgeOptions& options,
+                        const RunContext& run) {
+    detail::require_valid(options, "detect_edges");
     if (topology.activeVoxelCount() == 0)
-        throw Error(Errc::InvalidInput, "edge: expected active voxels in the band, got none");
+        throw Error(Errc::InvalidInput, "detect_edges: expected active voxels in the band, got none");
     const Domain domain = domain_of(topology);
     EdgeResult result;
     EdgeReport& report = result.report;
@@ -193,7 +194,7 @@ EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions
         }
     }
     if (!(report.low < report.high))
-        throw Error(Errc::InvalidInput, "edge: " + image.path() + ": every voxel has the value " +
+        throw Error(Errc::InvalidInput, "detect_edges: " + image.path() + ": every voxel has the value " +
                                             std::to_string(report.low) +
                                             ", there is no edge to find; segment with the points alone (`rho = 0`)");
     with_threads(run, [&] {
@@ -226,7 +227,7 @@ EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions
         if (!(report.edge_contrast > 0)) report.edge_contrast = automatic_contrast(*result.grid, options, is_line);
         if (!(report.edge_contrast > 0))
             throw Error(Errc::InvalidInput,
-                        "edge: " + image.path() +
+                        "detect_edges: " + image.path() +
                             ": constant wherever the band lies, there is no edge to find; check that the "
                             "points lie on the image's structure");
         report.edge_k = 1.0 / (report.edge_contrast * report.edge_contrast);
@@ -237,8 +238,8 @@ EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions
     return result;
 }
 
-MarkedFeature feature_at(const Image& image, const std::vector<Vec3>& places, const std::vector<Vec3>& normals,
-                         double reach) {
+MarkedFeature detect_feature(const Image& image, const std::vector<Vec3>& places, const std::vector<Vec3>& normals,
+                             double reach) {
     const auto value_at = [&](const Vec3& x) {
         Domain one;
         one.origin = x;

@@ -263,7 +263,7 @@ bool Guide::learn(const Scene& scene, bool first) {
         places.push_back(mark.at);
         normals.push_back(patches_.directions[mark.patch]);
     }
-    report_.feature = feature_at(image_, places, normals, kSides * h_);
+    report_.feature = detect_feature(image_, places, normals, kSides * h_);
     report_.inside = lesson_->brightness(-2 * kStepsPerVoxel);
     report_.border = lesson_->brightness(0);
     report_.outside = lesson_->brightness(2 * kStepsPerVoxel);

@@ -24,7 +24,7 @@ constexpr double kNoisyShare = 0.3;  // of a voxel: a layer of points thicker th
 
 // A thick layer of points, or several beside each other, has its surface in the middle.
 void average_noise(Job& job) {
-    const double radius = kScanRadiusVoxels * job.h(), thickness = layer_thickness(job.points, radius, job.run);
+    const double radius = kScanRadiusVoxels * job.h(), thickness = measure_layer_thickness(job.points, radius, job.run);
     if (!(thickness > kNoisyShare * job.h())) return;
     job.points = average_layers(job.points, radius, job.run);
     job.choose("points_averaged", "within " + number(radius),
@@ -123,7 +123,8 @@ void choose_values(Job& job) {
     SegmentOptions& options = job.options;
     if (options.voxel_size <= 0) {
         options.voxel_size_is_automatic = true;
-        const VoxelSizeChoice choice = choose_voxel_size(job.image, job.points, job.tags());
+        const VoxelSizeChoice choice =
+            job.image != nullptr ? choose_voxel_size(*job.image) : choose_voxel_size(job.points, job.tags());
         options.voxel_size = choice.voxel_size;
         job.choose("voxel_size", number(job.h()), choice.reason);
     }
@@ -154,26 +155,27 @@ void choose_values(Job& job) {
 
 }  // namespace pipeline
 
-VoxelSizeChoice choose_voxel_size(const Image* image, const std::vector<Vec3>& world_points, bool tagged) {
+VoxelSizeChoice choose_voxel_size(const Image& image) {
+    const Vec3& spacing = image.geometry().spacing;
+    return {*std::min_element(spacing.begin(), spacing.end()), "the image's smallest spacing"};
+}
+
+VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool tagged) {
     using pipeline::kFewPoints, pipeline::kCloudNoise, pipeline::number;
-    if (image != nullptr) {
-        const Vec3& spacing = image->geometry().spacing;
-        return {*std::min_element(spacing.begin(), spacing.end()), "the image's smallest spacing"};
-    }
     const std::vector<Vec3> distinct = merge_close_points(world_points, 0);
     if (distinct.size() < 2)
         throw Error(Errc::InvalidInput, "choose_voxel_size: expected an image or at least 2 distinct points, got " +
                                             std::to_string(distinct.size()));
     constexpr const char* kNearest = "the median distance between neighbouring points";
     if (!tagged && distinct.size() > pipeline::kMostGuessMarks) {
-        const CloudScale scale = cloud_scale(distinct);
+        const CloudScale scale = measure_cloud_scale(distinct);
         const double h = kCloudNoise * scale.noise;
         if (h > scale.nearest)
             return {h, number(kCloudNoise) + " times the noise of the points, " + number(scale.noise)};
         return {scale.nearest, kNearest};
     }
-    const double spacing = nearest_neighbour_spacing(distinct).median;
-    const ScanVoxelSize scan = scan_voxel_size(distinct, spacing);
+    const double spacing = measure_spacing(distinct).median;
+    const ScanVoxelSize scan = choose_scan_voxel_size(distinct, spacing);
     if (scan.voxel_size <= spacing) {
         // A surface of few points is so few spacings wide that in voxels as large as they are curvature would outweigh
         // them.

@@ -54,7 +54,7 @@ void step_back(FloatGrid& u, const FloatGrid& start, double h) {
 /// The flow from `start`, a level set on the lattice of `fine`. @return empty, or why its result is of no use
 std::string run_coarse(Job& job, const FloatGrid& start, const Domain& fine) {
     Timed total(job.report().seconds.total);
-    job.report().domain = domain_of_box(fine.world_box(), job.h());
+    job.report().domain = make_domain(fine.world_box(), job.h());
     try {
         job.result.u = start_from_grid(job.domain(), start, job.run);
     } catch (const Error& error) {
@@ -63,7 +63,7 @@ std::string run_coarse(Job& job, const FloatGrid& start, const Domain& fine) {
     }
     const FloatGridPtr before = job.result.u->deepCopy();
     if (job.uses_points())
-        compute_distance(job, job.tags() ? job.options.tag_distance + band_slack(job) : tube_for_start(job));
+        find_distance(job, job.tags() ? job.options.tag_distance + band_slack(job) : tube_for_start(job));
     pass_coarse_levels(job);
     find_edges(job);
     flow(job);

@@ -202,18 +202,18 @@ TEST_CASE("points to surface: exact distances, mean, 95 % and maximum") {
     TriangleMesh mesh;
     mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
     mesh.triangles = {{0, 1, 2}};
-    const FitStatistics one = points_to_surface({{0.2, 0.2, 3}}, mesh);
+    const FitStatistics one = measure_fit({{0.2, 0.2, 3}}, mesh);
     CHECK(one.mean == Approx(3));
-    CHECK(points_to_surface({{-3, -4, 0}}, mesh).max == Approx(5));
-    CHECK(points_to_surface({{1, 1, 0}}, mesh).max == Approx(std::sqrt(0.5)));
+    CHECK(measure_fit({{-3, -4, 0}}, mesh).max == Approx(5));
+    CHECK(measure_fit({{1, 1, 0}}, mesh).max == Approx(std::sqrt(0.5)));
     std::vector<Vec3> points;
     for (int i = 1; i <= 100; ++i) points.push_back({0.2, 0.2, double(i)});
-    const FitStatistics fit = points_to_surface(points, mesh);
+    const FitStatistics fit = measure_fit(points, mesh);
     CHECK(fit.mean == Approx(50.5));
     CHECK(fit.p95 == Approx(95));
     CHECK(fit.max == Approx(100));
-    CHECK_THROWS_AS(points_to_surface({}, mesh), Error);
-    CHECK_THROWS_AS(points_to_surface(points, TriangleMesh{}), Error);
+    CHECK_THROWS_AS(measure_fit({}, mesh), Error);
+    CHECK_THROWS_AS(measure_fit(points, TriangleMesh{}), Error);
 }
 
 TEST_CASE("the report does not depend on the number of threads") {

@@ -54,7 +54,7 @@ double mean_radius(const TriangleMesh& mesh) {
 TEST_CASE("segment: points alone give a closed sphere and record what was chosen") {
     SegmentOptions options;
     options.voxel_size = 0.8;
-    const SegmentResult result = segment(nullptr, sphere_points(1200), options);
+    const SegmentResult result = reconstruct(sphere_points(1200), options);
     CHECK(result.report.surface.closed);
     CHECK(result.report.surface.genus == 0);
     CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.03 * options.voxel_size);
@@ -70,7 +70,7 @@ TEST_CASE("segment: points alone give a closed sphere and record what was chosen
 
 TEST_CASE("segment: image and points agree on the ball") {
     const Image image = ball_image(1.0);
-    const SegmentResult result = segment(&image, sphere_points(800));
+    const SegmentResult result = segment(image, sphere_points(800));
     CHECK(result.report.domain.voxel_size == 1.0);
     CHECK(result.report.surface.closed);
     CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.25);
@@ -84,7 +84,7 @@ TEST_CASE("segment: a sphere as start follows the image edge, without points") {
     options.start.kind = Start::Kind::Sphere;
     options.start.radius = kRadius + 2;
     options.evolve.delta = 0.2;
-    const SegmentResult result = segment(&image, {}, options);
+    const SegmentResult result = segment(image, options);
     CHECK(result.report.resolved.evolve.follow);
     CHECK(result.report.resolved.evolve.theta == 0);
     CHECK(result.distance == nullptr);
@@ -100,7 +100,7 @@ TEST_CASE("segment: an unlimited attraction reaches from a far start to the poin
     options.evolve.attraction_range = 0;
     // the points are a voxel apart: more and curvature wins between them
     options.evolve.delta = 0.1 * options.voxel_size;
-    const SegmentResult result = segment(nullptr, sphere_points(1200), options);
+    const SegmentResult result = reconstruct(sphere_points(1200), options);
     CHECK(result.report.automatic.count("distance_tube") == 1);
     CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.1 * options.voxel_size);
 }
@@ -134,7 +134,7 @@ SegmentResult from_sphere(const Image& image, double radius, int coarse_levels) 
     options.start.radius = radius;
     options.evolve.delta = 0.2;
     options.coarse_levels = coarse_levels;
-    return segment(&image, {}, options);
+    return segment(image, options);
 }
 
 }  // namespace
@@ -148,7 +148,7 @@ TEST_CASE("segment: a coarse level first gives the same surface in fewer steps")
     CHECK(both.report.solve.steps < fine.report.solve.steps / 2);
     std::vector<Vec3> vertices;
     for (const auto& v : both.mesh.vertices) vertices.push_back({v[0], v[1], v[2]});
-    const FitStatistics fit = points_to_surface(vertices, fine.mesh);
+    const FitStatistics fit = measure_fit(vertices, fine.mesh);
     CHECK(fit.mean < 0.1);
     CHECK(fit.p95 < 0.2);
 }
@@ -162,36 +162,36 @@ TEST_CASE("segment: what a coarse level cannot hold is not lost") {
 }
 
 TEST_CASE("segment: what is missing is an error that says so") {
-    CHECK(code_of([] { (void)segment(nullptr, {}); }) == Errc::InvalidInput);
+    CHECK(code_of([] { (void)reconstruct({}); }) == Errc::InvalidInput);
     const Image image = ball_image(2.0);
-    CHECK(code_of([&] { (void)segment(&image, {}); }) == Errc::InvalidInput);  // tagging without points
+    CHECK(code_of([&] { (void)segment(image); }) == Errc::InvalidInput);  // tagging without points
     SegmentOptions options;
     options.evolve.theta = 2;
-    CHECK(code_of([&] { (void)segment(nullptr, sphere_points(100), options); }) == Errc::InvalidOptions);
+    CHECK(code_of([&] { (void)reconstruct(sphere_points(100), options); }) == Errc::InvalidOptions);
     options = {};
     options.start.kind = Start::Kind::Sphere;  // radius 0
-    CHECK(code_of([&] { (void)segment(&image, {}, options); }) == Errc::InvalidOptions);
+    CHECK(code_of([&] { (void)segment(image, options); }) == Errc::InvalidOptions);
     options = {};
     options.roi = WorldBox{{0, 0, 0}, {1, 0, 1}};
-    CHECK(code_of([&] { (void)segment(&image, sphere_points(100), options); }) == Errc::InvalidOptions);
+    CHECK(code_of([&] { (void)segment(image, sphere_points(100), options); }) == Errc::InvalidOptions);
 }
 
 TEST_CASE("segment: a set cancel flag ends it with Cancelled") {
     const std::atomic<bool> cancel = true;
     RunContext run;
     run.cancel = &cancel;
-    CHECK(code_of([&] { (void)segment(nullptr, sphere_points(1200), {}, run); }) == Errc::Cancelled);
+    CHECK(code_of([&] { (void)reconstruct(sphere_points(1200), {}, run); }) == Errc::Cancelled);
 }
 
 TEST_CASE("choose_voxel_size: image before points, median spacing of distinct points") {
     const Image image = ball_image(2.0);
-    CHECK(choose_voxel_size(&image, {{0, 0, 0}}).voxel_size == 2.0);
+    CHECK(choose_voxel_size(image).voxel_size == 2.0);
     // Three distinct points: as many voxels as a thousand would have.
-    CHECK(choose_voxel_size(nullptr, {{0, 0, 0}, {3, 0, 0}, {0, 0, 0}, {6, 0, 0}}).voxel_size ==
+    CHECK(choose_voxel_size({{0, 0, 0}, {3, 0, 0}, {0, 0, 0}, {6, 0, 0}}).voxel_size ==
           Approx(3 * std::sqrt(3.0 / 1000)));
     std::vector<Vec3> plate;
     for (int i = 0; i < 40; ++i)
         for (int j = 0; j < 25; ++j) plate.push_back({3.0 * i, 3.0 * j, 0});
-    CHECK(choose_voxel_size(nullptr, plate).voxel_size == Approx(3));
-    CHECK(code_of([] { (void)choose_voxel_size(nullptr, {{1, 1, 1}, {1, 1, 1}}); }) == Errc::InvalidInput);
+    CHECK(choose_voxel_size(plate).voxel_size == Approx(3));
+    CHECK(code_of([] { (void)choose_voxel_size({{1, 1, 1}, {1, 1, 1}}); }) == Errc::InvalidInput);
 }

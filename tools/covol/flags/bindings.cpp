@@ -175,7 +175,7 @@ WorldPoints read_world_points(const PointFlags& flags, const ImageGeometry* geom
     for (const std::string& path : flags.paths) {
         run.check();
         const PointCloud cloud = read_points(path, flags.options);
-        const std::vector<Vec3> world = to_world(cloud, geometry);
+        const std::vector<Vec3> world = geometry != nullptr ? to_world(cloud, *geometry) : to_world(cloud);
         if (geometry != nullptr) check_inside(cloud, *geometry, run);
         all.points.insert(all.points.end(), world.begin(), world.end());
         add_hints(cloud, world, all);
@@ -201,7 +201,7 @@ double DomainFlags::resolve_voxel_size(const Image* image, const std::vector<Vec
     if (voxel_size.given && !(voxel_size.value > 0))
         throw Error(Errc::InvalidOptions, "--voxel-size: expected > 0, got " + to_text(voxel_size.value));
     if (voxel_size.given && !voxel_size.in_voxels) return voxel_size.value;
-    const VoxelSizeChoice choice = choose_voxel_size(image, points);
+    const VoxelSizeChoice choice = image != nullptr ? choose_voxel_size(*image) : choose_voxel_size(points);
     const double h = voxel_size.resolve(choice.voxel_size, choice.voxel_size);
     const std::string line =
         to_text(h) + " (" + (voxel_size.given ? to_text(voxel_size.value) + " times " : "") + choice.reason + ")";

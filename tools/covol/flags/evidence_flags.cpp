@@ -49,8 +49,8 @@ Evidence EvidenceFlags::judge(const SegmentResult& result, const std::vector<Vec
     // Brightness is nowhere 0 as slopes are, and g falls below 1/2 before there is a line.
     if (used.edge.feature > EdgeFeature::Slope) options.weak_edge = kWeakLine;
     // Where the image had no weight its edges are looked up now.
-    const FloatGridPtr g = result.edge ? result.edge : edge(image, *result.surface, used.edge, run).grid;
-    return evidence(result.mesh, marks, g.get(), image.geometry(), options, run);
+    const FloatGridPtr g = result.edge ? result.edge : detect_edges(image, *result.surface, used.edge, run).grid;
+    return assess_evidence(result.mesh, marks, *g, image.geometry(), options, run);
 }
 
 Json to_json(const Evidence& e) {

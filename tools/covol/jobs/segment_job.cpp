@@ -227,7 +227,8 @@ void SegmentJob::run_one(Session& session) const {
     options.inside = sides.inside;
     options.outside = sides.outside;
     // Shared by the writers that run at the end.
-    const auto result = std::make_shared<SegmentResult>(segment(pointer, marks.points, options, session.run()));
+    const auto result = std::make_shared<SegmentResult>(pixels ? segment(*pixels, marks.points, options, session.run())
+                                                               : reconstruct(marks.points, options, session.run()));
     input["points"]["densified"] = result->report.densified;
     session.report().update(to_json(result->report), true);
     add_seconds(session, result->report.seconds);
@@ -244,7 +245,8 @@ void SegmentJob::run_one(Session& session) const {
     if (result->report.holes.policy == Holes::Open) vdb.metadata["covol_holes"] = "closed here; the mesh alone is open";
     Outputs& outputs = session.outputs();
     outputs.add(output, [=](const std::string& path) { write_vdb(path, {result->surface}, vdb); });
-    outputs.add(density_path, [=](const std::string& path) { write_vdb(path, {density(*result->surface)}, vdb); });
+    outputs.add(density_path,
+                [=](const std::string& path) { write_vdb(path, {to_fog_volume(*result->surface)}, vdb); });
     outputs.add(fields_path, [=](const std::string& path) {
         std::vector<FloatGridPtr> grids{result->u};
         for (const FloatGridPtr& field : {result->distance, result->edge})

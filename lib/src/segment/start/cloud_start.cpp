@@ -49,7 +49,7 @@ void start_from_cloud(Job& job) {
                        "the start touches the points, and where there are none nothing should pull");
         }
         if (!report.encloses) job.hold = job.result.u->deepCopy();
-        compute_distance(job, tube_for_start(job));
+        find_distance(job, tube_for_start(job));
     }
     const std::string how = report.encloses ? "; averaged within " + number(report.radius)
                                             : "; they enclose nothing: inside is what they hide";

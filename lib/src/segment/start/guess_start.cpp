@@ -53,7 +53,7 @@ void start_from_guess(Job& job) {
         job.result.u = std::move(guess.u);
         job.on_surface = std::move(guess.marks);
     }
-    if (!job.rests() && job.uses_points()) compute_distance(job, tube_for_start(job));
+    if (!job.rests() && job.uses_points()) find_distance(job, tube_for_start(job));
     job.choose("guess", job.report().guess.summary, "");
 }
 

@@ -27,7 +27,7 @@ std::vector<Vec3> all_seeds(const Job& job) {
 }
 
 /// Holes narrower than D are no exterior, and seeds outside may lie as close to the border as they like; a seed of the
-/// exterior that the user gave is band()'s to judge.
+/// exterior that the user gave is tag_interior()'s to judge.
 std::vector<Vec3> seeds_beyond(const Job& job, double D) {
     std::vector<Vec3> seeds = job.options.exterior_seeds;
     const auto d_at = job.result.distance->getConstAccessor();
@@ -52,7 +52,7 @@ void choose_tag(Job& job) {
 // The tagged surface lies D outside the points, as far as the widest gap is large. Its closing by a ball of radius D
 // touches them, needs a band of a few voxels instead of {d <= D + 3h}, and leaves the flow a short way.
 void start_from_closing(Job& job, double D) {
-    FloatGridPtr closed = closing(*job.result.u, D, job.run);
+    FloatGridPtr closed = close_by_ball(*job.result.u, D, job.run);
     if (!closed) return;
     job.result.u = closed;
     job.options.evolve.follow = true;
@@ -99,11 +99,11 @@ std::optional<CutBody> tag_with(Job& job, const std::vector<Vec3>& beyond) {
     }
     const double D = body.tag.tag_distance;
     const Domain wide = around(job.domain(), closed, D + kMarginVoxels * h);
-    const FloatGridPtr d = distance(closed, wide, {D + band_slack(job)}, job.run).grid;
-    BandResult tagged = band(*d, {D, all_seeds(job)}, job.run);
+    const FloatGridPtr d = compute_distance(closed, wide, {D + band_slack(job)}, job.run).grid;
+    BandResult tagged = tag_interior(*d, {D, all_seeds(job)}, job.run);
     if (tagged.report.leaks) return {};
     body.band = tagged.report;
-    body.level_set = closing(*tagged.grid, D, job.run);
+    body.level_set = close_by_ball(*tagged.grid, D, job.run);
     if (!body.level_set) body.level_set = tagged.grid;
     return body;
 }
@@ -112,7 +112,8 @@ std::optional<CutBody> tag_with(Job& job, const std::vector<Vec3>& beyond) {
 bool encloses_alone(const Job& job) {
     const double D = job.options.tag_distance;
     if (D <= 0) return choose_tag_distance(job.points, job.domain(), all_seeds(job), job.run).encloses;
-    return !band(*distance(job.points, job.domain(), {D + band_slack(job)}, job.run).grid, {D, all_seeds(job)}, job.run)
+    return !tag_interior(*compute_distance(job.points, job.domain(), {D + band_slack(job)}, job.run).grid,
+                         {D, all_seeds(job)}, job.run)
                 .report.leaks;
 }
 
@@ -152,7 +153,7 @@ bool start_from_cut_body(Job& job) {
         if (!body) {
             how = "with their mirror image beyond the image's end they enclose a body";
             const std::vector<Vec3> images =
-                detail::mirrored(job.points, faces, kMirrorSpacings * nearest_neighbour_spacing(job.points).median);
+                detail::mirrored(job.points, faces, kMirrorSpacings * measure_spacing(job.points).median);
             if (!images.empty() && !encloses_alone(job)) body = tag_with(job, images);
         }
         if (!body) return false;
@@ -169,7 +170,7 @@ bool start_from_cut_body(Job& job) {
     job.report().band = body->band;
     job.options.evolve.follow = true;
     drop_cap_marks(job, faces);
-    if (job.uses_points()) compute_distance(job, job.options.tag_distance + band_slack(job), job.options.tag_distance);
+    if (job.uses_points()) find_distance(job, job.options.tag_distance + band_slack(job), job.options.tag_distance);
     return true;
 }
 
@@ -182,9 +183,9 @@ void start_by_tagging(Job& job) {
     if (is_automatic) choose_tag(job);
     const double D = job.options.tag_distance;
     job.report().domain = job.domain_with_chosen_margin(D + kMarginVoxels * job.h());
-    compute_distance(job, D + band_slack(job), D);
+    find_distance(job, D + band_slack(job), D);
     Timed timed(job.report().seconds.tag);
-    BandResult tagged = band(*job.result.distance, {D, seeds_beyond(job, D)}, job.run);
+    BandResult tagged = tag_interior(*job.result.distance, {D, seeds_beyond(job, D)}, job.run);
     job.report().band = tagged.report;
     job.result.u = tagged.grid;
     if (tagged.report.leaks) job.run.warn(tagged.report.leak());
