@@ -9,11 +9,13 @@
 
 namespace covol {
 
-/// How alike two solids are. Distances are symmetric (both directions pooled), world units.
+/// How alike two solids are. Distances between their surfaces are symmetric (both directions pooled), world units.
 struct CompareReport {
     double dice = 0, jaccard = 0;
     double volume_a = 0, volume_b = 0;
-    double hausdorff = 0, hausdorff95 = 0, mean_distance = 0;
+    double hausdorff = 0;  ///< the largest
+    double hd95 = 0;       ///< the 95th percentile
+    double assd = 0;       ///< the mean: average symmetric surface distance
 };
 
 /// A solid in one of the forms that covol writes. Masks: label 0 is outside; `label` picks one, 0 any.

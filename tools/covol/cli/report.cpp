@@ -78,13 +78,8 @@ Json to_json(const SeedCheck& s) {
 }
 
 Json to_json(const CompareReport& r) {
-    return {{"dice", r.dice},
-            {"jaccard", r.jaccard},
-            {"volume_a", r.volume_a},
-            {"volume_b", r.volume_b},
-            {"hausdorff", r.hausdorff},
-            {"hausdorff95", r.hausdorff95},
-            {"mean_distance", r.mean_distance}};
+    return {{"dice", r.dice},           {"jaccard", r.jaccard},  {"volume_a", r.volume_a}, {"volume_b", r.volume_b},
+            {"hausdorff", r.hausdorff}, {"hausdorff95", r.hd95}, {"mean_distance", r.assd}};
 }
 
 Json to_json(const SegmentOptions& o) {

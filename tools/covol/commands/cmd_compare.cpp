@@ -51,8 +51,8 @@ struct CompareJob {
         session.report()["compare"] = to_json(r);
         std::ostringstream text;
         text << std::setprecision(6) << "Dice " << r.dice << ", Jaccard " << r.jaccard << ", volumes " << r.volume_a
-             << " and " << r.volume_b << "\ndistance between the surfaces: mean " << r.mean_distance << ", 95 % "
-             << r.hausdorff95 << ", max " << r.hausdorff;
+             << " and " << r.volume_b << "\ndistance between the surfaces: mean " << r.assd << ", 95 % " << r.hd95
+             << ", max " << r.hausdorff;
         session.say(text.str());
     }
 
