@@ -1,5 +1,6 @@
 #pragma once
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,8 +25,9 @@ struct CloudCleanupOptions {
     double simplify = 0;        ///< > 0: one point stays in each cell of a lattice of this edge, world units.
     CloudSmoothing smooth = CloudSmoothing::None;
     double wlop_share = 0.25;  ///< Of the points, that WLOP makes anew, in (0,1].
-    double wlop_radius = 0;    ///< Of WLOP's neighbourhoods, world units; 0: 2.5 mean spacings of the new points.
-    int neighbours = 24;       ///< For outliers and jets, >= 6.
+    /// Of WLOP's neighbourhoods, world units, > 0; automatic: 2.5 mean spacings of the new points.
+    std::optional<double> wlop_radius;
+    int neighbours = 24;  ///< For outliers and jets, >= 6.
 
     /// Whether anything but duplicates is asked for.
     [[nodiscard]] bool any() const { return outlier_factor > 0 || simplify > 0 || smooth != CloudSmoothing::None; }

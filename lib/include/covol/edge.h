@@ -1,5 +1,6 @@
 #pragma once
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,12 +25,13 @@ enum class EdgeFeature {
 
 struct EdgeOptions {
     EdgeFeature feature = EdgeFeature::Automatic;
-    double sigma = -1.0;         ///< σ >= 0, world units: presmoothing; < 0 picks 1 voxel.
-    double edge_k = 0.0;         ///< K > 0 in g = 1/(1+K s^2), 0: see edge_contrast.
-    double edge_contrast = 0.0;  ///< s at which g = 1/2, i.e. K = 1/s^2; 0 picks a percentile of s in the band.
-    /// that percentile, in (0,1); 0 picks 0.9 for slopes, and for lines a third of the median: g then goes by relative
-    /// brightness, as contrast that varies needs
-    double contrast_percentile = 0.0;
+    std::optional<double> sigma;          ///< σ >= 0, world units: presmoothing; automatic: 1 voxel
+    std::optional<double> edge_k;         ///< K > 0 in g = 1/(1+K s^2); automatic: see edge_contrast
+    std::optional<double> edge_contrast;  ///< s > 0 at which g = 1/2, i.e. K = 1/s^2; automatic: a percentile of s in
+                                          ///< the band
+    /// that percentile, in (0,1); automatic: 0.9 for slopes, and for lines a third of the median: g then goes by
+    /// relative brightness, as contrast that varies needs
+    std::optional<double> contrast_percentile;
     double low = 0.0, high = 0.0;  ///< intensities mapped to 0 and 1; equal: the image's 0.5 % and 99.5 % percentiles.
     [[nodiscard]] COVOL_API std::string why_invalid() const;
 };

@@ -2,6 +2,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,9 +18,9 @@ namespace covol {
 inline constexpr double kCorrectionVoxels = 12.0;
 
 struct CorrectionOptions {
-    double precision = 0.0;     ///< of the marks, world units; 0 picks half a voxel
-    double least_radius = 0.0;  ///< within which a mark acts on the guess, however little it moves it, world units;
-                                ///< 0 picks kCorrectionVoxels
+    std::optional<double> precision;     ///< of the marks, world units, > 0; automatic: half a voxel
+    std::optional<double> least_radius;  ///< within which a mark acts on the guess, however little it moves it, world
+                                         ///< units, > 0; automatic: kCorrectionVoxels
     [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,9 +13,10 @@ namespace covol {
 
 /// What changes the result of guide(); lengths in world units.
 struct GuidanceOptions {
-    /// a mark lies within half of this of the border it means, along each axis; < 0: one voxel of the image
-    double mark_precision = -1;
-    double range = -1;  ///< how far from the guess the border is looked for; < 0: by the distance to the marks
+    /// a mark lies within half of this of the border it means, along each axis, >= 0; automatic: one voxel of the image
+    std::optional<double> mark_precision;
+    /// how far from the guess the border is looked for, >= 0; automatic: by the distance to the marks
+    std::optional<double> range;
     double weight = 1;  ///< in [0,1]: share of what the image says that counts; 0 leaves the guess as it is
     /// Empty when usable, else one line for each bad field: "weight: expected 0 to 1, got 2".
     [[nodiscard]] COVOL_API std::string why_invalid() const;

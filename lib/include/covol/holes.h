@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <vector>
 
 #include "covol/api.h"
@@ -18,7 +19,8 @@ enum class Holes {
 
 struct HolesOptions {
     Holes policy = Holes::Close;
-    double distance = 0;  ///< world units: a hole is what lies farther from all points; 0: choose_hole_distance()
+    /// world units, > 0: a hole is what lies farther from all points; automatic: choose_hole_distance()
+    std::optional<double> distance;
 };
 
 /// A closed line on which a mesh ends.

@@ -47,13 +47,13 @@ enum class Model {
 
 struct SegmentOptions {
     Model model = Model::Guided;
-    /// standard deviation of a mark's place, world units; < 0: 0.3 of the image's spacing along each axis
-    double mark_precision = -1.0;
-    double voxel_size = 0.0;  ///< h, world units; 0: see choose_voxel_size()
-    /// it is choose_voxel_size()'s: points that enclose nothing may be given another
-    bool voxel_size_is_automatic = false;
-    std::optional<WorldBox> roi;  ///< the domain, instead of the image's box
-    double margin = 0.0;          ///< points alone: between points and domain boundary; 0 picks D + 6 voxels
+    /// standard deviation of a mark's place, world units, >= 0; automatic: 0.3 of the image's spacing along each axis
+    std::optional<double> mark_precision;
+    std::optional<double> voxel_size;  ///< h, world units, > 0; automatic: choose_voxel_size()
+    /// `voxel_size` is a first choice, as an automatic one: points that enclose nothing may be given a larger one.
+    bool voxel_size_may_grow = false;
+    std::optional<WorldBox> roi;   ///< the domain, instead of the image's box
+    std::optional<double> margin;  ///< points alone, >= 0: between points and domain boundary; automatic: D + 6 voxels
     Start start;
     /// Another tool's result (Mesh, Mask or Vdb): corrected by the marks and seeds near them, and no flow. `start` is
     /// then not used.
@@ -64,22 +64,19 @@ struct SegmentOptions {
     /// exterior seed lies inside it: then all points are tagged, and each hole that inner contours leave is an exterior
     /// seed.
     std::shared_ptr<const Contours> contours;
-    PointHints hints;                   ///< of the points as they are given; for a cloud
-    std::vector<Vec3> inside, outside;  ///< seeds: positions whose side is known, world units
-    double tag_distance = 0.0;          ///< D; 0: automatic
+    PointHints hints;                    ///< of the points as they are given; for a cloud
+    std::vector<Vec3> inside, outside;   ///< seeds: positions whose side is known, world units
+    std::optional<double> tag_distance;  ///< D, world units, > 0; automatic: choose_tag_distance()
     std::vector<Vec3> exterior_seeds;
     EdgeOptions edge;
-    /// With attraction_range < 0 the pipeline picks: unlimited after tagging (the band bounds the points' reach),
-    /// 5 voxels after the other starts. Their `follow` is set by the pipeline too.
-    EvolveOptions evolve = automatic_evolve();
+    /// An automatic attraction range: after tagging 8 voxels, unlimited without an image (the band bounds the points'
+    /// reach), 5 voxels after the other starts. `follow` is chosen too.
+    EvolveOptions evolve;
     ExtractOptions extract;
     HolesOptions holes;  ///< of points without an image
-    /// levels of voxel size 2h, 4h, ... that the flow passes first; -1: 1 for a sphere or a box, else 0
-    int coarse_levels = -1;
+    /// levels of voxel size 2h, 4h, ... that the flow passes first, >= 0; automatic: 1 for a sphere or a box, else 0
+    std::optional<int> coarse_levels;
     [[nodiscard]] COVOL_API std::string why_invalid() const;
-
-    /// EvolveOptions with an automatic attraction range.
-    [[nodiscard]] COVOL_API static EvolveOptions automatic_evolve();
 };
 
 struct SegmentReport {
@@ -120,7 +117,7 @@ struct SegmentReport {
     CorrectionReport correction;      ///< of SegmentOptions::guess
     double share_without_points = 0;  ///< of the closed surface's area: farther than holes.distance from every point
     HolesReport holes;                ///< of points without an image; distance 0: none
-    SegmentOptions resolved;          ///< what was used: every automatic choice replaced by its value
+    SegmentOptions resolved;          ///< what was used: each automatic choice that was made has its value
     std::map<std::string, std::string> automatic;  ///< each automatic choice and its reason
 };
 

@@ -20,7 +20,7 @@ struct Structure {
 };
 
 struct SeparateOptions {
-    double gap = -1.0;          ///< gaps narrower than this close, world units; 0: none; < 0 picks 1 voxel
+    std::optional<double> gap;  ///< gaps narrower than this close, world units; 0: none; automatic: 1 voxel
     double nested_share = 0.9;  ///< in (0.5,1]: a solid that lies in a larger one with this share is carved out of it
     [[nodiscard]] COVOL_API std::string why_invalid() const;
 };

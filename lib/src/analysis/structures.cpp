@@ -43,7 +43,7 @@ public:
         : structures_(structures), options_(options), run_(run) {
         check_input();
         h_ = domain_of(*structures.front().surface).voxel_size;
-        gap_ = options.gap < 0 ? h_ : options.gap;
+        gap_ = options.gap.value_or(h_);
         for (const Structure& s : structures) phi_.push_back(s.surface);
         report_.changed.assign(structures.size(), false);
     }
@@ -347,7 +347,7 @@ private:
 
 std::string SeparateOptions::why_invalid() const {
     detail::FieldChecks checks;
-    checks.expect_finite("gap", gap);
+    checks.expect_not_negative("gap", gap);
     checks.expect(nested_share > 0.5 && nested_share <= 1, "nested_share", "> 0.5 and <= 1", nested_share);
     return checks.lines();
 }

@@ -43,17 +43,19 @@ void merge_points(Job& job) {
 
 void choose_attraction_range(Job& job) {
     job.has_automatic_range = true;
-    double& range = job.options.evolve.attraction_range;
-    range = 0;
+    std::optional<double>& chosen = job.options.evolve.attraction_range;
+    chosen = 0;
     if (!job.uses_points()) return;
     if (job.tags() && job.uses_image()) {
-        range = kTagAttractionVoxels * job.h();
+        const double range = kTagAttractionVoxels * job.h();
+        chosen = range;
         job.choose("attraction_range", number(range),
                    number(kTagAttractionVoxels) + " voxels: farther from marks the image decides");
     } else if (job.tags()) {
         job.choose("attraction_range", "0", "unlimited: the band around the points bounds it");
     } else {
-        range = kAttractionVoxels * job.h();
+        const double range = kAttractionVoxels * job.h();
+        chosen = range;
         job.choose("attraction_range", number(range), number(kAttractionVoxels) + " voxels");
     }
 }
@@ -63,7 +65,7 @@ void choose_start(Job& job) {
     Start::Kind& kind = job.options.start.kind;
     if (kind != Start::Kind::Auto || !job.starts_from_marks()) return;
     kind = Start::Kind::Tag;
-    if (!job.guided() || job.options.contours || job.options.tag_distance > 0 || job.points.size() > kMostGuessMarks)
+    if (!job.guided() || job.options.contours || job.options.tag_distance || job.points.size() > kMostGuessMarks)
         return;
     if (job.image == nullptr && !can_enclose(job.points)) return;  // a layer: tagging tells what it needs
     kind = Start::Kind::Guess;
@@ -81,14 +83,14 @@ void try_cloud(Job& job) {
     const SegmentOptions& o = job.options;
     const bool has_seeds =
         !o.exterior_seeds.empty() || !job.hole_seeds.empty() || !o.inside.empty() || !o.outside.empty();
-    if (!asked && (!job.guided() || o.contours || o.tag_distance > 0 || has_seeds || job.image != nullptr ||
+    if (!asked && (!job.guided() || o.contours || o.tag_distance || has_seeds || job.image != nullptr ||
                    !job.uses_points() || job.points.size() <= kMostGuessMarks || !can_enclose(job.points)))
         return;
     Timed timed(job.report().seconds.tag);
     job.cloud =
         orient_cloud(job.points, job.points.size() == job.given.size() ? job.options.hints : PointHints{}, job.run);
     kind = Start::Kind::Cloud;
-    if (job.cloud->encloses || !job.options.voxel_size_is_automatic) return;
+    if (job.cloud->encloses || !job.options.voxel_size_may_grow) return;
     // The indicator is all that there is to see.
     const double h = kViewVoxel * job.cloud->orientation.screened->cell();
     if (h <= job.h()) return;
@@ -121,8 +123,8 @@ void check_input(Job& job) {
 
 void choose_values(Job& job) {
     SegmentOptions& options = job.options;
-    if (options.voxel_size <= 0) {
-        options.voxel_size_is_automatic = true;
+    if (!options.voxel_size) {
+        options.voxel_size_may_grow = true;
         const VoxelSizeChoice choice =
             job.image != nullptr ? choose_voxel_size(*job.image) : choose_voxel_size(job.points, job.tags());
         options.voxel_size = choice.voxel_size;
@@ -136,20 +138,21 @@ void choose_values(Job& job) {
     EvolveOptions& evolve = options.evolve;
     const bool marked = job.tags() || job.guesses();  // the start is close to the end
     const double delta_voxels = marked ? kTagDeltaVoxels : 1.0;
-    const bool chooses_delta = evolve.delta < 0;
+    const bool chooses_delta = !evolve.delta;
     if (chooses_delta) evolve.delta = delta_voxels * h;
     if (job.options.guess || ((job.guesses() || job.is_cloud()) && job.guided() && job.uses_points()))
         return;  // nothing flows; a later frame may
-    if (chooses_delta) job.choose("delta", number(evolve.delta), number(delta_voxels) + " voxels");
-    if (evolve.tau < 0) job.choose("tau", number(h), "1 voxel at unit speed; longer while the surface moves slowly");
-    if (options.edge.sigma < 0 && job.uses_image()) {
+    if (chooses_delta) job.choose("delta", number(*evolve.delta), number(delta_voxels) + " voxels");
+    if (!evolve.tau) job.choose("tau", number(h), "1 voxel at unit speed; longer while the surface moves slowly");
+    if (!options.edge.sigma && job.uses_image()) {
         const double voxels = job.tags() ? kTagSigmaVoxels : 1.0;
-        job.choose("sigma", number(options.edge.sigma = voxels * h), number(voxels) + " voxels");
+        job.choose("sigma", number(*(options.edge.sigma = voxels * h)), number(voxels) + " voxels");
     }
-    if (evolve.attraction_range < 0) choose_attraction_range(job);
-    if (evolve.image_yields < 0) {
+    if (!evolve.attraction_range) choose_attraction_range(job);
+    if (!evolve.image_yields) {
         evolve.image_yields = job.tags() && job.uses_points() && job.uses_image() ? 1.0 : 0.0;
-        if (evolve.image_yields > 0) job.choose("image_yields", "1", "near marks the marks know better than the edges");
+        if (*evolve.image_yields > 0)
+            job.choose("image_yields", "1", "near marks the marks know better than the edges");
     }
 }
 

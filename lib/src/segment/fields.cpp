@@ -96,7 +96,7 @@ void find_distance(Job& job, double radius, double reach) {
 
 double tube_for_start(Job& job) {
     const double slack = band_slack(job);
-    if (job.options.evolve.attraction_range > 0) return job.options.evolve.attraction_range + slack;
+    if (job.attraction_range() > 0) return job.attraction_range() + slack;
     const WorldBox all = job.domain().world_box();
     const Domain coarse = make_domain(all, kCoarseFactor * job.h());
     const FloatGridPtr d =
@@ -114,7 +114,7 @@ double tube_for_start(Job& job) {
 }
 
 void compute_trusted_distance(Job& job) {
-    const double range = job.options.evolve.attraction_range;
+    const double range = job.attraction_range();
     if (job.rests() || !job.options.contours || !job.uses_points() || !job.uses_image() || range <= 0) return;
     Timed timed(job.report().seconds.distance);
     job.trusted_distance =
@@ -136,7 +136,7 @@ void choose_edge_feature(Job& job) {
         normals.push_back(normal);
     }
     const double reach =
-        reach_within(*job.body(), places, normals, kSidesSigmas * std::max(edge.sigma, job.h()), job.h());
+        reach_within(*job.body(), places, normals, kSidesSigmas * std::max(edge.sigma.value_or(0), job.h()), job.h());
     const MarkedFeature found = detect_feature(*job.image, places, normals, reach);
     edge.feature = found.feature;
     const std::string line = "at the marks the image is " + number(std::abs(found.line)) +
@@ -157,7 +157,7 @@ void find_edges(Job& job) {
     job.result.edge = found.grid;
     job.report().edge = found.report;
     const EdgeReport& e = found.report;
-    if (options.edge_k <= 0 && options.edge_contrast <= 0) {
+    if (!options.edge_k && !options.edge_contrast) {
         const char* measure = options.feature <= EdgeFeature::Slope ? "gradient" : "brightness";
         job.choose("edge_k", number(e.edge_k),
                    std::string("g = 1/2 at a ") + measure + " of " + number(e.edge_contrast));
@@ -166,7 +166,7 @@ void find_edges(Job& job) {
         job.choose("intensities", number(e.low) + " to " + number(e.high), "mapped to 0 and 1, percentiles");
     // Fixed from here on: a band that moves must not change the meaning of g.
     options.edge_k = e.edge_k;
-    options.edge_contrast = 0;
+    options.edge_contrast.reset();
     options.low = e.low;
     options.high = e.high;
 }

@@ -60,8 +60,7 @@ void treat_holes(Job& job) {
     std::vector<float>& distances = job.result.distance_to_points;
     const std::vector<Vec3>& points = job.cloud ? job.cloud->points : job.points;  // without stray ones
     const HolesOptions& options = job.options.holes;
-    const double automatic = choose_hole_distance(points, job.h()),
-                 distance = options.distance > 0 ? options.distance : automatic;
+    const double automatic = choose_hole_distance(points, job.h()), distance = options.distance.value_or(automatic);
     const double slack = kRimSlack * std::min(automatic, distance);
     distances = measure_distances(mesh, points, job.run);
     report.share_without_points = measure_share_beyond(mesh, distances, distance);

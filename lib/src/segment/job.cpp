@@ -37,7 +37,7 @@ Domain Job::domain_with_margin(double margin) const {
 }
 
 Domain Job::domain_with_chosen_margin(double automatic) const {
-    return domain_with_margin(options.margin > 0 ? options.margin : automatic);
+    return domain_with_margin(options.margin.value_or(automatic));
 }
 
 }  // namespace covol::pipeline

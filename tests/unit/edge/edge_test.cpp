@@ -42,7 +42,7 @@ FloatGridPtr topology_where(const Domain& domain, const std::function<bool(const
 EdgeOptions options(double sigma, double k) {
     EdgeOptions o;
     o.sigma = sigma;
-    o.edge_k = k;
+    if (k > 0) o.edge_k = k;
     o.low = 0;
     o.high = 1;
     return o;
@@ -75,18 +75,19 @@ Errc edge_code(const std::function<void()>& call) { return code_of(call, "detect
 TEST_CASE("every edge option says when it is out of range") {
     CHECK(EdgeOptions{}.why_invalid().empty());
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-    const auto rejects = [](const char* field, double EdgeOptions::*member, double value) {
+    const auto rejects = [](const char* field, auto EdgeOptions::*member, double value) {
         EdgeOptions o;
         o.*member = value;
         INFO(field << " = " << value << ": " << o.why_invalid());
         CHECK(o.why_invalid().rfind(std::string(field) + ": expected ", 0) == 0);
     };
-    rejects("sigma", &EdgeOptions::sigma, nan);
-    for (const double bad : {-1.0, nan}) {
+    for (const double bad : {-1.0, nan}) rejects("sigma", &EdgeOptions::sigma, bad);
+    for (const double bad : {-1.0, 0.0, nan}) {
         rejects("edge_k", &EdgeOptions::edge_k, bad);
         rejects("edge_contrast", &EdgeOptions::edge_contrast, bad);
     }
-    for (const double bad : {-0.1, 1.0, nan}) rejects("contrast_percentile", &EdgeOptions::contrast_percentile, bad);
+    for (const double bad : {-0.1, 0.0, 1.0, nan})
+        rejects("contrast_percentile", &EdgeOptions::contrast_percentile, bad);
     rejects("low", &EdgeOptions::low, 3.0);  // above high = 0
     rejects("low", &EdgeOptions::high, nan);
 }
@@ -151,7 +152,7 @@ TEST_CASE("g is 1/2 at the contrast, asked for or chosen") {
     EdgeOptions o = options(kH, 0);
     o.edge_contrast = 0.2;
     CHECK(detect_edges(image, *topology, o).report.edge_k == Approx(25));
-    o.edge_contrast = 0;
+    o.edge_contrast.reset();
     o.contrast_percentile = 0.8;
     const EdgeResult chosen = detect_edges(image, *topology, o);
     std::int64_t steeper = 0;

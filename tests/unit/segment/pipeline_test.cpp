@@ -4,6 +4,7 @@
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <optional>
 
 #include "covol/error.h"
 #include "covol/surface.h"
@@ -52,15 +53,16 @@ double mean_radius(const TriangleMesh& mesh) {
 }  // namespace
 
 TEST_CASE("segment: points alone give a closed sphere and record what was chosen") {
+    constexpr double h = 0.8;
     SegmentOptions options;
-    options.voxel_size = 0.8;
+    options.voxel_size = h;
     const SegmentResult result = reconstruct(sphere_points(1200), options);
     CHECK(result.report.surface.closed);
     CHECK(result.report.surface.genus == 0);
-    CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.03 * options.voxel_size);
-    CHECK(result.report.fit.mean < 0.05 * options.voxel_size);
+    CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.03 * h);
+    CHECK(result.report.fit.mean < 0.05 * h);
     CHECK(result.report.resolved.evolve.rho == 0);
-    CHECK(result.report.resolved.evolve.delta == Approx(0.5 * options.voxel_size));
+    CHECK(result.report.resolved.evolve.delta.value() == Approx(0.5 * h));
     CHECK(result.report.automatic.count("rho") == 1);
     CHECK(result.report.automatic.count("guess") == 1);
     CHECK(result.report.guess.marks == 1200);
@@ -75,7 +77,7 @@ TEST_CASE("segment: image and points agree on the ball") {
     CHECK(result.report.surface.closed);
     CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.25);
     CHECK(result.edge != nullptr);
-    CHECK(result.report.resolved.edge.edge_k > 0);
+    CHECK(result.report.resolved.edge.edge_k.value() > 0);
 }
 
 TEST_CASE("segment: a sphere as start follows the image edge, without points") {
@@ -92,17 +94,18 @@ TEST_CASE("segment: a sphere as start follows the image edge, without points") {
 }
 
 TEST_CASE("segment: an unlimited attraction reaches from a far start to the points") {
+    constexpr double h = 0.8;
     SegmentOptions options;
-    options.voxel_size = 0.8;
+    options.voxel_size = h;
     options.start.kind = Start::Kind::Sphere;
     options.start.radius = kRadius + 4;
     options.margin = 8;
     options.evolve.attraction_range = 0;
     // the points are a voxel apart: more and curvature wins between them
-    options.evolve.delta = 0.1 * options.voxel_size;
+    options.evolve.delta = 0.1 * h;
     const SegmentResult result = reconstruct(sphere_points(1200), options);
     CHECK(result.report.automatic.count("distance_tube") == 1);
-    CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.1 * options.voxel_size);
+    CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.1 * h);
 }
 
 namespace {
@@ -128,7 +131,7 @@ Image ellipsoid_image(const Vec3& semi_axes) {
     return Image::from_values(geometry, values.data());
 }
 
-SegmentResult from_sphere(const Image& image, double radius, int coarse_levels) {
+SegmentResult from_sphere(const Image& image, double radius, std::optional<int> coarse_levels) {
     SegmentOptions options;
     options.start.kind = Start::Kind::Sphere;
     options.start.radius = radius;
@@ -141,7 +144,7 @@ SegmentResult from_sphere(const Image& image, double radius, int coarse_levels) 
 
 TEST_CASE("segment: a coarse level first gives the same surface in fewer steps") {
     const Image image = ellipsoid_image({26, 18, 22});
-    const SegmentResult fine = from_sphere(image, 32, 0), both = from_sphere(image, 32, -1);
+    const SegmentResult fine = from_sphere(image, 32, 0), both = from_sphere(image, 32, {});
     REQUIRE(both.report.coarse.size() == 1);
     CHECK(both.report.coarse[0].why_not.empty());
     CHECK(fine.report.coarse.empty());
@@ -156,7 +159,7 @@ TEST_CASE("segment: a coarse level first gives the same surface in fewer steps")
 TEST_CASE("segment: what a coarse level cannot hold is not lost") {
     // A plate of three voxels: a voxel and a half at twice the size.
     const Image image = ellipsoid_image({24, 24, 2});
-    const SegmentResult fine = from_sphere(image, 28, 0), both = from_sphere(image, 28, -1);
+    const SegmentResult fine = from_sphere(image, 28, 0), both = from_sphere(image, 28, {});
     CHECK(both.report.surface.closed);
     CHECK(both.report.surface.volume == Approx(fine.report.surface.volume).epsilon(0.05));
 }
@@ -171,6 +174,11 @@ TEST_CASE("segment: what is missing is an error that says so") {
     options = {};
     options.start.kind = Start::Kind::Sphere;  // radius 0
     CHECK(code_of([&] { (void)segment(image, options); }) == Errc::InvalidOptions);
+    options = {};
+    for (const double bad : {0.0, -1.0}) {
+        options.voxel_size = options.tag_distance = bad;
+        CHECK(code_of([&] { (void)segment(image, sphere_points(100), options); }) == Errc::InvalidOptions);
+    }
     options = {};
     options.roi = WorldBox{{0, 0, 0}, {1, 0, 1}};
     CHECK(code_of([&] { (void)segment(image, sphere_points(100), options); }) == Errc::InvalidOptions);

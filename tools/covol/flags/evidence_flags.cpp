@@ -44,7 +44,8 @@ Evidence EvidenceFlags::judge(const SegmentResult& result, const std::vector<Vec
                               const RunContext& run) const {
     const SegmentOptions& used = result.report.resolved;
     EvidenceOptions options;
-    options.reach = used.evolve.attraction_range > 0 ? used.evolve.attraction_range : kReachVoxels * used.voxel_size;
+    const double range = used.evolve.attraction_range.value_or(0);
+    options.reach = range > 0 ? range : kReachVoxels * *used.voxel_size;
     options.suggestions = suggestions;
     // Brightness is nowhere 0 as slopes are, and g falls below 1/2 before there is a line.
     if (used.edge.feature > EdgeFeature::Slope) options.weak_edge = kWeakLine;

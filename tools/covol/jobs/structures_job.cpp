@@ -109,7 +109,7 @@ StructuresOutput segment_structures(const SegmentJob& job, const std::vector<Str
         }
         options.exterior_seeds = inputs[n].exterior_seeds;
         options.start = starts[n].start;
-        if (options.evolve.delta < 0) options.evolve.delta = starts[n].delta;
+        if (!options.evolve.delta) options.evolve.delta = starts[n].delta;
         try {
             s.result = segment(image, marks.points, options, own);
         } catch (const Error& error) {

@@ -42,9 +42,9 @@ void start_from_cloud(Job& job) {
         job.result.u = surface_from_cloud(job.domain(), *job.cloud, report, job.run);
     }
     if (!job.rests() && job.uses_points()) {
-        double& range = job.options.evolve.attraction_range;
         if (job.has_automatic_range) {
-            range = kReachSpacings * std::max(report.spacing, job.h());
+            const double range = kReachSpacings * std::max(report.spacing, job.h());
+            job.options.evolve.attraction_range = range;
             job.choose("attraction_range", number(range),
                        "the start touches the points, and where there are none nothing should pull");
         }

@@ -46,7 +46,7 @@ void choose_tag(Job& job) {
     const Domain wide = job.domain_with_margin(0.25 * longest_side(bounding_box(job.points)) + kMarginVoxels * job.h());
     job.report().tag = choose_tag_distance(job.points, wide, all_seeds(job), job.run);
     job.options.tag_distance = job.report().tag.tag_distance;
-    job.choose("tag_distance", number(job.options.tag_distance), job.report().tag.reason);
+    job.choose("tag_distance", number(job.report().tag.tag_distance), job.report().tag.reason);
 }
 
 // The tagged surface lies D outside the points, as far as the widest gap is large. Its closing by a ball of radius D
@@ -90,8 +90,9 @@ std::optional<CutBody> tag_with(Job& job, const std::vector<Vec3>& beyond) {
     closed.insert(closed.end(), beyond.begin(), beyond.end());
     const double h = job.h();
     CutBody body{.beyond = beyond, .level_set = nullptr, .band = {}, .tag = {}};
-    body.tag.tag_distance = job.options.tag_distance;
-    if (body.tag.tag_distance <= 0) {
+    if (job.options.tag_distance) {
+        body.tag.tag_distance = *job.options.tag_distance;
+    } else {
         body.tag = choose_tag_distance(
             closed, around(job.domain(), closed, 0.25 * longest_side(bounding_box(closed)) + kMarginVoxels * h),
             all_seeds(job), job.run);
@@ -110,8 +111,9 @@ std::optional<CutBody> tag_with(Job& job, const std::vector<Vec3>& beyond) {
 
 /// Whether the points, with the image's end as a hole wherever it cuts them, enclose a body all the same.
 bool encloses_alone(const Job& job) {
-    const double D = job.options.tag_distance;
-    if (D <= 0) return choose_tag_distance(job.points, job.domain(), all_seeds(job), job.run).encloses;
+    if (!job.options.tag_distance)
+        return choose_tag_distance(job.points, job.domain(), all_seeds(job), job.run).encloses;
+    const double D = *job.options.tag_distance;
     return !tag_interior(*compute_distance(job.points, job.domain(), {D + band_slack(job)}, job.run).grid,
                          {D, all_seeds(job)}, job.run)
                 .report.leaks;
@@ -164,13 +166,13 @@ bool start_from_cut_body(Job& job) {
         job.trusted.insert(job.trusted.end(), body->beyond.begin(), body->beyond.end());
     }
     job.choose("start", "cut body", how);
-    if (job.options.tag_distance <= 0) job.choose("tag_distance", number(body->tag.tag_distance), body->tag.reason);
+    if (!job.options.tag_distance) job.choose("tag_distance", number(body->tag.tag_distance), body->tag.reason);
     job.options.tag_distance = body->tag.tag_distance;
     job.report().tag = body->tag;
     job.report().band = body->band;
     job.options.evolve.follow = true;
     drop_cap_marks(job, faces);
-    if (job.uses_points()) find_distance(job, job.options.tag_distance + band_slack(job), job.options.tag_distance);
+    if (const double D = body->tag.tag_distance; job.uses_points()) find_distance(job, D + band_slack(job), D);
     return true;
 }
 
@@ -178,10 +180,10 @@ bool start_from_cut_body(Job& job) {
 
 void start_by_tagging(Job& job) {
     job.origin = StartOrigin::Tagged;
-    const bool is_automatic = job.options.tag_distance <= 0;
+    const bool is_automatic = !job.options.tag_distance;
     if (start_from_cut_body(job)) return;
     if (is_automatic) choose_tag(job);
-    const double D = job.options.tag_distance;
+    const double D = *job.options.tag_distance;
     job.report().domain = job.domain_with_chosen_margin(D + kMarginVoxels * job.h());
     find_distance(job, D + band_slack(job), D);
     Timed timed(job.report().seconds.tag);
