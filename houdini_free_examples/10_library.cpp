@@ -28,27 +28,27 @@ int main(int argc, char** argv) {
         const covol::Image image = covol::read_image(argv[1]);
         const covol::PointCloud cloud = covol::read_points(argv[2]);
         covol::check_inside(cloud, image.geometry());
-        std::vector<covol::Vec3> points = covol::to_world(cloud, &image.geometry());
+        std::vector<covol::Vec3> points = covol::to_world(cloud, image.geometry());
 
         // The domain: isotropic voxels over the image's box. Every grid below shares its transform.
         const auto& spacing = image.geometry().spacing;
         const double h = *std::min_element(spacing.begin(), spacing.end());
-        const covol::Domain domain = covol::domain_of_box(image.geometry().world_box(), h);
+        const covol::Domain domain = covol::make_domain(image.geometry().world_box(), h);
         points = covol::merge_close_points(points, h / 4);
 
         // 1. Distance to the points, in a tube around them. D closes the gaps that the points leave.
         const covol::TagDistanceChoice choice = covol::choose_tag_distance(points, domain, {});
         const double D = choice.tag_distance;
-        const covol::DistanceResult d = covol::distance(points, domain, {D + 5 * h});
+        const covol::DistanceResult d = covol::compute_distance(points, domain, {D + 5 * h});
         std::printf("D = %g (%s)\n", D, choice.reason.c_str());
 
         // 2. Tagging: what a flood from outside cannot reach is inside. u starts as a clamped signed distance.
-        covol::BandResult tagged = covol::band(*d.grid, {D, {}});
+        covol::BandResult tagged = covol::tag_interior(*d.grid, {D, {}});
         if (tagged.report.leaks)
             std::printf("the points leave gaps; D = %g would hold\n", tagged.report.holding_distance);
 
         // 3. The edge detector, only where the band is.
-        const covol::EdgeResult g = covol::edge(image, *tagged.grid);
+        const covol::EdgeResult g = covol::detect_edges(image, *tagged.grid);
 
         // 4. The flow: points, image edges and curvature move u until it is steady.
         covol::FloatGridPtr u = tagged.grid;
@@ -59,7 +59,7 @@ int main(int argc, char** argv) {
         std::printf("%d steps, %s\n", solved.steps, covol::to_string(solved.stop_reason));
 
         // 5. A true signed distance, and what comes from it.
-        const covol::FloatGridPtr surface = covol::surface(*u);
+        const covol::FloatGridPtr surface = covol::extract_surface(*u);
         const covol::TriangleMesh mesh = covol::extract_mesh(*surface);
         const covol::MeshMeasures measures = covol::measure(mesh);
         std::printf("volume %g, area %g, genus %d\n", measures.volume, measures.area, measures.genus);

@@ -44,7 +44,7 @@ DenseField dense_image(const Image& image, const Domain& domain, double low, dou
 Problem make_problem(const bench::Arguments& arguments) {
     const Image image = read_image(arguments.text("image"));
     Problem p;
-    p.domain = domain_of_box(image.geometry().world_box(), image.geometry().spacing[0]);
+    p.domain = make_domain(image.geometry().world_box(), image.geometry().spacing[0]);
     if (arguments.number("octant", 0) != 0)
         for (int a = 0; a < 3; ++a) p.domain.min[a] += (p.domain.max[a] - p.domain.min[a] + 1) / 2;
     const double h = p.domain.voxel_size, radius = arguments.number("radius");
@@ -65,7 +65,8 @@ Problem make_problem(const bench::Arguments& arguments) {
     p.edge = test::dense_edge(p.edge, arguments.number("edge-k"));
     // Beyond the range the points' potential is constant, so the tube's background serves there.
     const auto points = read_points(arguments.text("points")).points;
-    p.distance = test::to_dense(p.domain, *distance(points, p.domain, {p.options.attraction_range + 2 * h}).grid);
+    p.distance =
+        test::to_dense(p.domain, *compute_distance(points, p.domain, {p.options.attraction_range + 2 * h}).grid);
     return p;
 }
 

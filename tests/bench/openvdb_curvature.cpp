@@ -67,7 +67,7 @@ void run_covol(double radius, int steps, int threads, Outcome& outcome) {
     const EvolveReport report = evolve(*grid, {}, options, run);
     outcome.voxels = double(report.active_voxels);
     outcome.take(watch, outcome.voxels * steps);
-    outcome.radius = radius_of(*surface(*grid));
+    outcome.radius = radius_of(*extract_surface(*grid));
 }
 
 nlohmann::json to_json(const Outcome& outcome, double start, int steps, double shrinkage) {

@@ -129,10 +129,10 @@ struct Phantoms {
         options.size = kPhantomSize;
         options.point_count = kPoints;
         sphere = make_phantom(options);
-        domain = domain_of_box(sphere.image.geometry().world_box(), sphere.image.geometry().spacing[0]);
-        distance = covol::distance(sphere.points, domain, tube()).grid;
-        band = covol::band(*distance, tagging()).grid;
-        surface = covol::surface(*band);
+        domain = make_domain(sphere.image.geometry().world_box(), sphere.image.geometry().spacing[0]);
+        distance = covol::compute_distance(sphere.points, domain, tube()).grid;
+        band = covol::tag_interior(*distance, tagging()).grid;
+        surface = covol::extract_surface(*band);
     }
     [[nodiscard]] DistanceOptions tube() const { return {kTubeVoxels * domain.voxel_size}; }
     [[nodiscard]] BandOptions tagging() const { return {kTagVoxels * domain.voxel_size, {}}; }
@@ -144,25 +144,25 @@ struct Phantoms {
 
 void distance_stage(benchmark::State& state) {
     const Phantoms& p = Phantoms::get();
-    for (auto _ : state) benchmark::DoNotOptimize(distance(p.sphere.points, p.domain, p.tube(), on(state)));
+    for (auto _ : state) benchmark::DoNotOptimize(compute_distance(p.sphere.points, p.domain, p.tube(), on(state)));
     count_voxels(state, double(p.distance->activeVoxelCount()));
 }
 
 void tag_stage(benchmark::State& state) {
     const Phantoms& p = Phantoms::get();
-    for (auto _ : state) benchmark::DoNotOptimize(band(*p.distance, p.tagging(), on(state)));
+    for (auto _ : state) benchmark::DoNotOptimize(tag_interior(*p.distance, p.tagging(), on(state)));
     count_voxels(state, double(p.band->activeVoxelCount()));
 }
 
 void edge_stage(benchmark::State& state) {
     const Phantoms& p = Phantoms::get();
-    for (auto _ : state) benchmark::DoNotOptimize(edge(p.sphere.image, *p.band, {}, on(state)));
+    for (auto _ : state) benchmark::DoNotOptimize(detect_edges(p.sphere.image, *p.band, {}, on(state)));
     count_voxels(state, double(p.band->activeVoxelCount()));
 }
 
 void surface_stage(benchmark::State& state) {
     const Phantoms& p = Phantoms::get();
-    for (auto _ : state) benchmark::DoNotOptimize(surface(*p.band, on(state)));
+    for (auto _ : state) benchmark::DoNotOptimize(extract_surface(*p.band, on(state)));
     count_voxels(state, double(p.surface->activeVoxelCount()));
 }
 

@@ -57,7 +57,7 @@ inline void write_zero_level(const std::string& path, const Domain& domain, cons
     std::vector<char> active(u.size(), 0);
     for (std::size_t p = 0; p < u.size(); ++p) active[p] = std::abs(u[p]) < half_width;
     const FloatGridPtr grid = test::to_grid(domain, u, active, "u", static_cast<float>(half_width));
-    write_mesh(path, extract_mesh(*surface(*grid)));
+    write_mesh(path, extract_mesh(*extract_surface(*grid)));
 }
 
 }  // namespace covol::bench

@@ -32,7 +32,8 @@ struct PlaneRun {
         });
         EvolveOptions o;
         o.theta = 1;
-        o.rho = o.delta = 0;
+        o.rho = 0;
+        o.delta = 0;
         o.tolerance = 0;
         o.solver_tolerance = 1e-6;
         o.max_steps = steps;
@@ -101,7 +102,8 @@ TEST_CASE("a sphere shrinks at unit speed towards a point, first order in h") {
         const FloatGridPtr d = to_grid(domain, sample(domain, [](const Vec3& x) { return length(x); }), "distance");
         EvolveOptions o;
         o.theta = 1;
-        o.rho = o.delta = 0;
+        o.rho = 0;
+        o.delta = 0;
         o.tolerance = 0;
         o.follow = true;
         o.max_steps = static_cast<int>(std::lround(time / h));

@@ -57,8 +57,8 @@ TEST_CASE("the dense reference: a shrinking sphere, first order in h or better")
         const double h = 2.8 / n;
         Problem p = whole_cube(n, h, signed_distance);
         const EvolveOptions o = curvature_alone(0.1 * h);
-        p.options.delta = o.delta;
-        p.options.tau = o.tau;
+        p.options.delta = *o.delta;
+        p.options.tau = *o.tau;
         p.options.solver_tolerance = 1e-4;
         const double error = radius_error(p.domain, run_dense(p, o.max_steps), kEnd);
         const double order = print_order("dense, whole domain, tau = h/10", h, error, previous);

@@ -9,7 +9,7 @@ import sys
 # Folders of lib/src from the bottom up, with the public headers that they implement; a file may include headers of its own
 # level and of those below.
 LAYERS = [
-    {"base": ["fwd", "error", "option_names", "run", "domain"], "scheme": []},
+    {"base": ["api", "version", "fwd", "error", "option_names", "run", "domain"], "scheme": []},
     {"grid": [], "mesh": ["mesh"], "io": ["vdb_io"]},
     {"io/image": ["image"], "io/mesh": ["mesh_io"], "distance": ["distance"]},
     {"image": [], "io/points": ["points"], "clip": ["clip"], "edge": ["edge"], "redistance": []},

@@ -1,4 +1,4 @@
-// distance() against brute force on random clouds of several kinds.
+// compute_distance() against brute force on random clouds of several kinds.
 #include <openvdb/openvdb.h>
 
 #include <catch2/catch.hpp>
@@ -24,14 +24,14 @@ std::vector<Vec3> random_cloud(unsigned seed) {
 
 }  // namespace
 
-TEST_CASE("distance() is within 0.01 h of brute force on average, 0.3 h at most") {
+TEST_CASE("compute_distance() is within 0.01 h of brute force on average, 0.3 h at most") {
     for (unsigned seed = 0; seed < 24; ++seed) {
         INFO("seed " << seed);
         const std::vector<Vec3> points = random_cloud(seed);
         const double h = 0.25 + 0.01 * seed;
-        const Domain domain = domain_of_box({{-8, -8, -8}, {8, 8, 8}}, h);
+        const Domain domain = make_domain({{-8, -8, -8}, {8, 8, 8}}, h);
         const double radius = (2 + seed % 7) * h;
-        const DistanceResult result = distance(points, domain, {radius});
+        const DistanceResult result = compute_distance(points, domain, {radius});
         REQUIRE(result.report.active_voxels > 0);
         std::mt19937 random(seed);
         double sum = 0, worst = 0, least = 0;

@@ -52,7 +52,7 @@ TEST_CASE("200 random solids: relaxed meshes are proper, have the topology of th
         TriangleMesh mesh = extract_mesh(*solid.level_set);
         const MeshMeasures before = measure(mesh);
         REQUIRE(before.closed);
-        const MeshDeviation deviation = deviation_from(*solid.level_set, mesh);
+        const MeshDeviation deviation = measure_deviation(*solid.level_set, mesh);
         const RelaxReport report = relax_mesh(mesh, *solid.level_set);
         check_proper(mesh, before);
         // Parts thinner than the lattice resolves have no room for triangles as large as voxels.

@@ -41,12 +41,12 @@ TEST_CASE("D is chosen so that real scans are closed") {
         INFO(cloud.path);
         const std::vector<Vec3> points = read_points(std::string(data) + "/" + cloud.path).points;
         const double h = cloud.voxel_size;
-        const Domain domain = domain_of_box(bounding_box(points, 30 * h), h);
+        const Domain domain = make_domain(bounding_box(points, 30 * h), h);
         const double chosen = choose_tag_distance(points, domain, cloud.exterior_seeds).tag_distance;
         CHECK(chosen >= cloud.low * h);
         CHECK(chosen <= cloud.high * h);
-        const DistanceResult tube = distance(points, domain, {chosen + 4 * h});
-        const BandReport report = band(*tube.grid, {chosen, cloud.exterior_seeds}).report;
+        const DistanceResult tube = compute_distance(points, domain, {chosen + 4 * h});
+        const BandReport report = tag_interior(*tube.grid, {chosen, cloud.exterior_seeds}).report;
         CHECK_FALSE(report.leaks);
         CHECK(report.core_volume > 0);
     }
@@ -59,6 +59,6 @@ TEST_CASE("a cloud without an inside says so") {
         return;
     }
     const std::vector<Vec3> points = read_points(std::string(data) + "/clouds/autzen_stadium.ply").points;
-    const Domain domain = domain_of_box(bounding_box(points, 30), 4.0);
+    const Domain domain = make_domain(bounding_box(points, 30), 4.0);
     CHECK(choose_tag_distance(points, domain, {}).reason.find("no closed structure") != std::string::npos);
 }

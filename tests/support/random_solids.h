@@ -188,13 +188,13 @@ private:
             if (pick(0, 1) == 0) box.min[a] += h_ * uniform(8, 13);
             if (pick(0, 1) == 0) box.max[a] -= h_ * uniform(8, 13);
         }
-        domain_ = domain_of_box(box, h_);
+        domain_ = make_domain(box, h_);
         const Domain& d = domain_;
         const FloatGridPtr u = level_set([&, first = d.min](const Vec3& p) {
             return shape({p[0] - first[0] + 8, p[1] - first[1] + 8, p[2] - first[2] + 8});
         });
-        set_clip(*u, clip_at(box));
-        return surface(*u);
+        set_clip(*u, make_clip(box));
+        return extract_surface(*u);
     }
 
     unsigned seed_;

@@ -101,7 +101,7 @@ inline DenseField to_dense(const Domain& d, const FloatGrid& grid) {
     return field;
 }
 
-/// u0 as band() and the other starts leave it: clamp(signed distance, ±3h), active where |distance| < width.
+/// u0 as tag_interior() and the other starts leave it: clamp(signed distance, ±3h), active where |distance| < width.
 inline FloatGridPtr start_grid(const Domain& d, const Function& signed_distance, double width) {
     const double w = 3 * d.voxel_size;
     const DenseField u = sample(d, [&](const Vec3& x) { return clamp_to(signed_distance(x), w); });

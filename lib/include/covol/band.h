@@ -2,6 +2,7 @@
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/domain.h"
 #include "covol/run.h"
 
@@ -10,7 +11,7 @@ namespace covol {
 struct BandOptions {
     double tag_distance = 0.0;         ///< D, world units; > 0.
     std::vector<Vec3> exterior_seeds;  ///< world positions that are outside, in cavities say
-    [[nodiscard]] std::string why_invalid() const;
+    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 
 struct BandReport {
@@ -22,7 +23,7 @@ struct BandReport {
     std::int64_t active_voxels = 0;
 
     /// Where it leaks: what to tell people.
-    [[nodiscard]] std::string leak() const;
+    [[nodiscard]] COVOL_API std::string leak() const;
 };
 
 struct BandResult {
@@ -41,21 +42,23 @@ struct TagDistanceChoice {
 /// appears when its last gap closes (a saddle of d) and vanishes at its inner radius (a peak of d). D is put just
 /// above the saddle that closes the main cores. Without a core that stands out, 1.8 times the mean spacing.
 /// @throws Error InvalidInput.
-[[nodiscard]] TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Domain& domain,
-                                                    const std::vector<Vec3>& exterior_seeds,
-                                                    const RunContext& run = {});
+[[nodiscard]] COVOL_API TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Domain& domain,
+                                                              const std::vector<Vec3>& exterior_seeds,
+                                                              const RunContext& run = {});
 
 /// Tagging. Exterior is what a flood from the domain's boundary and the exterior seeds reaches through {d > D};
 /// u0 is the signed distance to the tagged surface clamped to [-3h, 3h] (negative inside) on the band {d <= D + 3h}.
 /// Leaks are reported, never thrown.
-/// @param distance  from distance(), with max_distance >= D + 3h.
+/// @param distance  from compute_distance(), with max_distance >= D + 3h.
 /// @throws Error InvalidOptions, InvalidInput (the tube is too narrow; an exterior seed outside the domain or at d <=
 /// D).
-[[nodiscard]] BandResult band(const FloatGrid& distance, const BandOptions& options, const RunContext& run = {});
+[[nodiscard]] COVOL_API BandResult tag_interior(const FloatGrid& distance, const BandOptions& options,
+                                                const RunContext& run = {});
 
 /// The closing of a tagged body by a ball: what a ball of radius D that rolls outside the tagged surface of `band`
 /// cannot reach with its far side, that is, the exterior grown back by D. Its surface touches the points; a signed
 /// distance clamped to 5 voxels. Null where nothing would be left.
-[[nodiscard]] FloatGridPtr closing(const FloatGrid& band, double tag_distance, const RunContext& run = {});
+[[nodiscard]] COVOL_API FloatGridPtr close_by_ball(const FloatGrid& band, double tag_distance,
+                                                   const RunContext& run = {});
 
 }  // namespace covol

@@ -1,6 +1,7 @@
 #pragma once
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/domain.h"
 #include "covol/image.h"
 
@@ -17,14 +18,14 @@ struct HalfSpace {
 /// A domain holds whole voxels and may reach half a voxel beyond the image: the clip is the image's own end.
 using Clip = std::vector<HalfSpace>;
 
-[[nodiscard]] Clip clip_at(const WorldBox& box);
+[[nodiscard]] COVOL_API Clip make_clip(const WorldBox& box);
 /// The image's own box, half a voxel beyond the last centres; turned as the image is.
-[[nodiscard]] Clip clip_at(const ImageGeometry& geometry);
+[[nodiscard]] COVOL_API Clip make_clip(const ImageGeometry& geometry);
 
-/// Stores the clip as metadata ("covol_clip_0", ...). surface() closes the solid there by a flat cap; extract_mesh()
-/// puts caps along the lattice exactly on it, with sharp edges; rasterize() ends there.
-void set_clip(FloatGrid& grid, const Clip& clip);
+/// Stores the clip as metadata ("covol_clip_0", ...). extract_surface() closes the solid there by a flat cap;
+/// extract_mesh() puts caps along the lattice exactly on it, with sharp edges; rasterize() ends there.
+COVOL_API void set_clip(FloatGrid& grid, const Clip& clip);
 /// What set_clip stored, or an empty one.
-[[nodiscard]] Clip clip_of(const FloatGrid& grid);
+[[nodiscard]] COVOL_API Clip clip_of(const FloatGrid& grid);
 
 }  // namespace covol

@@ -1,8 +1,10 @@
 #pragma once
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/fwd.h"
 #include "covol/run.h"
 
@@ -23,13 +25,14 @@ struct CloudCleanupOptions {
     double simplify = 0;        ///< > 0: one point stays in each cell of a lattice of this edge, world units.
     CloudSmoothing smooth = CloudSmoothing::None;
     double wlop_share = 0.25;  ///< Of the points, that WLOP makes anew, in (0,1].
-    double wlop_radius = 0;    ///< Of WLOP's neighbourhoods, world units; 0: 2.5 mean spacings of the new points.
-    int neighbours = 24;       ///< For outliers and jets, >= 6.
+    /// Of WLOP's neighbourhoods, world units, > 0; automatic: 2.5 mean spacings of the new points.
+    std::optional<double> wlop_radius;
+    int neighbours = 24;  ///< For outliers and jets, >= 6.
 
     /// Whether anything but duplicates is asked for.
     [[nodiscard]] bool any() const { return outlier_factor > 0 || simplify > 0 || smooth != CloudSmoothing::None; }
     /// Empty when usable, else one line for each bad field.
-    [[nodiscard]] std::string why_invalid() const;
+    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 
 struct CloudCleanupReport {
@@ -48,7 +51,8 @@ struct CloudCleanupReport {
 /// new ones. The same bits for any number of threads.
 /// @param report  may be null
 /// @throws Error InvalidOptions, InvalidInput (a value that is not finite), Numerical (CGAL refuses), Cancelled.
-[[nodiscard]] std::vector<Vec3> clean_cloud(const std::vector<Vec3>& points, const CloudCleanupOptions& options,
-                                            const RunContext& run = {}, CloudCleanupReport* report = nullptr);
+[[nodiscard]] COVOL_API std::vector<Vec3> clean_cloud(const std::vector<Vec3>& points,
+                                                      const CloudCleanupOptions& options, const RunContext& run = {},
+                                                      CloudCleanupReport* report = nullptr);
 
 }  // namespace covol

@@ -1,6 +1,7 @@
 #pragma once
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/domain.h"
 #include "covol/orientation.h"
 #include "covol/run.h"
@@ -34,7 +35,7 @@ struct CloudReport {
 /// that enclose nothing it is the screened indicator. Where the indicator has fewer pieces and handles its topology is
 /// held.
 /// @throws Error InvalidInput (no surface), Cancelled.
-[[nodiscard]] FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cloud, CloudReport& report,
-                                              const RunContext& run = {});
+[[nodiscard]] COVOL_API FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cloud,
+                                                        CloudReport& report, const RunContext& run = {});
 
 }  // namespace covol

@@ -1,6 +1,7 @@
 #pragma once
 #include <optional>
 
+#include "covol/api.h"
 #include "covol/fwd.h"
 #include "covol/image.h"
 #include "covol/mesh.h"
@@ -8,11 +9,13 @@
 
 namespace covol {
 
-/// How alike two solids are. Distances are symmetric (both directions pooled), world units.
+/// How alike two solids are. Distances between their surfaces are symmetric (both directions pooled), world units.
 struct CompareReport {
     double dice = 0, jaccard = 0;
     double volume_a = 0, volume_b = 0;
-    double hausdorff = 0, hausdorff95 = 0, mean_distance = 0;
+    double hausdorff = 0;  ///< the largest
+    double hd95 = 0;       ///< the 95th percentile
+    double assd = 0;       ///< the mean: average symmetric surface distance
 };
 
 /// A solid in one of the forms that covol writes. Masks: label 0 is outside; `label` picks one, 0 any.
@@ -23,9 +26,9 @@ struct Solid {
     FloatGridPtr level_set;
 };
 /// By the name's end: images, meshes, .vdb (as read_vdb_level_set chooses).
-[[nodiscard]] Solid read_solid(const std::string& path, int label = 0, const RunContext& run = {});
+[[nodiscard]] COVOL_API Solid read_solid(const std::string& path, int label = 0, const RunContext& run = {});
 
 /// Overlap on the finer of both lattices (a mask's own voxels when one is a mask), distances between surfaces.
-[[nodiscard]] CompareReport compare(const Solid& a, const Solid& b, const RunContext& run = {});
+[[nodiscard]] COVOL_API CompareReport compare(const Solid& a, const Solid& b, const RunContext& run = {});
 
 }  // namespace covol

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/domain.h"
 #include "covol/image.h"
 #include "covol/points.h"
@@ -20,7 +21,7 @@ struct ContourOptions {
     double step = 0.0;  ///< largest distance between neighbouring points, world units, > 0; the voxel size h
     ContourCurve curve = ContourCurve::Spline;
     double thickness = 0.0;  ///< of a body that is marked on a single slice, world units; 0: not known
-    [[nodiscard]] std::string why_invalid() const;
+    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 
 /// The body that closed contours on parallel slices enclose: shape-based interpolation.
@@ -30,23 +31,23 @@ struct ContourOptions {
 /// interpolated (Raya and Udupa, IEEE TMI 9, 1990) by cubics (Herman, Zheng and Bucholtz, IEEE CG&A 12, 1992) that do
 /// not overshoot, so a hole or a part that the next slice lacks ends in between. Where two single contours do not
 /// overlap at all, they are carried along the line between their centroids. Beyond the first and the last slice the
-/// body ends in a dome, a paraboloid over a disc; see cap_height().
+/// body ends in a dome, a paraboloid over a disc; see compute_cap_height().
 class ContourSolid {
 public:
     struct Data;
-    explicit ContourSolid(std::shared_ptr<const Data> data);
+    COVOL_API explicit ContourSolid(std::shared_ptr<const Data> data);
 
     /// Negative inside; a signed distance within the plane on a slice, of the same order elsewhere (world units).
-    [[nodiscard]] double level(const Vec3& world) const;
+    [[nodiscard]] COVOL_API double level(const Vec3& world) const;
     /// False only where the surface does not meet the ball.
-    [[nodiscard]] bool may_meet(const Vec3& center, double radius) const;
+    [[nodiscard]] COVOL_API bool may_meet(const Vec3& center, double radius) const;
     /// Holds the body.
-    [[nodiscard]] WorldBox box() const;
+    [[nodiscard]] COVOL_API WorldBox box() const;
     /// Points of the surface between the slices and on the domes, in world units; one for each lattice line of the
     /// slices' grid that crosses the surface along the axis which its normal is closest to.
-    [[nodiscard]] std::vector<Vec3> surface_points(double step, const RunContext& run = {}) const;
+    [[nodiscard]] COVOL_API std::vector<Vec3> surface_points(double step, const RunContext& run = {}) const;
     /// One position deep inside each hole of each slice.
-    [[nodiscard]] std::vector<Vec3> hole_seeds() const;
+    [[nodiscard]] COVOL_API std::vector<Vec3> hole_seeds() const;
 
 private:
     std::shared_ptr<const Data> data_;
@@ -58,7 +59,7 @@ private:
 /// @param area, before  of the last slice and of the one before it, 0 when there is none
 /// @param distance      between those two
 /// @param gap           usual distance between marked slices
-[[nodiscard]] double cap_height(double area, double before, double distance, double gap);
+[[nodiscard]] COVOL_API double compute_cap_height(double area, double before, double distance, double gap);
 
 /// Marks on slices, made dense enough to hold a level set.
 struct Contours {
@@ -79,10 +80,12 @@ struct Contours {
 /// The plane of a line is found from its marks: an index coordinate that is constant along it. The body is built from
 /// the plane with the most marks; lines in other planes, and open lines, are joined along themselves only. Points that
 /// belong to no line count as marks. A closed line of fewer than three distinct marks is taken as open.
-/// @param geometry  of the image; null: the clouds are in world units and the slices lie across a world axis.
 /// @throws Error InvalidOptions; InvalidInput (no line; a line in none of the planes; a line outside the image: both
 ///         name it).
-[[nodiscard]] Contours densify(const std::vector<PointCloud>& clouds, const ImageGeometry* geometry,
-                               const ContourOptions& options, const RunContext& run = {});
+[[nodiscard]] COVOL_API Contours densify(const std::vector<PointCloud>& clouds, const ImageGeometry& geometry,
+                                         const ContourOptions& options, const RunContext& run = {});
+/// Clouds in world units without an image: the slices lie across a world axis.
+[[nodiscard]] COVOL_API Contours densify(const std::vector<PointCloud>& clouds, const ContourOptions& options,
+                                         const RunContext& run = {});
 
 }  // namespace covol

@@ -1,6 +1,7 @@
 #pragma once
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/domain.h"
 #include "covol/run.h"
 
@@ -8,7 +9,7 @@ namespace covol {
 
 struct DistanceOptions {
     double max_distance = 0.0;  ///< Radius of the tube, world units, > 0.
-    [[nodiscard]] std::string why_invalid() const;
+    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 
 struct DistanceReport {
@@ -28,7 +29,7 @@ struct DistanceResult {
 /// nearest one. Values do not depend on the number of threads.
 /// @param points  world positions, finite, at least one; points outside the domain count too.
 /// @throws Error InvalidOptions, InvalidInput.
-[[nodiscard]] DistanceResult distance(const std::vector<Vec3>& points, const Domain& domain,
-                                      const DistanceOptions& options, const RunContext& run = {});
+[[nodiscard]] COVOL_API DistanceResult compute_distance(const std::vector<Vec3>& points, const Domain& domain,
+                                                        const DistanceOptions& options, const RunContext& run = {});
 
 }  // namespace covol

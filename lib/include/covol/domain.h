@@ -1,6 +1,7 @@
 #pragma once
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/fwd.h"
 
 namespace covol {
@@ -10,7 +11,7 @@ struct WorldBox {
     Vec3 min{0, 0, 0};
     Vec3 max{0, 0, 0};
 };
-[[nodiscard]] double longest_side(const WorldBox& box);
+[[nodiscard]] COVOL_API double longest_side(const WorldBox& box);
 
 /// Half the width of narrow bands, and the clamp on initial values, in voxels: u0 is in [-3h, 3h].
 inline constexpr double kHalfWidthVoxels = 3.0;
@@ -26,12 +27,12 @@ struct Domain {
     Index3 min{0, 0, 0};      ///< first voxel
     Index3 max{-1, -1, -1};   ///< last voxel, inclusive
 
-    [[nodiscard]] Vec3 index_to_world(const Vec3& index) const;
-    [[nodiscard]] Vec3 world_to_index(const Vec3& world) const;
+    [[nodiscard]] COVOL_API Vec3 index_to_world(const Vec3& index) const;
+    [[nodiscard]] COVOL_API Vec3 world_to_index(const Vec3& world) const;
     /// From outer face to outer face.
-    [[nodiscard]] WorldBox world_box() const;
-    [[nodiscard]] bool contains(const Vec3& world) const;
-    [[nodiscard]] std::int64_t voxel_count() const;
+    [[nodiscard]] COVOL_API WorldBox world_box() const;
+    [[nodiscard]] COVOL_API bool contains(const Vec3& world) const;
+    [[nodiscard]] COVOL_API std::int64_t voxel_count() const;
     friend bool operator==(const Domain&, const Domain&) = default;
 };
 
@@ -40,23 +41,23 @@ struct Domain {
 /// voxels are the domain's voxels.
 /// @throws Error InvalidOptions (h <= 0, not finite), InvalidInput (an empty box, or more than 2^30 voxels along an
 /// axis).
-[[nodiscard]] Domain domain_of_box(const WorldBox& box, double voxel_size);
+[[nodiscard]] COVOL_API Domain make_domain(const WorldBox& box, double voxel_size);
 
 /// The same lattice with `layers` more voxels on every side.
-[[nodiscard]] Domain widened(Domain domain, int layers);
+[[nodiscard]] COVOL_API Domain widened(Domain domain, int layers);
 
 /// Box around the points, `margin` (world units) wider on every side.
-[[nodiscard]] WorldBox bounding_box(const std::vector<Vec3>& points, double margin = 0.0);
+[[nodiscard]] COVOL_API WorldBox bounding_box(const std::vector<Vec3>& points, double margin = 0.0);
 
 /// Sets the grid's transform and stores the box as metadata ("covol_domain_min", "covol_domain_max").
-void set_domain(FloatGrid& grid, const Domain& domain);
+COVOL_API void set_domain(FloatGrid& grid, const Domain& domain);
 
 /// The domain that set_domain stored. Without the metadata the box is the bounding box of the
 /// active voxels grown by one leaf (8 voxels), so that nothing touches its boundary.
 /// @throws Error InvalidInput when the transform is not a uniform scale and a translation.
-[[nodiscard]] Domain domain_of(const FloatGrid& grid);
+[[nodiscard]] COVOL_API Domain domain_of(const FloatGrid& grid);
 
 /// An empty grid on `domain`: `background` everywhere, no active voxel, the given name.
-[[nodiscard]] FloatGridPtr make_grid(const Domain& domain, float background, const char* name);
+[[nodiscard]] COVOL_API FloatGridPtr make_grid(const Domain& domain, float background, const char* name);
 
 }  // namespace covol

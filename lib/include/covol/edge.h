@@ -1,8 +1,10 @@
 #pragma once
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/domain.h"
 #include "covol/image.h"
 #include "covol/run.h"
@@ -11,7 +13,7 @@ namespace covol {
 
 /// What an edge is: s in g(s), Eq. (2), of the image normalised to [0,1].
 enum class EdgeFeature {
-    Automatic,   ///< edge() takes Slope; segment() asks the marks of contours, see feature_at()
+    Automatic,   ///< detect_edges() takes Slope; segment() asks the marks of contours, see detect_feature()
     Slope,       ///< s = |∇G_σ * I| per world unit: borders between darker and brighter, the paper's
     BrightLine,  ///< s = G_σ * I: bright sheets such as stained membranes, whose middle has no slope and its sides have
                  ///< two
@@ -19,18 +21,19 @@ enum class EdgeFeature {
 };
 
 /// "auto", "slope", "bright-line", "dark-line"
-[[nodiscard]] const char* to_string(EdgeFeature feature);
+[[nodiscard]] COVOL_API const char* to_string(EdgeFeature feature);
 
 struct EdgeOptions {
     EdgeFeature feature = EdgeFeature::Automatic;
-    double sigma = -1.0;         ///< σ >= 0, world units: presmoothing; < 0 picks 1 voxel.
-    double edge_k = 0.0;         ///< K > 0 in g = 1/(1+K s^2), 0: see edge_contrast.
-    double edge_contrast = 0.0;  ///< s at which g = 1/2, i.e. K = 1/s^2; 0 picks a percentile of s in the band.
-    /// that percentile, in (0,1); 0 picks 0.9 for slopes, and for lines a third of the median: g then goes by relative
-    /// brightness, as contrast that varies needs
-    double contrast_percentile = 0.0;
+    std::optional<double> sigma;          ///< σ >= 0, world units: presmoothing; automatic: 1 voxel
+    std::optional<double> edge_k;         ///< K > 0 in g = 1/(1+K s^2); automatic: see edge_contrast
+    std::optional<double> edge_contrast;  ///< s > 0 at which g = 1/2, i.e. K = 1/s^2; automatic: a percentile of s in
+                                          ///< the band
+    /// that percentile, in (0,1); automatic: 0.9 for slopes, and for lines a third of the median: g then goes by
+    /// relative brightness, as contrast that varies needs
+    std::optional<double> contrast_percentile;
     double low = 0.0, high = 0.0;  ///< intensities mapped to 0 and 1; equal: the image's 0.5 % and 99.5 % percentiles.
-    [[nodiscard]] std::string why_invalid() const;
+    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 
 struct EdgeReport {
@@ -49,8 +52,8 @@ struct EdgeResult {
 /// The image is sampled there and in a halo, normalised, smoothed by the implicit heat equation over time σ²/2, and
 /// |∇I| is the mean over the 24 tetrahedra of each voxel.
 /// @throws Error InvalidOptions, InvalidInput (no active voxel; the image is constant).
-[[nodiscard]] EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions& options = {},
-                              const RunContext& run = {});
+[[nodiscard]] COVOL_API EdgeResult detect_edges(const Image& image, const FloatGrid& topology,
+                                                const EdgeOptions& options = {}, const RunContext& run = {});
 
 /// What the image has where people mark a border, on the average over many places.
 struct MarkedFeature {
@@ -64,7 +67,7 @@ struct MarkedFeature {
 /// @param places   world units
 /// @param normals  outward unit vectors; as many
 /// @param reach    how far beside a place its sides are looked at, world units
-[[nodiscard]] MarkedFeature feature_at(const Image& image, const std::vector<Vec3>& places,
-                                       const std::vector<Vec3>& normals, double reach);
+[[nodiscard]] COVOL_API MarkedFeature detect_feature(const Image& image, const std::vector<Vec3>& places,
+                                                     const std::vector<Vec3>& normals, double reach);
 
 }  // namespace covol

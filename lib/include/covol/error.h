@@ -2,6 +2,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "covol/api.h"
+
 namespace covol {
 
 /// What kind of trouble an Error reports; the command line maps each to an exit code.
@@ -19,7 +21,7 @@ enum class Errc {
 /// Messages say where, what, what was expected and what was found:
 /// `read_points: cloud.xyz:18: expected 3 numbers, got 2`. Where an option would help they name its field, as
 /// option_names.h tells.
-class Error : public std::runtime_error {
+class COVOL_API Error : public std::runtime_error {
 public:
     Error(Errc code, const std::string& message) : std::runtime_error(message), code_(code) {}
     [[nodiscard]] Errc code() const noexcept { return code_; }

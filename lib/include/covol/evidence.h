@@ -2,6 +2,7 @@
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/fwd.h"
 #include "covol/image.h"
 #include "covol/mesh.h"
@@ -15,7 +16,7 @@ struct EvidenceOptions {
     /// in (0,1): where the edge strength 1 − g is below this the image does not hold the surface
     double weak_edge = 0.25;
     int suggestions = 0;  ///< how many slices to name, >= 0
-    [[nodiscard]] std::string why_invalid() const;
+    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 
 /// The surface and the marks in one slice of the image (along its third axis, half a slice to either side).
@@ -54,18 +55,22 @@ struct Evidence {
 /// the outline), then the next without what that one supports.
 /// @param mesh   world units
 /// @param marks  world positions, may be empty
-/// @param edge   g from edge(), or null; background 1
+/// @param edge   g from detect_edges(); background 1
 /// @throws Error InvalidOptions; InvalidInput (an empty mesh).
-[[nodiscard]] Evidence evidence(const TriangleMesh& mesh, const std::vector<Vec3>& marks, const FloatGrid* edge,
-                                const ImageGeometry& geometry, const EvidenceOptions& options,
-                                const RunContext& run = {});
+[[nodiscard]] COVOL_API Evidence assess_evidence(const TriangleMesh& mesh, const std::vector<Vec3>& marks,
+                                                 const FloatGrid& edge, const ImageGeometry& geometry,
+                                                 const EvidenceOptions& options, const RunContext& run = {});
+/// By the marks alone.
+[[nodiscard]] COVOL_API Evidence assess_evidence(const TriangleMesh& mesh, const std::vector<Vec3>& marks,
+                                                 const ImageGeometry& geometry, const EvidenceOptions& options,
+                                                 const RunContext& run = {});
 
 /// Share of a surface's area that lies farther than `reach` from every point: where the points do not determine it.
 /// @param distance  to the points; its background, for what lies beyond its tube, is at least `reach`
-[[nodiscard]] double share_without_points(const TriangleMesh& mesh, const FloatGrid& distance, double reach,
-                                          const RunContext& run = {});
+[[nodiscard]] COVOL_API double measure_share_without_points(const TriangleMesh& mesh, const FloatGrid& distance,
+                                                            double reach, const RunContext& run = {});
 /// The same, on a distance grid of its own with a third of `reach` as voxel size.
-[[nodiscard]] double share_without_points(const TriangleMesh& mesh, const std::vector<Vec3>& points, double reach,
-                                          const RunContext& run = {});
+[[nodiscard]] COVOL_API double measure_share_without_points(const TriangleMesh& mesh, const std::vector<Vec3>& points,
+                                                            double reach, const RunContext& run = {});
 
 }  // namespace covol

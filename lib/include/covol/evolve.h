@@ -1,9 +1,11 @@
 #pragma once
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/fwd.h"
 #include "covol/run.h"
 
@@ -12,16 +14,19 @@ namespace covol {
 /// What changes the result of evolve(). Symbols and equation numbers are the paper's; lengths are in world
 /// units, the unit of the voxel size h; the flow's speed is 1 world unit per unit of time.
 struct EvolveOptions {
-    double theta = 1.0;   ///< θ in [0,1]: weight of the pull towards the points, Eq. (3).
-    double rho = 1.0;     ///< ρ in [0,1]: weight of the pull towards image edges, Eq. (3).
-    double delta = -1.0;  ///< δ >= 0: weight of curvature, Eq. (1), world units; < 0 picks 1 voxel.
-    double tau = -1.0;  ///< τ > 0: time step; < 0 picks h (one voxel at unit speed), and more while the surface moves
-                        ///< slowly, unless an image alone decides.
-    double epsilon = 1e-2;       ///< ε > 0: regularises |∇u|, Eqs. (13)-(14); dimensionless.
-    double edge_epsilon = 0.02;  ///< ε in |∇g|_ε, Eq. (20): a slope of g per voxel; below it the pull fades.
-    /// r, world units: the points pull fully up to r/2, not at all beyond r; 0: unlimited.
-    double attraction_range = 0.0;
-    double image_yields = 0.0;  ///< in [0,1]: share of ρ that fades close to marks, on the attraction range's taper.
+    double theta = 1.0;           ///< θ in [0,1]: weight of the pull towards the points, Eq. (3).
+    double rho = 1.0;             ///< ρ in [0,1]: weight of the pull towards image edges, Eq. (3).
+    std::optional<double> delta;  ///< δ >= 0: weight of curvature, Eq. (1), world units; automatic: 1 voxel
+    std::optional<double> tau;    ///< τ > 0: time step; automatic: h (one voxel at unit speed), and more while the
+                                  ///< surface moves slowly, unless an image alone decides
+    double epsilon = 1e-2;        ///< ε > 0: regularises |∇u|, Eqs. (13)-(14); dimensionless.
+    double edge_epsilon = 0.02;   ///< ε in |∇g|_ε, Eq. (20): a slope of g per voxel; below it the pull fades.
+    /// r, world units: the points pull fully up to r/2, not at all beyond r; 0: unlimited; automatic: unlimited, but
+    /// segment() chooses.
+    std::optional<double> attraction_range;
+    /// in [0,1]: share of ρ that fades close to marks, on the attraction range's taper; automatic: 0, but segment()
+    /// chooses.
+    std::optional<double> image_yields;
     /// in [0,1]: θ is this much of itself where no trusted mark is near, on the same taper.
     double guess_weight = 1.0;
     bool follow = false;      ///< the band follows the surface (starts other than tagging).
@@ -30,12 +35,12 @@ struct EvolveOptions {
                               ///< or when over 10 steps fewer voxels than that changed sign
     double solver_tolerance = 1e-3;  ///< a step's solve ends at this residual, relative to that of u before
     int max_sweeps = 200;            ///< upper bound on a step's sweeps
-    [[nodiscard]] std::string why_invalid() const;
+    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 
 /// Why evolve() returned. In every case u holds the last whole step.
 enum class StopReason { NotRun, Steady, MaxSteps, Cancelled, Vanished };
-[[nodiscard]] const char* to_string(StopReason reason);
+[[nodiscard]] COVOL_API const char* to_string(StopReason reason);
 
 struct EvolveReport {
     StopReason stop_reason = StopReason::NotRun;
@@ -74,7 +79,7 @@ struct EvolveFields {
 ///        without `follow`, min u0 <= u <= max u0.
 /// @throws Error  InvalidOptions, InvalidInput (no active voxel; transforms differ; a value that is not finite; a
 ///                needed field is null), Numerical (u is left at the step before).
-EvolveReport evolve(FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options = {},
-                    const RunContext& run = {});
+COVOL_API EvolveReport evolve(FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options = {},
+                              const RunContext& run = {});
 
 }  // namespace covol

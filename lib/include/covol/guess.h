@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/domain.h"
 #include "covol/run.h"
 
@@ -20,7 +21,7 @@ struct GuessOptions {
     std::vector<Vec3> inside, outside;  ///< places whose side is known
     /// The world's end: where the body is cut off. Marks in the cut are told from marks on the surface.
     std::optional<WorldBox> end;
-    [[nodiscard]] std::string why_invalid() const;
+    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 
 struct GuessReport {
@@ -32,7 +33,7 @@ struct GuessReport {
 };
 
 /// Whether marks can have a body between them: at least four, not all in one plane.
-[[nodiscard]] bool can_enclose(const std::vector<Vec3>& marks);
+[[nodiscard]] COVOL_API bool can_enclose(const std::vector<Vec3>& marks);
 
 struct Guess {
     FloatGridPtr u;           ///< a start as those of band.h: u0 clamped to +-3h, active beside the surface
@@ -43,7 +44,8 @@ struct Guess {
 /// lib/src/guess/variational.h). No density of marks is asked for.
 /// @throws Error InvalidOptions; InvalidInput (fewer than four distinct marks, all in one plane, nothing inside the
 /// domain).
-[[nodiscard]] Guess guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks, const GuessOptions& options,
-                                     GuessReport& report, const RunContext& run = {});
+[[nodiscard]] COVOL_API Guess guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks,
+                                               const GuessOptions& options, GuessReport& report,
+                                               const RunContext& run = {});
 
 }  // namespace covol

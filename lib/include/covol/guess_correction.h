@@ -2,9 +2,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/fwd.h"
 #include "covol/image.h"
 #include "covol/run.h"
@@ -16,10 +18,10 @@ namespace covol {
 inline constexpr double kCorrectionVoxels = 12.0;
 
 struct CorrectionOptions {
-    double precision = 0.0;     ///< of the marks, world units; 0 picks half a voxel
-    double least_radius = 0.0;  ///< within which a mark acts on the guess, however little it moves it, world units;
-                                ///< 0 picks kCorrectionVoxels
-    [[nodiscard]] std::string why_invalid() const;
+    std::optional<double> precision;     ///< of the marks, world units, > 0; automatic: half a voxel
+    std::optional<double> least_radius;  ///< within which a mark acts on the guess, however little it moves it, world
+                                         ///< units, > 0; automatic: kCorrectionVoxels
+    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 
 struct CorrectionReport {
@@ -45,18 +47,18 @@ struct CorrectedMask {
 class GuessCorrection {
 public:
     struct Data;
-    explicit GuessCorrection(std::shared_ptr<const Data> data);
+    COVOL_API explicit GuessCorrection(std::shared_ptr<const Data> data);
     /// c, world units: how far out the surface moves there. Exactly 0 where no mark acts.
-    [[nodiscard]] double shift(const Vec3& world) const;
+    [[nodiscard]] COVOL_API double shift(const Vec3& world) const;
     /// Of the guess; negative inside.
-    [[nodiscard]] double guess(const Vec3& world) const;
-    [[nodiscard]] const CorrectionReport& report() const;
+    [[nodiscard]] COVOL_API double guess(const Vec3& world) const;
+    [[nodiscard]] COVOL_API const CorrectionReport& report() const;
     /// Voxels where c is 0, and those whose side stays the same, keep their value to the bit. Of the others those of
     /// value 0 that come in get `label`, those with `label` that go out get 0, and voxels of other labels stay.
     /// @throws Error InvalidInput (values that are no whole numbers).
-    [[nodiscard]] CorrectedMask apply(const Image& mask, int label, const RunContext& run = {}) const;
+    [[nodiscard]] COVOL_API CorrectedMask apply(const Image& mask, int label, const RunContext& run = {}) const;
     /// The corrected surface as a start on the guess's lattice: a signed distance, clamped.
-    [[nodiscard]] FloatGridPtr start(const RunContext& run = {}) const;
+    [[nodiscard]] COVOL_API FloatGridPtr start(const RunContext& run = {}) const;
 
 private:
     std::shared_ptr<const Data> data_;
@@ -66,8 +68,9 @@ private:
 /// @param marks  on the surface, world units
 /// @param inside, outside  seeds; those that the guess has on the wrong side move it to half a voxel beyond them
 /// @throws Error InvalidOptions, InvalidInput (no surface in the guess)
-[[nodiscard]] GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>& marks,
-                                            const std::vector<Vec3>& inside, const std::vector<Vec3>& outside,
-                                            const CorrectionOptions& options = {}, const RunContext& run = {});
+[[nodiscard]] COVOL_API GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>& marks,
+                                                      const std::vector<Vec3>& inside, const std::vector<Vec3>& outside,
+                                                      const CorrectionOptions& options = {},
+                                                      const RunContext& run = {});
 
 }  // namespace covol

@@ -1,7 +1,9 @@
 #pragma once
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/edge.h"
 #include "covol/fwd.h"
 #include "covol/image.h"
@@ -11,12 +13,13 @@ namespace covol {
 
 /// What changes the result of guide(); lengths in world units.
 struct GuidanceOptions {
-    /// a mark lies within half of this of the border it means, along each axis; < 0: one voxel of the image
-    double mark_precision = -1;
-    double range = -1;  ///< how far from the guess the border is looked for; < 0: by the distance to the marks
+    /// a mark lies within half of this of the border it means, along each axis, >= 0; automatic: one voxel of the image
+    std::optional<double> mark_precision;
+    /// how far from the guess the border is looked for, >= 0; automatic: by the distance to the marks
+    std::optional<double> range;
     double weight = 1;  ///< in [0,1]: share of what the image says that counts; 0 leaves the guess as it is
     /// Empty when usable, else one line for each bad field: "weight: expected 0 to 1, got 2".
-    [[nodiscard]] std::string why_invalid() const;
+    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 
 /// What guide() saw and did. The defaults say that nothing ran.
@@ -39,7 +42,7 @@ struct GuidanceReport {
                      ///< here is of the last one
 
     /// One more pass, which may not have moved anything.
-    void add(const GuidanceReport& pass, bool moved);
+    COVOL_API void add(const GuidanceReport& pass, bool moved);
 };
 
 /// Moves a guess to where the image shows, between the marks, the border that it shows at the marks.
@@ -55,7 +58,8 @@ struct GuidanceReport {
 /// @param marks  world positions; at least 8 near the guess, or the image is not used
 /// @return a level set as start_from_grid() gives, on the guess's domain. Does not depend on the number of threads.
 /// @throws Error InvalidOptions, InvalidInput (no surface in the domain), Cancelled.
-[[nodiscard]] FloatGridPtr guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const Image& image,
-                                 const GuidanceOptions& options, GuidanceReport& report, const RunContext& run = {});
+[[nodiscard]] COVOL_API FloatGridPtr guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const Image& image,
+                                           const GuidanceOptions& options, GuidanceReport& report,
+                                           const RunContext& run = {});
 
 }  // namespace covol

@@ -1,6 +1,8 @@
 #pragma once
+#include <optional>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/domain.h"
 #include "covol/mesh.h"
 #include "covol/run.h"
@@ -13,11 +15,12 @@ enum class Holes {
     Open,   ///< the mesh ends there; the level set stays closed
     Flat    ///< it is spanned by the flattest patch, in mesh and level set
 };
-[[nodiscard]] const char* to_string(Holes holes);
+[[nodiscard]] COVOL_API const char* to_string(Holes holes);
 
 struct HolesOptions {
     Holes policy = Holes::Close;
-    double distance = 0;  ///< world units: a hole is what lies farther from all points; 0: hole_distance()
+    /// world units, > 0: a hole is what lies farther from all points; automatic: choose_hole_distance()
+    std::optional<double> distance;
 };
 
 /// A closed line on which a mesh ends.
@@ -26,7 +29,7 @@ struct BoundaryLoop {
     double length = 0;  ///< world units
 };
 /// Those of a mesh with boundary, the longest first. @pre manifold
-[[nodiscard]] std::vector<BoundaryLoop> boundary_loops(const TriangleMesh& mesh);
+[[nodiscard]] COVOL_API std::vector<BoundaryLoop> find_boundary_loops(const TriangleMesh& mesh);
 
 struct HolesReport {
     Holes policy = Holes::Close;
@@ -40,30 +43,33 @@ struct HolesReport {
 /// A distance from which on points are missing: three spacings where they lie sparsely (the 95 % nearest neighbour),
 /// and three voxels. Of points spread evenly at random hardly a gap is as wide (one of 10^12 discs of that radius is
 /// empty).
-[[nodiscard]] double hole_distance(const std::vector<Vec3>& points, double voxel_size);
+[[nodiscard]] COVOL_API double choose_hole_distance(const std::vector<Vec3>& points, double voxel_size);
 
 /// At each vertex, to the nearest point. @pre there is a point
-[[nodiscard]] std::vector<float> distances_to_points(const TriangleMesh& mesh, const std::vector<Vec3>& points,
-                                                     const RunContext& run = {});
+[[nodiscard]] COVOL_API std::vector<float> measure_distances(const TriangleMesh& mesh, const std::vector<Vec3>& points,
+                                                             const RunContext& run = {});
 
 /// Share of the area that lies farther than `distance` from every point, of the distances at the vertices.
-[[nodiscard]] double share_beyond(const TriangleMesh& mesh, const std::vector<float>& distances, double distance);
+[[nodiscard]] COVOL_API double measure_share_beyond(const TriangleMesh& mesh, const std::vector<float>& distances,
+                                                    double distance);
 
 /// Takes away what lies farther than `distance` from all points, back to the last of them: all that is closer than that
 /// to such a place. So a ball of that radius rolls along the rim, which is as smooth as it. Triangles are cut along the
 /// line, vertices close to it moved onto it, and pieces smaller than the ball's disc left out.
 /// @param mesh       closed, manifold, outward
-/// @param to_points  distances_to_points()
+/// @param to_points  measure_distances()
 /// @param slack      of the rim beyond the last points, world units, < distance
 /// @return 2-manifold with boundary, outward; the mesh itself where there is no hole
 /// @throws Error InvalidInput where nothing is left.
-[[nodiscard]] TriangleMesh trimmed(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance,
-                                   double slack, HolesReport& report, const RunContext& run = {});
+[[nodiscard]] COVOL_API TriangleMesh trim_holes(const TriangleMesh& mesh, const std::vector<float>& to_points,
+                                                double distance, double slack, HolesReport& report,
+                                                const RunContext& run = {});
 
 /// The same cut, with the surface of least area in each hole instead of what was there (Pinkall and Polthier, Computing
 /// discrete minimal surfaces and their conjugates, Experimental Mathematics 2, 1993). It may pass through itself: a
 /// level set made from it does not.
-[[nodiscard]] TriangleMesh flattened(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance,
-                                     double slack, HolesReport& report, const RunContext& run = {});
+[[nodiscard]] COVOL_API TriangleMesh flatten_holes(const TriangleMesh& mesh, const std::vector<float>& to_points,
+                                                   double distance, double slack, HolesReport& report,
+                                                   const RunContext& run = {});
 
 }  // namespace covol

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/domain.h"
 #include "covol/fwd.h"
 #include "covol/run.h"
@@ -23,18 +24,18 @@ struct ImageGeometry {
     std::string unit;                                      ///< "um", "mm", ... or empty when the file does not say
     bool spacing_known = true;  ///< false: the file states no spacing, and 1 stands in for what is missing
 
-    [[nodiscard]] Vec3 index_to_world(const Vec3& index) const;
-    [[nodiscard]] Vec3 world_to_index(const Vec3& world) const;
+    [[nodiscard]] COVOL_API Vec3 index_to_world(const Vec3& index) const;
+    [[nodiscard]] COVOL_API Vec3 world_to_index(const Vec3& world) const;
     /// The smallest box that holds every voxel (cubes, not centres).
-    [[nodiscard]] WorldBox world_box() const;
+    [[nodiscard]] COVOL_API WorldBox world_box() const;
     /// Direction is the identity up to 1e-6.
-    [[nodiscard]] bool is_axis_aligned() const;
+    [[nodiscard]] COVOL_API bool is_axis_aligned() const;
 };
 
 enum class PixelType { UInt8, Int8, UInt16, Int16, UInt32, Int32, Float, Double };
 
 /// "uint8", ..., "float", "double"
-[[nodiscard]] const char* to_string(PixelType type);
+[[nodiscard]] COVOL_API const char* to_string(PixelType type);
 
 /// The voxels min..max of an image, inclusive.
 struct VoxelBox {
@@ -42,7 +43,7 @@ struct VoxelBox {
     Index3 max{-1, -1, -1};
 
     [[nodiscard]] Index3 size() const { return {max[0] - min[0] + 1, max[1] - min[1] + 1, max[2] - min[2] + 1}; }
-    [[nodiscard]] bool contains(const Index3& voxel) const;
+    [[nodiscard]] COVOL_API bool contains(const Index3& voxel) const;
     friend bool operator==(const VoxelBox&, const VoxelBox&) = default;
 };
 
@@ -67,27 +68,27 @@ public:
     /// The voxels that can be asked for.
     [[nodiscard]] const VoxelBox& held() const noexcept { return held_; }
     /// The value of voxel (i,j,k); @pre held.
-    [[nodiscard]] double at(int i, int j, int k) const;
+    [[nodiscard]] COVOL_API double at(int i, int j, int k) const;
 
     /// Trilinear samples at the centres of the voxels min..max (inclusive) of `frame`'s lattice;
     /// positions outside the image take the nearest voxel's value.
     /// @param out  (max-min+1) values, k fastest (OpenVDB's leaf order).
     /// @throws Error InvalidInput when they need voxels of the image that are not held.
-    void sample(const Domain& frame, const Index3& min, const Index3& max, float* out) const;
+    COVOL_API void sample(const Domain& frame, const Index3& min, const Index3& max, float* out) const;
 
     /// Intensities below which the fractions `low` and `high` of the held voxels lie (deterministic;
     /// large images are subsampled on a regular lattice).
-    [[nodiscard]] std::array<double, 2> percentiles(double low, double high) const;
+    [[nodiscard]] COVOL_API std::array<double, 2> percentiles(double low, double high) const;
     /// Smallest and largest value of the held voxels.
-    [[nodiscard]] std::array<double, 2> range() const;
+    [[nodiscard]] COVOL_API std::array<double, 2> range() const;
     /// The held voxels as an image of their own; shares their memory.
-    [[nodiscard]] Image cropped() const;
+    [[nodiscard]] COVOL_API Image cropped() const;
     /// The same voxels elsewhere in the world; shares their memory. @throws Error InvalidInput when the sizes differ.
-    [[nodiscard]] Image placed(const ImageGeometry& geometry) const;
+    [[nodiscard]] COVOL_API Image placed(const ImageGeometry& geometry) const;
 
     /// Takes a copy of `values` (i fastest, size[0]*size[1]*size[2]).
-    static Image from_values(const ImageGeometry& geometry, const float* values);
-    static Image from_values(const ImageGeometry& geometry, const std::uint8_t* values);
+    COVOL_API static Image from_values(const ImageGeometry& geometry, const float* values);
+    COVOL_API static Image from_values(const ImageGeometry& geometry, const std::uint8_t* values);
 
 private:
     friend Image read_image(const std::string&, const ReadImageOptions&, const RunContext&);
@@ -129,37 +130,37 @@ struct ImageInfo {
 /// ("FILE.vdb:name", or its first one; the box of its active voxels). A file that states no spacing is a warning.
 /// @throws Error Io (cannot be opened or read), InvalidInput (not 3D, empty, NaN or infinite values; an roi outside),
 ///               Unsupported (several channels, frames or series and none chosen: lists them; an unknown format).
-[[nodiscard]] Image read_image(const std::string& path, const ReadImageOptions& options = {},
-                               const RunContext& run = {});
+[[nodiscard]] COVOL_API Image read_image(const std::string& path, const ReadImageOptions& options = {},
+                                         const RunContext& run = {});
 
 /// Only what the header says; of options.roi nothing. @throws as read_image.
-[[nodiscard]] ImageGeometry read_image_geometry(const std::string& path, const ReadImageOptions& options = {},
-                                                const RunContext& run = {});
+[[nodiscard]] COVOL_API ImageGeometry read_image_geometry(const std::string& path, const ReadImageOptions& options = {},
+                                                          const RunContext& run = {});
 
 /// All that the header says. @throws as read_image, but channel and frame need not be chosen.
-[[nodiscard]] ImageInfo read_image_info(const std::string& path, const ReadImageOptions& options = {},
-                                        const RunContext& run = {});
+[[nodiscard]] COVOL_API ImageInfo read_image_info(const std::string& path, const ReadImageOptions& options = {},
+                                                  const RunContext& run = {});
 
 /// The voxels that read_image() holds for `roi`. @throws Error InvalidInput when it misses the image.
-[[nodiscard]] VoxelBox voxels_around(const ImageGeometry& geometry, const WorldBox& roi);
+[[nodiscard]] COVOL_API VoxelBox voxels_around(const ImageGeometry& geometry, const WorldBox& roi);
 
 /// The lattice of `box` alone.
-[[nodiscard]] ImageGeometry cropped(const ImageGeometry& geometry, const VoxelBox& box);
+[[nodiscard]] COVOL_API ImageGeometry cropped(const ImageGeometry& geometry, const VoxelBox& box);
 
 /// Writes values (i fastest) in the geometry's frame: .nrrd, .nii, .nii.gz, .mha, .tif by the name's end; packed,
 /// except .nii. A TIFF has spacing, unit and origin (Fiji's way) but no place for a direction; NIfTI has no unit but
 /// the millimetre, the numbers are written as they are.
 /// Whole or not at all: to a temporary name beside the target, then renamed.
-void write_image(const std::string& path, const ImageGeometry& geometry, const std::int32_t* labels);
-void write_image(const std::string& path, const ImageGeometry& geometry, const std::uint8_t* values);
-void write_image(const std::string& path, const ImageGeometry& geometry, const float* values);
+COVOL_API void write_image(const std::string& path, const ImageGeometry& geometry, const std::int32_t* labels);
+COVOL_API void write_image(const std::string& path, const ImageGeometry& geometry, const std::uint8_t* values);
+COVOL_API void write_image(const std::string& path, const ImageGeometry& geometry, const float* values);
 /// The same with key/value pairs, which NRRD keeps and the other formats drop.
-void write_image(const std::string& path, const ImageGeometry& geometry, const std::uint8_t* values,
-                 const std::vector<std::pair<std::string, std::string>>& metadata);
-void write_image(const std::string& path, const ImageGeometry& geometry, const std::int32_t* labels,
-                 const std::vector<std::pair<std::string, std::string>>& metadata);
+COVOL_API void write_image(const std::string& path, const ImageGeometry& geometry, const std::uint8_t* values,
+                           const std::vector<std::pair<std::string, std::string>>& metadata);
+COVOL_API void write_image(const std::string& path, const ImageGeometry& geometry, const std::int32_t* labels,
+                           const std::vector<std::pair<std::string, std::string>>& metadata);
 
 /// What `write_image` can write, judged by the name alone. @throws Error InvalidOptions with the list.
-void check_image_extension(const std::string& path);
+COVOL_API void check_image_extension(const std::string& path);
 
 }  // namespace covol

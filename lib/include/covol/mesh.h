@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/fwd.h"
 
 namespace covol {
@@ -23,7 +24,7 @@ struct MeshMeasures {
     bool closed = false;    ///< every edge belongs to exactly two triangles of opposite direction
     bool manifold = false;  ///< closed or not, each vertex's triangles form one fan and no edge has more than two
 };
-[[nodiscard]] MeshMeasures measure(const TriangleMesh& mesh);
+[[nodiscard]] COVOL_API MeshMeasures measure(const TriangleMesh& mesh);
 
 /// How far a mesh is from the surface that it stands for, in voxels.
 struct MeshDeviation {
@@ -32,12 +33,12 @@ struct MeshDeviation {
 };
 
 /// The 1st percentile of the triangles' smallest angles, degrees; 0 of an empty mesh.
-[[nodiscard]] double smallest_angle(const TriangleMesh& mesh);
+[[nodiscard]] COVOL_API double smallest_angle(const TriangleMesh& mesh);
 
 /// Unit normals at the vertices, weighted by angle.
-[[nodiscard]] std::vector<std::array<float, 3>> vertex_normals(const TriangleMesh& mesh);
+[[nodiscard]] COVOL_API std::vector<std::array<float, 3>> compute_vertex_normals(const TriangleMesh& mesh);
 
 /// Drops unreferenced vertices and triangles of a component whose |volume| is below `min_volume`.
-void remove_small_components(TriangleMesh& mesh, double min_volume);
+COVOL_API void remove_small_components(TriangleMesh& mesh, double min_volume);
 
 }  // namespace covol

@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "covol/api.h"
 #include "covol/mesh.h"
 #include "covol/run.h"
 
@@ -14,7 +15,7 @@ struct CleanupOptions {
     double adaptive = 0.0;
     int smooth_iterations = 0;  ///< tangential + normal (Taubin-like, volume keeping) smoothing steps
     bool repair = true;         ///< resolve self-intersections and non-manifold spots, fill holes
-    [[nodiscard]] std::string why_invalid() const;
+    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 /// What a step has made of a mesh.
 struct CleanupStep {
@@ -33,13 +34,13 @@ struct CleanupReport {
 /// Makes a mesh closed, manifold, outward and free of self-intersections, in place (CGAL, OpenMesh). Decimation and
 /// smoothing leave vertices where they are whose move would let triangles touch.
 /// @throws Error InvalidOptions, InvalidInput (a mesh that is not manifold, and is to be decimated without repair).
-CleanupReport clean_mesh(TriangleMesh& mesh, const CleanupOptions& options = {}, const RunContext& run = {});
+COVOL_API CleanupReport clean_mesh(TriangleMesh& mesh, const CleanupOptions& options = {}, const RunContext& run = {});
 
 /// The same for a mesh of a level set: decimated triangles are relaxed on it (relax_mesh()).
-CleanupReport clean_mesh(TriangleMesh& mesh, const FloatGrid& level_set, double isovalue = 0.0,
-                         const CleanupOptions& options = {}, const RunContext& run = {});
+COVOL_API CleanupReport clean_mesh(TriangleMesh& mesh, const FloatGrid& level_set, double isovalue = 0.0,
+                                   const CleanupOptions& options = {}, const RunContext& run = {});
 
 /// Pairs of triangles that have a point in common beyond the vertices and the edge that they share.
-[[nodiscard]] int count_self_intersections(const TriangleMesh& mesh);
+[[nodiscard]] COVOL_API int count_self_intersections(const TriangleMesh& mesh);
 
 }  // namespace covol

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/mesh.h"
 
 namespace covol {
@@ -24,7 +25,7 @@ struct WriteMeshOptions {
 
 /// PLY, OBJ, STL, OFF or binary glTF (.glb), by the name's end; with normals where the format has them.
 /// Whole or not at all. @throws Error Io, InvalidOptions (unknown ending).
-void write_mesh(const std::string& path, const TriangleMesh& mesh, const WriteMeshOptions& options = {});
+COVOL_API void write_mesh(const std::string& path, const TriangleMesh& mesh, const WriteMeshOptions& options = {});
 
 /// One of several meshes in a file.
 struct NamedMesh {
@@ -35,20 +36,21 @@ struct NamedMesh {
 
 /// Several meshes in one file: .obj (an object each) or .glb (a node with a material each); attributes are not kept.
 /// Whole or not at all. @throws Error Io, InvalidOptions (another ending), InvalidInput (no mesh).
-void write_meshes(const std::string& path, const std::vector<NamedMesh>& meshes, const WriteMeshOptions& options = {});
+COVOL_API void write_meshes(const std::string& path, const std::vector<NamedMesh>& meshes,
+                            const WriteMeshOptions& options = {});
 
 /// What write_meshes() can write, by the name alone.
-[[nodiscard]] bool holds_several_meshes(const std::string& path);
+[[nodiscard]] COVOL_API bool holds_several_meshes(const std::string& path);
 
 /// PLY, OBJ, STL, OFF, binary glTF (all its meshes as one); polygons are split into triangles. Sizes are checked before
 /// memory is taken.
 /// @throws Error Io, InvalidInput, Unsupported.
-[[nodiscard]] TriangleMesh read_mesh(const std::string& path);
+[[nodiscard]] COVOL_API TriangleMesh read_mesh(const std::string& path);
 
 /// What read_mesh() reads, by the name alone.
-[[nodiscard]] bool is_mesh_name(const std::string& path);
+[[nodiscard]] COVOL_API bool is_mesh_name(const std::string& path);
 
 /// @throws Error InvalidOptions with the list of endings that write_mesh knows.
-void check_mesh_extension(const std::string& path);
+COVOL_API void check_mesh_extension(const std::string& path);
 
 }  // namespace covol

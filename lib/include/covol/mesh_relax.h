@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <string>
 
+#include "covol/api.h"
 #include "covol/mesh.h"
 #include "covol/run.h"
 
@@ -11,7 +12,7 @@ struct RelaxOptions {
     double isovalue = 0.0;   ///< world units; that of extract_mesh()
     int rounds = 3;          ///< >= 0: turns of edge flips and moves; 0 leaves the mesh as it is
     double tolerance = 0.0;  ///< voxels; > 0: no change moves a triangle farther from the level set than that
-    [[nodiscard]] std::string why_invalid() const;
+    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 
 struct RelaxReport {
@@ -31,12 +32,12 @@ struct RelaxReport {
 /// Deterministic; vertices and triangles keep their number.
 /// @param level_set  what the mesh was extracted from.
 /// @throws Error InvalidOptions, InvalidInput (an edge with more than two triangles).
-RelaxReport relax_mesh(TriangleMesh& mesh, const FloatGrid& level_set, const RelaxOptions& options = {},
-                       const RunContext& run = {});
+COVOL_API RelaxReport relax_mesh(TriangleMesh& mesh, const FloatGrid& level_set, const RelaxOptions& options = {},
+                                 const RunContext& run = {});
 
 /// The distances of a mesh's points, less than a voxel apart, from a level set, to the first order; caps of a clip left
 /// out.
-[[nodiscard]] MeshDeviation deviation_from(const FloatGrid& level_set, const TriangleMesh& mesh, double isovalue = 0.0,
-                                           const RunContext& run = {});
+[[nodiscard]] COVOL_API MeshDeviation measure_deviation(const FloatGrid& level_set, const TriangleMesh& mesh,
+                                                        double isovalue = 0.0, const RunContext& run = {});
 
 }  // namespace covol

@@ -3,6 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
+
 namespace covol {
 
 /// How messages of errors and logs name fields of options: in backquotes, `roi`, or with a value that would help,
@@ -14,10 +16,10 @@ struct NamedOption {
 };
 
 /// All that the message names, in its order.
-[[nodiscard]] std::vector<NamedOption> named_options(const std::string& message);
+[[nodiscard]] COVOL_API std::vector<NamedOption> find_named_options(const std::string& message);
 
 /// The message with each of them, its backquotes included, as `name` writes it; several in one pair stand side by side.
-[[nodiscard]] std::string with_names(const std::string& message,
-                                     const std::function<std::string(const NamedOption&)>& name);
+[[nodiscard]] COVOL_API std::string replace_names(const std::string& message,
+                                                  const std::function<std::string(const NamedOption&)>& name);
 
 }  // namespace covol

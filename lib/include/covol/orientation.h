@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/domain.h"
 #include "covol/run.h"
 
@@ -16,24 +17,24 @@ struct CloudScale {
     double nearest = 0;  ///< median distance to the nearest other point
 };
 /// From quadrics through neighbourhoods of a sample of the points: that radius at which they are most of a sheet.
-[[nodiscard]] CloudScale cloud_scale(const std::vector<Vec3>& points, const RunContext& run = {});
+[[nodiscard]] COVOL_API CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext& run = {});
 
 /// The indicator function of a solid: about 1 inside and 0 outside, smooth over a few cells; nearest node beyond its
 /// lattice. Thread-safe.
 class Indicator {
 public:
     struct Values;
-    explicit Indicator(std::unique_ptr<const Values> values);
-    ~Indicator();
+    COVOL_API explicit Indicator(std::unique_ptr<const Values> values);
+    COVOL_API ~Indicator();
     struct Sample {
         double inside;
         Vec3 gradient;
     };  ///< 1, and 1 / world unit
-    [[nodiscard]] Sample at(const Vec3& world) const;
-    [[nodiscard]] double inside(const Vec3& world) const;  ///< at(), faster
-    [[nodiscard]] double cell() const;                     ///< of its lattice, world units
+    [[nodiscard]] COVOL_API Sample at(const Vec3& world) const;
+    [[nodiscard]] COVOL_API double inside(const Vec3& world) const;  ///< at(), faster
+    [[nodiscard]] COVOL_API double cell() const;                     ///< of its lattice, world units
     /// visit(box) for each cell of its lattice, world box, that its level 1/2 passes.
-    void crossed(const std::function<void(const WorldBox&)>& visit) const;
+    COVOL_API void crossed(const std::function<void(const WorldBox&)>& visit) const;
 
 private:
     std::unique_ptr<const Values> values_;
@@ -61,7 +62,8 @@ struct Orientation {
 /// is -1/2 instead of 1/2. So a normal is also turned where chi says that its point lies on the wrong side.
 /// @param scale  of the points: no lattice is finer
 /// @throws Error InvalidInput (fewer than 4 points, points without extent), Cancelled.
-[[nodiscard]] Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run = {});
+[[nodiscard]] COVOL_API Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale,
+                                           const RunContext& run = {});
 
 /// What files tell of points beside where they are. Each list is empty or has an entry for each point, 0 where nothing
 /// is told.
@@ -70,7 +72,8 @@ struct PointHints {
     std::vector<Vec3> to_sensor;  ///< unit: from the point to where it was seen from
 };
 /// Those of `from` for the points `to` that are left of them, or were made from them: each has those of the nearest.
-[[nodiscard]] PointHints carried(const PointHints& hints, const std::vector<Vec3>& from, const std::vector<Vec3>& to);
+[[nodiscard]] COVOL_API PointHints carried(const PointHints& hints, const std::vector<Vec3>& from,
+                                           const std::vector<Vec3>& to);
 
 /// What became of hints, which are checked and not trusted.
 struct HintsReport {
@@ -93,14 +96,14 @@ struct CloudOrientation {
     bool encloses = true;   ///< else the normals are those of what was seen from outside
     HintsReport hints;
 };
-/// cloud_scale(), without stray points, and orient(); where normals go on turning there, the points hardly enclose
-/// anything, as scans of some sides do: then each normal points to where its point can be seen from.
-[[nodiscard]] CloudOrientation orient_cloud(const std::vector<Vec3>& points, const RunContext& run = {});
+/// measure_cloud_scale(), without stray points, and orient(); where normals go on turning there, the points hardly
+/// enclose anything, as scans of some sides do: then each normal points to where its point can be seen from.
+[[nodiscard]] COVOL_API CloudOrientation orient_cloud(const std::vector<Vec3>& points, const RunContext& run = {});
 /// The same, by normals and sensors where they are consistent: half of them has to foresee the sides of the other half,
 /// and an orientation that settles without them may not contradict them in whole parts. A sensor gives each point the
 /// normal of its local plane on the side that was seen.
 /// @throws Error also InvalidInput (a list of another size)
-[[nodiscard]] CloudOrientation orient_cloud(const std::vector<Vec3>& points, const PointHints& hints,
-                                            const RunContext& run = {});
+[[nodiscard]] COVOL_API CloudOrientation orient_cloud(const std::vector<Vec3>& points, const PointHints& hints,
+                                                      const RunContext& run = {});
 
 }  // namespace covol

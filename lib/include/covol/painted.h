@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/contours.h"
 #include "covol/image.h"
 #include "covol/run.h"
@@ -30,7 +31,7 @@ struct LabelName {
 
 /// The labels that the image holds, ascending, with the names that a .seg.nrrd gives them.
 /// @throws Error InvalidInput (nothing is painted; values that are no whole numbers >= 0: says where).
-[[nodiscard]] std::vector<LabelName> painted_labels(const Image& labels);
+[[nodiscard]] COVOL_API std::vector<LabelName> find_painted_labels(const Image& labels);
 
 /// Slices across an axis of the label image that show the whole cross-section of a structure.
 struct PaintedView {
@@ -65,19 +66,19 @@ struct Painted {
 /// Each patch's outline runs between the painted voxels and their neighbours, smoothed along itself without shrinking
 /// (a local quadratic over 8 voxels to either side, less on small patches), by at most half a voxel anywhere. At the
 /// image's end it is cut, half a voxel beyond the last centres.
-/// @param names  from painted_labels()
+/// @param names  from find_painted_labels()
 /// @throws Error InvalidInput (an outside label that is not there: lists those that are).
-[[nodiscard]] Painted understand_painted(const Image& labels, const std::vector<LabelName>& names,
-                                         const PaintedOptions& options = {}, const RunContext& run = {});
+[[nodiscard]] COVOL_API Painted understand_painted(const Image& labels, const std::vector<LabelName>& names,
+                                                   const PaintedOptions& options = {}, const RunContext& run = {});
 
 /// The outlines joined to a body, as densify() does; what lies on the image's end is cut, not marked.
 /// @param lattice  of the label image. @pre the label has a view
-[[nodiscard]] Contours contours_of(const PaintedLabel& label, const ImageGeometry& lattice, double step,
-                                   const RunContext& run = {});
+[[nodiscard]] COVOL_API Contours connect_outlines(const PaintedLabel& label, const ImageGeometry& lattice, double step,
+                                                  const RunContext& run = {});
 
 /// The geometry that a label image of these voxels has beside `image`: its own, or the image's where its file states no
 /// spacing, or `force` is set, and both have equally many voxels.
 /// @throws Error InvalidInput where neither will do, or painted voxels lie outside the image: says how many and where.
-[[nodiscard]] Image placed_on(const Image& labels, const ImageGeometry& image, bool force = false);
+[[nodiscard]] COVOL_API Image placed_on(const Image& labels, const ImageGeometry& image, bool force = false);
 
 }  // namespace covol

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/band.h"
 #include "covol/cloud_surface.h"
 #include "covol/contours.h"
@@ -42,17 +43,17 @@ enum class Model {
              ///< it where it shows the border that it has at the marks
     Paper    ///< curvature alone, Eq. (1) as it is printed
 };
-[[nodiscard]] const char* to_string(Model model);
+[[nodiscard]] COVOL_API const char* to_string(Model model);
 
 struct SegmentOptions {
     Model model = Model::Guided;
-    /// standard deviation of a mark's place, world units; < 0: 0.3 of the image's spacing along each axis
-    double mark_precision = -1.0;
-    double voxel_size = 0.0;  ///< h, world units; 0: see choose_voxel_size()
-    /// it is choose_voxel_size()'s: points that enclose nothing may be given another
-    bool voxel_size_is_automatic = false;
-    std::optional<WorldBox> roi;  ///< the domain, instead of the image's box
-    double margin = 0.0;          ///< points alone: between points and domain boundary; 0 picks D + 6 voxels
+    /// standard deviation of a mark's place, world units, >= 0; automatic: 0.3 of the image's spacing along each axis
+    std::optional<double> mark_precision;
+    std::optional<double> voxel_size;  ///< h, world units, > 0; automatic: choose_voxel_size()
+    /// `voxel_size` is a first choice, as an automatic one: points that enclose nothing may be given a larger one.
+    bool voxel_size_may_grow = false;
+    std::optional<WorldBox> roi;   ///< the domain, instead of the image's box
+    std::optional<double> margin;  ///< points alone, >= 0: between points and domain boundary; automatic: D + 6 voxels
     Start start;
     /// Another tool's result (Mesh, Mask or Vdb): corrected by the marks and seeds near them, and no flow. `start` is
     /// then not used.
@@ -63,22 +64,19 @@ struct SegmentOptions {
     /// exterior seed lies inside it: then all points are tagged, and each hole that inner contours leave is an exterior
     /// seed.
     std::shared_ptr<const Contours> contours;
-    PointHints hints;                   ///< of the points as they are given; for a cloud
-    std::vector<Vec3> inside, outside;  ///< seeds: positions whose side is known, world units
-    double tag_distance = 0.0;          ///< D; 0: automatic
+    PointHints hints;                    ///< of the points as they are given; for a cloud
+    std::vector<Vec3> inside, outside;   ///< seeds: positions whose side is known, world units
+    std::optional<double> tag_distance;  ///< D, world units, > 0; automatic: choose_tag_distance()
     std::vector<Vec3> exterior_seeds;
     EdgeOptions edge;
-    /// With attraction_range < 0 the pipeline picks: unlimited after tagging (the band bounds the points' reach),
-    /// 5 voxels after the other starts. Their `follow` is set by the pipeline too.
-    EvolveOptions evolve = automatic_evolve();
+    /// An automatic attraction range: after tagging 8 voxels, unlimited without an image (the band bounds the points'
+    /// reach), 5 voxels after the other starts. `follow` is chosen too.
+    EvolveOptions evolve;
     ExtractOptions extract;
     HolesOptions holes;  ///< of points without an image
-    /// levels of voxel size 2h, 4h, ... that the flow passes first; -1: 1 for a sphere or a box, else 0
-    int coarse_levels = -1;
-    [[nodiscard]] std::string why_invalid() const;
-
-    /// EvolveOptions with an automatic attraction range.
-    [[nodiscard]] static EvolveOptions automatic_evolve();
+    /// levels of voxel size 2h, 4h, ... that the flow passes first, >= 0; automatic: 1 for a sphere or a box, else 0
+    std::optional<int> coarse_levels;
+    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 
 struct SegmentReport {
@@ -119,7 +117,7 @@ struct SegmentReport {
     CorrectionReport correction;      ///< of SegmentOptions::guess
     double share_without_points = 0;  ///< of the closed surface's area: farther than holes.distance from every point
     HolesReport holes;                ///< of points without an image; distance 0: none
-    SegmentOptions resolved;          ///< what was used: every automatic choice replaced by its value
+    SegmentOptions resolved;          ///< what was used: each automatic choice that was made has its value
     std::map<std::string, std::string> automatic;  ///< each automatic choice and its reason
 };
 
@@ -132,18 +130,26 @@ struct SegmentResult {
 };
 
 /// h and how it was found: the image's smallest spacing, or for points alone the median distance to the nearest other
-/// point, coarser where the scan is noisy (cloud_scale(); for tagging scan_voxel_size()), finer by sqrt(n / 1000) for
-/// n < 1000 points. @throws Error InvalidInput when there is neither, or fewer than two distinct points.
+/// point, coarser where the scan is noisy (measure_cloud_scale(); for tagging choose_scan_voxel_size()), finer by
+/// sqrt(n / 1000) for n < 1000 points. @throws Error InvalidInput when there are fewer than two distinct points.
 struct VoxelSizeChoice {
     double voxel_size = 0;
     std::string reason;  ///< one line for people
 };
-[[nodiscard]] VoxelSizeChoice choose_voxel_size(const Image* image, const std::vector<Vec3>& world_points,
-                                                bool tagged = false);
+[[nodiscard]] COVOL_API VoxelSizeChoice choose_voxel_size(const Image& image);
+[[nodiscard]] COVOL_API VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool tagged = false);
 
-/// The main job: image and points together (either may be absent: null, empty).
-/// @throws Error as the single steps; InvalidInput when there is neither.
-[[nodiscard]] SegmentResult segment(const Image* image, const std::vector<Vec3>& world_points,
-                                    const SegmentOptions& options = {}, const RunContext& run = {});
+/// The main job: image and points together.
+/// @throws Error as the single steps.
+[[nodiscard]] COVOL_API SegmentResult segment(const Image& image, const std::vector<Vec3>& world_points,
+                                              const SegmentOptions& options = {}, const RunContext& run = {});
+/// An image alone: SegmentOptions::start says where the surface is, or contours, seeds or a guess do.
+/// @throws Error also InvalidInput (tagging without points).
+[[nodiscard]] COVOL_API SegmentResult segment(const Image& image, const SegmentOptions& options = {},
+                                              const RunContext& run = {});
+/// Points alone.
+/// @throws Error as the single steps; InvalidInput when there is no point, contour or start.
+[[nodiscard]] COVOL_API SegmentResult reconstruct(const std::vector<Vec3>& world_points,
+                                                  const SegmentOptions& options = {}, const RunContext& run = {});
 
 }  // namespace covol

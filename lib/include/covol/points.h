@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/fwd.h"
 #include "covol/image.h"
 #include "covol/run.h"
@@ -62,27 +63,28 @@ struct PointCloud {
 ///
 /// Each format's own coordinate rule is applied and told in `rule`; the options go before it.
 /// @throws Error Io, InvalidInput (with path:line: text instead of numbers, NaN, truncated, no point), Unsupported.
-[[nodiscard]] PointCloud read_points(const std::string& path, const ReadPointsOptions& options = {});
+[[nodiscard]] COVOL_API PointCloud read_points(const std::string& path, const ReadPointsOptions& options = {});
 
 /// World positions; points in voxels or on slices are mapped by the image's geometry.
-/// @throws Error InvalidInput when points need the image and `geometry` is null.
-[[nodiscard]] std::vector<Vec3> to_world(const PointCloud& cloud, const ImageGeometry* geometry);
+[[nodiscard]] COVOL_API std::vector<Vec3> to_world(const PointCloud& cloud, const ImageGeometry& geometry);
+/// @throws Error InvalidInput when points need an image.
+[[nodiscard]] COVOL_API std::vector<Vec3> to_world(const PointCloud& cloud);
 
 /// Tries the usual mistakes where a point lies outside the image: order of the axes, voxels for world units and the
 /// reverse, voxels counted from 1, RAS for LPS, an origin left out, micrometres for millimetres, and two of them.
 /// Where all lie inside, warns through `run` when another reading is far more plausible, or the image has no spacing.
 /// @throws Error InvalidInput when a point lies outside: how many of how many, both boxes, and the fields of
 ///         ReadPointsOptions, or the image's spacing, that would mend it.
-void check_inside(const PointCloud& cloud, const ImageGeometry& geometry, const RunContext& run = {});
+COVOL_API void check_inside(const PointCloud& cloud, const ImageGeometry& geometry, const RunContext& run = {});
 
 /// Exact duplicates, and points closer than `cell` / 2 in the same cell of a lattice of edge `cell`, become one.
 /// The first of each stays; the order stays. cell = 0 removes exact duplicates only.
-[[nodiscard]] std::vector<Vec3> merge_close_points(const std::vector<Vec3>& points, double cell);
+[[nodiscard]] COVOL_API std::vector<Vec3> merge_close_points(const std::vector<Vec3>& points, double cell);
 
 /// Indices of points along a Z curve through 1024^3 cells of their box: those that follow each other lie close. Of more
 /// than `most`, so many of them, evenly out of that order: the cloud thins by the same share everywhere.
 /// @throws Error InvalidOptions (most = 0), InvalidInput (2^32 points and more).
-[[nodiscard]] std::vector<std::uint32_t> spatial_order(const std::vector<Vec3>& points, std::size_t most);
+[[nodiscard]] COVOL_API std::vector<std::uint32_t> order_spatially(const std::vector<Vec3>& points, std::size_t most);
 
 /// Spacing of a cloud, from nearest neighbours of a fixed subsample (world units).
 struct SpacingStatistics {
@@ -92,9 +94,9 @@ struct SpacingStatistics {
     double max = 0;
 };
 /// @pre no exact duplicates
-[[nodiscard]] SpacingStatistics nearest_neighbour_spacing(const std::vector<Vec3>& points);
+[[nodiscard]] COVOL_API SpacingStatistics measure_spacing(const std::vector<Vec3>& points);
 
 /// Writes .xyz, .csv or binary .ply by the name's end; whole or not at all.
-void write_points(const std::string& path, const std::vector<Vec3>& points, const std::string& comment = {});
+COVOL_API void write_points(const std::string& path, const std::vector<Vec3>& points, const std::string& comment = {});
 
 }  // namespace covol

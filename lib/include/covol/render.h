@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/image.h"
 #include "covol/mesh.h"
 #include "covol/run.h"
@@ -18,14 +19,17 @@ struct Picture {
 struct RenderOptions {
     int width = 1200, height = 800;
     int slices = 3;  ///< slice panels beside the shaded surface, spread over the structure; 0: none
-    [[nodiscard]] std::string why_invalid() const;
+    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 
-/// The shaded surface (OpenVDB's ray tracer) and, with an image, slices with the surface's outline and the points.
-[[nodiscard]] Picture render(const FloatGrid& surface, const Image* image, const std::vector<Vec3>& points,
-                             const RenderOptions& options = {}, const RunContext& run = {});
+/// The shaded surface (OpenVDB's ray tracer), and slices of the image with the surface's outline and the points.
+[[nodiscard]] COVOL_API Picture render(const FloatGrid& surface, const Image& image, const std::vector<Vec3>& points,
+                                       const RenderOptions& options = {}, const RunContext& run = {});
+/// The shaded surface from two sides.
+[[nodiscard]] COVOL_API Picture render(const FloatGrid& surface, const RenderOptions& options = {},
+                                       const RunContext& run = {});
 
 /// Whole or not at all. @throws Error Io.
-void write_png(const std::string& path, const Picture& picture);
+COVOL_API void write_png(const std::string& path, const Picture& picture);
 
 }  // namespace covol

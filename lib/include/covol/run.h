@@ -4,13 +4,16 @@
 #include <functional>
 #include <string>
 
+#include "covol/api.h"
+
 namespace covol {
 
 enum class LogLevel { Info, Warning };
 
 /// How a computation runs, as opposed to what it computes: nothing in here changes a result.
 struct RunContext {
-    int threads = 0;  ///< Threads to use; 0 takes every core.
+    int threads =
+        0;  ///< At most so many work, as far as there are cores; 0: those of the caller's TBB arena, all cores.
 
     /// Called from the calling thread with a stage's name and its fraction done in [0,1].
     std::function<void(const std::string& stage, double fraction)> progress;
@@ -29,14 +32,15 @@ struct RunContext {
     [[nodiscard]] bool cancelled() const noexcept {
         return cancel != nullptr && cancel->load(std::memory_order_relaxed);
     }
-    void info(const std::string& line) const;
-    void warn(const std::string& line) const;
-    void report(const std::string& stage, double fraction) const;
+    COVOL_API void info(const std::string& line) const;
+    COVOL_API void warn(const std::string& line) const;
+    COVOL_API void report(const std::string& stage, double fraction) const;
     /// @throws Error Cancelled when cancelled().
-    void check() const;
+    COVOL_API void check() const;
 };
 
-/// Runs `work` on run.threads threads (every TBB loop inside it, OpenVDB's own included).
-void with_threads(const RunContext& run, const std::function<void()>& work);
+/// Runs `work` on at most run.threads threads (every TBB loop inside it, OpenVDB's own included): in a TBB arena of its
+/// own, or in the one that the caller is in where that is as wide. What `work` throws passes through.
+COVOL_API void with_threads(const RunContext& run, const std::function<void()>& work);
 
 }  // namespace covol

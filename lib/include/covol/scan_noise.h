@@ -2,6 +2,7 @@
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/domain.h"
 #include "covol/run.h"
 
@@ -11,7 +12,8 @@ namespace covol {
 /// over a fixed subsample. Small against the radius on a smooth clean scan; 3/8 of it where points fill space evenly.
 /// 0 where no point has enough neighbours for a plane.
 /// @throws Error InvalidOptions (radius <= 0, not finite).
-[[nodiscard]] double layer_thickness(const std::vector<Vec3>& points, double radius, const RunContext& run = {});
+[[nodiscard]] COVOL_API double measure_layer_thickness(const std::vector<Vec3>& points, double radius,
+                                                       const RunContext& run = {});
 
 /// The voxel size that a scan supports, and how it was found: the smallest of spacing * 1.25^k, k = 0..7, from which
 /// on, up to some larger one, points lie within 0.35 voxels, on the mean, of the plane through what is within 2.5
@@ -20,16 +22,16 @@ namespace covol {
 /// points' box: beyond, a plane goes through the whole shape. Where none holds, the largest that counts.
 struct ScanVoxelSize {
     double voxel_size = 0;
-    double thickness = 0;  ///< layer_thickness() at it
+    double thickness = 0;  ///< measure_layer_thickness() at it
 };
-[[nodiscard]] ScanVoxelSize scan_voxel_size(const std::vector<Vec3>& points, double spacing,
-                                            const RunContext& run = {});
+[[nodiscard]] COVOL_API ScanVoxelSize choose_scan_voxel_size(const std::vector<Vec3>& points, double spacing,
+                                                             const RunContext& run = {});
 
 /// Each point moved along the normal onto the plane fitted, with weights that fall to 0 at `radius`, to the points
 /// around it; twice. Layers of one scan that lie beside each other become one. The order stays; points with fewer than
 /// six others around them stay where they are.
 /// @throws Error InvalidOptions (radius <= 0, not finite).
-[[nodiscard]] std::vector<Vec3> average_layers(const std::vector<Vec3>& points, double radius,
-                                               const RunContext& run = {});
+[[nodiscard]] COVOL_API std::vector<Vec3> average_layers(const std::vector<Vec3>& points, double radius,
+                                                         const RunContext& run = {});
 
 }  // namespace covol

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/fwd.h"
 #include "covol/image.h"
 #include "covol/points.h"
@@ -12,7 +13,10 @@ namespace covol {
 
 /// Positions inside or outside of a structure as a file gives them: loose points as they are, lines (scribbles) with
 /// points between their marks, no farther apart than `step`; closed lines are closed. World units.
-[[nodiscard]] std::vector<Vec3> seeds_of(const PointCloud& cloud, const ImageGeometry* geometry, double step);
+[[nodiscard]] COVOL_API std::vector<Vec3> collect_seeds(const PointCloud& cloud, const ImageGeometry& geometry,
+                                                        double step);
+/// @throws Error InvalidInput when points need an image.
+[[nodiscard]] COVOL_API std::vector<Vec3> collect_seeds(const PointCloud& cloud, double step);
 
 /// Seeds against a surface.
 struct SeedCheck {
@@ -23,15 +27,15 @@ struct SeedCheck {
 
     [[nodiscard]] std::size_t wrong() const { return wrong_inside + wrong_outside; }
     /// One line for people; empty where no seed is wrong.
-    [[nodiscard]] std::string warning() const;
+    [[nodiscard]] COVOL_API std::string warning() const;
 };
 
 /// Which seeds a surface has on the wrong side, by more than `slack` (world units).
 /// @param surface  a level set, negative inside
-[[nodiscard]] SeedCheck check_seeds(const FloatGrid& surface, const std::vector<Vec3>& inside,
-                                    const std::vector<Vec3>& outside, double slack = 0);
+[[nodiscard]] COVOL_API SeedCheck check_seeds(const FloatGrid& surface, const std::vector<Vec3>& inside,
+                                              const std::vector<Vec3>& outside, double slack = 0);
 
 /// @throws Error InvalidInput when a position is named inside and outside (closer than `same`): says where.
-void check_sides(const std::vector<Vec3>& inside, const std::vector<Vec3>& outside, double same);
+COVOL_API void check_sides(const std::vector<Vec3>& inside, const std::vector<Vec3>& outside, double same);
 
 }  // namespace covol

@@ -2,6 +2,7 @@
 #include <functional>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/contours.h"
 #include "covol/domain.h"
 #include "covol/image.h"
@@ -12,27 +13,29 @@ namespace covol {
 
 // Starts other than tagging: u0 = clamp(signed distance, -3h, 3h), active where |u0| < 3h, named "band".
 // All throw Error InvalidOptions / InvalidInput when no surface lies in the domain.
-[[nodiscard]] FloatGridPtr start_from_sphere(const Domain& domain, const Vec3& center, double radius);
-[[nodiscard]] FloatGridPtr start_from_box(const Domain& domain, const WorldBox& box);
-[[nodiscard]] FloatGridPtr start_from_mesh(const Domain& domain, const TriangleMesh& mesh, const RunContext& run = {});
+[[nodiscard]] COVOL_API FloatGridPtr start_from_sphere(const Domain& domain, const Vec3& center, double radius);
+[[nodiscard]] COVOL_API FloatGridPtr start_from_box(const Domain& domain, const WorldBox& box);
+[[nodiscard]] COVOL_API FloatGridPtr start_from_mesh(const Domain& domain, const TriangleMesh& mesh,
+                                                     const RunContext& run = {});
 /// Voxels of the mask above 0 are inside.
-[[nodiscard]] FloatGridPtr start_from_mask(const Domain& domain, const Image& mask, const RunContext& run = {});
+[[nodiscard]] COVOL_API FloatGridPtr start_from_mask(const Domain& domain, const Image& mask,
+                                                     const RunContext& run = {});
 /// The body between closed contours.
-[[nodiscard]] FloatGridPtr start_from_contours(const Domain& domain, const ContourSolid& solid,
-                                               const RunContext& run = {});
+[[nodiscard]] COVOL_API FloatGridPtr start_from_contours(const Domain& domain, const ContourSolid& solid,
+                                                         const RunContext& run = {});
 /// Fills values at from + n * step, n < count (world units): negative inside.
 using LevelRow = std::function<void(const Vec3& from, const Vec3& step, int count, double* values)>;
 /// The parts of a function's zero level set that pass near the seeds; its scale does not matter.
-[[nodiscard]] FloatGridPtr start_from_level(const Domain& domain, const std::vector<Vec3>& seeds, const LevelRow& level,
-                                            const RunContext& run = {});
+[[nodiscard]] COVOL_API FloatGridPtr start_from_level(const Domain& domain, const std::vector<Vec3>& seeds,
+                                                      const LevelRow& level, const RunContext& run = {});
 /// What seeds alone tell: the surface halfway between the nearest seeds inside and outside, but no farther from the
 /// seeds inside than half of what separates the two kinds usually (the median over the seeds outside of the distance to
 /// the nearest one inside), and far enough to join them. Without seeds outside that is kHalfWidthVoxels.
 /// @throws Error also where there is no seed inside, or none in the domain.
-[[nodiscard]] FloatGridPtr start_from_seeds(const Domain& domain, const std::vector<Vec3>& inside,
-                                            const std::vector<Vec3>& outside, const RunContext& run = {});
+[[nodiscard]] COVOL_API FloatGridPtr start_from_seeds(const Domain& domain, const std::vector<Vec3>& inside,
+                                                      const std::vector<Vec3>& outside, const RunContext& run = {});
 /// Any level-set-like grid (negative inside), resampled onto the domain.
-[[nodiscard]] FloatGridPtr start_from_grid(const Domain& domain, const FloatGrid& level_set,
-                                           const RunContext& run = {});
+[[nodiscard]] COVOL_API FloatGridPtr start_from_grid(const Domain& domain, const FloatGrid& level_set,
+                                                     const RunContext& run = {});
 
 }  // namespace covol

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/fwd.h"
 #include "covol/image.h"
 #include "covol/run.h"
@@ -15,13 +16,13 @@ namespace covol {
 /// One of several solids.
 struct Structure {
     std::string name;      ///< what people call it; not empty, unique
-    FloatGridPtr surface;  ///< as surface() makes it: a signed distance, negative inside
+    FloatGridPtr surface;  ///< as extract_surface() makes it: a signed distance, negative inside
 };
 
 struct SeparateOptions {
-    double gap = -1.0;          ///< gaps narrower than this close, world units; 0: none; < 0 picks 1 voxel
+    std::optional<double> gap;  ///< gaps narrower than this close, world units; 0: none; automatic: 1 voxel
     double nested_share = 0.9;  ///< in (0.5,1]: a solid that lies in a larger one with this share is carved out of it
-    [[nodiscard]] std::string why_invalid() const;
+    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 
 /// Two structures that overlapped.
@@ -47,37 +48,38 @@ struct SeparateResult {
 /// the gap's width and between the two (∇φ_i·∇φ_j < 0), gets φ_i' = (φ_i − m)/2: the new interface is the middle
 /// surface φ_i = φ_j, and φ_i' = −φ_j' beside it. Where overlaps are deep the distances are computed as deep. A solid
 /// inside another one is carved out instead: φ' = max(φ_outer, −φ_inner). Changed surfaces are redistanced by
-/// surface(). The result does not depend on the structures' order or on the number of threads.
+/// extract_surface(). The result does not depend on the structures' order or on the number of threads.
 ///
 /// @throws Error InvalidOptions; InvalidInput (names empty or not unique; grids whose transforms differ; two that are
 /// the
 ///               same solid; one of which nothing is left).
-[[nodiscard]] SeparateResult separate(const std::vector<Structure>& structures, const SeparateOptions& options = {},
-                                      const RunContext& run = {});
+[[nodiscard]] COVOL_API SeparateResult separate(const std::vector<Structure>& structures,
+                                                const SeparateOptions& options = {}, const RunContext& run = {});
 
 /// Label image in the given geometry (i fastest): n + 1 where the voxel's centre lies in structures[n], else 0.
 /// A centre that rounding puts into two solids, or into none where two touch, belongs to the nearer one (of equals, to
 /// the one whose name comes first).
 /// @throws Error InvalidInput (more than 254 structures).
-[[nodiscard]] std::vector<std::uint8_t> label_image(const std::vector<Structure>& structures,
-                                                    const ImageGeometry& geometry, const RunContext& run = {});
+[[nodiscard]] COVOL_API std::vector<std::uint8_t> make_label_image(const std::vector<Structure>& structures,
+                                                                   const ImageGeometry& geometry,
+                                                                   const RunContext& run = {});
 
 /// Identifiers for grids, [A-Za-z_][A-Za-z0-9_]*, unique. One structure is called "surface", as everywhere in covol.
-[[nodiscard]] std::vector<std::string> grid_names(const std::vector<std::string>& names);
+[[nodiscard]] COVOL_API std::vector<std::string> make_grid_names(const std::vector<std::string>& names);
 
 /// A colour for structure n, red, green and blue in [0,255]; the first twelve differ clearly.
-[[nodiscard]] std::array<std::uint8_t, 3> structure_color(std::size_t n);
+[[nodiscard]] COVOL_API std::array<std::uint8_t, 3> structure_color(std::size_t n);
 
 /// Key/value pairs that make an NRRD label image a segmentation of 3D Slicer (.seg.nrrd): names, colours, label values
 /// 1, 2, ... and extents.
 /// @param labels  n + 1 where structure n is
 /// @param values  the label values that the file has instead; empty: 1, 2, ...
-[[nodiscard]] std::vector<std::pair<std::string, std::string>> slicer_segments(const std::vector<std::string>& names,
-                                                                               const std::vector<std::uint8_t>& labels,
-                                                                               const Index3& size,
-                                                                               const std::vector<int>& values = {});
+[[nodiscard]] COVOL_API std::vector<std::pair<std::string, std::string>> make_slicer_segments(
+    const std::vector<std::string>& names, const std::vector<std::uint8_t>& labels, const Index3& size,
+    const std::vector<int>& values = {});
 
 /// ITK-SNAP's label description file for labels 1, 2, ..., or those of `values`
-[[nodiscard]] std::string itksnap_labels(const std::vector<std::string>& names, const std::vector<int>& values = {});
+[[nodiscard]] COVOL_API std::string make_itksnap_labels(const std::vector<std::string>& names,
+                                                        const std::vector<int>& values = {});
 
 }  // namespace covol

@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/image.h"
 #include "covol/mesh.h"
 #include "covol/run.h"
@@ -10,10 +11,10 @@ namespace covol {
 
 /// The zero level set of u as a true signed distance: class GRID_LEVEL_SET, half width 3 voxels, name "surface".
 /// Where the solid reaches the domain's boundary it is closed there. @throws Error InvalidInput (no zero crossing).
-[[nodiscard]] FloatGridPtr surface(const FloatGrid& u, const RunContext& run = {});
+[[nodiscard]] COVOL_API FloatGridPtr extract_surface(const FloatGrid& u, const RunContext& run = {});
 
 /// Fog volume in [0,1] of a level set: class GRID_FOG_VOLUME, name "density".
-[[nodiscard]] FloatGridPtr density(const FloatGrid& surface);
+[[nodiscard]] COVOL_API FloatGridPtr to_fog_volume(const FloatGrid& surface);
 
 struct ExtractOptions {
     double isovalue = 0.0;              ///< world units
@@ -21,12 +22,12 @@ struct ExtractOptions {
 };
 
 /// Closed, manifold, outward triangles of the zero level set, in world units.
-[[nodiscard]] TriangleMesh extract_mesh(const FloatGrid& surface, const ExtractOptions& options = {},
-                                        const RunContext& run = {});
+[[nodiscard]] COVOL_API TriangleMesh extract_mesh(const FloatGrid& surface, const ExtractOptions& options = {},
+                                                  const RunContext& run = {});
 
 /// Label image in the given geometry (i fastest): `label` where the voxel's centre is inside, else 0.
-[[nodiscard]] std::vector<std::uint8_t> rasterize(const FloatGrid& surface, const ImageGeometry& geometry,
-                                                  std::uint8_t label = 1, const RunContext& run = {});
+[[nodiscard]] COVOL_API std::vector<std::uint8_t> rasterize(const FloatGrid& surface, const ImageGeometry& geometry,
+                                                            std::uint8_t label = 1, const RunContext& run = {});
 
 /// Distances from points to the zero level set (world units), exact to the extracted triangles.
 struct FitStatistics {
@@ -34,7 +35,7 @@ struct FitStatistics {
     double bias = 0;  ///< of segment() alone: mean of the signed distances; > 0 where the points lie outside, and the
                       ///< surface is too small
 };
-[[nodiscard]] FitStatistics points_to_surface(const std::vector<Vec3>& points, const TriangleMesh& mesh,
-                                              const RunContext& run = {});
+[[nodiscard]] COVOL_API FitStatistics measure_fit(const std::vector<Vec3>& points, const TriangleMesh& mesh,
+                                                  const RunContext& run = {});
 
 }  // namespace covol

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "covol/api.h"
 #include "covol/fwd.h"
 #include "covol/run.h"
 
@@ -15,22 +16,23 @@ struct WriteVdbOptions {
 
 /// Writes the grids in order, with statistics metadata and creator "covol VERSION".
 /// Whole or not at all. @throws Error Io, InvalidInput (names empty or not unique).
-void write_vdb(const std::string& path, const std::vector<FloatGridPtr>& grids, const WriteVdbOptions& options = {});
+COVOL_API void write_vdb(const std::string& path, const std::vector<FloatGridPtr>& grids,
+                         const WriteVdbOptions& options = {});
 
 /// A grid as people name it, "FILE.vdb:name".
 struct VdbGridName {
     std::string path, grid;  ///< no grid where none is named, or where a file has the whole text as its name
 };
-[[nodiscard]] VdbGridName split_grid_name(const std::string& text);
+[[nodiscard]] COVOL_API VdbGridName split_grid_name(const std::string& text);
 
 /// The grid of that name; with an empty name the one in the path ("FILE.vdb:name"), else the file's first float grid.
 /// @throws Error Io, InvalidInput (no such grid; not a float grid: says which grids there are).
-[[nodiscard]] FloatGridPtr read_vdb(const std::string& path, const std::string& name = {});
+[[nodiscard]] COVOL_API FloatGridPtr read_vdb(const std::string& path, const std::string& name = {});
 
 /// The level set that the path names ("FILE.vdb:name"); else "surface", else the file's first level set, else its first
 /// float grid that is no fog volume. A file with several of them to choose from is a warning that names them.
 /// @throws Error as read_vdb; Unsupported (a fog volume).
-[[nodiscard]] FloatGridPtr read_vdb_level_set(const std::string& path, const RunContext& run = {});
+[[nodiscard]] COVOL_API FloatGridPtr read_vdb_level_set(const std::string& path, const RunContext& run = {});
 
 /// One line per grid for people and for `covol info`.
 struct VdbGridInfo {
@@ -42,6 +44,6 @@ struct VdbGridInfo {
     std::map<std::string, std::string> metadata;
 };
 /// All grids, or the one in the path ("FILE.vdb:name"). @throws as read_vdb.
-[[nodiscard]] std::vector<VdbGridInfo> list_vdb(const std::string& path);
+[[nodiscard]] COVOL_API std::vector<VdbGridInfo> list_vdb(const std::string& path);
 
 }  // namespace covol

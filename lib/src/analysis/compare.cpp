@@ -458,11 +458,11 @@ void compare_surfaces(const TriangleMesh& a, const TriangleMesh& b, double spaci
         sum += area * distance;
     }
     report.hausdorff = distances.back().first;
-    report.mean_distance = total > 0 ? sum / total : 0;
+    report.assd = total > 0 ? sum / total : 0;
     double below = 0;
     for (const auto& [distance, area] : distances) {
         below += area;
-        report.hausdorff95 = distance;
+        report.hd95 = distance;
         if (below >= 0.95 * total) break;
     }
 }

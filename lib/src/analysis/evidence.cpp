@@ -295,16 +295,31 @@ std::string EvidenceOptions::why_invalid() const {
     return checks.lines();
 }
 
-Evidence evidence(const TriangleMesh& mesh, const std::vector<Vec3>& marks, const FloatGrid* edge,
-                  const ImageGeometry& geometry, const EvidenceOptions& options, const RunContext& run) {
-    detail::require_valid(options, "evidence");
-    if (mesh.empty()) throw Error(Errc::InvalidInput, "evidence: expected a surface, got an empty mesh");
+namespace {
+
+Evidence assess(const TriangleMesh& mesh, const std::vector<Vec3>& marks, const FloatGrid* edge,
+                const ImageGeometry& geometry, const EvidenceOptions& options, const RunContext& run) {
+    detail::require_valid(options, "assess_evidence");
+    if (mesh.empty()) throw Error(Errc::InvalidInput, "assess_evidence: expected a surface, got an empty mesh");
     Evidence result;
     with_threads(run, [&] { result = Judge(mesh, marks, geometry, options, run).go(edge); });
     return result;
 }
 
-double share_without_points(const TriangleMesh& mesh, const FloatGrid& distance, double reach, const RunContext& run) {
+}  // namespace
+
+Evidence assess_evidence(const TriangleMesh& mesh, const std::vector<Vec3>& marks, const FloatGrid& edge,
+                         const ImageGeometry& geometry, const EvidenceOptions& options, const RunContext& run) {
+    return assess(mesh, marks, &edge, geometry, options, run);
+}
+
+Evidence assess_evidence(const TriangleMesh& mesh, const std::vector<Vec3>& marks, const ImageGeometry& geometry,
+                         const EvidenceOptions& options, const RunContext& run) {
+    return assess(mesh, marks, nullptr, geometry, options, run);
+}
+
+double measure_share_without_points(const TriangleMesh& mesh, const FloatGrid& distance, double reach,
+                                    const RunContext& run) {
     struct Areas {
         double total = 0, bare = 0;
     } areas;
@@ -336,11 +351,11 @@ double share_without_points(const TriangleMesh& mesh, const FloatGrid& distance,
     return areas.total > 0 ? areas.bare / areas.total : 0.0;
 }
 
-double share_without_points(const TriangleMesh& mesh, const std::vector<Vec3>& points, double reach,
-                            const RunContext& run) {
+double measure_share_without_points(const TriangleMesh& mesh, const std::vector<Vec3>& points, double reach,
+                                    const RunContext& run) {
     if (points.empty() || mesh.empty()) return 0;
-    const Domain domain = domain_of_box(bounding_box(points, reach), reach / 3);
-    return share_without_points(mesh, *distance(points, domain, {reach}, run).grid, reach, run);
+    const Domain domain = make_domain(bounding_box(points, reach), reach / 3);
+    return measure_share_without_points(mesh, *compute_distance(points, domain, {reach}, run).grid, reach, run);
 }
 
 }  // namespace covol

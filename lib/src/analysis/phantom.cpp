@@ -154,7 +154,7 @@ std::vector<Shape> shapes() {
 
 std::string joined_kinds() {
     std::string text;
-    for (const std::string& kind : phantom_kinds()) text += (text.empty() ? "" : ", ") + kind;
+    for (const std::string& kind : list_phantom_kinds()) text += (text.empty() ? "" : ", ") + kind;
     return text;
 }
 
@@ -162,7 +162,7 @@ std::string joined_kinds() {
 
 std::string PhantomOptions::why_invalid() const {
     detail::FieldChecks checks;
-    const std::vector<std::string> kinds = phantom_kinds();
+    const std::vector<std::string> kinds = list_phantom_kinds();
     checks.expect(std::find(kinds.begin(), kinds.end(), kind) != kinds.end(), "kind", "one of " + joined_kinds(),
                   "'" + kind + "'");
     checks.expect(size >= 16 && size <= 2048, "size", "16 to 2048", size);
@@ -171,7 +171,7 @@ std::string PhantomOptions::why_invalid() const {
     return checks.lines();
 }
 
-std::vector<std::string> phantom_kinds() {
+std::vector<std::string> list_phantom_kinds() {
     std::vector<std::string> names;
     for (const Shape& shape : shapes()) names.emplace_back(shape.name);
     return names;

@@ -163,18 +163,8 @@ void draw_slice(const FloatGrid& surface, const Image& image, const std::vector<
     });
 }
 
-}  // namespace
-
-std::string RenderOptions::why_invalid() const {
-    detail::FieldChecks checks;
-    checks.expect(width >= 64 && width <= 16384, "width", "64 to 16384", width);
-    checks.expect(height >= 64 && height <= 16384, "height", "64 to 16384", height);
-    checks.expect(slices >= 0 && slices <= 16, "slices", "0 to 16", slices);
-    return checks.lines();
-}
-
-Picture render(const FloatGrid& surface, const Image* image, const std::vector<Vec3>& points,
-               const RenderOptions& options, const RunContext& run) {
+Picture draw(const FloatGrid& surface, const Image* image, const std::vector<Vec3>& points,
+             const RenderOptions& options, const RunContext& run) {
     detail::require_valid(options, "render");
     Picture picture{options.width, options.height,
                     std::vector<std::uint8_t>(3 * std::size_t(options.width) * options.height, 255)};
@@ -200,6 +190,25 @@ Picture render(const FloatGrid& surface, const Image* image, const std::vector<V
         }
     });
     return picture;
+}
+
+}  // namespace
+
+std::string RenderOptions::why_invalid() const {
+    detail::FieldChecks checks;
+    checks.expect(width >= 64 && width <= 16384, "width", "64 to 16384", width);
+    checks.expect(height >= 64 && height <= 16384, "height", "64 to 16384", height);
+    checks.expect(slices >= 0 && slices <= 16, "slices", "0 to 16", slices);
+    return checks.lines();
+}
+
+Picture render(const FloatGrid& surface, const Image& image, const std::vector<Vec3>& points,
+               const RenderOptions& options, const RunContext& run) {
+    return draw(surface, &image, points, options, run);
+}
+
+Picture render(const FloatGrid& surface, const RenderOptions& options, const RunContext& run) {
+    return draw(surface, nullptr, {}, options, run);
 }
 
 void write_png(const std::string& path, const Picture& picture) {

@@ -55,20 +55,19 @@ std::int64_t Domain::voxel_count() const {
     return n;
 }
 
-Domain domain_of_box(const WorldBox& box, double voxel_size) {
+Domain make_domain(const WorldBox& box, double voxel_size) {
     if (!(voxel_size > 0) || !std::isfinite(voxel_size))
-        throw Error(Errc::InvalidOptions, "domain_of_box: voxel size: expected > 0, got " + std::to_string(voxel_size));
+        throw Error(Errc::InvalidOptions, "make_domain: voxel size: expected > 0, got " + std::to_string(voxel_size));
     Domain domain;
     domain.voxel_size = voxel_size;
     for (int a = 0; a < 3; ++a) {
         const double length = box.max[a] - box.min[a];
         if (!(length > 0) || !std::isfinite(length))
-            throw Error(Errc::InvalidInput,
-                        "domain_of_box: expected a box with a positive extent, got " + to_text(box));
+            throw Error(Errc::InvalidInput, "make_domain: expected a box with a positive extent, got " + to_text(box));
         // A tolerance keeps a box of exactly n voxels at n in spite of rounding.
         const double cells = std::max(1.0, std::ceil(length / voxel_size - 1e-6 * std::max(1.0, length / voxel_size)));
         if (cells > kMaxVoxelsPerAxis)
-            throw Error(Errc::InvalidInput, "domain_of_box: " + to_text(box) + " has more than 2^30 voxels of size " +
+            throw Error(Errc::InvalidInput, "make_domain: " + to_text(box) + " has more than 2^30 voxels of size " +
                                                 std::to_string(voxel_size) + " along an axis; use a larger voxel size");
         domain.origin[a] = 0.5 * (box.min[a] + box.max[a]) - 0.5 * (cells - 1) * voxel_size;
         domain.max[a] = static_cast<std::int32_t>(cells) - 1;

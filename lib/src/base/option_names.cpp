@@ -50,7 +50,7 @@ void walk(std::string_view message, const Text& text, const Options& options) {
 
 }  // namespace
 
-std::vector<NamedOption> named_options(const std::string& message) {
+std::vector<NamedOption> find_named_options(const std::string& message) {
     std::vector<NamedOption> all;
     walk(
         message, [](std::string_view) {},
@@ -58,7 +58,7 @@ std::vector<NamedOption> named_options(const std::string& message) {
     return all;
 }
 
-std::string with_names(const std::string& message, const std::function<std::string(const NamedOption&)>& name) {
+std::string replace_names(const std::string& message, const std::function<std::string(const NamedOption&)>& name) {
     std::string result;
     walk(
         message, [&](std::string_view text) { result += text; },
@@ -69,7 +69,7 @@ std::string with_names(const std::string& message, const std::function<std::stri
 }
 
 std::string Error::option() const {
-    const std::vector<NamedOption> named = named_options(what());
+    const std::vector<NamedOption> named = find_named_options(what());
     return named.empty() ? "" : named.front().field;
 }
 

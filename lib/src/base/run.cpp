@@ -1,6 +1,5 @@
 #include "covol/run.h"
 
-#include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
 #include "covol/error.h"
@@ -21,15 +20,11 @@ void RunContext::check() const {
 }
 
 void with_threads(const RunContext& run, const std::function<void()>& work) {
-    if (run.threads <= 0) {
+    if (run.threads <= 0 || run.threads == tbb::this_task_arena::max_concurrency()) {
         work();
         return;
     }
-    // The arena bounds the work; the control lets it have more threads than there are cores.
-    const tbb::global_control allow(tbb::global_control::max_allowed_parallelism,
-                                    static_cast<std::size_t>(run.threads));
-    tbb::task_arena arena(run.threads);
-    arena.execute([&] { work(); });
+    tbb::task_arena(run.threads).execute([&] { work(); });
 }
 
 }  // namespace covol

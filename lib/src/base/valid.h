@@ -1,6 +1,7 @@
 #pragma once
 // What the why_invalid() of options are made of.
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include "base/number.h"
@@ -21,6 +22,16 @@ public:
     void expect_positive(const char* field, double got) { expect(got > 0 && std::isfinite(got), field, "> 0", got); }
     void expect_not_negative(const char* field, double got) {
         expect(got >= 0 && std::isfinite(got), field, ">= 0", got);
+    }
+    /// Without a value a field is automatic, and fine.
+    void expect_positive(const char* field, const std::optional<double>& got) {
+        if (got) expect_positive(field, *got);
+    }
+    void expect_not_negative(const char* field, const std::optional<double>& got) {
+        if (got) expect_not_negative(field, *got);
+    }
+    void expect_share(const char* field, const std::optional<double>& got) {
+        if (got) expect_share(field, *got);
     }
     void expect_share(const char* field, double got) { expect(got >= 0 && got <= 1, field, "0 to 1", got); }
     /// The lines of a part's own why_invalid().

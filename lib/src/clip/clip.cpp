@@ -11,7 +11,7 @@ std::string clip_key(std::size_t n) { return "covol_clip_" + std::to_string(n); 
 
 }  // namespace
 
-Clip clip_at(const WorldBox& box) {
+Clip make_clip(const WorldBox& box) {
     Clip clip;
     for (int a = 0; a < 3; ++a) {
         Vec3 up{0, 0, 0}, down{0, 0, 0};
@@ -23,8 +23,8 @@ Clip clip_at(const WorldBox& box) {
     return clip;
 }
 
-Clip clip_at(const ImageGeometry& geometry) {
-    if (geometry.is_axis_aligned()) return clip_at(geometry.world_box());
+Clip make_clip(const ImageGeometry& geometry) {
+    if (geometry.is_axis_aligned()) return make_clip(geometry.world_box());
     Clip clip;
     for (int a = 0; a < 3; ++a)
         for (const double side : {-1.0, 1.0}) {

@@ -16,7 +16,7 @@ double ImageFace::depth(const Vec3& x) const {
 }
 
 std::vector<ImageFace> faces_of(const ImageGeometry& geometry) {
-    const Clip clip = clip_at(geometry);  // two for each axis
+    const Clip clip = make_clip(geometry);  // two for each axis
     std::vector<ImageFace> faces;
     for (std::size_t n = 0; n < clip.size(); ++n) faces.push_back({clip[n], geometry.spacing[n / 2]});
     return faces;

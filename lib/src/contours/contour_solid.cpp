@@ -223,7 +223,7 @@ std::vector<Vec2> deepest_in_holes(const std::vector<float>& level, const SliceG
 
 }  // namespace
 
-double cap_height(double area, double before, double distance, double gap) {
+double compute_cap_height(double area, double before, double distance, double gap) {
     return before > area ? std::min(gap, distance * area / (before - area)) : gap;
 }
 

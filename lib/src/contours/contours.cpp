@@ -94,7 +94,7 @@ private:
 };
 
 void Densifier::read(const PointCloud& cloud) {
-    const std::vector<Vec3> world = to_world(cloud, has_image_ ? &geometry_ : nullptr);
+    const std::vector<Vec3> world = has_image_ ? to_world(cloud, geometry_) : to_world(cloud);
     result_.marks.insert(result_.marks.end(), world.begin(), world.end());
     std::vector<char> in_line(world.size(), 0);
     for (std::size_t n = 0; n < cloud.lines.size(); ++n) {
@@ -344,7 +344,7 @@ void Densifier::cap_ends(ContourSolid::Data& data) {
         const bool alone = end == before, first = end < before;
         const double distance = std::abs(slices[end].w - slices[before].w);
         slices[end].cap =
-            std::max(cap_height(slices[end].area, alone ? 0 : slices[before].area, distance, gap), 1e-3 * gap);
+            std::max(compute_cap_height(slices[end].area, alone ? 0 : slices[before].area, distance, gap), 1e-3 * gap);
         if (!has_image_ || alone) return;
         // On the image's last slice, or where the next one to be marked would lie beyond it and the sections do not end
         // before.
@@ -388,12 +388,25 @@ std::string ContourOptions::why_invalid() const {
     return checks.lines();
 }
 
-Contours densify(const std::vector<PointCloud>& clouds, const ImageGeometry* geometry, const ContourOptions& options,
-                 const RunContext& run) {
+namespace {
+
+Contours densify_in(const ImageGeometry* geometry, const std::vector<PointCloud>& clouds, const ContourOptions& options,
+                    const RunContext& run) {
     detail::require_valid(options, "densify");
     Contours result;
     with_threads(run, [&] { result = Densifier(geometry, options, run).go(clouds); });
     return result;
+}
+
+}  // namespace
+
+Contours densify(const std::vector<PointCloud>& clouds, const ImageGeometry& geometry, const ContourOptions& options,
+                 const RunContext& run) {
+    return densify_in(&geometry, clouds, options, run);
+}
+
+Contours densify(const std::vector<PointCloud>& clouds, const ContourOptions& options, const RunContext& run) {
+    return densify_in(nullptr, clouds, options, run);
 }
 
 }  // namespace covol

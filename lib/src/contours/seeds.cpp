@@ -17,10 +17,7 @@ namespace {
 
 using detail::to_text;
 
-}  // namespace
-
-std::vector<Vec3> seeds_of(const PointCloud& cloud, const ImageGeometry* geometry, double step) {
-    const std::vector<Vec3> world = to_world(cloud, geometry);
+std::vector<Vec3> seeds_along(const PointCloud& cloud, const std::vector<Vec3>& world, double step) {
     std::vector<Vec3> seeds;
     std::vector<char> in_line(world.size(), 0);
     for (const MarkLine& line : cloud.lines) {
@@ -33,6 +30,16 @@ std::vector<Vec3> seeds_of(const PointCloud& cloud, const ImageGeometry* geometr
     for (std::size_t n = 0; n < world.size(); ++n)
         if (!in_line[n]) seeds.push_back(world[n]);
     return seeds;
+}
+
+}  // namespace
+
+std::vector<Vec3> collect_seeds(const PointCloud& cloud, const ImageGeometry& geometry, double step) {
+    return seeds_along(cloud, to_world(cloud, geometry), step);
+}
+
+std::vector<Vec3> collect_seeds(const PointCloud& cloud, double step) {
+    return seeds_along(cloud, to_world(cloud), step);
 }
 
 std::string SeedCheck::warning() const {

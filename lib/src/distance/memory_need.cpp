@@ -40,7 +40,8 @@ public:
         coarse_ = std::max(2 * domain.voxel_size, std::cbrt(volume / kCoarseVoxels));
         RunContext unbounded = run;
         unbounded.memory_budget = 0;
-        const FloatGridPtr grid = distance(points, domain_of_box(box, coarse_), {std::sqrt(diagonal)}, unbounded).grid;
+        const FloatGridPtr grid =
+            compute_distance(points, make_domain(box, coarse_), {std::sqrt(diagonal)}, unbounded).grid;
         for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf)
             for (auto value = leaf->cbeginValueOn(); value; ++value) sorted_.push_back(*value);
         std::sort(sorted_.begin(), sorted_.end());

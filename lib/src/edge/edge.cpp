@@ -148,7 +148,7 @@ double contrast_of(const FloatGrid& slopes, double percentile) {
 }
 
 double automatic_contrast(const FloatGrid& s, const EdgeOptions& options, bool is_line) {
-    if (options.contrast_percentile > 0) return contrast_of(s, options.contrast_percentile);
+    if (options.contrast_percentile) return contrast_of(s, *options.contrast_percentile);
     return is_line ? kLineShare * contrast_of(s, kLinePercentile) : contrast_of(s, kSlopePercentile);
 }
 
@@ -166,23 +166,24 @@ const char* to_string(EdgeFeature feature) {
 
 std::string EdgeOptions::why_invalid() const {
     detail::FieldChecks checks;
-    checks.expect_finite("sigma", sigma);
-    checks.expect_not_negative("edge_k", edge_k);
-    checks.expect_not_negative("edge_contrast", edge_contrast);
-    checks.expect(contrast_percentile >= 0 && contrast_percentile < 1, "contrast_percentile", "between 0 and 1",
-                  contrast_percentile);
+    checks.expect_not_negative("sigma", sigma);
+    checks.expect_positive("edge_k", edge_k);
+    checks.expect_positive("edge_contrast", edge_contrast);
+    if (const auto p = contrast_percentile)
+        checks.expect(*p > 0 && *p < 1, "contrast_percentile", "between 0 and 1", *p);
     checks.expect(std::isfinite(low) && std::isfinite(high) && low <= high, "low", "<= high", low);
     return checks.lines();
 }
 
-EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions& options, const RunContext& run) {
-    detail::require_valid(options, "edge");
+EdgeResult detect_edges(const Image& image, const FloatGrid& topology, const EdgeOptions& options,
+                        const RunContext& run) {
+    detail::require_valid(options, "detect_edges");
     if (topology.activeVoxelCount() == 0)
-        throw Error(Errc::InvalidInput, "edge: expected active voxels in the band, got none");
+        throw Error(Errc::InvalidInput, "detect_edges: expected active voxels in the band, got none");
     const Domain domain = domain_of(topology);
     EdgeResult result;
     EdgeReport& report = result.report;
-    report.sigma = options.sigma < 0 ? domain.voxel_size : options.sigma;
+    report.sigma = options.sigma.value_or(domain.voxel_size);
     report.low = options.low, report.high = options.high;
     if (!(report.low < report.high)) {
         const auto percentiles = image.percentiles(kLowPercentile, kHighPercentile);
@@ -193,7 +194,7 @@ EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions
         }
     }
     if (!(report.low < report.high))
-        throw Error(Errc::InvalidInput, "edge: " + image.path() + ": every voxel has the value " +
+        throw Error(Errc::InvalidInput, "detect_edges: " + image.path() + ": every voxel has the value " +
                                             std::to_string(report.low) +
                                             ", there is no edge to find; segment with the points alone (`rho = 0`)");
     with_threads(run, [&] {
@@ -221,12 +222,15 @@ EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions
             for (int n = 0; n < kLeafSize; ++n)
                 if (node->isValueOn(n)) node->setValueOnly(n, slope[n]);
         });
-        report.edge_contrast = options.edge_contrast;
-        if (options.edge_k > 0) report.edge_contrast = 1.0 / std::sqrt(options.edge_k);
-        if (!(report.edge_contrast > 0)) report.edge_contrast = automatic_contrast(*result.grid, options, is_line);
+        if (options.edge_k)
+            report.edge_contrast = 1.0 / std::sqrt(*options.edge_k);
+        else if (options.edge_contrast)
+            report.edge_contrast = *options.edge_contrast;
+        else
+            report.edge_contrast = automatic_contrast(*result.grid, options, is_line);
         if (!(report.edge_contrast > 0))
             throw Error(Errc::InvalidInput,
-                        "edge: " + image.path() +
+                        "detect_edges: " + image.path() +
                             ": constant wherever the band lies, there is no edge to find; check that the "
                             "points lie on the image's structure");
         report.edge_k = 1.0 / (report.edge_contrast * report.edge_contrast);
@@ -237,8 +241,8 @@ EdgeResult edge(const Image& image, const FloatGrid& topology, const EdgeOptions
     return result;
 }
 
-MarkedFeature feature_at(const Image& image, const std::vector<Vec3>& places, const std::vector<Vec3>& normals,
-                         double reach) {
+MarkedFeature detect_feature(const Image& image, const std::vector<Vec3>& places, const std::vector<Vec3>& normals,
+                             double reach) {
     const auto value_at = [&](const Vec3& x) {
         Domain one;
         one.origin = x;

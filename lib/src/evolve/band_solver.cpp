@@ -103,7 +103,7 @@ void check_finite(const LeafBand& band, const HaloField& field, const char* what
 }
 
 SchemeConstants constants_for(const EvolveOptions& options, double h, double tau) {
-    const double delta = options.delta < 0 ? 1.0 : options.delta / h;
+    const double delta = options.delta ? *options.delta / h : 1.0;
     SchemeConstants constants{};
     constants.tau = static_cast<float>(tau);
     constants.theta = static_cast<float>(options.theta);
@@ -156,7 +156,7 @@ void BandSolver::keep_inactive(const LeafStates& old, const std::vector<Coord>& 
 }
 
 void BandSolver::gather_fields(const EvolveFields& fields) {
-    const Taper taper{options_.attraction_range};
+    const Taper taper{options_.attraction_range.value_or(0)};
     if (options_.theta > 0) {
         const double h = domain_.voxel_size;
         phi_ = gather_potential(band_, fields, taper, options_.guess_weight, h);
@@ -174,11 +174,12 @@ void BandSolver::gather_fields(const EvolveFields& fields) {
         check_finite(band_, *obstacle_, "obstacle");
     }
     const FloatGrid* trusted = fields.trusted != nullptr ? fields.trusted : fields.distance;
-    if (options_.rho > 0 && options_.image_yields > 0 && trusted != nullptr)
+    const double yields = options_.image_yields.value_or(0);
+    if (options_.rho > 0 && yields > 0 && trusted != nullptr)
         image_weight_ = gather(band_, *trusted, false, [&](const LeafNode* leaf, float, float* block) {
             for (int n = 0; n < kLeafSize; ++n)  // far from every mark where the distance is not known
                 block[n] = leaf != nullptr && leaf->isValueOn(n)
-                               ? static_cast<float>(1.0 - options_.image_yields * taper(leaf->getValue(n)))
+                               ? static_cast<float>(1.0 - yields * taper(leaf->getValue(n)))
                                : 1.0F;
         });
 }

@@ -45,7 +45,7 @@ class Evolver {
 public:
     Evolver(FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options, const RunContext& run)
         : u_(u), fields_(fields), options_(options), run_(run), domain_(domain_of(u)) {
-        tau_ = options.tau < 0 ? 1.0 : options.tau / domain_.voxel_size;
+        tau_ = options.tau ? *options.tau / domain_.voxel_size : 1.0;
         if (options.theta > 0) check_field(fields.distance, "distance", "theta");
         if (options.rho > 0) check_field(fields.edge, "edge", "rho");
         if (fields.obstacle != nullptr) check_transform(*fields.obstacle, "obstacle");
@@ -84,7 +84,7 @@ public:
                 report_.stop_reason = StopReason::Steady;
                 break;
             }
-            if (options_.tau < 0 && (options_.rho == 0 || options_.image_yields > 0)) adapt_tau(motion.mean);
+            if (!options_.tau && (options_.rho == 0 || options_.image_yields.value_or(0) > 0)) adapt_tau(motion.mean);
         }
         solver_->store(u_);
         report_.sweeps_per_step = report_.steps > 0 ? double(counts_.passes) / report_.steps : 0.0;
@@ -230,8 +230,8 @@ std::string EvolveOptions::why_invalid() const {
     detail::FieldChecks checks;
     checks.expect_share("theta", theta);
     checks.expect_share("rho", rho);
-    checks.expect_finite("delta", delta);
-    checks.expect(std::isfinite(tau) && tau != 0, "tau", "> 0", tau);
+    checks.expect_not_negative("delta", delta);
+    checks.expect_positive("tau", tau);
     checks.expect_positive("epsilon", epsilon);
     checks.expect_positive("edge_epsilon", edge_epsilon);
     checks.expect_not_negative("attraction_range", attraction_range);

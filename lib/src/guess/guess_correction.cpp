@@ -258,8 +258,8 @@ FloatGridPtr GuessCorrection::start(const RunContext& run) const {
 
 std::string CorrectionOptions::why_invalid() const {
     detail::FieldChecks checks;
-    checks.expect_not_negative("precision", precision);
-    checks.expect_not_negative("least_radius", least_radius);
+    checks.expect_positive("precision", precision);
+    checks.expect_positive("least_radius", least_radius);
     return checks.lines();
 }
 
@@ -270,8 +270,8 @@ GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>
     auto data = std::make_shared<GuessCorrection::Data>(guess);
     with_threads(run, [&] {
         const double h = guess->voxelSize()[0];
-        const double precision = options.precision > 0 ? options.precision : kPrecisionVoxels * h;
-        const double least = options.least_radius > 0 ? options.least_radius : kCorrectionVoxels * h;
+        const double precision = options.precision.value_or(kPrecisionVoxels * h);
+        const double least = options.least_radius.value_or(kCorrectionVoxels * h);
         std::vector<Target> on_surface;
         for (const Vec3& mark : marks) on_surface.push_back({mark, data->distance.at(mark)});
         std::vector<Target> targets = on_surface;

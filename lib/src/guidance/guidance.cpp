@@ -182,7 +182,7 @@ bool Guide::place_marks(bool first) {
             mark.residual += share * residual[m];
             for (int a = 0; a < 3; ++a) mark.at[a] += share * marks_[m][a];
         }
-        const double precision = options_.mark_precision >= 0 ? options_.mark_precision : patches_.voxel[i];
+        const double precision = options_.mark_precision.value_or(patches_.voxel[i]);
         mark.deviation = precision * std::sqrt(share / 12);  // of a uniform error
         on_.push_back(mark);
     }
@@ -218,12 +218,12 @@ void Guide::set_ranges() {
         broad2[i] = squared(0.5 * reach[i]);
     });
     broad_ = std::sqrt(mean(broad2));
-    if (options_.range >= 0) broad_ = std::min(broad_, 0.5 * options_.range);
+    if (options_.range) broad_ = std::min(broad_, 0.5 * *options_.range);
     ranges_.resize(count);
     for (std::size_t i = 0; i < count; ++i) {
         // Marks are asked as any other place is, as if the guess were no better there.
         double range = std::max(reach[i], 2 * broad_);
-        if (options_.range >= 0) range = std::min(range, options_.range);
+        if (options_.range) range = std::min(range, *options_.range);
         range = std::min(range + std::abs(home_[i]), (kWidth - 2) * h_);
         ranges_[i] = int(std::ceil(range * kStepsPerVoxel / patches_.voxel[i]));
     }
@@ -263,7 +263,7 @@ bool Guide::learn(const Scene& scene, bool first) {
         places.push_back(mark.at);
         normals.push_back(patches_.directions[mark.patch]);
     }
-    report_.feature = feature_at(image_, places, normals, kSides * h_);
+    report_.feature = detect_feature(image_, places, normals, kSides * h_);
     report_.inside = lesson_->brightness(-2 * kStepsPerVoxel);
     report_.border = lesson_->brightness(0);
     report_.outside = lesson_->brightness(2 * kStepsPerVoxel);
@@ -457,8 +457,8 @@ void GuidanceReport::add(const GuidanceReport& pass, bool moved) {
 
 std::string GuidanceOptions::why_invalid() const {
     detail::FieldChecks checks;
-    checks.expect_finite("mark_precision", mark_precision);
-    checks.expect_finite("range", range);
+    checks.expect_not_negative("mark_precision", mark_precision);
+    checks.expect_not_negative("range", range);
     checks.expect_share("weight", weight);
     return checks.lines();
 }
@@ -470,7 +470,7 @@ FloatGridPtr guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const
     FloatGridPtr result;
     with_threads(run, [&] {
         result = start_from_grid(domain_of(guess), guess, run);
-        if (marks.empty() || !(options.weight > 0) || options.range == 0) {
+        if (marks.empty() || !(options.weight > 0) || options.range == 0.0) {
             report.reason = marks.empty() ? "there are no marks to learn the border from" : "the image has no weight";
             return;
         }

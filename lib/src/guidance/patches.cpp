@@ -63,7 +63,7 @@ Patches make_patches(const TriangleMesh& mesh, const ImageGeometry& g, double wi
     const std::size_t count = mesh.vertices.size();
     p.places.resize(count);
     p.normals.resize(count);
-    const auto normals = vertex_normals(mesh);
+    const auto normals = compute_vertex_normals(mesh);
     for (std::size_t v = 0; v < count; ++v)
         for (int a = 0; a < 3; ++a) {
             p.places[v][a] = mesh.vertices[v][a];

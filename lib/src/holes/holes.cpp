@@ -96,7 +96,7 @@ public:
         }
         report.distance = distance_;
         report.share = area > 0 ? gone / area : 0;
-        report.loops = boundary_loops(holes::kept_part(cut));
+        report.loops = find_boundary_loops(holes::kept_part(cut));
         return cut;
     }
 
@@ -190,12 +190,11 @@ holes::CutMesh cut_holes(const TriangleMesh& mesh, const std::vector<float>& to_
 
 const char* to_string(Holes holes) { return holes == Holes::Close ? "close" : holes == Holes::Open ? "open" : "flat"; }
 
-double hole_distance(const std::vector<Vec3>& points, double voxel_size) {
-    return kFar * std::max(voxel_size, nearest_neighbour_spacing(points).p95 / kP95OfSpacing);
+double choose_hole_distance(const std::vector<Vec3>& points, double voxel_size) {
+    return kFar * std::max(voxel_size, measure_spacing(points).p95 / kP95OfSpacing);
 }
 
-std::vector<float> distances_to_points(const TriangleMesh& mesh, const std::vector<Vec3>& points,
-                                       const RunContext& run) {
+std::vector<float> measure_distances(const TriangleMesh& mesh, const std::vector<Vec3>& points, const RunContext& run) {
     std::vector<float> result(mesh.vertices.size());
     with_threads(run, [&] {
         const detail::KdTree tree(points);
@@ -207,7 +206,7 @@ std::vector<float> distances_to_points(const TriangleMesh& mesh, const std::vect
     return result;
 }
 
-double share_beyond(const TriangleMesh& mesh, const std::vector<float>& distances, double distance) {
+double measure_share_beyond(const TriangleMesh& mesh, const std::vector<float>& distances, double distance) {
     double area = 0, beyond = 0;
     for (const Triangle& t : mesh.triangles) {
         const double own = area_of(mesh, t);
@@ -217,7 +216,7 @@ double share_beyond(const TriangleMesh& mesh, const std::vector<float>& distance
     return area > 0 ? beyond / area : 0;
 }
 
-std::vector<BoundaryLoop> boundary_loops(const TriangleMesh& mesh) {
+std::vector<BoundaryLoop> find_boundary_loops(const TriangleMesh& mesh) {
     // Sides without a partner, by their first vertex.
     std::vector<std::pair<std::uint32_t, std::uint32_t>> sides;
     for (const Triangle& t : mesh.triangles)
@@ -245,16 +244,16 @@ std::vector<BoundaryLoop> boundary_loops(const TriangleMesh& mesh) {
     return loops;
 }
 
-TriangleMesh trimmed(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack,
-                     HolesReport& report, const RunContext& run) {
-    const holes::CutMesh cut = cut_holes(mesh, to_points, distance, slack, report, run, "trimmed");
+TriangleMesh trim_holes(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack,
+                        HolesReport& report, const RunContext& run) {
+    const holes::CutMesh cut = cut_holes(mesh, to_points, distance, slack, report, run, "trim_holes");
     report.policy = Holes::Open;
     return report.share > 0 ? holes::kept_part(cut) : mesh;
 }
 
-TriangleMesh flattened(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack,
-                       HolesReport& report, const RunContext& run) {
-    holes::CutMesh cut = cut_holes(mesh, to_points, distance, slack, report, run, "flattened");
+TriangleMesh flatten_holes(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack,
+                           HolesReport& report, const RunContext& run) {
+    holes::CutMesh cut = cut_holes(mesh, to_points, distance, slack, report, run, "flatten_holes");
     TriangleMesh result;
     with_threads(run, [&] {
         std::vector<char> fixed(cut.mesh.vertices.size(), 0), spans(cut.mesh.vertices.size(), 0);

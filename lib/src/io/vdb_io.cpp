@@ -12,6 +12,7 @@
 
 #include "base/file.h"
 #include "covol/error.h"
+#include "covol/version.h"
 
 namespace covol {
 namespace {
@@ -232,7 +233,7 @@ void write_vdb(const std::string& path, const std::vector<FloatGridPtr>& grids, 
     vdb::initialize();
     const auto add_provenance = [&](vdb::MetaMap& metadata) {
         for (const auto& [key, value] : options.metadata) metadata.insertMeta(key, vdb::StringMetadata(value));
-        metadata.insertMeta(vdb::GridBase::META_GRID_CREATOR, vdb::StringMetadata("covol " COVOL_VERSION));
+        metadata.insertMeta(vdb::GridBase::META_GRID_CREATOR, vdb::StringMetadata("covol " COVOL_VERSION_STRING));
     };
     vdb::MetaMap file_metadata;
     add_provenance(file_metadata);

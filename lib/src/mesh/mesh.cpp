@@ -139,7 +139,7 @@ double smallest_angle(const TriangleMesh& mesh) {
     return std::acos(std::clamp(double(worst[std::size_t(rank)]), -1.0, 1.0)) * 180 / std::numbers::pi;
 }
 
-std::vector<std::array<float, 3>> vertex_normals(const TriangleMesh& mesh) {
+std::vector<std::array<float, 3>> compute_vertex_normals(const TriangleMesh& mesh) {
     std::vector<Vec3> sums(mesh.vertices.size(), Vec3{0, 0, 0});
     for (const auto& t : mesh.triangles)
         for (int k = 0; k < 3; ++k) {

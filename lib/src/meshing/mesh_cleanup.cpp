@@ -164,7 +164,8 @@ MeshDeviation change_of(const TriangleMesh& before, const TriangleMesh& after) {
 CleanupStep step_report(const Work& work, const TriangleMesh& before) {
     CleanupStep step{
         std::int64_t(work.mesh.triangles.size()), smallest_angle(work.mesh), change_of(before, work.mesh), {}};
-    if (work.level_set != nullptr) step.deviation = deviation_from(*work.level_set, work.mesh, work.isovalue, work.run);
+    if (work.level_set != nullptr)
+        step.deviation = measure_deviation(*work.level_set, work.mesh, work.isovalue, work.run);
     return step;
 }
 
@@ -174,7 +175,7 @@ void keep_volume(TriangleMesh& mesh, const MeshMeasures& before, const meshing::
     const MeshMeasures after = measure(mesh);
     if (!before.closed || !after.closed || !(after.area > 0)) return;
     const auto offset = static_cast<float>((before.volume - after.volume) / after.area);
-    const auto normals = vertex_normals(mesh);
+    const auto normals = compute_vertex_normals(mesh);
     std::optional<meshing::Level> level;
     if (surface != nullptr) level.emplace(surface->level());
     meshing::Positions goal = mesh.vertices;

@@ -68,7 +68,7 @@ std::vector<double> distances_to(const TriangleMesh& mesh, const std::vector<Vec
         trees[n] = std::make_unique<TriangleTree>(mesh, n * kTriangles, std::min(count, (n + 1) * kTriangles));
     });
     if (points.empty()) return {};
-    const std::vector<std::uint32_t> order = spatial_order(points, points.size());
+    const std::vector<std::uint32_t> order = order_spatially(points, points.size());
     std::vector<double> distances(points.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, order.size(), 256), [&](const auto& range) {
         Kernel::Point_3 closest = to_cgal(mesh.vertices[mesh.triangles.front()[0]]);
@@ -93,9 +93,9 @@ FitStatistics statistics_of(std::vector<double> distances) {
 
 }  // namespace detail
 
-FitStatistics points_to_surface(const std::vector<Vec3>& points, const TriangleMesh& mesh, const RunContext& run) {
-    if (points.empty()) throw Error(Errc::InvalidInput, "points_to_surface: expected at least one point, got none");
-    if (mesh.empty()) throw Error(Errc::InvalidInput, "points_to_surface: the surface has no triangle");
+FitStatistics measure_fit(const std::vector<Vec3>& points, const TriangleMesh& mesh, const RunContext& run) {
+    if (points.empty()) throw Error(Errc::InvalidInput, "measure_fit: expected at least one point, got none");
+    if (mesh.empty()) throw Error(Errc::InvalidInput, "measure_fit: the surface has no triangle");
     std::vector<double> distances;
     with_threads(run, [&] { distances = detail::distances_to(mesh, points); });
     return detail::statistics_of(std::move(distances));

@@ -398,8 +398,8 @@ RelaxReport relax_mesh(TriangleMesh& mesh, const FloatGrid& level_set, const Rel
     return report;
 }
 
-MeshDeviation deviation_from(const FloatGrid& level_set, const TriangleMesh& mesh, double isovalue,
-                             const RunContext& run) {
+MeshDeviation measure_deviation(const FloatGrid& level_set, const TriangleMesh& mesh, double isovalue,
+                                const RunContext& run) {
     MeshDeviation deviation;
     with_threads(run, [&] { deviation = meshing::Surface(level_set, isovalue).deviation(mesh); });
     return deviation;

@@ -52,7 +52,7 @@ std::string count_text(std::size_t count, const char* what) {
 
 [[noreturn]] void bad_value(const Image& labels, const Index3& at) {
     std::ostringstream text;
-    text << "painted_labels: " << labels.path() << ": expected whole numbers >= 0, got "
+    text << "find_painted_labels: " << labels.path() << ": expected whole numbers >= 0, got "
          << labels.at(at[0], at[1], at[2]) << " at voxel " << to_text(at) << "; is it a label image?";
     throw Error(Errc::InvalidInput, text.str());
 }
@@ -300,7 +300,7 @@ PaintedLabel understand(const Image& labels, const LabelName& name, const VoxelB
 
 }  // namespace
 
-std::vector<LabelName> painted_labels(const Image& labels) {
+std::vector<LabelName> find_painted_labels(const Image& labels) {
     std::vector<LabelName> found;
     const std::map<int, std::string> names = painted::segment_names(labels.path());
     for (const auto& [label, box] : boxes_of(labels)) {
@@ -309,7 +309,7 @@ std::vector<LabelName> painted_labels(const Image& labels) {
             {label, named != names.end() ? named->second : "label" + std::to_string(label), named != names.end()});
     }
     if (found.empty())
-        throw Error(Errc::InvalidInput, "painted_labels: " + labels.path() +
+        throw Error(Errc::InvalidInput, "find_painted_labels: " + labels.path() +
                                             ": expected painted voxels, got 0 everywhere in " +
                                             size_text(labels.geometry().size));
     return found;
@@ -341,10 +341,10 @@ Painted understand_painted(const Image& labels, const std::vector<LabelName>& na
     return result;
 }
 
-Contours contours_of(const PaintedLabel& label, const ImageGeometry& lattice, double step, const RunContext& run) {
+Contours connect_outlines(const PaintedLabel& label, const ImageGeometry& lattice, double step, const RunContext& run) {
     std::vector<PointCloud> clouds;
     for (const PaintedView& view : label.views) clouds.push_back(view.outlines);
-    Contours contours = densify(clouds, &lattice, {step, ContourCurve::Lines}, run);
+    Contours contours = densify(clouds, lattice, {step, ContourCurve::Lines}, run);
     const auto is_cut = [&](const Vec3& world) {
         const Vec3 p = lattice.world_to_index(world);
         for (int a = 0; a < 3; ++a)

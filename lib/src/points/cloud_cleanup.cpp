@@ -90,10 +90,10 @@ public:
         // Two rings of new neighbours; CGAL's own 8 spacings of the old points flatten what is curved.
         constexpr double kRings = 2.5;
         constexpr unsigned kRing = 6;
-        double radius = options_.wlop_radius;
-        if (radius == 0)
-            radius = kRings * CGAL::compute_average_spacing<Tag>(entries_, kRing, parameters()) /
-                     std::sqrt(options_.wlop_share);
+        const double radius = options_.wlop_radius
+                                  ? *options_.wlop_radius
+                                  : kRings * CGAL::compute_average_spacing<Tag>(entries_, kRing, parameters()) /
+                                        std::sqrt(options_.wlop_share);
         run_.check();
         std::vector<Point> points;
         CGAL::wlop_simplify_and_regularize_point_set<Tag>(
@@ -154,7 +154,7 @@ std::string CloudCleanupOptions::why_invalid() const {
                   "0 or >= 1", outlier_factor);
     checks.expect_not_negative("simplify", simplify);
     checks.expect(wlop_share > 0 && wlop_share <= 1, "wlop_share", "in (0,1]", wlop_share);
-    checks.expect_not_negative("wlop_radius", wlop_radius);
+    checks.expect_positive("wlop_radius", wlop_radius);
     checks.expect(neighbours >= 6, "neighbours", ">= 6", neighbours);
     return checks.lines();
 }

@@ -114,8 +114,8 @@ void expect_radius(double radius, const char* where) {
 
 }  // namespace
 
-double layer_thickness(const std::vector<Vec3>& points, double radius, const RunContext& run) {
-    expect_radius(radius, "layer_thickness");
+double measure_layer_thickness(const std::vector<Vec3>& points, double radius, const RunContext& run) {
+    expect_radius(radius, "measure_layer_thickness");
     if (points.empty()) return 0;
     const Neighbourhoods cloud(points, radius);
     const std::size_t step = (points.size() + kSamples - 1) / kSamples;
@@ -136,7 +136,7 @@ double layer_thickness(const std::vector<Vec3>& points, double radius, const Run
     return count > 0 ? sum / double(count) : 0.0;
 }
 
-ScanVoxelSize scan_voxel_size(const std::vector<Vec3>& points, double spacing, const RunContext& run) {
+ScanVoxelSize choose_scan_voxel_size(const std::vector<Vec3>& points, double spacing, const RunContext& run) {
     ScanVoxelSize choice{spacing, 0};
     if (!(spacing > 0) || points.empty()) return choice;
     const double widest = second_longest_edge(bounding_box(points)) / 2;
@@ -145,7 +145,7 @@ ScanVoxelSize scan_voxel_size(const std::vector<Vec3>& points, double spacing, c
     for (int k = kCoarsest; k >= 0; --k) {
         const double h = spacing * std::pow(kGrowth, k);
         if (k > 0 && kPlaneVoxels * h > widest) continue;
-        const ScanVoxelSize finer{h, layer_thickness(points, kPlaneVoxels * h, run)};
+        const ScanVoxelSize finer{h, measure_layer_thickness(points, kPlaneVoxels * h, run)};
         const bool holds = finer.thickness <= (thick && !thin ? kCleanShare : kThinShare) * h;
         if (thin && !holds) break;
         if (holds || !any) choice = finer;

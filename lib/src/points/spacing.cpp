@@ -52,11 +52,11 @@ std::vector<Vec3> merge_close_points(const std::vector<Vec3>& points, double cel
     return result;
 }
 
-std::vector<std::uint32_t> spatial_order(const std::vector<Vec3>& points, std::size_t most) {
-    if (most == 0) throw Error(Errc::InvalidOptions, "spatial_order: most: expected > 0, got 0");
+std::vector<std::uint32_t> order_spatially(const std::vector<Vec3>& points, std::size_t most) {
+    if (most == 0) throw Error(Errc::InvalidOptions, "order_spatially: most: expected > 0, got 0");
     if (points.size() > std::numeric_limits<std::uint32_t>::max())
         throw Error(Errc::InvalidInput,
-                    "spatial_order: expected fewer than 2^32 points, got " + std::to_string(points.size()));
+                    "order_spatially: expected fewer than 2^32 points, got " + std::to_string(points.size()));
     if (points.empty()) return {};
     constexpr int kBits = 10;
     const WorldBox box = bounding_box(points);
@@ -79,7 +79,7 @@ std::vector<std::uint32_t> spatial_order(const std::vector<Vec3>& points, std::s
     return order;
 }
 
-SpacingStatistics nearest_neighbour_spacing(const std::vector<Vec3>& points) {
+SpacingStatistics measure_spacing(const std::vector<Vec3>& points) {
     if (points.size() < 2) return {};
     constexpr std::size_t kQueries = 50000;
     const std::size_t step = (points.size() + kQueries - 1) / kQueries;

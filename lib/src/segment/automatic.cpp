@@ -24,7 +24,7 @@ constexpr double kNoisyShare = 0.3;  // of a voxel: a layer of points thicker th
 
 // A thick layer of points, or several beside each other, has its surface in the middle.
 void average_noise(Job& job) {
-    const double radius = kScanRadiusVoxels * job.h(), thickness = layer_thickness(job.points, radius, job.run);
+    const double radius = kScanRadiusVoxels * job.h(), thickness = measure_layer_thickness(job.points, radius, job.run);
     if (!(thickness > kNoisyShare * job.h())) return;
     job.points = average_layers(job.points, radius, job.run);
     job.choose("points_averaged", "within " + number(radius),
@@ -43,17 +43,19 @@ void merge_points(Job& job) {
 
 void choose_attraction_range(Job& job) {
     job.has_automatic_range = true;
-    double& range = job.options.evolve.attraction_range;
-    range = 0;
+    std::optional<double>& chosen = job.options.evolve.attraction_range;
+    chosen = 0;
     if (!job.uses_points()) return;
     if (job.tags() && job.uses_image()) {
-        range = kTagAttractionVoxels * job.h();
+        const double range = kTagAttractionVoxels * job.h();
+        chosen = range;
         job.choose("attraction_range", number(range),
                    number(kTagAttractionVoxels) + " voxels: farther from marks the image decides");
     } else if (job.tags()) {
         job.choose("attraction_range", "0", "unlimited: the band around the points bounds it");
     } else {
-        range = kAttractionVoxels * job.h();
+        const double range = kAttractionVoxels * job.h();
+        chosen = range;
         job.choose("attraction_range", number(range), number(kAttractionVoxels) + " voxels");
     }
 }
@@ -63,7 +65,7 @@ void choose_start(Job& job) {
     Start::Kind& kind = job.options.start.kind;
     if (kind != Start::Kind::Auto || !job.starts_from_marks()) return;
     kind = Start::Kind::Tag;
-    if (!job.guided() || job.options.contours || job.options.tag_distance > 0 || job.points.size() > kMostGuessMarks)
+    if (!job.guided() || job.options.contours || job.options.tag_distance || job.points.size() > kMostGuessMarks)
         return;
     if (job.image == nullptr && !can_enclose(job.points)) return;  // a layer: tagging tells what it needs
     kind = Start::Kind::Guess;
@@ -81,14 +83,14 @@ void try_cloud(Job& job) {
     const SegmentOptions& o = job.options;
     const bool has_seeds =
         !o.exterior_seeds.empty() || !job.hole_seeds.empty() || !o.inside.empty() || !o.outside.empty();
-    if (!asked && (!job.guided() || o.contours || o.tag_distance > 0 || has_seeds || job.image != nullptr ||
+    if (!asked && (!job.guided() || o.contours || o.tag_distance || has_seeds || job.image != nullptr ||
                    !job.uses_points() || job.points.size() <= kMostGuessMarks || !can_enclose(job.points)))
         return;
     Timed timed(job.report().seconds.tag);
     job.cloud =
         orient_cloud(job.points, job.points.size() == job.given.size() ? job.options.hints : PointHints{}, job.run);
     kind = Start::Kind::Cloud;
-    if (job.cloud->encloses || !job.options.voxel_size_is_automatic) return;
+    if (job.cloud->encloses || !job.options.voxel_size_may_grow) return;
     // The indicator is all that there is to see.
     const double h = kViewVoxel * job.cloud->orientation.screened->cell();
     if (h <= job.h()) return;
@@ -121,9 +123,10 @@ void check_input(Job& job) {
 
 void choose_values(Job& job) {
     SegmentOptions& options = job.options;
-    if (options.voxel_size <= 0) {
-        options.voxel_size_is_automatic = true;
-        const VoxelSizeChoice choice = choose_voxel_size(job.image, job.points, job.tags());
+    if (!options.voxel_size) {
+        options.voxel_size_may_grow = true;
+        const VoxelSizeChoice choice =
+            job.image != nullptr ? choose_voxel_size(*job.image) : choose_voxel_size(job.points, job.tags());
         options.voxel_size = choice.voxel_size;
         job.choose("voxel_size", number(job.h()), choice.reason);
     }
@@ -135,45 +138,47 @@ void choose_values(Job& job) {
     EvolveOptions& evolve = options.evolve;
     const bool marked = job.tags() || job.guesses();  // the start is close to the end
     const double delta_voxels = marked ? kTagDeltaVoxels : 1.0;
-    const bool chooses_delta = evolve.delta < 0;
+    const bool chooses_delta = !evolve.delta;
     if (chooses_delta) evolve.delta = delta_voxels * h;
     if (job.options.guess || ((job.guesses() || job.is_cloud()) && job.guided() && job.uses_points()))
         return;  // nothing flows; a later frame may
-    if (chooses_delta) job.choose("delta", number(evolve.delta), number(delta_voxels) + " voxels");
-    if (evolve.tau < 0) job.choose("tau", number(h), "1 voxel at unit speed; longer while the surface moves slowly");
-    if (options.edge.sigma < 0 && job.uses_image()) {
+    if (chooses_delta) job.choose("delta", number(*evolve.delta), number(delta_voxels) + " voxels");
+    if (!evolve.tau) job.choose("tau", number(h), "1 voxel at unit speed; longer while the surface moves slowly");
+    if (!options.edge.sigma && job.uses_image()) {
         const double voxels = job.tags() ? kTagSigmaVoxels : 1.0;
-        job.choose("sigma", number(options.edge.sigma = voxels * h), number(voxels) + " voxels");
+        job.choose("sigma", number(*(options.edge.sigma = voxels * h)), number(voxels) + " voxels");
     }
-    if (evolve.attraction_range < 0) choose_attraction_range(job);
-    if (evolve.image_yields < 0) {
+    if (!evolve.attraction_range) choose_attraction_range(job);
+    if (!evolve.image_yields) {
         evolve.image_yields = job.tags() && job.uses_points() && job.uses_image() ? 1.0 : 0.0;
-        if (evolve.image_yields > 0) job.choose("image_yields", "1", "near marks the marks know better than the edges");
+        if (*evolve.image_yields > 0)
+            job.choose("image_yields", "1", "near marks the marks know better than the edges");
     }
 }
 
 }  // namespace pipeline
 
-VoxelSizeChoice choose_voxel_size(const Image* image, const std::vector<Vec3>& world_points, bool tagged) {
+VoxelSizeChoice choose_voxel_size(const Image& image) {
+    const Vec3& spacing = image.geometry().spacing;
+    return {*std::min_element(spacing.begin(), spacing.end()), "the image's smallest spacing"};
+}
+
+VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool tagged) {
     using pipeline::kFewPoints, pipeline::kCloudNoise, pipeline::number;
-    if (image != nullptr) {
-        const Vec3& spacing = image->geometry().spacing;
-        return {*std::min_element(spacing.begin(), spacing.end()), "the image's smallest spacing"};
-    }
     const std::vector<Vec3> distinct = merge_close_points(world_points, 0);
     if (distinct.size() < 2)
         throw Error(Errc::InvalidInput, "choose_voxel_size: expected an image or at least 2 distinct points, got " +
                                             std::to_string(distinct.size()));
     constexpr const char* kNearest = "the median distance between neighbouring points";
     if (!tagged && distinct.size() > pipeline::kMostGuessMarks) {
-        const CloudScale scale = cloud_scale(distinct);
+        const CloudScale scale = measure_cloud_scale(distinct);
         const double h = kCloudNoise * scale.noise;
         if (h > scale.nearest)
             return {h, number(kCloudNoise) + " times the noise of the points, " + number(scale.noise)};
         return {scale.nearest, kNearest};
     }
-    const double spacing = nearest_neighbour_spacing(distinct).median;
-    const ScanVoxelSize scan = scan_voxel_size(distinct, spacing);
+    const double spacing = measure_spacing(distinct).median;
+    const ScanVoxelSize scan = choose_scan_voxel_size(distinct, spacing);
     if (scan.voxel_size <= spacing) {
         // A surface of few points is so few spacings wide that in voxels as large as they are curvature would outweigh
         // them.

@@ -30,16 +30,16 @@ bool is_large(const Domain& d) {
 }
 
 SegmentOptions coarsened(SegmentOptions options) {
-    const double h = options.voxel_size *= kRefinement;
-    --options.coarse_levels;
+    const double h = *(options.voxel_size = *options.voxel_size * kRefinement);
+    --*options.coarse_levels;
     options.contours = nullptr;  // their points are among the others
-    options.edge.sigma = std::max(options.edge.sigma, kLeastCoarseSigma * h);
+    options.edge.sigma = std::max(options.edge.sigma.value_or(0), kLeastCoarseSigma * h);
     EvolveOptions& evolve = options.evolve;
     evolve.follow = true;
     evolve.tolerance = std::max(evolve.tolerance, kCoarseTolerance);
-    if (evolve.tau > 0) evolve.tau *= kRefinement;
-    double& range = evolve.attraction_range;
-    if (range > 0) range = std::max(range, kLeastCoarseAttraction * h);
+    if (evolve.tau) *evolve.tau *= kRefinement;
+    if (const double range = evolve.attraction_range.value_or(0); range > 0)
+        evolve.attraction_range = std::max(range, kLeastCoarseAttraction * h);
     return options;
 }
 
@@ -54,7 +54,7 @@ void step_back(FloatGrid& u, const FloatGrid& start, double h) {
 /// The flow from `start`, a level set on the lattice of `fine`. @return empty, or why its result is of no use
 std::string run_coarse(Job& job, const FloatGrid& start, const Domain& fine) {
     Timed total(job.report().seconds.total);
-    job.report().domain = domain_of_box(fine.world_box(), job.h());
+    job.report().domain = make_domain(fine.world_box(), job.h());
     try {
         job.result.u = start_from_grid(job.domain(), start, job.run);
     } catch (const Error& error) {
@@ -63,7 +63,7 @@ std::string run_coarse(Job& job, const FloatGrid& start, const Domain& fine) {
     }
     const FloatGridPtr before = job.result.u->deepCopy();
     if (job.uses_points())
-        compute_distance(job, job.tags() ? job.options.tag_distance + band_slack(job) : tube_for_start(job));
+        find_distance(job, job.tags() ? job.options.tag_distance.value_or(0) + band_slack(job) : tube_for_start(job));
     pass_coarse_levels(job);
     find_edges(job);
     flow(job);
@@ -75,8 +75,8 @@ std::string run_coarse(Job& job, const FloatGrid& start, const Domain& fine) {
 }  // namespace
 
 std::optional<FineStart> pass_coarse_levels(Job& job) {
-    int& levels = job.options.coarse_levels;
-    if (levels < 0)
+    std::optional<int>& levels = job.options.coarse_levels;
+    if (!levels)
         levels =
             knows_nothing(job.options.start.kind) && job.origin != StartOrigin::Grown && is_large(job.domain()) ? 1 : 0;
     if (levels == 0 || job.obstacle || job.rests() || job.origin == StartOrigin::Contours) return {};

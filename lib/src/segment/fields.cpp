@@ -85,21 +85,22 @@ double reach_within(const ContourSolid& body, const std::vector<Vec3>& places, c
 
 }  // namespace
 
-void compute_distance(Job& job, double radius, double reach) {
+void find_distance(Job& job, double radius, double reach) {
     Timed timed(job.report().seconds.distance);
     detail::require_tube_memory(job.points, job.domain(), {reach, (radius - reach) / job.h(), true}, "segment",
                                 job.run);
     RunContext checked = job.run;
-    checked.memory_budget = 0;  // distance() need not estimate it again
-    job.result.distance = distance(job.points, job.domain(), {radius}, checked).grid;
+    checked.memory_budget = 0;  // compute_distance() need not estimate it again
+    job.result.distance = compute_distance(job.points, job.domain(), {radius}, checked).grid;
 }
 
 double tube_for_start(Job& job) {
     const double slack = band_slack(job);
-    if (job.options.evolve.attraction_range > 0) return job.options.evolve.attraction_range + slack;
+    if (job.attraction_range() > 0) return job.attraction_range() + slack;
     const WorldBox all = job.domain().world_box();
-    const Domain coarse = domain_of_box(all, kCoarseFactor * job.h());
-    const FloatGridPtr d = distance(job.points, coarse, {diagonal(all, bounding_box(job.points))}, job.run).grid;
+    const Domain coarse = make_domain(all, kCoarseFactor * job.h());
+    const FloatGridPtr d =
+        compute_distance(job.points, coarse, {diagonal(all, bounding_box(job.points))}, job.run).grid;
     double largest = 0;
     const auto d_at = d->getConstAccessor();
     for (auto leaf = job.result.u->tree().cbeginLeaf(); leaf; ++leaf) {
@@ -113,10 +114,11 @@ double tube_for_start(Job& job) {
 }
 
 void compute_trusted_distance(Job& job) {
-    const double range = job.options.evolve.attraction_range;
+    const double range = job.attraction_range();
     if (job.rests() || !job.options.contours || !job.uses_points() || !job.uses_image() || range <= 0) return;
     Timed timed(job.report().seconds.distance);
-    job.trusted_distance = distance(job.trusted, job.domain(), {range + kTubeSlackVoxels * job.h()}, job.run).grid;
+    job.trusted_distance =
+        compute_distance(job.trusted, job.domain(), {range + kTubeSlackVoxels * job.h()}, job.run).grid;
 }
 
 void choose_edge_feature(Job& job) {
@@ -134,8 +136,8 @@ void choose_edge_feature(Job& job) {
         normals.push_back(normal);
     }
     const double reach =
-        reach_within(*job.body(), places, normals, kSidesSigmas * std::max(edge.sigma, job.h()), job.h());
-    const MarkedFeature found = feature_at(*job.image, places, normals, reach);
+        reach_within(*job.body(), places, normals, kSidesSigmas * std::max(edge.sigma.value_or(0), job.h()), job.h());
+    const MarkedFeature found = detect_feature(*job.image, places, normals, reach);
     edge.feature = found.feature;
     const std::string line = "at the marks the image is " + number(std::abs(found.line)) +
                              (found.line > 0 ? " brighter" : " darker") + " than on both sides, which differ by " +
@@ -151,11 +153,11 @@ void find_edges(Job& job) {
                                    ? dilated_topology(*job.result.u, edge_reach(job.origin), job.domain())
                                    : job.result.u;
     EdgeOptions& options = job.options.edge;
-    EdgeResult found = edge(*job.image, *reach, options, job.run);
+    EdgeResult found = detect_edges(*job.image, *reach, options, job.run);
     job.result.edge = found.grid;
     job.report().edge = found.report;
     const EdgeReport& e = found.report;
-    if (options.edge_k <= 0 && options.edge_contrast <= 0) {
+    if (!options.edge_k && !options.edge_contrast) {
         const char* measure = options.feature <= EdgeFeature::Slope ? "gradient" : "brightness";
         job.choose("edge_k", number(e.edge_k),
                    std::string("g = 1/2 at a ") + measure + " of " + number(e.edge_contrast));
@@ -164,7 +166,7 @@ void find_edges(Job& job) {
         job.choose("intensities", number(e.low) + " to " + number(e.high), "mapped to 0 and 1, percentiles");
     // Fixed from here on: a band that moves must not change the meaning of g.
     options.edge_k = e.edge_k;
-    options.edge_contrast = 0;
+    options.edge_contrast.reset();
     options.low = e.low;
     options.high = e.high;
 }
@@ -173,7 +175,7 @@ void extend_edges(Job& job, const FloatGrid& u, EvolveFields& fields) {
     if (fields.edge == nullptr || covers(*fields.edge, u)) return;
     Timed timed(job.report().seconds.edge);
     const FloatGridPtr reach = dilated_topology(u, edge_reach(job.origin), job.domain());
-    job.result.edge = edge(*job.image, *reach, job.options.edge, job.run).grid;
+    job.result.edge = detect_edges(*job.image, *reach, job.options.edge, job.run).grid;
     fields.edge = job.result.edge.get();
 }
 

@@ -11,9 +11,9 @@ inline constexpr double kTubeSlackVoxels = 2.0;  // the upwind scheme looks one 
 
 /// @param reach  the part of the radius that does not depend on h; in memory's estimate a larger h keeps it
 /// @pre the domain is chosen. @throws Error InvalidOptions where memory would not do.
-void compute_distance(Job& job, double radius, double reach = 0);
+void find_distance(Job& job, double radius, double reach = 0);
 
-/// The radius for compute_distance() that the flow from job.result.u needs. Beyond the attraction range d is not
+/// The radius for find_distance() that the flow from job.result.u needs. Beyond the attraction range d is not
 /// needed. Without one it must reach from the start to the points: the surface moves down d, so the largest d on the
 /// start bounds what it meets.
 [[nodiscard]] double tube_for_start(Job& job);

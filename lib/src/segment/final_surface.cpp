@@ -23,9 +23,9 @@ constexpr std::size_t kLoopsToTell = 8;
 
 /// Where a solid ends whatever the marks say: the image's box, and the region of interest.
 Clip where_it_ends(const Job& job) {
-    Clip all = job.image != nullptr ? clip_at(job.image->geometry()) : Clip{};
+    Clip all = job.image != nullptr ? make_clip(job.image->geometry()) : Clip{};
     if (!job.options.roi) return all;
-    const Clip region = clip_at(*job.options.roi);
+    const Clip region = make_clip(*job.options.roi);
     all.insert(all.end(), region.begin(), region.end());
     return all;
 }
@@ -35,7 +35,7 @@ void relax(Job& job) {
 }
 
 void mesh_of(Job& job, const FloatGrid& level_set) {
-    job.result.surface = surface(level_set, job.run);
+    job.result.surface = extract_surface(level_set, job.run);
     job.result.mesh = extract_mesh(*job.result.surface, job.options.extract, job.run);
     relax(job);
 }
@@ -60,27 +60,26 @@ void treat_holes(Job& job) {
     std::vector<float>& distances = job.result.distance_to_points;
     const std::vector<Vec3>& points = job.cloud ? job.cloud->points : job.points;  // without stray ones
     const HolesOptions& options = job.options.holes;
-    const double automatic = hole_distance(points, job.h()),
-                 distance = options.distance > 0 ? options.distance : automatic;
+    const double automatic = choose_hole_distance(points, job.h()), distance = options.distance.value_or(automatic);
     const double slack = kRimSlack * std::min(automatic, distance);
-    distances = distances_to_points(mesh, points, job.run);
-    report.share_without_points = share_beyond(mesh, distances, distance);
+    distances = measure_distances(mesh, points, job.run);
+    report.share_without_points = measure_share_beyond(mesh, distances, distance);
     report.holes.policy = options.policy;
     report.holes.distance = distance;
     if (options.policy == Holes::Close) return;
     if (options.policy == Holes::Open) {
         const double volume = measure(mesh).volume;
-        mesh = trimmed(mesh, distances, distance, slack, report.holes, job.run);
+        mesh = trim_holes(mesh, distances, distance, slack, report.holes, job.run);
         if (report.holes.share > 0) {
             report.holes.closed_volume = volume;
             relax(job);
         }
     }
     if (options.policy == Holes::Flat) {
-        const TriangleMesh flat = flattened(mesh, distances, distance, slack, report.holes, job.run);
+        const TriangleMesh flat = flatten_holes(mesh, distances, distance, slack, report.holes, job.run);
         if (report.holes.share > 0) replace_by(job, flat);
     }
-    if (report.holes.share > 0) distances = distances_to_points(mesh, points, job.run);
+    if (report.holes.share > 0) distances = measure_distances(mesh, points, job.run);
     std::string lengths;
     for (std::size_t n = 0; n < report.holes.loops.size() && n < kLoopsToTell; ++n)
         lengths += (n > 0 ? ", " : "") + number(report.holes.loops[n].length);

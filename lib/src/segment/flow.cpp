@@ -71,7 +71,8 @@ std::string why_vanished(const Job& job) {
     const SegmentReport& report = job.result.report;
     if (job.tags() && job.origin != StartOrigin::Contours) {
         const bool encloses = report.tag.reason.empty() ? !report.band.leaks : report.tag.encloses;
-        if (job.image == nullptr) return detail::why_nothing_held(job.points, job.options.tag_distance, encloses);
+        if (job.image == nullptr)
+            return detail::why_nothing_held(job.points, job.options.tag_distance.value_or(0), encloses);
         if (!encloses)
             return "the points enclose nothing and nothing held it; where the structure is cut off by the image's end "
                    "mark the cut "
@@ -86,7 +87,7 @@ void ask_image(Job& job) {
     if (!job.uses_image() || job.origin == StartOrigin::Corrected) return;
     const std::vector<Vec3>& marks = job.origin == StartOrigin::Guess ? job.on_surface : job.trusted;
     GuidanceOptions options;
-    if (job.options.mark_precision >= 0) options.mark_precision = job.options.mark_precision / kUniformDeviation;
+    if (job.options.mark_precision) options.mark_precision = *job.options.mark_precision / kUniformDeviation;
     options.weight = job.options.evolve.rho;
     GuidanceReport& report = job.report().guidance;
     job.result.u = guide(*job.result.u, marks, *job.image, options, report, job.run);

@@ -31,13 +31,13 @@ void Job::warn(const std::string& line) {
 }
 
 Domain Job::domain_with_margin(double margin) const {
-    if (options.roi) return domain_of_box(*options.roi, h());
-    if (image != nullptr) return domain_of_box(image->geometry().world_box(), h());
-    return domain_of_box(bounding_box(points, margin), h());
+    if (options.roi) return make_domain(*options.roi, h());
+    if (image != nullptr) return make_domain(image->geometry().world_box(), h());
+    return make_domain(bounding_box(points, margin), h());
 }
 
 Domain Job::domain_with_chosen_margin(double automatic) const {
-    return domain_with_margin(options.margin > 0 ? options.margin : automatic);
+    return domain_with_margin(options.margin.value_or(automatic));
 }
 
 }  // namespace covol::pipeline

@@ -47,7 +47,9 @@ struct Job {
 
     SegmentReport& report() { return result.report; }
     [[nodiscard]] const Domain& domain() const { return result.report.domain; }
-    [[nodiscard]] double h() const { return options.voxel_size; }
+    [[nodiscard]] double h() const { return options.voxel_size.value_or(0); }
+    /// 0: unlimited, or not chosen yet.
+    [[nodiscard]] double attraction_range() const { return options.evolve.attraction_range.value_or(0); }
     [[nodiscard]] bool uses_points() const { return options.evolve.theta > 0; }
     [[nodiscard]] bool uses_image() const { return options.evolve.rho > 0; }
     /// Neither marks nor a start are given: the seeds inside are all there is.

@@ -94,9 +94,7 @@ void run_steps(Job& job) {
     make_surface(job);
 }
 
-}  // namespace
-
-SegmentResult segment(const Image* image, const std::vector<Vec3>& world_points, const SegmentOptions& options,
+SegmentResult run_job(const Image* image, const std::vector<Vec3>& world_points, const SegmentOptions& options,
                       const RunContext& run) {
     SegmentResult result;
     with_threads(run, [&] {
@@ -106,6 +104,21 @@ SegmentResult segment(const Image* image, const std::vector<Vec3>& world_points,
         result = std::move(job.result);
     });
     return result;
+}
+
+}  // namespace
+
+SegmentResult segment(const Image& image, const std::vector<Vec3>& world_points, const SegmentOptions& options,
+                      const RunContext& run) {
+    return run_job(&image, world_points, options, run);
+}
+
+SegmentResult segment(const Image& image, const SegmentOptions& options, const RunContext& run) {
+    return run_job(&image, {}, options, run);
+}
+
+SegmentResult reconstruct(const std::vector<Vec3>& world_points, const SegmentOptions& options, const RunContext& run) {
+    return run_job(nullptr, world_points, options, run);
 }
 
 }  // namespace covol

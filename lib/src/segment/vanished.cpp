@@ -47,7 +47,7 @@ std::string why_nothing_held(const std::vector<Vec3>& points, double tag_distanc
     Vec3 side;
     for (int a = 0; a < 3; ++a) side[a] = box.max[a] - box.min[a];
     const double layer =
-        std::min(kLayerSpacings * nearest_neighbour_spacing(points).mean, 0.5 * std::hypot(side[0], side[1], side[2]));
+        std::min(kLayerSpacings * measure_spacing(points).mean, 0.5 * std::hypot(side[0], side[1], side[2]));
     text << (is_line   ? "the points lie on a line"
              : is_flat ? "the points lie in a plane"
                        : "the points enclose nothing")

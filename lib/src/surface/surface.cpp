@@ -119,7 +119,7 @@ FloatGridPtr clipped_surface(const FloatGrid& u, const Domain& domain, const Cli
 
 }  // namespace
 
-FloatGridPtr surface(const FloatGrid& u, const RunContext& run) {
+FloatGridPtr extract_surface(const FloatGrid& u, const RunContext& run) {
     const Domain domain = domain_of(u);
     FloatGridPtr result;
     const Clip clip = clip_of(u);
@@ -131,7 +131,7 @@ FloatGridPtr surface(const FloatGrid& u, const RunContext& run) {
     return result;
 }
 
-FloatGridPtr density(const FloatGrid& surface) {
+FloatGridPtr to_fog_volume(const FloatGrid& surface) {
     FloatGridPtr fog = surface.deepCopy();
     openvdb::tools::sdfToFogVolume(*fog);
     fog->setName("density");

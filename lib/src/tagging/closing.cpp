@@ -11,7 +11,7 @@
 
 namespace covol {
 
-FloatGridPtr closing(const FloatGrid& band, double tag_distance, const RunContext& run) {
+FloatGridPtr close_by_ball(const FloatGrid& band, double tag_distance, const RunContext& run) {
     constexpr double kReachVoxels = 6.0;  // beyond D, enough for a band around the closing's surface
     constexpr double kHalfWidth = 5.0;
     const Domain domain = domain_of(band);
@@ -25,7 +25,7 @@ FloatGridPtr closing(const FloatGrid& band, double tag_distance, const RunContex
             {p.origin[0] + double(p.center[0]), p.origin[1] + double(p.center[1]), p.origin[2] + double(p.center[2])});
     }
     // Inside the tagged body D - d is the signed distance to the closing; outside it anything positive will do.
-    const FloatGridPtr grown = distance(surface, domain, {tag_distance + reach}, run).grid;
+    const FloatGridPtr grown = compute_distance(surface, domain, {tag_distance + reach}, run).grid;
     const auto D = static_cast<float>(tag_distance);
     const auto inside = band.getConstAccessor();
     bool any = false;

@@ -270,7 +270,7 @@ Domain analysis_domain(const std::vector<Vec3>& points, const Domain& domain, do
         if (!(box.max[a] > box.min[a]))
             throw Error(Errc::InvalidInput, "choose_tag_distance: no point lies in the domain");
     }
-    return domain_of_box(box, voxel_size);
+    return make_domain(box, voxel_size);
 }
 
 /// Distance at which the main cores are closed, voxels; 0 when nothing but pockets is enclosed.
@@ -323,7 +323,7 @@ TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Dom
     std::ostringstream reason;
     for (;;) {
         run.check();
-        const DistanceResult tube = distance(points, analysis_domain(points, domain, a), {radius}, run);
+        const DistanceResult tube = compute_distance(points, analysis_domain(points, domain, a), {radius}, run);
         if (tube.grid->tree().leafCount() == 0) break;
         const Analysis analysis = Sweep(*tube.grid, radius, exterior_seeds).run();
         const Verdict verdict = judge(analysis);
@@ -343,7 +343,7 @@ TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Dom
         radius = std::max(1.3 * choice.tag_distance, 4 * a);
     }
     if (choice.tag_distance == 0) {
-        const double spacing = nearest_neighbour_spacing(merge_close_points(points, 0.0)).mean;
+        const double spacing = measure_spacing(merge_close_points(points, 0.0)).mean;
         choice.tag_distance = std::max(1.8 * spacing, 1.5 * h);
         reason << "no closed structure found; 1.8 times the mean spacing " << spacing;
     }

@@ -96,15 +96,14 @@ TEST_CASE("shifted spheres have the analytic overlap and distances, as level set
         CHECK(report.volume_a == Approx(whole).epsilon(0.005));
         CHECK(report.volume_b == Approx(whole).epsilon(0.005));
         CHECK(report.hausdorff == Approx(shift).margin(0.02 * h));
-        CHECK(report.mean_distance == Approx(mean).margin(0.03 * h));
+        CHECK(report.assd == Approx(mean).margin(0.03 * h));
     }
 }
 
 TEST_CASE("concentric spheres: every distance is the difference of the radii") {
     const CompareReport report = compare(level_set({1, 2, 3}, 1.0, 0.05), level_set({1, 2, 3}, 0.8, 0.04));
     CHECK(report.dice == Approx(2 * 0.512 / 1.512).margin(0.003));
-    for (const double d : {report.hausdorff, report.hausdorff95, report.mean_distance})
-        CHECK(d == Approx(0.2).margin(0.002));
+    for (const double d : {report.hausdorff, report.hd95, report.assd}) CHECK(d == Approx(0.2).margin(0.002));
 }
 
 TEST_CASE("a solid equals itself, and mesh and level set of one solid agree") {
@@ -130,7 +129,7 @@ TEST_CASE("a rotated anisotropic mask agrees with the mesh and the level set of 
         CHECK(report.dice > 0.998);
         CHECK(report.volume_a == Approx(whole).epsilon(0.01));
         CHECK(report.hausdorff <= 0.13);  // the surface lies between centres that differ
-        CHECK(report.mean_distance < 0.03);
+        CHECK(report.assd < 0.03);
     }
     const CompareReport swapped = compare(smooth, mask);
     CHECK(swapped.dice == compare(mask, smooth).dice);
@@ -202,18 +201,18 @@ TEST_CASE("points to surface: exact distances, mean, 95 % and maximum") {
     TriangleMesh mesh;
     mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
     mesh.triangles = {{0, 1, 2}};
-    const FitStatistics one = points_to_surface({{0.2, 0.2, 3}}, mesh);
+    const FitStatistics one = measure_fit({{0.2, 0.2, 3}}, mesh);
     CHECK(one.mean == Approx(3));
-    CHECK(points_to_surface({{-3, -4, 0}}, mesh).max == Approx(5));
-    CHECK(points_to_surface({{1, 1, 0}}, mesh).max == Approx(std::sqrt(0.5)));
+    CHECK(measure_fit({{-3, -4, 0}}, mesh).max == Approx(5));
+    CHECK(measure_fit({{1, 1, 0}}, mesh).max == Approx(std::sqrt(0.5)));
     std::vector<Vec3> points;
     for (int i = 1; i <= 100; ++i) points.push_back({0.2, 0.2, double(i)});
-    const FitStatistics fit = points_to_surface(points, mesh);
+    const FitStatistics fit = measure_fit(points, mesh);
     CHECK(fit.mean == Approx(50.5));
     CHECK(fit.p95 == Approx(95));
     CHECK(fit.max == Approx(100));
-    CHECK_THROWS_AS(points_to_surface({}, mesh), Error);
-    CHECK_THROWS_AS(points_to_surface(points, TriangleMesh{}), Error);
+    CHECK_THROWS_AS(measure_fit({}, mesh), Error);
+    CHECK_THROWS_AS(measure_fit(points, TriangleMesh{}), Error);
 }
 
 TEST_CASE("the report does not depend on the number of threads") {
@@ -224,6 +223,6 @@ TEST_CASE("the report does not depend on the number of threads") {
     run.threads = 2;
     const CompareReport two = compare(a, b, run);
     CHECK(one.dice == two.dice);
-    CHECK(one.mean_distance == two.mean_distance);
-    CHECK(one.hausdorff95 == two.hausdorff95);
+    CHECK(one.assd == two.assd);
+    CHECK(one.hd95 == two.hd95);
 }

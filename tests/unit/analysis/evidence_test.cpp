@@ -19,7 +19,7 @@ constexpr double kH = 0.5, kR = 8, kReach = 2;
 Domain space() { return {kH, {0, 0, 0}, {-22, -22, -22}, {22, 22, 22}}; }
 
 const FloatGridPtr& sphere() {
-    static const FloatGridPtr grid = surface(*start_from_sphere(space(), {0, 0, 0}, kR));
+    static const FloatGridPtr grid = extract_surface(*start_from_sphere(space(), {0, 0, 0}, kR));
     return grid;
 }
 
@@ -63,7 +63,7 @@ const double kAngle = 2 * std::asin(kReach / (2 * kR));
 
 TEST_CASE("A half without marks is unsupported, but for the rim that the marks reach") {
     const TriangleMesh mesh = extract_mesh(*sphere());
-    const Evidence e = evidence(mesh, lower_half(), nullptr, slices(), {kReach, 0.25, 0});
+    const Evidence e = assess_evidence(mesh, lower_half(), slices(), {kReach, 0.25, 0});
     CHECK(e.area == Approx(4 * M_PI * kR * kR).epsilon(0.01));
     CHECK(e.unsupported_area / e.area == Approx((1 - std::sin(kAngle)) / 2).epsilon(0.01));
     CHECK(e.edge_strength.empty());
@@ -78,7 +78,7 @@ TEST_CASE("A half without marks is unsupported, but for the rim that the marks r
 }
 
 TEST_CASE("Each slice tells of its own zone of the sphere") {
-    const Evidence e = evidence(extract_mesh(*sphere()), lower_half(0.5), nullptr, slices(), {kReach, 0.25, 0});
+    const Evidence e = assess_evidence(extract_mesh(*sphere()), lower_half(0.5), slices(), {kReach, 0.25, 0});
     int last = -1;
     double area = 0;
     int marks = 0;
@@ -111,13 +111,13 @@ TEST_CASE("Each slice tells of its own zone of the sphere") {
 TEST_CASE("Strong edges support what marks do not") {
     const TriangleMesh mesh = extract_mesh(*sphere());
     const FloatGridPtr all = edges([](const openvdb::Vec3d&) { return true; });
-    const Evidence supported = evidence(mesh, lower_half(), all.get(), slices(), {kReach, 0.25, 5});
+    const Evidence supported = assess_evidence(mesh, lower_half(), *all, slices(), {kReach, 0.25, 5});
     CHECK(supported.unsupported_area == 0);
     CHECK(supported.suggestions.empty());
     for (const float s : supported.edge_strength) CHECK(s == Approx(0.8).margin(1e-5));
 
     const FloatGridPtr half = edges([](const openvdb::Vec3d& x) { return x[0] > 0; });
-    const Evidence e = evidence(mesh, lower_half(), half.get(), slices(), {kReach, 0.25, 1});
+    const Evidence e = assess_evidence(mesh, lower_half(), *half, slices(), {kReach, 0.25, 1});
     CHECK(e.unsupported_area / e.area == Approx((1 - std::sin(kAngle)) / 4).epsilon(0.03));
     REQUIRE(e.suggestions.size() == 1);
     CHECK(e.suggestions[0].world[0] < 0);
@@ -125,7 +125,7 @@ TEST_CASE("Strong edges support what marks do not") {
 
 TEST_CASE("The suggested outline is the one that reaches the most bare surface") {
     const TriangleMesh mesh = extract_mesh(*sphere());
-    const Evidence e = evidence(mesh, lower_half(), nullptr, slices(), {kReach, 0.25, 20});
+    const Evidence e = assess_evidence(mesh, lower_half(), slices(), {kReach, 0.25, 20});
     REQUIRE(e.suggestions.size() >= 2);
     // Marks at elevation t cover t - angle to t + angle: the lowest that wastes nothing is at 2 angle.
     const double z = kR * std::sin(2 * kAngle);
@@ -148,23 +148,23 @@ TEST_CASE("The suggested outline is the one that reaches the most bare surface")
 
 TEST_CASE("Without marks all is bare, and the same bits come from any number of threads") {
     const TriangleMesh mesh = extract_mesh(*sphere());
-    const Evidence e = evidence(mesh, {}, nullptr, slices(), {kReach, 0.25, 3});
+    const Evidence e = assess_evidence(mesh, {}, slices(), {kReach, 0.25, 3});
     CHECK(e.unsupported_area == e.area);
     CHECK(e.distance_to_marks.empty());
     CHECK(e.suggestions.size() == 3);
     RunContext one;
     one.threads = 1;
-    const Evidence again = evidence(mesh, {}, nullptr, slices(), {kReach, 0.25, 3}, one);
+    const Evidence again = assess_evidence(mesh, {}, slices(), {kReach, 0.25, 3}, one);
     for (int n = 0; n < 3; ++n) {
         CHECK(again.suggestions[n].world == e.suggestions[n].world);
         CHECK(again.suggestions[n].area == e.suggestions[n].area);
     }
 }
 
-TEST_CASE("evidence() says what is wrong with its input") {
-    CHECK_THROWS_AS(evidence({}, {}, nullptr, slices(), {kReach, 0.25, 0}), Error);
+TEST_CASE("assess_evidence() says what is wrong with its input") {
+    CHECK_THROWS_AS(assess_evidence({}, {}, slices(), {kReach, 0.25, 0}), Error);
     const TriangleMesh mesh = extract_mesh(*sphere());
-    CHECK_THROWS_WITH(evidence(mesh, {}, nullptr, slices(), {0, 0.25, 0}), Catch::Contains("reach"));
-    CHECK_THROWS_WITH(evidence(mesh, {}, nullptr, slices(), {1, 1.5, 0}), Catch::Contains("weak_edge"));
-    CHECK_THROWS_WITH(evidence(mesh, {}, nullptr, slices(), {1, 0.5, -1}), Catch::Contains("suggestions"));
+    CHECK_THROWS_WITH(assess_evidence(mesh, {}, slices(), {0, 0.25, 0}), Catch::Contains("reach"));
+    CHECK_THROWS_WITH(assess_evidence(mesh, {}, slices(), {1, 1.5, 0}), Catch::Contains("weak_edge"));
+    CHECK_THROWS_WITH(assess_evidence(mesh, {}, slices(), {1, 0.5, -1}), Catch::Contains("suggestions"));
 }

@@ -56,7 +56,7 @@ TEST_CASE("solids have the volume of their formula, in the labels and, with part
 }
 
 TEST_CASE("points lie on the surface that the labels bound") {
-    const std::string kind = GENERATE(from_range(phantom_kinds()));
+    const std::string kind = GENERATE(from_range(list_phantom_kinds()));
     const Phantom phantom = make_phantom(options_of(kind));
     INFO(kind);
     REQUIRE(phantom.points.size() == 200);

@@ -24,11 +24,11 @@ int brightness(const std::array<int, 3>& c) { return c[0] + c[1] + c[2]; }
 }  // namespace
 
 TEST_CASE("a sphere fills the middle of its panel and leaves the corners to the background") {
-    const Domain domain = domain_of_box({{-1, -1, -1}, {1, 1, 1}}, 0.05);
-    const FloatGridPtr sphere = surface(*start_from_sphere(domain, {0, 0, 0}, 0.6));
+    const Domain domain = make_domain({{-1, -1, -1}, {1, 1, 1}}, 0.05);
+    const FloatGridPtr sphere = extract_surface(*start_from_sphere(domain, {0, 0, 0}, 0.6));
     RenderOptions options;
     options.width = 404, options.height = 200, options.slices = 0;
-    const Picture picture = render(*sphere, nullptr, {}, options);
+    const Picture picture = render(*sphere, options);
     REQUIRE(picture.rgb.size() == 3U * 404 * 200);
     int lit = 0;
     for (int y = 0; y < 200; ++y)
@@ -44,15 +44,15 @@ TEST_CASE("a slice shows the image, the outline where the surface is, and the po
     kind.kind = "sphere";
     kind.size = 48;
     const Phantom phantom = make_phantom(kind);
-    const Domain domain = domain_of_box(phantom.image.geometry().world_box(), phantom.image.geometry().spacing[0]);
+    const Domain domain = make_domain(phantom.image.geometry().world_box(), phantom.image.geometry().spacing[0]);
     const WorldBox box = domain.world_box();
     const double radius = 0.2 * (box.max[0] - box.min[0]);
     const Vec3 center = {0.5 * (box.min[0] + box.max[0]), 0.5 * (box.min[1] + box.max[1]),
                          0.5 * (box.min[2] + box.max[2])};
-    const FloatGridPtr sphere = surface(*start_from_sphere(domain, center, radius));
+    const FloatGridPtr sphere = extract_surface(*start_from_sphere(domain, center, radius));
     RenderOptions options;
     options.width = 404, options.height = 200, options.slices = 1;
-    const Picture picture = render(*sphere, &phantom.image, {center}, options);
+    const Picture picture = render(*sphere, phantom.image, {center}, options);
     CHECK(pixel(picture, 204 + 100, 100)[2] > pixel(picture, 204 + 100, 100)[0]);  // the dot is cyan
     int orange = 0;
     for (int x = 204; x < 404; ++x) {

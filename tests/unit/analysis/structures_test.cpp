@@ -25,7 +25,7 @@ struct Ball {
     }
 };
 
-FloatGridPtr ball(const Ball& b) { return surface(*start_from_sphere(space(), b.center, b.radius)); }
+FloatGridPtr ball(const Ball& b) { return extract_surface(*start_from_sphere(space(), b.center, b.radius)); }
 
 Vec3 to_vec(const std::array<float, 3>& v) { return {v[0], v[1], v[2]}; }
 
@@ -131,8 +131,8 @@ TEST_CASE("A gap narrower than a voxel closes in its middle, a wider one stays")
 
 TEST_CASE("Walls beside each other close no more than the gap between them") {
     // Two slabs with a slit of 0.6 voxel; above them nothing grows.
-    const FloatGridPtr a = surface(*start_from_box(space(), {{-6, -6, -6}, {0, 6, 4}}));
-    const FloatGridPtr b = surface(*start_from_box(space(), {{0.6 * kH, -6, -6}, {6, 6, 4}}));
+    const FloatGridPtr a = extract_surface(*start_from_box(space(), {{-6, -6, -6}, {0, 6, 4}}));
+    const FloatGridPtr b = extract_surface(*start_from_box(space(), {{0.6 * kH, -6, -6}, {6, 6, 4}}));
     const auto [surfaces, report] = separate({{"a", a}, {"b", b}});
     // Each grows by half the slit, but for a strip along the rim, less than a voxel wide, that rounds off.
     const double most = 0.3 * kH * 12 * 10, least = most - 0.3 * kH * 2 * (12 + 10) * kH;
@@ -222,7 +222,7 @@ TEST_CASE("separate() says what is wrong with its input") {
     CHECK_THROWS_WITH(separate({{"a", a}, {"b", a}}), Catch::Contains("'a' and 'b' are the same solid"));
     Domain finer = space();
     finer.voxel_size /= 2;
-    const FloatGridPtr other = surface(*start_from_sphere(finer, {0, 0, 0}, 3));
+    const FloatGridPtr other = extract_surface(*start_from_sphere(finer, {0, 0, 0}, 3));
     CHECK_THROWS_WITH(separate({{"a", a}, {"b", other}}), Catch::Contains("one transform"));
     CHECK_THROWS_AS(separate({{"a", a}}, {std::nan(""), 0.9}), Error);
     CHECK_THROWS_AS(separate({{"a", a}}, {0, 0.3}), Error);
@@ -231,14 +231,14 @@ TEST_CASE("separate() says what is wrong with its input") {
 
 TEST_CASE("Labels leave no voxel to two structures, and none out where they touch") {
     // The middle plane x = 0.1 is a plane of voxel centres: ties all over it.
-    const FloatGridPtr a = surface(*start_from_box(space(), {{-5.9, -4, -4}, {0.6, 4, 4}}));
-    const FloatGridPtr b = surface(*start_from_box(space(), {{-0.4, -4, -4}, {6.1, 4, 4}}));
+    const FloatGridPtr a = extract_surface(*start_from_box(space(), {{-5.9, -4, -4}, {0.6, 4, 4}}));
+    const FloatGridPtr b = extract_surface(*start_from_box(space(), {{-0.4, -4, -4}, {6.1, 4, 4}}));
     const SeparateResult settled = separate({{"b", b}, {"a", a}});
     ImageGeometry g;
     g.size = {40, 40, 40};
     g.spacing = {kH, kH, kH};
     g.origin = {0.1 - 20 * kH, -0.05 - 20 * kH, 0.02 - 20 * kH};
-    const auto labels = label_image({{"b", settled.surfaces[0]}, {"a", settled.surfaces[1]}}, g);
+    const auto labels = make_label_image({{"b", settled.surfaces[0]}, {"a", settled.surfaces[1]}}, g);
     REQUIRE(labels.size() == 64000);
     for (int k = 0; k < 40; ++k)
         for (int j = 0; j < 40; ++j)
@@ -254,8 +254,8 @@ TEST_CASE("Labels leave no voxel to two structures, and none out where they touc
 }
 
 TEST_CASE("Names become identifiers") {
-    CHECK(grid_names({"anything at all"}) == std::vector<std::string>{"surface"});
-    CHECK(grid_names({"ve", "left lung", "left-lung", "2nd", "é"}) ==
+    CHECK(make_grid_names({"anything at all"}) == std::vector<std::string>{"surface"});
+    CHECK(make_grid_names({"ve", "left lung", "left-lung", "2nd", "é"}) ==
           std::vector<std::string>{"ve", "left_lung", "left_lung_2", "_2nd", "__"});
 }
 
@@ -263,7 +263,7 @@ TEST_CASE("Segment metadata names labels, colours and extents") {
     std::vector<std::uint8_t> labels(4 * 3 * 2, 0);
     labels[1] = 1;           // (1,0,0)
     labels[12 + 4 + 2] = 1;  // (2,1,1)
-    const auto fields = slicer_segments({"ve", "ex e"}, labels, {4, 3, 2});
+    const auto fields = make_slicer_segments({"ve", "ex e"}, labels, {4, 3, 2});
     const auto at = [&](const std::string& key) {
         for (const auto& [name, value] : fields)
             if (name == key) return value;
@@ -277,6 +277,6 @@ TEST_CASE("Segment metadata names labels, colours and extents") {
     CHECK(at("Segment1_Extent") == "0 -1 0 -1 0 -1");
     CHECK(at("Segment0_Layer") == "0");
     CHECK(at("Segment0_Color") == "0.266667 0.466667 0.666667");
-    CHECK_THAT(itksnap_labels({"ve", "a \"b\""}),
+    CHECK_THAT(make_itksnap_labels({"ve", "a \"b\""}),
                Catch::Contains("    1   68  119  170        1  1  1    \"ve\"\n") && Catch::Contains("\"a 'b'\""));
 }

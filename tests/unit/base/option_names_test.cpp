@@ -10,7 +10,7 @@ namespace {
 
 /// As a form would: "[field]" or "[field: value]".
 std::string in_form(const std::string& message) {
-    return with_names(
+    return replace_names(
         message, [](const NamedOption& o) { return "[" + o.field + (o.value.empty() ? "" : ": " + o.value) + "]"; });
 }
 
@@ -20,7 +20,7 @@ TEST_CASE("options that a message names are found, with their values, and replac
     CHECK(in_form("use a larger `voxel_size`, or `roi`") == "use a larger [voxel_size], or [roi]");
     CHECK(in_form("; `space = Index, order = ZYX` would") == "; [space: Index] [order: ZYX] would");
     CHECK(in_form("`spacing = sx,sy,sz` gives it") == "[spacing: sx,sy,sz] gives it");
-    const std::vector<NamedOption> named = named_options("`max_steps = 0, tag_distance = 1.5e-3` or `delta`");
+    const std::vector<NamedOption> named = find_named_options("`max_steps = 0, tag_distance = 1.5e-3` or `delta`");
     REQUIRE(named.size() == 3);
     CHECK((named[0].field == "max_steps" && named[0].value == "0"));
     CHECK((named[1].field == "tag_distance" && named[1].value == "1.5e-3"));
@@ -31,7 +31,7 @@ TEST_CASE("other text between backquotes stays as it is") {
     for (const char* text :
          {"", "no option", "what `covol band` wrote", "`Roi`", "``", "`", "a `b", "`x = `` y", "cells`7.tif: `z9`"}) {
         CHECK(in_form(text) == text);
-        CHECK(named_options(text).empty());
+        CHECK(find_named_options(text).empty());
     }
     CHECK(in_form("its name has a ` in it; choose a part with `roi`") ==
           "its name has a ` in it; choose a part with [roi]");

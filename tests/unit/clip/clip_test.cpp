@@ -141,12 +141,12 @@ TEST_CASE("a solid that the image cuts ends at the image's box: mesh, cap, mask 
             const Scene scene = scene_of(cut, radii);
             INFO(cut.name << ", " << 100 * cut.share << " % left" << (cut.two ? " along two axes" : "") << ", radii "
                           << radii[0] << " " << radii[1] << " " << radii[2]);
-            const Clip clip = clip_at(scene.geometry);
+            const Clip clip = make_clip(scene.geometry);
             const WorldBox box = scene.geometry.world_box();
-            const Domain domain = domain_of_box(box, cut.h);
+            const Domain domain = make_domain(box, cut.h);
             const FloatGridPtr u = level_set(domain, scene.shape);
             set_clip(*u, clip);
-            const FloatGridPtr solid = surface(*u);
+            const FloatGridPtr solid = extract_surface(*u);
             REQUIRE(clip_of(*solid) == clip);
             const TriangleMesh mesh = extract_mesh(*solid);
             const MeshMeasures m = measure(mesh);
@@ -202,9 +202,9 @@ TEST_CASE("a solid that the image cuts ends at the image's box: mesh, cap, mask 
 
 TEST_CASE("the clip survives a .vdb file, and a surface of a clipped surface is the same solid") {
     const Scene scene = scene_of({"", {0.8, 0.8, 1.75}, 0.8, 0.5, true, false}, {9, 8, 11});
-    const FloatGridPtr u = level_set(domain_of_box(scene.geometry.world_box(), 0.8), scene.shape);
-    set_clip(*u, clip_at(scene.geometry));
-    const FloatGridPtr solid = surface(*u);
+    const FloatGridPtr u = level_set(make_domain(scene.geometry.world_box(), 0.8), scene.shape);
+    set_clip(*u, make_clip(scene.geometry));
+    const FloatGridPtr solid = extract_surface(*u);
     const std::string path = (std::filesystem::temp_directory_path() / "covol_clip_test.vdb").string();
     write_vdb(path, {solid}, {});
     const FloatGridPtr read = read_vdb(path, "surface");
@@ -212,7 +212,7 @@ TEST_CASE("the clip survives a .vdb file, and a surface of a clipped surface is 
     CHECK(clip_of(*read) == clip_of(*solid));
     const double volume = measure(extract_mesh(*solid)).volume;
     CHECK(measure(extract_mesh(*read)).volume == volume);
-    CHECK(measure(extract_mesh(*surface(*solid))).volume == Approx(volume).epsilon(0.005));
+    CHECK(measure(extract_mesh(*extract_surface(*solid))).volume == Approx(volume).epsilon(0.005));
 }
 
 TEST_CASE("a turned image cuts along its own faces") {
@@ -222,10 +222,10 @@ TEST_CASE("a turned image cuts along its own faces") {
     const double c = std::cos(0.4), s = std::sin(0.4);
     geometry.direction = {{{c, 0, s}, {0, 1, 0}, {-s, 0, c}}};
     const Vec3 center = geometry.index_to_world({19.5, 19.5, -0.5});  // in the middle of the first slice's face
-    const FloatGridPtr u = level_set(domain_of_box(geometry.world_box(), 1), ellipsoid(center, {13, 13, 13}));
-    const Clip clip = clip_at(geometry);
+    const FloatGridPtr u = level_set(make_domain(geometry.world_box(), 1), ellipsoid(center, {13, 13, 13}));
+    const Clip clip = make_clip(geometry);
     set_clip(*u, clip);
-    const TriangleMesh mesh = extract_mesh(*surface(*u));
+    const TriangleMesh mesh = extract_mesh(*extract_surface(*u));
     const MeshMeasures m = measure(mesh);
     CHECK(m.closed);
     CHECK(m.manifold);
@@ -246,11 +246,11 @@ TEST_CASE("a turned image cuts along its own faces") {
 TEST_CASE("a solid that no face cuts is the same with a clip and without one") {
     ImageGeometry geometry;
     geometry.size = {40, 40, 40};
-    const Domain domain = domain_of_box(geometry.world_box(), 1);
+    const Domain domain = make_domain(geometry.world_box(), 1);
     const FloatGridPtr u = level_set(domain, ellipsoid({19, 20, 18.5}, {12, 13, 14}));
-    const TriangleMesh before = extract_mesh(*surface(*u));
-    set_clip(*u, clip_at(geometry));
-    const TriangleMesh after = extract_mesh(*surface(*u));
+    const TriangleMesh before = extract_mesh(*extract_surface(*u));
+    set_clip(*u, make_clip(geometry));
+    const TriangleMesh after = extract_mesh(*extract_surface(*u));
     CHECK(before.vertices == after.vertices);
     CHECK(before.triangles == after.triangles);
 }
@@ -259,10 +259,10 @@ TEST_CASE("a solid that fills the image is the image's box") {
     ImageGeometry geometry;
     geometry.size = {10, 12, 9};
     geometry.spacing = {1, 1, 1.7};
-    const Domain domain = domain_of_box(geometry.world_box(), 1);
+    const Domain domain = make_domain(geometry.world_box(), 1);
     const FloatGridPtr u = level_set(domain, [](const Vec3&) { return -5.0; });
-    set_clip(*u, clip_at(geometry));
-    const MeshMeasures m = measure(extract_mesh(*surface(*u)));
+    set_clip(*u, make_clip(geometry));
+    const MeshMeasures m = measure(extract_mesh(*extract_surface(*u)));
     CHECK(m.closed);
     CHECK(m.genus == 0);
     CHECK(m.volume == Approx(10 * 12 * 9 * 1.7).epsilon(0.002));

@@ -60,7 +60,7 @@ public:
 
     [[nodiscard]] Contours densify(double step, ContourCurve curve = ContourCurve::Lines,
                                    const RunContext& run = {}) const {
-        return covol::densify({cloud_}, &geometry_, {step, curve}, run);
+        return covol::densify({cloud_}, geometry_, {step, curve}, run);
     }
     [[nodiscard]] const ImageGeometry& geometry() const { return geometry_; }
     [[nodiscard]] const PointCloud& cloud() const { return cloud_; }
@@ -134,11 +134,11 @@ double widest_gap(const ContourSolid& solid, const std::vector<Vec3>& points, co
     return widest;
 }
 
-/// What a flood from outside through {d > D} leaves, by band()'s own judgement.
+/// What a flood from outside through {d > D} leaves, by tag_interior()'s own judgement.
 BandReport flood(const std::vector<Vec3>& points, double h, double D) {
-    const Domain domain = domain_of_box(bounding_box(points, D + 6 * h), h);
-    const FloatGridPtr d = covol::distance(points, domain, {D + 6 * h}).grid;
-    return band(*d, {D, {}}).report;
+    const Domain domain = make_domain(bounding_box(points, D + 6 * h), h);
+    const FloatGridPtr d = covol::compute_distance(points, domain, {D + 6 * h}).grid;
+    return tag_interior(*d, {D, {}}).report;
 }
 
 struct Warnings {
@@ -406,11 +406,11 @@ TEST_CASE("slices need not be evenly spaced, nor lie on the image's") {
 
 TEST_CASE("a dome ends where the shrinking section would") {
     // Areas of an ellipsoid's sections near its pole are linear in the height.
-    CHECK(cap_height(3, 9, 4, 4) == Approx(2));
-    CHECK(cap_height(3, 4, 4, 4) == 4);  // not beyond the next slice
-    CHECK(cap_height(3, 3, 4, 4) == 4);
-    CHECK(cap_height(5, 3, 4, 4) == 4);
-    CHECK(cap_height(3, 0, 4, 4) == 4);
+    CHECK(compute_cap_height(3, 9, 4, 4) == Approx(2));
+    CHECK(compute_cap_height(3, 4, 4, 4) == 4);  // not beyond the next slice
+    CHECK(compute_cap_height(3, 3, 4, 4) == 4);
+    CHECK(compute_cap_height(5, 3, 4, 4) == 4);
+    CHECK(compute_cap_height(3, 0, 4, 4) == 4);
 }
 
 TEST_CASE("one slice makes a lens, two slices a body") {
@@ -462,7 +462,7 @@ TEST_CASE("the start from a body has its volume, and holes stay open") {
     Drawing drawing(cube(64, 0.5));
     for (int k = 12; k <= 50; k += 2) drawing.circle(32, 32, k, 12).circle(32, 32, k, 5);
     const Contours c = drawing.densify(0.5);
-    const Domain domain = domain_of_box(drawing.geometry().world_box(), 0.5);
+    const Domain domain = make_domain(drawing.geometry().world_box(), 0.5);
     const FloatGridPtr u = start_from_contours(domain, *c.solid);
     CHECK(domain_of(*u) == domain);
     double inside = 0;
@@ -495,7 +495,7 @@ TEST_CASE("the points do not depend on the number of threads") {
 // ---- hostile input --------------------------------------------------------------------------------------------------
 
 TEST_CASE("what is no contour is refused, and the message names it") {
-    CHECK(code_of([] { (void)densify({}, nullptr, {1}); }) == Errc::InvalidInput);
+    CHECK(code_of([] { (void)densify({}, {1}); }) == Errc::InvalidInput);
     const Drawing loose = Drawing(cube(40)).loose({1, 2, 3});
     CHECK(message_of([&] { (void)loose.densify(1); }).find("marks.csv: expected lines of marks") != std::string::npos);
     for (const double step : {0.0, -1.0, std::nan(""), HUGE_VAL}) {
@@ -569,7 +569,7 @@ TEST_CASE("contours in the world need no image") {
     for (int k = 10; k <= 20; ++k) drawing.circle(30, 30, k, 10);
     PointCloud world = drawing.cloud();
     world.space = PointSpace::World;
-    const Contours c = densify({world}, nullptr, {0.5});
+    const Contours c = densify({world}, {0.5});
     CHECK(c.slices == 11);
     CHECK(c.solid->level({40, 30, 14.5}) == Approx(0).margin(0.02));
 }

@@ -34,11 +34,11 @@ TEST_CASE("lines of seeds are scribbles", "[seeds]") {
     line.end = 3;
     line.closed = false;
     cloud.lines = {line};
-    const std::vector<Vec3> seeds = seeds_of(cloud, nullptr, 1);
+    const std::vector<Vec3> seeds = collect_seeds(cloud, 1);
     CHECK(seeds.size() == 9);  // 0..4, then 1..3 along y, and the loose one
     CHECK(seeds.back() == Vec3{9, 9, 9});
     cloud.lines[0].closed = true;
-    CHECK(seeds_of(cloud, nullptr, 1).size() == 13);
+    CHECK(collect_seeds(cloud, 1).size() == 13);
 }
 
 TEST_CASE("the surface between two seeds is their middle plane, within half their distance", "[seeds]") {

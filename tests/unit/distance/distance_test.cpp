@@ -14,7 +14,7 @@ namespace {
 
 /// Every active voxel has the exact distance, every voxel of the domain in the tube is active, and no other.
 void check_against_brute_force(const std::vector<Vec3>& points, const Domain& domain, double radius) {
-    const DistanceResult result = distance(points, domain, {radius});
+    const DistanceResult result = compute_distance(points, domain, {radius});
     std::int64_t active = 0;
     double worst = 0;
     int misplaced = 0;
@@ -34,7 +34,7 @@ void check_against_brute_force(const std::vector<Vec3>& points, const Domain& do
     CHECK(result.grid->background() == float(radius));
 }
 
-const Domain kCube = domain_of_box({{0, 0, 0}, {10, 10, 10}}, 0.25);  // 40^3
+const Domain kCube = make_domain({{0, 0, 0}, {10, 10, 10}}, 0.25);  // 40^3
 
 }  // namespace
 
@@ -52,13 +52,13 @@ TEST_CASE("duplicates change nothing") {
     std::vector<Vec3> thrice = once;
     thrice.insert(thrice.end(), once.begin(), once.end());
     thrice.insert(thrice.end(), once.begin(), once.end());
-    CHECK(identical(*distance(once, kCube, {2.0}).grid, *distance(thrice, kCube, {2.0}).grid));
+    CHECK(identical(*compute_distance(once, kCube, {2.0}).grid, *compute_distance(thrice, kCube, {2.0}).grid));
 }
 
 TEST_CASE("points outside the domain count") {
     check_against_brute_force({{-1.5, 5, 5}, {-0.9, 7, 5}, {5, 11, 11}}, kCube, 2.5);
     SECTION("up to the radius") {
-        const DistanceResult far = distance({{-3, 5, 5}}, kCube, {2.5});
+        const DistanceResult far = compute_distance({{-3, 5, 5}}, kCube, {2.5});
         CHECK(far.report.active_voxels == 0);
         CHECK(far.grid->tree().leafCount() == 0);
     }
@@ -77,7 +77,7 @@ TEST_CASE("a domain far from the origin is as exact as one at it") {
 
 TEST_CASE("a dense cluster in a few voxels") {
     const std::vector<Vec3> points = box_cloud(20000, {{5, 5, 5}, {5.6, 5.6, 5.6}}, 4);
-    const DistanceResult result = distance(points, kCube, {2.0});
+    const DistanceResult result = compute_distance(points, kCube, {2.0});
     double worst = 0;
     for (auto value = result.grid->cbeginValueOn(); value; ++value)
         worst = std::max(worst, *value - brute_force_distance(points, world_of(kCube, value.getCoord())));
@@ -88,10 +88,10 @@ TEST_CASE("the number of threads does not change a bit") {
     const std::vector<Vec3> points = sphere_cloud(3000, 3.5, 5, {5, 5, 5});
     RunContext run;
     run.threads = 1;
-    const DistanceResult one = distance(points, kCube, {1.5}, run);
+    const DistanceResult one = compute_distance(points, kCube, {1.5}, run);
     for (const int threads : {2, 8}) {
         run.threads = threads;
-        const DistanceResult many = distance(points, kCube, {1.5}, run);
+        const DistanceResult many = compute_distance(points, kCube, {1.5}, run);
         CHECK(identical(*one.grid, *many.grid));
         CHECK(one.report.rounds == many.report.rounds);
     }
@@ -105,7 +105,7 @@ TEST_CASE("mirrored and permuted points give mirrored and permuted distances") {
     const std::vector<Vec3> points = sphere_cloud(200, 6.0, 6);
     std::vector<Vec3> moved = points;
     for (Vec3& p : moved) p = {-p[2], p[0], -p[1]};
-    const DistanceResult a = distance(points, domain, {3.0}), b = distance(moved, domain, {3.0});
+    const DistanceResult a = compute_distance(points, domain, {3.0}), b = compute_distance(moved, domain, {3.0});
     // Sweeping has an order: a few voxels may miss their nearest point in one of the two, by little.
     double worst = 0, sum = 0;
     for (auto value = a.grid->cbeginValueOn(); value; ++value) {
@@ -121,7 +121,7 @@ TEST_CASE("mirrored and permuted points give mirrored and permuted distances") {
 TEST_CASE("unusable input is refused") {
     const auto code = [](const std::vector<Vec3>& points, double radius) {
         try {
-            (void)distance(points, kCube, {radius});
+            (void)compute_distance(points, kCube, {radius});
         } catch (const Error& e) {
             return e.code();
         }
@@ -134,5 +134,5 @@ TEST_CASE("unusable input is refused") {
     const std::atomic<bool> cancel = true;
     RunContext run;
     run.cancel = &cancel;
-    CHECK_THROWS_AS(distance({{1, 1, 1}}, kCube, {1.0}, run), Error);
+    CHECK_THROWS_AS(compute_distance({{1, 1, 1}}, kCube, {1.0}, run), Error);
 }

@@ -42,7 +42,7 @@ FloatGridPtr topology_where(const Domain& domain, const std::function<bool(const
 EdgeOptions options(double sigma, double k) {
     EdgeOptions o;
     o.sigma = sigma;
-    o.edge_k = k;
+    if (k > 0) o.edge_k = k;
     o.low = 0;
     o.high = 1;
     return o;
@@ -68,25 +68,26 @@ double largest_difference(const Domain& domain, const FloatGrid& g, const DenseF
 
 bool everywhere(const Vec3&) { return true; }
 
-Errc edge_code(const std::function<void()>& call) { return code_of(call, "edge: "); }
+Errc edge_code(const std::function<void()>& call) { return code_of(call, "detect_edges: "); }
 
 }  // namespace
 
 TEST_CASE("every edge option says when it is out of range") {
     CHECK(EdgeOptions{}.why_invalid().empty());
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-    const auto rejects = [](const char* field, double EdgeOptions::*member, double value) {
+    const auto rejects = [](const char* field, auto EdgeOptions::*member, double value) {
         EdgeOptions o;
         o.*member = value;
         INFO(field << " = " << value << ": " << o.why_invalid());
         CHECK(o.why_invalid().rfind(std::string(field) + ": expected ", 0) == 0);
     };
-    rejects("sigma", &EdgeOptions::sigma, nan);
-    for (const double bad : {-1.0, nan}) {
+    for (const double bad : {-1.0, nan}) rejects("sigma", &EdgeOptions::sigma, bad);
+    for (const double bad : {-1.0, 0.0, nan}) {
         rejects("edge_k", &EdgeOptions::edge_k, bad);
         rejects("edge_contrast", &EdgeOptions::edge_contrast, bad);
     }
-    for (const double bad : {-0.1, 1.0, nan}) rejects("contrast_percentile", &EdgeOptions::contrast_percentile, bad);
+    for (const double bad : {-0.1, 0.0, 1.0, nan})
+        rejects("contrast_percentile", &EdgeOptions::contrast_percentile, bad);
     rejects("low", &EdgeOptions::low, 3.0);  // above high = 0
     rejects("low", &EdgeOptions::high, nan);
 }
@@ -100,7 +101,8 @@ TEST_CASE("on a ramp g is 1/(1 + K s^2), with s per world unit of the normalised
     o.edge_k = 400;
     o.low = 100;
     o.high = 500;
-    const EdgeResult result = edge(image, *topology_where(domain, [](const Vec3& x) { return std::abs(x[1]) < 2; }), o);
+    const EdgeResult result =
+        detect_edges(image, *topology_where(domain, [](const Vec3& x) { return std::abs(x[1]) < 2; }), o);
     REQUIRE(result.grid->activeVoxelCount() > 1000);
     for (auto v = result.grid->cbeginValueOn(); v; ++v)
         REQUIRE(*v == Approx(1 / (1 + 400 * 0.05 * 0.05)).epsilon(1e-3));
@@ -118,7 +120,7 @@ TEST_CASE("the edge detector is the dense reference's") {
     const Image image = image_on(domain, f);
     for (const double sigma : {0.0, kH, 2.5 * kH}) {
         INFO("sigma = " << sigma / kH << " h");
-        const EdgeResult result = edge(image, *topology_where(domain, everywhere), options(sigma, 5));
+        const EdgeResult result = detect_edges(image, *topology_where(domain, everywhere), options(sigma, 5));
         REQUIRE(result.grid->activeVoxelCount() == 21 * 21 * 21);
         const DenseField expected = reference(domain, f, sigma, 5);
         CHECK(largest_difference(domain, *result.grid, expected) < 1e-4);
@@ -133,8 +135,8 @@ TEST_CASE("a band gets the values of the whole domain, and keeps its topology") 
     const Function waves = random_waves(32, 3.0);
     const Image image = image_on(domain, [&](const Vec3& x) { return 0.5 + 0.4 * waves(x); });
     const FloatGridPtr shell = topology_where(domain, [](const Vec3& x) { return std::abs(length(x) - 6) < 1; });
-    const EdgeResult all = edge(image, *topology_where(domain, everywhere), options(2 * kH, 5));
-    const EdgeResult band = edge(image, *shell, options(2 * kH, 5));
+    const EdgeResult all = detect_edges(image, *topology_where(domain, everywhere), options(2 * kH, 5));
+    const EdgeResult band = detect_edges(image, *shell, options(2 * kH, 5));
     CHECK(band.grid->tree().hasSameTopology(shell->tree()));
     CHECK(band.grid->background() == 1.0F);
     CHECK(band.grid->getName() == "edge");
@@ -149,10 +151,10 @@ TEST_CASE("g is 1/2 at the contrast, asked for or chosen") {
     const FloatGridPtr topology = topology_where(domain, everywhere);
     EdgeOptions o = options(kH, 0);
     o.edge_contrast = 0.2;
-    CHECK(edge(image, *topology, o).report.edge_k == Approx(25));
-    o.edge_contrast = 0;
+    CHECK(detect_edges(image, *topology, o).report.edge_k == Approx(25));
+    o.edge_contrast.reset();
     o.contrast_percentile = 0.8;
-    const EdgeResult chosen = edge(image, *topology, o);
+    const EdgeResult chosen = detect_edges(image, *topology, o);
     std::int64_t steeper = 0;
     for (auto v = chosen.grid->cbeginValueOn(); v; ++v) steeper += *v < 0.5F;
     CHECK(static_cast<double>(steeper) / static_cast<double>(domain.voxel_count()) == Approx(0.2).margin(0.002));
@@ -165,7 +167,7 @@ TEST_CASE("a mirrored or permuted image has a mirrored or permuted edge detector
     const Function f = [&](const Vec3& x) { return 0.5 + 0.4 * waves(x); };
     const FloatGridPtr topology = topology_where(domain, everywhere);
     const DenseField values = sample(domain, f);
-    const DenseField expected = to_dense(domain, *edge(image_on(domain, f), *topology, options(kH, 5)).grid);
+    const DenseField expected = to_dense(domain, *detect_edges(image_on(domain, f), *topology, options(kH, 5)).grid);
     for (const Symmetry& symmetry : all_symmetries()) {
         const DenseField moved = symmetry(values);
         const Function at_voxel = [&](const Vec3& x) {
@@ -173,12 +175,13 @@ TEST_CASE("a mirrored or permuted image has a mirrored or permuted edge detector
             return moved.at(int(std::lround(index[0])) + 3, int(std::lround(index[1])) + 3,
                             int(std::lround(index[2])) + 3);
         };
-        const DenseField g = to_dense(domain, *edge(image_on(domain, at_voxel), *topology, options(kH, 5)).grid);
+        const DenseField g =
+            to_dense(domain, *detect_edges(image_on(domain, at_voxel), *topology, options(kH, 5)).grid);
         CHECK(max_difference(g, symmetry(expected)) < 1e-4);
     }
 }
 
-TEST_CASE("edge(): the same bits for 1, 2 and 8 threads") {
+TEST_CASE("detect_edges(): the same bits for 1, 2 and 8 threads") {
     const Domain domain = cube_domain(40, kH);
     const Function waves = random_waves(35, 2.0);
     const Image image = image_on(domain, waves);
@@ -188,7 +191,7 @@ TEST_CASE("edge(): the same bits for 1, 2 and 8 threads") {
         run.threads = threads;
         EdgeOptions o;
         o.sigma = 2 * kH;
-        return edge(image, *topology, o, run).grid;
+        return detect_edges(image, *topology, o, run).grid;
     };
     const FloatGridPtr one = run_with(1);
     for (const int threads : {2, 8}) {
@@ -199,16 +202,16 @@ TEST_CASE("edge(): the same bits for 1, 2 and 8 threads") {
     }
 }
 
-TEST_CASE("edge() refuses what has no edges") {
+TEST_CASE("detect_edges() refuses what has no edges") {
     const Domain domain = cube_domain(10, kH);
     const Image image = image_on(domain, [](const Vec3& x) { return x[0]; });
     const Image constant = image_on(domain, [](const Vec3&) { return 7.0; });
     const FloatGridPtr topology = topology_where(domain, everywhere);
     EdgeOptions bad;
     bad.edge_k = -1;
-    CHECK(edge_code([&] { (void)edge(image, *topology, bad); }) == Errc::InvalidOptions);
-    CHECK(edge_code([&] { (void)edge(constant, *topology); }) == Errc::InvalidInput);
-    CHECK(edge_code([&] { (void)edge(image, *make_grid(domain, 1.0F, "band")); }) == Errc::InvalidInput);
+    CHECK(edge_code([&] { (void)detect_edges(image, *topology, bad); }) == Errc::InvalidOptions);
+    CHECK(edge_code([&] { (void)detect_edges(constant, *topology); }) == Errc::InvalidInput);
+    CHECK(edge_code([&] { (void)detect_edges(image, *make_grid(domain, 1.0F, "band")); }) == Errc::InvalidInput);
 }
 
 // ---- lines ----------------------------------------------------------------------------------------------------------
@@ -228,7 +231,7 @@ MarkedFeature feature_on_sheet(const Image& image) {
             places.push_back({kSheetAt, y, z});
             normals.push_back({1, 0, 0});
         }
-    return feature_at(image, places, normals, 2.5);
+    return detect_feature(image, places, normals, 2.5);
 }
 
 }  // namespace
@@ -241,7 +244,7 @@ TEST_CASE("g of a line is least in its middle, g of a slope on its sides") {
     EdgeOptions o = options(0.5, 4);
     const auto least = [&](const Image& image, EdgeFeature feature) {
         o.feature = feature;
-        const EdgeResult r = edge(image, *where, o);
+        const EdgeResult r = detect_edges(image, *where, o);
         double at = 0, value = 2;
         for (auto v = r.grid->cbeginValueOn(); v; ++v)
             if (*v < value) value = *v, at = r.grid->indexToWorld(v.getCoord())[0];
@@ -254,7 +257,7 @@ TEST_CASE("g of a line is least in its middle, g of a slope on its sides") {
     // s is the brightness itself.
     o.feature = EdgeFeature::BrightLine;
     o.sigma = 0;
-    const EdgeResult exact = edge(bright, *where, o);
+    const EdgeResult exact = detect_edges(bright, *where, o);
     for (auto v = exact.grid->cbeginValueOn(); v; ++v) {
         const openvdb::Vec3d x = exact.grid->indexToWorld(v.getCoord());
         const double s = sheet({x[0], x[1], x[2]});
@@ -268,7 +271,7 @@ TEST_CASE("lines take their contrast from a third of the median") {
     EdgeOptions o;
     o.low = 0, o.high = 1, o.sigma = 0.5;
     o.feature = EdgeFeature::BrightLine;
-    const EdgeResult r = edge(image_on(domain, sheet), *where, o);
+    const EdgeResult r = detect_edges(image_on(domain, sheet), *where, o);
     std::int64_t above = 0;
     for (auto v = r.grid->cbeginValueOn(); v; ++v) above += *v < 0.1;  // 1 / (1 + 3^2)
     CHECK(double(above) / double(r.grid->activeVoxelCount()) == Approx(0.5).margin(0.01));
@@ -295,5 +298,5 @@ TEST_CASE("marks tell lines from borders, and both from noise") {
     std::mt19937 random(4);
     std::uniform_real_distribution<double> grey(0, 1);
     CHECK(feature_on_sheet(image_on(domain, [&](const Vec3&) { return grey(random); })).feature == EdgeFeature::Slope);
-    CHECK(feature_at(image_on(domain, sheet), {}, {}, 1).feature == EdgeFeature::Slope);
+    CHECK(detect_feature(image_on(domain, sheet), {}, {}, 1).feature == EdgeFeature::Slope);
 }

@@ -80,7 +80,8 @@ TEST_CASE("every option says when it is out of range") {
         rejects("epsilon", &EvolveOptions::epsilon, bad);
         rejects("edge_epsilon", &EvolveOptions::edge_epsilon, bad);
     }
-    rejects("tau", &EvolveOptions::tau, 0.0);
+    for (const double bad : {0.0, -1.0}) rejects("tau", &EvolveOptions::tau, bad);
+    rejects("delta", &EvolveOptions::delta, -1.0);
     rejects("attraction_range", &EvolveOptions::attraction_range, -1.0);
     rejects("tolerance", &EvolveOptions::tolerance, -1.0);
     rejects("solver_tolerance", &EvolveOptions::solver_tolerance, 0.0);

@@ -154,7 +154,7 @@ TEST_CASE("options of a correction", "[guess]") {
     CHECK(options.why_invalid().empty());
     options.precision = -1;
     options.least_radius = -2;
-    CHECK(options.why_invalid() == "precision: expected >= 0, got -1\nleast_radius: expected >= 0, got -2");
+    CHECK(options.why_invalid() == "precision: expected > 0, got -1\nleast_radius: expected > 0, got -2");
     CHECK(code_of([&] { (void)correct_guess(start_from_sphere(cube(), kMiddle, kRadius), {}, {}, {}, options); }) ==
           Errc::InvalidOptions);
 }

@@ -84,7 +84,7 @@ Bias bias_of(const Shape& shape, const std::vector<Vec3>& marks, const GuessOpti
     const Domain domain = cube_domain(80, 1.0);
     GuessReport report;
     const FloatGridPtr guess = guess_from_marks(domain, marks, options, report).u;
-    const TriangleMesh mesh = extract_mesh(*surface(*guess), {});
+    const TriangleMesh mesh = extract_mesh(*extract_surface(*guess), {});
     double sum = 0;
     for (const auto& v : mesh.vertices) sum += shape.distance({v[0], v[1], v[2]});
     return {sum / double(mesh.vertices.size()), measure(mesh).volume / shape.volume};
@@ -157,7 +157,7 @@ TEST_CASE("marks in the cut are told from marks on the surface") {
     CHECK(report.cut_marks == 60);
     double sum = 0;
     int count = 0;
-    for (const auto& v : extract_mesh(*surface(*guess), {}).vertices)
+    for (const auto& v : extract_mesh(*extract_surface(*guess), {}).vertices)
         if (v[2] < top - 1) sum += shape.distance({v[0], v[1], v[2]}), ++count;
     CHECK(std::abs(sum / count) < 0.03);
 }
@@ -177,6 +177,6 @@ TEST_CASE("a seed in a cavity makes it one, and one in a dent keeps it open") {
     CHECK(value_at(*guess, {0, 0, 0}) > 0);
     CHECK(value_at(*guess, {0, 16, 0}) < 0);
     CHECK(value_at(*guess, {0, 0, 28}) > 0);
-    const MeshMeasures measures = measure(extract_mesh(*surface(*guess), {}));
+    const MeshMeasures measures = measure(extract_mesh(*extract_surface(*guess), {}));
     CHECK(measures.volume == Approx(4.0 / 3 * kPi * (22 * 22 * 22 - 1000)).epsilon(0.03));
 }

@@ -64,7 +64,7 @@ std::vector<Vec3> marks_on_sphere(int count, double radius, double jitter = 0.5,
     return marks;
 }
 
-Domain domain_of_image(const ImageGeometry& g) { return domain_of_box(g.world_box(), 1.0); }
+Domain domain_of_image(const ImageGeometry& g) { return make_domain(g.world_box(), 1.0); }
 
 /// A level set from a function that is negative inside.
 FloatGridPtr level_set(const Domain& d, const std::function<double(const Vec3&)>& f) {
@@ -82,7 +82,7 @@ struct Radius {
 
 /// Of the surface about the origin, less `radius`: mean, root mean square, largest deviation.
 Radius radius_of(const FloatGrid& grid, double radius) {
-    const TriangleMesh mesh = extract_mesh(*surface(grid));
+    const TriangleMesh mesh = extract_mesh(*extract_surface(grid));
     Radius r{0, 0, 0};
     for (const auto& v : mesh.vertices) {
         const double off = length({v[0], v[1], v[2]}) - radius;

@@ -85,9 +85,9 @@ template <typename Function>
 Trial treat(Function function, const TriangleMesh& mesh, const std::vector<Vec3>& points,
             double slack_share = 1.0 / 6) {
     Trial result;
-    const double distance = hole_distance(points, 0.01);
-    result.mesh = function(mesh, distances_to_points(mesh, points), distance, slack_share * distance, result.report,
-                           RunContext{});
+    const double distance = choose_hole_distance(points, 0.01);
+    result.mesh =
+        function(mesh, measure_distances(mesh, points), distance, slack_share * distance, result.report, RunContext{});
     return result;
 }
 
@@ -105,13 +105,13 @@ TEST_CASE("boundary loops: number, edges, length") {
             strip.triangles.push_back({a, a + 1, a + 6});
             strip.triangles.push_back({a, a + 6, a + 5});
         }
-    const std::vector<BoundaryLoop> loops = boundary_loops(strip);
+    const std::vector<BoundaryLoop> loops = find_boundary_loops(strip);
     REQUIRE(loops.size() == 2);
     CHECK(loops[0].edges == 14);
     CHECK(loops[0].length == Approx(14));
     CHECK(loops[1].edges == 4);
     CHECK(loops[1].length == Approx(4));
-    CHECK(boundary_loops(sphere_mesh(2)).empty());
+    CHECK(find_boundary_loops(sphere_mesh(2)).empty());
 }
 
 TEST_CASE("a cut parts the area where it should, and leaves no slivers") {
@@ -128,7 +128,7 @@ TEST_CASE("a cut parts the area where it should, and leaves no slivers") {
         CHECK(measure(part).area == Approx(2 * kPi * (1 - level)).margin(0.004 * area));
         CHECK(measure(part).manifold);
         CHECK(narrowest_angle(part) > 8);
-        const std::vector<BoundaryLoop> loops = boundary_loops(part);
+        const std::vector<BoundaryLoop> loops = find_boundary_loops(part);
         REQUIRE(loops.size() == 1);
         CHECK(loops[0].length == Approx(2 * kPi * std::sqrt(1 - level * level)).epsilon(0.01));
         for (const auto& v : part.vertices) CHECK(v[2] * 0.8 + v[0] * 0.6 > level - 0.002);
@@ -144,7 +144,7 @@ TEST_CASE("where two fans of a part meet in a vertex it becomes two") {
     CHECK(part.vertices.size() == 6);
     CHECK(measure(part).manifold);
     CHECK(measure(part).components == 2);
-    CHECK(boundary_loops(part).size() == 2);
+    CHECK(find_boundary_loops(part).size() == 2);
 }
 
 TEST_CASE("the membrane between two rings is a catenoid, over a flat rim a plane") {
@@ -188,7 +188,7 @@ TEST_CASE("a sphere with holes is cut at the last points, whatever the draw") {
             // Points below the level: a hole of radius sqrt(1 - level^2) above it.
             const std::vector<Vec3> points = sphere_points(8000, seed, [&](const Vec3& p) { return p[2] < level; });
             const double spacing = std::sqrt(4 * kPi / 8000), rim = 2 * kPi * std::sqrt(1 - level * level);
-            const Trial open = treat(trimmed, sphere, points);
+            const Trial open = treat(trim_holes, sphere, points);
             INFO("seed " << seed << ", hole above z = " << level);
             REQUIRE(open.report.loops.size() == 1);
             CHECK(open.report.loops[0].length == Approx(rim).epsilon(0.06));
@@ -214,7 +214,7 @@ TEST_CASE("a sphere with holes is cut at the last points, whatever the draw") {
             }
             CHECK(inward == 0);
 
-            const Trial flat = treat(flattened, sphere, points);
+            const Trial flat = treat(flatten_holes, sphere, points);
             const double cap = kPi * (1 - level * level), below = kPi * (2.0 / 3 + level - level * level * level / 3);
             CHECK(measure(flat.mesh).closed);
             CHECK(measure(flat.mesh).area == Approx(2 * kPi * (1 + level) + cap).margin(rim * spacing));
@@ -226,31 +226,31 @@ TEST_CASE("a sphere with holes is cut at the last points, whatever the draw") {
 TEST_CASE("two holes, no hole, and nothing but holes") {
     const TriangleMesh sphere = sphere_mesh(5);
     const std::vector<Vec3> belt = sphere_points(8000, 3, [](const Vec3& p) { return std::abs(p[2]) < 0.6; });
-    const Trial open = treat(trimmed, sphere, belt);
+    const Trial open = treat(trim_holes, sphere, belt);
     REQUIRE(open.report.loops.size() == 2);
     for (const BoundaryLoop& loop : open.report.loops) CHECK(loop.length == Approx(2 * kPi * 0.8).epsilon(0.06));
-    CHECK(measure(treat(flattened, sphere, belt).mesh).volume == Approx(2 * kPi * (0.6 - 0.072)).epsilon(0.05));
+    CHECK(measure(treat(flatten_holes, sphere, belt).mesh).volume == Approx(2 * kPi * (0.6 - 0.072)).epsilon(0.05));
 
     const std::vector<Vec3> all = sphere_points(8000, 4, [](const Vec3&) { return true; });
-    const Trial whole = treat(trimmed, sphere, all);
+    const Trial whole = treat(trim_holes, sphere, all);
     CHECK(whole.report.loops.empty());
     CHECK(whole.report.share == 0);
     CHECK(whole.mesh.triangles == sphere.triangles);
-    CHECK(share_beyond(sphere, distances_to_points(sphere, all), whole.report.distance) == 0);
+    CHECK(measure_share_beyond(sphere, measure_distances(sphere, all), whole.report.distance) == 0);
 
     HolesReport report;
     const std::vector<Vec3> far{{5, 0, 0}};
-    CHECK_THROWS_AS(trimmed(sphere, distances_to_points(sphere, far), 0.1, 0.01, report), Error);
-    CHECK_THROWS_AS(flattened(sphere, distances_to_points(sphere, far), 0.1, 0.01, report), Error);
-    CHECK_THROWS_AS(trimmed(sphere, {}, 0.1, 0.01, report), Error);
-    CHECK_THROWS_AS(trimmed(sphere, distances_to_points(sphere, all), 0.1, 0.1, report), Error);
+    CHECK_THROWS_AS(trim_holes(sphere, measure_distances(sphere, far), 0.1, 0.01, report), Error);
+    CHECK_THROWS_AS(flatten_holes(sphere, measure_distances(sphere, far), 0.1, 0.01, report), Error);
+    CHECK_THROWS_AS(trim_holes(sphere, {}, 0.1, 0.01, report), Error);
+    CHECK_THROWS_AS(trim_holes(sphere, measure_distances(sphere, all), 0.1, 0.1, report), Error);
 }
 
 TEST_CASE("a few points by themselves in a hole are no piece of the surface") {
     const TriangleMesh sphere = sphere_mesh(5);
     std::vector<Vec3> points = sphere_points(8000, 5, [](const Vec3& p) { return p[2] < 0; });
     points.push_back({0, 0, 1});
-    const Trial open = treat(trimmed, sphere, points);
+    const Trial open = treat(trim_holes, sphere, points);
     CHECK(open.report.dropped_pieces <= 1);
     CHECK(open.report.loops.size() == 1);
     CHECK(measure(open.mesh).components == 1);
@@ -259,28 +259,28 @@ TEST_CASE("a few points by themselves in a hole are no piece of the surface") {
 TEST_CASE("distances to points are those of brute force; the share is that of a cap") {
     const TriangleMesh sphere = sphere_mesh(4);
     const std::vector<Vec3> points = test::sphere_cloud(200, 1.1, 6);
-    const std::vector<float> distances = distances_to_points(sphere, points);
+    const std::vector<float> distances = measure_distances(sphere, points);
     for (std::size_t v = 0; v < distances.size(); v += 37) {
         const auto& p = sphere.vertices[v];
         CHECK(distances[v] == Approx(test::brute_force_distance(points, {p[0], p[1], p[2]})).epsilon(1e-5));
     }
     // Within a chord d of the pole: a cap of height d^2 / 2.
-    const std::vector<float> from_pole = distances_to_points(sphere, {{0, 0, 1}});
-    CHECK(share_beyond(sphere, from_pole, 1) == Approx(0.75).epsilon(0.02));
+    const std::vector<float> from_pole = measure_distances(sphere, {{0, 0, 1}});
+    CHECK(measure_share_beyond(sphere, from_pole, 1) == Approx(0.75).epsilon(0.02));
 }
 
 TEST_CASE("segment: a bowl is closed, open, or has a flat lid, and the level set says the same but for open") {
     std::vector<Vec3> points = sphere_points(12000, 7, [](const Vec3& p) { return p[2] < 0; });
     SegmentOptions options;
     options.voxel_size = 0.04;
-    const SegmentResult closed = segment(nullptr, points, options);
+    const SegmentResult closed = reconstruct(points, options);
     CHECK(closed.report.holes.policy == Holes::Close);
     CHECK(closed.report.holes.loops.empty());
     CHECK(closed.report.share_without_points > 0.2);
     CHECK(closed.distance_to_points.size() == closed.mesh.vertices.size());
 
     options.holes.policy = Holes::Open;
-    const SegmentResult open = segment(nullptr, points, options);
+    const SegmentResult open = reconstruct(points, options);
     CHECK_FALSE(open.report.surface.closed);
     CHECK(open.report.surface.manifold);
     REQUIRE(open.report.holes.loops.size() == 1);
@@ -291,7 +291,7 @@ TEST_CASE("segment: a bowl is closed, open, or has a flat lid, and the level set
     CHECK(open.distance_to_points.size() == open.mesh.vertices.size());
 
     options.holes.policy = Holes::Flat;
-    const SegmentResult flat = segment(nullptr, points, options);
+    const SegmentResult flat = reconstruct(points, options);
     CHECK(flat.report.surface.closed);
     CHECK(flat.report.surface.genus == 0);
     CHECK(flat.report.surface.components == 1);
@@ -304,5 +304,5 @@ TEST_CASE("segment: a bowl is closed, open, or has a flat lid, and the level set
 
     options.holes.policy = Holes::Open;
     options.holes.distance = 3;  // farther than anything: no hole
-    CHECK(segment(nullptr, points, options).report.surface.closed);
+    CHECK(reconstruct(points, options).report.surface.closed);
 }

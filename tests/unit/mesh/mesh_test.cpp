@@ -93,7 +93,7 @@ TEST_CASE("holes, flipped triangles, common edges and common corners are noticed
 
 TEST_CASE("normals are unit length, weighted by angle and point outward") {
     const TriangleMesh mesh = cube(1);
-    const auto normals = vertex_normals(mesh);
+    const auto normals = compute_vertex_normals(mesh);
     REQUIRE(normals.size() == 8);
     for (int c = 0; c < 8; ++c)  // by angle, not by triangle count: exactly along the diagonals
         for (int a = 0; a < 3; ++a)

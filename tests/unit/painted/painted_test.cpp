@@ -65,7 +65,7 @@ bool in_ball(int i, int j, int k, double middle, double r) {
 }
 
 Painted understood(const Image& image, const PaintedOptions& options = {}) {
-    return understand_painted(image, painted_labels(image), options);
+    return understand_painted(image, find_painted_labels(image), options);
 }
 
 }  // namespace
@@ -179,7 +179,7 @@ TEST_CASE("slices that lie apart were painted as a whole", "[painted]") {
     CHECK(label.views[0].axis == axis);
     CHECK(label.views[0].slices == std::vector<int>{10, 15, 20, 25, 30});
     CHECK(label.summary.find("5 slices across " + std::string(1, "xyz"[axis])) != std::string::npos);
-    const Contours contours = contours_of(label, result.geometry, 1);
+    const Contours contours = connect_outlines(label, result.geometry, 1);
     CHECK(contours.slices == 5);
     REQUIRE(contours.solid);
     for (const Vec3& p : contours.marks) CHECK(std::abs(std::hypot(p[0] - 19.5, p[1] - 19.5, p[2] - 19.5) - 14) < 1);
@@ -260,12 +260,12 @@ TEST_CASE("several labels, and one for the outside", "[painted]") {
 
 TEST_CASE("label images that say nothing", "[painted]") {
     CHECK(message_of([] {
-              (void)painted_labels(painting(lattice({4, 5, 6}), [](int, int, int) { return 0; }));
+              (void)find_painted_labels(painting(lattice({4, 5, 6}), [](int, int, int) { return 0; }));
           }).find("expected painted voxels, got 0 everywhere in 4 x 5 x 6") != std::string::npos);
     std::vector<float> values(27, 0.0F);
     values[13] = 0.5F;
     CHECK(message_of([&] {
-              (void)painted_labels(Image::from_values(lattice({3, 3, 3}), values.data()));
+              (void)find_painted_labels(Image::from_values(lattice({3, 3, 3}), values.data()));
           }).find("expected whole numbers >= 0, got 0.5 at voxel (1, 1, 1)") != std::string::npos);
 }
 

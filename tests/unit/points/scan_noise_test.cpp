@@ -19,18 +19,18 @@ double mean_off_sphere(const std::vector<Vec3>& points, double radius) {
 
 }  // namespace
 
-TEST_CASE("layer_thickness: 0 in a plane, 3/8 of the radius where points fill space") {
+TEST_CASE("measure_layer_thickness: 0 in a plane, 3/8 of the radius where points fill space") {
     std::mt19937 random(3);
     std::uniform_real_distribution<double> x(0, 1);
     std::vector<Vec3> plane(2000);
     for (Vec3& p : plane) p = {x(random), x(random), 0};
-    CHECK(layer_thickness(plane, 0.1) < 1e-9);
+    CHECK(measure_layer_thickness(plane, 0.1) < 1e-9);
     const std::vector<Vec3> block = test::box_cloud(40000, {{0, 0, 0}, {1, 1, 1}}, 5);
     // The plane of least squares is the best of all, and balls stick out of the block: less than 3/8, not by far.
-    CHECK(layer_thickness(block, 0.1) < 0.0375);
-    CHECK(layer_thickness(block, 0.1) > 0.75 * 0.0375);
-    CHECK(layer_thickness({{0, 0, 0}, {1, 0, 0}}, 10) == 0);
-    CHECK_THROWS_AS(layer_thickness(block, 0), Error);
+    CHECK(measure_layer_thickness(block, 0.1) < 0.0375);
+    CHECK(measure_layer_thickness(block, 0.1) > 0.75 * 0.0375);
+    CHECK(measure_layer_thickness({{0, 0, 0}, {1, 0, 0}}, 10) == 0);
+    CHECK_THROWS_AS(measure_layer_thickness(block, 0), Error);
     CHECK_THROWS_AS(average_layers(block, -1), Error);
 }
 
@@ -49,30 +49,30 @@ TEST_CASE("average_layers brings two layers of one sphere together between them,
     CHECK(mean_off_sphere(average_layers(thin, 0.15), 1) == Approx(sag).epsilon(0.15));
 }
 
-TEST_CASE("scan_voxel_size: a bend is no noise, however few the points are") {
+TEST_CASE("choose_scan_voxel_size: a bend is no noise, however few the points are") {
     // 2.5 voxels of 4.8 spacings reach around the sphere, or around a good part of it.
     for (const int count : {50, 100, 300, 1000}) {
         const std::vector<Vec3> few = test::sphere_cloud(count, 6, 1);
         const double spacing = 6 * std::sqrt(M_PI / count);
         INFO(count << " points");
-        CHECK(scan_voxel_size(few, spacing).voxel_size == Approx(spacing));
+        CHECK(choose_scan_voxel_size(few, spacing).voxel_size == Approx(spacing));
     }
 }
 
-TEST_CASE("scan_voxel_size: two sides of a plate are no noise, points that fill it are") {
+TEST_CASE("choose_scan_voxel_size: two sides of a plate are no noise, points that fill it are") {
     std::vector<Vec3> plate = test::box_cloud(8000, {{0, 0, 0}, {100, 100, 0}}, 5);
     const std::vector<Vec3> above = test::box_cloud(8000, {{0, 0, 5}, {100, 100, 5}}, 6);
     plate.insert(plate.end(), above.begin(), above.end());
-    CHECK(scan_voxel_size(plate, 1).voxel_size == Approx(1));
+    CHECK(choose_scan_voxel_size(plate, 1).voxel_size == Approx(1));
     // Filled, points lie 5/4 from the plane on the mean: 1.25^6 is the first with 0.35 voxels above that.
     const std::vector<Vec3> filled = test::box_cloud(50000, {{0, 0, 0}, {100, 100, 5}}, 7);
-    CHECK(scan_voxel_size(filled, 1).voxel_size == Approx(std::pow(1.25, 6)));
+    CHECK(choose_scan_voxel_size(filled, 1).voxel_size == Approx(std::pow(1.25, 6)));
 }
 
-TEST_CASE("scan_voxel_size: the spacing for a clean scan, coarser than the noise for a noisy one") {
+TEST_CASE("choose_scan_voxel_size: the spacing for a clean scan, coarser than the noise for a noisy one") {
     const std::vector<Vec3> clean = test::sphere_cloud(20000, 1, 1);
     const double spacing = 0.0125;
-    CHECK(scan_voxel_size(clean, spacing).voxel_size == Approx(spacing));
+    CHECK(choose_scan_voxel_size(clean, spacing).voxel_size == Approx(spacing));
     std::mt19937 random(7);
     std::normal_distribution<double> noise(0, 0.02);
     std::vector<Vec3> noisy = clean;
@@ -80,7 +80,7 @@ TEST_CASE("scan_voxel_size: the spacing for a clean scan, coarser than the noise
         const double r = 1 + noise(random);
         for (double& c : p) c *= r;
     }
-    const ScanVoxelSize choice = scan_voxel_size(noisy, spacing);
+    const ScanVoxelSize choice = choose_scan_voxel_size(noisy, spacing);
     CHECK(choice.voxel_size > 2 * spacing);
     CHECK(choice.voxel_size < 5 * spacing);
     // The mean distance of a normal distribution, 0.8 sigma, and what the plane swallowed.

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <optional>
 
 #include "covol/error.h"
 #include "covol/surface.h"
@@ -52,15 +53,16 @@ double mean_radius(const TriangleMesh& mesh) {
 }  // namespace
 
 TEST_CASE("segment: points alone give a closed sphere and record what was chosen") {
+    constexpr double h = 0.8;
     SegmentOptions options;
-    options.voxel_size = 0.8;
-    const SegmentResult result = segment(nullptr, sphere_points(1200), options);
+    options.voxel_size = h;
+    const SegmentResult result = reconstruct(sphere_points(1200), options);
     CHECK(result.report.surface.closed);
     CHECK(result.report.surface.genus == 0);
-    CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.03 * options.voxel_size);
-    CHECK(result.report.fit.mean < 0.05 * options.voxel_size);
+    CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.03 * h);
+    CHECK(result.report.fit.mean < 0.05 * h);
     CHECK(result.report.resolved.evolve.rho == 0);
-    CHECK(result.report.resolved.evolve.delta == Approx(0.5 * options.voxel_size));
+    CHECK(result.report.resolved.evolve.delta.value() == Approx(0.5 * h));
     CHECK(result.report.automatic.count("rho") == 1);
     CHECK(result.report.automatic.count("guess") == 1);
     CHECK(result.report.guess.marks == 1200);
@@ -70,12 +72,12 @@ TEST_CASE("segment: points alone give a closed sphere and record what was chosen
 
 TEST_CASE("segment: image and points agree on the ball") {
     const Image image = ball_image(1.0);
-    const SegmentResult result = segment(&image, sphere_points(800));
+    const SegmentResult result = segment(image, sphere_points(800));
     CHECK(result.report.domain.voxel_size == 1.0);
     CHECK(result.report.surface.closed);
     CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.25);
     CHECK(result.edge != nullptr);
-    CHECK(result.report.resolved.edge.edge_k > 0);
+    CHECK(result.report.resolved.edge.edge_k.value() > 0);
 }
 
 TEST_CASE("segment: a sphere as start follows the image edge, without points") {
@@ -84,7 +86,7 @@ TEST_CASE("segment: a sphere as start follows the image edge, without points") {
     options.start.kind = Start::Kind::Sphere;
     options.start.radius = kRadius + 2;
     options.evolve.delta = 0.2;
-    const SegmentResult result = segment(&image, {}, options);
+    const SegmentResult result = segment(image, options);
     CHECK(result.report.resolved.evolve.follow);
     CHECK(result.report.resolved.evolve.theta == 0);
     CHECK(result.distance == nullptr);
@@ -92,17 +94,18 @@ TEST_CASE("segment: a sphere as start follows the image edge, without points") {
 }
 
 TEST_CASE("segment: an unlimited attraction reaches from a far start to the points") {
+    constexpr double h = 0.8;
     SegmentOptions options;
-    options.voxel_size = 0.8;
+    options.voxel_size = h;
     options.start.kind = Start::Kind::Sphere;
     options.start.radius = kRadius + 4;
     options.margin = 8;
     options.evolve.attraction_range = 0;
     // the points are a voxel apart: more and curvature wins between them
-    options.evolve.delta = 0.1 * options.voxel_size;
-    const SegmentResult result = segment(nullptr, sphere_points(1200), options);
+    options.evolve.delta = 0.1 * h;
+    const SegmentResult result = reconstruct(sphere_points(1200), options);
     CHECK(result.report.automatic.count("distance_tube") == 1);
-    CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.1 * options.voxel_size);
+    CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.1 * h);
 }
 
 namespace {
@@ -128,27 +131,27 @@ Image ellipsoid_image(const Vec3& semi_axes) {
     return Image::from_values(geometry, values.data());
 }
 
-SegmentResult from_sphere(const Image& image, double radius, int coarse_levels) {
+SegmentResult from_sphere(const Image& image, double radius, std::optional<int> coarse_levels) {
     SegmentOptions options;
     options.start.kind = Start::Kind::Sphere;
     options.start.radius = radius;
     options.evolve.delta = 0.2;
     options.coarse_levels = coarse_levels;
-    return segment(&image, {}, options);
+    return segment(image, options);
 }
 
 }  // namespace
 
 TEST_CASE("segment: a coarse level first gives the same surface in fewer steps") {
     const Image image = ellipsoid_image({26, 18, 22});
-    const SegmentResult fine = from_sphere(image, 32, 0), both = from_sphere(image, 32, -1);
+    const SegmentResult fine = from_sphere(image, 32, 0), both = from_sphere(image, 32, {});
     REQUIRE(both.report.coarse.size() == 1);
     CHECK(both.report.coarse[0].why_not.empty());
     CHECK(fine.report.coarse.empty());
     CHECK(both.report.solve.steps < fine.report.solve.steps / 2);
     std::vector<Vec3> vertices;
     for (const auto& v : both.mesh.vertices) vertices.push_back({v[0], v[1], v[2]});
-    const FitStatistics fit = points_to_surface(vertices, fine.mesh);
+    const FitStatistics fit = measure_fit(vertices, fine.mesh);
     CHECK(fit.mean < 0.1);
     CHECK(fit.p95 < 0.2);
 }
@@ -156,42 +159,47 @@ TEST_CASE("segment: a coarse level first gives the same surface in fewer steps")
 TEST_CASE("segment: what a coarse level cannot hold is not lost") {
     // A plate of three voxels: a voxel and a half at twice the size.
     const Image image = ellipsoid_image({24, 24, 2});
-    const SegmentResult fine = from_sphere(image, 28, 0), both = from_sphere(image, 28, -1);
+    const SegmentResult fine = from_sphere(image, 28, 0), both = from_sphere(image, 28, {});
     CHECK(both.report.surface.closed);
     CHECK(both.report.surface.volume == Approx(fine.report.surface.volume).epsilon(0.05));
 }
 
 TEST_CASE("segment: what is missing is an error that says so") {
-    CHECK(code_of([] { (void)segment(nullptr, {}); }) == Errc::InvalidInput);
+    CHECK(code_of([] { (void)reconstruct({}); }) == Errc::InvalidInput);
     const Image image = ball_image(2.0);
-    CHECK(code_of([&] { (void)segment(&image, {}); }) == Errc::InvalidInput);  // tagging without points
+    CHECK(code_of([&] { (void)segment(image); }) == Errc::InvalidInput);  // tagging without points
     SegmentOptions options;
     options.evolve.theta = 2;
-    CHECK(code_of([&] { (void)segment(nullptr, sphere_points(100), options); }) == Errc::InvalidOptions);
+    CHECK(code_of([&] { (void)reconstruct(sphere_points(100), options); }) == Errc::InvalidOptions);
     options = {};
     options.start.kind = Start::Kind::Sphere;  // radius 0
-    CHECK(code_of([&] { (void)segment(&image, {}, options); }) == Errc::InvalidOptions);
+    CHECK(code_of([&] { (void)segment(image, options); }) == Errc::InvalidOptions);
+    options = {};
+    for (const double bad : {0.0, -1.0}) {
+        options.voxel_size = options.tag_distance = bad;
+        CHECK(code_of([&] { (void)segment(image, sphere_points(100), options); }) == Errc::InvalidOptions);
+    }
     options = {};
     options.roi = WorldBox{{0, 0, 0}, {1, 0, 1}};
-    CHECK(code_of([&] { (void)segment(&image, sphere_points(100), options); }) == Errc::InvalidOptions);
+    CHECK(code_of([&] { (void)segment(image, sphere_points(100), options); }) == Errc::InvalidOptions);
 }
 
 TEST_CASE("segment: a set cancel flag ends it with Cancelled") {
     const std::atomic<bool> cancel = true;
     RunContext run;
     run.cancel = &cancel;
-    CHECK(code_of([&] { (void)segment(nullptr, sphere_points(1200), {}, run); }) == Errc::Cancelled);
+    CHECK(code_of([&] { (void)reconstruct(sphere_points(1200), {}, run); }) == Errc::Cancelled);
 }
 
 TEST_CASE("choose_voxel_size: image before points, median spacing of distinct points") {
     const Image image = ball_image(2.0);
-    CHECK(choose_voxel_size(&image, {{0, 0, 0}}).voxel_size == 2.0);
+    CHECK(choose_voxel_size(image).voxel_size == 2.0);
     // Three distinct points: as many voxels as a thousand would have.
-    CHECK(choose_voxel_size(nullptr, {{0, 0, 0}, {3, 0, 0}, {0, 0, 0}, {6, 0, 0}}).voxel_size ==
+    CHECK(choose_voxel_size({{0, 0, 0}, {3, 0, 0}, {0, 0, 0}, {6, 0, 0}}).voxel_size ==
           Approx(3 * std::sqrt(3.0 / 1000)));
     std::vector<Vec3> plate;
     for (int i = 0; i < 40; ++i)
         for (int j = 0; j < 25; ++j) plate.push_back({3.0 * i, 3.0 * j, 0});
-    CHECK(choose_voxel_size(nullptr, plate).voxel_size == Approx(3));
-    CHECK(code_of([] { (void)choose_voxel_size(nullptr, {{1, 1, 1}, {1, 1, 1}}); }) == Errc::InvalidInput);
+    CHECK(choose_voxel_size(plate).voxel_size == Approx(3));
+    CHECK(code_of([] { (void)choose_voxel_size({{1, 1, 1}, {1, 1, 1}}); }) == Errc::InvalidInput);
 }

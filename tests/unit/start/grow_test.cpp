@@ -55,7 +55,7 @@ TEST_CASE("a sphere inside a clean object, bright or dark, grows to its edges wh
                 INFO("inside " << inside << ", noise " << noise << ", seed off by " << off[0] << " " << off[1] << " "
                                << off[2]);
                 const Image image = image_of(50, ellipsoid(center, radii), inside, noise, 3);
-                const Domain domain = domain_of_box(image.geometry().world_box(), 1);
+                const Domain domain = make_domain(image.geometry().world_box(), 1);
                 const FloatGridPtr seed =
                     start_from_sphere(domain, {center[0] + off[0], center[1] + off[1], center[2] + off[2]}, 3.5);
                 const detail::GrownStart grown = detail::grow_to_edges(image, *seed, 1, {});
@@ -68,7 +68,7 @@ TEST_CASE("a sphere inside a clean object, bright or dark, grows to its edges wh
 TEST_CASE("a start around an object, at an edge or in an empty image stays as it is") {
     const Vec3 center{24, 24, 24};
     const Image image = image_of(50, ellipsoid(center, {10, 10, 10}), 180, 5, 1);
-    const Domain domain = domain_of_box(image.geometry().world_box(), 1);
+    const Domain domain = make_domain(image.geometry().world_box(), 1);
     CHECK_FALSE(detail::grow_to_edges(image, *start_from_sphere(domain, center, 16), 1, {}).level_set);
     CHECK_FALSE(detail::grow_to_edges(image, *start_from_sphere(domain, center, 10), 1, {}).level_set);
     const Image empty = image_of(

@@ -12,7 +12,7 @@ using namespace covol::test;
 
 namespace {
 
-const Domain kDomain = domain_of_box({{-10, -10, -10}, {10, 10, 10}}, 0.5);
+const Domain kDomain = make_domain({{-10, -10, -10}, {10, 10, 10}}, 0.5);
 const Vec3 kCenter{0.7, -1.1, 0.3};
 constexpr double kRadius = 5.0;
 
@@ -57,7 +57,7 @@ TEST_CASE("a sphere's start is its clamped distance") {
 }
 
 TEST_CASE("a sphere that the domain cuts is filled up to its end and not beyond") {
-    const Domain cut = domain_of_box({{-2, -2, -2}, {10, 3, 40}}, 0.25);
+    const Domain cut = make_domain({{-2, -2, -2}, {10, 3, 40}}, 0.25);
     const auto distance = [](const Vec3& x) { return std::hypot(x[0], x[1], x[2]) - 8; };
     const FloatGridPtr grid = start_from_sphere(cut, {0, 0, 0}, 8);
     CHECK(worst_error(*grid, cut, distance) < 1e-5);
@@ -89,7 +89,7 @@ TEST_CASE("a mesh's start is the distance to it") {
 }
 
 TEST_CASE("another grid's surface is taken over on a finer lattice") {
-    Domain coarse = domain_of_box({{-11, -12, -13}, {11, 12, 13}}, 0.8);
+    Domain coarse = make_domain({{-11, -12, -13}, {11, 12, 13}}, 0.8);
     const FloatGridPtr grid = start_from_grid(kDomain, *start_from_sphere(coarse, kCenter, kRadius));
     CHECK(worst_error(*grid, kDomain, sphere_distance) < 0.12);  // of the coarse grid's linear interpolation
 }

@@ -19,7 +19,7 @@ using openvdb::Coord;
 
 namespace {
 
-const Domain kDomain = domain_of_box({{-8, -8, -8}, {8, 8, 8}}, 0.5);
+const Domain kDomain = make_domain({{-8, -8, -8}, {8, 8, 8}}, 0.5);
 constexpr double kH = 0.5, kHalfWidth = 3 * kH;
 
 openvdb::CoordBBox box_of(const Domain& d) { return {{d.min[0], d.min[1], d.min[2]}, {d.max[0], d.max[1], d.max[2]}}; }
@@ -90,7 +90,7 @@ double nearest_by_search(const detail::InterfacePatches& patches, const Coord& a
 TEST_CASE("a plane's surface is its distance, whatever the slope of u") {
     const Vec3 n{0.48, 0.6, 0.64};
     const auto distance = [&](const Vec3& x) { return n[0] * x[0] + n[1] * x[1] + n[2] * x[2] - 0.3; };
-    const FloatGridPtr grid = surface(*field(kDomain, [&](const Vec3& x) { return 5 * distance(x); }));
+    const FloatGridPtr grid = extract_surface(*field(kDomain, [&](const Vec3& x) { return 5 * distance(x); }));
     CHECK(grid->getGridClass() == openvdb::GRID_LEVEL_SET);
     CHECK(grid->getName() == "surface");
     CHECK(grid->background() == float(kHalfWidth));
@@ -109,8 +109,8 @@ TEST_CASE("distances are those to the nearest of all patches, between sheets and
     double worst = 0;
     int voxels = 0, off = 0;
     for (unsigned seed = 1; seed <= 3; ++seed) {
-        const Domain domain = domain_of_box({{-5, -5, -5}, {5, 5, 5}}, kH);
-        const FloatGridPtr u = waves(domain, seed), grid = surface(*u);
+        const Domain domain = make_domain({{-5, -5, -5}, {5, 5, 5}}, kH);
+        const FloatGridPtr u = waves(domain, seed), grid = extract_surface(*u);
         const auto patches = detail::find_interface(*u, domain, detail::DomainEnd::Closed, {});
         for (auto value = grid->cbeginValueOn(); value; ++value) {
             const double exact = nearest_by_search(patches, value.getCoord()), got = std::abs(*value) / kH;
@@ -184,7 +184,7 @@ TEST_CASE("eight voxels at a time and one by one find the same distance to a pat
 }
 
 TEST_CASE("what is inside at the domain's end is closed half a voxel beyond it") {
-    const FloatGridPtr grid = surface(*field(kDomain, [](const Vec3& x) { return x[0]; }));
+    const FloatGridPtr grid = extract_surface(*field(kDomain, [](const Vec3& x) { return x[0]; }));
     CHECK(grid->tree().getValue({0, 16, 16}) == Approx(-0.5 * kH));
     CHECK(grid->tree().getValue({-1, 16, 16}) == Approx(0.5 * kH));
     CHECK(extract_mesh(*grid).triangles.size() > 1000);
@@ -194,7 +194,7 @@ TEST_CASE("what is inside at the domain's end is closed half a voxel beyond it")
 TEST_CASE("an inside that is a tile has its surface too") {
     FloatGridPtr u = make_grid(kDomain, 1.0F, "u");
     u->tree().addTile(1, {8, 8, 8}, -1.0F, false);
-    const FloatGridPtr grid = surface(*u);
+    const FloatGridPtr grid = extract_surface(*u);
     CHECK(grid->tree().getValue({8, 11, 11}) == Approx(-0.5 * kH));
     CHECK(grid->tree().getValue({7, 11, 11}) == Approx(0.5 * kH));
     CHECK(grid->tree().getValue({5, 11, 11}) == Approx(2.5 * kH));
@@ -204,25 +204,25 @@ TEST_CASE("surface: the same bits for 1, 2 and 8 threads") {
     const FloatGridPtr u = waves(kDomain, 9);
     RunContext run;
     run.threads = 1;
-    const FloatGridPtr one = surface(*u, run);
+    const FloatGridPtr one = extract_surface(*u, run);
     for (const int threads : {2, 8}) {
         run.threads = threads;
-        CHECK(identical(*one, *surface(*u, run)));
+        CHECK(identical(*one, *extract_surface(*u, run)));
     }
 }
 
 TEST_CASE("a field without a crossing, and one whose outside is not positive, are refused") {
-    CHECK_THROWS_AS(surface(*field(kDomain, [](const Vec3&) { return 1.0; })), Error);
-    CHECK_THROWS_AS(surface(*make_grid(kDomain, 1.0F, "u")), Error);
+    CHECK_THROWS_AS(extract_surface(*field(kDomain, [](const Vec3&) { return 1.0; })), Error);
+    CHECK_THROWS_AS(extract_surface(*make_grid(kDomain, 1.0F, "u")), Error);
     FloatGridPtr inside_out = make_grid(kDomain, -1.0F, "u");
     inside_out->tree().setValue({3, 3, 3}, 1.0F);
-    CHECK_THROWS_AS(surface(*inside_out), Error);
+    CHECK_THROWS_AS(extract_surface(*inside_out), Error);
 }
 
 TEST_CASE("fog is 1 deep inside, 0 outside, and rises across the inner half of the band") {
     const FloatGridPtr level_set =
-        surface(*field(kDomain, [](const Vec3& x) { return std::hypot(x[0], x[1], x[2]) - 5; }));
-    const FloatGridPtr fog = density(*level_set);
+        extract_surface(*field(kDomain, [](const Vec3& x) { return std::hypot(x[0], x[1], x[2]) - 5; }));
+    const FloatGridPtr fog = to_fog_volume(*level_set);
     CHECK(fog->getGridClass() == openvdb::GRID_FOG_VOLUME);
     CHECK(fog->getName() == "density");
     for (auto at = box_of(kDomain).begin(); at; ++at) {
@@ -236,7 +236,7 @@ TEST_CASE("a label image has the label where the voxel's centre is inside, in an
     const auto off = [&](const Vec3& x) {
         return std::hypot(x[0] - center[0], x[1] - center[1], x[2] - center[2]) - 5;
     };
-    const FloatGridPtr level_set = surface(*field(kDomain, off));
+    const FloatGridPtr level_set = extract_surface(*field(kDomain, off));
     ImageGeometry geometry;
     geometry.size = {33, 29, 21};
     geometry.spacing = {0.47, 0.61, 0.83};

@@ -17,7 +17,7 @@ constexpr double kPi = 3.14159265358979323846;
 double ball(double radius) { return 4.0 / 3.0 * kPi * radius * radius * radius; }
 
 FloatGridPtr tube(const std::vector<Vec3>& points, const Domain& domain, double radius) {
-    return distance(points, domain, {radius}).grid;
+    return compute_distance(points, domain, {radius}).grid;
 }
 
 /// Points of a sphere without those above z.
@@ -26,14 +26,14 @@ std::vector<Vec3> without_cap(std::vector<Vec3> points, double z) {
     return points;
 }
 
-const Domain kDomain = domain_of_box({{-32, -32, -32}, {32, 32, 32}}, 1.0);
+const Domain kDomain = make_domain({{-32, -32, -32}, {32, 32, 32}}, 1.0);
 
 }  // namespace
 
 TEST_CASE("a sphere's cloud encloses a ball of radius r + D") {
     const double r = 20, tag_distance = 2.5;
     const FloatGridPtr d = tube(sphere_cloud(40000, r, 1), kDomain, 8);
-    const BandResult result = band(*d, {tag_distance, {}});
+    const BandResult result = tag_interior(*d, {tag_distance, {}});
     CHECK(result.report.enclosed_volume == Approx(ball(r + tag_distance)).epsilon(0.01));
     CHECK(result.report.core_volume == Approx(ball(r - tag_distance)).epsilon(0.01));
     CHECK_FALSE(result.report.leaks);
@@ -80,7 +80,7 @@ TEST_CASE("the tagged surface of a plane of points is exact to a hundredth of a 
                 points.push_back({s, end, t});
                 points.push_back({s, t, end});
             }
-    const BandResult result = band(*tube(points, kDomain, 8), {2.3, {}});
+    const BandResult result = tag_interior(*tube(points, kDomain, 8), {2.3, {}});
     double worst = 0;
     for (double x = 19.5; x <= 25.5; x += 1)
         for (double y = -10.5; y < 11; y += 1) {
@@ -96,9 +96,9 @@ TEST_CASE("an exterior seed opens a cavity") {
     const std::vector<Vec3> inner = sphere_cloud(15000, 12, 2);
     points.insert(points.end(), inner.begin(), inner.end());
     const FloatGridPtr d = tube(points, kDomain, 8);
-    const BandResult closed = band(*d, {2.5, {}});
+    const BandResult closed = tag_interior(*d, {2.5, {}});
     CHECK(closed.report.enclosed_volume == Approx(ball(26.5)).epsilon(0.01));
-    const BandResult open = band(*d, {2.5, {{0, 0, 0}}});
+    const BandResult open = tag_interior(*d, {2.5, {{0, 0, 0}}});
     CHECK(open.report.enclosed_volume == Approx(ball(26.5) - ball(9.5)).epsilon(0.01));
     CHECK(value_at(*open.grid, {0.5, 0.5, 0.5}) == 3.0F);
     CHECK(value_at(*open.grid, {0.5, 0.5, 18}) == -3.0F);
@@ -109,7 +109,7 @@ TEST_CASE("exterior seeds that cannot be are refused") {
     const FloatGridPtr d = tube(sphere_cloud(5000, 20, 1), kDomain, 8);
     const auto message = [&](const Vec3& seed) -> std::string {
         try {
-            (void)band(*d, {2.5, {seed}});
+            (void)tag_interior(*d, {2.5, {seed}});
         } catch (const Error& e) {
             CHECK(e.code() == Errc::InvalidInput);
             return e.what();
@@ -124,17 +124,17 @@ TEST_CASE("a leak is reported with the distance that holds") {
     // A cap of radius sqrt(20^2 - 18^2) = 8.7 is missing.
     const std::vector<Vec3> points = without_cap(sphere_cloud(40000, 20, 3), 18);
     const FloatGridPtr d = tube(points, kDomain, 14);
-    const BandResult leaking = band(*d, {3.0, {}});
+    const BandResult leaking = tag_interior(*d, {3.0, {}});
     CHECK(leaking.report.leaks);
     CHECK(leaking.report.core_volume < 100);
     CHECK(leaking.report.holding_distance > 6.0);
     CHECK(leaking.report.holding_distance < 10.0);
-    const BandResult holding = band(*d, {leaking.report.holding_distance, {}});
+    const BandResult holding = tag_interior(*d, {leaking.report.holding_distance, {}});
     CHECK_FALSE(holding.report.leaks);
     CHECK(holding.report.core_volume > 1000);
 
     SECTION("none was found in a narrow tube") {
-        const BandResult narrow = band(*tube(points, kDomain, 6.5), {3.0, {}});
+        const BandResult narrow = tag_interior(*tube(points, kDomain, 6.5), {3.0, {}});
         CHECK(narrow.report.leaks);
         CHECK(narrow.report.holding_distance == 0);
     }
@@ -143,15 +143,15 @@ TEST_CASE("a leak is reported with the distance that holds") {
 TEST_CASE("a solid body without a core does not leak") {
     // D is larger than the sphere: a smaller D still finds the core.
     const std::vector<Vec3> points = sphere_cloud(3000, 4, 1);
-    const BandResult result = band(*tube(points, kDomain, 9), {5.0, {}});
+    const BandResult result = tag_interior(*tube(points, kDomain, 9), {5.0, {}});
     CHECK(result.report.core_volume == 0);
     CHECK_FALSE(result.report.leaks);
 }
 
 TEST_CASE("what lies beyond the domain is outside") {
     // The domain cuts the sphere; its wall reaches the boundary.
-    const Domain half = domain_of_box({{-32, -32, 0}, {32, 32, 32}}, 1.0);
-    const BandResult result = band(*tube(sphere_cloud(40000, 20, 1), half, 8), {2.5, {}});
+    const Domain half = make_domain({{-32, -32, 0}, {32, 32, 32}}, 1.0);
+    const BandResult result = tag_interior(*tube(sphere_cloud(40000, 20, 1), half, 8), {2.5, {}});
     int inside_beyond = 0;
     for (auto value = result.grid->tree().cbeginValueAll(); value; ++value)
         if (value.getCoord().z() < half.min[2] && *value < 0) ++inside_beyond;
@@ -160,44 +160,44 @@ TEST_CASE("what lies beyond the domain is outside") {
 }
 
 TEST_CASE("a large empty domain costs nothing") {
-    const Domain large = domain_of_box({{-4096, -4096, -4096}, {4096, 4096, 4096}}, 1.0);
-    const BandResult result = band(*tube(sphere_cloud(8000, 12, 1, {3000, -3000, 500}), large, 7), {2.5, {}});
+    const Domain large = make_domain({{-4096, -4096, -4096}, {4096, 4096, 4096}}, 1.0);
+    const BandResult result = tag_interior(*tube(sphere_cloud(8000, 12, 1, {3000, -3000, 500}), large, 7), {2.5, {}});
     CHECK(result.report.enclosed_volume == Approx(ball(14.5)).epsilon(0.02));
     CHECK(value_at(*result.grid, {3000, -3000, 500}) == -3.0F);
     CHECK(value_at(*result.grid, {0, 0, 0}) == 3.0F);
 }
 
 TEST_CASE("interior far from the surface is tiles, not leaves") {
-    const Domain wide = domain_of_box({{-80, -80, -80}, {80, 80, 80}}, 1.0);
-    const BandResult result = band(*tube(sphere_cloud(150000, 70, 1), wide, 6), {2.5, {}});
+    const Domain wide = make_domain({{-80, -80, -80}, {80, 80, 80}}, 1.0);
+    const BandResult result = tag_interior(*tube(sphere_cloud(150000, 70, 1), wide, 6), {2.5, {}});
     CHECK(value_at(*result.grid, {0.5, 0.5, 0.5}) == -3.0F);
     CHECK(result.grid->tree().probeConstLeaf({0, 0, 0}) == nullptr);
     CHECK(negative_volume(*result.grid) == Approx(ball(72.5)).epsilon(0.01));
 }
 
-TEST_CASE("band() gives the same bits for any number of threads") {
+TEST_CASE("tag_interior() gives the same bits for any number of threads") {
     const FloatGridPtr d = tube(sphere_cloud(3000, 20, 1), kDomain, 8);
     RunContext run;
     run.threads = 1;
-    const BandResult one = band(*d, {2.5, {}}, run);
+    const BandResult one = tag_interior(*d, {2.5, {}}, run);
     for (const int threads : {2, 8}) {
         run.threads = threads;
-        CHECK(identical(*one.grid, *band(*d, {2.5, {}}, run).grid));
+        CHECK(identical(*one.grid, *tag_interior(*d, {2.5, {}}, run).grid));
     }
 }
 
 TEST_CASE("a tube that is too narrow, a missing tube and a bad D are refused") {
     const FloatGridPtr d = tube({{0, 0, 0}}, kDomain, 5);
-    CHECK_THROWS_AS(band(*d, {2.5, {}}), Error);
-    CHECK_THROWS_AS(band(*make_grid(kDomain, 5.0F, "distance"), {2.0, {}}), Error);
-    CHECK_THROWS_AS(band(*d, {0.0, {}}), Error);
-    CHECK_NOTHROW(band(*d, {2.0, {}}));
+    CHECK_THROWS_AS(tag_interior(*d, {2.5, {}}), Error);
+    CHECK_THROWS_AS(tag_interior(*make_grid(kDomain, 5.0F, "distance"), {2.0, {}}), Error);
+    CHECK_THROWS_AS(tag_interior(*d, {0.0, {}}), Error);
+    CHECK_NOTHROW(tag_interior(*d, {2.0, {}}));
 }
 
 TEST_CASE("the tag distance is chosen from the cloud") {
     const auto leaks_with = [](const std::vector<Vec3>& points, const TagDistanceChoice& choice) {
         const FloatGridPtr d = tube(points, kDomain, choice.tag_distance + 4);
-        const BandReport report = band(*d, {choice.tag_distance, {}}).report;
+        const BandReport report = tag_interior(*d, {choice.tag_distance, {}}).report;
         return report.leaks || report.core_volume == 0;
     };
     SECTION("dense points: close to the voxel size") {
@@ -228,7 +228,7 @@ TEST_CASE("the tag distance is chosen from the cloud") {
         points.insert(points.end(), inner.begin(), inner.end());
         const TagDistanceChoice choice = choose_tag_distance(points, kDomain, {{0, 0, 0}});
         CHECK(choice.tag_distance < 3.5);
-        const BandReport report = band(*tube(points, kDomain, 8), {choice.tag_distance, {{0, 0, 0}}}).report;
+        const BandReport report = tag_interior(*tube(points, kDomain, 8), {choice.tag_distance, {{0, 0, 0}}}).report;
         CHECK(report.core_volume > 0.5 * (ball(26) - ball(12)));
     }
     SECTION("a sheet has no inside: the spacing decides, and the reason says so") {

@@ -26,19 +26,19 @@ std::vector<Vec3> sphere_points(int n) {
 TEST_CASE("the closing of a tagged cloud touches its points and stays near the body they bound") {
     const double h = 0.05, D = 0.45;
     const std::vector<Vec3> points = sphere_points(120);
-    const Domain domain = domain_of_box({{-2, -2, -2}, {2, 2, 2}}, h);
-    const FloatGridPtr d = distance(points, domain, {D + 5 * h}).grid;
-    const BandResult tagged = band(*d, {D, {}});
+    const Domain domain = make_domain({{-2, -2, -2}, {2, 2, 2}}, h);
+    const FloatGridPtr d = compute_distance(points, domain, {D + 5 * h}).grid;
+    const BandResult tagged = tag_interior(*d, {D, {}});
     REQUIRE_FALSE(tagged.report.leaks);
 
-    const FloatGridPtr closed = closing(*tagged.grid, D);
+    const FloatGridPtr closed = close_by_ball(*tagged.grid, D);
     REQUIRE(closed);
-    const FloatGridPtr solid = surface(*closed);
+    const FloatGridPtr solid = extract_surface(*closed);
     const TriangleMesh mesh = extract_mesh(*solid);
     CHECK(measure(mesh).genus == 0);
     CHECK(measure(mesh).closed);
     // The closing has a cusp at each point, which a grid rounds off by less than a voxel.
-    const FitStatistics fit = points_to_surface(points, mesh);
+    const FitStatistics fit = measure_fit(points, mesh);
     CHECK(fit.max < h);
     CHECK(fit.mean < 0.5 * h);
     // Between its contacts the ball dips in by at most its own sagitta over the gap, D - sqrt(D^2 - gap^2).
@@ -52,10 +52,10 @@ TEST_CASE("the closing of a tagged cloud touches its points and stays near the b
 
 TEST_CASE("a ball too large for the body leaves no closing") {
     const double h = 0.05;
-    const Domain domain = domain_of_box({{-2, -2, -2}, {2, 2, 2}}, h);
+    const Domain domain = make_domain({{-2, -2, -2}, {2, 2, 2}}, h);
     // One point: the tagged body is the ball of radius D around it, its closing the point itself.
-    const FloatGridPtr d = distance({{0.01, 0.02, 0.015}}, domain, {0.5 + 5 * h}).grid;
-    const BandResult tagged = band(*d, {0.5, {}});
-    const FloatGridPtr closed = closing(*tagged.grid, 0.5 + h);
+    const FloatGridPtr d = compute_distance({{0.01, 0.02, 0.015}}, domain, {0.5 + 5 * h}).grid;
+    const BandResult tagged = tag_interior(*d, {0.5, {}});
+    const FloatGridPtr closed = close_by_ball(*tagged.grid, 0.5 + h);
     CHECK_FALSE(closed);
 }

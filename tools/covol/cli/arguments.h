@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -24,6 +25,14 @@ struct Length {
     [[nodiscard]] double resolve(double voxel_size, double fallback) const {
         if (!given) return fallback;
         return in_voxels ? value * voxel_size : value;
+    }
+    /// The same; none where the option was not given.
+    [[nodiscard]] std::optional<double> resolve(double voxel_size) const {
+        return given ? std::optional(resolve(voxel_size, 0)) : std::nullopt;
+    }
+    /// The same; none where it was given as 0.
+    [[nodiscard]] std::optional<double> resolve_above_0(double voxel_size) const {
+        return resolve(voxel_size, 0) > 0 ? resolve(voxel_size) : std::nullopt;
     }
 };
 

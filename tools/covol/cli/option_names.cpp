@@ -44,6 +44,6 @@ std::string spell(const NamedOption& option) {
 
 }  // namespace
 
-std::string with_flags(const std::string& message) { return with_names(message, spell); }
+std::string with_flags(const std::string& message) { return replace_names(message, spell); }
 
 }  // namespace covol::tool

@@ -78,32 +78,28 @@ Json to_json(const SeedCheck& s) {
 }
 
 Json to_json(const CompareReport& r) {
-    return {{"dice", r.dice},
-            {"jaccard", r.jaccard},
-            {"volume_a", r.volume_a},
-            {"volume_b", r.volume_b},
-            {"hausdorff", r.hausdorff},
-            {"hausdorff95", r.hausdorff95},
-            {"mean_distance", r.mean_distance}};
+    return {{"dice", r.dice},           {"jaccard", r.jaccard},  {"volume_a", r.volume_a}, {"volume_b", r.volume_b},
+            {"hausdorff", r.hausdorff}, {"hausdorff95", r.hd95}, {"mean_distance", r.assd}};
 }
 
 Json to_json(const SegmentOptions& o) {
+    constexpr double kAutomatic = -1;  // not needed, and so not chosen
     const EvolveOptions& e = o.evolve;
     return {{"model", to_string(o.model)},
-            {"voxel_size", o.voxel_size},
-            {"tag_distance", o.tag_distance},
+            {"voxel_size", o.voxel_size.value_or(0)},
+            {"tag_distance", o.tag_distance.value_or(0)},
             {"theta", e.theta},
             {"rho", e.rho},
-            {"delta", e.delta},
-            {"tau", e.tau},
-            {"sigma", o.edge.sigma},
+            {"delta", e.delta.value_or(kAutomatic)},
+            {"tau", e.tau.value_or(kAutomatic)},
+            {"sigma", o.edge.sigma.value_or(kAutomatic)},
             {"edge_feature", to_string(o.edge.feature)},
-            {"edge_k", o.edge.edge_k},
+            {"edge_k", o.edge.edge_k.value_or(0)},
             {"intensities", {o.edge.low, o.edge.high}},
             {"epsilon", e.epsilon},
             {"edge_epsilon", e.edge_epsilon},
-            {"attraction_range", e.attraction_range},
-            {"image_yields", e.image_yields},
+            {"attraction_range", e.attraction_range.value_or(kAutomatic)},
+            {"image_yields", e.image_yields.value_or(kAutomatic)},
             {"guess_weight", e.guess_weight},
             {"follow", e.follow},
             {"max_steps", e.max_steps},

@@ -10,6 +10,7 @@
 #include "cli/profile.h"
 #include "covol/error.h"
 #include "covol/vdb_io.h"
+#include "covol/version.h"
 
 namespace covol::tool {
 namespace {
@@ -138,7 +139,7 @@ Session::Session() : app_("covol: segment 3D images with the help of a point clo
     app_.formatter(help_);
     app_.footer("covol COMMAND --help shows the options of a command.");
     add_help_flags(app_);
-    app_.set_version_flag("--version", std::string("covol ") + COVOL_VERSION, "print the version");
+    app_.set_version_flag("--version", std::string("covol ") + version(), "print the version");
     app_.add_flag_callback("--describe-options", [this] { throw CLI::CallForVersion(help_->describe(app_), kDone); })
         ->configurable(false)
         ->group("");
@@ -245,7 +246,7 @@ int Session::execute() {
 }
 
 void Session::start_report() {
-    report_["covol"] = COVOL_VERSION;
+    report_["covol"] = version();
     report_["command"] = command_->get_name();
     report_["options"] = options_of(*command_);
     report_["seconds"] = Json::object();
@@ -255,7 +256,7 @@ void Session::finish() {
     const Stopwatch watch;
     if (!save_config_path_.empty())
         outputs_.add(save_config_path_, [this](const std::string& path) {
-            write_text(path, std::string("# covol ") + COVOL_VERSION + ", " + command_->get_name() + "\n" +
+            write_text(path, std::string("# covol ") + version() + ", " + command_->get_name() + "\n" +
                                  command_->config_to_str(false, true));
         });
     outputs_.commit();
@@ -313,7 +314,7 @@ std::map<std::string, std::string> Session::metadata() const {
     Json options = report_.at("options");
     options["command"] = report_.at("command");
     const auto text = [](const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); };
-    std::map<std::string, std::string> facts{{"covol_version", COVOL_VERSION}, {"covol_options", text(options)}};
+    std::map<std::string, std::string> facts{{"covol_version", version()}, {"covol_options", text(options)}};
     if (report_.contains("resolved")) facts["covol_resolved"] = text(report_.at("resolved"));
     return facts;
 }

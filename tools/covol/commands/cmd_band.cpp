@@ -31,7 +31,7 @@ struct BandJob {
         const FloatGridPtr d = read_vdb(distance_path);
         const double D = choose_distance(domain_of(*d), session);
         const Stopwatch watch;
-        const BandResult result = band(*d, {D, tag.exterior_seeds}, session.run());
+        const BandResult result = tag_interior(*d, {D, tag.exterior_seeds}, session.run());
         session.add_seconds("tag", watch.seconds());
         session.report()["band"] = to_json(result.report);
         session.note(std::to_string(result.report.active_voxels) + " active voxels, encloses " +

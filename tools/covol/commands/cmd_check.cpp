@@ -149,7 +149,7 @@ void check_points(const std::string& path, const std::string& image_path, const 
     if (distinct.size() < 4) {
         findings.problem(std::to_string(distinct.size()) + " distinct points enclose no volume");
     } else {
-        const SpacingStatistics s = nearest_neighbour_spacing(distinct);
+        const SpacingStatistics s = measure_spacing(distinct);
         if (s.max > kFarPoint * s.median)
             findings.remark("a point lies " + std::to_string(s.max) + " from its nearest neighbour, the median is " +
                             std::to_string(s.median) + ": it may be an outlier");

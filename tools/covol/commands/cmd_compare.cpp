@@ -51,8 +51,8 @@ struct CompareJob {
         session.report()["compare"] = to_json(r);
         std::ostringstream text;
         text << std::setprecision(6) << "Dice " << r.dice << ", Jaccard " << r.jaccard << ", volumes " << r.volume_a
-             << " and " << r.volume_b << "\ndistance between the surfaces: mean " << r.mean_distance << ", 95 % "
-             << r.hausdorff95 << ", max " << r.hausdorff;
+             << " and " << r.volume_b << "\ndistance between the surfaces: mean " << r.assd << ", 95 % " << r.hd95
+             << ", max " << r.hausdorff;
         session.say(text.str());
     }
 
@@ -73,8 +73,8 @@ struct CompareJob {
 
     /// Points are no solid: how far they lie from the other's surface.
     static void measure_points(const std::string& points_path, const std::string& solid_path, Session& session) {
-        const std::vector<Vec3> points = to_world(read_points(points_path), nullptr);
-        const FitStatistics fit = points_to_surface(points, surface_of(solid_path, session.run()), session.run());
+        const std::vector<Vec3> points = to_world(read_points(points_path));
+        const FitStatistics fit = measure_fit(points, surface_of(solid_path, session.run()), session.run());
         session.report()["fit"]["points_to_surface"] = to_json(fit);
         std::ostringstream text;
         text << std::setprecision(6) << "points to surface: mean " << fit.mean << ", 95 % " << fit.p95 << ", max "

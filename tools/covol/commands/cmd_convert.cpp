@@ -33,7 +33,7 @@ struct ConvertJob {
 
     void image_to_vdb(Session& session) const {
         const Image pixels = image.read(input, session.run());
-        const double finest = choose_voxel_size(&pixels, {}).voxel_size;
+        const double finest = choose_voxel_size(pixels).voxel_size;
         const double h = voxel_size.resolve(finest, finest);
         const FloatGridPtr grid = to_grid(pixels, h, session.run());
         session.report()["image"] = to_json(pixels.geometry());
@@ -55,7 +55,7 @@ struct ConvertJob {
         std::optional<ImageGeometry> geometry;
         if (!like.empty()) geometry = read_image_geometry(like, image.options, session.run());
         const PointCloud cloud = read_points(input, points.options);
-        std::vector<Vec3> world = to_world(cloud, geometry ? &*geometry : nullptr);
+        std::vector<Vec3> world = geometry ? to_world(cloud, *geometry) : to_world(cloud);
         if (geometry) check_inside(cloud, *geometry, session.run());
         session.note(input + ": " + std::to_string(world.size()) + " points, " + cloud.rule);
         Json& report = session.report()["points"];

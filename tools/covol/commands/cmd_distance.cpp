@@ -17,10 +17,10 @@ struct DistanceJob {
     std::string like, output;
     bool half = false;
 
-    Domain make_domain(const ImageGeometry* geometry, const std::vector<Vec3>& cloud, double h, double radius) const {
-        if (domain.roi) return domain_of_box(*domain.roi, h);
-        if (geometry != nullptr) return domain_of_box(geometry->world_box(), h);
-        return domain_of_box(bounding_box(cloud, domain.margin.resolve(h, radius + h)), h);
+    Domain choose_domain(const ImageGeometry* geometry, const std::vector<Vec3>& cloud, double h, double radius) const {
+        if (domain.roi) return make_domain(*domain.roi, h);
+        if (geometry != nullptr) return make_domain(geometry->world_box(), h);
+        return make_domain(bounding_box(cloud, domain.margin.resolve(h, radius + h)), h);
     }
 
     double voxel_size(const ImageGeometry* geometry, const std::vector<Vec3>& cloud, Session& session) const {
@@ -38,9 +38,9 @@ struct DistanceJob {
         const std::vector<Vec3> cloud = read_world_points(points, pointer, session.run()).points;
         const double h = voxel_size(pointer, cloud, session);
         const double radius = max_distance.resolve(h, kTubeVoxels * h);
-        const Domain box = make_domain(pointer, cloud, h, radius);
+        const Domain box = choose_domain(pointer, cloud, h, radius);
         const Stopwatch watch;
-        const DistanceResult result = distance(cloud, box, {radius}, session.run());
+        const DistanceResult result = compute_distance(cloud, box, {radius}, session.run());
         session.add_seconds("distance", watch.seconds());
         session.report()["input"]["points"]["count"] = cloud.size();
         session.report()["grid"] = {

@@ -22,7 +22,7 @@ struct EdgeJob {
         reading.roi = sampled_box(domain.world_box(), h);
         const Image pixels = read_image(image_path, reading, session.run());
         const Stopwatch watch;
-        const EdgeResult result = edge(pixels, *topology, edge_flags.resolve(h, h), session.run());
+        const EdgeResult result = detect_edges(pixels, *topology, edge_flags.resolve(h), session.run());
         session.add_seconds("edge", watch.seconds());
         session.report()["input"]["image"] = to_json(pixels.geometry());
         session.report()["edge"] = to_json(result.report);

@@ -17,7 +17,7 @@ struct EvolveJob {
 
     /// A field that is not given has no weight.
     EvolveOptions resolve(double h, Session& session) const {
-        EvolveOptions options = flags.resolve(h, EvolveOptions{});
+        EvolveOptions options = flags.resolve(h);
         if (distance_path.empty() && options.theta > 0) {
             options.theta = 0;
             session.note("theta: 0 (there is no --distance)");

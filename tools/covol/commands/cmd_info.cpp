@@ -131,7 +131,7 @@ void describe_points(const std::string& path, const PointFlags& flags, Session& 
               {"space", name_of(cloud.space)},
               {"box", to_json(box)}};
     if (distinct.size() > 1) {
-        const SpacingStatistics s = nearest_neighbour_spacing(distinct);
+        const SpacingStatistics s = measure_spacing(distinct);
         text << "\ndistance to the nearest other point: median " << s.median << ", mean " << s.mean << ", 95 % "
              << s.p95 << ", max " << s.max;
         report["spacing"] = {{"median", s.median}, {"mean", s.mean}, {"p95", s.p95}, {"max", s.max}};

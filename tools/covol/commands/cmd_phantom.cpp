@@ -48,7 +48,7 @@ struct PhantomJob {
 void add_phantom(Session& session) {
     const auto [job, command] = session.add_job<PhantomJob>("phantom", "Test shapes with known truth");
     std::string kinds;
-    for (const std::string& kind : phantom_kinds()) kinds += (kinds.empty() ? "" : ", ") + kind;
+    for (const std::string& kind : list_phantom_kinds()) kinds += (kinds.empty() ? "" : ", ") + kind;
     in_group(*command, Group::Input);
     command->add_option("kind", job->options.kind, kinds)->required()->type_name("KIND");
     in_group(*command, Group::Output);

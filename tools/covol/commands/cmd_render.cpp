@@ -21,8 +21,9 @@ struct RenderJob {
         if (!image_path.empty()) pixels = image.read(image_path, session.run());
         const WorldPoints cloud = read_world_points(points, pixels ? &pixels->geometry() : nullptr, session.run());
         const Stopwatch watch;
-        const auto picture = std::make_shared<Picture>(
-            render(*level_set, pixels ? &*pixels : nullptr, cloud.points, options, session.run()));
+        const auto picture =
+            std::make_shared<Picture>(pixels ? render(*level_set, *pixels, cloud.points, options, session.run())
+                                             : render(*level_set, options, session.run()));
         session.add_seconds("render", watch.seconds());
         session.outputs().add(output, [picture](const std::string& path) { write_png(path, *picture); });
     }

@@ -16,13 +16,13 @@ struct SurfaceJob {
         session.outputs().check("--density", density_path, OutputKind::Vdb);
         const FloatGridPtr u = read_vdb(input);
         const Stopwatch watch;
-        const FloatGridPtr level_set = surface(*u, session.run());
+        const FloatGridPtr level_set = extract_surface(*u, session.run());
         session.add_seconds("surface", watch.seconds());
         session.report()["grid"] = {{"voxel_size", domain_of(*level_set).voxel_size}};
         const WriteVdbOptions vdb{half, session.metadata()};
         session.outputs().add(output, [=](const std::string& path) { write_vdb(path, {level_set}, vdb); });
         session.outputs().add(density_path,
-                              [=](const std::string& path) { write_vdb(path, {density(*level_set)}, vdb); });
+                              [=](const std::string& path) { write_vdb(path, {to_fog_volume(*level_set)}, vdb); });
     }
 };
 

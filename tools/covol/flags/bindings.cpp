@@ -15,7 +15,8 @@ void add_box(CLI::App& command, const std::string& flag, std::optional<WorldBox>
         ->type_name("X0,Y0,Z0,X1,Y1,Z1");
 }
 
-CLI::Option* add_positive(CLI::App& command, const std::string& flag, double& target, const std::string& description) {
+template <typename Number>
+CLI::Option* add_positive(CLI::App& command, const std::string& flag, Number& target, const std::string& description) {
     CLI::Option* option = command.add_option_function<double>(
         flag,
         [&target, flag](const double& value) {
@@ -175,7 +176,7 @@ WorldPoints read_world_points(const PointFlags& flags, const ImageGeometry* geom
     for (const std::string& path : flags.paths) {
         run.check();
         const PointCloud cloud = read_points(path, flags.options);
-        const std::vector<Vec3> world = to_world(cloud, geometry);
+        const std::vector<Vec3> world = geometry != nullptr ? to_world(cloud, *geometry) : to_world(cloud);
         if (geometry != nullptr) check_inside(cloud, *geometry, run);
         all.points.insert(all.points.end(), world.begin(), world.end());
         add_hints(cloud, world, all);
@@ -201,7 +202,7 @@ double DomainFlags::resolve_voxel_size(const Image* image, const std::vector<Vec
     if (voxel_size.given && !(voxel_size.value > 0))
         throw Error(Errc::InvalidOptions, "--voxel-size: expected > 0, got " + to_text(voxel_size.value));
     if (voxel_size.given && !voxel_size.in_voxels) return voxel_size.value;
-    const VoxelSizeChoice choice = choose_voxel_size(image, points);
+    const VoxelSizeChoice choice = image != nullptr ? choose_voxel_size(*image) : choose_voxel_size(points);
     const double h = voxel_size.resolve(choice.voxel_size, choice.voxel_size);
     const std::string line =
         to_text(h) + " (" + (voxel_size.given ? to_text(voxel_size.value) + " times " : "") + choice.reason + ")";
@@ -253,9 +254,9 @@ void EdgeFlags::bind(CLI::App& command, bool alone) {
         ->excludes(k);
 }
 
-EdgeOptions EdgeFlags::resolve(double h, double otherwise) const {
+EdgeOptions EdgeFlags::resolve(double h) const {
     EdgeOptions resolved = options;
-    resolved.sigma = sigma.resolve(h, otherwise);
+    resolved.sigma = sigma.resolve(h);
     return resolved;
 }
 
@@ -270,8 +271,8 @@ void EvolveFlags::bind(CLI::App& command, bool with_image, bool alone) {
     command.add_option("--epsilon", options.epsilon, "regularises the norm of grad u")->capture_default_str();
     in_group(command, Group::Flow);
     add_length(command, "--attraction-range", attraction_range, "",
-               "points pull fully up to half of it, not at all beyond; 0: unlimited [" +
-                   (alone        ? to_text(options.attraction_range)
+               std::string("points pull fully up to half of it, not at all beyond; 0: unlimited [") +
+                   (alone        ? "0"
                     : with_image ? "after tagging 8vx, and 0 with --rho 0; else 5vx"
                                  : "0 after tagging, else 5vx") +
                    "]");
@@ -280,9 +281,9 @@ void EvolveFlags::bind(CLI::App& command, bool with_image, bool alone) {
         command.add_option("--edge-epsilon", options.edge_epsilon, "regularises the norm of grad g")
             ->capture_default_str();
         in_group(command, Group::Flow);
-        add_share(command, "--image-yields", image_yields,
-                  "share of rho that fades close to points, on the attraction range's taper, 0 to 1 [" +
-                      (alone ? to_text(options.image_yields) : "1 after tagging, else 0") + "]");
+        add_share(command, "--image-yields", options.image_yields,
+                  std::string("share of rho that fades close to points, on the attraction range's taper, 0 to 1 [") +
+                      (alone ? "0" : "1 after tagging, else 0") + "]");
         add_share(command, "--guess-weight", guess_weight,
                   "share of theta that is left to what lies between marked slices, far from every mark, 0 to 1 [" +
                       to_text(options.guess_weight) + "]");
@@ -297,13 +298,12 @@ void EvolveFlags::bind(CLI::App& command, bool with_image, bool alone) {
     command.add_flag("--strict", strict, "exit code 5 when the flow is not steady at the end");
 }
 
-EvolveOptions EvolveFlags::resolve(double h, const EvolveOptions& otherwise) const {
+EvolveOptions EvolveFlags::resolve(double h) const {
     EvolveOptions resolved = options;
-    resolved.delta = delta.resolve(h, otherwise.delta);
-    resolved.tau = tau.resolve(h, otherwise.tau);
-    resolved.attraction_range = attraction_range.resolve(h, otherwise.attraction_range);
-    resolved.image_yields = image_yields.value_or(otherwise.image_yields);
-    resolved.guess_weight = guess_weight.value_or(otherwise.guess_weight);
+    resolved.delta = delta.resolve(h);
+    resolved.tau = tau.resolve(h);
+    resolved.attraction_range = attraction_range.resolve(h);
+    resolved.guess_weight = guess_weight.value_or(options.guess_weight);
     return resolved;
 }
 

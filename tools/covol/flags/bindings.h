@@ -96,20 +96,18 @@ struct EdgeFlags {
     EdgeOptions options;
     /// @param alone  the single step, which knows of no marks
     void bind(CLI::App& command, bool alone = false);
-    /// `otherwise` is sigma where none was given.
-    [[nodiscard]] EdgeOptions resolve(double h, double otherwise) const;
+    [[nodiscard]] EdgeOptions resolve(double h) const;
 };
 
 struct EvolveFlags {
     Length delta, tau, attraction_range;
-    std::optional<double> image_yields, guess_weight;
+    std::optional<double> guess_weight;
     EvolveOptions options;
     bool strict = false;
     /// @param with_image  without one there is no rho
     /// @param alone       the single step: what is automatic elsewhere is as in EvolveOptions
     void bind(CLI::App& command, bool with_image, bool alone = false);
-    /// What was not given is as in `otherwise`.
-    [[nodiscard]] EvolveOptions resolve(double h, const EvolveOptions& otherwise) const;
+    [[nodiscard]] EvolveOptions resolve(double h) const;
 };
 
 struct MeshFlags {

@@ -60,7 +60,7 @@ void CloudFlags::bind(CLI::App& command, bool with_most) {
 std::vector<std::uint32_t> CloudFlags::used(const std::vector<Vec3>& points, const RunContext& run,
                                             Json& report) const {
     std::vector<std::uint32_t> order =
-        spatial_order(points, most_points > 0 ? most_points : std::numeric_limits<std::size_t>::max());
+        order_spatially(points, most_points > 0 ? most_points : std::numeric_limits<std::size_t>::max());
     if (order.size() < points.size()) {
         report["thinned_to"] = order.size();
         run.info("cloud: " + std::to_string(order.size()) + " of " + std::to_string(points.size()) +

@@ -31,8 +31,9 @@ std::vector<PointCloud> ContourFlags::read(const ReadPointsOptions& reading, con
 std::shared_ptr<const Contours> ContourFlags::densify(const std::vector<PointCloud>& clouds,
                                                       const ImageGeometry* geometry, double h, const RunContext& run,
                                                       Json& report) const {
-    const auto contours =
-        std::make_shared<Contours>(covol::densify(clouds, geometry, {h, curve, thickness.resolve(h, 0)}, run));
+    const ContourOptions options{h, curve, thickness.resolve(h, 0)};
+    const auto contours = std::make_shared<Contours>(
+        geometry != nullptr ? covol::densify(clouds, *geometry, options, run) : covol::densify(clouds, options, run));
     run.info("contours: " + contours->summary);
     Json rules = Json::array();
     for (const PointCloud& cloud : clouds) rules.push_back(cloud.rule);

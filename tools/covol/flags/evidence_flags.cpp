@@ -44,13 +44,14 @@ Evidence EvidenceFlags::judge(const SegmentResult& result, const std::vector<Vec
                               const RunContext& run) const {
     const SegmentOptions& used = result.report.resolved;
     EvidenceOptions options;
-    options.reach = used.evolve.attraction_range > 0 ? used.evolve.attraction_range : kReachVoxels * used.voxel_size;
+    const double range = used.evolve.attraction_range.value_or(0);
+    options.reach = range > 0 ? range : kReachVoxels * *used.voxel_size;
     options.suggestions = suggestions;
     // Brightness is nowhere 0 as slopes are, and g falls below 1/2 before there is a line.
     if (used.edge.feature > EdgeFeature::Slope) options.weak_edge = kWeakLine;
     // Where the image had no weight its edges are looked up now.
-    const FloatGridPtr g = result.edge ? result.edge : edge(image, *result.surface, used.edge, run).grid;
-    return evidence(result.mesh, marks, g.get(), image.geometry(), options, run);
+    const FloatGridPtr g = result.edge ? result.edge : detect_edges(image, *result.surface, used.edge, run).grid;
+    return assess_evidence(result.mesh, marks, *g, image.geometry(), options, run);
 }
 
 Json to_json(const Evidence& e) {

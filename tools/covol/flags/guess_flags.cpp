@@ -57,7 +57,7 @@ Guess read_guess(const std::string& path, int label, const ImageGeometry& image,
         case FileKind::Image: break;
     }
     guess.mask = placed_on(read_image(path, {}, RunContext{}), image, force);
-    const std::vector<LabelName> labels = painted_labels(*guess.mask);
+    const std::vector<LabelName> labels = find_painted_labels(*guess.mask);
     if (label == 0 && labels.size() > 1)
         throw Error(Errc::InvalidInput, "--guess: " + path + ": expected one label, got " + list_of(labels) +
                                             "; choose one by --guess-label");

@@ -29,7 +29,7 @@ std::vector<std::shared_ptr<const PaintedFile>> PaintedFlags::read(const RunCont
         const Named named = split_name(text);
         auto file = std::make_shared<PaintedFile>(
             PaintedFile{named.value, named.name, read_image(named.value, {}, RunContext{}), {}});
-        for (LabelName& label : painted_labels(file->image))
+        for (LabelName& label : find_painted_labels(file->image))
             if (label.label != options.outside_label) file->labels.push_back(std::move(label));
         if (!named.name.empty()) {
             if (file->labels.size() > 1)

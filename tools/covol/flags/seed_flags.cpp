@@ -30,7 +30,8 @@ std::vector<Vec3> read_side(const std::string& flag, const std::vector<std::stri
             cloud = read_points(text, reading);
         }
         if (geometry != nullptr) check_inside(cloud, *geometry, run);
-        const std::vector<Vec3> found = seeds_of(cloud, geometry, step);
+        const std::vector<Vec3> found =
+            geometry != nullptr ? collect_seeds(cloud, *geometry, step) : collect_seeds(cloud, step);
         seeds.insert(seeds.end(), found.begin(), found.end());
         if (!is_position(text))
             run.info(flag + " " + text + ": " + std::to_string(found.size()) + " seeds" +

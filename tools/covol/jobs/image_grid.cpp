@@ -35,7 +35,7 @@ void fill_leaf(const Image& image, const Domain& domain, FloatGrid::TreeType::Le
 }  // namespace
 
 FloatGridPtr to_grid(const Image& image, double h, const RunContext& run) {
-    const Domain domain = domain_of_box(image.geometry().world_box(), h);
+    const Domain domain = make_domain(image.geometry().world_box(), h);
     FloatGridPtr grid = make_grid(domain, 0.0F, "density");
     grid->setGridClass(openvdb::GRID_FOG_VOLUME);
     std::vector<FloatGrid::TreeType::LeafNodeType*> leaves;

@@ -30,7 +30,7 @@ Marks read_marks(const PointFlags& points, const ContourFlags& contours, const C
     marks.drawn = contours.read(points.options, geometry, run);
     marks.given = marks.points;
     for (const PointCloud& lines : marks.drawn) {
-        const std::vector<Vec3> world = to_world(lines, geometry);
+        const std::vector<Vec3> world = geometry != nullptr ? to_world(lines, *geometry) : to_world(lines);
         marks.given.insert(marks.given.end(), world.begin(), world.end());
         count += world.size();
     }

@@ -25,7 +25,7 @@ void PaintReader::add_outlines(const StructureInput& input, Marks& marks, const 
     for (const StructureInput::Paint& paint : input.paint)
         for (const PaintedView& view : label_of(paint, run).views) {
             PointCloud outlines = view.outlines;
-            outlines.points = to_world(outlines, &of(paint, run).geometry);
+            outlines.points = to_world(outlines, of(paint, run).geometry);
             outlines.space = PointSpace::World;
             marks.drawn.push_back(std::move(outlines));
         }
@@ -36,7 +36,7 @@ std::shared_ptr<const Contours> PaintReader::own_contours(const StructureInput& 
     if (input.paint.size() != 1 || !marks.drawn.empty()) return nullptr;
     const PaintedLabel& label = label_of(input.paint.front(), run);
     if (label.views.empty()) return nullptr;
-    auto contours = std::make_shared<Contours>(contours_of(label, of(input.paint.front(), run).geometry, h, run));
+    auto contours = std::make_shared<Contours>(connect_outlines(label, of(input.paint.front(), run).geometry, h, run));
     run.info("painted: " + contours->summary);
     return contours;
 }

@@ -34,24 +34,24 @@ void check_tag_distance(double tag_distance, const std::vector<Vec3>& points) {
 SegmentOptions SegmentJob::resolve(double h) const {
     SegmentOptions options;
     options.voxel_size = h;
-    options.voxel_size_is_automatic = !domain.voxel_size.given;
+    options.voxel_size_may_grow = !domain.voxel_size.given;
     options.roi = domain.roi;
-    options.margin = domain.margin.resolve(h, 0);
+    options.margin = domain.margin.resolve_above_0(h);
     options.start = start;
     options.model = model;
-    options.mark_precision = mark_precision.resolve(h, -1);
-    options.tag_distance = tag.tag_distance.resolve(h, 0);
-    if (tag.tag_distance.given && !(options.tag_distance > 0))
+    options.mark_precision = mark_precision.resolve(h);
+    options.tag_distance = tag.tag_distance.resolve_above_0(h);
+    if (tag.tag_distance.given && !options.tag_distance)
         throw Error(Errc::InvalidOptions, "--tag-distance: expected > 0, got 0");
     options.exterior_seeds = tag.exterior_seeds;
-    options.edge = edge.resolve(h, -1);
-    options.evolve = evolve.resolve(h, SegmentOptions::automatic_evolve());
-    options.coarse_levels = coarse_levels;
+    options.edge = edge.resolve(h);
+    options.evolve = evolve.resolve(h);
+    if (coarse_levels >= 0) options.coarse_levels = coarse_levels;
     options.holes.policy = holes.policy;
-    options.holes.distance = hole_distance.resolve(h, 0);
-    if (hole_distance.given && !(options.holes.distance > 0))
+    options.holes.distance = hole_distance.resolve_above_0(h);
+    if (hole_distance.given && !options.holes.distance)
         throw Error(Errc::InvalidOptions, "--hole-distance: expected > 0, got 0");
-    options.correction.least_radius = guess.radius.resolve(h, 0);
+    options.correction.least_radius = guess.radius.resolve_above_0(h);
     const double side = min_component.resolve(h, 0);
     options.extract.min_component_volume = side * side * side;
     return options;
@@ -72,7 +72,7 @@ std::string SegmentJob::unused(const SegmentReport& report) const {
     name(evolve.delta.given, "--delta");
     name(evolve.tau.given, "--tau");
     name(evolve.attraction_range.given, "--attraction-range");
-    name(evolve.image_yields.has_value(), "--image-yields");
+    name(evolve.options.image_yields.has_value(), "--image-yields");
     if (flags.empty()) return {};
     return flags +
            " did nothing: the surface is a guess that marks and image hold, and nothing flowed; --model paper flows";
@@ -220,14 +220,15 @@ void SegmentJob::run_one(Session& session) const {
     prepare(marks, cloud, contours, geometry, h, session, session.run());
     input.update(marks.report);
     SegmentOptions options = resolve(h);
-    check_tag_distance(options.tag_distance, marks.given);
+    check_tag_distance(options.tag_distance.value_or(0), marks.given);
     options.contours = marks.contours;
     options.hints = marks.hints;
     const Seeds sides = read_seeds(seeds, points.options, geometry, h, session.run());
     options.inside = sides.inside;
     options.outside = sides.outside;
     // Shared by the writers that run at the end.
-    const auto result = std::make_shared<SegmentResult>(segment(pointer, marks.points, options, session.run()));
+    const auto result = std::make_shared<SegmentResult>(pixels ? segment(*pixels, marks.points, options, session.run())
+                                                               : reconstruct(marks.points, options, session.run()));
     input["points"]["densified"] = result->report.densified;
     session.report().update(to_json(result->report), true);
     add_seconds(session, result->report.seconds);
@@ -244,7 +245,8 @@ void SegmentJob::run_one(Session& session) const {
     if (result->report.holes.policy == Holes::Open) vdb.metadata["covol_holes"] = "closed here; the mesh alone is open";
     Outputs& outputs = session.outputs();
     outputs.add(output, [=](const std::string& path) { write_vdb(path, {result->surface}, vdb); });
-    outputs.add(density_path, [=](const std::string& path) { write_vdb(path, {density(*result->surface)}, vdb); });
+    outputs.add(density_path,
+                [=](const std::string& path) { write_vdb(path, {to_fog_volume(*result->surface)}, vdb); });
     outputs.add(fields_path, [=](const std::string& path) {
         std::vector<FloatGridPtr> grids{result->u};
         for (const FloatGridPtr& field : {result->distance, result->edge})

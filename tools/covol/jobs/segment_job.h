@@ -30,7 +30,7 @@ struct SegmentJob {
     Start start;
     Model model = Model::Guided;
     Length mark_precision;
-    int coarse_levels = SegmentOptions{}.coarse_levels;
+    int coarse_levels = -1;  ///< < 0: automatic
     HolesOptions holes;
     Length hole_distance;
     Length min_component;  ///< edge of a cube of the smallest volume that is kept

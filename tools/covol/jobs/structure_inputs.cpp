@@ -127,7 +127,7 @@ std::vector<StructureStart> starts_of(const SegmentJob& job, const std::vector<S
     if (job.start.kind != Start::Kind::Vdb)
         throw UsageError(
             "--init: several structures cannot start from one shape; expected tag, or vdb:FILE with a grid for each");
-    const std::vector<std::string> grids = grid_names(names_of(inputs));
+    const std::vector<std::string> grids = make_grid_names(names_of(inputs));
     for (std::size_t n = 0; n < starts.size(); ++n) starts[n].start.level_set = read_vdb(job.start.path, grids[n]);
     return starts;
 }

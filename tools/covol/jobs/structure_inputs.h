@@ -1,5 +1,6 @@
 #pragma once
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,7 +39,7 @@ struct StructureInput {
 /// line gives none: a surface that changed its stiffness between frames would seem to move.
 struct StructureStart {
     Start start;
-    double delta = -1;  ///< world units; < 0: automatic
+    std::optional<double> delta;  ///< world units
 };
 
 /// The starts that --init asks for, one for each structure.

@@ -91,20 +91,20 @@ void hand_over_labels(const std::shared_ptr<const StructuresOutput>& output, con
             std::vector<std::pair<std::string, std::string>> segments;
             std::vector<std::uint8_t> own;
             for (const std::int32_t value : only.corrected->values) own.push_back(value == only.label ? 1 : 0);
-            if (has_names) segments = slicer_segments(output->names(), own, output->geometry.size, label_of);
+            if (has_names) segments = make_slicer_segments(output->names(), own, output->geometry.size, label_of);
             return write_labels(file, output->geometry, only.corrected->values, segments);
         }
-        const std::vector<std::uint8_t> labels = label_image(solids(*output), output->geometry, run);
+        const std::vector<std::uint8_t> labels = make_label_image(solids(*output), output->geometry, run);
         std::vector<std::int32_t> values(labels.begin(), labels.end());
         for (std::int32_t& value : values)
             if (value > 0) value = label_of[std::size_t(value) - 1];
         write_labels(file, output->geometry, values,
-                     has_names ? slicer_segments(output->names(), labels, output->geometry.size, label_of)
+                     has_names ? make_slicer_segments(output->names(), labels, output->geometry.size, label_of)
                                : std::vector<std::pair<std::string, std::string>>{});
     });
     if (has_names && !is_nrrd(path))
         sink(labels_path(path), [output](const std::string& file) {
-            write_text(file, itksnap_labels(output->names(), output->labels()));
+            write_text(file, make_itksnap_labels(output->names(), output->labels()));
         });
 }
 
@@ -163,7 +163,7 @@ void check_outputs(const SegmentJob& job, const std::vector<StructureInput>& inp
     const std::string mesh = tagged(job.mesh_path);
     if (inputs.size() == 1 || mesh.empty() || holds_several_meshes(mesh))
         return outputs.check("--mesh", mesh, OutputKind::Mesh);
-    for (const std::string& grid : grid_names(names_of(inputs)))
+    for (const std::string& grid : make_grid_names(names_of(inputs)))
         outputs.check("--mesh", with_suffix(mesh, "_" + grid), OutputKind::Mesh);
 }
 
@@ -179,8 +179,8 @@ void hand_over(const SegmentJob& job, const std::shared_ptr<const StructuresOutp
     sink(tagged(job.density_path), [output, vdb](const std::string& file) {
         std::vector<FloatGridPtr> grids;
         for (const StructureOutput& s : output->structures)
-            grids.push_back(
-                named(density(*s.result.surface), output->structures.size() > 1 ? "density_" + s.grid : "density"));
+            grids.push_back(named(to_fog_volume(*s.result.surface),
+                                  output->structures.size() > 1 ? "density_" + s.grid : "density"));
         write_vdb(file, grids, vdb);
     });
     sink(tagged(job.fields_path), [output, vdb](const std::string& file) { write_vdb(file, fields_of(*output), vdb); });

@@ -51,7 +51,7 @@ void separate_all(StructuresOutput& output, const SegmentOptions& options, const
         s.result.mesh = extract_mesh(*s.result.surface, options.extract, run);
         s.result.report.mesh = relax_mesh(s.result.mesh, *s.result.surface, {options.extract.isovalue}, run);
         s.result.report.surface = measure(s.result.mesh);
-        if (!s.marks.empty()) s.result.report.fit = points_to_surface(s.marks, s.result.mesh, run);
+        if (!s.marks.empty()) s.result.report.fit = measure_fit(s.marks, s.result.mesh, run);
         SegmentReport& report = s.result.report;
         report.seeds = check_seeds(*s.result.surface, report.resolved.inside, report.resolved.outside);
     }
@@ -74,7 +74,7 @@ StructuresOutput segment_structures(const SegmentJob& job, const std::vector<Str
     output.geometry = image.geometry();
     const double h = job.domain.resolve_voxel_size(&image, {}, session);
     const SegmentOptions given = job.resolve(h);
-    const std::vector<std::string> grids = grid_names(names_of(inputs));
+    const std::vector<std::string> grids = make_grid_names(names_of(inputs));
     PaintReader paint(job, output.geometry);
     const bool force = job.image.options.spacing[0] > 0;
     for (std::size_t n = 0; n < inputs.size(); ++n) {
@@ -109,9 +109,9 @@ StructuresOutput segment_structures(const SegmentJob& job, const std::vector<Str
         }
         options.exterior_seeds = inputs[n].exterior_seeds;
         options.start = starts[n].start;
-        if (options.evolve.delta < 0) options.evolve.delta = starts[n].delta;
+        if (!options.evolve.delta) options.evolve.delta = starts[n].delta;
         try {
-            s.result = segment(&image, marks.points, options, own);
+            s.result = segment(image, marks.points, options, own);
         } catch (const Error& error) {
             if (s.name.empty()) throw;
             throw Error(error.code(), s.name + ": " + error.what());

@@ -77,9 +77,9 @@ double median_of(const std::vector<Around>& around, Value value) {
 
 }  // namespace
 
-CloudScale cloud_scale(const std::vector<Vec3>& points, const RunContext& run) {
+CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext& run) {
     CloudScale scale;
-    const double nearest = scale.nearest = nearest_neighbour_spacing(points).median;
+    const double nearest = scale.nearest = measure_spacing(points).median;
     scale.spacing = 2 * nearest;  // what it is for points spread evenly at random
     if (!(nearest > 0)) return scale;
     const std::size_t step = std::max<std::size_t>(1, points.size() / kSamples);

@@ -361,7 +361,7 @@ CloudOrientation orient_cloud(const std::vector<Vec3>& points, const PointHints&
     CloudOrientation cloud;
     with_threads(run, [&] {
         cloud.points = merge_close_points(points, 0);
-        cloud.scale = cloud_scale(cloud.points, run);
+        cloud.scale = measure_cloud_scale(cloud.points, run);
         // Where there are many, some show once others are gone.
         for (int round = 0; round < kStrayRounds; ++round) {
             const std::vector<char> stray = cloud::find_stray(cloud.points, cloud.scale, run);

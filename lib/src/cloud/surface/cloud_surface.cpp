@@ -268,8 +268,8 @@ struct TopologyOf {
 
 /// Whether some of the surface is far from all points.
 bool is_open(const FloatGrid& level_set, const CloudOrientation& cloud, const RunContext& run) {
-    return share_without_points(extract_mesh(level_set, {}, run), cloud.points, kFarSpacings * cloud.scale.spacing,
-                                run) > kOpenShare;
+    return measure_share_without_points(extract_mesh(level_set, {}, run), cloud.points,
+                                        kFarSpacings * cloud.scale.spacing, run) > kOpenShare;
 }
 
 /// The points where the indicator has its surface, as far as noise can have brought them from there: else there would

@@ -13,6 +13,7 @@
 #include <optional>
 #include <sstream>
 
+#include "base/while_any.h"
 #include "io/image/dicom_header.h"
 #include "io/image/image_formats.h"
 #include "io/image/itk_call.h"
@@ -110,7 +111,7 @@ void fill_plain(const DicomHeader& header, const std::string& unusable, Slice& s
 }
 
 void fill_through_gdcm(const std::string& unusable, Slice& slice) {
-    const QuietGdcm quiet;
+    const WhileAny<QuietGdcm> quiet;
     const auto io = itk::GDCMImageIO::New();
     io->SetFileName(slice.path);
     with_itk(Errc::InvalidInput, unusable, [&] {
@@ -298,7 +299,7 @@ private:
             decode_plain(slice, unusable, pixels, values.data());
             return values;
         }
-        const QuietGdcm quiet;
+        const WhileAny<QuietGdcm> quiet;
         const auto io = itk::GDCMImageIO::New();
         io->SetFileName(slice.path);
         with_itk(Errc::InvalidInput, unusable, [&] {

@@ -4,20 +4,29 @@
 #include <algorithm>
 #include <string>
 
+#include "base/while_any.h"
 #include "covol/error.h"
 #include "covol/image.h"
 
 namespace covol::detail {
 
+/// ITK's own warnings, which it would print, are off while this lives.
+class QuietItk {
+public:
+    QuietItk() { itk::Object::SetGlobalWarningDisplay(false); }
+    ~QuietItk() { itk::Object::SetGlobalWarningDisplay(before_); }
+    QuietItk(const QuietItk&) = delete;
+    QuietItk& operator=(const QuietItk&) = delete;
+
+private:
+    bool before_ = itk::Object::GetGlobalWarningDisplay();
+};
+
 /// Runs one call into ITK. Its warnings, which it would print, are off meanwhile, and its many-lined exceptions become
 /// one line.
 template <typename Call>
 void with_itk(Errc code, const std::string& what, Call&& call) {
-    struct Quiet {
-        bool before = itk::Object::GetGlobalWarningDisplay();
-        Quiet() { itk::Object::SetGlobalWarningDisplay(false); }
-        ~Quiet() { itk::Object::SetGlobalWarningDisplay(before); }
-    } quiet;
+    const WhileAny<QuietItk> quiet;
     const auto one_line = [](std::string text) {
         std::replace_if(
             text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');

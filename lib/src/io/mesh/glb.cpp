@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "covol/error.h"
+#include "covol/version.h"
 #include "io/mesh/mesh_formats.h"
 
 namespace covol::mesh_io {
@@ -246,7 +247,8 @@ TriangleMesh read_glb(Source& source, std::string_view text) { return GlbReader(
 /// glTF 2.0 in one file: a JSON chunk that describes the binary chunk.
 void write_glb_parts(Output& out, const std::vector<GlbPart>& parts, const std::vector<std::string>& comments) {
     nlohmann::json json{
-        {"asset", {{"version", "2.0"}, {"generator", "covol " COVOL_VERSION}, {"extras", {{"comments", comments}}}}},
+        {"asset",
+         {{"version", "2.0"}, {"generator", "covol " COVOL_VERSION_STRING}, {"extras", {{"comments", comments}}}}},
         {"scene", 0}};
     const std::uint64_t binary_bytes = describe_glb(parts, json);
     json["buffers"] = {{{"byteLength", binary_bytes}}};

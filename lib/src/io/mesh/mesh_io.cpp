@@ -64,7 +64,7 @@ Prepared prepare(const TriangleMesh& mesh, const WriteMeshOptions& options) {
         for (float& c : p) c = float(c * options.unit_scale);
         if (options.y_up) p = {p[0], p[2], -p[1]};
     }
-    result.normals = vertex_normals(result.mesh);
+    result.normals = compute_vertex_normals(result.mesh);
     return result;
 }
 

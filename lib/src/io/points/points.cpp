@@ -89,16 +89,20 @@ PointCloud read_points(const std::string& path, const ReadPointsOptions& options
     return cloud;
 }
 
-std::vector<Vec3> to_world(const PointCloud& cloud, const ImageGeometry* geometry) {
-    if (cloud.space == PointSpace::World) return cloud.points;
-    if (geometry == nullptr)
+std::vector<Vec3> to_world(const PointCloud& cloud) {
+    if (cloud.space != PointSpace::World)
         throw Error(Errc::InvalidInput,
                     "to_world: " + cloud.source +
                         ": the points are in an image's own frame, and there is no image; give one, "
                         "or `space = World` for points in lengths");
+    return cloud.points;
+}
+
+std::vector<Vec3> to_world(const PointCloud& cloud, const ImageGeometry& geometry) {
+    if (cloud.space == PointSpace::World) return cloud.points;
     std::vector<Vec3> world;
     world.reserve(cloud.points.size());
-    for (const Vec3& p : cloud.points) world.push_back(detail::to_world(cloud.space, p, *geometry));
+    for (const Vec3& p : cloud.points) world.push_back(detail::to_world(cloud.space, p, geometry));
     return world;
 }
 

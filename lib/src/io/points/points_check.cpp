@@ -51,7 +51,7 @@ public:
         : cloud_(cloud), geometry_(geometry), now_(cloud.reading) {
         if (now_.space == PointSpace::Unstated) now_.space = cloud.space;  // a cloud that no file gave
         if (now_.order == PointOrder::Unstated) now_.order = PointOrder::XYZ;
-        world_ = to_world(cloud, &geometry);
+        world_ = to_world(cloud, geometry);
     }
 
     [[nodiscard]] std::size_t count_outside() const {

@@ -51,14 +51,14 @@ void start_from_cloud(Job& job) {
         job.result.u = surface_from_cloud(job.domain(), *job.cloud, report, job.run);
     }
     if (!job.rests() && job.uses_points()) {
-        double& range = job.options.evolve.attraction_range;
         if (job.has_automatic_range) {
-            range = kReachSpacings * std::max(report.spacing, job.h());
+            const double range = kReachSpacings * std::max(report.spacing, job.h());
+            job.options.evolve.attraction_range = range;
             job.choose("attraction_range", number(range),
                        "the start touches the points, and where there are none nothing should pull");
         }
         if (!report.encloses) job.obstacle = raised(*job.result.u, kHoldDepth * job.h());
-        compute_distance(job, tube_for_start(job));
+        find_distance(job, tube_for_start(job));
     }
     const std::string how = report.encloses ? "; averaged within " + number(report.radius)
                                             : "; they enclose nothing: inside is what they hide";

@@ -66,7 +66,7 @@ bool start_from_contours(Job& job) {
     }
     if (job.guided() && job.uses_points() && !loose.empty()) correct_start(job);
     if (job.uses_points())
-        compute_distance(job, std::max(job.options.evolve.attraction_range, kMarginVoxels * job.h()) + band_slack(job));
+        find_distance(job, std::max(job.attraction_range(), kMarginVoxels * job.h()) + band_slack(job));
     return true;
 }
 

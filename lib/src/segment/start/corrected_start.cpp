@@ -12,13 +12,13 @@ constexpr double kRadiusSpacings = 2.0;  // a mark on a slice tells of the next 
 
 CorrectionOptions correction(const Job& job) {
     CorrectionOptions options = job.options.correction;
-    if (options.least_radius > 0) return options;
-    options.least_radius = kCorrectionVoxels * job.h();
+    if (options.least_radius) return options;
+    double least = kCorrectionVoxels * job.h();
     if (job.image != nullptr) {
         const Vec3& spacing = job.image->geometry().spacing;
-        options.least_radius =
-            std::max(options.least_radius, kRadiusSpacings * *std::max_element(spacing.begin(), spacing.end()));
+        least = std::max(least, kRadiusSpacings * *std::max_element(spacing.begin(), spacing.end()));
     }
+    options.least_radius = least;
     return options;
 }
 

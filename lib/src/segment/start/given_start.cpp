@@ -68,7 +68,7 @@ void start_as_given(Job& job) {
         job.origin = StartOrigin::Guess;
         return job.choose("start", "near its marks", "it is a guess that they correct, and nothing flows");
     }
-    compute_distance(job, tube_for_start(job));
+    find_distance(job, tube_for_start(job));
 }
 
 }  // namespace covol::pipeline

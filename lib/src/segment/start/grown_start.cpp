@@ -13,15 +13,16 @@ constexpr double kGrownDeltaVoxels = 0.1;
 void grow_to_edges(Job& job) {
     if (!job.guided() || !job.uses_image() || job.uses_points()) return;
     Timed timed(job.report().seconds.tag);
-    const detail::GrownStart grown = detail::grow_to_edges(*job.image, *job.result.u, job.options.edge.sigma, job.run);
+    const detail::GrownStart grown =
+        detail::grow_to_edges(*job.image, *job.result.u, job.options.edge.sigma.value_or(job.h()), job.run);
     if (!grown.level_set) return job.choose("growth", "none", grown.why);
     job.choose("growth", "to edges", grown.why);
     job.origin = StartOrigin::Grown;
     job.result.u = grown.level_set;
     if (job.report().automatic.count("delta") == 0) return;
-    job.options.evolve.delta = kGrownDeltaVoxels * job.h();
-    job.choose("delta", number(job.options.evolve.delta),
-               number(kGrownDeltaVoxels) + " voxels: the start lies at the edges");
+    const double delta = kGrownDeltaVoxels * job.h();
+    job.options.evolve.delta = delta;
+    job.choose("delta", number(delta), number(kGrownDeltaVoxels) + " voxels: the start lies at the edges");
 }
 
 }  // namespace covol::pipeline

@@ -12,9 +12,9 @@ constexpr int kBeyondVoxels = 8;
 std::array<Vec3, 3> deviation(const Job& job) {
     std::array<Vec3, 3> axes{};
     for (int a = 0; a < 3; ++a) {
-        const double given = job.options.mark_precision;
-        if (job.image == nullptr || given >= 0) {
-            axes[a][a] = given >= 0 ? given : kUniformDeviation * job.h();
+        const std::optional<double>& given = job.options.mark_precision;
+        if (job.image == nullptr || given) {
+            axes[a][a] = given.value_or(kUniformDeviation * job.h());
             continue;
         }
         const ImageGeometry& geometry = job.image->geometry();
@@ -53,7 +53,7 @@ void start_from_guess(Job& job) {
         job.result.u = std::move(guess.u);
         job.on_surface = std::move(guess.marks);
     }
-    if (!job.rests() && job.uses_points()) compute_distance(job, tube_for_start(job));
+    if (!job.rests() && job.uses_points()) find_distance(job, tube_for_start(job));
     job.choose("guess", job.report().guess.summary, "");
 }
 

@@ -27,7 +27,7 @@ std::vector<Vec3> all_seeds(const Job& job) {
 }
 
 /// Holes narrower than D are no exterior, and seeds outside may lie as close to the border as they like; a seed of the
-/// exterior that the user gave is band()'s to judge.
+/// exterior that the user gave is tag_interior()'s to judge.
 std::vector<Vec3> seeds_beyond(const Job& job, double D) {
     std::vector<Vec3> seeds = job.options.exterior_seeds;
     const auto d_at = job.result.distance->getConstAccessor();
@@ -46,13 +46,13 @@ void choose_tag(Job& job) {
     const Domain wide = job.domain_with_margin(0.25 * longest_side(bounding_box(job.points)) + kMarginVoxels * job.h());
     job.report().tag = choose_tag_distance(job.points, wide, all_seeds(job), job.run);
     job.options.tag_distance = job.report().tag.tag_distance;
-    job.choose("tag_distance", number(job.options.tag_distance), job.report().tag.reason);
+    job.choose("tag_distance", number(job.report().tag.tag_distance), job.report().tag.reason);
 }
 
 // The tagged surface lies D outside the points, as far as the widest gap is large. Its closing by a ball of radius D
 // touches them, needs a band of a few voxels instead of {d <= D + 3h}, and leaves the flow a short way.
 void start_from_closing(Job& job, double D) {
-    FloatGridPtr closed = closing(*job.result.u, D, job.run);
+    FloatGridPtr closed = close_by_ball(*job.result.u, D, job.run);
     if (!closed) return;
     job.result.u = closed;
     job.options.evolve.follow = true;
@@ -89,8 +89,9 @@ std::optional<CutBody> tag_with(Job& job, const std::vector<Vec3>& beyond) {
     closed.insert(closed.end(), beyond.begin(), beyond.end());
     const double h = job.h();
     CutBody body{.beyond = beyond, .level_set = nullptr, .band = {}, .tag = {}};
-    body.tag.tag_distance = job.options.tag_distance;
-    if (body.tag.tag_distance <= 0) {
+    if (job.options.tag_distance) {
+        body.tag.tag_distance = *job.options.tag_distance;
+    } else {
         body.tag = choose_tag_distance(
             closed, around(job.domain(), closed, 0.25 * longest_side(bounding_box(closed)) + kMarginVoxels * h),
             all_seeds(job), job.run);
@@ -98,20 +99,22 @@ std::optional<CutBody> tag_with(Job& job, const std::vector<Vec3>& beyond) {
     }
     const double D = body.tag.tag_distance;
     const Domain wide = around(job.domain(), closed, D + kMarginVoxels * h);
-    const FloatGridPtr d = distance(closed, wide, {D + band_slack(job)}, job.run).grid;
-    BandResult tagged = band(*d, {D, all_seeds(job)}, job.run);
+    const FloatGridPtr d = compute_distance(closed, wide, {D + band_slack(job)}, job.run).grid;
+    BandResult tagged = tag_interior(*d, {D, all_seeds(job)}, job.run);
     if (tagged.report.leaks) return {};
     body.band = tagged.report;
-    body.level_set = closing(*tagged.grid, D, job.run);
+    body.level_set = close_by_ball(*tagged.grid, D, job.run);
     if (!body.level_set) body.level_set = tagged.grid;
     return body;
 }
 
 /// Whether the points, with the image's end as a hole wherever it cuts them, enclose a body all the same.
 bool encloses_alone(const Job& job) {
-    const double D = job.options.tag_distance;
-    if (D <= 0) return choose_tag_distance(job.points, job.domain(), all_seeds(job), job.run).encloses;
-    return !band(*distance(job.points, job.domain(), {D + band_slack(job)}, job.run).grid, {D, all_seeds(job)}, job.run)
+    if (!job.options.tag_distance)
+        return choose_tag_distance(job.points, job.domain(), all_seeds(job), job.run).encloses;
+    const double D = *job.options.tag_distance;
+    return !tag_interior(*compute_distance(job.points, job.domain(), {D + band_slack(job)}, job.run).grid,
+                         {D, all_seeds(job)}, job.run)
                 .report.leaks;
 }
 
@@ -151,7 +154,7 @@ bool start_from_cut_body(Job& job) {
         if (!body) {
             how = "with their mirror image beyond the image's end they enclose a body";
             const std::vector<Vec3> images =
-                detail::mirrored(job.points, faces, kMirrorSpacings * nearest_neighbour_spacing(job.points).median);
+                detail::mirrored(job.points, faces, kMirrorSpacings * measure_spacing(job.points).median);
             if (!images.empty() && !encloses_alone(job)) body = tag_with(job, images);
         }
         if (!body) return false;
@@ -162,13 +165,13 @@ bool start_from_cut_body(Job& job) {
         job.trusted.insert(job.trusted.end(), body->beyond.begin(), body->beyond.end());
     }
     job.choose("start", "cut body", how);
-    if (job.options.tag_distance <= 0) job.choose("tag_distance", number(body->tag.tag_distance), body->tag.reason);
+    if (!job.options.tag_distance) job.choose("tag_distance", number(body->tag.tag_distance), body->tag.reason);
     job.options.tag_distance = body->tag.tag_distance;
     job.report().tag = body->tag;
     job.report().band = body->band;
     job.options.evolve.follow = true;
     drop_cap_marks(job, faces);
-    if (job.uses_points()) compute_distance(job, job.options.tag_distance + band_slack(job), job.options.tag_distance);
+    if (const double D = body->tag.tag_distance; job.uses_points()) find_distance(job, D + band_slack(job), D);
     return true;
 }
 
@@ -176,14 +179,14 @@ bool start_from_cut_body(Job& job) {
 
 void start_by_tagging(Job& job) {
     job.origin = StartOrigin::Tagged;
-    const bool is_automatic = job.options.tag_distance <= 0;
+    const bool is_automatic = !job.options.tag_distance;
     if (start_from_cut_body(job)) return;
     if (is_automatic) choose_tag(job);
-    const double D = job.options.tag_distance;
+    const double D = *job.options.tag_distance;
     job.report().domain = job.domain_with_chosen_margin(D + kMarginVoxels * job.h());
-    compute_distance(job, D + band_slack(job), D);
+    find_distance(job, D + band_slack(job), D);
     Timed timed(job.report().seconds.tag);
-    BandResult tagged = band(*job.result.distance, {D, seeds_beyond(job, D)}, job.run);
+    BandResult tagged = tag_interior(*job.result.distance, {D, seeds_beyond(job, D)}, job.run);
     job.report().band = tagged.report;
     job.result.u = tagged.grid;
     if (tagged.report.leaks) job.run.warn(tagged.report.leak());

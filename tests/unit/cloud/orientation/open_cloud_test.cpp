@@ -51,8 +51,8 @@ TEST_CASE("a bowl becomes a solid with a lid, not a skin") {
     for (unsigned seed = 1; seed <= 3; ++seed) {
         const CloudOrientation cloud = orient_cloud(bowl(4000, seed));
         CloudReport report;
-        const TriangleMesh mesh = extract_mesh(
-            *surface_from_cloud(domain_of_box({{-1.5, -1.5, -1.5}, {1.5, 1.5, 1.5}}, 0.05), cloud, report));
+        const TriangleMesh mesh =
+            extract_mesh(*surface_from_cloud(make_domain({{-1.5, -1.5, -1.5}, {1.5, 1.5, 1.5}}, 0.05), cloud, report));
         const MeshMeasures m = measure(mesh);
         CHECK(m.closed);
         CHECK(m.components == 1);
@@ -61,10 +61,10 @@ TEST_CASE("a bowl becomes a solid with a lid, not a skin") {
         CHECK(m.volume < 2.0 / 3 * kPi * 1.4);
         CHECK(m.volume > 2.0 / 3 * kPi * 0.6);
         // A flat lid would be a third of the area; its rim is near the points.
-        const double share = share_without_points(mesh, cloud.points, 0.15);
+        const double share = measure_share_without_points(mesh, cloud.points, 0.15);
         CHECK(share > 0.15);
         CHECK(share < 0.45);
-        CHECK(share_without_points(mesh, cloud.points, 3.0) == 0);
+        CHECK(measure_share_without_points(mesh, cloud.points, 3.0) == 0);
     }
 }
 
@@ -72,14 +72,14 @@ TEST_CASE("points in a plane are refused") {
     std::vector<Vec3> plane;
     for (int i = 0; i < 80; ++i)
         for (int j = 0; j < 80; ++j) plane.push_back({0.1 * i, 0.1 * j, 0});
-    CHECK_THROWS_AS(segment(nullptr, plane, {}), Error);
+    CHECK_THROWS_AS(reconstruct(plane, {}), Error);
 }
 
 TEST_CASE("segment: a bowl is closed by a lid, on the points elsewhere") {
     const std::vector<Vec3> points = bowl(6000, 2);
     SegmentOptions options;
     options.voxel_size = 0.04;
-    const SegmentResult result = segment(nullptr, points, options);
+    const SegmentResult result = reconstruct(points, options);
     CHECK(result.report.automatic.count("start") == 1);
     CHECK(result.report.surface.closed);
     CHECK(result.report.surface.genus == 0);
@@ -92,7 +92,7 @@ TEST_CASE("segment: a noisy torus of which each part was seen from one side has 
     const std::vector<Vec3> points = half_seen_torus(12000, 0.01, 3);
     SegmentOptions options;
     options.voxel_size = 0.05;
-    const SegmentResult result = segment(nullptr, points, options);
+    const SegmentResult result = reconstruct(points, options);
     CHECK(result.report.surface.closed);
     CHECK(result.report.surface.components == 1);
     CHECK(result.report.surface.genus == 1);

@@ -67,14 +67,14 @@ std::vector<Shape> shapes() {
 
 }  // namespace
 
-TEST_CASE("cloud_scale: spacing and noise of a plane and a sphere") {
+TEST_CASE("measure_cloud_scale: spacing and noise of a plane and a sphere") {
     for (const unsigned seed : {1, 2, 3})
         for (const double spacings : {0.1, kNoise, 0.7})
             for (const bool is_plane : {true, false}) {
                 test::SurfaceSample s = is_plane ? patch(4000, seed) : test::ball(1).sample(4000, seed);
                 const double spacing = s.spacing();
                 test::add_noise(s, spacings * spacing, seed + 10);
-                const CloudScale scale = cloud_scale(s.points);
+                const CloudScale scale = measure_cloud_scale(s.points);
                 INFO("seed " << seed << (is_plane ? ", plane" : ", sphere") << ", noise of " << spacings
                              << " spacings; found " << scale.spacing / spacing << " of the spacing, "
                              << scale.noise / (spacings * spacing) << " of the noise");
@@ -83,14 +83,14 @@ TEST_CASE("cloud_scale: spacing and noise of a plane and a sphere") {
             }
 }
 
-TEST_CASE("cloud_scale: hardly any noise where there is none, lengths follow the points' unit") {
+TEST_CASE("measure_cloud_scale: hardly any noise where there is none, lengths follow the points' unit") {
     const test::SurfaceSample s = test::torus(1, 0.35).sample(4000, 4);
-    const CloudScale scale = cloud_scale(s.points);
+    const CloudScale scale = measure_cloud_scale(s.points);
     CHECK(scale.spacing / s.spacing() == Approx(1).margin(0.12));
     CHECK(scale.noise < 0.03 * s.spacing());
     std::vector<Vec3> larger = s.points;
     for (Vec3& p : larger) p = test::scaled(256, p);
-    const CloudScale of_larger = cloud_scale(larger);
+    const CloudScale of_larger = measure_cloud_scale(larger);
     CHECK(of_larger.spacing == Approx(256 * scale.spacing));
     CHECK(of_larger.noise == Approx(256 * scale.noise).margin(1e-6));
 }
@@ -100,7 +100,7 @@ TEST_CASE("orient: the normals of closed shapes point outward, into cavities too
         for (const auto& [spacings, seed] :
              std::vector<std::pair<double, unsigned>>{{0, 1}, {kNoise, 2}, {kNoise, 3}}) {
             const test::SurfaceSample s = noisy(shape.solid, shape.count, spacings, seed);
-            const Orientation o = orient(s.points, cloud_scale(s.points));
+            const Orientation o = orient(s.points, measure_cloud_scale(s.points));
             REQUIRE(o.normals.size() == s.points.size());
             REQUIRE(o.areas.size() == s.points.size());
             double area = 0, off_unit = 0;
@@ -121,7 +121,7 @@ TEST_CASE("orient: the normals of closed shapes point outward, into cavities too
 TEST_CASE("orient: the indicator is 1 in the solid and 0 elsewhere; its level passes the points") {
     const test::Solid3 shape = test::shell(1, 0.5);
     const test::SurfaceSample s = noisy(shape, 4000, kNoise, 5);
-    const Orientation o = orient(s.points, cloud_scale(s.points));
+    const Orientation o = orient(s.points, measure_cloud_scale(s.points));
     double worst_in = 0, worst_out = 0;
     for (const Vec3& x : test::box_cloud(2000, {{-1.2, -1.2, -1.2}, {1.2, 1.2, 1.2}}, 6)) {
         if (shape.distance(x) < -0.2) worst_in = std::max(worst_in, std::abs(o.indicator->inside(x) - 1));
@@ -174,7 +174,7 @@ TEST_CASE("orient: points given several times") {
     std::vector<Vec3> doubled = s.points, normals = s.normals;
     doubled.insert(doubled.end(), s.points.begin(), s.points.end());
     normals.insert(normals.end(), s.normals.begin(), s.normals.end());
-    const CloudScale scale = cloud_scale(s.points);
+    const CloudScale scale = measure_cloud_scale(s.points);
     const Orientation o = orient(doubled, scale);
     CHECK(share_wrong(o.normals, normals) < 0.007);
     for (std::size_t n = 0; n < s.points.size(); ++n) REQUIRE(o.normals[n] == o.normals[n + s.points.size()]);

@@ -64,7 +64,7 @@ TEST_CASE("orient: half a ball points outwards all over") {
         std::vector<Vec3> points;
         for (const Vec3& p : test::sphere_cloud(12000, 1, seed))
             if (p[2] > 0) points.push_back(p);
-        const Orientation o = orient(points, cloud_scale(points));
+        const Orientation o = orient(points, measure_cloud_scale(points));
         CHECK(inward(points, o.normals) == 0);
     }
 }

@@ -25,7 +25,7 @@ struct Result {
 Result surface_of(const std::vector<Vec3>& points, double h, const RunContext& run = {}) {
     Result result;
     const CloudOrientation cloud = orient_cloud(points, run);
-    result.grid = surface_from_cloud(domain_of_box(bounding_box(points, 8 * h), h), cloud, result.report, run);
+    result.grid = surface_from_cloud(make_domain(bounding_box(points, 8 * h), h), cloud, result.report, run);
     result.mesh = extract_mesh(*result.grid);
     return result;
 }
@@ -45,7 +45,7 @@ struct Shape {
 };
 
 /// Around the ball of radius 1.
-const Domain kDomain = domain_of_box({{-1.5, -1.5, -1.5}, {1.5, 1.5, 1.5}}, 0.06);
+const Domain kDomain = make_domain({{-1.5, -1.5, -1.5}, {1.5, 1.5, 1.5}}, 0.06);
 
 }  // namespace
 
@@ -104,7 +104,7 @@ TEST_CASE("surface_from_cloud: holes in the points are closed") {
     CHECK(m.genus == 0);
     CHECK(m.components == 1);
     CHECK(m.volume == Approx(4.0 / 3 * M_PI).epsilon(0.03));
-    CHECK(points_to_surface(points, r.mesh).mean < 0.05 * s.spacing());
+    CHECK(measure_fit(points, r.mesh).mean < 0.05 * s.spacing());
 }
 
 TEST_CASE("surface_from_cloud: the same bits for any number of threads") {

@@ -56,7 +56,7 @@ TEST_CASE("a part of an image has the whole's values, in every format") {
         const Vec3 b = g.index_to_world({box.min[0] + 1.0, box.min[1] + 2.0, box.min[2] + 3.0});
         for (int c = 0; c < 3; ++c) CHECK(a[c] == Approx(b[c]));
 
-        const Domain frame = domain_of_box(kRoi, 0.4);
+        const Domain frame = make_domain(kRoi, 0.4);
         std::vector<float> from_part(std::size_t(frame.voxel_count())), from_whole(from_part.size());
         part.sample(frame, frame.min, frame.max, from_part.data());
         whole.sample(frame, frame.min, frame.max, from_whole.data());

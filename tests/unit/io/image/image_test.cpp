@@ -468,7 +468,7 @@ TEST_CASE("trilinear samples of a linear function are exact in any frame") {
                 for (int i = 0; i < g.size[0]; ++i)
                     values.push_back(static_cast<float>(linear(g.index_to_world({double(i), double(j), double(k)}))));
         const Image image = Image::from_values(g, values.data());
-        const Domain frame = domain_of_box(g.world_box(), 0.23);
+        const Domain frame = make_domain(g.world_box(), 0.23);
         std::vector<float> out(std::size_t(frame.voxel_count()));
         image.sample(frame, frame.min, frame.max, out.data());
         std::size_t n = 0;

@@ -391,7 +391,7 @@ TEST_CASE("the same marks are at the same place in the world in every format") {
         const PointCloud cloud = read_points(scratch.write(file.name, file.content));
         INFO(cloud.rule);
         CHECK(cloud.rule.find(file.rule) != std::string::npos);
-        const std::vector<Vec3> world = to_world(cloud, &g);
+        const std::vector<Vec3> world = to_world(cloud, g);
         REQUIRE(world.size() == kIndex.size());
         for (std::size_t n = 0; n < world.size(); ++n) {
             const Vec3 expected = g.index_to_world(kIndex[n]);

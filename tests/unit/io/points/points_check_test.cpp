@@ -144,7 +144,7 @@ TEST_CASE("what the advice asks for, reads the file rightly") {
         says(verdict(read_points(path), geometry), "; " + advice + " would bring them inside");
         const PointCloud mended = read_points(path, options);
         CHECK(verdict(mended, geometry).empty());
-        const std::vector<Vec3> back = to_world(mended, &geometry);
+        const std::vector<Vec3> back = to_world(mended, geometry);
         for (std::size_t n = 0; n < world.size(); ++n)
             for (int a = 0; a < 3; ++a) REQUIRE(back[n][a] == Approx(world[n][a]));
     };

@@ -284,10 +284,10 @@ TEST_CASE("index points go through the image's geometry") {
     geometry.origin = {100, 200, 300};
     PointCloud cloud;
     cloud.points = {{2, 4, 1}};
-    CHECK(to_world(cloud, nullptr)[0] == Vec3{2, 4, 1});
+    CHECK(to_world(cloud)[0] == Vec3{2, 4, 1});
     cloud.space = PointSpace::Index;
-    CHECK(to_world(cloud, &geometry)[0] == Vec3{101, 202, 302});
-    CHECK_THROWS_AS(to_world(cloud, nullptr), Error);
+    CHECK(to_world(cloud, geometry)[0] == Vec3{101, 202, 302});
+    CHECK_THROWS_AS(to_world(cloud), Error);
 }
 
 TEST_CASE("close points become one, the first stays and so does the order") {
@@ -317,7 +317,7 @@ TEST_CASE("close points become one, the first stays and so does the order") {
 TEST_CASE("points sorted in space follow their neighbours, and thin by the same share everywhere") {
     std::vector<Vec3> points = random_points(20000, 7);
     for (Vec3& p : points) p[0] *= p[0];  // denser on one side
-    std::vector<std::uint32_t> order = spatial_order(points, points.size());
+    std::vector<std::uint32_t> order = order_spatially(points, points.size());
     const auto path = [&](const std::vector<std::uint32_t>& along) {
         double length = 0;
         for (std::size_t n = 1; n < along.size(); ++n) {
@@ -329,8 +329,8 @@ TEST_CASE("points sorted in space follow their neighbours, and thin by the same 
     std::vector<std::uint32_t> all(points.size());
     for (std::size_t n = 0; n < all.size(); ++n) all[n] = std::uint32_t(n);
     CHECK(path(order) < 0.12 * path(all));
-    CHECK(spatial_order(points, 1000000) == order);
-    const std::vector<std::uint32_t> some = spatial_order(points, 3000);
+    CHECK(order_spatially(points, 1000000) == order);
+    const std::vector<std::uint32_t> some = order_spatially(points, 3000);
     REQUIRE(some.size() == 3000);
     for (int octant = 0; octant < 8; ++octant) {
         const auto is_in = [&](std::uint32_t n) {
@@ -343,9 +343,9 @@ TEST_CASE("points sorted in space follow their neighbours, and thin by the same 
     }
     std::sort(order.begin(), order.end());
     CHECK(order == all);
-    CHECK(spatial_order({}, 5).empty());
-    CHECK(spatial_order(std::vector<Vec3>(10, Vec3{1, 2, 3}), 4).size() == 4);
-    CHECK_THROWS_AS(spatial_order(points, 0), Error);
+    CHECK(order_spatially({}, 5).empty());
+    CHECK(order_spatially(std::vector<Vec3>(10, Vec3{1, 2, 3}), 4).size() == 4);
+    CHECK_THROWS_AS(order_spatially(points, 0), Error);
 }
 
 TEST_CASE("spacing of a lattice, of clusters, and against brute force") {
@@ -353,7 +353,7 @@ TEST_CASE("spacing of a lattice, of clusters, and against brute force") {
     for (int i = 0; i < 12; ++i)
         for (int j = 0; j < 12; ++j)
             for (int k = 0; k < 12; ++k) lattice.push_back({0.5 * i, 0.5 * j, 0.5 * k});
-    SpacingStatistics s = nearest_neighbour_spacing(lattice);
+    SpacingStatistics s = measure_spacing(lattice);
     CHECK(s.mean == Approx(0.5));
     CHECK(s.max == Approx(0.5));
 
@@ -373,11 +373,11 @@ TEST_CASE("spacing of a lattice, of clusters, and against brute force") {
         exact.push_back(best);
     }
     std::sort(exact.begin(), exact.end());
-    s = nearest_neighbour_spacing(points);
+    s = measure_spacing(points);
     double sum = 0;
     for (const double d : exact) sum += d;
     CHECK(s.mean == Approx(sum / 1000));
     CHECK(s.max == Approx(exact.back()));
     CHECK(s.p95 == Approx(exact[949]));
-    CHECK(nearest_neighbour_spacing({{1, 2, 3}}).mean == 0);
+    CHECK(measure_spacing({{1, 2, 3}}).mean == 0);
 }

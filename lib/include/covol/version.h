@@ -1,0 +1,18 @@
+#pragma once
+
+#include "covol/api.h"
+
+// CMake compares these with the project's version.
+#define COVOL_VERSION_MAJOR 0
+#define COVOL_VERSION_MINOR 1
+#define COVOL_VERSION_PATCH 0
+#define COVOL_VERSION_STRING "0.1.0"
+/// For #if: 100 as 0.1.0, 10203 as 1.2.3.
+#define COVOL_VERSION_NUMBER (COVOL_VERSION_MAJOR * 10000 + COVOL_VERSION_MINOR * 100 + COVOL_VERSION_PATCH)
+
+namespace covol {
+
+/// COVOL_VERSION_STRING of the library that the program runs with; the macros are of that which it was compiled with.
+[[nodiscard]] COVOL_API const char* version() noexcept;
+
+}  // namespace covol

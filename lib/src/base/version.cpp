@@ -1,0 +1,7 @@
+#include "covol/version.h"
+
+namespace covol {
+
+const char* version() noexcept { return COVOL_VERSION_STRING; }
+
+}  // namespace covol

@@ -1,0 +1,48 @@
+"""The shared library gives programs the functions of its public headers, and nothing of what it is made of.
+
+    python3 tests/lint/symbols_test.py LIBRARY [NM]
+"""
+import re
+import subprocess
+import sys
+
+# Code of headers that say default visibility themselves: the same in every library that uses them.
+FOREIGN = re.compile(r"^(std|__gnu_cxx|openvdb|tbb|boost|itk)::|^(guard variable|typeinfo|typeinfo name|vtable|VTT) for "
+                     r"(std|__gnu_cxx|openvdb|tbb|boost|itk)::")
+ABOUT = re.compile(r"^(?:(?:guard variable|typeinfo|typeinfo name|vtable|VTT) for |(?:non-)?virtual thunk to )")
+# A lower-case namespace inside of covol is internal: covol::detail, covol::pipeline. Classes have capitals.
+INTERNAL = re.compile(r"\bcovol::[a-z_]\w*::")
+
+
+def without_arguments(name):
+    """`covol::f` of `T covol::f<...>(...)`: template arguments, parameters and the return type are left out."""
+    while True:
+        shorter = re.sub(r"\([^()]*\)|<[^<>]*>|\[[^\[\]]*\]|\{[^{}]*\}", "", name.replace("(anonymous namespace)", "anonymous"))
+        if shorter == name:
+            break
+        name = shorter
+    return re.sub(r"\s*(const|&+)?\s*$", "", name)
+
+
+def findings(listing):
+    symbols = [line.split(maxsplit=2) for line in listing.splitlines()]
+    symbols = [(kind, name) for _, kind, name in (s for s in symbols if len(s) == 3) if kind != "A"]
+    own = 0
+    for kind, name in symbols:
+        subject = ABOUT.sub("", without_arguments(name)).split(" ")[-1]
+        if INTERNAL.search(name):
+            yield f"internal: {name}"
+        elif subject.startswith("covol::"):
+            own += 1
+        elif not (kind in "WVu" and (FOREIGN.match(subject) or FOREIGN.match(name))):
+            yield f"not covol's: {kind} {name}"
+    if own < 100:
+        yield f"expected covol's public functions, found {own}"
+
+
+if __name__ == "__main__":
+    library, nm = sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else "nm"
+    listing = subprocess.run([nm, "-DC", "--defined-only", library], capture_output=True, text=True, check=True).stdout
+    found = list(findings(listing))
+    print("\n".join(found) if found else f"{len(listing.splitlines())} symbols, no finding")
+    sys.exit(1 if found else 0)
