@@ -14,7 +14,8 @@ constexpr double kReachSpacings = 3.0;    // that the start may lie off the poin
 constexpr double kWarnDisagreeing = 0.1;  // of given normals
 // of the longest side, beyond the points: where they leave holes the surface bulges
 constexpr double kMarginShare = 0.1;
-constexpr double kHoldDepth = 0.75;  // voxels that the surface may sink below the start where the points enclose nothing
+// voxels that the surface may sink below its start where the points enclose nothing
+constexpr double kHoldDepth = 0.75;
 
 // Where a scan has no points its surface rests on nothing, and would slide along the walls that have some.
 FloatGridPtr raised(const FloatGrid& start, double depth) {
