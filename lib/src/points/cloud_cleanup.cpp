@@ -16,6 +16,7 @@
 #include "base/valid.h"
 #include "covol/error.h"
 #include "covol/points.h"
+#include "points/heuristics.h"
 
 namespace covol {
 namespace {
@@ -45,9 +46,7 @@ public:
     }
 
     void remove_outliers(CloudCleanupReport& report) {
-        // Each pass lowers the mean distance that the far points have raised.
-        constexpr int kMostPasses = 10;
-        while (report.outlier_passes < kMostPasses && entries_.size() >= kFewest) {
+        while (report.outlier_passes < kCleanup.most_passes && entries_.size() >= kFewest) {
             run_.check();
             const double mean = CGAL::compute_average_spacing<Tag>(entries_, neighbours(), parameters());
             run_.check();
@@ -87,12 +86,9 @@ public:
     void smooth_by_wlop(CloudCleanupReport& report) {
         if (entries_.size() < kFewest) return;
         run_.check();
-        // Two rings of new neighbours; CGAL's own 8 spacings of the old points flatten what is curved.
-        constexpr double kRings = 2.5;
-        constexpr unsigned kRing = 6;
         double radius = options_.wlop_radius;
         if (radius == 0)
-            radius = kRings * CGAL::compute_average_spacing<Tag>(entries_, kRing, parameters()) /
+            radius = kCleanup.rings * CGAL::compute_average_spacing<Tag>(entries_, kCleanup.ring, parameters()) /
                      std::sqrt(options_.wlop_share);
         run_.check();
         std::vector<Point> points;

@@ -1,13 +1,9 @@
 // A start inside an object grows to the object's edges where the image alone decides.
+#include "segment/heuristics.h"
 #include "segment/start/starts.h"
 #include "start/grow.h"
 
 namespace covol::pipeline {
-namespace {
-
-constexpr double kGrownDeltaVoxels = 0.1;
-
-}  // namespace
 
 // Where nothing is near, curvature would close the start before it meets an edge.
 void grow_to_edges(Job& job) {
@@ -19,9 +15,9 @@ void grow_to_edges(Job& job) {
     job.origin = StartOrigin::Grown;
     job.result.u = grown.level_set;
     if (job.report().automatic.count("delta") == 0) return;
-    job.options.evolve.delta = kGrownDeltaVoxels * job.h();
+    job.options.evolve.delta = kStarts.grown_delta_voxels * job.h();
     job.choose("delta", number(job.options.evolve.delta),
-               number(kGrownDeltaVoxels) + " voxels: the start lies at the edges");
+               number(kStarts.grown_delta_voxels) + " voxels: the start lies at the edges");
 }
 
 }  // namespace covol::pipeline
