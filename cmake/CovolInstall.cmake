@@ -1,4 +1,7 @@
 # cmake --install: the program, the library, its headers, and what find_package(covol) needs.
+if(COVOL_SENSITIVITY)
+  install(CODE "message(FATAL_ERROR \"covol: a build with COVOL_SENSITIVITY is not for use\")")
+endif()
 include(CMakePackageConfigHelpers)
 
 set(COVOL_CONFIG_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/covol)

@@ -24,7 +24,7 @@ FOLDER = {header: folder for folders in LAYERS for folder, headers in folders.it
 MOST_FILES, MOST_LINES = 20, 500
 # The modules of segment(), in the same way; segment/pipeline.cpp is above them all.
 PIPELINE = [
-    ["job", "options"],
+    ["heuristics", "job", "options"],
     ["automatic", "fields", "vanished"],
     ["doubts"],
     ["starts", "given_start", "grown_start", "guess_start", "cloud_start", "corrected_start", "seed_start", "contour_start", "tagged_start", "flow"],

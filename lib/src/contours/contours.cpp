@@ -10,6 +10,7 @@
 #include "base/valid.h"
 #include "contours/contour_curve.h"
 #include "contours/contour_solid.h"
+#include "contours/heuristics.h"
 #include "covol/error.h"
 
 namespace covol {
@@ -20,12 +21,7 @@ using detail::SliceFrame;
 using detail::SolidSlice;
 using detail::Vec2;
 
-constexpr double kSameSlice = 0.1;            // voxels; marks of one slice may differ by this
-constexpr double kSameSliceOfExtent = 1e-4;   // without an image: of the line's extent
 constexpr std::size_t kMaxNodes = 64u << 20;  // of all slices' grids together: 256 MB; a coarser grid beyond
-constexpr double kMarginCells = 2;
-constexpr double kSideCells = 10;  // the same across the slices: the end of it lies where nothing is computed
-constexpr double kOpenCells = 6;   // that a body goes on beyond the image's end: more than a band's half width
 
 constexpr const char* kAxisNames[3] = {"x", "y", "z"};
 
@@ -124,7 +120,7 @@ void Densifier::check_inside(const Line& line) const {
     const Vec3* first = nullptr;
     for (const Vec3& p : line.index)
         for (int a = 0; a < 3; ++a)
-            if (p[a] < -0.5 - kSameSlice || p[a] > geometry_.size[a] - 0.5 + kSameSlice) {
+            if (p[a] < -0.5 - kContours.same_slice || p[a] > geometry_.size[a] - 0.5 + kContours.same_slice) {
                 ++outside;
                 if (first == nullptr) first = &p;
                 break;
@@ -146,7 +142,7 @@ void Densifier::find_planes(Line& line) const {
             high[a] = std::max(high[a], p[a]);
         }
     const double extent = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
-    const double tolerance = has_image_ ? kSameSlice : kSameSliceOfExtent * extent;
+    const double tolerance = has_image_ ? kContours.same_slice : kContours.same_slice_of_extent * extent;
     for (int a = 0; a < 3; ++a) line.constant[a] = high[a] - low[a] <= tolerance;
     if (line.constant == std::array<bool, 3>{false, false, false}) {
         std::ostringstream text;
@@ -195,7 +191,7 @@ std::vector<Vec3> Densifier::carried_beyond_sides(std::vector<Vec3> curve) const
             if (end > n) {
                 for (std::size_t m = n; m <= end; ++m) {
                     carried.push_back(curve[m]);
-                    carried.back()[a] = face + out * kSideCells * options_.step;
+                    carried.back()[a] = face + out * kContours.side_cells * options_.step;
                 }
                 carried.push_back(curve[end]);
             }
@@ -241,7 +237,8 @@ void Densifier::make_solid() {
     auto data = std::make_shared<ContourSolid::Data>();
     data->frame = frame_;
     std::vector<std::vector<Polygon>> polygons;
-    const double same = has_image_ ? kSameSlice * geometry_.spacing[frame_.axis] : kSameSliceOfExtent * options_.step;
+    const double same = has_image_ ? kContours.same_slice * geometry_.spacing[frame_.axis]
+                                   : kContours.same_slice_of_extent * options_.step;
     for (auto& [w, polygon] : loops_) {
         if (data->slices.empty() || w - data->slices.back().w > same) {
             data->slices.emplace_back();
@@ -281,9 +278,9 @@ void Densifier::fill_slices(ContourSolid::Data& data, const std::vector<std::vec
         run_.info("contours: slices are filled on a grid of " + detail::number(cell) +
                   ", coarser than the voxels, to bound memory");
     data.grid.cell = cell;
-    data.grid.origin = {low[0] - kMarginCells * cell, low[1] - kMarginCells * cell};
-    data.grid.nx = int((high[0] - low[0]) / cell + 2 * kMarginCells) + 2;
-    data.grid.ny = int((high[1] - low[1]) / cell + 2 * kMarginCells) + 2;
+    data.grid.origin = {low[0] - kContours.margin_cells * cell, low[1] - kContours.margin_cells * cell};
+    data.grid.nx = int((high[0] - low[0]) / cell + 2 * kContours.margin_cells) + 2;
+    data.grid.ny = int((high[1] - low[1]) / cell + 2 * kContours.margin_cells) + 2;
     run_.check();
     tbb::parallel_for(std::size_t(0), data.slices.size(), [&](std::size_t n) {
         SolidSlice& slice = data.slices[n];
@@ -353,7 +350,7 @@ void Densifier::cap_ends(ContourSolid::Data& data) {
         const double shrinks_by = slices[before].area - slices[end].area;
         const double ends_after = shrinks_by > 0 ? distance * slices[end].area / shrinks_by : 2 * gap;
         slices[end].open = left < spacing || (left <= gap && left < ends_after);
-        if (slices[end].open) slices[end].cap = left + kOpenCells * options_.step;
+        if (slices[end].open) slices[end].cap = left + kContours.open_cells * options_.step;
     };
     if (slices.size() == 1) {
         cap(0, 0);

@@ -11,6 +11,7 @@
 
 #include "base/valid.h"
 #include "covol/error.h"
+#include "edge/heuristics.h"
 #include "grid/halo.h"
 #include "scheme/scheme.h"
 
@@ -25,15 +26,9 @@ using detail::kPaddedSize;
 using detail::LeafBand;
 using detail::LeafBounds;
 
-constexpr double kHaloSigmas = 3.0;       // beyond it smoothing carries nothing worth computing
-constexpr double kLargestHeatStep = 0.5;  // h²; shorter steps make the kernel rounder, more like a Gaussian
-constexpr double kHeatTolerance = 1e-4;   // relative residual
+constexpr double kHeatTolerance = 1e-4;  // relative residual
 constexpr int kMaxHeatSweeps = 100;
 constexpr int kInnerSweeps = 2;
-constexpr double kSlopePercentile = 0.9;
-constexpr double kLinePercentile = 0.5, kLineShare = 1.0 / 3.0;
-constexpr double kStandardErrors = 3.0;  // a line weaker than that may be noise
-constexpr double kLowPercentile = 0.005, kHighPercentile = 0.995;
 
 // The band's leaves and enough around them, with the normalised image.
 struct Window {
@@ -63,7 +58,7 @@ Window sample_window(const Image& image, const FloatGrid& topology, const Domain
     std::vector<Coord> origins;
     for (auto leaf = topology.tree().cbeginLeaf(); leaf; ++leaf)
         if (!leaf->isEmpty()) origins.push_back(leaf->origin());
-    const int rings = int(std::ceil((kHaloSigmas * sigma / domain.voxel_size + 2.0) / kLeafDim));
+    const int rings = int(std::ceil((kEdge.halo_sigmas * sigma / domain.voxel_size + 2.0) / kLeafDim));
     Window window{LeafBand(detail::dilate_leaves(origins, rings, domain)), {}};
     const LeafBand& band = window.band;
     window.image.values = detail::LeafArray<float>(band.size(), 0.0F, 1);
@@ -108,7 +103,7 @@ double relax_heat(const detail::LeafStar& values, const float* before, float t, 
 // I_t = ΔI over time σ²/2 by implicit steps.
 void smooth(Window& window, const Domain& domain, double sigma, const RunContext& run) {
     const double time = 0.5 * sigma * sigma / (domain.voxel_size * domain.voxel_size);
-    const int steps = int(std::ceil(time / kLargestHeatStep - 1e-9));
+    const int steps = int(std::ceil(time / kEdge.largest_heat_step - 1e-9));
     if (steps == 0) return;
     const double t = time / steps;
     const double jacobi = 6.0 * t / (1.0 + 6.0 * t);
@@ -149,7 +144,7 @@ double contrast_of(const FloatGrid& slopes, double percentile) {
 
 double automatic_contrast(const FloatGrid& s, const EdgeOptions& options, bool is_line) {
     if (options.contrast_percentile) return contrast_of(s, *options.contrast_percentile);
-    return is_line ? kLineShare * contrast_of(s, kLinePercentile) : contrast_of(s, kSlopePercentile);
+    return is_line ? kEdge.line_share * contrast_of(s, kEdge.line_percentile) : contrast_of(s, kEdge.slope_percentile);
 }
 
 }  // namespace
@@ -186,7 +181,7 @@ EdgeResult detect_edges(const Image& image, const FloatGrid& topology, const Edg
     report.sigma = options.sigma.value_or(domain.voxel_size);
     report.low = options.low, report.high = options.high;
     if (!(report.low < report.high)) {
-        const auto percentiles = image.percentiles(kLowPercentile, kHighPercentile);
+        const auto percentiles = image.percentiles(kEdge.low_percentile, kEdge.high_percentile);
         report.low = percentiles[0], report.high = percentiles[1];
         if (!(report.low < report.high)) {
             const auto range = image.range();
@@ -269,7 +264,7 @@ MarkedFeature detect_feature(const Image& image, const std::vector<Vec3>& places
     found.line = line / count;
     found.step = step / count;
     const double error = std::sqrt(std::max(0.0, squares / count - found.line * found.line) / (count - 1));
-    if (std::abs(found.line) > std::abs(found.step) && std::abs(found.line) > kStandardErrors * error)
+    if (std::abs(found.line) > std::abs(found.step) && std::abs(found.line) > kEdge.standard_errors * error)
         found.feature = found.line > 0 ? EdgeFeature::BrightLine : EdgeFeature::DarkLine;
     return found;
 }

@@ -17,19 +17,12 @@
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "evolve/band_solver.h"
+#include "evolve/heuristics.h"
 #include "evolve/motion.h"
 #include "evolve/tracking.h"
 
 namespace covol {
 namespace {
-
-// A leaf becomes inactive when a step moves it by less than this share of the motion that counts as steady.
-constexpr double kInactiveShare = 0.2;
-constexpr int kCycle = 3;  // steps between two redistancings of a tracked band
-
-// An automatic time step grows while the surface moves by little, up to kLargestTau, and shrinks when it moves by much.
-constexpr double kSlowMotion = 0.1, kFastMotion = 0.4;  // voxels a step
-constexpr double kTauGrowth = 1.5, kLargestTau = 10.0;  // h
 
 double tracking_clamp(const EvolveOptions& options) {
     return options.rho > 0 ? kHalfWidthVoxels : detail::kTrackingWidth;
@@ -122,7 +115,7 @@ private:
         marks_.resize(solver_->band().size());
     }
 
-    [[nodiscard]] double inactive_below() const { return kInactiveShare * options_.tolerance * tau_; }
+    [[nodiscard]] double inactive_below() const { return kEvolve.inactive_share * options_.tolerance * tau_; }
 
     // A fixed band. @return how much the surface still moves, voxels a step
     double keep_band(double motion) {
@@ -134,7 +127,7 @@ private:
     // steps u is made a distance again. The front's displacement is measured just before that, at the same phase of
     // each cycle.
     double track(double motion) {
-        if (report_.steps % kCycle != 0) return motion;
+        if (report_.steps % kEvolve.cycle != 0) return motion;
         std::vector<float> largest;
         const double moved = measure_displacement(largest);
         const std::vector<std::size_t> left = front_displacement_.leaves_left(solver_->u());
@@ -143,8 +136,8 @@ private:
         else
             remake_band(left, largest);
         // Only now, so that a leaf becomes inactive in the phase in which the others are at the end.
-        if (solver_) solver_->update_active_leaves(largest, kCycle * inactive_below());
-        return std::min(motion, moved / kCycle);
+        if (solver_) solver_->update_active_leaves(largest, kEvolve.cycle * inactive_below());
+        return std::min(motion, moved / kEvolve.cycle);
     }
 
     // @param largest  out: of each leaf, the displacement of the crossing that moved most since the last call, voxels
@@ -198,8 +191,8 @@ private:
     }
 
     void adapt_tau(double motion) {
-        if (motion < kSlowMotion) tau_ = std::min(tau_ * kTauGrowth, kLargestTau);
-        if (motion > kFastMotion) tau_ = std::max(tau_ / kTauGrowth, 1.0);
+        if (motion < kEvolve.slow_motion) tau_ = std::min(tau_ * kEvolve.tau_growth, kEvolve.largest_tau);
+        if (motion > kEvolve.fast_motion) tau_ = std::max(tau_ / kEvolve.tau_growth, 1.0);
     }
 
     // Steps and the fall of the change, whichever is further.

@@ -8,15 +8,11 @@
 #include <functional>
 #include <limits>
 
+#include "evolve/heuristics.h"
 #include "grid/sign_masks.h"
 
 namespace covol::detail {
 namespace {
-
-constexpr double kLeftBy = 0.75, kLeavingBy = 0.4;  // voxels, on the average over a leaf
-constexpr double kShareLeft = 0.1;  // of the leaves with the surface in them; before that it is not worth while
-constexpr int kFewCrossings = 32;   // a leaf's average over fewer says little
-constexpr float kDeep = 2.0F;       // voxels, anywhere
 
 double crossing(float a, float b) { return double(a) / (double(a) - b); }
 
@@ -155,7 +151,7 @@ void CrossingMarks::remake(const std::vector<std::int32_t>& old_leaf) {
 
 FrontDisplacement::Reference::Reference(const float* values)
     : negative(negative_mask(values)), crossed(crossed_edges(negative)) {
-    for (int n = 0; n < kLeafSize; ++n) near[n >> 6] |= std::uint64_t(std::abs(values[n]) < kDeep) << (n & 63);
+    for (int n = 0; n < kLeafSize; ++n) near[n >> 6] |= std::uint64_t(std::abs(values[n]) < kMotion.deep) << (n & 63);
 }
 
 void FrontDisplacement::remember(const LeafArray<float>& u, std::size_t leaves) {
@@ -184,8 +180,12 @@ std::vector<std::size_t> FrontDisplacement::leaves_left(const LeafArray<float>& 
             deep |= (flipped & ~made.near[word]) != 0;
             flips += __builtin_popcountll(flipped);
         }
-        const double moved = flips > 0 ? kCrossingsPerVoxel * flips / std::max(made.crossed, kFewCrossings) : 0.0;
-        states[leaf] = deep ? kDeepDown : moved >= kLeftBy ? kLeft : moved >= kLeavingBy ? kLeaving : kStays;
+        const double moved =
+            flips > 0 ? kCrossingsPerVoxel * flips / std::max(made.crossed, kMotion.few_crossings) : 0.0;
+        states[leaf] = deep                          ? kDeepDown
+                       : moved >= kMotion.left_by    ? kLeft
+                       : moved >= kMotion.leaving_by ? kLeaving
+                                                     : kStays;
     });
     std::vector<std::size_t> leaving;
     std::size_t crossed = 0, left = 0;
@@ -196,7 +196,7 @@ std::vector<std::size_t> FrontDisplacement::leaves_left(const LeafArray<float>& 
         deep |= states[leaf] == kDeepDown;
         if (states[leaf] >= kLeaving) leaving.push_back(leaf);
     }
-    if (!deep && double(left) < kShareLeft * double(crossed)) leaving.clear();
+    if (!deep && double(left) < kMotion.share_left * double(crossed)) leaving.clear();
     return leaving;
 }
 

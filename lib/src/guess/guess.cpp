@@ -7,16 +7,11 @@
 
 #include "base/valid.h"
 #include "covol/start.h"
+#include "guess/heuristics.h"
 #include "guess/marks_surface.h"
 
 namespace covol {
 namespace {
-
-constexpr double kInsideVoxels = 1.5;  // within the section by more: in the cut
-constexpr double kLeastSlope = 0.05;   // a section whose body ends right beyond it
-constexpr int kCutRounds = 2;
-constexpr int kSeedRounds = 4;
-constexpr std::size_t kLeastOutline = 8;  // marks off the cuts, to say what is inside of them
 
 double longest(const std::array<Vec3, 3>& axes) {
     double most = 0;
@@ -85,7 +80,7 @@ double within_section(const guess::MarksSurface& body, const Vec3& mark, int acr
         high[a] += step;
         slope = std::hypot(slope, (body.value(high) - body.value(low)) / (2 * step));
     }
-    return body.value(mark) / std::max(slope, kLeastSlope);
+    return body.value(mark) / std::max(slope, kGuess.least_slope);
 }
 
 /// Marks in the cut lie inside the section of the body that the others mark: the surface need not pass them.
@@ -94,9 +89,9 @@ std::vector<Vec3> without_cut_marks(const std::vector<Vec3>& marks, const GuessO
     if (!options.end) return marks;
     std::vector<Vec3> sure, doubtful;
     for (const Vec3& mark : marks) (end_beside(mark, options) >= 0 ? doubtful : sure).push_back(mark);
-    if (doubtful.empty() || sure.size() < kLeastOutline || !guess::span_space(sure)) return marks;
+    if (doubtful.empty() || sure.size() < kGuess.least_outline || !guess::span_space(sure)) return marks;
     std::vector<Vec3> held = sure, before;
-    for (int round = 0; round < kCutRounds && held != before;
+    for (int round = 0; round < kGuess.cut_rounds && held != before;
          ++round) {  // those on its outline tell better where the section ends
         const guess::MarksSurface body(imprecise(held, options), run);
         before = std::exchange(held, sure);
@@ -105,7 +100,7 @@ std::vector<Vec3> without_cut_marks(const std::vector<Vec3>& marks, const GuessO
             double voxel = 0;
             for (int a = 0; a < 3; ++a)
                 if (a != across) voxel = std::max(voxel, deviation_along(options, a) / kUniformDeviation);
-            if (within_section(body, mark, across, options) > -kInsideVoxels * voxel) held.push_back(mark);
+            if (within_section(body, mark, across, options) > -kGuess.inside_voxels * voxel) held.push_back(mark);
         }
     }
     return held;
@@ -132,7 +127,7 @@ Guess guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks, con
         report.marks = result.marks.size();
         report.cut_marks = marks.size() - result.marks.size();
         auto surface = std::make_unique<guess::MarksSurface>(known, run);
-        for (int round = 0; round < kSeedRounds && hold_seeds(*surface, options, known); ++round)
+        for (int round = 0; round < kGuess.seed_rounds && hold_seeds(*surface, options, known); ++round)
             surface = std::make_unique<guess::MarksSurface>(known, run);
         report.patches = surface->patches();
         report.wrong_seeds = count_wrong(*surface, options);

@@ -13,6 +13,7 @@
 #include "base/wendland.h"
 #include "covol/error.h"
 #include "covol/start.h"
+#include "guess/heuristics.h"
 #include "points/kd_tree.h"
 
 namespace covol {
@@ -20,13 +21,7 @@ namespace {
 
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
-constexpr double kPrecisionVoxels = 0.5;
-constexpr double kRadiusOfResidual = 3.0;  // above 2.11, see the header
-constexpr double kLevelRatio = 2.0;        // bumps whose radii differ by less are solved for together
-constexpr double kSeedDepthVoxels = 0.5;   // how far beyond a seed the surface is put
-constexpr int kSeedRounds = 4;             // moving for one seed may bring the next to the wrong side
-constexpr double kExactVoxels = 2.0;       // the clamped distance is taken below this
-constexpr double kSolved = 1e-6;           // of the right-hand side
+constexpr double kSolved = 1e-6;  // of the right-hand side
 constexpr int kMostIterations = 1000;
 
 struct Bump {
@@ -38,7 +33,7 @@ struct Bump {
 class FarDistance {
 public:
     explicit FarDistance(const FloatGridPtr& guess)
-        : guess_(guess), exact_(kExactVoxels * guess->voxelSize()[0]), surface_(crossings(*guess)) {}
+        : guess_(guess), exact_(kCorrection.exact_voxels * guess->voxelSize()[0]), surface_(crossings(*guess)) {}
 
     [[nodiscard]] double at(const Vec3& world) const {
         const double near = double(openvdb::tools::BoxSampler::sample(
@@ -137,7 +132,9 @@ std::vector<double> solve(const std::vector<Target>& targets, double radius, dou
 /// Adds bumps until the targets have their shifts, the farthest first.
 void add_bumps(std::vector<Bump>& bumps, const std::vector<Target>& targets, double least_radius, double precision) {
     std::vector<Target> met, open = targets;
-    const auto radius_of = [&](double shift) { return std::max(least_radius, kRadiusOfResidual * std::abs(shift)); };
+    const auto radius_of = [&](double shift) {
+        return std::max(least_radius, kCorrection.radius_of_residual * std::abs(shift));
+    };
     while (!open.empty()) {
         std::vector<double> left;
         double largest = 0;
@@ -150,7 +147,7 @@ void add_bumps(std::vector<Bump>& bumps, const std::vector<Target>& targets, dou
         double square = 0, fourth = 0;  // of residuals
         std::size_t now = 0;
         for (std::size_t n = 0; n < open.size(); ++n) {
-            if (radius_of(left[n]) * kLevelRatio < radius) {
+            if (radius_of(left[n]) * kCorrection.level_ratio < radius) {
                 later.push_back(open[n]);
                 continue;
             }
@@ -270,14 +267,14 @@ GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>
     auto data = std::make_shared<GuessCorrection::Data>(guess);
     with_threads(run, [&] {
         const double h = guess->voxelSize()[0];
-        const double precision = options.precision.value_or(kPrecisionVoxels * h);
+        const double precision = options.precision.value_or(kCorrection.precision_voxels * h);
         const double least = options.least_radius.value_or(kCorrectionVoxels * h);
         std::vector<Target> on_surface;
         for (const Vec3& mark : marks) on_surface.push_back({mark, data->distance.at(mark)});
         std::vector<Target> targets = on_surface;
         std::vector<char> used(inside.size() + outside.size(), 0);
         // Seeds act once they are on the wrong side.
-        for (int round = 0; round < kSeedRounds; ++round) {
+        for (int round = 0; round < kCorrection.seed_rounds; ++round) {
             run.check();
             data->bumps.clear();
             add_bumps(data->bumps, targets, least, precision);
@@ -288,7 +285,7 @@ GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>
                 const double distance = data->distance.at(seed), now = distance - sum_of(data->bumps, seed);
                 if (used[n] || (in ? now < 0 : now > 0)) continue;
                 used[n] = 1;
-                targets.push_back({seed, distance + (in ? 1 : -1) * kSeedDepthVoxels * h});
+                targets.push_back({seed, distance + (in ? 1 : -1) * kCorrection.seed_depth_voxels * h});
             }
             if (targets.size() == before) break;
         }

@@ -8,18 +8,11 @@
 #include <limits>
 
 #include "base/wendland.h"
+#include "guess/heuristics.h"
 #include "points/kd_tree.h"
 
 namespace covol::guess {
 namespace {
-
-// Time, not accuracy, sets these: the whole takes the cube of its number of marks, a part the cube of its own.
-constexpr std::size_t kOriented = 100;   // marks whose normals are searched for from nothing
-constexpr std::size_t kWhole = 300;      // marks of the whole
-constexpr std::size_t kPatchMarks = 48;  // marks of a part
-constexpr std::size_t kCoreMarks = 12;   // of these, nearest to its centre, need no part of their own
-constexpr double kVarianceStep = 4, kLeastFactor = 1e-3;
-constexpr double kWholeWeight = 1e-3;  // of the whole, among parts that weigh 1 at their centres
 
 double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
@@ -98,9 +91,9 @@ struct LikeliestVariance {
     std::unique_ptr<VariationalSurface> surface;  ///< with it
 };
 
-/// Exact marks are likelier by a factor of sqrt(kVarianceStep) each with a variance that is kVarianceStep times
-/// smaller; a step is taken where they show half of that. (What is said is never enlarged: a surface that is truly
-/// rough looks like imprecise marks.)
+/// Exact marks are likelier by a factor of sqrt(kMarks.variance_step) each with a variance that is kMarks.variance_step
+/// times smaller; a step is taken where they show half of that. (What is said is never enlarged: a surface that is
+/// truly rough looks like imprecise marks.)
 LikeliestVariance likeliest_variance(const VariationalSurface& said, const ImpreciseMarks& marks,
                                      const std::vector<std::size_t>& chosen,
                                      const std::function<Constraints(Constraints)>& complete, const RunContext& run) {
@@ -110,13 +103,13 @@ LikeliestVariance likeliest_variance(const VariationalSurface& said, const Impre
         for (double& v : part.variance) v *= factor;
         return std::make_unique<VariationalSurface>(part, at(normals, chosen));
     };
-    const double enough = 0.5 * 0.5 * double(chosen.size()) * std::log(kVarianceStep);
+    const double enough = 0.5 * 0.5 * double(chosen.size()) * std::log(kMarks.variance_step);
     LikeliestVariance best{1, with(1)};
-    while (best.factor > kLeastFactor) {
+    while (best.factor > kMarks.least_factor) {
         run.check();
-        std::unique_ptr<VariationalSurface> finer = with(best.factor / kVarianceStep);
+        std::unique_ptr<VariationalSurface> finer = with(best.factor / kMarks.variance_step);
         if (finer->log_likelihood() - best.surface->log_likelihood() < enough) break;
-        best = {best.factor / kVarianceStep, std::move(finer)};
+        best = {best.factor / kMarks.variance_step, std::move(finer)};
     }
     return best;
 }
@@ -136,19 +129,19 @@ MarksSurface::MarksSurface(const ImpreciseMarks& marks, const RunContext& run) {
         part.world = marks.world;
         return part;
     };
-    const std::vector<std::size_t> few = spread_out(marks.marks, kOriented);
+    const std::vector<std::size_t> few = spread_out(marks.marks, kMarks.oriented);
     const Constraints unoriented = with_seeds(part_of(marks, few, {}));
     const VariationalSurface first(unoriented);
     const LikeliestVariance likeliest = likeliest_variance(first, marks, few, with_seeds, run);
     const VariationalSurface& oriented = *likeliest.surface;
     variance_factor_ = likeliest.factor;
     const std::vector<Vec3> normals = normals_of(oriented, marks.marks);
-    const std::vector<std::size_t> many = spread_out(marks.marks, kWhole);
+    const std::vector<std::size_t> many = spread_out(marks.marks, kMarks.whole);
     const Constraints part = with_factor(with_seeds(part_of(marks, many, normals)));
     whole_ = std::make_unique<VariationalSurface>(part, at(normals, many), oriented.amplitude());
     offset_ = mean_value(*whole_, part);
     run.check();
-    if (marks.marks.size() > kWhole) make_patches(marks, run);
+    if (marks.marks.size() > kMarks.whole) make_patches(marks, run);
 }
 
 void MarksSurface::make_patches(const ImpreciseMarks& marks, const RunContext& run) {
@@ -163,8 +156,8 @@ void MarksSurface::make_patches(const ImpreciseMarks& marks, const RunContext& r
     std::vector<Neighbourhood> places;
     for (std::size_t n = 0; n < count; ++n) {
         if (covered[n]) continue;
-        std::vector<std::size_t> near = nearest(marks.marks, n, kPatchMarks);
-        for (std::size_t k = 0; k < std::min(kCoreMarks, near.size()); ++k) covered[near[k]] = 1;
+        std::vector<std::size_t> near = nearest(marks.marks, n, kMarks.patch_marks);
+        for (std::size_t k = 0; k < std::min(kMarks.core_marks, near.size()); ++k) covered[near[k]] = 1;
         const double reach = std::sqrt(detail::squared_distance(marks.marks[near.back()], marks.marks[n]));
         places.push_back({n, std::move(near), reach});
     }
@@ -234,7 +227,7 @@ void MarksSurface::row(const Vec3& from, const Vec3& step, int count, double* va
     whole_->row(from, step, count, values);
     for (int n = 0; n < count; ++n) values[n] -= offset_;
     if (patches_.empty()) return;
-    std::vector<double> added(count, 0.0), weights(std::size_t(count), kWholeWeight), part(count), w(count);
+    std::vector<double> added(count, 0.0), weights(std::size_t(count), kMarks.whole_weight), part(count), w(count);
     // The patches of all cells that the row passes, in order: the same sum however rows are cut.
     std::vector<std::uint32_t> met;
     std::size_t last = std::numeric_limits<std::size_t>::max();

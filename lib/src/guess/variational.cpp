@@ -11,6 +11,7 @@
 #include <string>
 
 #include "covol/error.h"
+#include "guess/heuristics.h"
 #include "guess/triharmonic.h"
 
 namespace covol::guess {
@@ -22,16 +23,8 @@ using Vector = Eigen::VectorXd;
 using Point = Eigen::Vector3d;
 
 constexpr int kPolynomial = 4;  // 1, x, y, z: what the energy does not see
-constexpr int kModes = 3;       // of the energy, tried as directions of the normals
-constexpr int kSubspace = 6, kSubspaceSteps = 12;
 constexpr double kLocalShares[] = {0.5, 0.25, 0.125};
-constexpr double kLeastLocal = 6;  // neighbours, to have a middle
-constexpr int kDirections = 64;
 constexpr double kAround[] = {1.15, 1.5};  // of the farthest mark
-constexpr int kLeastEnergySteps = 500;
-constexpr int kAmplitudeRounds = 3;
-constexpr double kFlat = 1e-8;         // least over largest variance of marks in one plane
-constexpr double kLeastLambda = 1e-9;  // keeps M regular where marks coincide
 
 /// Least-energy interpolation at fixed nodes: the energy of values v and gradients g is that of
 /// g^T H g + 2 c^T g + constant.
@@ -175,7 +168,7 @@ Gradients descend(const Matrix& H, const Vector& c, const Vector& first) {
     std::copy(start.data(), start.data() + size, y);
     lbfgs_parameter_t parameter;
     lbfgs_parameter_init(&parameter);
-    parameter.max_iterations = kLeastEnergySteps;
+    parameter.max_iterations = kVariational.least_energy_steps;
     parameter.epsilon = 1e-5;
     parameter.past = 5;
     parameter.delta = 1e-6;
@@ -190,7 +183,7 @@ Gradients descend(const Matrix& H, const Vector& c, const Vector& first) {
 
 /// Approximate eigenvectors of the least eigenvalues: inverse iteration on a subspace.
 Matrix flattest_modes(const Matrix& H, const Vector& outward) {
-    const Index size = H.rows(), count = std::min<Index>(kSubspace, size);
+    const Index size = H.rows(), count = std::min<Index>(kVariational.subspace, size);
     Matrix shifted = H;
     shifted.diagonal().array() += 1e-10 * H.trace() / double(size);
     const Eigen::LLT<Matrix> factor(shifted);
@@ -198,7 +191,7 @@ Matrix flattest_modes(const Matrix& H, const Vector& outward) {
     space.col(0) = outward;
     for (Index j = 1; j < count; ++j)
         for (Index i = 0; i < size; ++i) space(i, j) = std::cos(double((i + 1) * (j + 1)));  // any vectors do
-    for (int step = 0; step < kSubspaceSteps; ++step) {
+    for (int step = 0; step < kVariational.subspace_steps; ++step) {
         space = factor.solve(space).eval();
         space = (Eigen::HouseholderQR<Matrix>(space).householderQ() * Matrix::Identity(size, count)).eval();
     }
@@ -238,8 +231,8 @@ bool has_one_sign_around(const std::vector<Point>& nodes, Index marks, const Exp
     for (Index n = 0; n < marks; ++n) reach = std::max(reach, (to_ball * nodes[std::size_t(n)]).norm());
     constexpr double kNoStep[3] = {0, 0, 0};
     int positive = 0, count = 0;
-    for (int n = 0; n < kDirections; ++n) {  // a Fibonacci lattice
-        const double z = 1 - (2 * n + 1) / double(kDirections), phi = n * 2.399963229728653;
+    for (int n = 0; n < kVariational.directions; ++n) {  // a Fibonacci lattice
+        const double z = 1 - (2 * n + 1) / double(kVariational.directions), phi = n * 2.399963229728653;
         const Point direction(std::sqrt(1 - z * z) * std::cos(phi), std::sqrt(1 - z * z) * std::sin(phi), z);
         for (const double around : kAround) {
             const Point at = around * reach * (from_ball * direction);
@@ -275,10 +268,10 @@ Gradients least_energy(const HermiteSystem& system, const Vector& values, const 
                        const std::vector<Point>& nodes, Index marks, const Vector& outward, const Inside& in_world) {
     std::vector<Gradients> ends{descend(system.energy(), c, outward)};
     for (const double share : kLocalShares)
-        if (share * double(marks) >= kLeastLocal)
+        if (share * double(marks) >= kVariational.least_local)
             ends.push_back(descend(system.energy(), c, away_from_neighbours(nodes, marks, share)));
     const Matrix modes = flattest_modes(system.energy(), outward);
-    for (Index k = 0; k < std::min<Index>(kModes, modes.cols()); ++k)
+    for (Index k = 0; k < std::min<Index>(kVariational.modes, modes.cols()); ++k)
         ends.push_back(descend(system.energy(), c, modes.col(k)));
     Gradients best;
     for (Gradients& end : ends) {
@@ -308,7 +301,7 @@ bool span_space(const std::vector<Vec3>& marks) {
     Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
     for (const Vec3& m : marks) spread += (to_point(m) - mean) * (to_point(m) - mean).transpose();
     const Point axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues();
-    return axes[0] > kFlat * axes[2];
+    return axes[0] > kVariational.flat * axes[2];
 }
 
 void Expansion::negate() {
@@ -364,9 +357,9 @@ VariationalSurface::VariationalSurface(const Constraints& given, const std::vect
 
     double unit_amplitude = amplitude > 0 ? amplitude * radius_ : 1.0;
     Gradients found;
-    const int rounds = amplitude > 0 ? 1 : kAmplitudeRounds;
+    const int rounds = amplitude > 0 ? 1 : kVariational.amplitude_rounds;
     for (int round = 0; round < rounds; ++round) {
-        const Vector lambda = (variance / unit_amplitude).cwiseMax(kLeastLambda);
+        const Vector lambda = (variance / unit_amplitude).cwiseMax(kVariational.least_lambda);
         const HermiteSystem system(nodes, marks, lambda);
         double constant = 0;
         const Vector c = system.linear(values, constant) - system.energy() * before;

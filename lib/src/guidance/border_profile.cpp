@@ -5,14 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "guidance/heuristics.h"
+
 namespace covol::guidance {
 namespace {
 
 // beyond the border's own profile, as far as inside and outside are learnt
 constexpr int kFarSteps = 4 * kStepsPerVoxel;
-constexpr double kDepthBlur = 1.4;  // steps: a mark's jitter, and samples closer than a voxel are no two samples
-constexpr double kLevelBlur = 1.0;
-constexpr double kBelief = 2.0;  // places' worth of belief in the more general counts
 
 /// Gaussian blur of rows of `count` values that lie `stride` apart; ends keep their mass.
 void blur(double* values, int count, int stride, double sigma) {
@@ -82,11 +81,11 @@ BorderProfile::Counts BorderProfile::count(const MarkedPlace& place) const {
                     c.outside[level] += weight / kFarSteps;
             }
         }
-    for (int level = 0; level < kLevels; ++level) blur(c.border.data() + level, kDepths, kLevels, kDepthBlur);
+    for (int level = 0; level < kLevels; ++level) blur(c.border.data() + level, kDepths, kLevels, kBorder.depth_blur);
     for (int depth = 0; depth < kDepths; ++depth)
-        blur(c.border.data() + std::size_t(depth) * kLevels, kLevels, 1, kLevelBlur);
-    blur(c.inside.data(), kLevels, 1, kLevelBlur);
-    blur(c.outside.data(), kLevels, 1, kLevelBlur);
+        blur(c.border.data() + std::size_t(depth) * kLevels, kLevels, 1, kBorder.level_blur);
+    blur(c.inside.data(), kLevels, 1, kBorder.level_blur);
+    blur(c.outside.data(), kLevels, 1, kBorder.level_blur);
     return c;
 }
 
@@ -107,14 +106,14 @@ void BorderProfile::normalise(Counts& c, const Counts* base) {
             values[level] = (values[level] + belief * prior[level]) / (total + belief);
     };
     std::vector<double> prior(kLevels, 1.0 / kLevels);
-    mix(c.inside.data(), base ? base->inside.data() : prior.data(), kBelief);
-    mix(c.outside.data(), base ? base->outside.data() : prior.data(), kBelief);
+    mix(c.inside.data(), base ? base->inside.data() : prior.data(), kBorder.belief);
+    mix(c.outside.data(), base ? base->outside.data() : prior.data(), kBorder.belief);
     for (int depth = 0; depth < kDepths; ++depth) {
         double* row = c.border.data() + std::size_t(depth) * kLevels;
         const double out = std::clamp(0.5 + double(depth - kBorderSteps) / (2.0 * kStepsPerVoxel), 0.0, 1.0);
         for (int level = 0; level < kLevels; ++level)
             prior[level] = (1 - out) * c.inside[level] + out * c.outside[level];
-        mix(row, base ? base->border.data() + std::size_t(depth) * kLevels : prior.data(), kBelief);
+        mix(row, base ? base->border.data() + std::size_t(depth) * kLevels : prior.data(), kBorder.belief);
     }
 }
 

@@ -15,6 +15,7 @@
 #include "covol/domain.h"
 #include "covol/start.h"
 #include "covol/surface.h"
+#include "guidance/heuristics.h"
 #include "guidance/learning.h"
 #include "guidance/wide_distance.h"
 #include "points/kd_tree.h"
@@ -26,21 +27,7 @@ namespace {
 
 using namespace guidance;
 
-constexpr int kMostPasses = 3;
-constexpr int kIterations = 2;            // normals, and what is inside and outside, are better known the second time
-constexpr double kWidth = 14.0;           // voxels to both sides of the surface in which profiles are read
-constexpr double kLongestOffset = 12.0;   // voxels in one iteration
-constexpr double kPatchWidth = 2.0;       // voxels
-constexpr double kPatchesPerSpacing = 4;  // offsets that vary within a fourth of the marks' spacing are not sought
-constexpr double kSides = 3.0;            // voxels beside a mark, to tell lines from steps
-constexpr int kNormalRounds = 6;          // of averaging, about two voxels
 constexpr std::array<double, 3> kSigmas{0.5, 1.0, 2.0};  // voxels
-constexpr std::size_t kFewestMarks = 8, kMostMarks = 400;
-constexpr double kLeastResponse = 0.25;  // a field that hardly follows the image does not tell how good the image is
-constexpr double kBeliefInAll = 4;       // marks' worth of belief that the image is as good everywhere
-constexpr int kPriors = 5;               // each half of the one before
-// A surface that bends least leaves about a third of the sagitta d^2 / (2 R) between marks at distance d.
-constexpr double kShareOfSagitta = 0.3;
 
 double squared(double x) { return x * x; }
 
@@ -63,7 +50,7 @@ public:
     bool step(bool first) {
         run_.check();
         cut_surface();
-        distance_.emplace(*surface_, patches_.places, domain_, kWidth, run_);
+        distance_.emplace(*surface_, patches_.places, domain_, kGuide.width, run_);
         if (first) start_ = distance_->grid();
         if (!place_marks(first)) return false;
         set_ranges();
@@ -141,15 +128,15 @@ void Guide::cut_surface() {
     const detail::KdTree tree(marks_);
     const auto cut = [&](double width) {
         width_ = width;
-        patches_ = make_patches(mesh, image_.geometry(), width, kNormalRounds);
+        patches_ = make_patches(mesh, image_.geometry(), width, kGuide.normal_rounds);
         to_mark_.resize(patches_.size());
         tbb::parallel_for(std::size_t(0), patches_.size(),
                           [&](std::size_t i) { to_mark_[i] = std::sqrt(tree.nearest(patches_.centers[i])); });
         // Points spread at random with one in each s^2 are s / 2 away in the mean.
         spacing_ = std::max(2 * mean(to_mark_), 2 * h_);
     };
-    cut(kPatchWidth * h_);
-    if (spacing_ > kPatchesPerSpacing * width_) cut(spacing_ / kPatchesPerSpacing);
+    cut(kGuide.patch_width * h_);
+    if (spacing_ > kGuide.patches_per_spacing * width_) cut(spacing_ / kGuide.patches_per_spacing);
 }
 
 bool Guide::place_marks(bool first) {
@@ -169,9 +156,9 @@ bool Guide::place_marks(bool first) {
     // Marks of one patch are one mark; those far away mean another surface.
     std::map<std::size_t, std::vector<std::size_t>> by_patch;
     for (std::size_t m = 0; m < marks_.size(); ++m)
-        if (std::abs(residual[m]) < (kWidth - 2) * h_) by_patch[patch[m]].push_back(m);
+        if (std::abs(residual[m]) < (kGuide.width - 2) * h_) by_patch[patch[m]].push_back(m);
     on_.clear();
-    const std::size_t every = by_patch.size() / kMostMarks + 1;
+    const std::size_t every = by_patch.size() / kGuide.most_marks + 1;
     std::size_t count = 0;
     for (const auto& [i, members] : by_patch) {
         if (count++ % every != 0) continue;
@@ -186,7 +173,7 @@ bool Guide::place_marks(bool first) {
         mark.deviation = precision * std::sqrt(share / 12);  // of a uniform error
         on_.push_back(mark);
     }
-    if (on_.size() < kFewestMarks) {
+    if (on_.size() < kGuide.fewest_marks) {
         report_.reason = "only " + std::to_string(on_.size()) +
                          " places of the guess have marks near them; the image's border cannot be learnt";
         return false;
@@ -214,7 +201,7 @@ void Guide::set_ranges() {
         for (std::uint32_t n = patches_.first[i]; n < patches_.first[i + 1]; ++n)
             home_[i] -= value_at(*start_, domain_, patches_.places[patches_.members[n]]) /
                         (patches_.first[i + 1] - patches_.first[i]);
-        reach[i] = std::min(0.5 * to_mark_[i] + 2 * patches_.voxel[i], kLongestOffset * h_);
+        reach[i] = std::min(0.5 * to_mark_[i] + 2 * patches_.voxel[i], kGuide.longest_offset * h_);
         broad2[i] = squared(0.5 * reach[i]);
     });
     broad_ = std::sqrt(mean(broad2));
@@ -224,7 +211,7 @@ void Guide::set_ranges() {
         // Marks are asked as any other place is, as if the guess were no better there.
         double range = std::max(reach[i], 2 * broad_);
         if (options_.range) range = std::min(range, *options_.range);
-        range = std::min(range + std::abs(home_[i]), (kWidth - 2) * h_);
+        range = std::min(range + std::abs(home_[i]), (kGuide.width - 2) * h_);
         ranges_[i] = int(std::ceil(range * kStepsPerVoxel / patches_.voxel[i]));
     }
 }
@@ -237,8 +224,8 @@ bool Guide::learn(const Scene& scene, bool first) {
             box.max[a] = std::max(box.max[a], x[a]);
         }
     for (int a = 0; a < 3; ++a) {
-        box.min[a] -= kWidth * h_;
-        box.max[a] += kWidth * h_;
+        box.min[a] -= kGuide.width * h_;
+        box.max[a] += kGuide.width * h_;
     }
     lesson_.reset();
     const auto try_sigma = [&](double sigma) {
@@ -263,7 +250,7 @@ bool Guide::learn(const Scene& scene, bool first) {
         places.push_back(mark.at);
         normals.push_back(patches_.directions[mark.patch]);
     }
-    report_.feature = detect_feature(image_, places, normals, kSides * h_);
+    report_.feature = detect_feature(image_, places, normals, kGuide.sides * h_);
     report_.inside = lesson_->brightness(-2 * kStepsPerVoxel);
     report_.border = lesson_->brightness(0);
     report_.outside = lesson_->brightness(2 * kStepsPerVoxel);
@@ -335,7 +322,7 @@ std::vector<double> Guide::local_error2(const Word& word) const {
     const double all = word.error2 + mark2_;
     std::vector<double> result(patches_.size());
     tbb::parallel_for(std::size_t(0), result.size(), [&](std::size_t i) {
-        double sum = kBeliefInAll * all, total = kBeliefInAll;
+        double sum = kGuide.belief_in_all * all, total = kGuide.belief_in_all;
         for (std::size_t n = 0; n < on_.size(); ++n) {
             const double weight =
                 std::exp(-0.5 * detail::squared_distance(on_[n].at, patches_.centers[i]) / squared(spacing_));
@@ -354,13 +341,13 @@ void Guide::weigh(bool first) {
     std::vector<double> distance2(count), least2(count);
     for (std::size_t i = 0; i < count; ++i) {
         distance2[i] = squared(to_mark_[i]);
-        least2[i] = squared(kShareOfSagitta * distance2[i] / (2 * size_));
+        least2[i] = squared(kGuide.share_of_sagitta * distance2[i] / (2 * size_));
     }
     std::vector<Word> words;
     if (first) {
-        for (int n = 0; n < kPriors; ++n) {
+        for (int n = 0; n < kGuide.priors; ++n) {
             words.push_back(hear(field, broad_ * std::pow(0.5, n)));
-            if (words.back().response < kLeastResponse) break;
+            if (words.back().response < kGuide.least_response) break;
         }
     } else {
         words.push_back(hear(field, prior_));
@@ -370,7 +357,7 @@ void Guide::weigh(bool first) {
     const double needed2 = guess2_ + std::max(slope2 * mean(distance2), mean(least2));
     Word chosen = words.front();
     for (const Word& w : words)
-        if (w.response >= kLeastResponse && w.prior2 >= needed2 &&
+        if (w.response >= kGuide.least_response && w.prior2 >= needed2 &&
             w.error2 / squared(w.response) < chosen.error2 / squared(chosen.response))
             chosen = w;
     prior_ = std::sqrt(chosen.prior2);
@@ -475,15 +462,15 @@ FloatGridPtr guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const
             return;
         }
         // Where the image errs less than the guess, what it made of that is the better guess.
-        for (int pass = 0; pass < kMostPasses; ++pass) {
+        for (int pass = 0; pass < kGuide.most_passes; ++pass) {
             GuidanceReport now;
             Guide surface(result, marks, image, options, now, run);
             int done = 0;
-            while (done < kIterations && surface.step(done == 0))
-                run.report("image guidance", (pass + double(++done) / kIterations) / kMostPasses);
+            while (done < kGuide.iterations && surface.step(done == 0))
+                run.report("image guidance", (pass + double(++done) / kGuide.iterations) / kGuide.most_passes);
             result = surface.surface();
             report.add(now, done > 0);
-            if (done < kIterations || !(now.image_error < now.guess_error)) break;
+            if (done < kGuide.iterations || !(now.image_error < now.guess_error)) break;
         }
         if (report.used) result = start_from_grid(domain_of(guess), *result, run);
         run.report("image guidance", 1);

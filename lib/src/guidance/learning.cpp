@@ -9,13 +9,13 @@
 #include <cmath>
 #include <limits>
 
+#include "cloud/orientation/heuristics.h"
+#include "guidance/heuristics.h"
 #include "points/kd_tree.h"
 
 namespace covol::guidance {
 namespace {
 
-constexpr std::size_t kMarksForPlaces = 40;  // fewer say nothing of how the profile varies
-constexpr int kNeighbours = 12;              // marks within the radius of a local profile, about
 constexpr int kBeyondRange = 3 * kStepsPerVoxel, kBeyondMark = 8 * kStepsPerVoxel;
 constexpr std::array<double, 6> kSharpness{0.05, 0.1, 0.2, 0.4, 0.7, 1.0};
 constexpr std::array<double, 4> kStray{0.02, 0.1, 0.25, 0.5};
@@ -159,8 +159,8 @@ Lesson::Lesson(const Scene& scene, const std::vector<PatchMark>& marks, const Sm
     : profile_(places_of(scene, marks, image, guess_deviation)) {
     gain_ = -std::numeric_limits<double>::infinity();
     test(scene, marks, prior_deviation, apart, false);
-    if (marks.size() >= kMarksForPlaces) {
-        radius_ = std::max(neighbourhood(profile_, kNeighbours), apart);
+    if (marks.size() >= kLearning.marks_for_places) {
+        radius_ = std::max(neighbourhood(profile_, kLearning.neighbours), apart);
         test(scene, marks, prior_deviation, apart, true);
     }
     const std::vector<double> all(marks.size(), 1.0);

@@ -6,10 +6,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "guidance/heuristics.h"
+
 namespace covol::guidance {
 namespace {
 
-constexpr int kRounds = 4;
 using Sparse = Eigen::SparseMatrix<double>;
 
 }  // namespace
@@ -84,7 +85,7 @@ OffsetField::Fit OffsetField::fit(const std::vector<double>& mean, const std::ve
     const Sparse prior = inverse_deviation.asDiagonal() * system_->precision * inverse_deviation.asDiagonal();
     const Eigen::VectorXd pull = prior * prior_mean;
     std::vector<double> site(count, 0.0), believed(count);
-    for (int round = 0; round < (asked ? kRounds : 1); ++round) {
+    for (int round = 0; round < (asked ? kOffsets.rounds : 1); ++round) {
         // What the others say about a patch: the field's value there, the surer the more they know.
         for (std::size_t i = 0; i < count; ++i) {
             believed[i] = 1 / (deviation[i] * deviation[i]) + fixed_precision[i];

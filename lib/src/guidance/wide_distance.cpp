@@ -6,12 +6,12 @@
 
 #include <cmath>
 
+#include "guidance/heuristics.h"
+
 namespace covol::guidance {
 namespace {
 
 using Leaf = FloatGrid::TreeType::LeafNodeType;
-
-constexpr double kOwnVoxels = 2.5;  // the start's band, less what its clamp touches
 
 std::vector<Vec3> to_index(const Domain& domain, const std::vector<Vec3>& world) {
     std::vector<Vec3> index;
@@ -34,7 +34,7 @@ WideDistance::WideDistance(const FloatGrid& start, const std::vector<Vec3>& vert
     : nearest_(detail::nearest_points(to_index(domain, vertices), detail::box_of(domain), width, "guide", run)),
       grid_(start.deepCopy()) {
     const double h = domain.voxel_size;
-    const auto own = float(kOwnVoxels * h), far = float(width * h);
+    const auto own = float(kOffsets.own_voxels * h), far = float(width * h);
     openvdb::tools::changeLevelSetBackground(grid_->tree(), far);
     const std::vector<Leaf*> leaves = touched(*grid_, nearest_);
     const detail::CoordBBox box = detail::box_of(domain);

@@ -5,15 +5,13 @@
 #include <map>
 #include <utility>
 
+#include "holes/heuristics.h"
+
 namespace covol::holes {
 namespace {
 
 using Point = std::array<float, 3>;
 using Triangle = std::array<std::uint32_t, 3>;
-
-constexpr float kClose = 0.3F;        // of an edge: a vertex that close to the line is moved onto it
-constexpr double kLeastCosine = 0.5;  // between a triangle before and after
-constexpr int kUndoRounds = 4;
 
 Point between(const Point& a, const Point& b, float t) {
     Point p;
@@ -38,12 +36,12 @@ std::array<double, 3> area_vector(const std::vector<Point>& vertices, const Tria
 
 bool turns(const std::array<double, 3>& a, const std::array<double, 3>& b) {
     const auto dot = [](const auto& x, const auto& y) { return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]; };
-    return dot(a, b) < kLeastCosine * std::sqrt(dot(a, a) * dot(b, b));
+    return dot(a, b) < kCut.least_cosine * std::sqrt(dot(a, a) * dot(b, b));
 }
 
 /// Moves vertices close to the line onto it; their value becomes 0 in any case.
 void snap(const TriangleMesh& mesh, std::vector<Point>& vertices, std::vector<float>& values) {
-    std::vector<float> closest(values.size(), kClose);
+    std::vector<float> closest(values.size(), kCut.close);
     std::vector<Point> moved = vertices;
     for (const Triangle& t : mesh.triangles)
         for (int k = 0; k < 3; ++k)
@@ -57,13 +55,13 @@ void snap(const TriangleMesh& mesh, std::vector<Point>& vertices, std::vector<fl
     std::vector<Point> tried = vertices;
     std::vector<char> moves(values.size());
     for (std::size_t v = 0; v < values.size(); ++v) {
-        moves[v] = closest[v] < kClose;
+        moves[v] = closest[v] < kCut.close;
         if (!moves[v]) continue;
         values[v] = 0;
         tried[v] = moved[v];
     }
     bool undone = true;
-    for (int round = 0; undone && round < kUndoRounds; ++round) {
+    for (int round = 0; undone && round < kCut.undo_rounds; ++round) {
         undone = false;
         for (const Triangle& t : mesh.triangles) {
             if (!moves[t[0]] && !moves[t[1]] && !moves[t[2]]) continue;

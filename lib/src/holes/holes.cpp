@@ -10,15 +10,13 @@
 #include "covol/error.h"
 #include "covol/points.h"
 #include "holes/cut.h"
+#include "holes/heuristics.h"
 #include "holes/membrane.h"
 #include "points/kd_tree.h"
 
 namespace covol {
 namespace {
 
-constexpr double kFar = 3;          // spacings, and voxels
-constexpr double kSmoothing = 0.5;  // of the distance: wiggles of the rim shorter than about three times that go
-constexpr float kStep = 0.5F;       // of smoothing, towards the neighbours' mean
 // nearest neighbour of points spread evenly at random, their spacing being 1 / sqrt(density)
 constexpr double kP95OfSpacing = 0.976;
 
@@ -43,8 +41,8 @@ void smooth(const TriangleMesh& mesh, double width, std::vector<float>& values) 
             count[t[k]] += 2;
             squares += detail::squared_distance(place(mesh, t[k]), place(mesh, t[(k + 1) % 3]));
         }
-    // A step adds half of a mean squared edge, times kStep, to the variance along each axis.
-    const double variance = 0.5 * kStep * squares / double(3 * mesh.triangles.size());
+    // A step adds half of a mean squared edge, times kHoles.step, to the variance along each axis.
+    const double variance = 0.5 * kHoles.step * squares / double(3 * mesh.triangles.size());
     const auto steps = int(std::ceil(width * width / variance));
     std::vector<float> sums(values.size());
     for (int n = 0; n < steps; ++n) {
@@ -52,7 +50,7 @@ void smooth(const TriangleMesh& mesh, double width, std::vector<float>& values) 
         for (const Triangle& t : mesh.triangles)
             for (int k = 0; k < 3; ++k) sums[t[k]] += values[t[(k + 1) % 3]] + values[t[(k + 2) % 3]];
         for (std::size_t v = 0; v < values.size(); ++v)
-            if (count[v] > 0) values[v] += kStep * (sums[v] / float(count[v]) - values[v]);
+            if (count[v] > 0) values[v] += kHoles.step * (sums[v] / float(count[v]) - values[v]);
     }
 }
 
@@ -129,7 +127,7 @@ private:
                 values[v] =
                     float(std::min(std::sqrt(tree.nearest(place(mesh_, std::uint32_t(v)))), 2 * reach_) - reach_);
         });
-        smooth(mesh_, kSmoothing * distance_, values);
+        smooth(mesh_, kHoles.smoothing * distance_, values);
         return values;
     }
 
@@ -191,7 +189,7 @@ holes::CutMesh cut_holes(const TriangleMesh& mesh, const std::vector<float>& to_
 const char* to_string(Holes holes) { return holes == Holes::Close ? "close" : holes == Holes::Open ? "open" : "flat"; }
 
 double choose_hole_distance(const std::vector<Vec3>& points, double voxel_size) {
-    return kFar * std::max(voxel_size, measure_spacing(points).p95 / kP95OfSpacing);
+    return kHoles.far * std::max(voxel_size, measure_spacing(points).p95 / kP95OfSpacing);
 }
 
 std::vector<float> measure_distances(const TriangleMesh& mesh, const std::vector<Vec3>& points, const RunContext& run) {

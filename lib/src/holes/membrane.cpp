@@ -6,13 +6,10 @@
 #include <cmath>
 
 #include "covol/error.h"
+#include "holes/heuristics.h"
 
 namespace covol::holes {
 namespace {
-
-constexpr int kMostRounds = 20;
-constexpr double kSteady = 1e-3;  // of the mean edge: the largest move of a round that is the last
-constexpr double kLeastWeight = 1e-3, kMostWeight = 100;  // triangles without area have no cotangents
 
 using Matrix = Eigen::SparseMatrix<double>;
 using Positions = Eigen::Matrix<double, Eigen::Dynamic, 3>;
@@ -35,7 +32,7 @@ void span_membrane(TriangleMesh& mesh, const std::vector<char>& fixed, const Run
     for (std::size_t v = 0; v < number.size(); ++v)
         for (int a = 0; a < 3; ++a) at(std::ptrdiff_t(v), a) = mesh.vertices[v][a];
     Eigen::SimplicialLDLT<Matrix> solver;
-    for (int round = 0; round < kMostRounds; ++round) {
+    for (int round = 0; round < kMembrane.most_rounds; ++round) {
         run.check();
         std::vector<Eigen::Triplet<double>> entries;
         Positions right = Positions::Zero(count, 3);
@@ -47,7 +44,8 @@ void span_membrane(TriangleMesh& mesh, const std::vector<char>& fixed, const Run
                 const Eigen::Vector3d tip = at.row(t[k]), u = at.row(a).transpose() - tip,
                                       v = at.row(b).transpose() - tip;
                 // At first all edges are springs: that spreads the vertices of a bulge over what it is to become.
-                const double w = round == 0 ? 1 : std::clamp(cotangent(u, v), kLeastWeight, kMostWeight);
+                const double w =
+                    round == 0 ? 1 : std::clamp(cotangent(u, v), kMembrane.least_weight, kMembrane.most_weight);
                 edges += (u - v).norm();
                 ++edge_count;
                 for (const auto& [own, other] : {std::pair{a, b}, {b, a}}) {
@@ -71,7 +69,7 @@ void span_membrane(TriangleMesh& mesh, const std::vector<char>& fixed, const Run
             most = std::max(most, (solved.row(number[v]) - at.row(std::ptrdiff_t(v))).norm());
             at.row(std::ptrdiff_t(v)) = solved.row(number[v]);
         }
-        if (most < kSteady * edges / edge_count) break;
+        if (most < kMembrane.steady * edges / edge_count) break;
     }
     for (std::size_t v = 0; v < number.size(); ++v)
         if (number[v] >= 0)

@@ -13,13 +13,11 @@
 #include "covol/error.h"
 #include "mesh/corner_table.h"
 #include "meshing/contacts.h"
+#include "meshing/heuristics.h"
 
 namespace covol::meshing {
 namespace {
 
-/// Weight of an edge's length, to the fourth power, against squared distances from planes times areas.
-constexpr double kRoundness = 3e-3;
-constexpr double kTurn = 0.5;  // cosine: a triangle may not turn farther
 /// Collapses that make a triangle with a smaller angle than that of the cosine, 23, 14 and 6 degrees, and than there
 /// was, cost so many times as much.
 struct Needle {
@@ -27,9 +25,6 @@ struct Needle {
     float factor;
 };
 constexpr Needle kNeedles[] = {{0.92, 10}, {0.97, 100}, {0.995, std::numeric_limits<float>::infinity()}};
-// 19 degrees: with a tolerance the goal is good triangles, not few, and none may have less
-constexpr double kAdaptiveNeedle = 0.945;
-constexpr int kPasses = 3;  // a collapse that was in another's way is asked for again in the next
 
 struct Traits : OpenMesh::DefaultTraitsDouble {
     VertexAttributes(OpenMesh::Attributes::Status);
@@ -175,7 +170,8 @@ private:
             if ((kept & (kFixed | kChamfer)) || (holds_[lost] & ~kept)) continue;
             const double square = (info.p1 - info.p0).sqrnorm();
             candidates_.push_back(
-                {std::max(0.0F, Quadric::collapse_priority(info)) + float(kRoundness * square * square), edge});
+                {std::max(0.0F, Quadric::collapse_priority(info)) + float(kDecimate.roundness * square * square),
+                 edge});
         }
         for (auto& [cost, edge] : candidates_) {
             gather(edge);
@@ -226,14 +222,16 @@ private:
         for (const auto& [triangle, t] : changed_) {
             const Vec3 to = at(t[0]), next = at(t[1]), previous = at(t[2]);
             const Vec3 was = area_normal(from, next, previous), is = area_normal(to, next, previous);
-            if (!(dot(was, is) > kTurn * length(was) * length(is))) return std::numeric_limits<float>::infinity();
+            if (!(dot(was, is) > kDecimate.turn * length(was) * length(is)))
+                return std::numeric_limits<float>::infinity();
             const double now = worst_cosine(to, next, previous);
             if (now > worst && now > kNeedles[0].cosine && now > worst_cosine(from, next, previous)) worst = now;
         }
         float factor = 1;
         for (const Needle& needle : kNeedles)
             if (worst > needle.cosine) factor = needle.factor;
-        return goal_.tolerance > 0 && worst > kAdaptiveNeedle ? std::numeric_limits<float>::infinity() : factor;
+        return goal_.tolerance > 0 && worst > kDecimate.adaptive_needle ? std::numeric_limits<float>::infinity()
+                                                                        : factor;
     }
 
     [[nodiscard]] bool leaves_surface(std::uint32_t lost) {
@@ -279,7 +277,7 @@ bool decimate(TriangleMesh& mesh, const Surface* surface, const DecimateGoal& go
     SafeQuadric& decider = decimater.module(handle);
     decider.begin(mesh, table, surface, goal, trust, run);
     decimater.initialize();
-    for (int pass = 0; pass < kPasses && decider.left() > goal.triangles; ++pass) {
+    for (int pass = 0; pass < kDecimate.passes && decider.left() > goal.triangles; ++pass) {
         decider.begin_pass();
         if (decimater.decimate((decider.left() - goal.triangles + 1) / 2) == 0) break;  // two triangles each
     }

@@ -6,17 +6,12 @@
 #include <cmath>
 
 #include "grid/leaf_band.h"
+#include "meshing/heuristics.h"
 
 namespace covol::meshing {
 namespace {
 
-constexpr int kSteps = 6;            // of Newton's method
 constexpr double kConverged = 1e-4;  // voxels
-constexpr double kLongest = 0.5;     // voxels, a step
-constexpr double kReach = 1.0;       // voxels, all steps
-constexpr double kFlat = 0.05;       // of the slope that a distance has: no direction to go
-constexpr double kLeastSlope = 0.5;  // of a distance: between two walls it has none
-constexpr double kSampling = 0.75;   // voxels
 constexpr double kNearFace = 0.01;   // voxels: twice extract_mesh()'s chamfer
 
 /// Calls visit(point) for points of a triangle at most `step` apart: its middle and those of its sides where it is not
@@ -146,18 +141,18 @@ std::optional<Vec3> Level::project(const Vec3& world, unsigned held) const {
     const double h = domain_.voxel_size;
     Vec3 p = world;
     double gone = 0;
-    for (int step = 0; step <= kSteps; ++step) {
+    for (int step = 0; step <= kLevel.steps; ++step) {
         const Sample here = sample(p);
         Vec3 g = here.gradient;
         for (int a = 0; a < 3; ++a)
             if (held >> a & 1) g[a] = 0;
         const double steep = dot(g, g);
         if (std::abs(here.value) <= kConverged * h * std::sqrt(steep) || here.value == 0) return p;
-        if (step == kSteps || !(steep > kFlat * kFlat)) return {};
+        if (step == kLevel.steps || !(steep > kLevel.flat * kLevel.flat)) return {};
         const double whole = here.value / std::sqrt(steep);
-        const double move = std::clamp(whole, -kLongest * h, kLongest * h);
+        const double move = std::clamp(whole, -kLevel.longest * h, kLevel.longest * h);
         gone += std::abs(move);
-        if (!(gone <= kReach * h)) return {};
+        if (!(gone <= kLevel.reach * h)) return {};
         p = plus(p, -move / std::sqrt(steep), g);
     }
     return {};
@@ -165,12 +160,12 @@ std::optional<Vec3> Level::project(const Vec3& world, unsigned held) const {
 
 double Level::distance(const Vec3& world) const {
     const Sample here = sample(world);
-    return std::abs(here.value) / std::max(length(here.gradient), kLeastSlope);
+    return std::abs(here.value) / std::max(length(here.gradient), kLevel.least_slope);
 }
 
 bool Level::is_farther(const Vec3& a, const Vec3& b, const Vec3& c, double voxels) const {
     bool farther = false;
-    for_each_sample(a, b, c, kSampling * voxel_size(),
+    for_each_sample(a, b, c, kLevel.sampling * voxel_size(),
                     [&](const Vec3& p) { farther = farther || distance(p) > voxels * voxel_size(); });
     return farther;
 }
@@ -214,7 +209,7 @@ MeshDeviation Surface::deviation(const TriangleMesh& mesh) const {
                        c = to_vec3(mesh.vertices[t[2]]);
             double distances = 0;
             int count = 0;
-            for_each_sample(a, b, c, kSampling * level.voxel_size(), [&](const Vec3& p) {
+            for_each_sample(a, b, c, kLevel.sampling * level.voxel_size(), [&](const Vec3& p) {
                 const double distance = level.distance(p);
                 sum.max = std::max(sum.max, distance);
                 distances += distance;

@@ -14,25 +14,13 @@
 #include "mesh/corner_table.h"
 #include "meshing/contacts.h"
 #include "meshing/edge_collapser.h"
+#include "meshing/heuristics.h"
 #include "meshing/level.h"
 #include "meshing/safe_moves.h"
 
 namespace covol {
 namespace meshing {
 namespace {
-
-constexpr int kMovesPerRound = 5;
-constexpr double kStep = 0.7;      // of the way to the middle of the neighbours
-constexpr double kSameSide = 0.3;  // cosine: a triangle may not turn farther in a move
-constexpr double kSmooth = 0.5;    // cosine: farther than this neighbours are not turned into each other
-constexpr double kDrop = 0.5;      // of a tangential move: what the projection may add to it
-constexpr double kGain = 1e-3;     // of a cosine: below this an edge is not worth turning
-constexpr double kPoor = 0.85;     // cosine of an angle, 32 degrees: what is better needs no second round
-// cosine of an angle, 26 degrees: below it a triangle's shortest side is drawn together
-constexpr double kSliver = 0.9;
-constexpr double kShort = 0.5;  // voxels: longer sides are not
-// voxels: a turned edge may leave the level set so far, or as far as before; ends that meet so far
-constexpr double kOffLevel = 0.1;
 
 class Relaxer {
 public:
@@ -49,10 +37,10 @@ public:
     void relax(int rounds, RelaxReport& report) {
         for (int round = 0; round < rounds; ++round) {
             if (round > 0) report.collapses += std::int64_t(collapse_slivers());
-            choose(round == 0 ? 2.0 : kPoor);
+            choose(round == 0 ? 2.0 : kRelax.poor);
             std::vector<Flip> turned = flip_edges();
             const Positions before = mesh_.vertices;
-            for (int n = 0; n < kMovesPerRound; ++n) {
+            for (int n = 0; n < kRelax.moves_per_round; ++n) {
                 move();
                 run_.check();
             }
@@ -104,18 +92,19 @@ private:
         const std::uint32_t v = table_.vertex(corner), w = table_.vertex(across);
         const Vec3 pa = at(a), pb = at(b), pv = at(v), pw = at(w);
         const double now = std::max(worst_cosine(pv, pa, pb), worst_cosine(pw, pb, pa));
-        if (!(std::max(worst_cosine(pv, pa, pw), worst_cosine(pw, pb, pv)) < now - kGain)) return false;
+        if (!(std::max(worst_cosine(pv, pa, pw), worst_cosine(pw, pb, pv)) < now - kRelax.gain)) return false;
         const Vec3 was[2] = {area_normal(pv, pa, pb), area_normal(pw, pb, pa)};
         const Vec3 is[2] = {area_normal(pv, pa, pw), area_normal(pw, pb, pv)};
         for (const Vec3& m : was)
             for (const Vec3& n : is)
-                if (!(dot(m, n) > kSmooth * length(m) * length(n))) return false;
+                if (!(dot(m, n) > kRelax.smooth * length(m) * length(n))) return false;
         const unsigned face = face_of(v, a, b);
         if (face_of(w, b, a) != face || face_of(v, a, w) != face || face_of(w, b, v) != face) return false;
         if (face != 0) return table_.can_flip(corner);
         const Level& level = levels_.local();
         const double off = std::abs(level.sample(plus(pv, 0.5, minus(pw, pv))).value);
-        if (off > kOffLevel * level.voxel_size() && off > std::abs(level.sample(plus(pa, 0.5, minus(pb, pa))).value))
+        if (off > kRelax.off_level * level.voxel_size() &&
+            off > std::abs(level.sample(plus(pa, 0.5, minus(pb, pa))).value))
             return false;
         if (tolerance_ > 0 && (is_off(pv, pa, pw, 0) || is_off(pw, pb, pv, 0))) return false;
         return table_.can_flip(corner);
@@ -185,7 +174,7 @@ private:
             ++count;
         });
         const Vec3 p = to_vec3(here);
-        Vec3 step = plus(Vec3{}, kStep, minus(plus(Vec3{}, 1.0 / count, sum), p));
+        Vec3 step = plus(Vec3{}, kRelax.step, minus(plus(Vec3{}, 1.0 / count, sum), p));
         const unsigned held = holds_[v] & kFaces;
         for (int a = 0; a < 3; ++a)
             if (held >> a & 1) step[a] = normal[a] = 0;
@@ -196,7 +185,7 @@ private:
         const Vec3 goal = plus(p, 1, step);
         const std::optional<Vec3> found = levels_.local().project(goal, held);
         const double slack = 1e-3 * levels_.local().voxel_size();
-        if (!found || length(minus(*found, goal)) > kDrop * length(step) + slack) return here;
+        if (!found || length(minus(*found, goal)) > kRelax.drop * length(step) + slack) return here;
         Position there = to_position(*found);
         for (int a = 0; a < 3; ++a)
             if (held >> a & 1) there[a] = here[a];
@@ -205,7 +194,7 @@ private:
 
     /// Whether a move turns the triangle over, or moves it off the surface.
     [[nodiscard]] bool spoilt(const Triangle& t, const Positions& before, const Positions& after) const {
-        if (is_turned(t, before, after, kSameSide)) return true;
+        if (is_turned(t, before, after, kRelax.same_side)) return true;
         return tolerance_ > 0 && has_moved(t, before, after) &&
                is_off(to_vec3(after[t[0]]), to_vec3(after[t[1]]), to_vec3(after[t[2]]), face_of(t[0], t[1], t[2]));
     }
@@ -284,7 +273,7 @@ private:
         const Triangle& v = mesh_.triangles[t];
         return worst_cosine(at(v[0]), at(v[1]), at(v[2])) > cosine;
     }
-    [[nodiscard]] bool is_sliver(std::uint32_t t) const { return is_worse(t, kSliver); }
+    [[nodiscard]] bool is_sliver(std::uint32_t t) const { return is_worse(t, kRelax.sliver); }
 
     /// The corner that faces it.
     [[nodiscard]] std::uint32_t shortest_side(std::uint32_t t) const {
@@ -306,7 +295,8 @@ private:
         const unsigned all = holds_[a] | holds_[b];
         const Position &pa = mesh_.vertices[a], &pb = mesh_.vertices[b];
         std::vector<Position> points;
-        if ((all & kFixed) || length(minus(to_vec3(pa), to_vec3(pb))) > kShort * level.voxel_size()) return points;
+        if ((all & kFixed) || length(minus(to_vec3(pa), to_vec3(pb))) > kRelax.short_side * level.voxel_size())
+            return points;
         Position goal;
         for (int k = 0; k < 3; ++k)
             goal[k] = holds_[a] >> k & 1 ? pa[k] : holds_[b] >> k & 1 ? pb[k] : 0.5F * (pa[k] + pb[k]);
@@ -314,7 +304,7 @@ private:
             points.push_back(goal);
         else if (holds_[a] == holds_[b]) {
             const auto found = level.project(to_vec3(goal), all & kFaces);
-            if (found && length(minus(*found, to_vec3(goal))) < kOffLevel * level.voxel_size())
+            if (found && length(minus(*found, to_vec3(goal))) < kRelax.off_level * level.voxel_size())
                 points.push_back(to_position(*found));
             for (int k = 0; k < 3 && !points.empty(); ++k)
                 if (all >> k & 1) points.back()[k] = goal[k];
@@ -337,7 +327,7 @@ private:
             const auto shape_of = [&](std::uint32_t t) {
                 const Triangle& v = mesh_.triangles[t];
                 const double shape = worst_cosine(at(v[0]), at(v[1]), at(v[2]));
-                slivers += int(shape > kSliver);
+                slivers += int(shape > kRelax.sliver);
                 narrowest_before = std::max(narrowest_before, shape);
                 return shape;
             };
@@ -346,12 +336,13 @@ private:
                 const Vec3 next = at(t.next), previous = at(t.previous), p = to_vec3(there);
                 const Vec3 was = area_normal(at(t.mover), next, previous), is = area_normal(p, next, previous);
                 const double before = shape_of(t.number), after = worst_cosine(p, next, previous);
-                slivers -= int(after > kSliver);
+                slivers -= int(after > kRelax.sliver);
                 narrowest = std::max(narrowest, after);
                 worse = worse ||
                         (tolerance_ > 0 &&
                          is_off(p, next, previous, holds_[t.mover] & holds_[t.next] & holds_[t.previous] & kFaces));
-                worse = worse || !(dot(was, is) > (before > kSliver ? 0.0 : kSameSide) * length(was) * length(is));
+                worse = worse ||
+                        !(dot(was, is) > (before > kRelax.sliver ? 0.0 : kRelax.same_side) * length(was) * length(is));
             }
             if (worse || slivers <= 0 || narrowest > narrowest_before || !edge.collapse(there)) continue;
             holds_[a] |= holds_[b];

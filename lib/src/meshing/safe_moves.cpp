@@ -4,6 +4,8 @@
 #include <functional>
 #include <numeric>
 
+#include "meshing/heuristics.h"
+
 namespace covol::meshing {
 
 std::vector<std::uint32_t> restore(const CornerTable& table, const std::vector<std::uint32_t>& some,
@@ -21,13 +23,14 @@ std::vector<std::uint32_t> restore(const CornerTable& table, const std::vector<s
 }
 
 std::size_t move_where_free(TriangleMesh& mesh, const Positions& goal) {
-    constexpr double kSameSide = 0.3;
     const CornerTable table(mesh.triangles, mesh.vertices.size());
     const Positions before = mesh.vertices;
     mesh.vertices = goal;
     std::vector<std::uint32_t> all(mesh.triangles.size());
     std::iota(all.begin(), all.end(), 0U);
-    const auto turned = [&](std::uint32_t t) { return is_turned(mesh.triangles[t], before, mesh.vertices, kSameSide); };
+    const auto turned = [&](std::uint32_t t) {
+        return is_turned(mesh.triangles[t], before, mesh.vertices, kRelax.same_side);
+    };
     restore_all(table, those(all, turned), before, mesh.vertices, turned);
     ContactFinder finder(mesh.vertices, mesh.triangles);
     for (std::vector<ContactFinder::Pair> contacts = finder.contacts(table.is_closed()); !contacts.empty();) {

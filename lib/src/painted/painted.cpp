@@ -11,6 +11,7 @@
 
 #include "base/file.h"
 #include "covol/error.h"
+#include "painted/heuristics.h"
 #include "painted/outline.h"
 #include "painted/segments.h"
 
@@ -20,8 +21,6 @@ namespace {
 using painted::Patch;
 using painted::Slice;
 
-constexpr int kNarrowest = 3;  // voxels; a patch that is nowhere wider says little about a cross-section
-constexpr int kThinRun = 3;    // a run of painted slices may be as thick as the widest patch by this
 constexpr std::size_t kMostListed = 8;
 constexpr const char* kAxisNames[3] = {"x", "y", "z"};
 
@@ -190,7 +189,7 @@ AxisPaint look_across(const Paint& paint, int axis) {
         bool has_area = false, has_stroke = false;
         for (const Patch& patch : found[std::size_t(n)]) {
             has_stroke |= patch.stroke;
-            if (patch.stroke || patch.width < kNarrowest) continue;
+            if (patch.stroke || patch.width < kPainted.narrowest) continue;
             has_area = true;
             result.widest = std::max(result.widest, patch.width);
         }
@@ -210,8 +209,8 @@ bool is_sliced(const AxisPaint& paint, int axis, const ImageGeometry& geometry) 
     if (paint.longest_run == 1) return true;
     const auto [x, y] = Paint::plane(axis);
     const double across = std::max(geometry.spacing[x], geometry.spacing[y]) * paint.widest;
-    return kThinRun * paint.longest_run <= paint.widest &&
-           kThinRun * paint.longest_run * geometry.spacing[axis] <= across;
+    return kPainted.thin_run * paint.longest_run <= paint.widest &&
+           kPainted.thin_run * paint.longest_run * geometry.spacing[axis] <= across;
 }
 
 /// Small patches alone in their slice, away from other paint: the tip of what tapers.
@@ -279,7 +278,7 @@ PaintedLabel understand(const Image& labels, const LabelName& name, const VoxelB
         std::array<AxisPaint, 3> axes;
         for (int a = 0; a < 3; ++a) axes[a] = look_across(paint, a);
         for (const int a : {2, 1, 0})
-            if (axes[a].widest >= kNarrowest && is_sliced(axes[a], a, labels.geometry()))
+            if (axes[a].widest >= kPainted.narrowest && is_sliced(axes[a], a, labels.geometry()))
                 result.views.push_back(view_of(paint, a, with_tips(axes[a]), source));
         if (result.views.empty() && as == PaintedAs::Slices) {
             // The axis along which the fewest slices of the paint's box hold any.

@@ -16,6 +16,7 @@
 #include "base/valid.h"
 #include "covol/error.h"
 #include "covol/points.h"
+#include "points/heuristics.h"
 
 namespace covol {
 namespace {
@@ -45,9 +46,7 @@ public:
     }
 
     void remove_outliers(CloudCleanupReport& report) {
-        // Each pass lowers the mean distance that the far points have raised.
-        constexpr int kMostPasses = 10;
-        while (report.outlier_passes < kMostPasses && entries_.size() >= kFewest) {
+        while (report.outlier_passes < kCleanup.most_passes && entries_.size() >= kFewest) {
             run_.check();
             const double mean = CGAL::compute_average_spacing<Tag>(entries_, neighbours(), parameters());
             run_.check();

@@ -7,11 +7,10 @@
 #include <algorithm>
 #include <vector>
 
+#include "points/heuristics.h"
 #include "points/point_cells.h"
 
 namespace covol::cloud {
-
-inline constexpr double kFirstRadius = 2, kMostRadius = 40;  // neighbours are looked for within, spacings
 
 struct Neighbour {
     double squared;    ///< distance
@@ -50,7 +49,7 @@ void for_nearest(const PointCells& cells, double spacing, std::size_t count, Vis
         for (std::size_t n = some.begin(); n < some.end(); ++n) {
             if (!wanted(n)) continue;
             const Vec3& p = cells.sorted()[n];
-            for (double r = kFirstRadius * spacing; r > 0; r *= 2) {
+            for (double r = kNear.first_radius * spacing; r > 0; r *= 2) {
                 cells.find(p, r, ranges);
                 near.clear();
                 for (const PointCells::Range& range : ranges)
@@ -59,7 +58,7 @@ void for_nearest(const PointCells& cells, double spacing, std::size_t count, Vis
                         const double x = q[0] - p[0], y = q[1] - p[1], z = q[2] - p[2], d2 = x * x + y * y + z * z;
                         if (d2 <= r * r && m != n) near.push_back({d2, m});
                     }
-                if (near.size() >= count || near.size() + 1 >= cells.sorted().size() || r > kMostRadius * spacing)
+                if (near.size() >= count || near.size() + 1 >= cells.sorted().size() || r > kNear.most_radius * spacing)
                     break;
             }
             const std::size_t kept = std::min(count, near.size());

@@ -11,17 +11,10 @@
 #include <limits>
 
 #include "covol/error.h"
+#include "points/heuristics.h"
 
 namespace covol {
 namespace {
-
-constexpr double kThinShare = 0.35;  // voxels, of the mean distance to the local plane
-// where larger ones bend; scans as thick as their spacing are wide have 0.3 to 0.45
-constexpr double kCleanShare = 0.25;
-constexpr double kPlaneVoxels = 2.5, kGrowth = 1.25;
-constexpr int kCoarsest = 7;
-constexpr std::size_t kSamples = 3000, kLeastNeighbours = 6;
-constexpr int kPasses = 2;
 
 Eigen::Vector3d vector(const Vec3& p) { return {p[0], p[1], p[2]}; }
 
@@ -92,7 +85,7 @@ Plane fit_plane(const Neighbourhoods& cloud, const Vec3& x, Weight weight) {
         squares += w * v * v.transpose();
         ++plane.points;
     });
-    if (plane.points <= kLeastNeighbours || !(total > 0)) return {};
+    if (plane.points <= kScan.least_neighbours || !(total > 0)) return {};
     sum /= total;
     const Eigen::Matrix3d covariance = squares / total - sum * sum.transpose();
     plane.center = origin + sum;
@@ -118,7 +111,7 @@ double measure_layer_thickness(const std::vector<Vec3>& points, double radius, c
     expect_radius(radius, "measure_layer_thickness");
     if (points.empty()) return 0;
     const Neighbourhoods cloud(points, radius);
-    const std::size_t step = (points.size() + kSamples - 1) / kSamples;
+    const std::size_t step = (points.size() + kScan.samples - 1) / kScan.samples;
     std::vector<double> distance((points.size() + step - 1) / step, -1.0);
     run.check();
     tbb::parallel_for(std::size_t(0), distance.size(), [&](std::size_t n) {
@@ -142,11 +135,11 @@ ScanVoxelSize choose_scan_voxel_size(const std::vector<Vec3>& points, double spa
     const double widest = second_longest_edge(bounding_box(points)) / 2;
     bool any = false, thin = false, thick = false;
     // From the coarsest down: in a ball of a few spacings even points that fill space are few enough for a plane.
-    for (int k = kCoarsest; k >= 0; --k) {
-        const double h = spacing * std::pow(kGrowth, k);
-        if (k > 0 && kPlaneVoxels * h > widest) continue;
-        const ScanVoxelSize finer{h, measure_layer_thickness(points, kPlaneVoxels * h, run)};
-        const bool holds = finer.thickness <= (thick && !thin ? kCleanShare : kThinShare) * h;
+    for (int k = kScan.coarsest; k >= 0; --k) {
+        const double h = spacing * std::pow(kScan.growth, k);
+        if (k > 0 && kScan.plane_voxels * h > widest) continue;
+        const ScanVoxelSize finer{h, measure_layer_thickness(points, kScan.plane_voxels * h, run)};
+        const bool holds = finer.thickness <= (thick && !thin ? kScan.clean_share : kScan.thin_share) * h;
         if (thin && !holds) break;
         if (holds || !any) choice = finer;
         any = true;
@@ -158,7 +151,7 @@ ScanVoxelSize choose_scan_voxel_size(const std::vector<Vec3>& points, double spa
 std::vector<Vec3> average_layers(const std::vector<Vec3>& points, double radius, const RunContext& run) {
     expect_radius(radius, "average_layers");
     std::vector<Vec3> moved = points;
-    for (int pass = 0; pass < kPasses && !points.empty(); ++pass) {
+    for (int pass = 0; pass < kScan.passes && !points.empty(); ++pass) {
         run.check();
         const std::vector<Vec3> before = moved;
         const Neighbourhoods cloud(before, radius);

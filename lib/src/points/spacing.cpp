@@ -11,6 +11,7 @@
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "covol/points.h"
+#include "points/heuristics.h"
 #include "points/kd_tree.h"
 
 namespace covol {
@@ -81,8 +82,7 @@ std::vector<std::uint32_t> order_spatially(const std::vector<Vec3>& points, std:
 
 SpacingStatistics measure_spacing(const std::vector<Vec3>& points) {
     if (points.size() < 2) return {};
-    constexpr std::size_t kQueries = 50000;
-    const std::size_t step = (points.size() + kQueries - 1) / kQueries;
+    const std::size_t step = (points.size() + kSpacing.queries - 1) / kSpacing.queries;
     const detail::KdTree tree(points);
     std::vector<double> distances((points.size() + step - 1) / step);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, distances.size(), 256), [&](const auto& range) {

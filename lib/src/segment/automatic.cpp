@@ -6,38 +6,29 @@
 #include "base/valid.h"
 #include "covol/error.h"
 #include "covol/scan_noise.h"
+#include "segment/heuristics.h"
 
 namespace covol {
 namespace pipeline {
 namespace {
 
-// fewer get a voxel size at which their surface has as many voxels as this many would
-constexpr double kFewPoints = 1000;
-constexpr double kViewVoxel = 0.5;         // cells of the indicator, for a cloud that encloses nothing
-constexpr double kCloudNoise = 0.6;        // voxels of a cloud, in standard deviations of its points
-constexpr double kSameSeedVoxels = 1e-3;   // seeds closer than this are one position
-constexpr double kMergeVoxels = 0.25;      // points closer than this do not move the surface apart
-constexpr double kAttractionVoxels = 5.0;  // automatic range of the points after starts other than tagging
-constexpr double kTagDeltaVoxels = 0.5, kTagSigmaVoxels = 2.0;  // measured as kTagAttractionVoxels
-constexpr double kScanRadiusVoxels = 2.5;                       // layers of a scan within it are averaged
-constexpr double kNoisyShare = 0.3;  // of a voxel: a layer of points thicker than this is averaged
-
 // A thick layer of points, or several beside each other, has its surface in the middle.
 void average_noise(Job& job) {
-    const double radius = kScanRadiusVoxels * job.h(), thickness = measure_layer_thickness(job.points, radius, job.run);
-    if (!(thickness > kNoisyShare * job.h())) return;
+    const double radius = kAutomatic.scan_radius_voxels * job.h(),
+                 thickness = measure_layer_thickness(job.points, radius, job.run);
+    if (!(thickness > kAutomatic.noisy_share * job.h())) return;
     job.points = average_layers(job.points, radius, job.run);
     job.choose("points_averaged", "within " + number(radius),
                "they lie " + number(thickness) + " from their local plane on the mean, more than " +
-                   number(kNoisyShare) + " voxels");
+                   number(kAutomatic.noisy_share) + " voxels");
 }
 
 void merge_points(Job& job) {
     const std::size_t all = job.points.size();
-    job.points = merge_close_points(job.points, kMergeVoxels * job.h());
+    job.points = merge_close_points(job.points, kAutomatic.merge_voxels * job.h());
     if (job.points.size() < all)
         job.run.info("points: " + std::to_string(job.points.size()) + " of " + std::to_string(all) +
-                     " kept, the others are closer than half of " + number(kMergeVoxels * job.h()));
+                     " kept, the others are closer than half of " + number(kAutomatic.merge_voxels * job.h()));
     job.marks = job.points;
 }
 
@@ -47,16 +38,16 @@ void choose_attraction_range(Job& job) {
     chosen = 0;
     if (!job.uses_points()) return;
     if (job.tags() && job.uses_image()) {
-        const double range = kTagAttractionVoxels * job.h();
+        const double range = kAutomatic.tag_attraction_voxels * job.h();
         chosen = range;
         job.choose("attraction_range", number(range),
-                   number(kTagAttractionVoxels) + " voxels: farther from marks the image decides");
+                   number(kAutomatic.tag_attraction_voxels) + " voxels: farther from marks the image decides");
     } else if (job.tags()) {
         job.choose("attraction_range", "0", "unlimited: the band around the points bounds it");
     } else {
-        const double range = kAttractionVoxels * job.h();
+        const double range = kAutomatic.attraction_voxels * job.h();
         chosen = range;
-        job.choose("attraction_range", number(range), number(kAttractionVoxels) + " voxels");
+        job.choose("attraction_range", number(range), number(kAutomatic.attraction_voxels) + " voxels");
     }
 }
 
@@ -65,12 +56,13 @@ void choose_start(Job& job) {
     Start::Kind& kind = job.options.start.kind;
     if (kind != Start::Kind::Auto || !job.starts_from_marks()) return;
     kind = Start::Kind::Tag;
-    if (!job.guided() || job.options.contours || job.options.tag_distance || job.points.size() > kMostGuessMarks)
+    if (!job.guided() || job.options.contours || job.options.tag_distance ||
+        job.points.size() > kAutomatic.most_guess_marks)
         return;
     if (job.image == nullptr && !can_enclose(job.points)) return;  // a layer: tagging tells what it needs
     kind = Start::Kind::Guess;
     job.choose("start", "guess",
-               std::to_string(job.points.size()) + " marks, at most " + std::to_string(kMostGuessMarks));
+               std::to_string(job.points.size()) + " marks, at most " + std::to_string(kAutomatic.most_guess_marks));
 }
 
 // Points without an image that enclose something tell inside from outside themselves.
@@ -84,7 +76,7 @@ void try_cloud(Job& job) {
     const bool has_seeds =
         !o.exterior_seeds.empty() || !job.hole_seeds.empty() || !o.inside.empty() || !o.outside.empty();
     if (!asked && (!job.guided() || o.contours || o.tag_distance || has_seeds || job.image != nullptr ||
-                   !job.uses_points() || job.points.size() <= kMostGuessMarks || !can_enclose(job.points)))
+                   !job.uses_points() || job.points.size() <= kAutomatic.most_guess_marks || !can_enclose(job.points)))
         return;
     Timed timed(job.report().seconds.tag);
     job.cloud =
@@ -92,10 +84,10 @@ void try_cloud(Job& job) {
     kind = Start::Kind::Cloud;
     if (job.cloud->encloses || !job.options.voxel_size_may_grow) return;
     // The indicator is all that there is to see.
-    const double h = kViewVoxel * job.cloud->orientation.screened->cell();
+    const double h = kAutomatic.view_voxel * job.cloud->orientation.screened->cell();
     if (h <= job.h()) return;
     job.options.voxel_size = h;
-    job.choose("voxel_size", number(h), number(kViewVoxel) + " cells of the indicator");
+    job.choose("voxel_size", number(h), number(kAutomatic.view_voxel) + " cells of the indicator");
 }
 
 }  // namespace
@@ -108,7 +100,7 @@ void check_input(Job& job) {
         throw Error(Errc::InvalidInput,
                     "segment: the start 'tag' expects points, got none; give points, contours or "
                     "seeds inside, or choose another start (sphere, box, mesh, mask or vdb)");
-    check_sides(job.options.inside, job.options.outside, kSameSeedVoxels * job.h());
+    check_sides(job.options.inside, job.options.outside, kAutomatic.same_seed_voxels * job.h());
     job.report().point_count = job.given.size();
     EvolveOptions& evolve = job.options.evolve;
     if (job.points.empty() && evolve.theta > 0) {
@@ -137,7 +129,7 @@ void choose_values(Job& job) {
     const double h = job.h();
     EvolveOptions& evolve = options.evolve;
     const bool marked = job.tags() || job.guesses();  // the start is close to the end
-    const double delta_voxels = marked ? kTagDeltaVoxels : 1.0;
+    const double delta_voxels = marked ? kAutomatic.tag_delta_voxels : 1.0;
     const bool chooses_delta = !evolve.delta;
     if (chooses_delta) evolve.delta = delta_voxels * h;
     if (job.options.guess || ((job.guesses() || job.is_cloud()) && job.guided() && job.uses_points()))
@@ -145,7 +137,7 @@ void choose_values(Job& job) {
     if (chooses_delta) job.choose("delta", number(*evolve.delta), number(delta_voxels) + " voxels");
     if (!evolve.tau) job.choose("tau", number(h), "1 voxel at unit speed; longer while the surface moves slowly");
     if (!options.edge.sigma && job.uses_image()) {
-        const double voxels = job.tags() ? kTagSigmaVoxels : 1.0;
+        const double voxels = job.tags() ? kAutomatic.tag_sigma_voxels : 1.0;
         job.choose("sigma", number(*(options.edge.sigma = voxels * h)), number(voxels) + " voxels");
     }
     if (!evolve.attraction_range) choose_attraction_range(job);
@@ -164,17 +156,17 @@ VoxelSizeChoice choose_voxel_size(const Image& image) {
 }
 
 VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool tagged) {
-    using pipeline::kFewPoints, pipeline::kCloudNoise, pipeline::number;
+    using pipeline::kAutomatic, pipeline::number;
     const std::vector<Vec3> distinct = merge_close_points(world_points, 0);
     if (distinct.size() < 2)
         throw Error(Errc::InvalidInput, "choose_voxel_size: expected an image or at least 2 distinct points, got " +
                                             std::to_string(distinct.size()));
     constexpr const char* kNearest = "the median distance between neighbouring points";
-    if (!tagged && distinct.size() > pipeline::kMostGuessMarks) {
+    if (!tagged && distinct.size() > kAutomatic.most_guess_marks) {
         const CloudScale scale = measure_cloud_scale(distinct);
-        const double h = kCloudNoise * scale.noise;
+        const double h = kAutomatic.cloud_noise * scale.noise;
         if (h > scale.nearest)
-            return {h, number(kCloudNoise) + " times the noise of the points, " + number(scale.noise)};
+            return {h, number(kAutomatic.cloud_noise) + " times the noise of the points, " + number(scale.noise)};
         return {scale.nearest, kNearest};
     }
     const double spacing = measure_spacing(distinct).median;
@@ -182,7 +174,7 @@ VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool ta
     if (scan.voxel_size <= spacing) {
         // A surface of few points is so few spacings wide that in voxels as large as they are curvature would outweigh
         // them.
-        const double finer = std::sqrt(double(distinct.size()) / kFewPoints);
+        const double finer = std::sqrt(double(distinct.size()) / kAutomatic.few_points);
         if (finer >= 1) return {spacing, kNearest};
         return {finer * spacing, "finer than the median distance between neighbouring points, " + number(spacing) +
                                      ", for there are few"};

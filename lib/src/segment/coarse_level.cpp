@@ -8,17 +8,10 @@
 #include "covol/start.h"
 #include "segment/fields.h"
 #include "segment/flow.h"
+#include "segment/heuristics.h"
 
 namespace covol::pipeline {
 namespace {
-
-constexpr double kRefinement = 2.0;
-// Voxels of the coarse level.
-constexpr double kLeastCoarseSigma = 0.5;
-constexpr double kLeastCoarseAttraction = 3.0;
-constexpr double kCoarseTolerance = 5e-3;  // a surface far from all that pulls moves slowly, too
-constexpr double kStepBack = 2.0;
-constexpr int kLeastCoarsened = 64;  // of h: a smaller domain has little to gain, and thin things to lose
 
 /// Where the way to the surface may be long: tagging and a result of another run end beside it.
 bool knows_nothing(Start::Kind kind) { return kind == Start::Kind::Sphere || kind == Start::Kind::Box; }
@@ -26,26 +19,26 @@ bool knows_nothing(Start::Kind kind) { return kind == Start::Kind::Sphere || kin
 bool is_large(const Domain& d) {
     int least = d.max[0] - d.min[0];
     for (int a = 1; a < 3; ++a) least = std::min(least, d.max[a] - d.min[a]);
-    return least >= kLeastCoarsened;
+    return least >= kCoarse.least_coarsened;
 }
 
 SegmentOptions coarsened(SegmentOptions options) {
-    const double h = *(options.voxel_size = *options.voxel_size * kRefinement);
+    const double h = *(options.voxel_size = *options.voxel_size * kCoarse.refinement);
     --*options.coarse_levels;
     options.contours = nullptr;  // their points are among the others
-    options.edge.sigma = std::max(options.edge.sigma.value_or(0), kLeastCoarseSigma * h);
+    options.edge.sigma = std::max(options.edge.sigma.value_or(0), kCoarse.least_coarse_sigma * h);
     EvolveOptions& evolve = options.evolve;
     evolve.follow = true;
-    evolve.tolerance = std::max(evolve.tolerance, kCoarseTolerance);
-    if (evolve.tau) *evolve.tau *= kRefinement;
+    evolve.tolerance = std::max(evolve.tolerance, kCoarse.coarse_tolerance);
+    if (evolve.tau) *evolve.tau *= kCoarse.refinement;
     if (const double range = evolve.attraction_range.value_or(0); range > 0)
-        evolve.attraction_range = std::max(range, kLeastCoarseAttraction * h);
+        evolve.attraction_range = std::max(range, kCoarse.least_coarse_attraction * h);
     return options;
 }
 
 // Two edges closer than a few coarse voxels are one there: the fine level comes from the same side as the start would.
 void step_back(FloatGrid& u, const FloatGrid& start, double h) {
-    const auto back = static_cast<float>(kStepBack * h);
+    const auto back = static_cast<float>(kCoarse.step_back * h);
     const auto start_at = start.getConstAccessor();
     for (auto v = u.beginValueOn(); v; ++v)
         v.setValue(std::clamp(start_at.getValue(v.getCoord()), *v - back, *v + back));

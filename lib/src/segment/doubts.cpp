@@ -6,20 +6,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "segment/heuristics.h"
+
 namespace covol::pipeline {
 namespace {
-
-constexpr double kOffVoxels = 2.0;  // of the image, along its longest edge: no hand is so far off
-constexpr double kBiasVoxels = 0.25;
-constexpr double kBiasErrors = 4.0;   // standard errors of the mean
-constexpr double kOffNoise = 4.0;     // standard deviations of a cloud: that far off there is something else
-constexpr double kMissedShare = 0.1;  // of the marks
 
 double off(const Job& job) {
     double edge = job.h();
     if (job.image != nullptr)
         for (const double s : job.image->geometry().spacing) edge = std::max(edge, s);
-    return std::max(kOffVoxels * edge, kOffNoise * job.result.report.cloud.noise);
+    return std::max(kDoubts.off_voxels * edge, kDoubts.off_noise * job.result.report.cloud.noise);
 }
 
 std::string place(const Job& job, const SegmentReport::MarksOff& marks) {
@@ -54,8 +50,8 @@ void find_bias(Job& job, const std::vector<Vec3>& marks, const std::vector<doubl
     const auto count = double(marks.size());
     const double bias = sum / count, error = std::sqrt(std::max(0.0, squares / count - bias * bias) / count);
     job.report().fit.bias = bias;
-    if (std::abs(bias) < kBiasVoxels * std::max(job.h(), job.report().cloud.noise) ||
-        std::abs(bias) < kBiasErrors * error)
+    if (std::abs(bias) < kDoubts.bias_voxels * std::max(job.h(), job.report().cloud.noise) ||
+        std::abs(bias) < kDoubts.bias_errors * error)
         return;
     job.warn("the marks lie " + number(std::abs(bias) / job.h()) + " voxels " + (bias > 0 ? "outside" : "inside") +
              " the surface on the mean: it is too " + (bias > 0 ? "small" : "large"));
@@ -77,7 +73,7 @@ bool misses_marks(const Job& job, const FloatGrid& u) {
     const double beyond = std::min(off(job), 0.9 * double(u.background()));
     std::size_t far = 0;
     for (const Vec3& mark : job.trusted) far += std::abs(level_at(u, mark)) > beyond;
-    return double(far) > kMissedShare * double(job.trusted.size());
+    return double(far) > kDoubts.missed_share * double(job.trusted.size());
 }
 
 }  // namespace covol::pipeline

@@ -8,14 +8,10 @@
 
 #include "covol/distance.h"
 #include "distance/memory_need.h"
+#include "segment/heuristics.h"
 
 namespace covol::pipeline {
 namespace {
-
-constexpr double kCoarseFactor = 8.0;        // voxels of the coarse distance field, in h
-constexpr double kSidesSigmas = 3.0;         // beside a mark, to tell lines from borders
-constexpr double kSideDepth = 0.7;           // of the way to a side: how deep inside it has to be
-constexpr std::size_t kFeatureMarks = 4000;  // this many are looked at
 
 /// A band that follows moves this far, in voxels, before g is extended.
 int edge_reach(StartOrigin origin) {
@@ -76,7 +72,7 @@ double reach_within(const ContourSolid& body, const std::vector<Vec3>& places, c
         for (std::size_t n = 0; n < places.size(); ++n) {
             Vec3 side = places[n];
             for (int a = 0; a < 3; ++a) side[a] -= reach * normals[n][a];
-            inside += body.level(side) < -kSideDepth * reach;
+            inside += body.level(side) < -kFields.side_depth * reach;
         }
         if (2 * inside > places.size()) return reach;
     }
@@ -98,7 +94,7 @@ double tube_for_start(Job& job) {
     const double slack = band_slack(job);
     if (job.attraction_range() > 0) return job.attraction_range() + slack;
     const WorldBox all = job.domain().world_box();
-    const Domain coarse = make_domain(all, kCoarseFactor * job.h());
+    const Domain coarse = make_domain(all, kFields.coarse_factor * job.h());
     const FloatGridPtr d =
         compute_distance(job.points, coarse, {diagonal(all, bounding_box(job.points))}, job.run).grid;
     double largest = 0;
@@ -108,7 +104,7 @@ double tube_for_start(Job& job) {
         const openvdb::Vec3d where = d->worldToIndex(job.result.u->indexToWorld(center));
         largest = std::max(largest, double(d_at.getValue(openvdb::Coord::round(where))));
     }
-    const double radius = largest + kCoarseFactor * job.h() + slack;
+    const double radius = largest + kFields.coarse_factor * job.h() + slack;
     job.choose("distance_tube", number(radius), "the attraction is unlimited: it covers the way from the start");
     return radius;
 }
@@ -126,7 +122,7 @@ void choose_edge_feature(Job& job) {
     if (!job.uses_image() || edge.feature != EdgeFeature::Automatic || job.body() == nullptr) return;
     std::vector<Vec3> places, normals;
     const std::vector<Vec3>& along = job.options.contours->along;
-    const std::size_t stride = 1 + along.size() / kFeatureMarks;
+    const std::size_t stride = 1 + along.size() / kFields.feature_marks;
     for (std::size_t n = 0; n < along.size(); n += stride) {
         Vec3 normal = gradient(*job.body(), along[n], job.h());
         const double length = std::hypot(normal[0], normal[1], normal[2]);
@@ -135,8 +131,8 @@ void choose_edge_feature(Job& job) {
         places.push_back(along[n]);
         normals.push_back(normal);
     }
-    const double reach =
-        reach_within(*job.body(), places, normals, kSidesSigmas * std::max(edge.sigma.value_or(0), job.h()), job.h());
+    const double reach = reach_within(*job.body(), places, normals,
+                                      kFields.sides_sigmas * std::max(edge.sigma.value_or(0), job.h()), job.h());
     const MarkedFeature found = detect_feature(*job.image, places, normals, reach);
     edge.feature = found.feature;
     const std::string line = "at the marks the image is " + number(std::abs(found.line)) +

@@ -12,13 +12,11 @@
 #include "covol/start.h"
 #include "meshing/mesh_distance.h"
 #include "segment/doubts.h"
+#include "segment/heuristics.h"
 
 namespace covol::pipeline {
 namespace {
 
-constexpr double kWarnWithoutPoints = 0.02;  // share of the area
-constexpr double kRimSlack =
-    1.0 / 6;  // of the distance between points and a hole: half a spacing, where it is automatic
 constexpr std::size_t kLoopsToTell = 8;
 
 /// Where a solid ends whatever the marks say: the image's box, and the region of interest.
@@ -61,7 +59,7 @@ void treat_holes(Job& job) {
     const std::vector<Vec3>& points = job.cloud ? job.cloud->points : job.points;  // without stray ones
     const HolesOptions& options = job.options.holes;
     const double automatic = choose_hole_distance(points, job.h()), distance = options.distance.value_or(automatic);
-    const double slack = kRimSlack * std::min(automatic, distance);
+    const double slack = kFinal.rim_slack * std::min(automatic, distance);
     distances = measure_distances(mesh, points, job.run);
     report.share_without_points = measure_share_beyond(mesh, distances, distance);
     report.holes.policy = options.policy;
@@ -116,7 +114,7 @@ void make_surface(Job& job) {
             " pieces: where they are one body, mark between them; several bodies are better marked each by itself");
     report.seeds = check_seeds(*job.result.surface, job.options.inside, job.options.outside);
     if (const std::string warning = report.seeds.warning(); !warning.empty()) job.warn("seeds: " + warning);
-    if (report.share_without_points > kWarnWithoutPoints)
+    if (report.share_without_points > kFinal.warn_without_points)
         job.warn(number(std::round(1000 * report.share_without_points) / 10) + " % of the surface lie farther than " +
                  number(report.holes.distance) + " from every point: " +
                  (report.holes.policy == Holes::Close ? "there curvature alone closes it"

@@ -8,16 +8,11 @@
 #include "covol/error.h"
 #include "segment/doubts.h"
 #include "segment/fields.h"
+#include "segment/heuristics.h"
 #include "segment/vanished.h"
 
 namespace covol::pipeline {
 namespace {
-
-constexpr double kApproachTau = 3.0;  // time steps of the points' own approach, in tau
-constexpr int kApproachSteps = 40;
-constexpr double kApproachTolerance = 0.01;
-constexpr double kLeastOfGrown = 0.5;   // of its volume: a flow that leaves less has lost the edges
-constexpr double kLeavesVoxels = 0.25;  // farther from its marks than the start: what flowed has left them
 
 /// What the steps before cost goes to the total; the rest of it stays the later steps'.
 void add(const EvolveReport& before, EvolveReport& total) {
@@ -37,9 +32,9 @@ EvolveReport approach(Job& job, EvolveFields fields) {
     alone.rho = 0;
     alone.attraction_range = 0;
     alone.image_yields = 0;
-    if (alone.follow) alone.tau = kApproachTau * (alone.tau < 0 ? job.h() : alone.tau);
-    alone.max_steps = std::min(alone.max_steps, kApproachSteps);
-    alone.tolerance = std::max(alone.tolerance, kApproachTolerance);
+    if (alone.follow) alone.tau = kFlow.approach_tau * alone.tau.value_or(job.h());
+    alone.max_steps = std::min(alone.max_steps, kFlow.approach_steps);
+    alone.tolerance = std::max(alone.tolerance, kFlow.approach_tolerance);
     fields.edge = nullptr;
     fields.extend = nullptr;
     return evolve(*job.result.u, fields, alone, job.run);
@@ -134,8 +129,10 @@ bool has_vanished(const Job& job) { return job.result.report.solve.stop_reason =
 
 bool has_lost(const Job& job, const FloatGrid& start) {
     if (has_vanished(job)) return true;
-    if (job.origin == StartOrigin::Grown) return inside_volume(*job.result.u) < kLeastOfGrown * inside_volume(start);
-    return mean_distance(job.trusted, *job.result.u) > mean_distance(job.trusted, start) + kLeavesVoxels * job.h();
+    if (job.origin == StartOrigin::Grown)
+        return inside_volume(*job.result.u) < kFlow.least_of_grown * inside_volume(start);
+    return mean_distance(job.trusted, *job.result.u) >
+           mean_distance(job.trusted, start) + kFlow.leaves_voxels * job.h();
 }
 
 void check_flow(const Job& job) {

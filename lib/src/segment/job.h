@@ -12,8 +12,6 @@ namespace covol::pipeline {
 
 using detail::number;
 
-inline constexpr double kMarginVoxels = 6.0;  // between D and the domain's boundary, for points alone
-
 /// What the level set of now was made from: how far it may be from its end.
 enum class StartOrigin {
     Given,       ///< a sphere, a box, a file

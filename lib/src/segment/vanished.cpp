@@ -7,15 +7,10 @@
 
 #include "covol/domain.h"
 #include "covol/points.h"
+#include "segment/heuristics.h"
 
 namespace covol::detail {
 namespace {
-
-constexpr double kThinShare = 0.02;     // of the longest extent: thinner clouds are flat
-constexpr double kLayerSpacings = 4.5;  // of a layer around points without an inside: closes the gaps of random points
-constexpr double kHull = 0.6;           // of the longest side: such a ball fits into no body within it
-constexpr double kLayerVoxels = 4.0;    // less than what the pipeline closes again
-constexpr double kWiderTag = 1.25;      // times D: beyond the inner radius all that the points surround is one body
 
 /// Standard deviations of the positions along their principal axes, ascending.
 Eigen::Vector3d extents(const std::vector<Vec3>& points) {
@@ -35,29 +30,30 @@ Eigen::Vector3d extents(const std::vector<Vec3>& points) {
 
 std::string why_nothing_held(const std::vector<Vec3>& points, double tag_distance, bool encloses) {
     const Eigen::Vector3d extent = extents(points);
-    const bool is_flat = extent[0] <= kThinShare * extent[2], is_line = extent[1] <= kThinShare * extent[2];
+    const bool is_flat = extent[0] <= kVanished.thin_share * extent[2],
+               is_line = extent[1] <= kVanished.thin_share * extent[2];
     std::ostringstream text;
     text.precision(3);
     if (encloses && !is_flat) {
         text << "the points hold it too loosely at the tag distance " << tag_distance
-             << "; try `tag_distance = " << kWiderTag * tag_distance << "`, a lower `delta`, or more points";
+             << "; try `tag_distance = " << kVanished.wider_tag * tag_distance << "`, a lower `delta`, or more points";
         return text.str();
     }
     const WorldBox box = bounding_box(points);
     Vec3 side;
     for (int a = 0; a < 3; ++a) side[a] = box.max[a] - box.min[a];
     const double layer =
-        std::min(kLayerSpacings * measure_spacing(points).mean, 0.5 * std::hypot(side[0], side[1], side[2]));
+        std::min(kVanished.layer_spacings * measure_spacing(points).mean, 0.5 * std::hypot(side[0], side[1], side[2]));
     text << (is_line   ? "the points lie on a line"
              : is_flat ? "the points lie in a plane"
                        : "the points enclose nothing")
          << " and nothing held it; add points on the sides that are missing";
     if (!is_flat) text << ", or try `start = Cloud`";
-    const double hull = kHull * *std::max_element(side.begin(), side.end());
+    const double hull = kVanished.hull * *std::max_element(side.begin(), side.end());
     if (!is_flat && tag_distance < hull)
         text << "; if they surround a body on all sides, try `tag_distance = " << hull << "`";
     text << "; for a closed layer around them give `max_steps = 0, tag_distance = " << layer
-         << ", voxel_size = " << layer / kLayerVoxels << "`";
+         << ", voxel_size = " << layer / kVanished.layer_voxels << "`";
     return text.str();
 }
 

@@ -10,25 +10,14 @@
 
 #include "base/number.h"
 #include "covol/start.h"
+#include "start/heuristics.h"
 
 namespace covol::detail {
 namespace {
 
 using openvdb::Coord;
 
-constexpr double kLeastPad = 12;  // voxels around the start that are looked at first
 constexpr std::size_t kMostVoxels = 24u << 20;
-constexpr double kLeastSpread = 0.01;  // of the image's range: differences below it say nothing
-constexpr double kUnlike = 4;  // spreads of the start's surface: a voxel inside that differs more is not like it
-constexpr double kUnlikeShare = 0.03;  // of the inside: more of them, and the start holds something already
-constexpr double kSpeedSpreads = 2;    // a difference at which the front's speed is a half
-constexpr double kLeastSpeed = 1e-4;
-constexpr double kAtHand = 0.5;        // of the best front's edge: a start with as much lies at an edge
-constexpr double kClear = 0.3;         // spreads: a mean change across the front that noise does not make
-constexpr double kErrors = 4;          // standard errors of a front's mean change
-constexpr double kPassed = 0.5;        // of the best: the front has left the edge ...
-constexpr double kPassedGrowth = 2;    // ... and holds so many times the volume
-constexpr double kSmallCavity = 0.01;  // of the region: what the front has gone around and left out
 
 double median_of(std::vector<float>& values) {
     const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
@@ -126,13 +115,13 @@ public:
                              double(all[std::size_t(0.005 * double(all.size() - 1))]);
         if (!(range > 0)) return "the image is the same everywhere";
         inside_ = spread_of(inside);
-        inside_.width = std::max(inside_.width, kLeastSpread * range);
+        inside_.width = std::max(inside_.width, kGrow.least_spread * range);
         Spread surface = spread_of(shell);
-        surface.width = std::max({surface.width, inside_.width, 2 * kLeastSpread * range});
+        surface.width = std::max({surface.width, inside_.width, 2 * kGrow.least_spread * range});
         const auto unlike = std::count_if(inside.begin(), inside.end(), [&](float v) {
-            return std::abs(v - surface.middle) > kUnlike * surface.width;
+            return std::abs(v - surface.middle) > kGrow.unlike * surface.width;
         });
-        if (double(unlike) > kUnlikeShare * double(inside.size()))
+        if (double(unlike) > kGrow.unlike_share * double(inside.size()))
             return "the image inside it is not as it is on its surface";
         return {};
     }
@@ -160,15 +149,15 @@ public:
                 best_edge_ = edge();
                 best_count_ = order_.size();
             }
-            if (edge() < kPassed * best_edge_ && double(order_.size()) > kPassedGrowth * double(best_count_) &&
-                is_clear())
+            if (edge() < kGrow.passed * best_edge_ &&
+                double(order_.size()) > kGrow.passed_growth * double(best_count_) && is_clear())
                 break;
             if (order_.size() % 65536 == 0) run.check();
         }
     }
 
-    [[nodiscard]] bool is_clear() const { return best_edge_ > kClear * inside_.width; }
-    [[nodiscard]] bool starts_at_edge() const { return start_edge_ > kAtHand * best_edge_; }
+    [[nodiscard]] bool is_clear() const { return best_edge_ > kGrow.clear * inside_.width; }
+    [[nodiscard]] bool starts_at_edge() const { return start_edge_ > kGrow.at_hand * best_edge_; }
     [[nodiscard]] double growth() const { return double(best_count_) / double(std::max<std::size_t>(start_count_, 1)); }
     [[nodiscard]] double best_edge() const { return best_edge_; }
     [[nodiscard]] double spread() const { return inside_.width; }
@@ -197,7 +186,7 @@ private:
     [[nodiscard]] double edge() const {
         if (faces_ <= 0) return 0;
         const auto count = double(faces_);
-        return std::max(std::abs(change_) / count - kErrors * inside_.width / std::sqrt(count / alike_), 0.0);
+        return std::max(std::abs(change_) / count - kGrow.errors * inside_.width / std::sqrt(count / alike_), 0.0);
     }
 
     void take(std::size_t n) {
@@ -229,8 +218,8 @@ private:
             if (taken_[other]) near[axis] = std::min(near[axis], double(arrival_[other]));
         });
         std::sort(near.begin(), near.end());
-        const double away = std::abs(double(image_[n]) - inside_.middle) / (kSpeedSpreads * inside_.width);
-        const double slowness = 1 / std::max(1 / (1 + away * away * away * away), kLeastSpeed);
+        const double away = std::abs(double(image_[n]) - inside_.middle) / (kGrow.speed_spreads * inside_.width);
+        const double slowness = 1 / std::max(1 / (1 + away * away * away * away), kGrow.least_speed);
         double time = near[0] + slowness, sum = near[0], squares = near[0] * near[0];
         for (int m = 1; m < 3 && near[m] < time; ++m) {
             sum += near[m];
@@ -260,7 +249,7 @@ private:
                 });
                 at_border = at_border || neighbours < 6;
             }
-            if (!at_border && double(part.size()) < kSmallCavity * double(best_count_))
+            if (!at_border && double(part.size()) < kGrow.small_cavity * double(best_count_))
                 for (const std::size_t n : part) in[n] = 1;
         }
     }
@@ -300,7 +289,7 @@ FloatGridPtr level_set_of(const Box& box, std::vector<float> region, const Domai
 GrownStart grow_to_edges(const Image& image, const FloatGrid& start, double sigma, const RunContext& run) {
     const Domain domain = domain_of(start);
     const openvdb::CoordBBox active = start.evalActiveVoxelBoundingBox();
-    int pad = std::max(int(kLeastPad), int(active.dim()[active.dim().maxIndex()]));
+    int pad = std::max(int(kGrow.least_pad), int(active.dim()[active.dim().maxIndex()]));
     for (;; pad *= 2) {
         Coord lo, hi;
         for (int a = 0; a < 3; ++a) {

@@ -9,17 +9,16 @@
 #include "covol/error.h"
 #include "covol/start.h"
 #include "points/kd_tree.h"
+#include "start/heuristics.h"
 
 namespace covol {
 namespace {
 
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
-constexpr std::size_t kMostJoined = 2000;  // seeds whose links are searched one by one
-
 /// Half of the longest link of the shortest tree that joins the seeds (Prim).
 double joining_radius(const std::vector<Vec3>& seeds) {
-    if (seeds.size() > kMostJoined) {
+    if (seeds.size() > kSeeds.most_joined) {
         double widest = 0;  // dense paint: neighbours are close, patches may stay apart
         const detail::KdTree tree(seeds);
         for (const Vec3& seed : seeds) widest = std::max(widest, tree.nearest_other(seed));

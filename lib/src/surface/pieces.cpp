@@ -12,11 +12,10 @@
 #include <map>
 #include <unordered_map>
 
+#include "surface/heuristics.h"
+
 namespace covol::detail {
 namespace {
-
-constexpr double kSmall = 0.01;  // of the largest
-constexpr int kMarkVoxels = 2;   // around a piece
 
 using Pieces = std::vector<openvdb::MaskGrid::Ptr>;
 
@@ -35,7 +34,7 @@ Pieces pieces_of(const FloatGrid& level_set, bool inside) {
 
 bool has_mark(const openvdb::MaskGrid& piece, const FloatGrid& level_set, const std::vector<Vec3>& marks) {
     openvdb::CoordBBox box = piece.evalActiveVoxelBoundingBox();
-    box.expand(kMarkVoxels);
+    box.expand(kPieces.mark_voxels);
     return std::any_of(marks.begin(), marks.end(), [&](const Vec3& m) {
         return box.isInside(openvdb::Coord::round(level_set.worldToIndex(openvdb::Vec3d(m[0], m[1], m[2]))));
     });
@@ -320,7 +319,7 @@ void drop_unmarked_pieces(FloatGrid& level_set, const std::vector<Vec3>& marks) 
     for (const bool inside : {true, false}) {
         const Pieces pieces = pieces_of(level_set, inside);
         for (std::size_t n = 1; n < pieces.size(); ++n) {
-            if (double(pieces[n]->activeVoxelCount()) > kSmall * double(pieces[0]->activeVoxelCount())) continue;
+            if (double(pieces[n]->activeVoxelCount()) > kPieces.small * double(pieces[0]->activeVoxelCount())) continue;
             if (has_mark(*pieces[n], level_set, marks)) continue;
             erase(*pieces[n], level_set, inside);
         }

@@ -8,6 +8,7 @@
 #include "covol/distance.h"
 #include "covol/error.h"
 #include "redistance/redistance.h"
+#include "tagging/heuristics.h"
 
 namespace covol {
 
@@ -15,7 +16,7 @@ FloatGridPtr close_by_ball(const FloatGrid& band, double tag_distance, const Run
     constexpr double kReachVoxels = 6.0;  // beyond D, enough for a band around the closing's surface
     constexpr double kHalfWidth = 5.0;
     const Domain domain = domain_of(band);
-    const double h = domain.voxel_size, reach = kReachVoxels * h;
+    const double h = domain.voxel_size, reach = kClosing.reach_voxels * h;
     const detail::InterfacePatches tagged = detail::find_interface(band, domain, detail::DomainEnd::Open, run);
     if (tagged.patches.empty()) return nullptr;
     std::vector<Vec3> surface(tagged.patches.size());
@@ -39,8 +40,9 @@ FloatGridPtr close_by_ball(const FloatGrid& band, double tag_distance, const Run
     grown->tree().root().setBackground(static_cast<float>(reach), false);
     openvdb::tools::signedFloodFill(grown->tree());
     FloatGridPtr closed;
-    with_threads(
-        run, [&] { closed = detail::redistance(*grown, domain, kHalfWidth, detail::DomainEnd::Open, "band", run); });
+    with_threads(run, [&] {
+        closed = detail::redistance(*grown, domain, kClosing.half_width, detail::DomainEnd::Open, "band", run);
+    });
     return closed;
 }
 

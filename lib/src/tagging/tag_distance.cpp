@@ -16,21 +16,13 @@
 #include "covol/error.h"
 #include "covol/points.h"
 #include "grid/leaf_columns.h"
+#include "tagging/heuristics.h"
 
 namespace covol {
 namespace {
 
 using detail::Coord;
 using detail::kLeafSize;
-
-constexpr double kClearRatio = 2.0;         ///< peak / saddle of a core that is a structure, not a pocket in a wall
-constexpr double kSignificantRatio = 1.25;  ///< the same for a core that takes a large share of the cloud
-constexpr double kLargeShare = 0.1;         ///< of the cloud's area
-constexpr double kImportantShare = 0.1;     ///< of the most important core's volume: a core that D has to hold
-constexpr double kStructureShare = 0.25;    ///< of the cloud's area: less is pockets of a cloud without an inside
-constexpr std::int64_t kCoarseVoxels = 200'000;     ///< on the first grid
-constexpr std::int64_t kMaxTubeVoxels = 1'500'000;  ///< on the last grid
-constexpr double kBucketsPerVoxel = 16;
 
 /// An enclosed core, at the moment when it merges with the exterior. Lengths in voxels of the analysis grid.
 struct Core {
@@ -52,7 +44,8 @@ struct Analysis {
 
 double Analysis::cloud_volume(double distance) const {
     double n = 0;
-    for (std::size_t bucket = 0; bucket < histogram.size() && double(bucket) < distance * kBucketsPerVoxel; ++bucket)
+    for (std::size_t bucket = 0;
+         bucket < histogram.size() && double(bucket) < distance * kTagDistance.buckets_per_voxel; ++bucket)
         n += double(histogram[bucket]);
     return n;
 }
@@ -148,7 +141,7 @@ private:
     void enter_voxel(std::int32_t node);
     /// The component of the voxel beyond face `face` of voxel `at` of a leaf; -1: none yet.
     std::int32_t neighbour_label(std::int32_t leaf, int at, int face) const;
-    int bucket_of(float d) const { return int(double(d) / h_ * kBucketsPerVoxel); }
+    int bucket_of(float d) const { return int(double(d) / h_ * kTagDistance.buckets_per_voxel); }
 
     const detail::CoordBBox box_;
     const detail::LeafBand band_;
@@ -289,8 +282,9 @@ Verdict judge(const Analysis& analysis) {
     const auto is_significant = [&](const Core& c) {
         // Below half a voxel the grid itself closes the gap.
         const double ratio = c.peak / std::max(c.saddle, 0.5);
-        return c.peak >= 1.0 && (ratio >= kClearRatio ||
-                                 (ratio >= kSignificantRatio && c.full_area() >= kLargeShare * cloud_area(c.saddle)));
+        return c.peak >= 1.0 && (ratio >= kTagDistance.clear_ratio ||
+                                 (ratio >= kTagDistance.significant_ratio &&
+                                  c.full_area() >= kTagDistance.large_share * cloud_area(c.saddle)));
     };
     const Core* primary = nullptr;
     for (const Core& c : analysis.cores)
@@ -298,13 +292,13 @@ Verdict judge(const Analysis& analysis) {
     if (!primary) return verdict;
     double area = 0;
     for (const Core& c : analysis.cores) {
-        if (!is_significant(c) || c.full_volume() < kImportantShare * primary->full_volume()) continue;
+        if (!is_significant(c) || c.full_volume() < kTagDistance.important_share * primary->full_volume()) continue;
         verdict.saddle = std::max(verdict.saddle, c.saddle);
         area += c.full_area();
         ++verdict.cores;
     }
     verdict.peak = primary->peak;
-    return area < kStructureShare * cloud_area(verdict.saddle) ? Verdict{} : verdict;
+    return area < kTagDistance.structure_share * cloud_area(verdict.saddle) ? Verdict{} : verdict;
 }
 
 }  // namespace
@@ -317,7 +311,7 @@ TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Dom
     const double extent = std::max({box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2], h});
     double volume = 1;
     for (int a = 0; a < 3; ++a) volume *= std::max(box.max[a] - box.min[a], extent / 64);
-    double a = std::max(h, std::cbrt(volume / double(kCoarseVoxels)));
+    double a = std::max(h, std::cbrt(volume / double(kTagDistance.coarse_voxels)));
     double radius = extent;
     TagDistanceChoice choice;
     std::ostringstream reason;
@@ -338,7 +332,7 @@ TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Dom
         const double finer = std::max(h, 0.5 * a);
         const bool is_resolved = verdict.cores > 0 && verdict.saddle >= 2.5;
         const double next_voxels = double(analysis.tube_voxels) * (a / finer) * (a / finer);
-        if (is_resolved || !(finer < a) || next_voxels > double(kMaxTubeVoxels)) break;
+        if (is_resolved || !(finer < a) || next_voxels > double(kTagDistance.max_tube_voxels)) break;
         a = finer;
         radius = std::max(1.3 * choice.tag_distance, 4 * a);
     }

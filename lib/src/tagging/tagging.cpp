@@ -6,18 +6,17 @@
 #include <cmath>
 #include <numbers>
 
+#include "tagging/heuristics.h"
+
 namespace covol::detail {
 namespace {
-
-constexpr double kSignificantShare = 0.04;   ///< of the enclosed volume: a core that is less, grown by D, is a pocket
-constexpr double kSignificantRadius = 0.25;  ///< of D: a core that is thinner is a pocket
 
 /// @param core, enclosed, distance  in voxels.
 bool is_structure(double core, double enclosed, double distance) {
     constexpr double kBall = 4.0 / 3.0 * std::numbers::pi;
     const double radius = std::cbrt(core / kBall);
-    return radius > kSignificantRadius * distance &&
-           kBall * std::pow(radius + distance, 3) > kSignificantShare * enclosed;
+    return radius > kTagging.significant_radius * distance &&
+           kBall * std::pow(radius + distance, 3) > kTagging.significant_share * enclosed;
 }
 
 std::int64_t voxels_of(const LeafColumns::Piece& run) { return std::int64_t(run.end - run.begin) * kLeafSize; }

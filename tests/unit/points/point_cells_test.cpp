@@ -7,6 +7,7 @@
 #include <random>
 #include <set>
 
+#include "points/heuristics.h"
 #include "points/neighbours.h"
 #include "support/clouds.h"
 
@@ -157,7 +158,7 @@ TEST_CASE("the nearest neighbours are brute force's") {
     for (const auto& [name, points] : clouds(400, 5))
         for (const std::size_t count : {1, 8, 20}) {
             const double spacing = 0.15;
-            const PointCells cells(points, kFirstRadius * spacing);
+            const PointCells cells(points, kNear.first_radius * spacing);
             std::vector<std::vector<Neighbour>> found(points.size());
             for_nearest(cells, spacing, count,
                         [&](std::uint32_t point, const std::vector<Neighbour>& near) { found[point] = near; });

@@ -1,12 +1,23 @@
 #pragma once
+#include <cmath>
 #include <vector>
 
+#include "cloud/orientation/heuristics.h"
 #include "covol/domain.h"
+#include "points/heuristics.h"
+#include "points/neighbours.h"
 
 namespace covol::cloud {
 
 /// Of the surface around each point, world units squared: the disc to its eighth neighbour. A density on a lattice
 /// would count the other side of thin parts, too.
-[[nodiscard]] std::vector<double> areas_of(const std::vector<Vec3>& points, double spacing);
+[[nodiscard]] inline std::vector<double> areas_of(const std::vector<Vec3>& points, double spacing) {
+    const PointCells cells(points, kNear.first_radius * spacing);
+    std::vector<double> areas(points.size());
+    for_nearest(cells, spacing, kAreas.neighbours, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
+        areas[point] = near.empty() ? spacing * spacing : M_PI * near.back().squared / double(near.size());
+    });
+    return areas;
+}
 
 }  // namespace covol::cloud

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "base/median.h"
+#include "cloud/orientation/heuristics.h"
 #include "covol/orientation.h"
 #include "covol/points.h"
 #include "points/point_cells.h"
@@ -14,14 +15,7 @@
 namespace covol {
 namespace {
 
-constexpr std::size_t kSamples = 2000, kLeast = 12;
-constexpr int kRadii = 14;
-constexpr double kGrowth = 1.4142135623730951;
-constexpr double kFirstSpacings = 3.0;  // the first radius, in median distances to the nearest point
-constexpr double kCellRadii = 2;        // edge of the cells that points are sorted into, in first radii
-// standard deviation from the quadric, of the radius; points that fill a ball have 0.45
-constexpr double kSheet = 0.15;
-constexpr double kWorse = 1.05;
+constexpr double kCellRadii = 2;  // edge of the cells that points are sorted into, in first radii
 
 /// Standard deviation of points from the quadric over the plane of the last two axes that fits them best.
 double off_quadric(const std::vector<Eigen::Vector3d>& points, const Eigen::Matrix3d& axes) {
@@ -61,7 +55,7 @@ Around look_around(const cloud::PointCells& cells, const Vec3& at, double radius
             sum += near.back();
             squares += near.back() * near.back().transpose();
         }
-    if (near.size() < kLeast) return {};
+    if (near.size() < kCloudScale.least) return {};
     const double count = double(near.size());
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares / count -
                                                               sum * sum.transpose() / (count * count));
@@ -82,10 +76,10 @@ CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext
     const double nearest = scale.nearest = measure_spacing(points).median;
     scale.spacing = 2 * nearest;  // what it is for points spread evenly at random
     if (!(nearest > 0)) return scale;
-    const std::size_t step = std::max<std::size_t>(1, points.size() / kSamples);
-    double radius = kFirstSpacings * nearest, best = 1;
+    const std::size_t step = std::max<std::size_t>(1, points.size() / kCloudScale.samples);
+    double radius = kCloudScale.first_spacings * nearest, best = 1;
     const cloud::PointCells cells(points, kCellRadii * radius);
-    for (int n = 0; n < kRadii; ++n, radius *= kGrowth) {
+    for (int n = 0; n < kCloudScale.radii; ++n, radius *= kCloudScale.growth) {
         run.check();
         std::vector<Around> around((points.size() + step - 1) / step);
         tbb::parallel_for(std::size_t(0), around.size(),
@@ -99,7 +93,7 @@ CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext
             scale.noise = noise;
         }
         // Wider, the surface's own curvature is all that comes.
-        if (best < kSheet || noise / radius > kWorse * best) break;
+        if (best < kCloudScale.sheet || noise / radius > kCloudScale.worse * best) break;
     }
     return scale;
 }

@@ -9,27 +9,17 @@
 
 #include "base/vector.h"
 #include "cloud/orientation/areas.h"
+#include "cloud/orientation/heuristics.h"
 #include "cloud/orientation/indicator.h"
 #include "cloud/orientation/views.h"
 #include "covol/error.h"
+#include "points/heuristics.h"
 #include "points/kd_tree.h"
 #include "points/neighbours.h"
 
 namespace covol {
 namespace cloud {
 namespace {
-
-constexpr double kLeastTold = 0.5;       // of the points
-constexpr double kLeastForeseen = 0.65;  // of normals without a meaning half
-constexpr double kLeastFreeViews = 0.7;  // a body hides at least half of itself from a wrong place
-constexpr double kVoteSpacings = 2;  // cells of the lattice on which points judge each other: about four points each
-constexpr int kTurns = 3;
-constexpr double kSpeaksAgainst = 0.1;           // of the indicator's step over a cell
-constexpr int kSmoothings = 2;                   // of normals that noise has mixed
-constexpr std::size_t kBeside = 8;               // neighbours
-constexpr double kFlat = 0.3, kOpposite = -0.5;  // sines and cosines of normals beside each other
-constexpr double kPlaneNoises = 4;               // radius of the neighbourhood that a plane is fitted to
-constexpr double kLeastNeighbours = 12, kMostNeighbours = 100;
 
 std::size_t count_told(const std::vector<Vec3>& directions) {
     return std::size_t(std::count_if(directions.begin(), directions.end(), [](const Vec3& d) {
@@ -40,9 +30,10 @@ std::size_t count_told(const std::vector<Vec3>& directions) {
 /// Of local planes, on the side of `towards`.
 std::vector<Vec3> plane_normals(const std::vector<Vec3>& points, const std::vector<Vec3>& towards,
                                 const CloudScale& scale) {
-    const double radius = kPlaneNoises * scale.noise / scale.spacing;  // spacings
-    const auto count = std::size_t(std::clamp(M_PI * radius * radius, kLeastNeighbours, kMostNeighbours));
-    const PointCells cells(points, kFirstRadius * scale.spacing);
+    const double radius = kGivenSides.plane_noises * scale.noise / scale.spacing;  // spacings
+    const auto count =
+        std::size_t(std::clamp(M_PI * radius * radius, kGivenSides.least_neighbours, kGivenSides.most_neighbours));
+    const PointCells cells(points, kNear.first_radius * scale.spacing);
     std::vector<Vec3> normals(points.size());
     for_nearest(cells, scale.spacing, count, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
         const auto [sum, squares] = moments_of(cells, points[point], near);
@@ -60,7 +51,8 @@ class Jury {
 public:
     Jury(const std::vector<Vec3>& points, std::vector<Vec3> normals, const CloudScale& scale)
         : points_(points),
-          field_(indicator_lattice(points, cells_along(points, kVoteSpacings * std::max(scale.spacing, scale.noise)))) {
+          field_(indicator_lattice(
+              points, cells_along(points, kGivenSides.vote_spacings * std::max(scale.spacing, scale.noise)))) {
         voice_.normals = std::move(normals);
         voice_.areas = areas_of(points, scale.spacing);
     }
@@ -85,11 +77,11 @@ public:
     /// Turns single normals that all around speak against; those without one take the direction in which the indicator
     /// falls.
     void settle() {
-        for (int n = 0; n < kTurns; ++n) {
+        for (int n = 0; n < kGivenSides.turns; ++n) {
             listen(std::vector<char>(points_.size(), 1));
             std::size_t turned = 0;
             for (std::size_t p = 0; p < points_.size(); ++p) {
-                if (falls_along(p) * field_.indicator().lattice.cell > -kSpeaksAgainst) continue;
+                if (falls_along(p) * field_.indicator().lattice.cell > -kGivenSides.speaks_against) continue;
                 voice_.normals[p] = times(-1, voice_.normals[p]);
                 ++turned;
             }
@@ -115,7 +107,7 @@ private:
         std::vector<Vec3> vectors(points_.size());
         for (std::size_t n = 0; n < vectors.size(); ++n)
             vectors[n] = speaks[n] ? times(voice_.areas[n], voice_.normals[n]) : Vec3{0, 0, 0};
-        field_.solve(points_, vectors, kCyclesFromNothing);
+        field_.solve(points_, vectors, kIndicator.cycles_from_nothing);
         scale_to_half(field_, points_);
     }
 
@@ -127,13 +119,13 @@ private:
 /// Share of the points that have a neighbour beside, not above them, whose normal points to the other side: where a
 /// part is turned as a whole its rim has.
 double torn(const std::vector<Vec3>& points, const std::vector<Vec3>& normals, double spacing) {
-    const PointCells cells(points, kFirstRadius * spacing);
+    const PointCells cells(points, kNear.first_radius * spacing);
     std::vector<char> is_torn(points.size(), 0);
-    for_nearest(cells, spacing, kBeside, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
+    for_nearest(cells, spacing, kGivenSides.beside, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
         for (const Neighbour& other : near) {
             const double up = dot(minus(cells.sorted()[other.at], points[point]), normals[point]);
-            if (up * up < kFlat * kFlat * other.squared &&
-                dot(normals[point], normals[cells.order()[other.at]]) < kOpposite)
+            if (up * up < kGivenSides.flat * kGivenSides.flat * other.squared &&
+                dot(normals[point], normals[cells.order()[other.at]]) < kGivenSides.opposite)
                 is_torn[point] = 1;
         }
     });
@@ -142,7 +134,7 @@ double torn(const std::vector<Vec3>& points, const std::vector<Vec3>& normals, d
 
 /// What the indicator of an orientation's normals says; areas are scaled as it is.
 void find_indicator(WindingField& field, const std::vector<Vec3>& points, Orientation& result) {
-    solve(field, points, result, kCyclesFromNothing);
+    solve(field, points, result, kIndicator.cycles_from_nothing);
     const double half = scale_to_half(field, points);
     for (double& area : result.areas) area *= half;
     result.indicator = make_indicator(field);
@@ -156,7 +148,7 @@ bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, const 
     Jury jury(points, given, scale);
     result.report.foreseen = jury.foreseen(result.report);
     result.report.why_not.clear();
-    if (result.report.foreseen < kLeastForeseen) {
+    if (result.report.foreseen < kGivenSides.least_foreseen) {
         result.report.why_not = "half of them do not foresee the sides of the other half";
         return false;
     }
@@ -167,10 +159,10 @@ bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, const 
     result.torn = torn(points, own.normals, scale.spacing);
     own.turned = 1 - agreeing(points, own.normals, own, false);
     // Noise that carries points across a thin part leaves them with the other side's normals.
-    for (int n = 0; own.turned > kFewTurned && n < kSmoothings; ++n) {
+    for (int n = 0; own.turned > kGivenSides.few_turned && n < kGivenSides.smoothings; ++n) {
         for (std::size_t p = 0; p < points.size(); ++p)
             own.normals[p] = unit(times(-1, own.indicator->at(points[p]).gradient));
-        if (n + 1 < kSmoothings) find_indicator(field, points, own);
+        if (n + 1 < kGivenSides.smoothings) find_indicator(field, points, own);
     }
     result.report.used = true;
     return true;
@@ -195,13 +187,13 @@ GivenSides given_sides(const std::vector<Vec3>& points, const PointHints& hints,
     if (points.size() < 4 || !(scale.spacing > 0)) return result;
     result.report.normals = count_told(hints.normals);
     result.report.sensors = count_told(hints.to_sensor);
-    const auto least = kLeastTold * double(points.size());
+    const auto least = kGivenSides.least_told * double(points.size());
     if (double(result.report.normals) >= least && result.report.normals > 0 &&
         use(points, hints.normals, scale, cell, result))
         return result;
     run.check();
     if (double(result.report.sensors) < least || result.report.sensors == 0) return result;
-    if (share_free(points, hints.to_sensor, scale) < kLeastFreeViews) {
+    if (share_free(points, hints.to_sensor, scale) < kGivenSides.least_free_views) {
         if (result.report.normals == 0) result.report.why_not = "from the sensor most points cannot be seen";
         return result;
     }

@@ -4,8 +4,6 @@
 
 namespace covol::cloud {
 
-inline constexpr double kFewTurned = 0.002;  // of all normals: an orientation that is beyond doubt
-
 struct GivenSides {
     HintsReport report;
     std::vector<Vec3> given;  ///< the normals that were judged

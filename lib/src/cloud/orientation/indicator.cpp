@@ -8,6 +8,7 @@
 
 #include "base/median.h"
 #include "base/vector.h"
+#include "cloud/orientation/heuristics.h"
 #include "covol/points.h"
 #include "points/point_cells.h"
 
@@ -46,19 +47,14 @@ void Indicator::crossed(const std::function<void(const WorldBox&)>& visit) const
 }
 
 namespace cloud {
-namespace {
-
-constexpr double kBeyond = 0.2;  // of the longest side, around the points
-constexpr int kLeastCells = 48, kMostCells = 192;
-
-}  // namespace
 
 int cells_along(const std::vector<Vec3>& points, double cell) {
-    return std::clamp(int(longest_side(bounding_box(points)) * (1 + 2 * kBeyond) / cell), kLeastCells, kMostCells);
+    return std::clamp(int(longest_side(bounding_box(points)) * (1 + 2 * kIndicator.beyond) / cell),
+                      kIndicator.least_cells, kIndicator.most_cells);
 }
 
 Lattice indicator_lattice(const std::vector<Vec3>& points, int cells) {
-    return lattice_around(bounding_box(points), kBeyond, cells);
+    return lattice_around(bounding_box(points), kIndicator.beyond, cells);
 }
 
 double scale_to_half(WindingField& field, const std::vector<Vec3>& points) {
@@ -103,7 +99,7 @@ void solve(WindingField& field, const std::vector<Vec3>& points, const Orientati
 std::shared_ptr<const Indicator> indicator_of(const std::vector<Vec3>& points, const Orientation& orientation,
                                               double cell) {
     WindingField field(indicator_lattice(points, cells_along(points, cell)));
-    solve(field, points, orientation, kCyclesFromNothing);
+    solve(field, points, orientation, kIndicator.cycles_from_nothing);
     scale_to_half(field, points);
     return make_indicator(field);
 }

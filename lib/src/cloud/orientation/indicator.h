@@ -5,8 +5,6 @@
 
 namespace covol::cloud {
 
-inline constexpr int kCyclesFromNothing = 8;  // of multigrid
-
 /// Of a lattice of about this cell, along its longest side: 48 to 192.
 [[nodiscard]] int cells_along(const std::vector<Vec3>& points, double cell);
 /// Around the points, so much wider that the indicator is 0 at its end.

@@ -6,21 +6,12 @@
 #include <cmath>
 
 #include "base/vector.h"
+#include "cloud/orientation/heuristics.h"
 #include "cloud/orientation/indicator.h"
 #include "points/point_cells.h"
 
 namespace covol::cloud {
 namespace {
-
-// Lengths are in the distance from which on points are not of one sheet.
-constexpr double kCell = 2;           // of the points that turn together
-constexpr double kFarthestLayer = 6;  // below the one that hides it
-constexpr double kMostAway = 0.2;     // of a patch's points, that are farther from the surface once they are turned
-constexpr double kBareCells = 2;      // of the indicator: surface without points as near is bare
-constexpr double kMostGain = 1.5;  // bare surface, of the patch's area: a cavity's far side is not much larger than its
-                                   // near one, a ring's hole is
-constexpr int kMostPatches = 12;   // each costs a solution
-constexpr std::size_t kLeastPoints = 12;
 
 using Patch = std::vector<std::uint32_t>;  // points
 
@@ -35,7 +26,7 @@ public:
             frees.push_back(free[cells.order()[cells.cell(c).begin]]);  // the same for all of a cell
         }
         const PointCells near(places, cells.edge());
-        const double reach = kFarthestLayer * between, touching = std::sqrt(6.0) * cells.edge();
+        const double reach = kLayers.farthest_layer * between, touching = std::sqrt(6.0) * cells.edge();
         tbb::parallel_for(std::size_t(0), places.size(), [&](std::size_t c) {
             std::vector<PointCells::Range> ranges;
             const Vec3& p = places[c];
@@ -84,7 +75,7 @@ private:
 /// The indicator's surface.
 struct Level {
     Level(const WindingField& field, const PointCells& points) {
-        const double reach = kBareCells * field.indicator().lattice.cell;
+        const double reach = kLayers.bare_cells * field.indicator().lattice.cell;
         make_indicator(field)->crossed([&](const WorldBox& box) {
             middles.push_back(times(0.5, plus(box.min, box.max)));
             bare += !points.any_within(middles.back(), reach);
@@ -103,27 +94,27 @@ void turn(const Patch& patch, Orientation& orientation) {
 std::vector<char> turn_layers(WindingField& field, const std::vector<Vec3>& points, const std::vector<Vec3>& free,
                               double between, Orientation& orientation, const RunContext& run) {
     std::vector<char> turned(points.size(), 0);
-    const PointCells cells(points, kCell * between);
+    const PointCells cells(points, kLayers.cell * between);
     std::vector<Patch> patches = Opposed(cells, free, between).patches();
-    patches.resize(std::min<std::size_t>(patches.size(), kMostPatches));
+    patches.resize(std::min<std::size_t>(patches.size(), kLayers.most_patches));
     const double cell = field.indicator().lattice.cell;
     std::ptrdiff_t bare = Level(field, cells).bare;
     for (const Patch& patch : patches) {
-        if (patch.size() < kLeastPoints) break;
+        if (patch.size() < kLayers.least_points) break;
         run.check();
         turn(patch, orientation);
         WindingField now(field.indicator().lattice);
-        solve(now, points, orientation, kCyclesFromNothing);
+        solve(now, points, orientation, kIndicator.cycles_from_nothing);
         scale_to_half(now, points);
         const Level level(now, cells);
-        const PointCells surface(level.middles, kFarthestLayer * between);
+        const PointCells surface(level.middles, kLayers.farthest_layer * between);
         const auto away = std::count_if(patch.begin(), patch.end(), [&](std::uint32_t n) {
-            return !surface.any_within(points[n], kFarthestLayer * between);
+            return !surface.any_within(points[n], kLayers.farthest_layer * between);
         });
         double area = 0;
         for (const std::uint32_t n : patch) area += orientation.areas[n];
         const double gain = double(bare - level.bare) * cell * cell;
-        if (!(gain > 0 && gain < kMostGain * area) || double(away) > kMostAway * double(patch.size())) {
+        if (!(gain > 0 && gain < kLayers.most_gain * area) || double(away) > kLayers.most_away * double(patch.size())) {
             turn(patch, orientation);
             continue;
         }

@@ -10,6 +10,7 @@
 #include "base/vector.h"
 #include "cloud/orientation/areas.h"
 #include "cloud/orientation/given_sides.h"
+#include "cloud/orientation/heuristics.h"
 #include "cloud/orientation/indicator.h"
 #include "cloud/orientation/stray.h"
 #include "cloud/orientation/torn.h"
@@ -28,40 +29,14 @@ using cloud::PointCells;
 using cloud::unit;
 using cloud::WindingField;
 
-constexpr double kPatchCells = 2;   // edge of the cells over which the indicator is averaged
-constexpr double kPatchOff = 0.12;  // from 1/2, of a patch that may be turned
-constexpr int kPatchRounds = 4, kPatchCycles = 2, kAfterTurning = 3;
-constexpr double kFewStayed = 0.002;  // of the points, in patches that stay turned: those left may turn to and fro
-constexpr int kFirstPasses = 12;      // of smoothing, for the first guess
-constexpr double kSteady = 1e-4;      // the normals' mean change, 1 - cosine
-// chi at a point beyond which another part encloses it already. Noise brings points there that are none of these.
-constexpr double kEnclosed = 0.9, kSurelyEnclosed = 1.2;
-constexpr int kCycles = 1, kLastCycles = 4;  // of multigrid
-// The finest lattice's cell: smaller ones let single points turn, larger ones lose thin parts.
-constexpr double kCellSpacings = 0.8, kCellNoises = 1.0;
 /// What is tried until few normals turn.
 struct Try {
     double cell;      // of those
     double enclosed;  // on the first lattice
 };
-constexpr Try kTries[] = {{1, kEnclosed},         {1, kSurelyEnclosed}, {0.67, kSurelyEnclosed},
-                          {1.5, kSurelyEnclosed}, {0.44, kEnclosed},    {2.25, kSurelyEnclosed}};
-constexpr double kLeastSpacings = 0.5;
-constexpr double kOffHalf = 0.02;  // that the indicator's mean over the points may differ from 1/2
-// of more than that, among tries: walls that run into each other turn less than those that waver
-constexpr double kOffWeight = 2;
-constexpr double kSampledPerCell = 4;  // points that iterate, on the surface in a lattice cell's square
-constexpr double kSampleSpacings = 4;  // edge of the cells that they are taken from
-constexpr double kSharp = 0.2;  // noise, of the spacing: below it the nearest points tell the sheet that they are on
-constexpr int kStrayRounds = 3;
-constexpr double kManyStray = 0.005;  // of the points
-// Of given normals: with opposite ones beside them, and against an orientation that settled. Good ones have less than
-// 0.001 without noise and 0.005 at any, those of which a part is turned as a whole more than 0.01 and 0.1.
-constexpr double kFewTorn = 0.002, kContradicted = 0.03;
-// Whether points enclose a solid. Where they lie all around it its surface rests on them: of closed shapes less than
-// 0.01 of it is bare, however noisy they are, of scans of one side 0.14 to 0.4. Of a shape of which a part is missing,
-// up to 0.2, the normals settle all the same: doubts up to 0.013, of the scans from 0.026 to 0.19.
-constexpr double kSettled = 0.014, kBare = 0.05, kBareReach = 2;
+const Try kTries[] = {{1, kOrientation.enclosed},           {1, kOrientation.surely_enclosed},
+                      {0.67, kOrientation.surely_enclosed}, {1.5, kOrientation.surely_enclosed},
+                      {0.44, kOrientation.enclosed},        {2.25, kOrientation.surely_enclosed}};
 
 /// A lattice and what is done on it.
 struct Stage {
@@ -84,24 +59,24 @@ public:
         for (int n = 0; n < stage.iterations; ++n) {
             run.check();
             ++result.iterations;
-            if (turn(field, result, kCycles) < kSteady) break;
+            if (turn(field, result, kOrientation.cycles) < kOrientation.steady) break;
         }
         turn_patches(field, result, run);
-        if (stage.is_last) turn(field, result, kLastCycles);
+        if (stage.is_last) turn(field, result, kOrientation.last_cycles);
         last_.emplace(std::move(field));
     }
 
     /// @param spacing  of the points
     void mend(double spacing, Orientation& result) {
         result.mended = cloud::mend_torn(points_, spacing, result.normals);
-        if (result.mended > 0) solve(*last_, result, kLastCycles);
+        if (result.mended > 0) solve(*last_, result, kOrientation.last_cycles);
     }
 
     [[nodiscard]] WindingField& last() { return *last_; }
 
 private:
     void first_guess(const Lattice& lattice, Orientation& result) const {
-        const LatticeField density = cloud::point_density(lattice, points_, kFirstPasses);
+        const LatticeField density = cloud::point_density(lattice, points_, kOrientation.first_passes);
         result.normals.resize(points_.size());
         tbb::parallel_for(std::size_t(0), points_.size(), [&](std::size_t n) {
             const Vec3 g = density.at(points_[n]).gradient;
@@ -138,11 +113,11 @@ private:
     /// makes its own normals. Each such patch is turned to try, all at once, and stays turned where that brings it
     /// closer to 1/2.
     void turn_patches(WindingField& field, Orientation& result, const RunContext& run) {
-        const PointCells cells(points_, kPatchCells * field.indicator().lattice.cell);
+        const PointCells cells(points_, kOrientation.patch_cells * field.indicator().lattice.cell);
         const std::vector<std::vector<std::uint32_t>> beside = neighbours_of(cells);
-        for (int round = 0; round < kPatchRounds; ++round) {
+        for (int round = 0; round < kOrientation.patch_rounds; ++round) {
             run.check();
-            turn(field, result, kPatchCycles);  // the indicator of what the normals are now
+            turn(field, result, kOrientation.patch_cycles);  // the indicator of what the normals are now
             const std::vector<double> off = mean_off(cells, field.indicator());
             const std::vector<int> patch = patches_of(cells, beside, off);
             const int patches = 1 + *std::max_element(patch.begin(), patch.end());
@@ -152,7 +127,7 @@ private:
                 if (patch[cell] >= 0)
                     for (double& c : result.normals[point]) c = -c;
             });
-            solve(field, result, kPatchCycles);
+            solve(field, result, kOrientation.patch_cycles);
             const std::vector<double> turned = mean_off(cells, field.indicator());
             std::vector<double> gain(std::size_t(patches), 0.0);
             for (std::size_t cell = 0; cell < patch.size(); ++cell) {
@@ -169,8 +144,8 @@ private:
                 else
                     result.normals[point] = before[point];
             });
-            for (int n = 0; n < kAfterTurning; ++n) turn(field, result, kPatchCycles);
-            if (stayed < kFewStayed * double(points_.size())) return;
+            for (int n = 0; n < kOrientation.after_turning; ++n) turn(field, result, kOrientation.patch_cycles);
+            if (stayed < kOrientation.few_stayed * double(points_.size())) return;
         }
     }
 
@@ -213,7 +188,7 @@ private:
                                        const std::vector<double>& off) {
         std::vector<int> patch(cells.cell_count(), -1);
         const auto side = [&](std::size_t cell) {
-            return std::abs(off[cell]) < kPatchOff ? 0 : off[cell] < 0 ? -1 : 1;
+            return std::abs(off[cell]) < kOrientation.patch_off ? 0 : off[cell] < 0 ? -1 : 1;
         };
         int count = 0;
         std::vector<std::uint32_t> front;
@@ -253,25 +228,25 @@ std::vector<Vec3> normals_of(const Indicator& indicator, const std::vector<Vec3>
 }
 
 double first_cell(const CloudScale& scale) {
-    return std::max(kCellSpacings * scale.spacing, kCellNoises * scale.noise);
+    return std::max(kOrientation.cell_spacings * scale.spacing, kOrientation.cell_noises * scale.noise);
 }
 
 /// Parts that are turned as a whole go on turning, or lie where the indicator is not 1/2.
-double doubt(const Orientation& o, double weight = kOffWeight) {
-    return o.turned + weight * std::max(0.0, o.off_half - kOffHalf);
+double doubt(const Orientation& o, double weight = kOrientation.off_weight) {
+    return o.turned + weight * std::max(0.0, o.off_half - kOrientation.off_half);
 }
-bool is_settled(const Orientation& o) { return doubt(o, 1) < cloud::kFewTurned; }
+bool is_settled(const Orientation& o) { return doubt(o, 1) < kGivenSides.few_turned; }
 
 bool does_enclose(const CloudOrientation& cloud) {
-    const double reach = kBareReach * std::max(cloud.scale.spacing, cloud.scale.noise);
-    return doubt(cloud.orientation) < kSettled ||
-           cloud::share_bare(*cloud.orientation.indicator, cloud.points, reach) < kBare;
+    const double reach = kOrientation.bare_reach * std::max(cloud.scale.spacing, cloud.scale.noise);
+    return doubt(cloud.orientation) < kOrientation.settled ||
+           cloud::share_bare(*cloud.orientation.indicator, cloud.points, reach) < kOrientation.bare;
 }
 
 /// Every few points of those that lie together, and what each stands for.
 struct Sample {
     Sample(const std::vector<Vec3>& all, double spacing, std::size_t every)
-        : step(every), order(cloud::PointCells(all, kSampleSpacings * spacing).order()) {
+        : step(every), order(cloud::PointCells(all, kOrientation.sample_spacings * spacing).order()) {
         for (std::size_t n = step / 2; n < order.size(); n += step) points.push_back(all[order[n]]);
         areas = cloud::areas_of(points, spacing * std::sqrt(double(step)));
     }
@@ -292,12 +267,13 @@ struct Sample {
 void choose_orientation(CloudOrientation& cloud, const PointHints& hints, const RunContext& run) {
     cloud::GivenSides given = cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale), run);
     HintsReport& report = cloud.hints = given.report;
-    const bool is_certain = report.used && given.torn < kFewTorn && is_settled(given.orientation);
+    const bool is_certain = report.used && given.torn < kOrientation.few_torn && is_settled(given.orientation);
     if (!is_certain) {
         cloud.orientation = orient(cloud.points, cloud.scale, run);
         cloud.encloses = does_enclose(cloud);
         if (report.used && cloud.encloses &&
-            1 - cloud::agreeing(cloud.points, given.orientation.normals, cloud.orientation, false) > kContradicted) {
+            1 - cloud::agreeing(cloud.points, given.orientation.normals, cloud.orientation, false) >
+                kOrientation.contradicted) {
             report.used = false;
             report.why_not = "parts of them are turned as a whole";
         }
@@ -322,20 +298,20 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
         // Noise is hard to tell from thin parts: where normals go on turning a finer lattice may hold them.
         const double first = first_cell(scale);
         const double cell = cloud::indicator_lattice(points, cloud::cells_along(points, first)).cell;
-        const double share = kSampledPerCell * scale.spacing * scale.spacing / (cell * cell);
-        const bool is_sharp = scale.noise < kSharp * scale.spacing;
+        const double share = kOrientation.sampled_per_cell * scale.spacing * scale.spacing / (cell * cell);
+        const bool is_sharp = scale.noise < kOrientation.sharp * scale.spacing;
         const Sample sample(points, scale.spacing, std::size_t(std::max(1.0, 1 / share)));
         std::vector<std::pair<int, double>> tried;
         for (const Try& attempt : kTries) {
             const int cells =
-                cloud::cells_along(points, std::max(first * attempt.cell, kLeastSpacings * scale.spacing));
+                cloud::cells_along(points, std::max(first * attempt.cell, kOrientation.least_spacings * scale.spacing));
             if (std::count(tried.begin(), tried.end(), std::pair{cells, attempt.enclosed}) > 0) continue;
             tried.emplace_back(cells, attempt.enclosed);
             Orientation now;
             now.areas = sample.areas;
             Iteration iteration(sample.points);
-            for (const Stage& stage :
-                 {Stage{cells * 2 / 3, 12, false, attempt.enclosed}, Stage{cells, 8, true, kSurelyEnclosed}})
+            for (const Stage& stage : {Stage{cells * 2 / 3, 12, false, attempt.enclosed},
+                                       Stage{cells, 8, true, kOrientation.surely_enclosed}})
                 iteration.run(stage, now, run);
             if (is_sharp) iteration.mend(scale.spacing * std::sqrt(double(sample.step)), now);
             now.indicator = cloud::make_indicator(iteration.last());
@@ -347,7 +323,7 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
                             std::accumulate(sample.areas.begin(), sample.areas.end(), 0.0);
         best.areas = sample.all_areas();
         for (double& area : best.areas) area *= half;
-        best.normals = normals_of(*best.indicator, points, kSurelyEnclosed);
+        best.normals = normals_of(*best.indicator, points, kOrientation.surely_enclosed);
         if (best.mended > 0) best.mended = cloud::mend_torn(points, scale.spacing, best.normals);
     });
     return best;
@@ -363,7 +339,7 @@ CloudOrientation orient_cloud(const std::vector<Vec3>& points, const PointHints&
         cloud.points = merge_close_points(points, 0);
         cloud.scale = measure_cloud_scale(cloud.points, run);
         // Where there are many, some show once others are gone.
-        for (int round = 0; round < kStrayRounds; ++round) {
+        for (int round = 0; round < kOrientation.stray_rounds; ++round) {
             const std::vector<char> stray = cloud::find_stray(cloud.points, cloud.scale, run);
             std::size_t kept = 0;
             for (std::size_t n = 0; n < stray.size(); ++n)
@@ -371,7 +347,7 @@ CloudOrientation orient_cloud(const std::vector<Vec3>& points, const PointHints&
             const std::size_t gone = stray.size() - kept;
             cloud.stray += gone;
             cloud.points.resize(kept);
-            if (double(gone) < kManyStray * double(stray.size())) break;
+            if (double(gone) < kOrientation.many_stray * double(stray.size())) break;
         }
         choose_orientation(cloud, carried(hints, points, cloud.points), run);
     });

@@ -6,25 +6,23 @@
 
 #include "base/median.h"
 #include "base/vector.h"
+#include "cloud/orientation/heuristics.h"
+#include "points/heuristics.h"
 #include "points/neighbours.h"
 
 namespace covol::cloud {
 namespace {
 
-constexpr std::size_t kNeighbours = 8, kSamples = 20000, kBeside = 16;
-constexpr double kCellNoises = 0.5;  // a layer as thick as several of the points' spacings has few in a cell of theirs
-constexpr double kFar = 2.5;         // times the median distance to the eighth neighbour
-// standard deviation of the neighbours, or the point's own distance, of that to the eighth
-constexpr double kOffPlane = 0.25;
+constexpr std::size_t kBeside = 16;
 
 /// Of a sample of the points.
 double usual_reach(const PointCells& cells, double spacing) {
-    const std::size_t count = cells.sorted().size(), step = std::max<std::size_t>(1, count / kSamples);
+    const std::size_t count = cells.sorted().size(), step = std::max<std::size_t>(1, count / kStray.samples);
     std::vector<double> reach(count, -1);
     for_nearest(
-        cells, spacing, kNeighbours,
+        cells, spacing, kStray.neighbours,
         [&](std::uint32_t point, const std::vector<Neighbour>& near) {
-            reach[point] = near.size() < kNeighbours ? 1e300 : std::sqrt(near.back().squared);
+            reach[point] = near.size() < kStray.neighbours ? 1e300 : std::sqrt(near.back().squared);
         },
         [&](std::size_t n) { return n % step == 0; });
     std::erase(reach, -1);
@@ -36,11 +34,11 @@ bool is_lonely(const PointCells& cells, std::size_t n, double distance, std::vec
     const Vec3& p = cells.sorted()[n];
     std::size_t found = 0;
     const auto has_company = [&](std::size_t begin, std::size_t end) {
-        for (std::size_t m = begin; m < end && found < kNeighbours; ++m) {
+        for (std::size_t m = begin; m < end && found < kStray.neighbours; ++m) {
             const Vec3 to = minus(cells.sorted()[m], p);
             found += m != n && dot(to, to) <= distance * distance;
         }
-        return found >= kNeighbours;
+        return found >= kStray.neighbours;
     };
     // Most have it beside them in their cell.
     if (has_company(n - std::min(n, kBeside), std::min(n + kBeside, cells.sorted().size()))) return false;
@@ -54,9 +52,9 @@ bool is_lonely(const PointCells& cells, std::size_t n, double distance, std::vec
 
 std::vector<char> find_stray(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run) {
     std::vector<char> stray(points.size(), 0);
-    if (points.size() <= 2 * kNeighbours) return stray;
-    const PointCells cells(points, kFirstRadius * std::max(scale.spacing, kCellNoises * scale.noise));
-    const double far_reach = kFar * usual_reach(cells, scale.spacing);
+    if (points.size() <= 2 * kStray.neighbours) return stray;
+    const PointCells cells(points, kNear.first_radius * std::max(scale.spacing, kStray.cell_noises * scale.noise));
+    const double far_reach = kStray.far * usual_reach(cells, scale.spacing);
     run.check();
     std::vector<char> lonely(points.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 1024), [&](const auto& some) {
@@ -65,10 +63,10 @@ std::vector<char> find_stray(const std::vector<Vec3>& points, const CloudScale& 
     });
     run.check();
     for_nearest(
-        cells, scale.spacing, kNeighbours,
+        cells, scale.spacing, kStray.neighbours,
         [&](std::uint32_t point, const std::vector<Neighbour>& near) {
             stray[point] = 1;
-            if (near.size() < kNeighbours) return;
+            if (near.size() < kStray.neighbours) return;
             const auto [whole, squares] = moments_of(cells, points[point], near);
             const double count = double(near.size());
             const Eigen::Vector3d mean = whole / count;
@@ -77,7 +75,7 @@ std::vector<char> find_stray(const std::vector<Vec3>& points, const CloudScale& 
                          reach = std::sqrt(near.back().squared);
             // The farther the neighbours, the flatter they have to lie.
             const double off = std::max(deviation, std::abs(axes.eigenvectors().col(0).dot(mean))) / reach;
-            stray[point] = off * reach / far_reach > kOffPlane;
+            stray[point] = off * reach / far_reach > kStray.off_plane;
         },
         [&](std::size_t n) { return lonely[n] != 0; });
     return stray;

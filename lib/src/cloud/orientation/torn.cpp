@@ -8,6 +8,8 @@
 #include <numeric>
 
 #include "base/vector.h"
+#include "cloud/orientation/heuristics.h"
+#include "points/heuristics.h"
 #include "points/neighbours.h"
 #include "points/point_cells.h"
 
@@ -15,15 +17,12 @@ namespace covol::cloud {
 namespace {
 
 constexpr std::size_t kNeighbours = 12;
-constexpr double kFlat = 0.06;      // the least variance of the neighbours, of the middle one
-constexpr double kUpright = 0.5;    // cosine between a normal and its sheet's
-constexpr double kSameSheet = 0.9;  // cosine between sheets' normals
 
 /// Sheets at the points, and which points beside each other are on the same one.
 class Sheets {
 public:
     Sheets(const std::vector<Vec3>& points, double spacing) : axes_(points.size()), beside_(points.size()) {
-        const PointCells cells(points, kFirstRadius * spacing);
+        const PointCells cells(points, kNear.first_radius * spacing);
         for_nearest(cells, spacing, kNeighbours, [&](std::uint32_t point, const std::vector<Neighbour>& near) {
             for (std::size_t n = 0; n < kNeighbours; ++n)
                 beside_[point][n] = n < near.size() ? cells.order()[near[n].at] : point;
@@ -32,7 +31,7 @@ public:
             const double count = double(near.size()) + 1;  // the point itself
             const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> shape(squares / count -
                                                                        sum * sum.transpose() / (count * count));
-            if (shape.eigenvalues()[0] > kFlat * shape.eigenvalues()[1]) return;
+            if (shape.eigenvalues()[0] > kTorn.flat * shape.eigenvalues()[1]) return;
             const Eigen::Vector3d axis = shape.eigenvectors().col(0);
             axes_[point] = {axis[0], axis[1], axis[2]};
         });
@@ -45,7 +44,7 @@ public:
     template <typename Visit>
     void for_beside(std::size_t n, Visit visit) const {
         for (const std::uint32_t other : beside_[n])
-            if (other != n && std::abs(dot(axes_[n], axes_[other])) > kSameSheet) visit(other);
+            if (other != n && std::abs(dot(axes_[n], axes_[other])) > kTorn.same_sheet) visit(other);
     }
 
 private:
@@ -59,7 +58,7 @@ std::size_t set_upright(const Sheets& sheets, std::vector<Vec3>& normals) {
     std::vector<std::uint32_t> lying;
     for (std::uint32_t n = 0; n < sheets.size(); ++n) {
         const double squared = dot(sheets.axis(n), sheets.axis(n));
-        if (!(squared > 0) || std::abs(dot(sheets.axis(n), normals[n])) >= kUpright) continue;
+        if (!(squared > 0) || std::abs(dot(sheets.axis(n), normals[n])) >= kTorn.upright) continue;
         is_lying[n] = 1;
         lying.push_back(n);
     }

@@ -8,6 +8,7 @@
 
 #include "base/vector.h"
 #include "cloud/orientation/areas.h"
+#include "cloud/orientation/heuristics.h"
 #include "cloud/orientation/indicator.h"
 #include "cloud/orientation/layers.h"
 #include "covol/points.h"
@@ -16,15 +17,6 @@
 namespace covol::cloud {
 namespace {
 
-constexpr int kRays = 96;
-constexpr int kMostViewCells = 256;      // along the longest side
-constexpr double kFirstStep = 2.5;       // cells: beyond the point's own sheet
-constexpr double kViewSpacings = 2.0;    // edge of the cells that stop a view: about four points each
-constexpr double kCoarseSpacings = 2.4;  // edge of the indicator's cells: its topology counts
-constexpr double kFineSpacings = 1.2;    // of the screened one's
-constexpr double kLeastFree = 0.01;      // of all directions, less those opposite
-constexpr double kScreening = 4;         // of the indicator's own slope over a cell
-
 /// What tells points of a sheet from each other.
 double apart(const CloudScale& scale) { return std::max(scale.spacing, scale.noise); }
 
@@ -32,8 +24,8 @@ double apart(const CloudScale& scale) { return std::max(scale.spacing, scale.noi
 std::vector<Vec3> directions() {
     std::vector<Vec3> all;
     const double golden = M_PI * (3 - std::sqrt(5.0));
-    for (int n = 0; n < kRays; ++n) {
-        const double z = 1 - (2 * n + 1.0) / kRays, r = std::sqrt(1 - z * z);
+    for (int n = 0; n < kViews.rays; ++n) {
+        const double z = 1 - (2 * n + 1.0) / kViews.rays, r = std::sqrt(1 - z * z);
         all.push_back({r * std::cos(golden * n), r * std::sin(golden * n), z});
     }
     return all;
@@ -43,7 +35,7 @@ std::vector<Vec3> directions() {
 class Occupied {
 public:
     Occupied(const std::vector<Vec3>& points, double cell)
-        : box_(bounding_box(points)), cell_(std::max(cell, longest_side(box_) / kMostViewCells)) {
+        : box_(bounding_box(points)), cell_(std::max(cell, longest_side(box_) / kViews.most_view_cells)) {
         std::size_t all = 1;
         for (std::size_t a = 0; a < 3; ++a) {
             count_[a] = std::ptrdiff_t((box_.max[int(a)] - box_.min[int(a)]) / cell_) + 1;
@@ -56,7 +48,7 @@ public:
     [[nodiscard]] double cell() const { return cell_; }
 
     [[nodiscard]] bool is_free(const Vec3& from, const Vec3& direction) const {
-        for (double t = kFirstStep;; ++t) {
+        for (double t = kViews.first_step;; ++t) {
             const std::ptrdiff_t at = index({from[0] + t * cell_ * direction[0], from[1] + t * cell_ * direction[1],
                                              from[2] + t * cell_ * direction[2]});
             if (at < 0) return true;
@@ -96,14 +88,14 @@ std::vector<Vec3> free_directions(const std::vector<Vec3>& points, double cell) 
             for (int a = 0; a < 3; ++a) from[a] += cells.sorted()[at][a] / double(end - begin);
         for (const Vec3& ray : rays)
             if (occupied.is_free(from, ray))
-                for (int a = 0; a < 3; ++a) sum[a] += ray[a] / kRays;
+                for (int a = 0; a < 3; ++a) sum[a] += ray[a] / kViews.rays;
         for (std::uint32_t at = begin; at < end; ++at) free[cells.order()[at]] = sum;
     });
     return free;
 }
 
 double share_free(const std::vector<Vec3>& points, const std::vector<Vec3>& directions, const CloudScale& scale) {
-    const Occupied occupied(points, kViewSpacings * apart(scale));
+    const Occupied occupied(points, kViews.view_spacings * apart(scale));
     std::vector<char> free(points.size());
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
         free[n] = directions[n] != Vec3{0, 0, 0} && occupied.is_free(points[n], directions[n]);
@@ -117,21 +109,21 @@ double share_free(const std::vector<Vec3>& points, const std::vector<Vec3>& dire
 Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run) {
     Orientation result;
     const double between = apart(scale);
-    const std::vector<Vec3> free = free_directions(points, kViewSpacings * between);
+    const std::vector<Vec3> free = free_directions(points, kViews.view_spacings * between);
     run.check();
     result.areas = areas_of(points, scale.spacing);
     result.normals.resize(points.size());
     for (std::size_t n = 0; n < points.size(); ++n)
-        if (std::sqrt(dot(free[n], free[n])) > kLeastFree) result.normals[n] = unit(free[n]);
-    WindingField coarse(indicator_lattice(points, cells_along(points, kCoarseSpacings * between)));
-    solve(coarse, points, result, kCyclesFromNothing);
+        if (std::sqrt(dot(free[n], free[n])) > kViews.least_free) result.normals[n] = unit(free[n]);
+    WindingField coarse(indicator_lattice(points, cells_along(points, kViews.coarse_spacings * between)));
+    solve(coarse, points, result, kIndicator.cycles_from_nothing);
     const double half = scale_to_half(coarse, points);
     for (double& area : result.areas) area *= half;
     const std::vector<char> turned = turn_layers(coarse, points, free, between, result, run);
     result.layered = std::size_t(std::count(turned.begin(), turned.end(), 1));
     result.indicator = make_indicator(coarse);
     run.check();
-    WindingField fine(indicator_lattice(points, cells_along(points, kFineSpacings * between)));
+    WindingField fine(indicator_lattice(points, cells_along(points, kViews.fine_spacings * between)));
     const double cell = fine.indicator().lattice.cell;
     // A view tells the side alone; which way the surface lies its neighbours know better.
     std::vector<double> screen(points.size());
@@ -141,12 +133,12 @@ Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& s
         const bool agrees = dot(falling, result.normals[n]) > 0;
         against += !agrees;
         if (agrees) result.normals[n] = falling;
-        screen[n] = agrees && !turned[n] ? kScreening * result.areas[n] / (cell * cell) : 0;
+        screen[n] = agrees && !turned[n] ? kViews.screening * result.areas[n] / (cell * cell) : 0;
     }
     result.turned = double(against) / double(points.size());
     fine.start_from(coarse.indicator());
     fine.screen(points, screen);
-    solve(fine, points, result, kCyclesFromNothing);
+    solve(fine, points, result, kIndicator.cycles_from_nothing);
     result.screened = make_indicator(fine);
     return result;
 }

@@ -6,14 +6,13 @@
 #include <cmath>
 #include <cstring>
 
+#include "cloud/orientation/heuristics.h"
 #include "cloud/orientation/lattice_kernel.h"
 
 namespace covol::cloud {
 namespace {
 
 constexpr int kCoarsening = 16;  // of the finest lattice, by halving
-constexpr int kSweeps = 1;       // before and after each correction
-constexpr int kCoarsestSweeps = 16;
 
 using Float4 = float __attribute__((vector_size(16)));
 
@@ -254,17 +253,17 @@ void WindingField::cycle(std::size_t n) {
     const Lattice& l = level.solution.lattice;
     std::vector<float>& u = level.solution.values;
     if (n + 1 == levels_.size()) {
-        for (int sweeps = 0; sweeps < kCoarsestSweeps; ++sweeps) sweep(l, u, level.right, level.screen);
+        for (int sweeps = 0; sweeps < kWinding.coarsest_sweeps; ++sweeps) sweep(l, u, level.right, level.screen);
         return;
     }
     Level& coarse = levels_[n + 1];
-    for (int sweeps = 0; sweeps < kSweeps; ++sweeps) sweep(l, u, level.right, level.screen);
+    for (int sweeps = 0; sweeps < kWinding.sweeps; ++sweeps) sweep(l, u, level.right, level.screen);
     find_residual(l, u, level.right, level.screen, level.residual);
     restrict_to(l, level.residual, coarse.solution.lattice, coarse.right);
     std::fill(coarse.solution.values.begin(), coarse.solution.values.end(), 0.0F);
     cycle(n + 1);
     prolong(coarse.solution.lattice, coarse.solution.values, l, u);
-    for (int sweeps = 0; sweeps < kSweeps; ++sweeps) sweep(l, u, level.right, level.screen);
+    for (int sweeps = 0; sweeps < kWinding.sweeps; ++sweeps) sweep(l, u, level.right, level.screen);
 }
 
 void WindingField::solve(const std::vector<Vec3>& points, const std::vector<Vec3>& vectors, int cycles) {

@@ -11,6 +11,7 @@
 #include "base/vector.h"
 #include "cloud/orientation/indicator.h"
 #include "cloud/surface/blend_kernel.h"
+#include "cloud/surface/heuristics.h"
 #include "cloud/surface/hold_topology.h"
 #include "cloud/surface/join_pieces.h"
 #include "cloud/surface/local_fit.h"
@@ -32,26 +33,6 @@ using cloud::Quadric;
 using openvdb::Coord;
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
-constexpr double kReachVoxels = 2.5;      // of a quadric, at least
-constexpr double kReachOfLeast = 1.25;    // of the smallest neighbourhood that tells of it
-constexpr double kReachOfRadius = 0.35;   // of the one that it was fitted to
-constexpr double kMostOfRadius = 0.8;     // beyond it the quadric was never fitted
-constexpr double kMostOfCurvature = 0.7;  // of the smallest radius of curvature
-constexpr double kLeastReachVoxels = 1.5;
-constexpr double kBesideOfLeast = 0.75;  // of the smallest neighbourhood: beyond it, sideways, there should be others
-constexpr double kBesideOfApart = 2;     // of what nodes are apart
-constexpr double kTrusted = 0.6;         // of the reach; beyond, the indicator takes over
-constexpr double kSlope = 0.4;           // of the indicator at the surface, per cell
-constexpr double kNodeVoxels = 0.75;     // distance of quadrics
-constexpr double kMostNoises = 3;        // that their nodes may be moved
-constexpr int kLevelSteps = 2;           // of Newton's method
-// Points on a piece of its own; at least as many as on a ball of the noise's radius, for noise makes such pieces of
-// nothing.
-constexpr double kLeastResting = 12, kLeastRestingShare = 1e-3;
-constexpr double kCoarseSpacings = 2.4;  // cells of an indicator for points with gaps
-constexpr double kFarSpacings = 3, kOpenShare = 0.05;
-constexpr double kLeastRestingOpen = 1e-2;  // of them, where they enclose nothing: the pieces are none of thin parts
-
 /// Quadrics where they act, sorted into cells.
 class Pieces {
 public:
@@ -60,10 +41,11 @@ public:
         for (const std::uint32_t n : cells_.order()) {
             const Quadric& q = quadrics_[n];
             sorted.push_back(q);
-            const double wanted =
-                std::max({kReachVoxels * h, kReachOfLeast * q.least_radius, kReachOfRadius * q.radius});
-            reach_.push_back(float(std::max(kLeastReachVoxels * h, std::min({wanted, kMostOfRadius * q.radius,
-                                                                             kMostOfCurvature / q.curvature()}))));
+            const double wanted = std::max(
+                {kBlend.reach_voxels * h, kBlend.reach_of_least * q.least_radius, kBlend.reach_of_radius * q.radius});
+            reach_.push_back(float(std::max(
+                kBlend.least_reach_voxels * h,
+                std::min({wanted, kBlend.most_of_radius * q.radius, kBlend.most_of_curvature / q.curvature()}))));
             longest_ = std::max(longest_, double(reach_.back()));
         }
         quadrics_ = std::move(sorted);
@@ -151,9 +133,9 @@ public:
             }
             double value = trust * own;
             if (trust < 1)
-                value +=
-                    (1 - trust) * std::clamp((0.5 - indicator_.inside(place(origin, at))) * indicator_.cell() / kSlope,
-                                             -limit, limit);
+                value += (1 - trust) *
+                         std::clamp((0.5 - indicator_.inside(place(origin, at))) * indicator_.cell() / kBlend.slope,
+                                    -limit, limit);
             leaf.setValueOn(openvdb::Index(at), float(value));
         }
     }
@@ -161,7 +143,7 @@ public:
 private:
     /// 1 below the share that is trusted, 0 from 1 on.
     static double faded(double share) {
-        const double beyond = std::clamp((share - kTrusted) / (1 - kTrusted), 0.0, 1.0);
+        const double beyond = std::clamp((share - kBlend.trusted) / (1 - kBlend.trusted), 0.0, 1.0);
         return 1 - beyond * beyond * (3 - 2 * beyond);
     }
 
@@ -171,8 +153,9 @@ private:
         const Quadric& q = pieces_[piece];
         const Vec3 to = cloud::minus(world, pieces_.foot(piece));
         const double up = dot(to, q.axes[2]);
-        const double expected = std::max(
-            {kBesideOfLeast * q.least_radius, kLeastReachVoxels * domain_.voxel_size, kBesideOfApart * q.apart});
+        const double expected =
+            std::max({kBlend.beside_of_least * q.least_radius, kBlend.least_reach_voxels * domain_.voxel_size,
+                      kBlend.beside_of_apart * q.apart});
         return std::sqrt(std::max(0.0, dot(to, to) - up * up)) / expected;
     }
 
@@ -269,16 +252,16 @@ struct TopologyOf {
 /// Whether some of the surface is far from all points.
 bool is_open(const FloatGrid& level_set, const CloudOrientation& cloud, const RunContext& run) {
     return measure_share_without_points(extract_mesh(level_set, {}, run), cloud.points,
-                                        kFarSpacings * cloud.scale.spacing, run) > kOpenShare;
+                                        kBlend.far_spacings * cloud.scale.spacing, run) > kBlend.open_share;
 }
 
 /// The points where the indicator has its surface, as far as noise can have brought them from there: else there would
 /// be nodes all through the layer that they fill.
 OrientedCloud near_level(OrientedCloud points, const CloudOrientation& cloud) {
-    const double most = kMostNoises * cloud.scale.noise;
+    const double most = kBlend.most_noises * cloud.scale.noise;
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
         Vec3 place = points.points[n];
-        for (int step = 0; step < kLevelSteps; ++step) {
+        for (int step = 0; step < kBlend.level_steps; ++step) {
             const auto [inside, gradient] = cloud.orientation.indicator->at(place);
             const double steep = dot(gradient, gradient);
             if (!(steep > 0)) return;
@@ -292,8 +275,8 @@ OrientedCloud near_level(OrientedCloud points, const CloudOrientation& cloud) {
 
 std::vector<Quadric> quadrics_of(const CloudOrientation& cloud, double h, CloudReport& report, const RunContext& run) {
     const OrientedCloud points{cloud.points, cloud.orientation.normals, std::vector<float>(cloud.points.size(), 1.0F)};
-    std::vector<Quadric> quadrics =
-        cloud::quadrics_over(near_level(points, cloud), points, kNodeVoxels * h, cloud.scale, report.bare_nodes, run);
+    std::vector<Quadric> quadrics = cloud::quadrics_over(near_level(points, cloud), points, kBlend.node_voxels * h,
+                                                         cloud.scale, report.bare_nodes, run);
     std::vector<double> noise, radius;
     for (const Quadric& q : quadrics) {
         noise.push_back(q.noise);
@@ -328,10 +311,10 @@ FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cl
             const Pieces pieces(quadrics_of(cloud, h, report, run), h);
             result = level_set_of(pieces, *orientation.indicator, domain, run);
         }
-        const double share = cloud.encloses ? kLeastRestingShare : kLeastRestingOpen,
+        const double share = cloud.encloses ? kBlend.least_resting_share : kBlend.least_resting_open,
                      noises = report.noise / report.spacing;
-        const auto least =
-            std::size_t(std::max({kLeastResting, share * double(cloud.points.size()), 4 * M_PI * noises * noises}));
+        const auto least = std::size_t(
+            std::max({kBlend.least_resting, share * double(cloud.points.size()), 4 * M_PI * noises * noises}));
         report.dropped_pieces = detail::drop_bare_pieces(*result, cloud.points, least);
         // Before the indicator's topology is held, for it may have lost torn parts, and after, for it may tear others.
         const auto join = [&] {
@@ -346,7 +329,7 @@ FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cl
         // Where the points leave gaps, what surrounds a gap makes small handles on a lattice as fine as they are.
         if (topology.own.all > 1 && !orientation.screened && is_open(*result, cloud, run))
             topology.hold(*result,
-                          *cloud::indicator_of(cloud.points, orientation, kCoarseSpacings * cloud.scale.spacing),
+                          *cloud::indicator_of(cloud.points, orientation, kBlend.coarse_spacings * cloud.scale.spacing),
                           report);
         if (topology.own.pieces > 1) join();
         result = start_from_grid(domain, *result, run);

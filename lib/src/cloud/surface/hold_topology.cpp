@@ -11,12 +11,12 @@
 #include <queue>
 #include <vector>
 
+#include "cloud/surface/heuristics.h"
+
 namespace covol::cloud {
 namespace {
 
 using openvdb::Coord;
-
-constexpr double kHeldVoxels = 0.1;  // from the surface, of a voxel that keeps its sign
 
 /// The 26 neighbours of a voxel, one bit each, and which of them are neighbours of each other.
 struct Neighbourhood {
@@ -169,7 +169,7 @@ std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target) {
             queue.push({depth_at.getValue(beside), beside});
         }
     }
-    const auto small = float(kHeldVoxels * target.voxelSize()[0]);
+    const auto small = float(kHold.held_voxels * target.voxelSize()[0]);
     for (auto value = kept.cbeginValueOn(); value; ++value) {
         const Coord at = value.getCoord();
         target_at.setValue(at, target_at.getValue(at) < 0 ? small : -small);

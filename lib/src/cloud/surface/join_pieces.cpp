@@ -10,6 +10,7 @@
 
 #include "base/median.h"
 #include "base/vector.h"
+#include "cloud/surface/heuristics.h"
 #include "covol/mesh.h"
 #include "covol/surface.h"
 #include "mesh/triangle.h"
@@ -18,12 +19,6 @@
 
 namespace covol::cloud {
 namespace {
-
-constexpr double kSmall = 0.1;     // of the largest piece's volume
-constexpr double kMostGap = 4;     // of what points are apart
-constexpr double kNear = 1.0;      // of it: a place of the gap without a point as near is one where the surface ends
-constexpr double kAround = 1;      // of it: points that tell how thick the part is
-constexpr double kThickest = 0.5;  // of it: what is thicker does not tear
 
 struct Gap {
     double length = std::numeric_limits<double>::infinity();
@@ -106,8 +101,8 @@ void fill(FloatGrid& level_set, const Gap& gap, double radius) {
 
 std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, double apart, const RunContext& run) {
     std::vector<Piece> pieces = pieces_of(extract_mesh(level_set, {}, run));
-    const auto first_small = std::find_if(pieces.begin(), pieces.end(),
-                                          [&](const Piece& p) { return p.volume < kSmall * pieces.front().volume; });
+    const auto first_small = std::find_if(
+        pieces.begin(), pieces.end(), [&](const Piece& p) { return p.volume < kJoin.small * pieces.front().volume; });
     if (first_small == pieces.end()) return 0;
     std::vector<Vec3> large;
     for (auto piece = pieces.begin(); piece != first_small; ++piece)
@@ -122,7 +117,8 @@ std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, d
     const auto goes_on = [&](const Gap& gap) {
         const int steps = 1 + int(2 * gap.length / voxel);
         for (int n = 0; n <= steps; ++n)
-            if (!cells.any_within(plus(gap.from, times(double(n) / steps, minus(gap.to, gap.from))), kNear * apart))
+            if (!cells.any_within(plus(gap.from, times(double(n) / steps, minus(gap.to, gap.from))),
+                                  kJoin.near * apart))
                 return false;
         return true;
     };
@@ -132,18 +128,18 @@ std::size_t join_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, d
         const auto next = std::min_element(small.begin(), small.end(),
                                            [](const Piece& a, const Piece& b) { return a.gap.length < b.gap.length; });
         const Gap gap = next->gap;
-        if (!(gap.length <= kMostGap * apart)) break;
+        if (!(gap.length <= kJoin.most_gap * apart)) break;
         if (!goes_on(gap)) {
             next->gap = {};  // it may be joined to one that is joined later
             continue;
         }
         std::vector<double> around;
-        cells.find(box_around(gap, kAround * apart), ranges);
+        cells.find(box_around(gap, kJoin.around * apart), ranges);
         for (const PointCells::Range& range : ranges)
             for (std::uint32_t n = range.begin; n < range.end; ++n)
-                if (const double off = std::sqrt(squared_from(gap, cells.sorted()[n])); off < kAround * apart)
+                if (const double off = std::sqrt(squared_from(gap, cells.sorted()[n])); off < kJoin.around * apart)
                     around.push_back(off);
-        fill(level_set, gap, std::max(std::min(median(std::move(around)), kThickest * apart), voxel));
+        fill(level_set, gap, std::max(std::min(median(std::move(around)), kJoin.thickest * apart), voxel));
         ++joined;
         const detail::KdTree own(std::move(next->surface));
         small.erase(next);

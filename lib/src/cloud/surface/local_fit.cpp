@@ -10,34 +10,11 @@
 #include "base/median.h"
 #include "base/vector.h"
 #include "cloud/surface/fit_kernel.h"
+#include "cloud/surface/heuristics.h"
 #include "points/point_cells.h"
 
 namespace covol::cloud {
 namespace {
-
-constexpr int kLevels = 9;
-constexpr double kGrowth = 1.4142135623730951;
-constexpr double kFirstSpacings = 2.0;  // radius of the first: about 12 points
-constexpr double kThinnedShare = 0.2;   // of the radius: points closer are averaged first
-constexpr std::size_t kLeastPoints = 9;
-constexpr double kSheetShare = 0.3;     // noise, of the radius; points that fill a ball have 0.45
-constexpr double kAgreement = 1.5;      // standard deviations; 1 to 2 change the errors by a tenth
-constexpr double kMisfitGrowth = 1.13;  // beyond it the fit itself is off
-constexpr double kRidge = 1e-4;
-constexpr double kSheetHeight = 0.15;  // of the radius: what is farther off the plane may be another sheet
-constexpr double kMostHeight = 0.4;    // of the radius: a foot farther from its node is no sheet's
-constexpr double kLeastCosine = 0.4;   // between the normal as it was oriented and as it is fitted
-// standard deviation along any direction, of the radius; where points fill the disc 0.35
-constexpr double kLeastSpread = 0.16;
-// of the points' mean, of the radius: half a disc has 0.29, what lies beyond a sheet's end more
-constexpr double kMostOffCentre = 0.33;
-constexpr double kMostGrowth = 2.9;   // of the radius, until the points are a sheet
-constexpr double kLeastMajority = 5;  // points
-constexpr double kMostUnbent = 0.5;   // of the noise, that it is taken to have lowered the points
-constexpr double kWidest = 2;         // of the nodes' cells: the first are so large
-constexpr double kWideOfApart = 7;    // the radius, of what its nodes are apart: there need not be more
-constexpr double kSameSheet = 0.7;    // cosine of the normals
-constexpr double kLone = 2.5;  // least radii, beside quadrics of points that lie closer; 2 to 4 give the same surfaces
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
@@ -92,7 +69,7 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
             near.add(dot(to, axes[0]) / r, dot(to, axes[1]) / r, dot(to, axes[2]) / r, double(level.counts[n]));
         }
     Fit result;
-    if (near.size < kLeastPoints) return result;
+    if (near.size < kFit.least_points) return result;
     near.fill_up();
     const FitSums sums = fit_sums(near);
     constexpr int kMoment[6][6] = {{0, 1, 2, 3, 4, 5},    {1, 3, 4, 6, 7, 8},    {2, 4, 5, 7, 8, 9},
@@ -102,13 +79,13 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
         for (int b = 0; b < 6; ++b) m(a, b) = sums.moments[kMoment[a][b]];
     const Vector6 right = Eigen::Map<const Vector6>(sums.heights);
     const double sum = sums.moments[0];
-    if (std::hypot(m(0, 1), m(0, 2)) > kMostOffCentre * sum) return result;
+    if (std::hypot(m(0, 1), m(0, 2)) > kFit.most_off_centre * sum) return result;
     // Narrow bodies seen from the side: across them the quadric knows nothing beyond its points.
     const double uu = m(1, 1) / sum - m(0, 1) * m(0, 1) / (sum * sum),
                  vv = m(2, 2) / sum - m(0, 2) * m(0, 2) / (sum * sum),
                  uv = m(1, 2) / sum - m(0, 1) * m(0, 2) / (sum * sum);
-    if (0.5 * (uu + vv) - std::hypot(0.5 * (uu - vv), uv) < kLeastSpread * kLeastSpread) return result;
-    for (int d = 3; d < 6; ++d) m(d, d) += kRidge * sum;
+    if (0.5 * (uu + vv) - std::hypot(0.5 * (uu - vv), uv) < kFit.least_spread * kFit.least_spread) return result;
+    for (int d = 3; d < 6; ++d) m(d, d) += kFit.ridge * sum;
     const Eigen::LDLT<Matrix6> solver(m);
     if (solver.info() != Eigen::Success || !solver.isPositive()) return result;
     const Vector6 x = solver.solve(right);
@@ -127,7 +104,7 @@ Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes,
 /// Whether most points beside this one on its own sheet have a normal like it; -1: too few to tell.
 int is_of_majority(const Level& level, const Vec3& origin, const Vec3& normal,
                    const std::vector<PointCells::Range>& ranges) {
-    const double r2 = level.radius * level.radius, height = kSheetHeight * level.radius;
+    const double r2 = level.radius * level.radius, height = kFit.sheet_height * level.radius;
     double same = 0, opposite = 0;
     for (const PointCells::Range& range : ranges)
         for (std::uint32_t n = range.begin; n < range.end; ++n) {
@@ -135,7 +112,7 @@ int is_of_majority(const Level& level, const Vec3& origin, const Vec3& normal,
             if (dot(to, to) >= r2 || std::abs(dot(to, normal)) > height) continue;
             (dot(level.normals[n], normal) > 0 ? same : opposite) += double(level.counts[n]);
         }
-    return same + opposite < kLeastMajority ? -1 : same >= opposite;
+    return same + opposite < kFit.least_majority ? -1 : same >= opposite;
 }
 
 Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& normal, Scratch& scratch) {
@@ -154,9 +131,9 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
             best.least_radius = level.radius;
         }
         if (majority == 0) return best;
-        if (seen.empty() && majority >= 0 && level.radius > kMostGrowth * best.least_radius) return best;
+        if (seen.empty() && majority >= 0 && level.radius > kFit.most_growth * best.least_radius) return best;
         Fit now = fit(level, point, best.axes, scratch);
-        if (!now.good || now.misfit > kSheetShare * level.radius) {
+        if (!now.good || now.misfit > kFit.sheet_share * level.radius) {
             if (seen.empty()) continue;
             break;
         }
@@ -174,11 +151,12 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
                 best.axes = before;
         }
         const bool agrees = std::all_of(seen.begin(), seen.end(), [&](const Seen& s) {
-            return std::abs(s.height - now.c[0]) <= kAgreement * s.deviation && now.misfit <= kMisfitGrowth * s.misfit;
+            return std::abs(s.height - now.c[0]) <= kFit.agreement * s.deviation &&
+                   now.misfit <= kFit.misfit_growth * s.misfit;
         });
         if (!agrees) break;
         if (seen.empty() &&
-            (std::abs(now.c[0]) > kMostHeight * level.radius || dot(best.axes[2], normal) < kLeastCosine))
+            (std::abs(now.c[0]) > kFit.most_height * level.radius || dot(best.axes[2], normal) < kFit.least_cosine))
             return best;
         if (seen.empty()) best.noise = now.noise;  // wider, it has the surface's own shape in it
         seen.push_back({now.c[0], now.deviation, now.misfit});
@@ -187,7 +165,7 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
     }
     // Noise along the surface brings points here from where it lies lower, or higher: their mean height is off by half
     // the variance times the Laplacian.
-    const double lower = best.noise * best.noise * (best.c[3] + best.c[5]), most = kMostUnbent * best.noise;
+    const double lower = best.noise * best.noise * (best.c[3] + best.c[5]), most = kFit.most_unbent * best.noise;
     best.c[0] -= std::clamp(lower, -most, most);
     return best;
 }
@@ -196,13 +174,13 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
 class Fitter {
 public:
     Fitter(const OrientedCloud& cloud, double spacing, const RunContext& run) {
-        levels_.reserve(kLevels);
+        levels_.reserve(kFit.levels);
         OrientedCloud last;
-        double radius = kFirstSpacings * spacing;
-        for (int n = 0; n < kLevels; ++n, radius *= kGrowth) {
+        double radius = kFit.first_spacings * spacing;
+        for (int n = 0; n < kFit.levels; ++n, radius *= kFit.growth) {
             run.check();
             // Averages of averages cost little and miss nothing that a radius this large could see.
-            last = thinned(n == 0 ? cloud : last, kThinnedShare * radius);
+            last = thinned(n == 0 ? cloud : last, kFit.thinned_share * radius);
             levels_.emplace_back(last, radius);
         }
     }
@@ -243,7 +221,7 @@ OrientedCloud without_covered(const OrientedCloud& nodes, const std::vector<Quad
                 for (std::uint32_t at = range.begin; at < range.end && !covered[n]; ++at) {
                     const Quadric& q = quadrics[cells.order()[at]];
                     const Vec3 to = minus(p, cells.sorted()[at]);
-                    covered[n] = dot(to, to) < q.apart * q.apart && dot(nodes.normals[n], q.axes[2]) > kSameSheet;
+                    covered[n] = dot(to, to) < q.apart * q.apart && dot(nodes.normals[n], q.axes[2]) > kFit.same_sheet;
                 }
         }
     });
@@ -274,13 +252,13 @@ std::vector<Quadric> without_lone(const std::vector<Quadric>& quadrics) {
         std::vector<PointCells::Range> ranges;
         for (std::size_t n = part.begin(); n < part.end(); ++n) {
             const double r = least[n];
-            if (r <= kLone * usual) continue;
+            if (r <= kFit.lone * usual) continue;
             const Vec3& p = feet[n];
             cells.find(p, r, ranges);
             for (const PointCells::Range& range : ranges)
                 for (std::uint32_t at = range.begin; at < range.end && !lone[n]; ++at) {
                     const Vec3 to = minus(cells.sorted()[at], p);
-                    lone[n] = dot(to, to) < r * r && kLone * least[cells.order()[at]] < r;
+                    lone[n] = dot(to, to) < r * r && kFit.lone * least[cells.order()[at]] < r;
                 }
         }
     });
@@ -379,7 +357,7 @@ std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCl
     const Fitter fitter(cloud, scale.spacing, run);
     std::vector<Quadric> all;
     bare = 0;
-    for (const double times : {kWidest, 1.0}) {
+    for (const double times : {kFit.widest, 1.0}) {
         // Where noise is less, wide neighbourhoods are those of flat parts: they tell less about what lies beside
         // these.
         if (times > 1 && scale.noise < scale.spacing) continue;
@@ -387,7 +365,7 @@ std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCl
         OrientedCloud nodes = thinned(places, apart);
         if (!all.empty()) nodes = without_covered(nodes, all);
         std::vector<Quadric> found = fitter.fit(nodes, run);
-        const double least = times > 1 ? kWideOfApart * apart : 0;
+        const double least = times > 1 ? kFit.wide_of_apart * apart : 0;
         bare = std::size_t(std::count_if(found.begin(), found.end(), [](const Quadric& q) { return !(q.radius > 0); }));
         for (Quadric& q : found) {
             if (!(q.radius > least)) continue;

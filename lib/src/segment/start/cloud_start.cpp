@@ -5,17 +5,11 @@
 
 #include "distance/memory_need.h"
 #include "segment/fields.h"
+#include "segment/heuristics.h"
 #include "segment/start/starts.h"
 
 namespace covol::pipeline {
 namespace {
-
-constexpr double kReachSpacings = 3.0;    // that the start may lie off the points
-constexpr double kWarnDisagreeing = 0.1;  // of given normals
-// of the longest side, beyond the points: where they leave holes the surface bulges
-constexpr double kMarginShare = 0.1;
-// voxels that the surface may sink below its start where the points enclose nothing
-constexpr double kHoldDepth = 0.75;
 
 // Where a scan has no points its surface rests on nothing, and would slide along the walls that have some.
 FloatGridPtr raised(const FloatGrid& start, double depth) {
@@ -34,7 +28,7 @@ void tell_of_hints(Job& job, const HintsReport& hints) {
     job.choose("normals", normals ? "as given" : "by the sensor",
                number(std::round(1000 * hints.agree) / 10) + " % agree with the result" +
                    (hints.inward ? ", after all were turned over, for they pointed inwards" : ""));
-    if (1 - hints.agree > kWarnDisagreeing)
+    if (1 - hints.agree > kStarts.warn_disagreeing)
         job.warn(number(std::round(1000 * (1 - hints.agree)) / 10) + " % of the normals that are " +
                  (normals ? "given" : "made by the sensor") + " point to the wrong side");
 }
@@ -44,8 +38,8 @@ void tell_of_hints(Job& job, const HintsReport& hints) {
 void start_from_cloud(Job& job) {
     job.origin = StartOrigin::Cloud;
     job.options.evolve.follow = true;
-    job.report().domain =
-        job.domain_with_chosen_margin(kMarginShare * longest_side(bounding_box(job.points)) + kMarginVoxels * job.h());
+    job.report().domain = job.domain_with_chosen_margin(kStarts.margin_share * longest_side(bounding_box(job.points)) +
+                                                        kJob.margin_voxels * job.h());
     CloudReport& report = job.report().cloud;
     {
         Timed timed(job.report().seconds.tag);
@@ -58,7 +52,7 @@ void start_from_cloud(Job& job) {
             job.choose("attraction_range", number(range),
                        "the start touches the points, and where there are none nothing should pull");
         }
-        if (!report.encloses) job.obstacle = raised(*job.result.u, kHoldDepth * job.h());
+        if (!report.encloses) job.obstacle = raised(*job.result.u, kFlow.hold_depth * job.h());
         find_distance(job, tube_for_start(job));
     }
     const std::string how = report.encloses ? "; averaged within " + number(report.radius)

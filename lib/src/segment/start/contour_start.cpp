@@ -5,6 +5,7 @@
 #include "covol/error.h"
 #include "segment/automatic.h"
 #include "segment/fields.h"
+#include "segment/heuristics.h"
 #include "segment/start/starts.h"
 
 namespace covol::pipeline {
@@ -15,7 +16,7 @@ namespace {
 void carry_beyond_image(Job& job) {
     Domain& domain = job.report().domain;
     const WorldBox body = job.body()->box(), box = domain.world_box();
-    const int layers = int(kMarginVoxels);
+    const int layers = int(kJob.margin_voxels);
     for (int a = 0; a < 3; ++a) {
         if (body.min[a] < box.min[a]) domain.min[a] -= layers;
         if (body.max[a] > box.max[a]) domain.max[a] += layers;
@@ -34,7 +35,7 @@ const char* why_tag(const Job& job, const std::vector<Vec3>& loose) {
         if (job.body()->level(seed) < 0) return "an exterior seed lies inside the contours";
     // Between slices, and beyond the last, the body may be that wrong.
     const double far =
-        std::max(kTagAttractionVoxels * job.h(), job.guided() ? job.options.contours->slice_distance : 0.0);
+        std::max(kAutomatic.tag_attraction_voxels * job.h(), job.guided() ? job.options.contours->slice_distance : 0.0);
     for (const Vec3& point : loose)
         if (std::abs(job.body()->level(point)) > far) return "points lie far from the contours' body";
     return nullptr;
@@ -58,7 +59,7 @@ bool start_from_contours(Job& job) {
     job.choose("start", "contours", "the body between the contours; what inner contours enclose is outside");
     job.origin = StartOrigin::Contours;
     job.options.evolve.follow = true;
-    job.report().domain = job.domain_with_chosen_margin(2 * kMarginVoxels * job.h());
+    job.report().domain = job.domain_with_chosen_margin(2 * kJob.margin_voxels * job.h());
     if (!job.options.roi) carry_beyond_image(job);
     {
         Timed timed(job.report().seconds.tag);
@@ -66,7 +67,7 @@ bool start_from_contours(Job& job) {
     }
     if (job.guided() && job.uses_points() && !loose.empty()) correct_start(job);
     if (job.uses_points())
-        find_distance(job, std::max(job.attraction_range(), kMarginVoxels * job.h()) + band_slack(job));
+        find_distance(job, std::max(job.attraction_range(), kJob.margin_voxels * job.h()) + band_slack(job));
     return true;
 }
 

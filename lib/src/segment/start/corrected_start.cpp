@@ -3,12 +3,11 @@
 
 #include <algorithm>
 
+#include "segment/heuristics.h"
 #include "segment/start/starts.h"
 
 namespace covol::pipeline {
 namespace {
-
-constexpr double kRadiusSpacings = 2.0;  // a mark on a slice tells of the next one
 
 CorrectionOptions correction(const Job& job) {
     CorrectionOptions options = job.options.correction;
@@ -16,7 +15,7 @@ CorrectionOptions correction(const Job& job) {
     double least = kCorrectionVoxels * job.h();
     if (job.image != nullptr) {
         const Vec3& spacing = job.image->geometry().spacing;
-        least = std::max(least, kRadiusSpacings * *std::max_element(spacing.begin(), spacing.end()));
+        least = std::max(least, kStarts.radius_spacings * *std::max_element(spacing.begin(), spacing.end()));
     }
     options.least_radius = least;
     return options;
@@ -43,7 +42,7 @@ void correct_start(Job& job) {
 
 void start_from_corrected_guess(Job& job) {
     job.origin = StartOrigin::Corrected;
-    job.report().domain = job.domain_with_chosen_margin(2 * kMarginVoxels * job.h());
+    job.report().domain = job.domain_with_chosen_margin(2 * kJob.margin_voxels * job.h());
     Timed timed(job.report().seconds.tag);
     job.options.correction = correction(job);
     const FloatGridPtr guess = start_grid(*job.options.guess, job.domain(), job.run);

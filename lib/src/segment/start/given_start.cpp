@@ -8,6 +8,7 @@
 #include "segment/automatic.h"
 #include "segment/doubts.h"
 #include "segment/fields.h"
+#include "segment/heuristics.h"
 #include "segment/start/starts.h"
 
 namespace covol::pipeline {
@@ -53,7 +54,7 @@ double known_area(const Start& start) {
 void start_as_given(Job& job) {
     job.origin = StartOrigin::Given;
     job.options.evolve.follow = true;
-    job.report().domain = job.domain_with_chosen_margin(2 * kMarginVoxels * job.h());
+    job.report().domain = job.domain_with_chosen_margin(2 * kJob.margin_voxels * job.h());
     detail::require_band_memory(known_area(job.options.start), job.h(), "segment", job.run);
     {
         Timed timed(job.report().seconds.tag);
@@ -62,7 +63,8 @@ void start_as_given(Job& job) {
     const bool is_rough = job.options.start.kind == Start::Kind::Sphere || job.options.start.kind == Start::Kind::Box;
     if (is_rough) grow_to_edges(job);
     if (!job.uses_points()) return;
-    if (job.guided() && !is_rough && job.trusted.size() <= kMostGuessMarks && !misses_marks(job, *job.result.u)) {
+    if (job.guided() && !is_rough && job.trusted.size() <= kAutomatic.most_guess_marks &&
+        !misses_marks(job, *job.result.u)) {
         correct_start(job);
         job.on_surface = job.trusted;
         job.origin = StartOrigin::Guess;

@@ -1,13 +1,9 @@
 // A start inside an object grows to the object's edges where the image alone decides.
+#include "segment/heuristics.h"
 #include "segment/start/starts.h"
 #include "start/grow.h"
 
 namespace covol::pipeline {
-namespace {
-
-constexpr double kGrownDeltaVoxels = 0.1;
-
-}  // namespace
 
 // Where nothing is near, curvature would close the start before it meets an edge.
 void grow_to_edges(Job& job) {
@@ -20,9 +16,9 @@ void grow_to_edges(Job& job) {
     job.origin = StartOrigin::Grown;
     job.result.u = grown.level_set;
     if (job.report().automatic.count("delta") == 0) return;
-    const double delta = kGrownDeltaVoxels * job.h();
+    const double delta = kStarts.grown_delta_voxels * job.h();
     job.options.evolve.delta = delta;
-    job.choose("delta", number(delta), number(kGrownDeltaVoxels) + " voxels: the start lies at the edges");
+    job.choose("delta", number(delta), number(kStarts.grown_delta_voxels) + " voxels: the start lies at the edges");
 }
 
 }  // namespace covol::pipeline

@@ -1,12 +1,11 @@
 // The start from few marks: the surface through them that bends least.
 #include "distance/memory_need.h"
 #include "segment/fields.h"
+#include "segment/heuristics.h"
 #include "segment/start/starts.h"
 
 namespace covol::pipeline {
 namespace {
-
-constexpr int kBeyondVoxels = 8;
 
 /// How well marks are placed, along the image's axes; without an image, of what the voxel size says.
 std::array<Vec3, 3> deviation(const Job& job) {
@@ -31,7 +30,7 @@ void start_from_guess(Job& job) {
     job.options.evolve.follow = true;
     const WorldBox box = bounding_box(job.points);
     const double extent = longest_side(box);
-    job.report().domain = job.domain_with_chosen_margin(0.25 * extent + kMarginVoxels * job.h());
+    job.report().domain = job.domain_with_chosen_margin(0.25 * extent + kJob.margin_voxels * job.h());
     double area = 0;  // of a ball of that size, at most
     for (int a = 0; a < 3; ++a) {
         const double u = box.max[(a + 1) % 3] - box.min[(a + 1) % 3], v = box.max[(a + 2) % 3] - box.min[(a + 2) % 3];
@@ -46,7 +45,8 @@ void start_from_guess(Job& job) {
     if (job.image != nullptr || job.options.roi) options.end = job.domain().world_box();
     // A body that the image cuts goes on beyond it: at the image's end itself its wall would be closed, and the image
     // asked about a cap. The clip at the end makes the cut.
-    if (job.image != nullptr && !job.options.roi) job.report().domain = widened(job.domain(), kBeyondVoxels);
+    if (job.image != nullptr && !job.options.roi)
+        job.report().domain = widened(job.domain(), kStarts.guess_beyond_voxels);
     {
         Timed timed(job.report().seconds.tag);
         Guess guess = guess_from_marks(job.domain(), job.points, options, job.report().guess, job.run);

@@ -1,4 +1,5 @@
 // The start from seeds alone; the image decides from there.
+#include "segment/heuristics.h"
 #include "segment/start/starts.h"
 
 namespace covol::pipeline {
@@ -6,7 +7,7 @@ namespace covol::pipeline {
 void start_from_seeds(Job& job) {
     job.origin = StartOrigin::Given;
     job.options.evolve.follow = true;
-    job.report().domain = job.domain_with_chosen_margin(2 * kMarginVoxels * job.h());
+    job.report().domain = job.domain_with_chosen_margin(2 * kJob.margin_voxels * job.h());
     {
         Timed timed(job.report().seconds.tag);
         job.result.u = covol::start_from_seeds(job.domain(), job.options.inside, job.options.outside, job.run);

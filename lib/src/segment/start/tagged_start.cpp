@@ -8,16 +8,11 @@
 #include "clip/open_ends.h"
 #include "covol/distance.h"
 #include "segment/fields.h"
+#include "segment/heuristics.h"
 #include "segment/start/starts.h"
 
 namespace covol::pipeline {
 namespace {
-
-constexpr double kCloseFromVoxels = 5.0;  // a tag distance beyond this starts from the closing instead
-constexpr double kCapDepthVoxels = 2.5;   // a mark on an end slice that lies deeper in the start is none of the outline
-// that a cut body goes on beyond the image, for a band at a right angle to the face
-constexpr double kBeyondVoxels = 6.0;
-constexpr double kMirrorSpacings = 4.0;  // of the points, beyond which none of them tells of a cut
 
 std::vector<Vec3> all_seeds(const Job& job) {
     std::vector<Vec3> seeds = job.options.exterior_seeds;
@@ -43,7 +38,8 @@ std::vector<Vec3> seeds_beyond(const Job& job, double D) {
 void choose_tag(Job& job) {
     Timed timed(job.report().seconds.tag);
     // Wide enough for any D below a quarter of the cloud: the final domain is made once D is known.
-    const Domain wide = job.domain_with_margin(0.25 * longest_side(bounding_box(job.points)) + kMarginVoxels * job.h());
+    const Domain wide =
+        job.domain_with_margin(0.25 * longest_side(bounding_box(job.points)) + kJob.margin_voxels * job.h());
     job.report().tag = choose_tag_distance(job.points, wide, all_seeds(job), job.run);
     job.options.tag_distance = job.report().tag.tag_distance;
     job.choose("tag_distance", number(job.report().tag.tag_distance), job.report().tag.reason);
@@ -56,9 +52,9 @@ void start_from_closing(Job& job, double D) {
     if (!closed) return;
     job.result.u = closed;
     job.options.evolve.follow = true;
-    job.choose(
-        "start", "closing",
-        "of the tagged surface by a ball of radius D, for D is wider than " + number(kCloseFromVoxels) + " voxels");
+    job.choose("start", "closing",
+               "of the tagged surface by a ball of radius D, for D is wider than " + number(kStarts.close_from_voxels) +
+                   " voxels");
 }
 
 // ---- bodies that the image cuts off -------------------------------------------------------------------------------
@@ -93,12 +89,12 @@ std::optional<CutBody> tag_with(Job& job, const std::vector<Vec3>& beyond) {
         body.tag.tag_distance = *job.options.tag_distance;
     } else {
         body.tag = choose_tag_distance(
-            closed, around(job.domain(), closed, 0.25 * longest_side(bounding_box(closed)) + kMarginVoxels * h),
+            closed, around(job.domain(), closed, 0.25 * longest_side(bounding_box(closed)) + kJob.margin_voxels * h),
             all_seeds(job), job.run);
         if (!body.tag.encloses) return {};
     }
     const double D = body.tag.tag_distance;
-    const Domain wide = around(job.domain(), closed, D + kMarginVoxels * h);
+    const Domain wide = around(job.domain(), closed, D + kJob.margin_voxels * h);
     const FloatGridPtr d = compute_distance(closed, wide, {D + band_slack(job)}, job.run).grid;
     BandResult tagged = tag_interior(*d, {D, all_seeds(job)}, job.run);
     if (tagged.report.leaks) return {};
@@ -121,7 +117,7 @@ bool encloses_alone(const Job& job) {
 /// Marks within the section on an end slice, and those that carry them on, say that the body goes on there; a surface
 /// they are not.
 void drop_cap_marks(Job& job, const std::vector<detail::ImageFace>& faces) {
-    const double deep = kCapDepthVoxels * job.h();
+    const double deep = kStarts.cap_depth_voxels * job.h();
     const auto level = job.result.u->getConstAccessor();
     const auto caps = [&](const Vec3& p) {
         const Vec3 at = job.domain().world_to_index(p);
@@ -150,16 +146,17 @@ bool start_from_cut_body(Job& job) {
     {
         Timed timed(job.report().seconds.tag);
         job.report().domain = job.domain_with_chosen_margin(0);
-        if (has_ends) body = tag_with(job, detail::carried_on(job.points, faces, kBeyondVoxels * job.h()));
+        if (has_ends)
+            body = tag_with(job, detail::carried_on(job.points, faces, kStarts.tagged_beyond_voxels * job.h()));
         if (!body) {
             how = "with their mirror image beyond the image's end they enclose a body";
             const std::vector<Vec3> images =
-                detail::mirrored(job.points, faces, kMirrorSpacings * measure_spacing(job.points).median);
+                detail::mirrored(job.points, faces, kStarts.mirror_spacings * measure_spacing(job.points).median);
             if (!images.empty() && !encloses_alone(job)) body = tag_with(job, images);
         }
         if (!body) return false;
         // At the image's end itself the flow would turn the wall to a right angle.
-        job.report().domain = widened(job.domain(), kBeyondVoxels);
+        job.report().domain = widened(job.domain(), kStarts.tagged_beyond_voxels);
         job.result.u = start_from_grid(job.domain(), *body->level_set, job.run);
         job.points.insert(job.points.end(), body->beyond.begin(), body->beyond.end());
         job.trusted.insert(job.trusted.end(), body->beyond.begin(), body->beyond.end());
@@ -183,14 +180,14 @@ void start_by_tagging(Job& job) {
     if (start_from_cut_body(job)) return;
     if (is_automatic) choose_tag(job);
     const double D = *job.options.tag_distance;
-    job.report().domain = job.domain_with_chosen_margin(D + kMarginVoxels * job.h());
+    job.report().domain = job.domain_with_chosen_margin(D + kJob.margin_voxels * job.h());
     find_distance(job, D + band_slack(job), D);
     Timed timed(job.report().seconds.tag);
     BandResult tagged = tag_interior(*job.result.distance, {D, seeds_beyond(job, D)}, job.run);
     job.report().band = tagged.report;
     job.result.u = tagged.grid;
     if (tagged.report.leaks) job.run.warn(tagged.report.leak());
-    if (D > kCloseFromVoxels * job.h()) start_from_closing(job, D);
+    if (D > kStarts.close_from_voxels * job.h()) start_from_closing(job, D);
     job.report().tag.tag_distance = D;
 }
 

@@ -1,0 +1,40 @@
+#pragma once
+// Heuristic constants: thresholds, factors and counts that were chosen by judgement or measurement and change results.
+// Each folder keeps its own in heuristics.h, one struct for each step; docs/heuristics.md shows what half and twice of
+// each does.
+//
+// In the build that measures this (-DCOVOL_SENSITIVITY=ON, never installed) each is multiplied at start-up by what the
+// environment says: COVOL_SCALE="stray.far=2,local_fit.ridge=0.5".
+#ifdef COVOL_SENSITIVITY
+#include <algorithm>
+#include <cmath>
+#include <type_traits>
+
+#define COVOL_HEURISTICS inline const
+#else
+#define COVOL_HEURISTICS inline constexpr
+#endif
+
+namespace covol {
+
+#ifdef COVOL_SENSITIVITY
+/// The factor that COVOL_SCALE has for the name, else 1.
+[[nodiscard]] double heuristic_scale(const char* name);
+
+/// Counts are rounded, and at least 1.
+template <typename T>
+[[nodiscard]] T heuristic(const char* name, T value) {
+    const double scaled = heuristic_scale(name) * double(value);
+    if constexpr (std::is_integral_v<T>)
+        return T(std::max(1LL, std::llround(scaled)));
+    else
+        return T(scaled);
+}
+#else
+template <typename T>
+[[nodiscard]] constexpr T heuristic(const char* /*name*/, T value) {
+    return value;
+}
+#endif
+
+}  // namespace covol

@@ -1,0 +1,227 @@
+#pragma once
+// The heuristic constants of this folder: docs/heuristics.md shows what half and twice of each does.
+#include <cstddef>
+
+#include "base/heuristic.h"
+
+namespace covol {
+
+/// Spacing and noise of a cloud from quadrics through neighbourhoods that grow: cloud_scale.cpp.
+struct CloudScaleHeuristics {
+    /// [points] Places whose neighbourhoods are looked at; the medians are theirs.
+    std::size_t samples = heuristic("cloud_scale.samples", 2000);
+    /// [points] Fewest in a neighbourhood that a quadric (6 unknowns) is fitted to.
+    std::size_t least = heuristic("cloud_scale.least", 12);
+    /// [count] Most radii that are tried.
+    int radii = heuristic("cloud_scale.radii", 14);
+    /// [ratio] Of a radius to the one before: each neighbourhood has twice the points.
+    double growth = heuristic("cloud_scale.growth", 1.4142135623730951);
+    /// [median distances to the nearest point] The first radius.
+    double first_spacings = heuristic("cloud_scale.first_spacings", 3.0);
+    /// [radii] Standard deviation from the quadric below which the neighbourhood is a sheet; points that fill a ball
+    /// have 0.45.
+    double sheet = heuristic("cloud_scale.sheet", 0.15);
+    /// [ratio] Growth of that deviation, in radii, at which larger neighbourhoods are given up.
+    double worse = heuristic("cloud_scale.worse", 1.05);
+};
+COVOL_HEURISTICS CloudScaleHeuristics kCloudScale{};
+
+/// Points that lie on no sheet: stray.cpp.
+struct StrayHeuristics {
+    /// [points] Nearest ones that tell how lonely a point is and what sheet it is on.
+    std::size_t neighbours = heuristic("stray.neighbours", 8);
+    /// [points] That the usual distance to the last of them is the median of.
+    std::size_t samples = heuristic("stray.samples", 20000);
+    /// [noises] Least edge of the cells they are searched in: a layer as thick as several spacings has few in a cell of
+    /// a spacing.
+    double cell_noises = heuristic("stray.cell_noises", 0.5);
+    /// [median distances to the last neighbour] A last neighbour farther away makes a point lonely.
+    double far = heuristic("stray.far", 2.5);
+    /// [distances to the last neighbour] Deviation of the neighbours from their plane, or of the point, from which on a
+    /// lonely point is on no sheet.
+    double off_plane = heuristic("stray.off_plane", 0.25);
+};
+COVOL_HEURISTICS StrayHeuristics kStray{};
+
+/// The lattice of the indicator function: indicator.cpp.
+struct IndicatorHeuristics {
+    /// [longest sides] Of the lattice around the points.
+    double beyond = heuristic("indicator.beyond", 0.2);
+    /// [cells] Fewest along the longest side.
+    int least_cells = heuristic("indicator.least_cells", 48);
+    /// [cells] Most along the longest side: memory and time.
+    int most_cells = heuristic("indicator.most_cells", 192);
+    /// [V-cycles] Of multigrid where nothing is known yet.
+    int cycles_from_nothing = heuristic("indicator.cycles_from_nothing", 8);
+};
+COVOL_HEURISTICS IndicatorHeuristics kIndicator{};
+
+/// Multigrid for the Poisson equation of the indicator: winding_field.cpp.
+struct WindingFieldHeuristics {
+    /// [sweeps] Of Gauss-Seidel before and after each correction.
+    int sweeps = heuristic("winding_field.sweeps", 1);
+    /// [sweeps] On the coarsest lattice.
+    int coarsest_sweeps = heuristic("winding_field.coarsest_sweeps", 16);
+};
+COVOL_HEURISTICS WindingFieldHeuristics kWinding{};
+
+/// Normals that agree with their indicator function: orientation.cpp. Hou et al., Iterative Poisson surface
+/// reconstruction (iPSR), ACM Trans. Graph. 41(4), 2022, has the iteration; patches, tries and doubts are ours.
+struct OrientationHeuristics {
+    /// [cells] Edge of the patches over which the indicator is averaged.
+    double patch_cells = heuristic("orientation.patch_cells", 2);
+    /// [indicator] Distance from 1/2 of a patch's mean from which on it may be turned.
+    double patch_off = heuristic("orientation.patch_off", 0.12);
+    /// [rounds] Of turning patches.
+    int patch_rounds = heuristic("orientation.patch_rounds", 4);
+    /// [V-cycles] Of multigrid after each turn of patches.
+    int patch_cycles = heuristic("orientation.patch_cycles", 2);
+    /// [iterations] Of all normals once patches were turned.
+    int after_turning = heuristic("orientation.after_turning", 3);
+    /// [share of the points] In patches that stay turned: fewer, and those left may turn to and fro.
+    double few_stayed = heuristic("orientation.few_stayed", 0.002);
+    /// [passes] Of smoothing the density whose gradient is the first guess.
+    int first_passes = heuristic("orientation.first_passes", 12);
+    /// [1 - cosine] Mean change of the normals at which the iteration ends.
+    double steady = heuristic("orientation.steady", 1e-4);
+    /// [indicator] At a point beyond which another part encloses it already; noise brings points there that are none of
+    /// these.
+    double enclosed = heuristic("orientation.enclosed", 0.9);
+    /// [indicator] The same where more noise is allowed for.
+    double surely_enclosed = heuristic("orientation.surely_enclosed", 1.2);
+    /// [V-cycles] Of multigrid in an iteration.
+    int cycles = heuristic("orientation.cycles", 1);
+    /// [V-cycles] Of multigrid in the last one.
+    int last_cycles = heuristic("orientation.last_cycles", 4);
+    /// [spacings] Cell of the finest lattice: smaller ones let single points turn, larger ones lose thin parts.
+    double cell_spacings = heuristic("orientation.cell_spacings", 0.8);
+    /// [noises] The same, at least.
+    double cell_noises = heuristic("orientation.cell_noises", 1.0);
+    /// [spacings] Smallest cell of any try.
+    double least_spacings = heuristic("orientation.least_spacings", 0.5);
+    /// [indicator] That its mean over the points may differ from 1/2 without doubt.
+    double off_half = heuristic("orientation.off_half", 0.02);
+    /// [ratio] Of what is beyond that, against the share of normals that turned, among tries: walls that run into each
+    /// other turn less than those that waver.
+    double off_weight = heuristic("orientation.off_weight", 2);
+    /// [points] That iterate, on the surface in the square of a lattice's cell.
+    double sampled_per_cell = heuristic("orientation.sampled_per_cell", 4);
+    /// [spacings] Edge of the cells that those are taken from.
+    double sample_spacings = heuristic("orientation.sample_spacings", 4);
+    /// [spacings] Noise below which the nearest points tell the sheet that a point is on.
+    double sharp = heuristic("orientation.sharp", 0.2);
+    /// [rounds] Of leaving out stray points.
+    int stray_rounds = heuristic("orientation.stray_rounds", 3);
+    /// [share of the points] That a round has to leave out for another one.
+    double many_stray = heuristic("orientation.many_stray", 0.005);
+    /// [share of the points] Of given normals with opposite ones beside them; good ones have less than 0.001 without
+    /// noise and 0.005 at any.
+    double few_torn = heuristic("orientation.few_torn", 0.002);
+    /// [share of the points] Of given normals against an orientation that settled; those of which a part is turned as a
+    /// whole have more than 0.1.
+    double contradicted = heuristic("orientation.contradicted", 0.03);
+    /// [share of the points] Doubt below which points enclose a solid: of closed shapes up to 0.013, of scans of one
+    /// side from 0.026 to 0.19.
+    double settled = heuristic("orientation.settled", 0.014);
+    /// [share of the area] Without points, below which they enclose one all the same: of closed shapes less than 0.01,
+    /// of scans of one side 0.14 to 0.4.
+    double bare = heuristic("orientation.bare", 0.05);
+    /// [spacings or noises] Distance to the nearest point from which on the surface is bare.
+    double bare_reach = heuristic("orientation.bare_reach", 2);
+};
+COVOL_HEURISTICS OrientationHeuristics kOrientation{};
+
+/// Normals and sensors of the file, checked: given_sides.cpp.
+struct GivenSidesHeuristics {
+    /// [share of the normals] That turn of an orientation beyond doubt.
+    double few_turned = heuristic("given_sides.few_turned", 0.002);
+    /// [share of the points] Fewest with a normal or sensor for them to be used.
+    double least_told = heuristic("given_sides.least_told", 0.5);
+    /// [share of the normals] That the other half has to foresee; of normals without a meaning it is half.
+    double least_foreseen = heuristic("given_sides.least_foreseen", 0.65);
+    /// [share of the points] That their sensor has to see: a body hides at least half of itself from a wrong place.
+    double least_free_views = heuristic("given_sides.least_free_views", 0.7);
+    /// [spacings or noises] Cells of the lattice on which points judge each other: about four points each.
+    double vote_spacings = heuristic("given_sides.vote_spacings", 2);
+    /// [rounds] Of turning normals that the others contradict.
+    int turns = heuristic("given_sides.turns", 3);
+    /// [indicator's step over a cell] Slope from which on the indicator contradicts a normal.
+    double speaks_against = heuristic("given_sides.speaks_against", 0.1);
+    /// [rounds] Of smoothing normals that noise has mixed.
+    int smoothings = heuristic("given_sides.smoothings", 2);
+    /// [points] Neighbours whose normals are compared.
+    std::size_t beside = heuristic("given_sides.beside", 8);
+    /// [sine] Of a neighbour's height over the tangent plane, below which both are of one sheet.
+    double flat = heuristic("given_sides.flat", 0.3);
+    /// [cosine] Between normals of one sheet that is torn there.
+    double opposite = heuristic("given_sides.opposite", -0.5);
+    /// [noises] Radius of the neighbourhood that a sensor's plane is fitted to.
+    double plane_noises = heuristic("given_sides.plane_noises", 4);
+    /// [points] Fewest in it.
+    double least_neighbours = heuristic("given_sides.least_neighbours", 12);
+    /// [points] Most in it.
+    double most_neighbours = heuristic("given_sides.most_neighbours", 100);
+};
+COVOL_HEURISTICS GivenSidesHeuristics kGivenSides{};
+
+/// Clouds of one side, by where each point can be seen from: views.cpp.
+struct ViewsHeuristics {
+    /// [rays] From each cell, evenly over the sphere.
+    int rays = heuristic("views.rays", 96);
+    /// [cells] Along the longest side: memory.
+    int most_view_cells = heuristic("views.most_view_cells", 256);
+    /// [cells] Start of a ray: beyond the point's own sheet.
+    double first_step = heuristic("views.first_step", 2.5);
+    /// [spacings or noises] Edge of the cells that stop a view: about four points each.
+    double view_spacings = heuristic("views.view_spacings", 2.0);
+    /// [spacings or noises] Edge of the cells of the indicator whose topology counts.
+    double coarse_spacings = heuristic("views.coarse_spacings", 2.4);
+    /// [spacings or noises] Edge of the cells of the screened indicator.
+    double fine_spacings = heuristic("views.fine_spacings", 1.2);
+    /// [share of all directions] Less those opposite, from which a point is seen on a side.
+    double least_free = heuristic("views.least_free", 0.01);
+    /// [indicator's slope over a cell] Weight with which points hold the screened indicator (Kazhdan and Hoppe,
+    /// Screened Poisson surface reconstruction, ACM Trans. Graph. 32(3), 2013).
+    double screening = heuristic("views.screening", 4);
+};
+COVOL_HEURISTICS ViewsHeuristics kViews{};
+
+/// Layers of a scan below others: layers.cpp. Lengths are in the distance from which on points are not of one sheet.
+struct LayersHeuristics {
+    /// [distances between sheets] Edge of the cells whose points turn together.
+    double cell = heuristic("layers.cell", 2);
+    /// [distances between sheets] Of a layer below the one that hides it.
+    double farthest_layer = heuristic("layers.farthest_layer", 6);
+    /// [share of a patch's points] That may be farther from the surface once they are turned.
+    double most_away = heuristic("layers.most_away", 0.2);
+    /// [cells of the indicator] Surface without points as near is bare.
+    double bare_cells = heuristic("layers.bare_cells", 2);
+    /// [areas of the patch] Of bare surface: a cavity's far side is not much larger than its near one, a ring's hole
+    /// is.
+    double most_gain = heuristic("layers.most_gain", 1.5);
+    /// [patches] That are tried; each costs a solution.
+    int most_patches = heuristic("layers.most_patches", 12);
+    /// [points] Fewest of a patch.
+    std::size_t least_points = heuristic("layers.least_points", 12);
+};
+COVOL_HEURISTICS LayersHeuristics kLayers{};
+
+/// Normals turned over or lying in their sheet, where there is no noise: torn.cpp.
+struct TornHeuristics {
+    /// [ratio] Of the least variance of the neighbours to the middle one, above which they are no sheet.
+    double flat = heuristic("torn.flat", 0.06);
+    /// [cosine] Between a normal and its sheet's, below which it lies in the sheet.
+    double upright = heuristic("torn.upright", 0.5);
+    /// [cosine] Between normals of sheets that go on into each other.
+    double same_sheet = heuristic("torn.same_sheet", 0.9);
+};
+COVOL_HEURISTICS TornHeuristics kTorn{};
+
+/// Area of the surface that a point stands for: areas.cpp.
+struct AreasHeuristics {
+    /// [points] Within whose distance the density is taken.
+    std::size_t neighbours = heuristic("areas.neighbours", 8);
+};
+COVOL_HEURISTICS AreasHeuristics kAreas{};
+
+}  // namespace covol

@@ -1,0 +1,22 @@
+#pragma once
+// The heuristic constants of this folder: docs/heuristics.md shows what half and twice of each does.
+#include "base/heuristic.h"
+
+namespace covol {
+
+/// Slices of contours: contours.cpp.
+struct ContoursHeuristics {
+    /// [voxels] Marks of one slice may differ by this.
+    double same_slice = heuristic("contours.same_slice", 0.1);
+    /// [of the line's extent] The same without an image.
+    double same_slice_of_extent = heuristic("contours.same_slice_of_extent", 1e-4);
+    /// [cells] Around the contours within a slice.
+    double margin_cells = heuristic("contours.margin_cells", 2);
+    /// [cells] The same across the slices: the end of it lies where nothing is computed.
+    double side_cells = heuristic("contours.side_cells", 10);
+    /// [cells] That a body goes on beyond the image's end: more than a band's half width.
+    double open_cells = heuristic("contours.open_cells", 6);
+};
+COVOL_HEURISTICS ContoursHeuristics kContours{};
+
+}  // namespace covol

@@ -1,0 +1,86 @@
+#pragma once
+// The heuristic constants of this folder: docs/heuristics.md shows what half and twice of each does.
+#include <cstddef>
+
+#include "base/heuristic.h"
+
+namespace covol {
+
+/// The guess from marks: guess.cpp.
+struct GuessHeuristics {
+    /// [voxels] Within the section by more: a mark in the cut.
+    double inside_voxels = heuristic("guess.inside_voxels", 1.5);
+    /// [of a distance's slope] At a section whose body ends right beyond it.
+    double least_slope = heuristic("guess.least_slope", 0.05);
+    /// [rounds] Of telling marks in the cut from marks on the surface.
+    int cut_rounds = heuristic("guess.cut_rounds", 2);
+    /// [rounds] Of holding seeds that lie on the wrong side.
+    int seed_rounds = heuristic("guess.seed_rounds", 4);
+    /// [marks] Off the cuts, to say what is inside of them.
+    std::size_t least_outline = heuristic("guess.least_outline", 8);
+};
+COVOL_HEURISTICS GuessHeuristics kGuess{};
+
+/// A guess moved through marks: guess_correction.cpp.
+struct CorrectionHeuristics {
+    /// [voxels] Of marks whose precision is not given.
+    double precision_voxels = heuristic("correction.precision_voxels", 0.5);
+    /// [distances between mark and guess] Radius of a bump: above 2.11 the level set stays one (its slope does not
+    /// change sign), see the public header.
+    double radius_of_residual = heuristic("correction.radius_of_residual", 3.0);
+    /// [ratio] Bumps whose radii differ by less are solved for together.
+    double level_ratio = heuristic("correction.level_ratio", 2.0);
+    /// [voxels] How far beyond a seed the surface is put.
+    double seed_depth_voxels = heuristic("correction.seed_depth_voxels", 0.5);
+    /// [rounds] Moving for one seed may bring the next to the wrong side.
+    int seed_rounds = heuristic("correction.seed_rounds", 4);
+    /// [voxels] The clamped distance is taken below this.
+    double exact_voxels = heuristic("correction.exact_voxels", 2.0);
+};
+COVOL_HEURISTICS CorrectionHeuristics kCorrection{};
+
+/// The surface through marks, whole and in parts: marks_surface.cpp. Time, not accuracy, sets the numbers of marks: the
+/// whole takes the cube of its number, a part the cube of its own.
+struct MarksSurfaceHeuristics {
+    /// [marks] Whose normals are searched for from nothing.
+    std::size_t oriented = heuristic("marks_surface.oriented", 100);
+    /// [marks] Of the whole.
+    std::size_t whole = heuristic("marks_surface.whole", 300);
+    /// [marks] Of a part.
+    std::size_t patch_marks = heuristic("marks_surface.patch_marks", 48);
+    /// [marks] Of a part, nearest to its centre, that need no part of their own.
+    std::size_t core_marks = heuristic("marks_surface.core_marks", 12);
+    /// [ratio] Between variances of the marks that are tried.
+    double variance_step = heuristic("marks_surface.variance_step", 4);
+    /// [of the given variance] Below which marks are exact.
+    double least_factor = heuristic("marks_surface.least_factor", 1e-3);
+    /// [of a part's weight at its centre] Of the whole among parts.
+    double whole_weight = heuristic("marks_surface.whole_weight", 1e-3);
+};
+COVOL_HEURISTICS MarksSurfaceHeuristics kMarks{};
+
+/// Normals of least energy: variational.cpp. Huang, Carr and Ju, Variational implicit point set surfaces, ACM Trans.
+/// Graph. 38(4), 2019, has the energy; starts and lattice are ours.
+struct VariationalHeuristics {
+    /// [modes] Of the energy that are tried as directions of the normals.
+    int modes = heuristic("variational.modes", 3);
+    /// [vectors] Of the subspace iteration for them.
+    int subspace = heuristic("variational.subspace", 6);
+    /// [steps] Of it.
+    int subspace_steps = heuristic("variational.subspace_steps", 12);
+    /// [marks] Neighbours, to have a middle.
+    double least_local = heuristic("variational.least_local", 6);
+    /// [directions] Around the marks, in which the surface may not go on.
+    int directions = heuristic("variational.directions", 64);
+    /// [steps] Of L-BFGS, at most.
+    int least_energy_steps = heuristic("variational.least_energy_steps", 500);
+    /// [rounds] Of finding the amplitude against which precision counts.
+    int amplitude_rounds = heuristic("variational.amplitude_rounds", 3);
+    /// [ratio] Of the least to the largest variance of marks in one plane.
+    double flat = heuristic("variational.flat", 1e-8);
+    /// [of the amplitude] Keeps the matrix regular where marks coincide.
+    double least_lambda = heuristic("variational.least_lambda", 1e-9);
+};
+COVOL_HEURISTICS VariationalHeuristics kVariational{};
+
+}  // namespace covol

@@ -1,0 +1,72 @@
+#pragma once
+// The heuristic constants of this folder: docs/heuristics.md shows what half and twice of each does.
+#include <cstddef>
+
+#include "base/heuristic.h"
+
+namespace covol {
+
+/// What the image shows between the marks: guidance.cpp.
+struct GuidanceHeuristics {
+    /// [passes] Each asks the image again, from the result of the one before.
+    int most_passes = heuristic("guidance.most_passes", 3);
+    /// [iterations] Of a pass: normals, and what is inside and outside, are better known the second time.
+    int iterations = heuristic("guidance.iterations", 2);
+    /// [voxels] To both sides of the surface in which profiles are read.
+    double width = heuristic("guidance.width", 14.0);
+    /// [voxels] In one iteration.
+    double longest_offset = heuristic("guidance.longest_offset", 12.0);
+    /// [voxels] Of a patch of the surface that has one offset.
+    double patch_width = heuristic("guidance.patch_width", 2.0);
+    /// [patches] In the marks' spacing: offsets that vary within less are not sought.
+    double patches_per_spacing = heuristic("guidance.patches_per_spacing", 4);
+    /// [voxels] Beside a mark, to tell lines from steps.
+    double sides = heuristic("guidance.sides", 3.0);
+    /// [rounds] Of averaging normals, about two voxels.
+    int normal_rounds = heuristic("guidance.normal_rounds", 6);
+    /// [marks] That the image is learnt from.
+    std::size_t fewest_marks = heuristic("guidance.fewest_marks", 8);
+    /// [marks] That are tested by leaving them out.
+    std::size_t most_marks = heuristic("guidance.most_marks", 400);
+    /// [of a unit field] A field that hardly follows the image does not tell how good the image is.
+    double least_response = heuristic("guidance.least_response", 0.25);
+    /// [marks] Worth of belief that the image is as good everywhere.
+    double belief_in_all = heuristic("guidance.belief_in_all", 4);
+    /// [variances] That are tried, each half of the one before.
+    int priors = heuristic("guidance.priors", 5);
+    /// [d² / (2 R)] Error of a surface that bends least, at distance d from marks on a body of size R: about a third of
+    /// the sagitta.
+    double share_of_sagitta = heuristic("guidance.share_of_sagitta", 0.3);
+};
+COVOL_HEURISTICS GuidanceHeuristics kGuide{};
+
+/// The border's profile and how far it is believed: learning.cpp.
+struct LearningHeuristics {
+    /// [marks] Fewer say nothing of how the profile varies.
+    std::size_t marks_for_places = heuristic("learning.marks_for_places", 40);
+    /// [marks] Within the radius of a local profile, about.
+    int neighbours = heuristic("learning.neighbours", 12);
+};
+COVOL_HEURISTICS LearningHeuristics kLearning{};
+
+/// Counts of brightness by depth: border_profile.cpp.
+struct BorderProfileHeuristics {
+    /// [steps of a fourth of a voxel] A mark's jitter, and samples closer than a voxel are no two samples.
+    double depth_blur = heuristic("border.depth_blur", 1.4);
+    /// [levels of brightness] Of the 24.
+    double level_blur = heuristic("border.level_blur", 1.0);
+    /// [places] Worth of belief in the more general counts.
+    double belief = heuristic("border.belief", 2.0);
+};
+COVOL_HEURISTICS BorderProfileHeuristics kBorder{};
+
+/// The field of offsets, and the distance that it moves: offset_field.cpp, wide_distance.cpp.
+struct OffsetFieldHeuristics {
+    /// [rounds] Of reweighting marks and image.
+    int rounds = heuristic("offset_field.rounds", 4);
+    /// [voxels] The start's band, less what its clamp touches.
+    double own_voxels = heuristic("offset_field.own_voxels", 2.5);
+};
+COVOL_HEURISTICS OffsetFieldHeuristics kOffsets{};
+
+}  // namespace covol

@@ -1,0 +1,157 @@
+#pragma once
+// The heuristic constants of this folder: docs/heuristics.md shows what half and twice of each does.
+#include <cstddef>
+
+#include "base/heuristic.h"
+
+namespace covol {
+
+/// Values left to us: automatic.cpp.
+struct AutomaticHeuristics {
+    /// [marks] Of a guess, or of a start that they correct: more take long, and are dense.
+    std::size_t most_guess_marks = heuristic("automatic.most_guess_marks", 4000);
+    /// [voxels] Range of the points after tagging with an image: what is farther from marks is the image's. Measured on
+    /// brain, spleen and nucleus with 300 points each.
+    double tag_attraction_voxels = heuristic("automatic.tag_attraction_voxels", 8.0);
+    /// [points] Fewer get a voxel size at which their surface has as many voxels as this many would.
+    double few_points = heuristic("automatic.few_points", 1000);
+    /// [cells of the indicator] Voxel size of a cloud that encloses nothing.
+    double view_voxel = heuristic("automatic.view_voxel", 0.5);
+    /// [noises] Voxel size of a cloud, at least.
+    double cloud_noise = heuristic("automatic.cloud_noise", 0.6);
+    /// [voxels] Seeds closer than this are one position.
+    double same_seed_voxels = heuristic("automatic.same_seed_voxels", 1e-3);
+    /// [voxels] Points closer than this do not move the surface apart.
+    double merge_voxels = heuristic("automatic.merge_voxels", 0.25);
+    /// [voxels] Range of the points after starts other than tagging.
+    double attraction_voxels = heuristic("automatic.attraction_voxels", 5.0);
+    /// [voxels] Weight of curvature after tagging with an image.
+    double tag_delta_voxels = heuristic("automatic.tag_delta_voxels", 0.5);
+    /// [voxels] Presmoothing of the image after tagging.
+    double tag_sigma_voxels = heuristic("automatic.tag_sigma_voxels", 2.0);
+    /// [voxels] Layers of a scan within it are averaged.
+    double scan_radius_voxels = heuristic("automatic.scan_radius_voxels", 2.5);
+    /// [voxels] A layer of points thicker than this is averaged.
+    double noisy_share = heuristic("automatic.noisy_share", 0.3);
+};
+COVOL_HEURISTICS AutomaticHeuristics kAutomatic{};
+
+/// Distance and edge detector of a run: fields.cpp.
+struct FieldsHeuristics {
+    /// [voxels] Voxel of the coarse distance field that tells how far a tube has to reach.
+    double coarse_factor = heuristic("fields.coarse_factor", 8.0);
+    /// [sigmas] Beside a mark, to tell lines from borders.
+    double sides_sigmas = heuristic("fields.sides_sigmas", 3.0);
+    /// [of the way to a side] How deep inside it has to be.
+    double side_depth = heuristic("fields.side_depth", 0.7);
+    /// [marks] This many are looked at.
+    std::size_t feature_marks = heuristic("fields.feature_marks", 4000);
+};
+COVOL_HEURISTICS FieldsHeuristics kFields{};
+
+/// The domain: job.h.
+struct JobHeuristics {
+    /// [voxels] Between D and the domain's boundary, for points alone.
+    double margin_voxels = heuristic("job.margin_voxels", 6.0);
+};
+COVOL_HEURISTICS JobHeuristics kJob{};
+
+/// The flow of a run: flow.cpp.
+struct FlowHeuristics {
+    /// [tau] Time step of the points' own approach.
+    double approach_tau = heuristic("flow.approach_tau", 3.0);
+    /// [steps] Of it, at most.
+    int approach_steps = heuristic("flow.approach_steps", 40);
+    /// [voxels a step] At which it ends.
+    double approach_tolerance = heuristic("flow.approach_tolerance", 0.01);
+    /// [voxels] That the surface may sink below the start where the points enclose nothing.
+    double hold_depth = heuristic("flow.hold_depth", 0.75);
+    /// [volumes of the grown start] A flow that leaves less has lost the edges.
+    double least_of_grown = heuristic("flow.least_of_grown", 0.5);
+    /// [voxels] Farther from its marks than the start: what flowed has left them.
+    double leaves_voxels = heuristic("flow.leaves_voxels", 0.25);
+};
+COVOL_HEURISTICS FlowHeuristics kFlow{};
+
+/// The coarse level: coarse_level.cpp.
+struct CoarseLevelHeuristics {
+    /// [ratio] Of its voxel size.
+    double refinement = heuristic("coarse_level.refinement", 2.0);
+    /// [voxels of the coarse level] Presmoothing of the image, at least.
+    double least_coarse_sigma = heuristic("coarse_level.least_coarse_sigma", 0.5);
+    /// [voxels of the coarse level] Range of the points, at least.
+    double least_coarse_attraction = heuristic("coarse_level.least_coarse_attraction", 3.0);
+    /// [voxels a step] A surface far from all that pulls moves slowly, too.
+    double coarse_tolerance = heuristic("coarse_level.coarse_tolerance", 5e-3);
+    /// [voxels of the coarse level] That the fine level starts outside of the result.
+    double step_back = heuristic("coarse_level.step_back", 2.0);
+    /// [voxels] A smaller domain has little to gain, and thin things to lose.
+    int least_coarsened = heuristic("coarse_level.least_coarsened", 64);
+};
+COVOL_HEURISTICS CoarseLevelHeuristics kCoarse{};
+
+/// Warnings about marks: doubts.cpp.
+struct DoubtsHeuristics {
+    /// [longest edges of the image's voxel] No hand is so far off.
+    double off_voxels = heuristic("doubts.off_voxels", 2.0);
+    /// [voxels] Mean distance of marks on one side.
+    double bias_voxels = heuristic("doubts.bias_voxels", 0.25);
+    /// [standard errors of the mean] The same.
+    double bias_errors = heuristic("doubts.bias_errors", 4.0);
+    /// [noises of a cloud] That far off there is something else.
+    double off_noise = heuristic("doubts.off_noise", 4.0);
+    /// [share of the marks] That a surface may miss.
+    double missed_share = heuristic("doubts.missed_share", 0.1);
+};
+COVOL_HEURISTICS DoubtsHeuristics kDoubts{};
+
+/// Clouds without an inside: vanished.cpp.
+struct VanishedHeuristics {
+    /// [longest extents] Thinner clouds are flat.
+    double thin_share = heuristic("vanished.thin_share", 0.02);
+    /// [spacings] Of a layer around points without an inside: closes the gaps of random points.
+    double layer_spacings = heuristic("vanished.layer_spacings", 4.5);
+    /// [longest sides] Such a ball fits into no body within it.
+    double hull = heuristic("vanished.hull", 0.6);
+    /// [voxels] Of that layer, at most: less than what the pipeline closes again.
+    double layer_voxels = heuristic("vanished.layer_voxels", 4.0);
+    /// [D] Beyond the inner radius all that the points surround is one body.
+    double wider_tag = heuristic("vanished.wider_tag", 1.25);
+};
+COVOL_HEURISTICS VanishedHeuristics kVanished{};
+
+/// What is told of the surface: final_surface.cpp.
+struct FinalSurfaceHeuristics {
+    /// [share of the area] Without points, above which there is a warning.
+    double warn_without_points = heuristic("final_surface.warn_without_points", 0.02);
+    /// [distances between points and a hole] Half a spacing, where it is automatic.
+    double rim_slack = heuristic("final_surface.rim_slack", 1.0 / 6);
+};
+COVOL_HEURISTICS FinalSurfaceHeuristics kFinal{};
+
+/// Starts of a run: segment/start.
+struct StartsHeuristics {
+    /// [voxels] That a cut guess goes on beyond the image.
+    int guess_beyond_voxels = heuristic("starts.guess_beyond_voxels", 8);
+    /// [voxels] That a cut tagged body goes on beyond the image, for a band at a right angle to the face.
+    double tagged_beyond_voxels = heuristic("starts.tagged_beyond_voxels", 6.0);
+    /// [voxels] Weight of curvature from a start that lies at the edges.
+    double grown_delta_voxels = heuristic("starts.grown_delta_voxels", 0.1);
+    /// [spacings] Range of the points around a cloud's own surface.
+    double reach_spacings = heuristic("starts.reach_spacings", 3.0);
+    /// [share of the given normals] Against the result, above which there is a warning.
+    double warn_disagreeing = heuristic("starts.warn_disagreeing", 0.1);
+    /// [longest sides] Beyond the points of a cloud: where they leave holes the surface bulges.
+    double margin_share = heuristic("starts.margin_share", 0.1);
+    /// [slices] Radius of a correction: a mark on a slice tells of the next one.
+    double radius_spacings = heuristic("starts.radius_spacings", 2.0);
+    /// [voxels] A tag distance beyond this starts from the closing instead.
+    double close_from_voxels = heuristic("starts.close_from_voxels", 5.0);
+    /// [voxels] A mark on an end slice that lies deeper in the start is none of the outline.
+    double cap_depth_voxels = heuristic("starts.cap_depth_voxels", 2.5);
+    /// [spacings] Of the points, beyond which none of them tells of a cut.
+    double mirror_spacings = heuristic("starts.mirror_spacings", 4.0);
+};
+COVOL_HEURISTICS StartsHeuristics kStarts{};
+
+}  // namespace covol
