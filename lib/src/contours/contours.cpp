@@ -55,8 +55,8 @@ public:
         if (lines_.empty())
             throw Error(Errc::InvalidInput,
                         "densify: " + (clouds.empty() ? std::string("no file") : clouds.front().source) +
-                            ": expected lines of marks (slice, contour, x, y; shapes; selections), got "
-                            "loose points; give those as points");
+                            ": expected lines of marks (slice, contour, x, y; shapes; selections), got loose points; "
+                            "give those as points");
         choose_plane();
         join_lines();
         make_solid();
@@ -318,12 +318,12 @@ void Densifier::link_slices(ContourSolid::Data& data, const std::vector<std::vec
     }
     if (carried > 0)
         run_.warn("contours: " + std::to_string(carried) +
-                  " pairs of neighbouring slices have contours that do not overlap; "
-                  "they are joined along the line between their centroids. Mark more slices there if that is wrong");
+                  " pairs of neighbouring slices have contours that do not overlap; they are joined along the line "
+                  "between their centroids. Mark more slices there if that is wrong");
     if (ended > 0)
         run_.warn("contours: " + std::to_string(ended) +
-                  " pairs of neighbouring slices have several contours and no overlap; "
-                  "the parts end between them. Mark more slices there if that is wrong");
+                  " pairs of neighbouring slices have several contours and no overlap; the parts end between them. "
+                  "Mark more slices there if that is wrong");
 }
 
 void Densifier::cap_ends(ContourSolid::Data& data) {

@@ -224,10 +224,9 @@ EdgeResult detect_edges(const Image& image, const FloatGrid& topology, const Edg
         else
             report.edge_contrast = automatic_contrast(*result.grid, options, is_line);
         if (!(report.edge_contrast > 0))
-            throw Error(Errc::InvalidInput,
-                        "detect_edges: " + image.path() +
-                            ": constant wherever the band lies, there is no edge to find; check that the "
-                            "points lie on the image's structure");
+            throw Error(Errc::InvalidInput, "detect_edges: " + image.path() +
+                                                ": constant wherever the band lies, there is no edge to find; check "
+                                                "that the points lie on the image's structure");
         report.edge_k = 1.0 / (report.edge_contrast * report.edge_contrast);
         const auto k = static_cast<float>(report.edge_k);
         for (auto leaf = result.grid->tree().beginLeaf(); leaf; ++leaf)

@@ -147,9 +147,9 @@ void Image::sample(const Domain& frame, const Index3& min, const Index3& max, fl
     if (held_ != detail::whole_box(geometry_.size)) {
         const VoxelBox needed = touched(map, geometry_.size, min, max);
         if (!held_.contains(needed.min) || !held_.contains(needed.max))
-            throw Error(Errc::InvalidInput, "sample: " + path_ +
-                                                ": voxels outside the part that was read are needed; "
-                                                "choose a larger `roi`");
+            throw Error(
+                Errc::InvalidInput,
+                "sample: " + path_ + ": voxels outside the part that was read are needed; choose a larger `roi`");
     }
     Lattice lattice;
     for (int a = 0; a < 3; ++a) lattice[a] = {geometry_.size[a], held_.min[a], stride_[a]};

@@ -98,8 +98,8 @@ void check_input(Job& job) {
         throw Error(Errc::InvalidInput, "segment: expected an image or points, got neither");
     if (job.starts_from_marks() && job.points.empty())
         throw Error(Errc::InvalidInput,
-                    "segment: the start 'tag' expects points, got none; give points, contours or "
-                    "seeds inside, or choose another start (sphere, box, mesh, mask or vdb)");
+                    "segment: the start 'tag' expects points, got none; give points, contours or seeds inside, or "
+                    "choose another start (sphere, box, mesh, mask or vdb)");
     check_sides(job.options.inside, job.options.outside, kAutomatic.same_seed_voxels * job.h());
     job.report().point_count = job.given.size();
     EvolveOptions& evolve = job.options.evolve;

@@ -70,9 +70,8 @@ std::string why_vanished(const Job& job) {
             return detail::why_nothing_held(job.points, job.options.tag_distance.value_or(0), encloses);
         if (!encloses)
             return "the points enclose nothing and nothing held it; where the structure is cut off by the image's end "
-                   "mark the cut "
-                   "too, or give a `tag_distance` beyond its radius; or draw `contours`, or choose another start "
-                   "(`start`)";
+                   "mark the cut too, or give a `tag_distance` beyond its radius; or draw `contours`, or choose "
+                   "another start (`start`)";
     }
     return "nothing held it; lower `delta`, or start closer to the edges (`start`)";
 }

@@ -43,12 +43,12 @@ private:
 void check_extent(double extent, const std::string& what, Findings& findings) {
     if (extent > kLargeScene)
         findings.remark(what + " is " + std::to_string(extent) +
-                        " units wide: Blender and Houdini take a unit for a "
-                        "metre and clip it; write meshes with --unit-scale, or scale the object");
+                        " units wide: Blender and Houdini take a unit for a metre and clip it; write meshes with "
+                        "--unit-scale, or scale the object");
     if (extent > 0 && extent < kSmallScene)
         findings.remark(what + " is " + std::to_string(extent) +
-                        " units wide: Blender and Houdini take a unit for a "
-                        "metre and show a dot; write meshes with --unit-scale, or scale the object");
+                        " units wide: Blender and Houdini take a unit for a metre and show a dot; write meshes with "
+                        "--unit-scale, or scale the object");
 }
 
 void check_measures(const TriangleMesh& mesh, const std::string& what, Findings& findings) {
@@ -65,9 +65,9 @@ bool is_identifier(const std::string& name) {
 }
 
 void check_level_set(const std::string& path, const VdbGridInfo& info, const RunContext& run, Findings& findings) {
-    findings.remark("grid '" + info.name +
-                    "' is a level set: to render it as a volume, write a fog volume "
-                    "(--density) and give the renderer that");
+    findings.remark(
+        "grid '" + info.name +
+        "' is a level set: to render it as a volume, write a fog volume (--density) and give the renderer that");
     const FloatGridPtr grid = read_vdb(path, info.name);
     try {
         check_measures(extract_mesh(*grid, {}, run), "the surface of grid '" + info.name + "'", findings);
@@ -117,8 +117,7 @@ void check_image(const std::string& path, const ImageFlags& flags, const RunCont
     const auto [least, most] = std::minmax_element(g.spacing.begin(), g.spacing.end());
     if (*most > kFlatVoxels * *least)
         findings.remark("voxels are " + std::to_string(*most / *least) +
-                        " times longer along one axis: between the "
-                        "slices the surface is interpolated");
+                        " times longer along one axis: between the slices the surface is interpolated");
     if (!g.spacing_known)
         findings.remark("the file does not know its spacing: 1 stands in for what is missing; see --spacing");
     else if (g.spacing == Vec3{1, 1, 1})

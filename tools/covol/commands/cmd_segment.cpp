@@ -14,8 +14,8 @@ void add_segment(Session& session) {
         ->type_name("IMAGE...");
     job->points.bind(*command, "--points")
         ->description(
-            "marks on the surface: tables, marks of Fiji, napari, 3D Slicer and ITK-SNAP, clouds; with names, "
-            "ve=FILE exe=FILE, several structures")
+            "marks on the surface: tables, marks of Fiji, napari, 3D Slicer and ITK-SNAP, clouds; with names, ve=FILE "
+            "exe=FILE, several structures")
         ->type_name("[NAME=]FILE...");
     job->bind(*command, true);
     session.help().show_first(*command, {"--points", "--contours", "--painted", "--inside", "--outside", "--guess",

@@ -249,8 +249,8 @@ void EdgeFlags::bind(CLI::App& command, bool alone) {
                    (alone ? "[slope]" : "[what the marks of contours lie on, else slope]"));
     CLI::Option* k = add_positive(command, "--edge-k", options.edge_k, "K in g = 1/(1 + K s^2) [see --edge-contrast]");
     add_positive(command, "--edge-contrast", options.edge_contrast,
-                 "gradient, per world unit, or brightness of lines at which g = 1/2, of the image scaled to [0,1] "
-                 "[90 % percentile in the band, for lines a third of the median]")
+                 "gradient, per world unit, or brightness of lines at which g = 1/2, of the image scaled to [0,1] [90 "
+                 "% percentile in the band, for lines a third of the median]")
         ->excludes(k);
 }
 

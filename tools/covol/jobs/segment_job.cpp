@@ -123,11 +123,9 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
         .add_option_function<std::string>(
             "--init", [this](const std::string& text) { start = parse_start("--init", text); },
             "how the level set starts: auto, guess (through the marks with the least bending), cloud (many points "
-            "without an image: "
-            "their own surface), tag, sphere:x,y,z,r, "
-            "box:x0,y0,z0,x1,y1,z1 (inside an object and without marks these grow to its edges), mesh:F, mask:F or "
-            "vdb:F "
-            "(near its marks such a start is a guess that they correct)")
+            "without an image: their own surface), tag, sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1 (inside an object and "
+            "without marks these grow to its edges), mesh:F, mask:F or vdb:F (near its marks such a start is a guess "
+            "that they correct)")
         ->type_name("START")
         ->default_str("auto");
     in_group(command, Group::Start);
@@ -151,8 +149,7 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
         add_choice(command, "--holes", holes.policy,
                    {{"close", Holes::Close}, {"open", Holes::Open}, {"flat", Holes::Flat}},
                    "where no points are, the surface goes on smoothly, or the mesh ends (the level set stays closed), "
-                   "or the flattest "
-                   "patch spans it, in both");
+                   "or the flattest patch spans it, in both");
         add_length(command, "--hole-distance", hole_distance, "",
                    "a hole is where the surface lies farther from all points [3 spacings where they are sparse, at "
                    "least 3vx]");

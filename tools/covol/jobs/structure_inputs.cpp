@@ -102,8 +102,8 @@ std::vector<StructureInput> structures_of(const SegmentJob& job,
                                       : !input.contours.paths.empty() ? input.contours.paths.front()
                                                                       : input.guess;
             throw UsageError(
-                "--points, --contours: expected a name for every file when one has a name (ve=FILE) or several "
-                "labels are painted, got none for " +
+                "--points, --contours: expected a name for every file when one has a name (ve=FILE) or several labels "
+                "are painted, got none for " +
                 first);
         }
     share_seeds(inputs, "--inside", job.seeds.inside, &SeedFlags::inside);

@@ -21,8 +21,8 @@ using detail::PixelRequest;
 using detail::read_error;
 
 constexpr const char* kReadable =
-    ".tif, .tiff, .nrrd, .nhdr, .nii, .nii.gz, .mha, .mhd, .mrc, .map, .h5, .dcm or .vdb, "
-    "or a folder with a DICOM series";
+    ".tif, .tiff, .nrrd, .nhdr, .nii, .nii.gz, .mha, .mhd, .mrc, .map, .h5, .dcm or .vdb, or a folder with a DICOM "
+    "series";
 
 bool is_one_of(const std::string& text, std::initializer_list<const char*> list) {
     return std::any_of(list.begin(), list.end(), [&](const char* known) { return text == known; });
@@ -42,9 +42,9 @@ void check_geometry(const std::string& path, const ImageGeometry& g) {
             double dot = 0;
             for (int c = 0; c < 3; ++c) dot += g.direction[c][a] * g.direction[c][b];
             if (!(std::abs(dot - (a == b ? 1.0 : 0.0)) <= kTolerance))
-                throw Error(Errc::Unsupported, "read_image: " + path +
-                                                   ": expected perpendicular axes, got sheared or degenerate ones; "
-                                                   "resample the image");
+                throw Error(Errc::Unsupported,
+                            "read_image: " + path +
+                                ": expected perpendicular axes, got sheared or degenerate ones; resample the image");
         }
     }
 }
@@ -79,8 +79,7 @@ void warn_of_spacing(const std::string& path, const ImageInfo& info, const RunCo
         if (!info.spacing_known[a]) axes += (axes.empty() ? "" : ", ") + std::string(1, "xyz"[a]);
     if (axes.empty()) return;
     run.warn(path + ": the file states no spacing along " + axes +
-             ": 1 stands in for it, and lengths, volumes and shapes "
-             "may be wrong; `spacing = sx,sy,sz` gives it");
+             ": 1 stands in for it, and lengths, volumes and shapes may be wrong; `spacing = sx,sy,sz` gives it");
 }
 
 /// The user's corrections, and the last checks.

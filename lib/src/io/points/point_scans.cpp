@@ -249,9 +249,9 @@ PointTable parse_las(const std::string& path, const std::string& content) {
     const int minor = bytes.at<std::uint8_t>(25);
     const int format = bytes.at<std::uint8_t>(104);
     if ((format & 0xC0) != 0)
-        throw Error(Errc::Unsupported, "read_points: " + path +
-                                           ": expected LAS, got its compressed form LAZ; unpack it with laszip or "
-                                           "pdal translate");
+        throw Error(Errc::Unsupported,
+                    "read_points: " + path +
+                        ": expected LAS, got its compressed form LAZ; unpack it with laszip or pdal translate");
     if (bytes.at<std::uint8_t>(24) != 1 || minor > 4)
         throw Error(Errc::Unsupported, "read_points: " + path + ": expected LAS 1.0 to 1.4, got " +
                                            std::to_string(bytes.at<std::uint8_t>(24)) + "." + std::to_string(minor));

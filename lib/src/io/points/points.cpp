@@ -91,10 +91,9 @@ PointCloud read_points(const std::string& path, const ReadPointsOptions& options
 
 std::vector<Vec3> to_world(const PointCloud& cloud) {
     if (cloud.space != PointSpace::World)
-        throw Error(Errc::InvalidInput,
-                    "to_world: " + cloud.source +
-                        ": the points are in an image's own frame, and there is no image; give one, "
-                        "or `space = World` for points in lengths");
+        throw Error(Errc::InvalidInput, "to_world: " + cloud.source +
+                                            ": the points are in an image's own frame, and there is no image; give "
+                                            "one, or `space = World` for points in lengths");
     return cloud.points;
 }
 

@@ -54,8 +54,7 @@ bool start_from_contours(Job& job) {
     if (job.options.contours->flat && loose.empty())
         throw Error(Errc::InvalidInput,
                     "segment: all contours lie on one slice, which tells nothing of how thick the body is; mark a "
-                    "second slice, "
-                    "or give its `thickness`");
+                    "second slice, or give its `thickness`");
     job.choose("start", "contours", "the body between the contours; what inner contours enclose is outside");
     job.origin = StartOrigin::Contours;
     job.options.evolve.follow = true;
