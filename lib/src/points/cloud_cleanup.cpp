@@ -86,12 +86,10 @@ public:
     void smooth_by_wlop(CloudCleanupReport& report) {
         if (entries_.size() < kFewest) return;
         run_.check();
-        // Two rings of new neighbours; CGAL's own 8 spacings of the old points flatten what is curved.
-        constexpr double kRings = 2.5;
-        constexpr unsigned kRing = 6;
         const double radius = options_.wlop_radius
                                   ? *options_.wlop_radius
-                                  : kRings * CGAL::compute_average_spacing<Tag>(entries_, kRing, parameters()) /
+                                  : kCleanup.rings *
+                                        CGAL::compute_average_spacing<Tag>(entries_, kCleanup.ring, parameters()) /
                                         std::sqrt(options_.wlop_share);
         run_.check();
         std::vector<Point> points;

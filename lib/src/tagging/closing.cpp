@@ -13,8 +13,6 @@
 namespace covol {
 
 FloatGridPtr close_by_ball(const FloatGrid& band, double tag_distance, const RunContext& run) {
-    constexpr double kReachVoxels = 6.0;  // beyond D, enough for a band around the closing's surface
-    constexpr double kHalfWidth = 5.0;
     const Domain domain = domain_of(band);
     const double h = domain.voxel_size, reach = kClosing.reach_voxels * h;
     const detail::InterfacePatches tagged = detail::find_interface(band, domain, detail::DomainEnd::Open, run);
