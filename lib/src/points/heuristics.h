@@ -41,7 +41,7 @@ struct SpacingHeuristics {
     /// [points] Of which it is taken.
     std::size_t queries = heuristic("spacing.queries", 50000);
 };
-COVOL_HEURISTICS SpacingHeuristics kSpacing{};
+COVOL_HEURISTICS SpacingHeuristics kPointSpacing{};
 
 /// Cleaning on demand: cloud_cleanup.cpp.
 struct CleanupHeuristics {

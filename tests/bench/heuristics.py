@@ -1,0 +1,46 @@
+"""The heuristic constants of covol, read from the heuristics.h of each folder of lib/src."""
+import dataclasses
+import pathlib
+import re
+
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
+STRUCT = re.compile(r"((?:///[^\n]*\n)*)struct (\w+)Heuristics \{\n(.*?)\n\};\nCOVOL_HEURISTICS \w+ (\w+)\{\};", re.S)
+FIELD = re.compile(r"((?:    ///[^\n]*\n)*)    ([\w:]+) (\w+) =\s*heuristic\(\"([\w.]+)\", ([^;]+)\);")
+
+
+@dataclasses.dataclass
+class Heuristic:
+    name: str      # step.field
+    value: float
+    text: str      # the value as it stands in the header
+    is_count: bool
+    unit: str
+    meaning: str
+    folder: str
+    step: str      # what the struct's comment says
+    problem: str   # with how it is written; empty: none
+
+    def scaled(self, factor):
+        return max(1, int(self.value * factor + 0.5)) if self.is_count else self.value * factor
+
+
+def words(comment):
+    return re.sub(r"\s*///<?\s*", " ", comment).strip()
+
+
+def read_heuristics(source=SOURCE):
+    found = []
+    for path in sorted((source / "lib/src").rglob("heuristics.h")):
+        text = path.read_text()
+        before = len(found)
+        for comment, _, body, _ in STRUCT.findall(text):
+            for about, kind, field, name, value in FIELD.findall(body + "\n"):
+                plain = re.sub(r"(?<=\d)[FU]\b|'", "", value)
+                match = re.match(r"\[([^]]+)\] (.+)", words(about), re.S)
+                problem = "expected a comment '[unit] meaning'" if not match else "" if name.endswith("." + field) else f"its name is {name}"
+                unit, meaning = match.groups() if match else ("", "")
+                found.append(Heuristic(name, float(eval(plain, {"__builtins__": {}})), plain.replace(" ", ""), kind not in ("double", "float"), unit, meaning,
+                                       path.parent.relative_to(source / "lib/src").as_posix(), words(comment), problem))
+        if len(found) - before != len(re.findall(r"\bheuristic\(", text)) or not re.search(r"struct", text):
+            found.append(Heuristic(str(path), 0, "", False, "", "", "", "", "a field that is not read: expected `type field = heuristic(\"step.field\", value);` in a struct"))
+    return found

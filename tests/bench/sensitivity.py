@@ -1,0 +1,229 @@
+"""What happens at half and at twice each heuristic constant: docs/heuristics.md.
+
+    cmake --preset default -B build-sensitivity -DCOVOL_SENSITIVITY=ON -DCOVOL_BUILD_TESTS=OFF
+    cmake --build build-sensitivity
+    nice /usr/bin/python3 tests/bench/sensitivity.py build-sensitivity/bin/covol [--only STEP ...] [--minutes N]
+
+Each constant is scaled (COVOL_SCALE="step.name=0.5") in the jobs that exercise its step (sensitivity_jobs.py). Rows go to the CSV
+as they are made, and what is there is not run again. `--table` runs nothing: it writes the page from the CSV.
+"""
+import argparse
+import collections
+import concurrent.futures
+import csv
+import hashlib
+import os
+import pathlib
+import resource
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+import sensitivity_jobs as jobs
+from heuristics import SOURCE, read_heuristics
+
+CSV, PAGE = SOURCE / "tests/bench/results/heuristics.csv", SOURCE / "docs/heuristics.md"
+COLUMNS = ["name", "value", "factor", "job", "state", "error", "seconds"]
+MOST_SECONDS = 20  # of processor time
+CHECK = "local_fit.first_spacings=2"  # changes every cloud
+ABOVE, POINTS, FAIL = 0.1, 0.1, 3  # sensitive: an error that grows by a tenth of itself, and by so many points; fails: threefold, and by 1
+
+
+# ---- running --------------------------------------------------------------------------------------------------------------
+
+class Runner:
+    def __init__(self, covol, work):
+        self.covol, self.work, self.known = pathlib.Path(covol).resolve(), work, {}
+        if not self.covol.exists():
+            raise SystemExit(f"{covol}: no such file")
+        self.environment = os.environ | {"LD_LIBRARY_PATH": str(self.covol.parent.parent / "lib")}
+        os.environ["LD_LIBRARY_PATH"] = self.environment["LD_LIBRARY_PATH"]
+        jobs.make_inputs(work / "in", self.covol)
+
+    def run(self, job, scale):
+        """(state, error, seconds, digest); what is the same as without a scale is not measured again."""
+        out = pathlib.Path(tempfile.mkdtemp(dir=self.work))
+        begin = time.monotonic()
+        try:
+            done = subprocess.run([self.covol, *jobs.arguments_of(job), "--threads", "1", "--quiet"], cwd=out, capture_output=True, text=True,
+                                  timeout=10 * MOST_SECONDS, env=self.environment | {"COVOL_SCALE": scale},
+                                  preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (MOST_SECONDS, MOST_SECONDS)))
+            code = done.returncode
+        except subprocess.TimeoutExpired:
+            code = -9
+        seconds = time.monotonic() - begin
+        try:
+            path = jobs.output_of(job, out)
+            if code < 0 or not path.exists():
+                return "too slow" if code < 0 else "failed", None, seconds, None
+            digest = hashlib.sha256(path.read_bytes()).hexdigest()
+            same = self.known.get(job)
+            if same and same[3] == digest:
+                return "same", same[1], seconds, digest
+            return "", jobs.error_of(job, self.work / "in", out), seconds, digest
+        finally:
+            shutil.rmtree(out)
+
+    def learn(self, job):
+        if job not in self.known:
+            self.known[job] = self.run(job, "")
+        return self.known[job]
+
+
+def measure(options):
+    work = pathlib.Path(tempfile.mkdtemp(prefix="covol_sensitivity_"))
+    runner = Runner(options.covol, work)
+    if runner.learn("torus")[3] == runner.run("torus", CHECK)[3]:
+        raise SystemExit(f"{options.covol}: COVOL_SCALE changes nothing; expected a build with -DCOVOL_SENSITIVITY=ON")
+    there = {(row["name"], float(row["factor"]), row["job"]) for row in read_rows(options.csv)}
+    heuristics = collections.defaultdict(list)
+    for h in read_heuristics():
+        heuristics[h.name.split(".")[0]].append(h)
+    for step in set(options.only or []) - set(jobs.PLAN):
+        raise SystemExit(f"--only {step}: expected one of {', '.join(jobs.PLAN)}")
+    tasks = []  # the first job of every constant, then the second ones: what time allows is spread over all
+    for turn in range(max(len(names) for names in jobs.PLAN.values())):
+        for step, names in jobs.PLAN.items():
+            if turn < len(names) and (not options.only or step in options.only):
+                tasks += [("", "", 1.0, names[turn])]
+                tasks += [(h.name, h.text, factor, names[turn]) for h in heuristics[step] for factor in (0.5, 2.0) if h.scaled(factor) != h.value]
+    tasks = [task for task in dict.fromkeys(tasks) if (task[0], task[2], task[3]) not in there]
+    end = time.monotonic() + 60 * options.minutes
+    options.csv.parent.mkdir(exist_ok=True)
+    is_new = not options.csv.exists()
+    with open(options.csv, "a", newline="") as file, concurrent.futures.ThreadPoolExecutor(options.processes) as pool:
+        writer = csv.writer(file, lineterminator="\n")
+        if is_new:
+            writer.writerow(COLUMNS)
+
+        def work_on(task):
+            name, text, factor, job = task
+            if time.monotonic() > end:
+                return None
+            as_is = runner.learn(job)
+            state, error, seconds, _ = as_is if not name else runner.run(job, f"{name}={factor}")
+            return [name, text, factor, job, state, "" if error is None else f"{error:.4f}", f"{seconds:.2f}"]
+
+        for n, row in enumerate(pool.map(work_on, tasks)):
+            if row:
+                writer.writerow(row)
+                file.flush()
+            if n % 100 == 0:
+                print(f"{n} of {len(tasks)}", file=sys.stderr, flush=True)
+    shutil.rmtree(work)
+
+
+# ---- the page -------------------------------------------------------------------------------------------------------------
+
+def read_rows(path):
+    return list(csv.DictReader(open(path))) if path.exists() else []
+
+
+def number(error):
+    return "fails" if error is None else f"{error:.2f}"
+
+
+class Measured:
+    """Of one constant: {factor: {job: error, None where it failed}}, and without it."""
+    def __init__(self, rows, as_is, constant):
+        self.constant, self.same = constant, True
+        self.errors = collections.defaultdict(dict)
+        for row in rows:
+            if row["job"] in as_is:  # a job that fails as it is tells nothing
+                self.errors[float(row["factor"])][row["job"]] = float(row["error"]) if row["error"] else None
+                self.same &= row["state"] == "same"
+        self.as_is = {job: as_is[job] for found in self.errors.values() for job in found}
+
+    def median(self, factor):
+        found = self.as_is if factor == 1 else self.errors.get(factor)
+        return number(statistics.median([float("inf") if e is None else e for e in found.values()])).replace("inf", "fails") if found else "="
+
+    def worst(self):
+        """(growth in points, job, factor, error)"""
+        grown = [(float("inf") if error is None else error - self.as_is[job], job, factor, error)
+                 for factor, found in self.errors.items() for job, error in found.items()]
+        return max(grown, key=lambda g: g[0]) if grown else None
+
+    def word(self):
+        if not self.errors:
+            return "not run"
+        if self.same:
+            return "no effect"
+        worst, text = self.worst(), "flat"
+        for factor, found in self.errors.items():
+            for job, error in found.items():
+                before = self.as_is[job]
+                if error is None or (error > FAIL * before and error > before + 1):
+                    return "**fails**"
+                if error > before * (1 + ABOVE) and error > before + POINTS:
+                    text = "**sensitive**"
+        return text if worst else "not run"
+
+    def row(self):
+        h, worst = self.constant, self.worst()
+        where = "" if self.same or not worst or worst[0] < 0.005 else f"{worst[1]}, {'half' if worst[2] < 1 else 'twice'}: {number(self.as_is[worst[1]])} → {number(worst[3])}"
+        cells = [f"`{h.name}`", h.text, h.unit, h.meaning, str(len(self.as_is) or "")] + ([self.median(1), self.median(0.5), self.median(2)] if self.errors else ["", "", ""]) + [where, self.word()]
+        return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def write_page(path, rows):
+    as_is = {row["job"]: float(row["error"]) for row in rows if not row["name"] and row["error"]}
+    by_name = collections.defaultdict(list)
+    for row in rows:
+        by_name[row["name"]].append(row)
+    found = [Measured([row for row in by_name[h.name] if row["value"] == h.text], as_is, h) for h in read_heuristics()]
+    words = collections.Counter(m.word().strip("*") for m in found)
+    told = ", ".join(f"{words[word]} {word}" for word in ("fails", "sensitive", "flat", "no effect", "not run") if words[word])
+    text = f"""# Heuristic constants
+
+Thresholds, factors and counts that were chosen by judgement or measurement and change results. Each stands in `heuristics.h` of its folder of `lib/src`, one struct for each step, with unit and meaning; this page is written from there and from measurements, by [`tests/bench/sensitivity.py`](../tests/bench/sensitivity.py):
+
+```
+cmake --preset default -B build-sensitivity -DCOVOL_SENSITIVITY=ON -DCOVOL_BUILD_TESTS=OFF
+cmake --build build-sensitivity
+nice /usr/bin/python3 tests/bench/sensitivity.py build-sensitivity/bin/covol
+```
+
+Such a build multiplies each constant by what the environment says, `COVOL_SCALE="stray.far=2"`. Every constant is halved and doubled in the jobs that exercise its step ([`sensitivity_jobs.py`](../tests/bench/sensitivity_jobs.py)): clouds of 3,000 points of a ball with spikes, a torus, a thin plate and two balls close to each other, with noise, outliers and holes, scans of one side, and phantoms of 44³ voxels with marks. The error of a cloud is the mean distance between surface and truth, both ways, in % of the shape's half length; of a phantom 1 − Dice in %. The columns are the number of jobs and medians over them, as it is, at half and at twice; `=` where a count stays what it is. Then the job whose error grows most, and a word:
+
+- **fails**: a job ends with an error or takes more than {MOST_SECONDS} s of processor time, or its error is more than threefold and grows by more than a point;
+- **sensitive**: an error grows by more than a tenth of itself, and by more than {POINTS} points;
+- flat: none does; no effect: all meshes of clouds and masks of phantoms keep their bits, on the jobs that were run; not run: run the command again, it goes on where it ended.
+
+{len(found)} constants: {told}. A cosine or a share that is doubled past 1 says never or always. Sizes, formats, and tolerances of solvers are no heuristics and stand where they are used.
+"""
+    folder = step = None
+    for m in found:
+        if m.constant.folder != folder:
+            folder = m.constant.folder
+            text += f"\n## {folder}\n"
+        if m.constant.step != step:
+            step = m.constant.step
+            text += f"\n{step}\n\n| constant | value | unit | meaning | jobs | as is | half | twice | worst | |\n|---|---|---|---|---|---|---|---|---|---|\n"
+        text += m.row() + "\n"
+    path.write_text(text)
+    for word in ("**fails**", "**sensitive**", "no effect"):
+        print(word.strip("*") + ":", ", ".join(m.constant.name for m in found if m.word() == word))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("covol", nargs="?", help="of a build with -DCOVOL_SENSITIVITY=ON")
+    parser.add_argument("--only", nargs="+", metavar="STEP", help="of sensitivity_jobs.PLAN [all]")
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--minutes", type=float, default=1e6, help="no job starts later [no limit]")
+    parser.add_argument("--csv", type=pathlib.Path, default=CSV)
+    parser.add_argument("--table", action="store_true", help="write the page from the CSV alone")
+    options = parser.parse_args()
+    if not options.table:
+        if not options.covol:
+            parser.error("COVOL is missing")
+        measure(options)
+    write_page(PAGE, read_rows(options.csv))
+
+
+if __name__ == "__main__":
+    main()

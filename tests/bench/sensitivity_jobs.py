@@ -1,0 +1,276 @@
+"""What sensitivity.py runs: clouds and phantoms of known truth, each job of about a second, and the error of its result."""
+import pathlib
+import shlex
+import subprocess
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+COUNT = 3000  # points of a cloud
+
+
+# ---- clouds: f(p) is a distance near its surface, negative inside ------------------------------------------------------------
+
+def ball(center, radius):
+    return lambda p: np.linalg.norm(p - np.array(center), axis=1) - radius
+
+
+def capsule(a, b, radius):
+    a, b = np.array(a, float), np.array(b, float)
+
+    def f(p):
+        t = np.clip((p - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
+        return np.linalg.norm(p - a - t[:, None] * (b - a), axis=1) - radius
+    return f
+
+
+def torus(major, minor):
+    return lambda p: np.hypot(np.hypot(p[:, 0], p[:, 1]) - major, p[:, 2]) - minor
+
+
+def plate(half, rounding):
+    def f(p):
+        q = np.abs(p) - (np.array(half) - rounding)
+        return np.linalg.norm(np.maximum(q, 0), axis=1) + np.minimum(q.max(1), 0) - rounding
+    return f
+
+
+def union(*parts):
+    return lambda p: np.min([part(p) for part in parts], axis=0)
+
+
+SHAPES = {
+    "spikes": union(ball((0, 0, 0), 0.85), capsule((0, 0, 0), (1.4, 0, 0), 0.13), capsule((0, 0, 0), (-0.3, 1.35, 0.2), 0.11),
+                    capsule((0, 0, 0), (0, -0.4, -1.35), 0.15)),
+    "torus": torus(0.9, 0.3),
+    "plate": plate((1, 0.8, 0.08), 0.06),  # 4 spacings thick
+    "twins": union(ball((-0.62, 0, 0), 0.57), ball((0.62, 0, 0), 0.57)),  # a gap of 2 spacings
+    "ball": ball((0, 0, 0), 1),
+}
+
+
+def normals_at(f, p, step=1e-4):
+    n = np.stack([f(p + step * e) - f(p - step * e) for e in np.eye(3)], axis=1)
+    return n / np.linalg.norm(n, axis=1, keepdims=True)
+
+
+def on_surface(f, count, random):
+    """Points uniform by area, and their spacing: places in a thin shell, moved onto f = 0."""
+    p = random.uniform(-1.6, 1.6, (600_000, 3))
+    width = 0.03
+    p = p[np.abs(f(p)) < width]
+    area = len(p) / 600_000 * 3.2 ** 3 / (2 * width)
+    p = p[random.permutation(len(p))[:count]]
+    for _ in range(3):
+        p = p - f(p)[:, None] * normals_at(f, p)
+    return p, (area / count) ** 0.5
+
+
+def write_points(path, points, normals=None):
+    table = points if normals is None else np.hstack([points, normals])
+    np.savetxt(path, table, "%.6f", ",", header="x,y,z" + ("" if normals is None else ",nx,ny,nz"), comments="")
+
+
+def write_pcd(path, points, sensor):
+    header = f"# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {len(points)}\nHEIGHT 1\n" \
+        f"VIEWPOINT {sensor[0]} {sensor[1]} {sensor[2]} 1 0 0 0\nPOINTS {len(points)}\nDATA ascii\n"
+    path.write_text(header + "".join("%.6f %.6f %.6f\n" % tuple(p) for p in points))
+
+
+def make_clouds(folder):
+    for number, (name, f) in enumerate(SHAPES.items()):
+        np.save(folder / f"{name}.npy", on_surface(f, 10000, np.random.default_rng([number, 0]))[0])
+
+    def draw(name, seed, noise=0.0, outliers=0.0, part=lambda p: np.full(len(p), True), count=COUNT):
+        random = np.random.default_rng([seed, 1])
+        points, spacing = on_surface(SHAPES[name], count, random)
+        points = points[part(points)]
+        normals = normals_at(SHAPES[name], points)
+        points = points + random.normal(0, noise * spacing, points.shape) if noise else points
+        strays = random.uniform(-1.6, 1.6, (int(outliers * len(points)), 3))
+        return np.concatenate([points, strays]), np.concatenate([normals, strays])
+
+    def seen_from(direction):
+        direction = np.array(direction) / np.linalg.norm(direction)
+        return lambda p: normals_at(SHAPES["spikes"], p) @ direction > 0.15
+
+    for name, seed, noise, outliers in (("spikes", 1, 0, 0), ("spikes", 2, 0.5, 0.01), ("torus", 3, 0.3, 0.005), ("torus", 4, 0.9, 0), ("plate", 5, 0.2, 0),
+                                        ("plate", 6, 0, 0), ("twins", 7, 0.2, 0.01)):
+        write_points(folder / f"{name}{seed}.csv", draw(name, seed, noise, outliers)[0])
+    write_points(folder / "hole.csv", draw("torus", 8, 0.2, part=lambda p: (p[:, 0] < 0.8) | (p[:, 2] < 0.05))[0])
+    write_points(folder / "half.csv", draw("ball", 9, 0.1, part=lambda p: p[:, 2] > -0.1)[0])
+    front = draw("spikes", 10, 0.2, part=seen_from((1, 1, 1)), count=2400)[0]
+    write_points(folder / "front.csv", front)
+    write_pcd(folder / "front.pcd", front, (6, 6, 6))
+    side = draw("spikes", 11, 0.2, part=seen_from((1, 1, -0.5)), count=1200)[0]
+    write_points(folder / "layers.csv", np.concatenate([front[::2], side + 0.07]))
+    points, normals = draw("torus", 12, 0.2)
+    normals[::9] *= -1
+    write_points(folder / "normals.csv", points, normals)
+    points, normals = draw("plate", 13, 0.1)
+    write_points(folder / "normals_plate.csv", points, -normals)
+    points, normals = draw("spikes", 14, 0.2)
+    write_points(folder / "normals_wrong.csv", points, np.where(points[:, :1] > 0.3, -1, 1) * normals)
+    write_points(folder / "thick.csv", draw("torus", 15, 0.7, count=5000)[0])
+    write_points(folder / "few.csv", draw("torus", 16, 0.1, count=700)[0])
+
+
+def mesh_vertices(path):
+    data = path.read_bytes()
+    head, body = data.split(b"end_header\n", 1)
+    lines = head.decode().split("\n")
+    begin = next(n for n, line in enumerate(lines) if line.startswith("element vertex"))
+    fields = []
+    for line in lines[begin + 1:]:
+        if not line.startswith("property"):
+            break
+        fields.append((line.split()[2], {"float": "<f4", "double": "<f8", "uchar": "u1", "int": "<i4", "uint": "<u4", "float32": "<f4"}[line.split()[1]]))
+    table = np.frombuffer(body, np.dtype(fields), int(lines[begin].split()[2]))
+    return np.stack([table[a].astype(float) for a in "xyz"], axis=1)
+
+
+def cloud_error(folder, out, shape, part=None):
+    """Mean distance of the mesh from the shape, and of the shape from the mesh beyond 0.05, in % of the shape's half length."""
+    vertices = mesh_vertices(out / "s.ply")
+    truth = np.load(folder / f"{shape}.npy")
+    if part is not None:  # of an open surface: what the points show
+        truth = truth[cKDTree(part).query(truth)[0] < 0.05]
+        vertices = vertices[cKDTree(part).query(vertices)[0] < 0.2]
+    missing = np.maximum(0, cKDTree(vertices).query(truth)[0] - 0.05)
+    return 100 * float(np.abs(SHAPES[shape](vertices)).mean() + missing.mean())
+
+
+# ---- phantoms ------------------------------------------------------------------------------------------------------------
+
+def read_nrrd(path):
+    head, body = path.read_bytes().split(b"\n\n", 1)
+    fields = dict(line.split(": ", 1) for line in head.decode().split("\n") if ": " in line)
+    if fields["encoding"] in ("gzip", "gz"):
+        import gzip
+        body = gzip.decompress(body)
+    kind = {"float": "<f4", "uint8": "u1", "unsigned char": "u1", "uchar": "u1", "short": "<i2", "uint16": "<u2", "unsigned short": "<u2"}[fields["type"]]
+    return np.frombuffer(body, kind).reshape([int(n) for n in fields["sizes"].split()][::-1]), head
+
+
+def make_phantoms(folder, covol):
+    for name, kind, count, noise in (("round", "sphere-round", 60, 0.1), ("torus", "torus", 80, 0.3), ("two", "two-spheres", 60, 0.2), ("slit", "sphere-slit", 60, 0),
+                                     ("many", "torus", 350, 0.2), ("dense", "torus", 1500, 0.2), ("box", "box", 60, 0.2), ("sphere", "sphere", 300, 0.2)):
+        subprocess.run([covol, "phantom", kind, "--size", "44", "-o", f"p_{name}.nrrd", "--points", f"p_{name}.csv", "--labels", f"l_{name}.nrrd",
+                        "--count", str(count), "--noise", str(noise), "--seed", "3"], cwd=folder, check=True, capture_output=True)
+        labels, head = read_nrrd(folder / f"l_{name}.nrrd")
+        if name in ("torus", "round", "box"):
+            raw = head.replace(b"encoding: gzip", b"encoding: raw") + b"\n\n"
+            wrong = np.roll(labels, (1, 2, 0), (0, 1, 2)) if name == "torus" else labels & np.roll(labels, 3, 0)
+            (folder / f"g_{name}.nrrd").write_bytes(raw + np.ascontiguousarray(wrong).tobytes())
+            painted = np.zeros_like(labels)
+            painted[::6] = labels[::6]
+            (folder / f"s_{name}.nrrd").write_bytes(raw + painted.tobytes())
+        points = np.array([line.split(",")[:3] for line in (folder / f"p_{name}.csv").read_text().splitlines() if line[0] in "-0123456789"], float)
+        np.savetxt(folder / f"ten_{name}.csv", points[::max(1, len(points) // 10)], "%.6f", ",", header="x,y,z", comments="")
+    rows = []
+    for k in range(8, 37, 4):  # of the torus of radii 0.75 and 0.3: voxels are 2.6 / 44 wide
+        wide = 0.3 ** 2 - ((k - 21.5) * 2.6 / 44) ** 2
+        for number, radius in enumerate((0.75 + wide ** 0.5, 0.75 - wide ** 0.5) if wide > 0 else ()):
+            rows += [(k, number, 21.5 + radius * np.cos(t) * 44 / 2.6, 21.5 + radius * np.sin(t) * 44 / 2.6) for t in np.arange(0, 6.28, 0.35)]
+    np.savetxt(folder / "contours.csv", rows, "%.4f", ",", header="slice,contour,x_px,y_px", comments="")
+
+
+def mask_error(folder, out, name):
+    """1 - Dice, in %."""
+    truth, mask = read_nrrd(folder / f"l_{name}.nrrd")[0] > 0, read_nrrd(out / "m.nrrd")[0] > 0
+    return 100 * (1 - 2 * float((truth & mask).sum()) / max(1, float(truth.sum() + mask.sum())))
+
+
+# ---- jobs -----------------------------------------------------------------------------------------------------------------
+
+RECONSTRUCT = "reconstruct ../in/{} --init cloud -o s.vdb --mesh s.ply"
+MARKS = "segment ../in/p_{0}.nrrd --points ../in/p_{0}.csv -o s.vdb --mask m.nrrd"
+JOBS = {  # name: (arguments, kind of truth, shape, more)
+    "spikes": (RECONSTRUCT.format("spikes1.csv"), "cloud", "spikes"),
+    "spikes noisy": (RECONSTRUCT.format("spikes2.csv"), "cloud", "spikes"),
+    "torus": (RECONSTRUCT.format("torus3.csv"), "cloud", "torus"),
+    "torus noisy": (RECONSTRUCT.format("torus4.csv"), "cloud", "torus"),
+    "plate noisy": (RECONSTRUCT.format("plate5.csv"), "cloud", "plate"),
+    "plate": (RECONSTRUCT.format("plate6.csv"), "cloud", "plate"),
+    "twins": (RECONSTRUCT.format("twins7.csv"), "cloud", "twins"),
+    "hole": (RECONSTRUCT.format("hole.csv"), "cloud", "torus"),
+    "half open": (RECONSTRUCT.format("half.csv") + " --holes open", "open", "ball", "half.csv"),
+    "half flat": (RECONSTRUCT.format("half.csv") + " --holes flat", "open", "ball", "half.csv"),
+    "front": (RECONSTRUCT.format("front.csv"), "open", "spikes", "front.csv"),
+    "front sensor": (RECONSTRUCT.format("front.pcd"), "open", "spikes", "front.csv"),
+    "layers": (RECONSTRUCT.format("layers.csv"), "open", "spikes", "layers.csv"),
+    "normals": (RECONSTRUCT.format("normals.csv"), "cloud", "torus"),
+    "normals plate": (RECONSTRUCT.format("normals_plate.csv"), "cloud", "plate"),
+    "normals wrong": (RECONSTRUCT.format("normals_wrong.csv"), "cloud", "spikes"),
+    "thick tag": (RECONSTRUCT.format("thick.csv").replace("cloud", "tag"), "cloud", "torus"),
+    "spikes tag": (RECONSTRUCT.format("spikes1.csv").replace("cloud", "tag"), "cloud", "spikes"),
+    "twins tag": (RECONSTRUCT.format("twins7.csv").replace("cloud", "tag"), "cloud", "twins"),
+    "few": (RECONSTRUCT.format("few.csv").replace("--init cloud ", ""), "cloud", "torus"),
+    "cleaned": (RECONSTRUCT.format("spikes2.csv") + " --remove-outliers --smooth wlop", "cloud", "spikes"),
+    "relaxed": ("mesh ../in/spikes.vdb -o s.ply --target-edge 2vx", "cloud", "spikes"),
+    "adaptive": ("mesh ../in/spikes.vdb -o s.ply --adaptive 0.2vx", "cloud", "spikes"),
+    "m round": (MARKS.format("round"), "mask", "round"),
+    "m torus": (MARKS.format("torus"), "mask", "torus"),
+    "m two": (MARKS.format("two"), "mask", "two"),
+    "m box": (MARKS.format("box"), "mask", "box"),
+    "m many": (MARKS.format("many"), "mask", "many"),
+    "m many alone": (MARKS.format("many") + " --rho 0", "mask", "many"),
+    "m torus alone": (MARKS.format("torus") + " --rho 0", "mask", "torus"),
+    "m sides": (MARKS.format("two") + " --inside -0.55,0,0 --inside 0.55,0.1,0.05 --outside 0,0.9,0", "mask", "two"),
+    "m tag": (MARKS.format("dense") + " --init tag", "mask", "dense"),
+    "m tag slit": (MARKS.format("slit") + " --init tag --tag-distance 6vx", "mask", "slit"),
+    "m tag sphere": (MARKS.format("sphere") + " --init tag", "mask", "sphere"),
+    "m paper": (MARKS.format("dense") + " --model paper", "mask", "dense"),
+    "m grow": ("segment ../in/p_sphere.nrrd --theta 0 --init sphere:0,0,0,0.25 -o s.vdb --mask m.nrrd", "mask", "sphere"),
+    "m grow box": ("segment ../in/p_box.nrrd --theta 0 --inside 0,0,0 -o s.vdb --mask m.nrrd", "mask", "box"),
+    "m coarse": ("segment ../in/p_sphere.nrrd --theta 0 --init sphere:0,0,0,1.1 --voxel-size 0.03 --coarse-levels 1 -o s.vdb --mask m.nrrd", "mask", "sphere"),
+    "m init": (MARKS.format("dense") + " --init sphere:0,0,0,1.1", "mask", "dense"),
+    "m guess": (MARKS.format("torus").replace("p_torus.csv", "ten_torus.csv") + " --guess ../in/g_torus.nrrd", "mask", "torus"),
+    "m guess seed": (MARKS.format("box").replace("p_box.csv", "ten_box.csv") + " --guess ../in/g_box.nrrd --inside -0.8,0,0", "mask", "box"),
+    "m contours": ("segment ../in/p_torus.nrrd --contours ../in/contours.csv -o s.vdb --mask m.nrrd", "mask", "torus"),
+    "m contours alone": ("segment ../in/p_torus.nrrd --contours ../in/contours.csv --rho 0 -o s.vdb --mask m.nrrd", "mask", "torus"),
+    "m painted": ("segment ../in/p_torus.nrrd --painted ../in/s_torus.nrrd -o s.vdb --mask m.nrrd", "mask", "torus"),
+    "m painted box": ("segment ../in/p_box.nrrd --painted ../in/s_box.nrrd --rho 0 -o s.vdb --mask m.nrrd", "mask", "box"),
+}
+CLOUDS = ["spikes noisy", "plate noisy", "torus", "twins"]
+OPEN = ["front", "layers"]
+TAGGED = ["m tag", "twins tag", "thick tag", "m tag slit", "m tag sphere"]
+GUESSED = ["m round", "m torus", "m two"]
+FLOWS = ["m paper", "m init", "m grow"]
+PLAN = {  # step: the jobs that exercise it, the most telling first
+    "cloud_scale": CLOUDS, "stray": ["spikes noisy", "torus", "twins"], "indicator": CLOUDS, "winding_field": CLOUDS,
+    "orientation": CLOUDS[:2] + ["torus noisy"] + CLOUDS[2:], "local_fit": CLOUDS[:2] + ["torus noisy"] + CLOUDS[2:], "blend": CLOUDS[:1] + ["hole"] + CLOUDS[1:], "tag_distance": TAGGED,
+    "tagging": TAGGED, "closing": TAGGED, "guess": ["m torus alone", "m sides"], "marks_surface": ["m many alone", "m torus alone"],
+    "variational": ["m torus alone", "few", "m two"], "guidance": GUESSED, "learning": GUESSED, "border": GUESSED, "offset_field": GUESSED,
+    "correction": ["m guess", "m guess seed"], "torn": ["spikes", "plate", "normals plate"], "areas": CLOUDS, "join_pieces": ["spikes", "spikes noisy", "plate noisy", "twins"],
+    "hold_topology": ["spikes noisy", "plate noisy", "twins"], "given_sides": ["normals", "normals plate", "normals wrong", "front sensor"],
+    "views": OPEN + ["front sensor"], "layers": OPEN, "scan_noise": TAGGED[:2] + ["few"], "neighbours": CLOUDS[:2], "spacing": ["spikes", "few"],
+    "automatic": ["spikes noisy", "few", "front", "thick tag", "m tag", "m init"], "grow": ["m grow", "m grow box"], "seeds": ["m grow box"],
+    "fields": FLOWS, "job": TAGGED[:2] + ["few"], "flow": FLOWS + ["few"], "coarse_level": ["m coarse"], "doubts": ["m torus", "m tag slit"], "vanished": ["m tag slit", "half flat"],
+    "final_surface": ["half open", "front"], "starts": ["m tag", "m tag slit", "m guess", "hole", "m grow", "few"], "holes": ["half open", "half flat"],
+    "cut": ["half open", "half flat"], "membrane": ["half flat"], "edge": FLOWS, "evolve": FLOWS + ["few"], "motion": FLOWS, "solver": FLOWS,
+    "painted": ["m painted", "m painted box"], "outline": ["m painted", "m painted box"], "contours": ["m contours", "m contours alone"],
+    "relax": ["relaxed", "spikes"], "decimate": ["adaptive", "relaxed"], "level": ["relaxed", "adaptive"], "pieces": ["m two"], "cleanup": ["cleaned"],
+}
+
+
+def make_inputs(folder, covol):
+    folder.mkdir(parents=True)
+    make_clouds(folder)
+    make_phantoms(folder, covol)
+    subprocess.run([covol, "reconstruct", "spikes1.csv", "--init", "cloud", "-o", "spikes.vdb"], cwd=folder, check=True, capture_output=True)
+
+
+def arguments_of(job):
+    return shlex.split(JOBS[job][0])
+
+
+def output_of(job, out):
+    return out / ("m.nrrd" if JOBS[job][1] == "mask" else "s.ply")
+
+
+def error_of(job, folder, out):
+    _, kind, shape, *more = JOBS[job]
+    if kind == "mask":
+        return mask_error(folder, out, shape)
+    return cloud_error(folder, out, shape, np.genfromtxt(folder / more[0], delimiter=",", skip_header=1)[:, :3] if kind == "open" else None)

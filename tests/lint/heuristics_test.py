@@ -1,0 +1,60 @@
+"""Heuristic constants stand in heuristics.h, each with unit, meaning and a row in docs/heuristics.md; no others come beside them.
+
+    python3 tests/lint/heuristics_test.py SOURCE_DIR
+"""
+import pathlib
+import re
+import sys
+
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "bench"))
+from heuristics import read_heuristics  # noqa: E402
+
+# A constant of floating point in a .cpp of a folder that has a heuristics.h. Those that are none: tolerances of solvers, mathematics.
+CONSTANT = re.compile(r"^\s*(?:static )?constexpr (?:double|float) (k\w+)\b", re.M)
+ALLOWED = {
+    "cloud/orientation/cloud_scale.cpp:kCellRadii", "contours/contour_curve.cpp:kLongestPiece", "contours/slice_field.cpp:kSeedPiece",
+    "edge/edge.cpp:kHeatTolerance", "evolve/band_solver.cpp:kRounding", "evolve/motion.cpp:kInfinity", "evolve/tracking.cpp:kWidth",
+    "guess/guess_correction.cpp:kSolved", "guess/marks_surface.cpp:kInfinity", "guess/marks_surface.cpp:kMostCells",
+    "guess/variational.cpp:kAround", "guess/variational.cpp:kLocalShares", "guess/variational.cpp:kNoStep",
+    "guidance/smooth_image.cpp:kKernelSigmas", "guidance/smooth_image.cpp:kLeastSigma", "holes/holes.cpp:kP95OfSpacing",
+    "meshing/contacts.cpp:kAlong", "meshing/contacts.cpp:kFacing", "meshing/contacts.cpp:kFar", "meshing/contacts.cpp:kRounding",
+    "meshing/level.cpp:kConverged", "meshing/level.cpp:kNearFace", "start/start.cpp:kLeafRadius",
+    "start/start.cpp:kSame", "surface/surface_mesh.cpp:kChamfer", "surface/surface_mesh.cpp:kEdgeMargin", "tagging/tagging.cpp:kBall",
+}
+
+
+def findings(root):
+    heuristics = read_heuristics(root)
+    if len(heuristics) < 100:
+        yield f"lib/src: expected heuristics, found {len(heuristics)}"
+    rows = set(re.findall(r"^\| `([\w.]+)` \|", (root / "docs/heuristics.md").read_text(), re.M))
+    values = dict(re.findall(r"^\| `([\w.]+)` \| ([^|]+) \|", (root / "docs/heuristics.md").read_text(), re.M))
+    for h in heuristics:
+        if h.problem:
+            yield f"{h.name}: {h.problem}"
+        elif h.name not in rows:
+            yield f"{h.name}: no row in docs/heuristics.md; run tests/bench/sensitivity.py"
+        elif values[h.name] != h.text:
+            yield f"{h.name}: docs/heuristics.md has {values[h.name]}, the header {h.text}; run tests/bench/sensitivity.py"
+    for name in sorted(rows - {h.name for h in heuristics}):
+        yield f"docs/heuristics.md: {name}: no such constant"
+    for h in {h.name: h for h in heuristics}.values():
+        if sum(other.name == h.name for other in heuristics) > 1:
+            yield f"{h.name}: more than once"
+    found = set()
+    for folder in sorted(path.parent for path in (root / "lib/src").rglob("heuristics.h")):
+        for path in sorted(folder.rglob("*.cpp")):
+            for name in CONSTANT.findall(path.read_text()):
+                where = f"{path.relative_to(root / 'lib/src').as_posix()}:{name}"
+                found.add(where)
+                if where not in ALLOWED:
+                    yield f"lib/src/{where}: a heuristic belongs to {folder.name}/heuristics.h; what is none, to ALLOWED of this test"
+    for where in sorted(ALLOWED - found):
+        yield f"{where}: allowed, but not there"
+
+
+if __name__ == "__main__":
+    found = list(findings(pathlib.Path(sys.argv[1])))
+    print("\n".join(found) if found else "no finding")
+    sys.exit(1 if found else 0)
