@@ -156,7 +156,7 @@ VoxelSizeChoice choose_voxel_size(const Image& image) {
 }
 
 VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool tagged) {
-    using pipeline::kAutomatic, pipeline::number;
+    using pipeline::number;
     const std::vector<Vec3> distinct = merge_close_points(world_points, 0);
     if (distinct.size() < 2)
         throw Error(Errc::InvalidInput, "choose_voxel_size: expected an image or at least 2 distinct points, got " +

@@ -47,7 +47,7 @@ void start_from_cloud(Job& job) {
     }
     if (!job.rests() && job.uses_points()) {
         if (job.has_automatic_range) {
-            const double range = kReachSpacings * std::max(report.spacing, job.h());
+            const double range = kStarts.reach_spacings * std::max(report.spacing, job.h());
             job.options.evolve.attraction_range = range;
             job.choose("attraction_range", number(range),
                        "the start touches the points, and where there are none nothing should pull");
