@@ -40,7 +40,7 @@ EvolveReport approach(Job& job, EvolveFields fields) {
     alone.rho = 0;
     alone.attraction_range = 0;
     alone.image_yields = 0;
-    if (alone.follow) alone.tau = kApproachTau * (alone.tau < 0 ? job.h() : alone.tau);
+    if (alone.follow) alone.tau = kApproachTau * alone.tau.value_or(job.h());
     alone.max_steps = std::min(alone.max_steps, kApproachSteps);
     alone.tolerance = std::max(alone.tolerance, kApproachTolerance);
     fields.edge = nullptr;

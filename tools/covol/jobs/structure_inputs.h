@@ -39,7 +39,7 @@ struct StructureInput {
 /// line gives none: a surface that changed its stiffness between frames would seem to move.
 struct StructureStart {
     Start start;
-    std::optional<double> delta;  ///< world units
+    std::optional<double> delta{};  ///< world units
 };
 
 /// The starts that --init asks for, one for each structure.
