@@ -8,7 +8,7 @@ import sys
 
 # Code of headers that say default visibility themselves: the same in every library that uses them.
 FOREIGN = re.compile(r"^(std|__gnu_cxx|openvdb|tbb|boost|itk)::|^(guard variable|typeinfo|typeinfo name|vtable|VTT) for "
-                     r"(std|__gnu_cxx|openvdb|tbb|boost|itk)::")
+                     r"((std|__gnu_cxx|openvdb|tbb|boost|itk)::|void \(\*\)\()")
 ABOUT = re.compile(r"^(?:(?:guard variable|typeinfo|typeinfo name|vtable|VTT) for |(?:non-)?virtual thunk to )")
 # A lower-case namespace inside of covol is internal: covol::detail, covol::pipeline. Classes have capitals.
 INTERNAL = re.compile(r"\bcovol::[a-z_]\w*::")

@@ -1,6 +1,9 @@
 #include "covol/run.h"
 
+#include <tbb/info.h>
 #include <tbb/task_arena.h>
+
+#include <algorithm>
 
 #include "covol/error.h"
 
@@ -20,11 +23,13 @@ void RunContext::check() const {
 }
 
 void with_threads(const RunContext& run, const std::function<void()>& work) {
-    if (run.threads <= 0 || run.threads == tbb::this_task_arena::max_concurrency()) {
+    // TBB prints a warning where an arena asks for more than there are.
+    const int width = std::min(run.threads, tbb::info::default_concurrency());
+    if (run.threads <= 0 || width == tbb::this_task_arena::max_concurrency()) {
         work();
         return;
     }
-    tbb::task_arena(run.threads).execute([&] { work(); });
+    tbb::task_arena(width).execute([&] { work(); });
 }
 
 }  // namespace covol
