@@ -1,6 +1,6 @@
 #include "covol/run.h"
 
-#include <tbb/info.h>
+#include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -23,8 +23,9 @@ void RunContext::check() const {
 }
 
 void with_threads(const RunContext& run, const std::function<void()>& work) {
-    // TBB prints a warning where an arena asks for more than there are.
-    const int width = std::min(run.threads, tbb::info::default_concurrency());
+    // TBB prints a warning where an arena asks for more than the process may have.
+    const auto most = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+    const int width = std::min(run.threads, int(most));
     if (run.threads <= 0 || width == tbb::this_task_arena::max_concurrency()) {
         work();
         return;
