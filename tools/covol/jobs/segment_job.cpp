@@ -1,35 +1,13 @@
 #include "jobs/segment_job.h"
 
 #include <algorithm>
-#include <cmath>
-#include <memory>
-#include <optional>
-#include <sstream>
 
 #include "cli/report.h"
 #include "covol/error.h"
-#include "covol/surface.h"
-#include "covol/vdb_io.h"
-#include "jobs/marks.h"
 #include "jobs/structures_job.h"
 #include "jobs/timelapse_job.h"
 
 namespace covol::tool {
-namespace {
-
-/// A core that the points enclose is farther than D from all of them, and lies in their box.
-void check_tag_distance(double tag_distance, const std::vector<Vec3>& points) {
-    if (points.empty()) return;
-    const WorldBox box = bounding_box(points);
-    const double diagonal = std::hypot(box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]);
-    if (tag_distance <= diagonal) return;
-    std::ostringstream text;
-    text << "--tag-distance: " << tag_distance << " is more than the points' whole box measures, " << diagonal
-         << ": nothing that they enclose is that far from them";
-    throw Error(Errc::InvalidOptions, text.str());
-}
-
-}  // namespace
 
 SegmentOptions SegmentJob::resolve(double h) const {
     SegmentOptions options;
@@ -76,17 +54,6 @@ std::string SegmentJob::unused(const SegmentReport& report) const {
     if (flags.empty()) return {};
     return flags +
            " did nothing: the surface is a guess that marks and image hold, and nothing flowed; --model paper flows";
-}
-
-void SegmentJob::check_outputs(Outputs& outputs) const {
-    outputs.check("-o", output, OutputKind::Vdb);
-    outputs.check("--mask", mask_path, OutputKind::Image);
-    outputs.check("--mesh", mesh_path, OutputKind::Mesh);
-    outputs.check("--density", density_path, OutputKind::Vdb);
-    outputs.check("--fields", fields_path, OutputKind::Vdb);
-    outputs.check("--table", table_path, OutputKind::Table);
-    evidence.check(outputs, evidence.path);
-    mesh.check();
 }
 
 void SegmentJob::bind(CLI::App& command, bool with_image) {
@@ -189,85 +156,7 @@ void SegmentJob::run(Session& session) const {
     if (names && images.empty())
         throw UsageError("expected files without names: several structures need an image, see covol segment");
     if (is_timelapse(*this)) return run_timelapse(*this, session);
-    if (names || !tag.named_seeds.empty() || !painted.paths.empty() || !guess.paths.empty())
-        return run_structures(*this, session);
-    run_one(session);
-}
-
-void SegmentJob::run_one(Session& session) const {
-    check_outputs(session.outputs());
-    check_options();
-
-    std::optional<Image> pixels;
-    if (!images.empty()) {
-        ReadImageOptions options = image.options;
-        if (frames.given) options.frame = frames.first;
-        pixels = read(images.front(), options, session);
-    }
-    Json& input = session.report()["input"];
-    const Stopwatch reading;
-    const ImageGeometry* geometry = pixels ? &pixels->geometry() : nullptr;
-    Marks marks = read_marks(points, contours, cloud, geometry, session.run());
-    session.add_seconds("read", reading.seconds());
-    session.add_seconds("total", reading.seconds());
-
-    const Image* pointer = pixels ? &*pixels : nullptr;
-    if (pointer == nullptr && marks.given.empty()) throw UsageError("expected an image, points or contours, got none");
-    const double h = domain.resolve_voxel_size(pointer, marks.given, session);
-    prepare(marks, cloud, contours, geometry, h, session, session.run());
-    input.update(marks.report);
-    SegmentOptions options = resolve(h);
-    check_tag_distance(options.tag_distance.value_or(0), marks.given);
-    options.contours = marks.contours;
-    options.hints = marks.hints;
-    const Seeds sides = read_seeds(seeds, points.options, geometry, h, session.run());
-    options.inside = sides.inside;
-    options.outside = sides.outside;
-    // Shared by the writers that run at the end.
-    const auto result = std::make_shared<SegmentResult>(pixels ? segment(*pixels, marks.points, options, session.run())
-                                                               : reconstruct(marks.points, options, session.run()));
-    input["points"]["densified"] = result->report.densified;
-    session.report().update(to_json(result->report), true);
-    add_seconds(session, result->report.seconds);
-    for (const std::string& line : summary(result->report)) session.note(line);
-    if (const std::string line = unused(result->report); !line.empty()) session.warn(line);
-    std::optional<Evidence> judged;
-    if (pixels && evidence.wanted()) {
-        judged = evidence.judge(*result, marks.given, *pixels, session.run());
-        session.report()["evidence"] = to_json(*judged);
-        tell(session, *judged);
-    }
-
-    WriteVdbOptions vdb{half, session.metadata()};
-    if (result->report.holes.policy == Holes::Open) vdb.metadata["covol_holes"] = "closed here; the mesh alone is open";
-    Outputs& outputs = session.outputs();
-    outputs.add(output, [=](const std::string& path) { write_vdb(path, {result->surface}, vdb); });
-    outputs.add(density_path,
-                [=](const std::string& path) { write_vdb(path, {to_fog_volume(*result->surface)}, vdb); });
-    outputs.add(fields_path, [=](const std::string& path) {
-        std::vector<FloatGridPtr> grids{result->u};
-        for (const FloatGridPtr& field : {result->distance, result->edge})
-            if (field) grids.push_back(field);
-        write_vdb(path, grids, vdb);
-    });
-    WriteMeshOptions write = mesh.options(session);
-    write.attributes = vertex_attributes(judged);
-    if (!result->distance_to_points.empty())
-        write.attributes.push_back({"distance_to_points", result->distance_to_points});
-    outputs.add(mesh_path, [=](const std::string& path) { write_mesh(path, result->mesh, write); });
-    outputs.add(evidence.path, [=](const std::string& path) {
-        write_text(path, evidence_csv({{"surface", &*judged}}));
-    });
-    outputs.add(table_path, [=](const std::string& path) {
-        Table table(result_columns());
-        add_result(table.row(), "surface", 1, result->report);
-        write_text(path, table.text());
-    });
-    if (!mask_path.empty())
-        outputs.add(mask_path, [=, geometry = pixels->geometry(), &session](const std::string& path) {
-            write_image(path, geometry, rasterize(*result->surface, geometry, 1, session.run()).data());
-        });
-    if (evolve.strict && result->report.solve.stop_reason != StopReason::Steady) session.set_exit_code(kNotSteady);
+    run_structures(*this, session);
 }
 
 }  // namespace covol::tool

@@ -40,7 +40,7 @@ struct SegmentJob {
     bool half = false;
 
     void bind(CLI::App& command, bool with_image);
-    /// One structure in one image here; several structures and time-lapses in files of their own.
+    /// Time-lapses by run_timelapse(), all else by run_structures().
     void run(Session& session) const;
 
     // For those.
@@ -51,10 +51,6 @@ struct SegmentJob {
     [[nodiscard]] std::string unused(const SegmentReport& report) const;
     /// The image; the report tells of it.
     [[nodiscard]] Image read(const std::string& path, const ReadImageOptions& options, Session& session) const;
-
-private:
-    void run_one(Session& session) const;
-    void check_outputs(Outputs& outputs) const;
 };
 
 }  // namespace covol::tool

@@ -45,6 +45,8 @@ std::map<std::string, std::string> metadata_of(const StructuresOutput& output, c
             resolved[s.name] = used;
     }
     std::map<std::string, std::string> metadata = session.metadata();
+    if (output.structures.front().result.report.holes.policy == Holes::Open)
+        metadata["covol_holes"] = "closed here; the mesh alone is open";
     metadata["covol_resolved"] = resolved.dump(-1, ' ', false, Json::error_handler_t::replace);
     return metadata;
 }
@@ -65,9 +67,12 @@ void hand_over_meshes(const SegmentJob& job, const std::shared_ptr<const Structu
     for (std::size_t n = 0; n < output->structures.size(); ++n)
         sink(output->structures.size() > 1 ? with_suffix(path, "_" + output->structures[n].grid) : path,
              [output, n, options](const std::string& file) {
-                 WriteMeshOptions with_evidence = options;
-                 with_evidence.attributes = vertex_attributes(output->structures[n].evidence);
-                 write_mesh(file, output->structures[n].result.mesh, with_evidence);
+                 WriteMeshOptions with_attributes = options;
+                 with_attributes.attributes = vertex_attributes(output->structures[n].evidence);
+                 const SegmentResult& result = output->structures[n].result;
+                 if (!result.distance_to_points.empty())
+                     with_attributes.attributes.push_back({"distance_to_points", result.distance_to_points});
+                 write_mesh(file, result.mesh, with_attributes);
              });
 }
 

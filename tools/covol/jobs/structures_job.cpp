@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <sstream>
 
 #include "cli/report.h"
 #include "covol/error.h"
@@ -22,6 +24,18 @@ RunContext speaking_for(const std::string& name, const RunContext& run) {
     return named;
 }
 
+/// A core that the points enclose is farther than D from all of them, and lies in their box.
+void check_tag_distance(double tag_distance, const std::vector<Vec3>& points) {
+    if (points.empty()) return;
+    const WorldBox box = bounding_box(points);
+    const double diagonal = std::hypot(box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]);
+    if (tag_distance <= diagonal) return;
+    std::ostringstream text;
+    text << "--tag-distance: " << tag_distance << " is more than the points' whole box measures, " << diagonal
+         << ": nothing that they enclose is that far from them";
+    throw Error(Errc::InvalidOptions, text.str());
+}
+
 /// Up to rounding in files.
 bool is_same_lattice(const ImageGeometry& a, const ImageGeometry& b) {
     if (a.size != b.size) return false;
@@ -36,7 +50,6 @@ bool is_same_lattice(const ImageGeometry& a, const ImageGeometry& b) {
 
 /// What changed by the separation is measured again.
 void separate_all(StructuresOutput& output, const SegmentOptions& options, const RunContext& run) {
-    if (output.structures.size() < 2) return;
     const SeparateResult separated = separate(solids(output), {}, run);
     for (const StructureOverlap& overlap : separated.report.overlaps) {
         Json entry{{"structures", {output.structures[overlap.a].name, output.structures[overlap.b].name}},
@@ -57,10 +70,11 @@ void separate_all(StructuresOutput& output, const SegmentOptions& options, const
     }
 }
 
-void summarise(const StructuresOutput& output, Session& session) {
+void summarise(const StructuresOutput& output, const SegmentJob& job, Session& session) {
     for (const StructureOutput& s : output.structures) {
         const std::string who = s.name.empty() ? "" : s.name + ": ";
         for (const std::string& line : summary(s.result.report)) session.note(who + line);
+        if (const std::string line = job.unused(s.result.report); !line.empty()) session.warn(who + line);
         if (s.evidence) tell(session, *s.evidence, who);
     }
 }
@@ -68,25 +82,32 @@ void summarise(const StructuresOutput& output, Session& session) {
 }  // namespace
 
 StructuresOutput segment_structures(const SegmentJob& job, const std::vector<StructureInput>& inputs,
-                                    const Image& image, const std::vector<StructureStart>& starts, Session& session,
+                                    const Image* image, const std::vector<StructureStart>& starts, Session& session,
                                     const RunContext& run) {
     StructuresOutput output;
-    output.geometry = image.geometry();
-    const double h = job.domain.resolve_voxel_size(&image, {}, session);
-    const SegmentOptions given = job.resolve(h);
+    if (image != nullptr) output.geometry = image->geometry();
+    const ImageGeometry* const geometry = image != nullptr ? &output.geometry : nullptr;
     const std::vector<std::string> grids = make_grid_names(names_of(inputs));
     PaintReader paint(job, output.geometry);
     const bool force = job.image.options.spacing[0] > 0;
+    std::optional<double> voxel_size;  // one for all
     for (std::size_t n = 0; n < inputs.size(); ++n) {
         const RunContext own = speaking_for(inputs[n].name, run);
         StructureOutput s;
         s.name = inputs[n].name;
         s.grid = grids[n];
         s.label = inputs[n].label;
-        Marks marks = read_marks(inputs[n].points, inputs[n].contours, job.cloud, &image.geometry(), own);
+        const Stopwatch reading;
+        Marks marks = read_marks(inputs[n].points, inputs[n].contours, job.cloud, geometry, own);
+        session.add_seconds("read", reading.seconds());
+        session.add_seconds("total", reading.seconds());
+        if (image == nullptr && marks.given.empty())
+            throw UsageError("expected an image, points or contours, got none");
+        if (!voxel_size) voxel_size = job.domain.resolve_voxel_size(image, marks.given, session);
+        const double h = *voxel_size;
         const std::shared_ptr<const Contours> painted = paint.own_contours(inputs[n], marks, h, own);
         if (!painted) paint.add_outlines(inputs[n], marks, own);
-        prepare(marks, job.cloud, inputs[n].contours, &image.geometry(), h, session, own);
+        prepare(marks, job.cloud, inputs[n].contours, geometry, h, session, own);
         if (painted) {
             marks.contours = painted;
             marks.given.insert(marks.given.end(), painted->marks.begin(), painted->marks.end());
@@ -95,15 +116,17 @@ StructuresOutput segment_structures(const SegmentJob& job, const std::vector<Str
         s.marks = marks.given;
         s.input = marks.report;
         if (!inputs[n].paint.empty()) s.input["painted"] = paint.report(inputs[n], own);
-        SegmentOptions options = given;
+        SegmentOptions options = job.resolve(h);
+        check_tag_distance(options.tag_distance.value_or(0), marks.given);
         options.contours = marks.contours;
-        Seeds seeds = read_seeds(inputs[n].seeds, inputs[n].points.options, &image.geometry(), h, own);
+        options.hints = marks.hints;
+        Seeds seeds = read_seeds(inputs[n].seeds, inputs[n].points.options, geometry, h, own);
         options.inside = std::move(seeds.inside);
         options.outside = std::move(seeds.outside);
         paint.add_seeds(inputs, n, options, own);
         std::optional<Guess> guess;
         if (!inputs[n].guess.empty()) {
-            guess = read_guess(inputs[n].guess, job.guess.label, image.geometry(), force, own);
+            guess = read_guess(inputs[n].guess, job.guess.label, output.geometry, force, own);
             options.guess = guess->start;
             s.input["guess"] = {{"path", inputs[n].guess}, {"label", guess->label}};
         }
@@ -111,7 +134,8 @@ StructuresOutput segment_structures(const SegmentJob& job, const std::vector<Str
         options.start = starts[n].start;
         if (!options.evolve.delta) options.evolve.delta = starts[n].delta;
         try {
-            s.result = segment(image, marks.points, options, own);
+            s.result = image != nullptr ? segment(*image, marks.points, options, own)
+                                        : reconstruct(marks.points, options, own);
         } catch (const Error& error) {
             if (s.name.empty()) throw;
             throw Error(error.code(), s.name + ": " + error.what());
@@ -119,7 +143,7 @@ StructuresOutput segment_structures(const SegmentJob& job, const std::vector<Str
         s.input["points"]["densified"] = s.result.report.densified;
         if (guess && guess->mask && inputs.size() == 1) {
             s.label = guess->label;
-            if (!job.mask_path.empty() && is_same_lattice(guess->mask->geometry(), image.geometry()))
+            if (!job.mask_path.empty() && is_same_lattice(guess->mask->geometry(), output.geometry))
                 s.corrected = s.result.correction->apply(*guess->mask, guess->label, own);
             else if (!job.mask_path.empty())
                 own.warn("--guess: " + inputs[n].guess +
@@ -128,20 +152,19 @@ StructuresOutput segment_structures(const SegmentJob& job, const std::vector<Str
         add_seconds(session, s.result.report.seconds);
         output.structures.push_back(std::move(s));
     }
-    const Stopwatch separating;
-    separate_all(output, given, run);
-    session.add_seconds("separate", separating.seconds());
+    if (inputs.size() > 1) {
+        const Stopwatch separating;
+        separate_all(output, job.resolve(*voxel_size), run);
+        session.add_seconds("separate", separating.seconds());
+        session.add_seconds("total", separating.seconds());
+    }
     for (StructureOutput& s : output.structures) {
         s.result.surface->setName(s.grid);
-        if (job.evidence.wanted()) s.evidence = job.evidence.judge(s.result, s.marks, image, run);
+        if (image != nullptr && job.evidence.wanted()) s.evidence = job.evidence.judge(s.result, s.marks, *image, run);
         if (job.evolve.strict && s.result.report.solve.stop_reason != StopReason::Steady)
             session.set_exit_code(kNotSteady);
     }
-    session.add_seconds("total", separating.seconds());
-    summarise(output, session);
-    for (const StructureOutput& one : output.structures)
-        if (const std::string line = job.unused(one.result.report); !line.empty())
-            session.warn((one.name.empty() ? "" : one.name + ": ") + line);
+    summarise(output, job, session);
     return output;
 }
 
@@ -155,9 +178,10 @@ void run_structures(const SegmentJob& job, Session& session) {
     const std::vector<StructureStart> starts = starts_of(job, inputs);
     ReadImageOptions reading = job.image.options;
     if (job.frames.given) reading.frame = job.frames.first;
-    const Image image = job.read(job.images.front(), reading, session);
-    const auto output =
-        std::make_shared<StructuresOutput>(segment_structures(job, inputs, image, starts, session, session.run()));
+    std::optional<Image> image;
+    if (!job.images.empty()) image = job.read(job.images.front(), reading, session);
+    const auto output = std::make_shared<StructuresOutput>(
+        segment_structures(job, inputs, image ? &*image : nullptr, starts, session, session.run()));
     session.report().update(to_json(*output), true);
     hand_over(job, output, "", session,
               [&](const std::string& path, auto write) { outputs.add(path, std::move(write)); });
