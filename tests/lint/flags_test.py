@@ -9,7 +9,7 @@ import sys
 TOKEN = re.compile(r'"(?:[^"\\\n]|\\.)*"|\'(?:[^\'\\\n]|\\.)+\'|//[^\n]*|/\*.*?\*/', re.S)
 FLAG = re.compile(r"(?<![-!<])--[a-z]|(?:^| )--$")  # "--" alone is put before a name
 FIELD = re.compile(r"`([a-z_]+)(?=`| = )|(?:^|, )([a-z_]{2,}) = ")
-PUT_TOGETHER = {"channel", "frame"}  # by io/image/image.cpp, so that no string has them as a whole
+PUT_TOGETHER = {"channel", "frame"}  # by image/image.cpp, so that no string has them as a whole
 TABLE = re.compile(r'\{"([a-z_]+)", "(--[a-z-]+)"\}')
 
 

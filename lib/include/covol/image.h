@@ -14,6 +14,10 @@
 
 namespace covol {
 
+namespace detail {
+class ChunkedVoxels;
+}
+
 /// Where an image's voxels lie in the world, as ITK has it (LPS):
 /// world = origin + direction * diag(spacing) * (i,j,k), voxel centres at integers.
 struct ImageGeometry {
@@ -55,11 +59,19 @@ struct ReadImageOptions {
     std::optional<WorldBox> roi = {};
 };
 
+/// The chunks of an image whose file keeps it in boxes that are packed each on its own.
+struct ChunkCount {
+    Index3 size{0, 0, 0};     ///< voxels of a chunk along i, j, k
+    std::uint64_t read = 0;   ///< how many were read and decoded
+    std::uint64_t total = 0;  ///< of the whole image
+};
+
 /// A scalar 3D image in the file's own pixel type (a byte stays a byte).
 ///
 /// Its geometry is always the whole image's; with ReadImageOptions::roi only a box of voxels is held. Large files that
-/// keep their pixels as they are in memory are mapped, not read: only what is touched takes memory. Such a file must
-/// not be made shorter while the image lives.
+/// keep their pixels as they are in memory are mapped, not read: only what is touched takes memory. Of large images in
+/// chunks each chunk is read when its first voxel is asked for, and kept; a damaged one is found then, and thrown by
+/// whatever asked. Such files must not be changed while the image lives.
 class Image {
 public:
     [[nodiscard]] const ImageGeometry& geometry() const noexcept { return geometry_; }
@@ -69,6 +81,10 @@ public:
     [[nodiscard]] const VoxelBox& held() const noexcept { return held_; }
     /// The value of voxel (i,j,k); @pre held.
     [[nodiscard]] COVOL_API double at(int i, int j, int k) const;
+    /// The values of a box of held voxels, i fastest. @pre held.
+    COVOL_API void copy(const VoxelBox& box, float* out) const;
+    /// How much of the file was read; none where it has no chunks.
+    [[nodiscard]] COVOL_API std::optional<ChunkCount> chunks() const;
 
     /// Trilinear samples at the centres of the voxels min..max (inclusive) of `frame`'s lattice;
     /// positions outside the image take the nearest voxel's value.
@@ -77,9 +93,10 @@ public:
     COVOL_API void sample(const Domain& frame, const Index3& min, const Index3& max, float* out) const;
 
     /// Intensities below which the fractions `low` and `high` of the held voxels lie (deterministic;
-    /// large images are subsampled on a regular lattice).
+    /// large images are subsampled on a regular lattice; of large images in chunks the chunks that were read so far
+    /// count, or some on a regular lattice where none was).
     [[nodiscard]] COVOL_API std::array<double, 2> percentiles(double low, double high) const;
-    /// Smallest and largest value of the held voxels.
+    /// Smallest and largest value of the held voxels, with the same words on chunks.
     [[nodiscard]] COVOL_API std::array<double, 2> range() const;
     /// The held voxels as an image of their own; shares their memory.
     [[nodiscard]] COVOL_API Image cropped() const;
@@ -97,6 +114,9 @@ private:
     template <typename T>
     static Image copy_of(const ImageGeometry& geometry, PixelType type, const T* values);
     void require_finite() const;
+    template <typename T>
+    [[nodiscard]] std::vector<T> values_of_chunks(double most) const;
+    [[nodiscard]] VoxelBox in_file(const VoxelBox& held) const;
     void expect_slice(int k) const;
     void forget_slice(int k) const;
     [[nodiscard]] std::uint64_t slice_bytes() const;
@@ -108,6 +128,9 @@ private:
     std::shared_ptr<const void> data_;             // voxel held_.min
     std::array<std::int64_t, 3> stride_{1, 0, 0};  // pixels from a voxel to the next along i, j, k
     bool mapped_ = false;
+    std::shared_ptr<const detail::ChunkedVoxels> chunks_;  // in place of data_
+    Index3 first_{0, 0, 0};                                // the file's voxel that is held_.min
+    std::optional<ChunkCount> chunk_count_;
 };
 
 /// What a file's header says, and where it says so.
@@ -122,7 +145,10 @@ struct ImageInfo {
     std::array<bool, 3> spacing_known{true, true, true};
     /// Header fields that were used, and their values as they stand there.
     std::vector<std::pair<std::string, std::string>> fields;
-    std::uint64_t bytes_to_hold = 0;  ///< memory that read_image() takes; 0 where it maps the file
+    /// Memory that read_image() takes; 0 where it maps the file, or reads chunks when they are asked for.
+    std::uint64_t bytes_to_hold = 0;
+    Index3 chunk_size{0, 0, 0};       ///< voxels of a chunk; 0: the file has none
+    std::vector<std::string> levels;  ///< of a pyramid, each with its size, the finest first; empty: there is none
 };
 
 /// Reads a 3D image: TIFF (ImageJ, OME and tifffile descriptions understood; BigTIFF, tiles, several files), NRRD,

@@ -45,9 +45,9 @@ SmoothImage::SmoothImage(const Image& image, const WorldBox& box, double sigma) 
     }
     values_.resize(std::size_t(size_[0]) * size_[1] * size_[2]);
     tbb::parallel_for(0, size_[2], [&](int k) {
-        float* out = values_.data() + std::size_t(k) * size_[1] * size_[0];
-        for (int j = 0; j < size_[1]; ++j)
-            for (int i = 0; i < size_[0]; ++i) *out++ = float(image.at(first[0] + i, first[1] + j, first[2] + k));
+        const Index3 low{first[0], first[1], first[2] + k};
+        image.copy({low, {first[0] + size_[0] - 1, first[1] + size_[1] - 1, first[2] + k}},
+                   values_.data() + std::size_t(k) * size_[1] * size_[0]);
     });
     for (int a = 0; a < 3; ++a) smooth(a, sigma / g.spacing[a]);
 }

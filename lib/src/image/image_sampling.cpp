@@ -7,7 +7,7 @@
 #include "base/matrix.h"
 #include "covol/error.h"
 #include "covol/image.h"
-#include "io/image/raw_image.h"
+#include "io/pixels/chunks.h"
 
 namespace covol {
 namespace {
@@ -144,17 +144,28 @@ VoxelBox touched(const LatticeMap& map, const Index3& size, const Index3& min, c
 
 void Image::sample(const Domain& frame, const Index3& min, const Index3& max, float* out) const {
     const LatticeMap map = map_lattice(geometry_, frame);
-    if (held_ != detail::whole_box(geometry_.size)) {
+    VoxelBox box = held_;
+    if (chunks_ || held_ != detail::whole_box(geometry_.size)) {
         const VoxelBox needed = touched(map, geometry_.size, min, max);
         if (!held_.contains(needed.min) || !held_.contains(needed.max))
             throw Error(
                 Errc::InvalidInput,
                 "sample: " + path_ + ": voxels outside the part that was read are needed; choose a larger `roi`");
+        if (chunks_) box = needed;
     }
-    Lattice lattice;
-    for (int a = 0; a < 3; ++a) lattice[a] = {geometry_.size[a], held_.min[a], stride_[a]};
     detail::with_pixel_type(type_, [&](auto pixel) {
-        const auto* data = static_cast<const decltype(pixel)*>(data_.get());
+        using T = decltype(pixel);
+        const T* data = static_cast<const T*>(data_.get());
+        std::array<std::int64_t, 3> stride = stride_;
+        std::vector<T> copied;
+        if (chunks_) {
+            copied.resize(detail::voxel_count(box.size()));
+            chunks_->copy(in_file(box), copied.data());
+            data = copied.data();
+            stride = detail::dense_strides(box.size());
+        }
+        Lattice lattice;
+        for (int a = 0; a < 3; ++a) lattice[a] = {geometry_.size[a], box.min[a], stride[a]};
         if (map.separable)
             sample_separable(data, lattice, map, min, max, out);
         else

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "covol/image.h"
-#include "io/image/raw_image.h"
+#include "io/pixels/chunks.h"
 
 namespace covol {
 namespace {
@@ -50,7 +50,48 @@ MinMax scan_slices(const VoxelBox& box, const Visit& visit) {
     return all;
 }
 
+constexpr double kSamples = 4e6;  ///< for percentiles
+
 }  // namespace
+
+template <typename T>
+std::vector<T> Image::values_of_chunks(double most) const {
+    const VoxelBox held = in_file(held_);
+    std::vector<VoxelBox> boxes;
+    const auto add = [&](std::uint64_t chunk) {
+        VoxelBox box = chunks_->box_of(chunk);
+        bool empty = false;
+        for (int a = 0; a < 3; ++a) {
+            box.min[a] = std::max(box.min[a], held.min[a]);
+            box.max[a] = std::min(box.max[a], held.max[a]);
+            empty = empty || box.min[a] > box.max[a];
+        }
+        if (!empty) boxes.push_back(box);
+    };
+    for (const std::uint64_t chunk : chunks_->read_chunks()) add(chunk);
+    if (boxes.empty()) {
+        constexpr int kPlaces = 3;  // along each axis
+        for (int n = 0; n < kPlaces * kPlaces * kPlaces; ++n) {
+            Index3 voxel;
+            for (const auto& [a, at] : {std::pair{0, n % 3}, std::pair{1, n / 3 % 3}, std::pair{2, n / 9}})
+                voxel[a] = held.min[a] + std::int32_t((2 * at + 1) * std::int64_t(held.size()[a]) / (2 * kPlaces));
+            static_cast<void>(chunks_->at(voxel));
+        }
+        for (const std::uint64_t chunk : chunks_->read_chunks()) add(chunk);
+    }
+    double voxels = 0;
+    for (const VoxelBox& box : boxes) voxels += double(detail::voxel_count(box.size()));
+    const auto step = static_cast<std::size_t>(std::max(1.0, std::ceil(voxels / most)));
+    std::vector<T> values, part;
+    std::size_t next = 0;  // counted through all boxes
+    for (const VoxelBox& box : boxes) {
+        part.resize(detail::voxel_count(box.size()));
+        chunks_->copy(box, part.data());
+        for (; next < part.size(); next += step) values.push_back(part[next]);
+        next -= part.size();
+    }
+    return values;
+}
 
 template <typename T>
 const T* Image::row(int j, int k) const {
@@ -78,14 +119,14 @@ void Image::forget_slice(int k) const {
 }
 
 std::array<double, 2> Image::percentiles(double low, double high) const {
-    constexpr double kSamples = 4e6;
     const double ratio = double(detail::voxel_count(held_.size())) / kSamples;
     const auto step = static_cast<std::int32_t>(std::max(1.0, std::ceil(std::cbrt(ratio))));
     return detail::with_pixel_type(type_, [&](auto pixel) {
         using T = decltype(pixel);
         std::vector<T> values;
+        if (chunks_) values = values_of_chunks<T>(kSamples);
         const Index3 n = held_.size();
-        for (std::int32_t k = 0; k < n[2]; k += step) {
+        for (std::int32_t k = 0; !chunks_ && k < n[2]; k += step) {
             for (std::int32_t j = 0; j < n[1]; j += step) {
                 const T* line = row<T>(held_.min[1] + j, held_.min[2] + k);
                 for (std::int64_t i = 0; i < n[0]; i += step) values.push_back(line[i * stride_[0]]);
@@ -105,6 +146,11 @@ std::array<double, 2> Image::percentiles(double low, double high) const {
 
 std::array<double, 2> Image::range() const {
     return detail::with_pixel_type(type_, [&](auto pixel) {
+        if (chunks_) {
+            const auto values = values_of_chunks<decltype(pixel)>(std::numeric_limits<double>::infinity());
+            const auto [low, high] = std::minmax_element(values.begin(), values.end());
+            return std::array<double, 2>{double(*low), double(*high)};
+        }
         const MinMax all = scan_slices(held_, [&](int k) {
             MinMax slice;
             expect_slice(k);
@@ -118,6 +164,7 @@ std::array<double, 2> Image::range() const {
 }
 
 void Image::require_finite() const {
+    if (chunks_) return;  // each chunk when it is read
     detail::with_pixel_type(type_, [&](auto pixel) {
         using T = decltype(pixel);
         if constexpr (std::is_floating_point_v<T>) {
@@ -133,11 +180,7 @@ void Image::require_finite() const {
             for (int k = held_.min[2]; k <= held_.max[2]; ++k)
                 for (int j = held_.min[1]; j <= held_.max[1]; ++j)
                     for (int i = held_.min[0]; i <= held_.max[0]; ++i)
-                        if (!std::isfinite(at(i, j, k)))
-                            throw detail::read_error(Errc::InvalidInput, path_,
-                                                     "expected finite values, got NaN or infinity at voxel (" +
-                                                         std::to_string(i) + ", " + std::to_string(j) + ", " +
-                                                         std::to_string(k) + ")");
+                        if (!std::isfinite(at(i, j, k))) throw detail::not_finite(path_, {i, j, k});
         }
     });
 }

@@ -2,7 +2,7 @@
 #include <memory>
 #include <string>
 
-#include "io/image/raw_image.h"
+#include "io/pixels/raw_image.h"
 
 // One function for each family of image files; read_image() picks by the name's end.
 namespace covol::detail {

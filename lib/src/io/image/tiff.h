@@ -3,7 +3,7 @@
 #include <string>
 
 #include "covol/run.h"
-#include "io/image/raw_image.h"
+#include "io/pixels/raw_image.h"
 
 namespace covol::detail {
 

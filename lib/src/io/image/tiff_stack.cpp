@@ -9,7 +9,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "io/image/raw_image.h"
+#include "io/pixels/raw_image.h"
 
 namespace covol::detail {
 namespace {

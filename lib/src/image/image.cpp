@@ -11,6 +11,7 @@
 #include "covol/vdb_io.h"
 #include "io/image/image_formats.h"
 #include "io/image/tiff.h"
+#include "io/pixels/chunks.h"
 
 namespace covol {
 namespace {
@@ -218,10 +219,40 @@ const char* to_string(PixelType type) {
 }
 
 double Image::at(int i, int j, int k) const {
+    if (chunks_) return chunks_->at(in_file({{i, j, k}, {i, j, k}}).min);
     const std::int64_t n =
         stride_[0] * (i - held_.min[0]) + stride_[1] * (j - held_.min[1]) + stride_[2] * (k - held_.min[2]);
     return detail::with_pixel_type(
         type_, [&](auto pixel) { return double(static_cast<const decltype(pixel)*>(data_.get())[n]); });
+}
+
+VoxelBox Image::in_file(const VoxelBox& held) const {
+    VoxelBox box;
+    for (int a = 0; a < 3; ++a) {
+        box.min[a] = held.min[a] - held_.min[a] + first_[a];
+        box.max[a] = held.max[a] - held_.min[a] + first_[a];
+    }
+    return box;
+}
+
+void Image::copy(const VoxelBox& box, float* out) const {
+    if (!chunks_) {
+        for (int k = box.min[2]; k <= box.max[2]; ++k)
+            for (int j = box.min[1]; j <= box.max[1]; ++j)
+                for (int i = box.min[0]; i <= box.max[0]; ++i) *out++ = static_cast<float>(at(i, j, k));
+        return;
+    }
+    detail::with_pixel_type(type_, [&](auto pixel) {
+        std::vector<decltype(pixel)> values(detail::voxel_count(box.size()));
+        chunks_->copy(in_file(box), values.data());
+        std::transform(values.begin(), values.end(), out, [](auto value) { return static_cast<float>(value); });
+    });
+}
+
+std::optional<ChunkCount> Image::chunks() const {
+    std::optional<ChunkCount> count = chunk_count_;
+    if (chunks_) count->read = chunks_->read_count();
+    return count;
 }
 
 Image Image::cropped() const {
@@ -277,6 +308,9 @@ Image read_image(const std::string& path, const ReadImageOptions& options, const
         image.data_ = pixels.data;
         image.stride_ = pixels.stride;
         image.mapped_ = pixels.mapped;
+        image.chunks_ = pixels.chunks;
+        image.first_ = request.box.min;
+        image.chunk_count_ = pixels.chunk_count;
         image.require_finite();
     });
     return image;

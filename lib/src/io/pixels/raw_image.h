@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <type_traits>
 
@@ -9,11 +10,16 @@
 
 namespace covol::detail {
 
-/// Voxels of an open file: `data` points to the first voxel of the box that was asked for.
+class ChunkedVoxels;
+
+/// Voxels of an open file: `data` points to the first voxel of the box that was asked for; or `chunks` has all voxels
+/// of the image.
 struct Pixels {
     std::shared_ptr<const void> data;
     std::array<std::int64_t, 3> stride{1, 0, 0};  ///< in pixels
     bool mapped = false;
+    std::shared_ptr<const ChunkedVoxels> chunks{};
+    std::optional<ChunkCount> chunk_count{};  ///< of a format that has chunks
 };
 
 /// What to read of a file; everything exists.
@@ -75,6 +81,9 @@ std::array<std::int64_t, 3> dense_strides(const Index3& size);
 /// An Error whose text begins with "read_image: PATH: ".
 Error read_error(Errc code, const std::string& path, const std::string& what);
 
+/// What to throw at a voxel that is NaN or infinite.
+Error not_finite(const std::string& path, const Index3& voxel);
+
 /// @throws Error InvalidInput unless the image has at least two voxels along each axis.
 Index3 require_3d(const std::string& path, const std::uint64_t (&size)[3]);
 
@@ -113,7 +122,7 @@ std::unique_ptr<ImageFile> open_placed(const std::string& path, const ImageInfo&
 /// Maps `bytes` of a file at `offset`, which are there. @throws Error Io.
 std::shared_ptr<const void> map_file(const std::string& path, std::uint64_t offset, std::uint64_t bytes);
 
-/// Whether so many bytes are worth a mapping.
+/// Whether so many bytes are worth a mapping, or decoding only what is asked for.
 bool is_worth_mapping(std::uint64_t bytes);
 
 /// Says that mapped pages will be read from begin to end.

@@ -1,4 +1,4 @@
-#include "io/image/raw_image.h"
+#include "io/pixels/raw_image.h"
 
 #include <fcntl.h>
 #include <openvdb/math/Half.h>
@@ -333,6 +333,12 @@ std::array<std::int64_t, 3> dense_strides(const Index3& size) {
 
 Error read_error(Errc code, const std::string& path, const std::string& what) {
     return {code, "read_image: " + path + ": " + what};
+}
+
+Error not_finite(const std::string& path, const Index3& voxel) {
+    return read_error(Errc::InvalidInput, path,
+                      "expected finite values, got NaN or infinity at voxel (" + std::to_string(voxel[0]) + ", " +
+                          std::to_string(voxel[1]) + ", " + std::to_string(voxel[2]) + ")");
 }
 
 Index3 require_3d(const std::string& path, const std::uint64_t (&size)[3]) {

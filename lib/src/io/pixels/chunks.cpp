@@ -1,0 +1,197 @@
+#include "io/pixels/chunks.h"
+
+#include <tbb/concurrent_unordered_map.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <mutex>
+
+namespace covol::detail {
+namespace {
+
+/// The part of `box` that chunk c of this size holds.
+VoxelBox part_of(const VoxelBox& box, const Index3& chunk, const Index3& size) {
+    VoxelBox part;
+    for (int a = 0; a < 3; ++a) {
+        const std::int64_t first = std::int64_t(chunk[a]) * size[a];
+        part.min[a] = std::int32_t(std::max<std::int64_t>(box.min[a], first));
+        part.max[a] = std::int32_t(std::min<std::int64_t>(box.max[a], first + size[a] - 1));
+    }
+    return part;
+}
+
+/// Copies `part` from a chunk, dense, into `box`, dense.
+void copy_part(const VoxelBox& part, const void* chunk, const Index3& chunk_size, const VoxelBox& box, void* out,
+               std::uint64_t width) {
+    const Index3 n = box.size();
+    const std::uint64_t row = std::uint64_t(part.size()[0]) * width;
+    for (std::int32_t k = part.min[2]; k <= part.max[2]; ++k)
+        for (std::int32_t j = part.min[1]; j <= part.max[1]; ++j) {
+            const std::uint64_t from =
+                (std::uint64_t(k % chunk_size[2]) * chunk_size[1] + std::uint64_t(j % chunk_size[1])) * chunk_size[0] +
+                std::uint64_t(part.min[0] % chunk_size[0]);
+            const std::uint64_t to = (std::uint64_t(k - box.min[2]) * n[1] + std::uint64_t(j - box.min[1])) * n[0] +
+                                     (part.min[0] - box.min[0]);
+            std::memcpy(static_cast<char*>(out) + to * width, static_cast<const char*>(chunk) + from * width, row);
+        }
+}
+
+/// The first and the last chunk that the box touches.
+VoxelBox chunks_around(const VoxelBox& box, const Index3& chunk_size) {
+    VoxelBox chunks;
+    for (int a = 0; a < 3; ++a) {
+        chunks.min[a] = box.min[a] / chunk_size[a];
+        chunks.max[a] = box.max[a] / chunk_size[a];
+    }
+    return chunks;
+}
+
+/// @throws Error InvalidInput at the first voxel of `box` that is NaN or infinite.
+void require_finite(const ChunkSource& source, const VoxelBox& box, const void* chunk) {
+    with_pixel_type(source.type(), [&](auto pixel) {
+        using T = decltype(pixel);
+        if constexpr (std::is_floating_point_v<T>) {
+            const Index3 &n = source.chunk_size(), held = box.size();
+            for (std::int32_t k = 0; k < held[2]; ++k)
+                for (std::int32_t j = 0; j < held[1]; ++j) {
+                    const T* row = static_cast<const T*>(chunk) + (std::uint64_t(k) * n[1] + j) * n[0];
+                    for (std::int32_t i = 0; i < held[0]; ++i)
+                        if (!std::isfinite(row[i]))
+                            throw not_finite(source.path(), {box.min[0] + i, box.min[1] + j, box.min[2] + k});
+                }
+        }
+    });
+}
+
+}  // namespace
+
+ChunkSource::ChunkSource(std::string path, PixelType type, const Index3& size, const Index3& chunk_size)
+    : path_(std::move(path)), type_(type), size_(size), chunk_size_(chunk_size) {
+    std::uint64_t bytes = pixel_bytes(type);
+    for (const std::int32_t n : chunk_size) {
+        if (n < 1)
+            throw read_error(Errc::InvalidInput, path_, "expected chunks of voxels, got " + size_text(chunk_size));
+        bytes = bytes > kMostChunkBytes ? bytes : bytes * std::uint64_t(n);
+    }
+    if (bytes > kMostChunkBytes)
+        throw read_error(Errc::Unsupported, path_,
+                         "expected chunks of 1 GiB at most, got " + size_text(chunk_size) + " voxels of " +
+                             std::to_string(pixel_bytes(type)) + " bytes; write it with smaller chunks");
+}
+
+struct ChunkedVoxels::Table {
+    struct Entry {
+        std::once_flag once;
+        std::unique_ptr<char[]> voxels;
+    };
+    tbb::concurrent_unordered_map<std::uint64_t, Entry> entries;
+};
+
+ChunkedVoxels::ChunkedVoxels(std::shared_ptr<const ChunkSource> source)
+    : source_(std::move(source)), table_(std::make_unique<Table>()) {
+    static std::atomic<std::uint64_t> next{1};
+    serial_ = next++;
+    for (int a = 0; a < 3; ++a) counts_[a] = (source_->size()[a] - 1) / source_->chunk_size()[a] + 1;
+}
+
+ChunkedVoxels::~ChunkedVoxels() = default;
+
+std::uint64_t ChunkedVoxels::chunk_count() const noexcept { return voxel_count(counts_); }
+
+std::uint64_t ChunkedVoxels::number_of(const Index3& c) const noexcept {
+    return (std::uint64_t(c[2]) * counts_[1] + c[1]) * counts_[0] + c[0];
+}
+
+Index3 ChunkedVoxels::place_of(std::uint64_t number) const noexcept {
+    const auto nx = std::uint64_t(counts_[0]), ny = std::uint64_t(counts_[1]);
+    return {std::int32_t(number % nx), std::int32_t(number / nx % ny), std::int32_t(number / nx / ny)};
+}
+
+const void* ChunkedVoxels::chunk(std::uint64_t number) const {
+    Table::Entry& entry = table_->entries[number];
+    std::call_once(entry.once, [&] {
+        const std::uint64_t count = voxel_count(source_->chunk_size());
+        std::unique_ptr<char[]> voxels(new char[count * pixel_bytes(source_->type())]);
+        const Index3 place = place_of(number);
+        source_->read(place, voxels.get());
+        require_finite(*source_, box_of(number), voxels.get());
+        entry.voxels = std::move(voxels);
+        ++reads_;
+    });
+    return entry.voxels.get();
+}
+
+VoxelBox ChunkedVoxels::box_of(std::uint64_t chunk) const noexcept {
+    return part_of(whole_box(source_->size()), place_of(chunk), source_->chunk_size());
+}
+
+std::vector<std::uint64_t> ChunkedVoxels::read_chunks() const {
+    std::vector<std::uint64_t> numbers;
+    for (const auto& [number, entry] : table_->entries)
+        if (entry.voxels) numbers.push_back(number);
+    std::sort(numbers.begin(), numbers.end());
+    return numbers;
+}
+
+void ChunkedVoxels::copy(const VoxelBox& box, void* out) const {
+    const Index3& size = source_->chunk_size();
+    const VoxelBox around = chunks_around(box, size);
+    for (std::int32_t k = around.min[2]; k <= around.max[2]; ++k)
+        for (std::int32_t j = around.min[1]; j <= around.max[1]; ++j)
+            for (std::int32_t i = around.min[0]; i <= around.max[0]; ++i)
+                copy_part(part_of(box, {i, j, k}, size), chunk(number_of({i, j, k})), size, box, out,
+                          pixel_bytes(source_->type()));
+}
+
+double ChunkedVoxels::at(const Index3& voxel) const {
+    // Loops over voxels ask for those of one chunk again and again.
+    struct Last {
+        std::uint64_t serial = 0, number = 0;
+        const void* voxels = nullptr;
+    };
+    thread_local Last last;
+    const Index3& size = source_->chunk_size();
+    const std::uint64_t number = number_of({voxel[0] / size[0], voxel[1] / size[1], voxel[2] / size[2]});
+    if (last.serial != serial_ || last.number != number) last = {serial_, number, chunk(number)};
+    const std::uint64_t n =
+        (std::uint64_t(voxel[2] % size[2]) * size[1] + std::uint64_t(voxel[1] % size[1])) * size[0] +
+        std::uint64_t(voxel[0] % size[0]);
+    return with_pixel_type(source_->type(),
+                           [&](auto pixel) { return double(static_cast<const decltype(pixel)*>(last.voxels)[n]); });
+}
+
+Pixels read_chunks(std::shared_ptr<const ChunkSource> source, const VoxelBox& box, const RunContext& run) {
+    const Index3 size = source->chunk_size();
+    const VoxelBox around = chunks_around(box, size);
+    const Index3 n = around.size();
+    const std::uint64_t width = pixel_bytes(source->type()), count = voxel_count(n);
+    Pixels pixels;
+    if (is_worth_mapping(voxel_count(box.size()) * width)) {
+        pixels.chunks = std::make_shared<ChunkedVoxels>(std::move(source));
+        pixels.chunk_count = {size, 0, pixels.chunks->chunk_count()};
+        return pixels;
+    }
+    const std::shared_ptr<void> data = allocate_pixels(source->path(), voxel_count(box.size()), source->type(), 0);
+    tbb::parallel_for(std::uint64_t(0), count, [&](std::uint64_t at) {
+        if (run.cancelled()) return;
+        const Index3 c{around.min[0] + std::int32_t(at % n[0]), around.min[1] + std::int32_t(at / n[0] % n[1]),
+                       around.min[2] + std::int32_t(at / n[0] / n[1])};
+        const std::unique_ptr<char[]> voxels(new char[voxel_count(size) * width]);
+        source->read(c, voxels.get());
+        copy_part(part_of(box, c, size), voxels.get(), size, box, data.get(), width);
+    });
+    run.check();
+    pixels.data = data;
+    pixels.stride = dense_strides(box.size());
+    pixels.chunk_count = {size, count, voxel_count(chunks_around(whole_box(source->size()), size).size())};
+    return pixels;
+}
+
+std::uint64_t ChunkedFile::bytes_to_hold(const PixelRequest& request) const {
+    const std::uint64_t bytes = ImageFile::bytes_to_hold(request);
+    return is_worth_mapping(bytes) ? 0 : bytes;
+}
+
+}  // namespace covol::detail

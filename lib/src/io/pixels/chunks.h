@@ -1,0 +1,95 @@
+#pragma once
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "io/pixels/raw_image.h"
+
+// Images that lie in chunks: boxes of one size, each packed on its own. Chunks of a Zarr store or an HDF5 dataset,
+// tiles or strips of a TIFF.
+namespace covol::detail {
+
+/// One channel and frame of such an image.
+class ChunkSource {
+public:
+    ChunkSource(const ChunkSource&) = delete;
+    ChunkSource& operator=(const ChunkSource&) = delete;
+    virtual ~ChunkSource() = default;
+
+    /// Decodes chunk c, counted along i, j, k from 0, into chunk_size() voxels, i fastest; beyond the image's end
+    /// anything may stand there. Several threads may call it at once.
+    /// @throws Error InvalidInput (damaged), Io, Unsupported.
+    virtual void read(const Index3& chunk, void* out) const = 0;
+
+    [[nodiscard]] const std::string& path() const noexcept { return path_; }  ///< for messages
+    [[nodiscard]] PixelType type() const noexcept { return type_; }
+    [[nodiscard]] const Index3& size() const noexcept { return size_; }              ///< of the image, in voxels
+    [[nodiscard]] const Index3& chunk_size() const noexcept { return chunk_size_; }  ///< voxels along i, j, k; >= 1
+
+protected:
+    /// @throws Error InvalidInput, Unsupported when chunks are larger than kMostChunkBytes or have no voxels.
+    ChunkSource(std::string path, PixelType type, const Index3& size, const Index3& chunk_size);
+
+private:
+    std::string path_;
+    PixelType type_;
+    Index3 size_, chunk_size_;
+};
+
+/// What one chunk may take when it is unpacked. Zarr's own codecs stop at 2 GiB; the usual size is below 16 MiB.
+constexpr std::uint64_t kMostChunkBytes = std::uint64_t(1) << 30;
+
+/// The chunks of a source, each decoded when its first voxel is asked for, and kept. Safe to use by several threads.
+class ChunkedVoxels {
+public:
+    explicit ChunkedVoxels(std::shared_ptr<const ChunkSource> source);
+    ~ChunkedVoxels();
+    ChunkedVoxels(const ChunkedVoxels&) = delete;
+    ChunkedVoxels& operator=(const ChunkedVoxels&) = delete;
+
+    [[nodiscard]] const ChunkSource& source() const noexcept { return *source_; }
+    [[nodiscard]] std::uint64_t chunk_count() const noexcept;                   ///< of the whole image
+    [[nodiscard]] std::uint64_t read_count() const noexcept { return reads_; }  ///< decoded so far, each once
+
+    /// The values of `box`, i fastest, in the source's type. @throws as ChunkSource::read, and InvalidInput at a value
+    /// that is NaN or infinite.
+    void copy(const VoxelBox& box, void* out) const;
+    [[nodiscard]] double at(const Index3& voxel) const;
+    /// The numbers of the chunks that were decoded so far, ascending; not while others decode. Which they are depends
+    /// on what was asked for alone, not on threads.
+    [[nodiscard]] std::vector<std::uint64_t> read_chunks() const;
+    /// The image's voxels in a chunk.
+    [[nodiscard]] VoxelBox box_of(std::uint64_t chunk) const noexcept;
+
+private:
+    struct Table;
+    [[nodiscard]] std::uint64_t number_of(const Index3& chunk) const noexcept;
+    [[nodiscard]] Index3 place_of(std::uint64_t number) const noexcept;
+    [[nodiscard]] const void* chunk(std::uint64_t number) const;
+
+    std::shared_ptr<const ChunkSource> source_;
+    Index3 counts_;  ///< chunks along i, j, k
+    std::uint64_t serial_;
+    std::unique_ptr<Table> table_;
+    mutable std::atomic<std::uint64_t> reads_{0};
+};
+
+/// The voxels of `box`: a small box is decoded at once, of a large one each chunk when it is asked for.
+[[nodiscard]] Pixels read_chunks(std::shared_ptr<const ChunkSource> source, const VoxelBox& box, const RunContext& run);
+
+/// A format that keeps all its images in chunks.
+class ChunkedFile : public ImageFile {
+public:
+    [[nodiscard]] Pixels read(const PixelRequest& request, const RunContext& run) final {
+        return read_chunks(chunks(request), request.box, run);
+    }
+    [[nodiscard]] std::uint64_t bytes_to_hold(const PixelRequest& request) const final;
+
+protected:
+    /// The request's channel and frame; its box does not matter.
+    [[nodiscard]] virtual std::shared_ptr<const ChunkSource> chunks(const PixelRequest& request) const = 0;
+};
+
+}  // namespace covol::detail
