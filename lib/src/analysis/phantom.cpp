@@ -59,14 +59,14 @@ struct Shape {
 };
 
 /// A bright solid; the share of a voxel that lies inside is taken from the distance at its centre.
-Shape solid(const char* name, std::function<double(const Vec3&)> distance, std::function<Vec3(Random&)> point) {
+Shape solid(const char* name, const std::function<double(const Vec3&)>& distance, std::function<Vec3(Random&)> point) {
     auto intensity = [distance](const Vec3& p, double h) { return std::clamp(0.5 - distance(p) / h, 0.0, 1.0); };
     return {name, distance, intensity, std::move(point)};
 }
 
 /// A thin bright shell around a sphere with holes where the axes meet it; the points lie in the holes.
 /// in_hole(a, b): for the hole on axis x, (a, b) = (y, z), and so on by cyclic permutation.
-Shape sphere_with_holes(const char* name, std::function<bool(double, double)> in_hole) {
+Shape sphere_with_holes(const char* name, const std::function<bool(double, double)>& in_hole) {
     const auto is_open = [in_hole](const Vec3& p) {
         for (int axis = 0; axis < 3; ++axis) {
             const double a = p[(axis + 1) % 3], b = p[(axis + 2) % 3];

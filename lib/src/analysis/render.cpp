@@ -80,6 +80,7 @@ void draw_surface(const FloatGrid& surface, const Vec& to_eye, const Panel& pane
     const double distance = 2.0 * (box.max() - box.min()).length();
     const Intersector intersector(surface);
     tbb::parallel_for(tbb::blocked_range<int>(0, panel.height(), 8), [&](const tbb::blocked_range<int>& rows) {
+        // NOLINTNEXTLINE(performance-unnecessary-copy-initialization): it keeps the ray that it follows
         Intersector local(intersector);
         for (int y = rows.begin(); y != rows.end(); ++y)
             for (int x = 0; x < panel.width(); ++x) {

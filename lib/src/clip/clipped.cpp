@@ -264,7 +264,8 @@ private:
     }
 
     /// The wall's distance in the layers from `at` inward.
-    std::array<float, kDepth> column(const FloatGrid::Accessor& accessor, Coord at, int axis, int inward) const {
+    [[nodiscard]] [[nodiscard]] std::array<float, kDepth> column(const FloatGrid::Accessor& accessor, Coord at,
+                                                                 int axis, int inward) const {
         std::array<float, kDepth> wall;
         std::array<bool, kDepth> hidden;
         for (int n = 0; n < kDepth; ++n, at[axis] += inward) {

@@ -45,14 +45,14 @@ public:
     /// @param n  the slice below, or the end slice of a dome
     Interval(const ContourSolid::Data& data, Kind kind, std::size_t n) : data_(data), kind_(kind), n_(n) {}
 
-    double begin() const { return kind_ == Kind::Below ? slice().w - slice().cap : slice().w; }
-    double end() const {
+    [[nodiscard]] double begin() const { return kind_ == Kind::Below ? slice().w - slice().cap : slice().w; }
+    [[nodiscard]] double end() const {
         return kind_ == Kind::Between ? data_.slices[n_ + 1].w
                : kind_ == Kind::Above ? slice().w + slice().cap
                                       : slice().w;
     }
 
-    double level(double x, double y, double w) const {
+    [[nodiscard]] double level(double x, double y, double w) const {
         if (kind_ != Kind::Between && slice().open) return carried_on(x, y, std::abs(w - slice().w));
         if (kind_ != Kind::Between) return slice().at(data_.grid, x, y) + beyond(std::abs(w - slice().w));
         const SolidSlice& next = data_.slices[n_ + 1];
@@ -68,7 +68,7 @@ public:
                t * next.at(data_.grid, x + (1 - t) * s[0], y + (1 - t) * s[1]);
     }
     /// Of the level within a ball around a position of the plane, whatever w is; upper is not needed on domes.
-    std::array<double, 2> range(double x, double y, double radius) const {
+    [[nodiscard]] std::array<double, 2> range(double x, double y, double radius) const {
         const double here = slice().at(data_.grid, x, y);
         if (kind_ != Kind::Between && slice().open) {
             // Neither section's level changes faster than the position does.
@@ -87,14 +87,14 @@ public:
 
 private:
     /// Slopes of the level along w at the interval's two slices; beyond an end slice the dome goes on.
-    double slope_below(double x, double y, double here, double secant, double length) const {
+    [[nodiscard]] double slope_below(double x, double y, double here, double secant, double length) const {
         if (n_ == 0 && slice().open) return secant;
         if (n_ == 0) return monotone_slope(-slice().depth / slice().cap, slice().cap, secant, length);
         const SolidSlice& before = data_.slices[n_ - 1];
         const double left = slice().w - before.w;
         return monotone_slope((here - before.at(data_.grid, x, y)) / left, left, secant, length);
     }
-    double slope_above(double x, double y, double there, double secant, double length) const {
+    [[nodiscard]] double slope_above(double x, double y, double there, double secant, double length) const {
         const SolidSlice& next = data_.slices[n_ + 1];
         if (n_ + 2 == data_.slices.size() && next.open) return secant;
         if (n_ + 2 == data_.slices.size()) return monotone_slope(secant, length, next.depth / next.cap, next.cap);
@@ -102,19 +102,19 @@ private:
         const double right = after.w - next.w;
         return monotone_slope(secant, length, (after.at(data_.grid, x, y) - there) / right, right);
     }
-    const SolidSlice& slice() const { return data_.slices[n_]; }
+    [[nodiscard]] const SolidSlice& slice() const { return data_.slices[n_]; }
     /// The neighbour of an end slice.
-    const SolidSlice& inner() const { return data_.slices[kind_ == Kind::Below ? n_ + 1 : n_ - 1]; }
+    [[nodiscard]] const SolidSlice& inner() const { return data_.slices[kind_ == Kind::Below ? n_ + 1 : n_ - 1]; }
     /// Beyond an open end the level goes on as it came.
-    double carried_on(double x, double y, double height) const {
+    [[nodiscard]] double carried_on(double x, double y, double height) const {
         const double here = slice().at(data_.grid, x, y), share = height / std::abs(slice().w - inner().w);
         return here + share * (here - inner().at(data_.grid, x, y));
     }
-    double beyond(double height) const {
+    [[nodiscard]] double beyond(double height) const {
         const double cap = slice().cap;
         return dome(slice().depth, height / cap) + std::max(0.0, height - cap);
     }
-    bool may_cross(int i, int j) const;
+    [[nodiscard]] bool may_cross(int i, int j) const;
 
     const ContourSolid::Data& data_;
     Kind kind_;

@@ -53,7 +53,7 @@ public:
     }
 
 private:
-    std::size_t at(int i, int j) const { return std::size_t(j) * std::size_t(grid_.nx) + std::size_t(i); }
+    [[nodiscard]] std::size_t at(int i, int j) const { return std::size_t(j) * std::size_t(grid_.nx) + std::size_t(i); }
 
     void offer(int i, int j, std::int32_t edge) {
         const std::size_t n = at(i, j);

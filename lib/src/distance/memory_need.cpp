@@ -55,7 +55,7 @@ public:
     }
 
     /// Of the surface that the points mark, where a tube of radius r has no gaps.
-    double area(double r) const {
+    [[nodiscard]] double area(double r) const {
         const double wide = std::max(r, coarse_);
         return (*this)(wide) / (2 * wide);
     }

@@ -35,7 +35,7 @@ struct Row {
     Points8 p;
     Float8 squared;
 
-    COVOL_INLINE Float8 distance_to(const Points8& q) const {
+    [[nodiscard]] COVOL_INLINE Float8 distance_to(const Points8& q) const {
         const Float8 dx = q.x - i, dy = q.y - j, dz = q.z - k;
         return dx * dx + dy * dy + dz * dz;
     }

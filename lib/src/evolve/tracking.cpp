@@ -33,7 +33,7 @@ std::vector<Coord> track_surface_near(const std::vector<Coord>& stale, FloatGrid
                                       double clamp) {
     const auto limit = static_cast<float>(clamp), h = static_cast<float>(domain.voxel_size);
     // One more ring for what the leaves beyond say.
-    const std::vector<Coord> changed = dilate_leaves(stale, 1, domain);
+    std::vector<Coord> changed = dilate_leaves(stale, 1, domain);
     const LeafBand region(dilate_leaves(stale, 2, domain));
     std::vector<unsigned char> zone(region.size());
     std::vector<std::uint32_t> place(region.size());

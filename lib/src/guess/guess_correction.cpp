@@ -230,6 +230,7 @@ FloatGridPtr GuessCorrection::start(const RunContext& run) const {
     std::sort(origins.begin(), origins.end());
     origins.erase(std::unique(origins.begin(), origins.end()), origins.end());
     std::vector<Leaf*> leaves;
+    leaves.reserve(origins.size());
     for (const openvdb::Coord& origin : origins) leaves.push_back(field->tree().touchLeaf(origin));
     with_threads(run, [&] {
         tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t n) {
@@ -270,6 +271,7 @@ GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>
         const double precision = options.precision.value_or(kCorrection.precision_voxels * h);
         const double least = options.least_radius.value_or(kCorrectionVoxels * h);
         std::vector<Target> on_surface;
+        on_surface.reserve(marks.size());
         for (const Vec3& mark : marks) on_surface.push_back({mark, data->distance.at(mark)});
         std::vector<Target> targets = on_surface;
         std::vector<char> used(inside.size() + outside.size(), 0);

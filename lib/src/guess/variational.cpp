@@ -330,7 +330,7 @@ VariationalSurface::VariationalSurface(const Constraints& given, const std::vect
     radius_ = 0;
     std::vector<Point> nodes;
     for (const std::vector<Vec3>* list : {&given.marks, &given.seeds})
-        for (const Vec3& m : *list) nodes.push_back(to_point(m) - to_point(center_));
+        for (const Vec3& m : *list) nodes.emplace_back(to_point(m) - to_point(center_));
     for (Index n = 0; n < marks; ++n) radius_ = std::max(radius_, nodes[std::size_t(n)].norm());
     for (Point& node : nodes) node /= radius_;
 

@@ -136,8 +136,7 @@ Patches make_patches(const TriangleMesh& mesh, const ImageGeometry& g, double wi
                                       float(std::sqrt(detail::squared_distance(p.places[v], p.places[rows.other[n]]))));
         }
     std::sort(crossing.begin(), crossing.end());
-    for (std::size_t n = 0; n < crossing.size(); ++n) {
-        const auto [a, b, length] = crossing[n];
+    for (const auto& [a, b, length] : crossing) {
         if (p.borders.empty() || p.borders.back().a != a || p.borders.back().b != b)
             p.borders.push_back({a, b, 0, std::sqrt(detail::squared_distance(p.centers[a], p.centers[b]))});
         // Each edge was met from both ends; on a triangle lattice 1/sqrt(3) of its length is the border's.

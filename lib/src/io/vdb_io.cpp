@@ -101,7 +101,7 @@ public:
     vdb::GridBase::Ptr read_whole(std::size_t n) {
         const Entry& entry = entries_[n];
         seek_to_grid(entry);
-        const vdb::GridBase::Ptr grid = entry.empty_grid->copyGridWithNewTree();
+        vdb::GridBase::Ptr grid = entry.empty_grid->copyGridWithNewTree();
         readGrid(grid, entry.descriptor, stream_);
         if (entry.descriptor.isInstance()) {
             for (std::size_t parent = 0; parent < entries_.size(); ++parent)
@@ -263,8 +263,9 @@ VdbGridName split_grid_name(const std::string& text) {
 }
 
 FloatGridPtr read_vdb(const std::string& given, const std::string& wanted_name) {
-    const auto [path, named] = split_grid_name(given);
-    const std::string& name = wanted_name.empty() ? named : wanted_name;
+    const VdbGridName file = split_grid_name(given);
+    const std::string& path = file.path;
+    const std::string& name = wanted_name.empty() ? file.grid : wanted_name;
     require_readable("read_vdb", path);
     return with_openvdb(Errc::InvalidInput, unusable("read_vdb", path), [&] {
         Reader reader(path);
@@ -302,7 +303,7 @@ FloatGridPtr read_vdb_level_set(const std::string& path, const RunContext& run) 
                      level_sets.back());
         }
     }
-    const FloatGridPtr grid = read_vdb(path, chosen);
+    FloatGridPtr grid = read_vdb(path, chosen);
     if (grid->getGridClass() == vdb::GRID_FOG_VOLUME)
         throw Error(Errc::Unsupported, "read_vdb_level_set: " + path + ": grid '" + grid->getName() +
                                            "': expected a level set, got a fog volume");
@@ -310,7 +311,8 @@ FloatGridPtr read_vdb_level_set(const std::string& path, const RunContext& run) 
 }
 
 std::vector<VdbGridInfo> list_vdb(const std::string& given) {
-    const auto [path, name] = split_grid_name(given);
+    const VdbGridName file = split_grid_name(given);
+    const std::string &path = file.path, &name = file.grid;
     require_readable("list_vdb", path);
     return with_openvdb(Errc::InvalidInput, unusable("list_vdb", path), [&] {
         Reader reader(path);

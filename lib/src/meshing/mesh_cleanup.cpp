@@ -273,7 +273,10 @@ int count_self_intersections(const TriangleMesh& mesh) {
 namespace {
 
 CleanupReport clean(const Work& work) {
-    const auto& [mesh, level_set, isovalue, options, run] = work;
+    TriangleMesh& mesh = work.mesh;
+    const FloatGrid* const level_set = work.level_set;
+    const CleanupOptions& options = work.options;
+    const RunContext& run = work.run;
     detail::require_valid(options, "clean_mesh");
     if (options.adaptive > 0 && (level_set == nullptr || options.adaptive > 2 * work.voxel_size()))
         throw Error(Errc::InvalidOptions,

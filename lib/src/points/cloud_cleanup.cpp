@@ -132,7 +132,7 @@ private:
 
 std::vector<Vec3> clean(const std::vector<Vec3>& points, const CloudCleanupOptions& options, const RunContext& run,
                         CloudCleanupReport& report) {
-    const std::vector<Vec3> distinct = options.duplicates ? merge_close_points(points, 0) : points;
+    std::vector<Vec3> distinct = options.duplicates ? merge_close_points(points, 0) : points;
     report.duplicates = points.size() - distinct.size();
     if (distinct.empty() || !options.any()) return distinct;
     Cleaner cleaner(distinct, options, run);

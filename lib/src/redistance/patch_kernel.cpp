@@ -44,7 +44,7 @@ COVOL_INLINE Hit<Real> nearest_of(const PatchFan& fan, const Real (&arm)[3]) {
         const auto inside = (beside_to >= 0.0F) & (beside_from >= 0.0F) & (beside_to + beside_from <= t.area);
         const Real off = dot(arm, t.normal);
         const Real plane = off * off * t.inverse_area;
-        within = inside & (plane < within) ? plane : within;
+        within = (inside & (plane < within)) ? plane : within;
 
         const Real along = unit(from * t.inverse_from);
         const Real spoke[3] = {arm[0] - along * t.from[0], arm[1] - along * t.from[1], arm[2] - along * t.from[2]};
@@ -71,8 +71,8 @@ struct Positions {
     int most;
     COVOL_INLINE Positions(Float8 center, float half)
         : first(ceil_of(center - half)), last(center + half), most(static_cast<int>(2 * half) + 1) {}
-    COVOL_INLINE Int8 are_in(Float8 at) const { return (at <= last) & (at >= 0.0F) & (at <= 7.0F); }
-    COVOL_INLINE Int8 meet_leaf() const { return (first <= 7.0F) & (last >= 0.0F); }
+    [[nodiscard]] COVOL_INLINE Int8 are_in(Float8 at) const { return (at <= last) & (at >= 0.0F) & (at <= 7.0F); }
+    [[nodiscard]] COVOL_INLINE Int8 meet_leaf() const { return (first <= 7.0F) & (last >= 0.0F); }
 };
 
 }  // namespace
@@ -141,7 +141,7 @@ COVOL_CLONES void offer_patch(const PatchFan& fan, const PatchCylinder& cylinder
             const Int8 voxel = __builtin_convertvector(
                 lane * float(kStride[m]) + pu * float(kStride[u]) + pv * float(kStride[v]), Int8);
             for (int n = 0; n < 8; ++n)
-                if (here[n]) leaf.offer(voxel[n], {hit.squared[n], hit.is_interior[n] != 0}, index);
+                if (here[n]) static_cast<void>(leaf.offer(voxel[n], {hit.squared[n], hit.is_interior[n] != 0}, index));
         }
     }
 }

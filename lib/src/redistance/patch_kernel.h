@@ -46,7 +46,7 @@ struct PatchLeaf {
     std::uint64_t* interior;  ///< 512 bits, PatchHit::is_interior
 
     /// Voxel p takes the patch `index` where that is nearer than the one it has. @return whether it did
-    bool offer(int p, const PatchHit& hit, std::int32_t index) const {
+    [[nodiscard]] bool offer(int p, const PatchHit& hit, std::int32_t index) const {
         if (!(hit.squared < squared[p])) return false;
         squared[p] = hit.squared;
         patch[p] = index;

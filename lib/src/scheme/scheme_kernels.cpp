@@ -147,7 +147,7 @@ struct Star {
         q[kMinusK] = load(row - 1), q[kPlusK] = load(row + 1);
     }
     /// q - p, or 0 where either is unknown
-    [[nodiscard]] Lanes difference(int face) const { return (q[face] >= 0.0F) & (p >= 0.0F) ? q[face] - p : Lanes{}; }
+    [[nodiscard]] Lanes difference(int face) const { return ((q[face] >= 0.0F) & (p >= 0.0F)) ? q[face] - p : Lanes{}; }
 };
 
 // velocity[f] = v_pq / h², Eqs. (17), (20).

@@ -9,10 +9,12 @@
 namespace covol::detail {
 namespace {
 
+// NOLINTBEGIN(modernize-use-using): attributes of vectors bind to a typedef
 typedef float Lanes __attribute__((vector_size(32)));                              // 8 floats
 typedef float LooseLanes __attribute__((vector_size(32), aligned(4), may_alias));  // the same at any address
 typedef unsigned short LooseShorts __attribute__((vector_size(16), aligned(2), may_alias));
 typedef int LaneBits __attribute__((vector_size(32)));
+// NOLINTEND(modernize-use-using)
 
 inline Lanes load(const float* p) { return *reinterpret_cast<const LooseLanes*>(p); }
 inline void store(float* p, Lanes v) { *reinterpret_cast<LooseLanes*>(p) = v; }

@@ -1,14 +1,16 @@
 #include "segment/job.h"
 
+#include <utility>
+
 namespace covol::pipeline {
 
-Job::Job(const Image* image_or_null, const std::vector<Vec3>& world_points, const SegmentOptions& segment_options,
+Job::Job(const Image* image_or_null, const std::vector<Vec3>& world_points, SegmentOptions segment_options,
          const RunContext& context)
     : image(image_or_null),
       points(world_points),
       trusted(world_points),
       given(world_points),
-      options(segment_options),
+      options(std::move(segment_options)),
       run(context) {
     if (!options.contours) return;
     const Contours& contours = *options.contours;

@@ -25,7 +25,7 @@ enum class StartOrigin {
 };
 
 struct Job {
-    Job(const Image* image, const std::vector<Vec3>& points, const SegmentOptions& options, const RunContext& run);
+    Job(const Image* image, const std::vector<Vec3>& points, SegmentOptions options, const RunContext& run);
 
     const Image* image;
     std::vector<Vec3> points;      ///< all that attract

@@ -19,7 +19,7 @@ struct CompareJob {
     ImageFlags image;
 
     /// Masks may need a spacing that their file does not know.
-    Solid read(const std::string& path, int wanted, const RunContext& run) const {
+    [[nodiscard]] Solid read(const std::string& path, int wanted, const RunContext& run) const {
         if (kind_of_file(path) != FileKind::Image) {
             if (image.options.roi)
                 throw Error(Errc::InvalidOptions, "--roi: expected two label images to crop, got " + path);

@@ -15,7 +15,7 @@ struct MeshJob {
     bool repair = false;
     MeshFlags flags;
 
-    ExtractOptions extract_options(double h) const {
+    [[nodiscard]] ExtractOptions extract_options(double h) const {
         const double edge = min_component.resolve(h, 0);
         return {isovalue.resolve(h, 0), edge * edge * edge};
     }

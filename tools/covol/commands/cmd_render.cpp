@@ -47,7 +47,7 @@ void add_render(Session& session) {
     command
         ->add_option_function<std::string>(
             "--size",
-            [job](const std::string& text) {
+            [job = job](const std::string& text) {
                 const auto size = parse_size("--size", text);
                 job->options.width = size[0];
                 job->options.height = size[1];

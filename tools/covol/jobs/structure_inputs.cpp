@@ -117,6 +117,7 @@ std::vector<StructureInput> structures_of(const SegmentJob& job,
 
 std::vector<std::string> names_of(const std::vector<StructureInput>& inputs) {
     std::vector<std::string> names;
+    names.reserve(inputs.size());
     for (const StructureInput& input : inputs) names.push_back(input.name);
     return names;
 }

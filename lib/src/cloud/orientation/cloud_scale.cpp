@@ -51,7 +51,7 @@ Around look_around(const cloud::PointCells& cells, const Vec3& at, double radius
             const Vec3& q = cells.sorted()[p];
             const Eigen::Vector3d v(q[0] - at[0], q[1] - at[1], q[2] - at[2]);
             if (v.squaredNorm() > radius * radius) continue;
-            near.push_back(v / radius);
+            near.emplace_back(v / radius);
             sum += near.back();
             squares += near.back() * near.back().transpose();
         }

@@ -68,6 +68,7 @@ public:
 private:
     static std::vector<Vec3> feet(const std::vector<Quadric>& quadrics) {
         std::vector<Vec3> at;
+        at.reserve(quadrics.size());
         for (const Quadric& q : quadrics) at.push_back(q.foot());
         return at;
     }
@@ -206,7 +207,7 @@ private:
 /// band.
 FloatGridPtr level_set_of(const Pieces& pieces, const Indicator& indicator, const Domain& domain,
                           const RunContext& run) {
-    const FloatGridPtr field = make_grid(domain, float(kHalfWidthVoxels * domain.voxel_size), "u");
+    FloatGridPtr field = make_grid(domain, float(kHalfWidthVoxels * domain.voxel_size), "u");
     std::vector<Leaf*> leaves;
     for (const Coord& origin : leaves_of(pieces, indicator, domain)) leaves.push_back(field->tree().touchLeaf(origin));
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 8), [&](const auto& range) {

@@ -95,7 +95,7 @@ struct Waiting {
 /// How deep voxels lie below or above target's surface, in voxels, along chains of neighbours among them (Dijkstra):
 /// its values end with its band.
 FloatGrid::Ptr depth_of(const std::vector<Coord>& voxels, const FloatGrid& target) {
-    const FloatGrid::Ptr depth = FloatGrid::create(std::numeric_limits<float>::max());
+    FloatGrid::Ptr depth = FloatGrid::create(std::numeric_limits<float>::max());
     auto depth_at = depth->getAccessor();
     auto target_at = target.getConstAccessor();
     const auto h = float(target.voxelSize()[0]);
@@ -141,7 +141,7 @@ std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target) {
     for (auto value = rough.cbeginValueOn(); value; ++value)
         if (value.isVoxelValue()) compare(value.getCoord());
     // What lies between the two surfaces, far from both, is active in neither.
-    for (std::size_t n = 0; n < found.size(); ++n)
+    for (std::size_t n = 0; n < found.size(); ++n)  // NOLINT(modernize-loop-convert): it grows meanwhile
         for (std::uint32_t face = kAround.faces; face != 0; face &= face - 1)
             compare(Coord(found[n]) + kAround.offset[std::size_t(__builtin_ctz(face))]);
     // The deepest first: what is left in the end, to keep two fronts apart, are the narrowest places.

@@ -205,7 +205,7 @@ public:
         fill_info();
     }
 
-    std::uint64_t bytes_to_hold(const PixelRequest& request) const override {
+    [[nodiscard]] std::uint64_t bytes_to_hold(const PixelRequest& request) const override {
         return may_map(request) ? 0 : ImageFile::bytes_to_hold(request);
     }
 

@@ -68,8 +68,8 @@ private:
         unread_ = kShared * binary_.size();
     }
 
-    static Json member(const Json& object, const char* key, Json otherwise) {
-        return object.is_object() && object.contains(key) ? object.at(key) : std::move(otherwise);
+    static Json member(const Json& object, const char* key, const Json& otherwise) {
+        return object.is_object() && object.contains(key) ? object.at(key) : otherwise;
     }
     const Json& list(const char* key) const {
         static const Json kNone = Json::array();
@@ -147,7 +147,8 @@ private:
     void add(const Json& primitive) {
         constexpr unsigned kTriangles = 4;
         if (member(primitive, "mode", kTriangles) != kTriangles) unsupported("a mesh that is not of triangles");
-        const auto [first, count] = vertices(member(member(primitive, "attributes", nullptr), "POSITION", nullptr));
+        const auto placed = vertices(member(member(primitive, "attributes", nullptr), "POSITION", nullptr));
+        const std::uint64_t first = placed.first, count = placed.second;
         std::vector<std::uint32_t> corners;
         const auto corner = [&](std::uint64_t vertex) {
             if (vertex >= count)

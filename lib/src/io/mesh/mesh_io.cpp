@@ -115,6 +115,7 @@ void write_meshes(const std::string& path, const std::vector<NamedMesh>& meshes,
     WriteMeshOptions bare = options;
     bare.attributes.clear();
     std::vector<Prepared> prepared;
+    prepared.reserve(meshes.size());
     for (const NamedMesh& named : meshes) prepared.push_back(prepare(named.mesh, bare));
     const std::vector<std::string>& comments = prepared.front().comments;
     Output out;

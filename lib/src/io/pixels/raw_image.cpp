@@ -177,7 +177,7 @@ public:
         check_file_size();
     }
 
-    std::uint64_t bytes_to_hold(const PixelRequest& request) const override {
+    [[nodiscard]] std::uint64_t bytes_to_hold(const PixelRequest& request) const override {
         return is_mapped(request) ? 0 : ImageFile::bytes_to_hold(request);
     }
 
@@ -297,6 +297,7 @@ std::shared_ptr<const void> map_file(const std::string& path, std::uint64_t offs
 void expect_pages(const void* begin, std::uint64_t bytes) {
     const auto page = std::uintptr_t(::sysconf(_SC_PAGESIZE));
     const std::uintptr_t first = reinterpret_cast<std::uintptr_t>(begin) / page * page;
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): the beginning of a page
     ::madvise(reinterpret_cast<void*>(first), reinterpret_cast<std::uintptr_t>(begin) + bytes - first, MADV_WILLNEED);
 }
 
@@ -304,6 +305,7 @@ void release_pages(const void* begin, std::uint64_t bytes) {
     const auto page = std::uintptr_t(::sysconf(_SC_PAGESIZE));
     const std::uintptr_t first = (reinterpret_cast<std::uintptr_t>(begin) + page - 1) / page * page;
     const std::uintptr_t last = (reinterpret_cast<std::uintptr_t>(begin) + bytes) / page * page;
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): the beginning of a page
     if (first < last) ::madvise(reinterpret_cast<void*>(first), last - first, MADV_DONTNEED);
 }
 

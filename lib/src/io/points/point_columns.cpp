@@ -169,6 +169,7 @@ void sort_by_place(Line& line) {
     std::stable_sort(order.begin(), order.end(),
                      [&](std::size_t a, std::size_t b) { return line.places[a] < line.places[b]; });
     std::vector<Vec3> sorted;
+    sorted.reserve(order.size());
     for (const std::size_t n : order) sorted.push_back(line.points[n]);
     line.points = std::move(sorted);
 }

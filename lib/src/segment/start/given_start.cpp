@@ -15,7 +15,7 @@ namespace covol::pipeline {
 namespace {
 
 FloatGridPtr read_level_set(const std::string& path) {
-    const FloatGridPtr grid = read_solid(path).level_set;
+    FloatGridPtr grid = read_solid(path).level_set;
     if (!grid) throw Error(Errc::InvalidInput, "segment: " + path + ": expected a .vdb file with a level set");
     return grid;
 }

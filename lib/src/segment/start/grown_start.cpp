@@ -15,7 +15,7 @@ void grow_to_edges(Job& job) {
     job.choose("growth", "to edges", grown.why);
     job.origin = StartOrigin::Grown;
     job.result.u = grown.level_set;
-    if (job.report().automatic.count("delta") == 0) return;
+    if (!job.report().automatic.contains("delta")) return;
     const double delta = kStarts.grown_delta_voxels * job.h();
     job.options.evolve.delta = delta;
     job.choose("delta", number(delta), number(kStarts.grown_delta_voxels) + " voxels: the start lies at the edges");
