@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <vector>
 
 #include "covol/api.h"
@@ -42,6 +43,21 @@ struct Domain {
 /// @throws Error InvalidOptions (h <= 0, not finite), InvalidInput (an empty box, or more than 2^30 voxels along an
 /// axis).
 [[nodiscard]] COVOL_API Domain make_domain(const WorldBox& box, double voxel_size);
+
+/// The voxels of `lattice` whose union covers `box`, up to rounding; where the lattice's own voxels end does not
+/// matter. Boxes on one lattice have one transform, so that their grids may be joined voxel by voxel.
+/// @throws Error InvalidInput (an empty box, or one that reaches more than 2^23 voxels from voxel (0,0,0)).
+[[nodiscard]] COVOL_API Domain covering(const Domain& lattice, const WorldBox& box);
+
+/// The voxels of edge h that cover `box`, on a lattice that does not depend on `box`: two parts of an image or of a
+/// cloud share it, so that their grids may be joined.
+/// @param image   the world box of the image, whose voxels are the lattice's where h is their spacing; none: the
+/// lattice
+///                begins at the world's origin, or, more than 2^22 voxels from it, at a multiple of 2^22 voxels
+/// @param origin  the centre of voxel (0,0,0) instead, where it is stated
+/// @throws Error InvalidOptions, InvalidInput as make_domain and covering.
+[[nodiscard]] COVOL_API Domain choose_domain(const WorldBox& box, double voxel_size,
+                                             const std::optional<WorldBox>& image, const std::optional<Vec3>& origin);
 
 /// The same lattice with `layers` more voxels on every side.
 [[nodiscard]] COVOL_API Domain widened(Domain domain, int layers);

@@ -32,7 +32,8 @@ struct EdgeOptions {
     /// that percentile, in (0,1); automatic: 0.9 for slopes, and for lines a third of the median: g then goes by
     /// relative brightness, as contrast that varies needs
     std::optional<double> contrast_percentile;
-    double low = 0.0, high = 0.0;  ///< intensities mapped to 0 and 1; equal: the image's 0.5 % and 99.5 % percentiles.
+    double low = 0.0,
+           high = 0.0;  ///< intensities mapped to 0 and 1; equal: 0.5 % and 99.5 % percentiles near the band.
     [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 

@@ -52,7 +52,9 @@ struct SegmentOptions {
     std::optional<double> voxel_size;  ///< h, world units, > 0; automatic: choose_voxel_size()
     /// `voxel_size` is a first choice, as an automatic one: points that enclose nothing may be given a larger one.
     bool voxel_size_may_grow = false;
-    std::optional<WorldBox> roi;   ///< the domain, instead of the image's box
+    std::optional<WorldBox> roi;  ///< the domain, instead of the image's box, in whole voxels
+    /// World position of the centre of voxel (0,0,0); automatic: see choose_domain().
+    std::optional<Vec3> lattice_origin;
     std::optional<double> margin;  ///< points alone, >= 0: between points and domain boundary; automatic: D + 6 voxels
     Start start;
     /// Another tool's result (Mesh, Mask or Vdb): corrected by the marks and seeds near them, and no flow. `start` is

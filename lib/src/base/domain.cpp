@@ -14,12 +14,28 @@ namespace {
 constexpr const char* kMinKey = "covol_domain_min";
 constexpr const char* kMaxKey = "covol_domain_max";
 constexpr double kMaxVoxelsPerAxis = 1 << 30;
+// The keys of band leaves hold this many voxels on either side of voxel 0.
+constexpr double kFarthestVoxel = 1 << 23;
+constexpr double kAnchorVoxels = 1 << 22;
 
 std::string to_text(const WorldBox& b) {
     std::ostringstream s;
     s << "(" << b.min[0] << ", " << b.min[1] << ", " << b.min[2] << ") to (" << b.max[0] << ", " << b.max[1] << ", "
       << b.max[2] << ")";
     return s.str();
+}
+
+void require_extent(const char* where, const WorldBox& box) {
+    for (int a = 0; a < 3; ++a)
+        if (!(box.max[a] > box.min[a]) || !std::isfinite(box.max[a] - box.min[a]))
+            throw Error(Errc::InvalidInput,
+                        std::string(where) + ": expected a box with a positive extent, got " + to_text(box));
+}
+
+void require_voxel_size(const char* where, double voxel_size) {
+    if (!(voxel_size > 0) || !std::isfinite(voxel_size))
+        throw Error(Errc::InvalidOptions,
+                    std::string(where) + ": voxel size: expected > 0, got " + std::to_string(voxel_size));
 }
 
 }  // namespace
@@ -56,14 +72,12 @@ std::int64_t Domain::voxel_count() const {
 }
 
 Domain make_domain(const WorldBox& box, double voxel_size) {
-    if (!(voxel_size > 0) || !std::isfinite(voxel_size))
-        throw Error(Errc::InvalidOptions, "make_domain: voxel size: expected > 0, got " + std::to_string(voxel_size));
+    require_voxel_size("make_domain", voxel_size);
+    require_extent("make_domain", box);
     Domain domain;
     domain.voxel_size = voxel_size;
     for (int a = 0; a < 3; ++a) {
         const double length = box.max[a] - box.min[a];
-        if (!(length > 0) || !std::isfinite(length))
-            throw Error(Errc::InvalidInput, "make_domain: expected a box with a positive extent, got " + to_text(box));
         // A tolerance keeps a box of exactly n voxels at n in spite of rounding.
         const double cells = std::max(1.0, std::ceil(length / voxel_size - 1e-6 * std::max(1.0, length / voxel_size)));
         if (cells > kMaxVoxelsPerAxis)
@@ -73,6 +87,41 @@ Domain make_domain(const WorldBox& box, double voxel_size) {
         domain.max[a] = static_cast<std::int32_t>(cells) - 1;
     }
     return domain;
+}
+
+Domain covering(const Domain& lattice, const WorldBox& box) {
+    require_voxel_size("covering", lattice.voxel_size);
+    require_extent("covering", box);
+    Domain domain = lattice;
+    for (int a = 0; a < 3; ++a) {
+        // Faces that should coincide differ by rounding.
+        const double length = (box.max[a] - box.min[a]) / lattice.voxel_size, slack = 1e-6 * std::max(1.0, length);
+        const double first = std::floor((box.min[a] - lattice.origin[a]) / lattice.voxel_size + 0.5 + slack);
+        const double last = std::ceil((box.max[a] - lattice.origin[a]) / lattice.voxel_size - 0.5 - slack);
+        if (!(first > -kFarthestVoxel && last < kFarthestVoxel))
+            throw Error(Errc::InvalidInput,
+                        "covering: " + to_text(box) + " reaches more than 2^23 voxels of size " +
+                            std::to_string(lattice.voxel_size) +
+                            " from the lattice's origin; choose a nearer `lattice_origin`, or a larger `voxel_size`");
+        domain.min[a] = static_cast<std::int32_t>(first);
+        domain.max[a] = static_cast<std::int32_t>(std::max(first, last));
+    }
+    return domain;
+}
+
+Domain choose_domain(const WorldBox& box, double voxel_size, const std::optional<WorldBox>& image,
+                     const std::optional<Vec3>& origin) {
+    require_voxel_size("choose_domain", voxel_size);
+    if (image && !origin) return covering(make_domain(*image, voxel_size), box);
+    Domain lattice;
+    lattice.voxel_size = voxel_size;
+    const double step = kAnchorVoxels * voxel_size;
+    for (int a = 0; a < 3; ++a) {
+        const double middle = 0.5 * (box.min[a] + box.max[a]);
+        lattice.origin[a] = std::abs(middle) > step ? step * std::round(middle / step) : 0.0;
+    }
+    if (origin) lattice.origin = *origin;
+    return covering(lattice, box);
 }
 
 Domain widened(Domain domain, int layers) {

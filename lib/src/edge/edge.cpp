@@ -53,8 +53,7 @@ LeafBounds known_bounds(const Domain& domain, const LeafBand& band, std::size_t 
     return bounds;
 }
 
-Window sample_window(const Image& image, const FloatGrid& topology, const Domain& domain, double sigma,
-                     const EdgeReport& report) {
+Window sample_window(const Image& image, const FloatGrid& topology, const Domain& domain, double sigma) {
     std::vector<Coord> origins;
     for (auto leaf = topology.tree().cbeginLeaf(); leaf; ++leaf)
         if (!leaf->isEmpty()) origins.push_back(leaf->origin());
@@ -63,16 +62,42 @@ Window sample_window(const Image& image, const FloatGrid& topology, const Domain
     const LeafBand& band = window.band;
     window.image.values = detail::LeafArray<float>(band.size(), 0.0F, 1);
     window.image.blocks.resize(band.size());
-    const auto low = static_cast<float>(report.low);
-    const auto scale = static_cast<float>(1.0 / (report.high - report.low));
     tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
         window.image.blocks[leaf] = band.neighbours(leaf);
         const Coord& o = band.origin(leaf);
         float* values = window.image.values.leaf(leaf);
         image.sample(domain, {o.x(), o.y(), o.z()}, {o.x() + 7, o.y() + 7, o.z() + 7}, values);
-        for (int n = 0; n < kLeafSize; ++n) values[n] = std::clamp((values[n] - low) * scale, 0.0F, 1.0F);
     });
     return window;
+}
+
+// The brightness that becomes 0 and 1. Percentiles of what the window holds: those of the whole image would need all of
+// it, and a part of an image would have others than the whole.
+std::array<double, 2> brightness_range(const Window& window) {
+    constexpr std::size_t kSamples = 4'000'000;
+    const std::size_t all = window.band.size() * kLeafSize, step = all / kSamples + 1;
+    std::vector<float> values;
+    values.reserve(all / step + 1);
+    for (std::size_t n = 0; n < all; n += step)
+        values.push_back(window.image.values.leaf(n / kLeafSize)[n % kLeafSize]);
+    const auto value_at = [&](double fraction) {
+        const auto nth = values.begin() + std::lround(fraction * double(values.size() - 1));
+        std::nth_element(values.begin(), nth, values.end());
+        return double(*nth);
+    };
+    const double low = value_at(kEdge.low_percentile), high = value_at(kEdge.high_percentile);
+    if (low < high) return {low, high};
+    const auto [least, most] = std::minmax_element(values.begin(), values.end());
+    return {double(*least), double(*most)};
+}
+
+void normalise(Window& window, const EdgeReport& report) {
+    const auto low = static_cast<float>(report.low);
+    const auto scale = static_cast<float>(1.0 / (report.high - report.low));
+    tbb::parallel_for(std::size_t(0), window.band.size(), [&](std::size_t leaf) {
+        float* values = window.image.values.leaf(leaf);
+        for (int n = 0; n < kLeafSize; ++n) values[n] = std::clamp((values[n] - low) * scale, 0.0F, 1.0F);
+    });
 }
 
 // Calls work(leaf, padded values with mirrored boundary) for every leaf.
@@ -180,20 +205,19 @@ EdgeResult detect_edges(const Image& image, const FloatGrid& topology, const Edg
     EdgeReport& report = result.report;
     report.sigma = options.sigma.value_or(domain.voxel_size);
     report.low = options.low, report.high = options.high;
-    if (!(report.low < report.high)) {
-        const auto percentiles = image.percentiles(kEdge.low_percentile, kEdge.high_percentile);
-        report.low = percentiles[0], report.high = percentiles[1];
+    with_threads(run, [&] {
+        Window window = sample_window(image, topology, domain, report.sigma);
         if (!(report.low < report.high)) {
-            const auto range = image.range();
+            const auto range = brightness_range(window);
             report.low = range[0], report.high = range[1];
         }
-    }
-    if (!(report.low < report.high))
-        throw Error(Errc::InvalidInput, "detect_edges: " + image.path() + ": every voxel has the value " +
-                                            std::to_string(report.low) +
-                                            ", there is no edge to find; segment with the points alone (`rho = 0`)");
-    with_threads(run, [&] {
-        Window window = sample_window(image, topology, domain, report.sigma, report);
+        if (!(report.low < report.high))
+            throw Error(Errc::InvalidInput, "detect_edges: " + image.path() +
+                                                ": every voxel near the band has the value " +
+                                                std::to_string(report.low) +
+                                                ", there is no edge to find; check that the points lie on the image's "
+                                                "structure, or segment with the points alone (`rho = 0`)");
+        normalise(window, report);
         smooth(window, domain, report.sigma, run);
 
         result.grid = make_grid(domain, 1.0F, "edge");

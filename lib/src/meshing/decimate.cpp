@@ -169,9 +169,10 @@ private:
             const std::uint8_t kept = holds_[number(info.v1)];
             if ((kept & (kFixed | kChamfer)) || (holds_[lost] & ~kept)) continue;
             const double square = (info.p1 - info.p0).sqrnorm();
-            candidates_.emplace_back(  std::max(0.0F, Quadric::collapse_priority(info)) + float(kDecimate.roundness * square * square), edge);
+            candidates_.emplace_back(
+                std::max(0.0F, Quadric::collapse_priority(info)) + float(kDecimate.roundness * square * square), edge);
         }
-       for (auto& [cost, edge] : candidates_) {
+        for (auto& [cost, edge] : candidates_) {
             gather(edge);
             cost *= shape_factor(lost);
         }

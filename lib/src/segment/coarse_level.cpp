@@ -47,7 +47,7 @@ void step_back(FloatGrid& u, const FloatGrid& start, double h) {
 /// The flow from `start`, a level set on the lattice of `fine`. @return empty, or why its result is of no use
 std::string run_coarse(Job& job, const FloatGrid& start, const Domain& fine) {
     Timed total(job.report().seconds.total);
-    job.report().domain = make_domain(fine.world_box(), job.h());
+    job.report().domain = job.coarsened(fine);
     try {
         job.result.u = start_from_grid(job.domain(), start, job.run);
     } catch (const Error& error) {

@@ -33,9 +33,20 @@ void Job::warn(const std::string& line) {
 }
 
 Domain Job::domain_with_margin(double margin) const {
-    if (options.roi) return make_domain(*options.roi, h());
-    if (image != nullptr) return make_domain(image->geometry().world_box(), h());
-    return make_domain(bounding_box(points, margin), h());
+    std::optional<WorldBox> whole;
+    if (image != nullptr) whole = image->geometry().world_box();
+    const WorldBox box = options.roi ? *options.roi : whole ? *whole : bounding_box(points, margin);
+    return choose_domain(box, h(), whole, options.lattice_origin);
+}
+
+Domain Job::coarsened(const Domain& fine) const {
+    Domain lattice = fine;
+    lattice.voxel_size = h();
+    if (image != nullptr && !options.lattice_origin)
+        lattice = make_domain(make_domain(image->geometry().world_box(), fine.voxel_size).world_box(), h());
+    else  // the faces of voxel (0,0,0) meet
+        for (double& x : lattice.origin) x += 0.5 * (h() - fine.voxel_size);
+    return covering(lattice, fine.world_box());
 }
 
 Domain Job::domain_with_chosen_margin(double automatic) const {

@@ -83,10 +83,14 @@ struct Job {
     void choose(const std::string& what, const std::string& value, const std::string& reason);
     /// Logs a warning, and keeps it for the report.
     void warn(const std::string& line);
-    /// The region of interest, else the image's box, else that of the points with `margin` around it.
+    /// The region of interest, else the image's box, else that of the points with `margin` around it, in voxels of one
+    /// lattice: where voxels lie depends on h and on the image or the stated origin alone, so that runs on parts of an
+    /// image or a cloud give grids with one transform.
     [[nodiscard]] Domain domain_with_margin(double margin) const;
     /// The same with the margin of the options where they have one.
     [[nodiscard]] Domain domain_with_chosen_margin(double automatic) const;
+    /// `fine`, on the lattice of this job's larger voxels; it, too, is the same for all parts.
+    [[nodiscard]] Domain coarsened(const Domain& fine) const;
 };
 
 /// Adds the wall-clock time of its life to `seconds`.

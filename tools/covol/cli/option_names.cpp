@@ -16,6 +16,7 @@ const std::map<std::string, std::string> kFlags{
     {"delta", "--delta"},
     {"frame", "--frame"},
     {"inside", "--inside"},
+    {"lattice_origin", "--lattice-origin"},
     {"max_steps", "--max-steps"},
     {"min_component_volume", "--min-component"},
     {"order", "--points-order"},

@@ -18,9 +18,12 @@ struct DistanceJob {
     bool half = false;
 
     Domain choose_domain(const ImageGeometry* geometry, const std::vector<Vec3>& cloud, double h, double radius) const {
-        if (domain.roi) return make_domain(*domain.roi, h);
-        if (geometry != nullptr) return make_domain(geometry->world_box(), h);
-        return make_domain(bounding_box(cloud, domain.margin.resolve(h, radius + h)), h);
+        std::optional<WorldBox> whole;
+        if (geometry != nullptr) whole = geometry->world_box();
+        const WorldBox box = domain.roi ? *domain.roi
+                             : whole    ? *whole
+                                        : bounding_box(cloud, domain.margin.resolve(h, radius + h));
+        return choose_domain(box, h, whole, domain.lattice_origin);
     }
 
     double voxel_size(const ImageGeometry* geometry, const std::vector<Vec3>& cloud, Session& session) const {

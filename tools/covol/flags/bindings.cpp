@@ -194,6 +194,13 @@ void DomainFlags::bind(CLI::App& command, bool with_margin) {
     add_length(command, "--voxel-size", voxel_size, "",
                "edge of the voxels [the image's smallest spacing; without an image from the points]");
     add_box(command, "--roi", roi, "work in this box of the world only");
+    command
+        .add_option_function<std::string>(
+            "--lattice-origin",
+            [this](const std::string& text) { lattice_origin = parse_vec3("--lattice-origin", text); },
+            "centre of voxel (0,0,0): runs with the same voxel size and origin share their lattice [the image's; "
+            "without an image 0,0,0]")
+        ->type_name("X,Y,Z");
     if (with_margin)
         add_length(command, "--margin", margin, "", "between the points and the domain's boundary [D + 6vx]");
 }

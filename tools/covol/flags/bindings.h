@@ -77,6 +77,7 @@ struct WorldPoints {
 struct DomainFlags {
     Length voxel_size, margin;
     std::optional<WorldBox> roi;
+    std::optional<Vec3> lattice_origin;
     void bind(CLI::App& command, bool with_margin);
     /// h, where --voxel-size may be relative ("2vx") to the automatic one. Says which in `session`.
     [[nodiscard]] double resolve_voxel_size(const Image* image, const std::vector<Vec3>& points,

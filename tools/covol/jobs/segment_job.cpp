@@ -14,6 +14,7 @@ SegmentOptions SegmentJob::resolve(double h) const {
     options.voxel_size = h;
     options.voxel_size_may_grow = !domain.voxel_size.given;
     options.roi = domain.roi;
+    options.lattice_origin = domain.lattice_origin;
     options.margin = domain.margin.resolve_above_0(h);
     options.start = start;
     options.model = model;
