@@ -39,3 +39,34 @@ TEST_CASE("unusable boxes and transforms are refused") {
         openvdb::math::Mat4d(1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1)));
     CHECK_THROWS_AS(domain_of(*grid), Error);
 }
+
+TEST_CASE("parts of a domain lie on its lattice") {
+    const Domain whole = make_domain({{0, 0, 0}, {10, 10.3, 11}}, 0.5);
+    CHECK(covering(whole, whole.world_box()) == whole);
+    CHECK(covering(whole, {{0, 0, 0}, {10, 10.3, 11}}) == whole);
+    const Domain part = covering(whole, {{2.1, 3, 4}, {6, 5.2, 4.2}});
+    CHECK(part.origin == whole.origin);
+    CHECK(part.min == Index3{4, 6, 8});
+    CHECK(part.max == Index3{11, 10, 8});
+    for (int a = 0; a < 3; ++a) {
+        CHECK(part.world_box().min[a] <= Vec3{2.1, 3, 4}[a]);
+        CHECK(part.world_box().max[a] >= Vec3{6, 5.2, 4.2}[a]);
+    }
+    CHECK_THROWS_AS(covering(whole, {{0, 0, 0}, {1, 0, 1}}), Error);
+    CHECK_THROWS_AS(covering(whole, {{1e7, 0, 0}, {1e7 + 1, 1, 1}}), Error);
+}
+
+TEST_CASE("the lattice does not depend on the part that is asked for") {
+    const WorldBox image{{0, 0, 0}, {10, 10.3, 11}}, part{{2, 3, 4}, {5, 6, 7}}, other{{1.7, 8, 0}, {9, 9.1, 3}};
+    CHECK(choose_domain(image, 0.5, image, {}) == make_domain(image, 0.5));
+    CHECK(choose_domain(part, 0.5, image, {}).origin == make_domain(image, 0.5).origin);
+    CHECK(choose_domain(part, 0.5, {}, {}).origin == Vec3{0, 0, 0});
+    CHECK(choose_domain(part, 0.5, {}, {}).min == Index3{4, 6, 8});
+    CHECK(choose_domain(other, 0.5, image, Vec3{1, 2, 3}).origin == Vec3{1, 2, 3});
+    // Far from the world's origin neighbours share a lattice that the keys of leaves can hold.
+    const WorldBox far{{4e6, 5e6, 0}, {4e6 + 10, 5e6 + 10, 10}}, beside{{4e6 + 9, 5e6, 0}, {4e6 + 20, 5e6 + 9, 10}};
+    const Domain a = choose_domain(far, 0.01, {}, {}), b = choose_domain(beside, 0.01, {}, {});
+    CHECK(a.origin == b.origin);
+    CHECK(a.max[0] > b.min[0]);
+    CHECK(a.world_box().min[0] <= 4e6);
+}

@@ -1,5 +1,7 @@
 #include "covol/pipeline.h"
 
+#include <openvdb/openvdb.h>
+
 #include <algorithm>
 #include <atomic>
 #include <catch2/catch.hpp>
@@ -182,6 +184,26 @@ TEST_CASE("segment: what is missing is an error that says so") {
     options = {};
     options.roi = WorldBox{{0, 0, 0}, {1, 0, 1}};
     CHECK(code_of([&] { (void)segment(image, sphere_points(100), options); }) == Errc::InvalidOptions);
+}
+
+TEST_CASE("segment: parts of an image and of a cloud have the whole's lattice") {
+    const Image image = ball_image(1.0);
+    SegmentOptions options;
+    const SegmentResult whole = segment(image, sphere_points(300), options);
+    options.roi = WorldBox{{-11.3, -10.9, -11.1}, {11.6, 11.4, 11.2}};
+    const SegmentResult part = segment(image, sphere_points(300), options);
+    CHECK(part.surface->transform() == whole.surface->transform());
+    CHECK(mean_radius(part.mesh) == Approx(mean_radius(whole.mesh)).epsilon(1e-4));
+
+    options = {};
+    options.voxel_size = 0.7;
+    const SegmentResult cloud = reconstruct(sphere_points(6000), options);
+    std::vector<Vec3> turned = sphere_points(5000);  // another cloud, with a box of its own
+    for (Vec3& p : turned) std::swap(p[0], p[2]);
+    CHECK(reconstruct(turned, options).surface->transform() == cloud.surface->transform());
+    options.lattice_origin = Vec3{0.1, 0.2, 0.3};
+    CHECK(reconstruct(turned, options).surface->transform().indexToWorld(openvdb::Vec3d(0, 0, 0)) ==
+          openvdb::Vec3d(0.1, 0.2, 0.3));
 }
 
 TEST_CASE("segment: a set cancel flag ends it with Cancelled") {
