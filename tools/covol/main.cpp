@@ -18,5 +18,6 @@ int main(int argc, char** argv) {
     add_convert(session);
     add_render(session);
     add_phantom(session);
+    add_plan(session);
     return session.main(argc, argv);
 }

@@ -40,6 +40,8 @@ enum class PixelType { UInt8, Int8, UInt16, Int16, UInt32, Int32, Float, Double 
 
 /// "uint8", ..., "float", "double"
 [[nodiscard]] COVOL_API const char* to_string(PixelType type);
+/// Of one pixel.
+[[nodiscard]] COVOL_API std::size_t bytes_of(PixelType type);
 
 /// The voxels min..max of an image, inclusive.
 struct VoxelBox {

@@ -218,6 +218,10 @@ const char* to_string(PixelType type) {
     return "double";
 }
 
+std::size_t bytes_of(PixelType type) {
+    return detail::with_pixel_type(type, [](auto pixel) { return sizeof(pixel); });
+}
+
 double Image::at(int i, int j, int k) const {
     if (chunks_) return chunks_->at(in_file({{i, j, k}, {i, j, k}}).min);
     const std::int64_t n =

@@ -187,8 +187,13 @@ void Session::add_grid(const std::string& path, const FloatGridPtr& grid, bool h
 }
 
 int Session::main(int argc, char** argv) {
+    // What follows `plan` is a whole command line, with the options of its command.
+    std::vector<char*> words(argv, argv + argc);
+    const auto is = [&](std::size_t n, const char* word) { return n < words.size() && words[n] == std::string(word); };
+    planning_ = is(1, "plan") && (is(2, "segment") || is(2, "reconstruct"));
+    if (planning_) words.erase(words.begin() + 1);
     try {
-        app_.parse(argc, argv);
+        app_.parse(int(words.size()), words.data());
         expect_values(app_);
         expect_values(*app_.get_subcommands().front());
         forget_groups(*app_.get_subcommands().front());

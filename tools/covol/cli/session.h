@@ -78,6 +78,8 @@ public:
     void require_memory(std::uint64_t bytes, const std::string& what) const;
     /// Adds to seconds.<name> of the report.
     void add_seconds(const std::string& name, double seconds);
+    /// The command stands behind `covol plan`: it says what it would take, and makes nothing.
+    [[nodiscard]] bool is_planning() const noexcept { return planning_; }
     /// The run went well, but ends with this exit code.
     void set_exit_code(int code) { exit_code_ = code; }
 
@@ -99,7 +101,7 @@ private:
     const CLI::App* command_ = nullptr;
 
     int threads_ = 0;
-    bool quiet_ = false, profile_ = false;
+    bool quiet_ = false, profile_ = false, planning_ = false;
     std::string json_path_, save_config_path_, memory_limit_text_;
     std::uint64_t memory_limit_ = 0;  ///< bytes: as given, else what the machine has free
 

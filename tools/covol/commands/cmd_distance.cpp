@@ -23,7 +23,7 @@ struct DistanceJob {
         const WorldBox box = domain.roi ? *domain.roi
                              : whole    ? *whole
                                         : bounding_box(cloud, domain.margin.resolve(h, radius + h));
-        return choose_domain(box, h, whole, domain.lattice_origin);
+        return covol::choose_domain(box, h, whole, domain.lattice_origin);
     }
 
     double voxel_size(const ImageGeometry* geometry, const std::vector<Vec3>& cloud, Session& session) const {

@@ -19,5 +19,6 @@ void add_check(Session& session);
 void add_convert(Session& session);
 void add_render(Session& session);
 void add_phantom(Session& session);
+void add_plan(Session& session);
 
 }  // namespace covol::tool

@@ -4,6 +4,7 @@
 
 #include "cli/report.h"
 #include "covol/error.h"
+#include "jobs/plan_job.h"
 #include "jobs/structures_job.h"
 #include "jobs/timelapse_job.h"
 
@@ -156,6 +157,7 @@ void SegmentJob::run(Session& session) const {
         names = names || std::any_of(texts->begin(), texts->end(), has_name);
     if (names && images.empty())
         throw UsageError("expected files without names: several structures need an image, see covol segment");
+    if (session.is_planning()) return run_plan(*this, session);
     if (is_timelapse(*this)) return run_timelapse(*this, session);
     run_structures(*this, session);
 }

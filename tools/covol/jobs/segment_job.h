@@ -40,7 +40,7 @@ struct SegmentJob {
     bool half = false;
 
     void bind(CLI::App& command, bool with_image);
-    /// Time-lapses by run_timelapse(), all else by run_structures().
+    /// Time-lapses by run_timelapse(), all else by run_structures(); behind `covol plan` run_plan().
     void run(Session& session) const;
 
     // For those.

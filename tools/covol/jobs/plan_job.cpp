@@ -1,0 +1,191 @@
+#include "jobs/plan_job.h"
+
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <iomanip>
+#include <optional>
+#include <set>
+#include <sstream>
+
+#include "cli/report.h"
+#include "covol/error.h"
+#include "jobs/marks.h"
+#include "jobs/structure_inputs.h"
+#include "jobs/timelapse_job.h"
+
+namespace covol::tool {
+namespace {
+
+// Measured by tests/bench/run.sh on the embryo phantom (docs/benchmarks.md), rounded up.
+constexpr double kBandBytes = 110;   ///< peak memory for each voxel of the band, mesh and files included
+constexpr double kTubeBytes = 12;    ///< for each voxel of a distance tube
+constexpr double kBaseBytes = 8e7;   ///< the program itself
+constexpr double kImageTime = 1.3;   ///< with an image over without
+constexpr double kPilotVoxels = 64;  ///< across the marks' box, on the finer of the two lattices
+constexpr double kReachVoxels = 12;  ///< how far from the surface the image is sampled
+
+/// What the marks alone came to on a coarse lattice.
+struct Pilot {
+    double voxel_size = 0, active_voxels = 0, tube_voxels = 0, seconds = 0;
+    FloatGridPtr surface;
+};
+
+struct StructurePlan {
+    std::string name;
+    double active_voxels = 0, tube_voxels = 0, seconds = 0, area = 0;
+    std::set<std::uint64_t> chunks;
+};
+
+Pilot run_pilot(const SegmentJob& job, const StructureInput& input, const ImageGeometry* geometry, double h,
+                Session& session, const RunContext& quiet) {
+    Marks marks = read_marks(input.points, input.contours, job.cloud, geometry, quiet);
+    prepare(marks, job.cloud, input.contours, geometry, h, session, quiet);
+    SegmentOptions options = job.resolve(h);
+    options.contours = marks.contours;
+    options.hints = marks.hints;
+    options.exterior_seeds = input.exterior_seeds;
+    Seeds seeds = read_seeds(input.seeds, input.points.options, geometry, h, quiet);
+    options.inside = std::move(seeds.inside);
+    options.outside = std::move(seeds.outside);
+    options.evolve.rho = 0;
+    const Stopwatch watch;
+    const SegmentResult result = reconstruct(marks.points, options, quiet);
+    Pilot pilot{result.report.resolved.voxel_size.value_or(h), double(result.report.active_voxels), 0, watch.seconds(),
+                result.surface};
+    if (result.distance) pilot.tube_voxels = double(result.distance->activeVoxelCount());
+    return pilot;
+}
+
+/// The chunks that hold what lies within `reach` of the surface.
+std::set<std::uint64_t> chunks_near(const FloatGrid& surface, const ImageInfo& image, double reach) {
+    std::set<std::uint64_t> chunks;
+    const ImageGeometry& g = image.geometry;
+    Index3 counts;
+    for (int a = 0; a < 3; ++a) counts[a] = (g.size[a] - 1) / image.chunk_size[a] + 1;
+    const double h = surface.voxelSize()[0];
+    for (auto value = surface.cbeginValueOn(); value; ++value) {
+        if (std::abs(*value) > h) continue;
+        const openvdb::Vec3d w = surface.indexToWorld(value.getCoord());
+        const Vec3 at = g.world_to_index({w[0], w[1], w[2]});
+        Index3 first, last;
+        for (int a = 0; a < 3; ++a) {
+            const double voxels = (reach + h) / g.spacing[a], end = g.size[a] - 1;
+            first[a] = int(std::clamp(at[a] - voxels, 0.0, end)) / image.chunk_size[a];
+            last[a] = int(std::clamp(at[a] + voxels, 0.0, end)) / image.chunk_size[a];
+        }
+        for (int k = first[2]; k <= last[2]; ++k)
+            for (int j = first[1]; j <= last[1]; ++j)
+                for (int i = first[0]; i <= last[0]; ++i)
+                    chunks.insert((std::uint64_t(k) * counts[1] + j) * counts[0] + i);
+    }
+    return chunks;
+}
+
+StructurePlan plan_structure(const SegmentJob& job, const StructureInput& input, const ImageInfo* image, double given_h,
+                             Session& session, const RunContext& quiet) {
+    const ImageGeometry* geometry = image != nullptr ? &image->geometry : nullptr;
+    const Marks marks = read_marks(input.points, input.contours, job.cloud, geometry, quiet);
+    if (marks.given.empty())
+        throw Error(Errc::InvalidInput,
+                    "plan: expected points or contours, got none: how far a surface moves that starts without marks "
+                    "is not known before");
+    const double h = given_h > 0 ? given_h : job.domain.resolve_voxel_size(nullptr, marks.given, session);
+    const double coarse = std::max(h, longest_side(bounding_box(marks.given)) / kPilotVoxels);
+    const Pilot coarser = run_pilot(job, input, geometry, 1.5 * coarse, session, quiet);
+    const Pilot pilot = run_pilot(job, input, geometry, coarse, session, quiet);
+    // seconds = fixed + growing / h^2
+    const double c = pilot.voxel_size, d = std::max(coarser.voxel_size, 1.01 * c);
+    const double growing = std::max(0.0, (pilot.seconds - coarser.seconds) / (1 / (c * c) - 1 / (d * d)));
+    const double fixed = std::max(0.0, pilot.seconds - growing / (c * c));
+    StructurePlan plan;
+    plan.name = input.name;
+    const double finer = std::max(1.0, c / h);
+    plan.active_voxels = pilot.active_voxels * finer * finer;
+    plan.tube_voxels = pilot.tube_voxels * finer * finer * finer;
+    plan.seconds = fixed + growing / (c * c) * finer * finer;
+    if (image != nullptr) plan.seconds *= kImageTime;
+    if (image != nullptr && image->chunk_size[0] > 0)
+        plan.chunks = chunks_near(*pilot.surface, *image, kReachVoxels * h);
+    return plan;
+}
+
+std::string bytes_text(double bytes) {
+    std::ostringstream text;
+    text << std::fixed << std::setprecision(bytes < 1e9 ? 0 : 1);
+    bytes < 1e9 ? text << bytes / 1e6 << " MB" : text << bytes / 1e9 << " GB";
+    return text.str();
+}
+
+std::string size_text(const Index3& n) {
+    return std::to_string(n[0]) + " x " + std::to_string(n[1]) + " x " + std::to_string(n[2]);
+}
+
+}  // namespace
+
+void run_plan(const SegmentJob& job, Session& session) {
+    if (is_timelapse(job)) throw UsageError("plan: expected one image and one frame: every frame takes what one does");
+    job.check_options();
+    RunContext quiet = session.run();
+    quiet.log = {};
+    Json plan;
+    std::optional<ImageInfo> image;
+    double given_h = 0, image_bytes = 0, pixel_bytes = 0;
+    if (!job.images.empty()) {
+        ReadImageOptions reading = job.image.options;
+        reading.roi = job.domain.roi;
+        image = read_image_info(job.images.front(), reading, session.run());
+        const Vec3& spacing = image->geometry.spacing;
+        const double finest = *std::min_element(spacing.begin(), spacing.end());
+        given_h = job.domain.voxel_size.resolve(finest, finest);
+        const Index3& n = image->geometry.size;
+        pixel_bytes = double(bytes_of(image->type));
+        image_bytes = double(n[0]) * n[1] * n[2] * pixel_bytes;
+        plan["image"] = {{"path", job.images.front()},
+                         {"format", image->format},
+                         {"size", n},
+                         {"type", to_string(image->type)},
+                         {"unpacked_bytes", image_bytes}};
+        session.say("image: " + size_text(n) + " " + to_string(image->type) + ", " + image->format + ", " +
+                    bytes_text(image_bytes) + " unpacked");
+    }
+    double voxels = 0, tube = 0, seconds = 0;
+    std::set<std::uint64_t> chunks;
+    for (const StructureInput& input : structures_of(job, job.painted.read(session.run()))) {
+        const StructurePlan one = plan_structure(job, input, image ? &*image : nullptr, given_h, session, quiet);
+        voxels += one.active_voxels;
+        tube = std::max(tube, one.tube_voxels);
+        seconds += one.seconds;
+        chunks.insert(one.chunks.begin(), one.chunks.end());
+    }
+    double held = image ? double(image->bytes_to_hold) : 0;
+    if (image && image->chunk_size[0] > 0) {
+        const Index3& c = image->chunk_size;
+        double total = 1, each = pixel_bytes;
+        for (int a = 0; a < 3; ++a) {
+            total *= (image->geometry.size[a] - 1) / c[a] + 1;
+            each *= c[a];
+        }
+        const bool lazily = image->bytes_to_hold == 0;
+        const double read = lazily ? double(chunks.size()) : total;
+        if (lazily) held = read * each;
+        plan["image"]["chunks"] = {{"size", c}, {"read", read}, {"of", total}, {"unpacked_bytes", read * each}};
+        session.say("chunks of " + size_text(c) + ": about " + to_text(read) + " of " + to_text(total) + " are read, " +
+                    bytes_text(read * each) + " unpacked");
+    }
+    const double memory = kBaseBytes + held + std::max(kBandBytes * voxels, kTubeBytes * tube);
+    plan["active_voxels"] = std::round(voxels);
+    plan["memory_bytes"] = std::round(memory);
+    plan["seconds"] = seconds;
+    session.say("band: about " + to_text(std::round(voxels / 1000) * 1000) + " voxels");
+    session.say("memory: about " + bytes_text(memory) +
+                (held > 0 ? ", of which the image takes " + bytes_text(held) : ""));
+    std::ostringstream time;
+    time << "time: about " << std::setprecision(2) << seconds << " s on this machine, without reading a packed image";
+    session.say(time.str());
+    session.report()["plan"] = plan;
+}
+
+}  // namespace covol::tool
