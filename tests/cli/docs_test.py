@@ -60,7 +60,7 @@ class Pages(unittest.TestCase):
         for page in PAGES:
             for block in blocks(page):
                 for line in re.sub(r"\\\n", " ", block).splitlines():
-                    if command := re.match(r"\s*covol (\w+)", line):
+                    if command := re.match(r"\s*covol (?:plan )?(\w+)", line):
                         for flag in re.findall(r"(?<=\s)--?[a-z][\w-]*", line.split("#")[0]):
                             self.assertIn(flag, options[command[1]], f"{page.relative_to(ROOT)}: {line}")
             prose = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.M | re.S)

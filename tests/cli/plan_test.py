@@ -1,0 +1,47 @@
+"""What covol plan foretells, against what the job then takes.
+
+    COVOL=build/bin/covol python3 -m unittest tests/cli/plan_test.py
+"""
+import json
+import unittest
+
+from cli_test import Case
+
+
+class Plan(Case):
+    def run_both(self, *job):
+        """The plan, and the report of the job itself."""
+        self.run_covol("plan", *job, "--json", "plan.json")
+        self.assertEqual([path.name for path in self.folder.iterdir()], ["plan.json"])
+        planned = json.loads((self.folder / "plan.json").read_text())["plan"]
+        self.run_covol(*job, "--json", "job.json")
+        return planned, json.loads((self.folder / "job.json").read_text())
+
+    def check(self, planned, report):
+        self.assertLess(abs(planned["active_voxels"] / report["grid"]["active_voxels"] - 1), 0.4)
+        self.assertGreater(planned["memory_bytes"], 0.6 * report["peak_rss_bytes"])
+        self.assertLess(planned["memory_bytes"], 2.5 * report["peak_rss_bytes"])
+        self.assertGreater(planned["seconds"], 0)
+
+    def test_cloud(self):
+        self.run_covol("phantom", "torus", "--size", "8", "--count", "20000", "-o", self.inputs / "i.nrrd", "--points",
+                       self.inputs / "p.xyz")
+        self.check(*self.run_both("reconstruct", self.inputs / "p.xyz", "--voxel-size", "0.006", "-o", "s.vdb"))
+
+    def test_image_and_marks(self):
+        self.run_covol("phantom", "torus", "--size", "150", "--count", "500", "-o", self.inputs / "t.nrrd", "--points",
+                       self.inputs / "t.xyz")
+        planned, report = self.run_both("segment", self.inputs / "t.nrrd", "--points", self.inputs / "t.xyz", "-o", "s.vdb")
+        self.check(planned, report)
+        self.assertEqual(planned["image"]["size"], [150, 150, 150])
+        self.assertEqual(planned["image"]["unpacked_bytes"], 4 * 150 ** 3)
+
+    def test_what_cannot_be_planned(self):
+        self.assertIn("segment or reconstruct", self.run_covol("plan", "evolve", code=2).stderr)
+        self.run_covol("phantom", "sphere", "--size", "32", "-o", self.inputs / "s.nrrd", "--points", self.inputs / "s.xyz")
+        error = self.run_covol("plan", "segment", self.inputs / "s.nrrd", "--init", "sphere:0,0,0,0.3", "-o", "s.vdb", code=3).stderr
+        self.assertIn("expected points or contours", error)
+
+
+if __name__ == "__main__":
+    unittest.main()
