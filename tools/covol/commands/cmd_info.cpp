@@ -69,8 +69,7 @@ Json range_of(const std::string& path, ReadImageOptions options, int channel, co
                  ? "channel " + std::to_string(channel) + (named ? " " + info.channel_names[channel] : "") + ": "
                  : "values: ")
          << range[0] << " to " << range[1] << (info.frames > 1 ? ", frame " + std::to_string(options.frame) : "");
-    if (chunks && chunks->read < chunks->total)
-        text << ", of " << chunks->read << " of " << chunks->total << " chunks";
+    if (chunks && chunks->read < chunks->total) text << ", of " << chunks->read << " of " << chunks->total << " chunks";
     session.say(text.str());
     return {range[0], range[1]};
 }
