@@ -59,6 +59,9 @@ struct ReadImageOptions {
     int frame = -1;         ///< Which time point of a series, from 0; -1: there must be only one.
     /// Read only what samples within this box need: the voxels in it and one more on every side.
     std::optional<WorldBox> roi = {};
+    /// A coarse level of a pyramid that states no translation is moved by half the difference between its spacing and
+    /// the finest level's: where voxels are means of finer ones, that is where they lie.
+    bool correct_level_shift = false;
 };
 
 /// The chunks of an image whose file keeps it in boxes that are packed each on its own.
@@ -154,8 +157,9 @@ struct ImageInfo {
 };
 
 /// Reads a 3D image: TIFF (ImageJ, OME and tifffile descriptions understood; BigTIFF, tiles, several files), NRRD,
-/// NIfTI, MetaImage, MRC, ITK's HDF5, a DICOM series (its folder, or one of its files), a float grid of a .vdb file
-/// ("FILE.vdb:name", or its first one; the box of its active voxels). A file that states no spacing is a warning.
+/// NIfTI, MetaImage, MRC, ITK's HDF5, a DICOM series (its folder, or one of its files), OME-Zarr and Zarr 2 and 3 (the
+/// folder of the image, or of one level), a float grid of a .vdb file ("FILE.vdb:name", or its first one; the box of
+/// its active voxels). A file that states no spacing is a warning.
 /// @throws Error Io (cannot be opened or read), InvalidInput (not 3D, empty, NaN or infinite values; an roi outside),
 ///               Unsupported (several channels, frames or series and none chosen: lists them; an unknown format).
 [[nodiscard]] COVOL_API Image read_image(const std::string& path, const ReadImageOptions& options = {},

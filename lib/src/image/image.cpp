@@ -9,6 +9,7 @@
 #include "base/matrix.h"
 #include "covol/error.h"
 #include "covol/vdb_io.h"
+#include "io/chunked/zarr.h"
 #include "io/image/image_formats.h"
 #include "io/image/tiff.h"
 #include "io/pixels/chunks.h"
@@ -23,7 +24,7 @@ using detail::read_error;
 
 constexpr const char* kReadable =
     ".tif, .tiff, .nrrd, .nhdr, .nii, .nii.gz, .mha, .mhd, .mrc, .map, .h5, .dcm or .vdb, or a folder with a DICOM "
-    "series";
+    "series or a Zarr store";
 
 bool is_one_of(const std::string& text, std::initializer_list<const char*> list) {
     return std::any_of(list.begin(), list.end(), [&](const char* known) { return text == known; });
@@ -50,10 +51,13 @@ void check_geometry(const std::string& path, const ImageGeometry& g) {
     }
 }
 
-std::unique_ptr<ImageFile> open_image(const std::string& given, const RunContext& run) {
+std::unique_ptr<ImageFile> open_image(const std::string& given, const ReadImageOptions& options,
+                                      const RunContext& run) {
     const auto [path, grid] = split_grid_name(given);
     std::error_code status;
     if (!fs::exists(path, status)) throw read_error(Errc::Io, path, "no such file");
+    if (fs::is_directory(path, status) && detail::is_zarr(path))
+        return detail::open_zarr(path, options.correct_level_shift, run);
     if (fs::is_directory(path, status)) return detail::open_dicom(path, run);
     if (!fs::is_regular_file(path, status) || !std::ifstream(path).good())
         throw read_error(Errc::Io, path, "cannot be opened");
@@ -301,7 +305,7 @@ Image Image::from_values(const ImageGeometry& geometry, const std::uint8_t* valu
 Image read_image(const std::string& path, const ReadImageOptions& options, const RunContext& run) {
     Image image;
     with_threads(run, [&] {
-        const std::unique_ptr<ImageFile> file = open_image(path, run);
+        const std::unique_ptr<ImageFile> file = open_image(path, options, run);
         const ImageInfo info = corrected_info(path, *file, options, run);
         const PixelRequest request = choose_pixels(path, info, options);
         const detail::Pixels pixels = file->read(request, run);
@@ -325,7 +329,7 @@ ImageGeometry read_image_geometry(const std::string& path, const ReadImageOption
 }
 
 ImageInfo read_image_info(const std::string& path, const ReadImageOptions& options, const RunContext& run) {
-    const std::unique_ptr<ImageFile> file = open_image(path, run);
+    const std::unique_ptr<ImageFile> file = open_image(path, options, run);
     ImageInfo info = corrected_info(path, *file, options, run);
     ReadImageOptions first = options;
     if (info.channels > 1 && first.channel < 0) first.channel = 0;

@@ -13,6 +13,7 @@ const std::map<std::string, std::string> kFlags{
     {"channel", "--channel"},
     {"channels", "--points-channels"},
     {"contours", "--contours"},
+    {"correct_level_shift", "--correct-level-shift"},
     {"delta", "--delta"},
     {"frame", "--frame"},
     {"inside", "--inside"},

@@ -17,6 +17,8 @@ Json to_json(const ImageGeometry& g) {
             {"unit", g.unit}};
 }
 
+Json to_json(const ChunkCount& c) { return {{"size", c.size}, {"read", c.read}, {"of", c.total}}; }
+
 Json to_json(const Domain& d) {
     return {{"voxel_size", d.voxel_size},
             {"origin", to_json(d.origin)},

@@ -14,6 +14,8 @@ namespace covol::tool {
 [[nodiscard]] Json to_json(const Vec3& v);
 [[nodiscard]] Json to_json(const WorldBox& box);
 [[nodiscard]] Json to_json(const ImageGeometry& geometry);
+/// Of an image in chunks, once all that needs it has read it.
+[[nodiscard]] Json to_json(const ChunkCount& chunks);
 [[nodiscard]] Json to_json(const Domain& domain);
 [[nodiscard]] Json to_json(const BandReport& report);
 [[nodiscard]] Json to_json(const EdgeReport& report);

@@ -112,7 +112,13 @@ void check_image(const std::string& path, const ImageFlags& flags, const RunCont
     const Image image = flags.read(path, run);
     const ImageGeometry& g = image.geometry();
     const auto range = image.range();
-    if (range[0] == range[1]) findings.problem("all voxels are " + std::to_string(range[0]) + ": there is no edge");
+    const std::optional<ChunkCount> chunks = image.chunks();
+    const bool is_sample = chunks && chunks->read < chunks->total;
+    if (is_sample)
+        findings.remark("of " + std::to_string(chunks->total) + " chunks " + std::to_string(chunks->read) +
+                        " were read: what is wrong with the others is found when they are");
+    if (range[0] == range[1] && !is_sample)
+        findings.problem("all voxels are " + std::to_string(range[0]) + ": there is no edge");
     if (g.unit.empty()) findings.remark("the file names no unit of length: lengths are in its own units");
     const auto [least, most] = std::minmax_element(g.spacing.begin(), g.spacing.end());
     if (*most > kFlatVoxels * *least)

@@ -60,13 +60,16 @@ std::string axis_text(const ImageGeometry& g, int axis) {
 Json range_of(const std::string& path, ReadImageOptions options, int channel, const ImageInfo& info, Session& session) {
     options.channel = channel;
     if (info.frames > 1) options.frame = std::max(options.frame, 0);
-    const auto range = read_image(path, options, session.run()).range();
+    const Image image = read_image(path, options, session.run());
+    const auto range = image.range();
+    const std::optional<ChunkCount> chunks = image.chunks();
     const bool named = std::size_t(channel) < info.channel_names.size();
     std::ostringstream text;
     text << (info.channels > 1
                  ? "channel " + std::to_string(channel) + (named ? " " + info.channel_names[channel] : "") + ": "
                  : "values: ")
          << range[0] << " to " << range[1] << (info.frames > 1 ? ", frame " + std::to_string(options.frame) : "");
+    if (chunks && chunks->read < chunks->total) text << ", of " << chunks->read << " of " << chunks->total << " chunks";
     session.say(text.str());
     return {range[0], range[1]};
 }
@@ -82,6 +85,9 @@ void describe_image(const std::string& path, const ImageFlags& flags, Session& s
          << (g.spacing_known ? "" : " (not known)") << ", origin " << triple(g.origin) << "\naxes: i runs along "
          << axis_text(g, 0) << ", j along " << axis_text(g, 1) << ", k along " << axis_text(g, 2)
          << " of the world (LPS), which goes from " << triple(g.world_box().min) << " to " << triple(g.world_box().max);
+    const bool in_chunks = info.chunk_size[0] > 0;
+    if (in_chunks) text << "\nchunks of " << triple(info.chunk_size) << " voxels";
+    for (const std::string& level : info.levels) text << "\nlevel " << level;
     for (const auto& [field, value] : info.fields) text << "\n  " << field << ": " << value;
     session.say(text.str());
 
@@ -92,6 +98,8 @@ void describe_image(const std::string& path, const ImageFlags& flags, Session& s
     report["channels"] = info.channels;
     report["channel_names"] = info.channel_names;
     report["frames"] = info.frames;
+    if (in_chunks) report["chunk_size"] = info.chunk_size;
+    if (!info.levels.empty()) report["levels"] = info.levels;
     report["spacing_known"] = {info.spacing_known[0], info.spacing_known[1], info.spacing_known[2]};
     for (const auto& [field, value] : info.fields) report["fields"][field] = value;
     const int first = std::max(flags.options.channel, 0);

@@ -92,6 +92,8 @@ void ImageFlags::bind(CLI::App& command, bool with_roi, bool with_frame) {
     add_index("--channel", options.channel, "channel of an image that has several, from 0");
     if (with_frame) add_index("--frame", options.frame, "time point of an image that has several, from 0");
     if (with_roi) add_box(command, "--roi", options.roi, "take this box of the world only");
+    command.add_flag("--correct-level-shift", options.correct_level_shift,
+                     "move a coarse level of an OME-Zarr image that states no translation onto the finest one");
 }
 
 Image ImageFlags::read(const std::string& path, const RunContext& run) const {

@@ -150,6 +150,14 @@ Image SegmentJob::read(const std::string& path, const ReadImageOptions& options,
     return pixels;
 }
 
+void SegmentJob::tell_chunks(const Image& image, Session& session) {
+    const std::optional<ChunkCount> chunks = image.chunks();
+    if (!chunks) return;
+    session.report()["input"]["image"]["chunks"] = to_json(*chunks);
+    session.note("read " + std::to_string(chunks->read) + " of " + std::to_string(chunks->total) +
+                 " chunks of the image");
+}
+
 void SegmentJob::run(Session& session) const {
     const auto has_name = [](const std::string& text) { return !split_name(text).name.empty(); };
     bool names = false;

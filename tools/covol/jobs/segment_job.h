@@ -51,6 +51,8 @@ struct SegmentJob {
     [[nodiscard]] std::string unused(const SegmentReport& report) const;
     /// The image; the report tells of it.
     [[nodiscard]] Image read(const std::string& path, const ReadImageOptions& options, Session& session) const;
+    /// How much of the image was read, once it has been segmented.
+    static void tell_chunks(const Image& image, Session& session);
 };
 
 }  // namespace covol::tool

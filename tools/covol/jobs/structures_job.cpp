@@ -183,6 +183,7 @@ void run_structures(const SegmentJob& job, Session& session) {
     const auto output = std::make_shared<StructuresOutput>(
         segment_structures(job, inputs, image ? &*image : nullptr, starts, session, session.run()));
     session.report().update(to_json(*output), true);
+    if (image) SegmentJob::tell_chunks(*image, session);
     hand_over(job, output, "", session,
               [&](const std::string& path, auto write) { outputs.add(path, std::move(write)); });
     outputs.add(job.table_path, [output](const std::string& file) {

@@ -186,7 +186,9 @@ private:
         run.log = [this, who](LogLevel level, const std::string& line) {
             level == LogLevel::Warning ? session_.warn(who + ": " + line) : session_.note(who + ": " + line);
         };
-        return segment_structures(job_, inputs_at(frame), &image, starts_, session_, run);
+        StructuresOutput output = segment_structures(job_, inputs_at(frame), &image, starts_, session_, run);
+        SegmentJob::tell_chunks(image, session_);
+        return output;
     }
 
     void fail(const std::string& who, const Error& error) {

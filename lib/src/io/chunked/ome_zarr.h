@@ -1,0 +1,50 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace covol::detail {
+
+/// An axis of an OME-Zarr image.
+struct OmeAxis {
+    std::string name, type, unit;  ///< unit as normal_unit() has it
+};
+
+/// world = scale * index + translation, along each axis of the array.
+struct OmeLevel {
+    std::string path;  ///< of its array, below the group
+    std::vector<double> scale, translation;
+    bool has_scale = false;
+    bool has_translation = false;  ///< of its own, not of the whole pyramid's
+};
+
+/// The first image of a group, as its metadata describes it. https://ngff.openmicroscopy.org/0.5/
+struct OmeImage {
+    std::string group;     ///< the folder
+    std::string metadata;  ///< the file that all this is from
+    std::string version;   ///< "0.4"
+    int images = 0;        ///< that the group describes
+    std::vector<OmeAxis> axes;
+    std::vector<OmeLevel> levels;  ///< the finest first
+    std::vector<std::string> channels;
+};
+
+/// @returns nothing where the folder has no metadata of an image. @throws Error InvalidInput, Io, Unsupported.
+std::optional<OmeImage> read_ome_image(const std::string& folder);
+
+/// The image that a folder is a level of, and which. Its group may be up to three folders above.
+struct OmePlace {
+    OmeImage image;
+    std::size_t level = 0;
+};
+std::optional<OmePlace> find_ome_image(const std::string& array_folder);
+
+/// What to say of a group that is no image: names of what lies in it.
+struct OmeGroup {
+    std::vector<std::string> images;  ///< folders in it that are images or arrays
+    bool is_series = false;           ///< images 0, 1, ... as bioformats2raw writes them
+    bool is_plate = false;
+};
+OmeGroup read_ome_group(const std::string& folder);
+
+}  // namespace covol::detail

@@ -1,0 +1,51 @@
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "covol/image.h"
+#include "io/chunked/zarr_codecs.h"
+
+namespace covol::detail {
+
+/// How the chunks of a Zarr 3 array lie in shards: files that hold several, and an index of where.
+/// https://zarr-specs.readthedocs.io/en/latest/v3/codecs/sharding-indexed/
+struct ZarrShards {
+    std::vector<std::uint64_t> counts;  ///< chunks of a shard along each dimension; empty: each chunk is a file
+    bool index_at_end = true;
+    bool index_has_checksum = false;
+    bool index_is_big_endian = false;
+};
+
+/// What the metadata of an array says.
+/// https://zarr-specs.readthedocs.io/en/latest/v2/v2.0.html, https://zarr-specs.readthedocs.io/en/latest/v3/core/
+struct ZarrArray {
+    std::string folder;
+    std::string metadata;  ///< the file that all this is from
+    int version = 2;
+    PixelType type = PixelType::UInt8;
+    bool half = false;  ///< 16-bit floats, told as Float
+    bool swap = false;  ///< the other byte order
+    std::vector<std::uint64_t> shape;
+    std::vector<std::uint64_t> chunk;    ///< elements along each dimension; with shards of the chunks in them
+    std::vector<std::uint64_t> strides;  ///< elements of a chunk between neighbours along each dimension
+    std::vector<ZarrCodec> codecs;
+    double fill = 0;  ///< of chunks that are missing
+    ZarrShards shards;
+    std::string key_begin;  ///< of a chunk's file name: "c/"
+    char separator = '.';
+    std::vector<std::string> dimension_names;  ///< empty, or one for each dimension
+
+    [[nodiscard]] std::uint64_t stored_bytes() const;  ///< of an element
+    [[nodiscard]] std::uint64_t chunk_bytes() const;   ///< of a chunk, unpacked
+    /// The file of the chunk or shard at this place of the grid.
+    [[nodiscard]] std::string file_of(const std::vector<std::uint64_t>& place) const;
+};
+
+/// Whether a folder is an array, and no group.
+bool is_zarr_array(const std::string& folder);
+
+/// @throws Error InvalidInput, Io, Unsupported.
+ZarrArray read_zarr_array(const std::string& folder);
+
+}  // namespace covol::detail
