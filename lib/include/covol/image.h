@@ -92,6 +92,15 @@ public:
     /// @throws Error InvalidInput when they need voxels of the image that are not held.
     COVOL_API void sample(const Domain& frame, const Index3& min, const Index3& max, float* out) const;
 
+    /// Says which parts of `frame`'s lattice sample() will be asked for: of a large image in chunks they are decoded
+    /// now, in the file's order and in parallel, and not one by one as they come. Of other images nothing happens.
+    /// @throws Error InvalidInput (damaged), Io, Cancelled, InvalidOptions (more than run.memory_budget).
+    COVOL_API void load(const Domain& frame, const std::vector<VoxelBox>& boxes, const RunContext& run = {}) const;
+    /// The same for samples at single places of the world.
+    COVOL_API void load(const std::vector<Vec3>& places, const RunContext& run = {}) const;
+    /// The same for a box of held voxels that copy() or at() will be asked for.
+    COVOL_API void load(const VoxelBox& box, const RunContext& run = {}) const;
+
     /// Intensities below which the fractions `low` and `high` of the held voxels lie (deterministic;
     /// large images are subsampled on a regular lattice; of large images in chunks the chunks that were read so far
     /// count, or some on a regular lattice where none was).

@@ -54,7 +54,7 @@ LeafBounds known_bounds(const Domain& domain, const LeafBand& band, std::size_t 
 }
 
 Window sample_window(const Image& image, const FloatGrid& topology, const Domain& domain, double sigma,
-                     const EdgeReport& report) {
+                     const EdgeReport& report, const RunContext& run) {
     std::vector<Coord> origins;
     for (auto leaf = topology.tree().cbeginLeaf(); leaf; ++leaf)
         if (!leaf->isEmpty()) origins.push_back(leaf->origin());
@@ -65,11 +65,16 @@ Window sample_window(const Image& image, const FloatGrid& topology, const Domain
     window.image.blocks.resize(band.size());
     const auto low = static_cast<float>(report.low);
     const auto scale = static_cast<float>(1.0 / (report.high - report.low));
+    std::vector<VoxelBox> boxes;
+    for (std::size_t leaf = 0; leaf < band.size(); ++leaf) {
+        const Coord& o = band.origin(leaf);
+        boxes.push_back({{o.x(), o.y(), o.z()}, {o.x() + 7, o.y() + 7, o.z() + 7}});
+    }
+    image.load(domain, boxes, run);
     tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
         window.image.blocks[leaf] = band.neighbours(leaf);
-        const Coord& o = band.origin(leaf);
         float* values = window.image.values.leaf(leaf);
-        image.sample(domain, {o.x(), o.y(), o.z()}, {o.x() + 7, o.y() + 7, o.z() + 7}, values);
+        image.sample(domain, boxes[leaf].min, boxes[leaf].max, values);
         for (int n = 0; n < kLeafSize; ++n) values[n] = std::clamp((values[n] - low) * scale, 0.0F, 1.0F);
     });
     return window;
@@ -193,7 +198,7 @@ EdgeResult detect_edges(const Image& image, const FloatGrid& topology, const Edg
                                             std::to_string(report.low) +
                                             ", there is no edge to find; segment with the points alone (`rho = 0`)");
     with_threads(run, [&] {
-        Window window = sample_window(image, topology, domain, report.sigma, report);
+        Window window = sample_window(image, topology, domain, report.sigma, report, run);
         smooth(window, domain, report.sigma, run);
 
         result.grid = make_grid(domain, 1.0F, "edge");
@@ -244,14 +249,19 @@ MarkedFeature detect_feature(const Image& image, const std::vector<Vec3>& places
         image.sample(one, {0, 0, 0}, {0, 0, 0}, &value);
         return double(value);
     };
+    std::vector<Vec3> inner = places, outer = places;
+    for (std::size_t n = 0; n < places.size(); ++n)
+        for (int a = 0; a < 3; ++a) {
+            inner[n][a] -= reach * normals[n][a];
+            outer[n][a] += reach * normals[n][a];
+        }
+    std::vector<Vec3> all = places;
+    all.insert(all.end(), inner.begin(), inner.end());
+    all.insert(all.end(), outer.begin(), outer.end());
+    image.load(all);
     double line = 0, squares = 0, step = 0;
     for (std::size_t n = 0; n < places.size(); ++n) {
-        Vec3 inner = places[n], outer = places[n];
-        for (int a = 0; a < 3; ++a) {
-            inner[a] -= reach * normals[n][a];
-            outer[a] += reach * normals[n][a];
-        }
-        const double inside = value_at(inner), outside = value_at(outer);
+        const double inside = value_at(inner[n]), outside = value_at(outer[n]);
         const double here = value_at(places[n]) - 0.5 * (inside + outside);
         line += here;
         squares += here * here;
