@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "io/image/tiff_pages.h"
+#include "io/pixels/inflate.h"
 #include "io/pixels/packed_chunks.h"
 #include "support/scratch.h"
 
