@@ -53,7 +53,8 @@ LeafBounds known_bounds(const Domain& domain, const LeafBand& band, std::size_t 
     return bounds;
 }
 
-Window sample_window(const Image& image, const FloatGrid& topology, const Domain& domain, double sigma) {
+Window sample_window(const Image& image, const FloatGrid& topology, const Domain& domain, double sigma,
+                     const RunContext& run) {
     std::vector<Coord> origins;
     for (auto leaf = topology.tree().cbeginLeaf(); leaf; ++leaf)
         if (!leaf->isEmpty()) origins.push_back(leaf->origin());
@@ -62,11 +63,16 @@ Window sample_window(const Image& image, const FloatGrid& topology, const Domain
     const LeafBand& band = window.band;
     window.image.values = detail::LeafArray<float>(band.size(), 0.0F, 1);
     window.image.blocks.resize(band.size());
+    std::vector<VoxelBox> boxes;
+    for (std::size_t leaf = 0; leaf < band.size(); ++leaf) {
+        const Coord& o = band.origin(leaf);
+        boxes.push_back({{o.x(), o.y(), o.z()}, {o.x() + 7, o.y() + 7, o.z() + 7}});
+    }
+    image.load(domain, boxes, run);
     tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
         window.image.blocks[leaf] = band.neighbours(leaf);
-        const Coord& o = band.origin(leaf);
         float* values = window.image.values.leaf(leaf);
-        image.sample(domain, {o.x(), o.y(), o.z()}, {o.x() + 7, o.y() + 7, o.z() + 7}, values);
+        image.sample(domain, boxes[leaf].min, boxes[leaf].max, values);
     });
     return window;
 }
@@ -206,7 +212,7 @@ EdgeResult detect_edges(const Image& image, const FloatGrid& topology, const Edg
     report.sigma = options.sigma.value_or(domain.voxel_size);
     report.low = options.low, report.high = options.high;
     with_threads(run, [&] {
-        Window window = sample_window(image, topology, domain, report.sigma);
+        Window window = sample_window(image, topology, domain, report.sigma, run);
         if (!(report.low < report.high)) {
             const auto range = brightness_range(window);
             report.low = range[0], report.high = range[1];
@@ -268,14 +274,19 @@ MarkedFeature detect_feature(const Image& image, const std::vector<Vec3>& places
         image.sample(one, {0, 0, 0}, {0, 0, 0}, &value);
         return double(value);
     };
+    std::vector<Vec3> inner = places, outer = places;
+    for (std::size_t n = 0; n < places.size(); ++n)
+        for (int a = 0; a < 3; ++a) {
+            inner[n][a] -= reach * normals[n][a];
+            outer[n][a] += reach * normals[n][a];
+        }
+    std::vector<Vec3> all = places;
+    all.insert(all.end(), inner.begin(), inner.end());
+    all.insert(all.end(), outer.begin(), outer.end());
+    image.load(all);
     double line = 0, squares = 0, step = 0;
     for (std::size_t n = 0; n < places.size(); ++n) {
-        Vec3 inner = places[n], outer = places[n];
-        for (int a = 0; a < 3; ++a) {
-            inner[a] -= reach * normals[n][a];
-            outer[a] += reach * normals[n][a];
-        }
-        const double inside = value_at(inner), outside = value_at(outer);
+        const double inside = value_at(inner[n]), outside = value_at(outer[n]);
         const double here = value_at(places[n]) - 0.5 * (inside + outside);
         line += here;
         squares += here * here;

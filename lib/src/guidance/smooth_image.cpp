@@ -44,6 +44,7 @@ SmoothImage::SmoothImage(const Image& image, const WorldBox& box, double sigma) 
         high_[a] = g.size[a] - 0.5 - first[a];
     }
     values_.resize(std::size_t(size_[0]) * size_[1] * size_[2]);
+    image.load({first, {first[0] + size_[0] - 1, first[1] + size_[1] - 1, first[2] + size_[2] - 1}});
     tbb::parallel_for(0, size_[2], [&](int k) {
         const Index3 low{first[0], first[1], first[2] + k};
         image.copy({low, {first[0] + size_[0] - 1, first[1] + size_[1] - 1, first[2] + k}},

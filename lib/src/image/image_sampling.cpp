@@ -142,6 +142,34 @@ VoxelBox touched(const LatticeMap& map, const Index3& size, const Index3& min, c
 
 }  // namespace
 
+void Image::load(const Domain& frame, const std::vector<VoxelBox>& boxes, const RunContext& run) const {
+    if (!chunks_) return;
+    const LatticeMap map = map_lattice(geometry_, frame);
+    std::vector<VoxelBox> needed;
+    for (const VoxelBox& box : boxes) {
+        const VoxelBox part = touched(map, geometry_.size, box.min, box.max);
+        // what is not held sample() refuses
+        if (held_.contains(part.min) && held_.contains(part.max)) needed.push_back(in_file(part));
+    }
+    with_threads(run, [&] { chunks_->load(needed, run); });
+}
+
+void Image::load(const std::vector<Vec3>& places, const RunContext& run) const {
+    if (!chunks_) return;
+    std::vector<VoxelBox> needed;
+    for (const Vec3& place : places) {
+        Domain frame;
+        frame.origin = place;
+        const VoxelBox part = touched(map_lattice(geometry_, frame), geometry_.size, {0, 0, 0}, {0, 0, 0});
+        if (held_.contains(part.min) && held_.contains(part.max)) needed.push_back(in_file(part));
+    }
+    with_threads(run, [&] { chunks_->load(needed, run); });
+}
+
+void Image::load(const VoxelBox& box, const RunContext& run) const {
+    if (chunks_) with_threads(run, [&] { chunks_->load({in_file(box)}, run); });
+}
+
 void Image::sample(const Domain& frame, const Index3& min, const Index3& max, float* out) const {
     const LatticeMap map = map_lattice(geometry_, frame);
     VoxelBox box = held_;

@@ -71,12 +71,14 @@ std::vector<T> Image::values_of_chunks(double most) const {
     for (const std::uint64_t chunk : chunks_->read_chunks()) add(chunk);
     if (boxes.empty()) {
         constexpr int kPlaces = 3;  // along each axis
+        std::vector<VoxelBox> places;
         for (int n = 0; n < kPlaces * kPlaces * kPlaces; ++n) {
             Index3 voxel;
             for (const auto& [a, at] : {std::pair{0, n % 3}, std::pair{1, n / 3 % 3}, std::pair{2, n / 9}})
                 voxel[a] = held.min[a] + std::int32_t((2 * at + 1) * std::int64_t(held.size()[a]) / (2 * kPlaces));
-            static_cast<void>(chunks_->at(voxel));
+            places.push_back({voxel, voxel});
         }
+        chunks_->load(places, {});
         for (const std::uint64_t chunk : chunks_->read_chunks()) add(chunk);
     }
     double voxels = 0;

@@ -9,40 +9,13 @@
 #include <vector>
 
 #include "io/image/tiff_handle.h"
+#include "io/image/tiff_pages.h"
 #include "io/image/tiff_stack.h"
 
 namespace covol::detail {
 namespace {
 
-struct Page {
-    std::uint64_t offset = 0;  ///< of the directory in the file
-    std::uint32_t width = 0, height = 0;
-    std::uint16_t bits = 0, format = 0, samples = 0;
-
-    [[nodiscard]] bool same_kind(const Page& o) const {
-        return width == o.width && height == o.height && bits == o.bits && format == o.format && samples == o.samples;
-    }
-    [[nodiscard]] std::string to_text() const {
-        return std::to_string(width) + " x " + std::to_string(height) + " with " + std::to_string(samples) +
-               " sample(s) of " + std::to_string(bits) + " bits";
-    }
-    [[nodiscard]] std::uint64_t row_bytes() const { return std::uint64_t(width) * samples * (bits / 8); }
-    [[nodiscard]] std::uint64_t bytes() const { return row_bytes() * height; }
-};
-
-Page current_page(const Tiff& tiff) {
-    Page page;
-    page.offset = TIFFCurrentDirOffset(tiff.get());
-    page.width = tiff.tag<std::uint32_t>(TIFFTAG_IMAGEWIDTH, 0);
-    page.height = tiff.tag<std::uint32_t>(TIFFTAG_IMAGELENGTH, 0);
-    page.bits = tiff.tag<std::uint16_t>(TIFFTAG_BITSPERSAMPLE, 1);
-    page.format = tiff.tag<std::uint16_t>(TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_UINT);
-    if (page.format == SAMPLEFORMAT_VOID) page.format = SAMPLEFORMAT_UINT;
-    page.samples = tiff.tag<std::uint16_t>(TIFFTAG_SAMPLESPERPIXEL, 1);
-    return page;
-}
-
-PixelType pixel_type(const std::string& path, const Page& page) {
+PixelType pixel_type(const std::string& path, const TiffPage& page) {
     if (page.format == SAMPLEFORMAT_UINT) {
         if (page.bits == 8) return PixelType::UInt8;
         if (page.bits == 16) return PixelType::UInt16;
@@ -60,42 +33,8 @@ PixelType pixel_type(const std::string& path, const Page& page) {
                          " bits in sample format " + std::to_string(page.format));
 }
 
-/// Opens a file for reading; libtiff's own allocations are bound by the file's size.
-std::unique_ptr<Tiff> open_for_reading(const std::string& path) {
-    constexpr std::uint64_t kLeastLimit = std::uint64_t(1) << 28;
-    std::error_code status;
-    const std::uint64_t bytes = std::filesystem::file_size(path, status);
-    if (status) throw read_error(Errc::Io, path, "no such file");
-    auto tiff = std::make_unique<Tiff>(path, "r", std::max(kLeastLimit, 4 * bytes));
-    if (tiff->get() == nullptr)
-        throw tiff->error(Errc::InvalidInput, "read_image: " + path + ": not a usable TIFF file");
-    return tiff;
-}
-
-/// All full-resolution pages, which must be of one kind.
-std::vector<Page> list_pages(const std::string& path, const Tiff& tiff) {
-    constexpr std::uint32_t kReduced = FILETYPE_REDUCEDIMAGE;
-    std::vector<Page> pages;
-    for (bool more = true; more;) {
-        if ((tiff.tag<std::uint32_t>(TIFFTAG_SUBFILETYPE, 0) & kReduced) == 0 || pages.empty()) {
-            const Page page = current_page(tiff);
-            if (!pages.empty() && !page.same_kind(pages.front()))
-                throw read_error(Errc::Unsupported, path,
-                                 "expected pages of one kind, got page 0 of " + pages.front().to_text() + " and page " +
-                                     std::to_string(pages.size()) + " of " + page.to_text());
-            pages.push_back(page);
-        }
-        if (TIFFLastDirectory(tiff.get()) != 0) break;
-        more = TIFFReadDirectory(tiff.get()) == 1;
-        if (!more)
-            throw tiff.error(Errc::InvalidInput, "read_image: " + path + ": damaged or truncated after page " +
-                                                     std::to_string(pages.size() - 1));
-    }
-    return pages;
-}
-
 /// Where the pixels of an unpacked page lie when they lie in one piece.
-std::optional<std::uint64_t> pixels_in_one_piece(const Tiff& tiff, const Page& page) {
+std::optional<std::uint64_t> pixels_in_one_piece(const Tiff& tiff, const TiffPage& page) {
     if (tiff.tag<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE) != COMPRESSION_NONE) return std::nullopt;
     if (tiff.tag<std::uint16_t>(TIFFTAG_FILLORDER, FILLORDER_MSB2LSB) != FILLORDER_MSB2LSB) return std::nullopt;
     if (TIFFIsTiled(tiff.get()) != 0 || page.samples != 1) return std::nullopt;
@@ -108,81 +47,6 @@ std::optional<std::uint64_t> pixels_in_one_piece(const Tiff& tiff, const Page& p
             return std::nullopt;
     return rows > 0 && first > 0 ? std::optional(first) : std::nullopt;
 }
-
-/// One plane's part: the columns and rows of `box`, one sample of each pixel.
-class PageReader {
-public:
-    PageReader(const Tiff& tiff, const Page& page, const VoxelBox& box, std::uint64_t sample)
-        : tiff_(tiff), page_(page), box_(box), bytes_(page.bits / 8) {
-        const bool planar = tiff.tag<std::uint16_t>(TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG) == PLANARCONFIG_SEPARATE;
-        samples_ = planar ? 1 : page.samples;
-        plane_ = planar ? sample : 0;
-        sample_ = planar ? 0 : sample;
-        tiled_ = TIFFIsTiled(tiff.get()) != 0;
-        width_ = tiled_ ? tiff.tag<std::uint32_t>(TIFFTAG_TILEWIDTH, 0) : page.width;
-        height_ = tiled_ ? tiff.tag<std::uint32_t>(TIFFTAG_TILELENGTH, 0)
-                         : std::min(tiff.tag<std::uint32_t>(TIFFTAG_ROWSPERSTRIP, page.height), page.height);
-    }
-
-    /// False when the page is damaged or truncated.
-    bool read(char* out) {
-        // A tile may be larger than the page, but not absurdly so.
-        constexpr std::uint64_t kSlack = 65536;
-        if (width_ == 0 || height_ == 0 || width_ > page_.width + kSlack || height_ > page_.height + kSlack)
-            return false;
-        const std::uint64_t block_bytes = width_ * height_ * samples_ * bytes_;
-        const tmsize_t told = tiled_ ? TIFFTileSize(tiff_.get()) : TIFFStripSize(tiff_.get());
-        if (told < 0 || std::uint64_t(told) != block_bytes) return false;
-        block_.resize(block_bytes);
-        const auto first_x = std::uint64_t(box_.min[0]), first_y = std::uint64_t(box_.min[1]);
-        for (std::uint64_t y = first_y / height_ * height_; y <= std::uint64_t(box_.max[1]); y += height_)
-            for (std::uint64_t x = first_x / width_ * width_; x <= std::uint64_t(box_.max[0]); x += width_) {
-                if (!decode(x, y)) return false;
-                copy(x, y, out);
-            }
-        return true;
-    }
-
-private:
-    bool decode(std::uint64_t x, std::uint64_t y) {
-        const auto column = static_cast<std::uint32_t>(x), row = static_cast<std::uint32_t>(y);
-        const auto plane = static_cast<std::uint16_t>(plane_);
-        if (tiled_) {
-            const std::uint32_t tile = TIFFComputeTile(tiff_.get(), column, row, 0, plane);
-            const auto want = static_cast<tmsize_t>(block_.size());
-            return TIFFReadEncodedTile(tiff_.get(), tile, block_.data(), want) == want;
-        }
-        const std::uint64_t rows = std::min<std::uint64_t>(height_, page_.height - y);
-        const auto want = static_cast<tmsize_t>(rows * width_ * samples_ * bytes_);
-        return TIFFReadEncodedStrip(tiff_.get(), TIFFComputeStrip(tiff_.get(), row, plane), block_.data(), want) ==
-               want;
-    }
-
-    /// The part of the block at (x, y) that lies in the box.
-    void copy(std::uint64_t x, std::uint64_t y, char* out) const {
-        const std::uint64_t x0 = std::max<std::uint64_t>(x, std::uint64_t(box_.min[0]));
-        const std::uint64_t x1 = std::min<std::uint64_t>(x + width_, std::uint64_t(box_.max[0]) + 1);
-        const std::uint64_t y0 = std::max<std::uint64_t>(y, std::uint64_t(box_.min[1]));
-        const std::uint64_t y1 = std::min<std::uint64_t>(y + height_, std::uint64_t(box_.max[1]) + 1);
-        const auto columns = std::uint64_t(box_.size()[0]);
-        for (std::uint64_t row = y0; row < y1; ++row) {
-            const char* from = block_.data() + (((row - y) * width_ + x0 - x) * samples_ + sample_) * bytes_;
-            char* to = out + ((row - std::uint64_t(box_.min[1])) * columns + x0 - std::uint64_t(box_.min[0])) * bytes_;
-            if (samples_ == 1)
-                std::memcpy(to, from, (x1 - x0) * bytes_);
-            else
-                for (std::uint64_t n = 0; n < x1 - x0; ++n)
-                    std::memcpy(to + n * bytes_, from + n * samples_ * bytes_, bytes_);
-        }
-    }
-
-    const Tiff& tiff_;
-    const Page& page_;
-    const VoxelBox& box_;
-    std::uint64_t bytes_, samples_ = 1, plane_ = 0, sample_ = 0, width_ = 0, height_ = 0;
-    bool tiled_ = false;
-    std::vector<char> block_;
-};
 
 class TiffFile : public ImageFile {
 public:
@@ -206,12 +70,14 @@ public:
     }
 
     [[nodiscard]] std::uint64_t bytes_to_hold(const PixelRequest& request) const override {
-        return may_map(request) ? 0 : ImageFile::bytes_to_hold(request);
+        const std::uint64_t bytes = ImageFile::bytes_to_hold(request);
+        return may_map(request) || is_worth_mapping(bytes) ? 0 : bytes;
     }
 
     Pixels read(const PixelRequest& request, const RunContext& run) override {
         if (may_map(request))
             if (std::optional<Pixels> mapped = map(request)) return *mapped;
+        if (is_worth_mapping(ImageFile::bytes_to_hold(request))) return read_in_chunks(request, run);
         const Index3 n = request.box.size();
         const std::uint64_t page_bytes = std::uint64_t(n[0]) * std::uint64_t(n[1]) * pixel_bytes(info_.type);
         std::uint64_t file_bytes = 0;
@@ -280,6 +146,20 @@ private:
         return plane;
     }
 
+    [[nodiscard]] Pixels read_in_chunks(const PixelRequest& request, const RunContext& run) const {
+        TiffFrame frame;
+        frame.path = path_;
+        frame.type = info_.type;
+        frame.size = info_.geometry.size;
+        frame.kind = kind_;
+        frame.sample = kind_.samples > 1 ? request.channel : 0;
+        frame.files = stack_.files;
+        for (std::int32_t k = 0; k < frame.size[2]; ++k) frame.slices.push_back(plane(request, k));
+        frame.contiguous = contiguous_;
+        frame.swapped = TIFFIsByteSwapped(tiff_->get()) != 0;
+        return read_chunks(tiff_chunks(frame, tiff_chunk_size(*tiff_, frame)), request.box, run);
+    }
+
     [[nodiscard]] Error damaged(const TiffStack::Plane& plane) const {
         return tiff_->error(Errc::InvalidInput, "read_image: " + stack_.files[plane.file] +
                                                     ": damaged or truncated at page " + std::to_string(plane.page));
@@ -296,10 +176,10 @@ private:
     void read_page(const TiffStack::Plane& plane, const PixelRequest& request, char* out) {
         turn_to(plane.file);
         if (plane.page >= pages_.size() || !pages_[plane.page].same_kind(kind_)) throw damaged(plane);
-        const Page& page = pages_[plane.page];
+        const TiffPage& page = pages_[plane.page];
         if (TIFFSetSubDirectory(tiff_->get(), page.offset) != 1 || !current_page(*tiff_).same_kind(page))
             throw damaged(plane);
-        if (!PageReader(*tiff_, page, request.box, kind_.samples > 1 ? request.channel : 0).read(out))
+        if (!read_page_part(*tiff_, page, request.box, kind_.samples > 1 ? request.channel : 0, out))
             throw damaged(plane);
     }
 
@@ -357,8 +237,8 @@ private:
     std::string path_;
     std::unique_ptr<Tiff> tiff_;
     std::uint32_t open_ = 0;        ///< which of stack_.files tiff_ is
-    Page kind_;                     ///< the first page; all others are alike
-    std::vector<Page> pages_;       ///< of the open file; empty for a single directory
+    TiffPage kind_;                 ///< the first page; all others are alike
+    std::vector<TiffPage> pages_;   ///< of the open file; empty for a single directory
     std::uint64_t contiguous_ = 0;  ///< where the pixels begin of a stack with a single directory
     TiffStack stack_;
 };

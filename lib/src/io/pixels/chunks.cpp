@@ -2,8 +2,10 @@
 
 #include <tbb/concurrent_unordered_map.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <mutex>
@@ -81,10 +83,15 @@ ChunkSource::ChunkSource(std::string path, PixelType type, const Index3& size, c
                              std::to_string(pixel_bytes(type)) + " bytes; write it with smaller chunks");
 }
 
+void ChunkSource::read_layer(const std::vector<Index3>& chunks, const std::vector<void*>& out) const {
+    for (std::size_t n = 0; n < chunks.size(); ++n) read(chunks[n], out[n]);
+}
+
 struct ChunkedVoxels::Table {
     struct Entry {
         std::once_flag once;
         std::unique_ptr<char[]> voxels;
+        std::atomic<bool> is_there{false};
     };
     tbb::concurrent_unordered_map<std::uint64_t, Entry> entries;
 };
@@ -109,18 +116,88 @@ Index3 ChunkedVoxels::place_of(std::uint64_t number) const noexcept {
     return {std::int32_t(number % nx), std::int32_t(number / nx % ny), std::int32_t(number / nx / ny)};
 }
 
+std::unique_ptr<char[]> ChunkedVoxels::chunk_memory() const {
+    return std::unique_ptr<char[]>(new char[voxel_count(source_->chunk_size()) * pixel_bytes(source_->type())]);
+}
+
+bool ChunkedVoxels::is_there(std::uint64_t number) const {
+    const auto entry = table_->entries.find(number);
+    return entry != table_->entries.end() && entry->second.is_there;
+}
+
+void ChunkedVoxels::keep(std::uint64_t number, std::unique_ptr<char[]> voxels) const {
+    Table::Entry& entry = table_->entries[number];
+    std::call_once(entry.once, [&] {
+        require_finite(*source_, box_of(number), voxels.get());
+        entry.voxels = std::move(voxels);
+        entry.is_there = true;
+        ++reads_;
+    });
+}
+
 const void* ChunkedVoxels::chunk(std::uint64_t number) const {
     Table::Entry& entry = table_->entries[number];
     std::call_once(entry.once, [&] {
-        const std::uint64_t count = voxel_count(source_->chunk_size());
-        std::unique_ptr<char[]> voxels(new char[count * pixel_bytes(source_->type())]);
-        const Index3 place = place_of(number);
-        source_->read(place, voxels.get());
+        std::unique_ptr<char[]> voxels = chunk_memory();
+        source_->read(place_of(number), voxels.get());
         require_finite(*source_, box_of(number), voxels.get());
         entry.voxels = std::move(voxels);
+        entry.is_there = true;
         ++reads_;
     });
     return entry.voxels.get();
+}
+
+void ChunkedVoxels::load_together(const std::vector<std::uint64_t>& numbers) const {
+    std::vector<Index3> places;
+    std::vector<std::unique_ptr<char[]>> memory;
+    std::vector<void*> out;
+    for (const std::uint64_t number : numbers) {
+        places.push_back(place_of(number));
+        memory.push_back(chunk_memory());
+        out.push_back(memory.back().get());
+    }
+    source_->read_layer(places, out);
+    for (std::size_t n = 0; n < numbers.size(); ++n) keep(numbers[n], std::move(memory[n]));
+}
+
+void ChunkedVoxels::load(const std::vector<VoxelBox>& boxes, const RunContext& run) const {
+    std::vector<std::uint64_t> missing;
+    for (const VoxelBox& box : boxes) {
+        const VoxelBox around = chunks_around(box, source_->chunk_size());
+        for (std::int32_t k = around.min[2]; k <= around.max[2]; ++k)
+            for (std::int32_t j = around.min[1]; j <= around.max[1]; ++j)
+                for (std::int32_t i = around.min[0]; i <= around.max[0]; ++i) {
+                    const std::uint64_t number = number_of({i, j, k});
+                    // neighbours share their chunks
+                    if ((missing.empty() || missing.back() != number) && !is_there(number)) missing.push_back(number);
+                }
+    }
+    std::sort(missing.begin(), missing.end());
+    missing.erase(std::unique(missing.begin(), missing.end()), missing.end());
+    const std::uint64_t bytes = missing.size() * voxel_count(source_->chunk_size()) * pixel_bytes(source_->type());
+    if (run.memory_budget > 0 && bytes > run.memory_budget)
+        throw read_error(Errc::InvalidOptions, source_->path(),
+                         "the parts that are needed take " + std::to_string(bytes >> 20) + " MiB, the budget is " +
+                             std::to_string(run.memory_budget >> 20) + " MiB; choose a part with `roi`");
+    std::vector<std::vector<std::uint64_t>> groups;
+    const std::uint64_t in_layer = std::uint64_t(counts_[0]) * counts_[1];
+    for (const std::uint64_t number : missing) {
+        const bool joins =
+            source_->in_layers() && !groups.empty() && groups.back().back() / in_layer == number / in_layer;
+        if (!joins) groups.emplace_back();
+        groups.back().push_back(number);
+    }
+    // Progress is told between batches, by the calling thread.
+    const auto batch = std::size_t(tbb::this_task_arena::max_concurrency()) * (source_->in_layers() ? 2 : 32);
+    for (std::size_t first = 0; first < groups.size(); first += batch) {
+        run.check();
+        run.report("image", double(first) / double(groups.size()));
+        tbb::parallel_for(first, std::min(first + batch, groups.size()), [&](std::size_t n) {
+            if (!run.cancelled()) load_together(groups[n]);
+        });
+    }
+    run.check();
 }
 
 VoxelBox ChunkedVoxels::box_of(std::uint64_t chunk) const noexcept {
@@ -138,6 +215,7 @@ std::vector<std::uint64_t> ChunkedVoxels::read_chunks() const {
 void ChunkedVoxels::copy(const VoxelBox& box, void* out) const {
     const Index3& size = source_->chunk_size();
     const VoxelBox around = chunks_around(box, size);
+    if (source_->in_layers() && around.min != around.max) load({box}, {});
     for (std::int32_t k = around.min[2]; k <= around.max[2]; ++k)
         for (std::int32_t j = around.min[1]; j <= around.max[1]; ++j)
             for (std::int32_t i = around.min[0]; i <= around.max[0]; ++i)

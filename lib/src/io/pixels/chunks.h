@@ -23,6 +23,11 @@ public:
     /// @throws Error InvalidInput (damaged), Io, Unsupported.
     virtual void read(const Index3& chunk, void* out) const = 0;
 
+    /// Chunks of one k cost little more together than one of them does: see ChunkedVoxels::load().
+    [[nodiscard]] virtual bool in_layers() const noexcept { return false; }
+    /// Decodes chunks that share their k, each to its own place, as read() does.
+    virtual void read_layer(const std::vector<Index3>& chunks, const std::vector<void*>& out) const;
+
     [[nodiscard]] const std::string& path() const noexcept { return path_; }  ///< for messages
     [[nodiscard]] PixelType type() const noexcept { return type_; }
     [[nodiscard]] const Index3& size() const noexcept { return size_; }              ///< of the image, in voxels
@@ -57,6 +62,10 @@ public:
     /// that is NaN or infinite.
     void copy(const VoxelBox& box, void* out) const;
     [[nodiscard]] double at(const Index3& voxel) const;
+    /// Decodes what the boxes (of the image) need and is not there yet: in the file's order and in parallel, where at()
+    /// and copy() would take one chunk after the other as they come. Changes nothing else. Reports "image".
+    /// @throws as copy, and Error Cancelled, InvalidOptions when the chunks need more than run.memory_budget.
+    void load(const std::vector<VoxelBox>& boxes, const RunContext& run) const;
     /// The numbers of the chunks that were decoded so far, ascending; not while others decode. Which they are depends
     /// on what was asked for alone, not on threads.
     [[nodiscard]] std::vector<std::uint64_t> read_chunks() const;
@@ -68,6 +77,11 @@ private:
     [[nodiscard]] std::uint64_t number_of(const Index3& chunk) const noexcept;
     [[nodiscard]] Index3 place_of(std::uint64_t number) const noexcept;
     [[nodiscard]] const void* chunk(std::uint64_t number) const;
+    [[nodiscard]] bool is_there(std::uint64_t number) const;
+    void keep(std::uint64_t number, std::unique_ptr<char[]> voxels) const;
+    [[nodiscard]] std::unique_ptr<char[]> chunk_memory() const;
+    /// Chunks that are decoded at once.
+    void load_together(const std::vector<std::uint64_t>& numbers) const;
 
     std::shared_ptr<const ChunkSource> source_;
     Index3 counts_;  ///< chunks along i, j, k

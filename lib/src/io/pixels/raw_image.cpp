@@ -4,7 +4,6 @@
 #include <openvdb/math/Half.h>
 #include <sys/mman.h>
 #include <unistd.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <array>
@@ -15,6 +14,9 @@
 #include <fstream>
 #include <limits>
 #include <vector>
+
+#include "io/pixels/inflate.h"
+#include "io/pixels/packed_chunks.h"
 
 namespace covol::detail {
 namespace {
@@ -43,64 +45,6 @@ constexpr Spelling kSpellings[] = {
     {"centimeter", "cm"},  {"centimetre", "cm"},  {"meter", "m"},           {"metre", "m"},
     {"in", "inch"},        {"inches", "inch"},    {"\xC3\x85", "angstrom"}, {"pixel", ""},
     {"pixels", ""},        {"voxel", ""},         {"reference frame", ""}};
-
-/// An unpacked view of a gzip or zlib stream in a file.
-class Inflater {
-public:
-    explicit Inflater(std::ifstream& file) : file_(file) {
-        constexpr int kAnyHeader = 15 + 32;
-        good_ = inflateInit2(&stream_, kAnyHeader) == Z_OK;
-    }
-    ~Inflater() { inflateEnd(&stream_); }
-    Inflater(const Inflater&) = delete;
-    Inflater& operator=(const Inflater&) = delete;
-
-    /// Fills `out`; false when the stream ends before, or is damaged.
-    bool read(char* out, std::uint64_t count) {
-        while (good_ && count > 0) {
-            const std::uint64_t piece = std::min<std::uint64_t>(count, 1U << 30);
-            stream_.next_out = reinterpret_cast<Bytef*>(out);
-            stream_.avail_out = static_cast<uInt>(piece);
-            step();
-            const std::uint64_t done = piece - stream_.avail_out;
-            out += done;
-            count -= done;
-        }
-        return count == 0;
-    }
-    /// True unless the checksum behind the last byte that was read is there and wrong.
-    bool checksum_fits() {
-        char more = 0;
-        stream_.next_out = reinterpret_cast<Bytef*>(&more);
-        stream_.avail_out = 1;
-        if (good_) step();
-        return !damaged_;
-    }
-
-private:
-    void step() {
-        if (stream_.avail_in == 0) {
-            file_.read(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
-            stream_.next_in = reinterpret_cast<Bytef*>(buffer_.data());
-            stream_.avail_in = static_cast<uInt>(file_.gcount());
-            if (stream_.avail_in == 0) good_ = false;
-        }
-        const int status = good_ ? inflate(&stream_, Z_NO_FLUSH) : Z_OK;
-        // a gzip file may be several streams behind each other
-        if (status == Z_STREAM_END)
-            good_ = inflateReset(&stream_) == Z_OK;
-        else if (status != Z_OK && status != Z_BUF_ERROR) {
-            good_ = false;
-            damaged_ = true;
-        }
-    }
-
-    std::ifstream& file_;
-    std::vector<char> buffer_ = std::vector<char>(std::size_t(1) << 18);
-    z_stream stream_{};
-    bool good_ = true;
-    bool damaged_ = false;
-};
 
 /// The bytes of a PixelPlace, forwards only.
 class PixelStream {
@@ -132,38 +76,6 @@ private:
     std::unique_ptr<Inflater> inflater_;
 };
 
-/// Every `step`th of the stored values, as pixels: slope * stored + intercept.
-void convert(const PixelPlace& place, const void* stored, std::uint64_t step, std::uint64_t count, PixelType type,
-             void* out) {
-    if (place.half) {
-        const auto* source = static_cast<const std::uint16_t*>(stored);
-        auto* target = static_cast<float*>(out);
-        for (std::uint64_t n = 0; n < count; ++n) {
-            openvdb::math::internal::half value;
-            value.setBits(source[n * step]);
-            target[n] = float(value);
-        }
-        return;
-    }
-    const bool scaled = place.slope != 1 || place.intercept != 0;
-    with_pixel_type(place.type, [&](auto from) {
-        with_pixel_type(type, [&](auto to) {
-            using To = decltype(to);
-            const auto* source = static_cast<const decltype(from)*>(stored);
-            auto* target = static_cast<To*>(out);
-            if constexpr (std::is_same_v<decltype(from), To>) {
-                if (!scaled)
-                    for (std::uint64_t n = 0; n < count; ++n) target[n] = source[n * step];
-            }
-            if constexpr (std::is_floating_point_v<To>) {
-                if (scaled || !std::is_same_v<decltype(from), To>)
-                    for (std::uint64_t n = 0; n < count; ++n)
-                        target[n] = static_cast<To>(place.slope * double(source[n * step]) + place.intercept);
-            }
-        });
-    });
-}
-
 class PlacedFile : public ImageFile {
 public:
     PlacedFile(std::string path, const ImageInfo& info, PixelPlace place)
@@ -178,11 +90,20 @@ public:
     }
 
     [[nodiscard]] std::uint64_t bytes_to_hold(const PixelRequest& request) const override {
-        return is_mapped(request) ? 0 : ImageFile::bytes_to_hold(request);
+        return is_mapped(request) || is_in_chunks(request) ? 0 : ImageFile::bytes_to_hold(request);
     }
 
     Pixels read(const PixelRequest& request, const RunContext& run) override {
-        return is_mapped(request) ? map(request) : copy(request, run);
+        if (is_mapped(request)) return map(request);
+        if (!is_in_chunks(request)) return copy(request, run);
+        PackedFrame frame;
+        frame.type = info_.type;
+        frame.size = info_.geometry.size;
+        frame.components = components_;
+        frame.channel = request.channel;
+        frame.begin = frame_begin(request);
+        frame.is_last = request.frame + 1 == std::uint64_t(info_.frames);
+        return read_chunks(packed_chunks(path_, place_, frame, run), request.box, run);
     }
 
 private:
@@ -222,6 +143,11 @@ private:
                is_worth_mapping(slices * slice_bytes_);
     }
 
+    /// A large packed stream is not unpacked as a whole.
+    [[nodiscard]] bool is_in_chunks(const PixelRequest& request) const {
+        return place_.packed && is_worth_mapping(ImageFile::bytes_to_hold(request));
+    }
+
     [[nodiscard]] Pixels map(const PixelRequest& request) const {
         const VoxelBox& box = request.box;
         const std::uint64_t begin =
@@ -254,8 +180,8 @@ private:
             const std::uint64_t first =
                 (std::uint64_t(box.min[0]) * components_ + request.channel) * place_.stored_bytes();
             for (std::int32_t j = 0; j < n[1]; ++j, out += out_row)
-                convert(place_, rows.data() + std::uint64_t(j) * row_bytes_ + first, components_, std::uint64_t(n[0]),
-                        info_.type, out);
+                convert_pixels(place_, rows.data() + std::uint64_t(j) * row_bytes_ + first, components_,
+                               std::uint64_t(n[0]), info_.type, out);
         }
         const bool to_the_end =
             box == whole_box(info_.geometry.size) && request.frame + 1 == std::uint64_t(info_.frames);
@@ -276,6 +202,37 @@ std::uint64_t ImageFile::bytes_to_hold(const PixelRequest& request) const {
 
 std::unique_ptr<ImageFile> open_placed(const std::string& path, const ImageInfo& info, const PixelPlace& place) {
     return std::make_unique<PlacedFile>(path, info, place);
+}
+
+void convert_pixels(const PixelPlace& place, const void* stored, std::uint64_t step, std::uint64_t count,
+                    PixelType type, void* out) {
+    if (place.half) {
+        const auto* source = static_cast<const std::uint16_t*>(stored);
+        auto* target = static_cast<float*>(out);
+        for (std::uint64_t n = 0; n < count; ++n) {
+            openvdb::math::internal::half value;
+            value.setBits(source[n * step]);
+            target[n] = float(value);
+        }
+        return;
+    }
+    const bool scaled = place.slope != 1 || place.intercept != 0;
+    with_pixel_type(place.type, [&](auto from) {
+        with_pixel_type(type, [&](auto to) {
+            using To = decltype(to);
+            const auto* source = static_cast<const decltype(from)*>(stored);
+            auto* target = static_cast<To*>(out);
+            if constexpr (std::is_same_v<decltype(from), To>) {
+                if (!scaled)
+                    for (std::uint64_t n = 0; n < count; ++n) target[n] = source[n * step];
+            }
+            if constexpr (std::is_floating_point_v<To>) {
+                if (scaled || !std::is_same_v<decltype(from), To>)
+                    for (std::uint64_t n = 0; n < count; ++n)
+                        target[n] = static_cast<To>(place.slope * double(source[n * step]) + place.intercept);
+            }
+        });
+    });
 }
 
 bool is_worth_mapping(std::uint64_t bytes) { return bytes >= kMapFrom; }

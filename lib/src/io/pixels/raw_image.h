@@ -115,6 +115,10 @@ struct PixelPlace {
 /// Reads `count` bytes at the pixels' begin; false when there are fewer, or the packed stream is damaged.
 bool read_bytes(const PixelPlace& place, std::uint64_t count, void* out);
 
+/// Every `step`th of the stored values (in this machine's byte order), as pixels: slope * stored + intercept.
+void convert_pixels(const PixelPlace& place, const void* stored, std::uint64_t step, std::uint64_t count,
+                    PixelType type, void* out);
+
 /// An image whose pixels lie as `place` says; info.channels interleaved, info.frames behind each other.
 /// @throws Error InvalidInput when the file is too short.
 std::unique_ptr<ImageFile> open_placed(const std::string& path, const ImageInfo& info, const PixelPlace& place);

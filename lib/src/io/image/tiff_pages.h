@@ -1,0 +1,60 @@
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "io/image/tiff_handle.h"
+#include "io/image/tiff_stack.h"
+#include "io/pixels/chunks.h"
+#include "io/pixels/raw_image.h"
+
+namespace covol::detail {
+
+/// A directory of a TIFF.
+struct TiffPage {
+    std::uint64_t offset = 0;  ///< of the directory in the file
+    std::uint32_t width = 0, height = 0;
+    std::uint16_t bits = 0, format = 0, samples = 0;
+
+    [[nodiscard]] bool same_kind(const TiffPage& o) const {
+        return width == o.width && height == o.height && bits == o.bits && format == o.format && samples == o.samples;
+    }
+    [[nodiscard]] std::string to_text() const {
+        return std::to_string(width) + " x " + std::to_string(height) + " with " + std::to_string(samples) +
+               " sample(s) of " + std::to_string(bits) + " bits";
+    }
+    [[nodiscard]] std::uint64_t row_bytes() const { return std::uint64_t(width) * samples * (bits / 8); }
+    [[nodiscard]] std::uint64_t bytes() const { return row_bytes() * height; }
+};
+
+TiffPage current_page(const Tiff& tiff);
+
+/// Opens a file for reading; libtiff's own allocations are bound by the file's size. @throws Error Io, InvalidInput.
+std::unique_ptr<Tiff> open_for_reading(const std::string& path);
+
+/// All full-resolution pages, which must be of one kind. @throws Error Unsupported, InvalidInput.
+std::vector<TiffPage> list_pages(const std::string& path, const Tiff& tiff);
+
+/// Reads the columns and rows of `box`, one sample of each pixel, of the page that `tiff` is at.
+/// @return false when the page is damaged or truncated.
+bool read_page_part(const Tiff& tiff, const TiffPage& page, const VoxelBox& box, std::uint64_t sample, char* out);
+
+/// One channel and frame of a TIFF.
+struct TiffFrame {
+    std::string path;
+    PixelType type = PixelType::UInt8;
+    Index3 size{0, 0, 0};
+    TiffPage kind;                         ///< of every page
+    std::uint64_t sample = 0;              ///< of each pixel
+    std::vector<std::string> files;        ///< of the image
+    std::vector<TiffStack::Plane> slices;  ///< where slice k lies
+    std::uint64_t contiguous = 0;          ///< not 0: of a single directory, the slices behind each other from here
+    bool swapped = false;                  ///< those in the other byte order
+};
+
+/// Its tiles, or parts of its strips, of some 64 KiB; `tiff` is at one of its pages.
+Index3 tiff_chunk_size(const Tiff& tiff, const TiffFrame& frame);
+std::shared_ptr<const ChunkSource> tiff_chunks(const TiffFrame& frame, const Index3& chunk_size);
+
+}  // namespace covol::detail

@@ -1,0 +1,26 @@
+#pragma once
+#include <memory>
+#include <string>
+
+#include "io/pixels/chunks.h"
+#include "io/pixels/raw_image.h"
+
+namespace covol::detail {
+
+/// One channel and frame of a packed stream.
+struct PackedFrame {
+    PixelType type = PixelType::UInt8;  ///< of the image; the place's is that of the stored values
+    Index3 size{0, 0, 0};
+    std::uint64_t components = 1;  ///< values that a pixel has in the file, of which `channel` is read
+    std::uint64_t channel = 0;
+    std::uint64_t begin = 0;  ///< unpacked bytes before the frame
+    bool is_last = true;      ///< nothing follows it but the checksum
+};
+
+/// Bricks of a packed frame, decoded in layers of a few slices from the nearest place where the stream can be entered.
+/// Unpacks all of it once, which finds damage and takes 32 KiB for every 8 MiB.
+/// @throws Error InvalidInput (damaged, truncated), Io, Cancelled.
+std::shared_ptr<const ChunkSource> packed_chunks(const std::string& path, const PixelPlace& place,
+                                                 const PackedFrame& frame, const RunContext& run);
+
+}  // namespace covol::detail
