@@ -216,9 +216,6 @@ class Version2(Case):
         array = zarr.open(str(self.path("nan")), mode="w", shape=SHAPE, chunks=CHUNKS, dtype="f4", fill_value=math.nan)
         array[:5] = 1
         self.assertIn("a fill_value that is not finite", self.run_covol("info", "nan", code=3).stderr)
-        self.path("nan/0.0.0").unlink()
-        self.path("nan/.zarray").unlink()
-        self.assertEqual(self.run_covol("info", "nan", code=4).returncode, 4)
 
     def test_channels_and_frames(self):
         shape = (3, 2, *SHAPE)
@@ -328,8 +325,8 @@ class Pyramids(Case):
         self.assertEqual(info["format"], "OME-Zarr 0.4 (Zarr 2)")
         self.assertEqual((info["size"], info["spacing"], info["origin"], info["unit"]), ([34, 21, 13], [0.5, 0.5, 2], [-20, 10, 4], "um"))
         self.assertEqual(info["levels"], ["0: 34 x 21 x 13, spacing 0.5 x 0.5 x 2", "1: 17 x 11 x 7, spacing 1 x 1 x 4"])
-        self.check(path, pixels("u1"))
-        self.check(str(path) + "/0/", pixels("u1"))
+        self.check(path, pixels("u1", seed=0))
+        self.check(str(path) + "/0/", pixels("u1", seed=0))
         self.assertEqual(self.report("info", path / "0")["image"]["origin"], [-20, 10, 4])
         self.check(path / "1", pixels("u1", (7, 11, 17), 1))
         level = self.report("info", path / "1")["image"]
@@ -341,13 +338,13 @@ class Pyramids(Case):
         errors = self.run_covol("info", path / "1", "--quiet").stderr
         self.assertIn("states no translation", errors)
         self.assertIn("--correct-level-shift moves it", errors)
-        self.assertEqual(errors.count("states no translation"), 1)
-        self.assertNotIn("translation", self.run_covol("info", path, "--quiet").stderr)
+        self.assertEqual(errors.count("where its voxels are means"), 1)
+        self.assertNotIn("warning", self.run_covol("info", path, "--quiet").stderr)
         done = self.run_covol("info", path / "1", "--correct-level-shift", "--quiet", "--json", "r.json")
-        self.assertNotIn("translation", done.stderr)
+        self.assertNotIn("warning", done.stderr)
         self.assertEqual(json.loads(self.path("r.json").read_text())["image"]["origin"], [0.25, 0.25, 1])
         path = self.write2("b.zarr", datasets=[dataset("0", (2, 0.5, 0.5)), dataset("1", (4, 1, 1), (1, 0.25, 0.25))])
-        self.assertNotIn("translation", self.run_covol("info", path / "1", "--quiet").stderr)
+        self.assertNotIn("warning", self.run_covol("info", path / "1", "--quiet").stderr)
         info = self.report("info", path / "1", "--correct-level-shift")["image"]
         self.assertEqual(info["origin"], [0.25, 0.25, 1])
 
@@ -425,7 +422,8 @@ class Lazy(Case):
         self.assertLess(report["peak_rss_bytes"], 1 << 30)
         text = self.run_covol("info", "large.zarr", "--spacing", "1,1,1")
         self.assertIn("of 27 of 4096 chunks", text.stdout + text.stderr)
-        self.assertIn("of 4096 chunks 27 were read", self.run_covol("check", "large.zarr", "--spacing", "1,1,1").stdout)
+        text = self.run_covol("check", "large.zarr", "--spacing", "1,1,1")
+        self.assertIn("of 4096 chunks 27 were read", text.stdout + text.stderr)
 
         # what stands in a chunk that is needed shows when it is read
         (self.path("large.zarr") / "7.7.7").write_bytes(b"\0" * 30)
