@@ -64,6 +64,7 @@ Window sample_window(const Image& image, const FloatGrid& topology, const Domain
     window.image.values = detail::LeafArray<float>(band.size(), 0.0F, 1);
     window.image.blocks.resize(band.size());
     std::vector<VoxelBox> boxes;
+    boxes.reserve(band.size());
     for (std::size_t leaf = 0; leaf < band.size(); ++leaf) {
         const Coord& o = band.origin(leaf);
         boxes.push_back({{o.x(), o.y(), o.z()}, {o.x() + 7, o.y() + 7, o.z() + 7}});
