@@ -12,10 +12,10 @@ class Plan(Case):
     def run_both(self, *job):
         """The plan, and the report of the job itself."""
         self.run_covol("plan", *job, "--json", "plan.json")
-        self.assertEqual([path.name for path in self.folder.iterdir()], ["plan.json"])
-        planned = json.loads((self.folder / "plan.json").read_text())["plan"]
+        self.assertEqual([path.name for path in self.out.iterdir()], ["plan.json"])
+        planned = json.loads((self.out / "plan.json").read_text())["plan"]
         self.run_covol(*job, "--json", "job.json")
-        return planned, json.loads((self.folder / "job.json").read_text())
+        return planned, json.loads((self.out / "job.json").read_text())
 
     def check(self, planned, report):
         self.assertLess(abs(planned["active_voxels"] / report["grid"]["active_voxels"] - 1), 0.4)
@@ -24,17 +24,17 @@ class Plan(Case):
         self.assertGreater(planned["seconds"], 0)
 
     def test_cloud(self):
-        self.run_covol("phantom", "torus", "--size", "8", "--count", "20000", "-o", self.inputs / "i.nrrd", "--points",
+        self.run_covol("phantom", "torus", "--size", "16", "--count", "8000", "-o", self.inputs / "i.nrrd", "--points",
                        self.inputs / "p.xyz")
-        self.check(*self.run_both("reconstruct", self.inputs / "p.xyz", "--voxel-size", "0.006", "-o", "s.vdb"))
+        self.check(*self.run_both("reconstruct", self.inputs / "p.xyz", "--voxel-size", "0.01", "-o", "s.vdb"))
 
     def test_image_and_marks(self):
-        self.run_covol("phantom", "torus", "--size", "150", "--count", "500", "-o", self.inputs / "t.nrrd", "--points",
+        self.run_covol("phantom", "torus", "--size", "100", "--count", "300", "-o", self.inputs / "t.nrrd", "--points",
                        self.inputs / "t.xyz")
         planned, report = self.run_both("segment", self.inputs / "t.nrrd", "--points", self.inputs / "t.xyz", "-o", "s.vdb")
         self.check(planned, report)
-        self.assertEqual(planned["image"]["size"], [150, 150, 150])
-        self.assertEqual(planned["image"]["unpacked_bytes"], 4 * 150 ** 3)
+        self.assertEqual(planned["image"]["size"], [100, 100, 100])
+        self.assertEqual(planned["image"]["unpacked_bytes"], 100 ** 3)
 
     def test_what_cannot_be_planned(self):
         self.assertIn("segment or reconstruct", self.run_covol("plan", "evolve", code=2).stderr)

@@ -147,7 +147,7 @@ void run_plan(const SegmentJob& job, Session& session) {
                          {"format", image->format},
                          {"size", n},
                          {"type", to_string(image->type)},
-                         {"unpacked_bytes", image_bytes}};
+                         {"unpacked_bytes", std::llround(image_bytes)}};
         session.say("image: " + size_text(n) + " " + to_string(image->type) + ", " + image->format + ", " +
                     bytes_text(image_bytes) + " unpacked");
     }
@@ -171,15 +171,18 @@ void run_plan(const SegmentJob& job, Session& session) {
         const bool lazily = image->bytes_to_hold == 0;
         const double read = lazily ? double(chunks.size()) : total;
         if (lazily) held = read * each;
-        plan["image"]["chunks"] = {{"size", c}, {"read", read}, {"of", total}, {"unpacked_bytes", read * each}};
-        session.say("chunks of " + size_text(c) + ": about " + to_text(read) + " of " + to_text(total) + " are read, " +
-                    bytes_text(read * each) + " unpacked");
+        plan["image"]["chunks"] = {{"size", c},
+                                   {"read", std::llround(read)},
+                                   {"of", std::llround(total)},
+                                   {"unpacked_bytes", std::llround(read * each)}};
+        session.say("chunks of " + size_text(c) + ": about " + std::to_string(std::llround(read)) + " of " +
+                    std::to_string(std::llround(total)) + " are read, " + bytes_text(read * each) + " unpacked");
     }
     const double memory = kBaseBytes + held + std::max(kBandBytes * voxels, kTubeBytes * tube);
-    plan["active_voxels"] = std::round(voxels);
-    plan["memory_bytes"] = std::round(memory);
+    plan["active_voxels"] = std::llround(voxels);
+    plan["memory_bytes"] = std::llround(memory);
     plan["seconds"] = seconds;
-    session.say("band: about " + to_text(std::round(voxels / 1000) * 1000) + " voxels");
+    session.say("band: about " + std::to_string(std::llround(voxels / 1000) * 1000) + " voxels");
     session.say("memory: about " + bytes_text(memory) +
                 (held > 0 ? ", of which the image takes " + bytes_text(held) : ""));
     std::ostringstream time;
