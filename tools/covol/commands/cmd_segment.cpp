@@ -9,7 +9,7 @@ void add_segment(Session& session) {
     in_group(*command, Group::Input);
     command
         ->add_option("image", job->images,
-                     "3D image: TIFF, NRRD, NIfTI, MetaImage, DICOM, MRC, HDF5, .vdb; several are a time-lapse")
+                     "3D image: TIFF, OME-Zarr, NRRD, NIfTI, MetaImage, DICOM, MRC, HDF5, .vdb; several are a time-lapse")
         ->required()
         ->type_name("IMAGE...");
     job->points.bind(*command, "--points")

@@ -19,17 +19,19 @@
 namespace covol::tool {
 namespace {
 
-// Measured by tests/bench/run.sh on the embryo phantom (docs/benchmarks.md), rounded up.
-constexpr double kBandBytes = 110;   ///< peak memory for each voxel of the band, mesh and files included
-constexpr double kTubeBytes = 12;    ///< for each voxel of a distance tube
-constexpr double kBaseBytes = 8e7;   ///< the program itself
-constexpr double kImageTime = 1.3;   ///< with an image over without
-constexpr double kPilotVoxels = 64;  ///< across the marks' box, on the finer of the two lattices
-constexpr double kReachVoxels = 12;  ///< how far from the surface the image is sampled
+// Measured: docs/benchmarks.md, Plans.
+constexpr double kBandBytes = 130;    ///< peak memory for each voxel of the band, mesh and files included
+constexpr double kTubeBytes = 12;     ///< for each voxel of a distance tube
+constexpr double kBaseBytes = 1e8;    ///< the program itself
+constexpr double kFlowTime = 1.3;     ///< a flow with an image over one without
+constexpr double kGuessTime = 2.8;    ///< the same of a guess, which learns what the image shows at the marks
+constexpr double kPilotVoxels = 128;  ///< across the marks' box, on the finer of the two lattices
+constexpr double kReachVoxels = 12;   ///< how far from the surface the image is sampled
 
 /// What the marks alone came to on a coarse lattice.
 struct Pilot {
     double voxel_size = 0, active_voxels = 0, tube_voxels = 0, seconds = 0;
+    bool is_guess = false;
     FloatGridPtr surface;
 };
 
@@ -51,9 +53,19 @@ Pilot run_pilot(const SegmentJob& job, const StructureInput& input, const ImageG
     options.inside = std::move(seeds.inside);
     options.outside = std::move(seeds.outside);
     options.evolve.rho = 0;
-    const Stopwatch watch;
-    const SegmentResult result = reconstruct(marks.points, options, quiet);
-    Pilot pilot{result.report.resolved.voxel_size.value_or(h), double(result.report.active_voxels), 0, watch.seconds(),
+    Stopwatch watch;
+    SegmentResult result = reconstruct(marks.points, options, quiet);
+    Start::Kind start = result.report.resolved.start.kind;
+    if (geometry != nullptr && start == Start::Kind::Cloud) {  // which points have without an image alone
+        options.start.kind = start = Start::Kind::Tag;
+        watch = {};
+        result = reconstruct(marks.points, options, quiet);
+    }
+    Pilot pilot{result.report.resolved.voxel_size.value_or(h),
+                double(result.report.active_voxels),
+                0,
+                watch.seconds(),
+                start == Start::Kind::Guess,
                 result.surface};
     if (result.distance) pilot.tube_voxels = double(result.distance->activeVoxelCount());
     return pilot;
@@ -94,7 +106,7 @@ StructurePlan plan_structure(const SegmentJob& job, const StructureInput& input,
                     "is not known before");
     const double h = given_h > 0 ? given_h : job.domain.resolve_voxel_size(nullptr, marks.given, session);
     const double coarse = std::max(h, longest_side(bounding_box(marks.given)) / kPilotVoxels);
-    const Pilot coarser = run_pilot(job, input, geometry, 1.5 * coarse, session, quiet);
+    const Pilot coarser = run_pilot(job, input, geometry, 2 * coarse, session, quiet);
     const Pilot pilot = run_pilot(job, input, geometry, coarse, session, quiet);
     // seconds = fixed + growing / h^2
     const double c = pilot.voxel_size, d = std::max(coarser.voxel_size, 1.01 * c);
@@ -106,7 +118,7 @@ StructurePlan plan_structure(const SegmentJob& job, const StructureInput& input,
     plan.active_voxels = pilot.active_voxels * finer * finer;
     plan.tube_voxels = pilot.tube_voxels * finer * finer * finer;
     plan.seconds = fixed + growing / (c * c) * finer * finer;
-    if (image != nullptr) plan.seconds *= kImageTime;
+    if (image != nullptr) plan.seconds *= pilot.is_guess ? kGuessTime : kFlowTime;
     if (image != nullptr && image->chunk_size[0] > 0)
         plan.chunks = chunks_near(*pilot.surface, *image, kReachVoxels * h);
     return plan;
