@@ -8,8 +8,9 @@ void add_segment(Session& session) {
         session.add_job<SegmentJob>("segment", "Image and points together: the surface of a structure");
     in_group(*command, Group::Input);
     command
-        ->add_option("image", job->images,
-                     "3D image: TIFF, OME-Zarr, NRRD, NIfTI, MetaImage, DICOM, MRC, HDF5, .vdb; several are a time-lapse")
+        ->add_option(
+            "image", job->images,
+            "3D image: TIFF, OME-Zarr, NRRD, NIfTI, MetaImage, DICOM, MRC, HDF5, .vdb; several are a time-lapse")
         ->required()
         ->type_name("IMAGE...");
     job->points.bind(*command, "--points")
