@@ -101,7 +101,8 @@ std::unique_ptr<Tiff> open_for_reading(const std::string& path) {
     std::error_code status;
     const std::uint64_t bytes = std::filesystem::file_size(path, status);
     if (status) throw read_error(Errc::Io, path, "no such file");
-    auto tiff = std::make_unique<Tiff>(path, "r", std::max(kLeastLimit, 4 * bytes));
+    // m: not mapped, for pages of packed tiles that were read once would stay in memory
+    auto tiff = std::make_unique<Tiff>(path, "rm", std::max(kLeastLimit, 4 * bytes));
     if (tiff->get() == nullptr)
         throw tiff->error(Errc::InvalidInput, "read_image: " + path + ": not a usable TIFF file");
     return tiff;
