@@ -18,6 +18,7 @@ LAYERS = [
     {"start": ["start"], "painted": ["painted"], "analysis": ["compare", "evidence", "structures", "phantom", "render"]},
     {"guess": ["guess", "guess_correction"], "guidance": ["guidance"], "cloud/surface": ["cloud_surface"]},
     {"segment": ["pipeline"], "segment/start": []},
+    {"bricks": ["bricks"]},
 ]
 LEVEL = {folder: level for level, folders in enumerate(LAYERS) for folder in folders}
 FOLDER = {header: folder for folders in LAYERS for folder, headers in folders.items() for header in headers}

@@ -19,5 +19,6 @@ int main(int argc, char** argv) {
     add_render(session);
     add_phantom(session);
     add_plan(session);
+    add_brick(session);
     return session.main(argc, argv);
 }

@@ -64,6 +64,8 @@ struct EvolveFields {
     /// A level set that the surface may not sink below: after each step u <= obstacle, world units, so that
     /// {obstacle < 0} stays inside. Beyond its leaves its background holds; null: none.
     const FloatGrid* obstacle = nullptr;
+    /// The same from below: u >= floor. Where both are the same the surface is held.
+    const FloatGrid* floor = nullptr;
     /// With `follow`: called with u when its band reached voxels where a field is not known yet, so that the caller
     /// can extend it (and may replace the pointers above through `fields`).
     std::function<void(const FloatGrid& u, EvolveFields& fields)> extend;

@@ -163,13 +163,17 @@ void BandSolver::gather_fields(const EvolveFields& fields) {
         edge_ = gather_field(band_, *fields.edge, [](float g) { return g; });
         check_finite(band_, *edge_, "edge");
     }
-    if (fields.obstacle != nullptr) {
+    const auto gather_bound = [&](const FloatGrid* bound, const char* name) -> std::optional<HaloField> {
+        if (bound == nullptr) return {};
         const auto scale = static_cast<float>(1.0 / domain_.voxel_size);
-        obstacle_ = gather(band_, *fields.obstacle, false, [scale](const LeafNode* leaf, float tile, float* block) {
+        HaloField values = gather(band_, *bound, false, [scale](const LeafNode* leaf, float tile, float* block) {
             for (int n = 0; n < kLeafSize; ++n) block[n] = scale * (leaf != nullptr ? leaf->getValue(n) : tile);
         });
-        check_finite(band_, *obstacle_, "obstacle");
-    }
+        check_finite(band_, values, name);
+        return values;
+    };
+    obstacle_ = gather_bound(fields.obstacle, "obstacle");
+    floor_ = gather_bound(fields.floor, "floor");
     const FloatGrid* trusted = fields.trusted != nullptr ? fields.trusted : fields.distance;
     const double yields = options_.image_yields.value_or(0);
     if (options_.rho > 0 && yields > 0 && trusted != nullptr)
@@ -193,19 +197,23 @@ Motion BandSolver::step(double tau, Counts& counts) {
     const double row = std::min(rows.largest, regular_row);
     const double jacobi = row / (1.0 + row);
     solve(std::min(kSolver.max_omega, 2.0 / (1.0 + std::sqrt(1.0 - jacobi * jacobi))), rows.residual, counts);
-    hold_to_obstacle();
+    hold_to_bounds();
     counts.seconds_sweeps += seconds_since(solve_start);
     return measure();
 }
 
-void BandSolver::hold_to_obstacle() {
-    if (!obstacle_) return;
+void BandSolver::hold_to_bounds() {
+    if (!obstacle_ && !floor_) return;
     tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) {
         if (!leaf_active_[leaf]) return;
         float* u = field_.values.leaf(leaf);
-        const float* highest = obstacle_->values.leaf(leaf);
-        for (int n = 0; n < kLeafSize; ++n)
-            if (is_on(band_.active(leaf), n)) u[n] = std::min(u[n], highest[n]);
+        const float* highest = obstacle_ ? obstacle_->values.leaf(leaf) : nullptr;
+        const float* lowest = floor_ ? floor_->values.leaf(leaf) : nullptr;
+        for (int n = 0; n < kLeafSize; ++n) {
+            if (!is_on(band_.active(leaf), n)) continue;
+            if (highest != nullptr) u[n] = std::min(u[n], highest[n]);
+            if (lowest != nullptr) u[n] = std::max(u[n], lowest[n]);
+        }
     });
 }
 
@@ -265,7 +273,7 @@ void BandSolver::redistance(double clamp) {
         for (int n = 0; n < kLeafSize; ++n)
             if (is_on(band_.active(leaf), n)) u[n] = u[n] < 0.0F ? -std::min(d[n], limit) : std::min(d[n], limit);
     });
-    hold_to_obstacle();
+    hold_to_bounds();
 }
 
 // Steps resemble each other: the solve begins where the last one would lead to.

@@ -69,7 +69,7 @@ public:
 
 private:
     void gather_fields(const EvolveFields& fields);
-    void hold_to_obstacle();
+    void hold_to_bounds();
     struct Rows {
         double largest;   ///< Σ_q |a_pq|
         double residual;  ///< root mean square at u^{n-1}, voxels
@@ -91,7 +91,7 @@ private:
     LeafBand band_;
     std::int64_t active_count_ = 0;
     HaloField field_;  // u
-    std::optional<HaloField> phi_, edge_, image_weight_, obstacle_;
+    std::optional<HaloField> phi_, edge_, image_weight_, obstacle_, floor_;
     LeafArray<float> previous_;  // u^{n-1}; scratch for redistance()
     bool has_previous_ = false;  // it is from the step before
     static constexpr std::size_t kRowBytes = 6 * kLeafSize * sizeof(Share);

@@ -42,6 +42,7 @@ public:
         if (options.theta > 0) check_field(fields.distance, "distance", "theta");
         if (options.rho > 0) check_field(fields.edge, "edge", "rho");
         if (fields.obstacle != nullptr) check_transform(*fields.obstacle, "obstacle");
+        if (fields.floor != nullptr) check_transform(*fields.floor, "floor");
         if (options.follow) detail::track_surface(u_, domain_, tracking_clamp(options_), run_);
         make_solver();
     }

@@ -111,6 +111,7 @@ void flow(Job& job) {
     fields.edge = job.result.edge.get();
     fields.trusted = job.trusted_distance.get();
     fields.obstacle = job.obstacle.get();
+    fields.floor = job.floor.get();
     if (job.options.evolve.follow)
         fields.extend = [&job](const FloatGrid& u, EvolveFields& f) { extend_edges(job, u, f); };
     SegmentReport& report = job.report();

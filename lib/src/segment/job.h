@@ -40,7 +40,7 @@ struct Job {
     SegmentResult result;
     StartOrigin origin = StartOrigin::Given;
     std::optional<CloudOrientation> cloud;  ///< of points alone, many or asked for
-    FloatGridPtr obstacle;                  ///< of the flow, EvolveFields::obstacle, or null
+    FloatGridPtr obstacle, floor;           ///< of the flow, as in EvolveFields, or null
     FloatGridPtr trusted_distance;          ///< to the trusted marks, or null
 
     SegmentReport& report() { return result.report; }

@@ -286,6 +286,26 @@ TEST_CASE("a surface that shrinks comes to rest on an obstacle") {
     }
 }
 
+TEST_CASE("between an obstacle and a floor a surface stays where they hold it") {
+    Problem p = whole_cube(20, kH, [](const Vec3& x) { return clamp_to(length(x) - 3.5, 3 * kH); });
+    const FloatGridPtr held = start_grid(
+        p.domain, [](const Vec3& x) { return length(x) - 3.5; }, 3 * kH);
+    for (const bool follow : {false, true}) {
+        INFO((follow ? "a tracked band" : "a fixed band"));
+        EvolveOptions o = evolve_options(p.options, 40);
+        o.theta = 0;
+        o.delta = kH;
+        o.follow = follow;
+        EvolveFields fields;
+        fields.obstacle = fields.floor = held.get();
+        const FloatGridPtr u = start_of(p);
+        evolve(*u, fields, o);
+        const auto crossings = zero_crossings(p.domain, to_dense(p.domain, *u));
+        REQUIRE(crossings.size() > 100);
+        for (const Crossing& c : crossings) CHECK(length(c.position) == Approx(3.5).margin(0.05 * kH));
+    }
+}
+
 TEST_CASE("cancelled between steps, u holds the last whole one") {
     const Problem p = everything_on(20);
     std::atomic<bool> cancel{false};

@@ -187,13 +187,15 @@ void Session::add_grid(const std::string& path, const FloatGridPtr& grid, bool h
 }
 
 int Session::main(int argc, char** argv) {
-    // What follows `plan` is a whole command line, with the options of its command.
-    std::vector<char*> words(argv, argv + argc);
-    const auto is = [&](std::size_t n, const char* word) { return n < words.size() && words[n] == std::string(word); };
-    planning_ = is(1, "plan") && (is(2, "segment") || is(2, "reconstruct"));
-    if (planning_) words.erase(words.begin() + 1);
+    // What follows `plan` and `brick` is a whole command line, with the options of its command.
+    std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+    const auto is = [&](std::size_t n, const char* word) { return n < words.size() && words[n] == word; };
+    planning_ = is(0, "plan") && (is(1, "segment") || is(1, "reconstruct"));
+    if (planning_) words.erase(words.begin());
     try {
-        app_.parse(int(words.size()), words.data());
+        brick_ = take_brick_call(words);
+        std::reverse(words.begin(), words.end());  // as CLI11 wants them
+        app_.parse(std::move(words));
         expect_values(app_);
         expect_values(*app_.get_subcommands().front());
         forget_groups(*app_.get_subcommands().front());
@@ -228,7 +230,8 @@ int Session::execute() {
         if (memory_limit_ == 0) memory_limit_ = available_memory() / 100 * kUsablePercent;
         run_.memory_budget = memory_limit_;
         guard = std::make_unique<MemoryGuard>(memory_limit_, cancel_requested);
-        outputs_.protect(inputs_of(*command_));
+        inputs_ = inputs_of(*command_);
+        outputs_.protect(inputs_);
         if (json_path_ != "-") outputs_.check("--json", json_path_, OutputKind::Text);
         outputs_.check("--save-config", save_config_path_, OutputKind::Text);
         start_report();
@@ -334,6 +337,10 @@ std::string Session::comment() const {
     std::string text;
     for (const std::string& line : comments()) text += (text.empty() ? "" : "\n") + line;
     return text;
+}
+
+std::optional<std::uint64_t> Session::memory_limit() const {
+    return memory_limit_text_.empty() ? std::nullopt : std::optional(memory_limit_);
 }
 
 void Session::require_memory(std::uint64_t bytes, const std::string& what) const {

@@ -5,9 +5,12 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "cli/brick_call.h"
 #include "cli/help.h"
 #include "cli/memory.h"
 #include "cli/outputs.h"
@@ -80,13 +83,18 @@ public:
     void add_seconds(const std::string& name, double seconds);
     /// The command stands behind `covol plan`: it says what it would take, and makes nothing.
     [[nodiscard]] bool is_planning() const noexcept { return planning_; }
+    /// The command stands behind `covol brick`.
+    [[nodiscard]] const std::optional<BrickCall>& brick() const noexcept { return brick_; }
+    /// --memory-limit, bytes; none where it was not given.
+    [[nodiscard]] std::optional<std::uint64_t> memory_limit() const;
+    /// The files that the command line names to be read.
+    [[nodiscard]] const std::vector<std::string>& inputs() const noexcept { return inputs_; }
     /// The run went well, but ends with this exit code.
     void set_exit_code(int code) { exit_code_ = code; }
 
 private:
     static void add_help_flags(CLI::App& app);
     void add_common_flags();
-    void parse(int argc, char** argv);
     int execute();
     void start_report();
     void finish();
@@ -104,6 +112,9 @@ private:
     bool quiet_ = false, profile_ = false, planning_ = false;
     std::string json_path_, save_config_path_, memory_limit_text_;
     std::uint64_t memory_limit_ = 0;  ///< bytes: as given, else what the machine has free
+
+    std::optional<BrickCall> brick_;
+    std::vector<std::string> inputs_;
 
     RunContext run_;
     std::unique_ptr<Progress> progress_;

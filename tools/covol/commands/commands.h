@@ -20,5 +20,6 @@ void add_convert(Session& session);
 void add_render(Session& session);
 void add_phantom(Session& session);
 void add_plan(Session& session);
+void add_brick(Session& session);
 
 }  // namespace covol::tool

@@ -38,7 +38,7 @@ Marks read_marks(const PointFlags& points, const ContourFlags& contours, const C
     return marks;
 }
 
-void prepare(Marks& marks, const CloudFlags& cloud, const ContourFlags& contours, const ImageGeometry* geometry,
+void prepare_marks(Marks& marks, const CloudFlags& cloud, const ContourFlags& contours, const ImageGeometry* geometry,
              double h, Session& session, const RunContext& run) {
     std::vector<Vec3> cleaned = cloud.clean(marks.points, h, run, marks.report["points"]);
     if (cleaned != marks.points) marks.hints = carried(marks.hints, marks.points, cleaned);

@@ -12,7 +12,7 @@ namespace covol::tool {
 
 /// The marks of one structure: what its files hold, and what segment() takes once h is known.
 struct Marks {
-    std::vector<Vec3> given;                   ///< all of them as they were clicked, world units; cleaned by prepare()
+    std::vector<Vec3> given;                   ///< all of them as they were clicked, world units; cleaned by prepare_marks()
     std::vector<Vec3> points;                  ///< those that are no contours
     PointHints hints;                          ///< of those
     std::vector<PointCloud> drawn;             ///< contours
@@ -26,7 +26,7 @@ struct Marks {
                                const ImageGeometry* geometry, const RunContext& run);
 
 /// Cleans the points, and densifies the contours with step h.
-void prepare(Marks& marks, const CloudFlags& cloud, const ContourFlags& contours, const ImageGeometry* geometry,
+void prepare_marks(Marks& marks, const CloudFlags& cloud, const ContourFlags& contours, const ImageGeometry* geometry,
              double h, Session& session, const RunContext& run);
 
 }  // namespace covol::tool

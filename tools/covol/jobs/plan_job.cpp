@@ -44,7 +44,7 @@ struct StructurePlan {
 Pilot run_pilot(const SegmentJob& job, const StructureInput& input, const ImageGeometry* geometry, double h,
                 Session& session, const RunContext& quiet) {
     Marks marks = read_marks(input.points, input.contours, job.cloud, geometry, quiet);
-    prepare(marks, job.cloud, input.contours, geometry, h, session, quiet);
+    prepare_marks(marks, job.cloud, input.contours, geometry, h, session, quiet);
     SegmentOptions options = job.resolve(h);
     options.contours = marks.contours;
     options.hints = marks.hints;

@@ -4,6 +4,7 @@
 
 #include "cli/report.h"
 #include "covol/error.h"
+#include "jobs/brick_job.h"
 #include "jobs/plan_job.h"
 #include "jobs/structures_job.h"
 #include "jobs/timelapse_job.h"
@@ -113,6 +114,7 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
         ->check(CLI::Range(0, 4).description(""))
         ->type_name("N")
         ->default_str("auto");
+    bricks.bind(command);
     if (!with_image) {
         in_group(command, Group::Clouds);
         add_choice(command, "--holes", holes.policy,
@@ -166,8 +168,11 @@ void SegmentJob::run(Session& session) const {
     if (names && images.empty())
         throw UsageError("expected files without names: several structures need an image, see covol segment");
     if (session.is_planning()) return run_plan(*this, session);
+    if (session.brick()) return run_bricks(*this, session);
     if (is_timelapse(*this)) return run_timelapse(*this, session);
-    run_structures(*this, session);
+    run_structures(*this, session, [&](const Image* image, const PreparedStructure& structure, const RunContext& run) {
+        return solve_within_limit(*this, image, structure, session, run);
+    });
 }
 
 }  // namespace covol::tool

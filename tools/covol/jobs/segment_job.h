@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "flags/bindings.h"
+#include "flags/brick_flags.h"
 #include "flags/cloud_flags.h"
 #include "flags/contour_flags.h"
 #include "flags/evidence_flags.h"
@@ -35,12 +36,14 @@ struct SegmentJob {
     Length hole_distance;
     Length min_component;  ///< edge of a cube of the smallest volume that is kept
     EvidenceFlags evidence;
+    BrickFlags bricks;
     FrameChoice frames;
     std::string output, mask_path, mesh_path, density_path, fields_path, table_path;
     bool half = false;
 
     void bind(CLI::App& command, bool with_image);
-    /// Time-lapses by run_timelapse(), all else by run_structures(); behind `covol plan` run_plan().
+    /// Time-lapses by run_timelapse(), all else by run_structures(); behind `covol plan` run_plan(), behind `covol
+    /// brick` run_bricks().
     void run(Session& session) const;
 
     // For those.

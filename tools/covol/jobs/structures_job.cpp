@@ -81,66 +81,87 @@ void summarise(const StructuresOutput& output, const SegmentJob& job, Session& s
 
 }  // namespace
 
+StructurePreparer::StructurePreparer(const SegmentJob& job, const std::vector<StructureInput>& inputs,
+                                     const Image* image, const std::vector<StructureStart>& starts, Session& session)
+    : job_(job),
+      inputs_(inputs),
+      image_(image),
+      starts_(starts),
+      session_(session),
+      geometry_(image != nullptr ? image->geometry() : ImageGeometry{}),
+      grids_(make_grid_names(names_of(inputs))),
+      paint_(job, geometry_) {}
+
+PreparedStructure StructurePreparer::prepare(std::size_t n, const RunContext& run) {
+    const ImageGeometry* const geometry = image_ != nullptr ? &geometry_ : nullptr;
+    const StructureInput& input = inputs_[n];
+    PreparedStructure prepared;
+    StructureOutput& s = prepared.output;
+    s.name = input.name;
+    s.grid = grids_[n];
+    s.label = input.label;
+    const Stopwatch reading;
+    Marks marks = read_marks(input.points, input.contours, job_.cloud, geometry, run);
+    session_.add_seconds("read", reading.seconds());
+    session_.add_seconds("total", reading.seconds());
+    if (image_ == nullptr && marks.given.empty()) throw UsageError("expected an image, points or contours, got none");
+    if (!voxel_size_) voxel_size_ = job_.domain.resolve_voxel_size(image_, marks.given, session_);
+    const double h = *voxel_size_;
+    const std::shared_ptr<const Contours> painted = paint_.own_contours(input, marks, h, run);
+    if (!painted) paint_.add_outlines(input, marks, run);
+    prepare_marks(marks, job_.cloud, input.contours, geometry, h, session_, run);
+    if (painted) {
+        marks.contours = painted;
+        marks.given.insert(marks.given.end(), painted->marks.begin(), painted->marks.end());
+        marks.report["points"]["count"] = marks.given.size();
+    }
+    s.marks = marks.given;
+    s.input = marks.report;
+    if (!input.paint.empty()) s.input["painted"] = paint_.report(input, run);
+    SegmentOptions& options = prepared.options = job_.resolve(h);
+    check_tag_distance(options.tag_distance.value_or(0), marks.given);
+    options.contours = marks.contours;
+    options.hints = marks.hints;
+    Seeds seeds = read_seeds(input.seeds, input.points.options, geometry, h, run);
+    options.inside = std::move(seeds.inside);
+    options.outside = std::move(seeds.outside);
+    paint_.add_seeds(inputs_, n, options, run);
+    if (!input.guess.empty()) {
+        prepared.guess =
+            read_guess(input.guess, job_.guess.label, geometry_, job_.image.options.spacing[0] > 0, run);
+        options.guess = prepared.guess->start;
+        s.input["guess"] = {{"path", input.guess}, {"label", prepared.guess->label}};
+    }
+    options.exterior_seeds = input.exterior_seeds;
+    options.start = starts_[n].start;
+    if (!options.evolve.delta) options.evolve.delta = starts_[n].delta;
+    prepared.points = std::move(marks.points);
+    return prepared;
+}
+
+SegmentResult solve_in_one_piece(const Image* image, const PreparedStructure& structure, const RunContext& run) {
+    return image != nullptr ? segment(*image, structure.points, structure.options, run)
+                            : reconstruct(structure.points, structure.options, run);
+}
+
 StructuresOutput segment_structures(const SegmentJob& job, const std::vector<StructureInput>& inputs,
                                     const Image* image, const std::vector<StructureStart>& starts, Session& session,
-                                    const RunContext& run) {
+                                    const RunContext& run, const Solver& solve) {
     StructuresOutput output;
     if (image != nullptr) output.geometry = image->geometry();
-    const ImageGeometry* const geometry = image != nullptr ? &output.geometry : nullptr;
-    const std::vector<std::string> grids = make_grid_names(names_of(inputs));
-    PaintReader paint(job, output.geometry);
-    const bool force = job.image.options.spacing[0] > 0;
-    std::optional<double> voxel_size;  // one for all
+    StructurePreparer preparer(job, inputs, image, starts, session);
     for (std::size_t n = 0; n < inputs.size(); ++n) {
         const RunContext own = speaking_for(inputs[n].name, run);
-        StructureOutput s;
-        s.name = inputs[n].name;
-        s.grid = grids[n];
-        s.label = inputs[n].label;
-        const Stopwatch reading;
-        Marks marks = read_marks(inputs[n].points, inputs[n].contours, job.cloud, geometry, own);
-        session.add_seconds("read", reading.seconds());
-        session.add_seconds("total", reading.seconds());
-        if (image == nullptr && marks.given.empty())
-            throw UsageError("expected an image, points or contours, got none");
-        if (!voxel_size) voxel_size = job.domain.resolve_voxel_size(image, marks.given, session);
-        const double h = *voxel_size;
-        const std::shared_ptr<const Contours> painted = paint.own_contours(inputs[n], marks, h, own);
-        if (!painted) paint.add_outlines(inputs[n], marks, own);
-        prepare(marks, job.cloud, inputs[n].contours, geometry, h, session, own);
-        if (painted) {
-            marks.contours = painted;
-            marks.given.insert(marks.given.end(), painted->marks.begin(), painted->marks.end());
-            marks.report["points"]["count"] = marks.given.size();
-        }
-        s.marks = marks.given;
-        s.input = marks.report;
-        if (!inputs[n].paint.empty()) s.input["painted"] = paint.report(inputs[n], own);
-        SegmentOptions options = job.resolve(h);
-        check_tag_distance(options.tag_distance.value_or(0), marks.given);
-        options.contours = marks.contours;
-        options.hints = marks.hints;
-        Seeds seeds = read_seeds(inputs[n].seeds, inputs[n].points.options, geometry, h, own);
-        options.inside = std::move(seeds.inside);
-        options.outside = std::move(seeds.outside);
-        paint.add_seeds(inputs, n, options, own);
-        std::optional<Guess> guess;
-        if (!inputs[n].guess.empty()) {
-            guess = read_guess(inputs[n].guess, job.guess.label, output.geometry, force, own);
-            options.guess = guess->start;
-            s.input["guess"] = {{"path", inputs[n].guess}, {"label", guess->label}};
-        }
-        options.exterior_seeds = inputs[n].exterior_seeds;
-        options.start = starts[n].start;
-        if (!options.evolve.delta) options.evolve.delta = starts[n].delta;
+        PreparedStructure prepared = preparer.prepare(n, own);
+        StructureOutput& s = prepared.output;
         try {
-            s.result = image != nullptr ? segment(*image, marks.points, options, own)
-                                        : reconstruct(marks.points, options, own);
+            s.result = solve(image, prepared, own);
         } catch (const Error& error) {
             if (s.name.empty()) throw;
             throw Error(error.code(), s.name + ": " + error.what());
         }
         s.input["points"]["densified"] = s.result.report.densified;
+        const std::optional<Guess>& guess = prepared.guess;
         if (guess && guess->mask && inputs.size() == 1) {
             s.label = guess->label;
             if (!job.mask_path.empty() && is_same_lattice(guess->mask->geometry(), output.geometry))
@@ -154,7 +175,7 @@ StructuresOutput segment_structures(const SegmentJob& job, const std::vector<Str
     }
     if (inputs.size() > 1) {
         const Stopwatch separating;
-        separate_all(output, job.resolve(*voxel_size), run);
+        separate_all(output, job.resolve(preparer.voxel_size()), run);
         session.add_seconds("separate", separating.seconds());
         session.add_seconds("total", separating.seconds());
     }
@@ -168,7 +189,7 @@ StructuresOutput segment_structures(const SegmentJob& job, const std::vector<Str
     return output;
 }
 
-void run_structures(const SegmentJob& job, Session& session) {
+void run_structures(const SegmentJob& job, Session& session, const Solver& solve) {
     Outputs& outputs = session.outputs();
     const std::vector<StructureInput> inputs = structures_of(job, job.painted.read(session.run()));
     check_outputs(job, inputs, "", outputs);
@@ -181,7 +202,7 @@ void run_structures(const SegmentJob& job, Session& session) {
     std::optional<Image> image;
     if (!job.images.empty()) image = job.read(job.images.front(), reading, session);
     const auto output = std::make_shared<StructuresOutput>(
-        segment_structures(job, inputs, image ? &*image : nullptr, starts, session, session.run()));
+        segment_structures(job, inputs, image ? &*image : nullptr, starts, session, session.run(), solve));
     session.report().update(to_json(*output), true);
     if (image) SegmentJob::tell_chunks(*image, session);
     hand_over(job, output, "", session,

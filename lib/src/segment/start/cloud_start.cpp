@@ -35,11 +35,15 @@ void tell_of_hints(Job& job, const HintsReport& hints) {
 
 }  // namespace
 
+void choose_cloud_domain(Job& job) {
+    job.report().domain = job.domain_with_chosen_margin(kStarts.margin_share * longest_side(bounding_box(job.points)) +
+                                                        kJob.margin_voxels * job.h());
+}
+
 void start_from_cloud(Job& job) {
     job.origin = StartOrigin::Cloud;
     job.options.evolve.follow = true;
-    job.report().domain = job.domain_with_chosen_margin(kStarts.margin_share * longest_side(bounding_box(job.points)) +
-                                                        kJob.margin_voxels * job.h());
+    choose_cloud_domain(job);
     CloudReport& report = job.report().cloud;
     {
         Timed timed(job.report().seconds.tag);

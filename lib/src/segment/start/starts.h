@@ -11,6 +11,9 @@ void make_start(Job& job);
 /// The surface through the marks that bends least.
 void start_from_guess(Job& job);
 
+/// The domain of a cloud.
+void choose_cloud_domain(Job& job);
+
 /// The surface behind a cloud, oriented by itself.
 void start_from_cloud(Job& job);
 

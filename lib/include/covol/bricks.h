@@ -1,0 +1,90 @@
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "covol/api.h"
+#include "covol/edge.h"
+#include "covol/evolve.h"
+#include "covol/image.h"
+#include "covol/pipeline.h"
+
+// A job in parts: the surface is found brick by brick, each on its own machine or one after the other, and joined.
+//
+// A coarse solve of the whole gives every brick its start. A brick is solved with some layers of its neighbours around
+// it; what they found last holds the outermost of these (the alternating method of Schwarz, 1870, all bricks at once:
+// Lions, On the Schwarz alternating method, 1988). Sweeps repeat until neighbours agree where they meet. All bricks lie
+// on one lattice and each leaf of it belongs to one of them, so that the joined level set is a union of leaves.
+namespace covol {
+
+struct BrickOptions {
+    std::int64_t most_voxels = 8'000'000;  ///< > 0: of the band in a brick, its neighbours' layers not counted
+    int overlap = 16;                      ///< voxels, a multiple of 8, > 0: layers of its neighbours around a brick
+    double tolerance = 0.02;               ///< voxels, > 0: neighbours agree when their surfaces lie closer
+    int most_sweeps = 8;                   ///< >= 1
+    [[nodiscard]] COVOL_API std::string why_invalid() const;
+};
+
+struct Brick {
+    VoxelBox core;  ///< the voxels of the lattice that belong to it: whole leaves, cut at the domain's end
+    std::int64_t active_voxels = 0;       ///< of the band in it, by the coarse solve
+    std::vector<std::size_t> neighbours;  ///< bricks whose cores come within `overlap` of its own
+};
+
+/// What all bricks have in common.
+struct BrickPlan {
+    BrickOptions options;
+    Domain domain;        ///< of the whole
+    EdgeOptions edge;     ///< what g means, fixed for all bricks
+    FloatGridPtr coarse;  ///< a level set on a coarser lattice
+    std::vector<Brick> bricks;
+    bool has_sweeps = true;  ///< else each brick is what it is, whatever its neighbours are
+    [[nodiscard]] COVOL_API std::int64_t active_voxels() const;
+};
+
+/// What solving a brick did.
+struct BrickReport {
+    StopReason stop_reason = StopReason::NotRun;
+    int steps = 0;
+    std::int64_t active_voxels = 0;
+    double seconds = 0;
+};
+
+/// The last state of a brick: the level set on the leaves of its core and one layer of leaves around; null: there is
+/// none yet.
+using BrickStates = std::function<FloatGridPtr(std::size_t brick)>;
+
+/// A segmentation or reconstruction that is done in bricks. Of points with an image that are tagged, of clouds, and of
+/// the starts that flow; not of guesses and contours, whose surface rests on all marks at once.
+class BrickJob {
+public:
+    /// Chooses what is left to be chosen; of a cloud that takes its orientation. The image has to outlive the job.
+    /// @throws Error as segment() and reconstruct(); Unsupported where the job can't be done in bricks
+    COVOL_API BrickJob(const Image& image, const std::vector<Vec3>& points, const SegmentOptions& options,
+                       const RunContext& run);
+    COVOL_API BrickJob(const std::vector<Vec3>& points, const SegmentOptions& options, const RunContext& run);
+    COVOL_API ~BrickJob();
+    BrickJob(const BrickJob&) = delete;
+    BrickJob& operator=(const BrickJob&) = delete;
+
+    /// Solves the whole coarsely and splits it. @throws Error as segment() and reconstruct(), InvalidOptions.
+    [[nodiscard]] COVOL_API BrickPlan plan(const BrickOptions& options) const;
+    /// One sweep of one brick, from its own and its neighbours' last states, or from the coarse solve where `states`
+    /// has none. @return its state: no leaf where no surface passes it
+    [[nodiscard]] COVOL_API FloatGridPtr solve(const BrickPlan& plan, std::size_t brick, const BrickStates& states,
+                                               BrickReport& report) const;
+    /// Joins the states of all bricks and finishes the surface as segment() does. The job's last work.
+    /// @throws Error InvalidInput (no surface is left)
+    [[nodiscard]] COVOL_API SegmentResult join(const BrickPlan& plan, const BrickStates& states);
+
+private:
+    struct Parts;
+    std::unique_ptr<Parts> parts_;
+};
+
+/// How far apart a brick's surface and those of its neighbours lie where both know them, at most, voxels.
+[[nodiscard]] COVOL_API double measure_seams(const BrickPlan& plan, std::size_t brick, const BrickStates& states);
+
+}  // namespace covol

@@ -1,0 +1,28 @@
+#pragma once
+// Level sets of bricks, put together and taken apart leaf by leaf.
+#include "covol/bricks.h"
+
+namespace covol::bricks {
+
+/// The leaves of `u` that meet the box, with their masks; nothing else. Keeps u's transform and name.
+[[nodiscard]] FloatGridPtr leaves_within(const FloatGrid& u, const VoxelBox& box);
+
+/// A level set on `domain`: from each brick of the list the leaves of its core, as far as the domain goes.
+/// @throws Error InvalidInput where one has no state.
+[[nodiscard]] FloatGridPtr assemble(const BrickPlan& plan, const Domain& domain, const std::vector<std::size_t>& bricks,
+                                    const BrickStates& states);
+
+/// Bounds that hold a level set at the faces where its part ends and the whole goes on, and nowhere else.
+struct Frame {
+    FloatGridPtr floor, obstacle;
+};
+[[nodiscard]] Frame make_frame(const FloatGrid& start, const Domain& part, const Domain& whole);
+
+/// The voxels of `other` that lie next to those of `core`.
+[[nodiscard]] VoxelBox beside(const VoxelBox& core, const VoxelBox& other);
+
+/// Largest distance from the surface of `a` to that of `b` between the voxels of `box`, voxels; kHalfWidthVoxels where it
+/// is not within b's band.
+[[nodiscard]] double gap_between(const FloatGrid& a, const FloatGrid& b, const VoxelBox& box);
+
+}  // namespace covol::bricks

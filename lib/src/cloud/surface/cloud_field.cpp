@@ -1,0 +1,270 @@
+#include "cloud/surface/cloud_field.h"
+
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/SignedFloodFill.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/median.h"
+#include "base/vector.h"
+#include "cloud/surface/blend_kernel.h"
+#include "cloud/surface/heuristics.h"
+#include "cloud/surface/local_fit.h"
+#include "points/point_cells.h"
+
+namespace covol::cloud {
+
+using openvdb::Coord;
+using Leaf = FloatGrid::TreeType::LeafNodeType;
+
+/// Quadrics where they act, sorted into cells.
+class CloudField::Pieces {
+public:
+    Pieces(std::vector<Quadric> quadrics, double h) : quadrics_(std::move(quadrics)), cells_(feet(quadrics_), 4 * h) {
+        std::vector<Quadric> sorted;
+        for (const std::uint32_t n : cells_.order()) {
+            const Quadric& q = quadrics_[n];
+            sorted.push_back(q);
+            const double wanted = std::max(
+                {kBlend.reach_voxels * h, kBlend.reach_of_least * q.least_radius, kBlend.reach_of_radius * q.radius});
+            reach_.push_back(float(std::max(
+                kBlend.least_reach_voxels * h,
+                std::min({wanted, kBlend.most_of_radius * q.radius, kBlend.most_of_curvature / q.curvature()}))));
+            longest_ = std::max(longest_, double(reach_.back()));
+        }
+        quadrics_ = std::move(sorted);
+    }
+
+    [[nodiscard]] std::size_t size() const { return quadrics_.size(); }
+    [[nodiscard]] const Quadric& operator[](std::size_t n) const { return quadrics_[n]; }
+    [[nodiscard]] double reach(std::size_t n) const { return double(reach_[n]); }
+    [[nodiscard]] const Vec3& foot(std::size_t n) const { return cells_.sorted()[n]; }
+    /// Those that may reach the box.
+    void find(const WorldBox& box, std::vector<PointCells::Range>& ranges) const {
+        WorldBox wide = box;
+        for (int a = 0; a < 3; ++a) {
+            wide.min[a] -= longest_;
+            wide.max[a] += longest_;
+        }
+        cells_.find(wide, ranges);
+    }
+
+private:
+    static std::vector<Vec3> feet(const std::vector<Quadric>& quadrics) {
+        std::vector<Vec3> at;
+        at.reserve(quadrics.size());
+        for (const Quadric& q : quadrics) at.push_back(q.foot());
+        return at;
+    }
+    std::vector<Quadric> quadrics_;
+    PointCells cells_;
+    std::vector<float> reach_;
+    double longest_ = 0;
+};
+
+namespace {
+
+/// The leaves of the domain that quadrics reach or the indicator's surface passes.
+std::vector<Coord> leaves_of(const CloudField::Pieces& pieces, const Indicator& indicator, const Domain& domain) {
+    std::vector<Coord> leaves;
+    const auto add = [&](const Vec3& low, const Vec3& high) {
+        Coord first, last;
+        for (int a = 0; a < 3; ++a) {
+            first[a] = std::max(int(std::floor(low[a])), domain.min[a]) & ~7;
+            last[a] = std::min(int(std::ceil(high[a])), domain.max[a]);
+        }
+        for (int i = first.x(); i <= last.x(); i += 8)
+            for (int j = first.y(); j <= last.y(); j += 8)
+                for (int k = first.z(); k <= last.z(); k += 8) leaves.emplace_back(i, j, k);
+    };
+    const auto settle = [&] {
+        std::sort(leaves.begin(), leaves.end());
+        leaves.erase(std::unique(leaves.begin(), leaves.end()), leaves.end());
+    };
+    for (std::size_t n = 0; n < pieces.size(); ++n) {
+        Vec3 low = domain.world_to_index(pieces.foot(n)), high = low;
+        for (int a = 0; a < 3; ++a) {
+            low[a] -= pieces.reach(n) / domain.voxel_size;
+            high[a] += pieces.reach(n) / domain.voxel_size;
+        }
+        add(low, high);
+        if (leaves.size() > 1000000) settle();
+    }
+    indicator.crossed(
+        [&](const WorldBox& box) { add(domain.world_to_index(box.min), domain.world_to_index(box.max)); });
+    settle();
+    return leaves;
+}
+
+/// Fills one leaf.
+class Blend {
+public:
+    Blend(const CloudField::Pieces& pieces, const Indicator& indicator, const Domain& domain)
+        : pieces_(pieces), indicator_(indicator), domain_(domain) {}
+
+    void fill(Leaf& leaf) {
+        const double h = domain_.voxel_size;
+        const Coord origin = leaf.origin();
+        const WorldBox box{domain_.index_to_world({double(origin.x()), double(origin.y()), double(origin.z())}),
+                           domain_.index_to_world({origin.x() + 7.0, origin.y() + 7.0, origin.z() + 7.0})};
+        gather(box);
+        blend(near_.data(), near_.size(), float(h), leaf_);
+        const double limit = kHalfWidthVoxels * h;
+        for (int at = 0; at < 512; ++at) {
+            double own = 0, trust = 0;
+            const std::size_t n = std::size_t(at);
+            if (leaf_.nearest[n] >= 0) {
+                own = std::clamp(double(leaf_.sum[n] / leaf_.weight[n]), -limit, limit);
+                trust = faded(std::sqrt(double(leaf_.share[n]))) *
+                        faded(beside(pieces_of_near_[std::size_t(leaf_.nearest[n])], place(origin, at)));
+            }
+            double value = trust * own;
+            if (trust < 1)
+                value += (1 - trust) *
+                         std::clamp((0.5 - indicator_.inside(place(origin, at))) * indicator_.cell() / kBlend.slope,
+                                    -limit, limit);
+            leaf.setValueOn(openvdb::Index(at), float(value));
+        }
+    }
+
+private:
+    /// 1 below the share that is trusted, 0 from 1 on.
+    static double faded(double share) {
+        const double beyond = std::clamp((share - kBlend.trusted) / (1 - kBlend.trusted), 0.0, 1.0);
+        return 1 - beyond * beyond * (3 - 2 * beyond);
+    }
+
+    /// How far a place lies beside the nearest foot, not above it, as a share of what points lie apart: where the
+    /// surface goes on there is a nearer one.
+    [[nodiscard]] double beside(std::size_t piece, const Vec3& world) const {
+        const Quadric& q = pieces_[piece];
+        const Vec3 to = minus(world, pieces_.foot(piece));
+        const double up = dot(to, q.axes[2]);
+        const double expected =
+            std::max({kBlend.beside_of_least * q.least_radius, kBlend.least_reach_voxels * domain_.voxel_size,
+                      kBlend.beside_of_apart * q.apart});
+        return std::sqrt(std::max(0.0, dot(to, to) - up * up)) / expected;
+    }
+
+    [[nodiscard]] Vec3 place(const Coord& origin, int at) const {
+        return domain_.index_to_world(
+            {double(origin.x() + (at >> 6)), double(origin.y() + (at >> 3 & 7)), double(origin.z() + (at & 7))});
+    }
+
+    /// The pieces that may reach the voxels of the box, in its frame.
+    void gather(const WorldBox& box) {
+        pieces_.find(box, ranges_);
+        near_.clear();
+        pieces_of_near_.clear();
+        for (const PointCells::Range& range : ranges_)
+            for (std::uint32_t n = range.begin; n < range.end; ++n) {
+                const Vec3& foot = pieces_.foot(n);
+                double off = 0;
+                for (int a = 0; a < 3; ++a) {
+                    const double beyond = std::max({box.min[a] - foot[a], foot[a] - box.max[a], 0.0});
+                    off += beyond * beyond;
+                }
+                const double reach = pieces_.reach(n);
+                if (off >= reach * reach) continue;
+                const Quadric& q = pieces_[n];
+                BlendPiece piece{};
+                piece.reach = float(reach);
+                for (int a = 0; a < 3; ++a) {
+                    piece.foot[a] = float(foot[a] - box.min[a]);
+                    piece.origin[a] = float(q.origin[a] - box.min[a]);
+                    for (int b = 0; b < 3; ++b) piece.axes[a][b] = float(q.axes[a][b]);
+                }
+                for (int c = 0; c < 6; ++c) piece.c[c] = float(q.c[c]);
+                near_.push_back(piece);
+                pieces_of_near_.push_back(n);
+            }
+    }
+
+    const CloudField::Pieces& pieces_;
+    const Indicator& indicator_;
+    const Domain& domain_;
+    std::vector<PointCells::Range> ranges_;
+    std::vector<BlendPiece> near_;
+    std::vector<std::size_t> pieces_of_near_;
+    BlendLeaf leaf_;
+};
+
+/// The pieces' distance where they act, what the indicator's level 1/2 says of it elsewhere; not yet a level set's
+/// band.
+FloatGridPtr level_set_of(const CloudField::Pieces& pieces, const Indicator& indicator, const Domain& domain,
+                          const RunContext& run) {
+    FloatGridPtr field = make_grid(domain, float(kHalfWidthVoxels * domain.voxel_size), "u");
+    std::vector<Leaf*> leaves;
+    for (const Coord& origin : leaves_of(pieces, indicator, domain)) leaves.push_back(field->tree().touchLeaf(origin));
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 8), [&](const auto& range) {
+        if (run.cancelled()) return;
+        Blend blend(pieces, indicator, domain);
+        for (std::size_t n = range.begin(); n < range.end(); ++n) blend.fill(*leaves[n]);
+    });
+    run.check();
+    openvdb::tools::signedFloodFill(field->tree());
+    return field;
+}
+
+/// The points where the indicator has its surface, as far as noise can have brought them from there: else there would
+/// be nodes all through the layer that they fill.
+OrientedCloud near_level(OrientedCloud points, const CloudOrientation& cloud) {
+    const double most = kBlend.most_noises * cloud.scale.noise;
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
+        Vec3 place = points.points[n];
+        for (int step = 0; step < kBlend.level_steps; ++step) {
+            const auto [inside, gradient] = cloud.orientation.indicator->at(place);
+            const double steep = dot(gradient, gradient);
+            if (!(steep > 0)) return;
+            place = plus(place, times((0.5 - inside) / steep, gradient));
+        }
+        const Vec3 moved = minus(place, points.points[n]);
+        if (dot(moved, moved) < most * most) points.points[n] = place;
+    });
+    return points;
+}
+
+std::vector<Quadric> quadrics_of(const CloudOrientation& cloud, double h, CloudReport& report, const RunContext& run) {
+    const OrientedCloud points{cloud.points, cloud.orientation.normals, std::vector<float>(cloud.points.size(), 1.0F)};
+    std::vector<Quadric> quadrics = quadrics_over(near_level(points, cloud), points, kBlend.node_voxels * h,
+                                                         cloud.scale, report.bare_nodes, run);
+    std::vector<double> noise, radius;
+    for (const Quadric& q : quadrics) {
+        noise.push_back(q.noise);
+        radius.push_back(q.radius);
+    }
+    report.noise = median(noise);
+    report.radius = median(radius);
+    return quadrics;
+}
+
+}  // namespace
+
+CloudField::CloudField(const CloudOrientation& cloud, double h, CloudReport& report, const RunContext& run)
+    : indicator_(cloud.orientation.screened ? cloud.orientation.screened : cloud.orientation.indicator) {
+    report.spacing = cloud.scale.spacing;
+    report.noise = cloud.scale.noise;
+    report.stray = cloud.stray;
+    report.encloses = cloud.encloses;
+    report.layered = cloud.orientation.layered;
+    report.hints = cloud.hints;
+    report.iterations = cloud.orientation.iterations;
+    report.indicator_cell = cloud.orientation.indicator->cell();
+    report.turned = cloud.orientation.turned;
+    pieces_ = std::make_unique<const Pieces>(
+        cloud.orientation.screened ? std::vector<Quadric>{} : quadrics_of(cloud, h, report, run), h);
+}
+
+CloudField::~CloudField() = default;
+
+FloatGridPtr CloudField::on(const Domain& domain, const RunContext& run) const {
+    return level_set_of(*pieces_, *indicator_, domain, run);
+}
+
+FloatGridPtr level_set_of(const Indicator& indicator, const Domain& domain, const RunContext& run) {
+    return level_set_of(CloudField::Pieces({}, domain.voxel_size), indicator, domain, run);
+}
+
+}  // namespace covol::cloud

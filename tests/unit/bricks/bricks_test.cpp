@@ -1,0 +1,201 @@
+#include "covol/bricks.h"
+
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "bricks/split.h"
+#include "covol/error.h"
+#include "covol/start.h"
+#include "support/shapes.h"
+
+using namespace covol;
+
+namespace {
+
+constexpr double kRadius = 40.0;
+constexpr int kSide = 112;
+
+std::vector<Vec3> sphere_points(int count) {
+    std::vector<Vec3> points;
+    const double golden = std::acos(-1.0) * (3 - std::sqrt(5.0));
+    for (int n = 0; n < count; ++n) {
+        const double z = 1 - (2.0 * n + 1) / count, r = std::sqrt(1 - z * z);
+        points.push_back({kRadius * r * std::cos(golden * n), kRadius * r * std::sin(golden * n), kRadius * z});
+    }
+    return points;
+}
+
+Image ball_image() {
+    ImageGeometry geometry;
+    geometry.size = {kSide, kSide, kSide};
+    geometry.origin = {-0.5 * (kSide - 1), -0.5 * (kSide - 1), -0.5 * (kSide - 1)};
+    std::vector<float> values;
+    for (int k = 0; k < kSide; ++k)
+        for (int j = 0; j < kSide; ++j)
+            for (int i = 0; i < kSide; ++i) {
+                const Vec3 w = geometry.index_to_world({double(i), double(j), double(k)});
+                values.push_back(float(std::clamp(kRadius - std::hypot(w[0], w[1], w[2]) + 0.5, 0.0, 1.0)));
+            }
+    return Image::from_values(geometry, values.data());
+}
+
+/// All sweeps, one after the other, each from the states of the one before. @return how many there were
+int solve_all(const BrickJob& job, const BrickPlan& plan, std::vector<FloatGridPtr>& states) {
+    states.assign(plan.bricks.size(), nullptr);
+    for (int sweep = 1;; ++sweep) {
+        REQUIRE(sweep <= plan.options.most_sweeps);
+        const std::vector<FloatGridPtr> before = states;
+        const BrickStates known = [&](std::size_t n) { return before[n]; };
+        bool moved = false;
+        for (std::size_t n = 0; n < states.size(); ++n) {
+            if (sweep > 1 && (!plan.has_sweeps || measure_seams(plan, n, known) < plan.options.tolerance)) continue;
+            BrickReport report;
+            states[n] = job.solve(plan, n, known, report);
+            moved = true;
+        }
+        if (!moved) return sweep - 1;
+    }
+}
+
+/// Largest difference where both are near their surfaces, voxels; and how many voxels were compared.
+struct Apart {
+    double most = 0;
+    std::int64_t count = 0;
+};
+Apart apart(const FloatGrid& a, const FloatGrid& b) {
+    Apart result;
+    const double h = a.voxelSize()[0];
+    const auto at = b.getConstAccessor();
+    for (auto value = a.cbeginValueOn(); value; ++value) {
+        if (std::abs(*value) > h) continue;
+        result.most = std::max(result.most, std::abs(*value - double(at.getValue(value.getCoord()))) / h);
+        ++result.count;
+    }
+    return result;
+}
+
+bool overlap(const VoxelBox& a, const VoxelBox& b) {
+    for (int axis = 0; axis < 3; ++axis)
+        if (a.min[axis] > b.max[axis] || b.min[axis] > a.max[axis]) return false;
+    return true;
+}
+
+}  // namespace
+
+TEST_CASE("bricks are whole leaves, belong to one each, and share the band evenly") {
+    const Domain fine = make_domain({{-60, -50, -40}, {70, 61, 53}}, 0.5);
+    const Domain coarse = make_domain({{-60, -50, -40}, {70, 61, 53}}, 2.0);
+    const FloatGridPtr ball = start_from_sphere(coarse, {3, 4, 5}, 30);
+    BrickOptions options;
+    options.most_voxels = 40000;
+    const std::vector<Brick> bricks = bricks::split(fine, *ball, options);
+    REQUIRE(bricks.size() > 8);
+    std::int64_t voxels = 0, band = 0;
+    for (std::size_t n = 0; n < bricks.size(); ++n) {
+        const Brick& brick = bricks[n];
+        const Index3 size = brick.core.size();
+        voxels += std::int64_t(size[0]) * size[1] * size[2];
+        band += brick.active_voxels;
+        CHECK(brick.active_voxels <= options.most_voxels);
+        CHECK(brick.active_voxels > options.most_voxels / 8);
+        for (int a = 0; a < 3; ++a) {
+            CHECK((brick.core.min[a] == fine.min[a] || brick.core.min[a] % 8 == 0));
+            CHECK((brick.core.max[a] == fine.max[a] || (brick.core.max[a] + 1) % 8 == 0));
+        }
+        for (std::size_t m = 0; m < n; ++m) CHECK_FALSE(overlap(brick.core, bricks[m].core));
+        for (const std::size_t m : brick.neighbours) {
+            const std::vector<std::size_t>& back = bricks[m].neighbours;
+            CHECK(std::find(back.begin(), back.end(), n) != back.end());
+        }
+    }
+    CHECK(voxels == fine.voxel_count());
+    CHECK(band == 16 * std::int64_t(ball->activeVoxelCount()));
+}
+
+TEST_CASE("a ball in bricks is the ball in one piece, on seams and off them") {
+    const Image image = ball_image();
+    const std::vector<Vec3> points = sphere_points(6000);
+    SegmentOptions options;
+    options.model = Model::Paper;
+    SegmentOptions from_coarse = options;  // from the tagged start it comes to rest up to 0.06 voxels away
+    from_coarse.coarse_levels = 1;
+    const SegmentResult whole = segment(image, points, from_coarse);
+    BrickJob job(image, points, options, {});
+    BrickOptions bricks;
+    bricks.most_voxels = 30000;
+    const BrickPlan plan = job.plan(bricks);
+    REQUIRE(plan.bricks.size() >= 4);
+    std::vector<FloatGridPtr> states;
+    const int sweeps = solve_all(job, plan, states);
+    CHECK(sweeps >= 1);
+    const SegmentResult joined = job.join(plan, [&](std::size_t n) { return states[n]; });
+    CHECK(joined.report.surface.closed);
+    CHECK(joined.report.surface.components == 1);
+    CHECK(joined.report.surface.genus == 0);
+    CHECK(joined.surface->transform() == whole.surface->transform());
+    const Apart difference = apart(*joined.surface, *whole.surface);
+    CHECK(difference.count > 20000);
+    CHECK(difference.most < 0.05);
+    // Errors against the true ball, at the bricks' faces and away from them.
+    double on = 0, off = 0;
+    for (auto value = joined.surface->cbeginValueOn(); value; ++value) {
+        if (std::abs(*value) > 1) continue;
+        const openvdb::Coord at = value.getCoord();
+        const openvdb::Vec3d w = joined.surface->indexToWorld(at);
+        const double error = std::abs(*value - (w.length() - kRadius));
+        bool near = false;
+        for (const Brick& brick : plan.bricks)
+            for (int a = 0; a < 3; ++a)
+                near = near || (brick.core.min[a] != plan.domain.min[a] && std::abs(at[a] - brick.core.min[a]) <= 2);
+        double& most = near ? on : off;
+        most = std::max(most, error);
+    }
+    CHECK(on < 1.1 * off);
+}
+
+TEST_CASE("a brick is held at its neighbours' states, and moved by no others") {
+    const Image image = ball_image();
+    const std::vector<Vec3> points = sphere_points(6000);
+    SegmentOptions options;
+    options.model = Model::Paper;
+    BrickJob job(image, points, options, {});
+    BrickOptions bricks;
+    bricks.most_voxels = 30000;
+    const BrickPlan plan = job.plan(bricks);
+    const BrickStates none = [](std::size_t) { return FloatGridPtr(); };
+    BrickReport report;
+    const FloatGridPtr once = job.solve(plan, 1, none, report);
+    CHECK(report.stop_reason == StopReason::Steady);
+    CHECK(report.steps > 0);
+    const FloatGridPtr again = job.solve(plan, 1, none, report);
+    CHECK(apart(*once, *again).most == 0);
+    CHECK(measure_seams(plan, 1, none) > 1);  // nothing is known yet
+    CHECK_THROWS_AS(job.join(plan, none), Error);
+}
+
+TEST_CASE("a cloud in bricks is the cloud in one piece, bit by bit") {
+    std::vector<Vec3> points = sphere_points(20000);
+    for (std::size_t n = 0; n < points.size(); ++n)
+        for (double& x : points[n]) x *= 1 + 0.004 * std::sin(12.9898 * double(n));
+    const SegmentOptions options;
+    const SegmentResult whole = reconstruct(points, options);
+    BrickJob job(points, options, {});
+    BrickOptions bricks;
+    bricks.most_voxels = 30000;
+    const BrickPlan plan = job.plan(bricks);
+    REQUIRE(plan.bricks.size() >= 4);
+    CHECK_FALSE(plan.has_sweeps);
+    std::vector<FloatGridPtr> states;
+    CHECK(solve_all(job, plan, states) == 1);
+    const SegmentResult joined = job.join(plan, [&](std::size_t n) { return states[n]; });
+    CHECK(apart(*joined.surface, *whole.surface).most == 0);
+    CHECK(joined.mesh.triangles.size() == whole.mesh.triangles.size());
+    CHECK(joined.report.surface.volume == whole.report.surface.volume);
+}
+
+TEST_CASE("what rests on all marks at once is refused in bricks") {
+    CHECK_THROWS_AS(BrickJob(ball_image(), sphere_points(200), {}, {}), Error);
+}

@@ -1,0 +1,44 @@
+#include "flags/brick_flags.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace covol::tool {
+namespace {
+
+// Measured: docs/benchmarks.md, Bricks.
+constexpr double kBandBytes = 200;   ///< at the peak, for each voxel of a band that is solved on
+constexpr double kBaseBytes = 1.5e8; ///< the program itself
+constexpr double kLayers = 1.3;      ///< with its neighbours' layers a brick has so much more of the band
+constexpr double kLeastVoxels = 2e5;
+
+}  // namespace
+
+double memory_of_band(double active_voxels) { return kBaseBytes + kBandBytes * active_voxels; }
+
+void BrickFlags::bind(CLI::App& command) {
+    in_group(command, Group::Numerics);
+    command
+        .add_option("--brick-voxels", most_voxels,
+                    "band voxels of a brick, of covol brick or beyond --memory-limit [8000000, or what --memory-limit "
+                    "allows]")
+        ->check(CLI::Range(std::int64_t(1000), std::int64_t(1) << 40).description(""))
+        ->type_name("N");
+    command.add_option("--brick-overlap", options.overlap, "layers of its neighbours around a brick, a multiple of 8")
+        ->type_name("VOXELS");
+    command
+        .add_option("--seam-tolerance", options.tolerance,
+                    "sweeps over the bricks end when neighbours' surfaces lie closer than this, voxels")
+        ->type_name("VOXELS");
+}
+
+BrickOptions BrickFlags::resolve(std::optional<std::uint64_t> memory) const {
+    BrickOptions resolved = options;
+    if (memory)
+        resolved.most_voxels =
+            std::llround(std::max(kLeastVoxels, (double(*memory) - kBaseBytes) / (kBandBytes * kLayers)));
+    if (most_voxels) resolved.most_voxels = *most_voxels;
+    return resolved;
+}
+
+}  // namespace covol::tool

@@ -1,0 +1,244 @@
+#include "jobs/brick_job.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <numeric>
+
+#include "covol/error.h"
+#include "jobs/brick_folder.h"
+#include "jobs/timelapse_job.h"
+
+namespace covol::tool {
+namespace {
+
+constexpr double kSmallJob = 200;  // voxels across: never worth a look
+
+std::unique_ptr<BrickJob> make_job(const Image* image, const PreparedStructure& structure, const RunContext& run) {
+    if (image != nullptr) return std::make_unique<BrickJob>(*image, structure.points, structure.options, run);
+    return std::make_unique<BrickJob>(structure.points, structure.options, run);
+}
+
+/// Solves bricks of a plan, sweep by sweep.
+class BrickRunner {
+public:
+    BrickRunner(const BrickJob& job, const BrickPlan& plan, const BrickFolder& folder, const RunContext& run)
+        : job_(job), plan_(plan), folder_(folder), run_(run) {}
+
+    /// @return how many moved
+    std::size_t run_sweep(int sweep, const std::vector<std::size_t>& bricks) const {
+        std::size_t moved = 0;
+        const auto total = double(std::max<std::int64_t>(1, plan_.active_voxels()));
+        double done = 0;
+        for (const std::size_t brick : bricks) {
+            run_.check();
+            run_.report("bricks, sweep " + std::to_string(sweep), done / total);
+            moved += solve(sweep, brick);
+            done += double(plan_.bricks[brick].active_voxels);
+        }
+        return moved;
+    }
+
+    /// All bricks, until neighbours agree.
+    void run_all() const {
+        std::vector<std::size_t> all(plan_.bricks.size());
+        std::iota(all.begin(), all.end(), std::size_t(0));
+        const int most = plan_.has_sweeps ? plan_.options.most_sweeps : 1;
+        for (int sweep = 1; sweep <= most; ++sweep) {
+            const std::size_t moved = run_sweep(sweep, all);
+            run_.info("sweep " + std::to_string(sweep) + ": " + std::to_string(moved) + " of " +
+                      std::to_string(all.size()) + " bricks solved");
+            if (moved == 0) return;
+        }
+        if (plan_.has_sweeps)
+            run_.warn("bricks: neighbours do not agree within `seam_tolerance` after " + std::to_string(most) +
+                      " sweeps");
+    }
+
+private:
+    /// @return whether it was solved; false where it is as after the sweep before
+    bool solve(int sweep, std::size_t brick) const {
+        if (folder_.is_done(sweep, brick)) return folder_.moved(sweep, brick);
+        const BrickStates states = folder_.states(sweep - 1);
+        Json facts;
+        if (sweep > 1) {
+            for (const std::size_t n : with_neighbours(brick))
+                if (!folder_.is_done(sweep - 1, n))
+                    throw Error(Errc::InvalidInput, folder_.path() + ": brick " + std::to_string(brick) +
+                                                        " in sweep " + std::to_string(sweep) + " needs brick " +
+                                                        std::to_string(n) + " of sweep " +
+                                                        std::to_string(sweep - 1) + ": run that first");
+            const double gap = measure_seams(plan_, brick, states);
+            facts["gap"] = gap;
+            if (!plan_.has_sweeps || gap < plan_.options.tolerance) {
+                folder_.write_same(sweep, brick, facts);
+                return false;
+            }
+        }
+        BrickReport report;
+        const FloatGridPtr state = job_.solve(plan_, brick, states, report);
+        facts.update({{"steps", report.steps},
+                      {"stop_reason", to_string(report.stop_reason)},
+                      {"active_voxels", report.active_voxels},
+                      {"seconds", report.seconds},
+                      {"peak_rss_bytes", peak_rss()}});
+        folder_.write_state(sweep, brick, state, facts);
+        return true;
+    }
+
+    [[nodiscard]] std::vector<std::size_t> with_neighbours(std::size_t brick) const {
+        std::vector<std::size_t> all = plan_.bricks[brick].neighbours;
+        all.push_back(brick);
+        return all;
+    }
+
+    const BrickJob& job_;
+    const BrickPlan& plan_;
+    const BrickFolder& folder_;
+    const RunContext& run_;
+};
+
+/// Only stages of the whole, and no remark of a brick's own.
+RunContext quiet(const RunContext& run) {
+    RunContext inner = run;
+    inner.progress = {};
+    inner.log = [log = run.log](LogLevel level, const std::string& line) {
+        if (level == LogLevel::Warning && log) log(level, line);
+    };
+    return inner;
+}
+
+/// A sweep changes no more where its bricks were as before.
+void warn_of_seams(const BrickPlan& plan, const BrickFolder& folder, int sweep, const RunContext& run) {
+    double gap = 0;
+    for (std::size_t n = 0; n < plan.bricks.size(); ++n)
+        if (folder.moved(sweep, n)) gap = std::max(gap, measure_seams(plan, n, folder.states(sweep)));
+    if (gap < plan.options.tolerance) return;
+    run.warn("bricks: neighbours lie up to " + std::to_string(gap) + " voxels apart after sweep " +
+             std::to_string(sweep) + ": run the next one, and join again");
+}
+
+SegmentResult join(BrickJob& job, const BrickPlan& plan, const BrickFolder& folder, const RunContext& run) {
+    const int sweep = folder.last_sweep(plan.bricks.size());
+    if (sweep == 0)
+        throw Error(Errc::InvalidInput,
+                    folder.path() + ": expected a state of each brick: run covol brick run " + folder.path());
+    if (plan.has_sweeps) warn_of_seams(plan, folder, sweep, run);
+    return job.join(plan, folder.states(sweep));
+}
+
+void tell_plan(const BrickPlan& plan, Session& session) {
+    std::int64_t largest = 0;
+    for (const Brick& brick : plan.bricks) largest = std::max(largest, brick.active_voxels);
+    const double memory = memory_of_band(1.3 * double(largest));
+    Json& json = session.report()["plan"];
+    json = {{"bricks", plan.bricks.size()},
+            {"active_voxels", plan.active_voxels()},
+            {"largest_brick", largest},
+            {"memory_bytes", std::llround(memory)}};
+    session.say("bricks: " + std::to_string(plan.bricks.size()) + ", band: about " +
+                std::to_string(plan.active_voxels() / 1000 * 1000) + " voxels, the largest brick " +
+                std::to_string(largest / 1000 * 1000) + ", which takes about " +
+                std::to_string(std::llround(memory / 1e6)) + " MB");
+}
+
+/// Removes itself.
+class TemporaryFolder {
+public:
+    explicit TemporaryFolder(const std::string& beside) {
+        path_ = beside + ".bricks-XXXXXX";
+        if (::mkdtemp(path_.data()) == nullptr) throw Error(Errc::Io, path_ + ": cannot make a folder for bricks");
+    }
+    ~TemporaryFolder() {
+        std::error_code status;
+        std::filesystem::remove_all(path_, status);
+    }
+    TemporaryFolder(const TemporaryFolder&) = delete;
+    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+    [[nodiscard]] const std::string& path() const noexcept { return path_; }
+
+private:
+    std::string path_;
+};
+
+}  // namespace
+
+void run_bricks(const SegmentJob& job, Session& session) {
+    const BrickCall& call = *session.brick();
+    const std::vector<StructureInput> inputs = structures_of(job, job.painted.read(session.run()));
+    if (is_timelapse(job) || inputs.size() != 1)
+        throw UsageError("brick: expected one structure in one image; plan each by itself");
+    const BrickFolder folder(call.folder);
+    if (call.step == BrickCall::Step::Join)
+        return run_structures(job, session,
+                              [&](const Image* image, const PreparedStructure& structure, const RunContext& run) {
+                                  const BrickPlan plan = folder.read_plan();
+                                  return join(*make_job(image, structure, run), plan, folder, run);
+                              });
+    job.check_options();
+    const std::vector<StructureStart> starts = starts_of(job, inputs);
+    std::optional<Image> image;
+    if (!job.images.empty()) image = job.read(job.images.front(), job.image.options, session);
+    const Image* const pixels = image ? &*image : nullptr;
+    if (call.step == BrickCall::Step::Plan) {
+        const PreparedStructure structure =
+            StructurePreparer(job, inputs, pixels, starts, session).prepare(0, session.run());
+        const BrickPlan plan =
+            make_job(pixels, structure, session.run())->plan(job.bricks.resolve(session.memory_limit()));
+        folder.write_plan(plan, call.job, session.inputs(), {});
+        return tell_plan(plan, session);
+    }
+    const RunContext inner = quiet(session.run());
+    const BrickPlan plan = folder.read_plan();
+    for (const std::size_t brick : call.bricks)
+        if (brick >= plan.bricks.size())
+            throw UsageError("brick run: expected bricks 0 to " + std::to_string(plan.bricks.size() - 1) + ", got " +
+                             std::to_string(brick));
+    const PreparedStructure structure = StructurePreparer(job, inputs, pixels, starts, session).prepare(0, inner);
+    const std::unique_ptr<BrickJob> solver = make_job(pixels, structure, inner);
+    const BrickRunner runner(*solver, plan, folder, session.run());
+    std::vector<std::size_t> bricks = call.bricks;
+    if (bricks.empty()) {
+        if (call.sweep == 0) return runner.run_all();
+        bricks.resize(plan.bricks.size());
+        std::iota(bricks.begin(), bricks.end(), std::size_t(0));
+    }
+    runner.run_sweep(std::max(1, call.sweep), bricks);
+}
+
+SegmentResult solve_within_limit(const SegmentJob& job, const Image* image, const PreparedStructure& structure,
+                                 Session& session, const RunContext& run) {
+    const auto in_one = [&] { return solve_in_one_piece(image, structure, run); };
+    const std::optional<std::uint64_t> limit = session.memory_limit();
+    if (!limit) return in_one();
+    const WorldBox box =
+        structure.points.empty() ? (image != nullptr ? image->geometry().world_box() : WorldBox{})
+                                 : bounding_box(structure.points);
+    if (longest_side(box) < kSmallJob * structure.options.voxel_size.value_or(1)) return in_one();
+    const RunContext inner = quiet(run);
+    std::unique_ptr<BrickJob> solver;
+    BrickPlan plan;
+    try {
+        solver = make_job(image, structure, inner);
+        plan = solver->plan(job.bricks.resolve(limit));
+    } catch (const Error& error) {
+        if (error.code() == Errc::Cancelled) throw;
+        return in_one();  // which says what is wrong with the job, if anything is
+    }
+    if (memory_of_band(double(plan.active_voxels())) < double(*limit)) {
+        solver.reset();
+        plan = {};
+        return in_one();
+    }
+    run.info("about " + std::to_string(plan.active_voxels() / 1000000) +
+             " million voxels in the band, more than --memory-limit allows at once: in " +
+             std::to_string(plan.bricks.size()) + " bricks");
+    const TemporaryFolder temporary(job.output);
+    const BrickFolder folder(temporary.path());
+    BrickRunner(*solver, plan, folder, run).run_all();
+    return join(*solver, plan, folder, run);
+}
+
+}  // namespace covol::tool
