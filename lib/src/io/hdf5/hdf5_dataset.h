@@ -38,7 +38,7 @@ private:
     void set_bricks();
     void check_chunk() const;
     [[nodiscard]] std::optional<Bytes> packed_chunk(const std::vector<std::uint64_t>& begin, unsigned& skipped) const;
-    [[nodiscard]] Bytes read_box(const std::vector<std::uint64_t>& begin) const;
+    void read_box(const std::vector<std::uint64_t>& begin, const std::vector<std::uint64_t>& shape, void* out) const;
     [[nodiscard]] Error damaged(const std::string& what) const;
 
     std::shared_ptr<const Hdf5File> file_;

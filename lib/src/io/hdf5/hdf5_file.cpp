@@ -163,6 +163,9 @@ std::vector<std::string> Hdf5File::datasets(const std::string& group) const {
     const Hdf5Lock lock;
     std::vector<std::string> found, groups{group};
     std::set<haddr_t> seen;  // hard links may lead round in circles
+    H5O_info_t top{};
+    if (H5Oget_info_by_name2(file_.get(), group.c_str(), &top, H5O_INFO_BASIC, access_.get()) >= 0)
+        seen.insert(top.addr);
     std::size_t looked_at = 0;
     for (int depth = 0; depth < kDeepest && !groups.empty(); ++depth) {
         std::vector<std::string> below;
