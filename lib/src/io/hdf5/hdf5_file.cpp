@@ -52,7 +52,7 @@ std::vector<std::string> strings_of(const Hdf5Id& attribute) {
         std::vector<char*> read(count, nullptr);
         const Hdf5Id memory(H5Tcopy(type.get()), H5Tclose);
         if (H5Aread(attribute.get(), memory.get(), static_cast<void*>(read.data())) < 0) return texts;
-        for (const char* text : read) texts.push_back(text == nullptr ? "" : text);
+        for (const char* text : read) texts.emplace_back(text == nullptr ? "" : text);
         H5Dvlen_reclaim(memory.get(), space.get(), H5P_DEFAULT, static_cast<void*>(read.data()));
         return texts;
     }
@@ -98,7 +98,7 @@ Hdf5File::Hdf5File(std::string path) : path_(std::move(path)) {
     const Hdf5Id how(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
     // Objects that are still open keep the file open; some network folders know no locks.
     H5Pset_fclose_degree(how.get(), H5F_CLOSE_WEAK);
-    H5Pset_file_locking(how.get(), 1, 1);
+    H5Pset_file_locking(how.get(), true, true);
     file_ = Hdf5Id(H5Fopen(path_.c_str(), H5F_ACC_RDONLY, how.get()), H5Fclose);
     if (!file_)
         throw read_error(Errc::InvalidInput, path_,
@@ -127,7 +127,7 @@ bool Hdf5File::has_dataset(const std::string& name) const { return type_of(name)
 
 std::string Hdf5File::first_external_link(const std::string& name) const {
     for (std::size_t end = name.find('/', 1);; end = name.find('/', end + 1)) {
-        const std::string part = name.substr(0, end);
+        std::string part = name.substr(0, end);
         H5L_info_t link{};
         if (part.empty() || H5Lget_info(file_.get(), part.c_str(), &link, access_.get()) < 0) return "";
         if (link.type == H5L_TYPE_EXTERNAL) return part;
