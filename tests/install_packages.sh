@@ -11,12 +11,12 @@ packages=(
   # meshes, geometry
   libopenmesh-dev libcgal-dev libeigen3-dev liblbfgs-dev libgmp-dev libmpfr-dev
   # images
-  libinsighttoolkit5-dev libtiff-dev libpng-dev libzstd-dev liblz4-dev
+  libinsighttoolkit5-dev libtiff-dev libpng-dev libzstd-dev liblz4-dev libhdf5-dev
   # command line, reports
   libcli11-dev nlohmann-json3-dev
   # tests: other programs that read what covol writes
   catch2 libopenvdb-tools python3 python3-openvdb python3-numpy python3-tifffile
-  python3-nibabel python3-pydicom python3-zarr python3-numcodecs
+  python3-nibabel python3-pydicom python3-zarr python3-numcodecs python3-h5py
   "$@"
 )
 

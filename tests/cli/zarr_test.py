@@ -136,6 +136,24 @@ def dataset(path, scale, translation=None):
             steps + ([{"type": "translation", "translation": list(translation)}] if translation else [])}
 
 
+def ball(centre, radius, low, high):
+    """Grey values of a ball on the voxels low..high-1 of a cube."""
+    i = np.arange(low, high) - centre
+    r = np.sqrt(i[:, None, None] ** 2 + i[None, :, None] ** 2 + i[None, None, :] ** 2)
+    return (200 * np.clip(radius - r + 0.5, 0, 1)).astype(np.uint8)
+
+
+def write_marks(path, centre, radius, count=100):
+    """Evenly on a sphere."""
+    golden = math.pi * (3 - math.sqrt(5))
+    lines = []
+    for m in range(count):
+        z = 1 - (2 * m + 1) / count
+        s = math.sqrt(1 - z * z)
+        lines.append(" ".join(f"{centre + radius * v:.5f}" for v in (s * math.cos(golden * m), s * math.sin(golden * m), z)))
+    path.write_text("\n".join(lines) + "\n")
+
+
 @unittest.skipIf(MISSING, MISSING)
 class Case(unittest.TestCase):
     def setUp(self):
@@ -403,16 +421,8 @@ class Lazy(Case):
         n, size, centre, radius = 1024, 64, 500, 30
         array = zarr.open(str(self.path("large.zarr")), mode="w", shape=(n, n, n), chunks=(size,) * 3, dtype="u1", fill_value=0)
         low, high = centre - 40, centre + 40
-        i = np.arange(low, high) - centre
-        r = np.sqrt(i[:, None, None] ** 2 + i[None, :, None] ** 2 + i[None, None, :] ** 2)
-        array[low:high, low:high, low:high] = (200 * np.clip(radius - r + 0.5, 0, 1)).astype(np.uint8)
-        golden = math.pi * (3 - math.sqrt(5))
-        lines = []
-        for m in range(100):
-            z = 1 - (2 * m + 1) / 100
-            s = math.sqrt(1 - z * z)
-            lines.append(" ".join(f"{centre + radius * v:.5f}" for v in (s * math.cos(golden * m), s * math.sin(golden * m), z)))
-        self.path("marks.xyz").write_text("\n".join(lines) + "\n")
+        array[low:high, low:high, low:high] = ball(centre, radius, low, high)
+        write_marks(self.path("marks.xyz"), centre, radius)
         report = self.report("segment", "large.zarr", "--spacing", "1,1,1", "--points", "marks.xyz", "-o", "ball.vdb")
         self.assertAlmostEqual(report["surface"]["volume"] / (4 / 3 * math.pi * radius ** 3), 1, delta=0.03)
         chunks = report["input"]["image"]["chunks"]

@@ -11,7 +11,9 @@ import sys
 LAYERS = [
     {"base": ["api", "version", "fwd", "error", "option_names", "run", "domain"], "scheme": []},
     {"grid": [], "mesh": ["mesh"], "io": ["vdb_io"], "io/pixels": ["image"]},
-    {"io/image": [], "io/chunked": [], "io/mesh": ["mesh_io"], "distance": ["distance"]},
+    {"io/chunked": []},
+    {"io/hdf5": []},
+    {"io/image": [], "io/mesh": ["mesh_io"], "distance": ["distance"]},
     {"image": [], "io/points": ["points"], "clip": ["clip"], "edge": ["edge"], "redistance": []},
     {"points": ["scan_noise", "cloud_cleanup"], "surface": ["surface"], "evolve": ["evolve"], "tagging": ["band"]},
     {"contours": ["contours", "seeds"], "meshing": ["mesh_relax", "mesh_cleanup"], "holes": ["holes"], "cloud/orientation": ["orientation"]},

@@ -106,6 +106,10 @@ public:
     /// The same for a box of held voxels that copy() or at() will be asked for.
     COVOL_API void load(const VoxelBox& box, const RunContext& run = {}) const;
 
+    /// Gives the pages of a mapped file that were touched back to the system; they are read again when asked for.
+    /// Of images that are not mapped nothing is given back.
+    COVOL_API void release() const;
+
     /// Intensities below which the fractions `low` and `high` of the held voxels lie (deterministic;
     /// large images are subsampled on a regular lattice; of large images in chunks the chunks that were read so far
     /// count, or some on a regular lattice where none was).
@@ -161,14 +165,15 @@ struct ImageInfo {
     std::vector<std::pair<std::string, std::string>> fields;
     /// Memory that read_image() takes; 0 where it maps the file, or reads chunks when they are asked for.
     std::uint64_t bytes_to_hold = 0;
-    Index3 chunk_size{0, 0, 0};       ///< voxels of a chunk; 0: the file has none
+    Index3 chunk_size{0, 0, 0};       ///< voxels of a chunk; 0: it is not read in chunks
     std::vector<std::string> levels;  ///< of a pyramid, each with its size, the finest first; empty: there is none
 };
 
 /// Reads a 3D image: TIFF (ImageJ, OME and tifffile descriptions understood; BigTIFF, tiles, several files), NRRD,
-/// NIfTI, MetaImage, MRC, ITK's HDF5, a DICOM series (its folder, or one of its files), OME-Zarr and Zarr 2 and 3 (the
-/// folder of the image, or of one level), a float grid of a .vdb file ("FILE.vdb:name", or its first one; the box of
-/// its active voxels). A file that states no spacing is a warning.
+/// NIfTI, MetaImage, MRC, a DICOM series (its folder, or one of its files), OME-Zarr and Zarr 2 and 3 (the folder of
+/// the image, or of one level), HDF5 (Imaris, BigDataViewer, ITK's, or a dataset: "FILE.h5:/path/to/dataset"), a float
+/// grid of a .vdb file ("FILE.vdb:name", or its first one; the box of its active voxels). A file that states no spacing
+/// is a warning.
 /// @throws Error Io (cannot be opened or read), InvalidInput (not 3D, empty, NaN or infinite values; an roi outside),
 ///               Unsupported (several channels, frames or series and none chosen: lists them; an unknown format).
 [[nodiscard]] COVOL_API Image read_image(const std::string& path, const ReadImageOptions& options = {},

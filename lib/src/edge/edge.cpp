@@ -75,6 +75,7 @@ Window sample_window(const Image& image, const FloatGrid& topology, const Domain
         float* values = window.image.values.leaf(leaf);
         image.sample(domain, boxes[leaf].min, boxes[leaf].max, values);
     });
+    image.release();
     return window;
 }
 
@@ -293,6 +294,7 @@ MarkedFeature detect_feature(const Image& image, const std::vector<Vec3>& places
         squares += here * here;
         step += 0.5 * (outside - inside);
     }
+    image.release();
     MarkedFeature found;
     const auto count = double(places.size());
     if (count < 2) return found;

@@ -50,6 +50,7 @@ SmoothImage::SmoothImage(const Image& image, const WorldBox& box, double sigma) 
         image.copy({low, {first[0] + size_[0] - 1, first[1] + size_[1] - 1, first[2] + k}},
                    values_.data() + std::size_t(k) * size_[1] * size_[0]);
     });
+    image.release();
     for (int a = 0; a < 3; ++a) smooth(a, sigma / g.spacing[a]);
 }
 

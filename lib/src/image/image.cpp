@@ -10,6 +10,7 @@
 #include "covol/error.h"
 #include "covol/vdb_io.h"
 #include "io/chunked/zarr.h"
+#include "io/hdf5/hdf5_image.h"
 #include "io/image/image_formats.h"
 #include "io/image/tiff.h"
 #include "io/pixels/chunks.h"
@@ -23,7 +24,8 @@ using detail::PixelRequest;
 using detail::read_error;
 
 constexpr const char* kReadable =
-    ".tif, .tiff, .nrrd, .nhdr, .nii, .nii.gz, .mha, .mhd, .mrc, .map, .h5, .dcm or .vdb, or a folder with a DICOM "
+    ".tif, .tiff, .nrrd, .nhdr, .nii, .nii.gz, .mha, .mhd, .mrc, .map, .h5, .ims, .dcm or .vdb, or a folder with a "
+    "DICOM "
     "series or a Zarr store";
 
 bool is_one_of(const std::string& text, std::initializer_list<const char*> list) {
@@ -53,7 +55,9 @@ void check_geometry(const std::string& path, const ImageGeometry& g) {
 
 std::unique_ptr<ImageFile> open_image(const std::string& given, const ReadImageOptions& options,
                                       const RunContext& run) {
-    const auto [path, grid] = split_grid_name(given);
+    auto [path, grid] = split_grid_name(given);
+    const std::optional<detail::Hdf5Name> hdf5 = detail::split_hdf5_name(given);
+    if (hdf5) path = hdf5->path;
     std::error_code status;
     if (!fs::exists(path, status)) throw read_error(Errc::Io, path, "no such file");
     if (fs::is_directory(path, status) && detail::is_zarr(path))
@@ -63,15 +67,16 @@ std::unique_ptr<ImageFile> open_image(const std::string& given, const ReadImageO
         throw read_error(Errc::Io, path, "cannot be opened");
     const std::string end = detail::extension(path);
     const bool marked = is_one_of(end, {".dcm", ".ima", ".dicom", ""}) && detail::is_dicom(path);
-    const bool itk = is_one_of(end, {".nrrd", ".nhdr", ".nii", ".nii.gz", ".mha", ".mhd", ".h5", ".hdf5"});
+    const bool itk = is_one_of(end, {".nrrd", ".nhdr", ".nii", ".nii.gz", ".mha", ".mhd"});
     const bool mrc = is_one_of(end, {".mrc", ".map", ".rec", ".st", ".ccp4", ".ali"});
     const bool tiff = is_one_of(end, {".tif", ".tiff", ".btf", ".tf8"});
-    if (!marked && !itk && !mrc && !tiff && end != ".vdb")
+    if (!marked && !itk && !mrc && !tiff && !hdf5 && end != ".vdb")
         throw read_error(Errc::Unsupported, path,
                          std::string("expected a name ending in ") + kReadable + ", got '" + end + "'");
     if (fs::file_size(path) == 0) throw read_error(Errc::InvalidInput, path, "the file is empty");
     if (marked) return detail::open_dicom(path, run);
-    if (itk) return detail::open_itk(path);
+    if (hdf5 && !detail::is_itk_hdf5(*hdf5)) return detail::open_hdf5(*hdf5);
+    if (itk || hdf5) return detail::open_itk(path);
     if (mrc) return detail::open_mrc(path);
     if (tiff) return detail::open_tiff(path, run);
     return detail::open_vdb_image(path, grid);

@@ -120,6 +120,12 @@ void Image::forget_slice(int k) const {
         type_, [&](auto pixel) { detail::release_pages(row<decltype(pixel)>(held_.min[1], k), slice_bytes()); });
 }
 
+void Image::release() const {
+    if (!mapped_) return;
+    const auto slices = std::uint64_t(stride_[2]) * std::uint64_t(held_.size()[2] - 1) * detail::pixel_bytes(type_);
+    detail::release_pages(data_.get(), slices + slice_bytes());
+}
+
 std::array<double, 2> Image::percentiles(double low, double high) const {
     const double ratio = double(detail::voxel_count(held_.size())) / kSamples;
     const auto step = static_cast<std::int32_t>(std::max(1.0, std::ceil(std::cbrt(ratio))));

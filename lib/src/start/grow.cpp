@@ -300,6 +300,7 @@ GrownStart grow_to_edges(const Image& image, const FloatGrid& start, double sigm
         if (box.count() > kMostVoxels) return {nullptr, "too large a part of the image to look at"};
         std::vector<float> values(box.count()), level(box.count());
         image.sample(domain, {lo[0], lo[1], lo[2]}, {hi[0], hi[1], hi[2]}, values.data());
+        image.release();
         box.blur(values, sigma / domain.voxel_size);
         const auto accessor = start.getConstAccessor();
         for (std::size_t n = 0; n < level.size(); ++n) level[n] = accessor.getValue(box.at(n));

@@ -98,7 +98,7 @@ public:
                              "expected an axis for each dimension, got " + std::to_string(axes.size()) + " for " +
                                  std::to_string(array_.shape.size()));
         letters_ = letters_of(array_.metadata, axes);
-        set_axes();
+        axes_ = describe_axes(array_.metadata, letters_, array_, info_);
         if (ome_)
             describe_ome();
         else
@@ -130,31 +130,6 @@ private:
             ome_ = std::move(place->image);
             level_ = place->level;
         }
-    }
-
-    [[nodiscard]] std::size_t dimension(char letter) const { return letters_.find(letter); }
-
-    void set_axes() {
-        std::uint64_t size[3] = {};
-        for (int a = 0; a < 3; ++a) {
-            axes_.space[a] = dimension("xyz"[a]);
-            size[a] = array_.shape[axes_.space[a]];
-        }
-        info_.geometry.size = require_3d(path_, size);
-        for (std::size_t d = 0; d < letters_.size(); ++d) {
-            if (array_.shape[d] == 0)
-                throw read_error(Errc::InvalidInput, array_.metadata, "expected elements, got an axis of none");
-            if (letters_[d] == '?' && array_.shape[d] != 1)
-                throw read_error(Errc::Unsupported, array_.metadata,
-                                 "expected the axes t, c, z, y and x, got another one of " +
-                                     std::to_string(array_.shape[d]) + " elements");
-            if (letters_[d] == 'c') axes_.channel = d;
-            if (letters_[d] == 't') axes_.frame = d;
-            info_.axis_order.insert(0, 1, letters_[d] == '?' ? '?' : char(letters_[d] - 'a' + 'A'));
-        }
-        if (axes_.channel) info_.channels = static_cast<int>(array_.shape[*axes_.channel]);
-        if (axes_.frame) info_.frames = static_cast<int>(array_.shape[*axes_.frame]);
-        for (int a = 0; a < 3; ++a) info_.chunk_size[a] = static_cast<std::int32_t>(array_.chunk[axes_.space[a]]);
     }
 
     void describe_array() {
@@ -249,7 +224,7 @@ private:
     std::optional<OmeImage> ome_;
     std::size_t level_ = 0;
     std::string letters_;
-    ZarrAxes axes_;
+    ArrayAxes axes_;
     Vec3 in_unit_{1, 1, 1};  ///< lengths along x, y, z in the unit of the whole
 };
 

@@ -85,7 +85,7 @@ void Reader::set_type(char kind, char width, const std::string& name) {
             if (width == '4') return void(array_.type = PixelType::Int32);
             break;
         case 'f':
-            array_.half = width == '2';
+            if (width == '2') array_.stored_as = StoredAs::Half;
             if (width == '2' || width == '4') return void(array_.type = PixelType::Float);
             if (width == '8') return void(array_.type = PixelType::Double);
             break;
@@ -108,7 +108,7 @@ double Reader::bits_as_number(const std::string& text) const {
     const auto [end, status] = std::from_chars(digits.data(), digits.data() + digits.size(), bits, 16);
     if (status != std::errc() || end != digits.data() + digits.size() || digits.size() != 2 * array_.stored_bytes())
         throw wrong("expected the bits of an element as its fill_value, got " + quote(text));
-    if (array_.half) {
+    if (array_.stored_as == StoredAs::Half) {
         openvdb::math::internal::half value;
         value.setBits(static_cast<unsigned short>(bits));
         return float(value);
@@ -329,12 +329,6 @@ void Reader::read_shards(const Json& sharding) {
 std::string metadata_of(const std::string& folder, const char* name) { return folder + "/" + name; }
 
 }  // namespace
-
-std::uint64_t ZarrArray::stored_bytes() const { return half ? 2 : pixel_bytes(type); }
-
-std::uint64_t ZarrArray::chunk_bytes() const {
-    return std::accumulate(chunk.begin(), chunk.end(), stored_bytes(), std::multiplies<>());
-}
 
 std::string ZarrArray::file_of(const std::vector<std::uint64_t>& place) const {
     std::string file = folder + "/" + key_begin;

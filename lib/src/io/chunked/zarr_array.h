@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "covol/image.h"
+#include "io/chunked/array_chunks.h"
 #include "io/chunked/zarr_codecs.h"
 
 namespace covol::detail {
@@ -19,25 +19,16 @@ struct ZarrShards {
 
 /// What the metadata of an array says.
 /// https://zarr-specs.readthedocs.io/en/latest/v2/v2.0.html, https://zarr-specs.readthedocs.io/en/latest/v3/core/
-struct ZarrArray {
+struct ZarrArray : ChunkedArray {
     std::string folder;
     std::string metadata;  ///< the file that all this is from
     int version = 2;
-    PixelType type = PixelType::UInt8;
-    bool half = false;  ///< 16-bit floats, told as Float
-    bool swap = false;  ///< the other byte order
-    std::vector<std::uint64_t> shape;
-    std::vector<std::uint64_t> chunk;    ///< elements along each dimension; with shards of the chunks in them
-    std::vector<std::uint64_t> strides;  ///< elements of a chunk between neighbours along each dimension
     std::vector<ZarrCodec> codecs;
-    double fill = 0;  ///< of chunks that are missing
     ZarrShards shards;
     std::string key_begin;  ///< of a chunk's file name: "c/"
     char separator = '.';
     std::vector<std::string> dimension_names;  ///< empty, or one for each dimension
 
-    [[nodiscard]] std::uint64_t stored_bytes() const;  ///< of an element
-    [[nodiscard]] std::uint64_t chunk_bytes() const;   ///< of a chunk, unpacked
     /// The file of the chunk or shard at this place of the grid.
     [[nodiscard]] std::string file_of(const std::vector<std::uint64_t>& place) const;
 };

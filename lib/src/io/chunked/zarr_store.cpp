@@ -70,6 +70,10 @@ std::optional<Json> read_json(const std::string& path) {
         throw read_error(Errc::InvalidInput, path,
                          "expected metadata of 64 MiB at most, got " + std::to_string(file->size()) + " bytes");
     const Bytes text = file->read(0, file->size());
+    return parse_json(path, {text.data(), text.size()});
+}
+
+Json parse_json(const std::string& path, std::string_view text) {
     const auto check_depth = [&](int depth, Json::parse_event_t, const Json&) {
         if (depth > kDeepestJson)
             throw read_error(Errc::InvalidInput, path,
@@ -77,7 +81,7 @@ std::optional<Json> read_json(const std::string& path) {
         return true;
     };
     try {
-        Json json = Json::parse(text.data(), text.data() + text.size(), check_depth);
+        Json json = Json::parse(text.begin(), text.end(), check_depth);
         if (!json.is_object()) throw read_error(Errc::InvalidInput, path, "expected a JSON object");
         return json;
     } catch (const Json::exception& error) {

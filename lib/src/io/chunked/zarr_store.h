@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "covol/error.h"
 
@@ -53,6 +54,9 @@ private:
 /// @returns nothing when there is no such file.
 /// @throws Error InvalidInput (no JSON, or one that is larger or deeper than metadata can be), Io.
 std::optional<Json> read_json(const std::string& path);
+
+/// An object. @throws Error InvalidInput, with `path`, the text's.
+Json parse_json(const std::string& path, std::string_view text);
 
 /// The value of a key; null when there is none, or `object` is none.
 const Json& member(const Json& object, const char* key);

@@ -374,7 +374,11 @@ std::unique_ptr<ImageFile> open_dicom(const std::string& path, const RunContext&
         return std::make_unique<DicomSeries>(path, list_series(folder, run)[own.series]);
     }
     const auto series = list_series(path, run);
-    if (series.empty()) throw read_error(Errc::InvalidInput, path, "the folder holds no DICOM image");
+    if (series.empty())
+        throw read_error(
+            Errc::InvalidInput, path,
+            "expected a DICOM series, or a Zarr store (.zarray, .zgroup, .zattrs or zarr.json), got a folder "
+            "that holds no DICOM image and none of these files");
     if (series.size() > 1) {
         std::string list;
         for (const auto& [uid, slices] : series)

@@ -1,5 +1,4 @@
 // Formats whose headers ITK reads: NRRD, NIfTI, MetaImage, HDF5.
-#include <hdf5.h>
 #include <itkHDF5ImageIO.h>
 #include <itkMetaDataObject.h>
 #include <itkMetaImageIO.h>
@@ -18,6 +17,7 @@
 #include <vector>
 
 #include "base/file.h"
+#include "io/hdf5/hdf5_file.h"
 #include "io/image/image_formats.h"
 #include "io/image/itk_call.h"
 
@@ -25,22 +25,6 @@ namespace covol::detail {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// HDF5's own messages, which it would print, are off while this lives.
-class QuietHdf5 {
-public:
-    QuietHdf5() {
-        H5Eget_auto2(H5E_DEFAULT, &print_, &data_);
-        H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-    }
-    ~QuietHdf5() { H5Eset_auto2(H5E_DEFAULT, print_, data_); }
-    QuietHdf5(const QuietHdf5&) = delete;
-    QuietHdf5& operator=(const QuietHdf5&) = delete;
-
-private:
-    H5E_auto2_t print_ = nullptr;
-    void* data_ = nullptr;
-};
 
 /// ITK's reader and writer for files of this ending. Made directly: a static library has no registered factories.
 itk::ImageIOBase::Pointer make_io(const std::string& extension) {
@@ -302,6 +286,14 @@ public:
         info_ = std::move(info);
     }
 
+    ~ItkFile() override {
+        std::optional<Hdf5Lock> lock;
+        if (in_boxes_) lock.emplace();
+        io_ = nullptr;  // closes the file
+    }
+    ItkFile(const ItkFile&) = delete;
+    ItkFile& operator=(const ItkFile&) = delete;
+
     Pixels read(const PixelRequest& request, const RunContext&) override {
         const unsigned dimensions = io_->GetNumberOfDimensions();
         itk::ImageIORegion region(dimensions);
@@ -319,7 +311,8 @@ public:
         const std::shared_ptr<void> data =
             allocate_pixels(path_, frame * std::uint64_t(info_.frames), info_.type, file_bytes_);
         io_->SetIORegion(region);
-        const QuietHdf5 quiet;
+        std::optional<Hdf5Lock> lock;
+        if (in_boxes_) lock.emplace();
         with_itk(Errc::InvalidInput, unusable_, [&] { io_->Read(data.get()); });
         Pixels pixels;
         pixels.stride = dense_strides(box.size());
@@ -386,7 +379,8 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path) {
     begin.packed = end == ".nii.gz";
     std::optional<NiftiHeader> nifti;
     if (is_nifti) nifti.emplace(begin, unusable);
-    const QuietHdf5 quiet;
+    std::optional<Hdf5Lock> lock;
+    if (is_hdf5) lock.emplace();
     const itk::ImageIOBase::Pointer io = make_io(end);
     io->SetFileName(path);
     with_itk(Errc::InvalidInput, unusable, [&] {

@@ -136,6 +136,23 @@ private:
             info_.spacing_known[a] = stack_.spacing[a] > 0;
             if (info_.spacing_known[a]) geometry.spacing[a] = stack_.spacing[a];
         }
+        PixelRequest all;
+        all.box = whole_box(geometry.size);
+        if (!may_map(all) && is_worth_mapping(ImageFile::bytes_to_hold(all)))
+            info_.chunk_size = tiff_chunk_size(*tiff_, frame_of_kind());
+    }
+
+    /// One channel and frame, but for where it lies.
+    [[nodiscard]] TiffFrame frame_of_kind() const {
+        TiffFrame frame;
+        frame.path = path_;
+        frame.type = info_.type;
+        frame.size = info_.geometry.size;
+        frame.kind = kind_;
+        frame.files = stack_.files;
+        frame.contiguous = contiguous_;
+        frame.swapped = TIFFIsByteSwapped(tiff_->get()) != 0;
+        return frame;
     }
 
     [[nodiscard]] TiffStack::Plane plane(const PixelRequest& request, std::int32_t k) const {
@@ -147,16 +164,9 @@ private:
     }
 
     [[nodiscard]] Pixels read_in_chunks(const PixelRequest& request, const RunContext& run) const {
-        TiffFrame frame;
-        frame.path = path_;
-        frame.type = info_.type;
-        frame.size = info_.geometry.size;
-        frame.kind = kind_;
+        TiffFrame frame = frame_of_kind();
         frame.sample = kind_.samples > 1 ? request.channel : 0;
-        frame.files = stack_.files;
         for (std::int32_t k = 0; k < frame.size[2]; ++k) frame.slices.push_back(plane(request, k));
-        frame.contiguous = contiguous_;
-        frame.swapped = TIFFIsByteSwapped(tiff_->get()) != 0;
         return read_chunks(tiff_chunks(frame, tiff_chunk_size(*tiff_, frame)), request.box, run);
     }
 

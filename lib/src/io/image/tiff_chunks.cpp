@@ -83,7 +83,10 @@ public:
         }
     }
 
-    void read(const Index3& chunk, void* out) const override { read_layer({chunk}, {out}); }
+    [[nodiscard]] bool read(const Index3& chunk, void* out) const override {
+        read_layer({chunk}, {out});
+        return true;
+    }
 
     /// A strip is as wide as the page, and unpacked once for all its columns.
     [[nodiscard]] bool in_layers() const noexcept override { return true; }

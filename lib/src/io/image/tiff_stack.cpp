@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/pixels/raw_image.h"
+#include "io/xml.h"
 
 namespace covol::detail {
 namespace {
@@ -149,101 +150,6 @@ bool read_tifffile(const TiffFacts& facts, TiffStack& stack) {
 }
 
 // ---- OME ----------------------------------------------------------------------------------------------------------
-
-struct XmlTag {
-    std::string name;  ///< without a namespace
-    bool closing = false;
-    std::map<std::string, std::string> attributes;
-
-    [[nodiscard]] std::string value(const std::string& key) const {
-        const auto found = attributes.find(key);
-        return found == attributes.end() ? "" : found->second;
-    }
-};
-
-std::string decode_entities(const std::string& text) {
-    static constexpr std::pair<const char*, const char*> kEntities[] = {
-        {"amp;", "&"},         {"lt;", "<"},          {"gt;", ">"},          {"quot;", "\""},
-        {"apos;", "'"},        {"#181;", "\xC2\xB5"}, {"#xB5;", "\xC2\xB5"}, {"#xb5;", "\xC2\xB5"},
-        {"#956;", "\xCE\xBC"}, {"#197;", "\xC3\x85"}};
-    std::string out;
-    for (std::size_t at = 0; at < text.size(); ++at) {
-        out += text[at];
-        if (text[at] != '&') continue;
-        for (const auto& [name, meaning] : kEntities) {
-            const std::string_view entity(name);
-            if (text.compare(at + 1, entity.size(), entity) != 0) continue;
-            out.back() = meaning[0];
-            out += meaning + 1;
-            at += entity.size();
-            break;
-        }
-    }
-    return out;
-}
-
-/// Goes through the tags of an XML text; comments, declarations and text are passed over. Whatever is no XML ends it.
-class XmlTags {
-public:
-    explicit XmlTags(const std::string& text) : text_(text) {}
-
-    bool next(XmlTag& tag) {
-        while ((at_ = text_.find('<', at_)) != std::string::npos) {
-            if (text_.compare(at_, 4, "<!--") == 0) {
-                at_ = text_.find("-->", at_);
-                if (at_ == std::string::npos) return false;
-                continue;
-            }
-            ++at_;
-            if (at_ < text_.size() && (text_[at_] == '?' || text_[at_] == '!')) continue;
-            return read(tag);
-        }
-        return false;
-    }
-
-private:
-    static bool is_space(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
-    void skip_spaces() {
-        while (at_ < text_.size() && is_space(text_[at_])) ++at_;
-    }
-    std::string word() {
-        const std::size_t begin = at_;
-        while (at_ < text_.size() && !is_space(text_[at_]) && text_[at_] != '=' && text_[at_] != '>' &&
-               text_[at_] != '/')
-            ++at_;
-        const std::string name = text_.substr(begin, at_ - begin);
-        return name.substr(name.rfind(':') == std::string::npos ? 0 : name.rfind(':') + 1);
-    }
-    bool read(XmlTag& tag) {
-        tag = {};
-        if (at_ < text_.size() && text_[at_] == '/') {
-            tag.closing = true;
-            ++at_;
-        }
-        tag.name = word();
-        for (;;) {
-            skip_spaces();
-            if (at_ >= text_.size() || text_[at_] == '>') return at_ < text_.size();
-            if (text_[at_] == '/') {
-                ++at_;
-                continue;
-            }
-            const std::string key = word();
-            skip_spaces();
-            if (key.empty() || at_ >= text_.size() || text_[at_] != '=') return false;
-            ++at_;
-            skip_spaces();
-            const char quote = at_ < text_.size() ? text_[at_] : '\0';
-            const std::size_t end = quote == '"' || quote == '\'' ? text_.find(quote, at_ + 1) : std::string::npos;
-            if (end == std::string::npos) return false;
-            tag.attributes[key] = decode_entities(text_.substr(at_ + 1, end - at_ - 1));
-            at_ = end + 1;
-        }
-    }
-
-    const std::string& text_;
-    std::size_t at_ = 0;
-};
 
 /// <TiffData>: which pages hold which planes.
 struct TiffData {

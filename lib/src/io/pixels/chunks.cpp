@@ -84,15 +84,29 @@ ChunkSource::ChunkSource(std::string path, PixelType type, const Index3& size, c
 }
 
 void ChunkSource::read_layer(const std::vector<Index3>& chunks, const std::vector<void*>& out) const {
-    for (std::size_t n = 0; n < chunks.size(); ++n) read(chunks[n], out[n]);
+    for (std::size_t n = 0; n < chunks.size(); ++n) read_or_fill(chunks[n], out[n]);
+}
+
+void ChunkSource::read_or_fill(const Index3& chunk, void* out) const {
+    if (!read(chunk, out)) fill(out);
+}
+
+void ChunkSource::fill(void* out) const {
+    with_pixel_type(type_, [&](auto pixel) {
+        std::fill_n(static_cast<decltype(pixel)*>(out), voxel_count(chunk_size_),
+                    static_cast<decltype(pixel)>(fill_value()));
+    });
 }
 
 struct ChunkedVoxels::Table {
     struct Entry {
         std::once_flag once;
-        std::unique_ptr<char[]> voxels;
+        std::unique_ptr<char[]> own;   ///< null where the file has no such chunk
+        const char* voxels = nullptr;  ///< own, or fill values
         std::atomic<bool> is_there{false};
     };
+    std::once_flag filled;
+    std::unique_ptr<char[]> fill;
     tbb::concurrent_unordered_map<std::uint64_t, Entry> entries;
 };
 
@@ -129,23 +143,36 @@ void ChunkedVoxels::keep(std::uint64_t number, std::unique_ptr<char[]> voxels) c
     Table::Entry& entry = table_->entries[number];
     std::call_once(entry.once, [&] {
         require_finite(*source_, box_of(number), voxels.get());
-        entry.voxels = std::move(voxels);
+        entry.own = std::move(voxels);
+        entry.voxels = entry.own.get();
         entry.is_there = true;
         ++reads_;
     });
 }
 
-const void* ChunkedVoxels::chunk(std::uint64_t number) const {
+const char* ChunkedVoxels::fill_chunk() const {
+    std::call_once(table_->filled, [&] {
+        table_->fill = chunk_memory();
+        source_->fill(table_->fill.get());
+    });
+    return table_->fill.get();
+}
+
+const char* ChunkedVoxels::chunk(std::uint64_t number) const {
     Table::Entry& entry = table_->entries[number];
     std::call_once(entry.once, [&] {
         std::unique_ptr<char[]> voxels = chunk_memory();
-        source_->read(place_of(number), voxels.get());
-        require_finite(*source_, box_of(number), voxels.get());
-        entry.voxels = std::move(voxels);
+        if (source_->read(place_of(number), voxels.get())) {
+            require_finite(*source_, box_of(number), voxels.get());
+            entry.own = std::move(voxels);
+            entry.voxels = entry.own.get();
+        } else {
+            entry.voxels = fill_chunk();
+        }
         entry.is_there = true;
         ++reads_;
     });
-    return entry.voxels.get();
+    return entry.voxels;
 }
 
 void ChunkedVoxels::load_together(const std::vector<std::uint64_t>& numbers) const {
@@ -194,7 +221,11 @@ void ChunkedVoxels::load(const std::vector<VoxelBox>& boxes, const RunContext& r
         run.check();
         run.report("image", double(first) / double(groups.size()));
         tbb::parallel_for(first, std::min(first + batch, groups.size()), [&](std::size_t n) {
-            if (!run.cancelled()) load_together(groups[n]);
+            if (run.cancelled()) return;
+            if (source_->in_layers())
+                load_together(groups[n]);
+            else
+                static_cast<void>(chunk(groups[n].front()));
         });
     }
     run.check();
@@ -257,7 +288,7 @@ Pixels read_chunks(std::shared_ptr<const ChunkSource> source, const VoxelBox& bo
         const Index3 c{around.min[0] + std::int32_t(at % n[0]), around.min[1] + std::int32_t(at / n[0] % n[1]),
                        around.min[2] + std::int32_t(at / n[0] / n[1])};
         const std::unique_ptr<char[]> voxels(new char[voxel_count(size) * width]);
-        source->read(c, voxels.get());
+        source->read_or_fill(c, voxels.get());
         copy_part(part_of(box, c, size), voxels.get(), size, box, data.get(), width);
     });
     run.check();

@@ -20,12 +20,19 @@ public:
 
     /// Decodes chunk c, counted along i, j, k from 0, into chunk_size() voxels, i fastest; beyond the image's end
     /// anything may stand there. Several threads may call it at once.
+    /// @returns false where the file has no such chunk: its voxels are fill_value(), and `out` is as it was.
     /// @throws Error InvalidInput (damaged), Io, Unsupported.
-    virtual void read(const Index3& chunk, void* out) const = 0;
+    [[nodiscard]] virtual bool read(const Index3& chunk, void* out) const = 0;
+    /// Of chunks that the file does not have.
+    [[nodiscard]] virtual double fill_value() const noexcept { return 0; }
+    /// read(), or fill values where the file has no such chunk.
+    void read_or_fill(const Index3& chunk, void* out) const;
+    /// A chunk of fill values.
+    void fill(void* out) const;
 
     /// Chunks of one k cost little more together than one of them does: see ChunkedVoxels::load().
     [[nodiscard]] virtual bool in_layers() const noexcept { return false; }
-    /// Decodes chunks that share their k, each to its own place, as read() does.
+    /// Decodes chunks that share their k, each to its own place.
     virtual void read_layer(const std::vector<Index3>& chunks, const std::vector<void*>& out) const;
 
     [[nodiscard]] const std::string& path() const noexcept { return path_; }  ///< for messages
@@ -46,7 +53,8 @@ private:
 /// What one chunk may take when it is unpacked. Zarr's own codecs stop at 2 GiB; the usual size is below 16 MiB.
 constexpr std::uint64_t kMostChunkBytes = std::uint64_t(1) << 30;
 
-/// The chunks of a source, each decoded when its first voxel is asked for, and kept. Safe to use by several threads.
+/// The chunks of a source, each decoded when its first voxel is asked for, and kept; those that the file does not have
+/// share one chunk of fill values. Safe to use by several threads.
 class ChunkedVoxels {
 public:
     explicit ChunkedVoxels(std::shared_ptr<const ChunkSource> source);
@@ -76,7 +84,8 @@ private:
     struct Table;
     [[nodiscard]] std::uint64_t number_of(const Index3& chunk) const noexcept;
     [[nodiscard]] Index3 place_of(std::uint64_t number) const noexcept;
-    [[nodiscard]] const void* chunk(std::uint64_t number) const;
+    [[nodiscard]] const char* chunk(std::uint64_t number) const;
+    [[nodiscard]] const char* fill_chunk() const;
     [[nodiscard]] bool is_there(std::uint64_t number) const;
     void keep(std::uint64_t number, std::unique_ptr<char[]> voxels) const;
     [[nodiscard]] std::unique_ptr<char[]> chunk_memory() const;

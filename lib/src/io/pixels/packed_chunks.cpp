@@ -14,7 +14,7 @@ constexpr Index3 kBrick{64, 64, 16};
 class PackedChunks : public ChunkSource {
 public:
     PackedChunks(const std::string& path, PixelPlace place, const PackedFrame& frame, const RunContext& run)
-        : ChunkSource(path, frame.type, frame.size, smaller(frame.size, kBrick)),
+        : ChunkSource(path, frame.type, frame.size, packed_chunk_size(frame.size)),
           place_(std::move(place)),
           frame_(frame),
           row_bytes_(std::uint64_t(frame.size[0]) * frame.components * place_.stored_bytes()),
@@ -22,7 +22,10 @@ public:
           index_(place_.path, place_.file_offset, frame.begin + slice_bytes_ * std::uint64_t(frame.size[2]),
                  frame.is_last, run) {}
 
-    void read(const Index3& chunk, void* out) const override { read_layer({chunk}, {out}); }
+    [[nodiscard]] bool read(const Index3& chunk, void* out) const override {
+        read_layer({chunk}, {out});
+        return true;
+    }
 
     [[nodiscard]] bool in_layers() const noexcept override { return true; }
 
@@ -54,10 +57,6 @@ public:
     }
 
 private:
-    static Index3 smaller(const Index3& a, const Index3& b) {
-        return {std::min(a[0], b[0]), std::min(a[1], b[1]), std::min(a[2], b[2])};
-    }
-
     PixelPlace place_;
     PackedFrame frame_;
     std::uint64_t row_bytes_, slice_bytes_;
@@ -65,6 +64,10 @@ private:
 };
 
 }  // namespace
+
+Index3 packed_chunk_size(const Index3& size) {
+    return {std::min(size[0], kBrick[0]), std::min(size[1], kBrick[1]), std::min(size[2], kBrick[2])};
+}
 
 std::shared_ptr<const ChunkSource> packed_chunks(const std::string& path, const PixelPlace& place,
                                                  const PackedFrame& frame, const RunContext& run) {

@@ -17,6 +17,9 @@ struct PackedFrame {
     bool is_last = true;      ///< nothing follows it but the checksum
 };
 
+/// Voxels of its chunks.
+Index3 packed_chunk_size(const Index3& size);
+
 /// Bricks of a packed frame, decoded in layers of a few slices from the nearest place where the stream can be entered.
 /// Unpacks all of it once, which finds damage and takes 32 KiB for every 8 MiB.
 /// @throws Error InvalidInput (damaged, truncated), Io, Cancelled.

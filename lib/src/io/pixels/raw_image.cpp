@@ -87,6 +87,9 @@ public:
         slice_bytes_ = row_bytes_ * std::uint64_t(size[1]);
         frame_bytes_ = slice_bytes_ * std::uint64_t(size[2]) + place_.frame_gap;
         check_file_size();
+        PixelRequest all;
+        all.box = whole_box(size);
+        if (is_in_chunks(all)) info_.chunk_size = packed_chunk_size(size);
     }
 
     [[nodiscard]] std::uint64_t bytes_to_hold(const PixelRequest& request) const override {

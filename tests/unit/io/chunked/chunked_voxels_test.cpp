@@ -9,6 +9,7 @@
 
 #include "covol/image.h"
 #include "io/pixels/chunks.h"
+#include "support/resident.h"
 #include "support/scratch.h"
 #include "unit/io/chunked/zarr_stores.h"
 
@@ -22,7 +23,7 @@ class Numbered : public detail::ChunkSource {
 public:
     Numbered(const Index3& size, const Index3& chunk) : ChunkSource("numbered", PixelType::Float, size, chunk) {}
 
-    void read(const Index3& c, void* out) const override {
+    [[nodiscard]] bool read(const Index3& c, void* out) const override {
         ++reads;
         const Index3& n = chunk_size();
         auto* value = static_cast<float*>(out);
@@ -30,11 +31,22 @@ public:
             for (int j = c[1] * n[1]; j < (c[1] + 1) * n[1]; ++j)
                 for (int i = c[0] * n[0]; i < (c[0] + 1) * n[0]; ++i)
                     *value++ = bad == Index3{i, j, k} ? std::numeric_limits<float>::quiet_NaN() : number(i, j, k);
+        return true;
     }
     static float number(int i, int j, int k) { return float(i) + 100.0F * float(j) + 10000.0F * float(k); }
 
     mutable std::atomic<int> reads{0};
     Index3 bad{-1, -1, -1};
+};
+
+/// Every chunk but the first one is missing.
+class Missing : public Numbered {
+public:
+    using Numbered::Numbered;
+    [[nodiscard]] bool read(const Index3& c, void* out) const override {
+        return c == Index3{0, 0, 0} && Numbered::read(c, out);
+    }
+    [[nodiscard]] double fill_value() const noexcept override { return -3; }
 };
 
 /// 1024^2 x 256 voxels of a byte: enough to be read chunk by chunk. Eight chunks of 64^3 are there.
@@ -90,6 +102,20 @@ TEST_CASE("chunks: each is decoded once, and only what is asked for") {
     CHECK(wrong == 0);
     CHECK(source->reads == 8);
     CHECK(voxels.read_chunks() == std::vector<std::uint64_t>{0, 1, 4, 5, 16, 17, 20, 21});
+}
+
+TEST_CASE("chunks: those that a file does not have share one chunk of fill values") {
+    const ChunkedVoxels voxels(std::make_shared<Missing>(Index3{512, 512, 512}, Index3{128, 128, 128}));
+    const std::uint64_t before = resident_bytes();
+    voxels.load({detail::whole_box({512, 512, 512})}, {});
+    CHECK(voxels.read_count() == 64);
+    CHECK(resident_bytes() < before + 8 * 128 * 128 * 128 * sizeof(float));
+    CHECK(voxels.at({127, 5, 6}) == double(Numbered::number(127, 5, 6)));
+    CHECK(voxels.at({128, 5, 6}) == -3);
+    float pair[2];
+    voxels.copy({{127, 5, 6}, {128, 5, 6}}, pair);
+    CHECK(pair[0] == Numbered::number(127, 5, 6));
+    CHECK(pair[1] == -3);
 }
 
 TEST_CASE("chunks: two images do not take each other's chunks for their own") {

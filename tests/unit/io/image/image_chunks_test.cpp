@@ -261,3 +261,33 @@ TEST_CASE("a TIFF's tiles and strips are read one by one, by several threads") {
         fuzz(scratch, path, read_all, 6);
     }
 }
+
+TEST_CASE("the header of a large packed file tells the chunks that it will be read in") {
+    const Scratch scratch;
+    const std::string nrrd = "NRRD0004\ntype: uint8\ndimension: 3\nspacings: 1 1 1\nencoding: gzip\nsizes: ";
+    const std::string stream = packed(std::string(1U << 20, 'a'), kGzip) + std::string(1U << 16, 'b');
+    const std::string large = scratch.write("large.nrrd", nrrd + "650 650 650\n\n" + stream);
+    CHECK(read_image_info(large).chunk_size == Index3{64, 64, 16});
+    CHECK(read_image_info(large).bytes_to_hold == 0);
+    const std::string small = scratch.write("small.nrrd", nrrd + "600 600 600\n\n" + stream);
+    CHECK(read_image_info(small).chunk_size == Index3{0, 0, 0});
+
+    // pages whose tiles, but the first one, were never written
+    const std::string path = scratch.path("a.tif");
+    TIFF* tiff = TIFFOpen(path.c_str(), "w");
+    for (int k = 0; k < 3; ++k) {
+        TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, 16384);
+        TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, 8192);
+        TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 8);
+        TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, 1);
+        TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+        TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_ADOBE_DEFLATE);
+        TIFFSetField(tiff, TIFFTAG_TILEWIDTH, 512);
+        TIFFSetField(tiff, TIFFTAG_TILELENGTH, 256);
+        std::string tile(512 * 256, 'a');
+        TIFFWriteTile(tiff, tile.data(), 0, 0, 0, 0);
+        TIFFWriteDirectory(tiff);
+    }
+    TIFFClose(tiff);
+    CHECK(read_image_info(path).chunk_size == Index3{512, 256, 1});
+}

@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "covol/image.h"
+#include "support/resident.h"
 #include "support/scratch.h"
 
 using namespace covol;
@@ -100,6 +101,20 @@ TEST_CASE("a file too large to read is mapped, and only what the box needs is as
     const Image image = read_image(path);
     CHECK(image.at(500, 600, 700) == 42);
     CHECK(image.at(501, 600, 700) == 0);
+
+    // touched pages count as the program's until they are given back
+    const std::uint64_t before = resident_bytes();
+    constexpr std::uint64_t kTouched = std::uint64_t(32) << 20;
+    double sum = 0;
+    for (int k = 0; k < 8; ++k)
+        for (int j = 0; j < int(kSize); ++j)
+            for (int i = 0; i < int(kSize); i += 512) sum += image.at(i, j, 2 * k);
+    CHECK(sum == 0);
+    CHECK(resident_bytes() > before + kTouched / 2);
+    image.release();
+    CHECK(resident_bytes() < before + kTouched / 8);
+    CHECK(image.at(500, 600, 700) == 42);
+
     ReadImageOptions options;
     options.roi = WorldBox{{499, 599, 1399}, {501, 601, 1401}};
     CHECK(read_image_info(path, options).bytes_to_hold == 5U * 5U * 5U);

@@ -1,0 +1,64 @@
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/chunked/array_chunks.h"
+#include "io/hdf5/hdf5_file.h"
+#include "io/hdf5/hdf5_filters.h"
+
+namespace covol::detail {
+
+/// A dataset of grey values.
+class Hdf5Dataset {
+public:
+    /// @throws Error InvalidInput (damaged), Unsupported (types, filters, datasets whose values lie in other files).
+    Hdf5Dataset(std::shared_ptr<const Hdf5File> file, const std::string& name);
+
+    [[nodiscard]] const std::string& path() const noexcept { return path_; }  ///< "FILE.h5:/name", for messages
+    /// Its chunks are those of the file; of a dataset that has none, bricks.
+    [[nodiscard]] const ChunkedArray& array() const noexcept { return array_; }
+    /// Where in the file all values lie behind each other; none where they do not.
+    [[nodiscard]] std::optional<std::uint64_t> offset() const noexcept { return offset_; }
+    /// Integers of 16 bits have no sign, whatever the file says.
+    void take_as_unsigned() noexcept;
+    /// "gzip, shuffle"; empty without filters.
+    [[nodiscard]] std::string filter_names() const;
+    /// ArrayChunks::elements(). Several threads may call it at once.
+    [[nodiscard]] std::optional<Bytes> elements(const std::vector<std::uint64_t>& place) const;
+
+private:
+    void read_type(hid_t type);
+    void read_shape(hid_t space);
+    void read_layout(hid_t properties);
+    void read_filters(hid_t properties);
+    void read_fill(hid_t properties);
+    void set_bricks();
+    void check_chunk() const;
+    [[nodiscard]] std::optional<Bytes> packed_chunk(const std::vector<std::uint64_t>& begin, unsigned& skipped) const;
+    void read_box(const std::vector<std::uint64_t>& begin, const std::vector<std::uint64_t>& shape, void* out) const;
+    [[nodiscard]] Error damaged(const std::string& what) const;
+
+    std::shared_ptr<const Hdf5File> file_;
+    std::string path_;
+    Hdf5Id dataset_, type_;
+    ChunkedArray array_;
+    std::vector<Hdf5Filter> filters_;
+    bool as_packed_ = false;  ///< chunks are taken as they lie in the file, and unpacked here
+    std::optional<std::uint64_t> offset_;
+};
+
+/// The shape alone, and whether there are numbers; without what reading them needs.
+struct Hdf5Shape {
+    std::vector<std::uint64_t> shape;
+    bool has_numbers = false;
+};
+Hdf5Shape shape_of(const Hdf5File& file, const std::string& name);
+
+/// The chunks of one channel and frame.
+std::shared_ptr<const ChunkSource> hdf5_chunks(std::shared_ptr<const Hdf5Dataset> dataset, const ArrayAxes& axes,
+                                               const Index3& size, std::uint64_t channel, std::uint64_t frame);
+
+}  // namespace covol::detail

@@ -1,0 +1,87 @@
+#pragma once
+#include <hdf5.h>
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+// HDF5 files, through the HDF5 library. Whatever stands in them may be wrong on purpose.
+namespace covol::detail {
+
+/// While one lives its thread alone is in the HDF5 library, which need not be safe for several, and the library prints
+/// no messages. One thread may hold several. ITK's readers share the library.
+class Hdf5Lock {
+public:
+    Hdf5Lock();
+    ~Hdf5Lock();
+    Hdf5Lock(const Hdf5Lock&) = delete;
+    Hdf5Lock& operator=(const Hdf5Lock&) = delete;
+
+private:
+    H5E_auto2_t print_ = nullptr;
+    void* data_ = nullptr;
+};
+
+/// What the library knows by a number, until this ends.
+class Hdf5Id {
+public:
+    using Close = herr_t (*)(hid_t);
+    Hdf5Id() = default;
+    /// Takes what a function of the library made; < 0: it failed.
+    Hdf5Id(hid_t id, Close close) : id_(id), close_(close) {}
+    Hdf5Id(Hdf5Id&& other) noexcept;
+    Hdf5Id& operator=(Hdf5Id&& other) noexcept;
+    Hdf5Id(const Hdf5Id&) = delete;
+    Hdf5Id& operator=(const Hdf5Id&) = delete;
+    ~Hdf5Id();
+
+    [[nodiscard]] hid_t get() const noexcept { return id_; }
+    explicit operator bool() const noexcept { return id_ >= 0; }
+
+private:
+    hid_t id_ = -1;
+    Close close_ = nullptr;
+};
+
+/// A file, open for reading. Links into other files are not followed.
+class Hdf5File {
+public:
+    /// @throws Error InvalidInput (damaged, truncated, no HDF5).
+    explicit Hdf5File(std::string path);
+
+    [[nodiscard]] const std::string& path() const noexcept { return path_; }
+    [[nodiscard]] std::uint64_t bytes() const noexcept { return bytes_; }
+    /// "FILE.h5:/name", for messages.
+    [[nodiscard]] std::string path_of(const std::string& name) const;
+    /// Whether there is such a group or dataset. Names are paths from the root.
+    [[nodiscard]] bool has(const std::string& name) const;
+    [[nodiscard]] bool has_dataset(const std::string& name) const;
+    /// @throws Error InvalidInput where there is none, or in another file.
+    [[nodiscard]] Hdf5Id open(const std::string& name) const;
+    /// The names in a group, sorted; 100000 at most. None where it is no group.
+    [[nodiscard]] std::vector<std::string> members(const std::string& group) const;
+    /// The datasets in a group and the groups in it, by their paths from the root, sorted. Not through soft links.
+    [[nodiscard]] std::vector<std::string> datasets(const std::string& group) const;
+
+    /// The numbers of an attribute; empty where there is none, or where it holds others or too many.
+    [[nodiscard]] std::vector<double> numbers(const std::string& object, const char* attribute) const;
+    /// Its text, or the characters of a list; empty where there is none.
+    [[nodiscard]] std::string text(const std::string& object, const char* attribute) const;
+    /// The texts of a list.
+    [[nodiscard]] std::vector<std::string> texts(const std::string& object, const char* attribute) const;
+    /// A small dataset of numbers, the last dimension fastest; empty where it is no such.
+    [[nodiscard]] std::vector<double> table(const std::string& name) const;
+
+private:
+    [[nodiscard]] H5O_type_t type_of(const std::string& name) const;
+    [[nodiscard]] Hdf5Id open_attribute(const std::string& object, const char* attribute) const;
+    [[nodiscard]] std::string first_external_link(const std::string& name) const;
+
+    std::string path_;
+    std::uint64_t bytes_ = 0;
+    Hdf5Id file_, access_;
+};
+
+}  // namespace covol::detail

@@ -1,0 +1,24 @@
+#pragma once
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "io/pixels/raw_image.h"
+
+namespace covol::detail {
+
+/// "FILE.h5:/path/to/dataset", in its parts.
+struct Hdf5Name {
+    std::string path, inside;
+};
+/// @returns an empty `inside` where `text` names a file alone; nothing where its name is not one of HDF5.
+std::optional<Hdf5Name> split_hdf5_name(const std::string& text);
+
+/// Whether the file as a whole is an image in ITK's layout, which ITK reads. @throws Error InvalidInput.
+bool is_itk_hdf5(const Hdf5Name& name);
+
+/// An image in an HDF5 file: Imaris', BigDataViewer's, ilastik's, or any dataset of grey values.
+/// @throws Error InvalidInput (damaged), Io, Unsupported (types, filters, several datasets: lists them).
+std::unique_ptr<ImageFile> open_hdf5(const Hdf5Name& name);
+
+}  // namespace covol::detail

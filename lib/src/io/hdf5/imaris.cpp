@@ -1,0 +1,163 @@
+// Imaris: groups for levels, time points and channels, and attributes whose values are texts, a character an element.
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "base/text.h"
+#include "io/hdf5/hdf5_layouts.h"
+#include "io/pixels/raw_image.h"
+
+namespace covol::detail {
+namespace {
+
+constexpr const char *kLevel = "ResolutionLevel ", *kTime = "TimePoint ", *kChannel = "Channel ";
+constexpr int kMostLevels = 32;
+
+/// What a path chose.
+struct Choice {
+    int level = 0;
+    std::optional<int> time, channel;
+};
+
+/// @returns nothing where the path does not lead to an image's data.
+std::optional<Choice> parse(const std::string& inside) {
+    const std::vector<std::string> parts = parts_of(inside);
+    Choice choice;
+    for (std::size_t n = 0; n < parts.size(); ++n) {
+        std::optional<int> number = 0;
+        if (n == 0 && parts[n] != "DataSet") return std::nullopt;
+        if (n == 1) choice.level = (number = number_behind(parts[n], kLevel)).value_or(0);
+        if (n == 2) choice.time = number = number_behind(parts[n], kTime);
+        if (n == 3) choice.channel = number = number_behind(parts[n], kChannel);
+        if (!number || n > 4 || (n == 4 && parts[n] != "Data")) return std::nullopt;
+    }
+    return choice;
+}
+
+std::string level_name(int level) { return std::string("/DataSet/") + kLevel + std::to_string(level); }
+
+std::string channel_name(int level, int time, int channel) {
+    return level_name(level) + "/" + kTime + std::to_string(time) + "/" + kChannel + std::to_string(channel);
+}
+
+/// Of the attributes of /DataSetInfo/Image.
+class Extent {
+public:
+    explicit Extent(const Hdf5File& file) : file_(file) {
+        for (int a = 0; a < 3; ++a) {
+            const auto least = number("ExtMin" + std::to_string(a)), most = number("ExtMax" + std::to_string(a));
+            known_ = known_ && least && most && std::isfinite(*least) && std::isfinite(*most) && *most > *least;
+            if (!known_) return;
+            min_[a] = *least;
+            side_[a] = *most - *least;
+        }
+    }
+    [[nodiscard]] bool is_known() const { return known_; }
+    /// Of a voxel of the finest level.
+    [[nodiscard]] Vec3 spacing(const Index3& size) const {
+        Vec3 spacing{1, 1, 1};
+        for (int a = 0; known_ && a < 3; ++a) spacing[a] = side_[a] / size[a];
+        return spacing;
+    }
+    [[nodiscard]] const Vec3& min() const { return min_; }
+
+private:
+    [[nodiscard]] std::optional<double> number(const std::string& name) const {
+        return to_number(trim(file_.text("/DataSetInfo/Image", name.c_str())));
+    }
+
+    const Hdf5File& file_;
+    bool known_ = true;
+    Vec3 min_{0, 0, 0}, side_{1, 1, 1};
+};
+
+/// Without the padding to whole chunks.
+Index3 size_of(const Hdf5File& file, int level, int time, int channel) {
+    const std::string name = channel_name(level, time, channel);
+    const std::string data = name + "/Data";
+    const std::vector<std::uint64_t> shape = shape_of(file, data).shape;
+    if (shape.size() != 3)
+        throw read_error(Errc::InvalidInput, file.path_of(data),
+                         "expected 3 dimensions, got " + std::to_string(shape.size()));
+    std::uint64_t size[3];
+    for (int a = 0; a < 3; ++a) {
+        const auto stated =
+            to_number<std::uint64_t>(trim(file.text(name, (std::string("ImageSize") + "XYZ"[a]).c_str())));
+        size[a] = stated.value_or(shape[std::size_t(2 - a)]);
+    }
+    return require_3d(file.path_of(data), size);
+}
+
+/// Each level has voxels of 1, 2, 4, ... fine ones along each axis, and a last odd one left over or alone.
+Vec3 factors(const Index3& fine, const Index3& coarse) {
+    Vec3 factor;
+    for (int a = 0; a < 3; ++a)
+        factor[a] = std::exp2(std::max(0.0, std::round(std::log2(double(fine[a]) / coarse[a]))));
+    return factor;
+}
+
+int count_of(const Hdf5File& file, const std::string& group, const char* word) {
+    int count = 0;
+    const std::vector<std::string> names = file.members(group);
+    while (std::binary_search(names.begin(), names.end(), word + std::to_string(count))) ++count;
+    return count;
+}
+
+Vec3 times(const Vec3& a, const Vec3& b) { return {a[0] * b[0], a[1] * b[1], a[2] * b[2]}; }
+
+void describe_levels(const Hdf5File& file, const Extent& extent, const Index3& fine, const Choice& choice,
+                     ImageInfo& info) {
+    const int count = std::min(count_of(file, "/DataSet", kLevel), kMostLevels);
+    for (int level = 0; level < count; ++level) {
+        const std::string name = level_name(level);
+        try {
+            const Index3 size = size_of(file, level, choice.time.value_or(0), choice.channel.value_or(0));
+            info.levels.push_back(level_text(name, size, times(extent.spacing(fine), factors(fine, size))));
+        } catch (const Error&) {  // it does not matter until it is read
+            info.levels.push_back(name + ": cannot be read");
+        }
+    }
+}
+
+}  // namespace
+
+std::optional<Hdf5Layout> imaris_layout(const Hdf5File& file, const std::string& inside) {
+    const std::optional<Choice> choice = parse(inside);
+    if (!choice || !file.has(level_name(0)) || !file.has("/DataSetInfo/Image")) return std::nullopt;
+    const int time = choice->time.value_or(0), channel = choice->channel.value_or(0);
+    Hdf5Layout layout;
+    ImageInfo& info = layout.info;
+    info.format = "Imaris";
+    layout.in_datasets = true;
+    const Extent extent(file);
+    const Index3 fine = size_of(file, 0, time, channel);
+    layout.size = size_of(file, choice->level, time, channel);
+    const Vec3 factor = factors(fine, *layout.size);
+    info.geometry.spacing = times(extent.spacing(fine), factor);
+    // ExtMin is the corner of the first voxel.
+    for (int a = 0; extent.is_known() && a < 3; ++a)
+        info.geometry.origin[a] = extent.min()[a] + 0.5 * info.geometry.spacing[a];
+    info.spacing_known = {extent.is_known(), extent.is_known(), extent.is_known()};
+    info.geometry.unit = normal_unit(file.text("/DataSetInfo/Image", "Unit"));
+    const std::string level = level_name(choice->level);
+    info.frames = choice->time ? 1 : std::max(1, count_of(file, level, kTime));
+    info.channels =
+        choice->channel ? 1 : std::max(1, count_of(file, level + "/" + kTime + std::to_string(time), kChannel));
+    bool named = true;
+    for (int c = 0; c < info.channels; ++c) {
+        const std::string group = "/DataSetInfo/" + std::string(kChannel) + std::to_string(channel + c);
+        info.channel_names.push_back(file.text(group, "Name"));
+        named = named && !info.channel_names.back().empty();
+    }
+    if (!named) info.channel_names.clear();
+    for (const char* field : {"ExtMin0", "ExtMin1", "ExtMin2", "ExtMax0", "ExtMax1", "ExtMax2", "Unit"})
+        if (const std::string value = file.text("/DataSetInfo/Image", field); !value.empty())
+            info.fields.emplace_back(field, quote(value));
+    describe_levels(file, extent, fine, *choice, info);
+    layout.dataset = [level = choice->level, time, channel](std::uint64_t c, std::uint64_t t) {
+        return channel_name(level, time + int(t), channel + int(c)) + "/Data";
+    };
+    return layout;
+}
+
+}  // namespace covol::detail

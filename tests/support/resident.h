@@ -1,0 +1,12 @@
+#pragma once
+#include <unistd.h>
+
+#include <cstdint>
+#include <fstream>
+
+/// Memory that this program has now, in bytes.
+inline std::uint64_t resident_bytes() {
+    std::uint64_t pages = 0;
+    std::ifstream("/proc/self/statm") >> pages >> pages;
+    return pages * std::uint64_t(::sysconf(_SC_PAGESIZE));
+}
