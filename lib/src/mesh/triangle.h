@@ -24,6 +24,11 @@ inline double length(const Vec3& a) { return std::sqrt(dot(a, a)); }
 inline Vec3 to_vec3(const Position& p) { return {p[0], p[1], p[2]}; }
 inline Position to_position(const Vec3& p) { return {float(p[0]), float(p[1]), float(p[2])}; }
 
+/// Six times the signed volume between a triangle and `origin`.
+inline double six_volumes(const std::array<Vec3, 3>& p, const Vec3& origin) {
+    return dot(minus(p[0], origin), cross(minus(p[1], origin), minus(p[2], origin)));
+}
+
 /// Twice the area, along the outward normal.
 inline Vec3 area_normal(const Vec3& a, const Vec3& b, const Vec3& c) { return cross(minus(b, a), minus(c, a)); }
 inline Vec3 area_normal(const Positions& p, const Triangle& t) {
