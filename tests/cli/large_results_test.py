@@ -195,5 +195,110 @@ class Masks(unittest.TestCase):
         self.assertFalse([p for p in self.folder.iterdir() if p.name.startswith(".covol")])
 
 
+def read_ply(path):
+    data = path.read_bytes()
+    begin = data.index(b"end_header\n") + len(b"end_header\n")
+    counts = [int(line.split()[2]) for line in data[:begin].decode().splitlines() if line.startswith("element")]
+    vertices = np.frombuffer(data, np.dtype("<f4"), 6 * counts[0], begin).reshape(-1, 6)
+    faces = np.frombuffer(data, np.dtype([("n", "u1"), ("v", "<u4", 3)]), counts[1], begin + 24 * counts[0])
+    assert begin + 24 * counts[0] + 13 * counts[1] == len(data) and (faces["n"] == 3).all()
+    return vertices[:, :3], vertices[:, 3:], faces["v"]
+
+
+def read_obj(path):
+    rows = {"v": [], "vn": [], "f": []}
+    for line in path.read_text().splitlines():
+        key, *words = line.split()
+        if key == "f":
+            assert all(w.split("//")[0] == w.split("//")[1] for w in words)
+            rows["f"].append([int(w.split("//")[0]) - 1 for w in words])
+        elif key in rows:
+            rows[key].append([float(w) for w in words])
+    return np.array(rows["v"], np.float32), np.array(rows["vn"], np.float32), np.array(rows["f"])
+
+
+def read_stl(path):
+    data = path.read_bytes()
+    count, = struct.unpack_from("<I", data, 80)
+    assert len(data) == 84 + 50 * count
+    records = np.frombuffer(data, np.dtype([("n", "<f4", 3), ("p", "<f4", (3, 3)), ("a", "<u2")]), count, 84)
+    return records["n"], records["p"]
+
+
+@unittest.skipIf(MISSING, MISSING)
+class Meshes(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp())
+        h = 0.5
+        one = vdb.createLevelSetSphere(radius=60.0, center=(3.1, -7.7, 12.3), voxelSize=h, halfWidth=3.0)
+        other = vdb.createLevelSetSphere(radius=4.0, center=(80, 0.3, 0.1), voxelSize=h, halfWidth=3.0)
+        # Both in one grid: the smaller value of the two everywhere.
+        one.combine(other, min)
+        one.name = "surface"
+        cls.vdb = cls.folder / "balls.vdb"
+        vdb.write(str(cls.vdb), [one])
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.folder)
+
+    def mesh(self, name, *more):
+        path = self.folder / name
+        report = json.loads(run("mesh", self.vdb, "-o", path, "--plain", "--json", "-", *more).stdout)
+        return path, report
+
+    def check_closed(self, points, faces):
+        self.assertEqual(len(np.unique(points, axis=0)), len(points), "a vertex is there twice")
+        self.assertEqual(set(np.unique(faces)), set(range(len(points))), "a vertex of no face")
+        edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
+        forth = edges[:, 0] * len(points) + edges[:, 1]
+        back = edges[:, 1] * len(points) + edges[:, 0]
+        self.assertEqual(len(np.unique(forth)), len(forth))
+        self.assertTrue((np.sort(forth) == np.sort(back)).all())
+
+    def check_measures(self, report, points, faces):
+        corners = points.astype(float)[faces]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        surface = report["surface"]
+        self.assertAlmostEqual(surface["area"] / (np.linalg.norm(normal, axis=1).sum() / 2), 1, 9)
+        volume = (corners[:, 0] * normal).sum() / 6
+        self.assertAlmostEqual(surface["volume"] / volume, 1, 6)
+        self.assertAlmostEqual(volume / (4 / 3 * np.pi * (60 ** 3 + 4 ** 3)), 1, 3)
+        self.assertEqual((surface["components"], surface["genus"], surface["closed"], surface["manifold"]), (2, 0, True, True))
+        self.assertEqual(report["mesh"], {"vertices": len(points), "triangles": len(faces)})
+
+    def test_the_three_formats_hold_one_closed_mesh(self):
+        path, report = self.mesh("a.ply")
+        points, normals, faces = read_ply(path)
+        self.check_closed(points, faces)
+        self.check_measures(report, points, faces)
+        np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-5)
+        # of the large ball, outward
+        large = points[:, 0] < 70
+        self.assertTrue((((points - (3.1, -7.7, 12.3)) * normals).sum(1)[large] > 0.99 * 60).all())
+        got, got_normals, got_faces = read_obj(self.mesh("a.obj")[0])
+        np.testing.assert_array_equal(got, points)
+        np.testing.assert_array_equal(got_normals, normals)
+        np.testing.assert_array_equal(got_faces, faces)
+        np.testing.assert_array_equal(read_stl(self.mesh("a.stl")[0])[1], points[faces])
+        self.assertEqual(sorted(p.name for p in self.folder.iterdir() if p.name.startswith(".")), [])
+
+    def test_axes_and_units(self):
+        points, normals, faces = read_ply(self.mesh("a.ply")[0])
+        turned, turned_normals, same = read_ply(self.mesh("up.ply", "--up", "y", "--unit-scale", "2")[0])
+        np.testing.assert_array_equal(turned, 2 * points[:, [0, 2, 1]] * (1, 1, -1))
+        np.testing.assert_allclose(turned_normals, normals[:, [0, 2, 1]] * (1, 1, -1), atol=1e-6)
+        np.testing.assert_array_equal(same, faces)
+
+    def test_what_needs_the_whole_mesh_is_refused(self):
+        for more in ("--smooth", "2"), ("--adaptive", "1vx"), ("--min-component", "3vx"):
+            done = run("mesh", self.vdb, "-o", self.folder / "x.ply", "--plain", *more, code=2)
+            self.assertIn("--plain", done.stderr)
+        self.assertIn(".stl", run("mesh", self.vdb, "-o", self.folder / "x.glb", "--plain", code=2).stderr)
+        done = run("mesh", self.vdb, "-o", self.folder / "x.ply", "--plain", "--isovalue", "-1000", code=3)
+        self.assertFalse((self.folder / "x.ply").exists())
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -11,8 +11,8 @@ import sys
 LAYERS = [
     {"base": ["api", "version", "fwd", "error", "option_names", "run", "domain"], "scheme": []},
     {"grid": [], "mesh": ["mesh"], "io": ["vdb_io"], "io/pixels": ["image"]},
-    {"io/image": [], "io/chunked": [], "io/write": ["image_stream"], "io/mesh": ["mesh_io"], "distance": ["distance"]},
-    {"image": [], "io/points": ["points"], "clip": ["clip"], "edge": ["edge"], "redistance": []},
+    {"io/image": [], "io/chunked": [], "io/mesh": ["mesh_io"], "distance": ["distance"]},
+    {"image": [], "io/write": ["image_stream"], "io/points": ["points"], "clip": ["clip"], "edge": ["edge"], "redistance": []},
     {"points": ["scan_noise", "cloud_cleanup"], "surface": ["surface", "mesh_stream"], "evolve": ["evolve"], "tagging": ["band"]},
     {"contours": ["contours", "seeds"], "meshing": ["mesh_relax", "mesh_cleanup"], "holes": ["holes"], "cloud/orientation": ["orientation"]},
     {"start": ["start"], "painted": ["painted"], "analysis": ["compare", "evidence", "structures", "phantom", "render"]},

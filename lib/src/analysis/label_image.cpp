@@ -115,7 +115,7 @@ private:
 /// The values of structures: bytes where they are.
 PixelType type_of(const std::vector<int>& values) {
     return std::all_of(values.begin(), values.end(), [](int v) { return v >= 0 && v <= 255; }) ? PixelType::UInt8
-                                                                                             : PixelType::Int32;
+                                                                                               : PixelType::Int32;
 }
 
 std::vector<int> counted_up(std::vector<int> values, std::size_t count) {
@@ -299,8 +299,8 @@ std::vector<std::pair<std::string, std::string>> LabelImage::metadata() const {
     if (!state_->named) return {};
     std::vector<std::string> names;
     std::vector<VoxelBox> extents;
-    const bool before = std::all_of(state_->written.begin(), state_->written.end(),
-                                    [](const Written& w) { return w.voxels == 0; });
+    const bool before =
+        std::all_of(state_->written.begin(), state_->written.end(), [](const Written& w) { return w.voxels == 0; });
     const Index3 size = geometry().size;
     const Index3 last{size[0] - 1, size[1] - 1, size[2] - 1};
     for (std::size_t n = 0; n < state_->structures.size(); ++n) {

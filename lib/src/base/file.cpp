@@ -35,8 +35,7 @@ std::string name_beside(const fs::path& target) {
     const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
     std::error_code status;
     if (!fs::is_directory(folder, status))
-        throw Error(Errc::Io,
-                    target.string() + ": cannot write: the folder " + folder.string() + " does not exist");
+        throw Error(Errc::Io, target.string() + ": cannot write: the folder " + folder.string() + " does not exist");
     return (folder / (".covol-" + std::to_string(::getpid()) + "-" + target.filename().string())).string();
 }
 
@@ -71,8 +70,7 @@ void write_folder_atomically(const std::string& path, const std::function<bool(c
             fs::remove_all(name, ignored);
         }
     } remover{temporary};
-    if (!fs::create_directory(temporary, status))
-        throw Error(Errc::Io, path + ": cannot write: " + status.message());
+    if (!fs::create_directory(temporary, status)) throw Error(Errc::Io, path + ": cannot write: " + status.message());
     write(temporary);
     // All files of it reach the disk before its name does.
     const int folder = ::open(temporary.c_str(), O_RDONLY | O_DIRECTORY);

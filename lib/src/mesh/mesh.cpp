@@ -39,7 +39,7 @@ std::uint32_t next_corner(std::uint32_t corner) { return corner % 3 == 2 ? corne
 /// Calls visit(first, last) with the sides that lie on each edge; degenerate triangles have none.
 template <typename Visit>
 void for_each_edge(const TriangleMesh& mesh, const Visit& visit) {
-    const auto corners = std::uint32_t(3 * mesh.triangles.size());
+    const std::uint32_t corners = meshing::corner_count(mesh.triangles.size());
     const auto low = [&](std::uint32_t c) {
         return std::min(corner_vertex(mesh, c), corner_vertex(mesh, next_corner(c)));
     };
@@ -87,7 +87,7 @@ MeshMeasures measure(const TriangleMesh& mesh) {
 
     m.closed = m.manifold = !degenerate;
     DisjointSets components(mesh.triangles.size());
-    DisjointSets umbrellas(3 * mesh.triangles.size());  // of corners, around their vertices
+    DisjointSets umbrellas(meshing::corner_count(mesh.triangles.size()));  // of corners, around their vertices
     std::int64_t edges = 0;
     for_each_edge(mesh, [&](const Side* first, const Side* last) {
         ++edges;

@@ -207,8 +207,7 @@ private:
             for (int axis = 0; axis < 3; ++axis)
                 for (const bool above : {false, true}) {
                     openvdb::CoordBBox rim = box;
-                    rim.min()[axis] = rim.max()[axis] =
-                        above ? box.max()[axis] + 1 : box.min()[axis] - kLeafDim;
+                    rim.min()[axis] = rim.max()[axis] = above ? box.max()[axis] + 1 : box.min()[axis] - kLeafDim;
                     for (int i = rim.min()[0]; i <= rim.max()[0]; i += kLeafDim)
                         for (int j = rim.min()[1]; j <= rim.max()[1]; j += kLeafDim)
                             for (int k = rim.min()[2]; k <= rim.max()[2]; k += kLeafDim) {
@@ -307,9 +306,8 @@ private:
         for (int x = 0; x < 8; ++x) {
             const CornerWords words = corners(block, x);
             for (int axis = 0; axis < 3; ++axis) block.cut[axis][x] = words[0] ^ words[axis_bit(axis)];
-            for_each_cut_cube(words, [&](int, const CubeCase& cube) {
-                block.triangle_count += std::uint32_t(cube.triangle_count);
-            });
+            for_each_cut_cube(
+                words, [&](int, const CubeCase& cube) { block.triangle_count += std::uint32_t(cube.triangle_count); });
         }
         for (int axis = 0; axis < 3; ++axis)
             for (int x = 0; x < 8; ++x) {
@@ -376,8 +374,8 @@ private:
         const int stride = 64 >> (3 * axis);
         const bool last = local[axis] == 7;
         const double a = block.value(offset);
-        const double b = last ? blocks_[block.next[axis_bit(axis)]].value(offset - 7 * stride)
-                              : block.value(offset + stride);
+        const double b =
+            last ? blocks_[block.next[axis_bit(axis)]].value(offset - 7 * stride) : block.value(offset + stride);
         const double t = (isovalue_ - a) / (b - a);
         if (!(t >= 0 && t <= 1)) not_a_number_ = true;
         std::array<float, 3> position{};
@@ -433,8 +431,7 @@ private:
     }
 
     /// The allowed apex with the shortest diagonals.
-    static int best_apex(const CubeLoop& loop, const std::array<std::uint32_t, 12>& ring,
-                         const Positions& positions) {
+    static int best_apex(const CubeLoop& loop, const std::array<std::uint32_t, 12>& ring, const Positions& positions) {
         int best = std::countr_zero(loop.apexes);
         if (loop.size == 3) return best;
         float least = std::numeric_limits<float>::max();

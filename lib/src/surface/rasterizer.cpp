@@ -126,7 +126,8 @@ void Rasterizer::fill(const VoxelBox& box, std::uint8_t label, std::uint8_t* out
             std::fill(row.begin(), row.end(), 0);
             sampler.fill(to_index(0, j, k), step, first, end, 1, row.data());
             for (int i = first; i < end && !all_within_; ++i)
-                if (row[i - first] != 0 && depth_in(clip_, geometry_.index_to_world({double(i), double(j), double(k)})) > 0)
+                if (row[i - first] != 0 &&
+                    depth_in(clip_, geometry_.index_to_world({double(i), double(j), double(k)})) > 0)
                     row[i - first] = 0;
             for (int n = 0; n < end - first; ++n)
                 if (row[n] != 0) out[n] = label;

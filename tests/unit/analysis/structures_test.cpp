@@ -280,9 +280,9 @@ TEST_CASE("A label image in boxes is the one that is made at once") {
                 for (int z = 0; z < 47; z += edge)
                     for (int y = 0; y < 53; y += edge)
                         for (int x = 0; x < 61; x += edge) {
-                            const VoxelBox box{{x, y, z},
-                                               {std::min(x + edge, 61) - 1, std::min(y + edge, 53) - 1,
-                                                std::min(z + edge, 47) - 1}};
+                            const VoxelBox box{
+                                {x, y, z},
+                                {std::min(x + edge, 61) - 1, std::min(y + edge, 53) - 1, std::min(z + edge, 47) - 1}};
                             const std::size_t n = std::size_t(box.size()[0]) * box.size()[1] * box.size()[2];
                             std::vector<std::uint8_t> got(n, 99);
                             std::vector<std::int32_t> values(n, 99);

@@ -63,8 +63,9 @@ void Outputs::check_store(const std::string& flag, const std::string& path, cons
     std::error_code status;
     if (!fs::exists(target, status)) return;
     if (!is_zarr_store(target.string()))
-        throw Error(Errc::Io, flag + ": " + path + ": cannot write: something that is no Zarr store is there; choose "
-                              "another name");
+        throw Error(Errc::Io, flag + ": " + path +
+                                  ": cannot write: something that is no Zarr store is there; choose "
+                                  "another name");
     for (const std::string& input : inputs_)
         if (lies_in(input, target))
             throw Error(Errc::InvalidOptions,

@@ -43,7 +43,9 @@ void add_mask(Session& session) {
         ->type_name("IN.vdb[:NAME]");
     command->add_option("--like", job->like, "image whose lattice the mask gets")->required()->type_name("IMAGE");
     in_group(*command, Group::Output);
-    command->add_option("-o,--output", job->output, "label image")->required()->type_name("OUT.nrrd|.nii.gz|.tif|.mha|.zarr");
+    command->add_option("-o,--output", job->output, "label image")
+        ->required()
+        ->type_name("OUT.nrrd|.nii.gz|.tif|.mha|.zarr");
     command->add_option("--label", job->label, "value of the inside, 1 to 255")->capture_default_str();
     command->add_flag("--raw", job->raw, "leave the voxels of .nrrd and .mha unpacked");
     job->image.bind(*command);

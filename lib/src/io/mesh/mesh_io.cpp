@@ -54,7 +54,8 @@ Prepared prepare(const std::string& extension, const TriangleMesh& mesh, const W
                     "write_mesh: unit_scale: expected > 0, got " + std::to_string(options.unit_scale));
     check_references(mesh);
     for (const VertexAttribute& attribute : options.attributes) check_attribute(attribute, mesh);
-    Prepared result{mesh.triangles, mesh.vertices, {}, one_line_each(options.comments), options.attributes, options.binary};
+    Prepared result{mesh.triangles,     mesh.vertices, {}, one_line_each(options.comments),
+                    options.attributes, options.binary};
     for (auto& p : result.vertices) p = placed(p, options);
     if (extension == ".ply" || extension == ".obj" || extension == ".glb")
         result.normals = meshing::vertex_normals(result.vertices, mesh.triangles);

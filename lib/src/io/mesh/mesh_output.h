@@ -22,7 +22,9 @@ class Output {
 public:
     Output() = default;
     /// @throws Error Io when it cannot be written to, like all that follows. @param name  the file as errors call it
-    Output(const std::string& path, std::string name) : name_(std::move(name)), file_(path, std::ios::binary) { check(); }
+    Output(const std::string& path, std::string name) : name_(std::move(name)), file_(path, std::ios::binary) {
+        check();
+    }
 
     Output& operator<<(std::string_view text) {
         data_ += text;

@@ -33,9 +33,16 @@ class IndexedStream : public MeshStream {
 public:
     IndexedStream(const std::string& path, const std::string& name, bool ply, const PlyCounts& counts,
                   const std::vector<std::string>& comments)
-        : path_(path), name_(name), ply_(ply), faces_file_(path + ".faces"), out_(path, name), faces_(faces_file_, name) {
-        if (ply) return write_ply_header(out_, counts, comments, {}, true);
-        for (const std::string& comment : comments) out_ << "# " << comment << "\n";
+        : path_(path),
+          name_(name),
+          ply_(ply),
+          faces_file_(path + ".faces"),
+          out_(path, name),
+          faces_(faces_file_, name) {
+        if (ply)
+            write_ply_header(out_, counts, comments, {}, true);
+        else
+            for (const std::string& comment : comments) out_ << "# " << comment << "\n";
     }
     ~IndexedStream() override { ::unlink(faces_file_.c_str()); }
 

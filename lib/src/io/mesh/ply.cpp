@@ -1,8 +1,8 @@
 // PLY: ASCII and both byte orders, with elements and properties of any kind beside the mesh.
 #include <algorithm>
 #include <bit>
-#include <optional>
 #include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>

@@ -24,7 +24,9 @@ using Metadata = std::vector<std::pair<std::string, std::string>>;
 class DenseSource : public PixelSource {
 public:
     DenseSource(const ImageGeometry& geometry, PixelType type, bool labels, const void* values, Metadata metadata = {})
-        : PixelSource(geometry, type, labels), values_(static_cast<const char*>(values)), metadata_(std::move(metadata)) {}
+        : PixelSource(geometry, type, labels),
+          values_(static_cast<const char*>(values)),
+          metadata_(std::move(metadata)) {}
 
     void fill(const VoxelBox& box, void* out) const override {
         const Index3 whole = geometry().size, size = box.size();

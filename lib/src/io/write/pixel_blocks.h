@@ -24,9 +24,9 @@ enum class BlockPacking {
 
 struct PackedBlock {
     std::string bytes;
-    std::uint32_t check = 0;      ///< of what is packed
-    std::uint64_t unpacked = 0;   ///< bytes
-    bool is_zero = false;         ///< all of it
+    std::uint32_t check = 0;     ///< of what is packed
+    std::uint64_t unpacked = 0;  ///< bytes
+    bool is_zero = false;        ///< all of it
 };
 
 /// A box of the image, and the lattice that its voxels are put into: where that is larger, the rest is 0.

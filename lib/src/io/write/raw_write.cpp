@@ -69,7 +69,8 @@ std::string nrrd_header(const PixelSource& source, bool pack) {
     }
     std::string text =
         "NRRD0004\n# Complete NRRD file format specification at:\n# http://teem.sourceforge.net/nrrd/format.html\n"
-        "type: " + std::string(names_of(source.type()).nrrd) +
+        "type: " +
+        std::string(names_of(source.type()).nrrd) +
         "\ndimension: 3\nspace: left-posterior-superior\nsizes: " + joined(g.size, " ") +
         "\nspace directions: " + directions + "\nkinds: domain domain domain\n";
     if (pixel_bytes(source.type()) > 1) text += "endian: little\n";
@@ -211,8 +212,8 @@ public:
     [[nodiscard]] BlockPlace place(std::uint64_t n) const {
         const auto k = std::int32_t(n / std::uint64_t(per_slice_)) * slices_;
         const auto j = std::int32_t(n % std::uint64_t(per_slice_)) * rows_;
-        const VoxelBox box{{0, j, k},
-                           {size_[0] - 1, std::min(size_[1] - j, rows_) + j - 1, std::min(size_[2] - k, slices_) + k - 1}};
+        const VoxelBox box{
+            {0, j, k}, {size_[0] - 1, std::min(size_[1] - j, rows_) + j - 1, std::min(size_[2] - k, slices_) + k - 1}};
         return {box, box.size()};
     }
 

@@ -43,9 +43,9 @@ struct PageParts {
         const auto k = std::int32_t(n / per_page());
         const std::uint64_t in_page = n % per_page();
         const Index3 min{std::int32_t(in_page % across()) * part[0], std::int32_t(in_page / across()) * part[1], k};
-        const VoxelBox box{min,
-                           {std::min(size[0] - min[0], part[0]) + min[0] - 1,
-                            std::min(size[1] - min[1], part[1]) + min[1] - 1, k}};
+        const VoxelBox box{
+            min,
+            {std::min(size[0] - min[0], part[0]) + min[0] - 1, std::min(size[1] - min[1], part[1]) + min[1] - 1, k}};
         return {box, tiled ? part : box.size()};
     }
 };
@@ -56,7 +56,8 @@ PageParts parts_of(const Index3& size, std::uint64_t pixel, bool big) {
     constexpr std::uint64_t kStrip = 1U << 18;
     if (big) return {size, {kTile, kTile, 1}, true};
     const std::uint64_t row = std::uint64_t(size[0]) * pixel;
-    return {size, {size[0], std::int32_t(std::clamp<std::uint64_t>(kStrip / row, 1, std::uint64_t(size[1]))), 1}, false};
+    return {
+        size, {size[0], std::int32_t(std::clamp<std::uint64_t>(kStrip / row, 1, std::uint64_t(size[1]))), 1}, false};
 }
 
 }  // namespace
@@ -104,9 +105,8 @@ void write_tiff(const std::string& path, const PixelSource& source, const RunCon
         if (in_page == 0) begin_page(n == 0);
         auto* bytes = const_cast<char*>(block.bytes.data());
         const auto count = static_cast<tmsize_t>(block.bytes.size());
-        const tmsize_t written = parts.tiled
-                                     ? TIFFWriteRawTile(tiff.get(), std::uint32_t(in_page), bytes, count)
-                                     : TIFFWriteRawStrip(tiff.get(), std::uint32_t(in_page), bytes, count);
+        const tmsize_t written = parts.tiled ? TIFFWriteRawTile(tiff.get(), std::uint32_t(in_page), bytes, count)
+                                             : TIFFWriteRawStrip(tiff.get(), std::uint32_t(in_page), bytes, count);
         if (written != count || (in_page + 1 == per_page && TIFFWriteDirectory(tiff.get()) != 1)) throw failure();
     };
     BlockPacker(source, BlockPacking::Zlib)

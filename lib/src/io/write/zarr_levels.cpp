@@ -89,7 +89,7 @@ void coarsen(PixelType type, bool most_frequent, const Index3& factor, const voi
                                 same = same && values[std::size_t(count)] == values[0];
                                 ++count;
                             }
-                    *out++ = same             ? values[0]
+                    *out++ = same            ? values[0]
                              : most_frequent ? most_frequent_of(values.data(), count)
                                              : mean_of(values.data(), count);
                 }

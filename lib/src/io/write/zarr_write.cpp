@@ -52,13 +52,13 @@ std::string dtype_of(PixelType type) {
 /// As OME-Zarr spells units, those of UDUNITS; empty where it has no name for it.
 std::string unit_name(const std::string& unit) {
     static constexpr std::array<std::array<const char*, 2>, 8> kNames{{{"pm", "picometer"},
-                                                                        {"angstrom", "angstrom"},
-                                                                        {"nm", "nanometer"},
-                                                                        {"um", "micrometer"},
-                                                                        {"mm", "millimeter"},
-                                                                        {"cm", "centimeter"},
-                                                                        {"m", "meter"},
-                                                                        {"inch", "inch"}}};
+                                                                       {"angstrom", "angstrom"},
+                                                                       {"nm", "nanometer"},
+                                                                       {"um", "micrometer"},
+                                                                       {"mm", "millimeter"},
+                                                                       {"cm", "centimeter"},
+                                                                       {"m", "meter"},
+                                                                       {"inch", "inch"}}};
     for (const auto& [own, name] : kNames)
         if (normal_unit(unit) == own) return name;
     return {};
@@ -94,7 +94,8 @@ public:
         for (int k = 0; k < chunks(top)[2]; ++k)
             for (int j = 0; j < chunks(top)[1]; ++j)
                 for (int i = 0; i < chunks(top)[0]; ++i) places.push_back({i, j, k});
-        tbb::parallel_for(std::size_t(0), places.size(), [&](std::size_t n) { static_cast<void>(make(top, places[n])); });
+        tbb::parallel_for(std::size_t(0), places.size(),
+                          [&](std::size_t n) { static_cast<void>(make(top, places[n])); });
         run_.report("write", 1);
     }
 
@@ -148,8 +149,8 @@ private:
         if (!source_.is_labels()) return json;
         Json colors = Json::array(), properties = Json::array();
         for (const NamedLabel& label : source_.label_names()) {
-            colors.push_back({{"label-value", label.value},
-                              {"rgba", {label.color[0], label.color[1], label.color[2], 255}}});
+            colors.push_back(
+                {{"label-value", label.value}, {"rgba", {label.color[0], label.color[1], label.color[2], 255}}});
             properties.push_back({{"label-value", label.value}, {"name", label.name}});
         }
         json["image-label"] = {{"version", "0.4"}};
@@ -255,8 +256,8 @@ private:
 
     [[nodiscard]] std::string packed(const std::string& values) const {
         std::string out(values.size() + BLOSC_MAX_OVERHEAD, '\0');
-        const int size = blosc_compress_ctx(kCodecLevel, BLOSC_SHUFFLE, width_, values.size(), values.data(), out.data(),
-                                            out.size(), kCodec, 0, 1);
+        const int size = blosc_compress_ctx(kCodecLevel, BLOSC_SHUFFLE, width_, values.size(), values.data(),
+                                            out.data(), out.size(), kCodec, 0, 1);
         if (size <= 0) throw Error(Errc::Unsupported, "write_image: this libblosc cannot pack by zstd");
         out.resize(std::size_t(size));
         return out;

@@ -173,7 +173,9 @@ TEST_CASE("OME-Zarr: levels by the most frequent value, empty chunks left out, c
     class Named : public Balls<std::uint8_t> {
     public:
         using Balls::Balls;
-        [[nodiscard]] std::vector<NamedLabel> label_names() const override { return {{7, "wall", {1, 2, 3}}, {2, "core"}}; }
+        [[nodiscard]] std::vector<NamedLabel> label_names() const override {
+            return {{7, "wall", {1, 2, 3}}, {2, "core"}};
+        }
     };
     const Scratch scratch;
     const Named source(lattice({301, 290, 140}), PixelType::UInt8, true);
@@ -286,6 +288,7 @@ TEST_CASE("voxels are spread over a larger lattice") {
     std::vector<std::uint8_t> values{1, 2, 3, 4, 5, 6, 7, 8};
     values.resize(3 * 3 * 3, 0);
     detail::spread({2, 2, 2}, {3, 3, 3}, 1, reinterpret_cast<char*>(values.data()));
-    const std::vector<std::uint8_t> expected{1, 2, 0, 3, 4, 0, 0, 0, 0, 5, 6, 0, 7, 8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+    const std::vector<std::uint8_t> expected{1, 2, 0, 3, 4, 0, 0, 0, 0, 5, 6, 0, 7, 8,
+                                             0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     CHECK(values == expected);
 }
