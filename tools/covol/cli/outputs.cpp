@@ -9,6 +9,7 @@
 
 #include "covol/error.h"
 #include "covol/image.h"
+#include "covol/image_stream.h"
 #include "covol/mesh_io.h"
 
 namespace covol::tool {
