@@ -91,8 +91,8 @@ Json options_of(const CLI::App& command) {
     return options;
 }
 
-/// Files and folders that the command line names to be read: whatever exists under the value of an option that is no output. Values
-/// may begin with a structure's name or a kind of start, NAME=FILE and mesh:FILE.
+/// Files and folders that the command line names to be read: whatever exists under the value of an option that is no
+/// output. Values may begin with a structure's name or a kind of start, NAME=FILE and mesh:FILE.
 std::vector<std::string> inputs_of(const CLI::App& command) {
     std::vector<std::string> inputs;
     for (const CLI::Option* option : command.get_options()) {
