@@ -55,12 +55,12 @@ bool swap_folders(const std::string& temporary, const std::string& path) {
 
 }  // namespace
 
-void write_folder_atomically(const std::string& path, const std::function<bool(const std::string&)>& may_replace,
+void write_folder_atomically(const std::string& path, bool may_replace,
                              const std::function<void(const std::string&)>& write) {
     const std::string temporary = name_beside(path);
     std::error_code status;
     const bool exists = fs::exists(fs::symlink_status(path, status));
-    if (exists && (!fs::is_directory(path, status) || fs::is_symlink(path, status) || !may_replace(path)))
+    if (exists && (!fs::is_directory(path, status) || fs::is_symlink(path, status) || !may_replace))
         throw Error(Errc::Io, path + ": cannot write: something else is there, and not replaced; choose another name");
     fs::remove_all(temporary, status);
     struct Remover {

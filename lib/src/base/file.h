@@ -9,9 +9,9 @@ namespace covol::detail {
 /// @throws Error Io; whatever `write` throws.
 void write_atomically(const std::string& path, const std::function<void(const std::string& temporary)>& write);
 
-/// The same for a folder: `write` fills an empty one beside `path`. An old folder is replaced, at once, only where
-/// `may_replace` says so. @throws Error Io; whatever `write` throws.
-void write_folder_atomically(const std::string& path, const std::function<bool(const std::string& old)>& may_replace,
+/// The same for a folder: `write` fills an empty one beside `path`. An old folder is replaced, at once.
+/// @param may_replace  whether what is there may go @throws Error Io; whatever `write` throws.
+void write_folder_atomically(const std::string& path, bool may_replace,
                              const std::function<void(const std::string& temporary)>& write);
 
 /// "a.zarr" of "a.zarr/", as a shell completes it.

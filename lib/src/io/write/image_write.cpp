@@ -68,7 +68,7 @@ void write_image(const std::string& given, const PixelSource& source, const Writ
     const std::string extension = detail::extension(path);
     with_threads(run, [&] {
         if (extension == ".zarr")
-            detail::write_folder_atomically(path, detail::is_zarr, [&](const std::string& temporary) {
+            detail::write_folder_atomically(path, is_zarr_store(path), [&](const std::string& temporary) {
                 detail::write_ome_zarr(temporary, std::filesystem::path(path).filename().string(), source, run);
             });
         else

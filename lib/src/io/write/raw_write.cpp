@@ -93,7 +93,7 @@ std::string meta_header(const PixelSource& source, bool pack, std::uint64_t pack
     text += "TransformMatrix = " + matrix + "\nOffset = " + joined(g.origin, " ") +
             "\nCenterOfRotation = 0 0 0\nElementSpacing = " + joined(g.spacing, " ") +
             "\nDimSize = " + joined(g.size, " ") + "\n";
-    if (!g.unit.empty()) text += "unit = " + g.unit + "\n";
+    if (!g.unit.empty()) text += std::string("unit") + " = " + g.unit + "\n";
     return text + "ElementType = " + names_of(source.type()).meta + "\nElementDataFile = LOCAL\n";
 }
 
