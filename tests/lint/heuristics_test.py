@@ -20,7 +20,7 @@ ALLOWED = {
     "guidance/smooth_image.cpp:kKernelSigmas", "guidance/smooth_image.cpp:kLeastSigma", "holes/holes.cpp:kP95OfSpacing",
     "meshing/contacts.cpp:kAlong", "meshing/contacts.cpp:kFacing", "meshing/contacts.cpp:kFar", "meshing/contacts.cpp:kRounding",
     "meshing/level.cpp:kConverged", "meshing/level.cpp:kNearFace", "start/start.cpp:kLeafRadius",
-    "start/start.cpp:kSame", "surface/surface_mesh.cpp:kChamfer", "surface/surface_mesh.cpp:kEdgeMargin", "tagging/tagging.cpp:kBall",
+    "start/start.cpp:kSame", "surface/rasterizer.cpp:kCertain", "surface/rasterizer.cpp:kRounding", "tagging/tagging.cpp:kBall",
 }
 
 

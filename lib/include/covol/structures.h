@@ -2,6 +2,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "covol/api.h"
 #include "covol/fwd.h"
 #include "covol/image.h"
+#include "covol/image_stream.h"
 #include "covol/run.h"
 
 namespace covol {
@@ -64,6 +66,30 @@ struct SeparateResult {
                                                                    const ImageGeometry& geometry,
                                                                    const RunContext& run = {});
 
+/// The same image, to be written box by box (covol/image_stream.h): nothing of its size is held.
+class COVOL_API LabelImage : public PixelSource {
+public:
+    /// @param values  of the structures, instead of 1, 2, ...; int32 where one is below 0 or above 255, else bytes
+    /// @param named  keep names and colours where the format has a place for them
+    /// @throws Error InvalidInput (more than 254 structures).
+    LabelImage(std::vector<Structure> structures, const ImageGeometry& geometry, std::vector<int> values = {},
+               bool named = true);
+    ~LabelImage() override;
+
+    void fill(const VoxelBox& box, void* out) const override;
+    [[nodiscard]] std::optional<double> uniform(const VoxelBox& box) const override;
+    void wrote(const VoxelBox& box, const void* values, double uniform) const override;
+    [[nodiscard]] std::vector<std::pair<std::string, std::string>> metadata() const override;
+    [[nodiscard]] std::vector<NamedLabel> label_names() const override;
+
+    /// Of each structure, so far.
+    [[nodiscard]] std::vector<std::uint64_t> voxels_written() const;
+
+private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
 /// Identifiers for grids, [A-Za-z_][A-Za-z0-9_]*, unique. One structure is called "surface", as everywhere in covol.
 [[nodiscard]] COVOL_API std::vector<std::string> make_grid_names(const std::vector<std::string>& names);
 
@@ -72,11 +98,10 @@ struct SeparateResult {
 
 /// Key/value pairs that make an NRRD label image a segmentation of 3D Slicer (.seg.nrrd): names, colours, label values
 /// 1, 2, ... and extents.
-/// @param labels  n + 1 where structure n is
+/// @param extents  the box of each structure's voxels; 0 to -1 where it has none
 /// @param values  the label values that the file has instead; empty: 1, 2, ...
 [[nodiscard]] COVOL_API std::vector<std::pair<std::string, std::string>> make_slicer_segments(
-    const std::vector<std::string>& names, const std::vector<std::uint8_t>& labels, const Index3& size,
-    const std::vector<int>& values = {});
+    const std::vector<std::string>& names, const std::vector<VoxelBox>& extents, const std::vector<int>& values = {});
 
 /// ITK-SNAP's label description file for labels 1, 2, ..., or those of `values`
 [[nodiscard]] COVOL_API std::string make_itksnap_labels(const std::vector<std::string>& names,

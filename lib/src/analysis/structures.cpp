@@ -242,107 +242,6 @@ private:
     SeparateReport report_;
 };
 
-/// Trilinear samples of the structures' distances at world positions.
-class Distances {
-public:
-    explicit Distances(const std::vector<Structure>& structures) {
-        for (const Structure& s : structures) {
-            accessors_.push_back(s.surface->getConstAccessor());
-            transforms_.push_back(&s.surface->transform());
-        }
-    }
-    [[nodiscard]] float operator()(std::size_t n, const Vec3& world) const {
-        const openvdb::Vec3d at = transforms_[n]->worldToIndex(openvdb::Vec3d(world[0], world[1], world[2]));
-        const Coord base = Coord::floor(at);
-        const openvdb::Vec3d t = at - base.asVec3d();
-        double sum = 0;
-        for (int corner = 0; corner < 8; ++corner) {
-            const Coord c(corner & 1, corner >> 1 & 1, corner >> 2);
-            double weight = 1;
-            for (int a = 0; a < 3; ++a) weight *= c[a] != 0 ? t[a] : 1 - t[a];
-            if (weight != 0) sum += weight * accessors_[n].getValue(base + c);
-        }
-        return static_cast<float>(sum);
-    }
-
-private:
-    std::vector<Accessor> accessors_;
-    std::vector<const openvdb::math::Transform*> transforms_;
-};
-
-constexpr std::uint8_t kContested = 255;
-
-/// Adds one structure's voxels; those that are taken already become contested.
-void add_label(const std::vector<std::uint8_t>& solid, std::uint8_t label, std::vector<std::uint8_t>& labels) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, labels.size(), 1 << 16), [&](const auto& range) {
-        for (std::size_t n = range.begin(); n != range.end(); ++n)
-            if (solid[n] != 0) labels[n] = labels[n] == 0 ? label : kContested;
-    });
-}
-
-/// Decides the voxels that two structures claim, and those that none does where two touch.
-class Arbiter {
-public:
-    Arbiter(const std::vector<Structure>& structures, const ImageGeometry& geometry,
-            const std::vector<std::uint8_t>& claims)
-        : structures_(structures), geometry_(geometry), claims_(claims), distances_(structures) {
-        touching_ = 0.5F * static_cast<float>(structures.front().surface->voxelSize()[0]);
-    }
-
-    [[nodiscard]] std::uint8_t decide(int i, int j, int k) const {
-        const std::uint8_t claim = claims_[at(i, j, k)];
-        if (claim != 0 && claim != kContested) return claim;
-        const std::vector<std::size_t> candidates = claim == kContested ? everyone() : neighbours(i, j, k);
-        if (candidates.size() < 2) return 0;
-        const Vec3 world = geometry_.index_to_world({double(i), double(j), double(k)});
-        std::size_t best = 0;
-        float first = std::numeric_limits<float>::max(), second = first;
-        for (const std::size_t n : candidates) {
-            const float d = distances_(n, world);
-            if (d < first || (d == first && structures_[n].name < structures_[best].name)) {
-                second = first;
-                first = d;
-                best = n;
-            } else {
-                second = std::min(second, d);
-            }
-        }
-        return claim == kContested || first + second < touching_ ? static_cast<std::uint8_t>(best + 1) : 0;
-    }
-
-private:
-    [[nodiscard]] std::size_t at(int i, int j, int k) const {
-        return (std::size_t(k) * geometry_.size[1] + j) * geometry_.size[0] + i;
-    }
-    [[nodiscard]] std::vector<std::size_t> everyone() const {
-        std::vector<std::size_t> all(structures_.size());
-        for (std::size_t n = 0; n < all.size(); ++n) all[n] = n;
-        return all;
-    }
-    /// The different labels of the six neighbours, ascending. A slit of no width has both within one voxel.
-    [[nodiscard]] std::vector<std::size_t> neighbours(int i, int j, int k) const {
-        std::vector<std::size_t> found;
-        const Index3 here{i, j, k};
-        for (int face = 0; face < 6; ++face) {
-            Index3 c = here;
-            c[face / 2] += face % 2 == 0 ? -1 : 1;
-            if (c[face / 2] < 0 || c[face / 2] >= geometry_.size[face / 2]) continue;
-            const std::uint8_t label = claims_[at(c[0], c[1], c[2])];
-            if (label == 0 || label == kContested) continue;
-            if (std::find(found.begin(), found.end(), std::size_t(label - 1)) == found.end())
-                found.push_back(label - 1);
-        }
-        std::sort(found.begin(), found.end());
-        return found;
-    }
-
-    const std::vector<Structure>& structures_;
-    const ImageGeometry& geometry_;
-    const std::vector<std::uint8_t>& claims_;
-    Distances distances_;
-    float touching_;
-};
-
 }  // namespace
 
 std::string SeparateOptions::why_invalid() const {
@@ -357,31 +256,6 @@ SeparateResult separate(const std::vector<Structure>& structures, const Separate
     SeparateResult result;
     with_threads(run, [&] { result = Separation(structures, options, run).go(); });
     return result;
-}
-
-std::vector<std::uint8_t> make_label_image(const std::vector<Structure>& structures, const ImageGeometry& geometry,
-                                           const RunContext& run) {
-    if (structures.size() >= kContested)
-        throw Error(Errc::InvalidInput,
-                    "make_label_image: expected at most 254 structures, got " + std::to_string(structures.size()));
-    const auto [ni, nj, nk] = geometry.size;
-    std::vector<std::uint8_t> claims(std::size_t(ni) * std::size_t(nj) * std::size_t(nk), 0);
-    if (structures.empty()) return claims;
-    std::vector<std::uint8_t> labels;
-    with_threads(run, [&, ni = ni, nj = nj, nk = nk] {
-        for (std::size_t n = 0; n < structures.size(); ++n) {
-            run.check();
-            add_label(rasterize(*structures[n].surface, geometry, 1, run), static_cast<std::uint8_t>(n + 1), claims);
-        }
-        labels.resize(claims.size());
-        tbb::parallel_for(0, nk, [&](int k) {
-            const Arbiter arbiter(structures, geometry, claims);
-            std::uint8_t* out = labels.data() + std::size_t(k) * nj * ni;
-            for (int j = 0; j < nj; ++j)
-                for (int i = 0; i < ni; ++i) *out++ = arbiter.decide(i, j, k);
-        });
-    });
-    return labels;
 }
 
 std::vector<std::string> make_grid_names(const std::vector<std::string>& names) {
@@ -420,25 +294,8 @@ std::array<std::uint8_t, 3> structure_color(std::size_t n) {
 }
 
 std::vector<std::pair<std::string, std::string>> make_slicer_segments(const std::vector<std::string>& names,
-                                                                      const std::vector<std::uint8_t>& labels,
-                                                                      const Index3& size,
+                                                                      const std::vector<VoxelBox>& extents,
                                                                       const std::vector<int>& values) {
-    struct Extent {
-        Index3 min, max;
-    };
-    std::vector<Extent> extents(names.size(), {size, {-1, -1, -1}});
-    std::size_t at = 0;
-    for (int k = 0; k < size[2]; ++k)
-        for (int j = 0; j < size[1]; ++j)
-            for (int i = 0; i < size[0]; ++i, ++at) {
-                if (labels[at] == 0 || labels[at] > names.size()) continue;
-                Extent& e = extents[labels[at] - 1];
-                const Index3 here{i, j, k};
-                for (int a = 0; a < 3; ++a) {
-                    e.min[a] = std::min(e.min[a], here[a]);
-                    e.max[a] = std::max(e.max[a], here[a]);
-                }
-            }
     std::vector<std::pair<std::string, std::string>> fields{
         {"Segmentation_ContainedRepresentationNames", "Binary labelmap|"},
         {"Segmentation_MasterRepresentation", "Binary labelmap"},
@@ -450,9 +307,8 @@ std::vector<std::pair<std::string, std::string>> make_slicer_segments(const std:
         const auto rgb = structure_color(n);
         color.precision(6);
         color << rgb[0] / 255.0 << " " << rgb[1] / 255.0 << " " << rgb[2] / 255.0;
-        const Extent& e = extents[n];
-        // Slicer writes an empty segment's extent as 0 -1.
-        for (int a = 0; a < 3; ++a) extent << (a == 0 ? "" : " ") << (e.max[a] < 0 ? 0 : e.min[a]) << " " << e.max[a];
+        const VoxelBox& e = extents[n];
+        for (int a = 0; a < 3; ++a) extent << (a == 0 ? "" : " ") << e.min[a] << " " << e.max[a];
         for (const auto& [field, value] : std::vector<std::pair<std::string, std::string>>{
                  {"ID", make_grid_names({names[n], {}})[0]},
                  {"Name", names[n]},

@@ -9,6 +9,14 @@ namespace covol::detail {
 /// @throws Error Io; whatever `write` throws.
 void write_atomically(const std::string& path, const std::function<void(const std::string& temporary)>& write);
 
+/// The same for a folder: `write` fills an empty one beside `path`. An old folder is replaced, at once.
+/// @param may_replace  whether what is there may go @throws Error Io; whatever `write` throws.
+void write_folder_atomically(const std::string& path, bool may_replace,
+                             const std::function<void(const std::string& temporary)>& write);
+
+/// "a.zarr" of "a.zarr/", as a shell completes it.
+std::string without_end_slash(const std::string& path);
+
 /// "gz" is looked through: extension("a.nii.gz") is ".nii.gz"; always lower case.
 std::string extension(const std::string& path);
 

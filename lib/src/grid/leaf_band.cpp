@@ -4,6 +4,9 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <string>
+
+#include "covol/error.h"
 
 namespace covol::detail {
 namespace {
@@ -13,6 +16,20 @@ std::uint64_t pack(const Coord& origin) {
     constexpr std::int64_t kBias = 1 << 20;
     const auto field = [](std::int32_t v) { return std::uint64_t(std::int64_t(v >> 3) + kBias) & 0x1fffff; };
     return field(origin.x()) << 42 | field(origin.y()) << 21 | field(origin.z());
+}
+
+/// Farther apart, two leaves would have one key.
+void require_packable(const std::vector<Coord>& origins) {
+    constexpr std::int64_t kMost = 1 << 24;
+    for (int a = 0; a < 3 && !origins.empty(); ++a) {
+        const auto [low, high] = std::minmax_element(
+            origins.begin(), origins.end(), [a](const Coord& one, const Coord& other) { return one[a] < other[a]; });
+        const std::int64_t length = std::int64_t((*high)[a]) - (*low)[a] + kLeafDim;
+        if (length > kMost - 2 * kLeafDim)
+            throw Error(Errc::Unsupported, "the band is " + std::to_string(length) +
+                                               " voxels long along an axis, expected less than 2^24; use a larger "
+                                               "voxel size");
+    }
 }
 
 bool is_odd(const Coord& origin) { return ((origin.x() ^ origin.y() ^ origin.z()) >> 3) & 1; }
@@ -45,6 +62,7 @@ LeafBand::LeafBand(std::vector<Coord> origins) : origins_(std::move(origins)) {
 }
 
 void LeafBand::index() {
+    require_packable(origins_);
     lookup_.resize(origins_.size());
     for (std::size_t i = 0; i < origins_.size(); ++i) lookup_[i] = {pack(origins_[i]), static_cast<std::int32_t>(i)};
     std::sort(lookup_.begin(), lookup_.end());

@@ -12,7 +12,7 @@ namespace covol::meshing {
 
 CornerTable::CornerTable(std::vector<Triangle>& triangles, std::size_t vertices)
     : triangles_(triangles),
-      opposite_(3 * triangles.size(), kNone),
+      opposite_(corner_count(triangles.size()), kNone),
       corner_of_(vertices, kNone),
       on_boundary_(vertices, 0) {
     // Sides in the order of the vertex that they leave.

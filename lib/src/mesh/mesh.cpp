@@ -7,11 +7,14 @@
 #include <numeric>
 
 #include "mesh/corner_table.h"
+#include "mesh/disjoint_sets.h"
+#include "mesh/vertex_normals.h"
 
 namespace covol {
 namespace {
 
 using meshing::cross;
+using meshing::DisjointSets;
 using meshing::dot;
 using meshing::length;
 using meshing::minus;
@@ -19,23 +22,6 @@ using meshing::minus;
 Vec3 point(const TriangleMesh& mesh, std::uint32_t v) { return meshing::to_vec3(mesh.vertices[v]); }
 
 bool is_degenerate(const std::array<std::uint32_t, 3>& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
-
-class DisjointSets {
-public:
-    explicit DisjointSets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0U); }
-    std::uint32_t root(std::uint32_t i) {
-        while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-        return i;
-    }
-    void unite(std::uint32_t a, std::uint32_t b) {
-        a = root(a);
-        b = root(b);
-        if (a != b) parent_[std::max(a, b)] = std::min(a, b);
-    }
-
-private:
-    std::vector<std::uint32_t> parent_;
-};
 
 /// A triangle's side from corner k to corner k+1, number 3 t + k, under its lower vertex.
 struct Side {
@@ -53,7 +39,7 @@ std::uint32_t next_corner(std::uint32_t corner) { return corner % 3 == 2 ? corne
 /// Calls visit(first, last) with the sides that lie on each edge; degenerate triangles have none.
 template <typename Visit>
 void for_each_edge(const TriangleMesh& mesh, const Visit& visit) {
-    const auto corners = std::uint32_t(3 * mesh.triangles.size());
+    const std::uint32_t corners = meshing::corner_count(mesh.triangles.size());
     const auto low = [&](std::uint32_t c) {
         return std::min(corner_vertex(mesh, c), corner_vertex(mesh, next_corner(c)));
     };
@@ -79,10 +65,8 @@ void for_each_edge(const TriangleMesh& mesh, const Visit& visit) {
     }
 }
 
-/// Six times the signed volume between a triangle and `origin`.
 double six_volumes(const TriangleMesh& mesh, const std::array<std::uint32_t, 3>& t, const Vec3& origin) {
-    return dot(minus(point(mesh, t[0]), origin),
-               cross(minus(point(mesh, t[1]), origin), minus(point(mesh, t[2]), origin)));
+    return meshing::six_volumes({point(mesh, t[0]), point(mesh, t[1]), point(mesh, t[2])}, origin);
 }
 
 }  // namespace
@@ -103,7 +87,7 @@ MeshMeasures measure(const TriangleMesh& mesh) {
 
     m.closed = m.manifold = !degenerate;
     DisjointSets components(mesh.triangles.size());
-    DisjointSets umbrellas(3 * mesh.triangles.size());  // of corners, around their vertices
+    DisjointSets umbrellas(meshing::corner_count(mesh.triangles.size()));  // of corners, around their vertices
     std::int64_t edges = 0;
     for_each_edge(mesh, [&](const Side* first, const Side* last) {
         ++edges;
@@ -139,26 +123,38 @@ double smallest_angle(const TriangleMesh& mesh) {
     return std::acos(std::clamp(double(worst[std::size_t(rank)]), -1.0, 1.0)) * 180 / std::numbers::pi;
 }
 
-std::vector<std::array<float, 3>> compute_vertex_normals(const TriangleMesh& mesh) {
-    std::vector<Vec3> sums(mesh.vertices.size(), Vec3{0, 0, 0});
-    for (const auto& t : mesh.triangles)
-        for (int k = 0; k < 3; ++k) {
-            const Vec3 a = minus(point(mesh, t[(k + 1) % 3]), point(mesh, t[k]));
-            const Vec3 b = minus(point(mesh, t[(k + 2) % 3]), point(mesh, t[k]));
-            const Vec3 normal = cross(a, b);
-            const double size = length(normal);
-            if (!(size > 0)) continue;
-            const double angle = std::atan2(size, dot(a, b));
-            for (int c = 0; c < 3; ++c) sums[t[k]][c] += angle / size * normal[c];
-        }
-    std::vector<std::array<float, 3>> normals(sums.size());
-    for (std::size_t v = 0; v < sums.size(); ++v) {
-        const double size = length(sums[v]);
-        // A vertex without a direction of its own still needs a unit vector in most file formats.
-        normals[v] = size > 0 ? std::array{float(sums[v][0] / size), float(sums[v][1] / size), float(sums[v][2] / size)}
-                              : std::array{0.0F, 0.0F, 1.0F};
+void meshing::add_normals(const std::array<Vec3, 3>& corners, const std::array<Vec3*, 3>& sums) {
+    for (int k = 0; k < 3; ++k) {
+        const Vec3 a = minus(corners[(k + 1) % 3], corners[k]);
+        const Vec3 b = minus(corners[(k + 2) % 3], corners[k]);
+        const Vec3 normal = cross(a, b);
+        const double size = length(normal);
+        if (!(size > 0)) continue;
+        const double angle = std::atan2(size, dot(a, b));
+        for (int c = 0; c < 3; ++c) (*sums[k])[c] += angle / size * normal[c];
     }
+}
+
+std::array<float, 3> meshing::unit_normal(const Vec3& sum) {
+    const double size = length(sum);
+    // A vertex without a direction of its own still needs a unit vector in most file formats.
+    return size > 0 ? std::array{float(sum[0] / size), float(sum[1] / size), float(sum[2] / size)}
+                    : std::array{0.0F, 0.0F, 1.0F};
+}
+
+std::vector<std::array<float, 3>> meshing::vertex_normals(const std::vector<std::array<float, 3>>& vertices,
+                                                          const std::vector<Triangle>& triangles) {
+    std::vector<Vec3> sums(vertices.size(), Vec3{0, 0, 0});
+    for (const Triangle& t : triangles)
+        add_normals({to_vec3(vertices[t[0]]), to_vec3(vertices[t[1]]), to_vec3(vertices[t[2]])},
+                    {&sums[t[0]], &sums[t[1]], &sums[t[2]]});
+    std::vector<std::array<float, 3>> normals(sums.size());
+    std::transform(sums.begin(), sums.end(), normals.begin(), unit_normal);
     return normals;
+}
+
+std::vector<std::array<float, 3>> compute_vertex_normals(const TriangleMesh& mesh) {
+    return meshing::vertex_normals(mesh.vertices, mesh.triangles);
 }
 
 void remove_small_components(TriangleMesh& mesh, double min_volume) {

@@ -4,8 +4,10 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <string>
 #include <vector>
 
+#include "covol/error.h"
 #include "covol/fwd.h"
 
 namespace covol::meshing {
@@ -23,6 +25,20 @@ inline Vec3 cross(const Vec3& a, const Vec3& b) {
 inline double length(const Vec3& a) { return std::sqrt(dot(a, a)); }
 inline Vec3 to_vec3(const Position& p) { return {p[0], p[1], p[2]}; }
 inline Position to_position(const Vec3& p) { return {float(p[0]), float(p[1]), float(p[2])}; }
+
+/// Three for each triangle. @throws Error Unsupported where 32 bits cannot number them.
+inline std::uint32_t corner_count(std::uint64_t triangles) {
+    constexpr std::uint64_t kMost = (~std::uint32_t(0)) / 3;
+    if (triangles > kMost)
+        throw Error(Errc::Unsupported, "the mesh has " + std::to_string(triangles) + " triangles, expected at most " +
+                                           std::to_string(kMost) + "; use a larger voxel size");
+    return static_cast<std::uint32_t>(3 * triangles);
+}
+
+/// Six times the signed volume between a triangle and `origin`.
+inline double six_volumes(const std::array<Vec3, 3>& p, const Vec3& origin) {
+    return dot(minus(p[0], origin), cross(minus(p[1], origin), minus(p[2], origin)));
+}
 
 /// Twice the area, along the outward normal.
 inline Vec3 area_normal(const Vec3& a, const Vec3& b, const Vec3& c) { return cross(minus(b, a), minus(c, a)); }

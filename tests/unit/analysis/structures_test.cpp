@@ -253,6 +253,63 @@ TEST_CASE("Labels leave no voxel to two structures, and none out where they touc
             }
 }
 
+TEST_CASE("A label image in boxes is the one that is made at once") {
+    const FloatGridPtr a = extract_surface(*start_from_box(space(), {{-5.9, -4, -4}, {0.6, 4, 4}}));
+    const FloatGridPtr b = extract_surface(*start_from_box(space(), {{-0.4, -4, -4}, {6.1, 4, 4}}));
+    const FloatGridPtr c = ball({{0, 7, 5}, 3.3});
+    const SeparateResult settled = separate({{"b", b}, {"a", a}, {"c", c}});
+    const std::vector<Structure> all{
+        {"b", settled.surfaces[0]}, {"a", settled.surfaces[1]}, {"c", settled.surfaces[2]}};
+    ImageGeometry g;
+    g.size = {61, 53, 47};
+    g.spacing = {0.5, 0.31, 0.77};
+    g.origin = {-15, -8, -17};
+    const double cosine = std::cos(0.2), sine = std::sin(0.2);
+    for (const bool turned : {false, true}) {
+        if (turned) g.direction = {{{cosine, -sine, 0}, {sine, cosine, 0}, {0, 0, 1}}};
+        for (const std::size_t count : {1U, 3U}) {
+            const std::vector<Structure> some(all.begin(), all.begin() + std::ptrdiff_t(count));
+            const std::vector<std::uint8_t> dense = make_label_image(some, g);
+            const auto at = [&](int i, int j, int k) { return dense[(std::size_t(k) * 53 + j) * 61 + i]; };
+            const LabelImage bytes(some, g), wide(some, g, {-3, 700, 9});
+            CHECK(bytes.type() == PixelType::UInt8);
+            REQUIRE(wide.type() == PixelType::Int32);
+            int uniform = 0, different = 0;
+            std::vector<std::uint64_t> voxels(count, 0);
+            for (const int edge : {4, 16}) {
+                for (int z = 0; z < 47; z += edge)
+                    for (int y = 0; y < 53; y += edge)
+                        for (int x = 0; x < 61; x += edge) {
+                            const VoxelBox box{
+                                {x, y, z},
+                                {std::min(x + edge, 61) - 1, std::min(y + edge, 53) - 1, std::min(z + edge, 47) - 1}};
+                            const std::size_t n = std::size_t(box.size()[0]) * box.size()[1] * box.size()[2];
+                            std::vector<std::uint8_t> got(n, 99);
+                            std::vector<std::int32_t> values(n, 99);
+                            bytes.fill(box, got.data());
+                            wide.fill(box, values.data());
+                            const auto same = bytes.uniform(box);
+                            uniform += same ? 1 : 0;
+                            if (edge == 4) wide.wrote(box, values.data(), 0);
+                            std::size_t v = 0;
+                            for (int k = z; k <= box.max[2]; ++k)
+                                for (int j = y; j <= box.max[1]; ++j)
+                                    for (int i = x; i <= box.max[0]; ++i, ++v) {
+                                        const int label = at(i, j, k);
+                                        static constexpr std::array<int, 4> kValues{0, -3, 700, 9};
+                                        different += got[v] != label || values[v] != kValues[std::size_t(label)] ||
+                                                     (same && *same != label);
+                                        if (edge == 4 && label > 0) ++voxels[std::size_t(label) - 1];
+                                    }
+                        }
+            }
+            CHECK(different == 0);
+            CHECK(uniform > 1000);
+            CHECK(wide.voxels_written() == voxels);
+        }
+    }
+}
+
 TEST_CASE("Names become identifiers") {
     CHECK(make_grid_names({"anything at all"}) == std::vector<std::string>{"surface"});
     CHECK(make_grid_names({"ve", "left lung", "left-lung", "2nd", "é"}) ==
@@ -260,10 +317,7 @@ TEST_CASE("Names become identifiers") {
 }
 
 TEST_CASE("Segment metadata names labels, colours and extents") {
-    std::vector<std::uint8_t> labels(4 * 3 * 2, 0);
-    labels[1] = 1;           // (1,0,0)
-    labels[12 + 4 + 2] = 1;  // (2,1,1)
-    const auto fields = make_slicer_segments({"ve", "ex e"}, labels, {4, 3, 2});
+    const auto fields = make_slicer_segments({"ve", "ex e"}, {{{1, 0, 0}, {2, 1, 1}}, {}});
     const auto at = [&](const std::string& key) {
         for (const auto& [name, value] : fields)
             if (name == key) return value;

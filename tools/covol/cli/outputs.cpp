@@ -9,6 +9,7 @@
 
 #include "covol/error.h"
 #include "covol/image.h"
+#include "covol/image_stream.h"
 #include "covol/mesh_io.h"
 
 namespace covol::tool {
@@ -46,7 +47,31 @@ bool is_special(const fs::path& path) {
     return fs::exists(path, status) && !fs::is_regular_file(path, status) && !fs::is_directory(path, status);
 }
 
+bool is_zarr_name(const fs::path& path) {
+    return lower_extension((path.has_filename() ? path : path.parent_path()).string()) == ".zarr";
+}
+
+bool lies_in(const fs::path& path, const fs::path& folder) {
+    std::error_code status;
+    for (fs::path at = fs::absolute(path); at.has_relative_path(); at = at.parent_path())
+        if (fs::equivalent(at, folder, status)) return true;
+    return false;
+}
+
 }  // namespace
+
+void Outputs::check_store(const std::string& flag, const std::string& path, const fs::path& target) const {
+    std::error_code status;
+    if (!fs::exists(target, status)) return;
+    if (!is_zarr_store(target.string()))
+        throw Error(Errc::Io, flag + ": " + path +
+                                  ": cannot write: something that is no Zarr store is there; choose "
+                                  "another name");
+    for (const std::string& input : inputs_)
+        if (lies_in(input, target))
+            throw Error(Errc::InvalidOptions,
+                        flag + ": " + path + ": " + input + ", an input of this run, lies in it; choose another name");
+}
 
 void Outputs::check(const std::string& flag, const std::string& path, OutputKind kind) {
     if (path.empty()) return;
@@ -55,10 +80,14 @@ void Outputs::check(const std::string& flag, const std::string& path, OutputKind
     } catch (const Error& error) {
         throw Error(error.code(), flag + ": " + error.what());
     }
-    const fs::path target = fs::absolute(path).lexically_normal();
+    fs::path target = fs::absolute(path).lexically_normal();
+    if (target.filename().empty()) target = target.parent_path();
     const fs::path folder = target.parent_path();
     std::error_code status;
-    if (fs::is_directory(target, status)) throw Error(Errc::Io, flag + ": " + path + ": cannot write: it is a folder");
+    if (is_zarr_name(path))
+        check_store(flag, path, target);
+    else if (fs::is_directory(target, status))
+        throw Error(Errc::Io, flag + ": " + path + ": cannot write: it is a folder");
     if (is_special(target)) {
         if (kind == OutputKind::Text || kind == OutputKind::Table) return;
         throw Error(Errc::Io, flag + ": " + path + ": cannot write: it is not a regular file");
@@ -101,7 +130,11 @@ void Outputs::commit() {
 
 void Outputs::rollback() {
     std::error_code ignored;
-    for (const std::string& path : written_) fs::remove(path, ignored);
+    for (const std::string& path : written_)
+        if (is_zarr_name(path))
+            fs::remove_all(path, ignored);
+        else
+            fs::remove(path, ignored);
     written_.clear();
 }
 

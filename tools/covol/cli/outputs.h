@@ -1,4 +1,5 @@
 #pragma once
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
@@ -15,7 +16,7 @@ public:
     void protect(std::vector<std::string> inputs) { inputs_ = std::move(inputs); }
 
     /// Checks the ending, that the folder exists and can be written, and that no output is an input, another output, or
-    /// something that is not a file (a device; texts may go to one).
+    /// something that is not a file (a device; texts may go to one) or, for .zarr, a Zarr store.
     /// An empty path is an output that was not asked for. @throws Error InvalidOptions, Io.
     void check(const std::string& flag, const std::string& path, OutputKind kind);
 
@@ -33,6 +34,9 @@ public:
     [[nodiscard]] const std::vector<std::string>& written() const noexcept { return written_; }
 
 private:
+    /// A folder that is there is replaced where it is a Zarr store in which no input lies.
+    void check_store(const std::string& flag, const std::string& path, const std::filesystem::path& target) const;
+
     struct Pending {
         std::string path;
         std::function<void(const std::string&)> write;

@@ -91,8 +91,8 @@ Json options_of(const CLI::App& command) {
     return options;
 }
 
-/// Files that the command line names to be read: whatever exists under the value of an option that is no output. Values
-/// may begin with a structure's name or a kind of start, NAME=FILE and mesh:FILE.
+/// Files and folders that the command line names to be read: whatever exists under the value of an option that is no
+/// output. Values may begin with a structure's name or a kind of start, NAME=FILE and mesh:FILE.
 std::vector<std::string> inputs_of(const CLI::App& command) {
     std::vector<std::string> inputs;
     for (const CLI::Option* option : command.get_options()) {
@@ -101,7 +101,8 @@ std::vector<std::string> inputs_of(const CLI::App& command) {
             for (const std::size_t begin : {std::size_t(0), text.find('=') + 1, text.find(':') + 1}) {
                 std::error_code status;
                 const std::string path = text.substr(begin);
-                if (std::filesystem::is_regular_file(path, status)) inputs.push_back(path);
+                if (std::filesystem::is_regular_file(path, status) || std::filesystem::is_directory(path, status))
+                    inputs.push_back(path);
             }
     }
     return inputs;

@@ -1,9 +1,9 @@
-#include <algorithm>
+#include <memory>
 
 #include "cli/report.h"
 #include "commands/commands.h"
 #include "covol/error.h"
-#include "covol/surface.h"
+#include "covol/structures.h"
 #include "flags/bindings.h"
 
 namespace covol::tool {
@@ -13,6 +13,7 @@ struct MaskJob {
     std::string input, like, output;
     ImageFlags image;
     int label = 1;
+    bool raw = false;
 
     void run(Session& session) const {
         session.outputs().check("-o", output, OutputKind::Image);
@@ -20,15 +21,15 @@ struct MaskJob {
             throw Error(Errc::InvalidOptions, "--label: expected 1 to 255, got " + std::to_string(label));
         const FloatGridPtr level_set = read_vdb_level_set(input, session.run());
         const ImageGeometry geometry = image.read_geometry(like, session.run());
-        const Stopwatch watch;
-        const auto labels = std::make_shared<std::vector<std::uint8_t>>(
-            rasterize(*level_set, geometry, static_cast<std::uint8_t>(label), session.run()));
-        session.add_seconds("mask", watch.seconds());
-        const auto inside = std::count_if(labels->begin(), labels->end(), [](std::uint8_t v) { return v != 0; });
-        session.report()["mask"] = {{"voxels", inside}, {"image", to_json(geometry)}};
-        session.note(std::to_string(inside) + " voxels inside");
-        session.outputs().add(
-            output, [labels, geometry](const std::string& path) { write_image(path, geometry, labels->data()); });
+        const auto labels = std::make_shared<LabelImage>(std::vector<Structure>{{"surface", level_set}}, geometry,
+                                                         std::vector<int>{label}, false);
+        session.report()["mask"] = {{"image", to_json(geometry)}};
+        session.outputs().add(output, [this, labels, &session](const std::string& path) {
+            write_image(path, *labels, {!raw}, session.run());
+            const std::uint64_t inside = labels->voxels_written().front();
+            session.report()["mask"]["voxels"] = inside;
+            session.note(std::to_string(inside) + " voxels inside");
+        });
     }
 };
 
@@ -42,8 +43,11 @@ void add_mask(Session& session) {
         ->type_name("IN.vdb[:NAME]");
     command->add_option("--like", job->like, "image whose lattice the mask gets")->required()->type_name("IMAGE");
     in_group(*command, Group::Output);
-    command->add_option("-o,--output", job->output, "label image")->required()->type_name("OUT.nrrd|.nii.gz|.tif|.mha");
+    command->add_option("-o,--output", job->output, "label image")
+        ->required()
+        ->type_name("OUT.nrrd|.nii.gz|.tif|.mha|.zarr");
     command->add_option("--label", job->label, "value of the inside, 1 to 255")->capture_default_str();
+    command->add_flag("--raw", job->raw, "leave the voxels of .nrrd and .mha unpacked");
     job->image.bind(*command);
 }
 

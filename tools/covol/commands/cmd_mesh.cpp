@@ -1,7 +1,9 @@
+#include "cli/arguments.h"
 #include "cli/report.h"
 #include "commands/commands.h"
 #include "covol/mesh_cleanup.h"
 #include "covol/mesh_relax.h"
+#include "covol/mesh_stream.h"
 #include "covol/surface.h"
 #include "flags/bindings.h"
 
@@ -12,7 +14,7 @@ struct MeshJob {
     std::string input, output;
     Length isovalue, min_component, target_edge, adaptive;
     int smooth = 0;
-    bool repair = false;
+    bool repair = false, plain = false;
     MeshFlags flags;
 
     [[nodiscard]] ExtractOptions extract_options(double h) const {
@@ -47,11 +49,34 @@ struct MeshJob {
         tell("smoothing", done.smoothing);
     }
 
+    /// Marching cubes as they are, from the tree to the file.
+    void stream(const FloatGridPtr& level_set, double h, Session& session) const {
+        session.outputs().add(output, [this, level_set, h, &session](const std::string& path) {
+            const StreamedMesh made =
+                stream_mesh(path, *level_set, isovalue.resolve(h, 0), flags.options(session), session.run());
+            session.report()["mesh"] = {{"vertices", made.vertices}, {"triangles", made.triangles}};
+            session.report()["surface"] = to_json(made.measures);
+            session.note("mesh: " + std::to_string(made.triangles) + " triangles, as marching cubes leave them");
+            session.note("surface: " + one_line(made.measures));
+        });
+    }
+
+    void check_plain() const {
+        if (!plain) return;
+        if (repair || smooth != 0 || target_edge.given || adaptive.given || min_component.given)
+            throw UsageError(
+                "--plain: excludes --repair, --smooth, --target-edge, --adaptive and --min-component, which need the "
+                "whole mesh");
+        if (!can_stream_mesh(output)) throw UsageError("--plain: expected -o with .ply, .stl or .obj");
+    }
+
     void run(Session& session) const {
         session.outputs().check("-o", output, OutputKind::Mesh);
         flags.check();
+        check_plain();
         const FloatGridPtr level_set = read_vdb_level_set(input, session.run());
         const double h = domain_of(*level_set).voxel_size;
+        if (plain) return stream(level_set, h, session);
         const Stopwatch watch;
         TriangleMesh mesh = extract_mesh(*level_set, extract_options(h), session.run());
         session.add_seconds("surface", watch.seconds());
@@ -94,6 +119,9 @@ void add_mesh(Session& session) {
                "most 2vx");
     command->add_option("--smooth", job->smooth, "steps of volume-keeping smoothing")->capture_default_str();
     command->add_flag("--repair", job->repair, "resolve self-intersections, fill holes");
+    command->add_flag("--plain", job->plain,
+                      "triangles as marching cubes leave them, neither relaxed nor held in memory: for surfaces of "
+                      "tens of millions of triangles; .ply, .stl, .obj");
     job->flags.bind(*command);
 }
 

@@ -52,7 +52,9 @@ void add_phantom(Session& session) {
     in_group(*command, Group::Input);
     command->add_option("kind", job->options.kind, kinds)->required()->type_name("KIND");
     in_group(*command, Group::Output);
-    command->add_option("-o,--output", job->output, "the image")->required()->type_name("OUT.nrrd|.nii.gz|.tif|.mha");
+    command->add_option("-o,--output", job->output, "the image")
+        ->required()
+        ->type_name("OUT.nrrd|.nii.gz|.tif|.mha|.zarr");
     command->add_option("--points", job->points_path, "points on the true surface")->type_name("OUT.xyz|.csv|.ply");
     command->add_option("--labels", job->labels_path, "the true solid as a label image")->type_name("OUT");
     in_group(*command, Group::Input);

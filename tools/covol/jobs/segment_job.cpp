@@ -64,7 +64,7 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
     command.add_option("-o,--output", output, "the surface as a level set, .vdb")->required()->type_name("OUT.vdb");
     if (with_image) {
         command.add_option("--mask", mask_path, "label image in the image's own geometry; .seg.nrrd for 3D Slicer")
-            ->type_name("OUT.nrrd|.nii.gz|.tif|.mha");
+            ->type_name("OUT.nrrd|.nii.gz|.tif|.mha|.zarr");
         command.add_option("--table", table_path, "volume, area and fit of each structure and frame, as a table")
             ->type_name("OUT.csv");
         evidence.bind(command);

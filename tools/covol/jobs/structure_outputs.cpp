@@ -12,7 +12,12 @@
 namespace covol::tool {
 namespace {
 
-bool is_nrrd(const std::string& path) { return path.ends_with(".nrrd") || path.ends_with(".NRRD"); }
+/// Whether a label image has a place for the structures' names.
+bool keeps_names(const std::string& path) {
+    for (const char* end : {".nrrd", ".NRRD", ".zarr", ".zarr/"})
+        if (path.ends_with(end)) return true;
+    return false;
+}
 
 std::string labels_path(const std::string& mask) {
     return std::filesystem::path(with_suffix(mask, "_labels")).replace_extension(".txt").string();
@@ -76,38 +81,88 @@ void hand_over_meshes(const SegmentJob& job, const std::shared_ptr<const Structu
              });
 }
 
-/// Bytes where they hold all values.
-void write_labels(const std::string& file, const ImageGeometry& geometry, const std::vector<std::int32_t>& values,
-                  const std::vector<std::pair<std::string, std::string>>& metadata) {
-    const auto [low, high] = std::minmax_element(values.begin(), values.end());
-    if (*low < 0 || *high > 255) return write_image(file, geometry, values.data(), metadata);
-    const std::vector<std::uint8_t> bytes(values.begin(), values.end());
-    write_image(file, geometry, bytes.data(), metadata);
+using Metadata = std::vector<std::pair<std::string, std::string>>;
+
+std::vector<NamedLabel> label_names(const StructuresOutput& output) {
+    std::vector<NamedLabel> labels;
+    for (std::size_t n = 0; n < output.structures.size(); ++n)
+        labels.push_back({output.structures[n].label, output.structures[n].name, structure_color(n)});
+    return labels;
 }
+
+/// A mask that was given and corrected: its own values, bytes where they hold all of them.
+class CorrectedLabels : public PixelSource {
+public:
+    CorrectedLabels(std::shared_ptr<const StructuresOutput> output, bool has_names)
+        : PixelSource(output->geometry, type_of(output->structures.front().corrected->values), true),
+          output_(std::move(output)),
+          has_names_(has_names) {}
+
+    void fill(const VoxelBox& box, void* out) const override {
+        if (type() == PixelType::UInt8)
+            copy(box, static_cast<std::uint8_t*>(out));
+        else
+            copy(box, static_cast<std::int32_t*>(out));
+    }
+    [[nodiscard]] Metadata metadata() const override {
+        if (!has_names_) return {};
+        return make_slicer_segments(output_->names(), {extent()}, output_->labels());
+    }
+    [[nodiscard]] std::vector<NamedLabel> label_names() const override {
+        return has_names_ ? tool::label_names(*output_) : std::vector<NamedLabel>{};
+    }
+
+private:
+    static PixelType type_of(const std::vector<std::int32_t>& values) {
+        const auto [low, high] = std::minmax_element(values.begin(), values.end());
+        return *low < 0 || *high > 255 ? PixelType::Int32 : PixelType::UInt8;
+    }
+    [[nodiscard]] const std::vector<std::int32_t>& values() const {
+        return output_->structures.front().corrected->values;
+    }
+    [[nodiscard]] std::size_t first_of(int j, int k) const {
+        const Index3 size = geometry().size;
+        return (std::size_t(k) * size[1] + j) * size[0];
+    }
+    template <typename T>
+    void copy(const VoxelBox& box, T* out) const {
+        for (int k = box.min[2]; k <= box.max[2]; ++k)
+            for (int j = box.min[1]; j <= box.max[1]; ++j) {
+                const std::int32_t* row = values().data() + first_of(j, k);
+                for (int i = box.min[0]; i <= box.max[0]; ++i) *out++ = static_cast<T>(row[i]);
+            }
+    }
+    /// Of the structure's own voxels.
+    [[nodiscard]] VoxelBox extent() const {
+        const Index3 size = geometry().size;
+        VoxelBox box{size, {-1, -1, -1}};
+        for (int k = 0; k < size[2]; ++k)
+            for (int j = 0; j < size[1]; ++j)
+                for (int i = 0; i < size[0]; ++i) {
+                    if (values()[first_of(j, k) + i] != output_->structures.front().label) continue;
+                    const Index3 here{i, j, k};
+                    for (int a = 0; a < 3; ++a) {
+                        box.min[a] = std::min(box.min[a], here[a]);
+                        box.max[a] = std::max(box.max[a], here[a]);
+                    }
+                }
+        return box.max[0] < 0 ? VoxelBox{} : box;
+    }
+
+    std::shared_ptr<const StructuresOutput> output_;
+    bool has_names_;
+};
 
 void hand_over_labels(const std::shared_ptr<const StructuresOutput>& output, const std::string& path,
                       const RunContext& run, const Sink& sink) {
     if (path.empty()) return;
     const bool has_names = !output->structures.front().name.empty();
     sink(path, [output, run, has_names](const std::string& file) {
-        const std::vector<int> label_of = output->labels();
-        if (const StructureOutput& only = output->structures.front();
-            output->structures.size() == 1 && only.corrected) {
-            std::vector<std::pair<std::string, std::string>> segments;
-            std::vector<std::uint8_t> own;
-            for (const std::int32_t value : only.corrected->values) own.push_back(value == only.label ? 1 : 0);
-            if (has_names) segments = make_slicer_segments(output->names(), own, output->geometry.size, label_of);
-            return write_labels(file, output->geometry, only.corrected->values, segments);
-        }
-        const std::vector<std::uint8_t> labels = make_label_image(solids(*output), output->geometry, run);
-        std::vector<std::int32_t> values(labels.begin(), labels.end());
-        for (std::int32_t& value : values)
-            if (value > 0) value = label_of[std::size_t(value) - 1];
-        write_labels(file, output->geometry, values,
-                     has_names ? make_slicer_segments(output->names(), labels, output->geometry.size, label_of)
-                               : std::vector<std::pair<std::string, std::string>>{});
+        if (output->structures.size() == 1 && output->structures.front().corrected)
+            return write_image(file, CorrectedLabels(output, has_names), {}, run);
+        write_image(file, LabelImage(solids(*output), output->geometry, output->labels(), has_names), {}, run);
     });
-    if (has_names && !is_nrrd(path))
+    if (has_names && !keeps_names(path))
         sink(labels_path(path), [output](const std::string& file) {
             write_text(file, make_itksnap_labels(output->names(), output->labels()));
         });
@@ -137,7 +192,7 @@ std::string with_suffix(const std::string& path, const std::string& suffix) {
     std::string name = whole.filename().string();
     std::size_t dot = name.rfind('.');
     if (dot == std::string::npos || dot == 0) return path + suffix;
-    for (const char* end : {".nii.gz", ".seg.nrrd"})
+    for (const char* end : {".nii.gz", ".seg.nrrd", ".ome.zarr"})
         if (name.size() > std::string(end).size() && name.ends_with(end)) dot = name.size() - std::string(end).size();
     return (whole.parent_path() / name.insert(dot, suffix)).string();
 }
@@ -159,7 +214,7 @@ void check_outputs(const SegmentJob& job, const std::vector<StructureInput>& inp
     const auto tagged = [&](const std::string& path) { return path.empty() ? path : with_suffix(path, tag); };
     outputs.check("-o", tagged(job.output), OutputKind::Vdb);
     outputs.check("--mask", tagged(job.mask_path), OutputKind::Image);
-    if (!job.mask_path.empty() && !inputs.front().name.empty() && !is_nrrd(job.mask_path))
+    if (!job.mask_path.empty() && !inputs.front().name.empty() && !keeps_names(job.mask_path))
         outputs.check("--mask", labels_path(tagged(job.mask_path)), OutputKind::Text);
     outputs.check("--density", tagged(job.density_path), OutputKind::Vdb);
     outputs.check("--fields", tagged(job.fields_path), OutputKind::Vdb);

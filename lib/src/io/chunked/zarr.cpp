@@ -6,6 +6,7 @@
 #include <limits>
 #include <sstream>
 
+#include "base/file.h"
 #include "base/text.h"
 #include "io/chunked/ome_zarr.h"
 #include "io/chunked/zarr_array.h"
@@ -238,10 +239,7 @@ bool is_zarr(const std::string& folder) {
 }
 
 std::unique_ptr<ImageFile> open_zarr(const std::string& path, bool correct_level_shift, const RunContext& run) {
-    // a shell completes the names of folders with a slash
-    std::string folder = path;
-    while (folder.size() > 1 && folder.back() == '/') folder.pop_back();
-    return std::make_unique<ZarrFile>(folder, correct_level_shift, run);
+    return std::make_unique<ZarrFile>(without_end_slash(path), correct_level_shift, run);
 }
 
 }  // namespace covol::detail

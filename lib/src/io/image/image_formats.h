@@ -24,11 +24,4 @@ bool is_dicom(const std::string& path);
 /// @param name  the grid's, or empty for the file's first float grid
 std::unique_ptr<ImageFile> open_vdb_image(const std::string& path, const std::string& name);
 
-/// Key/value pairs beside the pixels.
-using ImageMetadata = std::vector<std::pair<std::string, std::string>>;
-
-/// What write_image() hands to ITK; NRRD alone keeps the metadata.
-void write_itk(const std::string& path, const ImageGeometry& geometry, PixelType type, const void* values,
-               const ImageMetadata& metadata);
-
 }  // namespace covol::detail

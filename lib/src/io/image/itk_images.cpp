@@ -1,6 +1,5 @@
 // Formats whose headers ITK reads: NRRD, NIfTI, MetaImage, HDF5.
 #include <itkHDF5ImageIO.h>
-#include <itkMetaDataObject.h>
 #include <itkMetaImageIO.h>
 #include <itkNiftiImageIO.h>
 #include <itkNrrdImageIO.h>
@@ -38,21 +37,6 @@ itk::ImageIOBase::Pointer make_io(const std::string& extension) {
     else
         io = itk::MetaImageIO::New().GetPointer();
     return io;
-}
-
-itk::IOComponentEnum component_type(PixelType type) {
-    using Component = itk::IOComponentEnum;
-    switch (type) {
-        case PixelType::UInt8: return Component::UCHAR;
-        case PixelType::Int8: return Component::CHAR;
-        case PixelType::UInt16: return Component::USHORT;
-        case PixelType::Int16: return Component::SHORT;
-        case PixelType::UInt32: return Component::UINT;
-        case PixelType::Int32: return Component::INT;
-        case PixelType::Float: return Component::FLOAT;
-        case PixelType::Double: break;
-    }
-    return Component::DOUBLE;
 }
 
 std::string lower(std::string text) {
@@ -426,35 +410,6 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path) {
                              " frames");
     const bool detached = header && !header->data_file().empty();
     return std::make_unique<ItkFile>(path, unusable, info, io, is_hdf5, detached ? 0 : fs::file_size(path));
-}
-
-void write_itk(const std::string& path, const ImageGeometry& g, PixelType type, const void* values,
-               const ImageMetadata& metadata) {
-    const itk::ImageIOBase::Pointer io = make_io(extension(path));
-    with_itk(Errc::Io, "write_image: " + path + ": cannot write", [&] {
-        io->SetFileName(path);
-        io->SetNumberOfDimensions(3);
-        itk::ImageIORegion region(3);
-        for (unsigned a = 0; a < 3; ++a) {
-            io->SetDimensions(a, static_cast<itk::SizeValueType>(g.size[a]));
-            io->SetSpacing(a, g.spacing[a]);
-            io->SetOrigin(a, g.origin[a]);
-            io->SetDirection(a, std::vector<double>{g.direction[0][a], g.direction[1][a], g.direction[2][a]});
-            region.SetSize(a, static_cast<itk::SizeValueType>(g.size[a]));
-        }
-        io->SetIORegion(region);
-        io->SetNumberOfComponents(1);
-        io->SetPixelType(itk::IOPixelEnum::SCALAR);
-        io->SetComponentType(component_type(type));
-        io->SetUseCompression(true);
-        // ITK has no field for the unit; as a key of our own the file keeps it, and read_image finds it again.
-        if (!g.unit.empty()) itk::EncapsulateMetaData<std::string>(io->GetMetaDataDictionary(), "unit", g.unit);
-        if (extension(path) == ".nrrd")
-            for (const auto& [key, value] : metadata)
-                itk::EncapsulateMetaData<std::string>(io->GetMetaDataDictionary(), key, value);
-        io->WriteImageInformation();
-        io->Write(values);
-    });
 }
 
 }  // namespace covol::detail

@@ -12,7 +12,4 @@ namespace covol::detail {
 /// (colour) are channels.
 std::unique_ptr<ImageFile> open_tiff(const std::string& path, const RunContext& run);
 
-/// One deflated page per z; spacing, unit and origin as ImageJ has them. TIFF has no place for a direction.
-void write_tiff(const std::string& path, const ImageGeometry& geometry, PixelType type, const void* values);
-
 }  // namespace covol::detail

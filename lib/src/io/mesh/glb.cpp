@@ -202,7 +202,7 @@ std::uint64_t describe_glb(const std::vector<GlbPart>& parts, nlohmann::json& js
         return json["bufferViews"].size() - 1;
     };
     for (std::size_t n = 0; n < parts.size(); ++n) {
-        const TriangleMesh& mesh = parts[n].in->mesh;
+        const Prepared& mesh = *parts[n].in;
         std::array<float, 3> low{}, high{};
         if (!mesh.vertices.empty()) low = high = mesh.vertices.front();
         for (const auto& p : mesh.vertices)
@@ -267,9 +267,9 @@ void write_glb_parts(Output& out, const std::vector<GlbPart>& parts, const std::
     out.raw(std::uint32_t(binary_bytes));
     out << std::string_view("BIN\0", 4);
     for (const GlbPart& part : parts) {
-        for (const auto& p : part.in->mesh.vertices) out.raw(p);
+        for (const auto& p : part.in->vertices) out.raw(p);
         for (const auto& n : part.in->normals) out.raw(n);
-        for (const Face& t : part.in->mesh.triangles) out.raw(t);
+        for (const Face& t : part.in->triangles) out.raw(t);
     }
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 // A reader and a writer for each format of meshes; clouds are read from PLY, OBJ and OFF by the same readers.
+#include <array>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -26,6 +27,24 @@ void write_obj(Output& out, const Prepared& in);
 void write_off(Output& out, const Prepared& in);
 void write_stl(Output& out, const Prepared& in);
 void write_glb(Output& out, const Prepared& in);
+
+/// Comments without line breaks.
+std::vector<std::string> one_line_each(std::vector<std::string> comments);
+/// A vertex, scaled and turned as the options say.
+std::array<float, 3> placed(const std::array<float, 3>& vertex, const WriteMeshOptions& options);
+
+/// What begins a PLY file, up to its vertices. @throws Error Unsupported (more vertices than its numbers tell apart).
+struct PlyCounts {
+    std::uint64_t vertices, triangles;
+};
+void write_ply_header(Output& out, const PlyCounts& counts, const std::vector<std::string>& comments,
+                      const std::vector<VertexAttribute>& attributes, bool binary);
+void write_ply_face(Output& out, const Face& triangle);
+/// What begins a binary STL file. @throws Error Unsupported (more than 2^32 - 1 triangles).
+void write_stl_header(Output& out, std::uint64_t triangles, const std::vector<std::string>& comments);
+void write_stl_facet(Output& out, const std::array<std::array<float, 3>, 3>& corners);
+/// @param first  the number of the mesh's first vertex in the file, from 1
+void write_obj_face(Output& out, const Face& triangle, std::uint64_t first);
 
 /// One of several meshes in a file. @param first  the number of its first vertex in the file, from 1
 void write_obj_object(Output& out, const Prepared& in, std::uint64_t first);

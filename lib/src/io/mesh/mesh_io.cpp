@@ -4,11 +4,13 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <string_view>
 
 #include "base/file.h"
 #include "covol/error.h"
 #include "io/mesh/mesh_formats.h"
+#include "mesh/vertex_normals.h"
 
 // Own readers and writers: OpenMesh's readers trust the counts in a file's header, drop triangles that are not manifold
 // and print about it, and its writers have no comments.
@@ -26,13 +28,6 @@ std::string read_file(const std::string& path) {
     if (!file || !file.read(text.data(), std::streamsize(size)))
         throw Error(Errc::Io, "read_mesh: " + path + ": cannot be read");
     return text;
-}
-
-std::vector<std::string> one_line_each(std::vector<std::string> comments) {
-    for (std::string& comment : comments)
-        std::replace_if(
-            comment.begin(), comment.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
-    return comments;
 }
 
 void check_references(const TriangleMesh& mesh) {
@@ -53,18 +48,17 @@ void check_attribute(const VertexAttribute& attribute, const TriangleMesh& mesh)
                         " values, one for each vertex, got " + std::to_string(attribute.values.size()));
 }
 
-Prepared prepare(const TriangleMesh& mesh, const WriteMeshOptions& options) {
+Prepared prepare(const std::string& extension, const TriangleMesh& mesh, const WriteMeshOptions& options) {
     if (!(options.unit_scale > 0) || !std::isfinite(options.unit_scale))
         throw Error(Errc::InvalidOptions,
                     "write_mesh: unit_scale: expected > 0, got " + std::to_string(options.unit_scale));
     check_references(mesh);
     for (const VertexAttribute& attribute : options.attributes) check_attribute(attribute, mesh);
-    Prepared result{mesh, {}, one_line_each(options.comments), options.attributes, options.binary};
-    for (auto& p : result.mesh.vertices) {
-        for (float& c : p) c = float(c * options.unit_scale);
-        if (options.y_up) p = {p[0], p[2], -p[1]};
-    }
-    result.normals = compute_vertex_normals(result.mesh);
+    Prepared result{mesh.triangles,     mesh.vertices, {}, one_line_each(options.comments),
+                    options.attributes, options.binary};
+    for (auto& p : result.vertices) p = placed(p, options);
+    if (extension == ".ply" || extension == ".obj" || extension == ".glb")
+        result.normals = meshing::vertex_normals(result.vertices, mesh.triangles);
     return result;
 }
 
@@ -84,23 +78,36 @@ Writer writer_of(const std::string& path) {
         "write_mesh: " + path + ": expected a name that ends in .ply, .obj, .stl, .off or .glb, got '" + end + "'");
 }
 
-void save(const std::string& path, const Output& out) {
+void save(const std::string& path, const std::function<void(Output& out)>& write) {
     detail::write_atomically(path, [&](const std::string& temporary) {
-        std::ofstream file(temporary, std::ios::binary);
-        if (!file.write(out.data().data(), std::streamsize(out.data().size())) || !file.flush())
-            throw Error(Errc::Io, "write_mesh: " + path + ": cannot be written");
+        Output out(temporary, path);
+        write(out);
+        out.close();
     });
 }
 
 }  // namespace
 
+std::vector<std::string> mesh_io::one_line_each(std::vector<std::string> comments) {
+    for (std::string& comment : comments)
+        std::replace_if(
+            comment.begin(), comment.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
+    return comments;
+}
+
+std::array<float, 3> mesh_io::placed(const std::array<float, 3>& vertex, const WriteMeshOptions& options) {
+    std::array<float, 3> p = vertex;
+    for (float& c : p) c = float(c * options.unit_scale);
+    if (options.y_up) p = {p[0], p[2], -p[1]};
+    return p;
+}
+
 void check_mesh_extension(const std::string& path) { static_cast<void>(writer_of(path)); }
 
 void write_mesh(const std::string& path, const TriangleMesh& mesh, const WriteMeshOptions& options) {
     const Writer writer = writer_of(path);
-    Output out;
-    writer(out, prepare(mesh, options));
-    save(path, out);
+    const Prepared prepared = prepare(detail::extension(path), mesh, options);
+    save(path, [&](Output& out) { writer(out, prepared); });
 }
 
 bool holds_several_meshes(const std::string& path) {
@@ -116,23 +123,22 @@ void write_meshes(const std::string& path, const std::vector<NamedMesh>& meshes,
     bare.attributes.clear();
     std::vector<Prepared> prepared;
     prepared.reserve(meshes.size());
-    for (const NamedMesh& named : meshes) prepared.push_back(prepare(named.mesh, bare));
+    for (const NamedMesh& named : meshes) prepared.push_back(prepare(detail::extension(path), named.mesh, bare));
     const std::vector<std::string>& comments = prepared.front().comments;
-    Output out;
-    if (detail::extension(path) == ".glb") {
-        std::vector<GlbPart> parts;
-        for (std::size_t n = 0; n < meshes.size(); ++n) parts.push_back({&prepared[n], &meshes[n]});
-        write_glb_parts(out, parts, comments);
-    } else {
+    save(path, [&](Output& out) {
+        if (detail::extension(path) == ".glb") {
+            std::vector<GlbPart> parts;
+            for (std::size_t n = 0; n < meshes.size(); ++n) parts.push_back({&prepared[n], &meshes[n]});
+            return write_glb_parts(out, parts, comments);
+        }
         for (const std::string& comment : comments) out << "# " << comment << "\n";
         std::uint64_t first = 1;
         for (std::size_t n = 0; n < meshes.size(); ++n) {
             out << "o " << one_line_each({meshes[n].name}).front() << "\n";
             write_obj_object(out, prepared[n], first);
-            first += prepared[n].mesh.vertices.size();
+            first += prepared[n].vertices.size();
         }
-    }
-    save(path, out);
+    });
 }
 
 bool is_mesh_name(const std::string& path) {

@@ -4,22 +4,31 @@
 #include <bit>
 #include <charconv>
 #include <cstdint>
+#include <fstream>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "covol/error.h"
 #include "covol/mesh_io.h"
 
 namespace covol::mesh_io {
 
 static_assert(std::endian::native == std::endian::little, "binary mesh files are written in the machine's byte order");
 
-/// A text or binary file that is put together in memory.
+/// A text or binary file that is put together: in memory, or in a file, of which a piece is in memory.
 class Output {
 public:
+    Output() = default;
+    /// @throws Error Io when it cannot be written to, like all that follows. @param name  the file as errors call it
+    Output(const std::string& path, std::string name) : name_(std::move(name)), file_(path, std::ios::binary) {
+        check();
+    }
+
     Output& operator<<(std::string_view text) {
         data_ += text;
-        return *this;
+        return kept();
     }
     Output& operator<<(float number) { return append(number); }
     Output& operator<<(std::uint64_t number) { return append(number); }
@@ -27,30 +36,56 @@ public:
     void raw(const T& value) {
         const auto* bytes = reinterpret_cast<const char*>(&value);
         data_.append(bytes, sizeof(T));
+        kept();
     }
     void pad(std::size_t multiple, char fill) {
-        while (data_.size() % multiple != 0) data_ += fill;
+        while ((flushed_ + data_.size()) % multiple != 0) data_ += fill;
     }
+    /// What is in memory: all, unless there is a file.
     [[nodiscard]] const std::string& data() const { return data_; }
+    /// Bytes so far.
+    [[nodiscard]] std::uint64_t size() const { return flushed_ + data_.size(); }
+    void close() {
+        flush();
+        file_.close();
+        check();
+    }
 
 private:
+    Output& kept() {
+        constexpr std::size_t kPiece = 1U << 20;
+        if (data_.size() >= kPiece && file_.is_open()) flush();
+        return *this;
+    }
+    void flush() {
+        file_.write(data_.data(), std::streamsize(data_.size()));
+        check();
+        flushed_ += data_.size();
+        data_.clear();
+    }
+    void check() const {
+        if (!file_) throw Error(Errc::Io, "write_mesh: " + name_ + ": cannot be written");
+    }
     template <typename T>
     Output& append(T number) {
         std::array<char, 32> text{};
         const auto end = std::to_chars(text.data(), text.data() + text.size(), number).ptr;
         data_.append(text.data(), end);
-        return *this;
+        return kept();
     }
-    std::string data_;
+    std::string data_, name_;
+    std::ofstream file_;
+    std::uint64_t flushed_ = 0;
 };
 
 inline Output& operator<<(Output& out, const std::array<float, 3>& p) {
     return out << p[0] << " " << p[1] << " " << p[2];
 }
 
-/// What every format needs: placed vertices, their normals, one-line comments.
+/// What every format needs: placed vertices, their normals where it has any, one-line comments.
 struct Prepared {
-    TriangleMesh mesh;
+    const std::vector<std::array<std::uint32_t, 3>>& triangles;
+    std::vector<std::array<float, 3>> vertices;
     std::vector<std::array<float, 3>> normals;
     std::vector<std::string> comments;
     std::vector<VertexAttribute> attributes;

@@ -67,14 +67,16 @@ void read_obj(Source& source, Receiver& receiver) {
     }
 }
 
+void write_obj_face(Output& out, const Face& triangle, std::uint64_t first) {
+    out << "f";
+    for (const std::uint32_t v : triangle) out << " " << first + v << "//" << first + v;
+    out << "\n";
+}
+
 void write_obj_object(Output& out, const Prepared& in, std::uint64_t first) {
-    for (const auto& p : in.mesh.vertices) out << "v " << p << "\n";
+    for (const auto& p : in.vertices) out << "v " << p << "\n";
     for (const auto& n : in.normals) out << "vn " << n << "\n";
-    for (const Face& t : in.mesh.triangles) {
-        out << "f";
-        for (const std::uint32_t v : t) out << " " << first + v << "//" << first + v;
-        out << "\n";
-    }
+    for (const Face& t : in.triangles) write_obj_face(out, t, first);
 }
 
 void write_obj(Output& out, const Prepared& in) {

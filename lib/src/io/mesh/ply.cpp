@@ -1,6 +1,7 @@
 // PLY: ASCII and both byte orders, with elements and properties of any kind beside the mesh.
 #include <algorithm>
 #include <bit>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -343,32 +344,45 @@ private:
 
 void read_ply(Source& source, Receiver& receiver) { PlyReader(source, receiver).read(); }
 
-void write_ply(Output& out, const Prepared& in) {
-    out << "ply\nformat " << (in.binary ? "binary_little_endian" : "ascii") << " 1.0\n";
-    for (const std::string& comment : in.comments) out << "comment " << comment << "\n";
-    out << "element vertex " << std::uint64_t(in.mesh.vertices.size()) << "\n";
+void write_ply_header(Output& out, const PlyCounts& counts, const std::vector<std::string>& comments,
+                      const std::vector<VertexAttribute>& attributes, bool binary) {
+    // Many readers keep the numbers of vertices as int, and the count of faces too.
+    constexpr std::uint64_t kMost = std::numeric_limits<std::int32_t>::max();
+    if (counts.vertices > kMost || counts.triangles > kMost)
+        throw Error(Errc::Unsupported, "write_mesh: PLY holds at most 2^31 - 1 vertices and faces, the mesh has " +
+                                           std::to_string(counts.vertices) + " and " +
+                                           std::to_string(counts.triangles) + "; decimate it or use larger voxels");
+    out << "ply\nformat " << (binary ? "binary_little_endian" : "ascii") << " 1.0\n";
+    for (const std::string& comment : comments) out << "comment " << comment << "\n";
+    out << "element vertex " << counts.vertices << "\n";
     for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) out << "property float " << name << "\n";
-    for (const VertexAttribute& attribute : in.attributes) out << "property float " << attribute.name << "\n";
-    out << "element face " << std::uint64_t(in.mesh.triangles.size())
-        << "\nproperty list uchar uint vertex_indices\nend_header\n";
-    for (std::size_t v = 0; v < in.mesh.vertices.size(); ++v) {
+    for (const VertexAttribute& attribute : attributes) out << "property float " << attribute.name << "\n";
+    out << "element face " << counts.triangles << "\nproperty list uchar uint vertex_indices\nend_header\n";
+}
+
+void write_ply_face(Output& out, const Face& triangle) {
+    out.raw(std::uint8_t(3));
+    out.raw(triangle);
+}
+
+void write_ply(Output& out, const Prepared& in) {
+    write_ply_header(out, {in.vertices.size(), in.triangles.size()}, in.comments, in.attributes, in.binary);
+    for (std::size_t v = 0; v < in.vertices.size(); ++v) {
         if (in.binary) {
-            out.raw(in.mesh.vertices[v]);
+            out.raw(in.vertices[v]);
             out.raw(in.normals[v]);
             for (const VertexAttribute& attribute : in.attributes) out.raw(attribute.values[v]);
         } else {
-            out << in.mesh.vertices[v] << " " << in.normals[v];
+            out << in.vertices[v] << " " << in.normals[v];
             for (const VertexAttribute& attribute : in.attributes) out << " " << attribute.values[v];
             out << "\n";
         }
     }
-    for (const Face& t : in.mesh.triangles) {
-        if (in.binary) {
-            out.raw(std::uint8_t(3));
-            out.raw(t);
-        } else {
+    for (const Face& t : in.triangles) {
+        if (in.binary)
+            write_ply_face(out, t);
+        else
             out << "3 " << std::uint64_t(t[0]) << " " << std::uint64_t(t[1]) << " " << std::uint64_t(t[2]) << "\n";
-        }
     }
 }
 

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <unordered_map>
 #include <vector>
 
@@ -42,10 +43,10 @@ private:
     std::vector<std::uint32_t> corners_;
 };
 
-std::array<float, 3> triangle_normal(const TriangleMesh& mesh, const Face& t) {
-    const auto side = [&](int corner, int axis) {
-        return double(mesh.vertices[t[corner]][axis]) - mesh.vertices[t[0]][axis];
-    };
+using Corners = std::array<std::array<float, 3>, 3>;
+
+std::array<float, 3> triangle_normal(const Corners& corners) {
+    const auto side = [&](int corner, int axis) { return double(corners[corner][axis]) - corners[0][axis]; };
     Vec3 n{};
     for (int a = 0; a < 3; ++a) {
         const int b = (a + 1) % 3, c = (a + 2) % 3;
@@ -84,28 +85,38 @@ TriangleMesh read_stl(Source& source, std::string_view text) {
     return mesh.finish();
 }
 
+void write_stl_header(Output& out, std::uint64_t triangles, const std::vector<std::string>& comments) {
+    if (triangles > std::numeric_limits<std::uint32_t>::max())
+        throw Error(Errc::Unsupported, "write_mesh: STL holds at most 2^32 - 1 triangles, the mesh has " +
+                                           std::to_string(triangles) + "; decimate it or use larger voxels");
+    // A header that begins with "solid" would be taken for text.
+    std::array<char, 80> header{};
+    const std::string text = "covol" + (comments.empty() ? std::string() : ": " + comments.front());
+    std::copy_n(text.begin(), std::min(text.size(), header.size()), header.begin());
+    out.raw(header);
+    out.raw(std::uint32_t(triangles));
+}
+
+void write_stl_facet(Output& out, const Corners& corners) {
+    out.raw(triangle_normal(corners));
+    out.raw(corners);
+    out.raw(std::uint16_t(0));
+}
+
 void write_stl(Output& out, const Prepared& in) {
-    if (in.binary) {
-        // A header that begins with "solid" would be taken for text.
-        std::array<char, 80> header{};
-        const std::string text = "covol" + (in.comments.empty() ? std::string() : ": " + in.comments.front());
-        std::copy_n(text.begin(), std::min(text.size(), header.size()), header.begin());
-        out.raw(header);
-        out.raw(std::uint32_t(in.mesh.triangles.size()));
-    } else {
+    if (in.binary)
+        write_stl_header(out, in.triangles.size(), in.comments);
+    else
         out << "solid covol\n";
-    }
-    for (const Face& t : in.mesh.triangles) {
-        const auto normal = triangle_normal(in.mesh, t);
+    for (const Face& t : in.triangles) {
+        const Corners corners{in.vertices[t[0]], in.vertices[t[1]], in.vertices[t[2]]};
         if (in.binary) {
-            out.raw(normal);
-            for (const std::uint32_t v : t) out.raw(in.mesh.vertices[v]);
-            out.raw(std::uint16_t(0));
-        } else {
-            out << "facet normal " << normal << "\n outer loop\n";
-            for (const std::uint32_t v : t) out << "  vertex " << in.mesh.vertices[v] << "\n";
-            out << " endloop\nendfacet\n";
+            write_stl_facet(out, corners);
+            continue;
         }
+        out << "facet normal " << triangle_normal(corners) << "\n outer loop\n";
+        for (const auto& corner : corners) out << "  vertex " << corner << "\n";
+        out << " endloop\nendfacet\n";
     }
     if (!in.binary) out << "endsolid covol\n";
 }

@@ -1,0 +1,72 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "covol/api.h"
+#include "covol/image.h"
+#include "covol/run.h"
+
+namespace covol {
+
+/// What a value of a label image stands for.
+struct NamedLabel {
+    std::int32_t value = 0;
+    std::string name;
+    std::array<std::uint8_t, 3> color{187, 187, 187};  ///< red, green, blue
+};
+
+/// The voxels of an image that is written, a box at a time: only what is being packed is held.
+class COVOL_API PixelSource {
+public:
+    /// @param labels  the values are labels: coarse levels take the most frequent one, not the mean
+    PixelSource(ImageGeometry geometry, PixelType type, bool labels)
+        : geometry_(std::move(geometry)), type_(type), is_labels_(labels) {}
+    PixelSource(const PixelSource&) = delete;
+    PixelSource& operator=(const PixelSource&) = delete;
+    virtual ~PixelSource();
+
+    [[nodiscard]] const ImageGeometry& geometry() const noexcept { return geometry_; }
+    [[nodiscard]] PixelType type() const noexcept { return type_; }
+    [[nodiscard]] bool is_labels() const noexcept { return is_labels_; }
+
+    /// Writes the values of `box`, of type(), to `out`, i fastest. Called by several threads at once.
+    virtual void fill(const VoxelBox& box, void* out) const = 0;
+    /// The value of all voxels of `box`, where that is known without a look at each of them.
+    [[nodiscard]] virtual std::optional<double> uniform(const VoxelBox& box) const;
+    /// Hears of each voxel of the file once, by several threads at once.
+    /// @param values  of the box; null: all are `uniform`
+    virtual void wrote(const VoxelBox& box, const void* values, double uniform) const;
+    /// Key/value pairs, for NRRD. Asked before the voxels, too: the later texts may be shorter, not longer.
+    [[nodiscard]] virtual std::vector<std::pair<std::string, std::string>> metadata() const;
+    /// What the values stand for, for OME-Zarr.
+    [[nodiscard]] virtual std::vector<NamedLabel> label_names() const;
+
+private:
+    ImageGeometry geometry_;
+    PixelType type_;
+    bool is_labels_;
+};
+
+/// Whether a folder is an array or a group of Zarr 2 or 3: what a .zarr may replace.
+[[nodiscard]] COVOL_API bool is_zarr_store(const std::string& folder);
+
+struct WriteImageOptions {
+    bool pack = true;  ///< false: .nrrd and .mha with the voxels as they are in memory
+};
+
+/// Writes an image as the other write_image() do, but in boxes of a few MB that are filled and packed in parallel: the
+/// memory does not grow with the image. The file does not depend on the number of threads.
+///
+/// .nrrd, .nii, .nii.gz, .mha, .tif as there; .zarr is OME-Zarr 0.4 in chunks of 128^3, with levels of half the size
+/// down to one chunk. A TIFF above 4000 MiB of voxels is a BigTIFF in tiles of 256 x 256.
+/// A folder that is no Zarr store is never replaced.
+/// @throws Error Io, InvalidOptions (ending), Unsupported (larger than the format allows), Cancelled; what the source
+///               throws. Nothing half-written stays.
+COVOL_API void write_image(const std::string& path, const PixelSource& source, const WriteImageOptions& options = {},
+                           const RunContext& run = {});
+
+}  // namespace covol

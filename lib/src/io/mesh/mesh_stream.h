@@ -1,0 +1,31 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "covol/mesh_io.h"
+
+// Files of meshes that come in pieces: vertices in the order of their numbers, triangles in any.
+namespace covol::mesh_io {
+
+class MeshStream {
+public:
+    /// @param path  to write to, a temporary one
+    /// @param name  of the file, whose ending says the format: .ply, .stl or .obj
+    /// @throws Error Io, Unsupported (more than the format holds).
+    static std::unique_ptr<MeshStream> open(const std::string& path, const std::string& name, std::uint64_t vertices,
+                                            std::uint64_t triangles, const std::vector<std::string>& comments);
+    MeshStream() = default;
+    MeshStream(const MeshStream&) = delete;
+    MeshStream& operator=(const MeshStream&) = delete;
+    virtual ~MeshStream() = default;
+
+    virtual void vertex(const std::array<float, 3>& position, const std::array<float, 3>& normal) = 0;
+    virtual void triangle(const std::array<std::uint32_t, 3>& vertices,
+                          const std::array<std::array<float, 3>, 3>& corners) = 0;
+    virtual void finish() = 0;
+};
+
+}  // namespace covol::mesh_io

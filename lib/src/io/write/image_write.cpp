@@ -1,0 +1,114 @@
+// Images to files.
+#include <cstring>
+#include <filesystem>
+#include <string>
+
+#include "base/file.h"
+#include "covol/error.h"
+#include "covol/image.h"
+#include "covol/image_stream.h"
+#include "io/chunked/zarr.h"
+#include "io/pixels/raw_image.h"
+#include "io/write/image_writers.h"
+
+namespace covol {
+namespace {
+
+using detail::pixel_bytes;
+
+constexpr const char* kWritable = ".nrrd, .nii, .nii.gz, .mha, .tif or .zarr";
+
+using Metadata = std::vector<std::pair<std::string, std::string>>;
+
+/// Voxels that are all in memory.
+class DenseSource : public PixelSource {
+public:
+    DenseSource(const ImageGeometry& geometry, PixelType type, bool labels, const void* values, Metadata metadata = {})
+        : PixelSource(geometry, type, labels),
+          values_(static_cast<const char*>(values)),
+          metadata_(std::move(metadata)) {}
+
+    void fill(const VoxelBox& box, void* out) const override {
+        const Index3 whole = geometry().size, size = box.size();
+        const std::uint64_t width = pixel_bytes(type()), row = std::uint64_t(size[0]) * width;
+        auto* next = static_cast<char*>(out);
+        for (int k = box.min[2]; k <= box.max[2]; ++k)
+            for (int j = box.min[1]; j <= box.max[1]; ++j, next += row) {
+                const std::uint64_t line = std::uint64_t(k) * std::uint64_t(whole[1]) + std::uint64_t(j);
+                const std::uint64_t first = line * std::uint64_t(whole[0]) + std::uint64_t(box.min[0]);
+                std::memcpy(next, values_ + first * width, row);
+            }
+    }
+    [[nodiscard]] Metadata metadata() const override { return metadata_; }
+
+private:
+    const char* values_;
+    Metadata metadata_;
+};
+
+}  // namespace
+
+PixelSource::~PixelSource() = default;
+std::optional<double> PixelSource::uniform(const VoxelBox&) const { return std::nullopt; }
+void PixelSource::wrote(const VoxelBox&, const void*, double) const {}
+Metadata PixelSource::metadata() const { return {}; }
+std::vector<NamedLabel> PixelSource::label_names() const { return {}; }
+
+bool is_zarr_store(const std::string& folder) { return detail::is_zarr(folder); }
+
+void write_image(const std::string& given, const PixelSource& source, const WriteImageOptions& options,
+                 const RunContext& run) {
+    const std::string path = detail::without_end_slash(given);
+    check_image_extension(path);
+    const ImageGeometry& geometry = source.geometry();
+    for (int a = 0; a < 3; ++a)
+        if (geometry.size[a] < 1 || !(geometry.spacing[a] > 0))
+            throw Error(Errc::InvalidInput, "write_image: " + path + ": expected voxels along every axis, got " +
+                                                detail::size_text(geometry.size));
+    const std::string extension = detail::extension(path);
+    with_threads(run, [&] {
+        if (extension == ".zarr")
+            detail::write_folder_atomically(path, is_zarr_store(path), [&](const std::string& temporary) {
+                detail::write_ome_zarr(temporary, std::filesystem::path(path).filename().string(), source, run);
+            });
+        else
+            detail::write_atomically(path, [&](const std::string& temporary) {
+                if (extension == ".tif" || extension == ".tiff")
+                    detail::write_tiff(temporary, source, run);
+                else
+                    detail::write_raw(temporary, extension, source, options.pack, run);
+            });
+    });
+}
+
+void write_image(const std::string& path, const ImageGeometry& geometry, const std::int32_t* labels) {
+    write_image(path, DenseSource(geometry, PixelType::Int32, true, labels));
+}
+
+void write_image(const std::string& path, const ImageGeometry& geometry, const std::uint8_t* values) {
+    write_image(path, DenseSource(geometry, PixelType::UInt8, false, values));
+}
+
+void write_image(const std::string& path, const ImageGeometry& geometry, const std::uint8_t* values,
+                 const Metadata& metadata) {
+    write_image(path, DenseSource(geometry, PixelType::UInt8, true, values, metadata));
+}
+
+void write_image(const std::string& path, const ImageGeometry& geometry, const std::int32_t* labels,
+                 const Metadata& metadata) {
+    write_image(path, DenseSource(geometry, PixelType::Int32, true, labels, metadata));
+}
+
+void write_image(const std::string& path, const ImageGeometry& geometry, const float* values) {
+    write_image(path, DenseSource(geometry, PixelType::Float, false, values));
+}
+
+void check_image_extension(const std::string& path) {
+    const std::string extension = detail::extension(detail::without_end_slash(path));
+    for (const char* known : {".nrrd", ".nii", ".nii.gz", ".mha", ".tif", ".tiff", ".zarr"})
+        if (extension == known) return;
+    throw Error(Errc::InvalidOptions,
+                "write_image: " + path + ": expected a name ending in " + kWritable + ", got '" + extension + "'");
+}
+
+}  // namespace covol

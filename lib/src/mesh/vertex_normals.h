@@ -1,0 +1,17 @@
+#pragma once
+#include <array>
+#include <vector>
+
+#include "mesh/triangle.h"
+
+// Normals at vertices: the sum of the triangles' unit normals, weighted by the angle at the vertex.
+namespace covol::meshing {
+
+/// Adds what a triangle contributes to its corners' sums.
+void add_normals(const std::array<Vec3, 3>& corners, const std::array<Vec3*, 3>& sums);
+[[nodiscard]] std::array<float, 3> unit_normal(const Vec3& sum);
+/// compute_vertex_normals() of a mesh in two parts.
+[[nodiscard]] std::vector<std::array<float, 3>> vertex_normals(const std::vector<std::array<float, 3>>& vertices,
+                                                               const std::vector<Triangle>& triangles);
+
+}  // namespace covol::meshing

@@ -1,0 +1,153 @@
+// Meshes from the tree to the file, a layer of leaves at a time.
+#include <cmath>
+#include <numeric>
+#include <optional>
+
+#include "base/file.h"
+#include "covol/error.h"
+#include "covol/mesh_stream.h"
+#include "io/mesh/mesh_formats.h"
+#include "io/mesh/mesh_stream.h"
+#include "mesh/disjoint_sets.h"
+#include "mesh/vertex_normals.h"
+#include "surface/marching_cubes.h"
+
+namespace covol {
+namespace {
+
+using meshing::Triangle;
+
+/// measure() of triangles that come one by one.
+class Totals {
+public:
+    explicit Totals(std::uint64_t vertices) : vertices_(vertices), pieces_(vertices) {}
+
+    void add(const Triangle& t, const std::array<Vec3, 3>& p) {
+        if (triangles_++ == 0) origin_ = p[0];
+        volume_ += meshing::six_volumes(p, origin_) / 6;
+        area_ += meshing::length(meshing::area_normal(p[0], p[1], p[2])) / 2;
+        for (int k = 0; k < 3; ++k) {
+            const std::uint32_t a = t[k], b = t[(k + 1) % 3];
+            edges_ += a < b ? mixed(a, b) : -mixed(b, a);
+        }
+        pieces_.unite(t[0], t[1]);
+        pieces_.unite(t[1], t[2]);
+    }
+
+    [[nodiscard]] MeshMeasures measures() {
+        MeshMeasures m;
+        m.volume = volume_;
+        m.area = area_;
+        for (std::uint32_t v = 0; v < vertices_; ++v) m.components += pieces_.root(v) == v;
+        m.closed = edges_ == 0;
+        m.manifold = m.closed;
+        const auto euler = std::int64_t(vertices_) - std::int64_t(triangles_ / 2);
+        m.genus = m.closed ? int(m.components - euler / 2) : -1;
+        return m;
+    }
+
+private:
+    /// A number for an edge: sums of such numbers, with signs for the direction, are 0 by chance once in 2^64.
+    /// https://prng.di.unimi.it/splitmix64.c
+    static std::uint64_t mixed(std::uint64_t low, std::uint64_t high) {
+        std::uint64_t z = (low << 32 | high) + 0x9e3779b97f4a7c15;
+        z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9;
+        z = (z ^ z >> 27) * 0x94d049bb133111eb;
+        return z ^ z >> 31;
+    }
+
+    std::uint64_t vertices_, triangles_ = 0, edges_ = 0;
+    Vec3 origin_{};
+    double volume_ = 0, area_ = 0;
+    meshing::DisjointSets pieces_;
+};
+
+/// Takes pieces of the mesh, writes their triangles and those of their vertices that are done.
+class Writer {
+public:
+    Writer(const std::string& temporary, const std::string& path, std::uint64_t vertices, std::uint64_t triangles,
+           const WriteMeshOptions& options)
+        : options_(options),
+          totals_(vertices),
+          file_(mesh_io::MeshStream::open(temporary, path, vertices, triangles,
+                                          mesh_io::one_line_each(options.comments))) {}
+
+    void take(const detail::MeshPiece& piece) {
+        for (std::size_t n = placed_.size(); n < piece.positions.size(); ++n) {
+            placed_.push_back(mesh_io::placed(piece.positions[n], options_));
+            sums_.push_back({0, 0, 0});
+        }
+        for (const Triangle& t : piece.triangles) {
+            std::array<std::array<float, 3>, 3> corners{};
+            std::array<Vec3, 3> own{}, there{};
+            std::array<Vec3*, 3> sums{};
+            for (std::size_t k = 0; k < 3; ++k) {
+                const std::size_t n = t[k] - piece.first;
+                corners[k] = placed_[n];
+                own[k] = meshing::to_vec3(piece.positions[n]);
+                there[k] = meshing::to_vec3(corners[k]);
+                sums[k] = &sums_[n];
+            }
+            totals_.add(t, own);
+            meshing::add_normals(there, sums);
+            file_->triangle(t, corners);
+        }
+        const auto done = std::ptrdiff_t(piece.done - piece.first);
+        for (std::ptrdiff_t n = 0; n < done; ++n)
+            file_->vertex(placed_[std::size_t(n)], meshing::unit_normal(sums_[std::size_t(n)]));
+        placed_.erase(placed_.begin(), placed_.begin() + done);
+        sums_.erase(sums_.begin(), sums_.begin() + done);
+    }
+
+    MeshMeasures finish() {
+        file_->finish();
+        return totals_.measures();
+    }
+
+private:
+    const WriteMeshOptions& options_;
+    Totals totals_;
+    std::unique_ptr<mesh_io::MeshStream> file_;
+    // from the piece's first vertex on
+    std::vector<std::array<float, 3>> placed_;
+    std::vector<Vec3> sums_;
+};
+
+}  // namespace
+
+bool can_stream_mesh(const std::string& path) {
+    const std::string end = detail::extension(path);
+    return end == ".ply" || end == ".stl" || end == ".obj";
+}
+
+StreamedMesh stream_mesh(const std::string& path, const FloatGrid& surface, double isovalue,
+                         const WriteMeshOptions& options, const RunContext& run) {
+    if (!std::isfinite(isovalue) || !(options.unit_scale > 0) || !std::isfinite(options.unit_scale))
+        throw Error(Errc::InvalidOptions, "stream_mesh: expected a finite isovalue and unit_scale > 0, got " +
+                                              std::to_string(isovalue) + " and " + std::to_string(options.unit_scale));
+    if (!options.binary || !options.attributes.empty())
+        throw Error(Errc::Unsupported, "stream_mesh: expected a binary file without attributes");
+    StreamedMesh made;
+    detail::write_atomically(path, [&](const std::string& temporary) {
+        with_threads(run, [&] {
+            std::optional<detail::Uncut> whole;
+            if (isovalue == 0) whole = detail::uncut(surface, detail::FaceLayer::OnFace);
+            detail::MarchingCubes cubes(whole ? *whole->distance : surface, whole ? whole->clip : detail::LatticeClip{},
+                                        isovalue, run);
+            std::optional<Writer> writer;
+            cubes.stream(
+                [&](std::uint64_t vertices, std::uint64_t triangles) {
+                    if (triangles == 0)
+                        throw Error(Errc::InvalidInput, "stream_mesh: " + path + ": no surface at this level");
+                    made.vertices = vertices;
+                    made.triangles = triangles;
+                    writer.emplace(temporary, path, vertices, triangles, options);
+                },
+                [&](const detail::MeshPiece& piece) { writer->take(piece); });
+            made.measures = writer->finish();
+        });
+    });
+    return made;
+}
+
+}  // namespace covol
