@@ -1,12 +1,12 @@
 #include "bricks/states.h"
 
 #include <openvdb/openvdb.h>
-#include <openvdb/tools/SignedFloodFill.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "covol/error.h"
+#include "grid/flood_tiles.h"
 
 namespace covol::bricks {
 namespace {
@@ -44,7 +44,7 @@ FloatGridPtr assemble(const BrickPlan& plan, const Domain& domain, const std::ve
         box.intersect(bounds({domain.min, domain.max}));
         if (!box.empty()) copy_leaves(*state, box, *whole);
     }
-    openvdb::tools::signedFloodFill(whole->tree());
+    detail::flood_tiles(*whole);
     return whole;
 }
 

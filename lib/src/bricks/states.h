@@ -21,8 +21,8 @@ struct Frame {
 /// The voxels of `other` that lie next to those of `core`.
 [[nodiscard]] VoxelBox beside(const VoxelBox& core, const VoxelBox& other);
 
-/// Largest distance from the surface of `a` to that of `b` between the voxels of `box`, voxels; kHalfWidthVoxels where it
-/// is not within b's band.
+/// Largest distance from the surface of `a` to that of `b` between the voxels of `box`, voxels; kHalfWidthVoxels where
+/// it is not within b's band.
 [[nodiscard]] double gap_between(const FloatGrid& a, const FloatGrid& b, const VoxelBox& box);
 
 }  // namespace covol::bricks

@@ -3,7 +3,6 @@
 
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Prune.h>
-#include <openvdb/tools/SignedFloodFill.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -11,6 +10,7 @@
 #include <string>
 
 #include "covol/error.h"
+#include "grid/flood_tiles.h"
 #include "grid/leaf_band.h"
 #include "grid/leaf_propagation.h"
 #include "redistance/interface_patches.h"
@@ -158,21 +158,6 @@ LeafMask inside_mask(const FloatGrid::ConstAccessor& accessor, const Coord& orig
     return inside;
 }
 
-// The flood passes over leaves whose voxels are all active. Their signs are known; where the band ends at an open end
-// of the domain it would guess them wrong.
-void fill_tiles(FloatGrid::TreeType& tree) {
-    using Leaf = FloatGrid::TreeType::LeafNodeType;
-    std::vector<Leaf*> leaves;
-    tree.getNodes(leaves);
-    std::vector<Leaf::NodeMaskType> masks(leaves.size());
-    tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t n) {
-        masks[n] = leaves[n]->valueMask();
-        leaves[n]->setValuesOn();
-    });
-    openvdb::tools::signedFloodFill(tree);
-    tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t n) { leaves[n]->setValueMask(masks[n]); });
-}
-
 }  // namespace
 
 FloatGridPtr redistance(const FloatGrid& u, const Domain& domain, double half_width, DomainEnd end, const char* name,
@@ -209,7 +194,7 @@ FloatGridPtr redistance(const FloatGrid& u, const Domain& domain, double half_wi
     });
     FloatGridPtr result = export_grid(band, values, domain, background, name);
     result->setGridClass(openvdb::GRID_LEVEL_SET);
-    fill_tiles(result->tree());
+    flood_tiles(*result);
     openvdb::tools::pruneLevelSet(result->tree());
     return result;
 }

@@ -1,12 +1,12 @@
 // Morphological closing of a tagged body: the exterior, grown back by the tag distance.
 #include <openvdb/openvdb.h>
-#include <openvdb/tools/SignedFloodFill.h>
 
 #include <algorithm>
 
 #include "covol/band.h"
 #include "covol/distance.h"
 #include "covol/error.h"
+#include "grid/flood_tiles.h"
 #include "redistance/redistance.h"
 #include "tagging/heuristics.h"
 
@@ -36,7 +36,7 @@ FloatGridPtr close_by_ball(const FloatGrid& band, double tag_distance, const Run
         }
     if (!any) return nullptr;
     grown->tree().root().setBackground(static_cast<float>(reach), false);
-    openvdb::tools::signedFloodFill(grown->tree());
+    detail::flood_tiles(*grown);
     FloatGridPtr closed;
     with_threads(run, [&] {
         closed = detail::redistance(*grown, domain, kClosing.half_width, detail::DomainEnd::Open, "band", run);

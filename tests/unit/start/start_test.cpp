@@ -159,3 +159,30 @@ TEST_CASE("starts give the same bits for any number of threads") {
     run.threads = 8;
     CHECK(identical(*one, *start_from_grid(kDomain, *source, run)));
 }
+
+TEST_CASE("a level set that its domain cuts off is inside where the solid is, whichever faces cut it") {
+    // Large enough for tiles of both sizes below the root.
+    const Domain whole = make_domain({{-160, -160, -160}, {160, 160, 160}}, 1.0);
+    const Vec3 center{3, -4, 5};
+    const FloatGridPtr ball = start_from_sphere(make_domain({{-160, -160, -160}, {160, 160, 160}}, 2.0), center, 150);
+    for (int octant = 0; octant < 8; ++octant) {
+        Domain part = whole;
+        for (int a = 0; a < 3; ++a) {
+            const int middle = (whole.min[a] + whole.max[a]) / 2;
+            (octant >> a & 1) ? part.min[a] = middle - 20 : part.max[a] = middle + 20;
+        }
+        const FloatGridPtr u = start_from_grid(part, *ball);
+        int wrong = 0, inside = 0;
+        for (int i = part.min[0]; i <= part.max[0]; i += 5)
+            for (int j = part.min[1]; j <= part.max[1]; j += 5)
+                for (int k = part.min[2]; k <= part.max[2]; k += 5) {
+                    const Vec3 x = part.index_to_world({double(i), double(j), double(k)});
+                    const double d = std::hypot(x[0] - center[0], x[1] - center[1], x[2] - center[2]) - 150;
+                    if (std::abs(d) < 2) continue;
+                    inside += d < 0;
+                    wrong += (u->tree().getValue({i, j, k}) < 0) != (d < 0);
+                }
+        CHECK(inside > 10000);
+        CHECK(wrong == 0);
+    }
+}

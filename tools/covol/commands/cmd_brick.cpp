@@ -18,7 +18,8 @@ struct BrickHelp {
 
 void add_brick(Session& session) {
     const auto [job, command] = session.add_job<BrickHelp>(
-        "brick", "A segment or reconstruct in bricks: plan it, run them on any number of machines, join what they found");
+        "brick",
+        "A segment or reconstruct in bricks: plan it, run them on any number of machines, join what they found");
     in_group(*command, Group::Input);
     command
         ->add_option("step", job->words,

@@ -7,9 +7,9 @@ namespace covol::tool {
 namespace {
 
 // Measured: docs/benchmarks.md, Bricks.
-constexpr double kBandBytes = 200;   ///< at the peak, for each voxel of a band that is solved on
-constexpr double kBaseBytes = 1.5e8; ///< the program itself
-constexpr double kLayers = 1.3;      ///< with its neighbours' layers a brick has so much more of the band
+constexpr double kBandBytes = 200;    ///< at the peak, for each voxel of a band that is solved on
+constexpr double kBaseBytes = 1.5e8;  ///< the program itself
+constexpr double kLayers = 1.3;       ///< with its neighbours' layers a brick has so much more of the band
 constexpr double kLeastVoxels = 2e5;
 
 }  // namespace

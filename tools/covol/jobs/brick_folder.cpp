@@ -2,13 +2,14 @@
 
 #include <openvdb/openvdb.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 
 #include "covol/error.h"
-#include "covol/version.h"
 #include "covol/vdb_io.h"
+#include "covol/version.h"
 
 namespace covol::tool {
 namespace {
@@ -118,8 +119,8 @@ BrickPlan BrickFolder::read_plan() const {
         plan.options.most_sweeps = json.at("most_sweeps").get<int>();
         plan.options.most_voxels = json.at("most_voxels").get<std::int64_t>();
         plan.has_sweeps = json.at("has_sweeps").get<bool>();
-        plan.domain = {json.at("voxel_size").get<double>(), json.at("origin").get<Vec3>(),
-                       json.at("min").get<Index3>(), json.at("max").get<Index3>()};
+        plan.domain = {json.at("voxel_size").get<double>(), json.at("origin").get<Vec3>(), json.at("min").get<Index3>(),
+                       json.at("max").get<Index3>()};
         plan.edge = edge_of(json.at("edge"));
         for (const Json& brick : json.at("bricks")) plan.bricks.push_back(brick_of(brick));
         for (const Brick& brick : plan.bricks)
@@ -174,6 +175,20 @@ void BrickFolder::write_same(int sweep, std::size_t brick, Json facts) const {
     std::filesystem::create_directories(std::filesystem::path(file).parent_path(), status);
     facts["same"] = true;
     write_text(file, facts.dump() + "\n");
+}
+
+BrickFolder::Spent BrickFolder::spent(int sweep, std::size_t bricks) const {
+    Spent all;
+    for (std::size_t n = 0; n < bricks; ++n) {
+        int steps = 0;
+        for (int s = 1; s <= sweep; ++s) {
+            const Json facts = read_json(name(s, n, ".json"));
+            steps += facts.value("steps", 0);
+            all.seconds += facts.value("seconds", 0.0);
+        }
+        all.steps = std::max(all.steps, steps);
+    }
+    return all;
 }
 
 int BrickFolder::last_sweep(std::size_t bricks) const {

@@ -30,6 +30,12 @@ public:
     void write_same(int sweep, std::size_t brick, Json facts) const;
     /// Whether a sweep that is done changed the brick's state.
     [[nodiscard]] bool moved(int sweep, std::size_t brick) const { return sweep_of_state(sweep, brick) == sweep; }
+    /// What the sweeps up to this one took.
+    struct Spent {
+        int steps = 0;  ///< of the brick that took most
+        double seconds = 0;
+    };
+    [[nodiscard]] Spent spent(int sweep, std::size_t bricks) const;
     /// The last sweep that all of so many bricks have done; 0: none.
     [[nodiscard]] int last_sweep(std::size_t bricks) const;
     /// Of a sweep, as a function of the brick. The folder has to outlive it.

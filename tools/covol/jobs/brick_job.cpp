@@ -66,10 +66,9 @@ private:
         if (sweep > 1) {
             for (const std::size_t n : with_neighbours(brick))
                 if (!folder_.is_done(sweep - 1, n))
-                    throw Error(Errc::InvalidInput, folder_.path() + ": brick " + std::to_string(brick) +
-                                                        " in sweep " + std::to_string(sweep) + " needs brick " +
-                                                        std::to_string(n) + " of sweep " +
-                                                        std::to_string(sweep - 1) + ": run that first");
+                    throw Error(Errc::InvalidInput, folder_.path() + ": brick " + std::to_string(brick) + " in sweep " +
+                                                        std::to_string(sweep) + " needs brick " + std::to_string(n) +
+                                                        " of sweep " + std::to_string(sweep - 1) + ": run that first");
             const double gap = measure_seams(plan_, brick, states);
             facts["gap"] = gap;
             if (!plan_.has_sweeps || gap < plan_.options.tolerance) {
@@ -126,7 +125,11 @@ SegmentResult join(BrickJob& job, const BrickPlan& plan, const BrickFolder& fold
         throw Error(Errc::InvalidInput,
                     folder.path() + ": expected a state of each brick: run covol brick run " + folder.path());
     if (plan.has_sweeps) warn_of_seams(plan, folder, sweep, run);
-    return job.join(plan, folder.states(sweep));
+    SegmentResult result = job.join(plan, folder.states(sweep));
+    const BrickFolder::Spent spent = folder.spent(sweep, plan.bricks.size());
+    result.report.solve.steps = spent.steps;
+    result.report.seconds.solve += spent.seconds;
+    return result;
 }
 
 void tell_plan(const BrickPlan& plan, Session& session) {
@@ -213,9 +216,8 @@ SegmentResult solve_within_limit(const SegmentJob& job, const Image* image, cons
     const auto in_one = [&] { return solve_in_one_piece(image, structure, run); };
     const std::optional<std::uint64_t> limit = session.memory_limit();
     if (!limit) return in_one();
-    const WorldBox box =
-        structure.points.empty() ? (image != nullptr ? image->geometry().world_box() : WorldBox{})
-                                 : bounding_box(structure.points);
+    const WorldBox box = structure.points.empty() ? (image != nullptr ? image->geometry().world_box() : WorldBox{})
+                                                  : bounding_box(structure.points);
     if (longest_side(box) < kSmallJob * structure.options.voxel_size.value_or(1)) return in_one();
     const RunContext inner = quiet(run);
     std::unique_ptr<BrickJob> solver;

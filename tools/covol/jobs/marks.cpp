@@ -39,7 +39,7 @@ Marks read_marks(const PointFlags& points, const ContourFlags& contours, const C
 }
 
 void prepare_marks(Marks& marks, const CloudFlags& cloud, const ContourFlags& contours, const ImageGeometry* geometry,
-             double h, Session& session, const RunContext& run) {
+                   double h, Session& session, const RunContext& run) {
     std::vector<Vec3> cleaned = cloud.clean(marks.points, h, run, marks.report["points"]);
     if (cleaned != marks.points) marks.hints = carried(marks.hints, marks.points, cleaned);
     marks.points = std::move(cleaned);

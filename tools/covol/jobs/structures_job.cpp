@@ -127,8 +127,7 @@ PreparedStructure StructurePreparer::prepare(std::size_t n, const RunContext& ru
     options.outside = std::move(seeds.outside);
     paint_.add_seeds(inputs_, n, options, run);
     if (!input.guess.empty()) {
-        prepared.guess =
-            read_guess(input.guess, job_.guess.label, geometry_, job_.image.options.spacing[0] > 0, run);
+        prepared.guess = read_guess(input.guess, job_.guess.label, geometry_, job_.image.options.spacing[0] > 0, run);
         options.guess = prepared.guess->start;
         s.input["guess"] = {{"path", input.guess}, {"label", prepared.guess->label}};
     }

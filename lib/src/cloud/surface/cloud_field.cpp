@@ -1,7 +1,6 @@
 #include "cloud/surface/cloud_field.h"
 
 #include <openvdb/openvdb.h>
-#include <openvdb/tools/SignedFloodFill.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -12,6 +11,7 @@
 #include "cloud/surface/blend_kernel.h"
 #include "cloud/surface/heuristics.h"
 #include "cloud/surface/local_fit.h"
+#include "grid/flood_tiles.h"
 #include "points/point_cells.h"
 
 namespace covol::cloud {
@@ -204,7 +204,7 @@ FloatGridPtr level_set_of(const CloudField::Pieces& pieces, const Indicator& ind
         for (std::size_t n = range.begin(); n < range.end(); ++n) blend.fill(*leaves[n]);
     });
     run.check();
-    openvdb::tools::signedFloodFill(field->tree());
+    detail::flood_tiles(*field);
     return field;
 }
 
@@ -228,8 +228,8 @@ OrientedCloud near_level(OrientedCloud points, const CloudOrientation& cloud) {
 
 std::vector<Quadric> quadrics_of(const CloudOrientation& cloud, double h, CloudReport& report, const RunContext& run) {
     const OrientedCloud points{cloud.points, cloud.orientation.normals, std::vector<float>(cloud.points.size(), 1.0F)};
-    std::vector<Quadric> quadrics = quadrics_over(near_level(points, cloud), points, kBlend.node_voxels * h,
-                                                         cloud.scale, report.bare_nodes, run);
+    std::vector<Quadric> quadrics =
+        quadrics_over(near_level(points, cloud), points, kBlend.node_voxels * h, cloud.scale, report.bare_nodes, run);
     std::vector<double> noise, radius;
     for (const Quadric& q : quadrics) {
         noise.push_back(q.noise);

@@ -63,8 +63,8 @@ FloatGridPtr cloud::settle(FloatGridPtr level_set, const CloudOrientation& cloud
     const Orientation& orientation = cloud.orientation;
     const double share = cloud.encloses ? kBlend.least_resting_share : kBlend.least_resting_open,
                  noises = report.noise / report.spacing;
-    const auto least = std::size_t(
-        std::max({kBlend.least_resting, share * double(cloud.points.size()), 4 * M_PI * noises * noises}));
+    const auto least =
+        std::size_t(std::max({kBlend.least_resting, share * double(cloud.points.size()), 4 * M_PI * noises * noises}));
     report.dropped_pieces = detail::drop_bare_pieces(*level_set, cloud.points, least);
     // Before the indicator's topology is held, for it may have lost torn parts, and after, for it may tear others.
     const auto join = [&] {
