@@ -31,7 +31,7 @@ class Bricks(Case):
         return json.loads((self.out / "plan.json").read_text())["plan"]
 
     def states(self, folder):
-        return {path.relative_to(self.out / folder): path.read_bytes() for path in sorted((self.out / folder).glob("sweep-*/*.vdb"))}
+        return {path.relative_to(self.out / folder): path.read_bytes() for path in sorted((self.out / folder).glob("sweep-*/brick-*.vdb"))}
 
     def values(self, path, grid="surface"):
         import pyopenvdb as vdb
@@ -90,7 +90,7 @@ class Bricks(Case):
         self.run_covol("brick", "join", "plan", "-o", "s.vdb")
 
     def test_within_a_memory_limit(self):
-        run = self.run_covol(*self.job, "-o", "s.vdb", "--mesh", "s.ply", "--memory-limit", "190M", "--json", "s.json")
+        run = self.run_covol(*self.job, "-o", "s.vdb", "--mesh", "s.ply", "--memory-limit", "175M", "--json", "s.json")
         self.assertIn("bricks", run.stderr)
         report = json.loads((self.out / "s.json").read_text())
         self.assertTrue(report["surface"]["closed"])

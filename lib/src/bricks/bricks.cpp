@@ -8,7 +8,6 @@
 #include <optional>
 
 #include "base/valid.h"
-#include "bricks/heuristics.h"
 #include "bricks/split.h"
 #include "bricks/states.h"
 #include "cloud/surface/cloud_field.h"
@@ -26,6 +25,10 @@ namespace {
 
 using namespace pipeline;
 
+constexpr double kCoarseVoxels = 400;     // most across the points, on the lattice of the coarse solve
+constexpr double kLeastFactor = 2;        // voxels: least size of that lattice's voxels
+constexpr std::size_t kEdgeSamples = 64;  // coarse leaves at which the image is looked at to fix what g means
+
 /// What is solved with, or without, an image.
 SegmentResult solve_whole(const Job& job, const SegmentOptions& options) {
     return job.image != nullptr ? segment(*job.image, job.given, options, job.run)
@@ -41,7 +44,7 @@ void require_bricks_can(const Job& job) {
     if (job.options.contours) refuse("contours, got some");
     if (job.options.guess) refuse("expected no guess to correct, got one");
     if (job.guesses())
-        refuse(std::to_string(job.points.size()) + " marks are a guess; the `model` paper, or more marks, flow");
+        refuse(std::to_string(job.points.size()) + " marks are a guess; `model = Paper`, or more marks, flow");
 }
 
 /// The voxels of one lattice that a coarse solve's domain covers.
@@ -57,7 +60,7 @@ Domain fine_domain(const Job& job, const Domain& coarse) {
 FloatGridPtr sample_band(const FloatGrid& coarse, const Domain& domain, const RunContext& run) {
     std::vector<const FloatGrid::TreeType::LeafNodeType*> leaves;
     for (auto leaf = coarse.tree().cbeginLeaf(); leaf; ++leaf) leaves.push_back(leaf.getLeaf());
-    const std::size_t stride = 1 + leaves.size() / std::size_t(kBricks.edge_samples);
+    const std::size_t stride = 1 + leaves.size() / kEdgeSamples;
     FloatGridPtr band = make_grid(domain, float(kHalfWidthVoxels * domain.voxel_size), "band");
     for (std::size_t n = 0; n < leaves.size(); n += stride) {
         const openvdb::BBoxd world = coarse.transform().indexToWorld(leaves[n]->getNodeBoundingBox());
@@ -163,8 +166,8 @@ struct BrickJob::Parts {
     /// The coarser lattice on which the whole is some hundred voxels wide.
     [[nodiscard]] double coarse_factor() const {
         const WorldBox box = job.points.empty() ? job.image->geometry().world_box() : bounding_box(job.points);
-        double factor = kBricks.least_factor;
-        while (longest_side(box) > kBricks.coarse_voxels * factor * job.h()) factor *= 2;
+        double factor = kLeastFactor;
+        while (longest_side(box) > kCoarseVoxels * factor * job.h()) factor *= 2;
         return factor;
     }
 
@@ -189,7 +192,7 @@ struct BrickJob::Parts {
                 plan.domain = fine_domain(job, coarse.report.domain);
                 break;
             } catch (const Error& error) {
-                if (error.code() == Errc::Cancelled || factor <= kBricks.least_factor) throw;
+                if (error.code() == Errc::Cancelled || factor <= kLeastFactor) throw;
                 run.info("coarse solve at " + number(*options.voxel_size) + ": " + error.what());
             }
         }

@@ -44,7 +44,7 @@ FloatGridPtr assemble(const BrickPlan& plan, const Domain& domain, const std::ve
         box.intersect(bounds({domain.min, domain.max}));
         if (!box.empty()) copy_leaves(*state, box, *whole);
     }
-    detail::flood_tiles(*whole);
+    detail::flood_tiles(*whole, domain);
     return whole;
 }
 

@@ -14,7 +14,7 @@ using Tree = FloatGrid::TreeType;
 
 /// One node: from its children outward, over slots that are tiles.
 template <typename Node>
-void fill_tiles(Node& node, float background) {
+void fill_tiles(Node& node, const openvdb::CoordBBox& domain, float background) {
     constexpr int kSide = 1 << Node::LOG2DIM, kChild = Node::ChildNodeType::DIM;
     const auto& children = node.getChildMask();
     auto* const table = const_cast<typename Node::UnionType*>(node.getTable());
@@ -24,6 +24,9 @@ void fill_tiles(Node& node, float background) {
     const auto place = [](openvdb::Index n) {
         return Coord(int(n >> (2 * Node::LOG2DIM)), int(n >> Node::LOG2DIM) & (kSide - 1), int(n) & (kSide - 1));
     };
+    const auto meets = [&](openvdb::Index n) {
+        return domain.hasOverlap(openvdb::CoordBBox::createCube(node.offsetToGlobalCoord(n), kChild));
+    };
     std::vector<unsigned char> known(Node::NUM_VALUES, 0);
     std::vector<openvdb::Index> front;
     const auto spread = [&](openvdb::Index from, const auto& value_towards) {
@@ -32,18 +35,22 @@ void fill_tiles(Node& node, float background) {
             next[face / 2] += face % 2 == 0 ? -1 : 1;
             if (next[face / 2] < 0 || next[face / 2] >= kSide) continue;
             const openvdb::Index n = at(next);
-            if (children.isOn(n) || known[n]) continue;
+            if (children.isOn(n) || known[n] || !meets(n)) continue;
             known[n] = 1;
             table[n].setValue(value_towards(face) < 0 ? -background : background);
             front.push_back(n);
         }
     };
-    for (auto on = children.beginOn(); on; ++on)
+    for (auto on = children.beginOn(); on; ++on) {
+        if (!meets(on.pos())) continue;
         spread(on.pos(), [&](int face) {
+            // In the middle of that face, as far as the domain goes.
             Coord voxel = node.offsetToGlobalCoord(on.pos()).offsetBy(kChild / 2);
             voxel[face / 2] += face % 2 == 0 ? -kChild / 2 : kChild / 2 - 1;
+            voxel = Coord::minComponent(Coord::maxComponent(voxel, domain.min()), domain.max());
             return table[on.pos()].getChild()->getValue(voxel);
         });
+    }
     while (!front.empty()) {
         const openvdb::Index n = front.back();
         front.pop_back();
@@ -52,15 +59,15 @@ void fill_tiles(Node& node, float background) {
 }
 
 template <typename Node>
-void fill_all(Tree& tree, float background) {
+void fill_all(Tree& tree, const openvdb::CoordBBox& domain, float background) {
     std::vector<Node*> nodes;
     tree.getNodes(nodes);
-    tbb::parallel_for(std::size_t(0), nodes.size(), [&](std::size_t n) { fill_tiles(*nodes[n], background); });
+    tbb::parallel_for(std::size_t(0), nodes.size(), [&](std::size_t n) { fill_tiles(*nodes[n], domain, background); });
 }
 
 }  // namespace
 
-void flood_tiles(FloatGrid& level_set) {
+void flood_tiles(FloatGrid& level_set, const Domain& domain) {
     using Leaf = Tree::LeafNodeType;
     using Upper = Tree::RootNodeType::ChildNodeType;
     Tree& tree = level_set.tree();
@@ -74,8 +81,9 @@ void flood_tiles(FloatGrid& level_set) {
     });
     openvdb::tools::signedFloodFill(tree);
     tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t n) { leaves[n]->setValueMask(masks[n]); });
-    fill_all<Upper::ChildNodeType>(tree, level_set.background());
-    fill_all<Upper>(tree, level_set.background());
+    const openvdb::CoordBBox box(Coord(domain.min.data()), Coord(domain.max.data()));
+    fill_all<Upper::ChildNodeType>(tree, box, level_set.background());
+    fill_all<Upper>(tree, box, level_set.background());
 }
 
 }  // namespace covol::detail

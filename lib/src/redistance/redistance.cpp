@@ -194,7 +194,7 @@ FloatGridPtr redistance(const FloatGrid& u, const Domain& domain, double half_wi
     });
     FloatGridPtr result = export_grid(band, values, domain, background, name);
     result->setGridClass(openvdb::GRID_LEVEL_SET);
-    flood_tiles(*result);
+    flood_tiles(*result, domain);
     openvdb::tools::pruneLevelSet(result->tree());
     return result;
 }

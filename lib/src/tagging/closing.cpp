@@ -36,7 +36,7 @@ FloatGridPtr close_by_ball(const FloatGrid& band, double tag_distance, const Run
         }
     if (!any) return nullptr;
     grown->tree().root().setBackground(static_cast<float>(reach), false);
-    detail::flood_tiles(*grown);
+    detail::flood_tiles(*grown, domain);
     FloatGridPtr closed;
     with_threads(run, [&] {
         closed = detail::redistance(*grown, domain, kClosing.half_width, detail::DomainEnd::Open, "band", run);

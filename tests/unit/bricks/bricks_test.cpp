@@ -18,15 +18,7 @@ namespace {
 constexpr double kRadius = 40.0;
 constexpr int kSide = 112;
 
-std::vector<Vec3> sphere_points(int count) {
-    std::vector<Vec3> points;
-    const double golden = std::acos(-1.0) * (3 - std::sqrt(5.0));
-    for (int n = 0; n < count; ++n) {
-        const double z = 1 - (2.0 * n + 1) / count, r = std::sqrt(1 - z * z);
-        points.push_back({kRadius * r * std::cos(golden * n), kRadius * r * std::sin(golden * n), kRadius * z});
-    }
-    return points;
-}
+std::vector<Vec3> marks_on_ball(int count) { return test::sphere_points(count, kRadius); }
 
 Image ball_image() {
     ImageGeometry geometry;
@@ -117,7 +109,7 @@ TEST_CASE("bricks are whole leaves, belong to one each, and share the band evenl
 
 TEST_CASE("a ball in bricks is the ball in one piece, on seams and off them") {
     const Image image = ball_image();
-    const std::vector<Vec3> points = sphere_points(6000);
+    const std::vector<Vec3> points = marks_on_ball(6000);
     SegmentOptions options;
     options.model = Model::Paper;
     SegmentOptions from_coarse = options;  // from the tagged start it comes to rest up to 0.06 voxels away
@@ -158,7 +150,7 @@ TEST_CASE("a ball in bricks is the ball in one piece, on seams and off them") {
 
 TEST_CASE("a brick is held at its neighbours' states, and moved by no others") {
     const Image image = ball_image();
-    const std::vector<Vec3> points = sphere_points(6000);
+    const std::vector<Vec3> points = marks_on_ball(6000);
     SegmentOptions options;
     options.model = Model::Paper;
     BrickJob job(image, points, options, {});
@@ -177,7 +169,7 @@ TEST_CASE("a brick is held at its neighbours' states, and moved by no others") {
 }
 
 TEST_CASE("a cloud in bricks is the cloud in one piece, bit by bit") {
-    std::vector<Vec3> points = sphere_points(20000);
+    std::vector<Vec3> points = marks_on_ball(20000);
     for (std::size_t n = 0; n < points.size(); ++n)
         for (double& x : points[n]) x *= 1 + 0.004 * std::sin(12.9898 * double(n));
     const SegmentOptions options;
@@ -197,5 +189,5 @@ TEST_CASE("a cloud in bricks is the cloud in one piece, bit by bit") {
 }
 
 TEST_CASE("what rests on all marks at once is refused in bricks") {
-    CHECK_THROWS_AS(BrickJob(ball_image(), sphere_points(200), {}, {}), Error);
+    CHECK_THROWS_AS(BrickJob(ball_image(), marks_on_ball(200), {}, {}), Error);
 }

@@ -1,4 +1,5 @@
 #include "covol/evolve.h"
+#include "covol/start.h"
 
 #include <catch2/catch.hpp>
 
@@ -303,6 +304,31 @@ TEST_CASE("between an obstacle and a floor a surface stays where they hold it") 
         const auto crossings = zero_crossings(p.domain, to_dense(p.domain, *u));
         REQUIRE(crossings.size() > 100);
         for (const Crossing& c : crossings) CHECK(length(c.position) == Approx(3.5).margin(0.05 * kH));
+    }
+}
+
+TEST_CASE("a tracked band that its domain cuts off has the solid's inside, whichever faces cut it") {
+    constexpr double kBall = 90;
+    const Domain whole = make_domain({{-128, -128, -128}, {128, 128, 128}}, 1.0);
+    const FloatGridPtr ball = start_from_sphere(make_domain(whole.world_box(), 2.0), {0, 0, 0}, kBall);
+    for (int octant = 0; octant < 8; ++octant) {
+        Domain part = whole;
+        for (int a = 0; a < 3; ++a) octant >> a & 1 ? part.min[a] = 112 : part.max[a] = 143;
+        const FloatGridPtr u = start_from_grid(part, *ball);
+        EvolveOptions o;
+        o.theta = o.rho = 0;
+        o.delta = 1;
+        o.follow = true;
+        o.max_steps = 12;
+        evolve(*u, {}, o);
+        int wrong = 0;
+        for (int i = part.min[0]; i <= part.max[0]; i += 3)
+            for (int j = part.min[1]; j <= part.max[1]; j += 3)
+                for (int k = part.min[2]; k <= part.max[2]; k += 3) {
+                    const double d = length(part.index_to_world({double(i), double(j), double(k)})) - kBall;
+                    wrong += std::abs(d) > 4 && (u->tree().getValue({i, j, k}) < 0) != (d < 0);
+                }
+        CHECK(wrong == 0);
     }
 }
 

@@ -20,6 +20,7 @@ const std::map<std::string, std::string> kFlags{
     {"lattice_origin", "--lattice-origin"},
     {"max_steps", "--max-steps"},
     {"min_component_volume", "--min-component"},
+    {"model", "--model"},
     {"order", "--points-order"},
     {"outside", "--outside"},
     {"rho", "--rho"},

@@ -159,8 +159,9 @@ void Session::add_common_flags() {
     app_.add_flag("--profile", profile_, "print at the end where time and memory went");
     app_.add_flag("--quiet", quiet_, "print nothing but results, warnings and errors");
     app_.add_option("--json", json_path_, "write the report to this file, - is standard output")->type_name("FILE|-");
-    app_.add_option("--memory-limit", memory_limit_text_,
-                    "stop when more memory is needed, 8G for example [what is free]")
+    app_.add_option(
+            "--memory-limit", memory_limit_text_,
+            "stop when more memory is needed, 8G for example; segment and reconstruct go on in bricks [what is free]")
         ->type_name("SIZE");
     app_.add_option("--save-config", save_config_path_, "write the options of this run to a TOML file")
         ->type_name("FILE")

@@ -14,7 +14,7 @@
 namespace covol::tool {
 namespace {
 
-constexpr double kSmallJob = 200;  // voxels across: never worth a look
+constexpr double kSmallJob = 64;  // voxels across: never worth a look
 
 std::unique_ptr<BrickJob> make_job(const Image* image, const PreparedStructure& structure, const RunContext& run) {
     if (image != nullptr) return std::make_unique<BrickJob>(*image, structure.points, structure.options, run);
@@ -53,7 +53,7 @@ public:
             if (moved == 0) return;
         }
         if (plan_.has_sweeps)
-            run_.warn("bricks: neighbours do not agree within `seam_tolerance` after " + std::to_string(most) +
+            run_.warn("bricks: neighbours do not agree within --seam-tolerance after " + std::to_string(most) +
                       " sweeps");
     }
 
@@ -78,6 +78,7 @@ private:
         }
         BrickReport report;
         const FloatGridPtr state = job_.solve(plan_, brick, states, report);
+        run_.check();  // what was cancelled is no state
         facts.update({{"steps", report.steps},
                       {"stop_reason", to_string(report.stop_reason)},
                       {"active_voxels", report.active_voxels},

@@ -204,7 +204,7 @@ FloatGridPtr level_set_of(const CloudField::Pieces& pieces, const Indicator& ind
         for (std::size_t n = range.begin(); n < range.end(); ++n) blend.fill(*leaves[n]);
     });
     run.check();
-    detail::flood_tiles(*field);
+    detail::flood_tiles(*field, domain);
     return field;
 }
 

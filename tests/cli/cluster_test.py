@@ -1,0 +1,164 @@
+"""Bricks by Snakemake on this machine, and through a Slurm that is started for the test.
+
+    COVOL=build/bin/covol python3 -m unittest tests/cli/cluster_test.py
+"""
+import json
+import os
+import pathlib
+import random
+import secrets
+import shutil
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+import unittest
+
+from cli_test import COVOL, Case
+
+WORKFLOW = pathlib.Path(__file__).resolve().parents[2] / "houdini_free_examples/bricks"
+
+
+def missing(*programs):
+    return [program for program in programs if shutil.which(program) is None]
+
+
+class Workflow(Case):
+    """A torus in bricks, once without a scheduler; what Snakemake makes of it has to be the same."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        image, marks = cls.inputs / "torus.nrrd", cls.inputs / "torus.xyz"
+        cls.covol("phantom", "torus", "--size", "96", "--count", "5000", "-o", image, "--points", marks)
+        cls.job = ["segment", image, "--points", marks, "--model", "paper", "--brick-voxels", "30000"]
+        cls.covol("brick", "plan", *cls.job, "-o", cls.inputs / "plan")
+        shutil.copytree(cls.inputs / "plan", cls.inputs / "calm")
+        cls.covol("brick", "run", cls.inputs / "calm")
+        cls.covol("brick", "join", cls.inputs / "calm", "-o", cls.inputs / "calm.vdb", "--mesh", cls.inputs / "calm.ply")
+        cls.bricks = len(json.loads((cls.inputs / "plan/plan.json").read_text())["bricks"])
+
+    @staticmethod
+    def covol(*args):
+        subprocess.run([COVOL, *map(str, args), "--quiet"], check=True, stdout=subprocess.DEVNULL)
+
+    def setUp(self):
+        super().setUp()
+        shutil.copytree(self.inputs / "plan", self.out / "plan")
+
+    def snakemake(self, *more, environment=None):
+        command = ["snakemake", "-s", WORKFLOW / "Snakefile", "-j", "2", "--latency-wait", "30", *more, "--config", "plan=plan",
+                   "out=joined.vdb", f"covol={pathlib.Path(COVOL).resolve()}", "threads=1", "join=--mesh joined.ply"]
+        return subprocess.Popen(list(map(str, command)), cwd=self.out, env={**os.environ, **(environment or {})}, text=True,
+                                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True)
+
+    def check(self, run):
+        said = run.communicate(timeout=600)[0]
+        self.assertEqual(run.returncode, 0, said)
+        self.assertEqual((self.out / "joined.ply").read_bytes().split(b"end_header")[1],
+                         (self.inputs / "calm.ply").read_bytes().split(b"end_header")[1])
+        return said
+
+
+@unittest.skipIf(missing("snakemake"), "snakemake is not installed")
+class Snakemake(Workflow):
+    def test_two_slots(self):
+        self.assertGreaterEqual(self.bricks, 4)
+        self.check(self.snakemake())
+
+    def test_killed_and_started_again(self):
+        chance = random.Random(2)
+        for _ in range(3):
+            run = self.snakemake("--rerun-incomplete", "--nolock")
+            time.sleep(chance.uniform(1, 6))
+            os.killpg(run.pid, signal.SIGKILL)
+            run.communicate()
+        self.check(self.snakemake("--rerun-incomplete", "--nolock"))
+
+
+SLURM = """ClusterName=covol
+SlurmctldHost={host}(127.0.0.1)
+SlurmUser=root
+AuthType=auth/munge
+AuthInfo=socket={folder}/munge/socket
+StateSaveLocation={folder}/state
+SlurmdSpoolDir={folder}/spool
+SlurmctldPidFile={folder}/slurmctld.pid
+SlurmdPidFile={folder}/slurmd.pid
+SlurmctldLogFile={folder}/slurmctld.log
+SlurmdLogFile={folder}/slurmd.log
+SlurmctldPort={port}
+SlurmdPort={next}
+ProctrackType=proctrack/linuxproc
+TaskPlugin=task/none
+SelectType=select/cons_tres
+SelectTypeParameters=CR_CPU
+MpiDefault=none
+ReturnToService=2
+SchedulerParameters=sched_min_interval=100000
+NodeName={host} NodeAddr=127.0.0.1 CPUs={cores} State=UNKNOWN
+PartitionName=main Nodes={host} Default=YES MaxTime=INFINITE State=UP
+"""
+
+
+@unittest.skipIf(missing("snakemake", "slurmctld", "slurmd", "munged", "sbatch"), "snakemake or slurm-wlm is not installed")
+@unittest.skipIf(os.geteuid() != 0, "a Slurm of one's own needs root")
+class Slurm(Workflow):
+    def start_slurm(self):
+        """@return the environment of its clients; None where this machine does not let it run"""
+        folder = pathlib.Path(tempfile.mkdtemp(prefix="covol-slurm-"))
+        for name in ("munge", "state", "spool"):
+            (folder / name).mkdir(mode=0o700)
+        key = folder / "munge/key"
+        key.write_bytes(secrets.token_bytes(1024))
+        key.chmod(0o400)
+        port = 20000 + os.getpid() % 20000
+        config = folder / "slurm.conf"
+        host = socket.gethostname().split(".")[0]
+        config.write_text(SLURM.format(folder=folder, host=host, port=port, next=port + 1, cores=os.cpu_count()))
+        environment = {"SLURM_CONF": str(config)}
+        own = {**os.environ, **environment}
+        self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
+
+        def stop():
+            for pid in [folder / "slurmd.pid", folder / "slurmctld.pid", folder / "munge/pid"]:
+                if pid.exists():
+                    try:
+                        os.kill(int(pid.read_text()), signal.SIGTERM)
+                    except ProcessLookupError:
+                        pass
+            time.sleep(1)
+        self.addCleanup(stop)
+        munge = ["munged", "--force", f"--key-file={key}", f"--socket={folder}/munge/socket", f"--pid-file={folder}/munge/pid",
+                 f"--log-file={folder}/munge/log", f"--seed-file={folder}/munge/seed"]
+        for command in (munge, ["slurmctld"], ["slurmd"]):
+            if subprocess.run(command, env=own, capture_output=True).returncode != 0:
+                return None
+        for _ in range(60):
+            state = subprocess.run(["sinfo", "-h", "-o", "%t"], env=own, capture_output=True, text=True).stdout.strip()
+            if state == "idle":
+                return environment
+            time.sleep(0.5)
+        return None
+
+    def test_a_job_is_killed_in_the_middle(self):
+        environment = self.start_slurm()
+        if environment is None:
+            self.skipTest("Slurm does not start on this machine")
+        own = {**os.environ, **environment}
+        run = self.snakemake("-j", "20", "--cluster", "sbatch --parsable --cpus-per-task {threads} --output=/dev/null",
+                             "--cluster-status", WORKFLOW / "slurm_status.sh", environment=environment)
+        killed = []
+        for _ in range(300):
+            killed = subprocess.run(["squeue", "-h", "-t", "R", "-o", "%i"], env=own, capture_output=True, text=True).stdout.split()
+            if killed:
+                break
+            time.sleep(0.2)
+        self.assertTrue(killed, "no job ever ran")
+        subprocess.run(["scancel", killed[0]], env=own, check=True)
+        self.check(run)
+
+
+if __name__ == "__main__":
+    unittest.main()
