@@ -16,14 +16,15 @@
 // A coarse solve of the whole gives every brick its start. A brick is solved with some layers of its neighbours around
 // it; what they found last holds the outermost of these (the alternating method of Schwarz, 1870, all bricks at once:
 // Lions, On the Schwarz alternating method, 1988). Sweeps repeat until neighbours agree where they meet. All bricks lie
-// on one lattice and each leaf of it belongs to one of them, so that the joined level set is a union of leaves.
+// on one lattice and each leaf of it belongs to one of them, so that the joined level set is a union of leaves; beside
+// a seam its values are the two states' weighted mean.
 namespace covol {
 
 struct BrickOptions {
     std::int64_t most_voxels = 8'000'000;  ///< > 0: of the band in a brick, its neighbours' layers not counted
     int overlap = 16;                      ///< voxels, a multiple of 8, > 0: layers of its neighbours around a brick
-    double tolerance = 0.02;               ///< voxels, > 0: neighbours agree when their surfaces lie closer
-    int most_sweeps = 8;                   ///< >= 1
+    double tolerance = 0.05;               ///< voxels, > 0: neighbours agree when their surfaces lie closer
+    int most_sweeps = 4;                   ///< >= 1
     [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 

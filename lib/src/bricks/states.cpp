@@ -15,6 +15,7 @@ using openvdb::Coord;
 using openvdb::CoordBBox;
 
 constexpr int kFrameLayers = 4;     // the scheme looks two voxels far, redistancing one more
+constexpr int kBlend = 8;           // voxels: states reach so far beyond their cores
 constexpr int kSeamLayers = 3;      // of one brick's voxels beside another, where their surfaces are compared
 constexpr double kBeyondAll = 1e3;  // voxels: a bound that binds nothing
 
@@ -33,17 +34,78 @@ FloatGridPtr leaves_within(const FloatGrid& u, const VoxelBox& box) {
     return part;
 }
 
+/// Where states overlap, one goes over into the other within kBlend voxels on either side of the seam.
+class SeamBlend {
+public:
+    SeamBlend(const BrickPlan& plan, const CoordBBox& box)
+        : domain_(bounds({plan.domain.min, plan.domain.max})), box_(box), sums_(0.0F), weights_(0.0F) {}
+
+    void add(const FloatGrid& state, const VoxelBox& core) {
+        const CoordBBox deep = inner(core);
+        for (auto leaf = state.tree().cbeginLeaf(); leaf; ++leaf) {
+            const CoordBBox voxels = leaf->getNodeBoundingBox();
+            if (deep.isInside(voxels) || !box_.hasOverlap(voxels)) continue;
+            auto* sum = sums_.touchLeaf(leaf->origin());
+            auto* weight = weights_.touchLeaf(leaf->origin());
+            for (auto value = leaf->cbeginValueOn(); value; ++value) {
+                const float own = weight_at(core, value.getCoord());
+                sum->setValueOn(value.pos(), sum->getValue(value.pos()) + own * *value);
+                weight->setValueOn(value.pos(), weight->getValue(value.pos()) + own);
+            }
+        }
+    }
+
+    void apply(FloatGrid& u) const {
+        for (auto sum = sums_.cbeginLeaf(); sum; ++sum) {
+            auto* leaf = u.tree().probeLeaf(sum->origin());
+            const auto* weight = weights_.probeConstLeaf(sum->origin());
+            if (leaf == nullptr) continue;
+            for (auto value = leaf->beginValueOn(); value; ++value)
+                if (const float all = weight->getValue(value.pos()); all > 0)
+                    value.setValue(sum->getValue(value.pos()) / all);
+        }
+    }
+
+private:
+    /// A core's voxels that no other state reaches.
+    [[nodiscard]] CoordBBox inner(const VoxelBox& core) const {
+        CoordBBox box = bounds(core);
+        for (int a = 0; a < 3; ++a) {
+            if (box.min()[a] > domain_.min()[a]) box.min()[a] += kBlend;
+            if (box.max()[a] < domain_.max()[a]) box.max()[a] -= kBlend;
+        }
+        return box;
+    }
+
+    /// 1 deep in the core, 1/2 at its faces, 0 where its state ends.
+    [[nodiscard]] float weight_at(const VoxelBox& core, const Coord& at) const {
+        float depth = kBlend;
+        for (int a = 0; a < 3; ++a) {
+            if (core.min[a] > domain_.min()[a]) depth = std::min(depth, float(at[a] - core.min[a]) + 0.5F);
+            if (core.max[a] < domain_.max()[a]) depth = std::min(depth, float(core.max[a] - at[a]) + 0.5F);
+        }
+        return std::max(0.0F, (kBlend + depth) / (2 * kBlend));
+    }
+
+    CoordBBox domain_, box_;
+    FloatGrid::TreeType sums_, weights_;
+};
+
 FloatGridPtr assemble(const BrickPlan& plan, const Domain& domain, const std::vector<std::size_t>& bricks,
                       const BrickStates& states) {
     FloatGridPtr whole = make_grid(domain, float(kHalfWidthVoxels * domain.voxel_size), "u");
+    const CoordBBox all = bounds({domain.min, domain.max});
+    SeamBlend blend(plan, all);
     for (const std::size_t n : bricks) {
         const FloatGridPtr state = states(n);
         if (!state)
             throw Error(Errc::InvalidInput, "bricks: expected a state of brick " + std::to_string(n) + ", got none");
         CoordBBox box = bounds(plan.bricks[n].core);
-        box.intersect(bounds({domain.min, domain.max}));
+        box.intersect(all);
         if (!box.empty()) copy_leaves(*state, box, *whole);
+        if (plan.has_sweeps) blend.add(*state, plan.bricks[n].core);
     }
+    blend.apply(*whole);
     detail::flood_tiles(*whole, domain);
     return whole;
 }

@@ -7,7 +7,8 @@ namespace covol::bricks {
 /// The leaves of `u` that meet the box, with their masks; nothing else. Keeps u's transform and name.
 [[nodiscard]] FloatGridPtr leaves_within(const FloatGrid& u, const VoxelBox& box);
 
-/// A level set on `domain`: from each brick of the list the leaves of its core, as far as the domain goes.
+/// A level set on `domain`: from each brick of the list the leaves of its core, as far as the domain goes. Beside seams
+/// it goes over from one state to the other, weighted by how deep in its core, or how far beyond it, a voxel lies.
 /// @throws Error InvalidInput where one has no state.
 [[nodiscard]] FloatGridPtr assemble(const BrickPlan& plan, const Domain& domain, const std::vector<std::size_t>& bricks,
                                     const BrickStates& states);

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <iomanip>
 #include <memory>
 #include <numeric>
+#include <sstream>
 
 #include "covol/error.h"
 #include "jobs/brick_folder.h"
@@ -53,8 +55,7 @@ public:
             if (moved == 0) return;
         }
         if (plan_.has_sweeps)
-            run_.warn("bricks: neighbours do not agree within --seam-tolerance after " + std::to_string(most) +
-                      " sweeps");
+            run_.info("neighbours do not agree within --seam-tolerance after " + std::to_string(most) + " sweeps");
     }
 
 private:
@@ -110,22 +111,28 @@ RunContext quiet(const RunContext& run) {
     return inner;
 }
 
-/// A sweep changes no more where its bricks were as before.
-void warn_of_seams(const BrickPlan& plan, const BrickFolder& folder, int sweep, const RunContext& run) {
+/// Seams of less than that are averaged out.
+constexpr double kWarnOfGap = 0.5;  // voxels
+
+void tell_of_seams(const BrickPlan& plan, const BrickFolder& folder, int sweep, Session& session) {
     double gap = 0;
     for (std::size_t n = 0; n < plan.bricks.size(); ++n)
-        if (folder.moved(sweep, n)) gap = std::max(gap, measure_seams(plan, n, folder.states(sweep)));
-    if (gap < plan.options.tolerance) return;
-    run.warn("bricks: neighbours lie up to " + std::to_string(gap) + " voxels apart after sweep " +
-             std::to_string(sweep) + ": run the next one, and join again");
+        gap = std::max(gap, measure_seams(plan, n, folder.states(sweep)));
+    session.report()["bricks"] = {{"count", plan.bricks.size()}, {"sweeps", sweep}, {"largest_gap", gap}};
+    std::ostringstream text;
+    text << std::setprecision(2) << "neighbouring bricks lie up to " << gap << " voxels apart after sweep " << sweep;
+    if (gap > kWarnOfGap)
+        session.warn(text.str() + ": run the next one, and join again");
+    else
+        session.note(text.str() + "; their mean is taken");
 }
 
-SegmentResult join(BrickJob& job, const BrickPlan& plan, const BrickFolder& folder, const RunContext& run) {
+SegmentResult join(BrickJob& job, const BrickPlan& plan, const BrickFolder& folder, Session& session) {
     const int sweep = folder.last_sweep(plan.bricks.size());
     if (sweep == 0)
         throw Error(Errc::InvalidInput,
                     folder.path() + ": expected a state of each brick: run covol brick run " + folder.path());
-    if (plan.has_sweeps) warn_of_seams(plan, folder, sweep, run);
+    if (plan.has_sweeps) tell_of_seams(plan, folder, sweep, session);
     SegmentResult result = job.join(plan, folder.states(sweep));
     const BrickFolder::Spent spent = folder.spent(sweep, plan.bricks.size());
     result.report.solve.steps = spent.steps;
@@ -179,7 +186,7 @@ void run_bricks(const SegmentJob& job, Session& session) {
         return run_structures(job, session,
                               [&](const Image* image, const PreparedStructure& structure, const RunContext& run) {
                                   const BrickPlan plan = folder.read_plan();
-                                  return join(*make_job(image, structure, run), plan, folder, run);
+                                  return join(*make_job(image, structure, run), plan, folder, session);
                               });
     job.check_options();
     const std::vector<StructureStart> starts = starts_of(job, inputs);
@@ -241,7 +248,7 @@ SegmentResult solve_within_limit(const SegmentJob& job, const Image* image, cons
     const TemporaryFolder temporary(job.output);
     const BrickFolder folder(temporary.path());
     BrickRunner(*solver, plan, folder, run).run_all();
-    return join(*solver, plan, folder, run);
+    return join(*solver, plan, folder, session);
 }
 
 }  // namespace covol::tool
