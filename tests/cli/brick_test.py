@@ -97,6 +97,21 @@ class Bricks(Case):
         self.assertIn("bricks", report["automatic"])
         self.assertEqual(sorted(path.name for path in self.out.iterdir()), ["s.json", "s.ply", "s.vdb"])
 
+    def test_a_mesh_that_does_not_fit_is_streamed(self):
+        self.plan("plan")
+        self.run_covol("brick", "run", "plan")
+        self.run_covol("brick", "join", "plan", "-o", "s.vdb", "--mesh", "s.ply", "--plain", "--json", "s.json")
+        report = json.loads((self.out / "s.json").read_text())
+        self.assertTrue(report["surface"]["closed"])
+        self.assertEqual(list(report["mesh"]), ["triangles"])
+        again = self.run_covol("mesh", "s.vdb", "-o", "again.ply", "--plain", "--json", "-")
+        self.assertEqual(json.loads(again.stdout)["mesh"]["triangles"], report["mesh"]["triangles"])
+        faces = [(self.out / name).read_bytes().partition(b"end_header")[2] for name in ("s.ply", "again.ply")]
+        self.assertEqual(*faces)
+        self.assertIn(".ply", self.run_covol("brick", "join", "plan", "-o", "t.vdb", "--mesh", "t.glb", "--plain", code=2).stderr)
+        refused = self.run_covol("brick", "join", "plan", "-o", "t.vdb", "--memory-limit", "60M", code=3).stderr
+        self.assertIn("--memory-limit", refused)
+
     def test_what_cannot_be_planned(self):
         self.assertIn("expected -o FOLDER", self.run_covol("brick", "plan", *self.job, code=2).stderr)
         self.assertIn("expected plan, run or join", self.run_covol("brick", "split", "x", code=2).stderr)

@@ -77,8 +77,10 @@ public:
     [[nodiscard]] COVOL_API FloatGridPtr solve(const BrickPlan& plan, std::size_t brick, const BrickStates& states,
                                                BrickReport& report) const;
     /// Joins the states of all bricks and finishes the surface as segment() does. The job's last work.
+    /// @param without_mesh  as SegmentOptions::without_mesh, where that is not set already
     /// @throws Error InvalidInput (no surface is left)
-    [[nodiscard]] COVOL_API SegmentResult join(const BrickPlan& plan, const BrickStates& states);
+    [[nodiscard]] COVOL_API SegmentResult join(const BrickPlan& plan, const BrickStates& states,
+                                               bool without_mesh = false);
 
 private:
     struct Parts;

@@ -10,7 +10,7 @@
 
 namespace covol {
 
-/// What was written.
+/// What was written, and how large it is.
 struct StreamedMesh {
     std::uint64_t vertices = 0, triangles = 0;
     MeshMeasures measures;
@@ -31,5 +31,9 @@ struct StreamedMesh {
 ///               InvalidInput (no surface at this level). Nothing half-written stays.
 COVOL_API StreamedMesh stream_mesh(const std::string& path, const FloatGrid& surface, double isovalue = 0.0,
                                    const WriteMeshOptions& options = {}, const RunContext& run = {});
+
+/// What stream_mesh() would write. @throws Error as extract_mesh(); InvalidInput (no surface at this level)
+[[nodiscard]] COVOL_API StreamedMesh measure_surface(const FloatGrid& surface, double isovalue = 0.0,
+                                                     const RunContext& run = {});
 
 }  // namespace covol

@@ -76,6 +76,10 @@ struct SegmentOptions {
     EvolveOptions evolve;
     ExtractOptions extract;
     HolesOptions holes;  ///< of points without an image
+    /// SegmentResult::mesh stays empty, and memory is that of level sets: the surface is measured a layer of leaves at
+    /// a time, and the marks' distances are sampled. Holes are closed, no piece is dropped, and the isovalue is 0.
+    bool without_mesh = false;
+    bool without_fields = false;  ///< SegmentResult::u, distance and edge are given up as soon as nothing needs them
     /// levels of voxel size 2h, 4h, ... that the flow passes first, >= 0; automatic: 1 for a sphere or a box, else 0
     std::optional<int> coarse_levels;
     [[nodiscard]] COVOL_API std::string why_invalid() const;

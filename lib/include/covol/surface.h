@@ -38,4 +38,9 @@ struct FitStatistics {
 [[nodiscard]] COVOL_API FitStatistics measure_fit(const std::vector<Vec3>& points, const TriangleMesh& mesh,
                                                   const RunContext& run = {});
 
+/// The same without the mesh: distances that are interpolated within the level set's half width, and at most 0.12
+/// voxels too large beyond it. @throws Error InvalidInput (no point)
+[[nodiscard]] COVOL_API FitStatistics measure_fit(const std::vector<Vec3>& points, const FloatGrid& surface,
+                                                  const RunContext& run = {});
+
 }  // namespace covol

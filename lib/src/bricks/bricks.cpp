@@ -13,6 +13,8 @@
 #include "cloud/surface/cloud_field.h"
 #include "covol/error.h"
 #include "covol/start.h"
+#include "covol/surface.h"
+#include "grid/flood_tiles.h"
 #include "segment/automatic.h"
 #include "segment/fields.h"
 #include "segment/final_surface.h"
@@ -27,6 +29,7 @@ using namespace pipeline;
 
 constexpr double kCoarseVoxels = 400;     // most across the points, on the lattice of the coarse solve
 constexpr double kLeastFactor = 2;        // voxels: least size of that lattice's voxels
+constexpr int kSurfaceLayers = 8;         // around a brick: its distance to the surface rests on no more
 constexpr std::size_t kEdgeSamples = 64;  // coarse leaves at which the image is looked at to fix what g means
 
 /// What is solved with, or without, an image.
@@ -104,15 +107,17 @@ std::vector<Vec3> points_near(const Job& job, const Domain& part) {
     return near;
 }
 
+std::vector<std::size_t> with_neighbours(const BrickPlan& plan, std::size_t brick) {
+    std::vector<std::size_t> all = plan.bricks[brick].neighbours;
+    all.push_back(brick);
+    return all;
+}
+
 /// The level set that a brick starts from; null where there is none.
 FloatGridPtr start_of(const BrickPlan& plan, std::size_t brick, const BrickStates& states, const Domain& part,
                       const RunContext& run) {
-    FloatGridPtr known = plan.coarse;
-    if (states(brick) != nullptr) {
-        std::vector<std::size_t> parts = plan.bricks[brick].neighbours;
-        parts.push_back(brick);
-        known = bricks::assemble(plan, part, parts, states);
-    }
+    const FloatGridPtr known =
+        states(brick) != nullptr ? bricks::assemble(plan, part, with_neighbours(plan, brick), states) : plan.coarse;
     try {
         return start_from_grid(part, *known, run);
     } catch (const Error& error) {
@@ -163,6 +168,42 @@ struct BrickJob::Parts {
         });
     }
 
+    /// What segment() leaves after the flow, all at once.
+    void join(const BrickPlan& plan, const BrickStates& states) {
+        job.result.u = bricks::assemble(plan, plan.domain, all_of(plan), states);
+        if (field) {
+            job.report().cloud = cloud;
+            job.result.u = cloud::settle(job.result.u, *job.cloud, job.report().cloud, run);
+            job.origin = StartOrigin::Cloud;
+        }
+        job.report().active_voxels = std::int64_t(job.result.u->activeVoxelCount());
+        job.report().leaf_count = std::int64_t(job.result.u->tree().leafCount());
+    }
+
+    /// The surface brick by brick: nothing but it is held of the whole.
+    void join_surfaces(const BrickPlan& plan, const BrickStates& states) {
+        FloatGridPtr surface = make_grid(plan.domain, float(kHalfWidthVoxels * plan.domain.voxel_size), "surface");
+        surface->setGridClass(openvdb::GRID_LEVEL_SET);
+        const Clip clip = where_it_ends(job);
+        for (std::size_t n = 0; n < plan.bricks.size(); ++n) {
+            run.check();
+            run.report("join", double(n) / double(plan.bricks.size()));
+            const VoxelBox& core = plan.bricks[n].core;
+            const FloatGridPtr u = bricks::assemble(plan, bricks::around(plan.domain, core, kSurfaceLayers),
+                                                    with_neighbours(plan, n), states);
+            if (u->tree().leafCount() == 0) continue;
+            bricks::count(*u, core, job.report().active_voxels, job.report().leaf_count);
+            set_clip(*u, clip);
+            try {
+                bricks::copy_leaves(*extract_surface(*u, run), core, *surface);
+            } catch (const Error& error) {
+                if (error.code() != Errc::InvalidInput) throw;  // a neighbour's band reaches it, and no surface does
+            }
+        }
+        detail::flood_tiles(*surface, plan.domain);
+        job.result.surface = surface;
+    }
+
     /// The coarser lattice on which the whole is some hundred voxels wide.
     [[nodiscard]] double coarse_factor() const {
         const WorldBox box = job.points.empty() ? job.image->geometry().world_box() : bounding_box(job.points);
@@ -183,6 +224,10 @@ struct BrickJob::Parts {
     void plan_flow(BrickPlan& plan) const {
         SegmentOptions options = given;
         options.voxel_size_may_grow = false;
+        options.without_mesh = true;
+        options.holes = {};
+        options.extract = {};
+        options.without_fields = false;
         // Where the structure is too fine for so coarse a lattice, a finer one may do.
         for (double factor = coarse_factor();; factor /= 2) {
             options.voxel_size = factor * job.h();
@@ -262,26 +307,24 @@ FloatGridPtr BrickJob::solve(const BrickPlan& plan, std::size_t brick, const Bri
     return state;
 }
 
-SegmentResult BrickJob::join(const BrickPlan& plan, const BrickStates& states) {
+SegmentResult BrickJob::join(const BrickPlan& plan, const BrickStates& states, bool without_mesh) {
     const RunContext& run = parts_->run;
     Job& job = parts_->job;
+    job.options.without_mesh = job.options.without_mesh || without_mesh;
+    detail::require_valid(job.options, "bricks");
     with_threads(run, [&] {
         job.report().domain = plan.domain;
-        job.result.u = bricks::assemble(plan, plan.domain, all_of(plan), states);
-        if (job.result.u->tree().leafCount() == 0)
+        job.origin = StartOrigin::CoarseLevel;
+        const bool in_parts = job.options.without_mesh && job.options.without_fields && !parts_->field;
+        in_parts ? parts_->join_surfaces(plan, states) : parts_->join(plan, states);
+        if (job.report().leaf_count == 0)
             throw Error(Errc::InvalidInput,
                         "bricks: the surface vanished in all of them; lower `delta`, or start closer to the edges "
                         "(`start`)");
-        job.origin = StartOrigin::CoarseLevel;
-        if (parts_->field) {
-            job.report().cloud = parts_->cloud;
-            job.result.u = cloud::settle(job.result.u, *job.cloud, job.report().cloud, run);
-            job.origin = StartOrigin::Cloud;
-        }
         SegmentReport& report = job.report();
         report.solve.stop_reason = StopReason::Steady;
-        report.active_voxels = report.solve.active_voxels = std::int64_t(job.result.u->activeVoxelCount());
-        report.leaf_count = report.solve.leaf_count = std::int64_t(job.result.u->tree().leafCount());
+        report.solve.active_voxels = report.active_voxels;
+        report.solve.leaf_count = report.leaf_count;
         job.choose("bricks", std::to_string(plan.bricks.size()), "solved apart and joined");
         make_surface(job);
         report.resolved = job.options;

@@ -34,6 +34,17 @@ FloatGridPtr leaves_within(const FloatGrid& u, const VoxelBox& box) {
     return part;
 }
 
+void copy_leaves(const FloatGrid& from, const VoxelBox& box, FloatGrid& to) { copy_leaves(from, bounds(box), to); }
+
+void count(const FloatGrid& u, const VoxelBox& box, std::int64_t& active_voxels, std::int64_t& leaves) {
+    const CoordBBox all = bounds(box);
+    for (auto leaf = u.tree().cbeginLeaf(); leaf; ++leaf) {
+        if (!all.hasOverlap(leaf->getNodeBoundingBox())) continue;
+        active_voxels += std::int64_t(leaf->onVoxelCount());
+        ++leaves;
+    }
+}
+
 /// Where states overlap, one goes over into the other within kBlend voxels on either side of the seam.
 class SeamBlend {
 public:

@@ -7,6 +7,12 @@ namespace covol::bricks {
 /// The leaves of `u` that meet the box, with their masks; nothing else. Keeps u's transform and name.
 [[nodiscard]] FloatGridPtr leaves_within(const FloatGrid& u, const VoxelBox& box);
 
+/// Adds the leaves of `from` that meet the box, with their masks. @pre `to` has none of them
+void copy_leaves(const FloatGrid& from, const VoxelBox& box, FloatGrid& to);
+
+/// Adds the active voxels and leaves of the box.
+void count(const FloatGrid& u, const VoxelBox& box, std::int64_t& active_voxels, std::int64_t& leaves);
+
 /// A level set on `domain`: from each brick of the list the leaves of its core, as far as the domain goes. Beside seams
 /// it goes over from one state to the other, weighted by how deep in its core, or how far beyond it, a voxel lies.
 /// @throws Error InvalidInput where one has no state.

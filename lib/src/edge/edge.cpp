@@ -53,6 +53,8 @@ LeafBounds known_bounds(const Domain& domain, const LeafBand& band, std::size_t 
     return bounds;
 }
 
+constexpr std::size_t kLeavesAtOnce = 1 << 15;  // between these a mapped image gives its pages back
+
 Window sample_window(const Image& image, const FloatGrid& topology, const Domain& domain, double sigma,
                      const RunContext& run) {
     std::vector<Coord> origins;
@@ -70,12 +72,14 @@ Window sample_window(const Image& image, const FloatGrid& topology, const Domain
         boxes.push_back({{o.x(), o.y(), o.z()}, {o.x() + 7, o.y() + 7, o.z() + 7}});
     }
     image.load(domain, boxes, run);
-    tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
-        window.image.blocks[leaf] = band.neighbours(leaf);
-        float* values = window.image.values.leaf(leaf);
-        image.sample(domain, boxes[leaf].min, boxes[leaf].max, values);
-    });
-    image.release();
+    for (std::size_t begin = 0; begin < band.size(); begin += kLeavesAtOnce) {
+        tbb::parallel_for(begin, std::min(begin + kLeavesAtOnce, band.size()), [&](std::size_t leaf) {
+            window.image.blocks[leaf] = band.neighbours(leaf);
+            float* values = window.image.values.leaf(leaf);
+            image.sample(domain, boxes[leaf].min, boxes[leaf].max, values);
+        });
+        image.release();
+    }
     return window;
 }
 

@@ -9,7 +9,9 @@
 #include "cloud/surface/hold_topology.h"
 #include "covol/clip.h"
 #include "covol/compare.h"
+#include "covol/mesh_stream.h"
 #include "covol/start.h"
+#include "meshing/level_set_distance.h"
 #include "meshing/mesh_distance.h"
 #include "segment/doubts.h"
 #include "segment/heuristics.h"
@@ -19,23 +21,26 @@ namespace {
 
 constexpr std::size_t kLoopsToTell = 8;
 
-/// Where a solid ends whatever the marks say: the image's box, and the region of interest.
-Clip where_it_ends(const Job& job) {
-    Clip all = job.image != nullptr ? make_clip(job.image->geometry()) : Clip{};
-    if (!job.options.roi) return all;
-    const Clip region = make_clip(*job.options.roi);
-    all.insert(all.end(), region.begin(), region.end());
-    return all;
-}
-
 void relax(Job& job) {
     job.report().mesh = relax_mesh(job.result.mesh, *job.result.surface, {job.options.extract.isovalue}, job.run);
 }
 
-void mesh_of(Job& job, const FloatGrid& level_set) {
-    job.result.surface = extract_surface(level_set, job.run);
+/// The surface of u, which is given up where nobody wants it.
+void surface_of_flow(Job& job) {
+    if (job.result.surface) return;
+    set_clip(*job.result.u, where_it_ends(job));
+    job.result.surface = extract_surface(*job.result.u, job.run);
+    if (job.options.without_fields) job.result.u.reset();
+}
+
+void mesh_of_surface(Job& job) {
     job.result.mesh = extract_mesh(*job.result.surface, job.options.extract, job.run);
     relax(job);
+}
+
+void mesh_of(Job& job, const FloatGrid& level_set) {
+    job.result.surface = extract_surface(level_set, job.run);
+    mesh_of_surface(job);
 }
 
 int complexity(const MeshMeasures& m) { return m.components + std::max(0, m.genus); }
@@ -88,22 +93,52 @@ void treat_holes(Job& job) {
                                                 (options.policy == Holes::Open ? "; the level set stays closed" : ""));
 }
 
-}  // namespace
+/// Measures the surface. @return the marks' distances to it
+std::vector<double> measure_without_mesh(Job& job, const std::vector<Vec3>& marks) {
+    const StreamedMesh mesh = measure_surface(*job.result.surface, 0, job.run);
+    job.report().surface = mesh.measures;
+    job.report().mesh.triangles = std::int64_t(mesh.triangles);
+    return job.points.empty() ? std::vector<double>{} : detail::distances_to(*job.result.surface, marks);
+}
 
-void make_surface(Job& job) {
+/// The same by way of the mesh, which stays.
+std::vector<double> make_mesh(Job& job, const std::vector<Vec3>& marks) {
     SegmentReport& report = job.report();
-    Timed timed(report.seconds.surface);
-    set_clip(*job.result.u, where_it_ends(job));
-    mesh_of(job, *job.result.u);
+    mesh_of_surface(job);
     if (!job.points.empty() && job.image == nullptr) treat_holes(job);
     // Parts of each of these run on one thread.
     std::vector<double> distances;
-    const std::vector<Vec3>& marks = job.options.contours ? job.given : job.marks;
     tbb::parallel_invoke([&] { report.surface = measure(job.result.mesh); },
                          [&] {
                              if (!job.points.empty()) distances = detail::distances_to(job.result.mesh, marks);
                          });
     if (report.holes.closed_volume > 0) report.surface.volume = report.holes.closed_volume;
+    return distances;
+}
+
+void give_up_fields(Job& job) {
+    job.trusted_distance = job.obstacle = job.floor = nullptr;
+    if (job.options.without_fields) job.result.distance = job.result.edge = nullptr;
+}
+
+}  // namespace
+
+Clip where_it_ends(const Job& job) {
+    Clip all = job.image != nullptr ? make_clip(job.image->geometry()) : Clip{};
+    if (!job.options.roi) return all;
+    const Clip region = make_clip(*job.options.roi);
+    all.insert(all.end(), region.begin(), region.end());
+    return all;
+}
+
+void make_surface(Job& job) {
+    SegmentReport& report = job.report();
+    Timed timed(report.seconds.surface);
+    give_up_fields(job);
+    surface_of_flow(job);
+    const std::vector<Vec3>& marks = job.options.contours ? job.given : job.marks;
+    const std::vector<double> distances =
+        job.options.without_mesh ? measure_without_mesh(job, marks) : make_mesh(job, marks);
     if (!distances.empty()) {
         report.fit = detail::statistics_of(distances);
         doubt(job, marks, distances);

@@ -20,6 +20,9 @@ std::string SegmentOptions::why_invalid() const {
     if (roi)
         for (int a = 0; a < 3; ++a)
             checks.expect(roi->max[a] > roi->min[a], "roi", "min < max along each axis", roi->max[a] - roi->min[a]);
+    checks.expect(
+        !without_mesh || (holes.policy == Holes::Close && extract.min_component_volume == 0 && extract.isovalue == 0),
+        "without_mesh", "false where holes are treated, pieces dropped or another level is wanted", without_mesh);
     checks.add(edge.why_invalid());
     checks.add(evolve.why_invalid());
     return checks.lines();

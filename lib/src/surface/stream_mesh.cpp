@@ -1,5 +1,6 @@
 // Meshes from the tree to the file, a layer of leaves at a time.
 #include <cmath>
+#include <functional>
 #include <numeric>
 #include <optional>
 
@@ -22,16 +23,12 @@ class Totals {
 public:
     explicit Totals(std::uint64_t vertices) : vertices_(vertices), pieces_(vertices) {}
 
-    void add(const Triangle& t, const std::array<Vec3, 3>& p) {
-        if (triangles_++ == 0) origin_ = p[0];
-        volume_ += meshing::six_volumes(p, origin_) / 6;
-        area_ += meshing::length(meshing::area_normal(p[0], p[1], p[2])) / 2;
-        for (int k = 0; k < 3; ++k) {
-            const std::uint32_t a = t[k], b = t[(k + 1) % 3];
-            edges_ += a < b ? mixed(a, b) : -mixed(b, a);
+    void add(const detail::MeshPiece& piece) {
+        for (const Triangle& t : piece.triangles) {
+            std::array<Vec3, 3> corners{};
+            for (std::size_t k = 0; k < 3; ++k) corners[k] = meshing::to_vec3(piece.positions[t[k] - piece.first]);
+            add(t, corners);
         }
-        pieces_.unite(t[0], t[1]);
-        pieces_.unite(t[1], t[2]);
     }
 
     [[nodiscard]] MeshMeasures measures() {
@@ -47,6 +44,18 @@ public:
     }
 
 private:
+    void add(const Triangle& t, const std::array<Vec3, 3>& p) {
+        if (triangles_++ == 0) origin_ = p[0];
+        volume_ += meshing::six_volumes(p, origin_) / 6;
+        area_ += meshing::length(meshing::area_normal(p[0], p[1], p[2])) / 2;
+        for (int k = 0; k < 3; ++k) {
+            const std::uint32_t a = t[k], b = t[(k + 1) % 3];
+            edges_ += a < b ? mixed(a, b) : -mixed(b, a);
+        }
+        pieces_.unite(t[0], t[1]);
+        pieces_.unite(t[1], t[2]);
+    }
+
     /// A number for an edge: sums of such numbers, with signs for the direction, are 0 by chance once in 2^64.
     /// https://prng.di.unimi.it/splitmix64.c
     static std::uint64_t mixed(std::uint64_t low, std::uint64_t high) {
@@ -68,7 +77,6 @@ public:
     Writer(const std::string& temporary, const std::string& path, std::uint64_t vertices, std::uint64_t triangles,
            const WriteMeshOptions& options)
         : options_(options),
-          totals_(vertices),
           file_(mesh_io::MeshStream::open(temporary, path, vertices, triangles,
                                           mesh_io::one_line_each(options.comments))) {}
 
@@ -79,16 +87,14 @@ public:
         }
         for (const Triangle& t : piece.triangles) {
             std::array<std::array<float, 3>, 3> corners{};
-            std::array<Vec3, 3> own{}, there{};
+            std::array<Vec3, 3> there{};
             std::array<Vec3*, 3> sums{};
             for (std::size_t k = 0; k < 3; ++k) {
                 const std::size_t n = t[k] - piece.first;
                 corners[k] = placed_[n];
-                own[k] = meshing::to_vec3(piece.positions[n]);
                 there[k] = meshing::to_vec3(corners[k]);
                 sums[k] = &sums_[n];
             }
-            totals_.add(t, own);
             meshing::add_normals(there, sums);
             file_->triangle(t, corners);
         }
@@ -99,19 +105,48 @@ public:
         sums_.erase(sums_.begin(), sums_.begin() + done);
     }
 
-    MeshMeasures finish() {
-        file_->finish();
-        return totals_.measures();
-    }
+    void finish() { file_->finish(); }
 
 private:
     const WriteMeshOptions& options_;
-    Totals totals_;
     std::unique_ptr<mesh_io::MeshStream> file_;
     // from the piece's first vertex on
     std::vector<std::array<float, 3>> placed_;
     std::vector<Vec3> sums_;
 };
+
+/// The mesh of a level set in pieces, and its measures.
+/// @param begin  takes the numbers of vertices and triangles, before the first piece
+StreamedMesh stream(const FloatGrid& surface, double isovalue, const RunContext& run,
+                    const std::function<void(const StreamedMesh&)>& begin,
+                    const std::function<void(const detail::MeshPiece&)>& take) {
+    if (!std::isfinite(isovalue))
+        throw Error(Errc::InvalidOptions, "stream_mesh: expected a finite isovalue, got " + std::to_string(isovalue));
+    StreamedMesh made;
+    with_threads(run, [&] {
+        std::optional<detail::Uncut> whole;
+        if (isovalue == 0) whole = detail::uncut(surface, detail::FaceLayer::OnFace);
+        detail::MarchingCubes cubes(whole ? *whole->distance : surface, whole ? whole->clip : detail::LatticeClip{},
+                                    isovalue, run);
+        std::optional<Totals> totals;
+        cubes.stream(
+            [&](std::uint64_t vertices, std::uint64_t triangles) {
+                if (triangles == 0)
+                    throw Error(Errc::InvalidInput,
+                                "stream_mesh: grid '" + surface.getName() + "': no surface at this level");
+                made.vertices = vertices;
+                made.triangles = triangles;
+                totals.emplace(vertices);
+                begin(made);
+            },
+            [&](const detail::MeshPiece& piece) {
+                totals->add(piece);
+                take(piece);
+            });
+        made.measures = totals->measures();
+    });
+    return made;
+}
 
 }  // namespace
 
@@ -122,32 +157,26 @@ bool can_stream_mesh(const std::string& path) {
 
 StreamedMesh stream_mesh(const std::string& path, const FloatGrid& surface, double isovalue,
                          const WriteMeshOptions& options, const RunContext& run) {
-    if (!std::isfinite(isovalue) || !(options.unit_scale > 0) || !std::isfinite(options.unit_scale))
-        throw Error(Errc::InvalidOptions, "stream_mesh: expected a finite isovalue and unit_scale > 0, got " +
-                                              std::to_string(isovalue) + " and " + std::to_string(options.unit_scale));
+    if (!(options.unit_scale > 0) || !std::isfinite(options.unit_scale))
+        throw Error(Errc::InvalidOptions,
+                    "stream_mesh: expected unit_scale > 0, got " + std::to_string(options.unit_scale));
     if (!options.binary || !options.attributes.empty())
         throw Error(Errc::Unsupported, "stream_mesh: expected a binary file without attributes");
     StreamedMesh made;
     detail::write_atomically(path, [&](const std::string& temporary) {
-        with_threads(run, [&] {
-            std::optional<detail::Uncut> whole;
-            if (isovalue == 0) whole = detail::uncut(surface, detail::FaceLayer::OnFace);
-            detail::MarchingCubes cubes(whole ? *whole->distance : surface, whole ? whole->clip : detail::LatticeClip{},
-                                        isovalue, run);
-            std::optional<Writer> writer;
-            cubes.stream(
-                [&](std::uint64_t vertices, std::uint64_t triangles) {
-                    if (triangles == 0)
-                        throw Error(Errc::InvalidInput, "stream_mesh: " + path + ": no surface at this level");
-                    made.vertices = vertices;
-                    made.triangles = triangles;
-                    writer.emplace(temporary, path, vertices, triangles, options);
-                },
-                [&](const detail::MeshPiece& piece) { writer->take(piece); });
-            made.measures = writer->finish();
-        });
+        std::optional<Writer> writer;
+        made = stream(
+            surface, isovalue, run,
+            [&](const StreamedMesh& mesh) { writer.emplace(temporary, path, mesh.vertices, mesh.triangles, options); },
+            [&](const detail::MeshPiece& piece) { writer->take(piece); });
+        writer->finish();
     });
     return made;
+}
+
+StreamedMesh measure_surface(const FloatGrid& surface, double isovalue, const RunContext& run) {
+    return stream(
+        surface, isovalue, run, [](const StreamedMesh&) {}, [](const detail::MeshPiece&) {});
 }
 
 }  // namespace covol

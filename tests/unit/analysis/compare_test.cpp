@@ -8,7 +8,9 @@
 
 #include "covol/domain.h"
 #include "covol/error.h"
+#include "covol/start.h"
 #include "covol/surface.h"
+#include "support/shapes.h"
 
 using namespace covol;
 
@@ -213,6 +215,21 @@ TEST_CASE("points to surface: exact distances, mean, 95 % and maximum") {
     CHECK(fit.max == Approx(100));
     CHECK_THROWS_AS(measure_fit({}, mesh), Error);
     CHECK_THROWS_AS(measure_fit(points, TriangleMesh{}), Error);
+}
+
+TEST_CASE("points to a level set: what the mesh says, near it and far from it") {
+    const Domain domain = make_domain({{-40, -40, -40}, {40, 40, 40}}, 1.0);
+    const FloatGridPtr ball = extract_surface(*start_from_sphere(domain, {0.3, 0.2, 0.1}, 25));
+    for (const double r : {25.2, 26.5, 27.5, 28.5, 33.0, 21.5, 5.0}) {
+        std::vector<Vec3> points = test::sphere_points(500, r);
+        for (Vec3& p : points) p = {p[0] + 0.3, p[1] + 0.2, p[2] + 0.1};
+        const FitStatistics fit = measure_fit(points, *ball);
+        INFO(r);
+        CHECK(fit.max < std::abs(r - 25) + 0.12);
+        CHECK(fit.max > std::abs(r - 25) - 0.01);
+        CHECK(fit.mean == Approx(std::abs(r - 25)).margin(0.06));
+    }
+    CHECK_THROWS_AS(measure_fit({}, *ball), Error);
 }
 
 TEST_CASE("the report does not depend on the number of threads") {

@@ -9,6 +9,7 @@
 #include "bricks/split.h"
 #include "covol/error.h"
 #include "covol/start.h"
+#include "covol/surface.h"
 #include "support/shapes.h"
 
 using namespace covol;
@@ -146,6 +147,30 @@ TEST_CASE("a ball in bricks is the ball in one piece, on seams and off them") {
         most = std::max(most, error);
     }
     CHECK(on < 1.1 * off);
+}
+
+TEST_CASE("bricks joined without a mesh have the same surface") {
+    const Image image = ball_image();
+    const std::vector<Vec3> points = marks_on_ball(6000);
+    SegmentOptions options;
+    options.model = Model::Paper;
+    options.without_fields = true;
+    const BrickJob one(image, points, options, {});
+    BrickOptions bricks;
+    bricks.most_voxels = 30000;
+    const BrickPlan plan = one.plan(bricks);
+    std::vector<FloatGridPtr> states;
+    solve_all(one, plan, states);
+    const BrickStates known = [&](std::size_t n) { return states[n]; };
+    BrickJob with(image, points, options, {}), without(image, points, options, {});
+    const SegmentResult mesh = with.join(plan, known), lean = without.join(plan, known, true);
+    CHECK(lean.mesh.triangles.empty());
+    CHECK(lean.u == nullptr);
+    CHECK(apart(*mesh.surface, *lean.surface).most < 1e-5);  // rounding, for each brick has its own corner
+    CHECK(lean.report.surface.genus == 0);
+    CHECK(lean.report.surface.volume == Approx(mesh.report.surface.volume).epsilon(1e-4));
+    CHECK(lean.report.fit.mean == Approx(mesh.report.fit.mean).margin(0.01));
+    CHECK(lean.report.mesh.triangles == std::int64_t(extract_mesh(*lean.surface).triangles.size()));
 }
 
 TEST_CASE("a brick is held at its neighbours' states, and moved by no others") {

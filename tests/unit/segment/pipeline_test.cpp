@@ -158,6 +158,25 @@ TEST_CASE("segment: a coarse level first gives the same surface in fewer steps")
     CHECK(fit.p95 < 0.2);
 }
 
+TEST_CASE("segment: without mesh and fields the surface is the same") {
+    const Image image = ellipsoid_image({26, 18, 22});
+    SegmentOptions options;
+    options.start.kind = Start::Kind::Sphere;
+    options.start.radius = 32;
+    const SegmentResult whole = segment(image, options);
+    options.without_mesh = options.without_fields = true;
+    const SegmentResult lean = segment(image, options);
+    CHECK(lean.u == nullptr);
+    CHECK(lean.edge == nullptr);
+    CHECK(lean.mesh.triangles.empty());
+    CHECK(lean.surface->tree().hasSameTopology(whole.surface->tree()));
+    CHECK(lean.report.mesh.triangles == whole.report.mesh.triangles);
+    CHECK(lean.report.surface.volume == Approx(whole.report.surface.volume).epsilon(3e-4));  // not relaxed
+    CHECK(lean.report.surface.genus == 0);
+    options.holes.policy = Holes::Open;
+    CHECK_THROWS_WITH(segment(image, options), Catch::Contains("without_mesh"));
+}
+
 TEST_CASE("segment: what a coarse level cannot hold is not lost") {
     // A plate of three voxels: a voxel and a half at twice the size.
     const Image image = ellipsoid_image({24, 24, 2});

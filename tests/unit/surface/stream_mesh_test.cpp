@@ -35,6 +35,9 @@ void check_same(const FloatGrid& surface, double isovalue, const WriteMeshOption
         CHECK(made.measures.genus == expected.genus);
         CHECK(made.measures.closed == expected.closed);
         CHECK(made.measures.manifold == expected.manifold);
+        const StreamedMesh measured = measure_surface(surface, isovalue);
+        CHECK(measured.triangles == made.triangles);
+        CHECK(measured.measures.volume == expected.volume);
     }
     CHECK(scratch.file_count() == 4);
     const StreamedMesh made = stream_mesh(scratch.path("piece.obj"), surface, isovalue, options);

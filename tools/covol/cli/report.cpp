@@ -122,7 +122,7 @@ Json to_json(const SegmentReport& r) {
     for (const auto& level : r.coarse) json["coarse"].push_back(to_json(level));
     json["solve"] = to_json(r.solve);
     json["surface"] = to_json(r.surface);
-    json["mesh"] = to_json(r.mesh);
+    json["mesh"] = r.resolved.without_mesh ? Json{{"triangles", r.mesh.triangles}} : to_json(r.mesh);
     if (r.point_count > 0) json["fit"]["points_to_surface"] = to_json(r.fit);
     if (r.point_count > 0) json["fit"]["points_to_surface"]["bias"] = r.fit.bias;
     if (r.marks_off.beyond > 0)
@@ -199,8 +199,10 @@ std::vector<std::string> summary(const SegmentReport& r) {
     std::ostringstream text;
     text << std::setprecision(4) << r.active_voxels << " active voxels of " << r.domain.voxel_size << ", "
          << r.solve.steps << " steps (" << to_string(r.solve.stop_reason) << "), " << r.seconds.total << " s";
-    std::vector<std::string> lines{text.str(), "surface: " + one_line(r.surface),
-                                   "mesh: " + mesh_line(r.mesh.triangles, r.mesh.smallest_angle, r.mesh.deviation)};
+    std::vector<std::string> lines{
+        text.str(), "surface: " + one_line(r.surface),
+        "mesh: " + (r.resolved.without_mesh ? plain_mesh_line(std::uint64_t(r.mesh.triangles))
+                                            : mesh_line(r.mesh.triangles, r.mesh.smallest_angle, r.mesh.deviation))};
     if (r.point_count == 0) return lines;
     text.str("");
     text << "points to surface: mean " << r.fit.mean << ", 95 % " << r.fit.p95 << ", max " << r.fit.max << ", bias "
@@ -213,6 +215,10 @@ std::string one_line(const MeshDeviation& d) {
     std::ostringstream text;
     text << std::setprecision(2) << "mean " << d.mean << ", max " << d.max << " voxels";
     return text.str();
+}
+
+std::string plain_mesh_line(std::uint64_t triangles) {
+    return std::to_string(triangles) + " triangles, as marching cubes leave them";
 }
 
 std::string mesh_line(std::int64_t triangles, double smallest_angle, const MeshDeviation& deviation) {

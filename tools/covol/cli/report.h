@@ -39,6 +39,7 @@ void add_seconds(Session& session, const SegmentReport::Seconds& seconds);
 [[nodiscard]] std::string one_line(const MeshMeasures& measures);
 [[nodiscard]] std::string one_line(const MeshDeviation& deviation);
 /// @param smallest_angle  degrees: 1st percentile. @param deviation  from the level set, voxels
+[[nodiscard]] std::string plain_mesh_line(std::uint64_t triangles);
 [[nodiscard]] std::string mesh_line(std::int64_t triangles, double smallest_angle, const MeshDeviation& deviation);
 
 }  // namespace covol::tool

@@ -14,7 +14,7 @@ struct MeshJob {
     std::string input, output;
     Length isovalue, min_component, target_edge, adaptive;
     int smooth = 0;
-    bool repair = false, plain = false;
+    bool repair = false;
     MeshFlags flags;
 
     [[nodiscard]] ExtractOptions extract_options(double h) const {
@@ -56,18 +56,18 @@ struct MeshJob {
                 stream_mesh(path, *level_set, isovalue.resolve(h, 0), flags.options(session), session.run());
             session.report()["mesh"] = {{"vertices", made.vertices}, {"triangles", made.triangles}};
             session.report()["surface"] = to_json(made.measures);
-            session.note("mesh: " + std::to_string(made.triangles) + " triangles, as marching cubes leave them");
+            session.note("mesh: " + plain_mesh_line(made.triangles));
             session.note("surface: " + one_line(made.measures));
         });
     }
 
     void check_plain() const {
-        if (!plain) return;
+        if (!flags.plain) return;
         if (repair || smooth != 0 || target_edge.given || adaptive.given || min_component.given)
             throw UsageError(
                 "--plain: excludes --repair, --smooth, --target-edge, --adaptive and --min-component, which need the "
                 "whole mesh");
-        if (!can_stream_mesh(output)) throw UsageError("--plain: expected -o with .ply, .stl or .obj");
+        flags.check_plain(output);
     }
 
     void run(Session& session) const {
@@ -76,7 +76,7 @@ struct MeshJob {
         check_plain();
         const FloatGridPtr level_set = read_vdb_level_set(input, session.run());
         const double h = domain_of(*level_set).voxel_size;
-        if (plain) return stream(level_set, h, session);
+        if (flags.plain) return stream(level_set, h, session);
         const Stopwatch watch;
         TriangleMesh mesh = extract_mesh(*level_set, extract_options(h), session.run());
         session.add_seconds("surface", watch.seconds());
@@ -119,9 +119,7 @@ void add_mesh(Session& session) {
                "most 2vx");
     command->add_option("--smooth", job->smooth, "steps of volume-keeping smoothing")->capture_default_str();
     command->add_flag("--repair", job->repair, "resolve self-intersections, fill holes");
-    command->add_flag("--plain", job->plain,
-                      "triangles as marching cubes leave them, neither relaxed nor held in memory: for surfaces of "
-                      "tens of millions of triangles; .ply, .stl, .obj");
+    job->flags.bind_plain(*command);
     job->flags.bind(*command);
 }
 

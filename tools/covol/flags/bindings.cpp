@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "covol/error.h"
+#include "covol/mesh_stream.h"
 
 namespace covol::tool {
 namespace {
@@ -328,6 +329,18 @@ void MeshFlags::bind(CLI::App& command) {
         ->default_str("z");
     command.add_option("--unit-scale", unit_scale, "multiplies the mesh's coordinates, 0.001 for mm to m")
         ->capture_default_str();
+}
+
+void MeshFlags::bind_plain(CLI::App& command) {
+    in_group(command, Group::MeshFiles);
+    command.add_flag("--plain", plain,
+                     "triangles as marching cubes leave them, neither relaxed nor held in memory: for surfaces of tens "
+                     "of millions of triangles; .ply, .stl, .obj");
+}
+
+void MeshFlags::check_plain(const std::string& path) const {
+    if (plain && !path.empty() && !can_stream_mesh(path))
+        throw UsageError("--plain: expected a mesh with .ply, .stl or .obj, got " + path);
 }
 
 void MeshFlags::check() const {

@@ -114,7 +114,11 @@ struct EvolveFlags {
 struct MeshFlags {
     bool y_up = false;
     double unit_scale = 1.0;
+    bool plain = false;  ///< stream_mesh()
     void bind(CLI::App& command);
+    void bind_plain(CLI::App& command);
+    /// @param path  of the mesh, or empty. @throws UsageError where its format can't be streamed.
+    void check_plain(const std::string& path) const;
     /// Checks before the long work. @throws Error InvalidOptions.
     void check() const;
     [[nodiscard]] WriteMeshOptions options(const Session& session) const;

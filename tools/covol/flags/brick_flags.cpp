@@ -8,6 +8,8 @@ namespace {
 
 // Measured: docs/benchmarks.md, Bricks.
 constexpr double kBandBytes = 200;    ///< at the peak, for each voxel of a band that is solved on
+constexpr double kJoinBytes = 30;     ///< likewise, when bricks of it are joined
+constexpr double kMeshBytes = 80;     ///< likewise with the whole mesh
 constexpr double kBaseBytes = 1.5e8;  ///< the program itself
 constexpr double kLayers = 1.3;       ///< with its neighbours' layers a brick has so much more of the band
 constexpr double kLeastVoxels = 2e5;
@@ -15,6 +17,9 @@ constexpr double kLeastVoxels = 2e5;
 }  // namespace
 
 double memory_of_band(double active_voxels) { return kBaseBytes + kBandBytes * active_voxels; }
+
+double memory_of_joined(double active_voxels) { return kBaseBytes + kJoinBytes * active_voxels; }
+double memory_of_joined_mesh(double active_voxels) { return kBaseBytes + kMeshBytes * active_voxels; }
 
 void BrickFlags::bind(CLI::App& command) {
     in_group(command, Group::Numerics);

@@ -19,5 +19,8 @@ struct BrickFlags {
 
 /// Memory that solving so many voxels of a band takes, with the program itself, bytes.
 [[nodiscard]] double memory_of_band(double active_voxels);
+/// The same of joining bricks, without the mesh and with it.
+[[nodiscard]] double memory_of_joined(double active_voxels);
+[[nodiscard]] double memory_of_joined_mesh(double active_voxels);
 
 }  // namespace covol::tool

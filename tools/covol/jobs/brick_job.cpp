@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "covol/error.h"
+#include "covol/mesh_stream.h"
 #include "jobs/brick_folder.h"
 #include "jobs/timelapse_job.h"
 
@@ -127,13 +128,37 @@ void tell_of_seams(const BrickPlan& plan, const BrickFolder& folder, int sweep, 
         session.note(text.str() + "; their mean is taken");
 }
 
-SegmentResult join(BrickJob& job, const BrickPlan& plan, const BrickFolder& folder, Session& session) {
+std::string megabytes(double bytes) { return std::to_string(std::llround(bytes / 1e6)) + " MB"; }
+
+/// Whether the mesh has to be streamed. @throws Error where the joined surface takes more than --memory-limit even so
+bool streams_mesh(const SegmentJob& job, const BrickPlan& plan, const Session& session) {
+    const auto voxels = double(plan.active_voxels()), limit = double(session.run().memory_budget);
+    if (job.mesh.plain || memory_of_joined_mesh(voxels) < limit) return job.mesh.plain;
+    const auto refuse = [&](double bytes, const std::string& what) {
+        throw Error(Errc::InvalidOptions, "bricks: " + what + " of a band of " +
+                                              std::to_string(plan.active_voxels() / 1000000) +
+                                              " million voxels takes about " + megabytes(bytes) + ", more than the " +
+                                              megabytes(limit) + " of --memory-limit, or that are free");
+    };
+    if (memory_of_joined(voxels) > limit)
+        refuse(memory_of_joined(voxels), "the joined level set (covol brick can join it on another machine)");
+    if (job.evidence.wanted() || job.holes.policy != Holes::Close || job.min_component.given)
+        refuse(memory_of_joined_mesh(voxels),
+               "the whole mesh, which --evidence, --suggest, --holes and --min-component need,");
+    if (!job.mesh_path.empty() && !can_stream_mesh(job.mesh_path))
+        refuse(memory_of_joined_mesh(voxels), "the whole mesh (.ply, .stl and .obj can be streamed)");
+    return true;
+}
+
+SegmentResult join(const SegmentJob& given, BrickJob& job, const BrickPlan& plan, const BrickFolder& folder,
+                   Session& session) {
+    const bool without_mesh = streams_mesh(given, plan, session);
     const int sweep = folder.last_sweep(plan.bricks.size());
     if (sweep == 0)
         throw Error(Errc::InvalidInput,
                     folder.path() + ": expected a state of each brick: run covol brick run " + folder.path());
     if (plan.has_sweeps) tell_of_seams(plan, folder, sweep, session);
-    SegmentResult result = job.join(plan, folder.states(sweep));
+    SegmentResult result = job.join(plan, folder.states(sweep), without_mesh);
     const BrickFolder::Spent spent = folder.spent(sweep, plan.bricks.size());
     result.report.solve.steps = spent.steps;
     result.report.seconds.solve += spent.seconds;
@@ -151,8 +176,7 @@ void tell_plan(const BrickPlan& plan, Session& session) {
             {"memory_bytes", std::llround(memory)}};
     session.say("bricks: " + std::to_string(plan.bricks.size()) + ", band: about " +
                 std::to_string(plan.active_voxels() / 1000 * 1000) + " voxels, the largest brick " +
-                std::to_string(largest / 1000 * 1000) + ", which takes about " +
-                std::to_string(std::llround(memory / 1e6)) + " MB");
+                std::to_string(largest / 1000 * 1000) + ", which takes about " + megabytes(memory));
 }
 
 /// Removes itself.
@@ -186,7 +210,7 @@ void run_bricks(const SegmentJob& job, Session& session) {
         return run_structures(job, session,
                               [&](const Image* image, const PreparedStructure& structure, const RunContext& run) {
                                   const BrickPlan plan = folder.read_plan();
-                                  return join(*make_job(image, structure, run), plan, folder, session);
+                                  return join(job, *make_job(image, structure, run), plan, folder, session);
                               });
     job.check_options();
     const std::vector<StructureStart> starts = starts_of(job, inputs);
@@ -242,13 +266,14 @@ SegmentResult solve_within_limit(const SegmentJob& job, const Image* image, cons
         plan = {};
         return in_one();
     }
+    (void)streams_mesh(job, plan, session);  // before the work rather than after it
     run.info("about " + std::to_string(plan.active_voxels() / 1000000) +
              " million voxels in the band, more than --memory-limit allows at once: in " +
              std::to_string(plan.bricks.size()) + " bricks");
     const TemporaryFolder temporary(job.output);
     const BrickFolder folder(temporary.path());
     BrickRunner(*solver, plan, folder, run).run_all();
-    return join(*solver, plan, folder, session);
+    return join(job, *solver, plan, folder, session);
 }
 
 }  // namespace covol::tool

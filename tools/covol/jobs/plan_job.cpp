@@ -53,6 +53,10 @@ Pilot run_pilot(const SegmentJob& job, const StructureInput& input, const ImageG
     options.inside = std::move(seeds.inside);
     options.outside = std::move(seeds.outside);
     options.evolve.rho = 0;
+    options.without_mesh = true;
+    options.holes = {};
+    options.extract = {};
+    options.without_fields = false;
     Stopwatch watch;
     SegmentResult result = reconstruct(marks.points, options, quiet);
     Start::Kind start = result.report.resolved.start.kind;

@@ -35,6 +35,8 @@ SegmentOptions SegmentJob::resolve(double h) const {
     options.correction.least_radius = guess.radius.resolve_above_0(h);
     const double side = min_component.resolve(h, 0);
     options.extract.min_component_volume = side * side * side;
+    options.without_mesh = mesh.plain;
+    options.without_fields = fields_path.empty() && !evidence.wanted();
     return options;
 }
 
@@ -42,6 +44,9 @@ void SegmentJob::check_options() const {
     const std::string why = resolve(1.0).why_invalid();
     if (!why.empty()) throw Error(Errc::InvalidOptions, why);
     cloud.check();
+    mesh.check_plain(mesh_path);
+    if (mesh.plain && evidence.wanted())
+        throw UsageError("--plain: excludes --evidence and --suggest, which need the whole mesh");
 }
 
 std::string SegmentJob::unused(const SegmentReport& report) const {
@@ -131,6 +136,7 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
     in_group(command, Group::Output);
     command.add_flag("--half", half, "store values in .vdb files as 16-bit floats");
     mesh.bind(command);
+    mesh.bind_plain(command);
     if (with_image) image.bind(command, false, false);
 }
 

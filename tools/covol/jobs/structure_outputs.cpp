@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "cli/report.h"
+#include "covol/mesh_stream.h"
 #include "covol/surface.h"
 #include "covol/vdb_io.h"
 
@@ -71,10 +72,12 @@ void hand_over_meshes(const SegmentJob& job, const std::shared_ptr<const Structu
     }
     for (std::size_t n = 0; n < output->structures.size(); ++n)
         sink(output->structures.size() > 1 ? with_suffix(path, "_" + output->structures[n].grid) : path,
-             [output, n, options](const std::string& file) {
+             [output, n, options, run = session.run()](const std::string& file) {
+                 const SegmentResult& result = output->structures[n].result;
+                 if (result.report.resolved.without_mesh)
+                     return void(stream_mesh(file, *result.surface, 0, options, run));
                  WriteMeshOptions with_attributes = options;
                  with_attributes.attributes = vertex_attributes(output->structures[n].evidence);
-                 const SegmentResult& result = output->structures[n].result;
                  if (!result.distance_to_points.empty())
                      with_attributes.attributes.push_back({"distance_to_points", result.distance_to_points});
                  write_mesh(file, result.mesh, with_attributes);

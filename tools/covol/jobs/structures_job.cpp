@@ -9,6 +9,7 @@
 
 #include "cli/report.h"
 #include "covol/error.h"
+#include "covol/mesh_stream.h"
 #include "covol/surface.h"
 #include "jobs/marks.h"
 #include "jobs/paint_reader.h"
@@ -48,6 +49,23 @@ bool is_same_lattice(const ImageGeometry& a, const ImageGeometry& b) {
     return true;
 }
 
+void measure_again(StructureOutput& s, const ExtractOptions& extract, const RunContext& run) {
+    SegmentReport& report = s.result.report;
+    const FloatGrid& surface = *s.result.surface;
+    if (report.resolved.without_mesh) {
+        const StreamedMesh made = measure_surface(surface, 0, run);
+        report.mesh.triangles = std::int64_t(made.triangles);
+        report.surface = made.measures;
+        if (!s.marks.empty()) report.fit = measure_fit(s.marks, surface, run);
+        return;
+    }
+    TriangleMesh& mesh = s.result.mesh;
+    mesh = extract_mesh(surface, extract, run);
+    report.mesh = relax_mesh(mesh, surface, {extract.isovalue}, run);
+    report.surface = measure(mesh);
+    if (!s.marks.empty()) report.fit = measure_fit(s.marks, mesh, run);
+}
+
 /// What changed by the separation is measured again.
 void separate_all(StructuresOutput& output, const SegmentOptions& options, const RunContext& run) {
     const SeparateResult separated = separate(solids(output), {}, run);
@@ -61,10 +79,7 @@ void separate_all(StructuresOutput& output, const SegmentOptions& options, const
         if (!separated.report.changed[n]) continue;
         StructureOutput& s = output.structures[n];
         s.result.surface = separated.surfaces[n];
-        s.result.mesh = extract_mesh(*s.result.surface, options.extract, run);
-        s.result.report.mesh = relax_mesh(s.result.mesh, *s.result.surface, {options.extract.isovalue}, run);
-        s.result.report.surface = measure(s.result.mesh);
-        if (!s.marks.empty()) s.result.report.fit = measure_fit(s.marks, s.result.mesh, run);
+        measure_again(s, options.extract, run);
         SegmentReport& report = s.result.report;
         report.seeds = check_seeds(*s.result.surface, report.resolved.inside, report.resolved.outside);
     }
