@@ -1,0 +1,243 @@
+# Types of the module covol; what things mean stands in the docstrings of covol/__init__.py. The options between the marks
+# are written by tools/python/write_stub.py.
+import os
+from collections.abc import Callable, Sequence
+from typing import Any, Literal, Tuple, Union
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__version__: str
+
+Vector = Union[Sequence[float], NDArray[Any]]  # three numbers, x, y, z
+Box = Union[Sequence[Vector], NDArray[Any]]  # two corners
+Length = Union[float, str]  # world units, or voxels as in "3vx"
+Path = Union[str, "os.PathLike[str]"]
+Progress = Callable[[str, float], object]
+Space = Literal["world", "index", "index1", "ras", "local"]
+Order = Literal["xyz", "zyx"]
+
+class Error(Exception):
+    code: Literal["invalid_options", "invalid_input", "io", "unsupported", "numerical", "cancelled"]
+    field: str | None
+    def __init__(self, message: str, code: str = ..., field: str | None = ...) -> None: ...
+
+class Image:
+    def __init__(
+        self,
+        array: ArrayLike,
+        *,
+        spacing: Vector | None = ...,
+        origin: Vector | None = ...,
+        direction: ArrayLike | None = ...,
+        unit: str = ...,
+    ) -> None: ...
+    @property
+    def array(self) -> NDArray[Any]: ...
+    def __array__(self, dtype: Any = ...) -> NDArray[Any]: ...
+    @property
+    def shape(self) -> Tuple[int, int, int]: ...
+    @property
+    def dtype(self) -> np.dtype[Any]: ...
+    @property
+    def spacing(self) -> Tuple[float, float, float]: ...
+    @property
+    def origin(self) -> Tuple[float, float, float]: ...
+    @property
+    def direction(self) -> NDArray[np.float64]: ...
+    @property
+    def affine(self) -> NDArray[np.float64]: ...
+    @property
+    def unit(self) -> str: ...
+    @property
+    def spacing_known(self) -> bool: ...
+    @property
+    def path(self) -> str: ...
+    def index_to_world(self, index: ArrayLike) -> NDArray[np.float64]: ...
+    def world_to_index(self, world: ArrayLike) -> NDArray[np.float64]: ...
+    def _repr_html_(self) -> str: ...
+
+class Points:
+    def __len__(self) -> int: ...
+    @property
+    def array(self) -> NDArray[np.float64]: ...
+    def __array__(self, dtype: Any = ...) -> NDArray[Any]: ...
+    @property
+    def normals(self) -> NDArray[np.float64] | None: ...
+    @property
+    def lines(self) -> list[NDArray[np.float64]]: ...
+    @property
+    def space(self) -> str: ...
+    @property
+    def rule(self) -> str: ...
+    @property
+    def source(self) -> str: ...
+    def to_world(self, image: Image | None = ...) -> NDArray[np.float64]: ...
+    def _repr_html_(self) -> str: ...
+
+class Mesh:
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None: ...
+    @property
+    def vertices(self) -> NDArray[np.float32]: ...
+    @property
+    def faces(self) -> NDArray[np.uint32]: ...
+    @property
+    def normals(self) -> NDArray[np.float32]: ...
+    @property
+    def attributes(self) -> dict[str, NDArray[np.float32]]: ...
+    def measure(self) -> dict[str, Any]: ...
+    def save(self, path: str, *, y_up: bool = ..., unit_scale: float = ...) -> None: ...
+    def _repr_html_(self) -> str: ...
+
+class LevelSet:
+    @property
+    def voxel_size(self) -> float: ...
+    @property
+    def box(self) -> Tuple[Tuple[float, float, float], Tuple[float, float, float]]: ...
+    def save(self, path: str, *, half: bool = ...) -> None: ...
+    def _repr_html_(self) -> str: ...
+
+class Suggestion:
+    slice: int
+    index: Tuple[float, float, float]
+    world: Tuple[float, float, float]
+    area: float
+
+class Result:
+    @property
+    def surface(self) -> LevelSet: ...
+    @property
+    def mesh(self) -> Mesh: ...
+    @property
+    def mask(self) -> NDArray[Any]: ...
+    @property
+    def image(self) -> Image | None: ...
+    @property
+    def marks(self) -> NDArray[np.float64]: ...
+    @property
+    def report(self) -> dict[str, Any]: ...
+    @property
+    def warnings(self) -> list[str]: ...
+    @property
+    def log(self) -> list[str]: ...
+    def suggest(self, count: int = ..., *, progress: Progress | None = ..., threads: int = ...) -> list[Suggestion]: ...
+    def save(self, path: Path) -> None: ...
+    def _repr_html_(self) -> str: ...
+
+ImageLike = Union[Image, ArrayLike, Path, Any]  # Any: what nibabel reads
+PointsLike = Union[Points, ArrayLike, Path]
+LinesLike = Union[Points, Sequence[ArrayLike], Path]
+Surface = Union[LevelSet, Result, Path]
+
+def segment(
+    image: ImageLike,
+    points: PointsLike | None = ...,
+    *,
+    contours: LinesLike | None = ...,
+    painted: ImageLike | None = ...,
+    inside: PointsLike | None = ...,
+    outside: PointsLike | None = ...,
+    guess: ImageLike | LevelSet | Result | None = ...,
+    init: ImageLike | LevelSet | Result | None = ...,
+    spacing: Vector | None = ...,
+    origin: Vector | None = ...,
+    direction: ArrayLike | None = ...,
+    affine: ArrayLike | None = ...,
+    points_space: Space | None = ...,
+    points_order: Order | None = ...,
+    points_scale: float = ...,
+    progress: Progress | None = ...,
+    threads: int = ...,
+    memory_limit: int = ...,
+    # options, from covol.options()
+    # end of options
+) -> Result: ...
+def reconstruct(
+    points: PointsLike | None = ...,
+    *,
+    contours: LinesLike | None = ...,
+    inside: PointsLike | None = ...,
+    outside: PointsLike | None = ...,
+    init: ImageLike | LevelSet | Result | None = ...,
+    normals: ArrayLike | None = ...,
+    points_space: Space | None = ...,
+    points_order: Order | None = ...,
+    points_scale: float = ...,
+    progress: Progress | None = ...,
+    threads: int = ...,
+    memory_limit: int = ...,
+    # options, from covol.options()
+    # end of options
+) -> Result: ...
+def read_image(
+    path: Path,
+    *,
+    spacing: Vector | None = ...,
+    channel: int | None = ...,
+    frame: int | None = ...,
+    roi: Box | None = ...,
+    correct_level_shift: bool = ...,
+    progress: Progress | None = ...,
+    threads: int = ...,
+    memory_limit: int = ...,
+) -> Image: ...
+def read_points(
+    path: Path,
+    *,
+    points_space: Space | None = ...,
+    points_order: Order | None = ...,
+    points_scale: float = ...,
+    points_channels: int = ...,
+) -> Points: ...
+def read_level_set(path: Path) -> LevelSet: ...
+def read_mesh(path: Path) -> Mesh: ...
+def mesh(
+    surface: Surface,
+    *,
+    isovalue: Length = ...,
+    min_component: Length = ...,
+    target_edge: Length = ...,
+    adaptive: Length = ...,
+    smooth: int = ...,
+    repair: bool = ...,
+    progress: Progress | None = ...,
+    threads: int = ...,
+) -> Mesh: ...
+def mask(
+    surface: Surface,
+    like: ImageLike,
+    *,
+    label: int = ...,
+    spacing: Vector | None = ...,
+    origin: Vector | None = ...,
+    direction: ArrayLike | None = ...,
+    affine: ArrayLike | None = ...,
+    progress: Progress | None = ...,
+    threads: int = ...,
+) -> NDArray[np.uint8]: ...
+def save_mask(path: Path, voxels: ArrayLike, like: ImageLike) -> None: ...
+def compare(
+    a: ImageLike | Mesh | LevelSet | Result,
+    b: ImageLike | Mesh | LevelSet | Result,
+    *,
+    label: int = ...,
+    label_b: int | None = ...,
+    spacing: Vector | None = ...,
+    origin: Vector | None = ...,
+    direction: ArrayLike | None = ...,
+    affine: ArrayLike | None = ...,
+    progress: Progress | None = ...,
+    threads: int = ...,
+) -> dict[str, float]: ...
+def distances(
+    points: ArrayLike, surface: Mesh | LevelSet | Result, *, progress: Progress | None = ..., threads: int = ...
+) -> dict[str, float]: ...
+def suggest(
+    result: Result, count: int = ..., *, progress: Progress | None = ..., threads: int = ...
+) -> list[Suggestion]: ...
+def phantom(
+    kind: str = ..., size: int = ..., points: int = ..., noise: float = ..., seed: int = ...
+) -> Tuple[Image, NDArray[np.float64], NDArray[np.uint8]]: ...
+def options() -> dict[str, Any]: ...
+def from_affine(affine: ArrayLike) -> Tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
+def to_affine(img: Image) -> NDArray[np.float64]: ...
