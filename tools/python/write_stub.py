@@ -7,6 +7,7 @@ import pathlib
 import re
 import sys
 
+sys.path.pop(0)  # the sources of the package lie beside this file, without the extension module
 from covol import _covol
 
 STUB = pathlib.Path(__file__).parent / "covol/__init__.pyi"
@@ -20,7 +21,12 @@ def parameter(name, type_name, default):
 
 def filled(text):
     lines = sorted(parameter(*option) for option in _covol.list_options())
-    return re.sub(f"{BEGIN}.*?{END}", lambda _: BEGIN + "".join(lines) + END, text, flags=re.S)
+    without_image = [line.replace("rho: float = 1.0", "rho: float = 0.0") for line in lines]
+    blocks = iter([lines, without_image])  # of segment() and reconstruct()
+    result, count = re.subn(f"{re.escape(BEGIN)}.*?{END}", lambda _: BEGIN + "".join(next(blocks)) + END, text, flags=re.S)
+    if count != 2:
+        sys.exit(f"{STUB}: expected two places for options, found {count}")
+    return result
 
 
 def main():
