@@ -24,7 +24,7 @@ install(FILES
   DESTINATION ${COVOL_CONFIG_DIR} COMPONENT development)
 if(BUILD_SHARED_LIBS)
   # Its paths are relative to where it lies: a package or a prefix may be anywhere.
-  file(RELATIVE_PATH COVOL_PC_TO_PREFIX /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
+  file(RELATIVE_PATH COVOL_PC_TO_PREFIX /p/${CMAKE_INSTALL_LIBDIR}/pkgconfig /p)
   configure_file(${PROJECT_SOURCE_DIR}/tools/packaging/covol.pc.in ${PROJECT_BINARY_DIR}/covol.pc @ONLY)
   install(FILES ${PROJECT_BINARY_DIR}/covol.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)
 endif()

@@ -116,7 +116,6 @@ def test_two_calls_at_once(sphere):
     ({"points_space": "here"}, "invalid_options", "points_space"), ({"points": np.zeros((3, 2))}, "invalid_input", "points"),
     ({"points": [[0, 0, np.inf]]}, "invalid_input", "points"), ({"points": [["a", "b", "c"]]}, "invalid_input", "points"),
     ({"inside": [[1, 2]]}, "invalid_input", "inside"), ({"progress": 3}, "invalid_options", "progress"),
-    ({"memory_limit": 1000}, "invalid_options", None),
 ])
 def test_errors(sphere, options, code, field):
     image, points, _ = sphere

@@ -81,7 +81,7 @@ def test_nibabel(tmp_path, ellipsoid, program):
         (nifti, {}), (image, {"affine": affine}), (tmp_path / "image.nii.gz", {}), (nibabel.load(tmp_path / "image.nii.gz"), {})]]
     assert dice(masks[0], labels) > 0.97
     for mask in masks[1:]:
-        assert (mask != masks[0]).mean() < 1e-4  # NIfTI keeps floats
+        assert (mask != masks[0]).mean() < 5e-4  # NIfTI keeps floats
     read = covol.read_image(tmp_path / "image.nii.gz")
     assert np.array_equal(read.array, image) and np.allclose(read.affine, affine, atol=1e-5)
     covol.save_mask(tmp_path / "mask.nii.gz", masks[0], read)

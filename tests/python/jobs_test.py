@@ -1,5 +1,6 @@
 """What the module computes: measured, and the same as the program's results on the same files."""
 import json
+import os
 import pathlib
 import subprocess
 import sys
@@ -25,7 +26,7 @@ def described(program):
 def test_accuracy(sphere, solved):
     _, _, labels = sphere
     assert dice(solved.mask, labels) > 0.99
-    assert solved.report["surface"]["volume"] == pytest.approx(4 / 3 * np.pi * 0.8**3, rel=0.01)
+    assert solved.report["surface"]["volume"] == pytest.approx(4 / 3 * np.pi * 0.8**3, rel=0.02)
     radius = np.linalg.norm(solved.mesh.vertices, axis=1)
     assert abs(radius - 0.8).max() < 0.3 * solved.surface.voxel_size
 
@@ -53,14 +54,15 @@ def test_the_program_gives_the_same(tmp_path, program, kind, options):
 def test_a_real_stack(tmp_path, program):
     """The quickstart's embryo: marks in a table, a TIFF, voxels of 3 pixels."""
     stack, marks, check = DATA / "celegans_embryo.tif", DATA / "celegans_marks.csv", DATA / "celegans_check.csv"
-    run(program, "segment", stack, "--points", marks, "--voxel-size", 3, "-o", tmp_path / "e.vdb", "--mask", tmp_path / "e.nrrd")
+    run(program, "segment", stack, "--points", marks, "--voxel-size", 3, "-o", tmp_path / "e.vdb", "--mask", tmp_path / "e.nrrd",
+        "--suggest", 2, "--json", tmp_path / "e.json")
     result = covol.segment(stack, marks, voxel_size=3)
     assert np.array_equal(result.mask, covol.read_image(tmp_path / "e.nrrd").array)
     held_out = covol.read_points(check).to_world(result.image)
     assert covol.distances(held_out, result)["mean"] < 1.0  # voxels; docs/commands/segment.md says 0.74
     found = result.suggest(2)
-    said = run(program, "segment", stack, "--points", marks, "--voxel-size", 3, "-o", tmp_path / "e.vdb", "--suggest", 2).stdout
-    assert [s.slice for s in found] == [int(line.split("slice ")[1].split(",")[0]) for line in said.splitlines() if "slice " in line]
+    theirs = json.loads((tmp_path / "e.json").read_text())["evidence"]["suggestions"]
+    assert len(found) == 2 and [(s.slice, s.area) for s in found] == [(s["slice"], s["area"]) for s in theirs]
     for s in found:
         assert np.allclose(result.image.index_to_world([s.index])[0], s.world) and round(s.index[0]) == s.slice
 
@@ -84,7 +86,7 @@ def test_every_flag_is_an_option(program):
     for command in described(program)["commands"]:
         if command["name"] in ("segment", "reconstruct"):
             for group in command["groups"]:
-                for option in group["options"]:
+                for option in group["options"] if group["name"] != "Help" else []:
                     for flag in option["names"].split(", "):
                         if flag.startswith("--"):
                             flags[flag[2:].replace("-", "_")] = option
@@ -92,7 +94,7 @@ def test_every_flag_is_an_option(program):
     assert set(ours) <= set(flags)
     words = {"points_space", "points_order", "points_scale", "points", "contours", "painted", "inside", "outside", "guess", "init", "spacing"}
     files = {"output", "mask", "mesh", "density", "fields", "table", "evidence", "suggest", "half", "up", "unit_scale", "channel", "frame",
-             "correct_level_shift", "points_channels"}  # of reading and writing, which are functions of their own
+             "correct_level_shift", "points_channels", "plain"}  # of reading and writing, which are functions of their own
     later = {"painted_as", "painted_outside", "strict", "brick_voxels", "brick_overlap", "seam_tolerance"}
     unknown = set(flags) - set(ours) - words - files - later
     assert not unknown, f"flags without a keyword: {sorted(unknown)}"
@@ -131,7 +133,7 @@ def test_contours_paint_and_guesses(sphere):
     image, points, labels = sphere
     angles = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     lines = []
-    for k in (8, 14, 20, 26, 32):
+    for k in (9, 14, 19, 24, 29):
         z = image.index_to_world([(k, 0, 0)])[0][2]
         r = np.sqrt(0.64 - z * z)
         lines.append(np.stack([r * np.cos(angles), r * np.sin(angles), np.full(24, z)], 1))
@@ -164,3 +166,12 @@ def test_the_stub_is_up_to_date():
     for name in covol.__all__:
         assert f"def {name}(" in text or f"class {name}" in text, f"{name} is not in the stub"
         assert getattr(covol, name).__doc__ or name in ("Image", "Points", "Mesh", "LevelSet", "Result"), f"{name} has no docstring"
+
+
+def test_the_example(tmp_path):
+    done = subprocess.run([sys.executable, DATA.parent / "11_python.py"], capture_output=True, text=True, cwd=tmp_path,
+                          env={**os.environ, "COVOL_OUT": str(tmp_path)})
+    assert done.returncode == 0, done.stderr
+    for name in ("embryo.vdb", "embryo.ply", "embryo_mask.tif"):
+        assert (tmp_path / "python" / name).stat().st_size > 1000 and name in done.stdout
+    assert covol.read_image(tmp_path / "python/embryo_mask.tif").array.sum() == int(done.stdout.split("voxels inside")[0].split()[-1])
