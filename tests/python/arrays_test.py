@@ -85,8 +85,8 @@ def test_large_integers_become_doubles():
 
 
 @pytest.mark.parametrize("array, word", [
-    (np.zeros((4, 4)), "three axes"), (np.zeros((0, 4, 4)), "voxels"), (np.zeros((2, 2, 2), complex), "complex128"),
-    (np.array([[["a"]]]), "image"), (np.full((2, 2, 2), np.nan), "nan"), ("no such file.tif", "no such file"),
+    (np.zeros((4, 4)), "three axes"), (np.zeros((0, 4, 4)), "voxels"), (np.zeros((1, 4, 4)), "two voxels"), (np.zeros((2, 2, 2), complex), "complex128"),
+    (np.array([[["a"]]]), "image"), (np.full((2, 2, 2), np.nan), "NaN"), ("no such file.tif", "no such file"),
 ])
 def test_what_is_no_image(array, word):
     with pytest.raises(covol.Error, match=word):
