@@ -19,7 +19,7 @@ trap finish EXIT
 begun=$SECONDS
 say() { echo "== $1, after $((SECONDS - begun)) s"; }
 
-cpack -G DEB --config "$build/CPackConfig.cmake" -B "$work/packages" >/dev/null
+cpack -G DEB --config "$build/CPackConfig.cmake" -B "$work/packages" >"$work/cpack.log" 2>&1 || { tail "$work/cpack.log" >&2; exit 1; }
 say "packages made"
 debootstrap --variant=minbase bookworm "$root" "$mirror" >"$work/debootstrap.log" 2>&1 ||
   { tail -5 "$work/debootstrap.log" >&2; exit 1; }

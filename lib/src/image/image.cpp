@@ -308,8 +308,8 @@ Image Image::from_values(const ImageGeometry& geometry, const std::uint8_t* valu
 
 Image Image::from_view(const ImageGeometry& geometry, const VoxelView& voxels) {
     if (geometry.size[0] < 2 || geometry.size[1] < 2 || geometry.size[2] < 2 || !voxels.first)
-        throw Error(Errc::InvalidInput, "image: expected at least two voxels along each axis, got " +
-                                            detail::size_text(geometry.size));
+        throw Error(Errc::InvalidInput,
+                    "image: expected at least two voxels along each axis, got " + detail::size_text(geometry.size));
     check_geometry("image", geometry);
     Image image;
     image.geometry_ = geometry;

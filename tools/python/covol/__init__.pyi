@@ -9,13 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 __version__: str
 
-Vector = Union[Sequence[float], NDArray[Any]]  # three numbers, x, y, z
-Box = Union[Sequence[Vector], NDArray[Any]]  # two corners
-Length = Union[float, str]  # world units, or voxels as in "3vx"
-Path = Union[str, "os.PathLike[str]"]
-Progress = Callable[[str, float], object]
-Space = Literal["world", "index", "index1", "ras", "local"]
-Order = Literal["xyz", "zyx"]
+_Vector = Union[Sequence[float], NDArray[Any]]  # three numbers, x, y, z
+_Box = Union[Sequence[_Vector], NDArray[Any]]  # two corners
+_Length = Union[float, str]  # world units, or voxels as in "3vx"
+_Path = Union[str, "os.PathLike[str]"]
+_Progress = Callable[[str, float], object]
+_Space = Literal["world", "index", "index1", "ras", "local"]
+_Order = Literal["xyz", "zyx"]
 
 class Error(Exception):
     code: Literal["invalid_options", "invalid_input", "io", "unsupported", "numerical", "cancelled"]
@@ -27,8 +27,8 @@ class Image:
         self,
         array: ArrayLike,
         *,
-        spacing: Vector | None = ...,
-        origin: Vector | None = ...,
+        spacing: _Vector | None = ...,
+        origin: _Vector | None = ...,
         direction: ArrayLike | None = ...,
         unit: str = ...,
     ) -> None: ...
@@ -102,6 +102,9 @@ class Suggestion:
     index: Tuple[float, float, float]
     world: Tuple[float, float, float]
     area: float
+    def __init__(
+        self, slice: int, index: Tuple[float, float, float], world: Tuple[float, float, float], area: float
+    ) -> None: ...
 
 class Result:
     @property
@@ -120,41 +123,41 @@ class Result:
     def warnings(self) -> list[str]: ...
     @property
     def log(self) -> list[str]: ...
-    def suggest(self, count: int = ..., *, progress: Progress | None = ..., threads: int = ...) -> list[Suggestion]: ...
-    def save(self, path: Path) -> None: ...
+    def suggest(self, count: int = ..., *, progress: _Progress | None = ..., threads: int = ...) -> list[Suggestion]: ...
+    def save(self, path: _Path) -> None: ...
     def _repr_html_(self) -> str: ...
 
-ImageLike = Union[Image, ArrayLike, Path, Any]  # Any: what nibabel reads
-PointsLike = Union[Points, ArrayLike, Path]
-LinesLike = Union[Points, Sequence[ArrayLike], Path]
-Surface = Union[LevelSet, Result, Path]
+_ImageLike = Union[Image, ArrayLike, _Path, Any]  # Any: what nibabel reads
+_PointsLike = Union[Points, ArrayLike, _Path]
+_LinesLike = Union[Points, Sequence[ArrayLike], _Path]
+_Surface = Union[LevelSet, Result, _Path]
 
 def segment(
-    image: ImageLike,
-    points: PointsLike | None = ...,
+    image: _ImageLike,
+    points: _PointsLike | None = ...,
     *,
-    contours: LinesLike | None = ...,
-    painted: ImageLike | None = ...,
-    inside: PointsLike | None = ...,
-    outside: PointsLike | None = ...,
-    guess: ImageLike | LevelSet | Result | None = ...,
-    init: ImageLike | LevelSet | Result | None = ...,
-    spacing: Vector | None = ...,
-    origin: Vector | None = ...,
+    contours: _LinesLike | None = ...,
+    painted: _ImageLike | None = ...,
+    inside: _PointsLike | None = ...,
+    outside: _PointsLike | None = ...,
+    guess: _ImageLike | LevelSet | Result | None = ...,
+    init: _ImageLike | LevelSet | Result | None = ...,
+    spacing: _Vector | None = ...,
+    origin: _Vector | None = ...,
     direction: ArrayLike | None = ...,
     affine: ArrayLike | None = ...,
-    points_space: Space | None = ...,
-    points_order: Order | None = ...,
+    points_space: _Space | None = ...,
+    points_order: _Order | None = ...,
     points_scale: float = ...,
-    progress: Progress | None = ...,
+    progress: _Progress | None = ...,
     threads: int = ...,
     memory_limit: int = ...,
     # options, from covol.options()
-    attraction_range: Length | None = None,
+    attraction_range: _Length | None = None,
     coarse_levels: int | None = None,
     contour_curve: Literal["spline", "lines"] = "spline",
-    contour_thickness: Length = 0.0,
-    delta: Length | None = None,
+    contour_thickness: _Length = 0.0,
+    delta: _Length | None = None,
     edge_contrast: float | None = None,
     edge_epsilon: float = 0.02,
     edge_feature: Literal["auto", "slope", "bright-line", "dark-line"] = "auto",
@@ -162,52 +165,52 @@ def segment(
     epsilon: float = 0.01,
     exterior_seed: ArrayLike = (),
     guess_label: int = 0,
-    guess_radius: Length | None = None,
+    guess_radius: _Length | None = None,
     guess_weight: float = 1.0,
-    hole_distance: Length | None = None,
+    hole_distance: _Length | None = None,
     holes: Literal["close", "open", "flat"] = "close",
     image_yields: float | None = None,
-    lattice_origin: Vector | None = None,
-    margin: Length | None = None,
-    mark_precision: Length | None = None,
+    lattice_origin: _Vector | None = None,
+    margin: _Length | None = None,
+    mark_precision: _Length | None = None,
     max_steps: int = 500,
-    min_component: Length = 0.0,
+    min_component: _Length = 0.0,
     model: Literal["guided", "paper"] = "guided",
     most_points: int = 2500000,
     remove_outliers: float = 0.0,
     rho: float = 1.0,
-    roi: Box | None = None,
-    sigma: Length | None = None,
-    simplify: Length = 0.0,
+    roi: _Box | None = None,
+    sigma: _Length | None = None,
+    simplify: _Length = 0.0,
     smooth: Literal["none", "jets", "wlop"] = "none",
     solver_tolerance: float = 0.001,
-    tag_distance: Length | None = None,
-    tau: Length | None = None,
+    tag_distance: _Length | None = None,
+    tau: _Length | None = None,
     theta: float = 1.0,
     tolerance: float = 0.002,
-    voxel_size: Length | None = None,
+    voxel_size: _Length | None = None,
     # end of options
 ) -> Result: ...
 def reconstruct(
-    points: PointsLike | None = ...,
+    points: _PointsLike | None = ...,
     *,
-    contours: LinesLike | None = ...,
-    inside: PointsLike | None = ...,
-    outside: PointsLike | None = ...,
-    init: ImageLike | LevelSet | Result | None = ...,
+    contours: _LinesLike | None = ...,
+    inside: _PointsLike | None = ...,
+    outside: _PointsLike | None = ...,
+    init: _ImageLike | LevelSet | Result | None = ...,
     normals: ArrayLike | None = ...,
-    points_space: Space | None = ...,
-    points_order: Order | None = ...,
+    points_space: _Space | None = ...,
+    points_order: _Order | None = ...,
     points_scale: float = ...,
-    progress: Progress | None = ...,
+    progress: _Progress | None = ...,
     threads: int = ...,
     memory_limit: int = ...,
     # options, from covol.options()
-    attraction_range: Length | None = None,
+    attraction_range: _Length | None = None,
     coarse_levels: int | None = None,
     contour_curve: Literal["spline", "lines"] = "spline",
-    contour_thickness: Length = 0.0,
-    delta: Length | None = None,
+    contour_thickness: _Length = 0.0,
+    delta: _Length | None = None,
     edge_contrast: float | None = None,
     edge_epsilon: float = 0.02,
     edge_feature: Literal["auto", "slope", "bright-line", "dark-line"] = "auto",
@@ -215,97 +218,97 @@ def reconstruct(
     epsilon: float = 0.01,
     exterior_seed: ArrayLike = (),
     guess_label: int = 0,
-    guess_radius: Length | None = None,
+    guess_radius: _Length | None = None,
     guess_weight: float = 1.0,
-    hole_distance: Length | None = None,
+    hole_distance: _Length | None = None,
     holes: Literal["close", "open", "flat"] = "close",
     image_yields: float | None = None,
-    lattice_origin: Vector | None = None,
-    margin: Length | None = None,
-    mark_precision: Length | None = None,
+    lattice_origin: _Vector | None = None,
+    margin: _Length | None = None,
+    mark_precision: _Length | None = None,
     max_steps: int = 500,
-    min_component: Length = 0.0,
+    min_component: _Length = 0.0,
     model: Literal["guided", "paper"] = "guided",
     most_points: int = 2500000,
     remove_outliers: float = 0.0,
     rho: float = 0.0,
-    roi: Box | None = None,
-    sigma: Length | None = None,
-    simplify: Length = 0.0,
+    roi: _Box | None = None,
+    sigma: _Length | None = None,
+    simplify: _Length = 0.0,
     smooth: Literal["none", "jets", "wlop"] = "none",
     solver_tolerance: float = 0.001,
-    tag_distance: Length | None = None,
-    tau: Length | None = None,
+    tag_distance: _Length | None = None,
+    tau: _Length | None = None,
     theta: float = 1.0,
     tolerance: float = 0.002,
-    voxel_size: Length | None = None,
+    voxel_size: _Length | None = None,
     # end of options
 ) -> Result: ...
 def read_image(
-    path: Path,
+    path: _Path,
     *,
-    spacing: Vector | None = ...,
+    spacing: _Vector | None = ...,
     channel: int | None = ...,
     frame: int | None = ...,
-    roi: Box | None = ...,
+    roi: _Box | None = ...,
     correct_level_shift: bool = ...,
-    progress: Progress | None = ...,
+    progress: _Progress | None = ...,
     threads: int = ...,
     memory_limit: int = ...,
 ) -> Image: ...
 def read_points(
-    path: Path,
+    path: _Path,
     *,
-    points_space: Space | None = ...,
-    points_order: Order | None = ...,
+    points_space: _Space | None = ...,
+    points_order: _Order | None = ...,
     points_scale: float = ...,
     points_channels: int = ...,
 ) -> Points: ...
-def read_level_set(path: Path) -> LevelSet: ...
-def read_mesh(path: Path) -> Mesh: ...
+def read_level_set(path: _Path) -> LevelSet: ...
+def read_mesh(path: _Path) -> Mesh: ...
 def mesh(
-    surface: Surface,
+    surface: _Surface,
     *,
-    isovalue: Length = ...,
-    min_component: Length = ...,
-    target_edge: Length = ...,
-    adaptive: Length = ...,
+    isovalue: _Length = ...,
+    min_component: _Length = ...,
+    target_edge: _Length = ...,
+    adaptive: _Length = ...,
     smooth: int = ...,
     repair: bool = ...,
-    progress: Progress | None = ...,
+    progress: _Progress | None = ...,
     threads: int = ...,
 ) -> Mesh: ...
 def mask(
-    surface: Surface,
-    like: ImageLike,
+    surface: _Surface,
+    like: _ImageLike,
     *,
     label: int = ...,
-    spacing: Vector | None = ...,
-    origin: Vector | None = ...,
+    spacing: _Vector | None = ...,
+    origin: _Vector | None = ...,
     direction: ArrayLike | None = ...,
     affine: ArrayLike | None = ...,
-    progress: Progress | None = ...,
+    progress: _Progress | None = ...,
     threads: int = ...,
 ) -> NDArray[np.uint8]: ...
-def save_mask(path: Path, voxels: ArrayLike, like: ImageLike) -> None: ...
+def save_mask(path: _Path, voxels: ArrayLike, like: _ImageLike) -> None: ...
 def compare(
-    a: ImageLike | Mesh | LevelSet | Result,
-    b: ImageLike | Mesh | LevelSet | Result,
+    a: _ImageLike | Mesh | LevelSet | Result,
+    b: _ImageLike | Mesh | LevelSet | Result,
     *,
     label: int = ...,
     label_b: int | None = ...,
-    spacing: Vector | None = ...,
-    origin: Vector | None = ...,
+    spacing: _Vector | None = ...,
+    origin: _Vector | None = ...,
     direction: ArrayLike | None = ...,
     affine: ArrayLike | None = ...,
-    progress: Progress | None = ...,
+    progress: _Progress | None = ...,
     threads: int = ...,
 ) -> dict[str, float]: ...
 def distances(
-    points: ArrayLike, surface: Mesh | LevelSet | Result, *, progress: Progress | None = ..., threads: int = ...
+    points: ArrayLike, surface: Mesh | LevelSet | Result, *, progress: _Progress | None = ..., threads: int = ...
 ) -> dict[str, float]: ...
 def suggest(
-    result: Result, count: int = ..., *, progress: Progress | None = ..., threads: int = ...
+    result: Result, count: int = ..., *, progress: _Progress | None = ..., threads: int = ...
 ) -> list[Suggestion]: ...
 def phantom(
     kind: str = ..., size: int = ..., points: int = ..., noise: float = ..., seed: int = ...

@@ -84,13 +84,15 @@ def read_points(path, *, points_space=None, points_order=None, points_scale=1.0,
 
 
 def points(name, value, reading, lines=False, normals=None):
-    """A list of Points from None, a file, Points, positions or, with `lines`, a list of closed lines of positions."""
+    """A list of Points from None, a file, Points, several of these, positions or, with `lines`, a list of closed lines of positions."""
     if value is None:
         return []
     if isinstance(value, _covol.Points):
         return [value]
     if is_path(value):
         return [read_points(value, **reading)]
+    if isinstance(value, (list, tuple)) and value and all(isinstance(v, _covol.Points) or is_path(v) for v in value):
+        return [cloud for v in value for cloud in points(name, v, reading)]  # of one structure
     keywords = (reading["points_space"], reading["points_order"], reading["points_scale"])
     if lines:
         if not isinstance(value, collections.abc.Iterable):

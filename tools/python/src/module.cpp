@@ -76,7 +76,7 @@ py::list list_options() {
     const Settings defaults;
     for (const Option& option : option_table())
         all.append(py::make_tuple(option.name, option.type, option.get(defaults)));
-    all.append(py::make_tuple("voxel_size", "Length | None", py::none()));
+    all.append(py::make_tuple("voxel_size", "_Length | None", py::none()));
     return all;
 }
 

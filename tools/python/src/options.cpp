@@ -34,8 +34,8 @@ double to_number(const std::string& name, py::handle value) {
 std::string type_of(double) { return "float"; }
 std::string type_of(int) { return "int"; }
 std::string type_of(std::size_t) { return "int"; }
-std::string type_of(const Vec3&) { return "Vector"; }
-std::string type_of(const WorldBox&) { return "Box"; }
+std::string type_of(const Vec3&) { return "_Vector"; }
+std::string type_of(const WorldBox&) { return "_Box"; }
 std::string type_of(const std::vector<Vec3>&) { return "ArrayLike"; }
 template <typename T>
 std::string type_of(const std::optional<T>&) {
@@ -108,8 +108,8 @@ Option length(const char* name, const char* field, At at) {
     Option option = value(name, field, at);
     option.is_length = true;
     option.type = std::is_same_v<std::remove_cvref_t<decltype(at(std::declval<Settings&>()))>, double>
-                      ? "Length"
-                      : "Length | None";
+                      ? "_Length"
+                      : "_Length | None";
     option.set_number = [at](Settings& s, double v) { at(s) = v; };
     return option;
 }
