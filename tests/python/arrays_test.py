@@ -42,7 +42,8 @@ def test_strides(sphere, expected, kind, dtype):
     assert np.array_equal(segment(array, image, points), expected)
 
 
-@pytest.mark.parametrize("dtype", ["int8", "uint16", "int16", "uint32", "int32", "int64", "uint64", "float16", "float64", ">i2", ">f4"])
+@pytest.mark.parametrize("dtype", ["int8", "uint16", "int16", "uint32", "int32", "int64", "uint64", "float16", "float64",
+                                   ">i2", ">f4"])
 def test_number_types(sphere, dtype):
     image, points, _ = sphere
     array = image.array // 2  # 0 to 127 fits all of them
@@ -85,7 +86,8 @@ def test_large_integers_become_doubles():
 
 
 @pytest.mark.parametrize("array, word", [
-    (np.zeros((4, 4)), "three axes"), (np.zeros((0, 4, 4)), "voxels"), (np.zeros((1, 4, 4)), "two voxels"), (np.zeros((2, 2, 2), complex), "complex128"),
+    (np.zeros((4, 4)), "three axes"), (np.zeros((0, 4, 4)), "voxels"), (np.zeros((1, 4, 4)), "two voxels"),
+    (np.zeros((2, 2, 2), complex), "complex128"),
     (np.array([[["a"]]]), "image"), (np.full((2, 2, 2), np.nan), "NaN"), ("no such file.tif", "no such file"),
 ])
 def test_what_is_no_image(array, word):

@@ -92,9 +92,10 @@ def test_every_flag_is_an_option(program):
                             flags[flag[2:].replace("-", "_")] = option
     ours = covol.options()
     assert set(ours) <= set(flags)
-    words = {"points_space", "points_order", "points_scale", "points", "contours", "painted", "inside", "outside", "guess", "init", "spacing"}
-    files = {"output", "mask", "mesh", "density", "fields", "table", "evidence", "suggest", "half", "up", "unit_scale", "channel", "frame",
-             "correct_level_shift", "points_channels", "plain"}  # of reading and writing, which are functions of their own
+    words = {"points_space", "points_order", "points_scale", "points", "contours", "painted", "inside", "outside", "guess", "init",
+             "spacing"}
+    files = {"output", "mask", "mesh", "density", "fields", "table", "evidence", "suggest", "half", "up", "unit_scale",
+             "channel", "frame", "correct_level_shift", "points_channels", "plain"}  # of reading and writing, which are functions of their own
     later = {"painted_as", "painted_outside", "strict", "brick_voxels", "brick_overlap", "seam_tolerance"}
     unknown = set(flags) - set(ours) - words - files - later
     assert not unknown, f"flags without a keyword: {sorted(unknown)}"
@@ -146,12 +147,14 @@ def test_contours_paint_and_guesses(sphere):
     assert set(np.unique(corrected)) == {0, 5} and dice(corrected, labels) > dice(shifted, labels) + 0.05
     from_mask = covol.segment(image, points, init=covol.Image(labels, spacing=image.spacing, origin=image.origin))
     assert dice(from_mask.mask, labels) > 0.98
-    seeds = covol.segment(image, points, inside=[[0, 0, 0]], outside=[[1.1, 0, 0], [-1.1, 0, 0], [0, 1.1, 0], [0, -1.1, 0], [0, 0, 1.1], [0, 0, -1.1]])
+    around = 1.1 * np.concatenate([np.eye(3), -np.eye(3)])
+    seeds = covol.segment(image, points, inside=[[0, 0, 0]], outside=around)
     assert seeds.report["seeds"] == {"inside": 1, "outside": 6, "wrong": 0, "wrong_inside": 0, "wrong_outside": 0}
 
 
 def test_shown_in_notebooks(solved, sphere):
-    for thing in (solved, solved.mesh, solved.surface, sphere[0], covol.Points("<b>", [[0, 0, 0]], None, None, None, 1.0, False, None)):
+    cloud = covol.Points("<b>", [[0, 0, 0]], None, None, None, 1.0, False, None)
+    for thing in (solved, solved.mesh, solved.surface, sphere[0], cloud):
         page = thing._repr_html_()
         assert page.startswith("<div>") and page.endswith("</div>") and "<b></b>" not in page
         assert repr(thing).startswith("<covol.")
@@ -165,7 +168,10 @@ def test_the_stub_is_up_to_date():
     text = script.with_name("covol").joinpath("__init__.pyi").read_text()
     for name in covol.__all__:
         assert f"def {name}(" in text or f"class {name}" in text, f"{name} is not in the stub"
-        assert getattr(covol, name).__doc__ or name in ("Image", "Points", "Mesh", "LevelSet", "Result"), f"{name} has no docstring"
+        assert getattr(covol, name).__doc__, f"{name} has no docstring"
+    for type_ in (covol.Image, covol.Points, covol.Mesh, covol.LevelSet, covol.Result):
+        for name, member in vars(type_).items():
+            assert name.startswith("_") or member.__doc__, f"{type_.__name__}.{name} has no docstring"
 
 
 def test_the_example(tmp_path):
@@ -174,4 +180,5 @@ def test_the_example(tmp_path):
     assert done.returncode == 0, done.stderr
     for name in ("embryo.vdb", "embryo.ply", "embryo_mask.tif"):
         assert (tmp_path / "python" / name).stat().st_size > 1000 and name in done.stdout
-    assert covol.read_image(tmp_path / "python/embryo_mask.tif").array.sum() == int(done.stdout.split("voxels inside")[0].split()[-1])
+    inside = int(done.stdout.split("voxels inside")[0].split()[-1])
+    assert covol.read_image(tmp_path / "python/embryo_mask.tif").array.sum() == inside

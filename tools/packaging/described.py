@@ -29,7 +29,8 @@ class Option:
 
     @property
     def is_file(self):
-        return not self.words and bool(re.search(r"FILE|IMAGE|OUT\.|IN\.|^A$|^B$|^IN$|^OUT$|START|PICTURE|FOLDER|\.vdb", self.value))
+        """Whether a file's name is expected, perhaps among others."""
+        return not self.words and bool(re.search(r"FILE|IMAGE|OUT|IN\b|^[AB]$|START|FOLDER|\.vdb", self.value))
 
 
 class Command:

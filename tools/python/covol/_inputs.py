@@ -84,7 +84,7 @@ def read_points(path, *, points_space=None, points_order=None, points_scale=1.0,
 
 
 def points(name, value, reading, lines=False, normals=None):
-    """A list of Points from None, a file, Points, several of these, positions or, with `lines`, a list of closed lines of positions."""
+    """A list of Points from None, a file, Points, several of these, positions or, with `lines`, closed lines of positions."""
     if value is None:
         return []
     if isinstance(value, _covol.Points):

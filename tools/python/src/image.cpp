@@ -116,14 +116,18 @@ py::tuple make_test_shape(const std::string& kind, int size, int points, double 
 }  // namespace
 
 void add_image(py::module_& module) {
-    py::class_<Image>(module, "Image")
+    py::class_<Image>(module, "Image",
+                      "A 3D image and where it lies: Image(array, spacing=, origin=, direction=, unit=), as segment() "
+                      "takes them. The "
+                      "array is not copied where it need not be. Raises Error.")
         .def(py::init([](const py::object& array, const py::object& spacing, const py::object& origin,
                          const py::object& direction, const std::string& unit) {
                  return to_image(array, make_geometry(spacing, origin, direction, unit));
              }),
              py::arg("array"), py::kw_only(), py::arg("spacing") = py::none(), py::arg("origin") = py::none(),
              py::arg("direction") = py::none(), py::arg("unit") = "")
-        .def_property_readonly("array", voxels_of)
+        .def_property_readonly("array", voxels_of,
+                               "(nz, ny, nx), read-only; the very memory of the image where it lies in memory.")
         .def(
             "__array__",
             [](const Image& image, const py::object& dtype) {
@@ -131,18 +135,31 @@ void add_image(py::module_& module) {
                 return dtype.is_none() ? py::object(array) : array.attr("astype")(dtype);
             },
             py::arg("dtype") = py::none())
-        .def_property_readonly("shape", [](const Image& image) { return shape_of(image.held().size()); })
-        .def_property_readonly("dtype",
-                               [](const Image& image) {
-                                   const std::string name = to_string(image.pixel_type());
-                                   return py::dtype(name == "float" ? "float32" : name == "double" ? "float64" : name);
-                               })
-        .def_property_readonly("spacing", [](const Image& image) { return from_vec3(image.geometry().spacing); })
-        .def_property_readonly("origin", [](const Image& image) { return from_vec3(image.geometry().origin); })
-        .def_property_readonly("direction", [](const Image& image) { return from_matrix(image.geometry().direction); })
-        .def_property_readonly("unit", [](const Image& image) { return image.geometry().unit; })
-        .def_property_readonly("spacing_known", [](const Image& image) { return image.geometry().spacing_known; })
-        .def_property_readonly("path", &Image::path)
+        .def_property_readonly(
+            "shape", [](const Image& image) { return shape_of(image.held().size()); }, "(nz, ny, nx)")
+        .def_property_readonly(
+            "dtype",
+            [](const Image& image) {
+                const std::string name = to_string(image.pixel_type());
+                return py::dtype(name == "float" ? "float32" : name == "double" ? "float64" : name);
+            },
+            "Of the voxels.")
+        .def_property_readonly(
+            "spacing", [](const Image& image) { return from_vec3(image.geometry().spacing); },
+            "(x, y, z), world units.")
+        .def_property_readonly(
+            "origin", [](const Image& image) { return from_vec3(image.geometry().origin); },
+            "(x, y, z) of the centre of voxel 0, world units.")
+        .def_property_readonly(
+            "direction", [](const Image& image) { return from_matrix(image.geometry().direction); },
+            "3 x 3; its columns are the axes of i, j, k.")
+        .def_property_readonly(
+            "unit", [](const Image& image) { return image.geometry().unit; },
+            "Of the world, 'um' say; empty where nothing says it.")
+        .def_property_readonly(
+            "spacing_known", [](const Image& image) { return image.geometry().spacing_known; },
+            "False where a file states no spacing, and 1 stands in for it.")
+        .def_property_readonly("path", &Image::path, "Of the file; empty for an image in memory.")
         .def(
             "index_to_world",
             [](const Image& image, const py::object& zyx) {
@@ -150,7 +167,7 @@ void add_image(py::module_& module) {
                 for (Vec3& p : places) p = image.geometry().index_to_world({p[2], p[1], p[0]});
                 return from_positions(places);
             },
-            py::arg("index"))
+            py::arg("index"), "Positions (x, y, z), shape (n, 3), of voxels (z, y, x), shape (n, 3).")
         .def(
             "world_to_index",
             [](const Image& image, const py::object& xyz) {
@@ -161,16 +178,18 @@ void add_image(py::module_& module) {
                 }
                 return from_positions(places);
             },
-            py::arg("world"));
+            py::arg("world"), "Voxels (z, y, x), shape (n, 3), of positions (x, y, z), shape (n, 3).");
     module.def("read_image", read);
     module.def("phantom", make_test_shape);
 }
 
 void add_points(py::module_& module) {
-    py::class_<PointCloud>(module, "Points")
+    py::class_<PointCloud>(module, "Points", "Marks or a cloud, as a file gives them: see read_points().")
         .def(py::init(&make_points))
         .def("__len__", [](const PointCloud& cloud) { return cloud.points.size(); })
-        .def_property_readonly("array", [](const PointCloud& cloud) { return from_positions(cloud.points); })
+        .def_property_readonly(
+            "array", [](const PointCloud& cloud) { return from_positions(cloud.points); },
+            "(n, 3), x, y, z in `space`.")
         .def(
             "__array__",
             [](const PointCloud& cloud, const py::object& dtype) {
@@ -178,30 +197,36 @@ void add_points(py::module_& module) {
                 return dtype.is_none() ? py::object(array) : array.attr("astype")(dtype);
             },
             py::arg("dtype") = py::none())
-        .def_property_readonly("normals",
-                               [](const PointCloud& cloud) -> py::object {
-                                   if (cloud.normals.empty()) return py::none();
-                                   return from_positions(cloud.normals);
-                               })
-        .def_property_readonly("lines",
-                               [](const PointCloud& cloud) {
-                                   py::list all;
-                                   for (const MarkLine& line : cloud.lines) {
-                                       const auto begin = cloud.points.begin();
-                                       all.append(from_positions({begin + static_cast<std::ptrdiff_t>(line.begin),
-                                                                  begin + static_cast<std::ptrdiff_t>(line.end)}));
-                                   }
-                                   return all;
-                               })
-        .def_property_readonly("space", [](const PointCloud& cloud) { return word_of(cloud.space); })
-        .def_readonly("rule", &PointCloud::rule)
-        .def_readonly("source", &PointCloud::source)
+        .def_property_readonly(
+            "normals",
+            [](const PointCloud& cloud) -> py::object {
+                if (cloud.normals.empty()) return py::none();
+                return from_positions(cloud.normals);
+            },
+            "(n, 3), unit vectors, 0 where there is none; None without normals.")
+        .def_property_readonly(
+            "lines",
+            [](const PointCloud& cloud) {
+                py::list all;
+                for (const MarkLine& line : cloud.lines) {
+                    const auto begin = cloud.points.begin();
+                    all.append(from_positions({begin + static_cast<std::ptrdiff_t>(line.begin),
+                                               begin + static_cast<std::ptrdiff_t>(line.end)}));
+                }
+                return all;
+            },
+            "Of contours: a list of arrays (n, 3).")
+        .def_property_readonly(
+            "space", [](const PointCloud& cloud) { return word_of(cloud.space); },
+            "'world', 'index', 'local' or 'slices'.")
+        .def_readonly("rule", &PointCloud::rule, "How the coordinates were understood.")
+        .def_readonly("source", &PointCloud::source, "The file.")
         .def(
             "to_world",
             [](const PointCloud& cloud, const Image* image) {
                 return from_positions(image != nullptr ? to_world(cloud, image->geometry()) : to_world(cloud));
             },
-            py::arg("image") = nullptr);
+            py::arg("image") = nullptr, "(n, 3), x, y, z in the world; those in voxels need the image. Raises Error.");
     module.def("read_points", [](const std::string& path, const std::optional<std::string>& space,
                                  const std::optional<std::string>& order, double scale, int channels) {
         const ReadPointsOptions reading = make_reading(space, order, scale, channels);

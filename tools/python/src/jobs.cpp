@@ -100,12 +100,18 @@ void add_jobs(py::module_& module) {
                 throw Error(Errc::InvalidOptions, "threads: expected >= 0, got " + std::to_string(threads));
             return Call{std::move(progress), std::move(log), threads, memory_limit};
         }));
-    py::class_<Result, std::shared_ptr<Result>>(module, "Result", py::dynamic_attr())
-        .def_property_readonly("surface", [](const Result& r) { return LevelSet{r.result.surface}; })
-        .def_property_readonly("mesh", mesh_of)
-        .def_property_readonly("image", [](const Result& r) { return r.image; })
-        .def_property_readonly("marks", [](const Result& r) { return from_positions(r.marks); })
-        .def_property_readonly("log", [](const Result& r) { return r.log; })
+    py::class_<Result, std::shared_ptr<Result>>(module, "Result", "What segment() and reconstruct() return.",
+                                                py::dynamic_attr())
+        .def_property_readonly(
+            "surface", [](const Result& r) { return LevelSet{r.result.surface}; },
+            "The LevelSet: a signed distance, world units.")
+        .def_property_readonly("mesh", mesh_of, "The Mesh: closed, manifold, outward.")
+        .def_property_readonly(
+            "image", [](const Result& r) { return r.image; }, "The Image; None of points alone.")
+        .def_property_readonly(
+            "marks", [](const Result& r) { return from_positions(r.marks); }, "(n, 3), as they were used, world units.")
+        .def_property_readonly(
+            "log", [](const Result& r) { return r.log; }, "Choices and warnings, in their order.")
         .def("_fields",
              [](const Result& r) {
                  return py::make_tuple(grid_of(r.result.u), grid_of(r.result.distance), grid_of(r.result.edge));

@@ -144,32 +144,41 @@ py::object measure_points(const py::object& points, const Mesh& mesh, const Call
 }  // namespace
 
 void add_surfaces(py::module_& module) {
-    py::class_<Mesh>(module, "Mesh")
+    py::class_<Mesh>(module, "Mesh", "Triangles: Mesh(vertices, faces). Raises Error.")
         .def(py::init([](const py::object& vertices, const py::object& faces) {
                  return Mesh{std::make_shared<const TriangleMesh>(to_mesh(vertices, faces)), {}};
              }),
              py::arg("vertices"), py::arg("faces"))
-        .def_property_readonly("vertices", vertices_of)
-        .def_property_readonly("faces", faces_of)
-        .def_property_readonly("normals", normals_of)
-        .def_property_readonly("attributes", attributes_of)
-        .def("measure",
-             [](const Mesh& mesh) { return from_json(tool::to_json(covol::measure(*mesh.triangles)).dump()); })
-        .def("save", save_mesh, py::arg("path"), py::kw_only(), py::arg("y_up") = false, py::arg("unit_scale") = 1.0);
-    py::class_<LevelSet>(module, "LevelSet")
-        .def_property_readonly("voxel_size", [](const LevelSet& s) { return domain_of(*s.grid).voxel_size; })
-        .def_property_readonly("box",
-                               [](const LevelSet& s) {
-                                   const WorldBox box = domain_of(*s.grid).world_box();
-                                   return py::make_tuple(from_vec3(box.min), from_vec3(box.max));
-                               })
+        .def_property_readonly("vertices", vertices_of, "(n, 3) float32, x, y, z, world units; read-only.")
+        .def_property_readonly("faces", faces_of, "(m, 3) uint32, counter-clockwise seen from outside; read-only.")
+        .def_property_readonly("normals", normals_of, "(n, 3) float32, unit vectors at the vertices.")
+        .def_property_readonly("attributes", attributes_of, "Numbers at the vertices by name: dict of arrays (n,).")
+        .def(
+            "measure",
+            [](const Mesh& mesh) { return from_json(tool::to_json(covol::measure(*mesh.triangles)).dump()); },
+            "dict: volume, area (world units), components, genus, closed, manifold.")
+        .def("save", save_mesh, py::arg("path"), py::kw_only(), py::arg("y_up") = false, py::arg("unit_scale") = 1.0,
+             "Writes .ply, .obj, .stl, .off or .glb. Raises Error.");
+    py::class_<LevelSet>(
+        module, "LevelSet",
+        "A level set of OpenVDB, negative inside; what mesh(), mask(), compare(), init= and guess= take.")
+        .def_property_readonly(
+            "voxel_size", [](const LevelSet& s) { return domain_of(*s.grid).voxel_size; }, "World units.")
+        .def_property_readonly(
+            "box",
+            [](const LevelSet& s) {
+                const WorldBox box = domain_of(*s.grid).world_box();
+                return py::make_tuple(from_vec3(box.min), from_vec3(box.max));
+            },
+            "Two corners of the domain, world units.")
         .def(
             "save",
             [](const LevelSet& s, const std::string& path, bool half) {
                 const py::gil_scoped_release released;
                 write_vdb(path, {s.grid}, {half, {}});
             },
-            py::arg("path"), py::kw_only(), py::arg("half") = false);
+            py::arg("path"), py::kw_only(), py::arg("half") = false,
+            "Writes a .vdb; half: values as 16-bit floats. Raises Error.");
     module.def("read_level_set", [](const std::string& path) {
         const py::gil_scoped_release released;
         return LevelSet{read_vdb_level_set(path)};
