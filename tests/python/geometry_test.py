@@ -87,8 +87,8 @@ def test_nibabel(tmp_path, ellipsoid, program):
     covol.save_mask(tmp_path / "mask.nii.gz", masks[0], read)
     again = nibabel.load(tmp_path / "mask.nii.gz")
     assert np.array_equal(np.asanyarray(again.dataobj).T, masks[0]) and np.allclose(again.affine, affine, atol=1e-5)
-    said = subprocess.run([program, "info", tmp_path / "mask.nii.gz"], capture_output=True, text=True, check=True).stdout
-    assert "50 x 40 x 30" in said
+    done = subprocess.run([program, "info", tmp_path / "mask.nii.gz"], capture_output=True, text=True, check=True)
+    assert "50 x 40 x 30" in done.stdout + done.stderr
 
 
 def test_affine_and_back(ellipsoid):

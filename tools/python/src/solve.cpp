@@ -6,7 +6,7 @@
 #include "covol/error.h"
 #include "covol/painted.h"
 #include "covol/seeds.h"
-#include "flags/judge.h"
+#include "flags/one_label.h"
 #include "flags/world_points.h"
 
 namespace covol::python {
@@ -27,17 +27,6 @@ void thin(tool::WorldPoints& all, std::size_t most) {
     all.points = taken(all.points, used);
     all.hints.normals = taken(all.hints.normals, used);
     all.hints.to_sensor = taken(all.hints.to_sensor, used);
-}
-
-/// Where a label image has that label.
-Image only(const Image& labels, int label) {
-    const auto [ni, nj, nk] = labels.geometry().size;
-    std::vector<std::uint8_t> values;
-    values.reserve(std::size_t(ni) * std::size_t(nj) * std::size_t(nk));
-    for (int k = 0; k < nk; ++k)
-        for (int j = 0; j < nj; ++j)
-            for (int i = 0; i < ni; ++i) values.push_back(labels.at(i, j, k) == label ? 1 : 0);
-    return Image::from_values(labels.geometry(), values.data());
 }
 
 /// The only label that is painted, or the wanted one.
@@ -181,7 +170,7 @@ private:
         const Image labels = geometry_ != nullptr ? placed_on(*mask, *geometry_) : *mask;
         out_->label = choose_label("guess", labels, settings_.guess_label).label;
         out_->guess_mask = labels;
-        settings_.options.guess->mask = std::make_shared<const Image>(only(labels, out_->label));
+        settings_.options.guess->mask = std::make_shared<const Image>(tool::only(labels, out_->label));
     }
 
     const std::optional<Image>& image_;
