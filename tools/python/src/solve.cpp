@@ -76,7 +76,7 @@ public:
     }
 
 private:
-    double voxel_size() const {
+    [[nodiscard]] double voxel_size() const {
         const Length& wanted = given_.voxel_size();
         if (wanted.given && !wanted.in_voxels) return wanted.value;
         std::vector<Vec3> all = world_.points;
@@ -89,7 +89,7 @@ private:
         return wanted.resolve(choice.voxel_size, choice.voxel_size);
     }
 
-    std::vector<Vec3> to_world_of(const PointCloud& cloud) const {
+    [[nodiscard]] std::vector<Vec3> to_world_of(const PointCloud& cloud) const {
         return geometry_ != nullptr ? to_world(cloud, *geometry_) : to_world(cloud);
     }
 
