@@ -120,6 +120,10 @@ def test_mesh_and_mask(tmp_path, solved, sphere):
         solved.save(tmp_path / name)
     assert covol.compare(tmp_path / "s.nrrd", solved)["dice"] > 0.99
     assert np.array_equal(covol.mesh(tmp_path / "s.vdb").vertices, covol.mesh(solved.surface).vertices)
+    solved.mesh.save(tmp_path / "up.glb", y_up=True)
+    solved.surface.save(tmp_path / "half.vdb", half=True)
+    assert (tmp_path / "half.vdb").stat().st_size < (tmp_path / "s.vdb").stat().st_size
+    assert np.allclose(covol.read_mesh(tmp_path / "up.glb").vertices, solved.mesh.vertices[:, [0, 2, 1]] * (1, 1, -1), atol=1e-6)
     with pytest.raises(covol.Error) as error:
         covol.mask(solved, image, label=0)
     assert error.value.field == "label"

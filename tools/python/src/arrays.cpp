@@ -39,8 +39,8 @@ constexpr struct {
 py::array known_numbers(py::array array) {
     const char kind = array.dtype().kind();
     const auto bytes = array.dtype().itemsize();
-    const auto converted = [&](const char* type) { return py::array(array.attr("astype")(type)); };
-    if (kind == 'b') return py::array(array.attr("view")("uint8"));
+    const auto converted = [&](const char* type) -> py::array { return array.attr("astype")(type); };
+    if (kind == 'b') return array.attr("view")("uint8");
     if (kind == 'f' && bytes == 2) return converted("float32");
     if (kind == 'f' && bytes > 8) return converted("float64");
     if ((kind == 'i' || kind == 'u') && bytes == 8) {
@@ -54,7 +54,7 @@ py::array known_numbers(py::array array) {
         throw Error(Errc::Unsupported,
                     "image: expected an array of integers, floats or bools, got " + text_of(array.dtype()));
     if (!py::cast<bool>(array.attr("dtype").attr("isnative")))
-        return py::array(array.attr("astype")(array.attr("dtype").attr("newbyteorder")("=")));
+        return array.attr("astype")(array.attr("dtype").attr("newbyteorder")("="));
     return array;
 }
 

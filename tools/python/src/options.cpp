@@ -138,7 +138,7 @@ Option word(const char* name, const char* field, At at, const Words<T>& words) {
 }
 
 #define COVOL_AT(expression) \
-    [](Settings & s) -> auto& { return s.expression; }
+    [](Settings & s) -> auto& { return (s.expression); }
 
 std::vector<Option> make_table() {
     return {

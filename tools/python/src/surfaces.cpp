@@ -1,7 +1,9 @@
 // Mesh and LevelSet, and what is made from them.
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include <cmath>
+#include <filesystem>
 
 #include "arrays.h"
 #include "classes.h"
@@ -46,13 +48,13 @@ py::dict attributes_of(const Mesh& mesh) {
     return all;
 }
 
-void save_mesh(const Mesh& mesh, const std::string& path, bool y_up, double unit_scale) {
+void save_mesh(const Mesh& mesh, const std::filesystem::path& path, bool y_up, double unit_scale) {
     WriteMeshOptions options;
     options.y_up = y_up;
     options.unit_scale = unit_scale;
     options.attributes = mesh.attributes;
     const py::gil_scoped_release released;
-    write_mesh(path, *mesh.triangles, options);
+    write_mesh(path.string(), *mesh.triangles, options);
 }
 
 /// What `covol mesh` does.
@@ -173,9 +175,9 @@ void add_surfaces(py::module_& module) {
             "Two corners of the domain, world units.")
         .def(
             "save",
-            [](const LevelSet& s, const std::string& path, bool half) {
+            [](const LevelSet& s, const std::filesystem::path& path, bool half) {
                 const py::gil_scoped_release released;
-                write_vdb(path, {s.grid}, {half, {}});
+                write_vdb(path.string(), {s.grid}, {half, {}});
             },
             py::arg("path"), py::kw_only(), py::arg("half") = false,
             "Writes a .vdb; half: values as 16-bit floats. Raises Error.");
