@@ -2,6 +2,7 @@
 #include <cctype>
 #include <optional>
 #include <regex>
+#include <utility>
 
 #include "classes.h"
 #include "cli/option_names.h"
@@ -38,7 +39,7 @@ std::string keyword_of(const std::string& field) {
 /// "tag_distance = 3", "points_order = 'zyx'"
 std::string spell(const NamedOption& option) {
     const std::string keyword = keyword_of(option.field);
-    const std::string name = keyword.empty() ? option.field : keyword;
+    std::string name = keyword.empty() ? option.field : keyword;
     if (option.value.empty()) return name;
     const bool is_word =
         std::isalpha(static_cast<unsigned char>(option.value[0])) != 0 && option.value.find(',') == std::string::npos;
@@ -63,7 +64,7 @@ void raise(const char* code, const std::string& message) {
 
 void translate(std::exception_ptr thrown) {
     try {
-        if (thrown) std::rethrow_exception(thrown);
+        if (thrown) std::rethrow_exception(std::move(thrown));
     } catch (const Error& error) {
         raise(word_of(error.code()), error.what());
     } catch (const tool::UsageError& error) {
