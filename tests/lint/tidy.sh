@@ -7,4 +7,4 @@ cd "$(dirname "$0")/../.."
 bash tests/install_packages.sh clang-tidy-14
 cmake --preset ci --log-level=WARNING
 names=$(IFS='|'; echo "${*:-}")
-run-clang-tidy-14 -p build-ci -quiet -j "${COVOL_JOBS:-$(nproc)}" "^$PWD/(lib/src|tools/covol)/.*($names).*\.cpp$"
+run-clang-tidy-14 -p build-ci -quiet -j "${COVOL_JOBS:-$(nproc)}" "^$PWD/(lib/src|tools/covol|tools/python)/.*($names).*\.cpp$"

@@ -71,6 +71,13 @@ struct ChunkCount {
     std::uint64_t total = 0;  ///< of the whole image
 };
 
+/// Voxels as they lie in memory.
+struct VoxelView {
+    PixelType type = PixelType::Float;
+    std::shared_ptr<const void> first;            ///< voxel (0,0,0); keeps the memory
+    std::array<std::int64_t, 3> stride{1, 0, 0};  ///< pixels from a voxel to the next along i, j, k; of any sign
+};
+
 /// A scalar 3D image in the file's own pixel type (a byte stays a byte).
 ///
 /// Its geometry is always the whole image's; with ReadImageOptions::roi only a box of voxels is held. Large files that
@@ -124,6 +131,12 @@ public:
     /// Takes a copy of `values` (i fastest, size[0]*size[1]*size[2]).
     COVOL_API static Image from_values(const ImageGeometry& geometry, const float* values);
     COVOL_API static Image from_values(const ImageGeometry& geometry, const std::uint8_t* values);
+    /// Takes no copy: the voxels stay where they are, and must not change while the image lives.
+    /// @throws Error InvalidInput (no voxel, a spacing or an origin that is none, values that are not finite),
+    ///               Unsupported (axes that are not perpendicular).
+    [[nodiscard]] COVOL_API static Image from_view(const ImageGeometry& geometry, const VoxelView& voxels);
+    /// The held voxels, without a copy; none of an image whose chunks are read when they are asked for.
+    [[nodiscard]] COVOL_API std::optional<VoxelView> view() const;
 
 private:
     friend Image read_image(const std::string&, const ReadImageOptions&, const RunContext&);

@@ -33,22 +33,23 @@ bool is_one_of(const std::string& text, std::initializer_list<const char*> list)
 }
 
 /// @throws Error InvalidInput, Unsupported unless spacing is positive, origin finite and the axes perpendicular.
-void check_geometry(const std::string& path, const ImageGeometry& g) {
+void check_geometry(const std::string& where, const ImageGeometry& g) {
     constexpr double kTolerance = 1e-3;
     for (int a = 0; a < 3; ++a) {
         if (!(g.spacing[a] > 0) || !std::isfinite(g.spacing[a]))
-            throw detail::read_error(Errc::InvalidInput, path,
-                                     "expected a positive spacing, got " + std::to_string(g.spacing[a]) +
-                                         " along axis " + std::to_string(a));
+            throw Error(Errc::InvalidInput, where + ": spacing: expected a positive spacing, got " +
+                                                std::to_string(g.spacing[a]) + " along axis " + std::to_string(a));
         if (!std::isfinite(g.origin[a]))
-            throw Error(Errc::InvalidInput, "read_image: " + path + ": the origin is not finite");
+            throw Error(Errc::InvalidInput, where + ": origin: expected finite numbers, got " +
+                                                std::to_string(g.origin[a]) + " along axis " + std::to_string(a));
         for (int b = 0; b <= a; ++b) {
             double dot = 0;
             for (int c = 0; c < 3; ++c) dot += g.direction[c][a] * g.direction[c][b];
             if (!(std::abs(dot - (a == b ? 1.0 : 0.0)) <= kTolerance))
                 throw Error(Errc::Unsupported,
-                            "read_image: " + path +
-                                ": expected perpendicular axes, got sheared or degenerate ones; resample the image");
+                            where +
+                                ": direction: expected perpendicular axes of length 1, got sheared or degenerate "
+                                "ones; resample the image");
         }
     }
 }
@@ -105,7 +106,7 @@ ImageInfo corrected_info(const std::string& path, const ImageFile& file, const R
         }
     }
     info.geometry.spacing_known = info.spacing_known[0] && info.spacing_known[1] && info.spacing_known[2];
-    check_geometry(path, info.geometry);
+    check_geometry("read_image: " + path, info.geometry);
     warn_of_spacing(path, info, run);
     return info;
 }
@@ -303,6 +304,26 @@ Image Image::from_values(const ImageGeometry& geometry, const float* values) {
 
 Image Image::from_values(const ImageGeometry& geometry, const std::uint8_t* values) {
     return copy_of(geometry, PixelType::UInt8, values);
+}
+
+Image Image::from_view(const ImageGeometry& geometry, const VoxelView& voxels) {
+    if (geometry.size[0] < 2 || geometry.size[1] < 2 || geometry.size[2] < 2 || !voxels.first)
+        throw Error(Errc::InvalidInput,
+                    "image: expected at least two voxels along each axis, got " + detail::size_text(geometry.size));
+    check_geometry("image", geometry);
+    Image image;
+    image.geometry_ = geometry;
+    image.type_ = voxels.type;
+    image.held_ = detail::whole_box(geometry.size);
+    image.data_ = voxels.first;
+    image.stride_ = voxels.stride;
+    image.require_finite();
+    return image;
+}
+
+std::optional<VoxelView> Image::view() const {
+    if (chunks_) return std::nullopt;
+    return VoxelView{type_, data_, stride_};
 }
 
 // ---------------------------------------------------------------------------------------------- reading

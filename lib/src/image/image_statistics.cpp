@@ -188,7 +188,8 @@ void Image::require_finite() const {
             for (int k = held_.min[2]; k <= held_.max[2]; ++k)
                 for (int j = held_.min[1]; j <= held_.max[1]; ++j)
                     for (int i = held_.min[0]; i <= held_.max[0]; ++i)
-                        if (!std::isfinite(at(i, j, k))) throw detail::not_finite(path_, {i, j, k});
+                        if (!std::isfinite(at(i, j, k)))
+                            throw detail::not_finite(path_.empty() ? "image" : path_, {i, j, k});
         }
     });
 }

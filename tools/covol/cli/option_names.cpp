@@ -1,6 +1,7 @@
 #include "cli/option_names.h"
 
-#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cctype>
 #include <map>
 
 #include "covol/option_names.h"
@@ -34,18 +35,29 @@ const std::map<std::string, std::string> kFlags{
     {"voxel_size", "--voxel-size"},
 };
 
-/// Choices are enumerators there, and words in lower case here.
+}  // namespace
+
 std::string value_of(const NamedOption& option) {
-    return option.value == "IndexOne" ? "index1" : CLI::detail::to_lower(option.value);
+    if (option.value == "IndexOne") return "index1";
+    std::string word = option.value;
+    std::transform(word.begin(), word.end(), word.begin(), [](unsigned char c) { return std::tolower(c); });
+    return word;
 }
 
+namespace {
+
 std::string spell(const NamedOption& option) {
-    const auto flag = kFlags.find(option.field);
-    if (flag == kFlags.end()) return "`" + option.field + (option.value.empty() ? "" : " = " + option.value) + "`";
-    return option.value.empty() ? flag->second : flag->second + " " + value_of(option);
+    const std::string flag = flag_of(option.field);
+    if (flag.empty()) return "`" + option.field + (option.value.empty() ? "" : " = " + option.value) + "`";
+    return option.value.empty() ? flag : flag + " " + value_of(option);
 }
 
 }  // namespace
+
+std::string flag_of(const std::string& field) {
+    const auto flag = kFlags.find(field);
+    return flag != kFlags.end() ? flag->second : "";
+}
 
 std::string with_flags(const std::string& message) { return replace_names(message, spell); }
 

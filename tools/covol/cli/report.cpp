@@ -185,16 +185,6 @@ Json to_json(const SegmentReport& r) {
     return json;
 }
 
-void add_seconds(Session& session, const SegmentReport::Seconds& seconds) {
-    session.add_seconds("distance", seconds.distance);
-    session.add_seconds("tag", seconds.tag);
-    session.add_seconds("coarse", seconds.coarse);
-    session.add_seconds("edge", seconds.edge);
-    session.add_seconds("solve", seconds.solve);
-    session.add_seconds("surface", seconds.surface);
-    session.add_seconds("total", seconds.total);
-}
-
 std::vector<std::string> summary(const SegmentReport& r) {
     std::ostringstream text;
     text << std::setprecision(4) << r.active_voxels << " active voxels of " << r.domain.voxel_size << ", "

@@ -1,5 +1,5 @@
 #pragma once
-#include "cli/session.h"
+#include "cli/json.h"
 #include "covol/band.h"
 #include "covol/compare.h"
 #include "covol/edge.h"
@@ -31,7 +31,6 @@ namespace covol::tool {
 
 /// Everything but the input and the seconds.
 [[nodiscard]] Json to_json(const SegmentReport& report);
-void add_seconds(Session& session, const SegmentReport::Seconds& seconds);
 /// The result in a few lines for people.
 [[nodiscard]] std::vector<std::string> summary(const SegmentReport& report);
 

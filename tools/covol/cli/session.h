@@ -4,7 +4,6 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <utility>
@@ -12,6 +11,7 @@
 
 #include "cli/brick_call.h"
 #include "cli/help.h"
+#include "cli/json.h"
 #include "cli/memory.h"
 #include "cli/outputs.h"
 #include "cli/progress.h"
@@ -21,8 +21,6 @@
 #include "covol/run.h"
 
 namespace covol::tool {
-
-using Json = nlohmann::ordered_json;
 
 /// Exit codes of the program.
 enum ExitCode {

@@ -10,6 +10,7 @@
 #include "covol/pipeline.h"
 #include "covol/points.h"
 #include "covol/vdb_io.h"
+#include "flags/world_points.h"
 
 // Groups of flags that several subcommands share. Each binds to its own struct; lengths in voxels are resolved
 // once h is known.
@@ -64,12 +65,6 @@ struct PointFlags {
     void bind_options(CLI::App& command);
 };
 
-/// Clouds read and moved to the world; with an image, points outside it are an error.
-struct WorldPoints {
-    std::vector<Vec3> points;
-    PointHints hints;                ///< of them
-    std::vector<std::string> rules;  ///< how each file was understood
-};
 [[nodiscard]] WorldPoints read_world_points(const PointFlags& flags, const ImageGeometry* geometry,
                                             const RunContext& run);
 

@@ -5,14 +5,11 @@
 
 #include "cli/report.h"
 #include "cli/table.h"
-#include "covol/edge.h"
 #include "covol/error.h"
+#include "flags/judge.h"
 
 namespace covol::tool {
 namespace {
-
-constexpr double kReachVoxels = 5.0;  // of marks whose attraction is unlimited
-constexpr double kWeakLine = 0.93;    // 1 - g where the image is 1.2 times as bright as the band's median
 
 std::string text_of(const Vec3& v, int decimals) {
     std::ostringstream text;
@@ -42,16 +39,7 @@ void EvidenceFlags::check(Outputs& outputs, const std::string& path_of_this_run)
 
 Evidence EvidenceFlags::judge(const SegmentResult& result, const std::vector<Vec3>& marks, const Image& image,
                               const RunContext& run) const {
-    const SegmentOptions& used = result.report.resolved;
-    EvidenceOptions options;
-    const double range = used.evolve.attraction_range.value_or(0);
-    options.reach = range > 0 ? range : kReachVoxels * *used.voxel_size;
-    options.suggestions = suggestions;
-    // Brightness is nowhere 0 as slopes are, and g falls below 1/2 before there is a line.
-    if (used.edge.feature > EdgeFeature::Slope) options.weak_edge = kWeakLine;
-    // Where the image had no weight its edges are looked up now.
-    const FloatGridPtr g = result.edge ? result.edge : detect_edges(image, *result.surface, used.edge, run).grid;
-    return assess_evidence(result.mesh, marks, *g, image.geometry(), options, run);
+    return tool::judge(result, marks, image, suggestions, run);
 }
 
 Json to_json(const Evidence& e) {

@@ -18,8 +18,7 @@ struct EvidenceFlags {
     void bind(CLI::App& command);
     void check(Outputs& outputs, const std::string& path_of_this_run) const;
     [[nodiscard]] bool wanted() const { return !path.empty() || suggestions > 0; }
-    /// Judges a result by its marks and the image's edges. The marks reach as far as the points' attraction does, or
-    /// 5 voxels where that is unlimited.
+    /// See flags/judge.h.
     [[nodiscard]] Evidence judge(const SegmentResult& result, const std::vector<Vec3>& marks, const Image& image,
                                  const RunContext& run) const;
 };

@@ -5,6 +5,7 @@
 #include "cli/file_kind.h"
 #include "covol/error.h"
 #include "covol/painted.h"
+#include "flags/one_label.h"
 
 namespace covol::tool {
 namespace {
@@ -13,17 +14,6 @@ std::string list_of(const std::vector<LabelName>& labels) {
     std::string text;
     for (const LabelName& label : labels) text += (text.empty() ? "" : ", ") + std::to_string(label.label);
     return text;
-}
-
-/// 1 where the label is.
-Image only(const Image& mask, int label) {
-    const auto [ni, nj, nk] = mask.geometry().size;
-    std::vector<std::uint8_t> values;
-    values.reserve(std::size_t(ni) * std::size_t(nj) * std::size_t(nk));
-    for (int k = 0; k < nk; ++k)
-        for (int j = 0; j < nj; ++j)
-            for (int i = 0; i < ni; ++i) values.push_back(mask.at(i, j, k) == label ? 1 : 0);
-    return Image::from_values(mask.geometry(), values.data());
 }
 
 }  // namespace

@@ -85,6 +85,16 @@ void separate_all(StructuresOutput& output, const SegmentOptions& options, const
     }
 }
 
+void add_seconds(Session& session, const SegmentReport::Seconds& seconds) {
+    session.add_seconds("distance", seconds.distance);
+    session.add_seconds("tag", seconds.tag);
+    session.add_seconds("coarse", seconds.coarse);
+    session.add_seconds("edge", seconds.edge);
+    session.add_seconds("solve", seconds.solve);
+    session.add_seconds("surface", seconds.surface);
+    session.add_seconds("total", seconds.total);
+}
+
 void summarise(const StructuresOutput& output, const SegmentJob& job, Session& session) {
     for (const StructureOutput& s : output.structures) {
         const std::string who = s.name.empty() ? "" : s.name + ": ";

@@ -1,0 +1,188 @@
+"""What the module computes: measured, and the same as the program's results on the same files."""
+import json
+import os
+import pathlib
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import covol
+from conftest import dice
+
+HERE = pathlib.Path(__file__).resolve().parent
+DATA = HERE.parents[1] / "houdini_free_examples/data"
+
+
+def run(program, *words):
+    return subprocess.run([program, *map(str, words), "--quiet"], capture_output=True, text=True, check=True)
+
+
+def described(program):
+    return json.loads(subprocess.run([program, "--describe-options"], capture_output=True, text=True, check=True).stdout)
+
+
+def test_accuracy(sphere, solved):
+    _, _, labels = sphere
+    assert dice(solved.mask, labels) > 0.99
+    assert solved.report["surface"]["volume"] == pytest.approx(4 / 3 * np.pi * 0.8**3, rel=0.02)
+    radius = np.linalg.norm(solved.mesh.vertices, axis=1)
+    assert abs(radius - 0.8).max() < 0.3 * solved.surface.voxel_size
+
+
+@pytest.mark.parametrize("kind, options", [("two-spheres", {}), ("torus", {"model": "paper", "max_steps": 20, "delta": "0.5vx"})])
+def test_the_program_gives_the_same(tmp_path, program, kind, options):
+    flags = [word for name, value in options.items() for word in ("--" + name.replace("_", "-"), str(value))]
+    image, points, mask, report = (tmp_path / name for name in ("i.nrrd", "p.ply", "m.nrrd", "r.json"))
+    run(program, "phantom", kind, "--size", 48, "--count", 900, "-o", image, "--points", points)
+    run(program, "segment", image, "--points", points, "-o", tmp_path / "s.vdb", "--mask", mask, "--mesh", tmp_path / "s.ply",
+        "--json", report, *flags)
+    result = covol.segment(image, points, **options)
+    assert np.array_equal(result.mask, covol.read_image(mask).array)
+    mesh = covol.read_mesh(tmp_path / "s.ply")
+    assert np.array_equal(mesh.faces, result.mesh.faces) and np.array_equal(mesh.vertices, result.mesh.vertices)
+    theirs = json.loads(report.read_text())
+    for part in ("resolved", "grid", "surface", "fit"):
+        assert result.report[part] == theirs[part]
+    # arrays in memory are the same job
+    read, marks = covol.read_image(image), covol.read_points(points)
+    again = covol.segment(np.array(read.array), marks.array, spacing=read.spacing, origin=read.origin, **options)
+    assert np.array_equal(again.mask, result.mask)
+
+
+def test_a_real_stack(tmp_path, program):
+    """The quickstart's embryo: marks in a table, a TIFF, voxels of 3 pixels."""
+    stack, marks, check = DATA / "celegans_embryo.tif", DATA / "celegans_marks.csv", DATA / "celegans_check.csv"
+    run(program, "segment", stack, "--points", marks, "--voxel-size", 3, "-o", tmp_path / "e.vdb", "--mask", tmp_path / "e.nrrd",
+        "--suggest", 2, "--json", tmp_path / "e.json")
+    result = covol.segment(stack, marks, voxel_size=3)
+    assert np.array_equal(result.mask, covol.read_image(tmp_path / "e.nrrd").array)
+    held_out = covol.read_points(check).to_world(result.image)
+    assert covol.distances(held_out, result)["mean"] < 1.0  # voxels; docs/commands/segment.md says 0.74
+    found = result.suggest(2)
+    theirs = json.loads((tmp_path / "e.json").read_text())["evidence"]["suggestions"]
+    assert len(found) == 2 and [(s.slice, s.area) for s in found] == [(s["slice"], s["area"]) for s in theirs]
+    for s in found:
+        assert np.allclose(result.image.index_to_world([s.index])[0], s.world) and round(s.index[0]) == s.slice
+
+
+def test_reconstruct(tmp_path, program):
+    cloud = tmp_path / "cloud.ply"
+    run(program, "phantom", "torus", "--size", 32, "--count", 3000, "-o", tmp_path / "i.nrrd", "--points", cloud)
+    run(program, "reconstruct", cloud, "-o", tmp_path / "t.vdb", "--mesh", tmp_path / "t.ply")
+    result = covol.reconstruct(cloud)
+    theirs = covol.read_mesh(tmp_path / "t.ply")
+    assert np.array_equal(theirs.vertices, result.mesh.vertices) and result.mesh.measure()["genus"] == 1
+    assert result.mesh.attributes["distance_to_points"].shape == (len(theirs.vertices),)
+    assert np.array_equal(covol.reconstruct(covol.read_points(cloud).array).mesh.vertices, theirs.vertices)
+    with pytest.raises(covol.Error, match="image"):
+        _ = result.mask
+
+
+def test_every_flag_is_an_option(program):
+    """Names are those of the flags, so that docs/commands tells of both; what is no option here is known."""
+    flags = {}
+    for command in described(program)["commands"]:
+        if command["name"] in ("segment", "reconstruct"):
+            for group in command["groups"]:
+                for option in group["options"] if group["name"] != "Help" else []:
+                    for flag in option["names"].split(", "):
+                        if flag.startswith("--"):
+                            flags[flag[2:].replace("-", "_")] = option
+    ours = covol.options()
+    assert set(ours) <= set(flags)
+    words = {"points_space", "points_order", "points_scale", "points", "contours", "painted", "inside", "outside", "guess", "init",
+             "spacing"}
+    files = {"output", "mask", "mesh", "density", "fields", "table", "evidence", "suggest", "half", "up", "unit_scale",
+             "channel", "frame", "correct_level_shift", "points_channels", "plain"}  # of reading and writing, which are functions of their own
+    later = {"painted_as", "painted_outside", "strict", "brick_voxels", "brick_overlap", "seam_tolerance"}
+    unknown = set(flags) - set(ours) - words - files - later
+    assert not unknown, f"flags without a keyword: {sorted(unknown)}"
+    for name, default in ours.items():  # where help shows a number, it is the default here
+        shown = flags[name]["default"]
+        try:
+            number = float(shown)
+        except ValueError:
+            continue
+        assert default is None or float(default) == number, (name, default, shown)
+
+
+def test_mesh_and_mask(tmp_path, solved, sphere):
+    image, _, labels = sphere
+    coarse = covol.mesh(solved, target_edge="3vx")
+    assert len(coarse.faces) < len(solved.mesh.faces) / 3 and coarse.measure()["closed"]
+    assert np.array_equal(covol.mask(solved.surface, image, label=7), 7 * solved.mask)
+    assert covol.compare(solved, image_of(labels, image))["dice"] > 0.99
+    assert covol.compare(solved.mesh, solved)["mean_distance"] < 0.1 * solved.surface.voxel_size
+    assert covol.compare(labels, labels)["dice"] == 1
+    for name in ("s.vdb", "s.ply", "s.nrrd"):
+        solved.save(tmp_path / name)
+    assert covol.compare(tmp_path / "s.nrrd", solved)["dice"] > 0.99
+    assert np.array_equal(covol.mesh(tmp_path / "s.vdb").vertices, covol.mesh(solved.surface).vertices)
+    solved.mesh.save(tmp_path / "up.glb", y_up=True)
+    solved.surface.save(tmp_path / "half.vdb", half=True)
+    assert (tmp_path / "half.vdb").stat().st_size < (tmp_path / "s.vdb").stat().st_size
+    assert np.allclose(covol.read_mesh(tmp_path / "up.glb").vertices, solved.mesh.vertices[:, [0, 2, 1]] * (1, 1, -1), atol=1e-6)
+    with pytest.raises(covol.Error) as error:
+        covol.mask(solved, image, label=0)
+    assert error.value.field == "label"
+
+
+def image_of(labels, like):
+    return covol.Image(labels, spacing=like.spacing, origin=like.origin, direction=like.direction)
+
+
+def test_contours_paint_and_guesses(sphere):
+    """Other kinds of marks reach the library."""
+    image, points, labels = sphere
+    angles = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    lines = []
+    for k in (9, 14, 19, 24, 29):
+        z = image.index_to_world([(k, 0, 0)])[0][2]
+        r = np.sqrt(0.64 - z * z)
+        lines.append(np.stack([r * np.cos(angles), r * np.sin(angles), np.full(24, z)], 1))
+    assert dice(covol.segment(image, contours=lines).mask, labels) > 0.96
+    painted = np.zeros_like(labels)
+    painted[8:33:6] = 3 * labels[8:33:6]
+    assert dice(covol.segment(image, painted=painted).mask, labels) > 0.96
+    shifted = np.roll(labels, 3, axis=2) * 5  # another program's mask, labelled 5, off to one side
+    corrected = covol.segment(image, points, guess=shifted).mask
+    assert set(np.unique(corrected)) == {0, 5} and dice(corrected, labels) > dice(shifted, labels) + 0.05
+    from_mask = covol.segment(image, points, init=covol.Image(labels, spacing=image.spacing, origin=image.origin))
+    assert dice(from_mask.mask, labels) > 0.98
+    around = 1.1 * np.concatenate([np.eye(3), -np.eye(3)])
+    seeds = covol.segment(image, points, inside=[[0, 0, 0]], outside=around)
+    assert seeds.report["seeds"] == {"inside": 1, "outside": 6, "wrong": 0, "wrong_inside": 0, "wrong_outside": 0}
+
+
+def test_shown_in_notebooks(solved, sphere):
+    cloud = covol.Points("<b>", [[0, 0, 0]], None, None, None, 1.0, False, None)
+    for thing in (solved, solved.mesh, solved.surface, sphere[0], cloud):
+        page = thing._repr_html_()
+        assert page.startswith("<div>") and page.endswith("</div>") and "<b></b>" not in page
+        assert repr(thing).startswith("<covol.")
+    assert "genus 0" in solved._repr_html_() and "&lt;b&gt;" in page
+
+
+def test_the_stub_is_up_to_date():
+    script = HERE.parents[1] / "tools/python/write_stub.py"
+    done = subprocess.run([sys.executable, "-B", script], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    text = script.with_name("covol").joinpath("__init__.pyi").read_text()
+    for name in covol.__all__:
+        assert f"def {name}(" in text or f"class {name}" in text, f"{name} is not in the stub"
+        assert getattr(covol, name).__doc__, f"{name} has no docstring"
+    for type_ in (covol.Image, covol.Points, covol.Mesh, covol.LevelSet, covol.Result):
+        for name, member in vars(type_).items():
+            assert name.startswith("_") or member.__doc__, f"{type_.__name__}.{name} has no docstring"
+
+
+def test_the_example(tmp_path):
+    done = subprocess.run([sys.executable, DATA.parent / "11_python.py"], capture_output=True, text=True, cwd=tmp_path,
+                          env={**os.environ, "COVOL_OUT": str(tmp_path)})
+    assert done.returncode == 0, done.stderr
+    for name in ("embryo.vdb", "embryo.ply", "embryo_mask.tif"):
+        assert (tmp_path / "python" / name).stat().st_size > 1000 and name in done.stdout
+    inside = int(done.stdout.split("voxels inside")[0].split()[-1])
+    assert covol.read_image(tmp_path / "python/embryo_mask.tif").array.sum() == inside

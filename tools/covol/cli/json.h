@@ -1,0 +1,8 @@
+#pragma once
+#include <nlohmann/json.hpp>
+
+namespace covol::tool {
+
+using Json = nlohmann::ordered_json;
+
+}  // namespace covol::tool

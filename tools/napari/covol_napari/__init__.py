@@ -1,0 +1,1 @@
+"""A plugin of napari that segments with covol."""

@@ -1,0 +1,11 @@
+# What is installed below /usr needs no path to its libraries, and Debian allows none.
+file(GLOB_RECURSE files ${CPACK_TEMPORARY_DIRECTORY}/*)
+foreach(file ${files})
+  if(IS_SYMLINK ${file} OR NOT file MATCHES "/(covol|[^/]*\\.so[^/]*)$")
+    continue()
+  endif()
+  file(READ ${file} magic LIMIT 4 HEX)
+  if(magic STREQUAL 7f454c46)
+    file(RPATH_REMOVE FILE ${file})
+  endif()
+endforeach()

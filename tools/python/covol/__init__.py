@@ -1,0 +1,307 @@
+"""covol finds the surface of a structure in a 3D image with the help of a few marks, and the surface behind a point cloud.
+
+    import covol
+    result = covol.segment(volume, marks, spacing=(0.35, 0.35, 1.0))
+    result.mask            # uint8, of the volume's shape
+    result.mesh.vertices   # (n, 3), x, y, z
+    result.save("cell.vdb")
+
+Arrays of voxels are indexed z, y, x, as SimpleITK's GetArrayFromImage() and tifffile give them. Positions, `spacing`, `origin`
+and `direction` are x, y, z in the image's own unit: world = origin + direction @ (spacing * (i, j, k)), LPS where it is anatomical,
+as SimpleITK has it; voxel centres are at whole numbers.
+
+Lengths among the options are world units, or voxels of the computation as in "3vx". An option that is None is chosen
+automatically. All of them: `covol.options()`, and docs/commands/segment.md, where they have the same names as flags.
+
+Functions raise covol.Error, with `code` and `field`. They release the GIL while they compute, and Ctrl-C stops them.
+"""
+import os
+
+import numpy as np
+
+from . import _covol, _html, _inputs
+from ._covol import Image, LevelSet, Mesh, Points, Result, __version__
+from ._errors import Error
+from ._inputs import from_affine, read_image, read_points, to_affine
+
+__all__ = ["Error", "Image", "LevelSet", "Mesh", "Points", "Result", "Suggestion", "compare", "distances", "from_affine", "mask",
+           "mesh", "options", "phantom", "read_image", "read_level_set", "read_mesh", "read_points", "reconstruct", "save_mask",
+           "segment", "suggest", "to_affine"]
+
+
+def segment(image, points=None, *, contours=None, painted=None, inside=None, outside=None, guess=None, init=None, spacing=None,
+            origin=None, direction=None, affine=None, points_space=None, points_order=None, points_scale=1.0, progress=None,
+            threads=0, memory_limit=0, **options):
+    """The surface of a structure in a 3D image, found with the help of marks.
+
+    Args:
+        image: array of shape (nz, ny, nx), of integers, floats or bools, with any strides; it is not copied where its numbers
+            are of at most 32 bits, or doubles, and must not change meanwhile. Or an Image, a file's path, or an image of nibabel.
+        points: marks on the surface, shape (n, 3); or Points, or a file.
+        contours: closed lines of marks on slices: a list of arrays of shape (n, 3), Points, or a file.
+        painted: label image of the image's shape with one label, painted on some slices or in some places.
+        inside, outside: positions whose side is known, shape (n, 3); or Points, or a file.
+        guess: another program's result that the marks correct: a mask of the image's shape, a LevelSet or a file.
+        init: how the level set starts, as the flag --init: "tag", "sphere:x,y,z,r", ...; or a mask or a LevelSet.
+        spacing, origin: three numbers, x, y, z, in the unit of the world; 1 and 0 where an array comes without.
+        direction: 3 x 3 (or its nine numbers row by row), whose columns are the image's axes i, j, k; perpendicular.
+        affine: instead of these three a 4 x 4 matrix from voxels (i, j, k) to RAS, as nibabel has it.
+        points_space: "world" (taken where nothing is stated), "index" (voxels from 0), "index1", "ras" or "local".
+        points_order: "xyz" (taken where nothing is stated) or "zyx".
+        points_scale: multiplies lengths of points.
+        progress: called with (stage, fraction) from the calling thread; what it raises stops the computation.
+        threads: at most so many; 0: all cores. Results do not depend on it.
+        memory_limit: bytes that may be taken; 0: no bound.
+        **options: see covol.options().
+
+    Returns:
+        Result.
+
+    Raises:
+        Error: "invalid_options" and "invalid_input" with the keyword in `field`; "io", "unsupported", "numerical".
+        KeyboardInterrupt: after Ctrl-C.
+    """
+    geometry = {"spacing": spacing, "origin": origin, "direction": direction, "affine": affine}
+    volume = _inputs.image(image, **geometry)
+    reading = {"points_space": points_space, "points_order": points_order, "points_scale": points_scale}
+    own = {"spacing": volume.spacing, "origin": volume.origin, "direction": volume.direction}
+
+    def like(value):
+        is_array = not (value is None or _inputs.is_path(value) or isinstance(value, (Image, LevelSet, Result)))
+        return _inputs.shape(value, **(own if is_array and not hasattr(value, "affine") else {}))
+
+    if painted is not None:
+        painted = _inputs.image(painted) if _inputs.is_path(painted) else like(painted)
+    if _inputs.is_path(guess):
+        guess = _guess_from(guess)
+    inputs = {"points": _inputs.points("points", points, reading),
+              "contours": _inputs.points("contours", contours, reading, lines=True),
+              "inside": _inputs.points("inside", inside, reading), "outside": _inputs.points("outside", outside, reading),
+              "painted": painted, "init": like(init), "guess": like(guess)}
+    return _covol.run("segment", volume, inputs, options, _inputs.call(progress, threads, memory_limit))
+
+
+def reconstruct(points=None, *, contours=None, inside=None, outside=None, init=None, normals=None, points_space=None,
+                points_order=None, points_scale=1.0, progress=None, threads=0, memory_limit=0, **options):
+    """The closed surface behind a point cloud, without an image and without normals.
+
+    Args:
+        points: positions, shape (n, 3), in world units; or Points, or a file. Normals that Points have are looked at.
+        normals: unit vectors, shape (n, 3), of `points` where these are an array. They are checked and not trusted.
+        contours, inside, outside, init, points_order, points_scale, progress, threads, memory_limit, **options: see segment().
+
+    Returns:
+        Result; it has no image, and so no mask.
+
+    Raises:
+        Error, KeyboardInterrupt: as segment().
+    """
+    reading = {"points_space": points_space, "points_order": points_order, "points_scale": points_scale}
+    inputs = {"points": _inputs.points("points", points, reading, normals=normals),
+              "contours": _inputs.points("contours", contours, reading, lines=True),
+              "inside": _inputs.points("inside", inside, reading), "outside": _inputs.points("outside", outside, reading),
+              "painted": None, "init": _inputs.shape(init), "guess": None}
+    return _covol.run("reconstruct", None, inputs, options, _inputs.call(progress, threads, memory_limit))
+
+
+def _guess_from(path):
+    """A mask is read, a level set too; meshes are named by their kind."""
+    path = os.fspath(path)
+    ending = os.path.splitext(path.lower())[1]
+    if ending in (".ply", ".obj", ".stl", ".off", ".glb"):
+        return "mesh:" + path
+    return "vdb:" + path if ".vdb" in path.lower() else read_image(path)
+
+
+def mesh(surface, *, isovalue=0.0, min_component=0.0, target_edge=0.0, adaptive=0.0, smooth=0, repair=False, progress=None,
+         threads=0):
+    """Closed, manifold, outward triangles of a level set.
+
+    Args:
+        surface: LevelSet, Result or the path of a .vdb file.
+        isovalue: this level outside the surface, a length.
+        min_component: pieces smaller than a cube of this edge are dropped.
+        target_edge: > 0: decimate to about this edge length.
+        adaptive: > 0: decimate as far as no triangle comes farther from the level set, at most "2vx".
+        smooth: steps of volume-keeping smoothing.
+        repair: resolve self-intersections, fill holes.
+
+    Returns:
+        Mesh. Raises Error.
+    """
+    return _covol.mesh(_level_set(surface), isovalue, min_component, target_edge, adaptive, smooth, repair,
+                       _inputs.call(progress, threads))
+
+
+def mask(surface, like, *, label=1, spacing=None, origin=None, direction=None, affine=None, progress=None, threads=0):
+    """Label image of a level set: `label` where a voxel's centre is inside, else 0.
+
+    Args:
+        surface: LevelSet, Result or the path of a .vdb file.
+        like: Image, array or file whose voxels the mask gets, as in segment().
+        label: 1 to 255.
+
+    Returns:
+        uint8 array of shape (nz, ny, nx). Raises Error.
+    """
+    lattice = _inputs.image(like, spacing, origin, direction, affine)
+    return _covol.mask(_level_set(surface), lattice, label, _inputs.call(progress, threads))
+
+
+def compare(a, b, *, label=0, label_b=None, spacing=None, origin=None, direction=None, affine=None, progress=None, threads=0):
+    """Overlap and surface distances of two solids.
+
+    Args:
+        a, b: masks (arrays, Images), Mesh, LevelSet, Result, or files of these, in any mix.
+        label: of masks; 0: any label. label_b: of b, where it differs.
+        spacing, origin, direction, affine: of arrays, as in segment().
+
+    Returns:
+        dict with dice, jaccard, volume_a, volume_b, and symmetric distances hausdorff, hausdorff95, mean_distance, in world
+        units. Raises Error.
+    """
+
+    def solid(value):
+        if isinstance(value, Result):
+            return value.surface
+        if isinstance(value, (Image, Mesh, LevelSet)):
+            return value
+        return os.fspath(value) if _inputs.is_path(value) else _inputs.image(value, spacing, origin, direction, affine)
+
+    return _covol.compare(solid(a), solid(b), label, label if label_b is None else label_b, _inputs.call(progress, threads))
+
+
+def distances(points, surface, *, progress=None, threads=0):
+    """How far points, shape (n, 3), lie from a surface (Mesh, LevelSet or Result): dict with mean, p95 and max, world units."""
+    triangles = surface if isinstance(surface, Mesh) else surface.mesh if isinstance(surface, Result) else mesh(surface)
+    return _covol.distances(points, triangles, _inputs.call(progress, threads))
+
+
+class Suggestion:
+    """A slice where marks would help.
+
+    Attributes:
+        slice: its index along z, from 0.
+        index: (z, y, x), the place in it where they would help most, in voxels.
+        world: (x, y, z), the same in the world.
+        area: the surface that marks along the outline there would hold, world units^2.
+    """
+
+    __slots__ = ("slice", "index", "world", "area")
+
+    def __init__(self, slice, index, world, area):
+        self.slice, self.index, self.world, self.area = slice, index, world, area
+
+    def __repr__(self):
+        return f"Suggestion(slice={self.slice}, index=({_html.numbers(self.index)}), area={self.area:.4g})"
+
+
+def suggest(result, count=3, *, progress=None, threads=0):
+    """The slices of a segmented image where new marks would help most, best first: a list of at most `count` Suggestions."""
+    return [Suggestion(*found) for found in _covol.Result._suggest(result, count, _inputs.call(progress, threads))]
+
+
+def read_level_set(path):
+    """The LevelSet of a .vdb file; of several in it "FILE.vdb:NAME" picks one. Raises Error."""
+    return _covol.read_level_set(os.fspath(path))
+
+
+def read_mesh(path):
+    """The Mesh of a PLY, OBJ, STL, OFF or GLB file. Raises Error."""
+    return _covol.read_mesh(os.fspath(path))
+
+
+def save_mask(path, voxels, like):
+    """Writes labels, an array of the shape of the Image `like`, in its geometry: .nrrd, .nii, .nii.gz, .mha, .tif."""
+    _covol.save_mask(os.fspath(path), voxels, _inputs.image(like))
+
+
+def phantom(kind="sphere", size=128, points=3000, noise=0.0, seed=1):
+    """A test shape: (Image, points of shape (n, 3), its true labels of the image's shape); kinds as of `covol phantom`."""
+    return _covol.phantom(kind, size, points, noise, seed)
+
+
+def options():
+    """The options of segment() and reconstruct() and their defaults; None is chosen automatically. reconstruct() has rho = 0."""
+    return {name: default for name, _, default in _covol.list_options()}
+
+
+def _level_set(surface):
+    if isinstance(surface, Result):
+        return surface.surface
+    return read_level_set(surface) if _inputs.is_path(surface) else surface
+
+
+# ---- what Python adds to the types of the extension module ------------------------------------------------------------------
+
+
+def _once(make):
+    """A property that is made when it is first asked for."""
+    name = "_made_" + make.__name__
+
+    def get(self):
+        if name not in self.__dict__:
+            self.__dict__[name] = make(self)
+        return self.__dict__[name]
+
+    return property(get, doc=make.__doc__)
+
+
+def _result_report(self):
+    """The report that `covol segment --json` writes: a dict."""
+    return self._report()
+
+
+def _result_mask(self):
+    """uint8 array of the image's shape: 1 inside. Of a guess that was a mask, its own labels, corrected."""
+    return self._mask(_inputs.call())
+
+
+def _save_result(self, path):
+    """Writes the level set (.vdb), the mesh (.ply, .obj, .stl, .off, .glb) or the mask (as save_mask()), by the name's end."""
+    path = os.fspath(path)
+    ending = os.path.splitext(path.lower())[1]
+    if ending == ".vdb":
+        self.surface.save(path)
+    elif ending in (".ply", ".obj", ".stl", ".off", ".glb"):
+        self.mesh.save(path)
+    else:
+        save_mask(path, self.mask, self.image)
+
+
+Result.report = _once(_result_report)
+Result.mask = _once(_result_mask)
+Result.warnings = property(lambda self: self.report["warnings"], doc="What a person has to look at, in plain words.")
+Result.suggest = suggest
+Result.save = _save_result
+Result.__repr__ = lambda self: "<covol.Result: volume {volume:.5g}, area {area:.5g}>".format(**self.report["surface"])
+Result._repr_html_ = _html.result
+Image.affine = property(to_affine, doc="4 x 4, voxels (i, j, k) to RAS, as nibabel has it.")
+Image.__repr__ = lambda self: f"<covol.Image {self.shape} {self.dtype}, spacing {_html.numbers(self.spacing)} {self.unit}>"
+Image._repr_html_ = _html.image
+Points.__repr__ = lambda self: f"<covol.Points: {len(self)} in {self.space}>"
+Points._repr_html_ = _html.points
+Mesh.__repr__ = lambda self: f"<covol.Mesh: {len(self.vertices)} vertices, {len(self.faces)} faces>"
+Mesh._repr_html_ = _html.mesh
+LevelSet.__repr__ = lambda self: f"<covol.LevelSet: voxels of {self.voxel_size:.5g}>"
+LevelSet._repr_html_ = _html.level_set
+read_image.__doc__ = """Reads a 3D image in its own number type.
+
+Args:
+    path: TIFF, OME-Zarr, NRRD, NIfTI, MetaImage, DICOM, MRC, HDF5 or .vdb, see docs/formats.md.
+    spacing: instead of the file's. channel, frame: of several. roi: two corners of the world.
+
+Returns:
+    Image: array (z, y, x; shares the file's memory where it is mapped), spacing, origin, direction, unit. Raises Error.
+"""
+read_points.__doc__ = """Reads marks or a cloud: tables, marks of Fiji, napari, 3D Slicer and ITK-SNAP, PLY, OBJ, PCD, LAS.
+
+Args:
+    path: see docs/formats.md. points_space, points_order, points_scale, points_channels: instead of what the format says.
+
+Returns:
+    Points: array of shape (n, 3) in its `space`, lines, normals; to_world(image) gives world positions. Raises Error.
+"""
+for _type in (Error, Image, LevelSet, Mesh, Points, Result, Suggestion, read_image, read_points, from_affine, to_affine):
+    _type.__module__ = "covol"
+del _type

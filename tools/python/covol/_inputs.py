@@ -1,0 +1,112 @@
+"""What people pass in, as the types of the extension module."""
+import collections.abc
+import logging
+import os
+
+import numpy as np
+
+from . import _covol
+from ._errors import Error
+
+_log = logging.getLogger("covol")
+
+
+def call(progress=None, threads=0, memory_limit=0):
+    """How a function runs; automatic choices and warnings go to the logger "covol"."""
+    if progress is not None and not callable(progress):
+        raise Error("progress: expected a function of (stage, fraction)", "invalid_options", "progress")
+    return _covol.Call(progress, lambda warns, line: _log.log(logging.WARNING if warns else logging.INFO, line),
+                       threads, memory_limit)
+
+
+def is_path(value):
+    return isinstance(value, (str, os.PathLike))
+
+
+def image(value, spacing=None, origin=None, direction=None, affine=None, name="image"):
+    """An Image from an array, a file, an Image or what nibabel reads."""
+    if affine is not None:
+        if spacing is not None or origin is not None or direction is not None:
+            raise Error("affine: expected without spacing, origin and direction", "invalid_options", "affine")
+        spacing, origin, direction = from_affine(affine)
+    given = {"spacing": spacing, "origin": origin, "direction": direction}
+    if is_path(value):
+        if origin is not None or direction is not None:
+            raise Error("origin, direction: expected for an array, got a file, which has its own", "invalid_options",
+                        "origin")
+        return read_image(value, spacing=spacing)
+    if isinstance(value, _covol.Image):
+        if all(v is None for v in given.values()):
+            return value
+        own = {"spacing": value.spacing, "origin": value.origin, "direction": value.direction}
+        given = {key: own[key] if v is None else v for key, v in given.items()}
+        return _covol.Image(value.array, unit=value.unit, **given)
+    if hasattr(value, "affine") and hasattr(value, "dataobj"):  # nibabel: x, y, z and RAS
+        if all(v is None for v in given.values()):
+            given = dict(zip(given, from_affine(value.affine)))
+        unit = value.header.get_xyzt_units()[0] if hasattr(value.header, "get_xyzt_units") else ""
+        return _covol.Image(np.asanyarray(value.dataobj).T, unit={"micron": "um", "unknown": ""}.get(unit, unit), **given)
+    return _covol.Image(value, **given)
+
+
+def from_affine(affine):
+    """Spacing, origin and direction (LPS) of an affine matrix that maps voxels (i, j, k) to RAS, as nibabel has it.
+
+    Raises Error where its axes are not perpendicular.
+    """
+    matrix = np.asarray(affine, float)
+    if matrix.shape != (4, 4):
+        raise Error(f"affine: expected shape (4, 4), got {matrix.shape}", "invalid_options", "affine")
+    matrix = np.diag([-1.0, -1.0, 1.0, 1.0]) @ matrix
+    spacing = np.linalg.norm(matrix[:3, :3], axis=0)
+    if not np.all(np.isfinite(matrix)) or np.any(spacing == 0):
+        raise Error("affine: expected finite numbers and no axis of length 0", "invalid_input", "affine")
+    return spacing, matrix[:3, 3], matrix[:3, :3] / spacing
+
+
+def to_affine(img):
+    """The affine matrix of an Image: voxels (i, j, k) to RAS, as nibabel has it."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.asarray(img.direction) * np.asarray(img.spacing)
+    matrix[:3, 3] = img.origin
+    return np.diag([-1.0, -1.0, 1.0, 1.0]) @ matrix
+
+
+def read_image(path, *, spacing=None, channel=None, frame=None, roi=None, correct_level_shift=False, progress=None,
+               threads=0, memory_limit=0):
+    number = lambda n: -1 if n is None else int(n)
+    return _covol.read_image(os.fspath(path), spacing, number(channel), number(frame), roi, correct_level_shift,
+                             call(progress, threads, memory_limit))
+
+
+def read_points(path, *, points_space=None, points_order=None, points_scale=1.0, points_channels=1):
+    return _covol.read_points(os.fspath(path), points_space, points_order, points_scale, points_channels)
+
+
+def points(name, value, reading, lines=False, normals=None):
+    """A list of Points from None, a file, Points, several of these, positions or, with `lines`, closed lines of positions."""
+    if value is None:
+        return []
+    if isinstance(value, _covol.Points):
+        return [value]
+    if is_path(value):
+        return [read_points(value, **reading)]
+    if isinstance(value, (list, tuple)) and value and all(isinstance(v, _covol.Points) or is_path(v) for v in value):
+        return [cloud for v in value for cloud in points(name, v, reading)]  # of one structure
+    keywords = (reading["points_space"], reading["points_order"], reading["points_scale"])
+    if lines:
+        if not isinstance(value, collections.abc.Iterable):
+            raise Error(f"{name}: expected a list of lines", "invalid_input", name)
+        return [_covol.Points(name, None, list(value), *keywords, True, None)]
+    return [_covol.Points(name, value, None, *keywords, True, normals)]
+
+
+def shape(value, **geometry):
+    """A start or a guess: a text or a file's path, a LevelSet, a mask."""
+    if value is None or isinstance(value, (_covol.LevelSet, _covol.Image, str)):
+        return value
+    if isinstance(value, _covol.Result):
+        return value.surface
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    return image(value, **geometry)
