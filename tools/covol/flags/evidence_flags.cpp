@@ -36,8 +36,8 @@ void EvidenceFlags::bind(CLI::App& command) {
 
 void EvidenceFlags::check(Outputs& outputs, const std::string& path_of_this_run) const {
     outputs.check("--evidence", path_of_this_run, OutputKind::Table);
-    if (suggestions < 0)
-        throw Error(Errc::InvalidOptions, "--suggest: expected >= 0, got " + std::to_string(suggestions));
+    if (suggestions.value_or(0) < 0)
+        throw Error(Errc::InvalidOptions, "--suggest: expected >= 0, got " + std::to_string(*suggestions));
 }
 
 Evidence EvidenceFlags::judge(const SegmentResult& result, const std::vector<Vec3>& marks, const Image& image,
@@ -46,7 +46,7 @@ Evidence EvidenceFlags::judge(const SegmentResult& result, const std::vector<Vec
     EvidenceOptions options;
     const double range = used.evolve.attraction_range.value_or(0);
     options.reach = range > 0 ? range : kReachVoxels * *used.voxel_size;
-    options.suggestions = suggestions;
+    options.suggestions = suggestions.value_or(for_page ? kPageSuggestions : 0);
     // Brightness is nowhere 0 as slopes are, and g falls below 1/2 before there is a line.
     if (used.edge.feature > EdgeFeature::Slope) options.weak_edge = kWeakLine;
     // Where the image had no weight its edges are looked up now.
