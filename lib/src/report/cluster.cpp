@@ -9,8 +9,8 @@
 namespace covol::detail {
 namespace {
 
-constexpr double kGrowth = 1.15;        // of the cells, until the triangles are few enough
-constexpr double kFirstShare = 0.8;     // of the edge at which that is expected: too fine costs a turn, too coarse detail
+constexpr double kGrowth = 1.15;     // of the cells, until the triangles are few enough
+constexpr double kFirstShare = 0.8;  // of the edge at which that is expected: too fine costs a turn, too coarse detail
 constexpr std::uint64_t kAxisBits = 21;  // of a cell's number
 
 struct Box {

@@ -43,9 +43,7 @@ VoxelBox around(const ImageGeometry& geometry, const VoxelBox& held, const std::
     VoxelBox box = held;
     for (int a = 0; a < 3; ++a) {
         const double margin = kMargin * longest / geometry.spacing[a];
-        const auto clamped = [&](double at) {
-            return int(std::clamp(at, double(held.min[a]), double(held.max[a])));
-        };
+        const auto clamped = [&](double at) { return int(std::clamp(at, double(held.min[a]), double(held.max[a]))); };
         box.min[a] = clamped(std::floor(low[a] - margin));
         box.max[a] = clamped(std::ceil(high[a] + margin));
     }

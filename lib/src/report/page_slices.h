@@ -21,7 +21,8 @@ struct SlicePlan {
 [[nodiscard]] SlicePlan plan_slices(const ImageGeometry& geometry, const VoxelBox& held,
                                     const std::vector<Vec3>& places, std::int64_t most);
 
-/// Slices along k, each a grey JPEG: black and white are the intensities that 0.2 % and 99.8 % of the voxels stay below.
+/// Slices along k, each a grey JPEG: black and white are the intensities that 0.2 % and 99.8 % of the voxels stay
+/// below.
 struct CodedSlices {
     ImageGeometry geometry;  ///< of the voxels that are shown
     double black = 0, white = 0;

@@ -67,18 +67,19 @@ Json to_json(const PageStructure& structure, const ReportPageOptions& options, s
         const detail::CodedValues own = detail::encode(numbers, coded.from);
         values[name] = {{"min", own.min}, {"max", own.max}, {"data", pack(own.steps)}};
     }
-    Json json{{"name", structure.name},
-              {"color", structure.color},
-              {"mesh",
-               {{"vertices", coded.vertex_count},
-                {"triangles", coded.triangle_count},
-                {"of_triangles", structure.mesh->triangles.size()},
-                {"min", coded.min},
-                {"max", coded.max},
-                {"positions", pack(coded.positions)},
-                {"corners", pack(coded.corners)},
-                {"values", values}}},
-              {"marks", {{"count", structure.marks.size()}, {"data", packed_marks(structure.marks, options.most_marks)}}}};
+    Json json{
+        {"name", structure.name},
+        {"color", structure.color},
+        {"mesh",
+         {{"vertices", coded.vertex_count},
+          {"triangles", coded.triangle_count},
+          {"of_triangles", structure.mesh->triangles.size()},
+          {"min", coded.min},
+          {"max", coded.max},
+          {"positions", pack(coded.positions)},
+          {"corners", pack(coded.corners)},
+          {"values", values}}},
+        {"marks", {{"count", structure.marks.size()}, {"data", packed_marks(structure.marks, options.most_marks)}}}};
     if (structure.evidence != nullptr) json["evidence"] = to_json(*structure.evidence);
     return json;
 }
@@ -113,8 +114,7 @@ Json to_json(const Image& image, const detail::SlicePlan& plan, const ReportPage
 
 void check(const ReportPage& page, const ReportPageOptions& options) {
     detail::require_valid(options, "write_report_page");
-    if (page.structures.empty())
-        throw Error(Errc::InvalidInput, "write_report_page: expected a structure, got none");
+    if (page.structures.empty()) throw Error(Errc::InvalidInput, "write_report_page: expected a structure, got none");
     for (const PageStructure& structure : page.structures)
         if (structure.mesh == nullptr || structure.mesh->empty())
             throw Error(Errc::InvalidInput,
@@ -126,12 +126,9 @@ Json data_of(const ReportPage& page, const ReportPageOptions& options, ReportPag
     Json facts = Json::parse(page.facts, nullptr, false);
     if (!facts.is_object())
         throw Error(Errc::InvalidInput, "write_report_page: facts: expected a JSON object, got something else");
-    Json data{{"covol", version()},
-              {"title", page.title},
-              {"unit", page.unit},
-              {"anatomical", page.is_anatomical},
-              {"facts", std::move(facts)},
-              {"structures", Json::array()}};
+    Json data{{"covol", version()},        {"title", page.title},
+              {"unit", page.unit},         {"anatomical", page.is_anatomical},
+              {"facts", std::move(facts)}, {"structures", Json::array()}};
     double all = 0;
     for (const PageStructure& structure : page.structures) all += double(structure.mesh->triangles.size());
     for (const PageStructure& structure : page.structures) {
@@ -170,9 +167,8 @@ ReportPageSummary write_report_page(const std::string& path, const ReportPage& p
     check(page, options);
     ReportPageSummary summary;
     std::string data;
-    with_threads(run, [&] {
-        data = data_of(page, options, summary, run).dump(-1, ' ', true, Json::error_handler_t::replace);
-    });
+    with_threads(
+        run, [&] { data = data_of(page, options, summary, run).dump(-1, ' ', true, Json::error_handler_t::replace); });
     data = detail::safe_in_script(data);
     const std::string_view viewer = detail::viewer();
     constexpr std::string_view kTitle = "{{title}}", kData = "{{data}}";

@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "covol/surface.h"
 #include "covol/start.h"
+#include "covol/surface.h"
 #include "report/cluster.h"
 #include "report/encoding.h"
 #include "report/mesh_codec.h"
@@ -31,7 +31,9 @@ TriangleMesh sphere() {
     return extract_mesh(*extract_surface(*start_from_sphere(domain, kCenter, kRadius)));
 }
 
-double away(const std::array<float, 3>& v) { return std::hypot(v[0] - kCenter[0], v[1] - kCenter[1], v[2] - kCenter[2]); }
+double away(const std::array<float, 3>& v) {
+    return std::hypot(v[0] - kCenter[0], v[1] - kCenter[1], v[2] - kCenter[2]);
+}
 
 /// A box of voxels whose values grow along k.
 Image ramp(const Index3& size) {

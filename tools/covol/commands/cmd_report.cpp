@@ -67,9 +67,8 @@ struct ReportPageJob {
             page->unit = (*slices)->geometry().unit;
             page->is_anatomical = is_anatomical(image_path, image.options, session.run());
         }
-        session.outputs().add(output, [page, kept, slices, &session](const std::string& path) {
-            write_page(path, *page, session);
-        });
+        session.outputs().add(
+            output, [page, kept, slices, &session](const std::string& path) { write_page(path, *page, session); });
     }
 
 private:
@@ -77,7 +76,8 @@ private:
     [[nodiscard]] Json read_facts(const Session& session) const {
         Json facts = page_facts(session);
         if (run_report.empty()) {
-            for (const auto& [key, value] : list_vdb(input).front().metadata) {
+            const std::vector<VdbGridInfo> grids = list_vdb(input);
+            for (const auto& [key, value] : grids.front().metadata) {
                 const Json said = Json::parse(value, nullptr, false);
                 if (said.is_discarded()) continue;
                 if (key == "covol_resolved") facts["resolved"] = said;
@@ -189,9 +189,7 @@ void add_report(Session& session) {
         ->required()
         ->type_name("IN.vdb[:NAME]");
     in_group(*command, Group::Output);
-    command->add_option("-o,--output", job->output, "the page; it needs no network")
-        ->required()
-        ->type_name("OUT.html");
+    command->add_option("-o,--output", job->output, "the page; it needs no network")->required()->type_name("OUT.html");
     in_group(*command, Group::Input);
     command->add_option("--image", job->image_path, "image for the slices")->type_name("IMAGE");
     command
@@ -209,7 +207,8 @@ void add_report(Session& session) {
         ->capture_default_str();
     job->contours.bind(*command, true);
     job->image.bind(*command);
-    session.help().show_first(*command, {"--image", "--points", "--contours", "--run-report", "--suggest", "--channel"});
+    session.help().show_first(*command,
+                              {"--image", "--points", "--contours", "--run-report", "--suggest", "--channel"});
 }
 
 }  // namespace covol::tool
