@@ -35,7 +35,7 @@ function slider(label, min, max, value, change) {
 export function toolbar(data, state, volume, view) {
   const names = [0, 1, 2].map((axis) => volume ? planeName(volume, axis, data.anatomical) : 'xyz'[axis]);
   const parts = [];
-  if (data.structures.some((s) => s.marks.length > 0)) parts.push(toggle('marks', true, (marks) => state.set({marks}), {'data-key': 'marks'}));
+  if (data.structures.some((s) => s.marks.length > 0)) parts.push(toggle('marks', state.get('marks'), (marks) => state.set({marks}), {'data-key': 'marks'}));
   if (volume)
     parts.push(el('div', {class: 'choice', role: 'group', 'aria-label': 'slice planes'}, el('span', {}, 'slices'), [2, 1, 0].map((axis) =>
       toggle(names[axis], state.get('planes')[axis], (on) => {
@@ -61,7 +61,7 @@ export function toolbar(data, state, volume, view) {
 export function contrast(state) {
   const window = {black: 0, white: 255};
   const set = (name) => (share) => { window[name] = Math.round(255 * share); state.set({grey: greyTable(window)}); };
-  return el('div', {class: 'contrast'}, slider('black', 0, 1, 0, set('black')), slider('white', 0, 1, 1, set('white')));
+  return el('div', {class: 'contrast'}, el('span', {}, 'contrast'), slider('black', 0, 1, 0, set('black')), slider('white', 0, 1, 1, set('white')));
 }
 
 export function greyTable({black, white}) {

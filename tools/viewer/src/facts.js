@@ -66,7 +66,7 @@ function optionRows(facts, data) {
   for (const name of new Set([...Object.keys(automatic), ...Object.keys(resolved)])) {
     const reason = automatic[name], value = name in resolved ? text(resolved[name]) : '';
     if (value === '\u2013' && !reason) continue;  // not needed, and so not chosen
-    rows.push({name: name.replace(/_/g, ' '), value, how: isGiven(name) ? 'given' : reason ? 'automatic' : 'default', reason: reason ?? ''});
+    rows.push({name: name.replace(/_/g, ' '), value, how: isGiven(name) && name in resolved ? 'given' : reason ? 'automatic' : 'default', reason: reason ?? ''});
   }
   const rank = {automatic: 0, given: 1, default: 2};
   return rows.sort((a, b) => rank[a.how] - rank[b.how]);

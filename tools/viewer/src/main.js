@@ -9,6 +9,8 @@ import {SlicePanel} from './slices.js';
 import {State} from './state.js';
 import {Volume} from './volume.js';
 
+const MOST_MARKS = 10000;  // more hide what they lie on, at first
+
 function middleOf(structures, volume) {
   const low = [Infinity, Infinity, Infinity], high = low.map((x) => -x);
   for (const {mesh} of structures)
@@ -96,7 +98,7 @@ async function start() {
     structure.markIndex = indexCoordinates(structure.marks, volume);
   }
   const slices = volume ? middleOf(data.structures, volume) : [0, 0, 0];
-  const state = new State({slices, visible: data.structures.map(() => true), marks: true, planes: [false, false, Boolean(volume)], cut: -1, flip: false,
+  const state = new State({slices, visible: data.structures.map(() => true), marks: !data.structures.some((s) => s.markCount > MOST_MARKS), planes: [false, false, Boolean(volume)], cut: -1, flip: false,
     cutShare: 0.5, opacity: 1, coloring: 'structure', grey: greyTable({black: 0, white: 255}), focus: null, large: -1, decoded: 0, theme: 'light'});
   const theme = themeButton(state);
   if (volume) await volume.decodeSlice(slices[2]);

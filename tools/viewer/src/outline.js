@@ -13,7 +13,7 @@ export function indexCoordinates(positions, volume) {
 }
 
 /** The segments x0, y0, x1, y1, ... in which triangles cross coordinates[axis] = at, in the two other axes. */
-export function cross(coordinates, corners, axis, at, [right, down]) {
+function cross(coordinates, corners, axis, at, [right, down]) {
   const along = coordinates[axis], xs = coordinates[right], ys = coordinates[down], segments = [];
   // A vertex on the plane counts as above it: no segment is found twice or lost.
   const edge = (a, b) => {
@@ -28,5 +28,16 @@ export function cross(coordinates, corners, axis, at, [right, down]) {
     if ((above >> 1 & 1) !== (above >> 2)) edge(b, c);
     if ((above & 1) !== (above >> 2)) edge(c, a);
   }
+  return segments;
+}
+
+/** A structure's outline on a slice; the last one of each axis is kept. */
+export function outlineAt(structure, axis, at, axes) {
+  structure.outlines ??= [];
+  const known = structure.outlines[axis];
+  if (known?.at === at) return known.segments;
+  // A lattice of marching cubes has vertices on slices: a little beside them no triangle lies in the plane.
+  const segments = cross(structure.index, structure.corners, axis, at + 1e-4, axes);
+  structure.outlines[axis] = {at, segments};
   return segments;
 }

@@ -1,11 +1,12 @@
 // The 3D view: surfaces, marks, three textured slice planes.
 import {
   AmbientLight, Box3, BufferAttribute, BufferGeometry, Color, DataTexture, DirectionalLight, DoubleSide, Group, IcosahedronGeometry,
-  InstancedMesh, LineBasicMaterial, LineLoop, LinearFilter, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial,
+  InstancedMesh, LineBasicMaterial, LineLoop, LineSegments, LinearFilter, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial,
   MeshStandardMaterial, PerspectiveCamera, Plane, Points, PointsMaterial, Scene, Sphere, SRGBColorSpace, Vector3, WebGLRenderer,
 } from 'three';
 import {OrbitControls} from 'three/examples/jsm/controls/OrbitControls.js';
 import {rangeOf, vertexColors} from './colors.js';
+import {outlineAt} from './outline.js';
 
 const MOST_BALLS = 4000;  // marks as balls; more are points
 const AXIS_COLORS = ['#d9574a', '#4f9e57', '#4a7fd1'];
@@ -39,7 +40,7 @@ export class View3D {
   }
 
   addLights() {
-    const key = new DirectionalLight(0xffffff, 2.5), fill = new DirectionalLight(0xdfe8ff, 0.9), rim = new DirectionalLight(0xffffff, 0.7);
+    const key = new DirectionalLight(0xffffff, 2.7), fill = new DirectionalLight(0xdfe8ff, 0.9), rim = new DirectionalLight(0xffffff, 0.7);
     key.position.set(-0.7, 0.9, 1.1);
     fill.position.set(1.2, -0.1, 0.7);
     rim.position.set(0.2, 0.8, -1.2);
@@ -47,7 +48,7 @@ export class View3D {
       this.camera.add(light, light.target);  // they turn with the eye
       light.target.position.set(0, 0, 0);
     }
-    this.scene.add(new AmbientLight(0xffffff, 0.55));
+    this.scene.add(new AmbientLight(0xffffff, 0.4));
   }
 
   addSurfaces() {
@@ -98,9 +99,14 @@ export class View3D {
       const border = new LineLoop(new BufferGeometry().setAttribute('position', geometry.getAttribute('position')),
         new LineBasicMaterial({color: AXIS_COLORS[axis]}));
       mesh.frustumCulled = border.frustumCulled = false;
-      const group = new Group().add(mesh, border);
+      const outlines = this.data.structures.map((structure) => {
+        const lines = new LineSegments(new BufferGeometry(), new LineBasicMaterial({color: rgbColor(structure.color)}));
+        lines.frustumCulled = false;
+        return lines;
+      });
+      const group = new Group().add(mesh, border, ...outlines);
       this.scene.add(group);
-      return {group, mesh};
+      return {group, mesh, outlines};
     });
     for (const axis of [0, 1, 2]) this.movePlane(axis);
   }
@@ -125,7 +131,28 @@ export class View3D {
       position.setXYZ(n, ...volume.toWorld(index));
     });
     position.needsUpdate = true;
-    if (group.visible) this.paintPlane(axis);
+    if (!group.visible) return;
+    this.paintPlane(axis);
+    this.drawOutlines(axis, at, right, down);
+  }
+
+  /** The surfaces' outlines on a plane, seen from both of its sides. */
+  drawOutlines(axis, at, right, down) {
+    const {volume} = this, lift = 0.002 * this.sphere.radius / volume.spacing[axis];
+    this.planes[axis].outlines.forEach((lines, n) => {
+      const structure = this.data.structures[n], segments = outlineAt(structure, axis, at, [right, down]);
+      const places = new Float32Array(3 * segments.length), index = [0, 0, 0];
+      for (const [side, offset] of [[0, -lift], [1, lift]])
+        for (let s = 0; s < segments.length; s += 2) {
+          index[axis] = at + offset;
+          index[right] = segments[s];
+          index[down] = segments[s + 1];
+          places.set(volume.toWorld(index), 3 * (s / 2 + side * segments.length / 2));
+        }
+      lines.geometry.dispose();
+      lines.geometry = new BufferGeometry().setAttribute('position', new BufferAttribute(places, 3));
+      lines.visible = this.state.get('visible')[n];
+    });
   }
 
   paintPlane(axis) {
@@ -149,7 +176,8 @@ export class View3D {
       this.updateClip();
       this.draw();
     });
-    state.on(['cut', 'flip'], () => { this.updateClip(); this.draw(); });
+    state.on(['cut'], () => { this.turnCut(); this.updateClip(); this.draw(); });
+    state.on(['flip'], () => { this.updateClip(); this.draw(); });
     state.on(['visible', 'marks', 'opacity'], () => { this.updateVisible(); this.draw(); });
     state.on(['coloring'], () => { this.updateColors(); this.draw(); });
     state.on(['focus'], () => this.showFocus());
@@ -163,6 +191,7 @@ export class View3D {
       const visible = this.state.get('visible')[n], material = this.surfaces[n].material;
       this.surfaces[n].visible = visible && opacity > 0;
       this.marks[n].visible = visible && this.state.get('marks');
+      for (const plane of this.planes ?? []) plane.outlines[n].visible = visible;
       const transparent = opacity < 1;
       if (material.transparent !== transparent) material.needsUpdate = true;
       material.transparent = transparent;
@@ -171,12 +200,20 @@ export class View3D {
     });
   }
 
-  /** The half behind the slice of an axis is cut away. */
+  /** The half that is cut away is the one in front. */
+  turnCut() {
+    const axis = this.state.get('cut');
+    if (axis < 0) return;
+    const {normal, place} = this.cutAt(axis);
+    this.cutSign = Math.sign(normal.dot(this.camera.position.clone().sub(place))) || 1;
+  }
+
+  /** One half beside the slice of an axis is cut away. */
   updateClip() {
     const axis = this.state.get('cut');
     let planes = null;
     if (axis >= 0) {
-      const sign = this.state.get('flip') ? -1 : 1;
+      const sign = (this.state.get('flip') ? -1 : 1) * (this.cutSign ?? 1);
       const {normal, place} = this.cutAt(axis);
       this.clip.setFromNormalAndCoplanarPoint(normal.multiplyScalar(-sign), place);
       planes = [this.clip];

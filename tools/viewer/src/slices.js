@@ -1,9 +1,10 @@
 // The slice viewer: three planes of the image with the surfaces' outlines and the marks.
 import {colorOf, el, number} from './dom.js';
-import {cross} from './outline.js';
+import {outlineAt} from './outline.js';
 import {AXIS_COLORS} from './scene.js';
 
 const LETTERS = [['R', 'L'], ['A', 'P'], ['I', 'S']];  // towards - and + of the world's axes, LPS
+const MANY_MARKS = 100;
 const PLANES = ['sagittal', 'coronal', 'axial'];
 
 /** The world axis that an image axis runs along most. */
@@ -154,12 +155,7 @@ export class SlicePanel {
   }
 
   outline(structure) {
-    structure.outlines ??= [];
-    const known = structure.outlines[this.axis];
-    if (known?.at === this.at) return known.segments;
-    const segments = cross(structure.index, structure.corners, this.axis, this.at + 1e-4, [this.right, this.down]);
-    structure.outlines[this.axis] = {at: this.at, segments};
-    return segments;
+    return outlineAt(structure, this.axis, this.at, [this.right, this.down]);
   }
 
   drawOutlines(context) {
@@ -186,12 +182,14 @@ export class SlicePanel {
       context.fillStyle = this.data.structures.length > 1 ? colorOf(structure.color) : '#2fb6ff';
       context.strokeStyle = 'rgba(0, 0, 0, 0.75)';
       context.lineWidth = 1;
-      for (let m = 0; m < along.length; ++m) {
-        if (Math.abs(along[m] - this.at) > half + 1e-3) continue;
+      const here = [];
+      for (let m = 0; m < along.length; ++m) if (Math.abs(along[m] - this.at) <= half + 1e-3) here.push(m);
+      const many = here.length > MANY_MARKS;  // these would hide the outline
+      for (const m of here) {
         context.beginPath();
-        context.arc(...this.place(xs[m], ys[m]), 3, 0, 2 * Math.PI);
+        context.arc(...this.place(xs[m], ys[m]), many ? 1.25 : 3, 0, 2 * Math.PI);
         context.fill();
-        context.stroke();
+        if (!many) context.stroke();
       }
     });
   }
@@ -215,7 +213,8 @@ export class SlicePanel {
   drawScale(context, width, height) {
     const most = Math.min(120, width / 4) / this.layout.scale, tens = 10 ** Math.floor(Math.log10(most));
     const length = [5, 2, 1].map((n) => n * tens).find((n) => n <= most), pixels = length * this.layout.scale;
-    const x = width - 12 - pixels, y = height - 12;
+    // On the picture itself, where there is room.
+    const {left, top} = this.layout, x = width - Math.max(12, left + 10) - pixels, y = height - Math.max(12, top + 10);
     const text = `${number(length)}${this.data.unitText ? ` ${this.data.unitText}` : ''}`;
     context.font = '11px system-ui, sans-serif';
     context.textAlign = 'center';
