@@ -14,8 +14,10 @@ export function structureFacts(data) {
 function warningsOf(data) {
   const warnings = Array.isArray(data.facts.warnings) ? data.facts.warnings : [];
   if (warnings.length === 0) return null;
-  return el('aside', {class: 'notice', role: 'note'}, el('strong', {}, warnings.length > 1 ? 'Warnings' : 'Warning'),
+  const label = warnings.length > 1 ? `${warnings.length} warnings` : '1 warning';
+  const element = el('aside', {class: 'notice', id: 'warnings', role: 'note'}, el('strong', {}, label),
     el('ul', {}, warnings.map((line) => el('li', {}, String(line)))));
+  return {label, element};
 }
 
 function figure(label, value, note) {

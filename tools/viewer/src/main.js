@@ -110,9 +110,10 @@ async function start() {
   const left = el('div', {class: 'left'}, three, toolbar(data, state, volume, () => view));
   const right = volume ? el('div', {class: 'right'}, panels[2].element, el('div', {class: 'pair'}, panels[1].element, panels[0].element), contrast(state)) : null;
   const stage = el('div', {class: `stage${volume ? '' : ' alone'}`}, left, right);
+  const warnings = warningsOf(data);
   page.replaceChildren(
-    el('header', {}, el('span', {class: 'mark'}, 'covol'), el('h1', {}, data.title), theme),
-    el('main', {}, warningsOf(data), stage, suggestions(data, state, volume), factsOf(data),
+    el('header', {}, el('span', {class: 'mark'}, 'covol'), el('h1', {}, data.title), warnings && el('a', {class: 'badge', href: '#warnings'}, warnings.label), theme),
+    el('main', {}, stage, suggestions(data, state, volume), warnings?.element, factsOf(data),
       el('footer', {}, 'Keys: m marks, 1 2 3 slice planes, [ ] slice, r reset view, t dark or light; arrows on a focused view.')));
   state.on(['large'], () => {
     stage.dataset.large = state.get('large');
