@@ -83,6 +83,8 @@ class Page(PageCase):
         facts = data_of(self.out / "p.html")["facts"]
         self.assertEqual(facts["seconds"], told["seconds"])
         self.assertEqual(facts["automatic"], told["automatic"])
+        (self.out / "odd.json").write_text(json.dumps({"covol": 1, "input": 3, "seconds": [], "structures": [4], "warnings": "x"}))
+        self.run_covol("report", "s.vdb", "--run-report", "odd.json", "--points", self.few, "-o", "o.html")
         (self.out / "bad.json").write_text("[1, 2]")
         done = self.run_covol("report", "s.vdb", "--run-report", "bad.json", "-o", "q.html", code=3)
         self.assertIn("--run-report: bad.json: expected a report that covol wrote", done.stderr)

@@ -75,23 +75,38 @@ private:
     /// The run's own report where it is given, else what the .vdb says of it.
     [[nodiscard]] Json read_facts(const Session& session) const {
         Json facts = page_facts(session);
-        if (run_report.empty()) {
-            const std::vector<VdbGridInfo> grids = list_vdb(input);
-            for (const auto& [key, value] : grids.front().metadata) {
-                const Json said = Json::parse(value, nullptr, false);
-                if (said.is_discarded()) continue;
-                if (key == "covol_resolved") facts["resolved"] = said;
-                if (key == "covol_options") facts["run_options"] = said;
-            }
-            return facts;
+        if (!run_report.empty()) return with_run(std::move(facts));
+        const std::vector<VdbGridInfo> grids = list_vdb(input);
+        if (grids.empty()) return facts;
+        for (const auto& [key, value] : grids.front().metadata) {
+            const Json said = Json::parse(value, nullptr, false);
+            if (key == "covol_resolved" && said.is_object()) facts["resolved"] = said;
         }
+        return facts;
+    }
+
+    /// What the run's report tells; fields that are not what covol writes are left out.
+    [[nodiscard]] Json with_run(Json facts) const {
         std::ifstream file(run_report, std::ios::binary);
-        Json told = Json::parse(file, nullptr, false);
+        if (!file) throw Error(Errc::Io, "--run-report: " + run_report + ": cannot open");
+        const Json told = Json::parse(file, nullptr, false);
         if (!told.is_object() || !told.contains("covol"))
             throw Error(Errc::InvalidInput,
                         "--run-report: " + run_report + ": expected a report that covol wrote with --json");
-        told["command_line"] = facts["command_line"];
-        return told;
+        for (const char* name : {"input", "resolved", "automatic", "grid", "solve", "surface", "fit", "seconds"})
+            if (told.contains(name) && told[name].is_object()) facts[name] = told[name];
+        if (told.contains("warnings") && told["warnings"].is_array()) facts["warnings"] = told["warnings"];
+        if (told.contains("structures") && told["structures"].is_array())
+            for (const Json& structure : told["structures"])
+                if (structure.is_object()) facts["structures"].push_back(structure);
+        return facts;
+    }
+
+    /// Whether a run's report on a structure is about this level set.
+    [[nodiscard]] static bool is_about(const Json& told, const std::string& grid) {
+        for (const char* name : {"vdb_grid", "name"})
+            if (told.contains(name) && told[name] == grid) return true;
+        return false;
     }
 
     /// All level sets of the file, or the one that is named.
@@ -166,7 +181,7 @@ private:
         for (const Shown& shown : all) {
             Json told{{"name", shown.grid}};
             for (const Json& known : facts.value("structures", Json::array()))
-                if (known.value("vdb_grid", known.value("name", "")) == shown.grid) told.update(known, true);
+                if (is_about(known, shown.grid)) told.update(known, true);
             told["name"] = shown.grid;
             if (facts.contains("resolved") && facts["resolved"].contains(shown.grid))
                 told["resolved"] = facts["resolved"][shown.grid];

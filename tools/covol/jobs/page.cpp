@@ -25,7 +25,7 @@ bool is_anatomical(const std::string& image_path, const ReadImageOptions& option
 
 Json page_facts(const Session& session) {
     Json facts = session.report();
-    facts.erase("frames");
+    for (const char* other : {"frames", "page"}) facts.erase(other);
     facts["command_line"] = session.command_line();
     facts["given"] = session.given();
     facts["peak_rss_bytes"] = peak_rss();
@@ -35,10 +35,10 @@ Json page_facts(const Session& session) {
 void write_page(const std::string& path, const ReportPage& page, Session& session) {
     const Stopwatch watch;
     const ReportPageSummary made = write_report_page(path, page, {}, session.run());
-    session.add_seconds("report", watch.seconds());
     session.report()["page"] = {{"path", path},
                                 {"bytes", made.bytes},
                                 {"triangles", made.triangles},
+                                {"seconds", watch.seconds()},
                                 {"slices", {{"size", made.slices_size}, {"step", made.slices_step}}}};
     std::ostringstream text;
     text << "report page: " << std::ceil(double(made.bytes) / 1e5) / 10 << " MB, " << made.triangles << " triangles";

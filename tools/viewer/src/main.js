@@ -111,9 +111,15 @@ async function start() {
   const right = volume ? el('div', {class: 'right'}, panels[2].element, el('div', {class: 'pair'}, panels[1].element, panels[0].element), contrast(state)) : null;
   const stage = el('div', {class: `stage${volume ? '' : ' alone'}`}, left, right);
   const warnings = warningsOf(data);
+  let figures;
+  try {
+    figures = factsOf(data);
+  } catch (error) {  // a report that another version wrote
+    figures = el('p', {class: 'notice'}, `The figures of this run cannot be shown: ${error.message}.`);
+  }
   page.replaceChildren(
     el('header', {}, el('span', {class: 'mark'}, 'covol'), el('h1', {}, data.title), warnings && el('a', {class: 'badge', href: '#warnings'}, warnings.label), theme),
-    el('main', {}, stage, suggestions(data, state, volume), warnings?.element, factsOf(data),
+    el('main', {}, stage, suggestions(data, state, volume), warnings?.element, figures,
       el('footer', {}, 'Keys: m marks, 1 2 3 slice planes, [ ] slice, r reset view, t dark or light; arrows on a focused view.')));
   state.on(['large'], () => {
     stage.dataset.large = state.get('large');
