@@ -1,9 +1,8 @@
 #include "covol/report_page.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "base/file.h"
@@ -84,14 +83,26 @@ Json to_json(const PageStructure& structure, const ReportPageOptions& options, s
     return json;
 }
 
-/// What the slices have to show.
+/// The corners of the box that the slices have to show.
 std::vector<Vec3> places_of(const ReportPage& page) {
-    std::vector<Vec3> places;
+    WorldBox box;
+    box.min.fill(std::numeric_limits<double>::max());
+    box.max.fill(std::numeric_limits<double>::lowest());
+    const auto add = [&](const auto& place) {
+        for (int a = 0; a < 3; ++a) {
+            box.min[a] = std::min(box.min[a], double(place[a]));
+            box.max[a] = std::max(box.max[a], double(place[a]));
+        }
+    };
     for (const PageStructure& structure : page.structures) {
-        for (const auto& v : structure.mesh->vertices) places.push_back({v[0], v[1], v[2]});
-        places.insert(places.end(), structure.marks.begin(), structure.marks.end());
+        for (const auto& vertex : structure.mesh->vertices) add(vertex);
+        for (const Vec3& mark : structure.marks) add(mark);
     }
-    return places;
+    std::vector<Vec3> corners;
+    for (int c = 0; c < 8; ++c)
+        corners.push_back(
+            {c & 1 ? box.max[0] : box.min[0], c & 2 ? box.max[1] : box.min[1], c & 4 ? box.max[2] : box.min[2]});
+    return corners;
 }
 
 Json to_json(const Image& image, const detail::SlicePlan& plan, const ReportPageOptions& options,
