@@ -99,6 +99,7 @@ std::vector<Vec3> places_of(const ReportPage& page) {
         for (const Vec3& mark : structure.marks) add(mark);
     }
     std::vector<Vec3> corners;
+    corners.reserve(8);
     for (int c = 0; c < 8; ++c)
         corners.push_back(
             {c & 1 ? box.max[0] : box.min[0], c & 2 ? box.max[1] : box.min[1], c & 4 ? box.max[2] : box.min[2]});
