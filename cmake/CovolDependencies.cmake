@@ -9,8 +9,8 @@ find_package(HDF5 REQUIRED COMPONENTS C)
 find_package(TIFF REQUIRED)
 find_package(ZLIB REQUIRED)
 find_package(PNG REQUIRED)
-# Codecs of chunked images; linked by name.
-foreach(codec blosc zstd lz4)
+# Codecs of chunked images, and of the report page's slices; linked by name.
+foreach(codec blosc zstd lz4 turbojpeg)
   find_library(COVOL_LIB_${codec} ${codec} REQUIRED)
   mark_as_advanced(COVOL_LIB_${codec})
 endforeach()

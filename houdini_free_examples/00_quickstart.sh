@@ -20,7 +20,8 @@ echo "== segmenting"
 mkdir -p "$out"
 # Slices are 3.5 pixels apart, marks about 30: voxels of 3 pixels lose nothing that either knows, and take two seconds.
 "$covol" segment "$image" --points "$points" --voxel-size 3 -o "$out/embryo.vdb" \
-  --mesh "$out/embryo.ply" --mask "$out/embryo_mask.tif" --json "$out/report.json"
+  --mesh "$out/embryo.ply" --mask "$out/embryo_mask.tif" --json "$out/report.json" \
+  --report "$out/embryo.html"
 "$covol" compare "$out/embryo.vdb" "$check" --json "$out/check.json"
 "$covol" render "$out/embryo.vdb" --image "$image" --points "$points" -o "$out/embryo.png"
 
@@ -39,6 +40,7 @@ print(f"surface            {'closed' if surface['closed'] else 'NOT CLOSED'}, ge
 print(f"solve              {r['solve']['steps']} steps, {r['solve']['stop_reason']}")
 print(f"time and memory    {r['seconds']['total']:.1f} s, {r['peak_rss_bytes'] / 2**20:.0f} MiB")
 for name, what in [("embryo.vdb", "level set"), ("embryo.ply", "mesh"), ("embryo_mask.tif", "label image"),
-                   ("report.json", "report"), ("embryo.png", "picture: look at this one first")]:
+                   ("report.json", "report"), ("embryo.png", "picture"),
+                   ("embryo.html", "page for the browser: look at this one first")]:
     print(f"{out}/{name:18} {what}")
 PYTHON

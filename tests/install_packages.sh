@@ -11,7 +11,7 @@ packages=(
   # meshes, geometry
   libopenmesh-dev libcgal-dev libeigen3-dev liblbfgs-dev libgmp-dev libmpfr-dev
   # images
-  libinsighttoolkit5-dev libtiff-dev libpng-dev libzstd-dev liblz4-dev libhdf5-dev
+  libinsighttoolkit5-dev libtiff-dev libpng-dev libturbojpeg0-dev libzstd-dev liblz4-dev libhdf5-dev
   # command line, reports, the Python module, packages
   libcli11-dev nlohmann-json3-dev pybind11-dev python3-dev dpkg-dev file
   # tests: other programs that read what covol writes

@@ -8,7 +8,7 @@ import unittest
 
 from cli_test import COMMANDS, Case
 
-LONG = ["segment", "reconstruct", "distance", "band", "evolve", "convert", "render"]  # --help is a selection
+LONG = ["segment", "reconstruct", "distance", "band", "evolve", "convert", "render", "report"]  # --help is a selection
 MOST = 14  # options in a selection, beside help itself
 
 

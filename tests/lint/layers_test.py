@@ -18,7 +18,7 @@ LAYERS = [
     {"points": ["scan_noise", "cloud_cleanup"], "surface": ["surface", "mesh_stream"], "evolve": ["evolve"], "tagging": ["band"]},
     {"contours": ["contours", "seeds"], "meshing": ["mesh_relax", "mesh_cleanup"], "holes": ["holes"], "cloud/orientation": ["orientation"]},
     {"start": ["start"], "painted": ["painted"], "analysis": ["compare", "evidence", "structures", "phantom", "render"]},
-    {"guess": ["guess", "guess_correction"], "guidance": ["guidance"], "cloud/surface": ["cloud_surface"]},
+    {"guess": ["guess", "guess_correction"], "guidance": ["guidance"], "cloud/surface": ["cloud_surface"], "report": ["report_page"]},
     {"segment": ["pipeline"], "segment/start": []},
     {"bricks": ["bricks"]},
 ]

@@ -17,6 +17,7 @@ int main(int argc, char** argv) {
     add_check(session);
     add_convert(session);
     add_render(session);
+    add_report(session);
     add_phantom(session);
     add_plan(session);
     add_brick(session);

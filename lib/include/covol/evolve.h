@@ -45,7 +45,8 @@ enum class StopReason { NotRun, Steady, MaxSteps, Cancelled, Vanished };
 struct EvolveReport {
     StopReason stop_reason = StopReason::NotRun;
     int steps = 0;
-    double last_change = 0;  ///< as in EvolveOptions::tolerance, voxels
+    double last_change = 0;      ///< as in EvolveOptions::tolerance, voxels
+    std::vector<float> changes;  ///< the same of each step
     double sweeps_per_step = 0;
     std::int64_t leaf_visits = 0;        ///< leaves swept, over all steps and sweeps
     std::int64_t leaf_visits_saved = 0;  ///< visits to leaves where nothing happened, that were left out

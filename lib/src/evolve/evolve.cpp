@@ -64,6 +64,7 @@ public:
             }
             ++report_.steps;
             report_.last_change = motion.mean;
+            report_.changes.push_back(float(motion.mean));
             run_.report("evolve", progress());
             if (!motion.crosses) {
                 report_.stop_reason = StopReason::Vanished;

@@ -18,6 +18,7 @@ namespace {
 void add(const EvolveReport& before, EvolveReport& total) {
     const double sweeps = before.sweeps_per_step * before.steps + total.sweeps_per_step * total.steps;
     total.steps += before.steps;
+    total.changes.insert(total.changes.begin(), before.changes.begin(), before.changes.end());
     total.sweeps_per_step = total.steps > 0 ? sweeps / total.steps : 0.0;
     total.leaf_visits += before.leaf_visits;
     total.leaf_visits_saved += before.leaf_visits_saved;

@@ -213,6 +213,9 @@ TEST_CASE("it stops when it is steady, and says so") {
     CHECK(report.stop_reason == StopReason::Steady);
     CHECK(report.steps < 100);
     CHECK(report.last_change < 1e-2 * p.options.tau / kH);
+    REQUIRE(int(report.changes.size()) == report.steps);
+    CHECK(report.changes.back() == Approx(report.last_change));
+    CHECK(report.changes.back() < report.changes.front());
     const DenseField end = to_dense(p.domain, *u);
     for (const Crossing& c : zero_crossings(p.domain, end)) CHECK(length(c.position) == Approx(3.0).margin(0.5 * kH));
 }

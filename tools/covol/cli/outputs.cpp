@@ -36,6 +36,7 @@ void check_ending(const std::string& path, OutputKind kind) {
         case OutputKind::Mesh: return check_mesh_extension(path);
         case OutputKind::Points: return check_extension(path, {".xyz", ".csv", ".ply"});
         case OutputKind::Picture: return check_extension(path, {".png"});
+        case OutputKind::Page: return check_extension(path, {".html", ".htm"});
         case OutputKind::Table: return check_extension(path, {".csv"});
         case OutputKind::Text: return;
     }

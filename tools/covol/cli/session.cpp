@@ -117,6 +117,15 @@ void expect_values(const CLI::App& app) {
     }
 }
 
+/// A word as a shell reads it back.
+std::string shell_quoted(const std::string& word) {
+    constexpr const char* kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_./:=,+@%-";
+    if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
+    std::string quoted = "'";
+    for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    return quoted + "'";
+}
+
 constexpr std::uint64_t kUsablePercent = 95;  // of the free memory: beyond it the system would end us without a word
 constexpr int kMostThreads = 1024;            // TBB runs out of stacks long after
 
@@ -191,6 +200,8 @@ void Session::add_grid(const std::string& path, const FloatGridPtr& grid, bool h
 int Session::main(int argc, char** argv) {
     // What follows `plan` and `brick` is a whole command line, with the options of its command.
     std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+    command_line_ = "covol";
+    for (const std::string& word : words) command_line_ += " " + shell_quoted(word);
     const auto is = [&](std::size_t n, const char* word) { return n < words.size() && words[n] == word; };
     planning_ = is(0, "plan") && (is(1, "segment") || is(1, "reconstruct"));
     if (planning_) words.erase(words.begin());
@@ -283,6 +294,13 @@ void Session::finish() {
     if (profile_)
         for (const std::string& line : profile_lines(report_)) progress_->line(line);
     progress_->clear();
+}
+
+std::vector<std::string> Session::given() const {
+    std::vector<std::string> names;
+    for (const CLI::Option* option : command_->get_options())
+        if (option->count() > 0) names.push_back(option->get_single_name());
+    return names;
 }
 
 void Session::write_report(const std::string& path) const {

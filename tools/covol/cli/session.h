@@ -64,6 +64,11 @@ public:
     void add_grid(const std::string& path, const FloatGridPtr& grid, bool half);
     /// The report that --json writes.
     [[nodiscard]] Json& report() noexcept { return report_; }
+    [[nodiscard]] const Json& report() const noexcept { return report_; }
+    /// As a shell takes it.
+    [[nodiscard]] const std::string& command_line() const noexcept { return command_line_; }
+    /// Names of the options that the command line or a configuration file gave, without dashes.
+    [[nodiscard]] std::vector<std::string> given() const;
     // note() and warn() put flags for the options that a line of the library names.
     /// Progress and remarks: silent with --quiet.
     void note(const std::string& line);
@@ -113,6 +118,7 @@ private:
 
     std::optional<BrickCall> brick_;
     std::vector<std::string> inputs_;
+    std::string command_line_;
 
     RunContext run_;
     std::unique_ptr<Progress> progress_;

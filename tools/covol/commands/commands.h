@@ -18,6 +18,7 @@ void add_info(Session& session);
 void add_check(Session& session);
 void add_convert(Session& session);
 void add_render(Session& session);
+void add_report(Session& session);
 void add_phantom(Session& session);
 void add_plan(Session& session);
 void add_brick(Session& session);

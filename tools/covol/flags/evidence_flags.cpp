@@ -11,6 +11,8 @@
 namespace covol::tool {
 namespace {
 
+constexpr int kPageSuggestions = 3;  // of a report page, where --suggest does not say
+
 std::string text_of(const Vec3& v, int decimals) {
     std::ostringstream text;
     text << std::fixed << std::setprecision(decimals) << v[0] << "," << v[1] << "," << v[2];
@@ -33,13 +35,13 @@ void EvidenceFlags::bind(CLI::App& command) {
 
 void EvidenceFlags::check(Outputs& outputs, const std::string& path_of_this_run) const {
     outputs.check("--evidence", path_of_this_run, OutputKind::Table);
-    if (suggestions < 0)
-        throw Error(Errc::InvalidOptions, "--suggest: expected >= 0, got " + std::to_string(suggestions));
+    if (suggestions.value_or(0) < 0)
+        throw Error(Errc::InvalidOptions, "--suggest: expected >= 0, got " + std::to_string(*suggestions));
 }
 
 Evidence EvidenceFlags::judge(const SegmentResult& result, const std::vector<Vec3>& marks, const Image& image,
                               const RunContext& run) const {
-    return tool::judge(result, marks, image, suggestions, run);
+    return tool::judge(result, marks, image, suggestions.value_or(for_page ? kPageSuggestions : 0), run);
 }
 
 Json to_json(const Evidence& e) {

@@ -10,14 +10,18 @@
 
 namespace covol::tool {
 
-/// What the surface rests on: --evidence and --suggest.
+/// Slices that a report page names where the command line does not say how many.
+inline constexpr int kPageSuggestions = 3;
+
+/// What the surface rests on: --evidence and --suggest; a report page has it, too.
 struct EvidenceFlags {
     std::string path;  ///< a table of the slices, .csv
-    int suggestions = 0;
+    std::optional<int> suggestions;
+    bool for_page = false;
 
     void bind(CLI::App& command);
     void check(Outputs& outputs, const std::string& path_of_this_run) const;
-    [[nodiscard]] bool wanted() const { return !path.empty() || suggestions > 0; }
+    [[nodiscard]] bool wanted() const { return !path.empty() || suggestions.value_or(0) > 0 || for_page; }
     /// See flags/judge.h.
     [[nodiscard]] Evidence judge(const SegmentResult& result, const std::vector<Vec3>& marks, const Image& image,
                                  const RunContext& run) const;

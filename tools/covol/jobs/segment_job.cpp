@@ -46,7 +46,7 @@ void SegmentJob::check_options() const {
     cloud.check();
     mesh.check_plain(mesh_path);
     if (mesh.plain && evidence.wanted())
-        throw UsageError("--plain: excludes --evidence and --suggest, which need the whole mesh");
+        throw UsageError("--plain: excludes --evidence, --suggest and --report, which need the whole mesh");
 }
 
 std::string SegmentJob::unused(const SegmentReport& report) const {
@@ -86,6 +86,11 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
     command.add_option("--density", density_path, "the solid as a fog volume, 0 to 1")->type_name("OUT.vdb");
     command.add_option("--fields", fields_path, "u, and distance and edge where the flow had them")
         ->type_name("OUT.vdb");
+    command
+        .add_option("--report", page_path,
+                    "one page for the browser: the surface in 3D, slices, figures, options, where new marks would help")
+        ->type_name("OUT.html")
+        ->each([this](const std::string&) { evidence.for_page = true; });
     contours.bind(command, with_image);
     if (with_image) painted.bind(command);
     seeds.bind(command, with_image);

@@ -38,7 +38,7 @@ struct SegmentJob {
     EvidenceFlags evidence;
     BrickFlags bricks;
     FrameChoice frames;
-    std::string output, mask_path, mesh_path, density_path, fields_path, table_path;
+    std::string output, mask_path, mesh_path, density_path, fields_path, table_path, page_path;
     bool half = false;
 
     void bind(CLI::App& command, bool with_image);

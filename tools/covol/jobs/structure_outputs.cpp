@@ -9,6 +9,7 @@
 #include "covol/mesh_stream.h"
 #include "covol/surface.h"
 #include "covol/vdb_io.h"
+#include "jobs/page.h"
 
 namespace covol::tool {
 namespace {
@@ -171,6 +172,12 @@ void hand_over_labels(const std::shared_ptr<const StructuresOutput>& output, con
         });
 }
 
+/// What the run is about: the image's name, or the output's.
+std::string title_of(const SegmentJob& job) {
+    const std::filesystem::path path(job.images.empty() ? job.output : job.images.front());
+    return (path.has_filename() ? path : path.parent_path()).filename().string();
+}
+
 Json report_of(const StructureOutput& s) {
     Json json{{"input", s.input}};
     json.update(to_json(s.result.report));
@@ -221,6 +228,7 @@ void check_outputs(const SegmentJob& job, const std::vector<StructureInput>& inp
         outputs.check("--mask", labels_path(tagged(job.mask_path)), OutputKind::Text);
     outputs.check("--density", tagged(job.density_path), OutputKind::Vdb);
     outputs.check("--fields", tagged(job.fields_path), OutputKind::Vdb);
+    outputs.check("--report", tagged(job.page_path), OutputKind::Page);
     job.evidence.check(outputs, tagged(job.evidence.path));
     job.mesh.check();
     const std::string mesh = tagged(job.mesh_path);
@@ -254,6 +262,10 @@ void hand_over(const SegmentJob& job, const std::shared_ptr<const StructuresOutp
         for (const StructureOutput& s : output->structures)
             surfaces.push_back({s.name.empty() ? s.grid : s.name, &*s.evidence});
         write_text(file, evidence_csv(surfaces));
+    });
+    // The last one, so that it tells of as much as there is to tell.
+    sink(tagged(job.page_path), [output, &session, title = title_of(job) + tag](const std::string& file) {
+        write_page(file, *output, title, session);
     });
 }
 

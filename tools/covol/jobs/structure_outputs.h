@@ -28,6 +28,8 @@ struct StructureOutput {
 /// All structures of one image, disjoint.
 struct StructuresOutput {
     ImageGeometry geometry;
+    std::optional<Image> image;  ///< where a report page shows it
+    bool is_anatomical = false;  ///< of that image
     std::vector<StructureOutput> structures;
     Json overlaps = Json::array();
     [[nodiscard]] std::vector<std::string> names() const;

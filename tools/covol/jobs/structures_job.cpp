@@ -12,6 +12,7 @@
 #include "covol/mesh_stream.h"
 #include "covol/surface.h"
 #include "jobs/marks.h"
+#include "jobs/page.h"
 #include "jobs/paint_reader.h"
 
 namespace covol::tool {
@@ -173,6 +174,10 @@ StructuresOutput segment_structures(const SegmentJob& job, const std::vector<Str
                                     const RunContext& run, const Solver& solve) {
     StructuresOutput output;
     if (image != nullptr) output.geometry = image->geometry();
+    if (image != nullptr && !job.page_path.empty()) {
+        output.image = *image;
+        output.is_anatomical = is_anatomical(image->path(), job.image.options, run);
+    }
     StructurePreparer preparer(job, inputs, image, starts, session);
     for (std::size_t n = 0; n < inputs.size(); ++n) {
         const RunContext own = speaking_for(inputs[n].name, run);

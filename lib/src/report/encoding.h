@@ -1,0 +1,21 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+// Bytes as text that a page may hold.
+namespace covol::detail {
+
+/// RFC 4648, with padding.
+[[nodiscard]] std::string to_base64(const std::uint8_t* data, std::size_t count);
+/// A zlib stream (RFC 1950) as base64.
+[[nodiscard]] std::string pack(const std::vector<std::uint8_t>& bytes);
+
+/// JSON text that may stand in a script element: no character in it ends one or begins a comment.
+[[nodiscard]] std::string safe_in_script(std::string_view json);
+/// A text between the tags of HTML, or in an attribute's quotes.
+[[nodiscard]] std::string escape_html(std::string_view text);
+
+}  // namespace covol::detail

@@ -1,0 +1,201 @@
+#include "covol/report_page.h"
+
+#include <algorithm>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "base/file.h"
+#include "base/valid.h"
+#include "covol/error.h"
+#include "covol/version.h"
+#include "report/cluster.h"
+#include "report/encoding.h"
+#include "report/mesh_codec.h"
+#include "report/page_slices.h"
+#include "report/viewer.h"
+
+namespace covol {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using detail::pack;
+
+Json to_json(const Vec3& v) { return Json::array({v[0], v[1], v[2]}); }
+
+std::string packed_marks(const std::vector<Vec3>& marks, std::int64_t most) {
+    const std::size_t stride = marks.size() / std::size_t(most + 1) + 1;
+    std::vector<float> numbers;
+    for (std::size_t n = 0; n < marks.size(); n += stride)
+        for (const double x : marks[n]) numbers.push_back(float(x));
+    const auto* const bytes = reinterpret_cast<const std::uint8_t*>(numbers.data());
+    return pack({bytes, bytes + numbers.size() * sizeof(float)});
+}
+
+Json to_json(const Evidence& evidence) {
+    Json suggestions = Json::array();
+    for (const Suggestion& s : evidence.suggestions)
+        suggestions.push_back(
+            {{"slice", s.slice}, {"area", s.area}, {"index", to_json(s.index)}, {"world", to_json(s.world)}});
+    return {{"reach", evidence.reach},
+            {"weak_edge", evidence.weak_edge},
+            {"area", evidence.area},
+            {"unsupported_area", evidence.unsupported_area},
+            {"suggestions", suggestions}};
+}
+
+detail::PageMesh page_mesh(const PageStructure& structure, std::int64_t most) {
+    detail::PageMesh mesh{*structure.mesh, {}};
+    const auto add = [&](const char* name, const std::vector<float>& values) {
+        if (values.size() == mesh.mesh.vertices.size()) mesh.values.emplace_back(name, values);
+    };
+    if (structure.evidence != nullptr) {
+        add("distance_to_marks", structure.evidence->distance_to_marks);
+        add("edge_strength", structure.evidence->edge_strength);
+    }
+    return cluster(std::move(mesh), most);
+}
+
+Json to_json(const PageStructure& structure, const ReportPageOptions& options, std::int64_t most_triangles,
+             ReportPageSummary& summary) {
+    const detail::PageMesh shown = page_mesh(structure, most_triangles);
+    const detail::CodedMesh coded = detail::encode(shown.mesh);
+    summary.triangles += coded.triangle_count;
+    Json values = Json::object();
+    for (const auto& [name, numbers] : shown.values) {
+        const detail::CodedValues own = detail::encode(numbers, coded.from);
+        values[name] = {{"min", own.min}, {"max", own.max}, {"data", pack(own.steps)}};
+    }
+    Json json{
+        {"name", structure.name},
+        {"color", structure.color},
+        {"mesh",
+         {{"vertices", coded.vertex_count},
+          {"triangles", coded.triangle_count},
+          {"of_triangles", structure.mesh->triangles.size()},
+          {"min", coded.min},
+          {"max", coded.max},
+          {"positions", pack(coded.positions)},
+          {"corners", pack(coded.corners)},
+          {"values", values}}},
+        {"marks", {{"count", structure.marks.size()}, {"data", packed_marks(structure.marks, options.most_marks)}}}};
+    if (structure.evidence != nullptr) json["evidence"] = to_json(*structure.evidence);
+    return json;
+}
+
+/// The corners of the box that the slices have to show.
+std::vector<Vec3> places_of(const ReportPage& page) {
+    WorldBox box;
+    box.min.fill(std::numeric_limits<double>::max());
+    box.max.fill(std::numeric_limits<double>::lowest());
+    const auto add = [&](const auto& place) {
+        for (int a = 0; a < 3; ++a) {
+            box.min[a] = std::min(box.min[a], double(place[a]));
+            box.max[a] = std::max(box.max[a], double(place[a]));
+        }
+    };
+    for (const PageStructure& structure : page.structures) {
+        for (const auto& vertex : structure.mesh->vertices) add(vertex);
+        for (const Vec3& mark : structure.marks) add(mark);
+    }
+    std::vector<Vec3> corners;
+    corners.reserve(8);
+    for (int c = 0; c < 8; ++c)
+        corners.push_back(
+            {c & 1 ? box.max[0] : box.min[0], c & 2 ? box.max[1] : box.min[1], c & 4 ? box.max[2] : box.min[2]});
+    return corners;
+}
+
+Json to_json(const Image& image, const detail::SlicePlan& plan, const ReportPageOptions& options,
+             const RunContext& run) {
+    const detail::CodedSlices coded = encode_slices(image, plan, options.jpeg_quality, run);
+    const ImageGeometry &g = coded.geometry, &whole = image.geometry();
+    return {{"size", g.size},
+            {"spacing", to_json(g.spacing)},
+            {"origin", to_json(g.origin)},
+            {"direction", {to_json(g.direction[0]), to_json(g.direction[1]), to_json(g.direction[2])}},
+            {"first", plan.region.min},
+            {"step", plan.step},
+            {"of_size", whole.size},
+            {"of_spacing", to_json(whole.spacing)},
+            {"of_origin", to_json(whole.origin)},
+            {"black", coded.black},
+            {"white", coded.white},
+            {"slices", coded.jpegs}};
+}
+
+void check(const ReportPage& page, const ReportPageOptions& options) {
+    detail::require_valid(options, "write_report_page");
+    if (page.structures.empty()) throw Error(Errc::InvalidInput, "write_report_page: expected a structure, got none");
+    for (const PageStructure& structure : page.structures)
+        if (structure.mesh == nullptr || structure.mesh->empty())
+            throw Error(Errc::InvalidInput,
+                        "write_report_page: " + structure.name + ": expected a mesh with triangles, got none");
+}
+
+Json data_of(const ReportPage& page, const ReportPageOptions& options, ReportPageSummary& summary,
+             const RunContext& run) {
+    Json facts = Json::parse(page.facts, nullptr, false);
+    if (!facts.is_object())
+        throw Error(Errc::InvalidInput, "write_report_page: facts: expected a JSON object, got something else");
+    Json data{{"covol", version()},        {"title", page.title},
+              {"unit", page.unit},         {"anatomical", page.is_anatomical},
+              {"facts", std::move(facts)}, {"structures", Json::array()}};
+    double all = 0;
+    for (const PageStructure& structure : page.structures) all += double(structure.mesh->triangles.size());
+    for (const PageStructure& structure : page.structures) {
+        run.check();
+        const double share = double(structure.mesh->triangles.size()) / all;
+        const auto most = std::max<std::int64_t>(100, std::int64_t(share * double(options.most_triangles)));
+        data["structures"].push_back(to_json(structure, options, most, summary));
+    }
+    if (page.image == nullptr) return data;
+    const detail::SlicePlan plan =
+        detail::plan_slices(page.image->geometry(), page.image->held(), places_of(page), options.most_voxels);
+    try {
+        data["image"] = to_json(*page.image, plan, options, run);
+        summary.slices_size = plan.size;
+        summary.slices_step = plan.step;
+    } catch (const Error& error) {
+        if (error.code() != Errc::InvalidOptions) throw;  // more chunks than the memory holds
+        run.warn(std::string("the report page has no slices: ") + error.what());
+    }
+    return data;
+}
+
+}  // namespace
+
+std::string ReportPageOptions::why_invalid() const {
+    detail::FieldChecks checks;
+    checks.expect(most_triangles >= 100, "most_triangles", ">= 100", double(most_triangles));
+    checks.expect(most_voxels >= 1000, "most_voxels", ">= 1000", double(most_voxels));
+    checks.expect(most_marks >= 1, "most_marks", ">= 1", double(most_marks));
+    checks.expect(jpeg_quality >= 1 && jpeg_quality <= 100, "jpeg_quality", "1 to 100", jpeg_quality);
+    return checks.lines();
+}
+
+ReportPageSummary write_report_page(const std::string& path, const ReportPage& page, const ReportPageOptions& options,
+                                    const RunContext& run) {
+    check(page, options);
+    ReportPageSummary summary;
+    std::string data;
+    with_threads(
+        run, [&] { data = data_of(page, options, summary, run).dump(-1, ' ', true, Json::error_handler_t::replace); });
+    data = detail::safe_in_script(data);
+    const std::string_view viewer = detail::viewer();
+    constexpr std::string_view kTitle = "{{title}}", kData = "{{data}}";
+    const std::size_t title = viewer.find(kTitle), script = viewer.find(kData);
+    const std::string safe_title = detail::escape_html(page.title);
+    detail::write_atomically(path, [&](const std::string& temporary) {
+        std::ofstream file(temporary, std::ios::binary);
+        file << viewer.substr(0, title) << safe_title
+             << viewer.substr(title + kTitle.size(), script - title - kTitle.size()) << data
+             << viewer.substr(script + kData.size());
+        summary.bytes = std::uint64_t(std::max<std::streamoff>(0, file.tellp()));
+        file.close();
+        if (!file) throw Error(Errc::Io, "write_report_page: " + path + ": cannot write");
+    });
+    return summary;
+}
+
+}  // namespace covol

@@ -1,0 +1,229 @@
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+
+#include "cli/report.h"
+#include "commands/commands.h"
+#include "covol/edge.h"
+#include "covol/error.h"
+#include "covol/mesh_relax.h"
+#include "covol/structures.h"
+#include "covol/surface.h"
+#include "jobs/marks.h"
+#include "jobs/page.h"
+
+namespace covol::tool {
+namespace {
+
+constexpr double kReachVoxels = 5.0;  // of marks, as where their attraction is unlimited
+
+/// One level set of the file, and what it is judged by.
+struct Shown {
+    std::string grid;
+    FloatGridPtr surface;
+    TriangleMesh mesh;
+    std::vector<Vec3> marks;
+    std::optional<Evidence> evidence;
+    Json facts;
+};
+
+struct ReportPageJob {
+    std::string input, output, image_path, run_report;
+    PointFlags points;
+    ContourFlags contours;
+    ImageFlags image;
+    int suggestions = kPageSuggestions;
+
+    void run(Session& session) const {
+        session.outputs().check("-o", output, OutputKind::Page);
+        if (suggestions < 0)
+            throw Error(Errc::InvalidOptions, "--suggest: expected >= 0, got " + std::to_string(suggestions));
+        Json facts = read_facts(session);
+        std::vector<Shown> all = read_surfaces(session.run());
+        std::optional<Image> pixels;
+        if (!image_path.empty()) pixels = image.read(image_path, session.run());
+        add_marks(all, pixels ? &pixels->geometry() : nullptr, session.run());
+        if (pixels) {
+            facts["input"]["image"] = to_json(pixels->geometry());
+            facts["input"]["image"]["path"] = image_path;
+        }
+        const Stopwatch watch;
+        for (Shown& shown : all) judge(shown, pixels ? &*pixels : nullptr, session.run());
+        session.add_seconds("surface", watch.seconds());
+        add_facts(all, facts, session);
+        const auto page = std::make_shared<ReportPage>();
+        const auto kept = std::make_shared<std::vector<Shown>>(std::move(all));
+        const auto slices = std::make_shared<std::optional<Image>>(std::move(pixels));
+        page->title = std::filesystem::path(split_grid_name(input).path).filename().string();
+        page->facts = facts.dump(-1, ' ', false, Json::error_handler_t::replace);
+        for (const Shown& shown : *kept) {
+            PageStructure structure{shown.grid, {}, &shown.mesh, shown.marks, nullptr};
+            structure.color = kept->size() > 1 ? structure_color(page->structures.size()) : PageStructure{}.color;
+            if (shown.evidence) structure.evidence = &*shown.evidence;
+            page->structures.push_back(std::move(structure));
+        }
+        if (*slices) {
+            page->image = &**slices;
+            page->unit = (*slices)->geometry().unit;
+            page->is_anatomical = is_anatomical(image_path, image.options, session.run());
+        }
+        session.outputs().add(
+            output, [page, kept, slices, &session](const std::string& path) { write_page(path, *page, session); });
+    }
+
+private:
+    /// The run's own report where it is given, else what the .vdb says of it.
+    [[nodiscard]] Json read_facts(const Session& session) const {
+        Json facts = page_facts(session);
+        if (!run_report.empty()) return with_run(std::move(facts));
+        const std::vector<VdbGridInfo> grids = list_vdb(input);
+        if (grids.empty()) return facts;
+        for (const auto& [key, value] : grids.front().metadata) {
+            const Json said = Json::parse(value, nullptr, false);
+            if (key == "covol_resolved" && said.is_object()) facts["resolved"] = said;
+        }
+        return facts;
+    }
+
+    /// What the run's report tells; fields that are not what covol writes are left out.
+    [[nodiscard]] Json with_run(Json facts) const {
+        std::ifstream file(run_report, std::ios::binary);
+        if (!file) throw Error(Errc::Io, "--run-report: " + run_report + ": cannot open");
+        const Json told = Json::parse(file, nullptr, false);
+        if (!told.is_object() || !told.contains("covol"))
+            throw Error(Errc::InvalidInput,
+                        "--run-report: " + run_report + ": expected a report that covol wrote with --json");
+        for (const char* name : {"input", "resolved", "automatic", "grid", "solve", "surface", "fit", "seconds"})
+            if (told.contains(name) && told[name].is_object()) facts[name] = told[name];
+        if (told.contains("warnings") && told["warnings"].is_array()) facts["warnings"] = told["warnings"];
+        if (told.contains("structures") && told["structures"].is_array())
+            for (const Json& structure : told["structures"])
+                if (structure.is_object()) facts["structures"].push_back(structure);
+        return facts;
+    }
+
+    /// Whether a run's report on a structure is about this level set.
+    [[nodiscard]] static bool is_about(const Json& told, const std::string& grid) {
+        for (const char* name : {"vdb_grid", "name"})
+            if (told.contains(name) && told[name] == grid) return true;
+        return false;
+    }
+
+    /// All level sets of the file, or the one that is named.
+    [[nodiscard]] std::vector<Shown> read_surfaces(const RunContext& run) const {
+        std::vector<Shown> all;
+        const VdbGridName name = split_grid_name(input);
+        if (name.grid.empty())
+            for (const VdbGridInfo& grid : list_vdb(input))
+                if (is_float_grid(grid) && grid.grid_class == "level set" && grid.active_voxels > 0)
+                    all.push_back({grid.name, read_vdb(name.path, grid.name), {}, {}, {}, {}});
+        if (all.empty()) {
+            const FloatGridPtr grid = read_vdb_level_set(input, run);
+            all.push_back({name.grid.empty() ? "surface" : name.grid, grid, {}, {}, {}, {}});
+        }
+        return all;
+    }
+
+    /// The structure that NAME=FILE is for; a file without a name is for the only one.
+    static Shown& owner(std::vector<Shown>& all, const std::string& flag, const Named& file) {
+        if (file.name.empty() && all.size() == 1) return all.front();
+        const auto at = std::find_if(all.begin(), all.end(), [&](const Shown& s) { return s.grid == file.name; });
+        if (at != all.end()) return *at;
+        std::string names;
+        for (const Shown& shown : all) names += (names.empty() ? "" : ", ") + shown.grid;
+        throw UsageError(flag + ": expected NAME=FILE with a level set of the file (" + names + "), got " +
+                         (file.name.empty() ? file.value : file.name + "=" + file.value));
+    }
+
+    void add_marks(std::vector<Shown>& all, const ImageGeometry* geometry, const RunContext& run) const {
+        const auto add = [&](const char* flag, const std::string& text, bool are_contours) {
+            const Named file = split_name(text);
+            Shown& shown = owner(all, flag, file);
+            PointFlags own_points = points;
+            ContourFlags own_contours = contours;
+            own_points.paths.clear();
+            own_contours.paths.clear();
+            (are_contours ? own_contours.paths : own_points.paths).push_back(file.value);
+            const Marks marks = read_marks(own_points, own_contours, {}, geometry, run);
+            shown.marks.insert(shown.marks.end(), marks.given.begin(), marks.given.end());
+            shown.facts["input"][are_contours ? "contours" : "points"]["paths"].push_back(file.value);
+        };
+        for (const std::string& text : points.paths) add("--points", text, false);
+        for (const std::string& text : contours.paths) add("--contours", text, true);
+    }
+
+    void judge(Shown& shown, const Image* pixels, const RunContext& run) const {
+        const double h = domain_of(*shown.surface).voxel_size;
+        shown.mesh = extract_mesh(*shown.surface, {}, run);
+        if (shown.mesh.empty())
+            throw Error(Errc::InvalidInput, input + ": grid '" + shown.grid + "': expected a surface, found none");
+        relax_mesh(shown.mesh, *shown.surface, {}, run);
+        shown.facts["grid"] = {{"voxel_size", h}};
+        shown.facts["surface"] = to_json(measure(shown.mesh));
+        if (!shown.marks.empty())
+            shown.facts["fit"]["points_to_surface"] = to_json(measure_fit(shown.marks, shown.mesh, run));
+        if (pixels == nullptr) return;
+        EvidenceOptions options;
+        options.reach = kReachVoxels * h;
+        options.suggestions = suggestions;
+        const EdgeResult edges = detect_edges(*pixels, *shown.surface, {}, run);
+        shown.evidence = assess_evidence(shown.mesh, shown.marks, *edges.grid, pixels->geometry(), options, run);
+        shown.facts["evidence"] = to_json(*shown.evidence);
+    }
+
+    static void add_facts(const std::vector<Shown>& all, Json& facts, Session& session) {
+        if (all.size() == 1) {
+            session.report().update(all.front().facts, true);
+            facts.update(all.front().facts, true);
+            return;
+        }
+        Json list = Json::array();
+        for (const Shown& shown : all) {
+            Json told{{"name", shown.grid}};
+            for (const Json& known : facts.value("structures", Json::array()))
+                if (is_about(known, shown.grid)) told.update(known, true);
+            told["name"] = shown.grid;
+            if (facts.contains("resolved") && facts["resolved"].contains(shown.grid))
+                told["resolved"] = facts["resolved"][shown.grid];
+            told.update(shown.facts, true);
+            list.push_back(told);
+        }
+        facts.erase("resolved");
+        facts["structures"] = list;
+        session.report()["structures"] = list;
+    }
+};
+
+}  // namespace
+
+void add_report(Session& session) {
+    const auto [job, command] = session.add_job<ReportPageJob>(
+        "report", "One page for the browser: surfaces in 3D, slices with outlines and marks, figures, options");
+    in_group(*command, Group::Input);
+    command->add_option("level_set", job->input, "level sets; of several in a file all are shown, :NAME picks one")
+        ->required()
+        ->type_name("IN.vdb[:NAME]");
+    in_group(*command, Group::Output);
+    command->add_option("-o,--output", job->output, "the page; it needs no network")->required()->type_name("OUT.html");
+    in_group(*command, Group::Input);
+    command->add_option("--image", job->image_path, "image for the slices")->type_name("IMAGE");
+    command
+        ->add_option("--run-report", job->run_report,
+                     "the report that the run wrote with --json: its time, options and automatic choices")
+        ->type_name("REPORT.json");
+    job->points.bind(*command, "--points")
+        ->description("marks on the surface; with names of level sets, ve=FILE exe=FILE")
+        ->type_name("[NAME=]FILE...");
+    in_group(*command, Group::Output);
+    command
+        ->add_option("--suggest", job->suggestions,
+                     "name the N slices where new marks would help most, and where in them")
+        ->type_name("N")
+        ->capture_default_str();
+    job->contours.bind(*command, true);
+    job->image.bind(*command);
+    session.help().show_first(*command,
+                              {"--image", "--points", "--contours", "--run-report", "--suggest", "--channel"});
+}
+
+}  // namespace covol::tool

@@ -1,0 +1,25 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/session.h"
+#include "covol/report_page.h"
+#include "jobs/structure_outputs.h"
+
+// Report pages: `--report` of segment and reconstruct, and `covol report`.
+namespace covol::tool {
+
+/// Whether an image's world is a patient's: DICOM and NIfTI, NRRD and MetaImage in millimetres.
+[[nodiscard]] bool is_anatomical(const std::string& image_path, const ReadImageOptions& options, const RunContext& run);
+
+/// The facts that a page shows: the report so far, the command line, and which options it gave.
+[[nodiscard]] Json page_facts(const Session& session);
+
+/// Writes the page, and tells of it in the report and in a note.
+void write_page(const std::string& path, const ReportPage& page, Session& session);
+
+/// What came out of a run.
+void write_page(const std::string& path, const StructuresOutput& output, const std::string& title, Session& session);
+
+}  // namespace covol::tool
