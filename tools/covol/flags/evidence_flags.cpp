@@ -11,8 +11,6 @@
 namespace covol::tool {
 namespace {
 
-constexpr int kPageSuggestions = 3;  // of a report page, where --suggest does not say
-
 std::string text_of(const Vec3& v, int decimals) {
     std::ostringstream text;
     text << std::fixed << std::setprecision(decimals) << v[0] << "," << v[1] << "," << v[2];
