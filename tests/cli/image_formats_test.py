@@ -253,6 +253,7 @@ class SameSurface(Case):
         self.assertGreater(compare["dice"], 0.9999)
 
     def test_nifti_in_micrometres(self):
+        """In the file's own unit, whichever of the forms it has."""
         scaled = np.diag([-SPACING[0] * 1000, -SPACING[1] * 1000, SPACING[2] * 1000, 1.0])
         scaled[:3, 3] = (-ORIGIN[0] * 1000, -ORIGIN[1] * 1000, ORIGIN[2] * 1000)
         for forms in "sq":
@@ -262,7 +263,11 @@ class SameSurface(Case):
                 image.set_sform(scaled, code=1 if forms == "s" else 0)
                 image.set_qform(scaled, code=1 if forms == "q" else 0)
                 nibabel.save(image, str(self.folder / "um.nii"))
-                self.check("um.nii", unit="mm")
+                info = self.report("info", "um.nii")["image"]
+                self.assertEqual(info["unit"], "um")
+                for a in range(3):
+                    self.assertAlmostEqual(info["spacing"][a], 1000 * SPACING[a], places=3)
+                    self.assertAlmostEqual(info["origin"][a], 1000 * ORIGIN[a], places=2)
 
     def test_mrc(self):
         for name, mode, kind, big in [("b.mrc", 0, "i1", False), ("i.mrc", 1, "i2", True), ("f.map", 2, "f4", False),

@@ -1,8 +1,11 @@
 #include "flags/bindings.h"
 
 #include <cmath>
+#include <iostream>
+#include <iterator>
 
 #include "covol/error.h"
+#include "covol/points_text.h"
 
 namespace covol::tool {
 namespace {
@@ -171,13 +174,23 @@ void add_hints(const PointCloud& cloud, const std::vector<Vec3>& world, WorldPoi
         if (!list->empty()) list->resize(all.points.size());
 }
 
+/// All of it; it is there once.
+const std::string& standard_input() {
+    static const std::string text{std::istreambuf_iterator<char>(std::cin), std::istreambuf_iterator<char>()};
+    return text;
+}
+
 }  // namespace
 
 WorldPoints read_world_points(const PointFlags& flags, const ImageGeometry* geometry, const RunContext& run) {
     WorldPoints all;
     for (const std::string& path : flags.paths) {
         run.check();
-        const PointCloud cloud = read_points(path, flags.options);
+        const PointCloud cloud = path == "-" ? parse_points(standard_input(), "standard input", flags.options)
+                                             : read_points(path, flags.options);
+        if (!cloud.lines.empty())
+            run.warn(path + ": its marks form " + std::to_string(cloud.lines.size()) +
+                     " lines, and are taken as loose points here; --contours joins them along the lines");
         const std::vector<Vec3> world = geometry != nullptr ? to_world(cloud, *geometry) : to_world(cloud);
         if (geometry != nullptr) check_inside(cloud, *geometry, run);
         all.points.insert(all.points.end(), world.begin(), world.end());
@@ -322,10 +335,10 @@ void MeshFlags::bind(CLI::App& command) {
     in_group(command, Group::MeshFiles);
     command
         .add_option_function<std::string>(
-            "--up", [this](const std::string& text) { y_up = text == "y"; }, "the mesh's axis that points up")
+            "--up", [this](const std::string& text) { y_up = text == "y"; },
+            "the mesh's axis that points up [z; in .glb y, which glTF prescribes]")
         ->check(CLI::IsMember({"y", "z"}).description(""))
-        ->type_name("y|z")
-        ->default_str("z");
+        ->type_name("y|z");
     command.add_option("--unit-scale", unit_scale, "multiplies the mesh's coordinates, 0.001 for mm to m")
         ->capture_default_str();
 }

@@ -1,5 +1,6 @@
 #pragma once
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -112,7 +113,7 @@ struct EvolveFlags {
 };
 
 struct MeshFlags {
-    bool y_up = false;
+    std::optional<bool> y_up;
     double unit_scale = 1.0;
     void bind(CLI::App& command);
     /// Checks before the long work. @throws Error InvalidOptions.
