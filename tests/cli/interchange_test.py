@@ -145,7 +145,7 @@ class MeshFiles(Folder):
         self.run_covol("convert", "b.glb", "back.ply", "--quiet")
         self.run_covol("mesh", "s.vdb", "-o", "b.ply", "--quiet")
         np.testing.assert_array_equal(read_ply(self.out / "back.ply")[1][:, :3], read_ply(self.out / "b.ply")[1][:, :3])
-        self.assertGreater(self.report("compare", "s.vdb", "b.glb")["compare"]["dice"], 0.99)
+        self.assertGreater(self.report("compare", "s.vdb", "b.glb")["compare"]["dice"], 0.98)
 
     def test_touching_structures_do_not_intersect_themselves(self):
         left, right = np.array(CENTRE) - (0, 2, 0), np.array(CENTRE) + (0, 3, 0)

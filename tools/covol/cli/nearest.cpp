@@ -44,7 +44,7 @@ std::vector<std::string> options_of(const CLI::App& app) {
 }
 
 std::string with_hint(const std::string& message, const std::string& close, const std::string& help) {
-    return message + (close.empty() ? "" : "; did you mean " + close + "?") + " See " + help;
+    return message + (close.empty() ? "." : "; did you mean " + close + "?") + " See " + help;
 }
 
 }  // namespace
