@@ -189,7 +189,7 @@ class MeshFiles(Folder):
             data = (self.out / name).read_bytes()
             self.assertNotIn(b"private folder", data, name)
             self.assertNotIn(str(self.out).encode(), data, name)
-        metadata = pyopenvdb.readMetadata(str(self.out / "s.vdb"), "surface").metadata
+        metadata = pyopenvdb.read(str(self.out / "s.vdb"), "surface").metadata
         options = json.loads(metadata["covol_options"])
         self.assertEqual(options["points"], ["p.xyz"])
 
