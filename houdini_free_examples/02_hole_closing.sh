@@ -25,5 +25,5 @@ echo "== image and points"
 
 echo "== results (voxels are 0.02; the sphere's cap is 0.054 higher than the disc)"
 for name in image_alone with_points; do
-  echo "$out/$name.vdb, $name.png: $("$covol" compare "$out/$name.vdb" "$out/holes.xyz" 2>&1)"
+  echo "$out/$name.vdb, $name.png: $("$covol" compare "$out/$name.vdb" "$out/holes.xyz")"
 done

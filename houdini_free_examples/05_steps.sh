@@ -29,6 +29,6 @@ echo "== surface: the zero level set as a true distance"
 echo "== results"
 "$covol" compare "$out/mask.nrrd" "$out/truth.nrrd"
 for name in distance band edge u surface; do
-  echo "$out/$name.vdb: $("$covol" info "$out/$name.vdb" 2>&1 | grep -o '[0-9]* active voxels')"
+  echo "$out/$name.vdb: $("$covol" info "$out/$name.vdb" | grep -o '[0-9]* active voxels')"
 done
 echo "$out/surface.ply, mask.nrrd, surface.png (picture)"

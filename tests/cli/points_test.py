@@ -113,7 +113,7 @@ class Formats(PointsCase):
         rows = [(n + 1, 200, p[0] * SPACING[0], p[1] * SPACING[1], p[2] + 1) for n, p in enumerate(self.marks)]
         path = self.write("Results.csv", rows, " ,Mean,X,Y,Slice\n", ",")
         self.same_place(path)
-        self.assertIn("taken in the image's unit, not in pixels", self.run_covol("info", path).stderr)
+        self.assertIn("taken in the image's unit, not in pixels", self.run_covol("info", path).stdout)
 
     def test_napari(self):
         self.same_place(self.write("napari.csv", [(n, p[2], p[1], p[0]) for n, p in enumerate(self.marks)],
@@ -124,7 +124,7 @@ class Formats(PointsCase):
         path = self.inputs / "marks.mrk.json"
         path.write_text(json.dumps({"markups": [{"type": "Fiducial", "coordinateSystem": "RAS", "controlPoints": points}]}))
         self.same_place(path)
-        self.assertIn("RAS turned to LPS", self.run_covol("info", path).stderr)
+        self.assertIn("RAS turned to LPS", self.run_covol("info", path).stdout)
 
     def test_options_go_before_the_format(self):
         path = self.write("reversed.xyz", [(p[2], p[1], p[0]) for p in self.marks])

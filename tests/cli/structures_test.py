@@ -418,7 +418,7 @@ class Evidence(Case):
 
     def test_suggestions_lie_on_the_bare_half(self):
         done = self.run_covol(*self.judge("--suggest", 3, "--json", "r.json"))
-        lines = [l for l in done.stderr.splitlines() if "marks would help in slice" in l]
+        lines = [l for l in done.stdout.splitlines() if "marks would help in slice" in l]
         report = json.loads((self.out / "r.json").read_text())["evidence"]
         self.assertEqual(len(lines), len(report["suggestions"]))
         self.assertGreaterEqual(len(lines), 2)

@@ -37,6 +37,8 @@ public:
     virtual void fill(const VoxelBox& box, void* out) const = 0;
     /// The value of all voxels of `box`, where that is known without a look at each of them.
     [[nodiscard]] virtual std::optional<double> uniform(const VoxelBox& box) const;
+    /// No value lies outside; none where that takes a look at the voxels. ImageJ shows this range.
+    [[nodiscard]] virtual std::optional<std::array<double, 2>> range() const;
     /// Hears of each voxel of the file once, by several threads at once.
     /// @param values  of the box; null: all are `uniform`
     virtual void wrote(const VoxelBox& box, const void* values, double uniform) const;
@@ -56,14 +58,17 @@ private:
 
 struct WriteImageOptions {
     bool pack = true;  ///< false: .nrrd and .mha with the voxels as they are in memory
+    /// The image whose lattice this is, or empty: a NIfTI file keeps its qform and sform and their codes, as long as
+    /// they mean that lattice.
+    std::string like = {};
 };
 
 /// Writes an image as the other write_image() do, but in boxes of a few MB that are filled and packed in parallel: the
 /// memory does not grow with the image. The file does not depend on the number of threads.
 ///
-/// .nrrd, .nii, .nii.gz, .mha, .tif as there; .zarr is OME-Zarr 0.4 in chunks of 128^3, with levels of half the size
-/// down to one chunk. A TIFF above 4000 MiB of voxels is a BigTIFF in tiles of 256 x 256.
-/// A folder that is no Zarr store is never replaced.
+/// .nrrd, .nii, .nii.gz, .mha, .tif, .npy as there; .zarr is OME-Zarr 0.4 in chunks of 128^3, with levels of half the
+/// size down to one chunk. A TIFF above 4000 MiB of voxels is a BigTIFF in tiles of 256 x 256. A folder that is no Zarr
+/// store is never replaced.
 /// @throws Error Io, InvalidOptions (ending), Unsupported (larger than the format allows), Cancelled; what the source
 ///               throws. Nothing half-written stays.
 COVOL_API void write_image(const std::string& path, const PixelSource& source, const WriteImageOptions& options = {},

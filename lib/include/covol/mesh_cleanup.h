@@ -43,4 +43,11 @@ COVOL_API CleanupReport clean_mesh(TriangleMesh& mesh, const FloatGrid& level_se
 /// Pairs of triangles that have a point in common beyond the vertices and the edge that they share.
 [[nodiscard]] COVOL_API int count_self_intersections(const TriangleMesh& mesh);
 
+/// The same pairs, by whether both triangles belong to one piece.
+struct Crossings {
+    int within = 0;   ///< a piece and itself
+    int between = 0;  ///< two pieces that touch or overlap, as structures that share a border do
+};
+[[nodiscard]] COVOL_API Crossings count_crossings(const TriangleMesh& mesh);
+
 }  // namespace covol

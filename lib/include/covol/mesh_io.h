@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,7 +18,7 @@ struct VertexAttribute {
 
 struct WriteMeshOptions {
     bool binary = true;                 ///< PLY, STL
-    bool y_up = false;                  ///< rotates z-up to y-up: (x,y,z) -> (x,z,-y)
+    std::optional<bool> y_up;           ///< rotates z-up to y-up: (x,y,z) -> (x,z,-y); none: in .glb, which is y-up
     double unit_scale = 1.0;            ///< multiplies coordinates; 0.001 for mm to m
     std::vector<std::string> comments;  ///< provenance lines, where the format has comments
     std::vector<VertexAttribute> attributes;
@@ -42,8 +43,8 @@ COVOL_API void write_meshes(const std::string& path, const std::vector<NamedMesh
 /// What write_meshes() can write, by the name alone.
 [[nodiscard]] COVOL_API bool holds_several_meshes(const std::string& path);
 
-/// PLY, OBJ, STL, OFF, binary glTF (all its meshes as one); polygons are split into triangles. Sizes are checked before
-/// memory is taken.
+/// PLY, OBJ, STL, OFF, binary glTF (all its meshes as one, turned from y up to z up); polygons are split into
+/// triangles. Sizes are checked before memory is taken.
 /// @throws Error Io, InvalidInput, Unsupported.
 [[nodiscard]] COVOL_API TriangleMesh read_mesh(const std::string& path);
 

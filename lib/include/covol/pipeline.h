@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "covol/api.h"
@@ -10,6 +11,7 @@
 #include "covol/cloud_surface.h"
 #include "covol/contours.h"
 #include "covol/edge.h"
+#include "covol/error.h"
 #include "covol/evolve.h"
 #include "covol/guess.h"
 #include "covol/guess_correction.h"
@@ -56,6 +58,7 @@ struct SegmentOptions {
     /// World position of the centre of voxel (0,0,0); automatic: see choose_domain().
     std::optional<Vec3> lattice_origin;
     std::optional<double> margin;  ///< points alone, >= 0: between points and domain boundary; automatic: D + 6 voxels
+    bool keep_failed = false;      ///< errors come as SegmentFailed, at the cost of a copy of the start
     Start start;
     /// Another tool's result (Mesh, Mask or Vdb): corrected by the marks and seeds near them, and no flow. `start` is
     /// then not used.
@@ -133,6 +136,16 @@ struct SegmentResult {
     std::vector<float> distance_to_points;              ///< at its vertices; of points without an image
     std::shared_ptr<const GuessCorrection> correction;  ///< of SegmentOptions::guess
     SegmentReport report;
+};
+
+/// An error of segment() or reconstruct() that comes after the start was made, with SegmentOptions::keep_failed: what
+/// there was, null where there was none.
+class COVOL_API SegmentFailed : public Error {
+public:
+    SegmentFailed(const Error& error, FloatGridPtr start_, const SegmentResult& made)
+        : Error(error), start(std::move(start_)), u(made.u), distance(made.distance), edge(made.edge) {}
+    FloatGridPtr start;              ///< the level set before the flow
+    FloatGridPtr u, distance, edge;  ///< as they were last
 };
 
 /// h and how it was found: the image's smallest spacing, or for points alone the median distance to the nearest other

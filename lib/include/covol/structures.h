@@ -78,6 +78,7 @@ public:
 
     void fill(const VoxelBox& box, void* out) const override;
     [[nodiscard]] std::optional<double> uniform(const VoxelBox& box) const override;
+    [[nodiscard]] std::optional<std::array<double, 2>> range() const override;
     void wrote(const VoxelBox& box, const void* values, double uniform) const override;
     [[nodiscard]] std::vector<std::pair<std::string, std::string>> metadata() const override;
     [[nodiscard]] std::vector<NamedLabel> label_names() const override;

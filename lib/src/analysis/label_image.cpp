@@ -273,6 +273,15 @@ std::optional<double> LabelImage::uniform(const VoxelBox& box) const {
     return *number == 0 ? 0 : state_->values[*number - 1U];
 }
 
+std::optional<std::array<double, 2>> LabelImage::range() const {
+    double low = 0, high = 0;
+    for (const int value : state_->values) {
+        low = std::min(low, double(value));
+        high = std::max(high, double(value));
+    }
+    return std::array<double, 2>{low, high};
+}
+
 void LabelImage::wrote(const VoxelBox& box, const void* values, double uniform) const {
     if (values == nullptr && uniform == 0) return;
     std::vector<Written> found(state_->values.size());

@@ -24,9 +24,8 @@ using detail::PixelRequest;
 using detail::read_error;
 
 constexpr const char* kReadable =
-    ".tif, .tiff, .nrrd, .nhdr, .nii, .nii.gz, .mha, .mhd, .mrc, .map, .h5, .ims, .dcm or .vdb, or a folder with a "
-    "DICOM "
-    "series or a Zarr store";
+    ".tif, .tiff, .nrrd, .nhdr, .nii, .nii.gz, .mha, .mhd, .mrc, .map, .h5, .ims, .npy, .dcm or .vdb, or a "
+    "folder with a DICOM series or a Zarr store";
 
 bool is_one_of(const std::string& text, std::initializer_list<const char*> list) {
     return std::any_of(list.begin(), list.end(), [&](const char* known) { return text == known; });
@@ -71,7 +70,7 @@ std::unique_ptr<ImageFile> open_image(const std::string& given, const ReadImageO
     const bool itk = is_one_of(end, {".nrrd", ".nhdr", ".nii", ".nii.gz", ".mha", ".mhd"});
     const bool mrc = is_one_of(end, {".mrc", ".map", ".rec", ".st", ".ccp4", ".ali"});
     const bool tiff = is_one_of(end, {".tif", ".tiff", ".btf", ".tf8"});
-    if (!marked && !itk && !mrc && !tiff && !hdf5 && end != ".vdb")
+    if (!marked && !itk && !mrc && !tiff && !hdf5 && end != ".npy" && end != ".vdb")
         throw read_error(Errc::Unsupported, path,
                          std::string("expected a name ending in ") + kReadable + ", got '" + end + "'");
     if (fs::file_size(path) == 0) throw read_error(Errc::InvalidInput, path, "the file is empty");
@@ -80,6 +79,7 @@ std::unique_ptr<ImageFile> open_image(const std::string& given, const ReadImageO
     if (itk || hdf5) return detail::open_itk(path);
     if (mrc) return detail::open_mrc(path);
     if (tiff) return detail::open_tiff(path, run);
+    if (end == ".npy") return detail::open_npy(path);
     return detail::open_vdb_image(path, grid);
 }
 

@@ -6,6 +6,10 @@
 #include <openvdb/openvdb.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
+#include <cctype>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <set>
@@ -196,6 +200,49 @@ void check_grids(const std::string& path, const std::vector<FloatGridPtr>& grids
     }
 }
 
+/// OpenVDB gives every file a random number, a UUID in its header; here it comes from what follows it, so that runs
+/// that are the same write files that are the same.
+void make_repeatable(const std::string& path) {
+    constexpr std::streamoff kUuid = 8 + 4 + 4 + 4 + 1;  // behind the magic number, three versions and a flag
+    constexpr std::size_t kLength = 36;
+    std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
+    std::string uuid(kLength, '\0');
+    file.seekg(kUuid);
+    file.read(uuid.data(), std::streamsize(kLength));
+    const auto is_uuid = [&] {
+        for (std::size_t n = 0; n < kLength; ++n) {
+            const bool dash = n == 8 || n == 13 || n == 18 || n == 23;
+            if (dash ? uuid[n] != '-' : std::isxdigit(static_cast<unsigned char>(uuid[n])) == 0) return false;
+        }
+        return true;
+    };
+    if (!file || !is_uuid()) OPENVDB_THROW(vdb::IoError, "expected a UUID in the header of the file just written");
+    // Two sums of the kind of MurmurHash's mixer. https://github.com/aappleby/smhasher
+    std::array<std::uint64_t, 2> sums{0x9e3779b97f4a7c15, 0xc2b2ae3d27d4eb4f};
+    std::vector<std::uint64_t> words(1U << 16);
+    while (file) {
+        std::fill(words.begin(), words.end(), 0);
+        file.read(reinterpret_cast<char*>(words.data()), std::streamsize(words.size() * sizeof(words[0])));
+        const auto count = (std::size_t(file.gcount()) + sizeof(words[0]) - 1) / sizeof(words[0]);
+        for (std::size_t n = 0; n < count; ++n) {
+            sums[0] = std::rotl((sums[0] ^ words[n]) * 0xff51afd7ed558ccd, 31);
+            sums[1] = std::rotl((sums[1] + words[n]) * 0xc4ceb9fe1a85ec53, 29);
+        }
+    }
+    sums[1] ^= sums[0] >> 32;
+    std::array<char, kLength + 1> text{};
+    // Version 8: the bits are the writer's own. https://www.rfc-editor.org/rfc/rfc9562
+    std::snprintf(text.data(), text.size(), "%08x-%04x-8%03x-%04x-%012llx", unsigned(sums[0] >> 32),
+                  unsigned(sums[0] >> 16 & 0xFFFF), unsigned(sums[0] & 0xFFF),
+                  unsigned(0x8000 | (sums[1] >> 48 & 0x3FFF)),
+                  static_cast<unsigned long long>(sums[1] & 0xFFFFFFFFFFFF));
+    file.clear();
+    file.seekp(kUuid);
+    file.write(text.data(), std::streamsize(kLength));
+    file.close();
+    if (!file) OPENVDB_THROW(vdb::IoError, "cannot be written");
+}
+
 VdbGridInfo describe(Reader& reader, std::size_t n) {
     vdb::GridBase::Ptr grid = reader.read_metadata(n);
     const char* const kCount = vdb::GridBase::META_FILE_VOXEL_COUNT;
@@ -251,6 +298,7 @@ void write_vdb(const std::string& path, const std::vector<FloatGridPtr>& grids, 
             file.setGridStatsMetadataEnabled(true);
             file.write(copies, file_metadata);
             file.close();
+            make_repeatable(temporary);
         });
     });
 }

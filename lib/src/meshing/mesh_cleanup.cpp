@@ -22,6 +22,7 @@
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "covol/mesh_relax.h"
+#include "mesh/disjoint_sets.h"
 #include "meshing/decimate.h"
 #include "meshing/mesh_distance.h"
 #include "meshing/safe_moves.h"
@@ -256,18 +257,34 @@ std::string CleanupOptions::why_invalid() const {
 }
 
 int count_self_intersections(const TriangleMesh& mesh) {
+    const Crossings crossings = count_crossings(mesh);
+    return crossings.within + crossings.between;
+}
+
+Crossings count_crossings(const TriangleMesh& mesh) {
     check_indices(mesh, "count_self_intersections");
+    meshing::DisjointSets pieces(mesh.vertices.size());
+    for (const auto& t : mesh.triangles) {
+        pieces.unite(t[0], t[1]);
+        pieces.unite(t[1], t[2]);
+    }
+    std::vector<std::uint32_t> piece_of(mesh.triangles.size());
+    for (std::size_t n = 0; n < piece_of.size(); ++n) piece_of[n] = pieces.root(mesh.triangles[n][0]);
     // Most pairs are apart by far; exact predicates decide on the others.
     const std::vector<meshing::ContactFinder::Pair> pairs =
         meshing::ContactFinder(mesh.vertices, mesh.triangles).contacts(false);
     return tbb::parallel_reduce(
-        tbb::blocked_range<std::size_t>(0, pairs.size()), 0,
-        [&](const auto& range, int count) {
-            for (std::size_t i = range.begin(); i < range.end(); ++i)
-                count += intersect(mesh, pairs[i].first, pairs[i].second);
+        tbb::blocked_range<std::size_t>(0, pairs.size()), Crossings{},
+        [&](const auto& range, Crossings count) {
+            for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                const auto [a, b] = pairs[i];
+                if (intersect(mesh, a, b)) ++(piece_of[a] == piece_of[b] ? count.within : count.between);
+            }
             return count;
         },
-        std::plus<>());
+        [](const Crossings& a, const Crossings& b) {
+            return Crossings{a.within + b.within, a.between + b.between};
+        });
 }
 
 namespace {

@@ -81,7 +81,7 @@ void solve(Job& job, const std::optional<FineStart>& without_coarse) {
     check_flow(job);
 }
 
-void run_steps(Job& job) {
+void run_steps(Job& job, FloatGridPtr& start) {
     Timed total(job.report().seconds.total);
     check_input(job);
     choose_values(job);
@@ -90,6 +90,7 @@ void run_steps(Job& job) {
     const std::optional<FineStart> without_coarse = pass_coarse_levels(job);
     find_edges(job);
     compute_trusted_distance(job);
+    if (job.options.keep_failed) start = job.result.u->deepCopy();
     solve(job, without_coarse);
     make_surface(job);
 }
@@ -99,7 +100,13 @@ SegmentResult run_job(const Image* image, const std::vector<Vec3>& world_points,
     SegmentResult result;
     with_threads(run, [&] {
         Job job(image, world_points, options, run);
-        run_steps(job);
+        FloatGridPtr start;
+        try {
+            run_steps(job, start);
+        } catch (const Error& error) {
+            if (!options.keep_failed || !job.result.u) throw;
+            throw SegmentFailed(error, start ? start : job.result.u, job.result);
+        }
         job.report().resolved = job.options;
         result = std::move(job.result);
     });

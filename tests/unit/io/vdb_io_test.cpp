@@ -4,6 +4,8 @@
 #include <openvdb/tools/LevelSetSphere.h>
 
 #include <catch2/catch.hpp>
+#include <fstream>
+#include <iterator>
 
 #include "support/scratch.h"
 
@@ -24,6 +26,24 @@ bool same_tree(const FloatGrid& a, const FloatGrid& b) {
 }
 
 }  // namespace
+
+TEST_CASE("the same grids make the same bytes, others another number of the file") {
+    const Scratch scratch;
+    const auto bytes_of = [&](const char* name, float radius, const char* fact) {
+        const std::string path = scratch.path(name);
+        write_vdb(path, {sphere("surface", radius)}, {false, {{"fact", fact}}});
+        std::ifstream file(path, std::ios::binary);
+        return std::string{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+    };
+    constexpr std::size_t kUuid = 21, kLength = 36;  // OpenVDB's header
+    const std::string one = bytes_of("a.vdb", 1, "x");
+    CHECK(bytes_of("b.vdb", 1, "x") == one);
+    CHECK(bytes_of("c.vdb", 1, "y").substr(kUuid, kLength) != one.substr(kUuid, kLength));
+    CHECK(bytes_of("d.vdb", 1.5F, "x").substr(kUuid, kLength) != one.substr(kUuid, kLength));
+    openvdb::io::File file(scratch.path("a.vdb"));
+    file.open();
+    CHECK(file.getUniqueTag() == one.substr(kUuid, kLength));
+}
 
 TEST_CASE("grids come back as they were written, by name or as the first") {
     const Scratch scratch;

@@ -73,6 +73,23 @@ TEST_CASE("self-intersections are counted in pairs, contact in shared corners an
     CHECK_THROWS_AS(count_self_intersections(side), Error);
 }
 
+TEST_CASE("crossings of pieces with each other are told from those with themselves") {
+    const Crossings apart = count_crossings(joined(sphere(8, 1), sphere(8, 1, 3)));
+    CHECK((apart.within == 0 && apart.between == 0));
+    const TriangleMesh both = joined(sphere(8, 1), sphere(8, 1, 1));
+    const Crossings crossed = count_crossings(both);
+    CHECK(crossed.within == 0);
+    CHECK(crossed.between > 0);
+    CHECK(count_self_intersections(both) == crossed.between);
+    // A third piece that cuts itself: two triangles through each other, joined at a corner.
+    TriangleMesh corner = two_triangles({0, 0, 0}, {1, 1, 1}, {1, 1, -1});
+    corner.triangles[1][0] = 0;
+    for (auto& v : corner.vertices) v[0] += 10;
+    const Crossings all = count_crossings(joined(both, corner));
+    CHECK(all.within == 1);
+    CHECK(all.between == crossed.between);
+}
+
 TEST_CASE("a proper mesh stays as it is") {
     const TriangleMesh before = sphere(10, 1);
     TriangleMesh mesh = before;

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "covol/error.h"
+#include "covol/image.h"
 #include "covol/mesh_io.h"
 #include "covol/points.h"
 #include "covol/vdb_io.h"
@@ -64,6 +65,19 @@ FileKind kind_of_output(const std::string& path, FileKind like) {
     if (is_one_of(end, kMeshEndings)) return FileKind::Mesh;
     if (is_one_of(end, kSharedEndings)) return like == FileKind::Points ? FileKind::Points : FileKind::Mesh;
     return FileKind::Image;
+}
+
+bool is_image_name(const std::string& path) {
+    try {
+        check_image_extension(path);
+    } catch (const Error&) {
+        return false;
+    }
+    return true;
+}
+
+bool is_segmentation_name(const std::string& path) {
+    return ending_of(path) == ".nrrd" && ending_of(std::filesystem::path(path).stem().string()) == ".seg";
 }
 
 const char* to_string(FileKind kind) {

@@ -12,6 +12,12 @@ enum class FileKind { Vdb, Image, Mesh, Points };
 /// By the name alone; PLY, OBJ and OFF are what `like` is when that is points, else meshes.
 [[nodiscard]] FileKind kind_of_output(const std::string& path, FileKind like);
 
+/// What write_image() writes.
+[[nodiscard]] bool is_image_name(const std::string& path);
+
+/// 3D Slicer's segmentations, whose label values have names.
+[[nodiscard]] bool is_segmentation_name(const std::string& path);
+
 /// "vdb", "image", "mesh", "points"
 [[nodiscard]] const char* to_string(FileKind kind);
 

@@ -34,12 +34,18 @@ Progress::Progress(bool quiet) : quiet_(quiet), terminal_(::isatty(STDERR_FILENO
 void Progress::update(const std::string& stage, double fraction) {
     if (quiet_) return;
     fraction = std::clamp(fraction, 0.0, 1.0);
-    if (stage != stage_) {
+    // A stage that begins again, for another structure or a finer level, is another line; within one nothing goes back.
+    const bool again = stage == stage_ && fraction_ >= 1 && fraction < 1;
+    if (stage != stage_ || again) {
         clear();
         stage_ = stage;
+        fraction_ = 0;
+        const int pass = ++passes_[stage];
+        shown_stage_ = stage + (pass > 1 ? " (" + std::to_string(pass) + ")" : "");
         begin_ = shown_ = Clock::now();
         announced_ = false;
     }
+    fraction = fraction_ = std::max(fraction, fraction_);
     const double elapsed = seconds_since(begin_);
     if (terminal_) {
         if (fraction >= 1) {
@@ -49,7 +55,8 @@ void Progress::update(const std::string& stage, double fraction) {
             shown_ = Clock::now();
         }
     } else if (seconds_since(shown_) > kLineSeconds || (announced_ && fraction >= 1)) {
-        std::fprintf(stderr, "covol: %s: %s\n", stage.c_str(), percentage_and_time_left(fraction, elapsed).c_str());
+        std::fprintf(stderr, "covol: %s: %s\n", shown_stage_.c_str(),
+                     percentage_and_time_left(fraction, elapsed).c_str());
         shown_ = Clock::now();
         announced_ = fraction < 1;
     }
@@ -58,7 +65,7 @@ void Progress::update(const std::string& stage, double fraction) {
 void Progress::draw(double fraction, double elapsed) {
     const int filled = static_cast<int>(fraction * kBarWidth);
     const std::string bar = std::string(filled, '#') + std::string(kBarWidth - filled, '.');
-    std::fprintf(stderr, "\r\033[Kcovol: %-9s [%s] %s", stage_.c_str(), bar.c_str(),
+    std::fprintf(stderr, "\r\033[Kcovol: %-9s [%s] %s", shown_stage_.c_str(), bar.c_str(),
                  percentage_and_time_left(fraction, elapsed).c_str());
     std::fflush(stderr);
     drawn_ = true;

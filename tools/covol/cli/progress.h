@@ -1,5 +1,6 @@
 #pragma once
 #include <chrono>
+#include <map>
 #include <string>
 
 namespace covol::tool {
@@ -27,7 +28,9 @@ private:
     bool terminal_;
     bool drawn_ = false;
     bool announced_ = false;
-    std::string stage_;
+    std::string stage_, shown_stage_;
+    double fraction_ = 0;                ///< of the stage; never less than before
+    std::map<std::string, int> passes_;  ///< how often each stage began
     Clock::time_point begin_;
     Clock::time_point shown_;
 };

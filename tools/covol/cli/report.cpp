@@ -85,23 +85,25 @@ Json to_json(const CompareReport& r) {
 }
 
 Json to_json(const SegmentOptions& o) {
-    constexpr double kAutomatic = -1;  // not needed, and so not chosen
+    // What was not needed was not chosen: null.
+    const auto chosen = [](const auto& value) { return value ? Json(*value) : Json(nullptr); };
     const EvolveOptions& e = o.evolve;
+    const bool feature = o.edge.feature != EdgeFeature::Automatic;
     return {{"model", to_string(o.model)},
-            {"voxel_size", o.voxel_size.value_or(0)},
-            {"tag_distance", o.tag_distance.value_or(0)},
+            {"voxel_size", chosen(o.voxel_size)},
+            {"tag_distance", chosen(o.tag_distance)},
             {"theta", e.theta},
             {"rho", e.rho},
-            {"delta", e.delta.value_or(kAutomatic)},
-            {"tau", e.tau.value_or(kAutomatic)},
-            {"sigma", o.edge.sigma.value_or(kAutomatic)},
-            {"edge_feature", to_string(o.edge.feature)},
-            {"edge_k", o.edge.edge_k.value_or(0)},
+            {"delta", chosen(e.delta)},
+            {"tau", chosen(e.tau)},
+            {"sigma", chosen(o.edge.sigma)},
+            {"edge_feature", feature ? Json(to_string(o.edge.feature)) : Json(nullptr)},
+            {"edge_k", chosen(o.edge.edge_k)},
             {"intensities", {o.edge.low, o.edge.high}},
             {"epsilon", e.epsilon},
             {"edge_epsilon", e.edge_epsilon},
-            {"attraction_range", e.attraction_range.value_or(kAutomatic)},
-            {"image_yields", e.image_yields.value_or(kAutomatic)},
+            {"attraction_range", chosen(e.attraction_range)},
+            {"image_yields", chosen(e.image_yields)},
             {"guess_weight", e.guess_weight},
             {"follow", e.follow},
             {"max_steps", e.max_steps},

@@ -6,6 +6,8 @@
 #include <iostream>
 
 #include "cli/arguments.h"
+#include "cli/grid_metadata.h"
+#include "cli/nearest.h"
 #include "cli/option_names.h"
 #include "cli/profile.h"
 #include "covol/error.h"
@@ -108,6 +110,29 @@ std::vector<std::string> inputs_of(const CLI::App& command) {
     return inputs;
 }
 
+/// File names in place of paths: files that are passed on need not tell whose folders they come from. What stands
+/// before a path stays, a structure's name or a kind of start (NAME=FILE, mesh:FILE), and what stands behind it, the
+/// place of a dataset (FILE.h5:/a/b).
+std::string without_folder(const std::string& text) {
+    std::size_t begin = text.find('=') + 1;
+    for (const char* kind : {"mesh:", "mask:", "vdb:"})
+        if (text.compare(begin, std::string(kind).size(), kind) == 0) begin += std::string(kind).size();
+    const std::size_t end = std::min(text.find(":/", begin), text.size());
+    std::size_t last = end;
+    while (last > begin && text[last - 1] == '/') --last;  // folders, such as .zarr/
+    const std::size_t slash = last > begin ? text.rfind('/', last - 1) : std::string::npos;
+    return slash == std::string::npos || slash < begin ? text : text.substr(0, begin) + text.substr(slash + 1);
+}
+
+Json without_folders(const Json& options) {
+    Json result = options;
+    for (Json& value : result) {
+        if (value.is_string()) value = without_folder(value.get<std::string>());
+        if (value.is_array() || value.is_object()) value = without_folders(value);
+    }
+    return result;
+}
+
 /// A value that is empty, as from a shell's unset variable, is never meant.
 void expect_values(const CLI::App& app) {
     for (const CLI::Option* option : app.get_options()) {
@@ -126,6 +151,7 @@ std::string shell_quoted(const std::string& word) {
     return quoted + "'";
 }
 
+constexpr int kReportSchema = 1;              // grows when a field of the report goes or means something else
 constexpr std::uint64_t kUsablePercent = 95;  // of the free memory: beyond it the system would end us without a word
 constexpr int kMostThreads = 1024;            // TBB runs out of stacks long after
 
@@ -205,8 +231,11 @@ int Session::main(int argc, char** argv) {
     const auto is = [&](std::size_t n, const char* word) { return n < words.size() && words[n] == word; };
     planning_ = is(0, "plan") && (is(1, "segment") || is(1, "reconstruct"));
     if (planning_) words.erase(words.begin());
+    std::vector<std::string> given;
     try {
+        check_blanks(words);
         brick_ = take_brick_call(words);
+        given = words;
         std::reverse(words.begin(), words.end());  // as CLI11 wants them
         app_.parse(std::move(words));
         expect_values(app_);
@@ -214,6 +243,7 @@ int Session::main(int argc, char** argv) {
         forget_groups(*app_.get_subcommands().front());
     } catch (const CLI::ParseError& error) {
         if (error.get_exit_code() == 0) return app_.exit(error);  // help and version
+        if (const std::string unknown = unknown_name(app_, given); !unknown.empty()) return fail(kUsage, unknown);
         return fail(kUsage, error.what() + std::string("; see covol --help"));
     } catch (const UsageError& error) {
         return fail(kUsage, error.what());
@@ -267,6 +297,7 @@ int Session::execute() {
 }
 
 void Session::start_report() {
+    report_["schema"] = kReportSchema;
     report_["covol"] = version();
     report_["command"] = command_->get_name();
     report_["options"] = options_of(*command_);
@@ -282,7 +313,8 @@ void Session::finish() {
         });
     outputs_.commit();
     add_seconds("write", watch.seconds());
-    add_seconds("total", watch.seconds());
+    report_["seconds"].erase("total");  // the last, and of all that was done
+    add_seconds("total", since_start_.seconds());
     report_["peak_rss_bytes"] = peak_rss();
     try {
         if (!json_path_.empty()) write_report(json_path_);
@@ -327,7 +359,11 @@ void Session::note(const std::string& line) {
     if (!quiet_) progress_->line("covol: " + with_flags(line));
 }
 
-void Session::say(const std::string& line) { progress_->line(line); }
+void Session::say(const std::string& line) {
+    if (json_path_ == "-") return progress_->line(line);  // standard output is the report's
+    progress_->clear();
+    std::cout << line << std::endl;
+}
 
 void Session::warn(const std::string& message) {
     const std::string line = with_flags(message);
@@ -338,11 +374,30 @@ void Session::warn(const std::string& message) {
     report_["warnings"].push_back(line);
 }
 
+void Session::set_world(const ImageGeometry& geometry) {
+    unit_ = geometry.unit.empty() ? "not stated" : geometry.unit;
+    space_ = "LPS";
+}
+
+void Session::set_world_of_points() {
+    unit_ = "not stated";
+    space_ = "none";
+}
+
+void Session::set_world(const FloatGrid& grid) {
+    const std::map<std::string, std::string> facts = text_metadata(grid);
+    const auto fact = [&](const char* name) { return facts.contains(name) ? facts.at(name) : ""; };
+    unit_ = fact("covol_unit");
+    space_ = fact("covol_space");
+}
+
 std::map<std::string, std::string> Session::metadata() const {
-    Json options = report_.at("options");
+    Json options = without_folders(report_.at("options"));
     options["command"] = report_.at("command");
     const auto text = [](const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); };
     std::map<std::string, std::string> facts{{"covol_version", version()}, {"covol_options", text(options)}};
+    if (!unit_.empty()) facts["covol_unit"] = unit_;
+    if (!space_.empty()) facts["covol_space"] = space_;
     if (report_.contains("resolved")) facts["covol_resolved"] = text(report_.at("resolved"));
     return facts;
 }

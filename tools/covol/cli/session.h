@@ -1,6 +1,7 @@
 #pragma once
 #include <CLI/CLI.hpp>
 #include <atomic>
+#include <chrono>
 #include <functional>
 #include <map>
 #include <memory>
@@ -35,6 +36,17 @@ enum ExitCode {
 };
 
 [[nodiscard]] int exit_code_of(Errc code);
+
+/// Seconds since construction.
+class Stopwatch {
+public:
+    [[nodiscard]] double seconds() const {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+    }
+
+private:
+    std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+};
 
 /// What all subcommands share: the flags that every one takes, the run context, the outputs and the report.
 class Session {
@@ -72,17 +84,24 @@ public:
     // note() and warn() put flags for the options that a line of the library names.
     /// Progress and remarks: silent with --quiet.
     void note(const std::string& line);
-    /// The result that was asked for (info, compare, check): never silent.
+    /// The result that was asked for (info, compare, check), on standard output; on standard error where --json - has
+    /// that. Never silent.
     void say(const std::string& line);
     void warn(const std::string& message);
-    /// Provenance for the metadata of .vdb files: version, options, and the numbers that were used once they are known.
+    /// What lengths and places mean in what is written: the image's unit and LPS; of points alone their own.
+    void set_world(const ImageGeometry& geometry);
+    void set_world_of_points();
+    /// The same as of a grid that was read.
+    void set_world(const FloatGrid& grid);
+    /// Provenance for the metadata of .vdb files: version, options with the names of files, not of their folders, the
+    /// numbers that were used once they are known, the unit of length and the space.
     [[nodiscard]] std::map<std::string, std::string> metadata() const;
     /// The same as comment lines for meshes and points.
     [[nodiscard]] std::vector<std::string> comments() const;
     [[nodiscard]] std::string comment() const;
     /// Refuses early what cannot fit into --memory-limit, or into what is free: `bytes` for `what` are needed at least.
     void require_memory(std::uint64_t bytes, const std::string& what) const;
-    /// Adds to seconds.<name> of the report.
+    /// Adds to seconds.<name> of the report; seconds.total is the whole run's.
     void add_seconds(const std::string& name, double seconds);
     /// The command stands behind `covol plan`: it says what it would take, and makes nothing.
     [[nodiscard]] bool is_planning() const noexcept { return planning_; }
@@ -119,23 +138,14 @@ private:
     std::optional<BrickCall> brick_;
     std::vector<std::string> inputs_;
     std::string command_line_;
+    std::string unit_, space_;  ///< empty: not known
 
     RunContext run_;
     std::unique_ptr<Progress> progress_;
     Outputs outputs_;
     Json report_;
+    Stopwatch since_start_;
     int exit_code_ = kDone;
-};
-
-/// Seconds since construction.
-class Stopwatch {
-public:
-    [[nodiscard]] double seconds() const {
-        return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
-    }
-
-private:
-    std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 
 }  // namespace covol::tool

@@ -1,5 +1,6 @@
 #include "cli/table.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -38,6 +39,24 @@ Table& Table::operator<<(double number) {
     const auto end =
         std::to_chars(digits.data(), digits.data() + digits.size(), number, std::chars_format::general, 7).ptr;
     return *this << std::string(digits.data(), end);
+}
+
+std::vector<std::string> aligned(const std::vector<std::vector<std::string>>& rows) {
+    std::vector<std::size_t> widths;
+    for (const auto& row : rows) {
+        widths.resize(std::max(widths.size(), row.size()));
+        for (std::size_t n = 0; n < row.size(); ++n) widths[n] = std::max(widths[n], row[n].size());
+    }
+    std::vector<std::string> lines;
+    for (const auto& row : rows) {
+        std::string line;
+        for (std::size_t n = 0; n < row.size(); ++n) {
+            const std::string blanks(widths[n] - row[n].size(), ' ');
+            line += n == 0 ? row[n] + blanks : "  " + blanks + row[n];
+        }
+        lines.push_back(line);
+    }
+    return lines;
 }
 
 }  // namespace covol::tool

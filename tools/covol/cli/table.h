@@ -20,4 +20,7 @@ private:
     bool first_ = true;
 };
 
+/// Rows of words as lines for people: the first column at its left, the others at their right.
+[[nodiscard]] std::vector<std::string> aligned(const std::vector<std::vector<std::string>>& rows);
+
 }  // namespace covol::tool

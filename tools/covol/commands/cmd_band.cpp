@@ -29,6 +29,7 @@ struct BandJob {
     void run(Session& session) const {
         session.outputs().check("-o", output, OutputKind::Vdb);
         const FloatGridPtr d = read_vdb(distance_path);
+        session.set_world(*d);
         const double D = choose_distance(domain_of(*d), session);
         const Stopwatch watch;
         const BandResult result = tag_interior(*d, {D, tag.exterior_seeds}, session.run());

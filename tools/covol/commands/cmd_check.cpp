@@ -135,8 +135,14 @@ void check_image(const std::string& path, const ImageFlags& flags, const RunCont
 void check_mesh_file(const std::string& path, Findings& findings) {
     const TriangleMesh mesh = read_mesh(path);
     check_measures(mesh, "the mesh", findings);
-    const int crossings = count_self_intersections(mesh);
-    if (crossings > 0) findings.problem("the mesh has " + std::to_string(crossings) + " self-intersections");
+    // Objects of one file are solids of their own: those that share a border touch.
+    const Crossings crossings = count_crossings(mesh);
+    const bool apart = holds_several_meshes(path);
+    const int own = crossings.within + (apart ? 0 : crossings.between);
+    if (own > 0) findings.problem("the mesh has " + std::to_string(own) + " self-intersections");
+    if (apart && crossings.between > 0)
+        findings.remark("triangles of different pieces meet " + std::to_string(crossings.between) +
+                        " times: solids that touch or overlap; to make one of them, join them by a Boolean union");
     std::vector<Vec3> corners;
     for (const auto& v : mesh.vertices) corners.push_back({v[0], v[1], v[2]});
     const WorldBox box = bounding_box(corners);

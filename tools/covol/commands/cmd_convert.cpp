@@ -33,6 +33,7 @@ struct ConvertJob {
 
     void image_to_vdb(Session& session) const {
         const Image pixels = image.read(input, session.run());
+        session.set_world(pixels.geometry());
         const double finest = choose_voxel_size(pixels).voxel_size;
         const double h = voxel_size.resolve(finest, finest);
         const FloatGridPtr grid = to_grid(pixels, h, session.run());
@@ -56,6 +57,7 @@ struct ConvertJob {
         if (!like.empty()) geometry = read_image_geometry(like, image.options, session.run());
         const PointCloud cloud = read_points(input, points.options);
         std::vector<Vec3> world = geometry ? to_world(cloud, *geometry) : to_world(cloud);
+        geometry ? session.set_world(*geometry) : session.set_world_of_points();
         if (geometry) check_inside(cloud, *geometry, session.run());
         session.note(input + ": " + std::to_string(world.size()) + " points, " + cloud.rule);
         Json& report = session.report()["points"];

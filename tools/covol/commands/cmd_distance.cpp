@@ -38,6 +38,7 @@ struct DistanceJob {
         std::optional<ImageGeometry> geometry;
         if (!like.empty()) geometry = read_image_geometry(like, image.options, session.run());
         const ImageGeometry* pointer = geometry ? &*geometry : nullptr;
+        geometry ? session.set_world(*geometry) : session.set_world_of_points();
         const std::vector<Vec3> cloud = read_world_points(points, pointer, session.run()).points;
         const double h = voxel_size(pointer, cloud, session);
         const double radius = max_distance.resolve(h, kTubeVoxels * h);

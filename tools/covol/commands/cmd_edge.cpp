@@ -21,6 +21,7 @@ struct EdgeJob {
         ReadImageOptions reading = image.options;
         reading.roi = sampled_box(domain.world_box(), h);
         const Image pixels = read_image(image_path, reading, session.run());
+        session.set_world(pixels.geometry());
         const Stopwatch watch;
         const EdgeResult result = detect_edges(pixels, *topology, edge_flags.resolve(h), session.run());
         session.add_seconds("edge", watch.seconds());

@@ -32,6 +32,7 @@ struct EvolveJob {
     void run(Session& session) const {
         session.outputs().check("-o", output, OutputKind::Vdb);
         const FloatGridPtr u = read_vdb(band_path);
+        session.set_world(*u);
         const FloatGridPtr d = distance_path.empty() ? nullptr : read_vdb(distance_path);
         const FloatGridPtr g = edge_path.empty() ? nullptr : read_vdb(edge_path);
         const EvolveOptions options = resolve(domain_of(*u).voxel_size, session);

@@ -1,5 +1,6 @@
 #include <memory>
 
+#include "cli/file_kind.h"
 #include "cli/report.h"
 #include "commands/commands.h"
 #include "covol/error.h"
@@ -22,10 +23,10 @@ struct MaskJob {
         const FloatGridPtr level_set = read_vdb_level_set(input, session.run());
         const ImageGeometry geometry = image.read_geometry(like, session.run());
         const auto labels = std::make_shared<LabelImage>(std::vector<Structure>{{"surface", level_set}}, geometry,
-                                                         std::vector<int>{label}, false);
+                                                         std::vector<int>{label}, is_segmentation_name(output));
         session.report()["mask"] = {{"image", to_json(geometry)}};
         session.outputs().add(output, [this, labels, &session](const std::string& path) {
-            write_image(path, *labels, {!raw}, session.run());
+            write_image(path, *labels, {!raw, like}, session.run());
             const std::uint64_t inside = labels->voxels_written().front();
             session.report()["mask"]["voxels"] = inside;
             session.note(std::to_string(inside) + " voxels inside");
@@ -45,7 +46,7 @@ void add_mask(Session& session) {
     in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "label image")
         ->required()
-        ->type_name("OUT.nrrd|.nii.gz|.tif|.mha|.zarr");
+        ->type_name("OUT.nrrd|.nii.gz|.tif|.mha|.npy|.zarr");
     command->add_option("--label", job->label, "value of the inside, 1 to 255")->capture_default_str();
     command->add_flag("--raw", job->raw, "leave the voxels of .nrrd and .mha unpacked");
     job->image.bind(*command);

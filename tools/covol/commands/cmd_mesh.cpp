@@ -75,6 +75,7 @@ struct MeshJob {
         flags.check();
         check_plain();
         const FloatGridPtr level_set = read_vdb_level_set(input, session.run());
+        session.set_world(*level_set);
         const double h = domain_of(*level_set).voxel_size;
         if (flags.plain) return stream(level_set, h, session);
         const Stopwatch watch;

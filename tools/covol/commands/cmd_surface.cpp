@@ -15,6 +15,7 @@ struct SurfaceJob {
         session.outputs().check("-o", output, OutputKind::Vdb);
         session.outputs().check("--density", density_path, OutputKind::Vdb);
         const FloatGridPtr u = read_vdb(input);
+        session.set_world(*u);
         const Stopwatch watch;
         const FloatGridPtr level_set = extract_surface(*u, session.run());
         session.add_seconds("surface", watch.seconds());

@@ -1,9 +1,12 @@
 #include "flags/bindings.h"
 
 #include <cmath>
+#include <iostream>
+#include <iterator>
 
 #include "covol/error.h"
 #include "covol/mesh_stream.h"
+#include "covol/points_text.h"
 
 namespace covol::tool {
 namespace {
@@ -149,11 +152,25 @@ void PointFlags::bind_options(CLI::App& command) {
         ->type_name("N");
 }
 
+namespace {
+
+/// All of it; it is there once.
+const std::string& standard_input() {
+    static const std::string text{std::istreambuf_iterator<char>(std::cin), std::istreambuf_iterator<char>()};
+    return text;
+}
+
+}  // namespace
+
 WorldPoints read_world_points(const PointFlags& flags, const ImageGeometry* geometry, const RunContext& run) {
     WorldPoints all;
     for (const std::string& path : flags.paths) {
         run.check();
-        const PointCloud cloud = read_points(path, flags.options);
+        const PointCloud cloud = path == "-" ? parse_points(standard_input(), "standard input", flags.options)
+                                             : read_points(path, flags.options);
+        if (!cloud.lines.empty())
+            run.warn(path + ": its marks form " + std::to_string(cloud.lines.size()) +
+                     " lines, and are taken as loose points here; --contours joins them along the lines");
         add_cloud(cloud, geometry, all, run);
         run.info(path + ": " + std::to_string(cloud.points.size()) + " points" +
                  (cloud.rule.empty() ? "" : ", " + cloud.rule));
@@ -294,10 +311,10 @@ void MeshFlags::bind(CLI::App& command) {
     in_group(command, Group::MeshFiles);
     command
         .add_option_function<std::string>(
-            "--up", [this](const std::string& text) { y_up = text == "y"; }, "the mesh's axis that points up")
+            "--up", [this](const std::string& text) { y_up = text == "y"; },
+            "the mesh's axis that points up [z; in .glb y, which glTF prescribes]")
         ->check(CLI::IsMember({"y", "z"}).description(""))
-        ->type_name("y|z")
-        ->default_str("z");
+        ->type_name("y|z");
     command.add_option("--unit-scale", unit_scale, "multiplies the mesh's coordinates, 0.001 for mm to m")
         ->capture_default_str();
 }

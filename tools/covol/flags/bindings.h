@@ -1,5 +1,6 @@
 #pragma once
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -107,7 +108,7 @@ struct EvolveFlags {
 };
 
 struct MeshFlags {
-    bool y_up = false;
+    std::optional<bool> y_up;
     double unit_scale = 1.0;
     bool plain = false;  ///< stream_mesh()
     void bind(CLI::App& command);

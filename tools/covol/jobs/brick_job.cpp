@@ -270,7 +270,7 @@ SegmentResult solve_within_limit(const SegmentJob& job, const Image* image, cons
     run.info("about " + std::to_string(plan.active_voxels() / 1000000) +
              " million voxels in the band, more than --memory-limit allows at once: in " +
              std::to_string(plan.bricks.size()) + " bricks");
-    const TemporaryFolder temporary(job.output);
+    const TemporaryFolder temporary(job.any_output());
     const BrickFolder folder(temporary.path());
     BrickRunner(*solver, plan, folder, run).run_all();
     return join(job, *solver, plan, folder, session);

@@ -49,7 +49,6 @@ void prepare_marks(Marks& marks, const CloudFlags& cloud, const ContourFlags& co
     marks.contours = contours.densify(marks.drawn, geometry, h, run, marks.report["contours"]);
     marks.given.insert(marks.given.end(), marks.contours->marks.begin(), marks.contours->marks.end());
     session.add_seconds("contours", watch.seconds());
-    session.add_seconds("total", watch.seconds());
 }
 
 }  // namespace covol::tool

@@ -1,7 +1,9 @@
 #include "jobs/segment_job.h"
 
 #include <algorithm>
+#include <utility>
 
+#include "cli/file_kind.h"
 #include "cli/report.h"
 #include "covol/error.h"
 #include "jobs/brick_job.h"
@@ -18,6 +20,7 @@ SegmentOptions SegmentJob::resolve(double h) const {
     options.roi = domain.roi;
     options.lattice_origin = domain.lattice_origin;
     options.margin = domain.margin.resolve_above_0(h);
+    options.keep_failed = !failed_path.empty();
     options.start = start;
     options.model = model;
     options.mark_precision = mark_precision.resolve(h);
@@ -64,9 +67,32 @@ std::string SegmentJob::unused(const SegmentReport& report) const {
            " did nothing: the surface is a guess that marks and image hold, and nothing flowed; --model paper flows";
 }
 
+void SegmentJob::sort_output(bool with_image) {
+    const FileKind kind = output.empty() ? FileKind::Vdb : kind_of_output(output, FileKind::Mesh);
+    const bool is_mask = kind == FileKind::Image && with_image && is_image_name(output);
+    if (kind != FileKind::Mesh && !is_mask) return;  // what is none of these is not written as .vdb, either
+    std::string& alone = is_mask ? mask_path : mesh_path;
+    if (!alone.empty())
+        throw UsageError("-o " + output + " and " + (is_mask ? "--mask " : "--mesh ") + alone +
+                         ": expected one of them; -o OUT.vdb goes with the others");
+    alone = std::exchange(output, "");
+}
+
+std::string SegmentJob::any_output() const {
+    for (const std::string* path : {&output, &mesh_path, &mask_path})
+        if (!path->empty()) return *path;
+    return {};
+}
+
 void SegmentJob::bind(CLI::App& command, bool with_image) {
     in_group(command, Group::Output);
-    command.add_option("-o,--output", output, "the surface as a level set, .vdb")->required()->type_name("OUT.vdb");
+    command
+        .add_option("-o,--output", output,
+                    std::string("the surface as a level set, .vdb; or ") +
+                        (with_image ? "a mesh or a label image" : "a mesh") + " alone, by the name's end")
+        ->required()
+        ->type_name("OUT.vdb|...");
+    command.final_callback([this, with_image] { sort_output(with_image); });
     if (with_image) {
         command.add_option("--mask", mask_path, "label image in the image's own geometry; .seg.nrrd for 3D Slicer")
             ->type_name("OUT.nrrd|.nii.gz|.tif|.mha|.zarr");
@@ -91,6 +117,10 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
                     "one page for the browser: the surface in 3D, slices, figures, options, where new marks would help")
         ->type_name("OUT.html")
         ->each([this](const std::string&) { evidence.for_page = true; });
+    command
+        .add_option("--keep-failed", failed_path,
+                    "where a run fails after its start was made: that start, u, distance and edge as far as they came")
+        ->type_name("OUT.vdb");
     contours.bind(command, with_image);
     if (with_image) painted.bind(command);
     seeds.bind(command, with_image);
@@ -155,11 +185,11 @@ Image SegmentJob::read(const std::string& path, const ReadImageOptions& options,
     }
     session.require_memory(read_image_info(path, needed, session.run()).bytes_to_hold, "the image");
     Image pixels = read_image(path, needed, session.run());
+    session.set_world(pixels.geometry());
     Json& input = session.report()["input"]["image"];
     input = to_json(pixels.geometry());
     input["path"] = path;
     session.add_seconds("read", reading.seconds());
-    session.add_seconds("total", reading.seconds());
     return pixels;
 }
 
@@ -178,6 +208,7 @@ void SegmentJob::run(Session& session) const {
         names = names || std::any_of(texts->begin(), texts->end(), has_name);
     if (names && images.empty())
         throw UsageError("expected files without names: several structures need an image, see covol segment");
+    if (images.empty()) session.set_world_of_points();
     if (session.is_planning()) return run_plan(*this, session);
     if (session.brick()) return run_bricks(*this, session);
     if (is_timelapse(*this)) return run_timelapse(*this, session);

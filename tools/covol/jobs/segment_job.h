@@ -38,7 +38,7 @@ struct SegmentJob {
     EvidenceFlags evidence;
     BrickFlags bricks;
     FrameChoice frames;
-    std::string output, mask_path, mesh_path, density_path, fields_path, table_path, page_path;
+    std::string output, mask_path, mesh_path, density_path, fields_path, table_path, failed_path, page_path;
     bool half = false;
 
     void bind(CLI::App& command, bool with_image);
@@ -47,6 +47,9 @@ struct SegmentJob {
     void run(Session& session) const;
 
     // For those.
+    /// A mesh or a label image that stands at -o goes where --mesh and --mask would have it.
+    void sort_output(bool with_image);
+    [[nodiscard]] std::string any_output() const;
     [[nodiscard]] SegmentOptions resolve(double h) const;
     /// Options that are wrong whatever h is are found before anything is read.
     void check_options() const;

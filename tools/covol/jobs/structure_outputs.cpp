@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "cli/file_kind.h"
 #include "cli/report.h"
 #include "covol/mesh_stream.h"
 #include "covol/surface.h"
@@ -90,7 +91,7 @@ using Metadata = std::vector<std::pair<std::string, std::string>>;
 std::vector<NamedLabel> label_names(const StructuresOutput& output) {
     std::vector<NamedLabel> labels;
     for (std::size_t n = 0; n < output.structures.size(); ++n)
-        labels.push_back({output.structures[n].label, output.structures[n].name, structure_color(n)});
+        labels.push_back({output.structures[n].label, output.structures[n].shown_name(), structure_color(n)});
     return labels;
 }
 
@@ -111,6 +112,10 @@ public:
     [[nodiscard]] Metadata metadata() const override {
         if (!has_names_) return {};
         return make_slicer_segments(output_->names(), {extent()}, output_->labels());
+    }
+    [[nodiscard]] std::optional<std::array<double, 2>> range() const override {
+        const auto [low, high] = std::minmax_element(values().begin(), values().end());
+        return std::array<double, 2>{double(*low), double(*high)};
     }
     [[nodiscard]] std::vector<NamedLabel> label_names() const override {
         return has_names_ ? tool::label_names(*output_) : std::vector<NamedLabel>{};
@@ -157,16 +162,19 @@ private:
     bool has_names_;
 };
 
+/// @param like  the image
 void hand_over_labels(const std::shared_ptr<const StructuresOutput>& output, const std::string& path,
-                      const RunContext& run, const Sink& sink) {
+                      const std::string& like, const RunContext& run, const Sink& sink) {
     if (path.empty()) return;
-    const bool has_names = !output->structures.front().name.empty();
-    sink(path, [output, run, has_names](const std::string& file) {
+    const bool named = !output->structures.front().name.empty();
+    const bool has_names = named || is_segmentation_name(path);
+    sink(path, [output, run, has_names, like](const std::string& file) {
         if (output->structures.size() == 1 && output->structures.front().corrected)
-            return write_image(file, CorrectedLabels(output, has_names), {}, run);
-        write_image(file, LabelImage(solids(*output), output->geometry, output->labels(), has_names), {}, run);
+            return write_image(file, CorrectedLabels(output, has_names), {true, like}, run);
+        write_image(file, LabelImage(solids(*output), output->geometry, output->labels(), has_names), {true, like},
+                    run);
     });
-    if (has_names && !keeps_names(path))
+    if (named && !keeps_names(path))
         sink(labels_path(path), [output](const std::string& file) {
             write_text(file, make_itksnap_labels(output->names(), output->labels()));
         });
@@ -193,7 +201,7 @@ Json report_of(const StructureOutput& s) {
 
 std::vector<std::string> StructuresOutput::names() const {
     std::vector<std::string> result;
-    for (const StructureOutput& s : structures) result.push_back(s.name);
+    for (const StructureOutput& s : structures) result.push_back(s.shown_name());
     return result;
 }
 
@@ -202,7 +210,7 @@ std::string with_suffix(const std::string& path, const std::string& suffix) {
     std::string name = whole.filename().string();
     std::size_t dot = name.rfind('.');
     if (dot == std::string::npos || dot == 0) return path + suffix;
-    for (const char* end : {".nii.gz", ".seg.nrrd", ".ome.zarr"})
+    for (const char* end : {".nii.gz", ".seg.nrrd", ".ome.zarr", ".ome.tif", ".ome.tiff"})
         if (name.size() > std::string(end).size() && name.ends_with(end)) dot = name.size() - std::string(end).size();
     return (whole.parent_path() / name.insert(dot, suffix)).string();
 }
@@ -215,7 +223,7 @@ std::vector<int> StructuresOutput::labels() const {
 
 std::vector<Structure> solids(const StructuresOutput& output) {
     std::vector<Structure> result;
-    for (const StructureOutput& s : output.structures) result.push_back({s.name, s.result.surface});
+    for (const StructureOutput& s : output.structures) result.push_back({s.shown_name(), s.result.surface});
     return result;
 }
 
@@ -229,6 +237,7 @@ void check_outputs(const SegmentJob& job, const std::vector<StructureInput>& inp
     outputs.check("--density", tagged(job.density_path), OutputKind::Vdb);
     outputs.check("--fields", tagged(job.fields_path), OutputKind::Vdb);
     outputs.check("--report", tagged(job.page_path), OutputKind::Page);
+    outputs.check("--keep-failed", tagged(job.failed_path), OutputKind::Vdb);
     job.evidence.check(outputs, tagged(job.evidence.path));
     job.mesh.check();
     const std::string mesh = tagged(job.mesh_path);
@@ -256,7 +265,7 @@ void hand_over(const SegmentJob& job, const std::shared_ptr<const StructuresOutp
     });
     sink(tagged(job.fields_path), [output, vdb](const std::string& file) { write_vdb(file, fields_of(*output), vdb); });
     hand_over_meshes(job, output, tagged(job.mesh_path), session, sink);
-    hand_over_labels(output, tagged(job.mask_path), session.run(), sink);
+    hand_over_labels(output, tagged(job.mask_path), job.images.empty() ? "" : job.images.front(), session.run(), sink);
     sink(tagged(job.evidence.path), [output](const std::string& file) {
         std::vector<EvidenceOf> surfaces;
         for (const StructureOutput& s : output->structures)

@@ -17,6 +17,7 @@ namespace covol::tool {
 /// What came out for one.
 struct StructureOutput {
     std::string name, grid;
+    [[nodiscard]] const std::string& shown_name() const { return name.empty() ? grid : name; }
     std::vector<Vec3> marks;  ///< as they were clicked
     Json input;               ///< of the report
     SegmentResult result;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
 #include <optional>
 #include <sstream>
 
@@ -11,6 +12,7 @@
 #include "covol/error.h"
 #include "covol/mesh_stream.h"
 #include "covol/surface.h"
+#include "covol/vdb_io.h"
 #include "jobs/marks.h"
 #include "jobs/page.h"
 #include "jobs/paint_reader.h"
@@ -18,11 +20,15 @@
 namespace covol::tool {
 namespace {
 
-/// A context whose lines begin with the structure's name.
-RunContext speaking_for(const std::string& name, const RunContext& run) {
+constexpr std::size_t kMostInLines = 4;  // structures; of more there is a table, and no line for each step
+
+/// A context whose lines begin with the structure's name. @param brief  warnings alone
+RunContext speaking_for(const std::string& name, bool brief, const RunContext& run) {
     RunContext named = run;
     if (!name.empty() && run.log)
-        named.log = [log = run.log, name](LogLevel level, const std::string& line) { log(level, name + ": " + line); };
+        named.log = [log = run.log, name, brief](LogLevel level, const std::string& line) {
+            if (!brief || level == LogLevel::Warning) log(level, name + ": " + line);
+        };
     return named;
 }
 
@@ -93,10 +99,53 @@ void add_seconds(Session& session, const SegmentReport::Seconds& seconds) {
     session.add_seconds("edge", seconds.edge);
     session.add_seconds("solve", seconds.solve);
     session.add_seconds("surface", seconds.surface);
-    session.add_seconds("total", seconds.total);
+}
+
+/// What a failed run had goes to --keep-failed at once, and stays.
+void keep_failed(const SegmentJob& job, const StructureOutput& s, const SegmentFailed& failed, Session& session) {
+    const std::string path = s.name.empty() ? job.failed_path : with_suffix(job.failed_path, "_" + s.grid);
+    std::vector<FloatGridPtr> grids;
+    const auto add = [&](const FloatGridPtr& grid, const char* name) {
+        if (!grid) return;
+        grids.push_back(grid->deepCopy());
+        grids.back()->setName(name);
+    };
+    add(failed.start, "start");
+    add(failed.u, "u");
+    add(failed.distance, "distance");
+    add(failed.edge, "edge");
+    std::map<std::string, std::string> metadata = session.metadata();
+    metadata["covol_failed"] = failed.what();
+    if (session.outputs().write(path, [&](const std::string& file) { write_vdb(file, grids, {job.half, metadata}); }))
+        session.note("kept " + path);
+}
+
+void summarise_in_table(const StructuresOutput& output, const SegmentJob& job, Session& session) {
+    const auto number = [](double value) {
+        std::ostringstream text;
+        text << std::setprecision(4) << value;
+        return text.str();
+    };
+    std::vector<std::vector<std::string>> rows{
+        {"structure", "volume", "area", "pieces", "genus", "marks", "off: mean", "95 %", "max", "steps", "seconds"}};
+    std::string unused;
+    for (const StructureOutput& s : output.structures) {
+        const SegmentReport& r = s.result.report;
+        const bool has_marks = r.point_count > 0;
+        const auto fit = [&](double value) { return has_marks ? number(value) : "-"; };
+        rows.push_back(
+            {s.shown_name(), number(r.surface.volume), number(r.surface.area), std::to_string(r.surface.components),
+             r.surface.closed ? std::to_string(r.surface.genus) : "open", std::to_string(r.point_count),
+             fit(r.fit.mean), fit(r.fit.p95), fit(r.fit.max), std::to_string(r.solve.steps), number(r.seconds.total)});
+        if (const std::string line = job.unused(r); !line.empty()) unused = line;
+        if (s.evidence) tell(session, *s.evidence, s.shown_name() + ": ");
+    }
+    for (const std::string& line : aligned(rows)) session.note(line);
+    if (!unused.empty()) session.warn(unused);
 }
 
 void summarise(const StructuresOutput& output, const SegmentJob& job, Session& session) {
+    if (output.structures.size() > kMostInLines) return summarise_in_table(output, job, session);
     for (const StructureOutput& s : output.structures) {
         const std::string who = s.name.empty() ? "" : s.name + ": ";
         for (const std::string& line : summary(s.result.report)) session.note(who + line);
@@ -129,7 +178,6 @@ PreparedStructure StructurePreparer::prepare(std::size_t n, const RunContext& ru
     const Stopwatch reading;
     Marks marks = read_marks(input.points, input.contours, job_.cloud, geometry, run);
     session_.add_seconds("read", reading.seconds());
-    session_.add_seconds("total", reading.seconds());
     if (image_ == nullptr && marks.given.empty()) throw UsageError("expected an image, points or contours, got none");
     if (!voxel_size_) voxel_size_ = job_.domain.resolve_voxel_size(image_, marks.given, session_);
     const double h = *voxel_size_;
@@ -180,11 +228,14 @@ StructuresOutput segment_structures(const SegmentJob& job, const std::vector<Str
     }
     StructurePreparer preparer(job, inputs, image, starts, session);
     for (std::size_t n = 0; n < inputs.size(); ++n) {
-        const RunContext own = speaking_for(inputs[n].name, run);
+        const RunContext own = speaking_for(inputs[n].name, inputs.size() > kMostInLines, run);
         PreparedStructure prepared = preparer.prepare(n, own);
         StructureOutput& s = prepared.output;
         try {
             s.result = solve(image, prepared, own);
+        } catch (const SegmentFailed& failed) {
+            keep_failed(job, s, failed, session);
+            throw Error(failed.code(), (s.name.empty() ? "" : s.name + ": ") + failed.what());
         } catch (const Error& error) {
             if (s.name.empty()) throw;
             throw Error(error.code(), s.name + ": " + error.what());
@@ -206,7 +257,6 @@ StructuresOutput segment_structures(const SegmentJob& job, const std::vector<Str
         const Stopwatch separating;
         separate_all(output, job.resolve(preparer.voxel_size()), run);
         session.add_seconds("separate", separating.seconds());
-        session.add_seconds("total", separating.seconds());
     }
     for (StructureOutput& s : output.structures) {
         s.result.surface->setName(s.grid);

@@ -13,6 +13,9 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path);
 /// MRC2014 and CCP4 maps: modes 0, 1, 2, 6 and 12, either byte order.
 std::unique_ptr<ImageFile> open_mrc(const std::string& path);
 
+/// NumPy's .npy: an array of three axes z, y, x, in C's or Fortran's order.
+std::unique_ptr<ImageFile> open_npy(const std::string& path);
+
 /// The series in a folder, or the one that a file belongs to; its slices sorted by position.
 /// @throws Error Unsupported when a folder holds several series: lists them.
 std::unique_ptr<ImageFile> open_dicom(const std::string& path, const RunContext& run);

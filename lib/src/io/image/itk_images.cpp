@@ -19,6 +19,7 @@
 #include "io/hdf5/hdf5_file.h"
 #include "io/image/image_formats.h"
 #include "io/image/itk_call.h"
+#include "io/pixels/nifti_space.h"
 
 namespace covol::detail {
 namespace {
@@ -165,8 +166,12 @@ public:
     [[nodiscard]] double number(std::size_t at) const { return double(load<float>(bytes_.data() + at, swap_)); }
     [[nodiscard]] int integer(std::size_t at) const { return load<std::int16_t>(bytes_.data() + at, swap_); }
     [[nodiscard]] bool in_one_piece() const { return std::memcmp(bytes_.data() + 344, "n+1", 4) == 0; }
-    /// 0: not stated, 1: m, 2: mm, 3: um
-    [[nodiscard]] int unit() const { return bytes_[123] & 7; }
+    /// Of kNiftiUnits; 0: not stated
+    [[nodiscard]] std::size_t unit() const {
+        const auto code = std::size_t(bytes_[123] & 7);
+        return code < kNiftiUnits.size() ? code : 0;
+    }
+    [[nodiscard]] std::string unit_name() const { return unit() > 0 ? kNiftiUnits[unit()] : "mm"; }
 
 private:
     std::array<char, 348> bytes_{};
@@ -192,28 +197,30 @@ std::optional<PixelPlace> nifti_pixels(const NiftiHeader& header, PixelPlace pla
         info.spacing_known[a] = std::abs(spacing) > 0;
         pixdim << (a == 0 ? "" : " ") << spacing;
     }
-    static constexpr const char* kUnits[] = {"not stated, taken as mm", "m", "mm", "um"};
     info.format = "NIfTI-1";
     info.fields = {{"pixdim", pixdim.str()},
-                   {"xyzt_units", kUnits[header.unit() <= 3 ? header.unit() : 0]},
+                   {"xyzt_units", header.unit() > 0 ? header.unit_name() : "not stated, taken as mm"},
                    {"qform_code", std::to_string(header.integer(252))},
                    {"sform_code", std::to_string(header.integer(254))},
                    {"space", "RAS in the file, turned to LPS"}};
     return place;
 }
 
-/// ITK 5.2 turns the spacing of files in um or m into mm, and forgets the origin.
-void scale_nifti_origin(const NiftiHeader& header, ImageGeometry& geometry) {
-    const double scale = header.unit() == 1 ? 1e3 : header.unit() == 3 ? 1e-3 : 1;
+/// ITK 5.2 turns the spacing of files in um or m into mm, and forgets the origin; here lengths are in the file's unit.
+void restore_nifti_unit(const NiftiHeader& header, ImageGeometry& geometry) {
+    geometry.unit = header.unit_name();
+    if (geometry.unit == "mm") return;
+    const double from_mm = geometry.unit == "m" ? 1e-3 : 1e3;
     const auto is_as_stored = [&](std::size_t first, std::size_t step) {
         bool same = true;
         for (std::size_t a = 0; a < 3; ++a)
             same = same && std::abs(geometry.origin[a]) == std::abs(header.number(first + a * step));
         return same;
     };
-    constexpr std::size_t kQoffset = 268, kSrowEnd = 292, kSrow = 16;
-    if (is_as_stored(kQoffset, 4) || is_as_stored(kSrowEnd, kSrow))
-        for (double& o : geometry.origin) o *= scale;
+    constexpr std::size_t kPixdim = 80, kQoffset = 268, kSrowEnd = 292, kSrow = 16;
+    for (std::size_t a = 0; a < 3; ++a) geometry.spacing[a] = std::abs(header.number(kPixdim + 4 * a));
+    if (!is_as_stored(kQoffset, 4) && !is_as_stored(kSrowEnd, kSrow))
+        for (double& o : geometry.origin) o *= from_mm;
 }
 
 /// Empty for the rare kinds that are left to ITK: ascii pixels, one file for each slice, a header to skip.
@@ -388,8 +395,7 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path) {
     std::optional<PixelPlace> place;
     if (is_nifti) {
         place = nifti_pixels(*nifti, begin, info);
-        scale_nifti_origin(*nifti, info.geometry);
-        info.geometry.unit = "mm";  // ITK converts NIfTI to millimetres
+        restore_nifti_unit(*nifti, info.geometry);
         const bool integers = info.type != PixelType::Float && info.type != PixelType::Double;
         if (!place || info.channels > 1 || (integers && info.type != place->type))
             throw read_error(Errc::Unsupported, path, "expected a NIfTI file in one piece with grey values");

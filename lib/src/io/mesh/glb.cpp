@@ -138,7 +138,7 @@ private:
             for (std::uint64_t n = 0; n < data.count; ++n) {
                 std::array<float, 3> p{};
                 std::memcpy(p.data(), data.bytes.data() + n * data.stride, sizeof(p));
-                builder_.vertex({p[0], p[1], p[2]});
+                builder_.vertex({p[0], -p[2], p[1]});  // from y up, which glTF prescribes
             }
         }
         return {known->second, data.count};

@@ -30,7 +30,7 @@ void write_glb(Output& out, const Prepared& in);
 
 /// Comments without line breaks.
 std::vector<std::string> one_line_each(std::vector<std::string> comments);
-/// A vertex, scaled and turned as the options say.
+/// A vertex, scaled, and turned where the options say y up.
 std::array<float, 3> placed(const std::array<float, 3>& vertex, const WriteMeshOptions& options);
 
 /// What begins a PLY file, up to its vertices. @throws Error Unsupported (more vertices than its numbers tell apart).

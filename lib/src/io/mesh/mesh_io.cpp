@@ -56,7 +56,9 @@ Prepared prepare(const std::string& extension, const TriangleMesh& mesh, const W
     for (const VertexAttribute& attribute : options.attributes) check_attribute(attribute, mesh);
     Prepared result{mesh.triangles,     mesh.vertices, {}, one_line_each(options.comments),
                     options.attributes, options.binary};
-    for (auto& p : result.vertices) p = placed(p, options);
+    WriteMeshOptions placing = options;
+    placing.y_up = options.y_up.value_or(extension == ".glb");
+    for (auto& p : result.vertices) p = placed(p, placing);
     if (extension == ".ply" || extension == ".obj" || extension == ".glb")
         result.normals = meshing::vertex_normals(result.vertices, mesh.triangles);
     return result;
@@ -98,7 +100,7 @@ std::vector<std::string> mesh_io::one_line_each(std::vector<std::string> comment
 std::array<float, 3> mesh_io::placed(const std::array<float, 3>& vertex, const WriteMeshOptions& options) {
     std::array<float, 3> p = vertex;
     for (float& c : p) c = float(c * options.unit_scale);
-    if (options.y_up) p = {p[0], p[2], -p[1]};
+    if (options.y_up.value_or(false)) p = {p[0], p[2], -p[1]};
     return p;
 }
 

@@ -9,7 +9,9 @@
 
 #include "base/file.h"
 #include "covol/error.h"
+#include "covol/points_text.h"
 #include "io/points/point_files.h"
+#include "io/points/point_formats.h"
 #include "io/points/point_reading.h"
 
 namespace covol {
@@ -57,15 +59,15 @@ std::string to_ply(const std::vector<Vec3>& points, const std::string& comment) 
     return text;
 }
 
-}  // namespace
-
-PointCloud read_points(const std::string& path, const ReadPointsOptions& options) {
+void check_options(const ReadPointsOptions& options) {
     if (!(options.scale > 0) || !std::isfinite(options.scale))
         throw Error(Errc::InvalidOptions, "read_points: scale: expected > 0, got " + std::to_string(options.scale));
     if (options.channels < 1)
         throw Error(Errc::InvalidOptions,
                     "read_points: channels: expected >= 1, got " + std::to_string(options.channels));
-    detail::PointTable table = detail::read_point_table(path);
+}
+
+PointCloud to_cloud(const std::string& path, detail::PointTable table, const ReadPointsOptions& options) {
     if (table.points.empty())
         throw Error(Errc::InvalidInput, "read_points: " + path + ": expected at least one point, got none");
     PointCloud cloud;
@@ -87,6 +89,19 @@ PointCloud read_points(const std::string& path, const ReadPointsOptions& options
     }
     cloud.rule = table.rule + ", as " + detail::describe(cloud.reading);
     return cloud;
+}
+
+}  // namespace
+
+PointCloud read_points(const std::string& path, const ReadPointsOptions& options) {
+    check_options(options);
+    return to_cloud(path, detail::read_point_table(path), options);
+}
+
+PointCloud parse_points(const std::string& text, const std::string& source, const ReadPointsOptions& options) {
+    check_options(options);
+    if (text.empty()) throw Error(Errc::InvalidInput, "read_points: " + source + ": expected points, got nothing");
+    return to_cloud(source, detail::parse_columns(source, text, true), options);
 }
 
 std::vector<Vec3> to_world(const PointCloud& cloud) {

@@ -100,7 +100,9 @@ public:
         std::vector<Reading> best;
         int most = axes;
         for (const Reading& reading : others()) {
-            if (reading.options.scale != now_.scale || reading.options.space == PointSpace::IndexOne || !fits(reading))
+            // Slices that count channels are whole numbers whatever the marks are.
+            if (reading.options.scale != now_.scale || reading.options.channels != now_.channels ||
+                reading.options.space == PointSpace::IndexOne || !fits(reading))
                 continue;
             const int count = axes_on_centres(reading.options);
             if (count > most) {

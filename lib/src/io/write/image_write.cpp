@@ -1,4 +1,5 @@
 // Images to files.
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <string>
@@ -16,7 +17,7 @@ namespace {
 
 using detail::pixel_bytes;
 
-constexpr const char* kWritable = ".nrrd, .nii, .nii.gz, .mha, .tif or .zarr";
+constexpr const char* kWritable = ".nrrd, .nii, .nii.gz, .mha, .tif, .ome.tif, .npy or .zarr";
 
 using Metadata = std::vector<std::pair<std::string, std::string>>;
 
@@ -40,16 +41,39 @@ public:
             }
     }
     [[nodiscard]] Metadata metadata() const override { return metadata_; }
+    [[nodiscard]] std::optional<std::array<double, 2>> range() const override {
+        return detail::with_pixel_type(type(), [&](auto pixel) {
+            const auto* first = reinterpret_cast<const decltype(pixel)*>(values_);
+            const auto [low, high] = std::minmax_element(first, first + detail::voxel_count(geometry().size));
+            return std::array<double, 2>{double(*low), double(*high)};
+        });
+    }
 
 private:
     const char* values_;
     Metadata metadata_;
 };
 
+bool is_ome_tiff(const std::string& path) {
+    const std::string name = std::filesystem::path(path).stem().string();
+    return detail::extension(name) == ".ome";
+}
+
+/// What of the geometry such a file has no place for.
+void warn_of_losses(const std::string& path, const ImageGeometry& geometry, const RunContext& run) {
+    if (is_ome_tiff(path) && geometry.origin != Vec3{0, 0, 0})
+        run.warn(path +
+                 ": OME-TIFF has no place for the image's origin: its first voxel lies at 0 there; .tif, .nrrd "
+                 "and others keep it");
+    if (detail::extension(path) == ".npy")
+        run.warn(path + ": NumPy's format has the voxels alone: neither spacing nor unit, origin and direction");
+}
+
 }  // namespace
 
 PixelSource::~PixelSource() = default;
 std::optional<double> PixelSource::uniform(const VoxelBox&) const { return std::nullopt; }
+std::optional<std::array<double, 2>> PixelSource::range() const { return std::nullopt; }
 void PixelSource::wrote(const VoxelBox&, const void*, double) const {}
 Metadata PixelSource::metadata() const { return {}; }
 std::vector<NamedLabel> PixelSource::label_names() const { return {}; }
@@ -66,6 +90,7 @@ void write_image(const std::string& given, const PixelSource& source, const Writ
             throw Error(Errc::InvalidInput, "write_image: " + path + ": expected voxels along every axis, got " +
                                                 detail::size_text(geometry.size));
     const std::string extension = detail::extension(path);
+    warn_of_losses(path, geometry, run);
     with_threads(run, [&] {
         if (extension == ".zarr")
             detail::write_folder_atomically(path, is_zarr_store(path), [&](const std::string& temporary) {
@@ -74,9 +99,9 @@ void write_image(const std::string& given, const PixelSource& source, const Writ
         else
             detail::write_atomically(path, [&](const std::string& temporary) {
                 if (extension == ".tif" || extension == ".tiff")
-                    detail::write_tiff(temporary, source, run);
+                    detail::write_tiff(temporary, source, is_ome_tiff(path), run);
                 else
-                    detail::write_raw(temporary, extension, source, options.pack, run);
+                    detail::write_raw(temporary, extension, source, options, run);
             });
     });
 }
@@ -105,7 +130,7 @@ void write_image(const std::string& path, const ImageGeometry& geometry, const f
 
 void check_image_extension(const std::string& path) {
     const std::string extension = detail::extension(detail::without_end_slash(path));
-    for (const char* known : {".nrrd", ".nii", ".nii.gz", ".mha", ".tif", ".tiff", ".zarr"})
+    for (const char* known : {".nrrd", ".nii", ".nii.gz", ".mha", ".tif", ".tiff", ".npy", ".zarr"})
         if (extension == known) return;
     throw Error(Errc::InvalidOptions,
                 "write_image: " + path + ": expected a name ending in " + kWritable + ", got '" + extension + "'");

@@ -1,24 +1,20 @@
-// NRRD, MetaImage and NIfTI-1: a header, and all voxels behind it.
+// NRRD, MetaImage, NIfTI-1 and NumPy's .npy: a header, and all voxels behind it.
+#include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <fstream>
 #include <limits>
 
 #include "covol/error.h"
+#include "io/pixels/nifti_space.h"
 #include "io/pixels/raw_image.h"
 #include "io/write/image_writers.h"
 #include "io/write/pixel_blocks.h"
+#include "io/write/shortest.h"
 
 namespace covol::detail {
 namespace {
-
-/// The shortest text that means this number; 0 without a sign.
-std::string shortest(double value) {
-    std::array<char, 32> text{};
-    return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value == 0 ? 0.0 : value).ptr};
-}
 
 template <typename Numbers>
 std::string joined(const Numbers& numbers, const char* between) {
@@ -37,25 +33,34 @@ struct TypeNames {
     const char* nrrd;
     const char* meta;
     std::int16_t nifti;
+    const char* numpy;
 };
 TypeNames names_of(PixelType type) {
     switch (type) {
-        case PixelType::UInt8: return {"unsigned char", "MET_UCHAR", 2};
-        case PixelType::Int8: return {"signed char", "MET_CHAR", 256};
-        case PixelType::UInt16: return {"unsigned short", "MET_USHORT", 512};
-        case PixelType::Int16: return {"short", "MET_SHORT", 4};
-        case PixelType::UInt32: return {"unsigned int", "MET_UINT", 768};
-        case PixelType::Int32: return {"int", "MET_INT", 8};
-        case PixelType::Float: return {"float", "MET_FLOAT", 16};
+        case PixelType::UInt8: return {"unsigned char", "MET_UCHAR", 2, "|u1"};
+        case PixelType::Int8: return {"signed char", "MET_CHAR", 256, "|i1"};
+        case PixelType::UInt16: return {"unsigned short", "MET_USHORT", 512, "<u2"};
+        case PixelType::Int16: return {"short", "MET_SHORT", 4, "<i2"};
+        case PixelType::UInt32: return {"unsigned int", "MET_UINT", 768, "<u4"};
+        case PixelType::Int32: return {"int", "MET_INT", 8, "<i4"};
+        case PixelType::Float: return {"float", "MET_FLOAT", 16, "<f4"};
         case PixelType::Double: break;
     }
-    return {"double", "MET_DOUBLE", 64};
+    return {"double", "MET_DOUBLE", 64, "<f8"};
 }
 
 /// A key or a text of NRRD's key/value pairs: one line.
 std::string escaped(const std::string& text) {
     std::string out;
     for (const char c : text) out += c == '\n' ? "\\n" : c == '\\' ? "\\\\" : std::string(1, c);
+    return out;
+}
+
+/// What stands between the quotes of a NRRD field.
+std::string quoted(const std::string& text) {
+    std::string out;
+    for (const char c : text)
+        if (c != '\n') out += (c == '"' || c == '\\' ? "\\" : "") + std::string(1, c);
     return out;
 }
 
@@ -75,7 +80,9 @@ std::string nrrd_header(const PixelSource& source, bool pack) {
         "\nspace directions: " + directions + "\nkinds: domain domain domain\n";
     if (pixel_bytes(source.type()) > 1) text += "endian: little\n";
     text += std::string("encoding: ") + (pack ? "gzip" : "raw") + "\nspace origin: (" + joined(g.origin, ",") + ")\n";
-    if (!g.unit.empty()) text += "unit:=" + escaped(g.unit) + "\n";
+    // After "space", as the format wants it.
+    const std::string unit = "\"" + quoted(g.unit) + "\"";
+    if (!g.unit.empty()) text += "space units: " + unit + " " + unit + " " + unit + "\n";
     for (const auto& [key, value] : source.metadata()) text += escaped(key) + ":=" + escaped(value) + "\n";
     return text;
 }
@@ -118,8 +125,37 @@ std::array<double, 3> quaternion(const Matrix3& r) {
     return q;
 }
 
+using nifti::kCodes, nifti::kPixdim, nifti::kQuatern, nifti::kSrow;
+
+/// Whether one of the forms that an input stated means the lattice that this header has.
+bool still_holds(const NiftiSpace& space, const std::string& header, double spacing) {
+    constexpr double kRounding = 1e-3;  // of voxels, and of rotations
+    const auto own = [&](std::size_t at, std::size_t n) {
+        float value = 0;
+        std::memcpy(&value, header.data() + at + n * sizeof(value), sizeof(value));
+        return double(value);
+    };
+    double square = 0;
+    for (std::size_t n = 0; n < 3; ++n) square += own(kQuatern, n) * own(kQuatern, n);
+    const auto turns_alike = [&](double sign) {
+        for (std::size_t n = 0; n < 3; ++n)
+            if (!(std::abs(sign * space.qform[n] - own(kQuatern, n)) <= kRounding)) return false;
+        return true;
+    };
+    const auto lies_alike = [&](const auto& stated, std::size_t at, std::size_t first) {
+        for (std::size_t n = first; n < stated.size(); ++n)
+            if (!(std::abs(stated[n] - own(at, n)) <= kRounding * spacing)) return false;
+        return true;
+    };
+    const bool same_side = (space.qfac < 0) == (own(kPixdim, 0) < 0);
+    // Of half a turn both signs of the axis mean the same.
+    const bool turn = turns_alike(1) || (square > 1 - kRounding && turns_alike(-1));
+    return (space.codes[0] > 0 && same_side && turn && lies_alike(space.qform, kQuatern, 3)) ||
+           (space.codes[1] > 0 && lies_alike(space.sform, kSrow, 0));
+}
+
 /// The 348 bytes of NIfTI-1 and four more; the world is RAS. https://nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h
-std::string nifti_header(const std::string& path, const PixelSource& source) {
+std::string nifti_header(const std::string& path, const PixelSource& source, const std::string& like) {
     const ImageGeometry& g = source.geometry();
     for (const std::int32_t n : g.size)
         if (n > std::numeric_limits<std::int16_t>::max())
@@ -131,7 +167,7 @@ std::string nifti_header(const std::string& path, const PixelSource& source) {
     const auto put_float = [&](std::size_t at, double value) { put(at, static_cast<float>(value)); };
     put(0, std::int32_t(348));
     header[38] = 'r';
-    constexpr std::size_t kDim = 40, kPixdim = 76, kQuatern = 256, kQoffset = 268, kSrow = 280;
+    constexpr std::size_t kDim = 40, kQoffset = 268;
     put(kDim, std::int16_t(3));
     for (std::size_t a = 0; a < 7; ++a) put(kDim + 2 + 2 * a, a < 3 ? std::int16_t(g.size[a]) : std::int16_t(1));
     put(70, names_of(source.type()).nifti);
@@ -157,11 +193,32 @@ std::string nifti_header(const std::string& path, const PixelSource& source) {
     }
     put_float(108, 352);  // where the voxels begin
     put_float(112, 1);    // slope
-    header[123] = 2;      // millimetres
-    put(252, std::int16_t(1));
-    put(254, std::int16_t(1));
+    const auto unit = std::find(kNiftiUnits.begin() + 1, kNiftiUnits.end(), g.unit);
+    header[123] = char(unit == kNiftiUnits.end() ? 0 : unit - kNiftiUnits.begin());
+    put(kCodes, std::int16_t(1));
+    put(kCodes + 2, std::int16_t(1));
+    const std::optional<NiftiSpace> stated = read_nifti_space(like);
+    if (stated && still_holds(*stated, header, *std::min_element(g.spacing.begin(), g.spacing.end()))) {
+        put(kPixdim, stated->qfac);
+        put(kCodes, stated->codes);
+        put(kQuatern, stated->qform);
+        put(kSrow, stated->sform);
+    }
     std::memcpy(header.data() + 344, "n+1", 3);
     return header;
+}
+
+/// NumPy's format 1.0, axes z, y, x. https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html
+std::string npy_header(const PixelSource& source) {
+    const Index3 n = source.geometry().size;
+    std::string dictionary = std::string("{'descr': '") + names_of(source.type()).numpy +
+                             "', 'fortran_order': False, 'shape': (" + std::to_string(n[2]) + ", " +
+                             std::to_string(n[1]) + ", " + std::to_string(n[0]) + "), }";
+    constexpr std::size_t kBefore = 10, kAlignment = 64;
+    const std::size_t whole = (kBefore + dictionary.size() + 1 + kAlignment - 1) / kAlignment * kAlignment;
+    dictionary.resize(whole - kBefore - 1, ' ');
+    const auto length = std::uint16_t(dictionary.size() + 1);
+    return std::string("\x93NUMPY\x01\x00", 8) + char(length & 0xFF) + char(length >> 8) + dictionary + "\n";
 }
 
 /// A file that grows at its end; zeros are left out where the file system keeps holes.
@@ -289,18 +346,19 @@ void write_meta(GrowingFile& file, const PixelSource& source, bool pack, const R
 
 }  // namespace
 
-void write_raw(const std::string& path, const std::string& extension, const PixelSource& source, bool pack,
-               const RunContext& run) {
+void write_raw(const std::string& path, const std::string& extension, const PixelSource& source,
+               const WriteImageOptions& options, const RunContext& run) {
+    const bool pack = options.pack;
     GrowingFile file(path);
     if (extension == ".nrrd") {
         write_nrrd(file, source, pack, run);
     } else if (extension == ".mha") {
         write_meta(file, source, pack, run);
-    } else if (extension == ".nii") {
-        file.add(nifti_header(path, source));
+    } else if (extension == ".nii" || extension == ".npy") {
+        file.add(extension == ".npy" ? npy_header(source) : nifti_header(path, source, options.like));
         add_voxels(file, source, BlockPacking::None, run);
     } else {
-        add_voxels(file, source, BlockPacking::Gzip, run, nifti_header(path, source));
+        add_voxels(file, source, BlockPacking::Gzip, run, nifti_header(path, source, options.like));
     }
     file.close();
 }

@@ -1,23 +1,19 @@
 #include <array>
-#include <charconv>
 #include <cstring>
 #include <vector>
 
 #include "io/image/tiff_handle.h"
 #include "io/pixels/raw_image.h"
 #include "io/write/image_writers.h"
+#include "io/write/ome_xml.h"
 #include "io/write/pixel_blocks.h"
+#include "io/write/shortest.h"
 
 namespace covol::detail {
 namespace {
 
-/// The shortest text that means this number.
-std::string shortest(double value) {
-    std::array<char, 32> text{};
-    return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
-}
-
-std::string imagej_description(const ImageGeometry& geometry) {
+/// @param range  what ImageJ shows from black to white; otherwise masks of ones are black among 255
+std::string imagej_description(const ImageGeometry& geometry, const std::optional<std::array<double, 2>>& range) {
     const std::string slices = std::to_string(geometry.size[2]);
     std::string description =
         "ImageJ=1.53t\nimages=" + slices + "\nslices=" + slices + "\nhyperstack=true\nmode=grayscale\n";
@@ -28,6 +24,7 @@ std::string imagej_description(const ImageGeometry& geometry) {
             description +=
                 std::string(1, "xyz"[a]) + "origin=" + shortest(-geometry.origin[a] / geometry.spacing[a]) + "\n";
     if (!geometry.unit.empty()) description += "unit=" + geometry.unit + "\n";
+    if (range) description += "min=" + shortest((*range)[0]) + "\nmax=" + shortest((*range)[1]) + "\n";
     return description;
 }
 
@@ -62,7 +59,7 @@ PageParts parts_of(const Index3& size, std::uint64_t pixel, bool big) {
 
 }  // namespace
 
-void write_tiff(const std::string& path, const PixelSource& source, const RunContext& run,
+void write_tiff(const std::string& path, const PixelSource& source, bool ome, const RunContext& run,
                 std::uint64_t classic_limit) {
     const ImageGeometry& geometry = source.geometry();
     const PixelType type = source.type();
@@ -70,7 +67,7 @@ void write_tiff(const std::string& path, const PixelSource& source, const RunCon
     Tiff tiff(path, big ? "w8" : "w", 0);
     const auto failure = [&] { return tiff.error(Errc::Io, "write_image: " + path + ": cannot write"); };
     if (tiff.get() == nullptr) throw failure();
-    const std::string description = imagej_description(geometry);
+    const std::string description = ome ? make_ome_xml(geometry, type) : imagej_description(geometry, source.range());
     const int format = with_pixel_type(type, [](auto pixel) {
         using T = decltype(pixel);
         return std::is_floating_point_v<T> ? SAMPLEFORMAT_IEEEFP

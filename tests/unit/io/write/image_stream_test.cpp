@@ -159,7 +159,7 @@ TEST_CASE("a BigTIFF has tiles, a classic one strips") {
     const Balls<std::uint8_t> source(lattice({301, 290, 5}), PixelType::UInt8, true);
     const std::string path = scratch.path("a.tif");
     for (const bool big : {false, true}) {
-        detail::write_tiff(path, source, {}, big ? 0 : detail::kClassicTiff);
+        detail::write_tiff(path, source, false, {}, big ? 0 : detail::kClassicTiff);
         check_read(path, source);
         CHECK(bytes_of(path)[2] == (big ? 43 : 42));
         TIFF* tiff = TIFFOpen(path.c_str(), "r");

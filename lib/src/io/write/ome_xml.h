@@ -1,0 +1,12 @@
+#pragma once
+#include <string>
+
+#include "covol/image.h"
+
+namespace covol::detail {
+
+/// What an OME-TIFF of one channel, a page for each slice, has as its description: sizes, spacing and unit.
+/// https://docs.openmicroscopy.org/ome-model/6.2.0/ome-tiff/specification.html
+[[nodiscard]] std::string make_ome_xml(const ImageGeometry& geometry, PixelType type);
+
+}  // namespace covol::detail
