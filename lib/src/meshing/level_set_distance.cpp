@@ -16,9 +16,6 @@
 namespace covol::detail {
 namespace {
 
-constexpr double kTrusted = 0.7;  // of the half width: farther out corners of a cell lie beyond it
-constexpr double kBeyond = std::numeric_limits<double>::infinity();
-
 /// Where edges of the lattice cut the surface.
 std::vector<Vec3> crossings_of(const FloatGrid& surface) {
     std::vector<Vec3> crossings;
@@ -44,7 +41,8 @@ std::vector<Vec3> crossings_of(const FloatGrid& surface) {
 
 std::vector<double> distances_to(const FloatGrid& surface, const std::vector<Vec3>& points) {
     using Range = tbb::blocked_range<std::size_t>;
-    const double limit = kTrusted * double(surface.background());
+    // farther out a corner of a point's cell may lie beyond the band, where values are cut
+    const double limit = double(surface.background()) - std::sqrt(3.0) * surface.voxelSize()[0];
     std::vector<double> distances(points.size());
     std::vector<char> is_far(points.size());
     tbb::parallel_for(Range(0, points.size(), 1024), [&](const Range& range) {
@@ -53,7 +51,7 @@ std::vector<double> distances_to(const FloatGrid& surface, const std::vector<Vec
             const openvdb::Vec3d world(points[n][0], points[n][1], points[n][2]);
             const double value = openvdb::tools::BoxSampler::sample(at, surface.worldToIndex(world));
             is_far[n] = !(std::abs(value) < limit);
-            distances[n] = is_far[n] ? kBeyond : std::abs(value);
+            distances[n] = is_far[n] ? std::numeric_limits<double>::infinity() : std::abs(value);
         }
     });
     std::vector<std::size_t> far;

@@ -48,7 +48,7 @@ py::dict attributes_of(const Mesh& mesh) {
     return all;
 }
 
-void save_mesh(const Mesh& mesh, const std::filesystem::path& path, bool y_up, double unit_scale) {
+void save_mesh(const Mesh& mesh, const std::filesystem::path& path, std::optional<bool> y_up, double unit_scale) {
     WriteMeshOptions options;
     options.y_up = y_up;
     options.unit_scale = unit_scale;
@@ -159,8 +159,8 @@ void add_surfaces(py::module_& module) {
             "measure",
             [](const Mesh& mesh) { return from_json(tool::to_json(covol::measure(*mesh.triangles)).dump()); },
             "dict: volume, area (world units), components, genus, closed, manifold.")
-        .def("save", save_mesh, py::arg("path"), py::kw_only(), py::arg("y_up") = false, py::arg("unit_scale") = 1.0,
-             "Writes .ply, .obj, .stl, .off or .glb. Raises Error.");
+        .def("save", save_mesh, py::arg("path"), py::kw_only(), py::arg("y_up") = py::none(), py::arg("unit_scale") = 1.0,
+             "Writes .ply, .obj, .stl, .off or .glb, which is y-up unless y_up says otherwise. Raises Error.");
     py::class_<LevelSet>(
         module, "LevelSet",
         "A level set of OpenVDB, negative inside; what mesh(), mask(), compare(), init= and guess= take.")
