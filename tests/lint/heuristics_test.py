@@ -14,7 +14,7 @@ from heuristics import read_heuristics  # noqa: E402
 CONSTANT = re.compile(r"^\s*(?:static )?constexpr (?:double|float) (k\w+)\b", re.M)
 ALLOWED = {
     "cloud/orientation/cloud_scale.cpp:kCellRadii", "contours/contour_curve.cpp:kLongestPiece", "contours/slice_field.cpp:kSeedPiece",
-    "edge/edge.cpp:kHeatTolerance", "evolve/band_solver.cpp:kRounding", "evolve/motion.cpp:kInfinity", "evolve/tracking.cpp:kWidth",
+    "edge/edge.cpp:kHeatTolerance", "evolve/band_solver.cpp:kRounding", "evolve/evolve.cpp:kSmallestStep", "evolve/motion.cpp:kInfinity", "evolve/tracking.cpp:kWidth",
     "guess/guess_correction.cpp:kSolved", "guess/marks_surface.cpp:kInfinity", "guess/marks_surface.cpp:kMostCells",
     "guess/variational.cpp:kAround", "guess/variational.cpp:kLocalShares", "guess/variational.cpp:kNoStep",
     "guidance/smooth_image.cpp:kKernelSigmas", "guidance/smooth_image.cpp:kLeastSigma", "holes/holes.cpp:kP95OfSpacing",

@@ -121,6 +121,9 @@ struct SegmentReport {
         Vec3 farthest_world{0, 0, 0};
         Vec3 farthest_index{0, 0, 0};  ///< voxels of the image; without one as farthest_world
     } marks_off;
+    /// Probability that the image varies more at a mark than five voxels beside it, along the surface's normal; 0.5
+    /// where it shows nothing there. None without an image and marks.
+    std::optional<double> image_support;
     std::vector<std::string> warnings;  ///< what a person has to look at, in plain words
     SeedCheck seeds;
     CorrectionReport correction;      ///< of SegmentOptions::guess

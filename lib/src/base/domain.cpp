@@ -162,8 +162,9 @@ Domain domain_of(const FloatGrid& grid) {
     // A rotation or shear shows when a diagonal step is not (h,h,h).
     const openvdb::Vec3d diagonal = transform.indexToWorld(openvdb::Vec3d(1, 1, 1)) - origin;
     const double tolerance = 1e-6 * h[0];
-    if (!transform.isLinear() || (diagonal - openvdb::Vec3d(h[0])).length() > tolerance ||
-        std::abs(h[1] - h[0]) > tolerance || std::abs(h[2] - h[0]) > tolerance)
+    if (!(h[0] > 0) || !std::isfinite(h[0]) || !origin.isFinite() || !transform.isLinear() ||
+        (diagonal - openvdb::Vec3d(h[0])).length() > tolerance || std::abs(h[1] - h[0]) > tolerance ||
+        std::abs(h[2] - h[0]) > tolerance)
         throw Error(Errc::InvalidInput, "domain_of: grid '" + grid.getName() +
                                             "': expected a transform of one uniform voxel size and a translation");
     Domain d;
@@ -171,18 +172,20 @@ Domain domain_of(const FloatGrid& grid) {
     d.origin = {origin[0], origin[1], origin[2]};
     const auto lo = grid.getMetadata<openvdb::Vec3IMetadata>(kMinKey);
     const auto hi = grid.getMetadata<openvdb::Vec3IMetadata>(kMaxKey);
-    if (lo && hi) {
-        for (int a = 0; a < 3; ++a) {
-            d.min[a] = lo->value()[a];
-            d.max[a] = hi->value()[a];
-        }
-        return d;
-    }
-    const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
-    if (box.empty()) return d;
+    const openvdb::CoordBBox box = lo && hi
+                                       ? openvdb::CoordBBox(openvdb::Coord(lo->value()), openvdb::Coord(hi->value()))
+                                       : grid.evalActiveVoxelBoundingBox();
+    if (box.empty() && !(lo && hi)) return d;
+    const int margin = lo && hi ? 0 : 8;
     for (int a = 0; a < 3; ++a) {
-        d.min[a] = box.min()[a] - 8;
-        d.max[a] = box.max()[a] + 8;
+        const double first = box.min()[a], last = box.max()[a];
+        if (first <= -kFarthestVoxel || last >= kFarthestVoxel || last < first - 1) {  // an empty domain is one
+            std::ostringstream text;
+            text << "domain_of: grid '" << grid.getName() << "': expected voxels within 2^23 of voxel 0, got " << box;
+            throw Error(Errc::InvalidInput, text.str());
+        }
+        d.min[a] = box.min()[a] - margin;
+        d.max[a] = box.max()[a] + margin;
     }
     return d;
 }

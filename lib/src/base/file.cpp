@@ -8,8 +8,10 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <random>
 
 #include "covol/error.h"
+#include "covol/file_set.h"
 
 namespace covol::detail {
 namespace fs = std::filesystem;
@@ -28,48 +30,58 @@ std::string without_end_slash(const std::string& path) {
     return text;
 }
 
+bool swap_paths(const std::string& one, const std::string& other) {
+    if (::renameat2(AT_FDCWD, one.c_str(), AT_FDCWD, other.c_str(), RENAME_EXCHANGE) == 0) return true;
+    if (errno != EINVAL && errno != ENOSYS) return false;
+    const std::string aside = one + ".old";
+    if (std::rename(other.c_str(), aside.c_str()) != 0) return false;
+    if (std::rename(one.c_str(), other.c_str()) == 0) return std::rename(aside.c_str(), one.c_str()) == 0;
+    const int why = errno;
+    static_cast<void>(std::rename(aside.c_str(), other.c_str()));
+    errno = why;
+    return false;
+}
+
 namespace {
 
-/// A hidden name beside `target`. @throws Error Io when its folder does not exist.
-std::string name_beside(const fs::path& target) {
+/// @throws Error Io when it does not exist.
+fs::path folder_of(const fs::path& target) {
     const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
     std::error_code status;
     if (!fs::is_directory(folder, status))
         throw Error(Errc::Io, target.string() + ": cannot write: the folder " + folder.string() + " does not exist");
-    return (folder / (".covol-" + std::to_string(::getpid()) + "-" + target.filename().string())).string();
+    return folder;
 }
 
-/// Puts the folder `temporary` in the place of `path`; what was there is at `temporary` after.
-bool swap_folders(const std::string& temporary, const std::string& path) {
-    if (::renameat2(AT_FDCWD, temporary.c_str(), AT_FDCWD, path.c_str(), RENAME_EXCHANGE) == 0) return true;
-    if (errno != EINVAL && errno != ENOSYS) return false;
-    // A file system that cannot exchange them: for a moment none is there.
-    const std::string old = temporary + ".old";
-    if (std::rename(path.c_str(), old.c_str()) != 0) return false;
-    if (std::rename(temporary.c_str(), path.c_str()) == 0) return std::rename(old.c_str(), temporary.c_str()) == 0;
-    const int why = errno;
-    static_cast<void>(std::rename(old.c_str(), path.c_str()));
-    errno = why;
-    return false;
+/// Makes an empty file beside `target`, with a hidden name that nobody can foresee, and that no one else has.
+std::string new_file_beside(const fs::path& target) {
+    const fs::path folder = folder_of(target);
+    const std::string whole = target.filename().string();
+    // The ending, that writers go by; a name may be as long as the file system allows.
+    constexpr std::size_t kEnd = 32;
+    const std::string end = whole.substr(whole.size() - std::min(whole.size(), kEnd));
+    std::random_device random;
+    for (;;) {
+        const std::string name = ".covol-" + std::to_string(random()) + "-" + end;
+        const int file = ::open((folder / name).c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+        if (file >= 0) {
+            ::close(file);
+            return (folder / name).string();
+        }
+        if (errno != EEXIST) throw Error(Errc::Io, target.string() + ": cannot write: " + std::strerror(errno));
+    }
 }
 
 }  // namespace
 
 void write_folder_atomically(const std::string& path, bool may_replace,
                              const std::function<void(const std::string&)>& write) {
-    const std::string temporary = name_beside(path);
     std::error_code status;
     const bool exists = fs::exists(fs::symlink_status(path, status));
     if (exists && (!fs::is_directory(path, status) || fs::is_symlink(path, status) || !may_replace))
         throw Error(Errc::Io, path + ": cannot write: something else is there, and not replaced; choose another name");
-    fs::remove_all(temporary, status);
-    struct Remover {
-        const std::string& name;
-        ~Remover() {
-            std::error_code ignored;
-            fs::remove_all(name, ignored);
-        }
-    } remover{temporary};
+    const ScratchFolder scratch(folder_of(path));
+    const std::string temporary = (scratch.path() / fs::path(path).filename()).string();
     if (!fs::create_directory(temporary, status)) throw Error(Errc::Io, path + ": cannot write: " + status.message());
     write(temporary);
     // All files of it reach the disk before its name does.
@@ -78,17 +90,17 @@ void write_folder_atomically(const std::string& path, bool may_replace,
     const int why = errno;
     if (folder >= 0) ::close(folder);
     if (!flushed) throw Error(Errc::Io, path + ": cannot write: " + std::strerror(why));
-    if (exists ? !swap_folders(temporary, path) : std::rename(temporary.c_str(), path.c_str()) != 0)
+    if (exists ? !swap_paths(temporary, path) : std::rename(temporary.c_str(), path.c_str()) != 0)
         throw Error(Errc::Io, path + ": cannot write: " + std::strerror(errno));
 }
 
 void write_atomically(const std::string& path, const std::function<void(const std::string&)>& write) {
     const fs::path target(path);
-    const std::string temporary = name_beside(target);
     std::error_code status;
     if (fs::is_directory(target, status)) throw Error(Errc::Io, path + ": cannot write: it is a folder");
     if (fs::exists(target, status) && !fs::is_regular_file(target, status))
         throw Error(Errc::Io, path + ": cannot write: it is not a regular file");
+    const std::string temporary = new_file_beside(target);
     struct Remover {
         const std::string& name;
         ~Remover() { ::unlink(name.c_str()); }

@@ -14,6 +14,10 @@ void write_atomically(const std::string& path, const std::function<void(const st
 void write_folder_atomically(const std::string& path, bool may_replace,
                              const std::function<void(const std::string& temporary)>& write);
 
+/// What lies at one path lies at the other after; for a moment neither may be there where a file system cannot do it at
+/// once. @returns whether it did, errno says why not.
+bool swap_paths(const std::string& one, const std::string& other);
+
 /// "a.zarr" of "a.zarr/", as a shell completes it.
 std::string without_end_slash(const std::string& path);
 

@@ -5,14 +5,17 @@
 #include "covol/evolve.h"
 
 #include <openvdb/openvdb.h>
+#include <openvdb/tree/LeafManager.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <memory>
 #include <utility>
 
+#include "base/number.h"
 #include "base/valid.h"
 #include "covol/domain.h"
 #include "covol/error.h"
@@ -34,6 +37,29 @@ bool has_active(const FloatGrid& u) {
     return false;
 }
 
+/// @throws Error InvalidInput.
+void expect_finite(const FloatGrid& grid, const char* name) {
+    openvdb::tree::LeafManager<const openvdb::FloatTree> leaves(grid.tree());
+    std::atomic<std::size_t> first = leaves.leafCount();
+    leaves.foreach ([&](const auto& leaf, std::size_t n) {
+        for (auto value = leaf.cbeginValueOn(); value; ++value)
+            if (!std::isfinite(*value))
+                for (std::size_t before = first; n < before && !first.compare_exchange_weak(before, n);) continue;
+    });
+    if (first == leaves.leafCount()) return;
+    for (auto value = leaves.leaf(first).cbeginValueOn(); value; ++value) {
+        if (std::isfinite(*value)) continue;
+        const openvdb::Coord at = value.getCoord();
+        throw Error(Errc::InvalidInput, std::string("evolve: ") + name + ": expected finite values, got " +
+                                            detail::number(double(*value)) + " at voxel " +
+                                            detail::to_text(Vec3{double(at.x()), double(at.y()), double(at.z())}));
+    }
+}
+
+// A row's shares are right to half of 1/65535: a step so small moves at most 1 % too far or too little; after one so
+// large the share that holds a voxel, 1/(1 + 6 * step), is still above the smallest.
+constexpr double kSmallestStep = 1e-3, kLargestStep = 1e4;
+
 class Evolver {
 public:
     Evolver(FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options, const RunContext& run)
@@ -43,6 +69,16 @@ public:
         if (options.rho > 0) check_field(fields.edge, "edge", "rho");
         if (fields.obstacle != nullptr) check_transform(*fields.obstacle, "obstacle");
         if (fields.floor != nullptr) check_transform(*fields.floor, "floor");
+        check_step();
+        if (options.follow) {
+            // Before u changes. A fixed band is checked where it is read.
+            expect_finite(u, "u");
+            if (!has_active(u)) throw Error(Errc::InvalidInput, "evolve: expected active voxels in u, got none");
+            for (const auto& [field, name] : {std::pair(fields.distance, "distance"), std::pair(fields.edge, "edge"),
+                                              std::pair(fields.trusted, "trusted"),
+                                              std::pair(fields.obstacle, "obstacle"), std::pair(fields.floor, "floor")})
+                if (field != nullptr) expect_finite(*field, name);
+        }
         if (options.follow) detail::track_surface(u_, domain_, tracking_clamp(options_), run_);
         make_solver();
     }
@@ -108,6 +144,18 @@ private:
         if (apart > 1e-6 * h)
             throw Error(Errc::InvalidInput, std::string("evolve: expected one transform for all grids, but that of ") +
                                                 name + " differs from u's");
+    }
+
+    void check_step() const {
+        const double delta = options_.delta ? *options_.delta / domain_.voxel_size : 1.0;
+        const double strongest = std::max({options_.theta, options_.rho, delta});
+        const double step = tau_ * strongest;
+        if (strongest == 0 || (step >= kSmallestStep && step <= kLargestStep)) return;
+        throw Error(Errc::InvalidOptions,
+                    std::string("evolve: ") + (options_.tau ? "`tau`" : "`delta`") +
+                        ": expected a step (tau in voxels, times the largest of theta, rho, and delta in voxels) of " +
+                        detail::number(kSmallestStep) + " to " + detail::number(kLargestStep) + ", got " +
+                        detail::number(step) + ": beyond it the coefficients of the scheme, of 16 bits, do not hold");
     }
 
     void make_solver() {

@@ -41,8 +41,8 @@ std::vector<Vec3> crossings_of(const FloatGrid& surface) {
 
 std::vector<double> distances_to(const FloatGrid& surface, const std::vector<Vec3>& points) {
     using Range = tbb::blocked_range<std::size_t>;
-    // farther out a corner of a point's cell may lie beyond the band, where values are cut
-    const double limit = double(surface.background()) - std::sqrt(3.0) * surface.voxelSize()[0];
+    // Within a voxel of the band's end corners of a point's cell lie beyond it, where values are cut.
+    const double limit = double(surface.background()) - surface.voxelSize()[0];
     std::vector<double> distances(points.size());
     std::vector<char> is_far(points.size());
     tbb::parallel_for(Range(0, points.size(), 1024), [&](const Range& range) {

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "image/support.h"
 #include "segment/heuristics.h"
 
 namespace covol::pipeline {
@@ -57,6 +59,59 @@ void find_bias(Job& job, const std::vector<Vec3>& marks, const std::vector<doubl
              " the surface on the mean: it is too " + (bias > 0 ? "small" : "large"));
 }
 
+/// Some of the marks, and the surface's normals there.
+struct Normals {
+    std::vector<Vec3> places, normals;
+};
+
+Normals normals_at(const Job& job, const std::vector<Vec3>& marks) {
+    constexpr std::size_t kMost = 3000;  // more tell nothing new
+    const std::size_t every = std::max<std::size_t>(1, marks.size() / kMost);
+    Normals found;
+    for (std::size_t n = 0; n < marks.size(); n += every) {
+        Vec3 normal{};
+        for (int a = 0; a < 3; ++a) {
+            Vec3 before = marks[n], behind = marks[n];
+            before[a] -= 0.5 * job.h(), behind[a] += 0.5 * job.h();
+            normal[a] = level_at(*job.result.surface, behind) - level_at(*job.result.surface, before);
+        }
+        const double length = std::hypot(normal[0], normal[1], normal[2]);
+        if (!(length > 0.5 * job.h())) continue;  // off the band
+        for (double& c : normal) c /= length;
+        found.places.push_back(marks[n]);
+        found.normals.push_back(normal);
+    }
+    return found;
+}
+
+/// Values are computed on in single precision.
+void find_lost_precision(Job& job) {
+    if (job.image == nullptr || !job.uses_image()) return;
+    const auto [low, high] = job.image->percentiles(0.01, 0.99);
+    const double largest = std::max(std::abs(low), std::abs(high));
+    const double step = largest * std::numeric_limits<float>::epsilon();
+    if (high > low && step > kDoubts.lost_precision * (high - low))
+        job.warn("the image's values lie between " + number(low) + " and " + number(high) +
+                 ", where single precision has steps of " + number(step) + ": subtract an offset first");
+}
+
+/// Marks of another image, of another channel or space, look like marks: the image knows better.
+void find_strange_image(Job& job, const std::vector<Vec3>& marks) {
+    if (job.image == nullptr || !job.uses_image()) return;
+    const Normals at = normals_at(job, marks);
+    const detail::ImageSupport support = detail::measure_support(*job.image, at.places, at.normals, job.h(), job.run);
+    if (support.places == 0) return;
+    job.report().image_support = support.share;
+    const GuidanceReport& guidance = job.report().guidance;
+    const char* const look = ": look whether the marks belong to this image, channel and space";
+    if (support.share + kDoubts.support_errors * support.error < kDoubts.image_support)
+        job.warn("the image varies more five voxels beside the marks than where they lie (in " +
+                 number(std::round(100 * (1 - support.share))) + " of 100 pairs)" + look);
+    else if (guidance.used && guidance.gain < kDoubts.least_gain)
+        job.warn("what the image shows at some marks hardly foretells where the others lie (gain " +
+                 number(guidance.gain) + " nats a mark)" + look);
+}
+
 }  // namespace
 
 double level_at(const FloatGrid& u, const Vec3& world) {
@@ -67,6 +122,11 @@ double level_at(const FloatGrid& u, const Vec3& world) {
 void doubt(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& distances) {
     find_marks_off(job, marks, distances);
     find_bias(job, marks, distances);
+    find_lost_precision(job);
+    find_strange_image(job, marks);
+    const GuidanceReport& guidance = job.report().guidance;
+    if (job.uses_image() && job.rests() && !guidance.used && !guidance.reason.empty())
+        job.warn("the image had no say between the marks: " + guidance.reason);
 }
 
 bool misses_marks(const Job& job, const FloatGrid& u) {

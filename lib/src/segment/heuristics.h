@@ -102,6 +102,15 @@ struct DoubtsHeuristics {
     double off_noise = heuristic("doubts.off_noise", 4.0);
     /// [share of the marks] That a surface may miss.
     double missed_share = heuristic("doubts.missed_share", 0.1);
+    /// [share of the image's range] Of a step of single precision, above which borders are lost.
+    double lost_precision = heuristic("doubts.lost_precision", 0.01);
+    /// [probability] That the image varies more at a mark than beside it, below which it shows a border there instead:
+    /// 0.5 for an image of something else; 0.39 to 1 with marks of its own, on eight structures of five images.
+    double image_support = heuristic("doubts.image_support", 0.4);
+    /// [standard errors] Of that, above what was found, which must stay below.
+    double support_errors = heuristic("doubts.support_errors", 2.0);
+    /// [nats] Of guidance: 0 to 0.06 with noise in place of the image, 0.08 to 1.2 with marks of its own, on the same.
+    double least_gain = heuristic("doubts.least_gain", 0.05);
 };
 COVOL_HEURISTICS DoubtsHeuristics kDoubts{};
 

@@ -3,6 +3,7 @@
 #include <openvdb/openvdb.h>
 
 #include <catch2/catch.hpp>
+#include <limits>
 
 #include "covol/error.h"
 
@@ -69,4 +70,26 @@ TEST_CASE("the lattice does not depend on the part that is asked for") {
     CHECK(a.origin == b.origin);
     CHECK(a.max[0] > b.min[0]);
     CHECK(a.world_box().min[0] <= 4e6);
+}
+
+TEST_CASE("a grid whose voxels no band can hold is refused") {
+    const Domain good = make_domain({{0, 0, 0}, {4, 4, 4}}, 1.0);
+    const auto with = [&](openvdb::Vec3i min, openvdb::Vec3i max) {
+        FloatGridPtr grid = make_grid(good, 1.0F, "u");
+        grid->insertMeta("covol_domain_min", openvdb::Vec3IMetadata(min));
+        grid->insertMeta("covol_domain_max", openvdb::Vec3IMetadata(max));
+        return grid;
+    };
+    CHECK_NOTHROW(domain_of(*with({0, 0, 0}, {7, 7, 7})));
+    constexpr int kInt = std::numeric_limits<int>::max();
+    CHECK_THROWS_AS(domain_of(*with({0, 0, 0}, {kInt, 7, 7})), Error);
+    CHECK_THROWS_AS(domain_of(*with({-kInt - 1, 0, 0}, {7, 7, 7})), Error);
+    CHECK_THROWS_AS(domain_of(*with({0, 9, 0}, {7, 7, 7})), Error);
+    auto far = FloatGrid::create();
+    far->tree().setValueOn(openvdb::Coord(kInt - 3, 0, 0), 1.0F);
+    CHECK_THROWS_AS(domain_of(*far), Error);
+    auto thin = FloatGrid::create();
+    thin->setTransform(openvdb::math::Transform::createLinearTransform(1e300));
+    thin->transform().postTranslate(openvdb::Vec3d(std::numeric_limits<double>::infinity(), 0, 0));
+    CHECK_THROWS_AS(domain_of(*thin), Error);
 }

@@ -130,6 +130,26 @@ TEST_CASE("unusable options and grids are refused, and u stays as it was") {
     CHECK(same_bits(*u, *before));
 }
 
+TEST_CASE("steps whose coefficients round to nothing are refused, those near them are not") {
+    const Problem p = everything_on(20);
+    const Fields grids(p);
+    const FloatGridPtr u = start_of(p), before = start_of(p);
+    EvolveOptions options = evolve_options(p.options, 2);
+    const auto code = [&](double tau, double delta) {
+        options.tau = tau, options.delta = delta;
+        return evolve_code([&] { evolve(*u, grids.get(), options); });
+    };
+    CHECK(code(1e-9 * kH, kH) == Errc::InvalidOptions);
+    CHECK(code(1e300, kH) == Errc::InvalidOptions);
+    CHECK(code(kH, 1e308) == Errc::InvalidOptions);
+    CHECK(same_bits(*u, *before));
+    evolve(*u, grids.get(), [&] {
+        options.tau = 2e-3 * kH, options.delta = kH;
+        return options;
+    }());
+    CHECK_FALSE(same_bits(*u, *before));
+}
+
 TEST_CASE("an empty band is refused") {
     const FloatGridPtr u = make_grid(cube_domain(8, kH), 1.0F, "u");
     EvolveOptions o;
@@ -140,14 +160,22 @@ TEST_CASE("an empty band is refused") {
 TEST_CASE("a value that is not finite is named, and u stays as it was") {
     const Problem p = everything_on(20);
     for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()})
-        for (const std::string what : {"u", "distance", "edge"}) {
+        for (const auto& [what, follow] :
+             {std::pair("u", false), std::pair("distance", false), std::pair("edge", false), std::pair("u", true),
+              std::pair("distance", true), std::pair("edge", true)}) {
             const Fields grids(p);
             const FloatGridPtr u = start_of(p);
             const openvdb::Coord at = u->cbeginValueOn().getCoord();
-            (what == "u" ? u : what == "edge" ? grids.edge : grids.distance)->tree().setValueOn(at, bad);
+            (what == std::string("u")      ? u
+             : what == std::string("edge") ? grids.edge
+                                           : grids.distance)
+                ->tree()
+                .setValueOn(at, bad);
             const FloatGridPtr before = u->deepCopy();
-            INFO(bad << " in " << what);
-            CHECK(evolve_code([&] { evolve(*u, grids.get(), evolve_options(p.options, 2)); }) == Errc::InvalidInput);
+            INFO(bad << " in " << what << (follow ? ", tracked" : ""));
+            EvolveOptions options = evolve_options(p.options, 2);
+            options.follow = follow;
+            CHECK(evolve_code([&] { evolve(*u, grids.get(), options); }) == Errc::InvalidInput);
             CHECK(same_bits(*u, *before));
         }
 }

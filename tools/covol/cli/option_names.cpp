@@ -31,6 +31,7 @@ const std::map<std::string, std::string> kFlags{
     {"spacing", "--spacing"},
     {"start", "--init"},
     {"tag_distance", "--tag-distance"},
+    {"tau", "--tau"},
     {"thickness", "--contour-thickness"},
     {"voxel_size", "--voxel-size"},
 };

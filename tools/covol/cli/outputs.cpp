@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 
@@ -111,45 +110,35 @@ void Outputs::add(const std::string& path, std::function<void(const std::string&
 
 bool Outputs::write(const std::string& path, const std::function<void(const std::string&)>& write) {
     if (path.empty()) return false;
-    write(path);
+    FileSet file;
+    file.write(path, write);
+    file.publish();
     kept_.push_back(path);
     return true;
 }
 
-void Outputs::commit() {
-    try {
-        for (const Pending& output : pending_) {
-            output.write(output.path);
-            written_.push_back(output.path);
-        }
-    } catch (...) {
-        rollback();
-        throw;
-    }
+void Outputs::write_queued() {
+    for (Pending& output : pending_)
+        if (is_special(output.path))
+            devices_.push_back(std::move(output));
+        else
+            files_.write(output.path, output.write);
     pending_.clear();
 }
 
-void Outputs::rollback() {
-    std::error_code ignored;
-    for (const std::string& path : written_)
-        if (is_zarr_name(path))
-            fs::remove_all(path, ignored);
-        else
-            fs::remove(path, ignored);
-    written_.clear();
+void Outputs::publish() {
+    for (const Pending& device : devices_) device.write(device.path);
+    devices_.clear();
+    written_ = files_.paths();
+    files_.publish();
 }
 
 void write_text(const std::string& path, const std::string& text) {
-    const bool special = is_special(path);
-    const std::string temporary = special ? path : path + ".part";
-    std::ofstream file(temporary, std::ios::binary);
+    if (!is_special(path)) return write_text_file(path, text);
+    std::ofstream file(path, std::ios::binary);
     file << text;
     file.close();
-    if (special && file) return;
-    if (special) throw Error(Errc::Io, path + ": cannot write");
-    if (file && std::rename(temporary.c_str(), path.c_str()) == 0) return;
-    std::remove(temporary.c_str());
-    throw Error(Errc::Io, path + ": cannot write");
+    if (!file) throw Error(Errc::Io, path + ": cannot write");
 }
 
 }  // namespace covol::tool

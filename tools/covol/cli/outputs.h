@@ -4,12 +4,14 @@
 #include <string>
 #include <vector>
 
+#include "covol/file_set.h"
+
 namespace covol::tool {
 
 enum class OutputKind { Vdb, Image, Mesh, Points, Picture, Page, Table, Text };
 
-/// The files of one run: checked before the long work, written together at its end. Each is whole or absent, and when
-/// one fails those already written in this run are removed.
+/// The files of one run: checked before the long work, written at its end, and put in place together when all are
+/// there. Where one fails what was there before stays as it was.
 class Outputs {
 public:
     /// Names the files that this run reads: no output may replace one of them.
@@ -20,17 +22,17 @@ public:
     /// An empty path is an output that was not asked for. @throws Error InvalidOptions, Io.
     void check(const std::string& flag, const std::string& path, OutputKind kind);
 
-    /// Queues a file; does nothing for an empty path.
+    /// Queues a file that write_queued() makes; does nothing for an empty path.
     void add(const std::string& path, std::function<void(const std::string& path)> write);
 
     /// Writes a file at once, to stay whatever comes after it. @returns false for an empty path.
     bool write(const std::string& path, const std::function<void(const std::string& path)>& write);
     [[nodiscard]] const std::vector<std::string>& kept() const noexcept { return kept_; }
 
-    /// Writes what is queued. @throws what a writer throws, after rollback().
-    void commit();
-    /// Removes what commit() has written.
-    void rollback();
+    /// Makes what is queued, under temporary names. @throws what a writer throws.
+    void write_queued();
+    /// Puts in place what write_queued() has made. @throws Error Io.
+    void publish();
     [[nodiscard]] const std::vector<std::string>& written() const noexcept { return written_; }
 
 private:
@@ -44,6 +46,8 @@ private:
     std::vector<std::string> inputs_;
     std::vector<std::string> checked_;
     std::vector<Pending> pending_;
+    std::vector<Pending> devices_;  ///< to be written last: that cannot be undone
+    FileSet files_;
     std::vector<std::string> written_;
     std::vector<std::string> kept_;
 };

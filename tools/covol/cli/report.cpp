@@ -127,6 +127,7 @@ Json to_json(const SegmentReport& r) {
     json["mesh"] = r.resolved.without_mesh ? Json{{"triangles", r.mesh.triangles}} : to_json(r.mesh);
     if (r.point_count > 0) json["fit"]["points_to_surface"] = to_json(r.fit);
     if (r.point_count > 0) json["fit"]["points_to_surface"]["bias"] = r.fit.bias;
+    if (r.image_support) json["fit"]["image_support"] = *r.image_support;
     if (r.marks_off.beyond > 0)
         json["fit"]["marks_off"] = {{"count", r.marks_off.count},
                                     {"beyond", r.marks_off.beyond},

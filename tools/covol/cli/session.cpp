@@ -224,6 +224,8 @@ void Session::add_grid(const std::string& path, const FloatGridPtr& grid, bool h
 }
 
 int Session::main(int argc, char** argv) {
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP})
+        if (std::signal(signal, on_signal) == SIG_IGN) std::signal(signal, SIG_IGN);  // as nohup wants it
     // What follows `plan` and `brick` is a whole command line, with the options of its command.
     std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
     command_line_ = "covol";
@@ -255,8 +257,6 @@ int Session::main(int argc, char** argv) {
 }
 
 int Session::execute() {
-    std::signal(SIGINT, on_signal);
-    std::signal(SIGTERM, on_signal);
     std::unique_ptr<MemoryGuard> guard;
     try {
         progress_ = std::make_unique<Progress>(quiet_);
@@ -311,17 +311,14 @@ void Session::finish() {
             write_text(path, std::string("# covol ") + version() + ", " + command_->get_name() + "\n" +
                                  command_->config_to_str(false, true));
         });
-    outputs_.commit();
+    outputs_.write_queued();
     add_seconds("write", watch.seconds());
     report_["seconds"].erase("total");  // the last, and of all that was done
     add_seconds("total", since_start_.seconds());
     report_["peak_rss_bytes"] = peak_rss();
-    try {
-        if (!json_path_.empty()) write_report(json_path_);
-    } catch (...) {
-        outputs_.rollback();
-        throw;
-    }
+    write_report();
+    run_.check();
+    outputs_.publish();
     for (const std::string& path : outputs_.written()) note("wrote " + path);
     if (profile_)
         for (const std::string& line : profile_lines(report_)) progress_->line(line);
@@ -335,14 +332,15 @@ std::vector<std::string> Session::given() const {
     return names;
 }
 
-void Session::write_report(const std::string& path) const {
+void Session::write_report() {
+    if (json_path_.empty()) return;
     const std::string text = report_.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-    if (path == "-") {
-        std::cout << text << std::flush;
-        if (!std::cout) throw Error(Errc::Io, "standard output: cannot write");
-        return;
+    if (json_path_ != "-") {
+        outputs_.add(json_path_, [text](const std::string& path) { write_text(path, text); });
+        return outputs_.write_queued();
     }
-    write_text(path, text);
+    std::cout << text << std::flush;
+    if (!std::cout) throw Error(Errc::Io, "standard output: cannot write");
 }
 
 std::string Session::interrupted_text() const {

@@ -120,7 +120,7 @@ private:
     int execute();
     void start_report();
     void finish();
-    void write_report(const std::string& path) const;
+    void write_report();
     int fail(int code, const std::string& message);
     [[nodiscard]] std::string interrupted_text() const;
     [[nodiscard]] std::string memory_limit_name() const;

@@ -1,7 +1,5 @@
 #include "jobs/brick_job.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <iomanip>
@@ -10,6 +8,7 @@
 #include <sstream>
 
 #include "covol/error.h"
+#include "covol/file_set.h"
 #include "covol/mesh_stream.h"
 #include "jobs/brick_folder.h"
 #include "jobs/timelapse_job.h"
@@ -179,25 +178,6 @@ void tell_plan(const BrickPlan& plan, Session& session) {
                 std::to_string(largest / 1000 * 1000) + ", which takes about " + megabytes(memory));
 }
 
-/// Removes itself.
-class TemporaryFolder {
-public:
-    explicit TemporaryFolder(const std::string& beside) {
-        path_ = beside + ".bricks-XXXXXX";
-        if (::mkdtemp(path_.data()) == nullptr) throw Error(Errc::Io, path_ + ": cannot make a folder for bricks");
-    }
-    ~TemporaryFolder() {
-        std::error_code status;
-        std::filesystem::remove_all(path_, status);
-    }
-    TemporaryFolder(const TemporaryFolder&) = delete;
-    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-    [[nodiscard]] const std::string& path() const noexcept { return path_; }
-
-private:
-    std::string path_;
-};
-
 }  // namespace
 
 void run_bricks(const SegmentJob& job, Session& session) {
@@ -270,8 +250,8 @@ SegmentResult solve_within_limit(const SegmentJob& job, const Image* image, cons
     run.info("about " + std::to_string(plan.active_voxels() / 1000000) +
              " million voxels in the band, more than --memory-limit allows at once: in " +
              std::to_string(plan.bricks.size()) + " bricks");
-    const TemporaryFolder temporary(job.any_output());
-    const BrickFolder folder(temporary.path());
+    const ScratchFolder scratch(std::filesystem::path(job.any_output()).parent_path());
+    const BrickFolder folder((scratch.path() / "bricks").string());
     BrickRunner(*solver, plan, folder, run).run_all();
     return join(job, *solver, plan, folder, session);
 }

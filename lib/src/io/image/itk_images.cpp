@@ -302,6 +302,8 @@ public:
         const std::shared_ptr<void> data =
             allocate_pixels(path_, frame * std::uint64_t(info_.frames), info_.type, file_bytes_);
         io_->SetIORegion(region);
+        if (std::uint64_t(region.GetNumberOfPixels()) != voxel_count(box.size()) * std::uint64_t(info_.frames))
+            throw Error(Errc::InvalidInput, unusable_);
         std::optional<Hdf5Lock> lock;
         if (in_boxes_) lock.emplace();
         with_itk(Errc::InvalidInput, unusable_, [&] { io_->Read(data.get()); });
@@ -386,9 +388,14 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path) {
     constexpr std::uint64_t kMost = std::uint64_t(1) << 20;
     std::uint64_t frames = 1;
     for (unsigned a = 3; a < io->GetNumberOfDimensions(); ++a)
-        frames = std::min(frames * std::min<std::uint64_t>(io->GetDimensions(a), kMost), kMost);
-    info.frames = static_cast<int>(std::max<std::uint64_t>(frames, 1));
-    info.channels = static_cast<int>(std::clamp<std::uint64_t>(io->GetNumberOfComponents(), 1, kMost));
+        if (__builtin_mul_overflow(frames, std::uint64_t(io->GetDimensions(a)), &frames)) frames = kMost + 1;
+    const std::uint64_t channels = io->GetNumberOfComponents();
+    if (frames < 1 || frames > kMost || channels < 1 || channels > kMost)
+        throw read_error(Errc::InvalidInput, path,
+                         "expected 1 to 2^20 frames and channels, the header claims " + std::to_string(frames) +
+                             " frames and " + std::to_string(channels) + " channels");
+    info.frames = static_cast<int>(frames);
+    info.channels = static_cast<int>(channels);
     if (info.channels > 1) info.axis_order = "C" + info.axis_order;
     if (io->GetPixelType() == itk::IOPixelEnum::RGB) info.channel_names = {"red", "green", "blue"};
 

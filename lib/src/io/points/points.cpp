@@ -4,11 +4,11 @@
 #include <bit>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <sstream>
 
 #include "base/file.h"
 #include "covol/error.h"
+#include "covol/file_set.h"
 #include "covol/points_text.h"
 #include "io/points/point_files.h"
 #include "io/points/point_formats.h"
@@ -134,12 +134,7 @@ void write_points(const std::string& path, const std::vector<Vec3>& points, cons
             Errc::InvalidOptions,
             "write_points: " + path + ": expected a name ending in .xyz, .csv or .ply, got '" + extension + "'");
     }
-    detail::write_atomically(path, [&](const std::string& temporary) {
-        std::ofstream file(temporary, std::ios::binary);
-        file.write(text.data(), static_cast<std::streamsize>(text.size()));
-        file.close();
-        if (!file) throw Error(Errc::Io, "write_points: " + path + ": cannot write");
-    });
+    write_text_file(path, text);
 }
 
 }  // namespace covol

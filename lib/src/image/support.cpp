@@ -1,0 +1,104 @@
+#include "image/support.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+namespace covol::detail {
+namespace {
+
+constexpr int kWindow = 4, kBeside = 10;  // half steps
+
+/// Where the samples of a place lie, as voxels of the image, and their values.
+class Profile {
+public:
+    Profile(const Image& image, const Vec3& place, const Vec3& normal, double step)
+        : image_(image), middle_(image.geometry().world_to_index(place)) {
+        const Vec3 ahead =
+            image.geometry().world_to_index({place[0] + normal[0], place[1] + normal[1], place[2] + normal[2]});
+        double length = 0;
+        for (int a = 0; a < 3; ++a) {
+            half_[a] = ahead[a] - middle_[a];
+            length += half_[a] * half_[a];
+        }
+        const double voxel = length > 0 ? 1 / std::sqrt(length) : 0;
+        for (double& c : half_) c *= 0.5 * std::max(voxel, step);
+    }
+    [[nodiscard]] std::optional<Index3> voxel(int at) const {
+        Index3 index;
+        for (int a = 0; a < 3; ++a) {
+            const double c = std::round(middle_[a] + at * half_[a]);
+            if (!(std::abs(c) < std::numeric_limits<int>::max())) return {};
+            index[a] = static_cast<int>(c);
+        }
+        if (!image_.held().contains(index)) return {};
+        return index;
+    }
+    /// Largest less smallest value; none where the window leaves the image.
+    [[nodiscard]] std::optional<double> range(int around) const {
+        double least = std::numeric_limits<double>::infinity(), most = -least;
+        for (int at = around - kWindow; at <= around + kWindow; ++at) {
+            const std::optional<Index3> index = voxel(at);
+            if (!index) return {};
+            const double value = image_.at((*index)[0], (*index)[1], (*index)[2]);
+            least = std::min(least, value), most = std::max(most, value);
+        }
+        return most - least;
+    }
+
+private:
+    const Image& image_;
+    Vec3 middle_, half_;
+};
+
+/// Probability that one of `first` exceeds one of `second`.
+double probability_above(const std::vector<double>& first, std::vector<double> second) {
+    std::sort(second.begin(), second.end());
+    double sum = 0;
+    for (const double value : first) {
+        const auto [below, above] = std::equal_range(second.begin(), second.end(), value);
+        sum += 0.5 * double((below - second.begin()) + (above - second.begin()));
+    }
+    return sum / (double(first.size()) * double(second.size()));
+}
+
+}  // namespace
+
+ImageSupport measure_support(const Image& image, const std::vector<Vec3>& places, const std::vector<Vec3>& normals,
+                             double step, const RunContext& run) {
+    std::vector<Profile> profiles;
+    profiles.reserve(places.size());
+    std::vector<Vec3> needed;
+    for (std::size_t n = 0; n < places.size(); ++n) {
+        profiles.emplace_back(image, places[n], normals[n], step);
+        for (int at = -kBeside - kWindow; at <= kBeside + kWindow; at += 2)
+            if (const std::optional<Index3> voxel = profiles.back().voxel(at))
+                needed.push_back(
+                    image.geometry().index_to_world({double((*voxel)[0]), double((*voxel)[1]), double((*voxel)[2])}));
+    }
+    if (image.chunks()) image.load(needed, run);
+    using Ranges = std::array<std::optional<double>, 3>;
+    std::vector<Ranges> ranges(places.size());
+    tbb::parallel_for(std::size_t(0), places.size(), [&](std::size_t n) {
+        ranges[n] = {profiles[n].range(0), profiles[n].range(-kBeside), profiles[n].range(kBeside)};
+    });
+    std::vector<double> at_places, beside;
+    for (const Ranges& r : ranges) {
+        if (!r[0] || (!r[1] && !r[2])) continue;
+        at_places.push_back(*r[0]);
+        for (int side = 1; side <= 2; ++side)
+            if (r[side]) beside.push_back(*r[side]);
+    }
+    ImageSupport support;
+    support.places = at_places.size();
+    if (at_places.empty()) return support;
+    support.share = probability_above(at_places, beside);
+    const double a = double(at_places.size()), b = double(beside.size());
+    support.error = std::sqrt((a + b + 1) / (12 * a * b));
+    return support;
+}
+
+}  // namespace covol::detail

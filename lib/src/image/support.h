@@ -1,0 +1,25 @@
+#pragma once
+#include <cstddef>
+#include <vector>
+
+#include "covol/image.h"
+
+namespace covol::detail {
+
+/// Whether an image varies more at some places than beside them, whatever it shows there, a step or a line.
+struct ImageSupport {
+    std::size_t places = 0;  ///< that lie in the image, with the windows beside them
+    double share = 0;  ///< probability that the range of values at a place exceeds that beside a place; ties are half
+    double error = 0;  ///< of `share`, standard
+};
+
+/// Compares the range of the nearest voxels within two steps of each place along its normal with the same about the
+/// points five steps before and behind it: the area under the curve of receiver operating characteristics, by ranks
+/// (Mann and Whitney), with the error of two samples of one distribution.
+/// @param places, normals  world units, as many of both; normals of length 1
+/// @param step  world units; where a voxel is longer along a normal, its length there is taken
+/// @throws Error as Image::load().
+[[nodiscard]] ImageSupport measure_support(const Image& image, const std::vector<Vec3>& places,
+                                           const std::vector<Vec3>& normals, double step, const RunContext& run);
+
+}  // namespace covol::detail

@@ -1,0 +1,144 @@
+"""Nothing lost, nothing wrong in silence: kills, signals, hostile numbers, marks of another image, with the real binary.
+
+    COVOL=build/bin/covol python3 -m unittest tests/cli/reliability_test.py
+"""
+import hashlib
+import random
+import signal
+import subprocess
+import time
+import unittest
+
+import numpy as np
+
+from cli_test import CENTER, COVOL, H, ORIGIN, RADIUS, SIZE, Case, sphere_points, write_nrrd, write_xyz
+
+OUTPUTS = ["-o", "s.vdb", "--mesh", "s.ply", "--mask", "s.nrrd", "--table", "s.csv", "--json", "s.json"]
+
+
+class Sets(Case):
+    """Outputs of a run come together, or none does."""
+
+    def segment(self, *more):
+        return [COVOL, "segment", self.image, "--points", self.points, "--quiet", "--threads", "1", "--init", "tag", *OUTPUTS, *more]
+
+    def state(self):
+        """Of each output; those that hold times change from run to run."""
+        return {name: hashlib.sha256((self.out / name).read_bytes()).hexdigest() for name in self.files()
+                if name not in ("s.json", "s.csv")}
+
+    def test_killed_at_any_moment_the_set_is_old_or_new(self):
+        sets = []
+        for more in (["--delta", "1vx"], ["--delta", "3vx"]):
+            start = time.monotonic()
+            subprocess.run(self.segment(*more), cwd=self.out, check=True)
+            seconds = time.monotonic() - start
+            sets.append(self.state())
+        self.assertTrue(all(sets[0][name] != sets[1][name] for name in sets[0]))
+        generator = random.Random(5)
+        killed = 0
+        for n in range(12):
+            # Most of them while files are written, at the end.
+            moment = seconds * (generator.uniform(0.7, 1.05) if n % 4 else generator.uniform(0, 1))
+            run = subprocess.Popen(self.segment("--delta", "1vx" if n % 2 else "3vx"), cwd=self.out)
+            time.sleep(moment)
+            run.kill()
+            killed += run.wait() == -signal.SIGKILL
+            # The next run in this folder clears up.
+            self.run_covol("phantom", "sphere", "--size", "16", "-o", "next.nrrd")
+            (self.out / "next.nrrd").unlink()
+            self.assertIn(self.state(), sets, f"killed after {moment:.3f} s of {seconds:.3f}")
+            self.assertEqual([p.name for p in self.out.iterdir() if p.name.startswith(".")], [])
+        self.assertGreater(killed, 3)
+
+    def test_signals_end_a_run_and_leave_nothing(self):
+        subprocess.run(self.segment(), cwd=self.out, check=True)
+        before = self.state()
+        for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+            run = subprocess.Popen([COVOL, "segment", self.image, "--points", self.points, "--init", "tag", *OUTPUTS, "--max-steps",
+                                    "100000000", "--tolerance", "0"], cwd=self.out, stderr=subprocess.PIPE, text=True)
+            while not run.stderr.readline().startswith("covol: tag_distance"):
+                self.assertIsNone(run.poll(), "ended before the signal")
+            run.send_signal(getattr(signal, name))
+            start = time.monotonic()
+            _, text = run.communicate(timeout=60)
+            self.assertEqual(run.returncode, 130, text)
+            self.assertLess(time.monotonic() - start, 10)
+            self.assertEqual(self.state(), before)
+            self.assertEqual([p.name for p in self.out.iterdir() if p.name.startswith(".")], [])
+
+    def test_a_hangup_that_is_ignored_stays_so(self):
+        run = subprocess.Popen(["nohup", *map(str, self.segment())], cwd=self.out, stdout=subprocess.DEVNULL,
+                               stderr=subprocess.DEVNULL)
+        time.sleep(0.1)
+        run.send_signal(signal.SIGHUP)
+        self.assertEqual(run.wait(timeout=120), 0)
+
+
+class Numbers(Case):
+    def test_steps_that_round_to_nothing_are_refused(self):
+        for option, value in (("--tau", "1e-9"), ("--tau", "1e300"), ("--delta", "1e308")):
+            with self.subTest(option + " " + value):
+                self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", "--init", "tag", option, value, code=3,
+                            says=option)
+
+    def test_more_frames_than_memory_are_refused(self):
+        path = self.inputs / "frames.nrrd"
+        header = ("NRRD0004\ntype: uint8\ndimension: 4\nsizes: 8 8 8 3000000\nspacings: 1 1 1 1\nencoding: raw\nbyte skip: {}\n\n")
+        for skip in (-1, 5):
+            path.write_bytes(header.format(skip).encode() + bytes(5000))
+            self.refuse("info", path, code=3, says="frames")
+        path = self.inputs / "frames.mha"
+        path.write_bytes(b"ObjectType = Image\nNDims = 4\nDimSize = 8 8 8 3000000\nElementSpacing = 1 1 1 1\nHeaderSize = 150\n"
+                         b"ElementType = MET_UCHAR\nElementDataFile = LOCAL\n" + bytes(5000))
+        self.refuse("info", path, code=3)
+
+
+class WrongInSilence(Case):
+    """Runs that end well on inputs that are not."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        rng = np.random.default_rng(3)
+        ball = cls.image.read_bytes().split(b"\n\n", 1)[1]
+        cls.values = np.frombuffer(ball, np.uint8).astype(np.float32) + rng.normal(0, 5, SIZE**3).astype(np.float32)
+        cls.noise = rng.normal(100, 30, SIZE**3).astype(np.float32)
+        cls.marks = np.array(sphere_points(300))
+
+    def warnings(self, values, marks):
+        image, points = self.inputs / "i.nrrd", self.inputs / "m.xyz"
+        write_nrrd(image, (SIZE,) * 3, np.asarray(values, "<f4").tobytes(), kind="float")
+        write_xyz(points, map(tuple, marks))
+        report = self.report("segment", image, "--points", points, "-o", "s.vdb")
+        return report.get("warnings", []), report["fit"]["image_support"]
+
+    def test_what_belongs_together_is_not_doubted(self):
+        for values in (self.values, 300 - self.values):
+            warnings, support = self.warnings(values, self.marks)
+            self.assertEqual(warnings, [])
+            self.assertGreater(support, 0.9)
+
+    def test_noise(self):
+        warnings, support = self.warnings(self.noise, self.marks)
+        self.assertIn("hardly foretells", " ".join(warnings))
+        self.assertLess(abs(support - 0.5), 0.1)
+
+    def test_marks_of_another_place_or_size(self):
+        middle = np.array(CENTER)
+        for marks in (self.marks + (8 * H, 0, 0), middle + 1.5 * (self.marks - middle), middle + 0.6 * (self.marks - middle)):
+            warnings, _ = self.warnings(self.values, marks)
+            self.assertIn("look whether the marks belong to this image", " ".join(warnings))
+
+    def test_random_marks(self):
+        marks = np.random.default_rng(7).uniform(-0.4, 0.4, (60, 3)) * SIZE * H + CENTER
+        warnings, _ = self.warnings(self.values, marks)
+        self.assertNotEqual(warnings, [])
+
+    def test_values_that_single_precision_does_not_hold(self):
+        warnings, _ = self.warnings(self.values + 1e9, self.marks)
+        self.assertIn("subtract an offset", " ".join(warnings))
+
+
+if __name__ == "__main__":
+    unittest.main()
