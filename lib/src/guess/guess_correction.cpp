@@ -10,7 +10,7 @@
 #include <numeric>
 
 #include "base/valid.h"
-#include "base/wendland.h"
+#include "guess/wendland.h"
 #include "covol/error.h"
 #include "covol/start.h"
 #include "guess/heuristics.h"

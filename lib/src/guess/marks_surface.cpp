@@ -7,7 +7,7 @@
 #include <functional>
 #include <limits>
 
-#include "base/wendland.h"
+#include "guess/wendland.h"
 #include "guess/heuristics.h"
 #include "points/kd_tree.h"
 
