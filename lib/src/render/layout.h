@@ -1,0 +1,47 @@
+#pragma once
+// Where a figure's parts lie.
+#include <array>
+#include <vector>
+
+#include "render/canvas.h"
+
+namespace covol::figure {
+
+/// A part whose sides are known, before its scale is.
+struct Cell {
+    double width = 1, height = 1;  ///< world units
+    int column = 0, row = 0;
+};
+
+/// Parts at one scale in columns and rows.
+struct Tiling {
+    std::vector<Cell> cells;
+    /// Pixel positions and the scale at which it fits into `room`, in its middle.
+    struct Placed {
+        std::vector<Rect> at;
+        Rect bounds;
+        double pixel = 1;  ///< world units
+    };
+    [[nodiscard]] Placed place(const Rect& room, int gap) const;
+};
+
+/// Ways to lay three planes that share sides two by two: beside and below the first, in a row, in a column.
+/// @param sizes  world units: of the first; the second has its height, the third its width
+[[nodiscard]] std::vector<Tiling> ways_for_planes(const std::array<std::array<double, 2>, 3>& sizes);
+/// Ways to lay equal parts in rows.
+[[nodiscard]] std::vector<Tiling> ways_for_equals(double width, double height, int count);
+
+/// A view, and parts beside or below it.
+struct Split {
+    Rect view;
+    Tiling::Placed parts;
+    int way = 0;  ///< of those given
+};
+/// The split that leaves the least of `room` empty; the view gets somewhat more than the parts.
+/// @param aspect  what is in the view: its width over its height
+/// @param rim     pixels below what is in the view, for a scale bar
+[[nodiscard]] Split split(const Rect& room, double aspect, int rim, const std::vector<Tiling>& ways, int gap);
+/// The parts alone, as large as they can be.
+[[nodiscard]] Split fill(const Rect& room, const std::vector<Tiling>& ways, int gap);
+
+}  // namespace covol::figure
