@@ -23,7 +23,7 @@ struct RenderStructure {
     const FloatGrid* surface = nullptr;                ///< level set, world units; not null
     std::array<std::uint8_t, 3> color{237, 179, 107};  ///< red, green, blue
     std::vector<Vec3> marks;                           ///< world units
-    /// 0 to 1, of its layers in the surface view; automatic: 1, and 0.35 where another structure's box lies in its own
+    /// 0 to 1, of its layers in the surface view; automatic: 1; 0.35 where another structure lies in its box; 0.16 in a volume view
     std::optional<double> opacity;
 };
 

@@ -30,10 +30,22 @@ double round_length(double length) {
 }
 
 std::string short_number(double value) {
-    char text[40];
-    std::snprintf(text, sizeof text, "%.4g", std::abs(value) < 1e-9 ? 0.0 : value);
+    if (!std::isfinite(value)) return "?";
+    const double size = std::abs(value);
+    char text[64];
+    if (size >= 1e6 || (size > 0 && size < 1e-4)) {
+        std::snprintf(text, sizeof text, "%.3g", value);
+    } else {
+        const int decimals = size >= 100 ? 0 : size >= 10 ? 1 : size >= 1 ? 2 : 4;
+        std::snprintf(text, sizeof text, "%.*f", decimals, value);
+    }
     std::string shown = text;
-    if (const auto minus = shown.find('-'); minus == 0) shown.replace(0, 1, "−");
+    if (shown.find('.') != std::string::npos && shown.find('e') == std::string::npos) {
+        shown.erase(shown.find_last_not_of('0') + 1);
+        if (shown.back() == '.') shown.pop_back();
+    }
+    if (shown == "-0") return "0";
+    if (shown.front() == '-') shown.replace(0, 1, "−");
     return shown;
 }
 

@@ -20,45 +20,55 @@ double fitted(const Rect& view, double aspect, int rim) {
 }  // namespace
 
 Tiling::Placed Tiling::place(const Rect& room, int gap) const {
-    std::vector<double> widths, heights;
-    for (const Cell& cell : cells) {
-        widths.resize(std::max(widths.size(), std::size_t(cell.column) + 1));
-        heights.resize(std::max(heights.size(), std::size_t(cell.row) + 1));
-        widths[cell.column] = std::max(widths[cell.column], cell.width);
-        heights[cell.row] = std::max(heights[cell.row], cell.height);
-    }
-    double width = 0, height = 0;
-    for (const double w : widths) width += w;
-    for (const double h : heights) height += h;
-    const int gaps_x = gap * int(widths.size() - 1), gaps_y = gap * int(heights.size() - 1);
+    std::vector<double> widths;
     Placed placed;
-    placed.pixel =
-        std::max(width / std::max(1, room.width - gaps_x), height / std::max(1, room.height - gaps_y));
+    double all = 0;
+    placed.pixel = 0;
+    for (const std::vector<Cell>& column : columns) {
+        double width = 0, height = 0;
+        for (const Cell& cell : column) {
+            width = std::max(width, cell.width);
+            height += cell.height;
+        }
+        widths.push_back(width);
+        all += width;
+        placed.pixel = std::max(placed.pixel, height / std::max(1, room.height - gap * int(column.size() - 1)));
+    }
+    placed.pixel = std::max(placed.pixel, all / std::max(1, room.width - gap * int(columns.size() - 1)));
     const auto pixels = [&](double length) { return std::max(1, int(std::floor(length / placed.pixel + 1e-9))); };
-    std::vector<int> x{0}, y{0};
-    for (const double w : widths) x.push_back(x.back() + pixels(w) + gap);
-    for (const double h : heights) y.push_back(y.back() + pixels(h) + gap);
-    placed.bounds = {room.x + (room.width - (x.back() - gap)) / 2, room.y + (room.height - (y.back() - gap)) / 2,
-                     x.back() - gap, y.back() - gap};
-    for (const Cell& cell : cells)
-        placed.at.push_back({placed.bounds.x + x[cell.column], placed.bounds.y + y[cell.row], pixels(cell.width),
-                             pixels(cell.height)});
+    int x = 0, most = 0;
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+        int y = 0;
+        for (const Cell& cell : columns[c]) {
+            placed.at.push_back({x, y, pixels(cell.width), pixels(cell.height)});
+            y += placed.at.back().height + gap;
+        }
+        most = std::max(most, y - gap);
+        x += pixels(widths[c]) + gap;
+    }
+    placed.bounds = {room.x + (room.width - (x - gap)) / 2, room.y + (room.height - most) / 2, x - gap, most};
+    for (Rect& rect : placed.at) {
+        rect.x += placed.bounds.x;
+        rect.y += placed.bounds.y;
+    }
     return placed;
 }
 
-std::vector<Tiling> ways_for_planes(const std::array<std::array<double, 2>, 3>& sizes) {
-    const auto cell = [&](int n, int column, int row) { return Cell{sizes[n][0], sizes[n][1], column, row}; };
-    return {{{cell(0, 0, 0), cell(1, 1, 0), cell(2, 0, 1)}},
-            {{cell(0, 0, 0), cell(1, 1, 0), cell(2, 2, 0)}},
-            {{cell(0, 0, 0), cell(1, 0, 1), cell(2, 0, 2)}}};
+std::vector<Tiling> ways_for_three(const std::array<Cell, 3>& parts) {
+    return {{{{parts[0], parts[2]}, {parts[1]}}},
+            {{{parts[0]}, {parts[1], parts[2]}}},
+            {{{parts[0], parts[1], parts[2]}}},
+            {{{parts[0]}, {parts[1]}, {parts[2]}}}};
 }
 
 std::vector<Tiling> ways_for_equals(double width, double height, int count) {
     std::vector<Tiling> ways;
     for (int columns = 1; columns <= count; ++columns) {
-        if (columns > 1 && (count + columns - 1) / columns == (count + columns - 2) / (columns - 1)) continue;
+        const int rows = (count + columns - 1) / columns;
+        if (columns > 1 && rows == (count + columns - 2) / (columns - 1)) continue;
         Tiling tiling;
-        for (int n = 0; n < count; ++n) tiling.cells.push_back({width, height, n % columns, n / columns});
+        tiling.columns.resize(columns);
+        for (int n = 0; n < count; ++n) tiling.columns[n % columns].push_back({width, height});
         ways.push_back(tiling);
     }
     return ways;
@@ -77,8 +87,10 @@ Split split(const Rect& room, double aspect, int rim, const std::vector<Tiling>&
                 (beside ? rest.x : rest.y) += used;
                 (beside ? rest.width : rest.height) -= used;
                 const Tiling::Placed parts = ways[way].place(rest, gap);
-                const double score =
-                    0.55 * std::log(fitted(view, aspect, rim)) + 0.45 * std::log(std::max(1.0, area(parts)));
+                const double filled = area(parts) / (double(parts.bounds.width) * parts.bounds.height);
+                const double score = 0.55 * std::log(fitted(view, aspect, rim)) +
+                                     0.45 * std::log(std::max(1.0, area(parts))) + 0.3 * std::log(filled) +
+                                     (beside ? 0.03 : 0);
                 if (score <= most + 1e-9) continue;
                 most = score;
                 best = {view, parts, way};

@@ -10,13 +10,12 @@ namespace covol::figure {
 /// A part whose sides are known, before its scale is.
 struct Cell {
     double width = 1, height = 1;  ///< world units
-    int column = 0, row = 0;
 };
 
-/// Parts at one scale in columns and rows.
+/// Columns of parts at one scale, each from the top.
 struct Tiling {
-    std::vector<Cell> cells;
-    /// Pixel positions and the scale at which it fits into `room`, in its middle.
+    std::vector<std::vector<Cell>> columns;
+    /// Pixel positions, column by column, and the scale at which it fits into `room`, in its middle.
     struct Placed {
         std::vector<Rect> at;
         Rect bounds;
@@ -25,10 +24,10 @@ struct Tiling {
     [[nodiscard]] Placed place(const Rect& room, int gap) const;
 };
 
-/// Ways to lay three planes that share sides two by two: beside and below the first, in a row, in a column.
-/// @param sizes  world units: of the first; the second has its height, the third its width
-[[nodiscard]] std::vector<Tiling> ways_for_planes(const std::array<std::array<double, 2>, 3>& sizes);
-/// Ways to lay equal parts in rows.
+/// Ways to lay three parts, in order: the first and the third in a column and the second beside; the first and, beside
+/// it, the others in a column; all in a column; all in a row.
+[[nodiscard]] std::vector<Tiling> ways_for_three(const std::array<Cell, 3>& parts);
+/// Ways to lay equal parts in columns.
 [[nodiscard]] std::vector<Tiling> ways_for_equals(double width, double height, int count);
 
 /// A view, and parts beside or below it.

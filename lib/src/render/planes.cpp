@@ -41,8 +41,13 @@ std::array<double, 2> range_of(const WorldBox& box, int axis, const ImageGeometr
         low = std::min(low, at);
         high = std::max(high, at);
     }
+    return {low, high};
+}
+
+/// The same within the image.
+std::array<double, 2> inside(const std::array<double, 2>& range, int axis, const ImageGeometry& geometry) {
     const double last = geometry.size[axis] - 1.0;
-    return {std::clamp(low, 0.0, last), std::clamp(high, 0.0, last)};
+    return {std::clamp(range[0], 0.0, last), std::clamp(range[1], 0.0, last)};
 }
 
 std::array<double, 2> range_of(const std::vector<WorldBox>& boxes, int axis, const ImageGeometry& geometry) {
@@ -66,8 +71,10 @@ Region region_around(const std::vector<WorldBox>& boxes, const ImageGeometry& ge
     }
     for (int a = 0; a < 3; ++a) {
         const double wider = margin * longest / geometry.spacing[a] + 0.5;
-        region.min[a] = std::max(-0.5, ranges[a][0] - wider);
-        region.max[a] = std::min(geometry.size[a] - 0.5, ranges[a][1] + wider);
+        // Beyond the image only where a structure is.
+        const double beyond = 0.25 * wider;
+        region.min[a] = std::max(std::min(-0.5, ranges[a][0] - beyond), ranges[a][0] - wider);
+        region.max[a] = std::min(std::max(geometry.size[a] - 0.5, ranges[a][1] + beyond), ranges[a][1] + wider);
     }
     return region;
 }
@@ -118,7 +125,7 @@ MarkedSlices find_marked_slices(const std::vector<Vec3>& marks, const ImageGeome
 
 std::vector<int> spread_slices(int axis, int count, const std::vector<WorldBox>& boxes, const MarkedSlices& marked,
                                const ImageGeometry& geometry) {
-    const auto range = range_of(boxes, axis, geometry);
+    const auto range = inside(range_of(boxes, axis, geometry), axis, geometry);
     const double gap = (range[1] - range[0]) / (count + 1);
     std::vector<int> result;
     for (int n = 0; n < count; ++n) {
@@ -137,7 +144,7 @@ std::vector<int> spread_slices(int axis, int count, const std::vector<WorldBox>&
 
 int middle_slice(int axis, const std::vector<WorldBox>& boxes, const MarkedSlices& marked,
                  const ImageGeometry& geometry) {
-    const auto all = range_of(boxes, axis, geometry);
+    const auto all = inside(range_of(boxes, axis, geometry), axis, geometry);
     const double middle = 0.5 * (all[0] + all[1]);
     std::vector<int> candidates;
     if (marked.axis == axis)
@@ -150,7 +157,7 @@ int middle_slice(int axis, const std::vector<WorldBox>& boxes, const MarkedSlice
     for (const int slice : candidates) {
         int cut = 0;
         for (const WorldBox& box : boxes) {
-            const auto range = range_of(box, axis, geometry);
+            const auto range = inside(range_of(box, axis, geometry), axis, geometry);
             // Near a box's end only the tip of a structure is cut.
             const double tip = 0.15 * (range[1] - range[0]);
             cut += slice >= range[0] + tip && slice <= range[1] - tip ? 1 : 0;
@@ -194,7 +201,9 @@ std::string name_of(const Plane& plane, const RenderScene& scene) {
     Vec3 index{0, 0, 0};
     index[plane.axis] = plane.index;
     constexpr const char* kAxes = "xyz";
-    return name + kAxes[world] + " = " + length_text(geometry.index_to_world(index)[world], scene.unit);
+    return name + kAxes[world] + " = " +
+           (scene.unit.empty() ? short_number(geometry.index_to_world(index)[world])
+                               : length_text(geometry.index_to_world(index)[world], scene.unit));
 }
 
 }  // namespace covol::figure

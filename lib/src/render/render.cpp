@@ -21,10 +21,12 @@ namespace {
 constexpr double kLow = 0.005, kHigh = 0.998;  // intensity percentiles shown as black and white
 constexpr double kRegionMargin = 0.08;         // around the structures on slices, of their longest side
 constexpr double kVolumeMargin = 0.15;
-constexpr double kViewMargin = 0.03;
-constexpr double kVeil = 0.35;         // opacity of what lies around another structure
-constexpr double kVolumeDensity = 1.0;
+constexpr double kViewMargin = 0.03, kVolumeView = 0.07;  // share of a view around what it shows
+// Opacity of what lies around another structure, and of all where the image's volume is to be seen inside.
+constexpr double kVeil = 0.35, kVolumeVeil = 0.16;
+constexpr double kVolumeDensity = 4.0;
 constexpr int kPlanes = 3;
+constexpr std::size_t kMostBalls = 3000;
 
 /// Text is as large as a picture of that size bears.
 double text_size(int width, int height) { return std::max(9.0, 0.0185 * std::sqrt(double(width) * height)); }
@@ -50,7 +52,7 @@ public:
             bodies_.push_back({structure.surface, to_color(structure.color), opacity_of(bodies_.size())});
         }
         all_marks_.insert(all_marks_.end(), scene.marks.begin(), scene.marks.end());
-        radius_ = mark_radius(text_, all_marks_.size());
+        radius_ = mark_radius(text_, std::min(kMostBalls, all_marks_.size()));
     }
 
     Picture go() {
@@ -73,6 +75,7 @@ private:
     /// Structures that lie around others let them be seen.
     [[nodiscard]] double opacity_of(std::size_t n) const {
         if (const auto& stated = scene_.structures[n].opacity) return *stated;
+        if (options_.volume) return kVolumeVeil;
         for (std::size_t m = 0; m < boxes_.size(); ++m) {
             if (m == n) continue;
             bool around = true;
@@ -105,27 +108,55 @@ private:
                                                        geometry.size[a] - 1.0)));
                 across[a] = plane_across(a, index, scene_);
             }
-            // The first shares a side with each of the others.
-            for (int a = 0; a < kPlanes; ++a) {
-                const Plane& main = across[a];
-                const Plane &beside = across[main.across], &below = across[main.down];
-                if (beside.down == main.down && below.across == main.across &&
-                    (planes_.empty() || (!scene_.is_anatomical && a == 2)))
-                    planes_ = {main, beside, below};
-            }
-            if (planes_.empty()) planes_ = {across[2], across[0], across[1]};
+            // In the first way to lay them the first shares a side with each of the others.
+            choose_first(across);
         }
         window_ = scene_.image->percentiles(kLow, kHigh);
     }
 
+    void choose_first(const std::array<Plane, kPlanes>& across) {
+        planes_ = {across[2], across[0], across[1]};
+        for (const Plane& main : across) {
+            const Plane &beside = across[main.across], &below = across[main.down];
+            if (scene_.is_anatomical && beside.down == main.down && below.across == main.across)
+                planes_ = {main, beside, below};
+        }
+    }
+
+    /// The order in which ways() has the planes. Beside the first one the second lies on its side, so that both share
+    /// an axis; elsewhere it lies as the third does. Slices come column by column.
+    void arrange(int way) {
+        if (options_.slices) {
+            std::vector<Plane> ordered;
+            const std::size_t columns = ways()[way].columns.size();
+            for (std::size_t c = 0; c < columns; ++c)
+                for (std::size_t n = c; n < planes_.size(); n += columns) ordered.push_back(planes_[n]);
+            planes_ = ordered;
+        } else if (way == 0) {
+            std::swap(planes_[1], planes_[2]);  // the first column holds the first and the third
+        } else {
+            planes_[1] = upright();
+        }
+    }
+
+    [[nodiscard]] Plane upright() const {
+        if (scene_.is_anatomical) return planes_[1];
+        Plane turned = planes_[1];
+        std::swap(turned.across, turned.down);
+        std::swap(turned.mirror_across, turned.mirror_down);
+        return turned;
+    }
+
     [[nodiscard]] std::vector<Tiling> ways() const {
         const ImageGeometry& geometry = scene_.image->geometry();
-        const auto size = [&](int n) {
-            return std::array<double, 2>{region_.length(planes_[n].across, geometry),
-                                         region_.length(planes_[n].down, geometry)};
+        const auto cell = [&](const Plane& plane) {
+            return Cell{region_.length(plane.across, geometry), region_.length(plane.down, geometry)};
         };
-        if (!options_.slices) return ways_for_planes({size(0), size(1), size(2)});
-        return ways_for_equals(size(0)[0], size(0)[1], int(planes_.size()));
+        const Cell first = cell(planes_[0]);
+        if (options_.slices) return ways_for_equals(first.width, first.height, int(planes_.size()));
+        std::vector<Tiling> all = ways_for_three({first, cell(upright()), cell(planes_[2])});
+        all.front() = ways_for_three({first, cell(planes_[1]), cell(planes_[2])}).front();
+        return all;
     }
 
     void draw_slices(const Tiling::Placed& placed) {
@@ -133,6 +164,7 @@ private:
         style.pixel = placed.pixel;
         style.text = std::max(9.0, 0.85 * text_);
         style.window = window_;
+        style.beyond = gray(options_.white_background ? 0.42 : 0.22);
         if (!options_.slices) style.others = planes_;
         style.mark_radius = std::max(1.2, 0.8 * radius_);
         for (std::size_t n = 0; n < planes_.size(); ++n)
@@ -156,6 +188,7 @@ private:
             draw_legend(canvas_, found.parts.bounds.x, found.parts.bounds.bottom() + 0.6 * text_, entries, text_,
                         theme_.ink);
         }
+        arrange(found.way);
         draw_slices(found.parts);
     }
 
@@ -177,15 +210,6 @@ private:
             return all;
         }
         for (const Body& body : bodies_) all.add(surface_extent(*body.surface, basis));
-        if (options_.volume) {
-            const Region region = region_around(boxes_, scene_.image->geometry(), kVolumeMargin);
-            for (int c = 0; c < 8; ++c) {
-                const Vec3 at = scene_.image->geometry().index_to_world({c & 1 ? region.max[0] : region.min[0],
-                                                                         c & 2 ? region.max[1] : region.min[1],
-                                                                         c & 4 ? region.max[2] : region.min[2]});
-                all.add(cloud::dot(at, basis.right), cloud::dot(at, basis.up), cloud::dot(at, basis.to_eye));
-            }
-        }
         return all;
     }
 
@@ -213,23 +237,28 @@ private:
         const Layer layer = cast_surfaces(bodies_, camera, run_);
         compose(layer, camera.at, canvas_);
         std::vector<Ball> balls;
-        balls.reserve(all_marks_.size());
         const bool several = scene_.structures.size() > 1;
         double slack = 0;
         for (const RenderStructure& structure : scene_.structures) {
             slack = std::max(slack, 2 * structure.surface->voxelSize()[0]);
             const Color color = several ? mix(to_color(structure.color), gray(1), 0.35) : kLoneMark;
-            for (const Vec3& mark : structure.marks) balls.push_back({mark, color});
+            add_balls(structure.marks, color, balls);
         }
-        for (const Vec3& mark : scene_.marks) balls.push_back({mark, several ? kLooseMark : kLoneMark});
+        add_balls(scene_.marks, several ? kLooseMark : kLoneMark, balls);
         draw_balls(canvas_, balls, camera, layer, radius_, slack);
+    }
+
+    /// Of very many marks some: they would hide the surface.
+    void add_balls(const std::vector<Vec3>& marks, const Color& color, std::vector<Ball>& balls) const {
+        const std::size_t stride = all_marks_.size() / kMostBalls + 1;
+        for (std::size_t n = 0; n < marks.size(); n += stride) balls.push_back({marks[n], color});
     }
 
     void draw_view(const Rect& at) {
         const Basis basis = look(options_.view.azimuth, options_.view.elevation);
         Rect inside = at;
         inside.height = std::max(1, at.height - rim());
-        const Camera camera = frame(basis, extent(basis), inside, kViewMargin, options_.zoom);
+        const Camera camera = frame(basis, extent(basis), inside, options_.volume ? kVolumeView : kViewMargin, options_.zoom);
         draw_surfaces(camera);
         draw_scale_bar(canvas_, at.right() - 0.6 * text_, at.bottom() - 0.3 * text_, at.width, camera.pixel,
                        scene_.unit, {theme_.ink, text_, 0});
@@ -263,20 +292,25 @@ private:
 
     /// A large view, and the structures from the front, from the right and from above.
     void draw_views(const Rect& room) {
-        const std::array<const char*, kPlanes> names{"front", scene_.is_anatomical ? "left" : "right", "top"};
+        std::array<const char*, kPlanes> names{"front", scene_.is_anatomical ? "left" : "right", "top"};
         std::array<Basis, kPlanes> bases;
         std::array<Extent, kPlanes> extents;
-        std::array<std::array<double, 2>, kPlanes> sizes{};
+        std::array<Cell, kPlanes> sizes{};
         for (int n = 0; n < kPlanes; ++n) {
             const ViewDirection view = parse_view(names[n], scene_.is_anatomical);
             bases[n] = look(view.azimuth, view.elevation);
             for (const Body& body : bodies_) extents[n].add(surface_extent(*body.surface, bases[n]));
             sizes[n] = {1.12 * extents[n].size(0), 1.12 * extents[n].size(1) + 0.06 * extents[n].size(0)};
         }
-        const Split found = split(room, aspect(), rim(), ways_for_planes(sizes), gap_);
+        const Split found = split(room, aspect(), rim(), ways_for_three(sizes), gap_);
         draw_view(found.view);
         draw_legend(canvas_, found.view.x, found.view.y, legend(), text_, theme_.ink);
         const double text = std::max(9.0, 0.85 * text_);
+        if (found.way == 0) {
+            std::swap(bases[1], bases[2]);
+            std::swap(extents[1], extents[2]);
+            std::swap(names[1], names[2]);
+        }
         for (int n = 0; n < kPlanes; ++n) {
             Camera camera = frame(bases[n], extents[n], found.parts.at[n], 0, 1);
             camera.pixel = found.parts.pixel;
@@ -288,6 +322,7 @@ private:
     void draw_composed(const Rect& room) {
         const Split found = split(room, aspect(), rim(), ways(), gap_);
         draw_view(found.view);
+        arrange(found.way);
         draw_slices(found.parts);
         if (!place_legend_in_corner(found))
             draw_legend(canvas_, found.view.x, found.view.y, legend(), text_, theme_.ink);
@@ -310,7 +345,7 @@ private:
     /// In the corner that three planes leave. @returns false where there is none, or it is too small.
     bool place_legend_in_corner(const Split& found) {
         if (options_.slices || found.way != 0 || found.parts.at.size() != kPlanes) return false;
-        const Rect &beside = found.parts.at[1], &below = found.parts.at[2];
+        const Rect &below = found.parts.at[1], &beside = found.parts.at[2];
         const auto entries = legend();
         const auto [width, height] = legend_size(entries, text_);
         if (width > beside.width - 0.5 * text_ || height > below.height) return false;

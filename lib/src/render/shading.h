@@ -17,7 +17,7 @@ struct Lights {
           fill(cloud::unit(direction(basis, 1.0, -0.1, 0.7))),
           half(cloud::unit(cloud::plus(key, to_eye))) {}
 
-    static constexpr double kAmbient = 0.30, kKey = 0.66, kFill = 0.16, kShine = 0.10, kGloss = 30, kRim = 0.25;
+    static constexpr double kAmbient = 0.34, kKey = 0.64, kFill = 0.16, kShine = 0.10, kGloss = 30, kRim = 0.25;
 
     /// @param normal  unit, on the eye's side
     [[nodiscard]] Color shade(const Color& color, const Vec3& normal) const {

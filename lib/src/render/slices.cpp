@@ -13,7 +13,8 @@
 namespace covol::figure {
 namespace {
 
-constexpr int kMostSamples = 4;   // of the image along each side of a pixel
+constexpr std::size_t kMostMarks = 120;
+constexpr int kMostSamples = 4;  // of the image along each side of a pixel
 constexpr double kFlat = 0.2;     // slope below which the surface lies in the plane rather than across it
 
 /// The image's values in one plane.
@@ -107,6 +108,10 @@ private:
         return geometry_.index_to_world(index);
     }
 
+    [[nodiscard]] bool is_in_image(int axis, double index) const {
+        return index >= -0.5 && index <= geometry_.size[axis] - 0.5;
+    }
+
     void draw_image() const {
         const Slice slice(*scene_.image, plane_, region_, run_);
         const double finest = std::min(geometry_.spacing[plane_.across], geometry_.spacing[plane_.down]);
@@ -114,14 +119,17 @@ private:
         const double span = style_.window[1] - style_.window[0], scale = span > 0 ? 1 / span : 0;
         tbb::parallel_for(0, at_.height, [&](int y) {
             for (int x = 0; x < at_.width; ++x) {
-                double sum = 0;
+                double sum = 0, inside = 0;
                 for (int s = 0; s < samples * samples; ++s) {
                     const auto [u, v] = indices(at_.x + x + (s % samples + 0.5) / samples,
                                                 at_.y + y + (s / samples + 0.5) / samples);
+                    if (!is_in_image(plane_.across, u) || !is_in_image(plane_.down, v)) continue;
                     sum += slice.at(u, v);
+                    ++inside;
                 }
-                const double value = (sum / (samples * samples) - style_.window[0]) * scale;
-                canvas_.at(at_.x + x, at_.y + y) = gray(std::clamp(value, 0.0, 1.0));
+                const double value = inside > 0 ? (sum / inside - style_.window[0]) * scale : 0;
+                canvas_.at(at_.x + x, at_.y + y) =
+                    mix(style_.beyond, gray(std::clamp(value, 0.0, 1.0)), inside / (samples * samples));
             }
         });
     }
@@ -137,7 +145,7 @@ private:
             for (int x = 0; x < width && !run_.cancelled(); ++x)
                 values[std::size_t(y) * width + x] = float(field.value(world(at_.x + x - 0.5, at_.y + y - 0.5)));
         });
-        const double half = std::max(0.7, 0.055 * style_.text), rim = std::max(0.5, 0.03 * style_.text);
+        const double half = std::max(0.8, 0.075 * style_.text), rim = std::max(0.5, 0.03 * style_.text);
         const Color color = to_color(structure.color);
         const float least = float(kFlat * style_.pixel);
         tbb::parallel_for(0, at_.height, [&](int y) {
@@ -174,10 +182,16 @@ private:
 
     void draw_marks(const std::vector<Vec3>& marks, const Color& color) const {
         const double thick = *std::max_element(geometry_.spacing.begin(), geometry_.spacing.end());
+        std::vector<std::array<double, 2>> places;
         for (const Vec3& mark : marks) {
             const Vec3 index = geometry_.world_to_index(mark);
-            if (std::abs(index[plane_.axis] - plane_.index) * geometry_.spacing[plane_.axis] > 0.5 * thick) continue;
-            const auto [x, y] = place_on(at_, plane_, region_, style_.pixel, index, geometry_);
+            if (std::abs(index[plane_.axis] - plane_.index) * geometry_.spacing[plane_.axis] <= 0.5 * thick)
+                places.push_back(place_on(at_, plane_, region_, style_.pixel, index, geometry_));
+        }
+        // Of very many some: they would hide the outline.
+        const std::size_t stride = places.size() / kMostMarks + 1;
+        for (std::size_t n = 0; n < places.size(); n += stride) {
+            const auto [x, y] = places[n];
             canvas_.disc(x, y, style_.mark_radius + std::max(0.6, 0.05 * style_.text), gray(0.05), 0.9, at_);
             canvas_.disc(x, y, style_.mark_radius, color, 1, at_);
         }

@@ -28,7 +28,7 @@ struct Region {
     }
 };
 
-/// The structures and a margin around them, as far as the image reaches.
+/// The structures and a margin around them, as far as the image or they reach.
 [[nodiscard]] Region region_around(const std::vector<WorldBox>& boxes, const ImageGeometry& geometry, double margin);
 
 /// The plane across an axis, laid as radiologists do where the axes are anatomical, else as the image's axes lie.
@@ -54,6 +54,7 @@ struct MarkedSlices {
 struct SliceStyle {
     double pixel = 1;  ///< world units
     double text = 16;  ///< size of the font, pixels
+    Color beyond{0, 0, 0};  ///< where the image has ended
     std::array<double, 2> window{0, 1};  ///< values shown as black and white
     std::vector<Plane> others;           ///< planes that cut this one: lines show where
     double mark_radius = 3;              ///< pixels

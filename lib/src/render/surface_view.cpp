@@ -23,6 +23,8 @@ using cloud::times;
 using Intersector = openvdb::tools::LevelSetRayIntersector<FloatGrid>;
 
 constexpr int kMostHits = 12;        // of one ray with one translucent body
+constexpr double kOnSurface = 0.02, kFinestStep = 0.25;  // voxels
+constexpr double kGrazing = 0.2;  // cosine between the ray and the normal
 constexpr int kFiner = 4;            // rays along each side of a pixel at an edge
 constexpr double kOpaque = 0.999;    // hides what is behind
 constexpr auto kMissing = -std::numeric_limits<float>::infinity();
@@ -87,17 +89,21 @@ private:
         double from = 0;
         const double h = fields_[n].voxel_size();
         const int most = bodies_[n].opacity >= 1 ? 1 : kMostHits;
-        for (int count = 0; count < most; ++count) {
+        for (int tries = 0, found = 0; tries < kMostHits && found < most; ++tries) {
             const openvdb::math::Ray<double> ray(to_vdb(origin), to_vdb(times(-1, to_eye)), from, 2 * reach_);
             openvdb::Vec3d at;
             if (!intersectors_[n].intersectsWS(ray, at)) return;
             const double t = reach_ - (to_vdb(to_eye).dot(at - to_vdb(middle)));
-            hits_.push_back(refined(n, origin, t));
             from = t + 0.3 * h;
+            const Hit hit = refined(n, origin, t);
+            if (hit.body < 0) continue;
+            hits_.push_back(hit);
+            ++found;
         }
     }
 
-    /// The place on the smooth field that lies next to where the ray meets the voxels.
+    /// The place on the smooth field that lies next to where the ray meets the voxels. No body where the ray only
+    /// grazes the voxels: their own outline would show.
     Hit refined(int n, const Vec3& origin, double t) {
         SmoothField& field = fields_[n];
         const Vec3 along = times(-1, camera_.basis.to_eye);
@@ -105,9 +111,21 @@ private:
         SmoothField::Sample sample = field.at(plus(origin, times(t, along)));
         for (int step = 0; step < 2; ++step) {
             const double slope = dot(sample.gradient, along);
-            if (std::abs(slope) < 0.1) break;
+            if (std::abs(slope) < kGrazing || std::abs(sample.value) < kOnSurface * h) break;
             t = std::clamp(t - sample.value / slope, first - h, first + h);
             sample = field.at(plus(origin, times(t, along)));
+        }
+        if (sample.value > kOnSurface * h && std::abs(dot(sample.gradient, along)) < 2 * kGrazing) {
+            double last = sample.value;
+            bool meets = false;
+            for (double ahead = kFinestStep * h; ahead < 2 * h && !meets; ahead += kFinestStep * h) {
+                sample = field.at(plus(origin, times(first + ahead, along)));
+                if (sample.value > last) break;
+                meets = sample.value <= 0;
+                last = sample.value;
+                t = first + ahead;
+            }
+            if (!meets) return {};
         }
         Vec3 normal = cloud::unit(sample.gradient);
         if (dot(normal, along) > 0) normal = times(-1, normal);  // seen from inside

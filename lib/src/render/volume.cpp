@@ -17,6 +17,7 @@ using cloud::times;
 constexpr double kMostVoxels = 3.2e7;
 constexpr double kMostRays = 1.2e6;
 constexpr int kMostSteps = 1200;
+constexpr double kDark = 0.12;  // is taken for nothing
 
 Index3 thinning(const VoxelBox& region, const Vec3& spacing) {
     Index3 step{1, 1, 1};
@@ -126,7 +127,7 @@ Layer cast_volume(const Volume& volume, const Camera& camera, double density, bo
             }
             double share = 0, light = 0;
             for (double t = from + 0.5 * step; t < to && share < 0.995; t += step) {
-                const double value = volume.at(plus(start, times(t, slope)));
+                const double value = std::max(0.0, (volume.at(plus(start, times(t, slope))) - kDark) / (1 - kDark));
                 const double adds = (1 - share) * (1 - std::exp(-absorption * value * std::sqrt(value)));
                 light += adds * (on_white ? 0.80 - 0.65 * value : 0.15 + 0.85 * value);
                 share += adds;

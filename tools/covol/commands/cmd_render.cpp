@@ -165,7 +165,7 @@ void add_picture_options(CLI::App& command, RenderJob& job) {
         ->capture_default_str();
     command
         .add_option("--opacity", job.opacities,
-                    "of the surfaces, 0 to 1, all of them or one by its name [1; 0.35 around other structures]")
+                    "of the surfaces, 0 to 1, all of them or one by its name [1; 0.35 around other structures; 0.16 with --volume]")
         ->type_name("[NAME=]SHARE...");
     command.add_flag("--volume", job.options.volume, "show the image, volume rendered, behind the surfaces");
     command
