@@ -23,7 +23,8 @@ struct RenderStructure {
     const FloatGrid* surface = nullptr;                ///< level set, world units; not null
     std::array<std::uint8_t, 3> color{237, 179, 107};  ///< red, green, blue
     std::vector<Vec3> marks;                           ///< world units
-    /// 0 to 1, of its layers in the surface view; automatic: 1; 0.35 where another structure lies in its box; 0.16 in a volume view
+    /// 0 to 1, of its layers in the surface view; automatic: 1; 0.35 where another structure lies in its box; 0.16 in a
+    /// volume view
     std::optional<double> opacity;
 };
 
@@ -58,14 +59,15 @@ struct RenderOptions {
     int width = 1200, height = 800;  ///< pixels, 64 to 16384
     FigureKind figure = FigureKind::Composed;
     ViewDirection view{-32, 28};
-    double zoom = 1;          ///< of the view of the surfaces, 0.05 to 100
-    bool whole_turn = false;  ///< the view has room for the surfaces turned about the vertical axis: frames fit each other
+    double zoom = 1;  ///< of the view of the surfaces, 0.05 to 100
+    bool whole_turn =
+        false;  ///< the view has room for the surfaces turned about the vertical axis: frames fit each other
     /// 0 to 64 slices along `slice_axis` in place of three planes that meet; those that have marks come first.
     std::optional<int> slices;
-    std::optional<int> slice_axis;         ///< of the image, 0 to 2; automatic: the one across marked slices, else 2
-    std::optional<Vec3> at;                ///< world; where the three planes meet; automatic: the structures' middle
-    bool volume = false;                   ///< the image, volume rendered, behind the surfaces
-    bool white_background = true;          ///< else black
+    std::optional<int> slice_axis;  ///< of the image, 0 to 2; automatic: the one across marked slices, else 2
+    std::optional<Vec3> at;         ///< world; where the three planes meet; automatic: the structures' middle
+    bool volume = false;            ///< the image, volume rendered, behind the surfaces
+    bool white_background = true;   ///< else black
     [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 

@@ -39,8 +39,8 @@ void Extent::add(const Extent& other) {
 
 std::array<double, 3> Camera::project(const Vec3& world) const {
     const Vec3 away = minus(world, center);
-    return {at.x + 0.5 * at.width + dot(away, basis.right) / pixel, at.y + 0.5 * at.height - dot(away, basis.up) / pixel,
-            dot(away, basis.to_eye)};
+    return {at.x + 0.5 * at.width + dot(away, basis.right) / pixel,
+            at.y + 0.5 * at.height - dot(away, basis.up) / pixel, dot(away, basis.to_eye)};
 }
 
 Vec3 Camera::place(double x, double y) const {

@@ -19,8 +19,8 @@ namespace covol::figure {
 
 struct BarStyle {
     Color color{1, 1, 1};
-    double text = 16;   ///< size of the font, pixels
-    double rim = 0;     ///< width of a darker rim, pixels: for bars on images
+    double text = 16;  ///< size of the font, pixels
+    double rim = 0;    ///< width of a darker rim, pixels: for bars on images
 };
 /// A bar of a round length, a fifth or so of `room`, with its text above; its right end and its lower edge are at x, y.
 void draw_scale_bar(Canvas& canvas, double x, double y, double room, double pixel, const std::string& unit,

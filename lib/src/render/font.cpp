@@ -83,7 +83,11 @@ std::vector<std::uint32_t> code_points(const std::string& utf8) {
     std::vector<std::uint32_t> codes;
     for (std::size_t n = 0; n < utf8.size();) {
         const auto byte = static_cast<unsigned char>(utf8[n++]);
-        const int more = byte < 0x80 ? 0 : byte >= 0xc2 && byte < 0xe0 ? 1 : byte >= 0xe0 && byte < 0xf0 ? 2 : byte >= 0xf0 && byte < 0xf5 ? 3 : -1;
+        const int more = byte < 0x80                   ? 0
+                         : byte >= 0xc2 && byte < 0xe0 ? 1
+                         : byte >= 0xe0 && byte < 0xf0 ? 2
+                         : byte >= 0xf0 && byte < 0xf5 ? 3
+                                                       : -1;
         std::uint32_t code = more <= 0 ? byte : byte & (0x3fU >> more);
         bool good = more >= 0;
         for (int m = 0; m < more && good; ++m) {

@@ -98,7 +98,8 @@ Split split(const Rect& room, double aspect, int rim, const std::vector<Tiling>&
             }
     // What the parts leave of their side goes to the view.
     int& corner = is_beside ? best.parts.bounds.x : best.parts.bounds.y;
-    const int moved = (is_beside ? room.right() - best.parts.bounds.width : room.bottom() - best.parts.bounds.height) - corner;
+    const int moved =
+        (is_beside ? room.right() - best.parts.bounds.width : room.bottom() - best.parts.bounds.height) - corner;
     corner += moved;
     for (Rect& part : best.parts.at) (is_beside ? part.x : part.y) += moved;
     (is_beside ? best.view.width : best.view.height) = corner - gap - (is_beside ? room.x : room.y);

@@ -9,8 +9,8 @@ double mark_radius(double text, std::size_t count) {
     return std::max(1.2, text * std::clamp(0.30 * std::sqrt(400.0 / std::max<double>(1, double(count))), 0.08, 0.24));
 }
 
-void draw_balls(Canvas& canvas, const std::vector<Ball>& balls, const Camera& camera, const Layer& layer,
-                double radius, double slack) {
+void draw_balls(Canvas& canvas, const std::vector<Ball>& balls, const Camera& camera, const Layer& layer, double radius,
+                double slack) {
     struct Seen {
         double x, y, depth;
         Color color;

@@ -18,7 +18,7 @@ struct Ball {
 [[nodiscard]] double mark_radius(double text, std::size_t count);
 
 /// Draws those that no surface hides; one may lie as far as `slack` (world units) behind the surface that it marks.
-void draw_balls(Canvas& canvas, const std::vector<Ball>& balls, const Camera& camera, const Layer& layer,
-                double radius, double slack);
+void draw_balls(Canvas& canvas, const std::vector<Ball>& balls, const Camera& camera, const Layer& layer, double radius,
+                double slack);
 
 }  // namespace covol::figure

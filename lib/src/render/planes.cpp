@@ -36,8 +36,8 @@ Directions directions_of(const ImageGeometry& geometry) {
 std::array<double, 2> range_of(const WorldBox& box, int axis, const ImageGeometry& geometry) {
     double low = std::numeric_limits<double>::max(), high = std::numeric_limits<double>::lowest();
     for (int c = 0; c < 8; ++c) {
-        const double at = geometry.world_to_index({c & 1 ? box.max[0] : box.min[0], c & 2 ? box.max[1] : box.min[1],
-                                                   c & 4 ? box.max[2] : box.min[2]})[axis];
+        const double at = geometry.world_to_index(
+            {c & 1 ? box.max[0] : box.min[0], c & 2 ? box.max[1] : box.min[1], c & 4 ? box.max[2] : box.min[2]})[axis];
         low = std::min(low, at);
         high = std::max(high, at);
     }
@@ -72,9 +72,12 @@ Region region_around(const std::vector<WorldBox>& boxes, const ImageGeometry& ge
     for (int a = 0; a < 3; ++a) {
         const double wider = margin * longest / geometry.spacing[a] + 0.5;
         // Beyond the image only where a structure is.
-        const double beyond = 0.25 * wider;
-        region.min[a] = std::max(std::min(-0.5, ranges[a][0] - beyond), ranges[a][0] - wider);
-        region.max[a] = std::min(std::max(geometry.size[a] - 0.5, ranges[a][1] + beyond), ranges[a][1] + wider);
+        const double beyond = 0.25 * wider, little = 0.01 * (ranges[a][1] - ranges[a][0]);
+        const double first = -0.5, last = geometry.size[a] - 0.5;
+        const double low = ranges[a][0] < first - little ? ranges[a][0] - beyond : first;
+        const double high = ranges[a][1] > last + little ? ranges[a][1] + beyond : last;
+        region.min[a] = std::max(low, ranges[a][0] - wider);
+        region.max[a] = std::min(high, ranges[a][1] + wider);
     }
     return region;
 }
@@ -192,7 +195,8 @@ std::string name_of(const Plane& plane, const RenderScene& scene) {
     const Directions directions = directions_of(geometry);
     const int world = directions.world[plane.axis];
     std::string name;
-    if (scene.is_anatomical) name = std::array<const char*, 3>{"sagittal", "coronal", "axial"}[world] + std::string(" ");
+    if (scene.is_anatomical)
+        name = std::array<const char*, 3>{"sagittal", "coronal", "axial"}[world] + std::string(" ");
     if (plane.axis == 2 || scene.is_anatomical) name += "slice " + short_number(plane.index) + ", ";
     if (!geometry.is_axis_aligned() && std::abs(geometry.direction[world][plane.axis]) < 1 - 1e-6) {
         constexpr const char* kIndices = "ijk";

@@ -104,8 +104,8 @@ private:
             for (int a = 0; a < kPlanes; ++a) {
                 int index = middle_slice(a, boxes_, marked, geometry);
                 if (options_.at)
-                    index = int(std::lround(std::clamp(geometry.world_to_index(*options_.at)[a], 0.0,
-                                                       geometry.size[a] - 1.0)));
+                    index = int(
+                        std::lround(std::clamp(geometry.world_to_index(*options_.at)[a], 0.0, geometry.size[a] - 1.0)));
                 across[a] = plane_across(a, index, scene_);
             }
             // In the first way to lay them the first shares a side with each of the others.
@@ -258,7 +258,8 @@ private:
         const Basis basis = look(options_.view.azimuth, options_.view.elevation);
         Rect inside = at;
         inside.height = std::max(1, at.height - rim());
-        const Camera camera = frame(basis, extent(basis), inside, options_.volume ? kVolumeView : kViewMargin, options_.zoom);
+        const Camera camera =
+            frame(basis, extent(basis), inside, options_.volume ? kVolumeView : kViewMargin, options_.zoom);
         draw_surfaces(camera);
         draw_scale_bar(canvas_, at.right() - 0.6 * text_, at.bottom() - 0.3 * text_, at.width, camera.pixel,
                        scene_.unit, {theme_.ink, text_, 0});
@@ -342,14 +343,18 @@ private:
         return entries;
     }
 
-    /// In the corner that three planes leave. @returns false where there is none, or it is too small.
+    /// Where three planes leave room: in the corner of the first way, beside the second plane of a column.
+    /// @returns false where there is none, or it is too small.
     bool place_legend_in_corner(const Split& found) {
-        if (options_.slices || found.way != 0 || found.parts.at.size() != kPlanes) return false;
-        const Rect &below = found.parts.at[1], &beside = found.parts.at[2];
+        if (options_.slices || found.way % 2 != 0 || found.parts.at.size() != kPlanes) return false;
+        const std::vector<Rect>& at = found.parts.at;
         const auto entries = legend();
         const auto [width, height] = legend_size(entries, text_);
-        if (width > beside.width - 0.5 * text_ || height > below.height) return false;
-        draw_legend(canvas_, beside.x + 0.4 * text_, below.y + 0.3 * text_, entries, text_, theme_.ink);
+        const Rect room = found.way == 0 ? Rect{at[2].x, at[1].y, at[2].width, at[1].height}
+                                         : Rect{at[1].right() + gap_, at[1].y,
+                                                found.parts.bounds.right() - at[1].right() - gap_, at[1].height};
+        if (width > room.width - 0.5 * text_ || height > room.height - 0.3 * text_) return false;
+        draw_legend(canvas_, room.x + 0.4 * text_, room.y + 0.3 * text_, entries, text_, theme_.ink);
         return true;
     }
 
@@ -407,15 +412,18 @@ ViewDirection parse_view(const std::string& text, bool is_anatomical) {
             return view;
     } catch (const std::logic_error&) {
     }
-    throw Error(Errc::InvalidOptions, "view: expected front, back, left, right, top, bottom, iso, or azimuth and elevation in "
-                                      "degrees (\"-32,28\", elevation -90 to 90), got '" + text + "'");
+    throw Error(Errc::InvalidOptions,
+                "view: expected front, back, left, right, top, bottom, iso, or azimuth and elevation in "
+                "degrees (\"-32,28\", elevation -90 to 90), got '" +
+                    text + "'");
 }
 
 Picture render(const RenderScene& scene, const RenderOptions& options, const RunContext& run) {
     detail::require_valid(options, "render");
     for (const RenderStructure& structure : scene.structures)
         if (structure.opacity && !(*structure.opacity >= 0 && *structure.opacity <= 1))
-            throw Error(Errc::InvalidOptions, "render: opacity: expected 0 to 1, got " + detail::number(*structure.opacity));
+            throw Error(Errc::InvalidOptions,
+                        "render: opacity: expected 0 to 1, got " + detail::number(*structure.opacity));
     Picture picture;
     with_threads(run, [&] { picture = figure::Drawing(scene, options, run).go(); });
     return picture;

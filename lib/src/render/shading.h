@@ -21,8 +21,8 @@ struct Lights {
 
     /// @param normal  unit, on the eye's side
     [[nodiscard]] Color shade(const Color& color, const Vec3& normal) const {
-        const double light = kAmbient + kKey * std::max(0.0, cloud::dot(normal, key)) +
-                             kFill * std::max(0.0, cloud::dot(normal, fill));
+        const double light =
+            kAmbient + kKey * std::max(0.0, cloud::dot(normal, key)) + kFill * std::max(0.0, cloud::dot(normal, fill));
         const double facing = std::max(0.0, cloud::dot(normal, to_eye));
         const double rim = 1 - kRim * std::pow(1 - facing, 3);
         const double shine = kShine * std::pow(std::max(0.0, cloud::dot(normal, half)), kGloss);

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kMostMarks = 120;
 constexpr int kMostSamples = 4;  // of the image along each side of a pixel
-constexpr double kFlat = 0.2;     // slope below which the surface lies in the plane rather than across it
+constexpr double kFlat = 0.2;    // slope below which the surface lies in the plane rather than across it
 
 /// The image's values in one plane.
 class Slice {
@@ -83,8 +83,7 @@ public:
         for (const RenderStructure& structure : scene_.structures) draw_outline(structure);
         draw_planes();
         for (const RenderStructure& structure : scene_.structures)
-            draw_marks(structure.marks,
-                       scene_.structures.size() > 1 ? to_color(structure.color) : kLoneMark);
+            draw_marks(structure.marks, scene_.structures.size() > 1 ? to_color(structure.color) : kLoneMark);
         draw_marks(scene_.marks, scene_.structures.size() > 1 ? kLooseMark : kLoneMark);
         draw_words();
     }
@@ -121,8 +120,8 @@ private:
             for (int x = 0; x < at_.width; ++x) {
                 double sum = 0, inside = 0;
                 for (int s = 0; s < samples * samples; ++s) {
-                    const auto [u, v] = indices(at_.x + x + (s % samples + 0.5) / samples,
-                                                at_.y + y + (s / samples + 0.5) / samples);
+                    const auto [u, v] =
+                        indices(at_.x + x + (s % samples + 0.5) / samples, at_.y + y + (s / samples + 0.5) / samples);
                     if (!is_in_image(plane_.across, u) || !is_in_image(plane_.down, v)) continue;
                     sum += slice.at(u, v);
                     ++inside;

@@ -11,9 +11,9 @@ namespace covol::figure {
 
 /// A plane across one of the image's axes, as it lies on the picture.
 struct Plane {
-    int axis = 2;                            ///< it is perpendicular to it
-    double index = 0;                        ///< along that axis
-    int across = 0, down = 1;                ///< axes of the image that go to the right and down
+    int axis = 2;                                     ///< it is perpendicular to it
+    double index = 0;                                 ///< along that axis
+    int across = 0, down = 1;                         ///< axes of the image that go to the right and down
     bool mirror_across = false, mirror_down = false;  ///< the index grows to the left, upwards
 
     friend bool operator==(const Plane&, const Plane&) = default;
@@ -52,9 +52,9 @@ struct MarkedSlices {
 
 /// How slices are drawn.
 struct SliceStyle {
-    double pixel = 1;  ///< world units
-    double text = 16;  ///< size of the font, pixels
-    Color beyond{0, 0, 0};  ///< where the image has ended
+    double pixel = 1;                    ///< world units
+    double text = 16;                    ///< size of the font, pixels
+    Color beyond{0, 0, 0};               ///< where the image has ended
     std::array<double, 2> window{0, 1};  ///< values shown as black and white
     std::vector<Plane> others;           ///< planes that cut this one: lines show where
     double mark_radius = 3;              ///< pixels

@@ -22,13 +22,13 @@ using cloud::plus;
 using cloud::times;
 using Intersector = openvdb::tools::LevelSetRayIntersector<FloatGrid>;
 
-constexpr int kMostHits = 12;        // of one ray with one translucent body
+constexpr int kMostHits = 12;                            // of one ray with one translucent body
 constexpr double kOnSurface = 0.02, kFinestStep = 0.25;  // voxels
-constexpr double kGrazing = 0.2;  // cosine between the ray and the normal
-constexpr int kFiner = 4;            // rays along each side of a pixel at an edge
-constexpr double kOpaque = 0.999;    // hides what is behind
+constexpr double kGrazing = 0.2;                         // cosine between the ray and the normal
+constexpr int kFiner = 4;                                // rays along each side of a pixel at an edge
+constexpr double kOpaque = 0.999;                        // hides what is behind
 constexpr auto kMissing = -std::numeric_limits<float>::infinity();
-constexpr double kCosEdge = 0.8;     // of the angle between neighbours' normals, above which a pixel is smooth
+constexpr double kCosEdge = 0.8;  // of the angle between neighbours' normals, above which a pixel is smooth
 constexpr int kRows = 8;
 
 openvdb::Vec3d to_vdb(const Vec3& v) { return {v[0], v[1], v[2]}; }
@@ -145,8 +145,7 @@ bool is_edge(const Seen& a, const Seen& b, double pixel) {
     if (a.body != b.body) return true;
     if (a.body < 0) return false;
     const float cosine = a.normal[0] * b.normal[0] + a.normal[1] * b.normal[1] + a.normal[2] * b.normal[2];
-    return cosine < kCosEdge || std::abs(a.depth - b.depth) > 12 * pixel ||
-           std::abs(a.share - b.share) > 0.08;
+    return cosine < kCosEdge || std::abs(a.depth - b.depth) > 12 * pixel || std::abs(a.share - b.share) > 0.08;
 }
 
 class View {
@@ -214,8 +213,8 @@ private:
     [[nodiscard]] Seen finer(Tracer& trace, int x, int y) const {
         Seen mean;
         for (int s = 0; s < kFiner * kFiner; ++s) {
-            const Seen one = trace(camera_.at.x + x + (s % kFiner + 0.5) / kFiner,
-                                   camera_.at.y + y + (s / kFiner + 0.5) / kFiner);
+            const Seen one =
+                trace(camera_.at.x + x + (s % kFiner + 0.5) / kFiner, camera_.at.y + y + (s / kFiner + 0.5) / kFiner);
             mean.color = sum(mean.color, scaled(one.color, 1.0 / (kFiner * kFiner)));
             mean.share += one.share / (kFiner * kFiner);
         }

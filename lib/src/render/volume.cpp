@@ -99,8 +99,8 @@ Layer cast_volume(const Volume& volume, const Camera& camera, double density, bo
     const double finest = std::min({g.spacing[0], g.spacing[1], g.spacing[2]});
     const Rect& at = camera.at;
     // Rays need not be finer than voxels; between them colours are interpolated.
-    const double coarse = std::max({1.0, 0.6 * finest / camera.pixel,
-                                    std::sqrt(double(at.width) * at.height / kMostRays)});
+    const double coarse =
+        std::max({1.0, 0.6 * finest / camera.pixel, std::sqrt(double(at.width) * at.height / kMostRays)});
     const int width = std::max(2, int(std::ceil(at.width / coarse)) + 1);
     const int height = std::max(2, int(std::ceil(at.height / coarse)) + 1);
     double thinnest = 1e300, longest = 0;
@@ -147,7 +147,8 @@ Layer cast_volume(const Volume& volume, const Camera& camera, double density, bo
             const std::size_t corner = std::size_t(v) * width + std::size_t(u), below = corner + std::size_t(width);
             const double s = u - std::floor(u), t = v - std::floor(v);
             const std::size_t n = std::size_t(y) * at.width + x;
-            layer.color[n] = mix(mix(colors[corner], colors[corner + 1], s), mix(colors[below], colors[below + 1], s), t);
+            layer.color[n] =
+                mix(mix(colors[corner], colors[corner + 1], s), mix(colors[below], colors[below + 1], s), t);
             layer.share[n] = float((1 - t) * ((1 - s) * shares[corner] + s * shares[corner + 1]) +
                                    t * ((1 - s) * shares[below] + s * shares[below + 1]));
         }

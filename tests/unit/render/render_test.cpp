@@ -86,8 +86,8 @@ RenderOptions sized(int width, int height, FigureKind kind) {
 }  // namespace
 
 TEST_CASE("a coarse ball has the shade of a ball: no voxels show") {
-    // Ten voxels from the centre to the surface. Normals that are constant in each voxel would be off by up to 0.05 rad,
-    // and the shade by 0.03.
+    // Ten voxels from the centre to the surface. Normals that are constant in each voxel would be off by up to 0.05
+    // rad, and the shade by 0.03.
     const double h = 0.1, radius = 1 - h * h / 3;  // that of the smoothed field
     const FloatGridPtr ball = make_ball({0.03, -0.02, 0.01}, 1, h);
     figure::Camera camera;
@@ -111,7 +111,8 @@ TEST_CASE("a coarse ball has the shade of a ball: no voxels show") {
             off_disc = std::max(off_disc, std::abs(layer.share[n] - covered));
             if (r > 0.97) continue;
             const Vec3 normal{u, v, std::sqrt(1 - r * r)};
-            const double light = 0.34 + 0.64 * std::max(0.0, dot(normal, key)) + 0.16 * std::max(0.0, dot(normal, fill));
+            const double light =
+                0.34 + 0.64 * std::max(0.0, dot(normal, key)) + 0.16 * std::max(0.0, dot(normal, fill));
             const double shine = 0.10 * std::pow(std::max(0.0, dot(normal, half)), 30);
             const double rim = 1 - 0.25 * std::pow(1 - normal[2], 3);
             for (int c = 0; c < 3; ++c)
@@ -146,10 +147,10 @@ TEST_CASE("in a figure the bar and the surface have one scale") {
     RenderScene scene;
     scene.structures = {structure(ball)};
     const Picture picture = render(scene, sized(600, 400, FigureKind::Surface));
-    const Bounds disc = find(picture, {0, 0, 600, 340}, is_warm);
+    const Bounds disc = find(picture, {120, 0, 360, 365}, [](const auto& c) { return !is_white(c); });
     const double pixel = 10.0 / (disc.right - disc.left + 1);
     CHECK(std::abs((disc.right - disc.left) - (disc.bottom - disc.top)) <= 2);
-    const Bounds bar = find(picture, {300, 388, 300, 1}, is_ink);
+    const Bounds bar = find(picture, {300, 391, 300, 1}, is_ink);
     const double shown = (bar.right - bar.left + 1) * pixel;
     CHECK(shown == Approx(figure::round_length(shown * 1.02)).epsilon(0.02));
 }
@@ -207,7 +208,7 @@ TEST_CASE("slices of patients lie as radiologists have them, and letters say so"
     geometry.origin = {19, 0, 0};
     const Vec3 left_place{15, 12, 8};  // to the patient's left of the middle
     const Image image = make_image(geometry, [&](const Vec3& at) {
-        return std::abs(at[0] - left_place[0]) + std::abs(at[1] - left_place[1]) < 4 ? 200.0F : 0.0F;
+        return std::abs(at[0] - left_place[0]) + std::abs(at[1] - left_place[1]) < 2 ? 200.0F : 0.0F;
     });
     RenderScene scene;
     const FloatGridPtr ball = make_ball({9.5, 12, 8}, 6, 1);
@@ -220,11 +221,11 @@ TEST_CASE("slices of patients lie as radiologists have them, and letters say so"
     };
     const figure::Plane axial = figure::plane_across(2, 8, scene), coronal = figure::plane_across(1, 12, scene);
     const figure::Plane sagittal = figure::plane_across(0, 9, scene);
-    CHECK(place(axial, {15, 12, 8})[0] > place(axial, {5, 12, 8})[0]);       // left to the right
-    CHECK(place(axial, {10, 20, 8})[1] > place(axial, {10, 5, 8})[1]);       // back down
-    CHECK(place(coronal, {15, 12, 8})[0] > place(coronal, {5, 12, 8})[0]);   // left to the right
-    CHECK(place(coronal, {10, 12, 12})[1] < place(coronal, {10, 12, 3})[1]); // head up
-    CHECK(place(sagittal, {10, 20, 8})[0] > place(sagittal, {10, 5, 8})[0]); // back to the right
+    CHECK(place(axial, {15, 12, 8})[0] > place(axial, {5, 12, 8})[0]);        // left to the right
+    CHECK(place(axial, {10, 20, 8})[1] > place(axial, {10, 5, 8})[1]);        // back down
+    CHECK(place(coronal, {15, 12, 8})[0] > place(coronal, {5, 12, 8})[0]);    // left to the right
+    CHECK(place(coronal, {10, 12, 12})[1] < place(coronal, {10, 12, 3})[1]);  // head up
+    CHECK(place(sagittal, {10, 20, 8})[0] > place(sagittal, {10, 5, 8})[0]);  // back to the right
     CHECK(figure::letters_of(0, geometry) == std::array<std::string, 2>{"R", "L"});
     CHECK(figure::letters_of(1, geometry) == std::array<std::string, 2>{"P", "A"});
     CHECK(figure::letters_of(2, geometry) == std::array<std::string, 2>{"S", "I"});
@@ -239,8 +240,8 @@ TEST_CASE("slices of patients lie as radiologists have them, and letters say so"
     const Picture picture = canvas.picture();
     const auto bright = [](const std::array<int, 3>& c) { return c[0] > 200 && c[2] > 200; };
     // The bright block; then the letters, beside which the picture is dark: L has ink at its foot, R at its top right.
-    CHECK(find(picture, {125, 95, 60, 20}, bright).count > 200);
-    CHECK(find(picture, {30, 95, 60, 20}, bright).count == 0);
+    CHECK(find(picture, {135, 115, 40, 20}, bright).count > 150);
+    CHECK(find(picture, {25, 115, 40, 20}, bright).count == 0);
     const Bounds r = find(picture, {0, 105, 24, 30}, bright), l = find(picture, {178, 105, 22, 30}, bright);
     REQUIRE(r.count > 20);
     REQUIRE(l.count > 15);
@@ -264,7 +265,7 @@ TEST_CASE("marked slices are found and chosen") {
     CHECK(marked.slices == std::vector<int>{4, 9, 15, 22});
     const std::vector<WorldBox> boxes{{{20, 20, 3}, {80, 60, 75}}};
     CHECK(figure::middle_slice(2, boxes, marked, geometry) == 15);
-    CHECK(figure::spread_slices(2, 3, boxes, marked, geometry) == std::vector<int>{9, 15, 18});
+    CHECK(figure::spread_slices(2, 3, boxes, marked, geometry) == std::vector<int>{9, 15, 22});
     CHECK(figure::spread_slices(2, 3, boxes, {}, geometry) == std::vector<int>{7, 13, 19});
     CHECK(figure::middle_slice(0, boxes, marked, geometry) == 50);
     // Of two structures that have no slice in common but one, that one.
@@ -299,7 +300,8 @@ TEST_CASE("structures have their own colours, and those around others let them b
     scene.structures[0].surface = around.get();
     scene.structures[1].surface = inner.get();
     picture = render(scene, options);
-    CHECK(red(pixel(picture, 200, 115)));
+    const std::array<int, 3> veiled = pixel(picture, 200, 115);
+    CHECK(veiled[0] > veiled[2] + 30);
     scene.structures[0].opacity = 1;
     picture = render(scene, options);
     CHECK(blue(pixel(picture, 200, 115)));
@@ -319,13 +321,11 @@ TEST_CASE("frames of a turn differ and have one scale") {
         options.view = {azimuth, 20};
         const Picture picture = render(scene, options);
         frames.insert(picture.rgb);
-        const std::size_t from = 3 * std::size_t(228) * 300;
         std::vector<std::uint8_t> bar;
         for (int y = 226; y < 240; ++y)
             for (int x = 150; x < 300; ++x)
                 for (const int c : pixel(picture, x, y)) bar.push_back(std::uint8_t(c));
         bars.insert(bar);
-        REQUIRE(picture.rgb.size() > from);
         // Nothing reaches the rim.
         for (int x = 0; x < 300; ++x) CHECK(is_white(pixel(picture, x, 2)));
         for (int y = 60; y < 180; ++y) CHECK((is_white(pixel(picture, 1, y)) && is_white(pixel(picture, 298, y))));
@@ -353,10 +353,11 @@ TEST_CASE("a composed figure is filled, shows slices with marks, and is the same
     RenderOptions options = sized(600, 400, FigureKind::Composed);
     const Picture picture = render(scene, options);
     // No column and no half of the picture is empty.
-    for (const Rect& part : {Rect{0, 0, 300, 200}, Rect{300, 0, 300, 200}, Rect{0, 200, 300, 200}, Rect{300, 200, 300, 200}})
+    for (const Rect& part :
+         {Rect{0, 0, 300, 200}, Rect{300, 0, 300, 200}, Rect{0, 200, 300, 200}, Rect{300, 200, 300, 200}})
         CHECK(find(picture, part, [](const auto& c) { return !is_white(c); }).count > 300 * 200 / 8);
     const auto mark = [](const std::array<int, 3>& c) { return c[2] > c[0] + 80; };
-    CHECK(find(picture, picture.width > 0 ? Rect{0, 0, 600, 400} : Rect{}, mark).count > 12 * 8);
+    CHECK(find(picture, {0, 0, 600, 400}, mark).count > 12 * 8);
     for (const int threads : {1, 2, 8}) {
         RunContext run;
         run.threads = threads;

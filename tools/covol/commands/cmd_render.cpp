@@ -30,7 +30,8 @@ struct RenderJob {
         if (turntable < 0 || turntable > kMostFrames)
             throw Error(Errc::InvalidOptions, "--turntable: expected 0 to " + std::to_string(kMostFrames) + ", got " +
                                                   std::to_string(turntable));
-        for (int n = 0; n < std::max(1, turntable); ++n) session.outputs().check("-o", frame_path(n), OutputKind::Picture);
+        for (int n = 0; n < std::max(1, turntable); ++n)
+            session.outputs().check("-o", frame_path(n), OutputKind::Picture);
         if (const std::string why = options.why_invalid(); !why.empty())
             throw Error(Errc::InvalidOptions, "render: " + why);
         static_cast<void>(parse_view(view, false));
@@ -150,14 +151,16 @@ void add_picture_options(CLI::App& command, RenderJob& job) {
         {"composed", FigureKind::Composed}, {"surface", FigureKind::Surface}, {"slices", FigureKind::Slices}};
     command
         .add_option_function<std::string>(
-            "--figure", [&job, figures](const std::string& word) { job.figure = figures.at(CLI::detail::to_lower(word)); },
+            "--figure",
+            [&job, figures](const std::string& word) { job.figure = figures.at(CLI::detail::to_lower(word)); },
             "the surfaces beside slices of the image, or either alone [composed; surface for a turntable]")
         ->check(CLI::IsMember(figures, CLI::ignore_case).description(""))
         ->type_name("composed|surface|slices");
     command
-        .add_option("--view", job.view,
-                    "where the surfaces are seen from: front|back|left|right|top|bottom|iso, or azimuth (0 front, 90 from "
-                    "+x) and elevation in degrees")
+        .add_option(
+            "--view", job.view,
+            "where the surfaces are seen from: front|back|left|right|top|bottom|iso, or azimuth (0 front, 90 from "
+            "+x) and elevation in degrees")
         ->type_name("NAME|AZ,EL")
         ->capture_default_str();
     command.add_option("--zoom", job.options.zoom, "enlarges the view of the surfaces")
@@ -165,7 +168,8 @@ void add_picture_options(CLI::App& command, RenderJob& job) {
         ->capture_default_str();
     command
         .add_option("--opacity", job.opacities,
-                    "of the surfaces, 0 to 1, all of them or one by its name [1; 0.35 around other structures; 0.16 with --volume]")
+                    "of the surfaces, 0 to 1, all of them or one by its name [1; 0.35 around other structures; 0.16 "
+                    "with --volume]")
         ->type_name("[NAME=]SHARE...");
     command.add_flag("--volume", job.options.volume, "show the image, volume rendered, behind the surfaces");
     command
