@@ -1,4 +1,4 @@
-"""Writes lib/src/render/font_data.cpp: outlines of the letters that pictures need, from DejaVu Sans Condensed (Debian: fonts-dejavu-core,
+"""Writes lib/src/render/draw/font_data.cpp: outlines of the letters that pictures need, from DejaVu Sans Condensed (Debian: fonts-dejavu-core,
 fonts-dejavu-extra; python3-fonttools). To be run when a letter is wanted that is not there:
 
     /usr/bin/python3 tools/font/write_font.py [FONT.ttf]
@@ -19,7 +19,7 @@ UNITS = 512  # per em; the font has 2048
 HEAD = '''// Made by tools/font/write_font.py from DejaVu Sans Condensed 2.37; do not edit. Attribution and licence: docs/licences.md.
 // A glyph: its code point, its advance, then steps in 1/512 em, y up, each from where the last one ended: m(ove to), l(ine),
 // q(uadratic: control point, end).
-#include "render/font.h"
+#include "render/draw/font.h"
 
 namespace covol::figure {
 
@@ -62,7 +62,7 @@ def main():
     font = TTFont(sys.argv[1] if len(sys.argv) > 1 else FONT)
     text = "".join(outline(font, letter) for letter in LETTERS)
     lines = [f'    "{text[n:n + 112]}"' for n in range(0, len(text), 112)]
-    (ROOT / "lib/src/render/font_data.cpp").write_text(HEAD + "\n".join(lines) + ";\n\n}  // namespace covol::figure\n")
+    (ROOT / "lib/src/render/draw/font_data.cpp").write_text(HEAD + "\n".join(lines) + ";\n\n}  // namespace covol::figure\n")
     print(len(LETTERS), "glyphs,", len(lines), "lines")
 
 

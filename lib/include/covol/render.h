@@ -7,15 +7,10 @@
 
 #include "covol/api.h"
 #include "covol/image.h"
+#include "covol/picture.h"
 #include "covol/run.h"
 
 namespace covol {
-
-/// 8-bit RGB, rows from the top.
-struct Picture {
-    int width = 0, height = 0;
-    std::vector<std::uint8_t> rgb;
-};
 
 /// One of the surfaces of a picture.
 struct RenderStructure {
@@ -78,8 +73,5 @@ struct RenderOptions {
 ///               no cubes, slices without an image); Cancelled; what reading the image throws.
 [[nodiscard]] COVOL_API Picture render(const RenderScene& scene, const RenderOptions& options = {},
                                        const RunContext& run = {});
-
-/// Whole or not at all. @throws Error Io.
-COVOL_API void write_png(const std::string& path, const Picture& picture);
 
 }  // namespace covol

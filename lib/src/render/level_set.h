@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "covol/fwd.h"
-#include "render/camera.h"
+#include "render/draw/camera.h"
 
 namespace covol::figure {
 

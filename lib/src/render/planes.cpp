@@ -5,7 +5,7 @@
 #include <limits>
 #include <set>
 
-#include "render/decorations.h"
+#include "render/draw/decorations.h"
 #include "render/slices.h"
 
 namespace covol::figure {

@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "base/vector.h"
-#include "render/camera.h"
-#include "render/color.h"
+#include "render/draw/camera.h"
+#include "render/draw/color.h"
 
 namespace covol::figure {
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "render/decorations.h"
+#include "render/draw/decorations.h"
 #include "render/level_set.h"
 #include "render/marks.h"
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "covol/render.h"
-#include "render/canvas.h"
+#include "render/draw/canvas.h"
 
 namespace covol::figure {
 

@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "covol/run.h"
-#include "render/camera.h"
-#include "render/color.h"
+#include "render/draw/camera.h"
+#include "render/draw/color.h"
 
 namespace covol::figure {
 

@@ -4,8 +4,7 @@
 #include <vector>
 
 #include "covol/domain.h"
-#include "covol/render.h"
-#include "render/canvas.h"
+#include "render/draw/canvas.h"
 
 namespace covol::figure {
 

@@ -1,4 +1,4 @@
-#include "render/decorations.h"
+#include "render/draw/decorations.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 #include <array>
 #include <vector>
 
-#include "render/canvas.h"
+#include "render/draw/canvas.h"
 
 namespace covol::figure {
 

@@ -1,4 +1,4 @@
-#include "render/font.h"
+#include "render/draw/font.h"
 
 #include <algorithm>
 #include <cmath>

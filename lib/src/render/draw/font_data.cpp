@@ -1,7 +1,7 @@
 // Made by tools/font/write_font.py from DejaVu Sans Condensed 2.37; do not edit. Attribution and licence:
 // docs/licences.md. A glyph: its code point, its advance, then steps in 1/512 em, y up, each from where the last one
 // ended: m(ove to), l(ine), q(uadratic: control point, end).
-#include "render/font.h"
+#include "render/draw/font.h"
 
 namespace covol::figure {
 

@@ -1,4 +1,4 @@
-#include "render/layout.h"
+#include "render/draw/layout.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "render/camera.h"
-#include "render/font.h"
+#include "render/draw/camera.h"
+#include "render/draw/font.h"
 
 namespace covol::figure {
 

@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "covol/render.h"
-#include "render/color.h"
+#include "covol/picture.h"
+#include "render/draw/color.h"
 
 namespace covol::figure {
 

@@ -2,7 +2,7 @@
 
 #include "base/file.h"
 #include "covol/error.h"
-#include "covol/render.h"
+#include "covol/picture.h"
 
 namespace covol {
 

@@ -2,7 +2,7 @@
 // Text in figures: outlines of a font, filled by the exact share of each pixel that they cover.
 #include <string>
 
-#include "render/canvas.h"
+#include "render/draw/canvas.h"
 
 namespace covol::figure {
 

@@ -1,4 +1,4 @@
-#include "render/canvas.h"
+#include "render/draw/canvas.h"
 
 #include <tbb/parallel_for.h>
 
