@@ -51,7 +51,7 @@ struct ViewDirection {
 [[nodiscard]] COVOL_API ViewDirection parse_view(const std::string& text, bool is_anatomical);
 
 struct RenderOptions {
-    int width = 1200, height = 800;  ///< pixels, 64 to 16384
+    int width = 1200, height = 800;  ///< pixels, 64 to 16384; their product at most 50 million
     FigureKind figure = FigureKind::Composed;
     ViewDirection view{-32, 28};
     double zoom = 1;  ///< of the view of the surfaces, 0.05 to 100

@@ -25,6 +25,7 @@ constexpr double kViewMargin = 0.03, kVolumeView = 0.07;  // share of a view aro
 // Opacity of what lies around another structure, and of all where the image's volume is to be seen inside.
 constexpr double kVeil = 0.35, kVolumeVeil = 0.16;
 constexpr double kVolumeDensity = 4.0;
+constexpr double kBytesPerPixel = 90;  // what colours, depths and normals take while a picture is made
 constexpr int kPlanes = 3;
 constexpr std::size_t kMostBalls = 3000;
 
@@ -377,10 +378,15 @@ private:
 }  // namespace
 }  // namespace figure
 
+namespace {
+constexpr double kMostPixels = 5e7;
+}
+
 std::string RenderOptions::why_invalid() const {
     detail::FieldChecks checks;
     checks.expect(width >= 64 && width <= 16384, "width", "64 to 16384", width);
     checks.expect(height >= 64 && height <= 16384, "height", "64 to 16384", height);
+    checks.expect(double(width) * height <= kMostPixels, "width * height", "<= 50 million", double(width) * height);
     checks.expect(zoom >= 0.05 && zoom <= 100, "zoom", "0.05 to 100", zoom);
     checks.expect_finite("azimuth", view.azimuth);
     checks.expect(view.elevation >= -90 && view.elevation <= 90, "elevation", "-90 to 90", view.elevation);
@@ -424,6 +430,10 @@ Picture render(const RenderScene& scene, const RenderOptions& options, const Run
         if (structure.opacity && !(*structure.opacity >= 0 && *structure.opacity <= 1))
             throw Error(Errc::InvalidOptions,
                         "render: opacity: expected 0 to 1, got " + detail::number(*structure.opacity));
+    const double bytes = figure::kBytesPerPixel * options.width * options.height;
+    if (run.memory_budget > 0 && bytes > double(run.memory_budget))
+        throw Error(Errc::InvalidOptions, "render: a picture of that size takes " + detail::number(bytes) +
+                                              " bytes, more than the memory budget: make it smaller");
     Picture picture;
     with_threads(run, [&] { picture = figure::Drawing(scene, options, run).go(); });
     return picture;

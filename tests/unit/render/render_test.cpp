@@ -425,11 +425,16 @@ TEST_CASE("pictures are written whole, and what cannot be drawn is refused") {
     options.zoom = 0;
     CHECK(options.why_invalid().find("width") != std::string::npos);
     CHECK(options.why_invalid().find("zoom") != std::string::npos);
+    options = sized(16384, 16384, FigureKind::Surface);
+    CHECK(options.why_invalid().find("50 million") != std::string::npos);
     CHECK_THROWS_AS(render(RenderScene{}), Error);
     const FloatGridPtr ball = make_ball({0, 0, 0}, 1, 0.2);
     RenderScene scene;
     scene.structures = {structure(ball)};
     CHECK_THROWS_AS(render(scene, sized(100, 100, FigureKind::Slices)), Error);
+    RunContext small;
+    small.memory_budget = 100'000;
+    CHECK_THROWS_AS(render(scene, sized(100, 100, FigureKind::Surface), small), Error);
     const std::string path = (std::filesystem::temp_directory_path() / "covol_render_test.png").string();
     write_png(path, Picture{2, 1, {255, 0, 0, 0, 255, 0}});
     CHECK(std::filesystem::file_size(path) > 8);
