@@ -33,12 +33,12 @@ echo "== segmenting both"
 "$covol" segment "$out/cells.tif" --points "left=$out/left.csv" "right=$out/right.csv" -o "$out/cells.vdb" \
   --mask "$out/cells.seg.nrrd" --mesh "$out/cells.glb" --table "$out/cells.csv" --evidence "$out/evidence.csv" \
   --json "$out/report.json"
-"$covol" render "$out/cells.vdb:left" --image "$out/cells.tif" -o "$out/cells.png"
+"$covol" render "$out/cells.vdb" --image "$out/cells.tif" --points "left=$out/left.csv" "right=$out/right.csv" -o "$out/cells.png"
 
 echo "== results"
 cat "$out/cells.csv"
 for name in "cells.vdb        a level set for each, 'left' and 'right'" "cells.seg.nrrd   label image with names and colours (3D Slicer)" \
             "cells.glb        both meshes" "cells.csv        volumes and areas" "evidence.csv     slice by slice: marks and edges" \
-            "cells.png        picture of the first"; do
+            "cells.png        picture of both"; do
   echo "$out/$name"
 done

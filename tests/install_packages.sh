@@ -16,7 +16,7 @@ packages=(
   libcli11-dev nlohmann-json3-dev pybind11-dev python3-dev dpkg-dev file
   # tests: other programs that read what covol writes
   catch2 libopenvdb-tools python3 python3-openvdb python3-numpy python3-tifffile
-  python3-nibabel python3-pydicom python3-zarr python3-numcodecs python3-h5py
+  python3-nibabel python3-pydicom python3-zarr python3-numcodecs python3-h5py python3-pil
   python3-pytest python3-yaml pkgconf lintian groff-base man-db fish zsh
   "$@"
 )

@@ -1,35 +1,77 @@
 #pragma once
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "covol/api.h"
 #include "covol/image.h"
-#include "covol/mesh.h"
+#include "covol/picture.h"
 #include "covol/run.h"
 
 namespace covol {
 
-/// 8-bit RGB, rows from the top.
-struct Picture {
-    int width = 0, height = 0;
-    std::vector<std::uint8_t> rgb;
+/// One of the surfaces of a picture.
+struct RenderStructure {
+    std::string name;                                  ///< for the legend; UTF-8
+    const FloatGrid* surface = nullptr;                ///< level set, world units; not null
+    std::array<std::uint8_t, 3> color{237, 179, 107};  ///< red, green, blue
+    std::vector<Vec3> marks;                           ///< world units
+    /// 0 to 1, of its layers in the surface view; automatic: 1; 0.35 where another structure lies in its box; 0.16 in a
+    /// volume view
+    std::optional<double> opacity;
 };
 
+/// What pictures show. What it points to has to outlive the call alone.
+struct RenderScene {
+    std::vector<RenderStructure> structures;
+    std::vector<Vec3> marks;       ///< world units, of no structure in particular
+    const Image* image = nullptr;  ///< null: no slices
+    std::string unit;              ///< of lengths, "um" or "mm"; empty: unknown
+    /// World axes are anatomical (LPS): letters stand at the edges of slices, which lie as radiologists have them.
+    bool is_anatomical = false;
+};
+
+/// What a picture consists of.
+enum class FigureKind {
+    Composed,  ///< a large view of the surfaces, and slices of the image; other views where there is no image
+    Surface,   ///< the view alone
+    Slices     ///< the slices alone
+};
+
+/// Where a parallel view looks from, in degrees. Azimuth 0 looks along +y and 90 along -x; elevation 90 along -z, down
+/// the world's third axis.
+struct ViewDirection {
+    double azimuth = 0, elevation = 0;
+};
+
+/// "front", "back", "left", "right", "top", "bottom" and "iso", or "AZIMUTH,ELEVATION". Where axes are anatomical, left
+/// is the patient's. @throws Error InvalidOptions.
+[[nodiscard]] COVOL_API ViewDirection parse_view(const std::string& text, bool is_anatomical);
+
 struct RenderOptions {
-    int width = 1200, height = 800;
-    int slices = 3;  ///< slice panels beside the shaded surface, spread over the structure; 0: none
+    int width = 1200, height = 800;  ///< pixels, 64 to 16384; their product at most 50 million
+    FigureKind figure = FigureKind::Composed;
+    ViewDirection view{-32, 28};
+    double zoom = 1;  ///< of the view of the surfaces, 0.05 to 100
+    bool whole_turn =
+        false;  ///< the view has room for the surfaces turned about the vertical axis: frames fit each other
+    /// 0 to 64 slices along `slice_axis` in place of three planes that meet; those that have marks come first.
+    std::optional<int> slices;
+    std::optional<int> slice_axis;  ///< of the image, 0 to 2; automatic: the one across marked slices, else 2
+    std::optional<Vec3> at;         ///< world; where the three planes meet; automatic: the structures' middle
+    bool volume = false;            ///< the image, volume rendered, behind the surfaces
+    bool white_background = true;   ///< else black
     [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 
-/// The shaded surface (OpenVDB's ray tracer), and slices of the image with the surface's outline and the points.
-[[nodiscard]] COVOL_API Picture render(const FloatGrid& surface, const Image& image, const std::vector<Vec3>& points,
-                                       const RenderOptions& options = {}, const RunContext& run = {});
-/// The shaded surface from two sides.
-[[nodiscard]] COVOL_API Picture render(const FloatGrid& surface, const RenderOptions& options = {},
+/// A figure: surfaces shaded by the gradient of smoothed level sets, with marks, axes and a scale bar; slices of the
+/// image in true proportions, with each structure's outline, the marks within half a slice, and a scale bar; a legend.
+/// The same input gives the same picture on any number of threads.
+/// @throws Error InvalidOptions; InvalidInput (no structure, a grid without voxels at a surface or with voxels that are
+///               no cubes, slices without an image); Cancelled; what reading the image throws.
+[[nodiscard]] COVOL_API Picture render(const RenderScene& scene, const RenderOptions& options = {},
                                        const RunContext& run = {});
-
-/// Whole or not at all. @throws Error Io.
-COVOL_API void write_png(const std::string& path, const Picture& picture);
 
 }  // namespace covol

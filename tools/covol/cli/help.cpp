@@ -11,7 +11,7 @@ constexpr std::size_t kColumn = 30;  // where texts begin
 constexpr std::size_t kWidth = 100;  // of a line
 
 // In the order of Group.
-constexpr std::array kGroupNames{"Input", "Marks",  "How marks are read", "Point clouds", "Output",   "Mesh",
+constexpr std::array kGroupNames{"Input", "Marks",  "How marks are read", "Point clouds", "Output",   "Mesh", "Picture",
                                  "Start", "Domain", "Image edges",        "Flow",         "Numerics", "Help"};
 
 /// `left`, then `text` in a column of its own, broken between words.

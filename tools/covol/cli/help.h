@@ -9,7 +9,21 @@
 namespace covol::tool {
 
 /// Groups of options, in the order in which help shows them.
-enum class Group { Input, Marks, ReadingMarks, Clouds, Output, MeshFiles, Start, Domain, Edges, Flow, Numerics, Help };
+enum class Group {
+    Input,
+    Marks,
+    ReadingMarks,
+    Clouds,
+    Output,
+    MeshFiles,
+    Picture,
+    Start,
+    Domain,
+    Edges,
+    Flow,
+    Numerics,
+    Help
+};
 
 /// Options that are added to `command` from here on stand in this group.
 void in_group(CLI::App& command, Group group);

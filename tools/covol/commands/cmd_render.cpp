@@ -1,63 +1,218 @@
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+
 #include "commands/commands.h"
 #include "covol/error.h"
 #include "covol/render.h"
+#include "covol/structures.h"
 #include "flags/bindings.h"
+#include "jobs/level_sets.h"
+#include "jobs/page.h"
 
 namespace covol::tool {
 namespace {
 
+constexpr int kMostFrames = 9999;
+
 struct RenderJob {
-    std::string input, output, image_path;
+    std::string input, output, image_path, view = "iso";
     PointFlags points;
     ImageFlags image;
+    std::vector<std::string> opacities;
+    std::vector<Vec3> at;
+    std::optional<FigureKind> figure;
+    int turntable = 0;
     RenderOptions options;
 
     void run(Session& session) const {
-        session.outputs().check("-o", output, OutputKind::Picture);
+        if (turntable < 0 || turntable > kMostFrames)
+            throw Error(Errc::InvalidOptions, "--turntable: expected 0 to " + std::to_string(kMostFrames) + ", got " +
+                                                  std::to_string(turntable));
+        for (int n = 0; n < std::max(1, turntable); ++n)
+            session.outputs().check("-o", frame_path(n), OutputKind::Picture);
         if (const std::string why = options.why_invalid(); !why.empty())
             throw Error(Errc::InvalidOptions, "render: " + why);
-        const FloatGridPtr level_set = read_vdb_level_set(input, session.run());
+        static_cast<void>(parse_view(view, false));
+        const std::vector<NamedLevelSet> level_sets = read_level_sets(input, session.run());
         std::optional<Image> pixels;
         if (!image_path.empty()) pixels = image.read(image_path, session.run());
-        const WorldPoints cloud = read_world_points(points, pixels ? &pixels->geometry() : nullptr, session.run());
+        RenderScene scene;
+        for (const NamedLevelSet& found : level_sets) {
+            RenderStructure structure;
+            structure.name = found.name;
+            structure.surface = found.surface.get();
+            if (level_sets.size() > 1) structure.color = structure_color(scene.structures.size());
+            scene.structures.push_back(structure);
+        }
+        add_opacities(scene);
+        add_marks(scene, pixels ? &pixels->geometry() : nullptr, session.run());
+        if (pixels) {
+            scene.image = &*pixels;
+            scene.is_anatomical = is_anatomical(image_path, image.options, session.run());
+        }
+        scene.unit = pixels && !pixels->geometry().unit.empty() ? pixels->geometry().unit : stated_unit();
+        RenderOptions chosen = options;
+        chosen.view = parse_view(view, scene.is_anatomical);
+        chosen.figure = figure.value_or(turntable > 0 ? FigureKind::Surface : FigureKind::Composed);
+        if (!at.empty()) chosen.at = at.back();
         const Stopwatch watch;
-        const auto picture =
-            std::make_shared<Picture>(pixels ? render(*level_set, *pixels, cloud.points, options, session.run())
-                                             : render(*level_set, options, session.run()));
+        if (turntable == 0) {
+            const auto picture = std::make_shared<Picture>(render(scene, chosen, session.run()));
+            session.outputs().add(output, [picture](const std::string& path) { write_png(path, *picture); });
+        } else {
+            write_frames(scene, chosen, session);
+        }
         session.add_seconds("render", watch.seconds());
-        session.outputs().add(output, [picture](const std::string& path) { write_png(path, *picture); });
+    }
+
+private:
+    /// Frames are written as they are made: many large ones would not fit into memory.
+    void write_frames(const RenderScene& scene, RenderOptions chosen, Session& session) const {
+        chosen.whole_turn = true;
+        const double first = chosen.view.azimuth;
+        for (int n = 0; n < turntable; ++n) {
+            session.run().report("frames", double(n) / turntable);
+            chosen.view.azimuth = first + 360.0 * n / turntable;
+            const Picture picture = render(scene, chosen, session.run());
+            session.outputs().write(frame_path(n), [&](const std::string& path) { write_png(path, picture); });
+        }
+    }
+
+    /// "turn_0001.png" of "turn.png"; the name as it is where there is one picture.
+    [[nodiscard]] std::string frame_path(int n) const {
+        if (turntable == 0) return output;
+        const std::filesystem::path path(output);
+        std::array<char, 16> number{};
+        std::snprintf(number.data(), number.size(), "_%04d", n + 1);
+        return (path.parent_path() / (path.stem().string() + number.data() + path.extension().string())).string();
+    }
+
+    /// What the .vdb says of its lengths.
+    [[nodiscard]] std::string stated_unit() const {
+        for (const VdbGridInfo& grid : list_vdb(input))
+            if (const auto found = grid.metadata.find("covol_unit"); found != grid.metadata.end())
+                return found->second == "not stated" ? "" : found->second;
+        return "";
+    }
+
+    static std::vector<std::string> names_of(const RenderScene& scene) {
+        std::vector<std::string> names;
+        for (const RenderStructure& structure : scene.structures) names.push_back(structure.name);
+        return names;
+    }
+
+    void add_opacities(RenderScene& scene) const {
+        for (const std::string& text : opacities) {
+            const Named given = split_name(text);
+            const double value = parse_share(given.value);
+            if (given.name.empty())
+                for (RenderStructure& structure : scene.structures) structure.opacity = value;
+            else
+                scene.structures[owner_of(names_of(scene), "--opacity", given, "SHARE")].opacity = value;
+        }
+    }
+
+    static double parse_share(const std::string& text) {
+        const double value = parse_number("--opacity", text);
+        if (!(value >= 0 && value <= 1)) throw UsageError("--opacity: expected [NAME=]SHARE, 0 to 1, got " + text);
+        return value;
+    }
+
+    void add_marks(RenderScene& scene, const ImageGeometry* geometry, const RunContext& run) const {
+        for (const std::string& text : points.paths) {
+            const Named file = split_name(text);
+            PointFlags own = points;
+            own.paths = {file.value};
+            const std::vector<Vec3> marks = read_world_points(own, geometry, run).points;
+            const bool loose = file.name.empty() && scene.structures.size() > 1;
+            std::vector<Vec3>& to =
+                loose ? scene.marks : scene.structures[owner_of(names_of(scene), "--points", file, "FILE")].marks;
+            to.insert(to.end(), marks.begin(), marks.end());
+        }
     }
 };
+
+void add_picture_options(CLI::App& command, RenderJob& job) {
+    in_group(command, Group::Picture);
+    command
+        .add_option_function<std::string>(
+            "--size",
+            [&job](const std::string& text) {
+                const auto size = parse_size("--size", text);
+                job.options.width = size[0];
+                job.options.height = size[1];
+            },
+            "of the picture, in pixels")
+        ->type_name("WIDTHxHEIGHT")
+        ->default_str(std::to_string(job.options.width) + "x" + std::to_string(job.options.height));
+    const std::map<std::string, FigureKind> figures{
+        {"composed", FigureKind::Composed}, {"surface", FigureKind::Surface}, {"slices", FigureKind::Slices}};
+    command
+        .add_option_function<std::string>(
+            "--figure",
+            [&job, figures](const std::string& word) { job.figure = figures.at(CLI::detail::to_lower(word)); },
+            "the surfaces beside slices of the image, or either alone [composed; surface for a turntable]")
+        ->check(CLI::IsMember(figures, CLI::ignore_case).description(""))
+        ->type_name("composed|surface|slices");
+    command
+        .add_option(
+            "--view", job.view,
+            "where the surfaces are seen from: front|back|left|right|top|bottom|iso, or azimuth (0 front, 90 from "
+            "+x) and elevation in degrees")
+        ->type_name("NAME|AZ,EL")
+        ->capture_default_str();
+    command.add_option("--zoom", job.options.zoom, "enlarges the view of the surfaces")
+        ->type_name("FACTOR")
+        ->capture_default_str();
+    command
+        .add_option("--opacity", job.opacities,
+                    "of the surfaces, 0 to 1, all of them or one by its name [1; 0.35 around other structures; 0.16 "
+                    "with --volume]")
+        ->type_name("[NAME=]SHARE...");
+    command.add_flag("--volume", job.options.volume, "show the image, volume rendered, behind the surfaces");
+    command
+        .add_option_function<int>(
+            "--slices", [&job](int count) { job.options.slices = count; },
+            "so many slices along one axis, marked ones first; 0 for none [three planes through the middle]")
+        ->type_name("N");
+    const std::map<std::string, int> axes{{"x", 0}, {"y", 1}, {"z", 2}};
+    command
+        .add_option_function<std::string>(
+            "--slice-axis", [&job, axes](const std::string& word) { job.options.slice_axis = axes.at(word); },
+            "the image's axis that slices are taken along [the one across marked slices, else z]")
+        ->check(CLI::IsMember(axes).description(""))
+        ->type_name("x|y|z");
+    add_vec3(command, "--at", job.at, "place in the world where the three planes meet [the structures' middle]");
+    add_choice(command, "--background", job.options.white_background, {{"black", false}, {"white", true}},
+               "around the pictures");
+    command
+        .add_option("--turntable", job.turntable,
+                    "N frames of a whole turn about the vertical axis: OUT_0001.png, OUT_0002.png, ... [0]")
+        ->type_name("N");
+}
 
 }  // namespace
 
 void add_render(Session& session) {
-    const auto [job, command] =
-        session.add_job<RenderJob>("render", "A picture: the shaded surface, slices with its outline and the points");
+    const auto [job, command] = session.add_job<RenderJob>(
+        "render", "A figure: shaded surfaces with marks and scale, slices of the image with their outlines");
     in_group(*command, Group::Input);
-    command->add_option("level_set", job->input, "a level set; of several in a file, :NAME picks one")
+    command->add_option("level_set", job->input, "level sets; of several in a file all are shown, :NAME picks one")
         ->required()
         ->type_name("IN.vdb[:NAME]");
     in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "the picture")->required()->type_name("OUT.png");
     in_group(*command, Group::Input);
-    command->add_option("--image", job->image_path, "image for the slices")->type_name("IMAGE");
-    job->points.bind(*command, "--points");
-    in_group(*command, Group::Output);
-    command
-        ->add_option_function<std::string>(
-            "--size",
-            [job = job](const std::string& text) {
-                const auto size = parse_size("--size", text);
-                job->options.width = size[0];
-                job->options.height = size[1];
-            },
-            "of the picture, in pixels")
-        ->type_name("WIDTHxHEIGHT")
-        ->default_str(std::to_string(job->options.width) + "x" + std::to_string(job->options.height));
-    command->add_option("--slices", job->options.slices, "panels with slices")->capture_default_str();
+    command->add_option("--image", job->image_path, "image for slices and the volume view")->type_name("IMAGE");
+    job->points.bind(*command, "--points")
+        ->description("marks to show; with names of level sets, ve=FILE exe=FILE")
+        ->type_name("[NAME=]FILE...");
+    add_picture_options(*command, *job);
     job->image.bind(*command);
-    session.help().show_first(*command, {"--image", "--points", "--size", "--slices", "--channel", "--frame", "--roi"});
+    session.help().show_first(*command, {"--image", "--points", "--size", "--figure", "--view", "--slices", "--opacity",
+                                         "--volume", "--turntable"});
 }
 
 }  // namespace covol::tool

@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <filesystem>
 #include <fstream>
 
@@ -9,6 +8,7 @@
 #include "covol/mesh_relax.h"
 #include "covol/structures.h"
 #include "covol/surface.h"
+#include "jobs/level_sets.h"
 #include "jobs/marks.h"
 #include "jobs/page.h"
 
@@ -109,36 +109,19 @@ private:
         return false;
     }
 
-    /// All level sets of the file, or the one that is named.
     [[nodiscard]] std::vector<Shown> read_surfaces(const RunContext& run) const {
         std::vector<Shown> all;
-        const VdbGridName name = split_grid_name(input);
-        if (name.grid.empty())
-            for (const VdbGridInfo& grid : list_vdb(input))
-                if (is_float_grid(grid) && grid.grid_class == "level set" && grid.active_voxels > 0)
-                    all.push_back({grid.name, read_vdb(name.path, grid.name), {}, {}, {}, {}});
-        if (all.empty()) {
-            const FloatGridPtr grid = read_vdb_level_set(input, run);
-            all.push_back({name.grid.empty() ? "surface" : name.grid, grid, {}, {}, {}, {}});
-        }
+        for (NamedLevelSet& found : read_level_sets(input, run))
+            all.push_back({found.name, std::move(found.surface), {}, {}, {}, {}});
         return all;
     }
 
-    /// The structure that NAME=FILE is for; a file without a name is for the only one.
-    static Shown& owner(std::vector<Shown>& all, const std::string& flag, const Named& file) {
-        if (file.name.empty() && all.size() == 1) return all.front();
-        const auto at = std::find_if(all.begin(), all.end(), [&](const Shown& s) { return s.grid == file.name; });
-        if (at != all.end()) return *at;
-        std::string names;
-        for (const Shown& shown : all) names += (names.empty() ? "" : ", ") + shown.grid;
-        throw UsageError(flag + ": expected NAME=FILE with a level set of the file (" + names + "), got " +
-                         (file.name.empty() ? file.value : file.name + "=" + file.value));
-    }
-
     void add_marks(std::vector<Shown>& all, const ImageGeometry* geometry, const RunContext& run) const {
+        std::vector<std::string> names;
+        for (const Shown& shown : all) names.push_back(shown.grid);
         const auto add = [&](const char* flag, const std::string& text, bool are_contours) {
             const Named file = split_name(text);
-            Shown& shown = owner(all, flag, file);
+            Shown& shown = all[owner_of(names, flag, file, "FILE")];
             PointFlags own_points = points;
             ContourFlags own_contours = contours;
             own_points.paths.clear();

@@ -1,0 +1,239 @@
+#include "render/slices.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "render/draw/decorations.h"
+#include "render/level_set.h"
+#include "render/marks.h"
+
+namespace covol::figure {
+namespace {
+
+constexpr std::size_t kMostMarks = 120;
+constexpr int kMostSamples = 4;  // of the image along each side of a pixel
+constexpr double kFlat = 0.2;    // slope below which the surface lies in the plane rather than across it
+
+/// The image's values in one plane.
+class Slice {
+public:
+    Slice(const Image& image, const Plane& plane, const Region& region, const RunContext& run) : plane_(plane) {
+        VoxelBox box = image.held();
+        for (const int a : {plane.across, plane.down}) {
+            box.min[a] = std::clamp(int(std::floor(region.min[a])), box.min[a], box.max[a]);
+            box.max[a] = std::clamp(int(std::ceil(region.max[a])), box.min[a], box.max[a]);
+        }
+        const int n = plane.axis;
+        box.min[n] = box.max[n] = std::clamp(int(std::lround(plane.index)), box.min[n], box.max[n]);
+        if (image.chunks()) image.load(box, run);
+        const Index3 size = box.size();
+        values_.resize(std::size_t(size[0]) * size[1] * size[2]);
+        image.copy(box, values_.data());
+        std::size_t stride = 1;
+        for (int a = 0; a < 3; ++a) {
+            if (a == plane.across) stride_[0] = stride;
+            if (a == plane.down) stride_[1] = stride;
+            stride *= std::size_t(size[a]);
+        }
+        first_ = {box.min[plane.across], box.min[plane.down]};
+        size_ = {size[plane.across], size[plane.down]};
+    }
+
+    /// Bilinear, at indices along the plane's two axes.
+    [[nodiscard]] double at(double u, double v) const {
+        const auto [i, s] = place(u, 0);
+        const auto [j, t] = place(v, 1);
+        const float* const p = values_.data() + i * stride_[0] + j * stride_[1];
+        const std::size_t di = size_[0] > 1 ? stride_[0] : 0, dj = size_[1] > 1 ? stride_[1] : 0;
+        const double near = p[0] + s * (double(p[di]) - p[0]), far = p[dj] + s * (double(p[di + dj]) - p[dj]);
+        return near + t * (far - near);
+    }
+
+private:
+    [[nodiscard]] std::pair<std::size_t, double> place(double at, int axis) const {
+        const double x = std::clamp(at - first_[axis], 0.0, size_[axis] - 1.0);
+        const auto base = std::size_t(std::min(std::floor(x), std::max(0.0, size_[axis] - 2.0)));
+        return {base, x - double(base)};
+    }
+
+    Plane plane_;
+    std::vector<float> values_;
+    std::array<std::size_t, 2> stride_{1, 1};
+    std::array<int, 2> first_{0, 0}, size_{1, 1};
+};
+
+class Panel {
+public:
+    Panel(Canvas& canvas, const Rect& at, const Plane& plane, const Region& region, const RenderScene& scene,
+          const SliceStyle& style, const RunContext& run)
+        : canvas_(canvas),
+          at_(at),
+          plane_(plane),
+          region_(region),
+          scene_(scene),
+          geometry_(scene.image->geometry()),
+          style_(style),
+          run_(run) {}
+
+    void go() {
+        draw_image();
+        for (const RenderStructure& structure : scene_.structures) draw_outline(structure);
+        draw_planes();
+        for (const RenderStructure& structure : scene_.structures)
+            draw_marks(structure.marks, scene_.structures.size() > 1 ? to_color(structure.color) : kLoneMark);
+        draw_marks(scene_.marks, scene_.structures.size() > 1 ? kLooseMark : kLoneMark);
+        draw_words();
+    }
+
+private:
+    /// Along the plane's two axes, of a place on the picture.
+    [[nodiscard]] std::array<double, 2> indices(double x, double y) const {
+        const int a = plane_.across, b = plane_.down;
+        const double u = (x - at_.x) * style_.pixel / geometry_.spacing[a];
+        const double v = (y - at_.y) * style_.pixel / geometry_.spacing[b];
+        return {plane_.mirror_across ? region_.max[a] - u : region_.min[a] + u,
+                plane_.mirror_down ? region_.max[b] - v : region_.min[b] + v};
+    }
+
+    [[nodiscard]] Vec3 world(double x, double y) const {
+        const auto [u, v] = indices(x, y);
+        Vec3 index;
+        index[plane_.axis] = plane_.index;
+        index[plane_.across] = u;
+        index[plane_.down] = v;
+        return geometry_.index_to_world(index);
+    }
+
+    [[nodiscard]] bool is_in_image(int axis, double index) const {
+        return index >= -0.5 && index <= geometry_.size[axis] - 0.5;
+    }
+
+    void draw_image() const {
+        const Slice slice(*scene_.image, plane_, region_, run_);
+        const double finest = std::min(geometry_.spacing[plane_.across], geometry_.spacing[plane_.down]);
+        const int samples = std::clamp(int(std::lround(style_.pixel / finest)), 1, kMostSamples);
+        const double span = style_.window[1] - style_.window[0], scale = span > 0 ? 1 / span : 0;
+        tbb::parallel_for(0, at_.height, [&](int y) {
+            for (int x = 0; x < at_.width; ++x) {
+                double sum = 0, inside = 0;
+                for (int s = 0; s < samples * samples; ++s) {
+                    const auto [u, v] =
+                        indices(at_.x + x + (s % samples + 0.5) / samples, at_.y + y + (s / samples + 0.5) / samples);
+                    if (!is_in_image(plane_.across, u) || !is_in_image(plane_.down, v)) continue;
+                    sum += slice.at(u, v);
+                    ++inside;
+                }
+                const double value = inside > 0 ? (sum / inside - style_.window[0]) * scale : 0;
+                canvas_.at(at_.x + x, at_.y + y) =
+                    mix(style_.beyond, gray(std::clamp(value, 0.0, 1.0)), inside / (samples * samples));
+            }
+        });
+    }
+
+    /// The zero of the level set, a line of the same width everywhere: the distance from it is the value over its slope
+    /// within the plane.
+    void draw_outline(const RenderStructure& structure) const {
+        const int width = at_.width + 2, height = at_.height + 2;  // a pixel more on every side, for slopes
+        std::vector<float> values(std::size_t(width) * height);
+        tbb::enumerable_thread_specific<SmoothField> fields([&] { return SmoothField(*structure.surface); });
+        tbb::parallel_for(0, height, [&](int y) {
+            SmoothField& field = fields.local();
+            for (int x = 0; x < width && !run_.cancelled(); ++x)
+                values[std::size_t(y) * width + x] = float(field.value(world(at_.x + x - 0.5, at_.y + y - 0.5)));
+        });
+        const double half = std::max(0.8, 0.075 * style_.text), rim = std::max(0.5, 0.03 * style_.text);
+        const Color color = to_color(structure.color);
+        const float least = float(kFlat * style_.pixel);
+        tbb::parallel_for(0, at_.height, [&](int y) {
+            for (int x = 0; x < at_.width; ++x) {
+                const float* const v = values.data() + std::size_t(y + 1) * width + x + 1;
+                const float slope = 0.5F * std::hypot(v[1] - v[-1], v[width] - v[-width]);
+                const double away = std::abs(v[0]) / std::max(slope, least);
+                const double line = std::clamp(half + 0.5 - away, 0.0, 1.0);
+                canvas_.blend(at_.x + x, at_.y + y, gray(0), 0.55 * std::clamp(half + rim + 0.5 - away, 0.0, 1.0));
+                canvas_.blend(at_.x + x, at_.y + y, color, line);
+            }
+        });
+    }
+
+    /// Where the other planes cut this one: dashes at the rims, so that they do not cross what is shown.
+    void draw_planes() const {
+        const double dash = std::max(4.0, 0.5 * style_.text), width = std::max(1.0, 0.07 * style_.text);
+        for (const Plane& other : style_.others) {
+            if (other.axis == plane_.axis) continue;
+            Vec3 index = region_.min;
+            index[other.axis] = other.index;
+            const auto [x, y] = place_on(at_, plane_, region_, style_.pixel, index, geometry_);
+            const bool upright = other.axis == plane_.across;
+            const double from = upright ? at_.y : at_.x, to = upright ? at_.bottom() : at_.right();
+            for (double t = from; t < to; t += 2 * dash) {
+                const double end = std::min(to, t + dash);
+                if (upright)
+                    canvas_.line({x, t}, {x, end}, width, gray(1), 0.45, at_);
+                else
+                    canvas_.line({t, y}, {end, y}, width, gray(1), 0.45, at_);
+            }
+        }
+    }
+
+    void draw_marks(const std::vector<Vec3>& marks, const Color& color) const {
+        const double thick = *std::max_element(geometry_.spacing.begin(), geometry_.spacing.end());
+        std::vector<std::array<double, 2>> places;
+        for (const Vec3& mark : marks) {
+            const Vec3 index = geometry_.world_to_index(mark);
+            if (std::abs(index[plane_.axis] - plane_.index) * geometry_.spacing[plane_.axis] <= 0.5 * thick)
+                places.push_back(place_on(at_, plane_, region_, style_.pixel, index, geometry_));
+        }
+        // Of very many some: they would hide the outline.
+        const std::size_t stride = places.size() / kMostMarks + 1;
+        for (std::size_t n = 0; n < places.size(); n += stride) {
+            const auto [x, y] = places[n];
+            canvas_.disc(x, y, style_.mark_radius + std::max(0.6, 0.05 * style_.text), gray(0.05), 0.9, at_);
+            canvas_.disc(x, y, style_.mark_radius, color, 1, at_);
+        }
+    }
+
+    void draw_words() const {
+        const double size = style_.text, pad = 0.45 * size, rim = std::max(1.0, 0.11 * size);
+        TextStyle style{size, gray(1), Align::Left, rim, gray(0)};
+        const std::string name = name_of(plane_, scene_);
+        const double cap = kCapHeight * size;
+        const double room = at_.width - 2 * pad;
+        if (text_width(name, size) <= room && at_.height > 2 * size)
+            draw_text(canvas_, at_.x + pad, at_.y + pad + cap, name, style);
+        if (!scene_.is_anatomical || std::min(at_.width, at_.height) < 5 * size) return;
+        const auto across = letters_of(plane_.across, geometry_), down = letters_of(plane_.down, geometry_);
+        const double middle_x = at_.x + 0.5 * at_.width, middle_y = at_.y + 0.5 * (at_.height + cap);
+        draw_text(canvas_, at_.x + pad, middle_y, across[plane_.mirror_across ? 0 : 1], style);
+        style.align = Align::Right;
+        draw_text(canvas_, at_.right() - pad, middle_y, across[plane_.mirror_across ? 1 : 0], style);
+        style.align = Align::Center;
+        draw_text(canvas_, middle_x, at_.bottom() - pad, down[plane_.mirror_down ? 1 : 0], style);
+        // Beneath the name where that reaches below the middle.
+        const bool under = at_.x + 2 * pad + text_width(name, size) > middle_x - 0.5 * size;
+        draw_text(canvas_, middle_x, at_.y + pad + cap + (under ? 1.2 * size : 0), down[plane_.mirror_down ? 0 : 1],
+                  style);
+    }
+
+    Canvas& canvas_;
+    const Rect& at_;
+    const Plane& plane_;
+    const Region& region_;
+    const RenderScene& scene_;
+    const ImageGeometry& geometry_;
+    const SliceStyle& style_;
+    const RunContext& run_;
+};
+
+}  // namespace
+
+void draw_slice(Canvas& canvas, const Rect& at, const Plane& plane, const Region& region, const RenderScene& scene,
+                const SliceStyle& style, const RunContext& run) {
+    run.check();
+    Panel(canvas, at, plane, region, scene, style, run).go();
+}
+
+}  // namespace covol::figure

@@ -1,0 +1,247 @@
+#include "render/surface_view.h"
+
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/RayIntersector.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "covol/error.h"
+#include "render/level_set.h"
+#include "render/shading.h"
+
+namespace covol::figure {
+namespace {
+
+using cloud::dot;
+using cloud::plus;
+using cloud::times;
+using Intersector = openvdb::tools::LevelSetRayIntersector<FloatGrid>;
+
+constexpr int kMostHits = 12;                            // of one ray with one translucent body
+constexpr double kOnSurface = 0.02, kFinestStep = 0.25;  // voxels
+constexpr double kGrazing = 0.2;                         // cosine between the ray and the normal
+constexpr int kFiner = 4;                                // rays along each side of a pixel at an edge
+constexpr double kOpaque = 0.999;                        // hides what is behind
+constexpr auto kMissing = -std::numeric_limits<float>::infinity();
+constexpr double kCosEdge = 0.8;  // of the angle between neighbours' normals, above which a pixel is smooth
+constexpr int kRows = 8;
+
+openvdb::Vec3d to_vdb(const Vec3& v) { return {v[0], v[1], v[2]}; }
+
+struct Hit {
+    double depth = kMissing;  // towards the eye
+    Vec3 normal{0, 0, 0};
+    int body = -1;
+};
+
+/// What one ray sees.
+struct Seen {
+    Color color{0, 0, 0};
+    float share = 0, depth = kMissing, solid = kMissing;
+    std::array<float, 3> normal{0, 0, 0};
+    int body = -1;
+};
+
+/// Rays of one thread.
+class Tracer {
+public:
+    Tracer(const std::vector<Body>& bodies, const std::vector<Intersector>& intersectors, const Camera& camera,
+           double reach)
+        : bodies_(bodies), intersectors_(intersectors), camera_(camera), reach_(reach), lights_(camera.basis) {
+        for (const Body& body : bodies) fields_.emplace_back(*body.surface);
+    }
+
+    Seen operator()(double x, double y) {
+        hits_.clear();
+        const Vec3 middle = camera_.place(x, y);
+        for (std::size_t n = 0; n < bodies_.size(); ++n) find_hits(int(n), middle);
+        std::sort(hits_.begin(), hits_.end(), [](const Hit& a, const Hit& b) { return a.depth > b.depth; });
+        Seen seen;
+        for (const Hit& hit : hits_) {
+            const Body& body = bodies_[hit.body];
+            const double facing = std::abs(dot(hit.normal, camera_.basis.to_eye));
+            // A slanted layer is thicker along the ray.
+            const double share = body.opacity >= 1 ? 1 : 1 - std::pow(1 - body.opacity, 1 / std::max(0.2, facing));
+            const double adds = (1 - seen.share) * share;
+            seen.color = sum(seen.color, scaled(lights_.shade(body.color, hit.normal), adds));
+            seen.share += float(adds);
+            if (seen.body < 0) {
+                seen.body = hit.body;
+                seen.depth = float(hit.depth);
+                seen.normal = {float(hit.normal[0]), float(hit.normal[1]), float(hit.normal[2])};
+            }
+            if (seen.share > kOpaque) {
+                seen.solid = float(hit.depth);
+                break;
+            }
+        }
+        return seen;
+    }
+
+private:
+    void find_hits(int n, const Vec3& middle) {
+        const Vec3 &to_eye = camera_.basis.to_eye, origin = plus(middle, times(reach_, to_eye));
+        double from = 0;
+        const double h = fields_[n].voxel_size();
+        const int most = bodies_[n].opacity >= 1 ? 1 : kMostHits;
+        for (int tries = 0, found = 0; tries < kMostHits && found < most; ++tries) {
+            const openvdb::math::Ray<double> ray(to_vdb(origin), to_vdb(times(-1, to_eye)), from, 2 * reach_);
+            openvdb::Vec3d at;
+            if (!intersectors_[n].intersectsWS(ray, at)) return;
+            const double t = reach_ - (to_vdb(to_eye).dot(at - to_vdb(middle)));
+            from = t + 0.3 * h;
+            const Hit hit = refined(n, origin, t);
+            if (hit.body < 0) continue;
+            hits_.push_back(hit);
+            ++found;
+        }
+    }
+
+    /// The place on the smooth field that lies next to where the ray meets the voxels. No body where the ray only
+    /// grazes the voxels: their own outline would show.
+    Hit refined(int n, const Vec3& origin, double t) {
+        SmoothField& field = fields_[n];
+        const Vec3 along = times(-1, camera_.basis.to_eye);
+        const double h = field.voxel_size(), first = t;
+        SmoothField::Sample sample = field.at(plus(origin, times(t, along)));
+        for (int step = 0; step < 2; ++step) {
+            const double slope = dot(sample.gradient, along);
+            if (std::abs(slope) < kGrazing || std::abs(sample.value) < kOnSurface * h) break;
+            t = std::clamp(t - sample.value / slope, first - h, first + h);
+            sample = field.at(plus(origin, times(t, along)));
+        }
+        if (sample.value > kOnSurface * h && std::abs(dot(sample.gradient, along)) < 2 * kGrazing) {
+            double last = sample.value;
+            bool meets = false;
+            for (double ahead = kFinestStep * h; ahead < 2 * h && !meets; ahead += kFinestStep * h) {
+                sample = field.at(plus(origin, times(first + ahead, along)));
+                if (sample.value > last) break;
+                meets = sample.value <= 0;
+                last = sample.value;
+                t = first + ahead;
+            }
+            if (!meets) return {};
+        }
+        Vec3 normal = cloud::unit(sample.gradient);
+        if (dot(normal, along) > 0) normal = times(-1, normal);  // seen from inside
+        return {reach_ - t, normal, n};
+    }
+
+    const std::vector<Body>& bodies_;
+    std::vector<Intersector> intersectors_;  // each keeps the ray that it follows
+    const Camera& camera_;
+    double reach_;
+    Lights lights_;
+    std::vector<SmoothField> fields_;
+    std::vector<Hit> hits_;
+};
+
+bool is_edge(const Seen& a, const Seen& b, double pixel) {
+    if (a.body != b.body) return true;
+    if (a.body < 0) return false;
+    const float cosine = a.normal[0] * b.normal[0] + a.normal[1] * b.normal[1] + a.normal[2] * b.normal[2];
+    return cosine < kCosEdge || std::abs(a.depth - b.depth) > 12 * pixel || std::abs(a.share - b.share) > 0.08;
+}
+
+class View {
+public:
+    View(const std::vector<Body>& bodies, const Camera& camera, const RunContext& run)
+        : camera_(camera), run_(run), width_(camera.at.width), height_(camera.at.height) {
+        double reach = 0;
+        std::vector<Intersector> intersectors;
+        for (const Body& body : bodies) {
+            try {
+                intersectors.emplace_back(*body.surface);
+            } catch (const openvdb::Exception& e) {
+                throw Error(Errc::InvalidInput, "render: grid '" + body.surface->getName() + "': " + e.what());
+            }
+            const Extent extent = surface_extent(*body.surface, camera.basis);
+            const double center = dot(camera.center, camera.basis.to_eye), h = body.surface->voxelSize()[0];
+            reach = std::max({reach, extent.max[2] - center + 8 * h, center - extent.min[2] + 8 * h});
+        }
+        make_ = [&bodies, intersectors, &camera, reach] { return Tracer(bodies, intersectors, camera, reach); };
+    }
+
+    Layer go() {
+        tbb::enumerable_thread_specific<Tracer> tracers(make_);
+        first_.resize(std::size_t(width_) * height_);
+        for_rows([&](int y) {
+            Tracer& trace = tracers.local();
+            for (int x = 0; x < width_; ++x) first(x, y) = trace(camera_.at.x + x + 0.5, camera_.at.y + y + 0.5);
+        });
+        Layer layer{width_, height_, {}, {}, {}, {}};
+        layer.color.resize(first_.size());
+        for (auto* values : {&layer.share, &layer.depth, &layer.solid}) values->resize(first_.size());
+        for_rows([&](int y) {
+            Tracer& trace = tracers.local();
+            for (int x = 0; x < width_; ++x) {
+                const Seen seen = at_edge(x, y) ? finer(trace, x, y) : first(x, y);
+                const std::size_t n = std::size_t(y) * width_ + x;
+                layer.color[n] = seen.color;
+                layer.share[n] = seen.share;
+                layer.depth[n] = first_[n].depth;
+                layer.solid[n] = first_[n].solid;
+            }
+        });
+        run_.check();
+        return layer;
+    }
+
+private:
+    Seen& first(int x, int y) { return first_[std::size_t(y) * width_ + x]; }
+
+    template <typename Row>
+    void for_rows(const Row& row) const {
+        tbb::parallel_for(tbb::blocked_range<int>(0, height_, kRows), [&](const tbb::blocked_range<int>& rows) {
+            for (int y = rows.begin(); y != rows.end() && !run_.cancelled(); ++y) row(y);
+        });
+    }
+
+    bool at_edge(int x, int y) {
+        const Seen& own = first(x, y);
+        return (x > 0 && is_edge(own, first(x - 1, y), camera_.pixel)) ||
+               (y > 0 && is_edge(own, first(x, y - 1), camera_.pixel)) ||
+               (x + 1 < width_ && is_edge(own, first(x + 1, y), camera_.pixel)) ||
+               (y + 1 < height_ && is_edge(own, first(x, y + 1), camera_.pixel));
+    }
+
+    [[nodiscard]] Seen finer(Tracer& trace, int x, int y) const {
+        Seen mean;
+        for (int s = 0; s < kFiner * kFiner; ++s) {
+            const Seen one =
+                trace(camera_.at.x + x + (s % kFiner + 0.5) / kFiner, camera_.at.y + y + (s / kFiner + 0.5) / kFiner);
+            mean.color = sum(mean.color, scaled(one.color, 1.0 / (kFiner * kFiner)));
+            mean.share += one.share / (kFiner * kFiner);
+        }
+        return mean;
+    }
+
+    const Camera& camera_;
+    const RunContext& run_;
+    int width_, height_;
+    std::function<Tracer()> make_;
+    std::vector<Seen> first_;
+};
+
+}  // namespace
+
+Layer cast_surfaces(const std::vector<Body>& bodies, const Camera& camera, const RunContext& run) {
+    return View(bodies, camera, run).go();
+}
+
+void compose(const Layer& layer, const Rect& at, Canvas& canvas) {
+    tbb::parallel_for(0, layer.height, [&](int y) {
+        for (int x = 0; x < layer.width; ++x) {
+            const std::size_t n = std::size_t(y) * layer.width + x;
+            Color& pixel = canvas.at(at.x + x, at.y + y);
+            pixel = sum(layer.color[n], scaled(pixel, 1 - layer.share[n]));
+        }
+    });
+}
+
+}  // namespace covol::figure

@@ -1,0 +1,24 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "cli/arguments.h"
+#include "covol/vdb_io.h"
+
+// Commands that show all level sets of a file.
+namespace covol::tool {
+
+struct NamedLevelSet {
+    std::string name;
+    FloatGridPtr surface;
+};
+
+/// All level sets of "FILE.vdb", or the one that "FILE.vdb:name" names. @throws Error as read_vdb_level_set.
+[[nodiscard]] std::vector<NamedLevelSet> read_level_sets(const std::string& input, const RunContext& run);
+
+/// Which of the level sets NAME=VALUE is for; a value without a name is for the only one.
+/// @param value  what VALUE is: "FILE" @throws UsageError, with their names.
+[[nodiscard]] std::size_t owner_of(const std::vector<std::string>& level_sets, const std::string& flag,
+                                   const Named& given, const std::string& value);
+
+}  // namespace covol::tool
