@@ -2,9 +2,9 @@
 size and smooth normals, and renders mesh and volume into one picture. 13_blender.sh makes the files and calls
 
     blender -b --factory-startup --python houdini_free_examples/13_blender.py -- \
-        OUTDIR FILE.vdb... FILE.ply FILE.glb [image=IMAGE.vdb:LOW:HIGH]
+        OUTDIR FILE.vdb... FILE.ply FILE.glb [image=IMAGE.vdb:LOW:HIGH] [size=800x450] [checks]
 
-The picture shows the image, its grid "density" from LOW to HIGH, or else the job's own fog volume.
+"checks" makes no picture. It shows the image, its grid "density" from LOW to HIGH, or else the job's own fog volume.
 Writes OUTDIR/blender.json (what was measured), blender.png and blender.blend. Exit code 0: all checks hold, 1: one does
 not, 2: files are missing. Made for Blender 3.4 (Debian 12); lengths are in the files' own unit.
 """
@@ -26,9 +26,9 @@ MESH_TOLERANCE = 1e-5  # of the largest side: PLY and GLB hold the same single-p
 BOX_TOLERANCE = 0.5    # voxels, a volume's surface against the mesh; that of the fog is met at a lattice line only
 MEAN_TOLERANCE = 0.1   # voxels
 NORMAL_TOLERANCE = 1   # degree, from Blender's own means over the triangles at a vertex
-PICTURE = (960, 540)
-SAMPLES = 24
-GLOW = 6
+PICTURE = (800, 450)
+SAMPLES = 16
+GLOW = 16
 
 
 def import_mesh(path):
@@ -196,7 +196,7 @@ def light(place, target, power, size):
     bpy.context.collection.objects.link(lamp)
 
 
-def render(path, ply, volume, low, high):
+def render(path, size, ply, volume, low, high):
     """Half of the mesh around the volume: what does not fit together shows at the seam."""
     a = corners(ply)
     least, most = a.min(0), a.max(0)
@@ -226,17 +226,18 @@ def render(path, ply, volume, low, high):
     scene.cycles.device, scene.cycles.samples, scene.cycles.seed = "CPU", SAMPLES, 1
     scene.cycles.use_denoising = False  # Debian's Blender has no denoiser
     scene.cycles.max_bounces = 2
+    scene.cycles.volume_step_rate = 2  # voxels; the glow is smooth
     scene.view_settings.view_transform = "Standard"
-    scene.render.resolution_x, scene.render.resolution_y = PICTURE
+    scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
 
 
 def main():
     words = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else []
-    images = [word[len("image="):] for word in words[1:] if word.startswith("image=")]
+    given = dict(word.split("=", 1) for word in words[1:] if "=" in word)
     out = pathlib.Path(words[0] if words else ".").resolve()
-    files = [pathlib.Path(word).resolve() for word in words[1:] if not word.startswith("image=")]
+    files = [pathlib.Path(word).resolve() for word in words[1:] if "=" not in word and word != "checks"]
     wanted = {end: [f for f in files if f.suffix == end] for end in (".vdb", ".ply", ".glb")}
     missing = [end for end, found in wanted.items() if not found] + [str(f) for f in files if not f.is_file()]
     if missing:
@@ -249,18 +250,23 @@ def main():
     lines = check(ply, glb, volumes)
     (out / "blender.json").write_text(json.dumps({"blender": bpy.app.version_string, "checks": lines}, indent=2) + "\n")
 
+    good = all(line["ok"] for line in lines)
+    if "checks" in words:
+        return 0 if good else 1
     shown, low, high = next((v for v in volumes if "density" in [g.name for g in v.data.grids]), None), 0, 1
-    if images:
-        path, low, high = images[0].rsplit(":", 2)
+    if "image" in given:
+        path, low, high = given["image"].rsplit(":", 2)
         shown = import_volume(pathlib.Path(path).resolve())
     if shown is None:
         print("no grid 'density': Blender draws no level set, and no picture is made", file=sys.stderr)
         return 1
     for obj in [ply, glb, *volumes]:
         obj.hide_render = obj is not shown
-    render(out / "blender.png", ply, shown, float(low), float(high))
+    size = [int(n) for n in given["size"].split("x")] if "size" in given else PICTURE
+    render(out / "blender.png", size, ply, shown, float(low), float(high))
+    bpy.context.preferences.filepaths.save_version = 0  # no older scene beside it
     bpy.ops.wm.save_as_mainfile(filepath=str(out / "blender.blend"), compress=True)
-    return 0 if all(line["ok"] for line in lines) else 1
+    return 0 if good else 1
 
 
 if __name__ == "__main__":

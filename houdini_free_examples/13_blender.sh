@@ -16,13 +16,13 @@ echo "== making the job's files"
 "$covol" segment "$image" --points "$points" --voxel-size 3 -o "$out/surface.vdb" --density "$out/fog.vdb" \
   --mesh "$out/embryo.ply"
 "$covol" mesh "$out/surface.vdb" -o "$out/embryo.glb"
-"$covol" convert "$image" "$out/image.vdb" --voxel-size 2
+"$covol" convert "$image" "$out/image.vdb" --voxel-size 3
 "$covol" render "$out/surface.vdb" --image "$image" --points "$points" -o "$out/embryo.png"
 
 echo "== Blender"
 if command -v blender >/dev/null; then
   blender -b --factory-startup --python houdini_free_examples/13_blender.py -- \
-    "$out" "$out"/{surface.vdb,fog.vdb,embryo.ply,embryo.glb} "image=$out/image.vdb:40:220" >"$out/blender.log" 2>&1 ||
+    "$out" "$out"/{surface.vdb,fog.vdb,embryo.ply,embryo.glb} "image=$out/image.vdb:30:150" >"$out/blender.log" 2>&1 ||
     { cat "$out/blender.log" >&2; exit 1; }
   grep -E '^(ok|FAIL) ' "$out/blender.log"
 else

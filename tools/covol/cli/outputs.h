@@ -6,7 +6,7 @@
 
 namespace covol::tool {
 
-enum class OutputKind { Vdb, Image, Mesh, Points, Picture, Page, Table, Text };
+enum class OutputKind { Vdb, NanoVdb, Image, Mesh, Points, Picture, Page, Scene, Table, Text };
 
 /// The files of one run: checked before the long work, written together at its end. Each is whole or absent, and when
 /// one fails those already written in this run are removed.

@@ -159,7 +159,8 @@ void add_surfaces(py::module_& module) {
             "measure",
             [](const Mesh& mesh) { return from_json(tool::to_json(covol::measure(*mesh.triangles)).dump()); },
             "dict: volume, area (world units), components, genus, closed, manifold.")
-        .def("save", save_mesh, py::arg("path"), py::kw_only(), py::arg("y_up") = py::none(), py::arg("unit_scale") = 1.0,
+        .def("save", save_mesh, py::arg("path"), py::kw_only(), py::arg("y_up") = py::none(),
+             py::arg("unit_scale") = 1.0,
              "Writes .ply, .obj, .stl, .off or .glb, which is y-up unless y_up says otherwise. Raises Error.");
     py::class_<LevelSet>(
         module, "LevelSet",
@@ -177,7 +178,7 @@ void add_surfaces(py::module_& module) {
             "save",
             [](const LevelSet& s, const std::filesystem::path& path, bool half) {
                 const py::gil_scoped_release released;
-                write_vdb(path.string(), {s.grid}, {half, {}});
+                write_vdb(path.string(), {s.grid}, {half, {}, VdbCompression::Blosc});
             },
             py::arg("path"), py::kw_only(), py::arg("half") = false,
             "Writes a .vdb; half: values as 16-bit floats. Raises Error.");
