@@ -10,14 +10,17 @@ out=$results/openvdb_pipeline
 mkdir -p "$out"
 has() { command -v "$1" >/dev/null || { echo "$1 is not installed: SKIPPED"; return 1; }; }
 
-echo "== level set and fog volume in one file, packed by zip"
+echo "== level set and fog volume in one file, unpacked"
 "$covol" reconstruct houdini_free_examples/data/celegans_marks.csv --voxel-size 4 -o "$out/embryo.vdb" \
-  --density "$out/embryo.vdb" --compression zip --usda "$out/embryo.usda"
+  --density "$out/embryo.vdb" --compression none --usda "$out/embryo.usda"
 "$covol" check "$out/embryo.vdb" --for blender
-if has vdb_print; then vdb_print -l "$out/embryo.vdb" | head -20; fi
+if has vdb_print; then vdb_print "$out/embryo.vdb"; fi
 
 echo "== half and quarter of the resolution"
-if has vdb_lod; then vdb_lod -name density -range 0-2-1 "$out/embryo.vdb" "$out/levels.vdb" && vdb_print "$out/levels.vdb"; fi
+if has vdb_lod; then
+  vdb_lod "$out/embryo.vdb" "$out/levels.vdb" -name density -range 0-2
+  vdb_print "$out/levels.vdb"
+fi
 
 echo "== python3-openvdb: a shell of 8 units, from the level set's own values"
 /usr/bin/python3 - "$out" <<'PYTHON'

@@ -5,7 +5,7 @@
 import re
 import unittest
 
-from interchange_test import CENTRE, MISSING, SPACING, Folder, ball, np, pyopenvdb, sphere, tifffile
+from interchange_test import CENTRE, MISSING, SPACING, Folder, ball, np, pyopenvdb, sphere, tifffile, write_um_tiff
 
 
 def parse_usda(text):
@@ -22,11 +22,9 @@ def parse_usda(text):
             return token.strip('"') if token[0] != "@" else token[3:-3]
         entries = {}
         while tokens[at] != "}":
-            key = tokens[at]
+            frame = float(tokens[at].rstrip(":"))
             at += 1
-            if tokens[at] == "=":
-                raise ValueError("a dictionary in time samples")
-            entries[float(key.rstrip(":"))] = value()
+            entries[frame] = value()
             if tokens[at] == ",":
                 at += 1
         at += 1
@@ -49,7 +47,8 @@ def parse_usda(text):
                 at += 1
                 if words[-1] == "customLayerData":
                     at += 1
-                    body("data", "}") if prims.setdefault("data", {}) is not None else None
+                    prims["data"] = {}
+                    body("data", "}")
                 else:
                     assert words[-1] not in prims[path], words
                     prims[path][words[-1]] = value()
@@ -82,8 +81,12 @@ class OneFile(Folder):
         self.assertEqual(len(pyopenvdb.readAllGridMetadata(str(self.out / "again.vdb"))), 2)
 
     def test_several_structures_have_a_density_each(self):
-        self.run_covol("segment", self.private / "i.tif", "--points", f"a={self.private}/p.xyz", f"b={self.private}/p.xyz",
-                       "-o", "ab.vdb", "--density", "ab.vdb", "--usda", "ab.usda", "--quiet")
+        centres = {name: np.add(CENTRE, (0, side, 0)) for name, side in (("a", -4.0), ("b", 4.0))}
+        write_um_tiff(self.out / "two.tif", np.uint8(20 + 200 * np.maximum(*(ball(c, 3) for c in centres.values()))))
+        for name, centre in centres.items():
+            np.savetxt(self.out / f"{name}.xyz", sphere(300, centre, 3))
+        self.run_covol("segment", "two.tif", "--points", "a=a.xyz", "b=b.xyz", "-o", "ab.vdb", "--density", "ab.vdb", "--usda",
+                       "ab.usda", "--quiet")
         names = {g.name for g in pyopenvdb.readAllGridMetadata(str(self.out / "ab.vdb"))}
         self.assertEqual(names, {"density_a", "density_b", "a", "b"})
         prims = parse_usda((self.out / "ab.usda").read_text())

@@ -10,7 +10,8 @@
 namespace covol {
 
 /// How the values of a .vdb file are packed. Blosc is the fastest and what OpenVDB's own programs write; a reader that
-/// was built without it fails on such a file, or crashes. Zip every reader has.
+/// was built without it fails on such a file, or crashes. Zip is for grids that are neither level sets nor fog volumes:
+/// those OpenVDB then leaves as they are.
 enum class VdbCompression { None, Zip, Blosc };
 
 struct WriteVdbOptions {

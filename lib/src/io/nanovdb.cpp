@@ -17,7 +17,8 @@ namespace covol::detail {
 void write_nanovdb(const std::string& file, const std::string& shown, const std::vector<FloatGridPtr>& grids) {
     std::ofstream out(file, std::ios::binary);
     for (const FloatGridPtr& grid : grids)
-        nanovdb::io::writeGrid(out, nanovdb::openToNanoVDB(*grid), nanovdb::io::Codec::NONE);
+        nanovdb::io::writeGrid(out, nanovdb::openToNanoVDB(*grid, nanovdb::StatsMode::All, nanovdb::ChecksumMode::Full),
+                               nanovdb::io::Codec::NONE);
     out.close();
     if (!out) throw Error(Errc::Io, "write_nvdb: " + shown + ": cannot write");
 }

@@ -76,7 +76,7 @@ const std::vector<Rule>& rules() {
          [](Facts) -> Text { return "import the mesh (--mesh OUT.ply), or move the object back"; }},
         {Program::Blender, kRemark, [](Facts f) { return is_vdb(f) && f.has_blosc; },
          [](Facts) -> Text { return "it is packed by Blosc: builds without it do not open the file"; },
-         [](Facts) -> Text { return "--compression zip, or covol convert IN.vdb OUT.vdb --compression zip"; }},
+         [](Facts) -> Text { return "--compression none, or covol convert IN.vdb OUT.vdb --compression none"; }},
         {Program::Blender, kRemark, [](Facts f) { return is_vdb(f) && f.extent > kFarAway; }, wide,
          [](Facts f) -> Text {
              return "scale the object by " + number(1 / f.extent) + ", or End of the view's clipping beyond it";
@@ -109,7 +109,7 @@ const std::vector<Rule>& rules() {
          [](Facts) -> Text {
              return "it is packed by Blosc: a host with another Blosc than its OpenVDB has may crash";
          },
-         [](Facts) -> Text { return "--compression zip, or covol convert IN.vdb OUT.vdb --compression zip"; }},
+         [](Facts) -> Text { return "--compression none, or covol convert IN.vdb OUT.vdb --compression none"; }},
         {Program::Houdini, kRemark, is_vdb,
          [](Facts) -> Text { return "y is up there and z here: the volume lies on its back"; },
          [](Facts) -> Text { return "turn it by -90 degrees about x"; }},
