@@ -7,7 +7,7 @@ packages=(
   # build
   g++ cmake ninja-build
   # grids, parallelism
-  libopenvdb-dev libtbb-dev libimath-dev libblosc-dev zlib1g-dev libboost-dev
+  libopenvdb-dev libnanovdb-dev libtbb-dev libimath-dev libblosc-dev zlib1g-dev libboost-dev
   # meshes, geometry
   libopenmesh-dev libcgal-dev libeigen3-dev liblbfgs-dev libgmp-dev libmpfr-dev
   # images
@@ -15,7 +15,7 @@ packages=(
   # command line, reports, the Python module, packages
   libcli11-dev nlohmann-json3-dev pybind11-dev python3-dev dpkg-dev file
   # tests: other programs that read what covol writes
-  catch2 libopenvdb-tools python3 python3-openvdb python3-numpy python3-tifffile
+  catch2 libopenvdb-tools libnanovdb-tools python3-vtk9 python3-meshio python3 python3-openvdb python3-numpy python3-tifffile
   python3-nibabel python3-pydicom python3-zarr python3-numcodecs python3-h5py python3-pil
   python3-pytest python3-yaml pkgconf lintian groff-base man-db fish zsh
   "$@"

@@ -9,15 +9,26 @@
 
 namespace covol {
 
+/// How the values of a .vdb file are packed. Blosc is the fastest and what OpenVDB's own programs write; a reader that
+/// was built without it fails on such a file, or crashes. Zip is for grids that are neither level sets nor fog volumes:
+/// those OpenVDB then leaves as they are.
+enum class VdbCompression { None, Zip, Blosc };
+
 struct WriteVdbOptions {
     bool half = false;                            ///< values as 16-bit floats
     std::map<std::string, std::string> metadata;  ///< provenance, stored in the file and on every grid
+    VdbCompression compression = VdbCompression::Blosc;
 };
 
 /// Writes the grids in order, with statistics metadata and creator "covol VERSION".
 /// Whole or not at all. @throws Error Io, InvalidInput (names empty or not unique).
 COVOL_API void write_vdb(const std::string& path, const std::vector<FloatGridPtr>& grids,
                          const WriteVdbOptions& options = {});
+
+/// NanoVDB, for viewers and GPUs: the same grids, values as floats, without compression and without the metadata that
+/// `options` and grids hold; only the name, class, transform and values of a grid are kept, and nothing here reads it.
+/// Whole or not at all. @throws Error as write_vdb; Unsupported (covol was built without NanoVDB's headers).
+COVOL_API void write_nvdb(const std::string& path, const std::vector<FloatGridPtr>& grids);
 
 /// A grid as people name it, "FILE.vdb:name".
 struct VdbGridName {
@@ -42,6 +53,7 @@ struct VdbGridInfo {
     std::uint64_t active_voxels = 0;
     Index3 min{}, max{};
     std::map<std::string, std::string> metadata;
+    std::string compression;  ///< "none", "zip" or "blosc"
 };
 /// All grids, or the one in the path ("FILE.vdb:name"). @throws as read_vdb.
 [[nodiscard]] COVOL_API std::vector<VdbGridInfo> list_vdb(const std::string& path);

@@ -17,6 +17,7 @@
 #include "base/file.h"
 #include "covol/error.h"
 #include "covol/version.h"
+#include "io/nanovdb.h"
 
 namespace covol {
 namespace {
@@ -101,6 +102,9 @@ public:
         entry.empty_grid->readTransform(stream_);
         return entry.empty_grid;
     }
+
+    /// Of the grid that was read last. @return OpenVDB's flags
+    [[nodiscard]] std::uint32_t grid_compression() { return vdb::io::getDataCompression(stream_); }
 
     vdb::GridBase::Ptr read_whole(std::size_t n) {
         const Entry& entry = entries_[n];
@@ -188,15 +192,15 @@ std::string list_grids(const Reader& reader) {
     return list.empty() ? "no grid at all" : list;
 }
 
-void check_grids(const std::string& path, const std::vector<FloatGridPtr>& grids) {
+void check_grids(const std::string& function, const std::string& path, const std::vector<FloatGridPtr>& grids) {
     std::set<std::string> names;
     for (const FloatGridPtr& grid : grids) {
-        if (!grid) throw Error(Errc::InvalidInput, "write_vdb: " + path + ": expected a grid, got a null pointer");
+        if (!grid) throw Error(Errc::InvalidInput, function + ": " + path + ": expected a grid, got a null pointer");
         if (grid->getName().empty())
-            throw Error(Errc::InvalidInput, "write_vdb: " + path + ": expected a name for every grid, got none");
+            throw Error(Errc::InvalidInput, function + ": " + path + ": expected a name for every grid, got none");
         if (!names.insert(grid->getName()).second)
             throw Error(Errc::InvalidInput,
-                        "write_vdb: " + path + ": expected unique names, got '" + grid->getName() + "' twice");
+                        function + ": " + path + ": expected unique names, got '" + grid->getName() + "' twice");
     }
 }
 
@@ -243,6 +247,20 @@ void make_repeatable(const std::string& path) {
     if (!file) OPENVDB_THROW(vdb::IoError, "cannot be written");
 }
 
+std::uint32_t flags_of(VdbCompression compression) {
+    switch (compression) {
+        case VdbCompression::None: return vdb::io::COMPRESS_NONE;
+        case VdbCompression::Zip: return vdb::io::COMPRESS_ZIP;
+        case VdbCompression::Blosc: break;
+    }
+    return vdb::io::COMPRESS_BLOSC;
+}
+
+const char* name_of(std::uint32_t flags) {
+    if ((flags & vdb::io::COMPRESS_BLOSC) != 0) return "blosc";
+    return (flags & vdb::io::COMPRESS_ZIP) != 0 ? "zip" : "none";
+}
+
 VdbGridInfo describe(Reader& reader, std::size_t n) {
     vdb::GridBase::Ptr grid = reader.read_metadata(n);
     const char* const kCount = vdb::GridBase::META_FILE_VOXEL_COUNT;
@@ -254,6 +272,7 @@ VdbGridInfo describe(Reader& reader, std::size_t n) {
     };
     VdbGridInfo info;
     info.metadata = to_text(*grid);
+    info.compression = name_of(reader.grid_compression());
     if (!has_statistics()) {
         grid = reader.read_whole(n);
         grid->addStatsMetadata();
@@ -276,7 +295,7 @@ VdbGridInfo describe(Reader& reader, std::size_t n) {
 }  // namespace
 
 void write_vdb(const std::string& path, const std::vector<FloatGridPtr>& grids, const WriteVdbOptions& options) {
-    check_grids(path, grids);
+    check_grids("write_vdb", path, grids);
     vdb::initialize();
     const auto add_provenance = [&](vdb::MetaMap& metadata) {
         for (const auto& [key, value] : options.metadata) metadata.insertMeta(key, vdb::StringMetadata(value));
@@ -294,12 +313,20 @@ void write_vdb(const std::string& path, const std::vector<FloatGridPtr>& grids, 
     detail::write_atomically(path, [&](const std::string& temporary) {
         with_openvdb(Errc::Io, "write_vdb: " + path + ": cannot write", [&] {
             vdb::io::File file(temporary);
-            file.setCompression(vdb::io::COMPRESS_BLOSC | vdb::io::COMPRESS_ACTIVE_MASK);
+            file.setCompression(flags_of(options.compression) | vdb::io::COMPRESS_ACTIVE_MASK);
             file.setGridStatsMetadataEnabled(true);
             file.write(copies, file_metadata);
             file.close();
             make_repeatable(temporary);
         });
+    });
+}
+
+void write_nvdb(const std::string& path, const std::vector<FloatGridPtr>& grids) {
+    check_grids("write_nvdb", path, grids);
+    detail::write_atomically(path, [&](const std::string& temporary) {
+        with_openvdb(Errc::Io, "write_nvdb: " + path + ": cannot write",
+                     [&] { detail::write_nanovdb(temporary, path, grids); });
     });
 }
 

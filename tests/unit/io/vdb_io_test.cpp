@@ -175,3 +175,42 @@ TEST_CASE("damaged .vdb files end in an Error, never in a crash") {
         60, 1500);
     CHECK(counts.truncated_accepted == 0);
 }
+
+TEST_CASE("every compression gives the same grid, and a listing names it") {
+    const Scratch scratch;
+    const FloatGridPtr level_set = sphere("surface"), other = sphere("u", 1.5F);
+    other->setGridClass(openvdb::GRID_UNKNOWN);
+    const auto names_of = [&](VdbCompression compression) {
+        const std::string path = scratch.path("packed.vdb");
+        write_vdb(path, {level_set, other}, {false, {}, compression});
+        CHECK(same_tree(*read_vdb(path, "surface"), *level_set));
+        CHECK(same_tree(*read_vdb(path, "u"), *other));
+        const std::vector<VdbGridInfo> list = list_vdb(path);
+        REQUIRE(list.size() == 2);
+        return std::vector<std::string>{list[0].compression, list[1].compression};
+    };
+    CHECK(names_of(VdbCompression::None) == std::vector<std::string>{"none", "none"});
+    // OpenVDB leaves level sets as they are under zip.
+    CHECK(names_of(VdbCompression::Zip) == std::vector<std::string>{"none", "zip"});
+    CHECK(names_of(VdbCompression::Blosc) == std::vector<std::string>{"blosc", "blosc"});
+}
+
+TEST_CASE("a file of NanoVDB is whole or not there") {
+    const Scratch scratch;
+    const std::string path = scratch.path("a.nvdb");
+    CHECK_THROWS_AS(write_nvdb(path, {sphere("a"), sphere("a")}), Error);
+    CHECK(scratch.file_count() == 0);
+    try {
+        write_nvdb(path, {sphere("surface"), sphere("u", 1.5F)});
+    } catch (const Error& error) {  // built without NanoVDB's headers
+        CHECK(error.code() == Errc::Unsupported);
+        CHECK(scratch.file_count() == 0);
+        return;
+    }
+    CHECK(scratch.file_count() == 1);
+    std::ifstream file(path, std::ios::binary);
+    std::string magic(8, '\0');
+    file.read(magic.data(), 8);
+    CHECK(magic == "NanoVDB0");
+    CHECK_THROWS_AS(write_nvdb(scratch.path("none/a.nvdb"), {sphere("a")}), Error);
+}

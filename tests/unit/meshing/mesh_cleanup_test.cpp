@@ -182,3 +182,20 @@ TEST_CASE("options out of range are refused") {
     CHECK_THAT(options.why_invalid(), Catch::Contains("target_edge") && Catch::Contains("smooth_iterations"));
     CHECK_THROWS_AS(clean_mesh(mesh, options), Error);
 }
+
+TEST_CASE("a wall is as thick as the solid between two faces") {
+    // A slab of 4 x 4 x 0.25, its large faces in two triangles each.
+    TriangleMesh slab;
+    for (const float z : {0.0F, 0.25F})
+        for (const float y : {0.0F, 4.0F})
+            for (const float x : {0.0F, 4.0F}) slab.vertices.push_back({x, y, z});
+    slab.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                      {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+    REQUIRE(measure(slab).volume == Approx(4));
+    CHECK(measure_wall(slab) == Approx(0.25));
+    CHECK(measure_wall({}) < 0);
+    // One triangle alone has nothing opposite.
+    TriangleMesh open = slab;
+    open.triangles.resize(1);
+    CHECK(measure_wall(open) < 0);
+}

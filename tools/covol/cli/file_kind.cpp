@@ -51,6 +51,8 @@ bool holds_triangles(const std::string& path) {
 FileKind kind_of_file(const std::string& path) {
     const std::string end = ending_of(split_grid_name(path).path);
     if (end == ".vdb") return FileKind::Vdb;
+    if (end == ".nvdb")
+        throw Error(Errc::Unsupported, path + ": NanoVDB files are for viewers and are not read; keep the .vdb");
     if (is_one_of(end, kPointEndings) || end == ".laz")
         return FileKind::Points;  // that LAZ is not read, its reader says
     if (is_one_of(end, kMeshEndings)) return FileKind::Mesh;
@@ -60,12 +62,14 @@ FileKind kind_of_file(const std::string& path) {
 
 FileKind kind_of_output(const std::string& path, FileKind like) {
     const std::string end = ending_of(path);
-    if (end == ".vdb") return FileKind::Vdb;
+    if (end == ".vdb" || end == ".nvdb") return FileKind::Vdb;
     if (is_one_of(end, kPointEndings)) return FileKind::Points;
     if (is_one_of(end, kMeshEndings)) return FileKind::Mesh;
     if (is_one_of(end, kSharedEndings)) return like == FileKind::Points ? FileKind::Points : FileKind::Mesh;
     return FileKind::Image;
 }
+
+bool is_nanovdb_name(const std::string& path) { return ending_of(path) == ".nvdb"; }
 
 bool is_image_name(const std::string& path) {
     try {

@@ -15,6 +15,9 @@ enum class FileKind { Vdb, Image, Mesh, Points };
 /// What write_image() writes.
 [[nodiscard]] bool is_image_name(const std::string& path);
 
+/// .nvdb: written for viewers, never read.
+[[nodiscard]] bool is_nanovdb_name(const std::string& path);
+
 /// 3D Slicer's segmentations, whose label values have names.
 [[nodiscard]] bool is_segmentation_name(const std::string& path);
 

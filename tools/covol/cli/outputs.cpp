@@ -31,11 +31,13 @@ void check_extension(const std::string& path, const std::vector<std::string>& kn
 void check_ending(const std::string& path, OutputKind kind) {
     switch (kind) {
         case OutputKind::Vdb: return check_extension(path, {".vdb"});
+        case OutputKind::NanoVdb: return check_extension(path, {".nvdb"});
         case OutputKind::Image: return check_image_extension(path);
         case OutputKind::Mesh: return check_mesh_extension(path);
         case OutputKind::Points: return check_extension(path, {".xyz", ".csv", ".ply"});
         case OutputKind::Picture: return check_extension(path, {".png"});
         case OutputKind::Page: return check_extension(path, {".html", ".htm"});
+        case OutputKind::Scene: return check_extension(path, {".usda"});
         case OutputKind::Table: return check_extension(path, {".csv"});
         case OutputKind::Text: return;
     }

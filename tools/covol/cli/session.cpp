@@ -11,7 +11,6 @@
 #include "cli/option_names.h"
 #include "cli/profile.h"
 #include "covol/error.h"
-#include "covol/vdb_io.h"
 #include "covol/version.h"
 
 namespace covol::tool {
@@ -218,8 +217,8 @@ CLI::App* Session::add_command(const std::string& name, const std::string& descr
     return command;
 }
 
-void Session::add_grid(const std::string& path, const FloatGridPtr& grid, bool half) {
-    const WriteVdbOptions options{half, metadata()};
+void Session::add_grid(const std::string& path, const FloatGridPtr& grid, WriteVdbOptions options) {
+    options.metadata = metadata();
     outputs_.add(path, [grid, options](const std::string& to) { write_vdb(to, {grid}, options); });
 }
 

@@ -20,6 +20,7 @@
 #include "covol/fwd.h"
 #include "covol/image.h"
 #include "covol/run.h"
+#include "covol/vdb_io.h"
 
 namespace covol::tool {
 
@@ -72,8 +73,8 @@ public:
     // For the bodies of subcommands.
     [[nodiscard]] const RunContext& run() const noexcept { return run_; }
     [[nodiscard]] Outputs& outputs() noexcept { return outputs_; }
-    /// Queues a .vdb file with one grid and the provenance. @param half  values as 16-bit floats
-    void add_grid(const std::string& path, const FloatGridPtr& grid, bool half);
+    /// Queues a .vdb file with one grid; the provenance comes on top of the options.
+    void add_grid(const std::string& path, const FloatGridPtr& grid, WriteVdbOptions options);
     /// The report that --json writes.
     [[nodiscard]] Json& report() noexcept { return report_; }
     [[nodiscard]] const Json& report() const noexcept { return report_; }

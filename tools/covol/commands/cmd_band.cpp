@@ -4,6 +4,7 @@
 #include "covol/error.h"
 #include "covol/vdb_io.h"
 #include "flags/bindings.h"
+#include "flags/vdb_flags.h"
 
 namespace covol::tool {
 namespace {
@@ -12,7 +13,7 @@ struct BandJob {
     std::string distance_path, output;
     PointFlags points;
     TagFlags tag;
-    bool half = false;
+    VdbFlags vdb;
 
     double choose_distance(const Domain& domain, Session& session) const {
         if (tag.tag_distance.given) return tag.tag_distance.resolve(domain.voxel_size, 0);
@@ -38,7 +39,7 @@ struct BandJob {
         session.note(std::to_string(result.report.active_voxels) + " active voxels, encloses " +
                      std::to_string(result.report.enclosed_volume));
         if (result.report.leaks) session.warn(result.report.leak());
-        session.add_grid(output, result.grid, half);
+        session.add_grid(output, result.grid, vdb.options);
     }
 };
 
@@ -55,8 +56,7 @@ void add_band(Session& session) {
     command->add_option("-o,--output", job->output, "the grid 'band', .vdb")->required()->type_name("OUT.vdb");
     job->tag.bind(*command);
     job->points.bind(*command, "--points");
-    in_group(*command, Group::Output);
-    command->add_flag("--half", job->half, "store values as 16-bit floats");
+    job->vdb.bind(*command);
     session.help().show_first(*command, {"--points", "--tag-distance", "--exterior-seed"});
 }
 

@@ -11,6 +11,7 @@
 #include "covol/surface.h"
 #include "covol/vdb_io.h"
 #include "flags/bindings.h"
+#include "jobs/program_rules.h"
 
 namespace covol::tool {
 namespace {
@@ -23,24 +24,39 @@ constexpr double kFarPoint = 20;       // a nearest neighbour this many medians 
 /// What would go wrong with a file elsewhere. Problems fail the check, remarks do not.
 class Findings {
 public:
-    explicit Findings(Session& session) : session_(session) { session.report()["findings"] = Json::array(); }
+    Findings(Session& session, Program program) : facts{}, session_(session), program_(program) {
+        session.report()["findings"] = Json::array();
+    }
+    FileFacts facts;  ///< for the rules of one program
+    [[nodiscard]] Program program() const { return program_; }
+    /// What a remark on programs in general would say, the rules of one say better.
+    [[nodiscard]] bool in_general() const { return program_ == Program::Any; }
     void problem(const std::string& text) {
         add("problem", text);
         ++problems_;
     }
     void remark(const std::string& text) { add("remark", text); }
+    void advise(const Advice& advice) {
+        add(advice.is_problem ? "problem" : "remark", advice.text, advice.mend);
+        if (advice.is_problem) ++problems_;
+    }
     [[nodiscard]] int problems() const { return problems_; }
 
 private:
-    void add(const char* severity, const std::string& text) {
-        session_.say(std::string(severity) + ": " + text);
-        session_.report()["findings"].push_back({{"severity", severity}, {"text", text}});
+    void add(const char* severity, const std::string& text, const std::string& mend = {}) {
+        session_.say(std::string(severity) + ": " + text + (mend.empty() ? "" : "; " + mend));
+        Json finding{{"severity", severity}, {"text", text}};
+        if (!mend.empty()) finding["mend"] = mend;
+        session_.report()["findings"].push_back(finding);
     }
     Session& session_;
+    Program program_;
     int problems_ = 0;
 };
 
 void check_extent(double extent, const std::string& what, Findings& findings) {
+    findings.facts.extent = std::max(findings.facts.extent, extent);
+    if (!findings.in_general()) return;
     if (extent > kLargeScene)
         findings.remark(what + " is " + std::to_string(extent) +
                         " units wide: Blender and Houdini take a unit for a metre and clip it; write meshes with "
@@ -53,7 +69,10 @@ void check_extent(double extent, const std::string& what, Findings& findings) {
 
 void check_measures(const TriangleMesh& mesh, const std::string& what, Findings& findings) {
     const MeshMeasures m = measure(mesh);
-    if (!m.closed) findings.problem(what + " is not closed: printing, volumes and Boolean operations fail");
+    findings.facts.is_closed = m.closed;
+    // Its rule says what mends it.
+    if (!m.closed && findings.program() != Program::Print)
+        findings.problem(what + " is not closed: printing, volumes and Boolean operations fail");
     if (!m.manifold) findings.problem(what + " is not manifold: subdivision and simulation fail");
     if (m.closed && m.volume < 0) findings.problem(what + " is inside out: normals point inward");
     if (m.components > 1) findings.remark(what + " has " + std::to_string(m.components) + " pieces");
@@ -65,9 +84,10 @@ bool is_identifier(const std::string& name) {
 }
 
 void check_level_set(const std::string& path, const VdbGridInfo& info, const RunContext& run, Findings& findings) {
-    findings.remark(
-        "grid '" + info.name +
-        "' is a level set: to render it as a volume, write a fog volume (--density) and give the renderer that");
+    if (findings.in_general())
+        findings.remark(
+            "grid '" + info.name +
+            "' is a level set: to render it as a volume, write a fog volume (--density) and give the renderer that");
     const FloatGridPtr grid = read_vdb(path, info.name);
     try {
         check_measures(extract_mesh(*grid, {}, run), "the surface of grid '" + info.name + "'", findings);
@@ -92,6 +112,11 @@ void check_grid(const std::string& path, const VdbGridInfo& g, const RunContext&
     for (const auto& [key, value] : g.metadata)
         if (key == "creator" && value.starts_with("Houdini"))
             findings.remark(what + ": its creator is Houdini: importers may turn its axes");
+    FileFacts& facts = findings.facts;
+    facts.has_level_set = facts.has_level_set || g.grid_class == "level set";
+    facts.has_density = facts.has_density || (g.name == "density" && g.grid_class == "fog volume");
+    facts.has_blosc = facts.has_blosc || g.compression == "blosc";
+    facts.voxel_size = g.voxel_size;
     double extent = 0;
     for (int a = 0; a < 3; ++a) extent = std::max(extent, (double(g.max[a]) - g.min[a] + 1) * g.voxel_size);
     check_extent(extent, what, findings);
@@ -108,10 +133,24 @@ void check_vdb(const std::string& path, const RunContext& run, Findings& finding
     }
 }
 
+/// Whether an image is labels that ImageJ would show black.
+bool has_display_range(const std::string& path, const FileFacts& facts, double most) {
+    constexpr double kLabels = 32;  // grey values of an image reach further
+    return facts.format != "ImageJ TIFF" || most > kLabels || header_holds(path, "\nmax=");
+}
+
 void check_image(const std::string& path, const ImageFlags& flags, const RunContext& run, Findings& findings) {
     const Image image = flags.read(path, run);
     const ImageGeometry& g = image.geometry();
     const auto range = image.range();
+    FileFacts& facts = findings.facts;
+    facts.unit = g.unit;
+    facts.has_spacing = g.spacing_known;
+    facts.is_rotated = !g.is_axis_aligned();
+    facts.format = read_image_info(path, flags.options, run).format;
+    facts.has_segments = header_holds(path, "Segment0_ID");
+    facts.is_big_tiff = header_holds(path, std::string("II+\0", 4)) || header_holds(path, std::string("MM\0+", 4));
+    facts.has_display_range = has_display_range(path, facts, range[1]);
     const std::optional<ChunkCount> chunks = image.chunks();
     const bool is_sample = chunks && chunks->read < chunks->total;
     if (is_sample)
@@ -132,14 +171,19 @@ void check_image(const std::string& path, const ImageFlags& flags, const RunCont
         findings.remark("the image is rotated: TIFF cannot keep that, NRRD, NIfTI and MetaImage can");
 }
 
-void check_mesh_file(const std::string& path, Findings& findings) {
+void check_mesh_file(const std::string& path, const RunContext& run, Findings& findings) {
     const TriangleMesh mesh = read_mesh(path);
+    const std::string unit = word_in_header(path, "covol_unit");
+    if (unit != "not") findings.facts.unit = unit;  // "not stated"
     check_measures(mesh, "the mesh", findings);
     // Objects of one file are solids of their own: those that share a border touch.
     const Crossings crossings = count_crossings(mesh);
     const bool apart = holds_several_meshes(path);
     const int own = crossings.within + (apart ? 0 : crossings.between);
-    if (own > 0) findings.problem("the mesh has " + std::to_string(own) + " self-intersections");
+    findings.facts.crossings = own;
+    if (findings.program() == Program::Print) findings.facts.wall = measure_wall(mesh, run);
+    if (own > 0 && findings.program() != Program::Print)
+        findings.problem("the mesh has " + std::to_string(own) + " self-intersections");
     if (apart && crossings.between > 0)
         findings.remark("triangles of different pieces meet " + std::to_string(crossings.between) +
                         " times: solids that touch or overlap; to make one of them, join them by a Boolean union");
@@ -174,16 +218,20 @@ void check_points(const std::string& path, const std::string& image_path, const 
     }
 }
 
-void check(const std::string& path, const std::string& image_path, const ImageFlags& flags, Session& session) {
-    Findings findings(session);
+void check(const std::string& path, Program program, const std::string& image_path, const ImageFlags& flags,
+           Session& session) {
+    Findings findings(session, program);
     const FileKind kind = kind_of_file(path);
+    findings.facts.kind = kind;
+    findings.facts.ending = long_ending(split_grid_name(path).path);
     session.report()["kind"] = to_string(kind);
     switch (kind) {
         case FileKind::Vdb: check_vdb(path, session.run(), findings); break;
         case FileKind::Image: check_image(path, flags, session.run(), findings); break;
-        case FileKind::Mesh: check_mesh_file(path, findings); break;
+        case FileKind::Mesh: check_mesh_file(path, session.run(), findings); break;
         case FileKind::Points: check_points(path, image_path, flags, session.run(), findings); break;
     }
+    for (const Advice& advice : advice_for(program, findings.facts)) findings.advise(advice);
     session.report()["problems"] = findings.problems();
     session.say(path + ": " +
                 (findings.problems() == 0 ? "no problem" : std::to_string(findings.problems()) + " problem(s)"));
@@ -196,13 +244,21 @@ void add_check(Session& session) {
     const auto path = std::make_shared<std::string>();
     const auto image = std::make_shared<std::string>();
     const auto flags = std::make_shared<ImageFlags>();
+    const auto program = std::make_shared<Program>(Program::Any);
     CLI::App* command =
         session.add_command("check", "What would go wrong with a file in Blender, Houdini, Slicer or covol",
-                            [path, image, flags, &session] { check(*path, *image, *flags, session); });
+                            [=, &session] { check(*path, *program, *image, *flags, session); });
     in_group(*command, Group::Input);
     command->add_option("file", *path, ".vdb, image, mesh or points; exit code 3 when there is a problem")
         ->required()
         ->type_name("FILE");
+    add_choice(*command, "--for", *program,
+               {{"blender", Program::Blender},
+                {"houdini", Program::Houdini},
+                {"slicer", Program::Slicer},
+                {"fiji", Program::Fiji},
+                {"print", Program::Print}},
+               "what goes wrong in this program or in 3D printing, and what mends it [no program in particular]");
     command->add_option("--image", *image, "points: the image that they belong to")->type_name("IMAGE");
     flags->bind(*command);
 }

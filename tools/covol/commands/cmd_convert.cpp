@@ -7,6 +7,7 @@
 #include "covol/vdb_io.h"
 #include "flags/bindings.h"
 #include "flags/cloud_flags.h"
+#include "flags/vdb_flags.h"
 #include "jobs/image_grid.h"
 
 namespace covol::tool {
@@ -29,7 +30,7 @@ struct ConvertJob {
     MeshFlags mesh;
     PointFlags points;  ///< its options alone
     CloudFlags cloud_flags;
-    bool half = false;
+    VdbFlags vdb;
 
     void image_to_vdb(Session& session) const {
         const Image pixels = image.read(input, session.run());
@@ -39,7 +40,7 @@ struct ConvertJob {
         const FloatGridPtr grid = to_grid(pixels, h, session.run());
         session.report()["image"] = to_json(pixels.geometry());
         session.report()["grid"] = {{"voxel_size", h}, {"domain", to_json(domain_of(*grid))}};
-        session.add_grid(output, grid, half);
+        session.add_grid(output, grid, vdb.options);
     }
 
     void vdb_to_image(Session& session) const {
@@ -50,6 +51,27 @@ struct ConvertJob {
         session.report()["image"] = to_json(geometry);
         session.outputs().add(
             output, [values, geometry](const std::string& path) { write_image(path, geometry, values->data()); });
+    }
+
+    /// The file's float grids, or the one that is named, packed as the options say.
+    void vdb_to_vdb(Session& session) const {
+        std::vector<FloatGridPtr> grids;
+        const VdbGridName file = split_grid_name(input);
+        const std::string name = grid_name.empty() ? file.grid : grid_name;
+        for (const VdbGridInfo& info : list_vdb(input)) {
+            if (!name.empty() && info.name != name) continue;
+            if (is_float_grid(info))
+                grids.push_back(read_vdb(file.path, info.name));
+            else
+                session.warn(input + ": grid '" + info.name + "' holds " + info.type + ", and is left out");
+        }
+        if (grids.empty()) grids.push_back(read_vdb(file.path, name));  // says which there are
+        session.set_world(*grids.front());
+        if (is_nanovdb_name(output))
+            return session.outputs().add(output, [grids](const std::string& path) { write_nvdb(path, grids); });
+        session.outputs().add(output, [grids, write = vdb.options](const std::string& path) {
+            write_vdb(path, grids, write);  // their provenance stays
+        });
     }
 
     void convert_points(Session& session) const {
@@ -82,25 +104,26 @@ struct ConvertJob {
     void run(Session& session) const {
         const FileKind from = kind_of_file(input);
         const FileKind to = kind_of_output(output, from);
-        session.outputs().check("OUT", output, output_kind(to));
+        session.outputs().check("OUT", output, is_nanovdb_name(output) ? OutputKind::NanoVdb : output_kind(to));
         mesh.check();
         cloud_flags.check();
         if (from == FileKind::Image && to == FileKind::Vdb) return image_to_vdb(session);
         if (from == FileKind::Vdb && to == FileKind::Image) return vdb_to_image(session);
+        if (from == FileKind::Vdb && to == FileKind::Vdb) return vdb_to_vdb(session);
         if (from == FileKind::Points && to == FileKind::Points) return convert_points(session);
         if (from == FileKind::Mesh && to == FileKind::Mesh) return convert_mesh(session);
         throw Error(Errc::Unsupported, std::string("convert: ") + input + " holds " + to_string(from) + ", " + output +
                                            " would hold " + to_string(to) +
-                                           ": expected image and .vdb, points and points, or mesh and mesh; see also "
-                                           "covol mesh, mask and segment --init");
+                                           ": expected image and .vdb, .vdb and .vdb or .nvdb, points and points, or "
+                                           "mesh and mesh; see also covol mesh, mask and segment --init");
     }
 };
 
 }  // namespace
 
 void add_convert(Session& session) {
-    const auto [job, command] =
-        session.add_job<ConvertJob>("convert", "Image to .vdb and back, points to points, mesh to mesh");
+    const auto [job, command] = session.add_job<ConvertJob>(
+        "convert", "Image to .vdb and back, .vdb to .vdb or .nvdb, points to points, mesh to mesh");
     in_group(*command, Group::Input);
     command->add_option("input", job->input, "the file to read")->required()->type_name("IN");
     in_group(*command, Group::Output);
@@ -115,8 +138,7 @@ void add_convert(Session& session) {
     job->cloud_flags.bind(*command, false);
     job->mesh.bind(*command);
     job->image.bind(*command);
-    in_group(*command, Group::Output);
-    command->add_flag("--half", job->half, "store values as 16-bit floats");
+    job->vdb.bind(*command);
     session.help().show_first(*command, {"--like", "--grid", "--voxel-size", "--remove-outliers", "--simplify",
                                          "--smooth", "--up", "--unit-scale", "--channel", "--frame"});
 }

@@ -3,6 +3,7 @@
 #include "covol/distance.h"
 #include "covol/error.h"
 #include "flags/bindings.h"
+#include "flags/vdb_flags.h"
 
 namespace covol::tool {
 namespace {
@@ -15,7 +16,7 @@ struct DistanceJob {
     ImageFlags image;
     Length max_distance;
     std::string like, output;
-    bool half = false;
+    VdbFlags vdb;
 
     Domain choose_domain(const ImageGeometry* geometry, const std::vector<Vec3>& cloud, double h, double radius) const {
         std::optional<WorldBox> whole;
@@ -51,7 +52,7 @@ struct DistanceJob {
             {"voxel_size", h}, {"active_voxels", result.report.active_voxels}, {"domain", to_json(box)}};
         session.report()["distance"] = {{"max_distance", radius}, {"rounds", result.report.rounds}};
         session.note(std::to_string(result.report.active_voxels) + " active voxels");
-        session.add_grid(output, result.grid, half);
+        session.add_grid(output, result.grid, vdb.options);
     }
 };
 
@@ -68,8 +69,7 @@ void add_distance(Session& session) {
     command->add_option("--like", job->like, "image whose box is the domain [the points' box]")->type_name("IMAGE");
     job->domain.bind(*command, true);
     job->image.bind(*command, false);
-    in_group(*command, Group::Output);
-    command->add_flag("--half", job->half, "store values as 16-bit floats");
+    job->vdb.bind(*command);
     session.help().show_first(*command, {"--max-distance", "--like", "--voxel-size", "--roi"});
 }
 

@@ -3,6 +3,7 @@
 #include "covol/edge.h"
 #include "covol/vdb_io.h"
 #include "flags/bindings.h"
+#include "flags/vdb_flags.h"
 
 namespace covol::tool {
 namespace {
@@ -11,7 +12,7 @@ struct EdgeJob {
     std::string image_path, band_path, output;
     ImageFlags image;
     EdgeFlags edge_flags;
-    bool half = false;
+    VdbFlags vdb;
 
     void run(Session& session) const {
         session.outputs().check("-o", output, OutputKind::Vdb);
@@ -29,7 +30,7 @@ struct EdgeJob {
         session.report()["edge"] = to_json(result.report);
         session.note("K = " + std::to_string(result.report.edge_k) + ": g = 1/2 at a gradient of " +
                      std::to_string(result.report.edge_contrast));
-        session.add_grid(output, result.grid, half);
+        session.add_grid(output, result.grid, vdb.options);
     }
 };
 
@@ -46,8 +47,7 @@ void add_edge(Session& session) {
     command->add_option("-o,--output", job->output, "the grid 'edge', .vdb")->required()->type_name("OUT.vdb");
     job->edge_flags.bind(*command, true);
     job->image.bind(*command, false);
-    in_group(*command, Group::Output);
-    command->add_flag("--half", job->half, "store values as 16-bit floats");
+    job->vdb.bind(*command);
 }
 
 }  // namespace covol::tool

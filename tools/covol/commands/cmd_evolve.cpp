@@ -6,6 +6,7 @@
 #include "covol/evolve.h"
 #include "covol/vdb_io.h"
 #include "flags/bindings.h"
+#include "flags/vdb_flags.h"
 
 namespace covol::tool {
 namespace {
@@ -13,7 +14,7 @@ namespace {
 struct EvolveJob {
     std::string band_path, distance_path, edge_path, output;
     EvolveFlags flags;
-    bool half = false;
+    VdbFlags vdb;
 
     /// A field that is not given has no weight.
     EvolveOptions resolve(double h, Session& session) const {
@@ -52,7 +53,7 @@ struct EvolveJob {
         if (result.stop_reason == StopReason::MaxSteps)
             session.warn("not steady after " + std::to_string(result.steps) + " steps");
         if (flags.strict && result.stop_reason != StopReason::Steady) session.set_exit_code(kNotSteady);
-        session.add_grid(output, u, half);
+        session.add_grid(output, u, vdb.options);
     }
 };
 
@@ -72,8 +73,7 @@ void add_evolve(Session& session) {
     command->add_option("--edge", job->edge_path, "what `covol edge` wrote")->type_name("EDGE.vdb");
     job->flags.bind(*command, true, true);
     command->add_flag("--follow", job->flags.options.follow, "the band follows the surface");
-    in_group(*command, Group::Output);
-    command->add_flag("--half", job->half, "store values as 16-bit floats");
+    job->vdb.bind(*command);
     session.help().show_first(*command, {"--distance", "--edge", "--theta", "--rho", "--delta", "--tau",
                                          "--attraction-range", "--max-steps", "--tolerance", "--follow"});
 }

@@ -3,27 +3,33 @@
 #include "covol/surface.h"
 #include "covol/vdb_io.h"
 #include "flags/bindings.h"
+#include "flags/vdb_flags.h"
 
 namespace covol::tool {
 namespace {
 
 struct SurfaceJob {
     std::string input, output, density_path;
-    bool half = false;
+    VdbFlags vdb;
 
     void run(Session& session) const {
         session.outputs().check("-o", output, OutputKind::Vdb);
-        session.outputs().check("--density", density_path, OutputKind::Vdb);
+        const bool in_one = density_path == output;
+        if (!in_one) session.outputs().check("--density", density_path, OutputKind::Vdb);
         const FloatGridPtr u = read_vdb(input);
         session.set_world(*u);
         const Stopwatch watch;
         const FloatGridPtr level_set = extract_surface(*u, session.run());
         session.add_seconds("surface", watch.seconds());
         session.report()["grid"] = {{"voxel_size", domain_of(*level_set).voxel_size}};
-        const WriteVdbOptions vdb{half, session.metadata()};
-        session.outputs().add(output, [=](const std::string& path) { write_vdb(path, {level_set}, vdb); });
+        const WriteVdbOptions write = vdb.with(session.metadata());
+        session.outputs().add(output, [=](const std::string& path) {
+            if (in_one) return write_vdb(path, {to_fog_volume(*level_set), level_set}, write);
+            write_vdb(path, {level_set}, write);
+        });
+        if (in_one) return;
         session.outputs().add(density_path,
-                              [=](const std::string& path) { write_vdb(path, {to_fog_volume(*level_set)}, vdb); });
+                              [=](const std::string& path) { write_vdb(path, {to_fog_volume(*level_set)}, write); });
     }
 };
 
@@ -36,8 +42,8 @@ void add_surface(Session& session) {
     command->add_option("u", job->input, "what `covol evolve` wrote")->required()->type_name("U.vdb");
     in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "the grid 'surface', .vdb")->required()->type_name("OUT.vdb");
-    command->add_option("--density", job->density_path, "the solid as a fog volume, 0 to 1")->type_name("OUT.vdb");
-    command->add_flag("--half", job->half, "store values as 16-bit floats");
+    command->add_option("--density", job->density_path, kDensityHelp)->type_name("OUT.vdb");
+    job->vdb.bind(*command);
 }
 
 }  // namespace covol::tool

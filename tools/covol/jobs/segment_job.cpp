@@ -109,7 +109,11 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
     }
     command.add_option("--mesh", mesh_path, "the surface as closed, manifold, outward triangles")
         ->type_name("OUT.ply|.obj|.stl|.off|.glb");
-    command.add_option("--density", density_path, "the solid as a fog volume, 0 to 1")->type_name("OUT.vdb");
+    command.add_option("--density", density_path, kDensityHelp)->type_name("OUT.vdb");
+    command
+        .add_option("--usda", scene_path,
+                    "a scene in USD's text form that refers to the .vdb files, of a time-lapse frame by frame")
+        ->type_name("OUT.usda");
     command.add_option("--fields", fields_path, "u, and distance and edge where the flow had them")
         ->type_name("OUT.vdb");
     command
@@ -168,8 +172,7 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
     in_group(command, Group::MeshFiles);
     add_length(command, "--min-component", min_component, "",
                "drop pieces of the mesh that are smaller than a cube of this edge");
-    in_group(command, Group::Output);
-    command.add_flag("--half", half, "store values in .vdb files as 16-bit floats");
+    vdb.bind(command);
     mesh.bind(command);
     mesh.bind_plain(command);
     if (with_image) image.bind(command, false, false);

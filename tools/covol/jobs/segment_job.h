@@ -10,6 +10,7 @@
 #include "flags/guess_flags.h"
 #include "flags/painted_flags.h"
 #include "flags/seed_flags.h"
+#include "flags/vdb_flags.h"
 
 namespace covol::tool {
 
@@ -38,8 +39,8 @@ struct SegmentJob {
     EvidenceFlags evidence;
     BrickFlags bricks;
     FrameChoice frames;
-    std::string output, mask_path, mesh_path, density_path, fields_path, table_path, failed_path, page_path;
-    bool half = false;
+    std::string output, mask_path, mesh_path, density_path, fields_path, table_path, failed_path, page_path, scene_path;
+    VdbFlags vdb;
 
     void bind(CLI::App& command, bool with_image);
     /// Time-lapses by run_timelapse(), all else by run_structures(); behind `covol plan` run_plan(), behind `covol

@@ -205,16 +205,6 @@ std::vector<std::string> StructuresOutput::names() const {
     return result;
 }
 
-std::string with_suffix(const std::string& path, const std::string& suffix) {
-    const std::filesystem::path whole(path);
-    std::string name = whole.filename().string();
-    std::size_t dot = name.rfind('.');
-    if (dot == std::string::npos || dot == 0) return path + suffix;
-    for (const char* end : {".nii.gz", ".seg.nrrd", ".ome.zarr", ".ome.tif", ".ome.tiff"})
-        if (name.size() > std::string(end).size() && name.ends_with(end)) dot = name.size() - std::string(end).size();
-    return (whole.parent_path() / name.insert(dot, suffix)).string();
-}
-
 std::vector<int> StructuresOutput::labels() const {
     std::vector<int> result;
     for (const StructureOutput& s : structures) result.push_back(s.label);
@@ -227,14 +217,19 @@ std::vector<Structure> solids(const StructuresOutput& output) {
     return result;
 }
 
-void check_outputs(const SegmentJob& job, const std::vector<StructureInput>& inputs, const std::string& tag,
+bool is_density_in_output(const SegmentJob& job) { return !job.output.empty() && job.density_path == job.output; }
+
+std::string density_name(const StructuresOutput& output, const StructureOutput& structure) {
+    return output.structures.size() > 1 ? "density_" + structure.grid : "density";
+}
+
+void check_outputs(const SegmentJob& job, const std::vector<StructureInput>& inputs, const NameTag& tagged,
                    Outputs& outputs) {
-    const auto tagged = [&](const std::string& path) { return path.empty() ? path : with_suffix(path, tag); };
     outputs.check("-o", tagged(job.output), OutputKind::Vdb);
     outputs.check("--mask", tagged(job.mask_path), OutputKind::Image);
     if (!job.mask_path.empty() && !inputs.front().name.empty() && !keeps_names(job.mask_path))
         outputs.check("--mask", labels_path(tagged(job.mask_path)), OutputKind::Text);
-    outputs.check("--density", tagged(job.density_path), OutputKind::Vdb);
+    if (!is_density_in_output(job)) outputs.check("--density", tagged(job.density_path), OutputKind::Vdb);
     outputs.check("--fields", tagged(job.fields_path), OutputKind::Vdb);
     outputs.check("--report", tagged(job.page_path), OutputKind::Page);
     outputs.check("--keep-failed", tagged(job.failed_path), OutputKind::Vdb);
@@ -247,22 +242,24 @@ void check_outputs(const SegmentJob& job, const std::vector<StructureInput>& inp
         outputs.check("--mesh", with_suffix(mesh, "_" + grid), OutputKind::Mesh);
 }
 
-void hand_over(const SegmentJob& job, const std::shared_ptr<const StructuresOutput>& output, const std::string& tag,
+void hand_over(const SegmentJob& job, const std::shared_ptr<const StructuresOutput>& output, const NameTag& tagged,
                Session& session, const Sink& sink) {
-    const auto tagged = [&](const std::string& path) { return path.empty() ? path : with_suffix(path, tag); };
-    const WriteVdbOptions vdb{job.half, metadata_of(*output, session)};
-    sink(tagged(job.output), [output, vdb](const std::string& file) {
+    const bool in_one = is_density_in_output(job);
+    const WriteVdbOptions vdb = job.vdb.with(metadata_of(*output, session));
+    const auto fogs_of = [output] {
         std::vector<FloatGridPtr> grids;
+        for (const StructureOutput& s : output->structures)
+            grids.push_back(named(to_fog_volume(*s.result.surface), density_name(*output, s)));
+        return grids;
+    };
+    sink(tagged(job.output), [output, vdb, fogs_of, in_one](const std::string& file) {
+        // Fog first: some programs take the first grid, and draw no level set.
+        std::vector<FloatGridPtr> grids = in_one ? fogs_of() : std::vector<FloatGridPtr>{};
         for (const StructureOutput& s : output->structures) grids.push_back(s.result.surface);
         write_vdb(file, grids, vdb);
     });
-    sink(tagged(job.density_path), [output, vdb](const std::string& file) {
-        std::vector<FloatGridPtr> grids;
-        for (const StructureOutput& s : output->structures)
-            grids.push_back(named(to_fog_volume(*s.result.surface),
-                                  output->structures.size() > 1 ? "density_" + s.grid : "density"));
-        write_vdb(file, grids, vdb);
-    });
+    if (!in_one)
+        sink(tagged(job.density_path), [vdb, fogs_of](const std::string& file) { write_vdb(file, fogs_of(), vdb); });
     sink(tagged(job.fields_path), [output, vdb](const std::string& file) { write_vdb(file, fields_of(*output), vdb); });
     hand_over_meshes(job, output, tagged(job.mesh_path), session, sink);
     hand_over_labels(output, tagged(job.mask_path), job.images.empty() ? "" : job.images.front(), session.run(), sink);
@@ -273,7 +270,7 @@ void hand_over(const SegmentJob& job, const std::shared_ptr<const StructuresOutp
         write_text(file, evidence_csv(surfaces));
     });
     // The last one, so that it tells of as much as there is to tell.
-    sink(tagged(job.page_path), [output, &session, title = title_of(job) + tag](const std::string& file) {
+    sink(tagged(job.page_path), [output, &session, title = title_of(job) + tagged.suffix](const std::string& file) {
         write_page(file, *output, title, session);
     });
 }

@@ -8,6 +8,7 @@
 #include "cli/table.h"
 #include "covol/structures.h"
 #include "flags/evidence_flags.h"
+#include "jobs/name_tag.h"
 #include "jobs/segment_job.h"
 #include "jobs/structure_inputs.h"
 
@@ -40,12 +41,16 @@ struct StructuresOutput {
 /// Their surfaces.
 [[nodiscard]] std::vector<Structure> solids(const StructuresOutput& output);
 
-/// One file for each output that was asked for, `tag` ("_t003", say) in front of their endings.
+/// --density has the name of -o: one file holds both kinds of grids.
+[[nodiscard]] bool is_density_in_output(const SegmentJob& job);
+[[nodiscard]] std::string density_name(const StructuresOutput& output, const StructureOutput& structure);
+
+/// One file for each output that was asked for, under its tagged name.
 using Sink = std::function<void(const std::string& path, std::function<void(const std::string& path)> write)>;
-void hand_over(const SegmentJob& job, const std::shared_ptr<const StructuresOutput>& output, const std::string& tag,
+void hand_over(const SegmentJob& job, const std::shared_ptr<const StructuresOutput>& output, const NameTag& tagged,
                Session& session, const Sink& sink);
 /// Checks those names. @throws Error as Outputs::check().
-void check_outputs(const SegmentJob& job, const std::vector<StructureInput>& inputs, const std::string& tag,
+void check_outputs(const SegmentJob& job, const std::vector<StructureInput>& inputs, const NameTag& tagged,
                    Outputs& outputs);
 
 /// {"structures": [...], "overlaps": [...]}, or the fields of the only one that has no name.
@@ -54,8 +59,5 @@ void check_outputs(const SegmentJob& job, const std::vector<StructureInput>& inp
 /// The table's columns for a structure's result, and their values.
 [[nodiscard]] std::vector<std::string> result_columns();
 void add_result(Table& table, const std::string& name, int label, const SegmentReport& report);
-
-/// "out.ply", "_ve" -> "out_ve.ply"; endings of two parts (.nii.gz, .seg.nrrd) stay whole.
-[[nodiscard]] std::string with_suffix(const std::string& path, const std::string& suffix);
 
 }  // namespace covol::tool

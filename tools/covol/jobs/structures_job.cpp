@@ -16,6 +16,7 @@
 #include "jobs/marks.h"
 #include "jobs/page.h"
 #include "jobs/paint_reader.h"
+#include "jobs/usd_scene.h"
 
 namespace covol::tool {
 namespace {
@@ -116,7 +117,7 @@ void keep_failed(const SegmentJob& job, const StructureOutput& s, const SegmentF
     add(failed.edge, "edge");
     std::map<std::string, std::string> metadata = session.metadata();
     metadata["covol_failed"] = failed.what();
-    if (session.outputs().write(path, [&](const std::string& file) { write_vdb(file, grids, {job.half, metadata}); }))
+    if (session.outputs().write(path, [&](const std::string& file) { write_vdb(file, grids, job.vdb.with(metadata)); }))
         session.note("kept " + path);
 }
 
@@ -271,7 +272,8 @@ StructuresOutput segment_structures(const SegmentJob& job, const std::vector<Str
 void run_structures(const SegmentJob& job, Session& session, const Solver& solve) {
     Outputs& outputs = session.outputs();
     const std::vector<StructureInput> inputs = structures_of(job, job.painted.read(session.run()));
-    check_outputs(job, inputs, "", outputs);
+    check_outputs(job, inputs, {}, outputs);
+    check_scene(job, outputs);
     outputs.check("--table", job.table_path, OutputKind::Table);
     job.check_options();
 
@@ -284,8 +286,11 @@ void run_structures(const SegmentJob& job, Session& session, const Solver& solve
         segment_structures(job, inputs, image ? &*image : nullptr, starts, session, session.run(), solve));
     session.report().update(to_json(*output), true);
     if (image) SegmentJob::tell_chunks(*image, session);
-    hand_over(job, output, "", session,
+    hand_over(job, output, {}, session,
               [&](const std::string& path, auto write) { outputs.add(path, std::move(write)); });
+    UsdScene scene;
+    add_to_scene(scene, job, *output, {});
+    write_scene(scene, job, session);
     outputs.add(job.table_path, [output](const std::string& file) {
         Table table(result_columns());
         for (const StructureOutput& s : output->structures)

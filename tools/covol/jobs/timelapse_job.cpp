@@ -1,49 +1,16 @@
 #include "jobs/timelapse_job.h"
 
 #include <algorithm>
-#include <charconv>
 #include <filesystem>
 
 #include "cli/option_names.h"
 #include "covol/error.h"
+#include "jobs/name_tag.h"
 #include "jobs/structures_job.h"
+#include "jobs/usd_scene.h"
 
 namespace covol::tool {
 namespace {
-
-bool parse_int(std::string_view text, int& value) {
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    return error == std::errc() && end == text.data() + text.size() && value >= 0;
-}
-
-/// The {frame...} in a path: where it is and how many digits it asks for.
-struct Placeholder {
-    std::size_t begin = std::string::npos, length = 0;
-    int digits = 0;
-};
-
-Placeholder find_placeholder(const std::string& path) {
-    Placeholder found;
-    const std::size_t begin = path.find("{frame");
-    const std::size_t end = begin == std::string::npos ? begin : path.find('}', begin);
-    if (end == std::string::npos) return found;
-    std::string width = path.substr(begin + 6, end - begin - 6);
-    if (!width.empty()) {
-        if (width.back() == 'd') width.pop_back();
-        if (width.size() < 2 || width[0] != ':' || !parse_int(std::string_view(width).substr(1), found.digits) ||
-            found.digits > 9)
-            throw UsageError(path + ": expected {frame} or {frame:03d}, got " + path.substr(begin, end - begin + 1));
-    }
-    found.begin = begin;
-    found.length = end - begin + 1;
-    return found;
-}
-
-std::string padded(int number, int digits) {
-    std::string text = std::to_string(number);
-    if (int(text.size()) < digits) text.insert(0, std::size_t(digits) - text.size(), '0');
-    return text;
-}
 
 /// One image of the series.
 struct Frame {
@@ -93,6 +60,7 @@ public:
         session_.report()["frames"] = reports_;
         session_.outputs().add(job_.table_path,
                                [text = table_.text()](const std::string& path) { write_text(path, text); });
+        write_scene(scene_, job_, session_);
         if (failed_ == int(frames_.size()))
             throw Error(first_error_, "no frame could be segmented; the first: " + first_message_);
         if (failed_ > 0) {
@@ -109,13 +77,17 @@ private:
         return names;
     }
 
-    [[nodiscard]] std::string tag(const Frame& frame) const {
-        return "_t" + padded(frame.number, std::max(3, int(std::to_string(frames_.back().number).size())));
+    [[nodiscard]] NameTag tag(const Frame& frame) const {
+        std::string digits = std::to_string(frame.number);
+        const std::size_t width = std::max<std::size_t>(3, std::to_string(frames_.back().number).size());
+        digits.insert(0, width - std::min(width, digits.size()), '0');
+        return {"_t" + digits, frame.number};
     }
 
     void check() {
         for (const Frame& frame : frames_) check_outputs(job_, inputs_, tag(frame), session_.outputs());
         session_.outputs().check("--table", job_.table_path, OutputKind::Table);
+        check_scene(job_, session_.outputs());
         job_.check_options();
     }
 
@@ -154,6 +126,7 @@ private:
             hand_over(job_, output, tag(frame), session_, [&](const std::string& path, auto write) {
                 if (session_.outputs().write(path, write)) session_.note("wrote " + path);
             });
+            add_to_scene(scene_, job_, *output, tag(frame));
             report["status"] = "ok";
             report.update(to_json(*output));
             for (std::size_t n = 0; n < output->structures.size(); ++n) {
@@ -206,6 +179,7 @@ private:
     std::vector<StructureStart> starts_;
     bool started_ = false;  ///< a frame has succeeded
     Json reports_ = Json::array();
+    UsdScene scene_;
     Table table_;
     int failed_ = 0;
     Errc first_error_ = Errc::InvalidInput;
@@ -213,15 +187,6 @@ private:
 };
 
 }  // namespace
-
-bool has_frame_pattern(const std::string& path) { return find_placeholder(path).begin != std::string::npos; }
-
-std::string with_frame(const std::string& pattern, int frame) {
-    const Placeholder found = find_placeholder(pattern);
-    std::string path = pattern;
-    if (found.begin != std::string::npos) path.replace(found.begin, found.length, padded(frame, found.digits));
-    return path;
-}
 
 bool is_timelapse(const SegmentJob& job) { return job.images.size() > 1 || (job.frames.given && !job.frames.is_one()); }
 

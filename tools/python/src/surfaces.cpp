@@ -178,7 +178,7 @@ void add_surfaces(py::module_& module) {
             "save",
             [](const LevelSet& s, const std::filesystem::path& path, bool half) {
                 const py::gil_scoped_release released;
-                write_vdb(path.string(), {s.grid}, {half, {}});
+                write_vdb(path.string(), {s.grid}, {half, {}, VdbCompression::Blosc});
             },
             py::arg("path"), py::kw_only(), py::arg("half") = false,
             "Writes a .vdb; half: values as 16-bit floats. Raises Error.");

@@ -1,0 +1,65 @@
+"""Blender imports what a job writes, at one place, one size, smooth; skipped where Blender is not installed.
+
+    COVOL=build/bin/covol python3 -m unittest tests/cli/blender_test.py
+"""
+import json
+import shutil
+import subprocess
+import unittest
+
+from interchange_test import MISSING, Folder
+
+SCRIPT = "houdini_free_examples/13_blender.py"
+BLENDER = shutil.which("blender")
+
+
+@unittest.skipIf(MISSING, MISSING)
+@unittest.skipUnless(BLENDER, "SKIPPED: Blender is not installed (apt-get install --no-install-recommends blender)")
+class Blender(Folder):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.run_covol(*cls.job, "-o", "both.vdb", "--density", "both.vdb", "--mesh", "m.ply")
+        cls.run_covol("mesh", "both.vdb", "-o", "m.glb", "--quiet")
+
+    def blender(self, *words, code=0):
+        from pathlib import Path
+        script = Path(__file__).resolve().parents[2] / SCRIPT
+        done = subprocess.run([BLENDER, "-b", "--factory-startup", "--python", str(script), "--", ".", *words],
+                              cwd=self.out, capture_output=True, text=True, timeout=300)
+        self.assertEqual(done.returncode, code, done.stdout + done.stderr)
+        return done
+
+    def failed(self):
+        report = json.loads((self.out / "blender.json").read_text())
+        return [line["what"] for line in report["checks"] if not line["ok"]]
+
+    def test_volume_and_meshes_agree_and_are_drawn(self):
+        self.blender("both.vdb", "m.ply", "m.glb", "size=160x90")
+        self.assertEqual(self.failed(), [])
+        names = [line["what"] for line in json.loads((self.out / "blender.json").read_text())["checks"]]
+        for grid in "both.vdb:surface", "both.vdb:density":
+            self.assertTrue(any(name.startswith(grid) for name in names), names)
+        data = (self.out / "blender.png").read_bytes()
+        self.assertEqual(data[:8], b"\x89PNG\r\n\x1a\n")
+        self.assertGreater(len(data), 160 * 90 / 8, "the picture is empty")
+
+    def test_what_lies_elsewhere_is_found(self):
+        self.run_covol("mesh", "both.vdb", "-o", "z.glb", "--up", "z", "--quiet")
+        self.blender("both.vdb", "m.ply", "z.glb", "checks", code=1)
+        self.assertIn("PLY and GLB: boxes differ", self.failed())
+        self.run_covol("mesh", "both.vdb", "-o", "big.ply", "--unit-scale", "1.1", "--quiet")
+        self.run_covol("mesh", "both.vdb", "-o", "big.glb", "--unit-scale", "1.1", "--quiet")
+        self.blender("both.vdb", "big.ply", "big.glb", "checks", code=1)
+        self.assertIn("both.vdb:surface: box off the mesh's", self.failed())
+        self.blender("both.vdb", "m.ply", code=2)
+
+    def test_every_compression_opens(self):
+        for compression in "none", "zip", "blosc":
+            with self.subTest(compression):
+                self.run_covol("convert", "both.vdb", "packed.vdb", "--compression", compression, "--half", "--quiet")
+                self.blender("packed.vdb", "m.ply", "m.glb", "checks")
+
+
+if __name__ == "__main__":
+    unittest.main()

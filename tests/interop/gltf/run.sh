@@ -1,0 +1,21 @@
+#!/usr/bin/env bash
+# Khronos' glTF validator on covol's .glb files: one structure, several, y up and z up. By hand, for it needs node and,
+# once, the package from npm:
+#
+#     COVOL=build/bin/covol bash tests/interop/gltf/run.sh
+set -euo pipefail
+covol=$(realpath "${COVOL:-build/bin/covol}")
+cd "$(dirname "$0")"
+[[ -d node_modules ]] || npm ci --no-audit --no-fund
+out=$(mktemp -d)
+trap 'rm -rf "$out"' EXIT
+data=../../../houdini_free_examples/data
+"$covol" reconstruct "$data/celegans_marks.csv" --voxel-size 6 -o "$out/s.vdb" --mesh "$out/one.glb" --quiet
+"$covol" mesh "$out/s.vdb" -o "$out/z_up.glb" --up z --quiet
+"$covol" mesh "$out/s.vdb" -o "$out/adaptive.glb" --adaptive 0.5vx --quiet
+for kind in sphere torus; do
+  "$covol" phantom $kind --size 40 -o "$out/$kind.nrrd" --points "$out/$kind.xyz" --quiet
+done
+"$covol" segment "$out/sphere.nrrd" --points "ball=$out/sphere.xyz" "ring=$out/torus.xyz" -o "$out/two.vdb" \
+  --mesh "$out/several.glb" --quiet
+node validate.mjs "$out"/*.glb

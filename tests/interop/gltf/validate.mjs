@@ -1,0 +1,14 @@
+// Prints what Khronos' glTF validator says of each file; exit code 1 where it finds an error or a warning.
+import fs from "node:fs";
+import validator from "gltf-validator";
+
+let bad = 0;
+for (const path of process.argv.slice(2)) {
+  const report = await validator.validateBytes(new Uint8Array(fs.readFileSync(path)), { uri: path });
+  const { numErrors, numWarnings, numInfos, messages } = report.issues;
+  console.log(`${path}: ${numErrors} errors, ${numWarnings} warnings, ${numInfos} remarks, ` +
+    `${report.info.totalVertexCount} vertices, ${report.info.totalTriangleCount} triangles`);
+  for (const { code, message, pointer } of messages) console.log(`  ${code} ${pointer}: ${message}`);
+  bad += numErrors + numWarnings;
+}
+process.exit(bad > 0 ? 1 : 0);

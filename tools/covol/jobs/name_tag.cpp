@@ -1,0 +1,72 @@
+#include "jobs/name_tag.h"
+
+#include <charconv>
+#include <filesystem>
+#include <string_view>
+
+#include "cli/arguments.h"
+
+namespace covol::tool {
+namespace {
+
+bool parse_int(std::string_view text, int& value) {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    return error == std::errc() && end == text.data() + text.size() && value >= 0;
+}
+
+/// The {frame...} in a path: where it is and how many digits it asks for.
+struct Placeholder {
+    std::size_t begin = std::string::npos, length = 0;
+    int digits = 0;
+};
+
+Placeholder find_placeholder(const std::string& path) {
+    Placeholder found;
+    const std::size_t begin = path.find("{frame");
+    const std::size_t end = begin == std::string::npos ? begin : path.find('}', begin);
+    if (end == std::string::npos) return found;
+    std::string width = path.substr(begin + 6, end - begin - 6);
+    if (!width.empty()) {
+        if (width.back() == 'd') width.pop_back();
+        if (width.size() < 2 || width[0] != ':' || !parse_int(std::string_view(width).substr(1), found.digits) ||
+            found.digits > 9)
+            throw UsageError(path + ": expected {frame} or {frame:03d}, got " + path.substr(begin, end - begin + 1));
+    }
+    found.begin = begin;
+    found.length = end - begin + 1;
+    return found;
+}
+
+std::string padded(int number, int digits) {
+    std::string text = std::to_string(number);
+    if (int(text.size()) < digits) text.insert(0, std::size_t(digits) - text.size(), '0');
+    return text;
+}
+
+}  // namespace
+
+std::string with_suffix(const std::string& path, const std::string& suffix) {
+    const std::filesystem::path whole(path);
+    std::string name = whole.filename().string();
+    std::size_t dot = name.rfind('.');
+    if (dot == std::string::npos || dot == 0) return path + suffix;
+    for (const char* end : {".nii.gz", ".seg.nrrd", ".ome.zarr", ".ome.tif", ".ome.tiff"})
+        if (name.size() > std::string(end).size() && name.ends_with(end)) dot = name.size() - std::string(end).size();
+    return (whole.parent_path() / name.insert(dot, suffix)).string();
+}
+
+bool has_frame_pattern(const std::string& path) { return find_placeholder(path).begin != std::string::npos; }
+
+std::string with_frame(const std::string& pattern, int frame) {
+    const Placeholder found = find_placeholder(pattern);
+    std::string path = pattern;
+    if (found.begin != std::string::npos) path.replace(found.begin, found.length, padded(frame, found.digits));
+    return path;
+}
+
+std::string NameTag::operator()(const std::string& path) const {
+    if (path.empty()) return path;
+    return frame && has_frame_pattern(path) ? with_frame(path, *frame) : with_suffix(path, suffix);
+}
+
+}  // namespace covol::tool

@@ -1,0 +1,111 @@
+#include "jobs/usd_scene.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <sstream>
+
+#include "covol/structures.h"
+
+namespace covol::tool {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// One frame of the image is one frame of the film; players of USD change that by framesPerSecond alone.
+constexpr int kFramesPerSecond = 24;
+
+double metres_per(const std::string& unit) {
+    static const std::map<std::string, double> metres{{"nm", 1e-9}, {"um", 1e-6}, {"mm", 1e-3}, {"cm", 1e-2}, {"m", 1}};
+    const auto found = metres.find(unit);
+    return found == metres.end() ? 1 : found->second;
+}
+
+/// Between two @@@, where an @ is nothing special.
+std::string asset(const std::string& file, const fs::path& folder) {
+    const fs::path near = fs::absolute(file).lexically_normal().lexically_relative(folder);
+    const std::string name = near.empty() ? fs::absolute(file).string() : near.generic_string();
+    return "@@@" + std::string(name.starts_with("..") || name.starts_with("/") ? "" : "./") + name + "@@@";
+}
+
+/// What a prim may be called.
+std::string identifier(const std::string& text) {
+    std::string name = text;
+    std::replace_if(
+        name.begin(), name.end(), [](unsigned char c) { return c >= 128 || (std::isalnum(c) == 0 && c != '_'); }, '_');
+    return name.empty() || std::isdigit(static_cast<unsigned char>(name.front())) != 0 ? "_" + name : name;
+}
+
+}  // namespace
+
+void add_to_scene(UsdScene& scene, const SegmentJob& job, const StructuresOutput& output, const NameTag& tagged) {
+    if (job.scene_path.empty()) return;
+    scene.is_timelapse = tagged.frame.has_value();
+    const auto add = [&](const std::string& grid, bool is_fog, const std::string& path) {
+        if (path.empty()) return;
+        UsdField& field = scene.fields[grid];
+        field.is_fog = is_fog;
+        field.files[tagged.frame.value_or(0)] = tagged(path);
+    };
+    for (const StructureOutput& s : output.structures) {
+        add(s.grid, false, job.output);
+        add(density_name(output, s), true, job.density_path);
+    }
+}
+
+std::string to_usda(const UsdScene& scene, const std::string& path, const std::string& unit) {
+    const fs::path whole = fs::absolute(path).lexically_normal();
+    const std::string volume = identifier(whole.stem().string());
+    std::ostringstream text;
+    text.precision(9);
+    text << "#usda 1.0\n(\n    defaultPrim = \"" << volume << "\"\n    metersPerUnit = " << metres_per(unit)
+         << "\n    upAxis = \"Z\"\n";
+    if (scene.is_timelapse) {
+        int first = scene.fields.begin()->second.files.begin()->first, last = first;
+        for (const auto& [grid, field] : scene.fields) {
+            first = std::min(first, field.files.begin()->first);
+            last = std::max(last, field.files.rbegin()->first);
+        }
+        text << "    startTimeCode = " << first << "\n    endTimeCode = " << last
+             << "\n    timeCodesPerSecond = " << kFramesPerSecond << "\n    framesPerSecond = " << kFramesPerSecond
+             << "\n";
+    }
+    text << "    customLayerData = {\n        string covol_unit = \"" << (unit.empty() ? "not stated" : unit)
+         << "\"\n    }\n)\n\ndef Volume \"" << volume << "\"\n{\n";
+    for (const auto& [grid, field] : scene.fields)
+        text << "    rel field:" << identifier(grid) << " = </" << volume << "/" << identifier(grid) << ">\n";
+    for (const auto& [grid, field] : scene.fields) {
+        text << "\n    def OpenVDBAsset \"" << identifier(grid) << "\"\n    {\n        token fieldName = \"" << grid
+             << "\"\n        token fieldDataType = \"float\"\n        token fieldClass = \""
+             << (field.is_fog ? "fogVolume" : "levelSet") << "\"\n        asset filePath";
+        if (scene.is_timelapse) {
+            text << ".timeSamples = {\n";
+            for (const auto& [frame, file] : field.files)
+                text << "            " << frame << ": " << asset(file, whole.parent_path()) << ",\n";
+            text << "        }\n";
+        } else {
+            text << " = " << asset(field.files.begin()->second, whole.parent_path()) << "\n";
+        }
+        text << "    }\n";
+    }
+    text << "}\n";
+    return text.str();
+}
+
+void check_scene(const SegmentJob& job, Outputs& outputs) {
+    if (job.scene_path.empty()) return;
+    if (job.output.empty() && job.density_path.empty())
+        throw UsageError("--usda: expected -o OUT.vdb or --density OUT.vdb, which the scene refers to");
+    outputs.check("--usda", job.scene_path, OutputKind::Scene);
+}
+
+void write_scene(const UsdScene& scene, const SegmentJob& job, Session& session) {
+    if (job.scene_path.empty() || scene.fields.empty()) return;
+    const std::map<std::string, std::string> facts = session.metadata();
+    const auto unit = facts.find("covol_unit");
+    session.outputs().add(job.scene_path,
+                          [scene, text_unit = unit == facts.end() ? "" : unit->second](const std::string& path) {
+                              write_text(path, to_usda(scene, path, text_unit));
+                          });
+}
+
+}  // namespace covol::tool
