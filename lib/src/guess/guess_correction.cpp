@@ -10,10 +10,10 @@
 #include <numeric>
 
 #include "base/valid.h"
-#include "guess/wendland.h"
 #include "covol/error.h"
 #include "covol/start.h"
 #include "guess/heuristics.h"
+#include "guess/wendland.h"
 #include "points/kd_tree.h"
 
 namespace covol {

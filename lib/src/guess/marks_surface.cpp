@@ -7,8 +7,8 @@
 #include <functional>
 #include <limits>
 
-#include "guess/wendland.h"
 #include "guess/heuristics.h"
+#include "guess/wendland.h"
 #include "points/kd_tree.h"
 
 namespace covol::guess {

@@ -34,6 +34,8 @@ TEST_CASE("a domain survives on a grid") {
 TEST_CASE("unusable boxes and transforms are refused") {
     CHECK_THROWS_AS(make_domain({{0, 0, 0}, {1, 1, 0}}, 0.1), Error);
     CHECK_THROWS_AS(make_domain({{0, 0, 0}, {1, 1, 1}}, 0.0), Error);
+    CHECK_THROWS_AS(make_domain({{0, 0, 0}, {1e-11, 1e-11, 1e-11}}, 1e-12), Error);  // OpenVDB holds none so small
+    CHECK_NOTHROW(set_domain(*FloatGrid::create(), make_domain({{0, 0, 0}, {1e-3, 1e-3, 1e-3}}, 1.5e-5)));
     CHECK_THROWS_AS(make_domain({{0, 0, 0}, {1e12, 1, 1}}, 1e-3), Error);
     auto grid = FloatGrid::create();
     grid->setTransform(openvdb::math::Transform::createLinearTransform(
