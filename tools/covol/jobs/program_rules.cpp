@@ -61,8 +61,8 @@ struct Rule {
 constexpr bool kProblem = true, kRemark = false;
 
 // One row for each thing that goes wrong: where, whether it fails the check, when, what happens, what mends it.
-// What is said of Blender was tried in Debian's 3.4 (tests/cli/blender_test.py); the rest is what the programs'
-// documentation says of their readers.
+// What is said of Blender was tried in Debian's 3.4 (tests/cli/blender_test.py); the rest is what is known of the other
+// programs' readers, and was not tried in them.
 const std::vector<Rule>& rules() {
     static const std::vector<Rule> table{
         {Program::Blender, kProblem, [](Facts f) { return is_vdb(f) && f.has_level_set && !f.has_density; },
