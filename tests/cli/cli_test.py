@@ -366,7 +366,7 @@ class Segment(Case):
         self.segment("--memory-limit", "8G")
 
     def test_too_fine_a_voxel_size(self):
-        for more in (["--voxel-size", "1e-5"], ["--voxel-size", "0.03", "--memory-limit", "200M"],
+        for more in (["--voxel-size", "2e-5"], ["--voxel-size", "0.03", "--memory-limit", "200M"],
                      ["--voxel-size", "0.02", "--memory-limit", "200M", "--init", "sphere:3,-2,1,7"]):
             with self.subTest(more):
                 line = self.refuse("reconstruct", self.points, "-o", "s.vdb", *more, code=3, says="GiB of memory")

@@ -383,7 +383,8 @@ class Several(ContoursCase):
                         ("render", "{}", "-o", "p.png"), ("compare", "{}", "s.vdb:core")):
             with self.subTest(command[0]):
                 done = self.run_covol(*[str(a).format("s.vdb") for a in command])
-                self.assertIn("'layer' is taken of the level sets layer, core", done.stderr)
+                if command[0] != "render":  # which draws them all
+                    self.assertIn("'layer' is taken of the level sets layer, core", done.stderr)
                 done = self.run_covol(*[str(a).format("s.vdb:core") for a in command])
                 self.assertNotIn("warning", done.stderr)
                 self.assertIn("nobody", self.run_covol(*[str(a).format("s.vdb:nobody") for a in command], code=3).stderr)

@@ -3,6 +3,7 @@
     COVOL=build/bin/covol python3 -m unittest tests/cli/reliability_test.py
 """
 import hashlib
+import os
 import random
 import signal
 import subprocess
@@ -73,6 +74,53 @@ class Sets(Case):
         time.sleep(0.1)
         run.send_signal(signal.SIGHUP)
         self.assertEqual(run.wait(timeout=120), 0)
+
+
+class Memory(Case):
+    """--memory-limit bounds what the program holds, whatever it is busy with."""
+
+    # What a program takes that has done nothing, and what a growing one takes between two looks at it.
+    OWN = 100 << 20
+
+    def peak(self, *words):
+        """@return exit code, peak of resident memory in bytes, standard error"""
+        with open(self.out / "errors", "w+") as errors:
+            run = subprocess.Popen([COVOL, *map(str, words), "--quiet"], cwd=self.out, stderr=errors)
+            _, status, usage = os.wait4(run.pid, 0)
+            run.returncode = os.waitstatus_to_exitcode(status)
+            errors.seek(0)
+            return run.returncode, usage.ru_maxrss * 1024, errors.read()
+
+    def test_is_not_passed(self):
+        self.run_covol("phantom", "torus", "--size", 224, "--count", 150000, "-o", "t.nrrd", "--points", "t.ply")
+        self.run_covol("segment", "t.nrrd", "--points", "t.ply", "--init", "tag", "--max-steps", 1, "-o", "t.vdb", "--mesh", "m.ply")
+        jobs = {
+            "tagged": ["segment", "t.nrrd", "--points", "t.ply", "--init", "tag", "-o", "o.vdb"],
+            "cloud": ["reconstruct", "t.ply", "-o", "o.vdb"],
+            "edge": ["edge", "t.nrrd", "--band", "t.vdb", "-o", "o.vdb"],
+            "mesh": ["mesh", "t.vdb", "-o", "o.ply", "--target-edge", "2vx"],
+            "repair": ["mesh", "t.vdb", "-o", "o.ply", "--repair"],
+            "compare": ["compare", "m.ply", "t.vdb"],
+            "check": ["check", "m.ply"],
+            "render": ["render", "t.vdb", "-o", "o.png", "--size", "1600x1200"],
+        }
+        seen = 0
+        for name, words in jobs.items():
+            with self.subTest(name):
+                code, whole, text = self.peak(*words)
+                self.assertIn(code, (0, 5), text)
+                limit = int(0.6 * (whole - self.OWN))
+                if limit < 20 << 20:
+                    continue
+                seen += 1
+                before = self.files()
+                code, peak, text = self.peak(*words, "--memory-limit", f"{limit >> 10}K", *(["--brick-voxels", "1000000000"]
+                                                                                           if words[0] in ("segment", "reconstruct") else []))
+                self.assertEqual(code, 3, text)
+                self.assertIn("memory", text)
+                self.assertLess(peak, 1.05 * limit + self.OWN)
+                self.assertEqual(self.files(), before)
+        self.assertGreaterEqual(seen, 4)
 
 
 class Numbers(Case):

@@ -22,6 +22,9 @@ public:
     ScratchFolder& operator=(const ScratchFolder&) = delete;
     [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
 
+    /// Removes those of this process, for one that ends without destroying them, of want of memory say.
+    static void remove_all() noexcept;
+
 private:
     std::filesystem::path path_;
     int lock_ = -1;

@@ -39,7 +39,8 @@ void require_voxel_size(const char* where, double voxel_size) {
     std::ostringstream text;
     text << where << ": `voxel_size`: expected >= " << kLeast << ", got " << voxel_size;
     if (voxel_size > 0 && voxel_size < kLeast)
-        text << ", less than OpenVDB holds; state lengths in a smaller unit (`spacing` of the image, `scale` of points)";
+        text
+            << ", less than OpenVDB holds; state lengths in a smaller unit (`spacing` of the image, `scale` of points)";
     throw Error(Errc::InvalidOptions, text.str());
 }
 

@@ -10,6 +10,8 @@
 #include <cstring>
 #include <fstream>
 #include <map>
+#include <mutex>
+#include <set>
 #include <utility>
 
 #include "base/file.h"
@@ -106,7 +108,23 @@ void clear_after_the_dead(const fs::path& folder) {
     }
 }
 
+/// Those of this process.
+struct Living {
+    std::mutex mutex;
+    std::set<fs::path> folders;
+};
+Living& living() {
+    static Living all;
+    return all;
+}
+
 }  // namespace
+
+void ScratchFolder::remove_all() noexcept {
+    const std::lock_guard lock(living().mutex);
+    std::error_code ignored;
+    for (const fs::path& folder : living().folders) fs::remove_all(folder, ignored);
+}
 
 ScratchFolder::ScratchFolder(const fs::path& beside) {
     const fs::path folder = fs::absolute(beside.empty() ? fs::path(".") : beside);
@@ -119,6 +137,10 @@ ScratchFolder::ScratchFolder(const fs::path& beside) {
     std::string name = (folder / (std::string(kPrefix) + "XXXXXX")).string();
     if (::mkdtemp(name.data()) == nullptr) fail(folder, errno);
     path_ = name;
+    {
+        const std::lock_guard own(living().mutex);
+        living().folders.insert(path_);
+    }
     Descriptor own(path_ / kLock, O_RDWR | O_CREAT | O_EXCL);
     if (own.get() >= 0 && ::flock(own.get(), LOCK_EX | LOCK_NB) == 0) lock_ = own.release();
 }
@@ -126,6 +148,10 @@ ScratchFolder::ScratchFolder(const fs::path& beside) {
 ScratchFolder::~ScratchFolder() {
     std::error_code ignored;
     fs::remove_all(path_, ignored);
+    {
+        const std::lock_guard lock(living().mutex);
+        living().folders.erase(path_);
+    }
     if (lock_ >= 0) ::close(lock_);
 }
 

@@ -56,9 +56,9 @@ void expect_finite(const FloatGrid& grid, const char* name) {
     }
 }
 
-// A row's shares are right to half of 1/65535: a step so small moves at most 1 % too far or too little; after one so
+// A row's shares are right to half of 1/65535: a step so small moves at most 1.5 % too far or too little; after one so
 // large the share that holds a voxel, 1/(1 + 6 * step), is still above the smallest.
-constexpr double kSmallestStep = 1e-3, kLargestStep = 1e4;
+constexpr double kSmallestStep = 5e-4, kLargestStep = 1e4;
 
 class Evolver {
 public:

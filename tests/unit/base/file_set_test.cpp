@@ -134,6 +134,17 @@ TEST_CASE("file_set: the next run clears after one that was killed, and leaves t
     CHECK(bytes_of(folder.path("a")) == "old a");
 }
 
+TEST_CASE("file_set: a process that ends without unwinding can remove its folders") {
+    const Scratch folder;
+    folder.write("a", "old a");
+    FileSet set;
+    write(set, folder.path("a"), "new a");
+    CHECK(folder.file_count() == 2);
+    ScratchFolder::remove_all();
+    CHECK(folder.file_count() == 1);
+    CHECK(bytes_of(folder.path("a")) == "old a");
+}
+
 TEST_CASE("file_set: a set that was killed while it was put in place is completed") {
     const Scratch folder;
     const fs::path root = folder.path("");

@@ -7,11 +7,13 @@
 #include <chrono>
 #include <fstream>
 #include <string>
+#include <utility>
 
 namespace covol::tool {
 namespace {
 
-constexpr auto kInterval = std::chrono::milliseconds(10);
+constexpr auto kInterval = std::chrono::milliseconds(5);
+constexpr std::uint64_t kSlack = 32;  // a part of the limit, for what ends by itself
 
 }  // namespace
 
@@ -45,16 +47,17 @@ std::uint64_t available_memory() {
     return available;
 }
 
-MemoryGuard::MemoryGuard(std::uint64_t limit, std::atomic<bool>& cancel) {
+MemoryGuard::MemoryGuard(std::uint64_t limit, std::atomic<bool>& cancel, std::function<void()> give_up) {
     if (limit == 0) return;
-    watcher_ = std::thread([this, limit, &cancel] {
+    watcher_ = std::thread([this, limit, &cancel, give_up = std::move(give_up)] {
         std::unique_lock lock(mutex_);
-        while (!wake_.wait_for(lock, kInterval, [this] { return done_; }))
-            if (held_memory() > limit) {
-                tripped_ = true;
-                cancel = true;
-                return;
-            }
+        while (!wake_.wait_for(lock, kInterval, [this] { return done_; })) {
+            const std::uint64_t held = held_memory();
+            if (held <= limit) continue;
+            tripped_ = true;
+            cancel = true;
+            if (held > limit + limit / kSlack) give_up();
+        }
     });
 }
 

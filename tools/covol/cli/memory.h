@@ -2,6 +2,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <mutex>
 #include <thread>
 
@@ -15,11 +16,11 @@ namespace covol::tool {
 [[nodiscard]] std::uint64_t available_memory();
 
 /// Watches the memory that this process holds (without mapped files, which the system takes back) and sets `cancel`
-/// when it passes the limit.
+/// when it passes the limit. What goes on beyond it, in a library that knows nothing of cancellation, is given up.
 class MemoryGuard {
 public:
-    /// limit = 0: no guard.
-    MemoryGuard(std::uint64_t limit, std::atomic<bool>& cancel);
+    /// limit = 0: no guard. @param give_up  ends the process; called by the guard's thread
+    MemoryGuard(std::uint64_t limit, std::atomic<bool>& cancel, std::function<void()> give_up);
     ~MemoryGuard();
     MemoryGuard(const MemoryGuard&) = delete;
     MemoryGuard& operator=(const MemoryGuard&) = delete;

@@ -1,5 +1,7 @@
 #include "cli/session.h"
 
+#include <unistd.h>
+
 #include <cmath>
 #include <csignal>
 #include <filesystem>
@@ -271,7 +273,11 @@ int Session::execute() {
         if (!memory_limit_text_.empty()) memory_limit_ = parse_bytes("--memory-limit", memory_limit_text_);
         if (memory_limit_ == 0) memory_limit_ = available_memory() / 100 * kUsablePercent;
         run_.memory_budget = memory_limit_;
-        guard = std::make_unique<MemoryGuard>(memory_limit_, cancel_requested);
+        guard = std::make_unique<MemoryGuard>(memory_limit_, cancel_requested, [this] {
+            const int code = fail(kBadInput, memory_text());
+            ScratchFolder::remove_all();
+            ::_exit(code);
+        });
         inputs_ = inputs_of(*command_);
         outputs_.protect(inputs_);
         if (json_path_ != "-") outputs_.check("--json", json_path_, OutputKind::Text);
@@ -285,8 +291,7 @@ int Session::execute() {
         return fail(kUsage, error.what());
     } catch (const Error& error) {
         if (error.code() == Errc::Cancelled && guard && guard->tripped() && !interrupted)
-            return fail(kBadInput,
-                        "more memory is needed than " + memory_limit_name() + "; use a larger --voxel-size or a --roi");
+            return fail(kBadInput, memory_text());
         return fail(exit_code_of(error.code()), error.code() == Errc::Cancelled ? interrupted_text() : error.what());
     } catch (const std::bad_alloc&) {
         return fail(kBadInput, "out of memory; use a larger --voxel-size or a --roi");
@@ -340,6 +345,10 @@ void Session::write_report() {
     }
     std::cout << text << std::flush;
     if (!std::cout) throw Error(Errc::Io, "standard output: cannot write");
+}
+
+std::string Session::memory_text() const {
+    return "more memory is needed than " + memory_limit_name() + "; use a larger --voxel-size or a --roi";
 }
 
 std::string Session::interrupted_text() const {

@@ -124,6 +124,7 @@ private:
     void write_report();
     int fail(int code, const std::string& message);
     [[nodiscard]] std::string interrupted_text() const;
+    [[nodiscard]] std::string memory_text() const;
     [[nodiscard]] std::string memory_limit_name() const;
 
     CLI::App app_;
