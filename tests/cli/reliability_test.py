@@ -76,6 +76,27 @@ class Sets(Case):
         self.assertEqual(run.wait(timeout=120), 0)
 
 
+class Inputs(Case):
+    def test_an_image_that_is_cut_short_while_it_is_read(self):
+        size = 704  # of so large a file pages are mapped
+        image, points = self.inputs / "large.nrrd", self.inputs / "marks.xyz"
+        write_nrrd(image, (size,) * 3, b"", spacing=1, origin=(0, 0, 0))
+        with open(image, "r+b") as file:
+            file.truncate(file.seek(0, os.SEEK_END) + size**3)
+        middle = np.array((size / 2,) * 3)
+        write_xyz(points, map(tuple, middle + 60 / RADIUS * (np.array(sphere_points(6000)) - CENTER)))
+        run = subprocess.Popen([COVOL, "segment", image, "--points", points, "--init", "tag", "-o", "s.vdb"], cwd=self.out,
+                               stderr=subprocess.PIPE, text=True)
+        while not run.stderr.readline().startswith("covol: tag_distance"):
+            self.assertIsNone(run.poll(), "ended too early")
+        os.truncate(image, 4096)
+        _, text = run.communicate(timeout=120)
+        self.assertEqual(run.returncode, 4, text)
+        self.assertIn("cut short by another program", text)
+        self.run_covol("phantom", "sphere", "--size", "16", "-o", "next.nrrd")
+        self.assertEqual([p.name for p in self.out.iterdir()], ["next.nrrd"])
+
+
 class Memory(Case):
     """--memory-limit bounds what the program holds, whatever it is busy with."""
 

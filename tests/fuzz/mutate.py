@@ -36,13 +36,13 @@ def seeds_of(covol, folder):
     run("segment", "seed.nrrd", "--points", "seed.ply", "-o", "seed.vdb", "--mesh", "seed_mesh.ply")
     found = {"nrrd": folder / "seed.nrrd", "vdb": folder / "seed.vdb"}
     for end in IMAGES[1:-1]:
-        run("convert", "seed.nrrd", "-o", f"seed.{end}")
+        run("mask", "seed.vdb", "--like", "seed.nrrd", "-o", f"seed.{end}")
         found[end] = folder / f"seed.{end}"
     for end in MESHES:
         run("mesh", "seed.vdb", "-o", f"surface.{end}")
         found[end] = folder / f"surface.{end}"
     for end in POINTS:
-        run("convert", "seed.ply", "-o", f"points.{end}")
+        run("convert", "seed.ply", f"points.{end}")
         found[end] = folder / f"points.{end}"
     return found
 
@@ -118,9 +118,9 @@ def commands(covol, end, path):
     elif end == "vdb":
         yield [covol, "mesh", path, "-o", "out.ply", "--quiet"]
     elif end in POINTS:
-        yield [covol, "convert", path, "-o", "out.ply", "--quiet"]
+        yield [covol, "convert", path, "out.ply", "--quiet"]
     else:
-        yield [covol, "convert", path, "-o", "out.nrrd", "--quiet"]
+        yield [covol, "convert", path, "out.vdb", "--quiet"]
 
 
 def fuzz(covol, end, seed, seconds, rng, limit, keep):

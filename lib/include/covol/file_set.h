@@ -48,6 +48,9 @@ public:
     /// @throws Error Io.
     void publish();
 
+    /// A text with the paths that were given in place of the temporary ones: what a writer says of its file.
+    [[nodiscard]] std::string shown(std::string text) const;
+
     /// What publish() would put in place, in the order of writing.
     [[nodiscard]] std::vector<std::string> paths() const;
 

@@ -162,6 +162,7 @@ struct FileSet::State {
     };
     std::map<fs::path, ScratchFolder> folders;
     std::vector<File> files;
+    File writing;
     /// Puts back what was there before the first `count` files took its place.
     void put_back(std::size_t count) {
         std::error_code status;
@@ -183,13 +184,11 @@ void FileSet::write(const std::string& path, const std::function<void(const std:
     const fs::path folder = target.parent_path();
     const fs::path scratch = state_->folders.try_emplace(folder, folder).first->second.path();
     const fs::path temporary = scratch / target.filename();
+    state_->writing = {path, target, temporary};
     try {
         write(temporary.string());
     } catch (const Error& error) {
-        std::string text = error.what();
-        for (std::size_t at; (at = text.find(temporary.string())) != std::string::npos;)
-            text.replace(at, temporary.string().size(), path);
-        throw Error(error.code(), text);
+        throw Error(error.code(), shown(error.what()));
     }
     std::error_code status;
     if (fs::exists(target, status) && fs::is_directory(target, status) != fs::is_directory(temporary, status))
@@ -221,6 +220,14 @@ void FileSet::publish() {
     }
     files.clear();
     state_->folders.clear();
+}
+
+std::string FileSet::shown(std::string text) const {
+    const std::string temporary = state_->writing.temporary.string();
+    if (temporary.empty()) return text;
+    for (std::size_t at = 0; (at = text.find(temporary, at)) != std::string::npos; at += state_->writing.path.size())
+        text.replace(at, temporary.size(), state_->writing.path);
+    return text;
 }
 
 std::vector<std::string> FileSet::paths() const {

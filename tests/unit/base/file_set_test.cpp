@@ -85,6 +85,18 @@ TEST_CASE("file_set: without publish() all is as before") {
     CHECK(folder.file_count() == 1);
 }
 
+TEST_CASE("file_set: people see the paths that they gave") {
+    const Scratch folder;
+    FileSet set;
+    std::string said;
+    set.write(folder.path("a"), [&](const std::string& to) {
+        said = set.shown(to + ": odd, " + to);
+        std::ofstream(to) << "a";
+    });
+    CHECK(said == folder.path("a") + ": odd, " + folder.path("a"));
+    CHECK(set.shown("nothing of it") == "nothing of it");
+}
+
 TEST_CASE("file_set: where publish() fails half way, what was there is put back") {
     const Scratch folder;
     const fs::path root = folder.path("");

@@ -112,9 +112,8 @@ void Outputs::add(const std::string& path, std::function<void(const std::string&
 
 bool Outputs::write(const std::string& path, const std::function<void(const std::string&)>& write) {
     if (path.empty()) return false;
-    FileSet file;
-    file.write(path, write);
-    file.publish();
+    files_.write(path, write);  // nothing else is in it before write_queued()
+    files_.publish();
     kept_.push_back(path);
     return true;
 }

@@ -31,6 +31,8 @@ public:
 
     /// Makes what is queued, under temporary names. @throws what a writer throws.
     void write_queued();
+    /// What a writer says of its file, with the path that was asked for.
+    [[nodiscard]] std::string shown(const std::string& line) const { return files_.shown(line); }
     /// Puts in place what write_queued() has made. @throws Error Io.
     void publish();
     [[nodiscard]] const std::vector<std::string>& written() const noexcept { return written_; }

@@ -29,6 +29,14 @@ extern "C" void on_signal(int signal) {
     std::signal(signal, SIG_DFL);  // a second one ends the program at once
 }
 
+/// A page of a mapped file is gone: another program cut the file short. What is in place stays; the next run clears
+/// what this one had begun.
+extern "C" void on_bus_error(int) {
+    constexpr char kText[] = "covol: error: a file that is being read was cut short by another program; run it again\n";
+    static_cast<void>(!::write(STDERR_FILENO, kText, sizeof kText - 1));
+    ::_exit(kIo);
+}
+
 /// One line: messages that list several problems are joined.
 std::string one_line(std::string text) {
     while (!text.empty() && text.back() == '\n') text.pop_back();
@@ -227,6 +235,7 @@ void Session::add_grid(const std::string& path, const FloatGridPtr& grid, WriteV
 int Session::main(int argc, char** argv) {
     for (const int signal : {SIGINT, SIGTERM, SIGHUP})
         if (std::signal(signal, on_signal) == SIG_IGN) std::signal(signal, SIG_IGN);  // as nohup wants it
+    std::signal(SIGBUS, on_bus_error);
     // What follows `plan` and `brick` is a whole command line, with the options of its command.
     std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
     command_line_ = "covol";
@@ -362,7 +371,7 @@ int Session::fail(int code, const std::string& message) {
 }
 
 void Session::note(const std::string& line) {
-    if (!quiet_) progress_->line("covol: " + with_flags(line));
+    if (!quiet_) progress_->line("covol: " + outputs_.shown(with_flags(line)));
 }
 
 void Session::say(const std::string& line) {
@@ -372,7 +381,7 @@ void Session::say(const std::string& line) {
 }
 
 void Session::warn(const std::string& message) {
-    const std::string line = with_flags(message);
+    const std::string line = outputs_.shown(with_flags(message));
     // A file that is opened twice says the same twice.
     for (const Json& said : report_["warnings"])
         if (said == line) return;

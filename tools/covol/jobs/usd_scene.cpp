@@ -102,10 +102,10 @@ void write_scene(const UsdScene& scene, const SegmentJob& job, Session& session)
     if (job.scene_path.empty() || scene.fields.empty()) return;
     const std::map<std::string, std::string> facts = session.metadata();
     const auto unit = facts.find("covol_unit");
+    // The path that was asked for: files are named as seen from there.
     session.outputs().add(job.scene_path,
-                          [scene, text_unit = unit == facts.end() ? "" : unit->second](const std::string& path) {
-                              write_text(path, to_usda(scene, path, text_unit));
-                          });
+                          [text = to_usda(scene, job.scene_path, unit == facts.end() ? "" : unit->second)](
+                              const std::string& path) { write_text(path, text); });
 }
 
 }  // namespace covol::tool
