@@ -4,9 +4,11 @@
 """
 import hashlib
 import os
+import pathlib
 import random
 import signal
 import subprocess
+import sys
 import time
 import unittest
 
@@ -161,6 +163,23 @@ class Numbers(Case):
         path.write_bytes(b"ObjectType = Image\nNDims = 4\nDimSize = 8 8 8 3000000\nElementSpacing = 1 1 1 1\nHeaderSize = 150\n"
                          b"ElementType = MET_UCHAR\nElementDataFile = LOCAL\n" + bytes(5000))
         self.refuse("info", path, code=3)
+
+
+class Damaged(Case):
+    def test_files_that_crashed_a_library_are_refused(self):
+        """Found by tests/fuzz/mutate.py: they made OpenVDB write behind a buffer, ITK abort, MetaIO go on for hours."""
+        files = sorted((pathlib.Path(__file__).resolve().parents[1] / "fuzz/regressions").iterdir())
+        self.assertGreaterEqual(len(files), 4)
+        for path in files:
+            with self.subTest(path.name):
+                self.refuse("mesh" if path.suffix == ".vdb" else "info", path, *(["-o", "o.ply"] if path.suffix == ".vdb" else []),
+                            code=3, says="damaged")
+
+    def test_a_minute_of_fuzzing(self):
+        script = pathlib.Path(__file__).resolve().parents[1] / "fuzz/mutate.py"
+        done = subprocess.run([sys.executable, script, "--covol", COVOL, "--seconds", "1.5", "--seed", "3", "--keep",
+                               self.out / "findings"], capture_output=True, text=True, timeout=300)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
 
 
 class WrongInSilence(Case):

@@ -66,6 +66,11 @@ def parse_usda(text):
 
 @unittest.skipIf(MISSING, MISSING)
 class OneFile(Folder):
+    def test_half_grids_are_grids(self):
+        self.run_covol(*self.job, "-o", "h.vdb", "--half")
+        self.assertNotIn("left out", self.run_covol("convert", "h.vdb", "c.vdb").stderr)
+        self.run_covol("render", "h.vdb", "-o", "h.png", "--size", "300x200")
+
     def test_density_beside_the_surface(self):
         self.run_covol(*self.job, "-o", "both.vdb", "--density", "both.vdb")
         self.run_covol(*self.job, "-o", "alone.vdb", "--density", "fog.vdb")

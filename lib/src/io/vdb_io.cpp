@@ -18,6 +18,7 @@
 #include "covol/error.h"
 #include "covol/version.h"
 #include "io/nanovdb.h"
+#include "io/vdb_walk.h"
 
 namespace covol {
 namespace {
@@ -110,7 +111,14 @@ public:
         const Entry& entry = entries_[n];
         seek_to_grid(entry);
         vdb::GridBase::Ptr grid = entry.empty_grid->copyGridWithNewTree();
-        readGrid(grid, entry.descriptor, stream_);
+        if (!entry.descriptor.isInstance()) look_ahead([&] { walk_tree(entry); });
+        try {
+            readGrid(grid, entry.descriptor, stream_);
+        } catch (...) {
+            // The nodes of a tree that was read in part have children that are not there: it must not be destroyed.
+            static_cast<void>(new vdb::GridBase::Ptr(grid));
+            throw;
+        }
         if (entry.descriptor.isInstance()) {
             for (std::size_t parent = 0; parent < entries_.size(); ++parent)
                 if (parent != n && !entries_[parent].descriptor.isInstance() &&
@@ -139,6 +147,17 @@ private:
             skip_metadata();
             skip_text("transform");
         });
+    }
+
+    /// @pre the stream is at the grid
+    void walk_tree(const Entry& entry) {
+        if (fileVersion() < vdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION) return;
+        readGridCompression(stream_);
+        const vdb::GridBase::Ptr head = entry.empty_grid->copyGridWithNewTree();
+        head->readMeta(stream_);
+        head->readTransform(stream_);
+        detail::walk_vdb_tree(stream_, {entry.descriptor.gridType(), entry.descriptor.saveFloatAsHalf(),
+                                        vdb::io::getDataCompression(stream_), file_bytes_});
     }
 
     template <typename Walk>

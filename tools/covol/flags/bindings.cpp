@@ -344,6 +344,8 @@ WriteMeshOptions MeshFlags::options(const Session& session) const {
     return write;
 }
 
-bool is_float_grid(const VdbGridInfo& grid) { return grid.type == "Tree_float_5_4_3"; }
+bool is_float_grid(const VdbGridInfo& grid) {
+    return grid.type == "Tree_float_5_4_3" || grid.type == "Tree_float_5_4_3_HalfFloat";
+}
 
 }  // namespace covol::tool

@@ -161,6 +161,12 @@ public:
                         "read_image: " + begin.path + ": NIfTI-2 is not read; convert it to NIfTI-1");
         swap_ = size != std::int32_t(bytes_.size());
         if (swap_ && swapped != std::int32_t(bytes_.size())) throw Error(Errc::InvalidInput, unusable);
+        // ITK's matrices abort the program at numbers that are not finite, or too large to square.
+        for (const auto& [begin_at, end_at] : {std::pair(76, 92), std::pair(256, 328)})
+            for (int at = begin_at; at < end_at; at += 4)
+                if (!(std::abs(number(std::size_t(at))) < 1e9))
+                    throw Error(Errc::InvalidInput,
+                                unusable + " (a spacing, origin or direction is not finite, or huge)");
     }
     [[nodiscard]] bool swap() const { return swap_; }
     [[nodiscard]] double number(std::size_t at) const { return double(load<float>(bytes_.data() + at, swap_)); }
@@ -262,6 +268,11 @@ std::optional<PixelPlace> nrrd_pixels(const std::string& path, const TextHeader&
 void require_meta_header(const TextHeader& header, const std::string& unusable) {
     for (const char* key : {"ndims", "dimsize", "elementtype", "elementdatafile"})
         if (header.value(key).empty()) throw Error(Errc::InvalidInput, unusable + " (no " + key + " in its header)");
+    // MetaIO makes arrays of whatever number of dimensions stands here.
+    const std::string dimensions = header.value("ndims");
+    if (dimensions.size() > 2 || dimensions.find_first_not_of("0123456789") != std::string::npos ||
+        std::stoi(dimensions) < 1 || std::stoi(dimensions) > 10)
+        throw Error(Errc::InvalidInput, unusable + " (expected 1 to 10 as NDims, got " + dimensions + ")");
 }
 
 /// What only ITK reads: all at once, but HDF5, which is read in boxes.
