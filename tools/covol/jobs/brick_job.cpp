@@ -30,7 +30,7 @@ public:
         : job_(job), plan_(plan), folder_(folder), run_(run) {}
 
     /// @return how many moved
-    std::size_t run_sweep(int sweep, const std::vector<std::size_t>& bricks) const {
+    [[nodiscard]] std::size_t run_sweep(int sweep, const std::vector<std::size_t>& bricks) const {
         std::size_t moved = 0;
         const auto total = double(std::max<std::int64_t>(1, plan_.active_voxels()));
         double done = 0;
@@ -60,7 +60,7 @@ public:
 
 private:
     /// @return whether it was solved; false where it is as after the sweep before
-    bool solve(int sweep, std::size_t brick) const {
+    [[nodiscard]] bool solve(int sweep, std::size_t brick) const {
         if (folder_.is_done(sweep, brick)) return folder_.moved(sweep, brick);
         const BrickStates states = folder_.states(sweep - 1);
         Json facts;
@@ -220,7 +220,7 @@ void run_bricks(const SegmentJob& job, Session& session) {
         bricks.resize(plan.bricks.size());
         std::iota(bricks.begin(), bricks.end(), std::size_t(0));
     }
-    runner.run_sweep(std::max(1, call.sweep), bricks);
+    static_cast<void>(runner.run_sweep(std::max(1, call.sweep), bricks));
 }
 
 SegmentResult solve_within_limit(const SegmentJob& job, const Image* image, const PreparedStructure& structure,
