@@ -358,6 +358,14 @@ class Segment(Case):
         self.segment("--init", "tag", "--max-steps", "1", "--tolerance", "0", "--strict", code=5)
         self.assertEqual(self.files(), ["s.vdb"])
 
+    def test_strict_tells_of_every_warning(self):
+        self.segment("--strict", "--quiet")
+        shifted = self.inputs / "shifted.xyz"
+        write_xyz(shifted, [(x + 0.5 * RADIUS, y, z) for x, y, z in sphere_points(300)])
+        report = self.report("segment", self.image, "--points", shifted, "-o", "s.vdb", "--strict", code=5)
+        self.assertNotEqual(report["warnings"], [])
+        self.assertEqual(self.files(), ["s.vdb"])
+
     def test_memory_limit(self):
         self.refuse("segment", self.image, "--points", self.points, "-o", "s.vdb", "--memory-limit", "20k", code=3,
                     says="--memory-limit 20k")

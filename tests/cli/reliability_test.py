@@ -5,7 +5,6 @@
 import hashlib
 import os
 import pathlib
-import random
 import signal
 import subprocess
 import sys
@@ -30,29 +29,54 @@ class Sets(Case):
         return {name: hashlib.sha256((self.out / name).read_bytes()).hexdigest() for name in self.files()
                 if name not in ("s.json", "s.csv")}
 
-    def test_killed_at_any_moment_the_set_is_old_or_new(self):
+    def clear(self):
+        """The next run in this folder clears up."""
+        self.run_covol("phantom", "sphere", "--size", "16", "-o", "next.nrrd")
+        (self.out / "next.nrrd").unlink()
+        self.assertEqual([p.name for p in self.out.iterdir() if p.name.startswith(".")], [])
+
+    def complete_sets(self, *choices):
         sets = []
-        for more in (["--delta", "1vx"], ["--delta", "3vx"]):
-            start = time.monotonic()
+        for more in choices:
             subprocess.run(self.segment(*more), cwd=self.out, check=True)
-            seconds = time.monotonic() - start
             sets.append(self.state())
         self.assertTrue(all(sets[0][name] != sets[1][name] for name in sets[0]))
-        generator = random.Random(5)
-        killed = 0
-        for n in range(12):
-            # Most of them while files are written, at the end.
-            moment = seconds * (generator.uniform(0.7, 1.05) if n % 4 else generator.uniform(0, 1))
-            run = subprocess.Popen(self.segment("--delta", "1vx" if n % 2 else "3vx"), cwd=self.out)
-            time.sleep(moment)
+        return sets
+
+    @unittest.skipUnless("COVOL_KILL_AT" in os.environ, "COVOL_KILL_AT, the library that kills, is not set")
+    def test_killed_at_any_call_the_set_is_old_or_new(self):
+        choices = [["--max-steps", "1", "--delta", delta] for delta in ("1vx", "3vx")]
+        sets = self.complete_sets(*choices)
+        new = 0
+        for call in range(1, 200):
+            last = self.state()
+            choice = 1 - sets.index(last)
+            environment = {**os.environ, "LD_PRELOAD": os.environ["COVOL_KILL_AT"], "KILL_AT": str(call)}
+            code = subprocess.run(self.segment(*choices[choice]), cwd=self.out, env=environment).returncode
+            if code == 0:
+                break
+            self.assertEqual(code, -signal.SIGKILL)
+            self.clear()
+            self.assertIn(self.state(), sets, f"killed before call {call}")
+            new += self.state() != last
+        self.assertEqual(code, 0)
+        self.assertEqual(self.state(), sets[choice])
+        # Each of the five outputs was put in place by a call of its own, and one that was killed between them went on.
+        self.assertGreaterEqual(new, len(sets[0]))
+        self.assertGreater(call, 2 * len(sets[0]))
+
+    def test_killed_while_files_are_written(self):
+        choices = [["--max-steps", "1", "--delta", delta] for delta in ("1vx", "3vx")]
+        sets = self.complete_sets(*choices)
+        for n in range(6):
+            run = subprocess.Popen(self.segment(*choices[n % 2]), cwd=self.out)
+            while run.poll() is None and not any(self.out.glob(".covol-*/s.*")):
+                pass
+            time.sleep(n * 2e-3)
             run.kill()
-            killed += run.wait() == -signal.SIGKILL
-            # The next run in this folder clears up.
-            self.run_covol("phantom", "sphere", "--size", "16", "-o", "next.nrrd")
-            (self.out / "next.nrrd").unlink()
-            self.assertIn(self.state(), sets, f"killed after {moment:.3f} s of {seconds:.3f}")
-            self.assertEqual([p.name for p in self.out.iterdir() if p.name.startswith(".")], [])
-        self.assertGreater(killed, 3)
+            run.wait()
+            self.clear()
+            self.assertIn(self.state(), sets)
 
     def test_signals_end_a_run_and_leave_nothing(self):
         subprocess.run(self.segment(), cwd=self.out, check=True)

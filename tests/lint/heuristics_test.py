@@ -19,8 +19,7 @@ ALLOWED = {
     "guess/variational.cpp:kAround", "guess/variational.cpp:kLocalShares", "guess/variational.cpp:kNoStep",
     "guidance/smooth_image.cpp:kKernelSigmas", "guidance/smooth_image.cpp:kLeastSigma", "holes/holes.cpp:kP95OfSpacing",
     "meshing/contacts.cpp:kAlong", "meshing/contacts.cpp:kFacing", "meshing/contacts.cpp:kFar", "meshing/contacts.cpp:kRounding",
-    "meshing/level.cpp:kConverged", "meshing/level.cpp:kNearFace", "meshing/wall.cpp:kFar", "meshing/wall.cpp:kLeastRays",
-    "meshing/wall.cpp:kMostTests", "meshing/wall.cpp:kThinShare", "start/start.cpp:kLeafRadius",
+    "meshing/level.cpp:kConverged", "meshing/level.cpp:kNearFace", "meshing/mesh_distance.cpp:kThinShare", "start/start.cpp:kLeafRadius",
     "start/start.cpp:kSame", "surface/rasterizer.cpp:kCertain", "surface/rasterizer.cpp:kRounding", "tagging/tagging.cpp:kBall",
 }
 

@@ -97,7 +97,7 @@ def test_every_flag_is_an_option(program):
     files = {"output", "mask", "mesh", "density", "fields", "table", "evidence", "suggest", "half", "up", "unit_scale",
              "channel", "frame", "correct_level_shift", "points_channels", "plain",
              "report", "keep_failed", "usda", "compression"}  # of reading and writing, which are functions of their own
-    later = {"painted_as", "painted_outside", "strict", "brick_voxels", "brick_overlap", "seam_tolerance"}
+    later = {"painted_as", "painted_outside", "brick_voxels", "brick_overlap", "seam_tolerance"}
     unknown = set(flags) - set(ours) - words - files - later
     assert not unknown, f"flags without a keyword: {sorted(unknown)}"
     for name, default in ours.items():  # where help shows a number, it is the default here
@@ -175,7 +175,7 @@ def test_the_stub_is_up_to_date():
     assert done.returncode == 0, done.stdout + done.stderr
     text = script.with_name("covol").joinpath("__init__.pyi").read_text()
     for name in covol.__all__:
-        assert f"def {name}(" in text or f"class {name}" in text, f"{name} is not in the stub"
+        assert f"def {name}(" in text or f"class {name}" in text, f"{name} is not in __init__.pyi"
         assert getattr(covol, name).__doc__, f"{name} has no docstring"
     for type_ in (covol.Image, covol.Points, covol.Mesh, covol.LevelSet, covol.Result):
         for name, member in vars(type_).items():

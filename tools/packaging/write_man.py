@@ -75,7 +75,7 @@ def program_page(program):
     lines += [".SH EXIT STATUS"]
     for code, what in [("0", "done"), ("1", "a defect of covol"), ("2", "the command line cannot be understood"),
                        ("3", "bad input or options"), ("4", "a file cannot be read or written"),
-                       ("5", "the flow is not steady, with \\-\\-strict"), ("6", "numerical trouble"), ("130", "interrupted")]:
+                       ("5", "a warning was said, with \\-\\-strict"), ("6", "numerical trouble"), ("130", "interrupted")]:
         lines += [".TP", code, what]
     return lines
 

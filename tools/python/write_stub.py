@@ -1,6 +1,6 @@
 """Fills the options of segment() and reconstruct() into covol/__init__.pyi, from the module's own table.
 
-    PYTHONPATH=BUILD/python /usr/bin/python3 tools/python/write_stub.py           says whether the stub is up to date
+    PYTHONPATH=BUILD/python /usr/bin/python3 tools/python/write_stub.py           says whether that is up to date
     PYTHONPATH=BUILD/python /usr/bin/python3 tools/python/write_stub.py --write   fills them in
 """
 import pathlib

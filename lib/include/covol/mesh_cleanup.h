@@ -51,7 +51,7 @@ struct Crossings {
 [[nodiscard]] COVOL_API Crossings count_crossings(const TriangleMesh& mesh);
 
 /// How thin the solid is, world units: from the middles of triangles that are evenly spread over the list, straight
-/// inward to the next triangle; the 1st percentile of up to 512, of fewer where the mesh is large. < 0: no ray met one.
+/// inward to the next triangle; the 1st percentile of up to 512. < 0: no ray met one.
 [[nodiscard]] COVOL_API double measure_wall(const TriangleMesh& mesh, const RunContext& run = {});
 
 }  // namespace covol

@@ -178,11 +178,11 @@ Domain domain_of(const FloatGrid& grid) {
     d.origin = {origin[0], origin[1], origin[2]};
     const auto lo = grid.getMetadata<openvdb::Vec3IMetadata>(kMinKey);
     const auto hi = grid.getMetadata<openvdb::Vec3IMetadata>(kMaxKey);
-    const openvdb::CoordBBox box = lo && hi
-                                       ? openvdb::CoordBBox(openvdb::Coord(lo->value()), openvdb::Coord(hi->value()))
-                                       : grid.evalActiveVoxelBoundingBox();
-    if (box.empty() && !(lo && hi)) return d;
-    const int margin = lo && hi ? 0 : 8;
+    const bool stated = lo && hi;
+    const openvdb::CoordBBox box = stated ? openvdb::CoordBBox(openvdb::Coord(lo->value()), openvdb::Coord(hi->value()))
+                                          : grid.evalActiveVoxelBoundingBox();
+    if (box.empty() && !stated) return d;
+    const int margin = stated ? 0 : 8;
     for (int a = 0; a < 3; ++a) {
         const double first = box.min()[a], last = box.max()[a];
         if (first <= -kFarthestVoxel || last >= kFarthestVoxel || last < first - 1) {  // an empty domain is one

@@ -1,5 +1,6 @@
 #pragma once
 // Arithmetic of vectors.
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -18,6 +19,14 @@ inline Vec3 cross(const Vec3& a, const Vec3& b) {
 inline Vec3 unit(const Vec3& v) {
     const double length = std::sqrt(dot(v, v));
     return length > 1e-30 ? times(1 / length, v) : Vec3{0, 0, 0};
+}
+
+inline std::array<Vec3, 8> corners(const WorldBox& box) {
+    std::array<Vec3, 8> all{};
+    for (int c = 0; c < 8; ++c)
+        all[c] = {(c & 1) != 0 ? box.max[0] : box.min[0], (c & 2) != 0 ? box.max[1] : box.min[1],
+                  (c & 4) != 0 ? box.max[2] : box.min[2]};
+    return all;
 }
 
 }  // namespace covol::cloud

@@ -9,9 +9,9 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <sstream>
 
 #include "covol/error.h"
+#include "evolve/finite.h"
 #include "evolve/heuristics.h"
 #include "redistance/local_distance.h"
 
@@ -91,11 +91,7 @@ void check_finite(const LeafBand& band, const HaloField& field, const char* what
     for (int n = 0; n < kLeafSize; ++n) {
         const float value = field.values.leaf(first)[n];
         if (!is_on(band.active(first), n) || std::isfinite(value)) continue;
-        const Coord at = band.origin(first).offsetBy(n >> 6, (n >> 3) & 7, n & 7);
-        std::ostringstream text;
-        text << "evolve: " << what << ": expected finite values, got " << value << " at voxel (" << at.x() << ", "
-             << at.y() << ", " << at.z() << ")";
-        throw Error(Errc::InvalidInput, text.str());
+        throw not_finite(what, value, band.origin(first).offsetBy(n >> 6, (n >> 3) & 7, n & 7));
     }
 }
 

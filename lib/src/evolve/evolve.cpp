@@ -5,11 +5,9 @@
 #include "covol/evolve.h"
 
 #include <openvdb/openvdb.h>
-#include <openvdb/tree/LeafManager.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -20,6 +18,7 @@
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "evolve/band_solver.h"
+#include "evolve/finite.h"
 #include "evolve/heuristics.h"
 #include "evolve/motion.h"
 #include "evolve/tracking.h"
@@ -35,25 +34,6 @@ bool has_active(const FloatGrid& u) {
     for (auto leaf = u.tree().cbeginLeaf(); leaf; ++leaf)
         if (!leaf->isEmpty()) return true;
     return false;
-}
-
-/// @throws Error InvalidInput.
-void expect_finite(const FloatGrid& grid, const char* name) {
-    openvdb::tree::LeafManager<const openvdb::FloatTree> leaves(grid.tree());
-    std::atomic<std::size_t> first = leaves.leafCount();
-    leaves.foreach ([&](const auto& leaf, std::size_t n) {
-        for (auto value = leaf.cbeginValueOn(); value; ++value)
-            if (!std::isfinite(*value))
-                for (std::size_t before = first; n < before && !first.compare_exchange_weak(before, n);) continue;
-    });
-    if (first == leaves.leafCount()) return;
-    for (auto value = leaves.leaf(first).cbeginValueOn(); value; ++value) {
-        if (std::isfinite(*value)) continue;
-        const openvdb::Coord at = value.getCoord();
-        throw Error(Errc::InvalidInput, std::string("evolve: ") + name + ": expected finite values, got " +
-                                            detail::number(double(*value)) + " at voxel " +
-                                            detail::to_text(Vec3{double(at.x()), double(at.y()), double(at.z())}));
-    }
 }
 
 // A row's shares are right to half of 1/65535: a step so small moves at most 1.5 % too far or too little; after one so
@@ -72,12 +52,12 @@ public:
         check_step();
         if (options.follow) {
             // Before u changes. A fixed band is checked where it is read.
-            expect_finite(u, "u");
+            detail::expect_finite(u, "u");
             if (!has_active(u)) throw Error(Errc::InvalidInput, "evolve: expected active voxels in u, got none");
             for (const auto& [field, name] : {std::pair(fields.distance, "distance"), std::pair(fields.edge, "edge"),
                                               std::pair(fields.trusted, "trusted"),
                                               std::pair(fields.obstacle, "obstacle"), std::pair(fields.floor, "floor")})
-                if (field != nullptr) expect_finite(*field, name);
+                if (field != nullptr) detail::expect_finite(*field, name);
         }
         if (options.follow) detail::track_surface(u_, domain_, tracking_clamp(options_), run_);
         make_solver();

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/matrix.h"
+#include "base/vector.h"
 
 namespace covol::guidance {
 namespace {
@@ -18,9 +19,8 @@ constexpr double kLeastSigma = 0.3;  // voxels; below it a sampled Gaussian is t
 SmoothImage::SmoothImage(const Image& image, const WorldBox& box, double sigma) {
     const ImageGeometry& g = image.geometry();
     Vec3 lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
-    for (int c = 0; c < 8; ++c) {
-        const Vec3 at = g.world_to_index(
-            {c & 1 ? box.max[0] : box.min[0], c & 2 ? box.max[1] : box.min[1], c & 4 ? box.max[2] : box.min[2]});
+    for (const Vec3& corner : cloud::corners(box)) {
+        const Vec3 at = g.world_to_index(corner);
         for (int a = 0; a < 3; ++a) {
             lo[a] = std::min(lo[a], at[a]);
             hi[a] = std::max(hi[a], at[a]);

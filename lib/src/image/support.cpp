@@ -79,7 +79,7 @@ ImageSupport measure_support(const Image& image, const std::vector<Vec3>& places
                 needed.push_back(
                     image.geometry().index_to_world({double((*voxel)[0]), double((*voxel)[1]), double((*voxel)[2])}));
     }
-    if (image.chunks()) image.load(needed, run);
+    image.load(needed, run);
     using Ranges = std::array<std::optional<double>, 3>;
     std::vector<Ranges> ranges(places.size());
     tbb::parallel_for(std::size_t(0), places.size(), [&](std::size_t n) {

@@ -4,7 +4,6 @@
 
 #include <array>
 #include <bit>
-#include <cstring>
 #include <map>
 #include <stdexcept>
 #include <vector>
@@ -65,7 +64,12 @@ private:
     void skip(std::int64_t bytes) {
         if (bytes < 0 || bytes > layout_.file_bytes - std::int64_t(stream_.tellg()))
             throw std::runtime_error("a block of " + std::to_string(bytes) + " bytes does not fit into the file");
-        stream_.seekg(bytes, std::ios::cur);
+        // To seek drops what the stream has read ahead.
+        constexpr std::int64_t kFar = 1 << 16;
+        if (bytes < kFar)
+            stream_.ignore(bytes);
+        else
+            stream_.seekg(bytes, std::ios::cur);
     }
     Mask mask(std::int64_t values) {
         Mask words(std::size_t(values / 64));
@@ -106,20 +110,12 @@ private:
                                          std::to_string(-packed));
             return skip(bytes);
         }
-        const auto begin = stream_.tellg();
-        skip(packed);
-        if (!blosc) return;
-        const auto end = stream_.tellg();
-        // Blosc's own header: versions, flags, size of an element; bytes, bytes of a block, packed bytes
-        std::array<char, 16> header{};
-        if (packed < std::int64_t(header.size())) throw std::runtime_error("a block is shorter than its header");
-        stream_.seekg(begin);
-        stream_.read(header.data(), header.size());
-        std::uint32_t whole = 0, all = 0;
-        std::memcpy(&whole, header.data() + 4, sizeof(whole));
-        std::memcpy(&all, header.data() + 12, sizeof(all));
-        if (whole != bytes || all != packed) throw std::runtime_error("a block's header has other sizes than it");
-        stream_.seekg(end);
+        if (!blosc) return skip(packed);
+        // Blosc's own header: versions, flags and size of an element; bytes; bytes of a block; packed bytes
+        const auto header = read<std::array<std::uint32_t, 4>>();
+        if (std::int64_t(header[1]) != bytes || std::int64_t(header[3]) != packed)
+            throw std::runtime_error("a block's header has other sizes than it");
+        skip(packed - std::int64_t(sizeof(header)));
     }
 
     std::istream& stream_;

@@ -10,10 +10,12 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <numeric>
 
 #include "covol/error.h"
+#include "covol/mesh_cleanup.h"
 #include "covol/points.h"
 #include "covol/surface.h"
 
@@ -33,7 +35,7 @@ Kernel::Point_3 to_cgal(const std::array<Real, 3>& p) {
 /// Some of a mesh's triangles.
 class TriangleTree {
 public:
-    TriangleTree(const TriangleMesh& mesh, std::size_t begin, std::size_t end) {
+    TriangleTree(const TriangleMesh& mesh, std::size_t begin, std::size_t end) : begin_(begin) {
         triangles_.reserve(end - begin);
         for (std::size_t n = begin; n < end; ++n) {
             const auto& t = mesh.triangles[n];
@@ -50,23 +52,41 @@ public:
     [[nodiscard]] Kernel::Point_3 closest_point(const Kernel::Point_3& query, const Kernel::Point_3& guess) const {
         return tree_.closest_point(query, guess);
     }
+    /// How far along a ray the first of the triangles lies; infinite where it meets none.
+    /// @param own  a triangle of the mesh that does not count
+    [[nodiscard]] double first_hit(const Kernel::Ray_3& ray, std::size_t own) const {
+        const auto is_own = [&](Triangles::const_iterator t) {
+            return begin_ + std::size_t(t - triangles_.begin()) == own;
+        };
+        const auto hit = tree_.first_intersection(ray, is_own);
+        if (!hit) return std::numeric_limits<double>::infinity();
+        if (const auto* point = boost::get<Kernel::Point_3>(&hit->first))
+            return std::sqrt(CGAL::squared_distance(ray.source(), *point));
+        return std::sqrt(CGAL::squared_distance(ray.source(), boost::get<Kernel::Segment_3>(hit->first)));
+    }
 
 private:
+    std::size_t begin_;
     Triangles triangles_;
     CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>> tree_;
 };
 
-}  // namespace
-
-std::vector<double> distances_to(const TriangleMesh& mesh, const std::vector<Vec3>& points) {
-    // Several trees of triangles that follow each other, and so mostly lie close: CGAL builds a tree on one thread, and
-    // the faster the smaller it is. Each more costs a query a look at its root.
+/// Several trees of triangles that follow each other, and so mostly lie close: CGAL builds a tree on one thread, and
+/// the faster the smaller it is. Each more costs a query a look at its root.
+std::vector<std::unique_ptr<TriangleTree>> trees_of(const TriangleMesh& mesh) {
     constexpr std::size_t kTriangles = 1 << 17;
     const std::size_t count = mesh.triangles.size();
     std::vector<std::unique_ptr<TriangleTree>> trees((count + kTriangles - 1) / kTriangles);
     tbb::parallel_for(std::size_t(0), trees.size(), [&](std::size_t n) {
         trees[n] = std::make_unique<TriangleTree>(mesh, n * kTriangles, std::min(count, (n + 1) * kTriangles));
     });
+    return trees;
+}
+
+}  // namespace
+
+std::vector<double> distances_to(const TriangleMesh& mesh, const std::vector<Vec3>& points) {
+    const std::vector<std::unique_ptr<TriangleTree>> trees = trees_of(mesh);
     if (points.empty()) return {};
     const std::vector<std::uint32_t> order = order_spatially(points, points.size());
     std::vector<double> distances(points.size());
@@ -99,6 +119,32 @@ FitStatistics measure_fit(const std::vector<Vec3>& points, const TriangleMesh& m
     std::vector<double> distances;
     with_threads(run, [&] { distances = detail::distances_to(mesh, points); });
     return detail::statistics_of(std::move(distances));
+}
+
+double measure_wall(const TriangleMesh& mesh, const RunContext& run) {
+    constexpr std::size_t kMostRays = 512;
+    constexpr double kThinShare = 0.01;  // a sliver of a triangle or two says nothing of the wall
+    const std::size_t count = mesh.triangles.size(), rays = std::min(count, kMostRays);
+    std::vector<double> walls(rays, std::numeric_limits<double>::infinity());
+    with_threads(run, [&] {
+        const std::vector<std::unique_ptr<detail::TriangleTree>> trees = detail::trees_of(mesh);
+        tbb::parallel_for(std::size_t(0), rays, [&](std::size_t ray) {
+            const std::size_t own = ray * count / rays;
+            const auto& t = mesh.triangles[own];
+            const detail::Kernel::Triangle_3 triangle(detail::to_cgal(mesh.vertices[t[0]]),
+                                                      detail::to_cgal(mesh.vertices[t[1]]),
+                                                      detail::to_cgal(mesh.vertices[t[2]]));
+            if (triangle.is_degenerate()) return;
+            const detail::Kernel::Ray_3 inward(CGAL::centroid(triangle),
+                                               -triangle.supporting_plane().orthogonal_vector());
+            for (const auto& tree : trees) walls[ray] = std::min(walls[ray], tree->first_hit(inward, own));
+        });
+    });
+    std::erase(walls, std::numeric_limits<double>::infinity());
+    if (walls.empty()) return -1;
+    const auto thin = walls.begin() + std::ptrdiff_t(kThinShare * double(walls.size()));
+    std::nth_element(walls.begin(), thin, walls.end());
+    return *thin;
 }
 
 }  // namespace covol

@@ -11,8 +11,6 @@
 namespace covol::figure {
 namespace {
 
-openvdb::Vec3d to_vdb(const Vec3& v) { return {v[0], v[1], v[2]}; }
-
 /// Places near the surface, a voxel's centre each, joined by `add`.
 template <typename Add>
 Extent extent_of(const FloatGrid& grid, const Add& add) {

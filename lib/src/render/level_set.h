@@ -9,6 +9,8 @@
 
 namespace covol::figure {
 
+inline openvdb::Vec3d to_vdb(const Vec3& v) { return {v[0], v[1], v[2]}; }
+
 /// The cubic B-spline whose coefficients are the voxels: two times differentiable, so that normals show no voxels. It
 /// lies h/(3R) voxels inside of a ball of radius R. For one thread.
 class SmoothField {

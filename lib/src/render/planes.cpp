@@ -5,6 +5,7 @@
 #include <limits>
 #include <set>
 
+#include "base/vector.h"
 #include "render/draw/decorations.h"
 #include "render/slices.h"
 
@@ -35,9 +36,8 @@ Directions directions_of(const ImageGeometry& geometry) {
 /// Indices along an axis between which a box of the world lies.
 std::array<double, 2> range_of(const WorldBox& box, int axis, const ImageGeometry& geometry) {
     double low = std::numeric_limits<double>::max(), high = std::numeric_limits<double>::lowest();
-    for (int c = 0; c < 8; ++c) {
-        const double at = geometry.world_to_index(
-            {c & 1 ? box.max[0] : box.min[0], c & 2 ? box.max[1] : box.min[1], c & 4 ? box.max[2] : box.min[2]})[axis];
+    for (const Vec3& corner : cloud::corners(box)) {
+        const double at = geometry.world_to_index(corner)[axis];
         low = std::min(low, at);
         high = std::max(high, at);
     }

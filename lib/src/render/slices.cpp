@@ -28,7 +28,7 @@ public:
         }
         const int n = plane.axis;
         box.min[n] = box.max[n] = std::clamp(int(std::lround(plane.index)), box.min[n], box.max[n]);
-        if (image.chunks()) image.load(box, run);
+        image.load(box, run);
         const Index3 size = box.size();
         values_.resize(std::size_t(size[0]) * size[1] * size[2]);
         image.copy(box, values_.data());

@@ -31,8 +31,6 @@ constexpr auto kMissing = -std::numeric_limits<float>::infinity();
 constexpr double kCosEdge = 0.8;  // of the angle between neighbours' normals, above which a pixel is smooth
 constexpr int kRows = 8;
 
-openvdb::Vec3d to_vdb(const Vec3& v) { return {v[0], v[1], v[2]}; }
-
 struct Hit {
     double depth = kMissing;  // towards the eye
     Vec3 normal{0, 0, 0};

@@ -47,7 +47,7 @@ Volume::Volume(const Image& image, const VoxelBox& region, const std::array<doub
     }
     geometry_.origin = geometry_.index_to_world(first);
     for (int a = 0; a < 3; ++a) geometry_.spacing[a] *= step[a];
-    if (image.chunks()) image.load(region, run);
+    image.load(region, run);
     const Index3 n = geometry_.size;
     voxels_.resize(std::size_t(n[0]) * n[1] * n[2]);
     const double scale = 255 / std::max(1e-300, window[1] - window[0]);

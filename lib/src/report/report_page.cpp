@@ -7,6 +7,7 @@
 
 #include "base/file.h"
 #include "base/valid.h"
+#include "base/vector.h"
 #include "covol/error.h"
 #include "covol/version.h"
 #include "report/cluster.h"
@@ -98,12 +99,8 @@ std::vector<Vec3> places_of(const ReportPage& page) {
         for (const auto& vertex : structure.mesh->vertices) add(vertex);
         for (const Vec3& mark : structure.marks) add(mark);
     }
-    std::vector<Vec3> corners;
-    corners.reserve(8);
-    for (int c = 0; c < 8; ++c)
-        corners.push_back(
-            {c & 1 ? box.max[0] : box.min[0], c & 2 ? box.max[1] : box.min[1], c & 4 ? box.max[2] : box.min[2]});
-    return corners;
+    const std::array<Vec3, 8> corners = cloud::corners(box);
+    return {corners.begin(), corners.end()};
 }
 
 Json to_json(const Image& image, const detail::SlicePlan& plan, const ReportPageOptions& options,

@@ -65,8 +65,7 @@ struct Normals {
 };
 
 Normals normals_at(const Job& job, const std::vector<Vec3>& marks) {
-    constexpr std::size_t kMost = 3000;  // more tell nothing new
-    const std::size_t every = std::max<std::size_t>(1, marks.size() / kMost);
+    const std::size_t every = std::max<std::size_t>(1, marks.size() / kDoubts.support_marks);
     Normals found;
     for (std::size_t n = 0; n < marks.size(); n += every) {
         Vec3 normal{};
@@ -86,7 +85,6 @@ Normals normals_at(const Job& job, const std::vector<Vec3>& marks) {
 
 /// Values are computed on in single precision.
 void find_lost_precision(Job& job) {
-    if (job.image == nullptr || !job.uses_image()) return;
     const auto [low, high] = job.image->percentiles(0.01, 0.99);
     const double largest = std::max(std::abs(low), std::abs(high));
     const double step = largest * std::numeric_limits<float>::epsilon();
@@ -97,7 +95,6 @@ void find_lost_precision(Job& job) {
 
 /// Marks of another image, of another channel or space, look like marks: the image knows better.
 void find_strange_image(Job& job, const std::vector<Vec3>& marks) {
-    if (job.image == nullptr || !job.uses_image()) return;
     const Normals at = normals_at(job, marks);
     const detail::ImageSupport support = detail::measure_support(*job.image, at.places, at.normals, job.h(), job.run);
     if (support.places == 0) return;
@@ -112,6 +109,12 @@ void find_strange_image(Job& job, const std::vector<Vec3>& marks) {
                  number(guidance.gain) + " nats a mark)" + look);
 }
 
+void find_silent_image(Job& job) {
+    const GuidanceReport& guidance = job.report().guidance;
+    if (job.rests() && !guidance.used && !guidance.reason.empty())
+        job.warn("the image had no say between the marks: " + guidance.reason);
+}
+
 }  // namespace
 
 double level_at(const FloatGrid& u, const Vec3& world) {
@@ -122,11 +125,10 @@ double level_at(const FloatGrid& u, const Vec3& world) {
 void doubt(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& distances) {
     find_marks_off(job, marks, distances);
     find_bias(job, marks, distances);
+    if (job.image == nullptr || !job.uses_image()) return;
     find_lost_precision(job);
     find_strange_image(job, marks);
-    const GuidanceReport& guidance = job.report().guidance;
-    if (job.uses_image() && job.rests() && !guidance.used && !guidance.reason.empty())
-        job.warn("the image had no say between the marks: " + guidance.reason);
+    find_silent_image(job);
 }
 
 bool misses_marks(const Job& job, const FloatGrid& u) {

@@ -5,8 +5,8 @@
 
 namespace covol::pipeline {
 
-/// What speaks against the result: marks that lie off the surface, or on one side of it. Goes into the report, and to
-/// people.
+/// What speaks against the result: marks that lie off the surface, or on one side of it, and an image that does not
+/// show what they mark. Goes into the report, and to people.
 /// @param marks      world units
 /// @param distances  of each to the surface
 void doubt(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& distances);

@@ -109,6 +109,8 @@ struct DoubtsHeuristics {
     double image_support = heuristic("doubts.image_support", 0.4);
     /// [standard errors] Of that, above what was found, which must stay below.
     double support_errors = heuristic("doubts.support_errors", 2.0);
+    /// [marks] At which the image is looked at, evenly taken: more tell nothing new.
+    std::size_t support_marks = heuristic("doubts.support_marks", 3000);
     /// [nats] Of guidance: 0 to 0.06 with noise in place of the image, 0.08 to 1.2 with marks of its own, on the same.
     double least_gain = heuristic("doubts.least_gain", 0.05);
 };

@@ -80,9 +80,16 @@ bool is_image_name(const std::string& path) {
     return true;
 }
 
-bool is_segmentation_name(const std::string& path) {
-    return ending_of(path) == ".nrrd" && ending_of(std::filesystem::path(path).stem().string()) == ".seg";
+std::string long_ending(const std::string& path) {
+    const std::filesystem::path whole(path);
+    std::string name = (whole.has_filename() ? whole : whole.parent_path()).filename().string();
+    std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+    for (const char* end : {".nii.gz", ".seg.nrrd", ".ome.tif", ".ome.tiff", ".ome.zarr"})
+        if (name.size() > std::string_view(end).size() && name.ends_with(end)) return end;
+    return std::filesystem::path(name).extension().string();
 }
+
+bool is_segmentation_name(const std::string& path) { return long_ending(path) == ".seg.nrrd"; }
 
 const char* to_string(FileKind kind) {
     switch (kind) {

@@ -37,8 +37,8 @@ namespace covol::tool {
 /// "{ mean, p95, max }" and the like as one line for people.
 [[nodiscard]] std::string one_line(const MeshMeasures& measures);
 [[nodiscard]] std::string one_line(const MeshDeviation& deviation);
-/// @param smallest_angle  degrees: 1st percentile. @param deviation  from the level set, voxels
 [[nodiscard]] std::string plain_mesh_line(std::uint64_t triangles);
+/// @param smallest_angle  degrees: 1st percentile. @param deviation  from the level set, voxels
 [[nodiscard]] std::string mesh_line(std::int64_t triangles, double smallest_angle, const MeshDeviation& deviation);
 
 }  // namespace covol::tool

@@ -202,6 +202,8 @@ void Session::add_common_flags() {
     app_.add_option("--threads", threads_, "threads to use, 0 takes every core");
     app_.add_flag("--profile", profile_, "print at the end where time and memory went");
     app_.add_flag("--quiet", quiet_, "print nothing but results, warnings and errors");
+    app_.add_flag("--strict", strict_,
+                  "exit code 5 where anything was warned of, a flow that is not steady or a surface off its marks");
     app_.add_option("--json", json_path_, "write the report to this file, - is standard output")->type_name("FILE|-");
     app_.add_option(
             "--memory-limit", memory_limit_text_,
@@ -336,6 +338,7 @@ void Session::finish() {
     if (profile_)
         for (const std::string& line : profile_lines(report_)) progress_->line(line);
     progress_->clear();
+    if (strict_ && exit_code_ == kDone && report_.contains("warnings")) exit_code_ = kWarned;
 }
 
 std::vector<std::string> Session::given() const {

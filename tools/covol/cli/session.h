@@ -31,7 +31,7 @@ enum ExitCode {
     kUsage = 2,
     kBadInput = 3,
     kIo = 4,
-    kNotSteady = 5,
+    kWarned = 5,
     kNumerical = 6,
     kInterrupted = 130
 };
@@ -133,7 +133,7 @@ private:
     const CLI::App* command_ = nullptr;
 
     int threads_ = 0;
-    bool quiet_ = false, profile_ = false, planning_ = false;
+    bool quiet_ = false, profile_ = false, strict_ = false, planning_ = false;
     std::string json_path_, save_config_path_, memory_limit_text_;
     std::uint64_t memory_limit_ = 0;  ///< bytes: as given, else what the machine has free
 

@@ -52,7 +52,6 @@ struct EvolveJob {
         session.note(std::to_string(result.steps) + " steps, " + to_string(result.stop_reason));
         if (result.stop_reason == StopReason::MaxSteps)
             session.warn("not steady after " + std::to_string(result.steps) + " steps");
-        if (flags.strict && result.stop_reason != StopReason::Steady) session.set_exit_code(kNotSteady);
         session.add_grid(output, u, vdb.options);
     }
 };

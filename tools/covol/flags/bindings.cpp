@@ -292,8 +292,6 @@ void EvolveFlags::bind(CLI::App& command, bool with_image, bool alone) {
     in_group(command, Group::Numerics);
     command.add_option("--solver-tolerance", options.solver_tolerance, "a step's solve ends at this relative residual")
         ->capture_default_str();
-    in_group(command, Group::Flow);
-    command.add_flag("--strict", strict, "exit code 5 when the flow is not steady at the end");
 }
 
 EvolveOptions EvolveFlags::resolve(double h) const {

@@ -100,7 +100,6 @@ struct EvolveFlags {
     Length delta, tau, attraction_range;
     std::optional<double> guess_weight;
     EvolveOptions options;
-    bool strict = false;
     /// @param with_image  without one there is no rho
     /// @param alone       the single step: what is automatic elsewhere is as in EvolveOptions
     void bind(CLI::App& command, bool with_image, bool alone = false);

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "cli/arguments.h"
+#include "cli/file_kind.h"
 
 namespace covol::tool {
 namespace {
@@ -37,22 +38,20 @@ Placeholder find_placeholder(const std::string& path) {
     return found;
 }
 
+}  // namespace
+
 std::string padded(int number, int digits) {
     std::string text = std::to_string(number);
     if (int(text.size()) < digits) text.insert(0, std::size_t(digits) - text.size(), '0');
     return text;
 }
 
-}  // namespace
-
 std::string with_suffix(const std::string& path, const std::string& suffix) {
     const std::filesystem::path whole(path);
     std::string name = whole.filename().string();
-    std::size_t dot = name.rfind('.');
-    if (dot == std::string::npos || dot == 0) return path + suffix;
-    for (const char* end : {".nii.gz", ".seg.nrrd", ".ome.zarr", ".ome.tif", ".ome.tiff"})
-        if (name.size() > std::string(end).size() && name.ends_with(end)) dot = name.size() - std::string(end).size();
-    return (whole.parent_path() / name.insert(dot, suffix)).string();
+    const std::size_t end = long_ending(name).size();
+    if (end == 0) return path + suffix;
+    return (whole.parent_path() / name.insert(name.size() - end, suffix)).string();
 }
 
 bool has_frame_pattern(const std::string& path) { return find_placeholder(path).begin != std::string::npos; }

@@ -12,6 +12,9 @@ namespace covol::tool {
 [[nodiscard]] std::string with_frame(const std::string& pattern, int frame);
 [[nodiscard]] bool has_frame_pattern(const std::string& path);
 
+/// 7, 3 -> "007"
+[[nodiscard]] std::string padded(int number, int digits);
+
 /// What the names of a frame's files get: its number where a name has {frame}, else a suffix ("_t003") in front of the
 /// ending. Of a single image nothing.
 struct NameTag {

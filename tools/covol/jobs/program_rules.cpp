@@ -7,6 +7,8 @@
 #include <sstream>
 #include <string_view>
 
+#include "jobs/length_unit.h"
+
 namespace covol::tool {
 namespace {
 
@@ -24,13 +26,7 @@ std::string number(double value) {
 }
 
 /// Millimetres in one unit of the file; 0 where that is not known.
-double millimetres(const FileFacts& f) {
-    if (f.unit == "mm") return 1;
-    if (f.unit == "um") return 1e-3;
-    if (f.unit == "nm") return 1e-6;
-    if (f.unit == "cm") return 10;
-    return f.unit == "m" ? 1000 : 0;
-}
+double millimetres(const FileFacts& f) { return f.unit == "mm" ? 1 : 1000 * metres_in(f.unit).value_or(0); }
 
 bool ends_in(const FileFacts& f, std::initializer_list<std::string_view> endings) {
     return std::find(endings.begin(), endings.end(), f.ending) != endings.end();
@@ -149,7 +145,7 @@ const std::vector<Rule>& rules() {
          [](Facts) -> Text { return "write .nrrd, .nii.gz or .seg.nrrd"; }},
         {Program::Slicer, kProblem,
          [](Facts f) {
-             return ends_in(f, {".npy", ".zarr", ".h5", ".hdf5", ".ims"});
+             return ends_in(f, {".npy", ".zarr", ".ome.zarr", ".h5", ".hdf5", ".ims"});
          },
          [](Facts f) -> Text { return "it does not open " + f.ending; },
          [](Facts) -> Text { return "write .nrrd or .nii.gz"; }},
@@ -185,7 +181,7 @@ const std::vector<Rule>& rules() {
          [](Facts) -> Text { return "--points-space index"; }},
         {Program::Fiji, kProblem,
          [](Facts f) {
-             return ends_in(f, {".npy", ".zarr"});
+             return ends_in(f, {".npy", ".zarr", ".ome.zarr"});
          },
          [](Facts f) -> Text { return "it does not open " + f.ending + " by itself"; },
          [](Facts) -> Text { return "covol mask -o OUT.tif; images by a plugin for their format"; }},
@@ -236,15 +232,6 @@ std::vector<Advice> advice_for(Program program, const FileFacts& facts) {
         if (rule.program == program && rule.applies(facts))
             found.push_back({rule.is_problem, rule.text(facts), rule.mend(facts)});
     return found;
-}
-
-std::string long_ending(const std::string& path) {
-    std::string name = std::filesystem::path(path).filename().string();
-    if (name.empty()) name = std::filesystem::path(path).parent_path().filename().string();
-    std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return char(std::tolower(c)); });
-    for (const char* end : {".seg.nrrd", ".nii.gz", ".ome.tif", ".ome.tiff"})
-        if (name.ends_with(end)) return end;
-    return std::filesystem::path(name).extension().string();
 }
 
 std::string word_in_header(const std::string& path, const std::string& key) {

@@ -12,7 +12,7 @@ enum class Program { Any, Blender, Houdini, Slicer, Fiji, Print };
 /// What the rules ask about a file.
 struct FileFacts {
     FileKind kind = FileKind::Image;
-    std::string ending;  ///< of the name, lower case, with its dot; ".seg.nrrd", ".nii.gz", ".ome.tif" whole
+    std::string ending;  ///< of the name, lower case, with its dot; as long_ending() has it
     std::string unit;    ///< of length; empty: the file states none
     double extent = 0;   ///< longest side of its box, world units
     // .vdb
@@ -35,9 +35,6 @@ struct Advice {
 
 /// What the program's rules say of the file, in the table's order.
 [[nodiscard]] std::vector<Advice> advice_for(Program program, const FileFacts& facts);
-
-/// Of the name, as in FileFacts.
-[[nodiscard]] std::string long_ending(const std::string& path);
 
 /// What stands behind `key` in the first 64 KiB of a file, a word; empty where that does not occur. Headers of meshes
 /// and images are text at their beginning, and this is asked of files that have been read in full before.

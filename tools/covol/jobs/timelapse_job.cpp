@@ -78,10 +78,8 @@ private:
     }
 
     [[nodiscard]] NameTag tag(const Frame& frame) const {
-        std::string digits = std::to_string(frame.number);
-        const std::size_t width = std::max<std::size_t>(3, std::to_string(frames_.back().number).size());
-        digits.insert(0, width - std::min(width, digits.size()), '0');
-        return {"_t" + digits, frame.number};
+        const int digits = std::max(3, int(std::to_string(frames_.back().number).size()));
+        return {"_t" + padded(frame.number, digits), frame.number};
     }
 
     void check() {

@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "covol/structures.h"
+#include "jobs/length_unit.h"
 
 namespace covol::tool {
 namespace {
@@ -13,12 +14,6 @@ namespace fs = std::filesystem;
 
 /// One frame of the image is one frame of the film; players of USD change that by framesPerSecond alone.
 constexpr int kFramesPerSecond = 24;
-
-double metres_per(const std::string& unit) {
-    static const std::map<std::string, double> metres{{"nm", 1e-9}, {"um", 1e-6}, {"mm", 1e-3}, {"cm", 1e-2}, {"m", 1}};
-    const auto found = metres.find(unit);
-    return found == metres.end() ? 1 : found->second;
-}
 
 /// Between two @@@, where an @ is nothing special.
 std::string asset(const std::string& file, const fs::path& folder) {
@@ -57,7 +52,7 @@ std::string to_usda(const UsdScene& scene, const std::string& path, const std::s
     const std::string volume = identifier(whole.stem().string());
     std::ostringstream text;
     text.precision(9);
-    text << "#usda 1.0\n(\n    defaultPrim = \"" << volume << "\"\n    metersPerUnit = " << metres_per(unit)
+    text << "#usda 1.0\n(\n    defaultPrim = \"" << volume << "\"\n    metersPerUnit = " << metres_in(unit).value_or(1)
          << "\n    upAxis = \"Z\"\n";
     if (scene.is_timelapse) {
         int first = scene.fields.begin()->second.files.begin()->first, last = first;

@@ -106,6 +106,8 @@ struct OrientationHeuristics {
     double off_weight = heuristic("orientation.off_weight", 2);
     /// [points] That iterate, on the surface in the square of a lattice's cell.
     double sampled_per_cell = heuristic("orientation.sampled_per_cell", 4);
+    /// [points] Fewest of those: where parts lie so far apart that the lattice has each in a cell.
+    std::size_t least_sampled = heuristic("orientation.least_sampled", 100);
     /// [spacings] Edge of the cells that those are taken from.
     double sample_spacings = heuristic("orientation.sample_spacings", 4);
     /// [spacings] Noise below which the nearest points tell the sheet that a point is on.

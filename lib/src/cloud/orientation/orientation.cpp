@@ -300,9 +300,8 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
         const double cell = cloud::indicator_lattice(points, cloud::cells_along(points, first)).cell;
         const double share = kOrientation.sampled_per_cell * scale.spacing * scale.spacing / (cell * cell);
         const bool is_sharp = scale.noise < kOrientation.sharp * scale.spacing;
-        constexpr std::size_t kFewest = 1000;  // where parts lie so far apart that the lattice has one in a cell
-        const std::size_t most = std::max<std::size_t>(1, points.size() / kFewest);
-        const Sample sample(points, scale.spacing, std::size_t(std::clamp(1 / share, 1.0, double(most))));
+        const double most = std::max(1.0, double(points.size() / kOrientation.least_sampled));
+        const Sample sample(points, scale.spacing, std::size_t(std::clamp(1 / share, 1.0, most)));
         std::vector<std::pair<int, double>> tried;
         for (const Try& attempt : kTries) {
             const int cells =

@@ -162,9 +162,9 @@ public:
         swap_ = size != std::int32_t(bytes_.size());
         if (swap_ && swapped != std::int32_t(bytes_.size())) throw Error(Errc::InvalidInput, unusable);
         // ITK's matrices abort the program at numbers that are not finite, or too large to square.
-        for (const auto& [begin_at, end_at] : {std::pair(76, 92), std::pair(256, 328)})
-            for (int at = begin_at; at < end_at; at += 4)
-                if (!(std::abs(number(std::size_t(at))) < 1e9))
+        for (const auto& [first, count] : {std::pair(nifti::kPixdim, 4), std::pair(nifti::kQuatern, 6 + 12)})
+            for (int n = 0; n < count; ++n)
+                if (!(std::abs(number(first + 4 * std::size_t(n))) < 1e9))
                     throw Error(Errc::InvalidInput,
                                 unusable + " (a spacing, origin or direction is not finite, or huge)");
     }

@@ -1,0 +1,37 @@
+/// Preloaded into a program: kills it before its KILL_AT-th call (from 1) of those that put files in place, as a power
+/// cut or the system's out-of-memory killer would. 0 or unset: never.
+#include <dlfcn.h>
+#include <sys/types.h>
+
+#include <atomic>
+#include <csignal>
+#include <cstdlib>
+
+namespace {
+
+void count() {
+    static const long last = std::getenv("KILL_AT") == nullptr ? 0 : std::atol(std::getenv("KILL_AT"));
+    static std::atomic<long> calls{0};
+    if (++calls == last) std::raise(SIGKILL);
+}
+
+template <class... Arguments>
+int pass_on(const char* name, Arguments... arguments) {
+    count();
+    return reinterpret_cast<int (*)(Arguments...)>(::dlsym(RTLD_NEXT, name))(arguments...);
+}
+
+}  // namespace
+
+extern "C" {
+int fsync(int file) { return pass_on("fsync", file); }
+int rename(const char* from, const char* to) noexcept { return pass_on("rename", from, to); }
+int renameat2(int from_folder, const char* from, int to_folder, const char* to, unsigned flags) noexcept {
+    return pass_on("renameat2", from_folder, from, to_folder, to, flags);
+}
+int unlink(const char* path) noexcept { return pass_on("unlink", path); }
+int unlinkat(int folder, const char* path, int flags) noexcept { return pass_on("unlinkat", folder, path, flags); }
+int remove(const char* path) noexcept { return pass_on("remove", path); }
+int mkdir(const char* path, mode_t mode) noexcept { return pass_on("mkdir", path, mode); }
+int flock(int file, int operation) noexcept { return pass_on("flock", file, operation); }
+}
