@@ -2,6 +2,7 @@
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/cluster_test.py
 """
+import csv
 import json
 import os
 import pathlib
@@ -15,9 +16,13 @@ import tempfile
 import time
 import unittest
 
-from cli_test import COVOL, Case
+import numpy as np
+import tifffile
 
-WORKFLOW = pathlib.Path(__file__).resolve().parents[2] / "houdini_free_examples/bricks"
+from cli_test import COVOL, Case, write_xyz
+
+EXAMPLES = pathlib.Path(__file__).resolve().parents[2] / "houdini_free_examples"
+WORKFLOW = EXAMPLES / "bricks"
 
 
 def missing(*programs):
@@ -75,6 +80,51 @@ class Snakemake(Workflow):
             os.killpg(run.pid, signal.SIGKILL)
             run.communicate()
         self.check(self.snakemake("--rerun-incomplete", "--nolock"))
+
+
+@unittest.skipIf(missing("snakemake"), "snakemake is not installed")
+class ManyImages(Case):
+    """Each image, or frame, is what covol segment makes of it by itself."""
+
+    def run_workflow(self, *config):
+        done = subprocess.run(["snakemake", "-s", str(EXAMPLES / "many/Snakefile"), "-j", "2", "--config", *map(str, config),
+                               "out=many", f"covol={pathlib.Path(COVOL).resolve()}", "threads=1", "options=--max-steps 40"],
+                              cwd=self.out, text=True, capture_output=True, timeout=600)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        with open(self.out / "many/table.csv", newline="") as table:
+            return done.stderr, list(csv.DictReader(table))
+
+    def compare(self, name, *job):
+        self.run_covol("segment", *job, "--max-steps", "40", "-o", "own.vdb", "--mesh", "own.ply")
+        mine, theirs = ((self.out / path).read_bytes().split(b"end_header")[1] for path in ("own.ply", f"many/{name}.ply"))
+        self.assertEqual(mine, theirs)
+
+    def test_folder(self):
+        for shape in ("sphere", "torus", "two-spheres"):
+            self.run_covol("phantom", shape, "--size", "40", "--count", "2000", "-o", f"{shape} a.nrrd", "--points", f"{shape} a.xyz")
+        (self.out / "torus a.xyz").unlink()
+        said, rows = self.run_workflow("images={name}.nrrd", "marks={name}.xyz")
+        self.assertIn("torus a: no torus a.xyz, left out", said)
+        self.assertEqual([row["name"] for row in rows], ["sphere a", "two-spheres a"])
+        self.assertTrue(all(float(row["volume"]) > 0 for row in rows))
+        self.compare("sphere a", "sphere a.nrrd", "--points", "sphere a.xyz")
+
+    def test_frames(self):
+        z, y, x = np.mgrid[0:24, 0:24, 0:24]
+        marks = np.random.default_rng(1).normal(size=(800, 3))
+        marks /= np.linalg.norm(marks, axis=1)[:, None]
+        movie = []
+        for frame in range(3):
+            radius = 6 + frame
+            movie.append(np.clip(128 + 40 * (radius - np.sqrt((x - 12) ** 2 + (y - 12) ** 2 + (z - 12) ** 2)), 0, 255))
+            write_xyz(self.out / f"marks_{frame:03d}.xyz", map(tuple, 12 + radius * marks))
+        tifffile.imwrite(self.out / "movie.tif", np.array(movie).astype(np.uint8), imagej=True, resolution=(1, 1),
+                         metadata={"axes": "TZYX", "spacing": 1, "unit": "um"})
+        _, rows = self.run_workflow("movie=movie.tif", "marks=marks_{name}.xyz")
+        self.assertEqual([row["name"] for row in rows], ["000", "001", "002"])
+        for frame, row in enumerate(rows):
+            self.assertAlmostEqual((3 * float(row["volume"]) / (4 * np.pi)) ** (1 / 3), 6 + frame, delta=0.3)
+        self.compare("002", "movie.tif", "--frame", "2", "--points", "marks_002.xyz")
 
 
 SLURM = """ClusterName=covol

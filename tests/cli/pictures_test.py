@@ -5,6 +5,7 @@
 import unittest
 
 import numpy as np
+import pyopenvdb as vdb
 from PIL import Image
 
 from cli_test import Case, write_nrrd
@@ -69,6 +70,38 @@ class Pictures(Case):
         for part in (white[:200, :300], white[:200, 300:], white[200:, :300], white[200:, 300:]):
             self.assertLess(part.mean(), 0.9)
         self.assertFalse(np.array_equal(composed, self.picture("--image", self.stack, "--size", "600x400")))
+
+    def nest(self, apart):
+        """A core and the layer around it; the layer's wall is now before the core's, now behind it, by up to `apart` voxels."""
+        x, y, z = np.mgrid[-16:17, -16:17, -16:17] + 0.3
+        r, grids = np.sqrt(x**2 + y**2 + z**2), []
+        inner = 7 + apart * np.sin(x) * np.sin(z)
+        for name, away in (("core", r - 7), ("layer", np.maximum(inner - r, r - 14))):
+            grid = vdb.FloatGrid(3.0)
+            grid.copyFromArray(np.clip(away, -3, 3).astype(np.float32), tolerance=0)
+            grid.name, grid.gridClass = name, vdb.GridClass.LEVEL_SET
+            grids.append(grid)
+        self.two = self.out / "nested.vdb"
+        vdb.write(str(self.two), grids)
+
+    def test_a_wall_that_two_share_has_the_colour_of_the_one_behind(self):
+        self.nest(0.2)
+        pixels = self.picture("--figure", "surface", "--view", "front", "--size", "400x400").astype(int)
+        y, x = np.mgrid[0:400, 0:400]
+        ball = (pixels.max(axis=-1) - pixels.min(axis=-1) > 20) & (y > 60) & (y < 360)
+        middle, radius = (x[ball].mean(), y[ball].mean()), np.sqrt(ball.sum() / np.pi)
+        away = np.hypot(x - middle[0], y - middle[1]) / radius
+        redness = pixels[..., 0] - pixels[..., 2]
+        behind, beside = redness[away < 0.4], redness[(away > 0.6) & (away < 0.8)]
+        self.assertLess(behind.std(), 0.25 * (beside.mean() - behind.mean()), "specks of the layer's inner wall on the core")
+
+    def test_an_outline_that_two_share_shows_both(self):
+        self.nest(0)
+        write_nrrd(self.out / "grey.nrrd", (33,) * 3, np.full(33**3, 128, np.uint8).tobytes(), 1, (-16,) * 3)
+        pixels = self.picture("--image", "grey.nrrd", "--figure", "slices", "--slices", 1, "--size", "1200x1200").astype(int)
+        blueness = pixels[:1100, ..., 2] - pixels[:1100, ..., 0]  # without the legend
+        self.assertGreater((blueness > 40).sum(), 800)
+        self.assertGreater((blueness < -40).sum(), 800)
 
     def test_background_opacity_and_volume(self):
         size = ("--figure", "surface", "--size", "300x200")

@@ -53,7 +53,8 @@ LeafBounds known_bounds(const Domain& domain, const LeafBand& band, std::size_t 
     return bounds;
 }
 
-constexpr std::size_t kLeavesAtOnce = 1 << 15;  // between these a mapped image gives its pages back
+// Between these a mapped image gives its pages back. Each of a leaf's 64 rows may lie in a page of its own: 0.5 GB.
+constexpr std::size_t kLeavesAtOnce = 1 << 11;
 
 Window sample_window(const Image& image, const FloatGrid& topology, const Domain& domain, double sigma,
                      const RunContext& run) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "render/draw/decorations.h"
 #include "render/level_set.h"
@@ -15,6 +16,7 @@ namespace {
 
 constexpr std::size_t kMostMarks = 120;
 constexpr int kMostSamples = 4;  // of the image along each side of a pixel
+constexpr float kFar = 1e6F;     // pixels
 constexpr double kFlat = 0.2;    // slope below which the surface lies in the plane rather than across it
 
 /// The image's values in one plane.
@@ -80,7 +82,7 @@ public:
 
     void go() {
         draw_image();
-        for (const RenderStructure& structure : scene_.structures) draw_outline(structure);
+        draw_outlines();
         draw_planes();
         for (const RenderStructure& structure : scene_.structures)
             draw_marks(structure.marks, scene_.structures.size() > 1 ? to_color(structure.color) : kLoneMark);
@@ -133,28 +135,64 @@ private:
         });
     }
 
-    /// The zero of the level set, a line of the same width everywhere: the distance from it is the value over its slope
-    /// within the plane.
-    void draw_outline(const RenderStructure& structure) const {
+    /// Of a pixel the two structures whose outlines are next to it: signed distances in pixels.
+    struct Nearest {
+        int structure[2] = {-1, -1};
+        float away[2] = {kFar, kFar};
+
+        void take(int n, float distance) {
+            const int rank = std::abs(distance) < std::abs(away[0]) ? 0 : 1;
+            if (std::abs(distance) >= std::abs(away[rank])) return;
+            if (rank == 0) structure[1] = structure[0], away[1] = away[0];
+            structure[rank] = n;
+            away[rank] = distance;
+        }
+    };
+
+    /// The zero of the level set: the distance from it is the value over its slope within the plane.
+    void find_outline(int n, std::vector<Nearest>& nearest) const {
         const int width = at_.width + 2, height = at_.height + 2;  // a pixel more on every side, for slopes
         std::vector<float> values(std::size_t(width) * height);
-        tbb::enumerable_thread_specific<SmoothField> fields([&] { return SmoothField(*structure.surface); });
+        tbb::enumerable_thread_specific<SmoothField> fields([&] { return SmoothField(*scene_.structures[n].surface); });
         tbb::parallel_for(0, height, [&](int y) {
             SmoothField& field = fields.local();
             for (int x = 0; x < width && !run_.cancelled(); ++x)
                 values[std::size_t(y) * width + x] = float(field.value(world(at_.x + x - 0.5, at_.y + y - 0.5)));
         });
-        const double half = std::max(0.8, 0.075 * style_.text), rim = std::max(0.5, 0.03 * style_.text);
-        const Color color = to_color(structure.color);
         const float least = float(kFlat * style_.pixel);
         tbb::parallel_for(0, at_.height, [&](int y) {
             for (int x = 0; x < at_.width; ++x) {
                 const float* const v = values.data() + std::size_t(y + 1) * width + x + 1;
                 const float slope = 0.5F * std::hypot(v[1] - v[-1], v[width] - v[-width]);
-                const double away = std::abs(v[0]) / std::max(slope, least);
-                const double line = std::clamp(half + 0.5 - away, 0.0, 1.0);
-                canvas_.blend(at_.x + x, at_.y + y, gray(0), 0.55 * std::clamp(half + rim + 0.5 - away, 0.0, 1.0));
-                canvas_.blend(at_.x + x, at_.y + y, color, line);
+                nearest[std::size_t(y) * at_.width + x].take(n, v[0] / std::max(slope, least));
+            }
+        });
+    }
+
+    /// Lines of the same width everywhere. Along a border that two structures share each lies on its own side of it.
+    void draw_outlines() const {
+        std::vector<Nearest> nearest(std::size_t(at_.width) * at_.height);
+        for (int n = 0; n < int(scene_.structures.size()); ++n) find_outline(n, nearest);
+        const double half = std::max(0.8, 0.075 * style_.text), rim = std::max(0.5, 0.03 * style_.text);
+        tbb::parallel_for(0, at_.height, [&](int y) {
+            for (int x = 0; x < at_.width; ++x) {
+                const Nearest& near = nearest[std::size_t(y) * at_.width + x];
+                const double apart = std::abs(std::abs(near.away[0]) - std::abs(near.away[1]));
+                const double shared = std::clamp(2 - 2 * apart / half, 0.0, 1.0);
+                const auto covered = [&](double away, double more) {
+                    const double own_side = std::clamp(0.5 - away, 0.0, 1.0);
+                    return std::lerp(std::clamp(half + more - std::abs(away), 0.0, 1.0),
+                                     own_side * std::clamp(2 * half + more - std::abs(away), 0.0, 1.0), shared);
+                };
+                const auto draw = [&](int rank, bool is_rim) {
+                    if (near.structure[rank] < 0) return;
+                    const double share = covered(near.away[rank], is_rim ? rim + 0.5 : 0.5);
+                    const Color color = is_rim ? gray(0) : to_color(scene_.structures[near.structure[rank]].color);
+                    canvas_.blend(at_.x + x, at_.y + y, color, is_rim ? 0.55 * share : share);
+                };
+                const int under = near.structure[0] < near.structure[1] ? 0 : 1;
+                for (const bool is_rim : {true, false})
+                    for (const int rank : {under, 1 - under}) draw(rank, is_rim);
             }
         });
     }

@@ -24,6 +24,7 @@ using Intersector = openvdb::tools::LevelSetRayIntersector<FloatGrid>;
 
 constexpr int kMostHits = 12;                            // of one ray with one translucent body
 constexpr double kOnSurface = 0.02, kFinestStep = 0.25;  // voxels
+constexpr double kOneWall = 1;                           // voxels: bodies closer than that share a wall
 constexpr double kGrazing = 0.2;                         // cosine between the ray and the normal
 constexpr int kFiner = 4;                                // rays along each side of a pixel at an edge
 constexpr double kOpaque = 0.999;                        // hides what is behind
@@ -35,6 +36,7 @@ struct Hit {
     double depth = kMissing;  // towards the eye
     Vec3 normal{0, 0, 0};
     int body = -1;
+    bool enters = true;  ///< the ray goes into the body here
 };
 
 /// What one ray sees.
@@ -61,6 +63,7 @@ public:
         std::sort(hits_.begin(), hits_.end(), [](const Hit& a, const Hit& b) { return a.depth > b.depth; });
         Seen seen;
         for (const Hit& hit : hits_) {
+            if (is_behind_neighbour(hit)) continue;
             const Body& body = bodies_[hit.body];
             const double facing = std::abs(dot(hit.normal, camera_.basis.to_eye));
             // A slanted layer is thicker along the ray.
@@ -82,6 +85,15 @@ public:
     }
 
 private:
+    /// Where the ray leaves one body and enters the next through the wall that they share, the next is seen.
+    [[nodiscard]] bool is_behind_neighbour(const Hit& hit) const {
+        if (hit.enters) return false;
+        return std::any_of(hits_.begin(), hits_.end(), [&](const Hit& other) {
+            const double apart = std::abs(other.depth - hit.depth) * std::abs(dot(other.normal, camera_.basis.to_eye));
+            return other.enters && other.body != hit.body && apart < kOneWall * fields_[hit.body].voxel_size();
+        });
+    }
+
     void find_hits(int n, const Vec3& middle) {
         const Vec3 &to_eye = camera_.basis.to_eye, origin = plus(middle, times(reach_, to_eye));
         double from = 0;
@@ -126,8 +138,9 @@ private:
             if (!meets) return {};
         }
         Vec3 normal = cloud::unit(sample.gradient);
-        if (dot(normal, along) > 0) normal = times(-1, normal);  // seen from inside
-        return {reach_ - t, normal, n};
+        const bool enters = dot(normal, along) <= 0;
+        if (!enters) normal = times(-1, normal);
+        return {reach_ - t, normal, n, enters};
     }
 
     const std::vector<Body>& bodies_;
