@@ -69,17 +69,21 @@ class Jobs(Bench):
         return row_of([planned, solved, joined], voxels, bricks=count, **facts)
 
     def in_slots(self, slots):
-        """Bricks that are planned already, by Snakemake, a thread each."""
-        shutil.rmtree(self.work / "run", ignore_errors=True)
-        shutil.copytree(self.work / "plan", self.work / "run")
+        """Bricks that are planned already, by Snakemake, a thread each. The peak is that of a job."""
+        folder, joined = self.work / "run", self.work / "by_slots.vdb"
+        shutil.rmtree(folder, ignore_errors=True)
+        shutil.copytree(self.work / "plan", folder)
+        joined.unlink(missing_ok=True)
         workflow = pathlib.Path(__file__).resolve().parents[2] / "houdini_free_examples/bricks/Snakefile"
-        return Run(["snakemake", "-s", workflow, "-j", slots, "--directory", self.work, "--config", "plan=run", "out=joined.vdb",
-                    f"covol={self.covol}", "threads=1"])
+        run = Run(["snakemake", "-s", workflow, "-j", slots, "--directory", self.work, "--config", "plan=run", f"out={joined.name}",
+                   f"covol={self.covol}", "threads=1"])
+        run.peak = max(json.loads(path.read_text()).get("peak_rss_bytes", 0) for path in folder.glob("sweep-*/*.json"))
+        return run
 
 
 def measure(jobs):
     unit = 1 if jobs.quick else 2
-    images = [jobs.whole(*make_ball(jobs.work, size, 50 * unit), image=size) for size in (128 * unit, 256 * unit, 512 * unit)]
+    images = [jobs.whole(*make_ball(jobs.work, size, 50 * unit), image_size=size) for size in (128 * unit, 256 * unit, 512 * unit)]
     jobs.write("bricks_image", images)
 
     bands = []
@@ -98,7 +102,7 @@ def measure(jobs):
 
 
 def draw(results):
-    panels = {"bricks_image": ("image", "voxels of the image's side"), "bricks_band": ("active_voxels", "voxels of the band"),
+    panels = {"bricks_image": ("image_size", "voxels of the image's side"), "bricks_band": ("active_voxels", "voxels of the band"),
               "bricks_count": ("bricks", "bricks"), "bricks_slots": ("slots", "slots of a thread each")}
     plt = plots.plt
     figure, all_axes = plt.subplots(1, len(panels), figsize=(4 * len(panels), 3.4))
@@ -115,10 +119,10 @@ def draw(results):
             memory.plot(x, plots.numbers(group, "peak_mib"), "s" + style, color=plots.MEMORY, label=name + "peak MiB")
         axes.set_xscale("log", base=2)
         for side in (axes, memory):
-            side.set_ylim(bottom=0)
+            side.set_ylim(0, 1.4 * max(max(line.get_ydata()) for line in side.get_lines()))
             side.tick_params(labelsize=7)
         lines = axes.get_lines() + memory.get_lines()
-        axes.legend(lines, [line.get_label() for line in lines], fontsize=7, loc="lower right")
+        axes.legend(lines, [line.get_label() for line in lines], fontsize=7, loc="upper left")
         axes.set_xlabel(label, fontsize=8)
     figure.suptitle(machine, fontsize=8)
     figure.tight_layout()
@@ -130,12 +134,12 @@ def main():
     parser.add_argument("--build", default="build")
     parser.add_argument("--results", default=str(pathlib.Path(__file__).resolve().parent / "results"))
     parser.add_argument("--quick", action="store_true", help="half the size")
+    parser.add_argument("--plot", action="store_true", help="draw what is in the results, measure nothing")
     options = parser.parse_args()
-    with tempfile.TemporaryDirectory(prefix="covol_bench_") as work:
-        options.work = work
-        jobs = Jobs(options)
-        jobs.work = pathlib.Path(work)
-        measure(jobs)
+    if not options.plot:
+        with tempfile.TemporaryDirectory(prefix="covol_bench_") as work:
+            options.work = work
+            measure(Jobs(options))
     draw(pathlib.Path(options.results))
 
 

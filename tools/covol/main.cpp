@@ -21,5 +21,6 @@ int main(int argc, char** argv) {
     add_phantom(session);
     add_plan(session);
     add_brick(session);
+    add_rerun(session);
     return session.main(argc, argv);
 }

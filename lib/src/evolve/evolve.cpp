@@ -22,6 +22,7 @@
 #include "evolve/heuristics.h"
 #include "evolve/motion.h"
 #include "evolve/tracking.h"
+#include "scheme/scheme.h"
 
 namespace covol {
 namespace {
@@ -267,6 +268,8 @@ std::string EvolveOptions::why_invalid() const {
     checks.expect(max_sweeps >= 1, "max_sweeps", ">= 1", max_sweeps);
     return checks.lines();
 }
+
+const char* instruction_set() { return detail::kernels().name; }
 
 const char* to_string(StopReason reason) {
     switch (reason) {

@@ -12,7 +12,9 @@
 #include "cli/nearest.h"
 #include "cli/option_names.h"
 #include "cli/profile.h"
+#include "cli/provenance.h"
 #include "covol/error.h"
+#include "covol/evolve.h"
 #include "covol/version.h"
 
 namespace covol::tool {
@@ -103,43 +105,25 @@ Json options_of(const CLI::App& command) {
 }
 
 /// Files and folders that the command line names to be read: whatever exists under the value of an option that is no
-/// output. Values may begin with a structure's name or a kind of start, NAME=FILE and mesh:FILE.
+/// output, with a structure's name or a kind of start before it (NAME=FILE, mesh:FILE), or the name of a grid or the
+/// place of a dataset behind it.
 std::vector<std::string> inputs_of(const CLI::App& command) {
     std::vector<std::string> inputs;
     for (const CLI::Option* option : command.get_options()) {
         if (option->get_type_name().starts_with("OUT")) continue;
         for (const std::string& text : option->results())
-            for (const std::size_t begin : {std::size_t(0), text.find('=') + 1, text.find(':') + 1}) {
-                std::error_code status;
-                const std::string path = text.substr(begin);
-                if (std::filesystem::is_regular_file(path, status) || std::filesystem::is_directory(path, status))
-                    inputs.push_back(path);
-            }
+            for (const std::size_t begin : {std::size_t(0), text.find('=') + 1, text.find(':') + 1})
+                for (const std::size_t end : {text.size(), text.rfind(':'), text.find(":/")}) {
+                    if (end == std::string::npos || end <= begin) continue;
+                    std::error_code status;
+                    const std::string path = text.substr(begin, end - begin);
+                    if ((std::filesystem::is_regular_file(path, status) ||
+                         std::filesystem::is_directory(path, status)) &&
+                        std::find(inputs.begin(), inputs.end(), path) == inputs.end())
+                        inputs.push_back(path);
+                }
     }
     return inputs;
-}
-
-/// File names in place of paths: files that are passed on need not tell whose folders they come from. What stands
-/// before a path stays, a structure's name or a kind of start (NAME=FILE, mesh:FILE), and what stands behind it, the
-/// place of a dataset (FILE.h5:/a/b).
-std::string without_folder(const std::string& text) {
-    std::size_t begin = text.find('=') + 1;
-    for (const char* kind : {"mesh:", "mask:", "vdb:"})
-        if (text.compare(begin, std::string(kind).size(), kind) == 0) begin += std::string(kind).size();
-    const std::size_t end = std::min(text.find(":/", begin), text.size());
-    std::size_t last = end;
-    while (last > begin && text[last - 1] == '/') --last;  // folders, such as .zarr/
-    const std::size_t slash = last > begin ? text.rfind('/', last - 1) : std::string::npos;
-    return slash == std::string::npos || slash < begin ? text : text.substr(0, begin) + text.substr(slash + 1);
-}
-
-Json without_folders(const Json& options) {
-    Json result = options;
-    for (Json& value : result) {
-        if (value.is_string()) value = without_folder(value.get<std::string>());
-        if (value.is_array() || value.is_object()) value = without_folders(value);
-    }
-    return result;
 }
 
 /// A value that is empty, as from a shell's unset variable, is never meant.
@@ -314,6 +298,7 @@ int Session::execute() {
 void Session::start_report() {
     report_["schema"] = kReportSchema;
     report_["covol"] = version();
+    report_["instruction_set"] = instruction_set();
     report_["command"] = command_->get_name();
     report_["options"] = options_of(*command_);
     report_["seconds"] = Json::object();
@@ -413,11 +398,26 @@ std::map<std::string, std::string> Session::metadata() const {
     Json options = without_folders(report_.at("options"));
     options["command"] = report_.at("command");
     const auto text = [](const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); };
-    std::map<std::string, std::string> facts{{"covol_version", version()}, {"covol_options", text(options)}};
+    std::map<std::string, std::string> facts{{"covol_version", version()},
+                                             {"covol_instruction_set", instruction_set()},
+                                             {"covol_options", text(options)},
+                                             {"covol_given", text(given())},
+                                             {"covol_inputs", text(described_inputs())}};
+    if (report_.contains("bricks")) facts["covol_bricks"] = text(report_.at("bricks").at("count"));
     if (!unit_.empty()) facts["covol_unit"] = unit_;
     if (!space_.empty()) facts["covol_space"] = space_;
     if (report_.contains("resolved")) facts["covol_resolved"] = text(report_.at("resolved"));
     return facts;
+}
+
+const CLI::App* Session::command(const std::string& name) const {
+    const auto found = app_.get_subcommands([&](const CLI::App* command) { return command->get_name() == name; });
+    return found.empty() ? nullptr : found.front();
+}
+
+const Json& Session::described_inputs() const {
+    if (inputs_described_.is_null()) inputs_described_ = describe_inputs(inputs_);
+    return inputs_described_;
 }
 
 std::vector<std::string> Session::comments() const {

@@ -94,12 +94,14 @@ public:
     void set_world_of_points();
     /// The same as of a grid that was read.
     void set_world(const FloatGrid& grid);
-    /// Provenance for the metadata of .vdb files: version, options with the names of files, not of their folders, the
-    /// numbers that were used once they are known, the unit of length and the space.
+    /// Provenance for the metadata of .vdb files: version, options with the names of files, not of their folders,
+    /// digests of the inputs, the numbers that were used once they are known, the unit of length and the space.
     [[nodiscard]] std::map<std::string, std::string> metadata() const;
     /// The same as comment lines for meshes and points.
     [[nodiscard]] std::vector<std::string> comments() const;
     [[nodiscard]] std::string comment() const;
+    /// The command of that name, for its options; null where there is none.
+    [[nodiscard]] const CLI::App* command(const std::string& name) const;
     /// Refuses early what cannot fit into --memory-limit, or into what is free: `bytes` for `what` are needed at least.
     void require_memory(std::uint64_t bytes, const std::string& what) const;
     /// Adds to seconds.<name> of the report; seconds.total is the whole run's.
@@ -124,6 +126,7 @@ private:
     void write_report();
     int fail(int code, const std::string& message);
     [[nodiscard]] std::string interrupted_text() const;
+    [[nodiscard]] const Json& described_inputs() const;
     [[nodiscard]] std::string memory_text() const;
     [[nodiscard]] std::string memory_limit_name() const;
 
@@ -139,6 +142,7 @@ private:
 
     std::optional<BrickCall> brick_;
     std::vector<std::string> inputs_;
+    mutable Json inputs_described_;  ///< null: not yet
     std::string command_line_;
     std::string unit_, space_;  ///< empty: not known
 

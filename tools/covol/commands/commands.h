@@ -22,5 +22,6 @@ void add_report(Session& session);
 void add_phantom(Session& session);
 void add_plan(Session& session);
 void add_brick(Session& session);
+void add_rerun(Session& session);
 
 }  // namespace covol::tool

@@ -1,0 +1,29 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "cli/json.h"
+
+namespace covol::tool {
+
+/// Where the path of a file lies in the value of an option, [begin, end): what stands before it is a structure's name
+/// or a kind of start (NAME=FILE, mesh:FILE), what stands behind it the place of a dataset (FILE.h5:/a/b).
+[[nodiscard]] std::pair<std::size_t, std::size_t> path_within(const std::string& text);
+
+/// File names in place of paths: files that are passed on need not tell whose folders they come from.
+[[nodiscard]] std::string without_folder(const std::string& text);
+[[nodiscard]] Json without_folders(const Json& options);
+
+/// What tells one input from another of the same name: "sha256:HEX" of the file; of one above 64 MiB
+/// "sha256-of-pieces:HEX", of 64 pieces of 1 MiB that lie evenly from its first byte to its last; of a folder, such as
+/// a Zarr store, "sha256-of-metadata:HEX", of the .zarray, .zattrs, .zgroup and zarr.json in it, by their paths.
+/// @throws Error Io.
+[[nodiscard]] std::string digest_of(const std::string& path);
+
+/// A list of {"name", "digest"} in the order of the paths.
+[[nodiscard]] Json describe_inputs(const std::vector<std::string>& paths);
+
+}  // namespace covol::tool
