@@ -144,6 +144,13 @@ class Rerun(Case):
         self.assertEqual([grid["name"] for grid in report["grids"]], ["density", "surface"])
         self.assertEqual(self.files(), sorted(before + ["again.vdb", "r.json"]))
 
+    def test_digests_are_those_of_xxh128sum(self):
+        self.make()
+        said = subprocess.run(["xxh128sum", "ball.nrrd", "marks with space.xyz"], cwd=self.out, capture_output=True, text=True, check=True)
+        expected = [{"name": line[34:], "digest": f"xxh128:{line[:32]}"} for line in said.stdout.splitlines()]
+        facts = vdb.readMetadata(str(self.out / "s.vdb"))
+        self.assertEqual(json.loads(facts["covol_inputs"]), expected)
+
     def test_from_another_folder_by_another_name(self):
         self.make()
         away = self.out / "away"
@@ -161,7 +168,7 @@ class Rerun(Case):
         marks = self.out / "marks with space.xyz"
         text = marks.read_text()
         marks.write_text(text + "\n")
-        self.assertIn("not the file that the run read: expected sha256:", self.run_covol("rerun", "s.vdb", code=3).stderr)
+        self.assertIn("not the file that the run read: expected xxh128:", self.run_covol("rerun", "s.vdb", code=3).stderr)
         marks.write_text(text)
         grid, facts = vdb.readAll(str(self.out / "s.vdb"))
         at = next(item.min for item in grid[0].citerOnValues())

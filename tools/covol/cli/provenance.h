@@ -17,9 +17,10 @@ namespace covol::tool {
 [[nodiscard]] std::string without_folder(const std::string& text);
 [[nodiscard]] Json without_folders(const Json& options);
 
-/// What tells one input from another of the same name: "sha256:HEX" of the file; of one above 64 MiB
-/// "sha256-of-pieces:HEX", of 64 pieces of 1 MiB that lie evenly from its first byte to its last; of a folder, such as
-/// a Zarr store, "sha256-of-metadata:HEX", of the .zarray, .zattrs, .zgroup and zarr.json in it, by their paths.
+/// What tells one input from another of the same name: "xxh128:HEX" of the file, as xxh128sum prints it; of one above
+/// 64 MiB "xxh128-of-pieces:HEX", of 64 pieces of 1 MiB that lie evenly from its first byte to its last; of a folder,
+/// such as a Zarr store, "xxh128-of-metadata:HEX", of the .zarray, .zattrs, .zgroup and zarr.json in it, by their
+/// paths.
 /// @throws Error Io.
 [[nodiscard]] std::string digest_of(const std::string& path);
 
