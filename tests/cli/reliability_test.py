@@ -3,10 +3,8 @@
     COVOL=build/bin/covol python3 -m unittest tests/cli/reliability_test.py
 """
 import hashlib
-import json
 import os
 import pathlib
-import shutil
 import signal
 import subprocess
 import sys
@@ -14,7 +12,6 @@ import time
 import unittest
 
 import numpy as np
-import pyopenvdb as vdb
 
 from cli_test import CENTER, COVOL, H, ORIGIN, RADIUS, SIZE, Case, sphere_points, write_nrrd, write_xyz
 
@@ -124,75 +121,6 @@ class Inputs(Case):
         self.assertIn("cut short by another program", text)
         self.run_covol("phantom", "sphere", "--size", "16", "-o", "next.nrrd")
         self.assertEqual([p.name for p in self.out.iterdir()], ["next.nrrd"])
-
-
-class Rerun(Case):
-    """A result from what it says of itself."""
-
-    def make(self, *more):
-        shutil.copy(self.image, self.out / "ball.nrrd")
-        shutil.copy(self.points, self.out / "marks with space.xyz")
-        self.run_covol("segment", "ball.nrrd", "--points", "marks with space.xyz", "--init", "tag", "-o", "s.vdb", "--mesh", "s.ply", *more)
-
-    def test_the_same_bits(self):
-        self.make("--delta", "0.7vx", "--max-steps", "20", "--density", "s.vdb")
-        before = self.files()
-        done = self.run_covol("rerun", "s.vdb", "--threads", "2", "--quiet", "-o", "again.vdb", "--json", "r.json")
-        self.assertIn("the same bits", done.stdout)
-        report = json.loads((self.out / "r.json").read_text())["rerun"]
-        self.assertTrue(report["same"])
-        self.assertEqual([grid["name"] for grid in report["grids"]], ["density", "surface"])
-        self.assertEqual(self.files(), sorted(before + ["again.vdb", "r.json"]))
-
-    def test_digests_are_those_of_xxh128sum(self):
-        self.make()
-        said = subprocess.run(["xxh128sum", "ball.nrrd", "marks with space.xyz"], cwd=self.out, capture_output=True, text=True, check=True)
-        expected = [{"name": line[34:], "digest": f"xxh128:{line[:32]}"} for line in said.stdout.splitlines()]
-        facts = vdb.readMetadata(str(self.out / "s.vdb"))
-        self.assertEqual(json.loads(facts["covol_inputs"]), expected)
-
-    def test_from_another_folder_by_another_name(self):
-        self.make()
-        away = self.out / "away"
-        away.mkdir()
-        (self.out / "s.vdb").rename(away / "renamed.vdb")
-        elsewhere = self.out / "inputs"
-        elsewhere.mkdir()
-        for name in ("ball.nrrd", "marks with space.xyz"):
-            (self.out / name).rename(elsewhere / name)
-        self.assertIn("ball.nrrd: an input of that run is not in", self.run_covol("rerun", "away/renamed.vdb", code=4).stderr)
-        self.assertIn("the same bits", self.run_covol("rerun", "away/renamed.vdb", "--inputs", elsewhere).stdout)
-
-    def test_inputs_that_changed_and_results_that_did(self):
-        self.make()
-        marks = self.out / "marks with space.xyz"
-        text = marks.read_text()
-        marks.write_text(text + "\n")
-        self.assertIn("not the file that the run read: expected xxh128:", self.run_covol("rerun", "s.vdb", code=3).stderr)
-        marks.write_text(text)
-        grid, facts = vdb.readAll(str(self.out / "s.vdb"))
-        at = next(item.min for item in grid[0].citerOnValues())
-        grid[0].getAccessor().setValueOn(at, grid[0].getConstAccessor().getValue(at) + 1e-3)
-        vdb.write(str(self.out / "s.vdb"), grid, facts)
-        done = self.run_covol("rerun", "s.vdb", code=3)
-        self.assertRegex(done.stdout, "surface: 1 voxels differ, by up to 0.0010")
-
-    def test_points_alone_and_a_label_image(self):
-        write_xyz(self.out / "p.xyz", sphere_points(6000))
-        self.run_covol("reconstruct", "p.xyz", "-o", "r.vdb")
-        self.assertIn("the same bits", self.run_covol("rerun", "r.vdb").stdout)
-        self.run_covol("phantom", "torus", "--size", "40", "-o", "t.nrrd", "--points", "t.xyz")
-        self.run_covol("segment", "t.nrrd", "--points", "a=t.xyz", "--init", "sphere:0,0,0,1", "-o", "t.vdb", "--max-steps", "4")
-        self.assertIn("the same bits", self.run_covol("rerun", "t.vdb").stdout)
-
-    def test_what_cannot_be_repeated(self):
-        self.run_covol("convert", self.image, "i.vdb")
-        self.assertIn("ball.nrrd", self.run_covol("rerun", "i.vdb", code=4).stderr)
-        vdb.write(str(self.out / "foreign.vdb"), vdb.createLevelSetSphere(5.0))
-        self.assertIn("another program or an older covol wrote it", self.run_covol("rerun", "foreign.vdb", code=3).stderr)
-        (self.out / "piped.xyz").write_text(self.points.read_text())
-        subprocess.run(f"cat piped.xyz | {COVOL} reconstruct - -o p.vdb --quiet", shell=True, cwd=self.out, check=True)
-        self.assertIn("through a pipe", self.run_covol("rerun", "p.vdb", code=3).stderr)
 
 
 class Memory(Case):
