@@ -1,0 +1,170 @@
+"""Many jobs: in one process without growth, eight at once, and random ones that are killed.
+
+    COVOL=build/bin/covol PYTHONPATH=build/python /usr/bin/python3 tests/soak/soak.py [--jobs 2000] [--minutes 20] [--seed 1]
+
+Prints what it did, a line for each part, and ends with exit code 1 where anything went wrong. Needs numpy, for the first
+part the Python module (left out, with a word, where it is not there).
+"""
+import argparse
+import gc
+import os
+import pathlib
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+import numpy as np
+
+COVOL = os.environ.get("COVOL", "build/bin/covol")
+ALLOWED = {0, 3, 130}  # done, refused, interrupted
+GROWTH = 24 << 20      # of all jobs together, after the first tenth of them: pools of threads and pages settle
+
+
+def resident():
+    return int(pathlib.Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGESIZE")
+
+
+def one_process(jobs, seed):
+    try:
+        import covol
+    except ImportError:
+        return "the Python module is not on the path: left out", True
+    generator = random.Random(seed)
+    image, points, _ = covol.phantom("sphere", 32, 400)
+    held = []
+    for n in range(jobs):
+        try:
+            if n % 3 == 0:
+                covol.reconstruct(points, voxel_size=0.15 + 0.05 * generator.random())
+            elif n % 3 == 1:
+                covol.segment(image, points, init="tag", max_steps=5)
+            else:
+                covol.segment(image, points[:3 if n % 2 else 200])
+        except covol.Error:
+            pass  # refused marks are a job, too
+        if n % max(1, jobs // 20) == 0:
+            gc.collect()
+            held.append(resident())
+    begin, end = held[len(held) // 10 + 1], held[-1]
+    return f"{jobs} jobs in one process: {begin >> 20} MiB after the first tenth, {end >> 20} at the end", end - begin < GROWTH
+
+
+class Folder:
+    """A few inputs, and random jobs on them."""
+
+    def __init__(self, folder, seed):
+        self.path, self.generator = pathlib.Path(folder), random.Random(seed)
+        for shape in ("sphere", "torus"):
+            self.run("phantom", shape, "--size", "48", "--count", "3000", "-o", f"{shape}.nrrd", "--points", f"{shape}.xyz").wait()
+        self.run("segment", "sphere.nrrd", "--points", "sphere.xyz", "-o", "start.vdb", "--mesh", "start.ply").wait()
+
+    def run(self, *words):
+        with open(self.path / "errors.txt", "ab") as errors:
+            return subprocess.Popen([str(pathlib.Path(COVOL).resolve()), *map(str, words), "--quiet"], cwd=self.path, stdout=subprocess.DEVNULL,
+                                    stderr=errors)
+
+    def job(self, n):
+        """@return words, outputs"""
+        r, shape = self.generator, self.generator.choice(("sphere", "torus"))
+        out = f"o{n}"
+        marks = ["--points", f"{shape}.xyz"]
+        kinds = [
+            (["segment", f"{shape}.nrrd", *marks, "-o", f"{out}.vdb", "--mesh", f"{out}.ply", "--mask", f"{out}.nrrd", "--json",
+              f"{out}.json", "--report", f"{out}.html"], [".vdb", ".ply", ".nrrd", ".json", ".html"]),
+            (["segment", f"{shape}.nrrd", *marks, "--init", "tag", "--tolerance", "0", "--max-steps", r.randint(1, 60), "-o",
+              f"{out}.vdb", "--mask", f"{out}.tif"], [".vdb", ".tif"]),
+            (["reconstruct", f"{shape}.xyz", "-o", f"{out}.vdb", "--mesh", f"{out}.stl"], [".vdb", ".stl"]),
+            (["mesh", "start.vdb", "-o", f"{out}.ply", "--target-edge", "2vx"], [".ply"]),
+            (["render", "start.vdb", "-o", f"{out}.png", "--size", "400x300"], [".png"]),
+            (["convert", f"{shape}.nrrd", f"{out}.vdb"], [".vdb"]),
+            (["segment", f"{shape}.nrrd", "--init", "sphere:0,0,0,0.4", "-o", f"{out}.vdb", "--mesh", f"{out}.obj"], [".vdb", ".obj"]),
+            (["compare", "start.vdb", "start.ply", "--json", f"{out}.json"], [".json"]),
+        ]
+        words, endings = r.choice(kinds)
+        return words, [f"{out}{ending}" for ending in endings]
+
+    def problems(self, code, words, outputs):
+        """Of a job that is over."""
+        there = [name for name in outputs if (self.path / name).exists()]
+        if code not in ALLOWED | {-signal.SIGKILL}:
+            return [f"exit code {code}: covol {' '.join(map(str, words))}"]
+        if code == 0 and there != outputs:
+            return [f"done without {set(outputs) - set(there)}: {words}"]
+        if code in (3, 130) and there:
+            return [f"exit code {code} left {there}: {words}"]
+        return []
+
+    def sweep(self, outputs):
+        for name in outputs:
+            (self.path / name).unlink(missing_ok=True)
+
+
+def eight_at_once(seed):
+    with tempfile.TemporaryDirectory(prefix="covol_soak_") as path:
+        folder, wrong = Folder(path, seed), []
+        for batch in range(4):
+            jobs = [folder.job(8 * batch + n) for n in range(8)]
+            runs = [folder.run(*words, "--threads", "2") for words, _ in jobs]
+            for run, (words, outputs) in zip(runs, jobs):
+                wrong += folder.problems(run.wait(), words, outputs)
+                if run.returncode != 0:
+                    wrong.append(f"exit code {run.returncode} of eight at once: {words}")
+        return f"32 jobs, eight at once: {len(wrong)} went wrong", wrong
+
+
+def kills(minutes, seed):
+    with tempfile.TemporaryDirectory(prefix="covol_soak_") as path:
+        folder, wrong, ended = Folder(path, seed), [], {}
+        deadline, n = time.monotonic() + 60 * minutes, 0
+        while time.monotonic() < deadline:
+            words, outputs = folder.job(n)
+            run = folder.run(*words)
+            how = folder.generator.choice((None, signal.SIGKILL, signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP))
+            if how is not None:
+                time.sleep(folder.generator.expovariate(4))
+                run.send_signal(how)
+            begin = time.monotonic()
+            code = run.wait()
+            if how not in (None, signal.SIGKILL) and time.monotonic() - begin > 10:
+                wrong.append(f"{how.name} took {time.monotonic() - begin:.1f} s: {words}")
+            ended[code] = ended.get(code, 0) + 1
+            # The next run in the folder clears up after one that was killed, and completes the set that it had begun.
+            folder.run("phantom", "sphere", "--size", "16", "-o", "next.nrrd").wait()
+            (folder.path / "next.nrrd").unlink()
+            there = [name for name in outputs if (folder.path / name).exists()]
+            if code == -signal.SIGKILL and there not in ([], outputs):
+                wrong.append(f"killed, and left {there} of {outputs}")
+            wrong += folder.problems(code, words, outputs)
+            hidden = [entry.name for entry in folder.path.iterdir() if entry.name.startswith(".covol")]
+            if hidden:
+                wrong.append(f"left {hidden}: {words}")
+            folder.sweep(outputs)
+            n += 1
+        errors = (folder.path / "errors.txt").read_text()
+        if "internal error" in errors:
+            wrong.append(next(line for line in errors.splitlines() if "internal error" in line))
+        counts = ", ".join(f"{count} with exit code {code}" for code, count in sorted(ended.items()))
+        return f"{n} jobs with kills in {minutes:g} minutes ({counts}): {len(wrong)} went wrong", wrong
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--jobs", type=int, default=2000)
+    parser.add_argument("--minutes", type=float, default=20)
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args()
+    failed = False
+    text, good = one_process(options.jobs, options.seed)
+    print(text, "" if good else "GREW", flush=True)
+    failed |= not good
+    for text, wrong in (eight_at_once(options.seed), kills(options.minutes, options.seed)):
+        print("\n".join([text, *wrong]), flush=True)
+        failed |= bool(wrong)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

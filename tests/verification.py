@@ -1,0 +1,162 @@
+"""covol against what is known without it: closed forms, convergence orders, the paper's shapes; writes docs/verification.md.
+
+    /usr/bin/python3 tests/verification.py --build build [--update-docs]
+
+Five minutes on two cores. With COVOL_DATA set to the folder of the larger phantoms the embryo is among them. Needs numpy,
+and tifffile for the embryo.
+"""
+import argparse
+import datetime
+import json
+import os
+import pathlib
+import platform
+import re
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE / "bench"))
+from quality import read_vertices, shell_errors  # noqa: E402
+
+SIDE = 2.6  # of the phantoms' cube
+R, MAJOR, MINOR, BOX = 0.8, 0.75, 0.3, np.array((0.9, 0.7, 0.5))  # half sides of the box; lib/src/analysis/phantom.cpp
+
+
+def off_box(p):
+    q = np.abs(p) - BOX
+    return np.linalg.norm(np.maximum(q, 0), axis=1) + np.minimum(q.max(axis=1), 0)
+
+
+SHAPES = {  # signed distance, volume, area
+    "sphere": (lambda p: np.linalg.norm(p, axis=1) - R, 4 / 3 * np.pi * R**3, 4 * np.pi * R**2),
+    "torus": (lambda p: np.hypot(np.hypot(p[:, 0], p[:, 1]) - MAJOR, p[:, 2]) - MINOR, 2 * np.pi**2 * MAJOR * MINOR**2,
+              4 * np.pi**2 * MAJOR * MINOR),
+    "box": (off_box, 8 * BOX.prod(), 8 * (BOX * np.roll(BOX, 1)).sum()),
+}
+
+
+class Verification:
+    def __init__(self, build, work):
+        self.covol, self.tests, self.work = build / "bin/covol", build / "tests", pathlib.Path(work)
+
+    def run(self, *words):
+        done = subprocess.run([self.covol, *map(str, words), "--quiet", "--json", "-"], cwd=self.work, check=True, text=True,
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        return json.loads(done.stdout)
+
+    def orders(self):
+        """Manufactured flows: a sphere that shrinks by its curvature, planes and spheres that run at unit speed."""
+        rows = []
+        for program in ("sphere_curvature_test", "advection_test"):
+            said = subprocess.run([self.tests / program], check=True, text=True, stdout=subprocess.PIPE).stdout
+            for line in said.splitlines():
+                match = re.match(r"(.*?): .*? = ([\d.]+) h", line)
+                if not match:
+                    continue
+                order = re.search(r"observed order ([\d.-]+)", line)
+                h = re.search(r"h = ([\d.]+)", line)[1]
+                flow = re.sub(r" = [\d.]+$", "", line.split(":")[0])
+                rows.append({"flow": flow, "h": h, "error in voxels": match[2], "observed order": order[1] if order else ""})
+        return rows
+
+    def distances(self):
+        """The distance of step 1 against the nearest of all points, by a loop."""
+        self.run("phantom", "torus", "--size", 16, "-o", "t.nrrd", "--points", "t.xyz", "--count", 3000)
+        points, rows = np.loadtxt(self.work / "t.xyz"), []
+        for size in (32, 64):
+            h = SIDE / size
+            self.run("distance", "t.xyz", "--voxel-size", h, "--max-distance", "6vx", "-o", "d.vdb")
+            import pyopenvdb
+            grid = pyopenvdb.read(str(self.work / "d.vdb"), "distance")
+            places = [(item.min, item.value) for item in grid.citerOnValues()]
+            chosen = np.random.default_rng(1).choice(len(places), 4000, replace=False)
+            worst = 0
+            for n in chosen:
+                place = np.array(grid.transform.indexToWorld(places[n][0]))
+                worst = max(worst, abs(np.linalg.norm(points - place, axis=1).min() - places[n][1]))
+            rows.append({"voxels across": size, "places": len(chosen), "largest error in voxels": f"{worst / h:.1e}"})
+        return rows
+
+    def shapes(self):
+        """Closed forms: points on a surface, and image and points, at three voxel sizes."""
+        rows = []
+        for kind, (off, volume, area) in SHAPES.items():
+            for size in (32, 64, 128):
+                h, files = SIDE / size, (f"{kind}.nrrd", f"{kind}.xyz")
+                self.run("phantom", kind, "--size", size, "--count", 2 * size**2, "-o", files[0], "--points", files[1])
+                for job, words in {"points": ("reconstruct", files[1], "--voxel-size", h),
+                                   "image and points": ("segment", files[0], "--points", files[1])}.items():
+                    report = self.run(*words, "-o", "s.vdb", "--mesh", "s.ply")
+                    away = np.abs(off(read_vertices(self.work / "s.ply"))) / h
+                    surface = report["surface"]
+                    rows.append({"shape": kind, "of": job, "voxels across": size, "mean distance": f"{away.mean():.4f}",
+                                 "largest": f"{away.max():.3f}", "volume": f"{100 * (surface['volume'] / volume - 1):+.3f} %",
+                                 "area": f"{100 * (surface['area'] / area - 1):+.3f} %"})
+        return rows
+
+    def holes(self):
+        """The paper's figure 4: spheres with six holes of three shapes, the points in the holes."""
+        rows, size = [], 260
+        for kind in ("sphere-round", "sphere-square", "sphere-slit"):
+            self.run("phantom", kind, "--size", size, "--count", 3000, "-o", "h.nrrd", "--points", "h.xyz")
+            for column, words in {"image": ("--theta", 0), "points": ("--points", "h.xyz", "--rho", 0, "--attraction-range", 0, "--delta", "0.25vx"),
+                                  "image and points": ("--points", "h.xyz", "--attraction-range", "5vx")}.items():
+                self.run("segment", "h.nrrd", "--init", "sphere:0,0,0,0.95", *words, "-o", "h.vdb", "--mesh", "h.ply")
+                shell, hole = shell_errors(self.work / "h.ply", kind, SIDE / size)
+                rows.append({"holes": kind[7:], "by": column, "error on the shell": f"{shell:.3f}", "in the holes": f"{hole:.3f}"})
+        return rows
+
+    def embryo(self):
+        """The paper's two tissues, of the embryo phantom; overlap with the truth."""
+        import tifffile
+        data, rows = pathlib.Path(os.environ["COVOL_DATA"]) / "phantoms", []
+        truth = tifffile.imread(data / "embryo_labels.tif")
+        for label, (name, seed) in enumerate({"ve": ("--exterior-seed", "89.6,89.6,28.5"), "exe": ()}.items(), 1):
+            for of, words in {"points": ("--points", data / f"embryo_{name}_points.ply", *seed),
+                              "contours": ("--contours", data / f"embryo_{name}_contours.csv")}.items():
+                self.run("segment", data / "embryo.tif", *words, "--voxel-size", 0.35, "-o", "e.vdb", "--mask", "e.tif")
+                inside = tifffile.imread(self.work / "e.tif") > 0
+                dice = 2 * (inside & (truth == label)).sum() / (inside.sum() + (truth == label).sum())
+                rows.append({"tissue": name.upper(), "marks": of, "Dice": f"{dice:.4f}"})
+        return rows
+
+
+def markdown(rows):
+    lines = ["| " + " | ".join(rows[0]) + " |", "|" + "---|" * len(rows[0])]
+    return "\n".join(lines + ["| " + " | ".join(map(str, row.values())) + " |" for row in rows])
+
+
+def machine():
+    with open("/proc/cpuinfo") as file:
+        model = next((line.split(":", 1)[1].strip() for line in file if line.startswith("model name")), platform.processor())
+    commit = subprocess.run(["git", "-C", HERE, "describe", "--always", "--dirty", "--exclude", "*"], capture_output=True, text=True)
+    return f"{datetime.date.today()}, {model}, covol {commit.stdout.strip() or 'of unknown version'}"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", default="build")
+    parser.add_argument("--update-docs", action="store_true", help="put the tables into docs/verification.md")
+    options = parser.parse_args()
+    text = [f"Measured {machine()}.", ""]
+    with tempfile.TemporaryDirectory(prefix="covol_verification_") as work:
+        made = Verification(pathlib.Path(options.build).resolve(), work)
+        for part in (made.orders, made.distances, made.shapes, made.holes, made.embryo):
+            if part == made.embryo and "COVOL_DATA" not in os.environ:
+                print("embryo: SKIPPED: COVOL_DATA is not set")
+                continue
+            text += [f"**{part.__doc__}**", "", markdown(part()), ""]
+            print("\n".join(text[-4:]), flush=True)
+    if options.update_docs:
+        page = HERE.parent / "docs/verification.md"
+        begin, end = "<!-- tables: written by tests/verification.py --update-docs -->\n", "<!-- tables: end -->"
+        head, rest = page.read_text().split(begin)
+        page.write_text(head + begin + "\n".join(["", *text]) + end + rest.split(end)[1])
+
+
+if __name__ == "__main__":
+    main()
