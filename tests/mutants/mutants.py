@@ -1,0 +1,151 @@
+"""Seeded faults in kernels and readers: which of them do the unit tests find?
+
+    /usr/bin/python3 tests/mutants/mutants.py --work FOLDER [--count 50] [--seed 1]
+
+Clones the repository's last commit into FOLDER, builds its unit tests there, and then changes one operator or constant at a
+time, builds the tests of that module, and runs them. A fault that does not compile is drawn again. Prints a line for each
+and, at the end, those that no test found: gaps, or changes that mean nothing (a bound that is never met with equality).
+"""
+import argparse
+import pathlib
+import random
+import re
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+# Files, and the programs of their tests. Half of the faults go into kernels, half into readers.
+KERNELS = {
+    "scheme/scheme_kernels.cpp": ["kernels_test", "scheme_test", "scheme_kernels_test", "evolve_test"],
+    "scheme/scheme.cpp": ["kernels_test", "scheme_test", "scheme_kernels_test", "evolve_test"],
+    "evolve/band_solver.cpp": ["evolve_test", "evolve_property_test", "sphere_curvature_test"],
+    "evolve/motion.cpp": ["evolve_test", "evolve_property_test"],
+    "evolve/evolve.cpp": ["evolve_test", "evolve_property_test", "advection_test"],
+    "distance/nearest_kernel.cpp": ["distance_test", "distance_property_test"],
+    "distance/distance.cpp": ["distance_test", "distance_property_test"],
+    "redistance/patch_kernel.cpp": ["surface_test", "evolve_test"],
+    "redistance/redistance.cpp": ["surface_test", "evolve_test"],
+    "tagging/band.cpp": ["band_test", "tag_distance_property_test"],
+    "tagging/closing.cpp": ["closing_test", "band_test"],
+    "edge/edge.cpp": ["edge_test"],
+    "surface/surface_mesh.cpp": ["extract_test", "surface_test", "mesh_property_test"],
+    "grid/leaf_band.cpp": ["evolve_test", "distance_test"],
+}
+READERS = {
+    "io/pixels/raw_image.cpp": ["image_test", "image_chunks_test", "image_view_test", "image_roi_test"],
+    "io/pixels/nifti_space.cpp": ["image_test", "image_formats_test"],
+    "io/image/mrc.cpp": ["image_test", "image_formats_test"],
+    "io/image/npy.cpp": ["image_test", "image_formats_test"],
+    "io/image/tiff_pages.cpp": ["image_test", "image_chunks_test"],
+    "io/image/tiff_stack.cpp": ["image_test", "image_chunks_test"],
+    "io/image/dicom_header.cpp": ["image_test", "image_formats_test"],
+    "io/chunked/zarr_array.cpp": ["zarr_test", "chunked_voxels_test"],
+    "io/chunked/zarr_chunks.cpp": ["zarr_test", "chunked_voxels_test"],
+    "io/chunked/array_chunks.cpp": ["zarr_test", "chunked_voxels_test"],
+    "io/points/fiji_roi.cpp": ["points_test", "point_formats_test"],
+    "io/points/zip.cpp": ["points_test", "point_formats_test"],
+    "io/points/point_columns.cpp": ["points_test", "point_formats_test", "points_check_test"],
+    "io/points/point_scans.cpp": ["point_formats_test", "point_normals_test"],
+    "io/points/slicer_markups.cpp": ["points_test", "point_formats_test"],
+    "io/mesh/ply.cpp": ["mesh_io_test", "point_formats_test"],
+    "io/mesh/stl.cpp": ["mesh_io_test"],
+    "io/mesh/obj.cpp": ["mesh_io_test"],
+    "io/mesh/glb.cpp": ["mesh_io_test"],
+}
+FAULTS = [
+    (r" < ", " <= "), (r" <= ", " < "), (r" > ", " >= "), (r" >= ", " > "), (r" == ", " != "), (r" != ", " == "),
+    (r" \+ ", " - "), (r" - ", " + "), (r" \* ", " + "), (r" && ", " || "), (r" \|\| ", " && "),
+    (r"std::min\(", "std::max("), (r"std::max\(", "std::min("), (r"\b0\.5\b", "0.6"), (r"\b1\b", "2"), (r"\b2\b", "3"),
+    (r"\btrue\b", "false"), (r"\bfalse\b", "true"), (r" \+= ", " -= "), (r"if \(!", "if ("),
+]
+SKIPPED = re.compile(r"^\s*(//|/\*|#|using|namespace|template|static_assert|include)|throw |Error\(|run\.report|k\w+ = |\bline\(|memory")
+SECONDS = 300  # of a test: faults make loops endless
+
+
+def faults_in(path):
+    """(line, column, old, new) of each place where one of the faults can be made."""
+    found, text = [], path.read_text().splitlines()
+    for number, line in enumerate(text):
+        if SKIPPED.search(line):
+            continue
+        code = re.sub(r'"(\\.|[^"\\])*"', lambda m: "\0" * len(m.group()), line.split(" //")[0])
+        for pattern, new in FAULTS:
+            for match in re.finditer(pattern, code):
+                found.append((number, match.start(), match.group(), new))
+    return found
+
+
+class Build:
+    def __init__(self, folder):
+        self.source, self.build = folder / "source", folder / "source/build-ci"
+
+    def make(self):
+        if not self.source.exists():
+            subprocess.run(["git", "clone", "-q", ROOT, self.source], check=True)
+            subprocess.run(["cmake", "--preset", "ci"], cwd=self.source, check=True, stdout=subprocess.DEVNULL)
+        tests = sorted({test for tests in {**KERNELS, **READERS}.values() for test in tests})
+        if not self.compile(tests):
+            sys.exit("the tests do not build")
+        for test in tests:
+            if not self.passes(test):
+                sys.exit(f"{test} fails without a fault")
+
+    def compile(self, tests):
+        return subprocess.run(["ninja", "-C", self.build, *tests], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode == 0
+
+    def passes(self, test):
+        try:
+            return subprocess.run([self.build / "tests" / test, "-a"], cwd=self.build / "tests", stdout=subprocess.DEVNULL,
+                                  stderr=subprocess.DEVNULL, timeout=SECONDS).returncode == 0
+        except subprocess.TimeoutExpired:
+            return False
+
+    def try_fault(self, name, tests, fault):
+        """@return the test that found it, "" where none did, None where it does not compile"""
+        path = self.source / "lib/src" / name
+        original = path.read_text()
+        lines = original.splitlines(keepends=True)
+        number, column, old, new = fault
+        lines[number] = lines[number][:column] + new + lines[number][column + len(old):]
+        path.write_text("".join(lines))
+        try:
+            if not self.compile(tests):
+                return None
+            return next((test for test in tests if not self.passes(test)), "")
+        finally:
+            path.write_text(original)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--work", type=pathlib.Path, required=True)
+    parser.add_argument("--count", type=int, default=50)
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args()
+    options.work.mkdir(parents=True, exist_ok=True)
+    build = Build(options.work.resolve())
+    build.make()
+    chance, found, survived = random.Random(options.seed), 0, []
+    while found + len(survived) < options.count:
+        modules = KERNELS if (found + len(survived)) % 2 == 0 else READERS
+        name = chance.choice(sorted(modules))
+        places = faults_in(build.source / "lib/src" / name)
+        if not places:
+            continue
+        fault = chance.choice(places)
+        by = build.try_fault(name, modules[name], fault)
+        if by is None:
+            continue
+        number, column, old, new = fault
+        line = (build.source / "lib/src" / name).read_text().splitlines()[number].strip()
+        text = f"{name}:{number + 1}:{column + 1}: '{old.strip()}' to '{new.strip()}' in: {line}"
+        print(f"{by or 'SURVIVED'}: {text}", flush=True)
+        if by:
+            found += 1
+        else:
+            survived.append(text)
+    print(f"{found} of {options.count} found; not found:", *survived, sep="\n  ")
+
+
+if __name__ == "__main__":
+    main()
