@@ -64,7 +64,7 @@ class Verification:
         return rows
 
     def distances(self):
-        """The distance of step 1 against the nearest of all points, by a loop."""
+        """The distance of step 1 against the nearest of all points, by a loop. Sweeping hands points on from voxel to voxel: few voxels miss the nearest."""
         self.run("phantom", "torus", "--size", 16, "-o", "t.nrrd", "--points", "t.xyz", "--count", 3000)
         points, rows = np.loadtxt(self.work / "t.xyz"), []
         for size in (32, 64):
@@ -74,11 +74,12 @@ class Verification:
             grid = pyopenvdb.read(str(self.work / "d.vdb"), "distance")
             places = [(item.min, item.value) for item in grid.citerOnValues()]
             chosen = np.random.default_rng(1).choice(len(places), 4000, replace=False)
-            worst = 0
+            errors = []
             for n in chosen:
                 place = np.array(grid.transform.indexToWorld(places[n][0]))
-                worst = max(worst, abs(np.linalg.norm(points - place, axis=1).min() - places[n][1]))
-            rows.append({"voxels across": size, "places": len(chosen), "largest error in voxels": f"{worst / h:.1e}"})
+                errors.append(abs(np.linalg.norm(points - place, axis=1).min() - places[n][1]) / h)
+            rows.append({"voxels across": size, "places": len(chosen), "mean error in voxels": f"{np.mean(errors):.1e}",
+                         "largest": f"{max(errors):.1e}"})
         return rows
 
     def shapes(self):

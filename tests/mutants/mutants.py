@@ -7,6 +7,7 @@ time, builds the tests of that module, and runs them. A fault that does not comp
 and, at the end, those that no test found: gaps, or changes that mean nothing (a bound that is never met with equality).
 """
 import argparse
+import os
 import pathlib
 import random
 import re
@@ -21,7 +22,7 @@ KERNELS = {
     "evolve/band_solver.cpp": ["evolve_test", "evolve_property_test", "sphere_curvature_test"],
     "evolve/motion.cpp": ["evolve_test", "evolve_property_test"],
     "evolve/evolve.cpp": ["evolve_test", "evolve_property_test", "advection_test"],
-    "distance/nearest_kernel.cpp": ["distance_test", "distance_property_test"],
+    "distance/nearest_kernel.cpp": ["nearest_kernel_test", "distance_test", "distance_property_test"],
     "distance/distance.cpp": ["distance_test", "distance_property_test"],
     "redistance/patch_kernel.cpp": ["surface_test", "evolve_test"],
     "redistance/redistance.cpp": ["surface_test", "evolve_test"],
@@ -33,15 +34,15 @@ KERNELS = {
 }
 READERS = {
     "io/pixels/raw_image.cpp": ["image_test", "image_chunks_test", "image_view_test", "image_roi_test"],
-    "io/pixels/nifti_space.cpp": ["image_test", "image_formats_test"],
-    "io/image/mrc.cpp": ["image_test", "image_formats_test"],
-    "io/image/npy.cpp": ["image_test", "image_formats_test"],
-    "io/image/tiff_pages.cpp": ["image_test", "image_chunks_test"],
-    "io/image/tiff_stack.cpp": ["image_test", "image_chunks_test"],
-    "io/image/dicom_header.cpp": ["image_test", "image_formats_test"],
-    "io/chunked/zarr_array.cpp": ["zarr_test", "chunked_voxels_test"],
-    "io/chunked/zarr_chunks.cpp": ["zarr_test", "chunked_voxels_test"],
-    "io/chunked/array_chunks.cpp": ["zarr_test", "chunked_voxels_test"],
+    "io/pixels/nifti_space.cpp": ["image_test", "image_formats_test", "cli/alignment_test"],
+    "io/image/mrc.cpp": ["image_test", "image_formats_test", "cli/image_formats_test", "cli/interchange_test"],
+    "io/image/npy.cpp": ["image_test", "image_formats_test", "cli/image_formats_test", "cli/interchange_test"],
+    "io/image/tiff_pages.cpp": ["image_test", "image_chunks_test", "cli/image_formats_test", "cli/alignment_test"],
+    "io/image/tiff_stack.cpp": ["image_test", "image_chunks_test", "cli/image_formats_test", "cli/alignment_test"],
+    "io/image/dicom_header.cpp": ["image_test", "image_formats_test", "cli/image_formats_test", "cli/interchange_test"],
+    "io/chunked/zarr_array.cpp": ["zarr_test", "chunked_voxels_test", "cli/zarr_test"],
+    "io/chunked/zarr_chunks.cpp": ["zarr_test", "chunked_voxels_test", "cli/zarr_test"],
+    "io/chunked/array_chunks.cpp": ["zarr_test", "chunked_voxels_test", "cli/hdf5_test"],
     "io/points/fiji_roi.cpp": ["points_test", "point_formats_test"],
     "io/points/zip.cpp": ["points_test", "point_formats_test"],
     "io/points/point_columns.cpp": ["points_test", "point_formats_test", "points_check_test"],
@@ -58,7 +59,7 @@ FAULTS = [
     (r"std::min\(", "std::max("), (r"std::max\(", "std::min("), (r"\b0\.5\b", "0.6"), (r"\b1\b", "2"), (r"\b2\b", "3"),
     (r"\btrue\b", "false"), (r"\bfalse\b", "true"), (r" \+= ", " -= "), (r"if \(!", "if ("),
 ]
-SKIPPED = re.compile(r"^\s*(//|/\*|#|using|namespace|template|static_assert|include)|throw |Error\(|run\.report|k\w+ = |\bline\(|memory")
+SKIPPED = re.compile(r"^\s*(//|/\*|#|using|namespace|template|static_assert|include)|throw |Error\(|run\.report|k\w+ = |\bline\(|memory|reserve")
 SECONDS = 300  # of a test: faults make loops endless
 
 
@@ -91,12 +92,16 @@ class Build:
                 sys.exit(f"{test} fails without a fault")
 
     def compile(self, tests):
-        return subprocess.run(["ninja", "-C", self.build, *tests], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode == 0
+        targets = sorted({"covol_tool" if test.startswith("cli/") else test for test in tests})
+        return subprocess.run(["ninja", "-C", self.build, *targets], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode == 0
 
     def passes(self, test):
+        command, folder = [self.build / "tests" / test, "-a"], self.build / "tests"
+        if test.startswith("cli/"):
+            command, folder = ["/usr/bin/python3", "-m", "unittest", "-f", test[4:]], self.source / "tests/cli"
         try:
-            return subprocess.run([self.build / "tests" / test, "-a"], cwd=self.build / "tests", stdout=subprocess.DEVNULL,
-                                  stderr=subprocess.DEVNULL, timeout=SECONDS).returncode == 0
+            return subprocess.run(command, cwd=folder, env={**os.environ, "COVOL": str(self.build / "bin/covol")}, timeout=SECONDS,
+                                  stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode == 0
         except subprocess.TimeoutExpired:
             return False
 

@@ -1,0 +1,142 @@
+// The kernel on a leaf against loops that spell out what it says.
+#include "distance/nearest_kernel.h"
+
+#include <array>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <random>
+
+using covol::detail::NearestBlock;
+
+namespace {
+
+struct Offer {
+    float x = NearestBlock::kFar, y = NearestBlock::kFar, z = NearestBlock::kFar;
+};
+
+void set(NearestBlock& block, int i, int j, int k, const Offer& point, int index) {
+    const int at = NearestBlock::offset(i, j, k);
+    block.x[at] = point.x;
+    block.y[at] = point.y;
+    block.z[at] = point.z;
+    block.index[at] = index;
+}
+
+/// Of the point that one voxel holds, to the place of another.
+double squared(const NearestBlock& block, const std::array<int, 3>& holder, const std::array<int, 3>& place) {
+    const int at = NearestBlock::offset(holder[0], holder[1], holder[2]);
+    const double x = block.x[at] - place[0], y = block.y[at] - place[1], z = block.z[at] - place[2];
+    return x * x + y * y + z * z;
+}
+
+std::unique_ptr<NearestBlock> no_points() {
+    auto block = std::make_unique<NearestBlock>();
+    for (int i = -1; i <= 8; ++i)
+        for (int j = -1; j <= 8; ++j)
+            for (int k = -1; k <= 8; ++k) set(*block, i, j, k, {}, -1);
+    return block;
+}
+
+/// Face 2a is that of the least coordinate on axis a, 2a + 1 of the largest. The rows of a face run along the later one
+/// of its axes; a halo voxel looks at the face's voxels in the three rows next to it.
+bool has_news(const NearestBlock& block, int face, double reach) {
+    const int axis = face / 2, across = axis == 0 ? 1 : 0, along = axis == 2 ? 1 : 2;
+    const int own = face % 2 == 0 ? 0 : 7, halo = face % 2 == 0 ? -1 : 8;
+    for (int r = 0; r < 8; ++r)
+        for (int n = 0; n < 8; ++n) {
+            std::array<int, 3> place{};
+            place[axis] = halo;
+            place[across] = r;
+            place[along] = n;
+            const double known = squared(block, place, place);
+            for (int step = -1; step <= 1; ++step) {
+                std::array<int, 3> holder = place;
+                holder[axis] = own;
+                holder[across] = r + step;
+                const double offered = squared(block, holder, place);
+                if (offered < known && offered <= reach) return true;
+            }
+        }
+    return false;
+}
+
+}  // namespace
+
+TEST_CASE("the six faces' news are those of a loop over the halo") {
+    std::mt19937 random(4);
+    std::uniform_real_distribution<float> place(-3.0F, 10.0F);
+    std::uniform_int_distribution<int> voxel(-1, 8), kind(0, 9);
+    std::array<int, 6> told{}, silent{};
+    for (int round = 0; round < 4000; ++round) {
+        const auto block = no_points();
+        // One or two points in it; known beyond some of the faces.
+        for (int count = 1 + round % 2; count > 0; --count)
+            set(*block, voxel(random), voxel(random), voxel(random), {place(random), place(random), place(random)},
+                count);
+        const double reach = kind(random) == 0 ? 4.0 : 400.0;
+        const unsigned news = covol::detail::faces_with_news(*block, float(reach));
+        for (int face = 0; face < 6; ++face) {
+            const bool expected = has_news(*block, face, reach);
+            INFO("round " << round << ", face " << face);
+            REQUIRE((news >> face & 1U) == unsigned(expected));
+            ++(expected ? told : silent)[face];
+        }
+        REQUIRE(news < 64);
+    }
+    for (int face = 0; face < 6; ++face) {
+        CHECK(told[face] > 100);
+        CHECK(silent[face] > 100);
+    }
+}
+
+TEST_CASE("a sweep carries a single point to every voxel of the leaf") {
+    for (const std::array<int, 3>& from :
+         {std::array{0, 0, 0}, {7, 7, 7}, {3, 0, 7}, {-1, 4, 4}, {4, 8, 2}, {5, 2, -1}}) {
+        const auto block = no_points();
+        const Offer point{float(from[0]) + 0.2F, float(from[1]) - 0.3F, float(from[2]) + 0.1F};
+        set(*block, from[0], from[1], from[2], point, 7);
+        covol::detail::sweep_nearest(*block);
+        std::array<float, 512> distances{};
+        covol::detail::squared_distances(*block, distances.data());
+        for (int i = 0; i < 8; ++i)
+            for (int j = 0; j < 8; ++j)
+                for (int k = 0; k < 8; ++k) {
+                    REQUIRE(block->index[NearestBlock::offset(i, j, k)] == 7);
+                    const double x = i - point.x, y = j - point.y, z = k - point.z;
+                    REQUIRE(distances[(i * 8 + j) * 8 + k] == Approx(x * x + y * y + z * z).epsilon(1e-5));
+                }
+    }
+}
+
+TEST_CASE("each voxel ends with the nearer of two points, but for a few between them") {
+    std::mt19937 random(9);
+    std::uniform_real_distribution<float> place(-0.5F, 7.5F);
+    int wrong = 0, all = 0;
+    for (int round = 0; round < 200; ++round) {
+        const auto block = no_points();
+        std::array<Offer, 2> points{};
+        for (int n = 0; n < 2; ++n) {
+            points[n] = {place(random), place(random), place(random)};
+            const std::array<int, 3> voxel{int(std::lround(points[n].x)), int(std::lround(points[n].y)),
+                                           int(std::lround(points[n].z))};
+            if (block->index[NearestBlock::offset(voxel[0], voxel[1], voxel[2])] >= 0) points[n] = points[0];
+            set(*block, voxel[0], voxel[1], voxel[2], points[n], n);
+        }
+        covol::detail::sweep_nearest(*block);
+        for (int i = 0; i < 8; ++i)
+            for (int j = 0; j < 8; ++j)
+                for (int k = 0; k < 8; ++k) {
+                    const auto off = [&](const Offer& p) {
+                        return (i - p.x) * (i - p.x) + (j - p.y) * (j - p.y) + (k - p.z) * (k - p.z);
+                    };
+                    const float nearest = std::min(off(points[0]), off(points[1]));
+                    const int held = block->index[NearestBlock::offset(i, j, k)];
+                    REQUIRE(held >= 0);
+                    wrong += off(points[held]) > nearest + 1e-4F;
+                    ++all;
+                }
+    }
+    CHECK(wrong < 0.002 * all);
+}
