@@ -5,6 +5,7 @@
 import hashlib
 import os
 import pathlib
+import resource
 import signal
 import subprocess
 import sys
@@ -121,6 +122,20 @@ class Inputs(Case):
         self.assertIn("cut short by another program", text)
         self.run_covol("phantom", "sphere", "--size", "16", "-o", "next.nrrd")
         self.assertEqual([p.name for p in self.out.iterdir()], ["next.nrrd"])
+
+
+    def test_clouds_that_no_lattice_holds(self):
+        """Named at once, not after minutes or for want of memory."""
+        ball = (np.array(sphere_points(6000)) - CENTER) / RADIUS
+        wild, apart = ball.copy(), 0.01 * ball
+        wild[17] = (1e7, 3, 4)
+        apart[::2] += (100, 0, 0)
+        for points, says in ((wild, "points: (1e+07, 3, 4) lies"), (apart, "the points are small parts, far apart")):
+            path = self.inputs / "cloud.xyz"
+            np.savetxt(path, points, "%.9g")
+            limit = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime + 20
+            self.refuse("reconstruct", path, "-o", "o.vdb", code=3, says=says)
+            self.assertLess(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime, limit)
 
 
 class Memory(Case):

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/median.h"
 #include "base/valid.h"
 #include "covol/error.h"
 #include "covol/scan_noise.h"
@@ -49,6 +50,30 @@ void choose_attraction_range(Job& job) {
         chosen = range;
         job.choose("attraction_range", number(range), number(kAutomatic.attraction_voxels) + " voxels");
     }
+}
+
+constexpr double kMostReach = 1 << 22;  // voxels from a lattice's origin, with room around
+
+// One wild point makes a domain that no lattice holds.
+void check_extent(const Job& job) {
+    if (job.image != nullptr || job.points.size() < 8) return;
+    Vec3 middle{};
+    for (int a = 0; a < 3; ++a) {
+        std::vector<double> values;
+        for (const Vec3& p : job.points) values.push_back(p[a]);
+        middle[a] = cloud::median(std::move(values));
+    }
+    std::vector<double> away;
+    for (const Vec3& p : job.points) away.push_back(std::hypot(p[0] - middle[0], p[1] - middle[1], p[2] - middle[2]));
+    const auto farthest = std::max_element(away.begin(), away.end()) - away.begin();
+    const double far = away[std::size_t(farthest)];
+    std::nth_element(away.begin(), away.begin() + std::ptrdiff_t(away.size() * 99 / 100), away.end());
+    const double most = away[away.size() * 99 / 100];
+    if (far < kAutomatic.wild_point * most || far < kMostReach * job.h()) return;
+    const Vec3& p = job.points[std::size_t(farthest)];
+    throw Error(Errc::InvalidInput, "points: (" + number(p[0]) + ", " + number(p[1]) + ", " + number(p[2]) + ") lies " +
+                                        number(far) + " from the middle of all points, " + number(far / most) +
+                                        " times as far as 99 % of them: leave it out, if it is a mistake");
 }
 
 // Tagging needs marks that lie closer together than the body is thick anywhere, by far; the guess does not.
@@ -122,6 +147,7 @@ void choose_values(Job& job) {
         options.voxel_size = choice.voxel_size;
         job.choose("voxel_size", number(job.h()), choice.reason);
     }
+    check_extent(job);
     try_cloud(job);
     merge_points(job);
     choose_start(job);

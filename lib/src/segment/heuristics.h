@@ -29,6 +29,9 @@ struct AutomaticHeuristics {
     double tag_delta_voxels = heuristic("automatic.tag_delta_voxels", 0.5);
     /// [voxels] Presmoothing of the image after tagging.
     double tag_sigma_voxels = heuristic("automatic.tag_sigma_voxels", 2.0);
+    /// [times the distance of 99 % of the points from their middle] A point farther off is a mistake, where no lattice
+    /// holds it.
+    double wild_point = heuristic("automatic.wild_point", 1000);
     /// [voxels] Layers of a scan within it are averaged.
     double scan_radius_voxels = heuristic("automatic.scan_radius_voxels", 2.5);
     /// [voxels] A layer of points thicker than this is averaged.

@@ -11,6 +11,7 @@
 #include "cloud/surface/blend_kernel.h"
 #include "cloud/surface/heuristics.h"
 #include "cloud/surface/local_fit.h"
+#include "covol/error.h"
 #include "grid/flood_tiles.h"
 #include "points/point_cells.h"
 
@@ -66,8 +67,20 @@ private:
 
 namespace {
 
+constexpr double kMostLeaves = 2e7;  // in a list, before those that are listed twice are gone
+
 /// The leaves of the domain that quadrics reach or the indicator's surface passes.
+/// @throws Error InvalidInput where the indicator's cells are so much larger than the voxels that its surface alone has
+/// more leaves than memory holds: of parts that are small and far apart.
 std::vector<Coord> leaves_of(const CloudField::Pieces& pieces, const Indicator& indicator, const Domain& domain) {
+    const double across = indicator.cell() / domain.voxel_size, in_a_cell = std::pow(across / 8 + 2, 3);
+    double crossed = 0;
+    indicator.crossed([&](const WorldBox&) { crossed += in_a_cell; });
+    if (crossed > kMostLeaves)
+        throw Error(Errc::InvalidInput,
+                    "reconstruct: the points are small parts, far apart: the finest cells that see the whole are " +
+                        std::to_string(std::int64_t(across)) +
+                        " voxels wide; take the parts one by one, or a larger `voxel_size`");
     std::vector<Coord> leaves;
     const auto add = [&](const Vec3& low, const Vec3& high) {
         Coord first, last;
