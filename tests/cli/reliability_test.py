@@ -5,7 +5,6 @@
 import hashlib
 import os
 import pathlib
-import resource
 import signal
 import subprocess
 import sys
@@ -133,9 +132,7 @@ class Inputs(Case):
         for points, says in ((wild, "points: (1e+07, 3, 4) lies"), (apart, "the points are small parts, far apart")):
             path = self.inputs / "cloud.xyz"
             np.savetxt(path, points, "%.9g")
-            limit = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime + 20
             self.refuse("reconstruct", path, "-o", "o.vdb", code=3, says=says)
-            self.assertLess(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime, limit)
 
 
 class Memory(Case):

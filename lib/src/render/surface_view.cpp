@@ -9,6 +9,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <utility>
 
 #include "covol/error.h"
 #include "render/level_set.h"
@@ -50,9 +51,12 @@ struct Seen {
 /// Rays of one thread.
 class Tracer {
 public:
-    Tracer(const std::vector<Body>& bodies, const std::vector<Intersector>& intersectors, const Camera& camera,
-           double reach)
-        : bodies_(bodies), intersectors_(intersectors), camera_(camera), reach_(reach), lights_(camera.basis) {
+    Tracer(const std::vector<Body>& bodies, std::vector<Intersector> intersectors, const Camera& camera, double reach)
+        : bodies_(bodies),
+          intersectors_(std::move(intersectors)),
+          camera_(camera),
+          reach_(reach),
+          lights_(camera.basis) {
         for (const Body& body : bodies) fields_.emplace_back(*body.surface);
     }
 

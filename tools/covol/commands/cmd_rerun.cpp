@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <bit>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -17,8 +18,6 @@
 #include "covol/evolve.h"
 #include "covol/file_set.h"
 #include "covol/version.h"
-
-extern char** environ;
 
 namespace covol::tool {
 namespace fs = std::filesystem;
@@ -179,7 +178,7 @@ Difference compare(const FloatGrid& one, const FloatGrid& other) {
                              one.tree().hasSameTopology(other.tree()) &&
                              one.tree().leafCount() == other.tree().leafCount();
     const auto add = [&](float a, float b, std::uint64_t voxels) {
-        if (std::memcmp(&a, &b, sizeof a) == 0) return;
+        if (std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b)) return;
         difference.voxels += voxels;
         difference.largest = std::max(difference.largest, std::abs(double(a) - double(b)));
     };
@@ -187,7 +186,7 @@ Difference compare(const FloatGrid& one, const FloatGrid& other) {
     for (; leaf && same; ++leaf, ++same)
         for (openvdb::Index n = 0; n < leaf->SIZE; ++n) add(leaf->getValue(n), same->getValue(n), 1);
     auto tile = one.tree().cbeginValueAll();
-    tile.setMaxDepth(tile.getLeafDepth() - 1);
+    tile.setMaxDepth(decltype(tile)::getLeafDepth() - 1);
     for (const auto other_at = other.getConstAccessor(); tile; ++tile)
         add(*tile, other_at.getValue(tile.getCoord()), tile.getVoxelCount());
     return difference;
