@@ -15,11 +15,13 @@ import subprocess
 import sys
 import tempfile
 import time
+import warnings
 
 import numpy as np
 
 COVOL = os.environ.get("COVOL", "build/bin/covol")
 ALLOWED = {0, 3, 130}  # done, refused, interrupted
+LOADING = 0.4          # seconds, of the program's libraries on a busy machine
 GROWTH = 24 << 20      # of all jobs together, after the first tenth of them: pools of threads and pages settle
 
 
@@ -32,6 +34,7 @@ def one_process(jobs, seed):
         import covol
     except ImportError:
         return "the Python module is not on the path: left out", True
+    warnings.simplefilter("ignore")
     generator = random.Random(seed)
     image, points, _ = covol.phantom("sphere", 32, 400)
     held = []
@@ -49,7 +52,8 @@ def one_process(jobs, seed):
             gc.collect()
             held.append(resident())
     begin, end = held[len(held) // 10 + 1], held[-1]
-    return f"{jobs} jobs in one process: {begin >> 20} MiB after the first tenth, {end >> 20} at the end", end - begin < GROWTH
+    shown = ", ".join(str(bytes >> 20) for bytes in held)
+    return f"{jobs} jobs in one process, MiB held along the way: {shown}", end - begin < GROWTH
 
 
 class Folder:
@@ -110,7 +114,7 @@ def eight_at_once(seed):
             runs = [folder.run(*words, "--threads", "2") for words, _ in jobs]
             for run, (words, outputs) in zip(runs, jobs):
                 wrong += folder.problems(run.wait(), words, outputs)
-                if run.returncode != 0:
+                if run.returncode not in (0, 3):
                     wrong.append(f"exit code {run.returncode} of eight at once: {words}")
         return f"32 jobs, eight at once: {len(wrong)} went wrong", wrong
 
@@ -122,9 +126,11 @@ def kills(minutes, seed):
         while time.monotonic() < deadline:
             words, outputs = folder.job(n)
             run = folder.run(*words)
+            waited = 0.0
             how = folder.generator.choice((None, signal.SIGKILL, signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP))
             if how is not None:
-                time.sleep(folder.generator.expovariate(4))
+                waited = folder.generator.expovariate(4)
+                time.sleep(waited)
                 run.send_signal(how)
             begin = time.monotonic()
             code = run.wait()
@@ -137,7 +143,10 @@ def kills(minutes, seed):
             there = [name for name in outputs if (folder.path / name).exists()]
             if code == -signal.SIGKILL and there not in ([], outputs):
                 wrong.append(f"killed, and left {there} of {outputs}")
-            wrong += folder.problems(code, words, outputs)
+            # Before main() a signal ends a process that has touched nothing yet.
+            early = how is not None and code == -how and waited < LOADING and not there
+            if not early:
+                wrong += folder.problems(code, words, outputs)
             hidden = [entry.name for entry in folder.path.iterdir() if entry.name.startswith(".covol")]
             if hidden:
                 wrong.append(f"left {hidden}: {words}")
