@@ -58,6 +58,8 @@ public:
         const auto is_own = [&](Triangles::const_iterator t) {
             return begin_ + std::size_t(t - triangles_.begin()) == own;
         };
+        // CGAL skips none in a tree of one.
+        if (triangles_.size() == 1 && is_own(triangles_.begin())) return std::numeric_limits<double>::infinity();
         const auto hit = tree_.first_intersection(ray, is_own);
         if (!hit) return std::numeric_limits<double>::infinity();
         if (const auto* point = boost::get<Kernel::Point_3>(&hit->first))
