@@ -2,25 +2,25 @@
 
     /usr/bin/python3 tests/verification.py --build build [--update-docs]
 
-Five minutes on two cores. With COVOL_DATA set to the folder of the larger phantoms the embryo is among them. Needs numpy,
-and tifffile for the embryo.
+Five minutes on two cores. With COVOL_DATA set to the folder of the larger phantoms the embryo is among them. Needs numpy
+and pyopenvdb, and tifffile for the embryo.
 """
 import argparse
-import datetime
 import json
 import os
 import pathlib
-import platform
 import re
 import subprocess
 import sys
 import tempfile
 
 import numpy as np
+import pyopenvdb
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE / "bench"))
 from quality import read_vertices, shell_errors  # noqa: E402
+from tables import markdown, provenance  # noqa: E402
 
 SIDE = 2.6  # of the phantoms' cube
 R, MAJOR, MINOR, BOX = 0.8, 0.75, 0.3, np.array((0.9, 0.7, 0.5))  # half sides of the box; lib/src/analysis/phantom.cpp
@@ -70,7 +70,6 @@ class Verification:
         for size in (32, 64):
             h = SIDE / size
             self.run("distance", "t.xyz", "--voxel-size", h, "--max-distance", "6vx", "-o", "d.vdb")
-            import pyopenvdb
             grid = pyopenvdb.read(str(self.work / "d.vdb"), "distance")
             places = [(item.min, item.value) for item in grid.citerOnValues()]
             chosen = np.random.default_rng(1).choice(len(places), 4000, replace=False)
@@ -126,24 +125,12 @@ class Verification:
         return rows
 
 
-def markdown(rows):
-    lines = ["| " + " | ".join(rows[0]) + " |", "|" + "---|" * len(rows[0])]
-    return "\n".join(lines + ["| " + " | ".join(map(str, row.values())) + " |" for row in rows])
-
-
-def machine():
-    with open("/proc/cpuinfo") as file:
-        model = next((line.split(":", 1)[1].strip() for line in file if line.startswith("model name")), platform.processor())
-    commit = subprocess.run(["git", "-C", HERE, "describe", "--always", "--dirty", "--exclude", "*"], capture_output=True, text=True)
-    return f"{datetime.date.today()}, {model}, covol {commit.stdout.strip() or 'of unknown version'}"
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", default="build")
     parser.add_argument("--update-docs", action="store_true", help="put the tables into docs/verification.md")
     options = parser.parse_args()
-    text = [f"Measured {machine()}.", ""]
+    text = [f"Measured {provenance()}.", ""]
     with tempfile.TemporaryDirectory(prefix="covol_verification_") as work:
         made = Verification(pathlib.Path(options.build).resolve(), work)
         for part in (made.orders, made.distances, made.shapes, made.holes, made.embryo):

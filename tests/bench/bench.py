@@ -6,12 +6,10 @@ speed.png are made from all the .csv files that are there.
 """
 import argparse
 import csv
-import datetime
 import functools
 import json
 import os
 import pathlib
-import platform
 import subprocess
 import sys
 import tempfile
@@ -22,6 +20,7 @@ import numpy as np
 
 import plots
 from quality import shell_errors
+from tables import markdown, provenance
 
 HERE = pathlib.Path(__file__).resolve().parent
 START_RADIUS = 0.95
@@ -106,16 +105,6 @@ class Bench:
 
 
 @functools.cache
-def provenance():
-    model = platform.processor()
-    with open("/proc/cpuinfo") as file:
-        model = next((line.split(":", 1)[1].strip() for line in file if line.startswith("model name")), model)
-    commit = subprocess.run(["git", "-C", HERE, "describe", "--always", "--dirty", "--exclude", "*"],
-                            capture_output=True, text=True).stdout.strip()
-    cores = len(os.sched_getaffinity(0))
-    return f"{datetime.date.today()}, {model}, {cores} cores (load before: {os.getloadavg()[0]:.1f}), covol {commit or 'of unknown version'}"
-
-
 # ---- parts -------------------------------------------------------------------------------------------------------
 
 def google_benchmark(bench, pattern, repetitions, min_time, **environment):
@@ -419,21 +408,6 @@ def read_results(folder, part):
         return None
     with open(path, newline="") as file:
         return file.readline().lstrip("# ").strip(), list(csv.DictReader(file))
-
-
-def short(text):
-    try:
-        value = float(text)
-    except ValueError:
-        return text
-    return f"{value:.0f}" if value == int(value) or abs(value) >= 100 else f"{value:.3g}"
-
-
-def markdown(rows, columns=None):
-    columns = columns or list(rows[0])
-    lines = ["| " + " | ".join(c.replace("_", " ") for c in columns) + " |", "|" + "---|" * len(columns)]
-    lines += ["| " + " | ".join(short(row[c]) for c in columns) + " |" for row in rows]
-    return "\n".join(lines)
 
 
 def write_tables(results):

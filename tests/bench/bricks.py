@@ -97,7 +97,7 @@ def measure(jobs):
     _, _, voxels = jobs.plan(*ball, 10**9)
     jobs.write("bricks_count", [jobs.whole(*ball)] + [jobs.in_bricks(*ball, voxels // parts) for parts in (2, 4, 8, 16, 32)])
 
-    planned, count, voxels = jobs.plan(*ball, voxels // 12)
+    _, count, voxels = jobs.plan(*ball, voxels // 12)
     jobs.write("bricks_slots", [{"slots": slots} | row_of([jobs.in_slots(slots)], voxels, bricks=count) for slots in (1, 2)])
 
 

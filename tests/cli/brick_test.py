@@ -89,6 +89,13 @@ class Bricks(Case):
         self.assertEqual(before, {path: path.stat().st_mtime_ns for path in before})
         self.run_covol("brick", "join", "plan", "-o", "s.vdb")
 
+    def test_not_steady(self):
+        planned = self.plan("plan", "--max-steps", "2", "--tolerance", "0")
+        self.run_covol("brick", "run", "plan")
+        said = self.run_covol("brick", "join", "plan", "-o", "s.vdb", "--json", "s.json", "--strict", code=5).stderr
+        self.assertRegex(said, f"not steady after [0-9]+ steps: [0-9]+ of {planned['bricks']} bricks")
+        self.assertEqual(json.loads((self.out / "s.json").read_text())["solve"]["stop_reason"], "max_steps")
+
     def test_within_a_memory_limit(self):
         run = self.run_covol(*self.job, "-o", "s.vdb", "--mesh", "s.ply", "--memory-limit", "175M", "--json", "s.json")
         self.assertIn("bricks", run.stderr)

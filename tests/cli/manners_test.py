@@ -126,7 +126,6 @@ class Reports(Case):
         self.assertGreater(len(documented), 100)
         patterns = {name: re.compile(re.escape(name).replace(r"\*", r".+") + r"(\[\])?$") for name in documented}
         seen, missing = set(), set()
-        totals = walls = 0
         for words, report, wall in self.runs():
             with self.subTest(words=[str(word) for word in words[:1] + words[2:]]):
                 self.assertEqual(report["schema"], 1)
@@ -135,8 +134,7 @@ class Reports(Case):
                 parts = sum(value for name, value in seconds.items() if name != "total")
                 self.assertGreaterEqual(seconds["total"], 0.999 * parts)
                 self.assertLessEqual(seconds["total"], wall)
-                totals += seconds["total"]
-                walls += wall
+                self.assertGreater(seconds["total"], 0.3 * wall - 0.1)
                 for structure in [report, *report.get("structures", []), *report.get("frames", [])]:
                     for name, value in structure.get("resolved", {}).items():
                         self.assertNotIn(value, ("auto", -1), name)
@@ -146,7 +144,6 @@ class Reports(Case):
                     seen |= names
                     if not names:
                         missing.add(field)
-        self.assertGreater(totals, 0.5 * walls, "what the reports say and what the jobs took")
         self.assertEqual(missing, set(), "fields that docs/report.md lacks")
         self.assertGreater(len(seen), 0.8 * len(documented), sorted(set(documented) - seen))
 

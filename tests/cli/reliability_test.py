@@ -122,7 +122,6 @@ class Inputs(Case):
         self.run_covol("phantom", "sphere", "--size", "16", "-o", "next.nrrd")
         self.assertEqual([p.name for p in self.out.iterdir()], ["next.nrrd"])
 
-
     def test_clouds_that_no_lattice_holds(self):
         """Named at once, not after minutes or for want of memory."""
         ball = (np.array(sphere_points(6000)) - CENTER) / RADIUS

@@ -69,6 +69,52 @@ class Rerun(Case):
         self.run_covol("segment", "t.nrrd", "--points", "a=t.xyz", "--init", "sphere:0,0,0,1", "-o", "t.vdb", "--max-steps", "4")
         self.assertIn("the same bits", self.run_covol("rerun", "t.vdb").stdout)
 
+    def write_with(self, name, changed):
+        """s.vdb with other metadata."""
+        grids, facts = vdb.readAll(str(self.out / "s.vdb"))
+        for grid in grids:
+            for key, value in changed.items():
+                grid[key] = value
+        vdb.write(str(self.out / name), grids, facts | changed)
+
+    def test_metadata_of_a_stranger(self):
+        self.make()
+        facts = vdb.readMetadata(str(self.out / "s.vdb"))
+        options = json.loads(facts["covol_options"])
+        for name, value, says in (("covol_given", '"output"', "damaged"), ("covol_given", '[3]', "damaged"),
+                                  ("covol_given", '["frames"]', "missing"), ("covol_given", "nothing", "damaged"),
+                                  ("covol_inputs", '[{"name": 1}]', "damaged"), ("covol_inputs", "[4]", "damaged"),
+                                  ("covol_inputs", '[{"name": "../ball.nrrd", "digest": "xxh128:"}]', "expected a file's name"),
+                                  ("covol_options", "[]", "damaged"), ("covol_options", json.dumps(options | {"output": []}), "damaged"),
+                                  ("covol_options", json.dumps(options | {"output": {"a": 1}}), "damaged"),
+                                  ("covol_options", json.dumps(options | {"command": "rerun"}), "repeat the run that it repeated"),
+                                  ("covol_options", json.dumps(options | {"command": "fly"}), "no command 'fly'")):
+            with self.subTest(name=name, value=value[:40]):
+                self.write_with("t.vdb", {name: value})
+                self.assertIn(says, self.run_covol("rerun", "t.vdb", code=3).stderr)
+        # Outputs stay where they belong.
+        self.write_with("t.vdb", {"covol_options": json.dumps(options | {"output": "../../away.vdb"})})
+        before = self.files()
+        self.assertIn("the same bits", self.run_covol("rerun", "t.vdb", "-o", "again.vdb").stdout)
+        self.assertEqual(self.files(), sorted(before + ["again.vdb"]))
+
+    def test_a_signal_ends_the_run_within(self):
+        self.make()
+        facts = vdb.readMetadata(str(self.out / "s.vdb"))
+        options = json.loads(facts["covol_options"]) | {"max-steps": 10**8, "tolerance": 0}
+        given = json.loads(facts["covol_given"]) + ["max-steps", "tolerance"]
+        self.write_with("t.vdb", {"covol_options": json.dumps(options), "covol_given": json.dumps(given)})
+        run = subprocess.Popen([COVOL, "rerun", "t.vdb", "-o", "again.vdb"], cwd=self.out, stderr=subprocess.PIPE, text=True)
+        try:
+            while "running" not in run.stderr.readline():
+                self.assertIsNone(run.poll(), "ended before the signal")
+            run.terminate()
+            run.communicate(timeout=60)  # which ends with the last that holds the stream, the run within
+        finally:
+            run.kill()
+        self.assertEqual(run.returncode, 130)
+        self.assertNotIn("again.vdb", self.files())
+
     def test_what_cannot_be_repeated(self):
         self.run_covol("convert", self.image, "i.vdb")
         self.assertIn("ball.nrrd", self.run_covol("rerun", "i.vdb", code=4).stderr)

@@ -57,6 +57,7 @@ constexpr double kMostReach = 1 << 22;  // voxels from a lattice's origin, with 
 // One wild point makes a domain that no lattice holds.
 void check_extent(const Job& job) {
     if (job.image != nullptr || job.points.size() < 8) return;
+    if (std::sqrt(3.0) * longest_side(bounding_box(job.points)) < kMostReach * job.h()) return;
     Vec3 middle{};
     for (int a = 0; a < 3; ++a) {
         std::vector<double> values;

@@ -21,7 +21,7 @@ import truth
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
-from bench import markdown, provenance  # noqa: E402  (the benchmarks of speed lie in the folder above)
+from tables import markdown, provenance  # noqa: E402  (of the folder above)
 
 
 BELOW_START = 0.003  # Dice that a result may lie below its start

@@ -26,7 +26,8 @@ import shapes
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
-from bench import Run, markdown, provenance  # noqa: E402  (the benchmarks of speed lie in the folder above)
+from bench import Run  # noqa: E402  (the benchmarks of speed lie in the folder above)
+from tables import markdown, provenance  # noqa: E402
 
 METHODS = ("covol", "poissonrecon", "poisson", "scale-space", "advancing-front", "alpha-wrap", "wnnc", "ipsr")
 

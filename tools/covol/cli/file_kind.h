@@ -19,8 +19,7 @@ enum class FileKind { Vdb, Image, Mesh, Points };
 [[nodiscard]] bool is_nanovdb_name(const std::string& path);
 
 /// Of the name of a file or a folder, in lower case and with its dot; those of two parts are whole: ".nii.gz",
-/// ".seg.nrrd",
-/// ".ome.tif", ".ome.tiff", ".ome.zarr".
+/// ".seg.nrrd", ".ome.tif", ".ome.tiff", ".ome.zarr".
 [[nodiscard]] std::string long_ending(const std::string& path);
 
 /// 3D Slicer's segmentations, whose label values have names.

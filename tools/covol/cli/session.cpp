@@ -269,7 +269,8 @@ int Session::execute() {
         if (memory_limit_ == 0) memory_limit_ = available_memory() / 100 * kUsablePercent;
         run_.memory_budget = memory_limit_;
         guard = std::make_unique<MemoryGuard>(memory_limit_, cancel_requested, [this] {
-            const int code = fail(kBadInput, memory_text());
+            if (has_last_word_.test_and_set()) return;  // the process ends by itself
+            const int code = tell_failure(kBadInput, memory_text());
             ScratchFolder::remove_all();
             ::_exit(code);
         });
@@ -353,6 +354,11 @@ std::string Session::interrupted_text() const {
 }
 
 int Session::fail(int code, const std::string& message) {
+    while (has_last_word_.test_and_set()) ::pause();  // the memory guard ends the process
+    return tell_failure(code, message);
+}
+
+int Session::tell_failure(int code, const std::string& message) {
     if (progress_) progress_->clear();
     std::cerr << "covol: error: " << one_line(with_flags(message)) << std::endl;
     return code;

@@ -124,7 +124,9 @@ private:
     void start_report();
     void finish();
     void write_report();
+    /// Says why the run fails, unless the memory guard does so now.
     int fail(int code, const std::string& message);
+    int tell_failure(int code, const std::string& message);
     [[nodiscard]] std::string interrupted_text() const;
     [[nodiscard]] const Json& described_inputs() const;
     [[nodiscard]] std::string memory_text() const;
@@ -152,6 +154,7 @@ private:
     Json report_;
     Stopwatch since_start_;
     int exit_code_ = kDone;
+    std::atomic_flag has_last_word_;  ///< a run ends with one error, said by its own thread or by the memory guard's
 };
 
 }  // namespace covol::tool

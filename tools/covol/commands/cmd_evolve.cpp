@@ -50,7 +50,10 @@ struct EvolveJob {
                                     {"leaf_count", result.leaf_count}};
         session.report()["solve"] = to_json(result);
         session.note(std::to_string(result.steps) + " steps, " + to_string(result.stop_reason));
-        if (result.stop_reason == StopReason::MaxSteps)
+        if (result.stop_reason == StopReason::Vanished)
+            session.warn("the surface vanished after " + std::to_string(result.steps) +
+                         " steps; lower --delta, or start closer to the edges");
+        else if (result.stop_reason != StopReason::Steady)
             session.warn("not steady after " + std::to_string(result.steps) + " steps");
         session.add_grid(output, u, vdb.options);
     }

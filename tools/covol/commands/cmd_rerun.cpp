@@ -5,10 +5,13 @@
 
 #include <algorithm>
 #include <bit>
-#include <cerrno>
+#include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstring>
 #include <filesystem>
+#include <map>
+#include <thread>
 
 #include "cli/arguments.h"
 #include "cli/json.h"
@@ -28,11 +31,20 @@ using Words = std::vector<std::string>;
 /// What a file says of the run that made it.
 struct Provenance {
     std::string version, instruction_set, command;
-    Json options, given, inputs;
+    std::map<std::string, Json> options;                      ///< words, numbers, flags, or lists of them, none empty
+    Words given;                                              ///< which of them
+    std::vector<std::pair<std::string, std::string>> inputs;  ///< name, digest
 };
 
 [[noreturn]] void refuse(const std::string& path, const std::string& why) {
     throw Error(Errc::Unsupported, path + ": " + why);
+}
+
+void check_value(const std::string& path, const std::string& name, const Json& value) {
+    const auto is_one = [](const Json& one) { return one.is_string() || one.is_number() || one.is_boolean(); };
+    if (is_one(value) || (value.is_array() && !value.empty() && std::all_of(value.begin(), value.end(), is_one)))
+        return;
+    refuse(path, "its metadata is damaged: expected words or numbers of '" + name + "', got " + value.dump());
 }
 
 Provenance read_provenance(const std::string& path) {
@@ -51,24 +63,30 @@ Provenance read_provenance(const std::string& path) {
         refuse(path, "it was made in bricks; plan, run and join them again (covol brick)");
     Provenance all{fact("covol_version"), fact("covol_instruction_set"), {}, {}, {}, {}};
     try {
-        all.options = Json::parse(fact("covol_options"));
-        all.given = Json::parse(fact("covol_given"));
-        all.inputs = Json::parse(fact("covol_inputs"));
+        all.options = Json::parse(fact("covol_options")).get<std::map<std::string, Json>>();
+        all.given = Json::parse(fact("covol_given")).get<Words>();
+        for (const Json& input : Json::parse(fact("covol_inputs"))) {
+            all.inputs.emplace_back(input.at("name").get<std::string>(), input.at("digest").get<std::string>());
+            const std::string& name = all.inputs.back().first;
+            if (name.empty() || fs::path(name).filename() != name)
+                refuse(path, "'" + name + "': expected a file's name");
+        }
         all.command = all.options.at("command").get<std::string>();
+        for (const std::string& name : all.given) check_value(path, name, all.options.at(name));
     } catch (const Json::exception& error) {
         refuse(path, std::string("its metadata is damaged: ") + error.what());
+    } catch (const std::out_of_range&) {
+        refuse(path, "its metadata is damaged: options are missing in covol_options");
     }
+    if (all.command == "rerun") refuse(path, "a rerun made it: repeat the run that it repeated");
     return all;
 }
 
 /// Where the inputs of a run are now.
 class Inputs {
 public:
-    Inputs(const Json& inputs, std::vector<std::string> folders) : folders_(std::move(folders)) {
-        for (const Json& input : inputs) {
-            const auto name = input.at("name").get<std::string>();
-            found_.emplace_back(name, find(name, input.at("digest").get<std::string>()));
-        }
+    Inputs(const Provenance& run, std::vector<std::string> folders) : folders_(std::move(folders)) {
+        for (const auto& [name, digest] : run.inputs) found_.emplace_back(name, find(name, digest));
     }
 
     /// The value of an option with the path of the file that it names.
@@ -121,19 +139,18 @@ Words command_line(const std::string& path, const Provenance& run, const CLI::Ap
                    const std::string& folder) {
     if (command == nullptr) refuse(path, "this covol has no command '" + run.command + "'");
     Words words{run.command}, positional;
-    for (const Json& given : run.given) {
-        const auto name = given.get<std::string>();
+    for (const std::string& name : run.given) {
         const CLI::Option* option = command->get_option_no_throw("--" + name);
         const bool is_positional = option == nullptr;
         if (is_positional) option = command->get_option_no_throw(name);
-        if (option == nullptr || !run.options.contains(name))
-            refuse(path, "this covol has no option '" + name + "' of '" + run.command + "'");
+        if (option == nullptr) refuse(path, "this covol has no option '" + name + "' of '" + run.command + "'");
         Words values = values_of(run.options.at(name));
         const bool is_output = option->get_type_name().starts_with("OUT");
         if (is_output && name != "output" && fs::path(values.front()).extension() != ".vdb") continue;
         for (std::string& value : values) {
             if (value == "-") refuse(path, "an input of that run came through a pipe");
-            value = is_output ? folder + "/" + value : inputs.placed(value);
+            // only a file's name is written down; that of a stranger's file may be a path
+            value = is_output ? (fs::path(folder) / fs::path(value).filename()).string() : inputs.placed(value);
         }
         if (is_positional) {
             positional.insert(positional.end(), values.begin(), values.end());
@@ -148,8 +165,8 @@ Words command_line(const std::string& path, const Provenance& run, const CLI::Ap
     return words;
 }
 
-/// @return exit code
-int run_covol(const Words& words) {
+/// @return exit code @throws Error Cancelled
+int run_covol(const Words& words, const RunContext& run) {
     std::string self = fs::read_symlink("/proc/self/exe").string();
     Words all{self};
     all.insert(all.end(), words.begin(), words.end());
@@ -160,8 +177,14 @@ int run_covol(const Words& words) {
     if (const int why = ::posix_spawn(&child, self.c_str(), nullptr, nullptr, argv.data(), environ); why != 0)
         throw Error(Errc::Io, self + ": cannot start: " + std::strerror(why));
     int status = 0;
-    while (::waitpid(child, &status, 0) < 0)
-        if (errno != EINTR) throw Error(Errc::Io, self + ": lost: " + std::strerror(errno));
+    for (pid_t ended = 0; ended == 0; ended = ::waitpid(child, &status, WNOHANG)) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        if (!run.cancelled()) continue;
+        ::kill(child, SIGTERM);
+        ::waitpid(child, &status, 0);
+        break;
+    }
+    run.check();
     return WIFEXITED(status) ? WEXITSTATUS(status) : kDefect;
 }
 
@@ -212,8 +235,8 @@ struct RerunJob {
                 places.push_back(folder.string());
         const auto scratch =
             std::make_shared<ScratchFolder>(kept.empty() ? fs::temp_directory_path() : fs::path(kept).parent_path());
-        const Words words = command_line(path, made, session.command(made.command), Inputs(made.inputs, places),
-                                         scratch->path().string());
+        const Words words =
+            command_line(path, made, session.command(made.command), Inputs(made, places), scratch->path().string());
         std::string shown = "covol";
         for (const std::string& word : words) shown += " " + word;
         session.note("running " + shown);
@@ -221,8 +244,7 @@ struct RerunJob {
         quiet.push_back("--quiet");
         if (session.run().threads > 0) quiet.insert(quiet.end(), {"--threads", std::to_string(session.run().threads)});
         const Stopwatch watch;
-        const int code = run_covol(quiet);
-        session.run().check();
+        const int code = run_covol(quiet, session.run());
         if (code != kDone)
             throw Error(Errc::InvalidInput, path + ": its run ends with exit code " + std::to_string(code) + " now");
         session.add_seconds("run", watch.seconds());

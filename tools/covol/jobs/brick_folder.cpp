@@ -181,12 +181,15 @@ BrickFolder::Spent BrickFolder::spent(int sweep, std::size_t bricks) const {
     Spent all;
     for (std::size_t n = 0; n < bricks; ++n) {
         int steps = 0;
+        std::string last;
         for (int s = 1; s <= sweep; ++s) {
             const Json facts = read_json(name(s, n, ".json"));
             steps += facts.value("steps", 0);
             all.seconds += facts.value("seconds", 0.0);
+            last = facts.value("stop_reason", last);
         }
         all.steps = std::max(all.steps, steps);
+        all.unsteady += last == to_string(StopReason::MaxSteps) ? 1 : 0;
     }
     return all;
 }

@@ -34,6 +34,7 @@ public:
     struct Spent {
         int steps = 0;  ///< of the brick that took most
         double seconds = 0;
+        std::size_t unsteady = 0;  ///< bricks whose flow ended at its last step
     };
     [[nodiscard]] Spent spent(int sweep, std::size_t bricks) const;
     /// The last sweep that all of so many bricks have done; 0: none.

@@ -161,6 +161,11 @@ SegmentResult join(const SegmentJob& given, BrickJob& job, const BrickPlan& plan
     const BrickFolder::Spent spent = folder.spent(sweep, plan.bricks.size());
     result.report.solve.steps = spent.steps;
     result.report.seconds.solve += spent.seconds;
+    if (spent.unsteady > 0) {
+        result.report.solve.stop_reason = StopReason::MaxSteps;
+        session.warn("not steady after " + std::to_string(spent.steps) + " steps: " + std::to_string(spent.unsteady) +
+                     " of " + std::to_string(plan.bricks.size()) + " bricks");
+    }
     return result;
 }
 

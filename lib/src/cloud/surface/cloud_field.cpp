@@ -73,14 +73,6 @@ constexpr double kMostLeaves = 2e7;  // in a list, before those that are listed 
 /// @throws Error InvalidInput where the indicator's cells are so much larger than the voxels that its surface alone has
 /// more leaves than memory holds: of parts that are small and far apart.
 std::vector<Coord> leaves_of(const CloudField::Pieces& pieces, const Indicator& indicator, const Domain& domain) {
-    const double across = indicator.cell() / domain.voxel_size, in_a_cell = std::pow(across / 8 + 2, 3);
-    double crossed = 0;
-    indicator.crossed([&](const WorldBox&) { crossed += in_a_cell; });
-    if (crossed > kMostLeaves)
-        throw Error(Errc::InvalidInput,
-                    "reconstruct: the points are small parts, far apart: the finest cells that see the whole are " +
-                        std::to_string(std::int64_t(across)) +
-                        " voxels wide; take the parts one by one, or a larger `voxel_size`");
     std::vector<Coord> leaves;
     const auto add = [&](const Vec3& low, const Vec3& high) {
         Coord first, last;
@@ -105,8 +97,16 @@ std::vector<Coord> leaves_of(const CloudField::Pieces& pieces, const Indicator& 
         add(low, high);
         if (leaves.size() > 1000000) settle();
     }
-    indicator.crossed(
-        [&](const WorldBox& box) { add(domain.world_to_index(box.min), domain.world_to_index(box.max)); });
+    const double across = indicator.cell() / domain.voxel_size, in_a_cell = std::pow(across / 8 + 2, 3);
+    double crossed = 0;
+    indicator.crossed([&](const WorldBox& box) {
+        if ((crossed += in_a_cell) > kMostLeaves)
+            throw Error(Errc::InvalidInput,
+                        "reconstruct: the points are small parts, far apart: the finest cells that see the whole are " +
+                            std::to_string(std::int64_t(across)) +
+                            " voxels wide; take the parts one by one, or a larger `voxel_size`");
+        add(domain.world_to_index(box.min), domain.world_to_index(box.max));
+    });
     settle();
     return leaves;
 }
