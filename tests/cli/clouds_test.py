@@ -245,6 +245,47 @@ class Normals(Clouds):
         self.assertGreater(found["agree"], 0.99)
 
 
+class Far(Clouds):
+    """Clouds in a national grid, millions of voxels from 0."""
+    ORIGIN = (500000.0, 5400000.0, -3000.0)
+
+    def run_covol(self, *words, code=0):
+        done = subprocess.run([COVOL, *words, "--quiet", "--json", "-"], cwd=self.out, capture_output=True, text=True, timeout=300)
+        self.assertEqual(done.returncode, code, done.stderr)
+        return json.loads(done.stdout), done.stderr
+
+    def make(self, name, origin):
+        write_xyz(self.out / f"{name}.xyz", [tuple(a + b for a, b in zip(p, origin)) for p in random_sphere(3000, 1)])
+        return self.run_covol("reconstruct", f"{name}.xyz", "-o", f"{name}.vdb", "--mesh", f"{name}.ply", "--voxel-size", "0.4",
+                              "--report", f"{name}.html")[0]
+
+    def test_as_near_0(self):
+        near, far = self.make("near", (0, 0, 0)), self.make("far", self.ORIGIN)
+        self.assertEqual(far["surface"]["genus"], 0)
+        self.assertAlmostEqual(far["surface"]["volume"] / near["surface"]["volume"], 1, places=3)
+        self.assertAlmostEqual(far["fit"]["points_to_surface"]["mean"], near["fit"]["points_to_surface"]["mean"], delta=0.01)
+        self.assertIn(b"property double x", (self.out / "far.ply").read_bytes())
+        for file in ("far.vdb", "far.ply"):
+            box = self.run_covol("compare", file, "far.xyz")[0]["fit"]["points_to_surface"]
+            self.assertLess(box["mean"], 0.05)
+        alike = self.run_covol("compare", "far.ply", "far.vdb")[0]["compare"]
+        self.assertGreater(alike["dice"], 0.99)
+        self.assertLess(alike["hausdorff"], 0.2)
+        self.assertEqual(self.run_covol("check", "far.ply")[0]["problems"], 0)
+        # what follows takes the files on
+        for end in ("obj", "glb"):
+            self.run_covol("mesh", "far.vdb", "-o", f"again.{end}")
+            self.assertGreater(self.run_covol("compare", f"again.{end}", "far.ply")[0]["compare"]["dice"], 0.999)
+        self.run_covol("mesh", "far.vdb", "-o", "plain.ply", "--plain")
+        self.assertGreater(self.run_covol("compare", "plain.ply", "far.ply")[0]["compare"]["dice"], 0.99)
+        self.assertIn("single precision", self.run_covol("mesh", "far.vdb", "-o", "far.stl")[1])
+        self.run_covol("mesh", "far.vdb", "-o", "far.stl", "--strict", code=5)
+        self.run_covol("report", "far.vdb", "--points", "far.xyz", "-o", "page.html")
+        for picture, vdb in (("a.png", "near.vdb"), ("b.png", "far.vdb")):
+            self.run_covol("render", vdb, "-o", picture)
+        self.run_covol("reconstruct", "far.xyz", "-o", "b.vdb", "--voxel-size", "0.4", "--init", "mesh:far.ply", "--theta", "1")
+
+
 class Open(Clouds):
     def check_layer(self, points, says, *more):
         advice = re.search(r"(--max-steps 0) (--tag-distance [0-9.e-]+) (--voxel-size [0-9.e-]+)", self.advice(points, says, *more))

@@ -32,6 +32,8 @@ using FloatGrid = openvdb::Grid<openvdb::tree::Tree<openvdb::tree::RootNode<
     openvdb::tree::InternalNode<openvdb::tree::InternalNode<openvdb::tree::LeafNode<float, 3>, 4>, 5>>>>;
 using FloatGridPtr = std::shared_ptr<FloatGrid>;
 
+struct WorldBox;
+
 using Vec3 = std::array<double, 3>;                    ///< x, y, z
 using Index3 = std::array<std::int32_t, 3>;            ///< i, j, k
 using Matrix3 = std::array<std::array<double, 3>, 3>;  ///< rows

@@ -1,5 +1,6 @@
 #pragma once
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -10,10 +11,26 @@ namespace covol {
 
 /// Triangles over shared vertices, in world units; outward orientation is counter-clockwise seen from outside.
 struct TriangleMesh {
-    std::vector<std::array<float, 3>> vertices;
+    std::vector<std::array<float, 3>> vertices;  ///< relative to `origin`
     std::vector<std::array<std::uint32_t, 3>> triangles;
+    /// World. 0, but where the surface lies so far from there that single precision would not hold it, as clouds in
+    /// national grids do.
+    Vec3 origin{0, 0, 0};
+
     [[nodiscard]] bool empty() const noexcept { return triangles.empty(); }
+    /// Where a vertex lies, world.
+    [[nodiscard]] Vec3 place(std::size_t vertex) const {
+        const std::array<float, 3>& v = vertices[vertex];
+        return {origin[0] + v[0], origin[1] + v[1], origin[2] + v[2]};
+    }
 };
+
+/// A round place for the `origin` of a mesh within a box; 0 where no coordinate is more than 2^17 of the finest lengths
+/// of interest, which single precision divides into 128 steps there.
+[[nodiscard]] COVOL_API Vec3 choose_mesh_origin(const WorldBox& box, double finest);
+
+/// The same mesh, its vertices relative to another origin.
+COVOL_API void move_mesh_origin(TriangleMesh& mesh, const Vec3& origin);
 
 /// Facts about a mesh; volume and genus are meant for closed meshes.
 struct MeshMeasures {

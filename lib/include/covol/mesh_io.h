@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,9 +23,11 @@ struct WriteMeshOptions {
     double unit_scale = 1.0;            ///< multiplies coordinates; 0.001 for mm to m
     std::vector<std::string> comments;  ///< provenance lines, where the format has comments
     std::vector<VertexAttribute> attributes;
+    std::function<void(const std::string& line)> warn;  ///< hears of what the format cannot hold
 };
 
-/// PLY, OBJ, STL, OFF or binary glTF (.glb), by the name's end; with normals where the format has them.
+/// PLY, OBJ, STL, OFF or binary glTF (.glb), by the name's end; with normals where the format has them. Of a mesh with
+/// an origin of its own PLY has doubles, .glb a translation; binary STL is relative to it, which `warn` hears.
 /// Whole or not at all. @throws Error Io, InvalidOptions (unknown ending).
 COVOL_API void write_mesh(const std::string& path, const TriangleMesh& mesh, const WriteMeshOptions& options = {});
 

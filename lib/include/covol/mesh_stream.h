@@ -13,6 +13,7 @@ namespace covol {
 /// What was written, and how large it is.
 struct StreamedMesh {
     std::uint64_t vertices = 0, triangles = 0;
+    Vec3 origin{0, 0, 0};  ///< of the mesh
     MeshMeasures measures;
 };
 

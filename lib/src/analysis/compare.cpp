@@ -42,10 +42,13 @@ public:
         const FloatGridPtr grid = level_set();
         TriangleMesh mesh = extract_mesh(*grid, {}, run);
         const ImageGeometry& geometry = mask_.geometry();
-        for (auto& v : mesh.vertices) {
-            const Vec3 p = geometry.index_to_world({v[0], v[1], v[2]});
-            v = {float(p[0]), float(p[1]), float(p[2])};
+        const Vec3 origin = choose_mesh_origin(geometry.world_box(),
+                                               *std::min_element(geometry.spacing.begin(), geometry.spacing.end()));
+        for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+            const Vec3 p = geometry.index_to_world(mesh.place(v));
+            for (int a = 0; a < 3; ++a) mesh.vertices[v][a] = float(p[a] - origin[a]);
         }
+        mesh.origin = origin;
         if (determinant(geometry.direction) < 0)
             for (auto& t : mesh.triangles) std::swap(t[0], t[1]);
         return mesh;
@@ -144,7 +147,7 @@ class MeshRows {
 public:
     MeshRows(const TriangleMesh& mesh, const ImageGeometry& lattice)
         : mesh_(mesh), triangles_of_(lattice.size[2] + 1, 0) {
-        for (const auto& v : mesh.vertices) points_.push_back(lattice.world_to_index({v[0], v[1], v[2]}));
+        for (std::size_t v = 0; v < mesh.vertices.size(); ++v) points_.push_back(lattice.world_to_index(mesh.place(v)));
         // Triangles by the slices that they reach.
         for_each_slice(lattice.size[2], [&](std::uint32_t, int k) { ++triangles_of_[k + 1]; });
         std::partial_sum(triangles_of_.begin(), triangles_of_.end(), triangles_of_.begin());
@@ -312,8 +315,8 @@ WorldBox box_of(const TriangleMesh& mesh, const std::function<Vec3(const Vec3&)>
     WorldBox box;
     box.min.fill(std::numeric_limits<double>::max());
     box.max.fill(std::numeric_limits<double>::lowest());
-    for (const auto& v : mesh.vertices) {
-        const Vec3 p = map({v[0], v[1], v[2]});
+    for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+        const Vec3 p = map(mesh.place(v));
         for (int a = 0; a < 3; ++a) {
             box.min[a] = std::min(box.min[a], p[a]);
             box.max[a] = std::max(box.max[a], p[a]);
@@ -408,8 +411,8 @@ struct Samples {
 Samples sample_surface(const TriangleMesh& mesh, double spacing) {
     spacing = std::max(spacing, std::sqrt(2 * measure(mesh).area / kMaxSamples));
     Samples samples;
-    for (const auto& v : mesh.vertices) {
-        samples.points.push_back({v[0], v[1], v[2]});
+    for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+        samples.points.push_back(mesh.place(v));
         samples.areas.push_back(0);
     }
     for (const auto& t : mesh.triangles) {

@@ -21,8 +21,6 @@
 namespace covol {
 namespace {
 
-Vec3 to_vec(const std::array<float, 3>& v) { return {v[0], v[1], v[2]}; }
-
 Vec3 minus(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 
 double triangle_area(const Vec3& a, const Vec3& b, const Vec3& c) {
@@ -36,7 +34,7 @@ std::vector<float> distances_to(const TriangleMesh& mesh, const std::vector<Vec3
     std::vector<float> result(mesh.vertices.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, result.size(), 1024), [&](const auto& range) {
         for (std::size_t v = range.begin(); v != range.end(); ++v)
-            result[v] = static_cast<float>(std::sqrt(tree.nearest(to_vec(mesh.vertices[v]))));
+            result[v] = static_cast<float>(std::sqrt(tree.nearest(mesh.place(v))));
     });
     return result;
 }
@@ -49,7 +47,7 @@ std::vector<float> strengths_on(const TriangleMesh& mesh, const FloatGrid* edge)
         const openvdb::tools::GridSampler<FloatGrid::ConstAccessor, openvdb::tools::BoxSampler> g(accessor,
                                                                                                   edge->transform());
         for (std::size_t v = range.begin(); v != range.end(); ++v) {
-            const auto& x = mesh.vertices[v];
+            const Vec3 x = mesh.place(v);
             result[v] = std::clamp(1.0F - g.wsSample(openvdb::Vec3d(x[0], x[1], x[2])), 0.0F, 1.0F);
         }
     });
@@ -111,7 +109,7 @@ private:
         levels_.resize(mesh_.vertices.size());
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, levels_.size(), 4096), [&](const auto& range) {
             for (std::size_t v = range.begin(); v != range.end(); ++v)
-                levels_[v] = geometry_.world_to_index(to_vec(mesh_.vertices[v]))[2];
+                levels_[v] = geometry_.world_to_index(mesh_.place(v))[2];
         });
     }
 
@@ -123,7 +121,7 @@ private:
     }
 
     [[nodiscard]] Piece piece(const std::array<std::uint32_t, 3>& t) const {
-        const Vec3 a = to_vec(mesh_.vertices[t[0]]), b = to_vec(mesh_.vertices[t[1]]), c = to_vec(mesh_.vertices[t[2]]);
+        const Vec3 a = mesh_.place(t[0]), b = mesh_.place(t[1]), c = mesh_.place(t[2]);
         const auto mean = [&](const auto& values) {
             return values.empty() ? 0.0 : (double(values[t[0]]) + values[t[1]] + values[t[2]]) / 3;
         };
@@ -201,12 +199,12 @@ private:
             const std::uint32_t a = t[side], b = t[(side + 1) % 3];
             if ((levels_[a] <= k) == (levels_[b] <= k)) continue;
             const double x = (k - levels_[a]) / (levels_[b] - levels_[a]);
-            for (int axis = 0; axis < 3; ++axis)
-                sum[axis] += mesh_.vertices[a][axis] + x * (double(mesh_.vertices[b][axis]) - mesh_.vertices[a][axis]);
+            const Vec3 from = mesh_.place(a), to = mesh_.place(b);
+            for (int axis = 0; axis < 3; ++axis) sum[axis] += from[axis] + x * (to[axis] - from[axis]);
             ++count;
         }
         // The plane may touch a corner alone.
-        if (count == 0) return to_vec(mesh_.vertices[t[0]]);
+        if (count == 0) return mesh_.place(t[0]);
         for (double& x : sum) x /= count;
         return sum;
     }
@@ -332,7 +330,7 @@ double measure_share_without_points(const TriangleMesh& mesh, const FloatGrid& d
                 for (std::size_t t = range.begin(); t != range.end(); ++t) {
                     openvdb::Vec3d corner[3];
                     for (int n = 0; n < 3; ++n) {
-                        const auto& v = mesh.vertices[mesh.triangles[t][n]];
+                        const Vec3 v = mesh.place(mesh.triangles[t][n]);
                         corner[n] = {v[0], v[1], v[2]};
                     }
                     const double area = 0.5 * (corner[1] - corner[0]).cross(corner[2] - corner[0]).length();

@@ -64,11 +64,10 @@ Patches make_patches(const TriangleMesh& mesh, const ImageGeometry& g, double wi
     p.places.resize(count);
     p.normals.resize(count);
     const auto normals = compute_vertex_normals(mesh);
-    for (std::size_t v = 0; v < count; ++v)
-        for (int a = 0; a < 3; ++a) {
-            p.places[v][a] = mesh.vertices[v][a];
-            p.normals[v][a] = normals[v][a];
-        }
+    for (std::size_t v = 0; v < count; ++v) {
+        p.places[v] = mesh.place(v);
+        for (int a = 0; a < 3; ++a) p.normals[v][a] = normals[v][a];
+    }
     const Rows rows(mesh);
     smooth_normals(p.normals, rows, smooth);
 

@@ -81,6 +81,7 @@ class Splitter {
 public:
     Splitter(const TriangleMesh& mesh, std::vector<float> values) : values_(std::move(values)) {
         cut_.mesh.vertices = mesh.vertices;
+        cut_.mesh.origin = mesh.origin;
         snap(mesh, cut_.mesh.vertices, values_);
         for (const Triangle& t : mesh.triangles) split(t);
     }
@@ -167,7 +168,7 @@ CutMesh cut_along(const TriangleMesh& mesh, std::vector<float> values) {
 }
 
 TriangleMesh kept_part(const CutMesh& cut) {
-    TriangleMesh part{cut.mesh.vertices, {}};
+    TriangleMesh part{cut.mesh.vertices, {}, cut.mesh.origin};
     for (std::size_t t = 0; t < cut.kept.size(); ++t)
         if (cut.kept[t]) part.triangles.push_back(cut.mesh.triangles[t]);
     part_fans(part);

@@ -22,12 +22,8 @@ constexpr double kP95OfSpacing = 0.976;
 
 using Triangle = std::array<std::uint32_t, 3>;
 
-Vec3 place(const TriangleMesh& mesh, std::uint32_t v) {
-    return {mesh.vertices[v][0], mesh.vertices[v][1], mesh.vertices[v][2]};
-}
-
 double area_of(const TriangleMesh& mesh, const Triangle& t) {
-    const Vec3 a = place(mesh, t[0]), b = place(mesh, t[1]), c = place(mesh, t[2]);
+    const Vec3 a = mesh.place(t[0]), b = mesh.place(t[1]), c = mesh.place(t[2]);
     const Vec3 u{b[0] - a[0], b[1] - a[1], b[2] - a[2]}, v{c[0] - a[0], c[1] - a[1], c[2] - a[2]};
     return 0.5 * std::hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]);
 }
@@ -39,7 +35,7 @@ void smooth(const TriangleMesh& mesh, double width, std::vector<float>& values) 
     for (const Triangle& t : mesh.triangles)
         for (int k = 0; k < 3; ++k) {
             count[t[k]] += 2;
-            squares += detail::squared_distance(place(mesh, t[k]), place(mesh, t[(k + 1) % 3]));
+            squares += detail::squared_distance(mesh.place(t[k]), mesh.place(t[(k + 1) % 3]));
         }
     // A step adds half of a mean squared edge, times kHoles.step, to the variance along each axis.
     const double variance = 0.5 * kHoles.step * squares / double(3 * mesh.triangles.size());
@@ -104,13 +100,13 @@ private:
         const auto far = float(distance_);
         std::vector<Vec3> places;
         for (std::uint32_t v = 0; v < to_points_.size(); ++v)
-            if (to_points_[v] > far) places.push_back(place(mesh_, v));
+            if (to_points_[v] > far) places.push_back(mesh_.place(v));
         for (const Triangle& t : mesh_.triangles)
             for (int k = 0; k < 3; ++k) {
                 const std::uint32_t a = t[k], b = t[(k + 1) % 3];
                 if (!(to_points_[a] > far) || to_points_[b] > far) continue;
                 const double share = double(to_points_[a] - far) / double(to_points_[a] - to_points_[b]);
-                const Vec3 p = place(mesh_, a), q = place(mesh_, b);
+                const Vec3 p = mesh_.place(a), q = mesh_.place(b);
                 places.push_back(
                     {p[0] + share * (q[0] - p[0]), p[1] + share * (q[1] - p[1]), p[2] + share * (q[2] - p[2])});
             }
@@ -125,7 +121,7 @@ private:
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, values.size(), 1024), [&](const auto& range) {
             for (std::size_t v = range.begin(); v != range.end(); ++v)
                 values[v] =
-                    float(std::min(std::sqrt(tree.nearest(place(mesh_, std::uint32_t(v)))), 2 * reach_) - reach_);
+                    float(std::min(std::sqrt(tree.nearest(mesh_.place(std::uint32_t(v)))), 2 * reach_) - reach_);
         });
         smooth(mesh_, kHoles.smoothing * distance_, values);
         return values;
@@ -198,7 +194,7 @@ std::vector<float> measure_distances(const TriangleMesh& mesh, const std::vector
         const detail::KdTree tree(points);
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, result.size(), 1024), [&](const auto& range) {
             for (std::size_t v = range.begin(); v != range.end(); ++v)
-                result[v] = float(std::sqrt(tree.nearest(place(mesh, std::uint32_t(v)))));
+                result[v] = float(std::sqrt(tree.nearest(mesh.place(v))));
         });
     });
     return result;
@@ -230,7 +226,7 @@ std::vector<BoundaryLoop> find_boundary_loops(const TriangleMesh& mesh) {
         BoundaryLoop loop;
         for (std::uint32_t v = first; next[v] != kNone;) {
             const std::uint32_t to = std::exchange(next[v], kNone);
-            const Vec3 a = place(mesh, v), b = place(mesh, to);
+            const Vec3 a = mesh.place(v), b = mesh.place(to);
             loop.length += std::hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]);
             ++loop.edges;
             v = to;

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "covol/domain.h"
 #include "mesh/corner_table.h"
 #include "mesh/disjoint_sets.h"
 #include "mesh/vertex_normals.h"
@@ -155,6 +156,24 @@ std::vector<std::array<float, 3>> meshing::vertex_normals(const std::vector<std:
 
 std::vector<std::array<float, 3>> compute_vertex_normals(const TriangleMesh& mesh) {
     return meshing::vertex_normals(mesh.vertices, mesh.triangles);
+}
+
+Vec3 choose_mesh_origin(const WorldBox& box, double finest) {
+    constexpr double kFar = 1 << 17;
+    double farthest = 0;
+    for (int a = 0; a < 3; ++a) farthest = std::max({farthest, std::abs(box.min[a]), std::abs(box.max[a])});
+    if (!(farthest > kFar * finest)) return {0, 0, 0};
+    const double round = std::pow(10.0, std::ceil(std::log10(std::max(longest_side(box), finest))));
+    Vec3 origin;
+    for (int a = 0; a < 3; ++a) origin[a] = round * std::round((box.min[a] + box.max[a]) / 2 / round);
+    return origin;
+}
+
+void move_mesh_origin(TriangleMesh& mesh, const Vec3& origin) {
+    if (origin == mesh.origin) return;
+    for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
+        mesh.vertices[v] = meshing::to_position(meshing::minus(mesh.place(v), origin));
+    mesh.origin = origin;
 }
 
 void remove_small_components(TriangleMesh& mesh, double min_volume) {

@@ -37,9 +37,10 @@ double gentler(double a, double b) {
 
 }  // namespace
 
-Level::Level(const FloatGrid& grid, const detail::LatticeClip& clip, double isovalue)
+Level::Level(const FloatGrid& grid, const detail::LatticeClip& clip, double isovalue, const Vec3& origin)
     : accessor_(grid.getConstAccessor()), clip_(clip), domain_(domain_of(grid)), isovalue_(isovalue) {
     for (int a = 0; a < 3; ++a) {
+        domain_.origin[a] -= origin[a];
         face_[a] = {float(domain_.origin[a] + domain_.voxel_size * clip_.low[a]),
                     float(domain_.origin[a] + domain_.voxel_size * clip_.high[a])};
         clipped_ = clipped_ || std::isfinite(face_[a][0]) || std::isfinite(face_[a][1]);
@@ -184,11 +185,12 @@ bool Level::on_chamfer(const Position& p) const {
     return near > 1;
 }
 
-Surface::Surface(const FloatGrid& level_set, double isovalue)
+Surface::Surface(const FloatGrid& level_set, double isovalue, const Vec3& origin)
     : whole_(isovalue == 0 ? detail::uncut(level_set, detail::FaceLayer::OnFace) : std::nullopt),
       grid_(whole_ ? *whole_->distance : level_set),
       clip_(whole_ ? whole_->clip : detail::LatticeClip{}),
-      isovalue_(isovalue) {}
+      isovalue_(isovalue),
+      origin_(origin) {}
 
 MeshDeviation Surface::deviation(const TriangleMesh& mesh) const {
     struct Sum {

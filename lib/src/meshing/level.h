@@ -23,7 +23,8 @@ namespace covol::meshing {
 class Level {
 public:
     /// @param grid  kept by reference. @param clip  where the grid has layers that stand for the faces of a cut.
-    Level(const FloatGrid& grid, const detail::LatticeClip& clip, double isovalue);
+    /// @param origin  of the mesh: all places are relative to it
+    Level(const FloatGrid& grid, const detail::LatticeClip& clip, double isovalue, const Vec3& origin);
 
     struct Sample {
         double value = 0;  ///< above the isovalue, world units; < 0 inside
@@ -72,8 +73,9 @@ private:
 class Surface {
 public:
     /// @param level_set  kept by reference; its clip is undone as in extract_mesh().
-    Surface(const FloatGrid& level_set, double isovalue);
-    [[nodiscard]] Level level() const { return {grid_, clip_, isovalue_}; }
+    /// @param origin  of the meshes that it is for
+    Surface(const FloatGrid& level_set, double isovalue, const Vec3& origin);
+    [[nodiscard]] Level level() const { return {grid_, clip_, isovalue_, origin_}; }
     /// Of points less than a voxel apart; faces of the clip left out.
     [[nodiscard]] MeshDeviation deviation(const TriangleMesh& mesh) const;
 
@@ -82,6 +84,7 @@ private:
     const FloatGrid& grid_;
     detail::LatticeClip clip_;
     double isovalue_;
+    Vec3 origin_;
 };
 
 /// What a vertex lies on, and has to stay on when it moves.

@@ -82,9 +82,10 @@ SurfaceMesh to_surface_mesh(const TriangleMesh& mesh) {
     return result;
 }
 
-TriangleMesh from_surface_mesh(SurfaceMesh& source) {
+TriangleMesh from_surface_mesh(SurfaceMesh& source, const Vec3& origin) {
     source.collect_garbage();
     TriangleMesh mesh;
+    mesh.origin = origin;
     mesh.vertices.reserve(source.number_of_vertices());
     for (const auto v : source.vertices()) {
         const Point& p = source.point(v);
@@ -146,10 +147,10 @@ struct Work {
 MeshDeviation change_of(const TriangleMesh& before, const TriangleMesh& after) {
     const auto samples = [](const TriangleMesh& mesh) {
         std::vector<Vec3> points;
-        for (const auto& v : mesh.vertices) points.push_back(meshing::to_vec3(v));
+        for (std::size_t v = 0; v < mesh.vertices.size(); ++v) points.push_back(mesh.place(v));
         for (const auto& t : mesh.triangles) {
             Vec3 middle{};
-            for (const std::uint32_t v : t) middle = meshing::plus(middle, 1.0 / 3, meshing::to_vec3(mesh.vertices[v]));
+            for (const std::uint32_t v : t) middle = meshing::plus(middle, 1.0 / 3, mesh.place(v));
             points.push_back(middle);
         }
         return points;
@@ -189,7 +190,7 @@ CleanupStep decimate(const Work& work, const MeshMeasures& facts) {
     constexpr int kRounds = 3;  // what collapses leave is relaxed
     const TriangleMesh before = work.mesh;
     std::optional<meshing::Surface> surface;
-    if (work.level_set != nullptr) surface.emplace(*work.level_set, work.isovalue);
+    if (work.level_set != nullptr) surface.emplace(*work.level_set, work.isovalue, work.mesh.origin);
     const double tolerance = work.options.adaptive > 0 ? work.options.adaptive / work.voxel_size() : 0.0;
     const std::size_t triangles = work.options.target_edge > 0 ? triangles_of(work.options.target_edge, facts.area) : 4;
     meshing::decimate(work.mesh, surface ? &*surface : nullptr, {triangles, tolerance}, work.run);
@@ -312,7 +313,7 @@ CleanupReport clean(const Work& work) {
             guarded([&] {
                 SurfaceMesh soup = to_surface_mesh(mesh);
                 report.holes_filled += repair(soup);
-                mesh = from_surface_mesh(soup);
+                mesh = from_surface_mesh(soup, mesh.origin);
             });
             facts = measure(mesh);
             intersections = count_self_intersections(mesh);

@@ -27,10 +27,7 @@ using Kernel = CGAL::Simple_cartesian<double>;
 using Triangles = std::vector<Kernel::Triangle_3>;
 using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
 
-template <typename Real>
-Kernel::Point_3 to_cgal(const std::array<Real, 3>& p) {
-    return {p[0], p[1], p[2]};
-}
+Kernel::Point_3 to_cgal(const Vec3& p) { return {p[0], p[1], p[2]}; }
 
 /// Some of a mesh's triangles.
 class TriangleTree {
@@ -39,8 +36,7 @@ public:
         triangles_.reserve(end - begin);
         for (std::size_t n = begin; n < end; ++n) {
             const auto& t = mesh.triangles[n];
-            triangles_.emplace_back(to_cgal(mesh.vertices[t[0]]), to_cgal(mesh.vertices[t[1]]),
-                                    to_cgal(mesh.vertices[t[2]]));
+            triangles_.emplace_back(to_cgal(mesh.place(t[0])), to_cgal(mesh.place(t[1])), to_cgal(mesh.place(t[2])));
         }
         tree_.insert(triangles_.begin(), triangles_.end());
         // A tree of the vertices, for first guesses, would cost as much as all queries: the point before has a better
@@ -93,7 +89,7 @@ std::vector<double> distances_to(const TriangleMesh& mesh, const std::vector<Vec
     const std::vector<std::uint32_t> order = order_spatially(points, points.size());
     std::vector<double> distances(points.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, order.size(), 256), [&](const auto& range) {
-        Kernel::Point_3 closest = to_cgal(mesh.vertices[mesh.triangles.front()[0]]);
+        Kernel::Point_3 closest = to_cgal(mesh.place(mesh.triangles.front()[0]));
         for (std::size_t n = range.begin(); n != range.end(); ++n) {
             const Kernel::Point_3 query = to_cgal(points[order[n]]);
             for (const auto& tree : trees) closest = tree->closest_point(query, closest);
@@ -133,9 +129,9 @@ double measure_wall(const TriangleMesh& mesh, const RunContext& run) {
         tbb::parallel_for(std::size_t(0), rays, [&](std::size_t ray) {
             const std::size_t own = ray * count / rays;
             const auto& t = mesh.triangles[own];
-            const detail::Kernel::Triangle_3 triangle(detail::to_cgal(mesh.vertices[t[0]]),
-                                                      detail::to_cgal(mesh.vertices[t[1]]),
-                                                      detail::to_cgal(mesh.vertices[t[2]]));
+            const detail::Kernel::Triangle_3 triangle(detail::to_cgal(mesh.place(t[0])),
+                                                      detail::to_cgal(mesh.place(t[1])),
+                                                      detail::to_cgal(mesh.place(t[2])));
             if (triangle.is_degenerate()) return;
             const detail::Kernel::Ray_3 inward(CGAL::centroid(triangle),
                                                -triangle.supporting_plane().orthogonal_vector());

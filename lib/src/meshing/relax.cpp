@@ -379,7 +379,7 @@ RelaxReport relax_mesh(TriangleMesh& mesh, const FloatGrid& level_set, const Rel
     if (mesh.empty()) return report;
     with_threads(run, [&] {
         report.smallest_angle_before = smallest_angle(mesh);
-        const meshing::Surface surface(level_set, options.isovalue);
+        const meshing::Surface surface(level_set, options.isovalue, mesh.origin);
         meshing::Relaxer(mesh, surface, options.tolerance, run).relax(options.rounds, report);
         meshing::remove_gone(mesh.triangles, mesh.vertices);
         report.triangles = std::int64_t(mesh.triangles.size());
@@ -392,7 +392,7 @@ RelaxReport relax_mesh(TriangleMesh& mesh, const FloatGrid& level_set, const Rel
 MeshDeviation measure_deviation(const FloatGrid& level_set, const TriangleMesh& mesh, double isovalue,
                                 const RunContext& run) {
     MeshDeviation deviation;
-    with_threads(run, [&] { deviation = meshing::Surface(level_set, isovalue).deviation(mesh); });
+    with_threads(run, [&] { deviation = meshing::Surface(level_set, isovalue, mesh.origin).deviation(mesh); });
     return deviation;
 }
 

@@ -24,20 +24,26 @@ using detail::pack;
 
 Json to_json(const Vec3& v) { return Json::array({v[0], v[1], v[2]}); }
 
-std::string packed_marks(const std::vector<Vec3>& marks, std::int64_t most) {
+// A browser computes in single precision: where the first mesh has an origin of its own, the whole page is relative to
+// it.
+Vec3 origin_of(const ReportPage& page) { return page.structures.front().mesh->origin; }
+
+std::string packed_marks(const std::vector<Vec3>& marks, const Vec3& origin, std::int64_t most) {
     const std::size_t stride = marks.size() / std::size_t(most + 1) + 1;
     std::vector<float> numbers;
     for (std::size_t n = 0; n < marks.size(); n += stride)
-        for (const double x : marks[n]) numbers.push_back(float(x));
+        for (int a = 0; a < 3; ++a) numbers.push_back(float(marks[n][a] - origin[a]));
     const auto* const bytes = reinterpret_cast<const std::uint8_t*>(numbers.data());
     return pack({bytes, bytes + numbers.size() * sizeof(float)});
 }
 
-Json to_json(const Evidence& evidence) {
+Json to_json(const Evidence& evidence, const Vec3& origin) {
     Json suggestions = Json::array();
     for (const Suggestion& s : evidence.suggestions)
-        suggestions.push_back(
-            {{"slice", s.slice}, {"area", s.area}, {"index", to_json(s.index)}, {"world", to_json(s.world)}});
+        suggestions.push_back({{"slice", s.slice},
+                               {"area", s.area},
+                               {"index", to_json(s.index)},
+                               {"world", to_json(cloud::minus(s.world, origin))}});
     return {{"reach", evidence.reach},
             {"weak_edge", evidence.weak_edge},
             {"area", evidence.area},
@@ -45,8 +51,9 @@ Json to_json(const Evidence& evidence) {
             {"suggestions", suggestions}};
 }
 
-detail::PageMesh page_mesh(const PageStructure& structure, std::int64_t most) {
+detail::PageMesh page_mesh(const PageStructure& structure, const Vec3& origin, std::int64_t most) {
     detail::PageMesh mesh{*structure.mesh, {}};
+    move_mesh_origin(mesh.mesh, origin);
     const auto add = [&](const char* name, const std::vector<float>& values) {
         if (values.size() == mesh.mesh.vertices.size()) mesh.values.emplace_back(name, values);
     };
@@ -57,9 +64,9 @@ detail::PageMesh page_mesh(const PageStructure& structure, std::int64_t most) {
     return cluster(std::move(mesh), most);
 }
 
-Json to_json(const PageStructure& structure, const ReportPageOptions& options, std::int64_t most_triangles,
-             ReportPageSummary& summary) {
-    const detail::PageMesh shown = page_mesh(structure, most_triangles);
+Json to_json(const PageStructure& structure, const Vec3& origin, const ReportPageOptions& options,
+             std::int64_t most_triangles, ReportPageSummary& summary) {
+    const detail::PageMesh shown = page_mesh(structure, origin, most_triangles);
     const detail::CodedMesh coded = detail::encode(shown.mesh);
     summary.triangles += coded.triangle_count;
     Json values = Json::object();
@@ -79,8 +86,9 @@ Json to_json(const PageStructure& structure, const ReportPageOptions& options, s
           {"positions", pack(coded.positions)},
           {"corners", pack(coded.corners)},
           {"values", values}}},
-        {"marks", {{"count", structure.marks.size()}, {"data", packed_marks(structure.marks, options.most_marks)}}}};
-    if (structure.evidence != nullptr) json["evidence"] = to_json(*structure.evidence);
+        {"marks",
+         {{"count", structure.marks.size()}, {"data", packed_marks(structure.marks, origin, options.most_marks)}}}};
+    if (structure.evidence != nullptr) json["evidence"] = to_json(*structure.evidence, origin);
     return json;
 }
 
@@ -96,26 +104,26 @@ std::vector<Vec3> places_of(const ReportPage& page) {
         }
     };
     for (const PageStructure& structure : page.structures) {
-        for (const auto& vertex : structure.mesh->vertices) add(vertex);
+        for (std::size_t v = 0; v < structure.mesh->vertices.size(); ++v) add(structure.mesh->place(v));
         for (const Vec3& mark : structure.marks) add(mark);
     }
     const std::array<Vec3, 8> corners = cloud::corners(box);
     return {corners.begin(), corners.end()};
 }
 
-Json to_json(const Image& image, const detail::SlicePlan& plan, const ReportPageOptions& options,
+Json to_json(const Image& image, const detail::SlicePlan& plan, const Vec3& origin, const ReportPageOptions& options,
              const RunContext& run) {
     const detail::CodedSlices coded = encode_slices(image, plan, options.jpeg_quality, run);
     const ImageGeometry &g = coded.geometry, &whole = image.geometry();
     return {{"size", g.size},
             {"spacing", to_json(g.spacing)},
-            {"origin", to_json(g.origin)},
+            {"origin", to_json(cloud::minus(g.origin, origin))},
             {"direction", {to_json(g.direction[0]), to_json(g.direction[1]), to_json(g.direction[2])}},
             {"first", plan.region.min},
             {"step", plan.step},
             {"of_size", whole.size},
             {"of_spacing", to_json(whole.spacing)},
-            {"of_origin", to_json(whole.origin)},
+            {"of_origin", to_json(cloud::minus(whole.origin, origin))},
             {"black", coded.black},
             {"white", coded.white},
             {"slices", coded.jpegs}};
@@ -144,13 +152,13 @@ Json data_of(const ReportPage& page, const ReportPageOptions& options, ReportPag
         run.check();
         const double share = double(structure.mesh->triangles.size()) / all;
         const auto most = std::max<std::int64_t>(100, std::int64_t(share * double(options.most_triangles)));
-        data["structures"].push_back(to_json(structure, options, most, summary));
+        data["structures"].push_back(to_json(structure, origin_of(page), options, most, summary));
     }
     if (page.image == nullptr) return data;
     const detail::SlicePlan plan =
         detail::plan_slices(page.image->geometry(), page.image->held(), places_of(page), options.most_voxels);
     try {
-        data["image"] = to_json(*page.image, plan, options, run);
+        data["image"] = to_json(*page.image, plan, origin_of(page), options, run);
         summary.slices_size = plan.size;
         summary.slices_step = plan.step;
     } catch (const Error& error) {

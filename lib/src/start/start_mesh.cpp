@@ -9,7 +9,9 @@
 namespace covol {
 namespace {
 
-FloatGridPtr signed_distance_grid(const Domain& domain, const TriangleMesh& mesh) {
+/// @return in the domain's index space
+FloatGridPtr signed_distance_grid(Domain domain, const TriangleMesh& mesh) {
+    for (int a = 0; a < 3; ++a) domain.origin[a] -= mesh.origin[a];  // vertices are relative to that
     std::vector<openvdb::Vec3s> points(mesh.vertices.size());
     std::vector<openvdb::Vec3I> triangles(mesh.triangles.size());
     for (std::size_t n = 0; n < points.size(); ++n)

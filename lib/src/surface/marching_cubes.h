@@ -67,6 +67,8 @@ public:
     /// @param clip  where the grid has layers that stand for the faces of a cut.
     MarchingCubes(const FloatGrid& grid, const LatticeClip& clip, double isovalue, const RunContext& run)
         : grid_(grid), clip_(clip), domain_(domain_of(grid)), isovalue_(float(isovalue)), run_(run) {
+        origin_ = choose_mesh_origin(domain_.world_box(), domain_.voxel_size);
+        for (int a = 0; a < 3; ++a) domain_.origin[a] -= origin_[a];
         if (!(grid.background() >= isovalue_))
             throw Error(Errc::InvalidInput,
                         "extract_mesh: grid '" + grid.getName() + "': expected a background above the isovalue " +
@@ -74,10 +76,13 @@ public:
                             "; the surface would not be closed");
     }
 
+    [[nodiscard]] const Vec3& origin() const { return origin_; }
+
     /// All of it.
     TriangleMesh extract() {
         prepare();
         TriangleMesh mesh;
+        mesh.origin = origin_;
         mesh.vertices.resize(vertices_);
         mesh.triangles.resize(triangles_);
         tbb::parallel_for(std::size_t(0), block_count_, [&](std::size_t b) {
@@ -95,7 +100,7 @@ public:
 
     /// The same vertices and triangles in the same order, in pieces. A triangle of a block has vertices of this block
     /// and of those behind it in the order of their origins, in the next layer along x at most: only these are held.
-    /// @param begin  called with the number of vertices and of triangles
+    /// @param begin  called with the number of vertices and of triangles. Positions are relative to origin().
     /// @param take   called with each piece
     template <typename Begin, typename Take>
     void stream(const Begin& begin, const Take& take) {
@@ -357,9 +362,9 @@ private:
         for (const double c : p)
             if (domain_.voxel_size < 16 * std::abs(c) * std::numeric_limits<float>::epsilon())
                 throw Error(Errc::Unsupported, "extract_mesh: coordinates near " + std::to_string(c) +
-                                                   " are too far from 0 for a voxel size of " +
+                                                   " are too far from each other for a voxel size of " +
                                                    std::to_string(domain_.voxel_size) +
-                                                   " in single precision; move the data to the origin");
+                                                   " in single precision; take the data in parts");
     }
 
     void place_vertices(const Block& block, std::array<float, 3>* out) {
@@ -453,7 +458,8 @@ private:
 
     const FloatGrid& grid_;
     const LatticeClip clip_;
-    const Domain domain_;
+    Domain domain_;  ///< relative to the mesh's origin
+    Vec3 origin_{};
     const float isovalue_;
     const RunContext& run_;
     std::vector<Block> blocks_;

@@ -74,10 +74,11 @@ private:
 /// Takes pieces of the mesh, writes their triangles and those of their vertices that are done.
 class Writer {
 public:
-    Writer(const std::string& temporary, const std::string& path, std::uint64_t vertices, std::uint64_t triangles,
+    Writer(const std::string& temporary, const std::string& path, const StreamedMesh& mesh,
            const WriteMeshOptions& options)
         : options_(options),
-          file_(mesh_io::MeshStream::open(temporary, path, vertices, triangles,
+          file_(mesh_io::MeshStream::open(temporary, path, mesh.vertices, mesh.triangles,
+                                          mesh_io::placed(mesh.origin, options),
                                           mesh_io::one_line_each(options.comments))) {}
 
     void take(const detail::MeshPiece& piece) {
@@ -134,6 +135,7 @@ StreamedMesh stream(const FloatGrid& surface, double isovalue, const RunContext&
                 if (triangles == 0)
                     throw Error(Errc::InvalidInput,
                                 "stream_mesh: grid '" + surface.getName() + "': no surface at this level");
+                made.origin = cubes.origin();
                 made.vertices = vertices;
                 made.triangles = triangles;
                 totals.emplace(vertices);
@@ -166,11 +168,11 @@ StreamedMesh stream_mesh(const std::string& path, const FloatGrid& surface, doub
     detail::write_atomically(path, [&](const std::string& temporary) {
         std::optional<Writer> writer;
         made = stream(
-            surface, isovalue, run,
-            [&](const StreamedMesh& mesh) { writer.emplace(temporary, path, mesh.vertices, mesh.triangles, options); },
+            surface, isovalue, run, [&](const StreamedMesh& mesh) { writer.emplace(temporary, path, mesh, options); },
             [&](const detail::MeshPiece& piece) { writer->take(piece); });
         writer->finish();
     });
+    mesh_io::tell_of_origin(path, made.origin, options);
     return made;
 }
 

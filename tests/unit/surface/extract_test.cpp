@@ -8,6 +8,8 @@
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "covol/mesh_cleanup.h"
+#include "covol/mesh_relax.h"
+#include "covol/start.h"
 #include "covol/surface.h"
 #include "grid/cube_cases.h"
 
@@ -193,9 +195,31 @@ TEST_CASE("grids that have no closed surface are refused, an empty one gives an 
     CHECK_THROWS_AS(extract_mesh(*grid, options), Error);
     grid->tree().setValue({1, 0, 0}, std::nanf(""));
     CHECK_THROWS_AS(extract_mesh(*grid), Error);
-    Domain far;
-    far.origin = {1e9, 0, 0};
-    grid = make_grid(far, 1.0F, "surface");
+    grid = make_grid({}, 1.0F, "surface");
     grid->tree().setValue({0, 0, 0}, -1.0F);
+    grid->tree().setValue({1 << 24, 0, 0}, -1.0F);  // too far from each other for single precision
     CHECK_THROWS_AS(extract_mesh(*grid), Error);
+}
+
+TEST_CASE("a surface far from 0 is the same surface, moved") {
+    const Domain near{0.1, {0, 0, 0}, {-20, -20, -20}, {20, 20, 20}};
+    Domain far = near;
+    far.origin = {500000.05, 5400000, -300};
+    const FloatGridPtr u = start_from_sphere(near, {0.02, 0, 0}, 1.5),
+                       v = start_from_sphere(far, {500000.07, 5400000, -300}, 1.5);
+    TriangleMesh here = extract_mesh(*u), there = extract_mesh(*v);
+    CHECK(here.origin == Vec3{0, 0, 0});
+    CHECK(there.origin[1] == 5400000);
+    CHECK(here.triangles.size() == there.triangles.size());
+    const MeshMeasures measured = measure(there);
+    CHECK(measured.closed);
+    CHECK(measured.genus == 0);
+    CHECK(measured.volume == Approx(measure(here).volume).epsilon(1e-4));
+    const RelaxReport relaxed = relax_mesh(there, *v);
+    CHECK(relaxed.deviation.mean < 0.02);
+    for (std::size_t n = 0; n < there.vertices.size(); n += 7) {
+        const Vec3 p = there.place(n);
+        CHECK(std::abs(std::hypot(p[0] - 500000.07, p[1] - 5400000, p[2] + 300) - 1.5) < 0.01);
+    }
+    CHECK(measure_fit({{500001.57, 5400000, -300}}, there).max < 0.01);
 }

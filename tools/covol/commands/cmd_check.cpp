@@ -188,7 +188,7 @@ void check_mesh_file(const std::string& path, const RunContext& run, Findings& f
         findings.remark("triangles of different pieces meet " + std::to_string(crossings.between) +
                         " times: solids that touch or overlap; to make one of them, join them by a Boolean union");
     std::vector<Vec3> corners;
-    for (const auto& v : mesh.vertices) corners.push_back({v[0], v[1], v[2]});
+    for (std::size_t v = 0; v < mesh.vertices.size(); ++v) corners.push_back(mesh.place(v));
     const WorldBox box = bounding_box(corners);
     double extent = 0;
     for (int a = 0; a < 3; ++a) extent = std::max(extent, box.max[a] - box.min[a]);

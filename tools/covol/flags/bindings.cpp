@@ -339,6 +339,7 @@ WriteMeshOptions MeshFlags::options(const Session& session) const {
     write.y_up = y_up;
     write.unit_scale = unit_scale;
     write.comments = session.comments();
+    write.warn = [run = session.run()](const std::string& line) { run.warn(line); };
     return write;
 }
 

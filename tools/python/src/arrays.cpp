@@ -190,8 +190,13 @@ py::array voxels_of(const Image& image) {
 
 TriangleMesh to_mesh(const py::handle& vertices, const py::handle& faces) {
     TriangleMesh mesh;
-    for (const Vec3& v : to_positions("vertices", vertices))
-        mesh.vertices.push_back({static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])});
+    const std::vector<Vec3> places = to_positions("vertices", vertices);
+    // a hundredth of an edge is what a surface is told to
+    if (!places.empty())
+        mesh.origin = choose_mesh_origin(bounding_box(places), 0.01 * longest_side(bounding_box(places)));
+    for (const Vec3& v : places)
+        mesh.vertices.push_back({static_cast<float>(v[0] - mesh.origin[0]), static_cast<float>(v[1] - mesh.origin[1]),
+                                 static_cast<float>(v[2] - mesh.origin[2])});
     const auto count = static_cast<double>(mesh.vertices.size());
     for (const Vec3& f : to_positions("faces", faces)) {
         std::array<std::uint32_t, 3> triangle{};

@@ -18,8 +18,18 @@
 namespace covol::python {
 namespace {
 
+/// In single precision and without a copy, but where that would not hold them.
 py::array vertices_of(const Mesh& mesh) {
     const auto count = static_cast<py::ssize_t>(mesh.triangles->vertices.size());
+    if (mesh.triangles->origin != Vec3{0, 0, 0}) {
+        std::vector<double> values;
+        values.reserve(3 * mesh.triangles->vertices.size());
+        for (std::size_t v = 0; v < mesh.triangles->vertices.size(); ++v) {
+            const Vec3 place = mesh.triangles->place(v);
+            values.insert(values.end(), place.begin(), place.end());
+        }
+        return give(std::move(values), {count, 3});
+    }
     const auto* first = reinterpret_cast<const float*>(mesh.triangles->vertices.data());
     return show(first, {count, 3}, {3 * sizeof(float), sizeof(float)}, mesh.triangles);
 }

@@ -48,13 +48,10 @@ std::vector<Piece> pieces_of(const TriangleMesh& mesh) {
     for (const auto& t : mesh.triangles)
         for (const std::uint32_t v : {t[1], t[2]}) parent[root(v)] = root(t[0]);
     std::map<std::uint32_t, Piece> pieces;
-    for (std::uint32_t v = 0; v < parent.size(); ++v)
-        pieces[root(v)].surface.push_back(meshing::to_vec3(mesh.vertices[v]));
+    for (std::uint32_t v = 0; v < parent.size(); ++v) pieces[root(v)].surface.push_back(mesh.place(v));
     for (const auto& t : mesh.triangles) {
         Piece& piece = pieces[root(t[0])];
-        const auto corner = [&](std::size_t n) {
-            return minus(meshing::to_vec3(mesh.vertices[t[n]]), piece.surface.front());
-        };
+        const auto corner = [&](std::size_t n) { return minus(mesh.place(t[n]), piece.surface.front()); };
         piece.volume += dot(corner(0), cross(corner(1), corner(2))) / 6;
     }
     std::vector<Piece> solid;

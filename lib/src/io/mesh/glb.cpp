@@ -27,9 +27,12 @@ public:
         read_chunks();
         const Json required = member(json_, "extensionsRequired", Json::array());
         if (!required.empty()) unsupported("the extension " + required.dump().substr(0, 60));
-        check_nodes();
-        for (const Json& mesh : list("meshes"))
-            for (const Json& primitive : member(mesh, "primitives", Json::array())) add(primitive);
+        const std::vector<Vec3> translations = read_nodes();
+        for (std::size_t n = 0; n < translations.size(); ++n) {
+            if (translations[n] != translation_) first_vertex_.clear();  // data that is used again lies elsewhere
+            translation_ = translations[n];
+            for (const Json& primitive : member(list("meshes")[n], "primitives", Json::array())) add(primitive);
+        }
         return builder_.finish();
     }
 
@@ -92,12 +95,35 @@ private:
         return value.get<std::uint64_t>();
     }
 
-    void check_nodes() const {
-        for (const Json& node : list("nodes"))
-            for (const char* key : {"matrix", "translation", "rotation", "scale"})
-                if (node.is_object() && node.contains(key))
-                    source_.unsupported(std::string("a node with a ") + key +
-                                        " is not read; apply the objects' transforms before the export");
+    /// Where the nodes put each mesh: a translation, as files have whose coordinates are far from 0.
+    [[nodiscard]] std::vector<Vec3> read_nodes() const {
+        std::vector<Vec3> translations(list("meshes").size(), Vec3{0, 0, 0});
+        std::vector<bool> is_placed(translations.size(), false);
+        const auto refuse = [&](const std::string& what) {
+            source_.unsupported("a node with " + what +
+                                " is not read; apply the objects' transforms before the export");
+        };
+        for (const Json& node : list("nodes")) {
+            if (!node.is_object()) continue;
+            for (const char* key : {"matrix", "rotation", "scale"})
+                if (node.contains(key)) refuse(std::string("a ") + key);
+            Vec3 moved{0, 0, 0};
+            if (node.contains("translation")) {
+                const Json& json = node.at("translation");
+                const auto is_number = [](const Json& c) { return c.is_number(); };
+                if (!json.is_array() || json.size() != 3 || !std::all_of(json.begin(), json.end(), is_number))
+                    source_.fail("translation: expected three numbers, got " + json.dump().substr(0, 40));
+                if (node.contains("children")) refuse("a translation and children");
+                for (std::size_t a = 0; a < 3; ++a) moved[a] = json[a].get<double>();
+            }
+            if (!node.contains("mesh")) continue;
+            static_cast<void>(item("meshes", node.at("mesh")));
+            const auto n = node.at("mesh").get<std::size_t>();
+            if (is_placed[n] && translations[n] != moved) refuse("a mesh that another node has elsewhere");
+            is_placed[n] = true;
+            translations[n] = moved;
+        }
+        return translations;
     }
 
     Accessor accessor(const Json& number, const char* type, std::uint64_t components) const {
@@ -138,7 +164,8 @@ private:
             for (std::uint64_t n = 0; n < data.count; ++n) {
                 std::array<float, 3> p{};
                 std::memcpy(p.data(), data.bytes.data() + n * data.stride, sizeof(p));
-                builder_.vertex({p[0], -p[2], p[1]});  // from y up, which glTF prescribes
+                const Vec3 at{translation_[0] + p[0], translation_[1] + p[1], translation_[2] + p[2]};
+                builder_.vertex({at[0], -at[2], at[1]});  // from y up, which glTF prescribes
             }
         }
         return {known->second, data.count};
@@ -180,6 +207,7 @@ private:
     std::string_view text_, binary_;
     Json json_;
     std::uint64_t unread_ = 0;
+    Vec3 translation_{0, 0, 0};  ///< of the mesh at hand
     std::unordered_map<std::uint64_t, std::uint64_t> first_vertex_;
 };
 
@@ -229,6 +257,7 @@ std::uint64_t describe_glb(const std::vector<GlbPart>& parts, nlohmann::json& js
                              {"type", "SCALAR"}});
         nlohmann::json primitive{{"attributes", {{"POSITION", first}, {"NORMAL", first + 1}}}, {"indices", first + 2}};
         nlohmann::json node{{"mesh", n}};
+        if (mesh.places.is_far()) node["translation"] = mesh.places.origin();
         if (parts[n].named != nullptr) {
             node["name"] = parts[n].named->name;
             primitive["material"] = n;

@@ -1,5 +1,7 @@
 #pragma once
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <string>
@@ -24,7 +26,9 @@ public:
     void expect_vertices(std::size_t count, bool) override { mesh_.vertices.reserve(count); }
 
     void vertex(const Vec3& position) override {
-        const std::array<float, 3> p{float(position[0]), float(position[1]), float(position[2])};
+        if (vertex_count() == 0) choose_origin(position);
+        std::array<float, 3> p{};
+        for (int a = 0; a < 3; ++a) p[a] = float(position[a] - mesh_.origin[a]);
         source_.check_finite(vertex_count(), p[0], p[1], p[2]);
         if (vertex_count() >= std::numeric_limits<std::uint32_t>::max()) source_.fail("more than 2^32 vertices");
         mesh_.vertices.push_back(p);
@@ -48,6 +52,15 @@ public:
     }
 
 private:
+    /// Coordinates far from 0 are kept from a round place near the first vertex on: without loss, for the differences
+    /// of numbers in single precision are such numbers too.
+    void choose_origin(const Vec3& first) {
+        constexpr double kFar = 1 << 17, kRound = 1024;
+        const bool is_far = std::any_of(first.begin(), first.end(), [](double c) { return std::abs(c) > kFar; });
+        for (int a = 0; a < 3; ++a)
+            if (is_far && std::isfinite(first[a])) mesh_.origin[a] = kRound * std::round(first[a] / kRound);
+    }
+
     const Source& source_;
     TriangleMesh mesh_;
 };

@@ -30,14 +30,23 @@ void write_glb(Output& out, const Prepared& in);
 
 /// Comments without line breaks.
 std::vector<std::string> one_line_each(std::vector<std::string> comments);
-/// A vertex, scaled, and turned where the options say y up.
-std::array<float, 3> placed(const std::array<float, 3>& vertex, const WriteMeshOptions& options);
+/// A vertex or a mesh's origin, scaled, and turned where the options say y up.
+template <typename Real>
+std::array<Real, 3> placed(const std::array<Real, 3>& vertex, const WriteMeshOptions& options) {
+    std::array<Real, 3> p = vertex;
+    for (Real& c : p) c = Real(c * options.unit_scale);
+    if (options.y_up.value_or(false)) p = {p[0], p[2], -p[1]};
+    return p;
+}
+
+/// Tells of a format that holds single precision alone, and so no origin.
+void tell_of_origin(const std::string& path, const Vec3& origin, const WriteMeshOptions& options);
 
 /// What begins a PLY file, up to its vertices. @throws Error Unsupported (more vertices than its numbers tell apart).
 struct PlyCounts {
     std::uint64_t vertices, triangles;
 };
-void write_ply_header(Output& out, const PlyCounts& counts, const std::vector<std::string>& comments,
+void write_ply_header(Output& out, const PlyCounts& counts, bool is_far, const std::vector<std::string>& comments,
                       const std::vector<VertexAttribute>& attributes, bool binary);
 void write_ply_face(Output& out, const Face& triangle);
 /// What begins a binary STL file. @throws Error Unsupported (more than 2^32 - 1 triangles).

@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <iomanip>
+#include <sstream>
 #include <string_view>
 
 #include "base/file.h"
@@ -54,10 +56,11 @@ Prepared prepare(const std::string& extension, const TriangleMesh& mesh, const W
                     "write_mesh: unit_scale: expected > 0, got " + std::to_string(options.unit_scale));
     check_references(mesh);
     for (const VertexAttribute& attribute : options.attributes) check_attribute(attribute, mesh);
-    Prepared result{mesh.triangles,     mesh.vertices, {}, one_line_each(options.comments),
-                    options.attributes, options.binary};
     WriteMeshOptions placing = options;
     placing.y_up = options.y_up.value_or(extension == ".glb");
+    Prepared result{
+        mesh.triangles,     mesh.vertices, Places(placed(mesh.origin, placing)), {}, one_line_each(options.comments),
+        options.attributes, options.binary};
     for (auto& p : result.vertices) p = placed(p, placing);
     if (extension == ".ply" || extension == ".obj" || extension == ".glb")
         result.normals = meshing::vertex_normals(result.vertices, mesh.triangles);
@@ -97,11 +100,12 @@ std::vector<std::string> mesh_io::one_line_each(std::vector<std::string> comment
     return comments;
 }
 
-std::array<float, 3> mesh_io::placed(const std::array<float, 3>& vertex, const WriteMeshOptions& options) {
-    std::array<float, 3> p = vertex;
-    for (float& c : p) c = float(c * options.unit_scale);
-    if (options.y_up.value_or(false)) p = {p[0], p[2], -p[1]};
-    return p;
+void mesh_io::tell_of_origin(const std::string& path, const Vec3& origin, const WriteMeshOptions& options) {
+    if (origin == Vec3{0, 0, 0} || detail::extension(path) != ".stl" || !options.binary || !options.warn) return;
+    std::ostringstream text;
+    text << std::setprecision(15) << origin[0] << ", " << origin[1] << ", " << origin[2];
+    options.warn(path + ": STL holds single precision alone, so coordinates are relative to (" + text.str() +
+                 "); .ply, .obj and .glb hold the whole ones");
 }
 
 void check_mesh_extension(const std::string& path) { static_cast<void>(writer_of(path)); }
@@ -109,6 +113,7 @@ void check_mesh_extension(const std::string& path) { static_cast<void>(writer_of
 void write_mesh(const std::string& path, const TriangleMesh& mesh, const WriteMeshOptions& options) {
     const Writer writer = writer_of(path);
     const Prepared prepared = prepare(detail::extension(path), mesh, options);
+    tell_of_origin(path, mesh.origin, options);
     save(path, [&](Output& out) { writer(out, prepared); });
 }
 

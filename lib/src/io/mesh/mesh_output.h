@@ -31,6 +31,7 @@ public:
         return kept();
     }
     Output& operator<<(float number) { return append(number); }
+    Output& operator<<(double number) { return append(number); }
     Output& operator<<(std::uint64_t number) { return append(number); }
     template <typename T>
     void raw(const T& value) {
@@ -78,14 +79,33 @@ private:
     std::uint64_t flushed_ = 0;
 };
 
-inline Output& operator<<(Output& out, const std::array<float, 3>& p) {
+template <typename Real>
+Output& operator<<(Output& out, const std::array<Real, 3>& p) {
     return out << p[0] << " " << p[1] << " " << p[2];
 }
+
+/// Vertices as a file holds them: in single precision, but where the mesh has an origin of its own.
+class Places {
+public:
+    explicit Places(const Vec3& origin) : origin_(origin), is_far_(origin != Vec3{0, 0, 0}) {}
+    [[nodiscard]] bool is_far() const { return is_far_; }
+    [[nodiscard]] const Vec3& origin() const { return origin_; }
+    [[nodiscard]] Vec3 whole(const std::array<float, 3>& p) const {
+        return {origin_[0] + p[0], origin_[1] + p[1], origin_[2] + p[2]};
+    }
+    void raw(Output& out, const std::array<float, 3>& p) const { is_far_ ? out.raw(whole(p)) : out.raw(p); }
+    void text(Output& out, const std::array<float, 3>& p) const { is_far_ ? out << whole(p) : out << p; }
+
+private:
+    Vec3 origin_;
+    bool is_far_;
+};
 
 /// What every format needs: placed vertices, their normals where it has any, one-line comments.
 struct Prepared {
     const std::vector<std::array<std::uint32_t, 3>>& triangles;
     std::vector<std::array<float, 3>> vertices;
+    Places places;
     std::vector<std::array<float, 3>> normals;
     std::vector<std::string> comments;
     std::vector<VertexAttribute> attributes;

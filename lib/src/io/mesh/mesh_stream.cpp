@@ -32,15 +32,16 @@ private:
 class IndexedStream : public MeshStream {
 public:
     IndexedStream(const std::string& path, const std::string& name, bool ply, const PlyCounts& counts,
-                  const std::vector<std::string>& comments)
+                  const Vec3& origin, const std::vector<std::string>& comments)
         : path_(path),
           name_(name),
           ply_(ply),
+          places_(origin),
           faces_file_(path + ".faces"),
           out_(path, name),
           faces_(faces_file_, name) {
         if (ply)
-            write_ply_header(out_, counts, comments, {}, true);
+            write_ply_header(out_, counts, places_.is_far(), comments, {}, true);
         else
             for (const std::string& comment : comments) out_ << "# " << comment << "\n";
     }
@@ -48,10 +49,12 @@ public:
 
     void vertex(const std::array<float, 3>& position, const std::array<float, 3>& normal) override {
         if (ply_) {
-            out_.raw(position);
+            places_.raw(out_, position);
             out_.raw(normal);
         } else {
-            out_ << "v " << position << "\nvn " << normal << "\n";
+            out_ << "v ";
+            places_.text(out_, position);
+            out_ << "\nvn " << normal << "\n";
         }
     }
     void triangle(const Face& vertices, const std::array<std::array<float, 3>, 3>&) override {
@@ -74,6 +77,7 @@ public:
 private:
     const std::string path_, name_;
     const bool ply_;
+    const Places places_;
     const std::string faces_file_;
     Output out_, faces_;
 };
@@ -81,13 +85,14 @@ private:
 }  // namespace
 
 std::unique_ptr<MeshStream> MeshStream::open(const std::string& path, const std::string& name, std::uint64_t vertices,
-                                             std::uint64_t triangles, const std::vector<std::string>& comments) {
+                                             std::uint64_t triangles, const Vec3& origin,
+                                             const std::vector<std::string>& comments) {
     const std::string end = detail::extension(name);
     if (end == ".stl") return std::make_unique<StlStream>(path, name, triangles, comments);
     if (end != ".ply" && end != ".obj")
         throw Error(Errc::InvalidOptions,
                     "stream_mesh: " + name + ": expected a name that ends in .ply, .stl or .obj, got '" + end + "'");
-    return std::make_unique<IndexedStream>(path, name, end == ".ply", PlyCounts{vertices, triangles}, comments);
+    return std::make_unique<IndexedStream>(path, name, end == ".ply", PlyCounts{vertices, triangles}, origin, comments);
 }
 
 }  // namespace covol::mesh_io

@@ -14,9 +14,11 @@ class MeshStream {
 public:
     /// @param path  to write to, a temporary one
     /// @param name  of the file, whose ending says the format: .ply, .stl or .obj
+    /// @param origin  of the mesh; vertices are relative to it
     /// @throws Error Io, Unsupported (more than the format holds).
     static std::unique_ptr<MeshStream> open(const std::string& path, const std::string& name, std::uint64_t vertices,
-                                            std::uint64_t triangles, const std::vector<std::string>& comments);
+                                            std::uint64_t triangles, const Vec3& origin,
+                                            const std::vector<std::string>& comments);
     MeshStream() = default;
     MeshStream(const MeshStream&) = delete;
     MeshStream& operator=(const MeshStream&) = delete;

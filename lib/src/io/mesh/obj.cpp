@@ -74,7 +74,11 @@ void write_obj_face(Output& out, const Face& triangle, std::uint64_t first) {
 }
 
 void write_obj_object(Output& out, const Prepared& in, std::uint64_t first) {
-    for (const auto& p : in.vertices) out << "v " << p << "\n";
+    for (const auto& p : in.vertices) {
+        out << "v ";
+        in.places.text(out, p);
+        out << "\n";
+    }
     for (const auto& n : in.normals) out << "vn " << n << "\n";
     for (const Face& t : in.triangles) write_obj_face(out, t, first);
 }

@@ -69,7 +69,10 @@ void write_off(Output& out, const Prepared& in) {
     out << "OFF\n";
     for (const std::string& comment : in.comments) out << "# " << comment << "\n";
     out << std::uint64_t(in.vertices.size()) << " " << std::uint64_t(in.triangles.size()) << " 0\n";
-    for (const auto& p : in.vertices) out << p << "\n";
+    for (const auto& p : in.vertices) {
+        in.places.text(out, p);
+        out << "\n";
+    }
     for (const Face& t : in.triangles)
         out << "3 " << std::uint64_t(t[0]) << " " << std::uint64_t(t[1]) << " " << std::uint64_t(t[2]) << "\n";
 }

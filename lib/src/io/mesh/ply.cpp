@@ -344,7 +344,7 @@ private:
 
 void read_ply(Source& source, Receiver& receiver) { PlyReader(source, receiver).read(); }
 
-void write_ply_header(Output& out, const PlyCounts& counts, const std::vector<std::string>& comments,
+void write_ply_header(Output& out, const PlyCounts& counts, bool is_far, const std::vector<std::string>& comments,
                       const std::vector<VertexAttribute>& attributes, bool binary) {
     // Many readers keep the numbers of vertices as int, and the count of faces too.
     constexpr std::uint64_t kMost = std::numeric_limits<std::int32_t>::max();
@@ -355,7 +355,8 @@ void write_ply_header(Output& out, const PlyCounts& counts, const std::vector<st
     out << "ply\nformat " << (binary ? "binary_little_endian" : "ascii") << " 1.0\n";
     for (const std::string& comment : comments) out << "comment " << comment << "\n";
     out << "element vertex " << counts.vertices << "\n";
-    for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) out << "property float " << name << "\n";
+    for (const char* name : {"x", "y", "z"}) out << "property " << (is_far ? "double " : "float ") << name << "\n";
+    for (const char* name : {"nx", "ny", "nz"}) out << "property float " << name << "\n";
     for (const VertexAttribute& attribute : attributes) out << "property float " << attribute.name << "\n";
     out << "element face " << counts.triangles << "\nproperty list uchar uint vertex_indices\nend_header\n";
 }
@@ -366,14 +367,16 @@ void write_ply_face(Output& out, const Face& triangle) {
 }
 
 void write_ply(Output& out, const Prepared& in) {
-    write_ply_header(out, {in.vertices.size(), in.triangles.size()}, in.comments, in.attributes, in.binary);
+    write_ply_header(out, {in.vertices.size(), in.triangles.size()}, in.places.is_far(), in.comments, in.attributes,
+                     in.binary);
     for (std::size_t v = 0; v < in.vertices.size(); ++v) {
         if (in.binary) {
-            out.raw(in.vertices[v]);
+            in.places.raw(out, in.vertices[v]);
             out.raw(in.normals[v]);
             for (const VertexAttribute& attribute : in.attributes) out.raw(attribute.values[v]);
         } else {
-            out << in.vertices[v] << " " << in.normals[v];
+            in.places.text(out, in.vertices[v]);
+            out << " " << in.normals[v];
             for (const VertexAttribute& attribute : in.attributes) out << " " << attribute.values[v];
             out << "\n";
         }

@@ -18,11 +18,11 @@ namespace {
 class StlBuilder {
 public:
     explicit StlBuilder(const Source& source) : mesh_(source) {}
-    void corner(float x, float y, float z) {
-        const Key key{std::bit_cast<std::uint32_t>(x + 0.0F), std::bit_cast<std::uint32_t>(y + 0.0F),
-                      std::bit_cast<std::uint32_t>(z + 0.0F)};
-        const auto [at, is_new] = known_.try_emplace(key, std::uint32_t(mesh_.vertex_count()));
-        if (is_new) mesh_.vertex({x, y, z});
+    void corner(const Vec3& p) {
+        const auto bits = [](double c) { return std::bit_cast<std::uint64_t>(c + 0.0); };  // -0 is 0
+        const auto [at, is_new] =
+            known_.try_emplace({bits(p[0]), bits(p[1]), bits(p[2])}, std::uint32_t(mesh_.vertex_count()));
+        if (is_new) mesh_.vertex(p);
         corners_.push_back(at->second);
         if (corners_.size() == 3) {
             mesh_.face(corners_);
@@ -32,7 +32,7 @@ public:
     TriangleMesh finish() { return mesh_.finish(); }
 
 private:
-    using Key = std::array<std::uint32_t, 3>;
+    using Key = std::array<std::uint64_t, 3>;
     struct Hash {
         std::size_t operator()(const Key& k) const {
             return ((k[0] * 0x9E3779B97F4A7C15ULL ^ k[1]) * 0x9E3779B97F4A7C15ULL ^ k[2]) * 0x9E3779B97F4A7C15ULL;
@@ -69,8 +69,7 @@ TriangleMesh read_stl(Source& source, std::string_view text) {
         while (!source.at_end()) {
             std::string_view line = source.line();
             if (detail::next_word(line) != "vertex") continue;
-            const Vec3 p = source.three_numbers(line);
-            mesh.corner(float(p[0]), float(p[1]), float(p[2]));
+            mesh.corner(source.three_numbers(line));
         }
         return mesh.finish();
     }
@@ -80,7 +79,7 @@ TriangleMesh read_stl(Source& source, std::string_view text) {
     for (std::uint32_t i = 0; i < count; ++i) {
         std::array<float, 12> record{};  // normal, three corners
         std::memcpy(record.data(), text.data() + kHeader + std::size_t(i) * kRecord, sizeof(record));
-        for (int k = 3; k < 12; k += 3) mesh.corner(record[k], record[k + 1], record[k + 2]);
+        for (int k = 3; k < 12; k += 3) mesh.corner({record[k], record[k + 1], record[k + 2]});
     }
     return mesh.finish();
 }
@@ -115,7 +114,11 @@ void write_stl(Output& out, const Prepared& in) {
             continue;
         }
         out << "facet normal " << triangle_normal(corners) << "\n outer loop\n";
-        for (const auto& corner : corners) out << "  vertex " << corner << "\n";
+        for (const auto& corner : corners) {
+            out << "  vertex ";
+            in.places.text(out, corner);
+            out << "\n";
+        }
         out << " endloop\nendfacet\n";
     }
     if (!in.binary) out << "endsolid covol\n";

@@ -410,6 +410,13 @@ TEST_CASE("glb of other programs: interleaved vertices, short indices, shared po
     refused(R"("POSITION":0)", R"("POSITION":9)", "there is no 9 among its accessors");
     refused(R"("mode":4)", R"("mode":1)", "not of triangles", Errc::Unsupported);
     refused(R"("mesh":0)", R"("mesh":0,"scale":[2,2,2])", "a node with a scale", Errc::Unsupported);
+    refused(R"("mesh":0)", R"("mesh":0,"translation":[2,2])", "expected three numbers");
+    refused(R"({"mesh":0})", R"({"mesh":0,"translation":[2,2,2]},{"mesh":0})", "elsewhere", Errc::Unsupported);
+    refused(R"({"mesh":0})", R"({"mesh":1})", "there is no 1 among its meshes");
+    const TriangleMesh moved = read_mesh(
+        folder.file("e.glb", glb_of(replaced(json, R"("mesh":0)", R"("mesh":0,"translation":[10,20,30])"), binary)));
+    CHECK(moved.vertices[1] == std::array<float, 3>{11, -30, 20});
+    CHECK(moved.origin == Vec3{0, 0, 0});
     refused(R"("nodes")", R"("extensionsRequired":["KHR_draco_mesh_compression"],"nodes")", "KHR_draco",
             Errc::Unsupported);
     refused(R"("byteLength":76)", R"("byteLength":76,"uri":"a.bin")", "another file", Errc::Unsupported);
@@ -429,4 +436,43 @@ TEST_CASE("glb of other programs: interleaved vertices, short indices, shared po
             } catch (const Error&) {
             }
         }
+}
+
+TEST_CASE("Meshes far from 0 keep their shape in every format but binary STL", "[mesh_io]") {
+    const Folder folder;
+    TriangleMesh mesh = tetrahedron();
+    mesh.origin = {500000, 5400000, -3000};
+    std::vector<std::string> said;
+    WriteMeshOptions options;
+    options.warn = [&](const std::string& line) { said.push_back(line); };
+    for (const char* name : {"a.ply", "a.obj", "a.off", "a.glb", "a.stl", "b.ply", "b.stl"}) {
+        INFO(name);
+        options.binary = name[0] == 'a';
+        write_mesh(folder.file(name), mesh, options);
+        const TriangleMesh again = read_mesh(folder.file(name));
+        REQUIRE(again.vertices.size() == 4);
+        const bool is_relative = std::string(name) == "a.stl";
+        for (std::size_t v = 0; v < 4; ++v) {
+            const Vec3 place = again.place(v);
+            double nearest = 1;  // STL has its vertices in another order
+            for (std::size_t other = 0; other < 4; ++other) {
+                const Vec3 there = mesh.place(other);
+                double apart = 0;
+                for (int a = 0; a < 3; ++a)
+                    apart = std::max(apart, std::abs(place[a] + (is_relative ? mesh.origin[a] : 0) - there[a]));
+                nearest = std::min(nearest, apart);
+            }
+            CHECK(nearest < 1e-4);
+        }
+    }
+    REQUIRE(said.size() == 1);
+    CHECK_THAT(said.front(), Catch::Contains("relative to (500000, 5400000, -3000)"));
+    // in another unit, y up
+    options = {};
+    options.y_up = true;
+    options.unit_scale = 0.001;
+    write_mesh(folder.file("c.ply"), mesh, options);
+    const TriangleMesh turned = read_mesh(folder.file("c.ply"));
+    const Vec3 at = turned.place(2), expected{500, -3, -5400.0023};
+    for (int a = 0; a < 3; ++a) CHECK(at[a] == Approx(expected[a]).margin(1e-4));
 }
