@@ -15,6 +15,7 @@
 #include "covol/mesh_io.h"
 #include "covol/surface.h"
 #include "covol/vdb_io.h"
+#include "mesh/triangle.h"
 #include "meshing/mesh_distance.h"
 
 namespace covol {
@@ -30,8 +31,7 @@ double smallest_spacing(const ImageGeometry& g) { return std::min({g.spacing[0],
 
 bool is_label(double value, int label) { return label == 0 ? value != 0 : value == label; }
 
-// ------------------------------------------------------------------------------------------------------ masks'
-// surfaces
+// ------------------------------------------------------------------------------------------------- surfaces of masks
 
 /// The boundary between a mask's voxels, at half value, in the world.
 class MaskSurface {
@@ -42,12 +42,10 @@ public:
         const FloatGridPtr grid = level_set();
         TriangleMesh mesh = extract_mesh(*grid, {}, run);
         const ImageGeometry& geometry = mask_.geometry();
-        const Vec3 origin = choose_mesh_origin(geometry.world_box(),
-                                               *std::min_element(geometry.spacing.begin(), geometry.spacing.end()));
-        for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-            const Vec3 p = geometry.index_to_world(mesh.place(v));
-            for (int a = 0; a < 3; ++a) mesh.vertices[v][a] = float(p[a] - origin[a]);
-        }
+        const Vec3 &s = geometry.spacing,
+                   origin = choose_mesh_origin(geometry.world_box(), std::min({s[0], s[1], s[2]}));
+        for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
+            mesh.vertices[v] = meshing::to_position(meshing::minus(geometry.index_to_world(mesh.place(v)), origin));
         mesh.origin = origin;
         if (determinant(geometry.direction) < 0)
             for (auto& t : mesh.triangles) std::swap(t[0], t[1]);
