@@ -80,6 +80,20 @@ def test_reconstruct(tmp_path, program):
         _ = result.mask
 
 
+def test_a_cloud_in_a_national_grid(tmp_path):
+    z = np.linspace(-1, 1, 2000)
+    turn = np.arange(2000) * 2.399963
+    ball = 5 * np.stack((np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z), axis=1)
+    place = np.array((500000.0, 5400000.0, 300.0))
+    mesh = covol.reconstruct(ball + place).mesh
+    assert mesh.vertices.dtype == np.float64
+    assert np.abs(np.linalg.norm(mesh.vertices - place, axis=1) - 5).max() < 0.02
+    again = covol.Mesh(mesh.vertices, mesh.faces)
+    assert np.abs(again.vertices - mesh.vertices).max() < 1e-4 and abs(again.measure()["volume"] / mesh.measure()["volume"] - 1) < 1e-5
+    mesh.save(tmp_path / "m.ply")
+    assert np.abs(covol.read_mesh(tmp_path / "m.ply").vertices - mesh.vertices).max() < 1e-6
+
+
 def test_every_flag_is_an_option(program):
     """Names are those of the flags, so that docs/commands tells of both; what is no option here is known."""
     flags = {}

@@ -162,7 +162,7 @@ Vec3 choose_mesh_origin(const WorldBox& box, double finest) {
     constexpr double kFar = 1 << 17;
     double farthest = 0;
     for (int a = 0; a < 3; ++a) farthest = std::max({farthest, std::abs(box.min[a]), std::abs(box.max[a])});
-    if (!(farthest > kFar * finest)) return {0, 0, 0};
+    if (!(finest > 0) || !(farthest > kFar * finest)) return {0, 0, 0};
     const double round = std::pow(10.0, std::ceil(std::log10(std::max(longest_side(box), finest))));
     Vec3 origin;
     for (int a = 0; a < 3; ++a) origin[a] = round * std::round((box.min[a] + box.max[a]) / 2 / round);

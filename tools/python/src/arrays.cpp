@@ -191,9 +191,10 @@ py::array voxels_of(const Image& image) {
 TriangleMesh to_mesh(const py::handle& vertices, const py::handle& faces) {
     TriangleMesh mesh;
     const std::vector<Vec3> places = to_positions("vertices", vertices);
-    // a hundredth of an edge is what a surface is told to
-    if (!places.empty())
-        mesh.origin = choose_mesh_origin(bounding_box(places), 0.01 * longest_side(bounding_box(places)));
+    if (!places.empty()) {
+        const WorldBox box = bounding_box(places);
+        mesh.origin = choose_mesh_origin(box, longest_side(box) / 100);
+    }
     for (const Vec3& v : places)
         mesh.vertices.push_back({static_cast<float>(v[0] - mesh.origin[0]), static_cast<float>(v[1] - mesh.origin[1]),
                                  static_cast<float>(v[2] - mesh.origin[2])});

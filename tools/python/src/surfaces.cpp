@@ -161,7 +161,10 @@ void add_surfaces(py::module_& module) {
                  return Mesh{std::make_shared<const TriangleMesh>(to_mesh(vertices, faces)), {}};
              }),
              py::arg("vertices"), py::arg("faces"))
-        .def_property_readonly("vertices", vertices_of, "(n, 3) float32, x, y, z, world units; read-only.")
+        .def_property_readonly(
+            "vertices", vertices_of,
+            "(n, 3) float32, x, y, z, world units; read-only. float64, and a copy, where they lie so far from 0 that "
+            "single precision would not hold them.")
         .def_property_readonly("faces", faces_of, "(m, 3) uint32, counter-clockwise seen from outside; read-only.")
         .def_property_readonly("normals", normals_of, "(n, 3) float32, unit vectors at the vertices.")
         .def_property_readonly("attributes", attributes_of, "Numbers at the vertices by name: dict of arrays (n,).")
