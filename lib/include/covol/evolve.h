@@ -74,6 +74,8 @@ struct EvolveFields {
     /// With `follow`: called with u when its band reached voxels where a field is not known yet, so that the caller
     /// can extend it (and may replace the pointers above through `fields`).
     std::function<void(const FloatGrid& u, EvolveFields& fields)> extend;
+    /// Called with the edges that `extend` had made, where the flow goes on from a state (RunContext::checkpoints).
+    std::function<void(const FloatGridPtr& edge, EvolveFields& fields)> take_edge;
 };
 
 /// Moves the level set u to the boundary of the segment: the semi-implicit co-volume scheme with upwinding,
@@ -84,6 +86,8 @@ struct EvolveFields {
 /// @post  without `follow`, u keeps its topology; with it u gets a new tree (accessors become invalid); values do not
 /// depend on the number of threads;
 ///        without `follow`, min u0 <= u <= max u0.
+/// With RunContext::checkpoints its state is kept at intervals, at its end and where it is cancelled, and one that was
+/// kept before is gone on from; the end has the same bits.
 /// @throws Error  InvalidOptions, InvalidInput (no active voxel; transforms differ; a value that is not finite; a
 ///                needed field is null), Numerical (u is left at the step before).
 COVOL_API EvolveReport evolve(FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options = {},

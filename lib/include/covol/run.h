@@ -2,11 +2,14 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 
 #include "covol/api.h"
 
 namespace covol {
+
+class Checkpoints;
 
 enum class LogLevel { Info, Warning };
 
@@ -24,6 +27,9 @@ struct RunContext {
     /// Set from anywhere (a signal handler, say) to make the computation throw Errc::Cancelled
     /// or, where partial results are useful, return early and say so.
     const std::atomic<bool>* cancel = nullptr;
+
+    /// Where the states of long flows are kept; null: nowhere.
+    std::shared_ptr<Checkpoints> checkpoints;
 
     /// Bytes that may be taken; 0: no bound. What is sure to need more is refused before it takes any
     /// (Errc::InvalidOptions).

@@ -13,6 +13,7 @@
 #include "covol/error.h"
 #include "evolve/finite.h"
 #include "evolve/heuristics.h"
+#include "evolve/state_file.h"
 #include "redistance/local_distance.h"
 
 namespace covol::detail {
@@ -146,6 +147,17 @@ void BandSolver::keep_inactive(const LeafStates& old, const std::vector<Coord>& 
         pending_motion_[leaf] = old.pending_motion[at];
         motions_[leaf] = old.motions[at];
     });
+}
+
+void BandSolver::exchange(StateFile& file) {
+    const std::size_t leaves = band_.size();
+    file.same(leaves);
+    file.array(field_.values.leaf(0), leaves * kLeafSize);
+    file.array(previous_.leaf(0), leaves * kLeafSize);
+    file.value(has_previous_);
+    file.array(leaf_active_.data(), leaves);
+    file.array(pending_motion_.data(), leaves);
+    file.array(motions_.data(), leaves);
 }
 
 void BandSolver::gather_fields(const EvolveFields& fields) {

@@ -47,6 +47,9 @@ public:
     /// @param changed  sorted origins of leaves with other values than there
     void keep_inactive(const LeafStates& old, const std::vector<Coord>& changed);
 
+    /// All that steps have changed, of the same band.
+    void exchange(StateFile& file);
+
     /// One time step of length τ = tau * h on the active leaves.
     Motion step(double tau, Counts& counts);
     /// Decides which leaves are active from here on: those that have moved, and the 26 around each.

@@ -19,6 +19,7 @@
 #include "covol/error.h"
 #include "evolve/band_solver.h"
 #include "evolve/finite.h"
+#include "evolve/flow_states.h"
 #include "evolve/heuristics.h"
 #include "evolve/motion.h"
 #include "evolve/tracking.h"
@@ -44,7 +45,7 @@ constexpr double kSmallestStep = 5e-4, kLargestStep = 1e4;
 class Evolver {
 public:
     Evolver(FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options, const RunContext& run)
-        : u_(u), fields_(fields), options_(options), run_(run), domain_(domain_of(u)) {
+        : u_(u), fields_(fields), options_(options), run_(run), domain_(domain_of(u)), states_(run.checkpoints.get()) {
         tau_ = options.tau ? *options.tau / domain_.voxel_size : 1.0;
         if (options.theta > 0) check_field(fields.distance, "distance", "theta");
         if (options.rho > 0) check_field(fields.edge, "edge", "rho");
@@ -60,13 +61,19 @@ public:
                                               std::pair(fields.obstacle, "obstacle"), std::pair(fields.floor, "floor")})
                 if (field != nullptr) detail::expect_finite(*field, name);
         }
+        if (states_.any()) {
+            go_on();
+            return;
+        }
         if (options.follow) detail::track_surface(u_, domain_, tracking_clamp(options_), run_);
         make_solver();
     }
 
     EvolveReport run() {
+        if (is_finished_) return report_;
         report_.stop_reason = StopReason::MaxSteps;
         while (report_.steps < options_.max_steps) {
+            if (states_.is_due() || (states_.are_kept() && run_.cancelled())) keep_state();
             if (run_.cancelled()) {
                 report_.stop_reason = StopReason::Cancelled;
                 break;
@@ -90,6 +97,7 @@ public:
             const double settled = options_.follow ? track(motion.mean) : keep_band(motion.mean);
             if (!solver_) {
                 report_.stop_reason = StopReason::Vanished;
+                keep_end();
                 return report_;
             }
             if (settled < options_.tolerance * tau_) {
@@ -106,6 +114,7 @@ public:
         report_.seconds_sweeps = counts_.seconds_sweeps;
         report_.active_voxels = solver_->active_count();
         report_.leaf_count = static_cast<std::int64_t>(solver_->band().size());
+        keep_end();
         return report_;
     }
 
@@ -139,7 +148,54 @@ private:
                         detail::number(step) + ": beyond it the coefficients of the scheme, of 16 bits, do not hold");
     }
 
+    // A state is that between two steps: u as the band was made of it, and what the steps since have changed.
+    void exchange(detail::StateFile& file) {
+        file.value(is_finished_);
+        file.value(tau_);
+        file.value(report_.stop_reason);
+        file.value(report_.steps);
+        file.value(report_.last_change);
+        file.list(report_.changes);
+        file.value(report_.sweeps_per_step);
+        file.value(report_.leaf_visits);
+        file.value(report_.leaf_visits_saved);
+        file.value(report_.active_voxels);
+        file.value(report_.leaf_count);
+        file.value(report_.seconds_assembly);
+        file.value(report_.seconds_sweeps);
+        file.value(counts_);
+        if (is_finished_) return;
+        if (file.reads()) make_solver();
+        solver_->exchange(file);
+        net_motion_.exchange(file);
+        front_displacement_.exchange(file);
+        marks_.exchange(file);
+    }
+
+    void go_on() {
+        const detail::FlowStates::Grids grids = states_.read_grids();
+        check_transform(*grids.u, "checkpoint");
+        u_.setTree(grids.u->treePtr());
+        if (grids.edge && fields_.take_edge) fields_.take_edge(grids.edge, fields_);
+        states_.read([&](detail::StateFile& file) { exchange(file); });
+        run_.info("evolve: " + std::string(is_finished_ ? "done before, " : "goes on after ") +
+                  std::to_string(report_.steps) + " steps");
+    }
+
+    void keep_state() {
+        const FloatGrid* u = is_band_new_ ? &u_ : nullptr;
+        states_.write(u, options_.follow ? fields_.edge : nullptr, [&](detail::StateFile& file) { exchange(file); });
+        is_band_new_ = false;
+    }
+
+    void keep_end() {
+        if (!states_.are_kept() || report_.stop_reason == StopReason::Cancelled) return;
+        is_finished_ = is_band_new_ = true;
+        keep_state();
+    }
+
     void make_solver() {
+        is_band_new_ = true;
         solver_ = std::make_unique<detail::BandSolver>(u_, fields_, options_, domain_);
         if (!options_.follow) return;
         front_displacement_.remember(solver_->u(), solver_->band().size());
@@ -204,6 +260,7 @@ private:
         if (!has_active(u_)) return;
         if (fields_.extend) fields_.extend(u_, fields_);
         solver_ = std::make_unique<detail::BandSolver>(u_, fields_, options_, domain_);
+        is_band_new_ = true;
         solver_->keep_inactive(states, changed);
         const detail::LeafBand& band = solver_->band();
         std::vector<std::int32_t> place(band.size()), same(band.size());
@@ -239,7 +296,9 @@ private:
     const EvolveOptions& options_;
     const RunContext& run_;
     const Domain domain_;
-    double tau_ = 1.0;  // in h
+    detail::FlowStates states_;
+    bool is_finished_ = false, is_band_new_ = true;  // since the last state
+    double tau_ = 1.0;                               // in h
     std::unique_ptr<detail::BandSolver> solver_;
     detail::BandSolver::Counts counts_;
     detail::NetMotion net_motion_;

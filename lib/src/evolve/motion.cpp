@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "evolve/heuristics.h"
+#include "evolve/state_file.h"
 #include "grid/sign_masks.h"
 
 namespace covol::detail {
@@ -107,6 +108,11 @@ double NetMotion::per_step(const LeafArray<float>& u, std::size_t leaves) {
     return kCrossingsPerVoxel * double(flips.flipped) / double(flips.crossed) / kWindow;
 }
 
+void NetMotion::exchange(StateFile& file) {
+    file.list(signs_);
+    file.value(age_);
+}
+
 CrossingMarks::Displacement CrossingMarks::renew(std::size_t leaf, const float* u) {
     std::vector<Crossing> now;
     const LeafMask negative = negative_mask(u);
@@ -147,6 +153,14 @@ void CrossingMarks::remake(const std::vector<std::int32_t>& old_leaf) {
     for (std::size_t leaf = 0; leaf < leaves.size(); ++leaf)
         if (old_leaf[leaf] >= 0) leaves[leaf] = std::move(leaves_[old_leaf[leaf]]);
     leaves_ = std::move(leaves);
+}
+
+void CrossingMarks::exchange(StateFile& file) {
+    file.same(leaves_.size());
+    for (Leaf& leaf : leaves_) {
+        file.list(leaf.crossings);
+        file.value(leaf.is_marked);
+    }
 }
 
 FrontDisplacement::Reference::Reference(const float* values)
@@ -198,6 +212,11 @@ std::vector<std::size_t> FrontDisplacement::leaves_left(const LeafArray<float>& 
     }
     if (!deep && double(left) < kMotion.share_left * double(crossed)) leaving.clear();
     return leaving;
+}
+
+void FrontDisplacement::exchange(StateFile& file) {
+    file.same(references_.size());
+    file.array(references_.data(), references_.size());
 }
 
 }  // namespace covol::detail

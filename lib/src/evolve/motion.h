@@ -6,6 +6,8 @@
 
 namespace covol::detail {
 
+class StateFile;
+
 /// What one step did to the level set in a leaf. Edges are those between voxels of the leaf.
 struct LeafMotion {
     double displacement = 0.0;  ///< of the zero crossings along voxel edges, voxels, summed over the edges
@@ -47,6 +49,7 @@ public:
     /// Called once a step. @return mean motion per step over the last window, voxels; infinity while a window is not
     /// complete
     double per_step(const LeafArray<float>& u, std::size_t leaves);
+    void exchange(StateFile& file);
 
 private:
     std::vector<LeafMask> signs_;  // at the window's begin
@@ -65,6 +68,7 @@ public:
     /// The band was made again. @param old_leaf  for each new leaf the old one at the same place, or -1
     void remake(const std::vector<std::int32_t>& old_leaf);
     [[nodiscard]] std::size_t count(std::size_t leaf) const { return leaves_[leaf].crossings.size(); }
+    void exchange(StateFile& file);
 
 private:
     struct Crossing {
@@ -88,6 +92,7 @@ public:
     void remake(const std::vector<std::int32_t>& old_leaf, const LeafArray<float>& u);
     /// The leaves that are due, or nearly; empty while the band need not be made again.
     [[nodiscard]] std::vector<std::size_t> leaves_left(const LeafArray<float>& u) const;
+    void exchange(StateFile& file);
 
 private:
     struct Reference {

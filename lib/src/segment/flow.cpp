@@ -115,6 +115,10 @@ void flow(Job& job) {
     fields.floor = job.floor.get();
     if (job.options.evolve.follow)
         fields.extend = [&job](const FloatGrid& u, EvolveFields& f) { extend_edges(job, u, f); };
+    fields.take_edge = [&job](const FloatGridPtr& edge, EvolveFields& f) {
+        job.result.edge = edge;
+        f.edge = edge.get();
+    };
     SegmentReport& report = job.report();
     {
         Timed timed(report.seconds.solve);

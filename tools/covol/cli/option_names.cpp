@@ -13,6 +13,8 @@ namespace {
 const std::map<std::string, std::string> kFlags{
     {"channel", "--channel"},
     {"channels", "--points-channels"},
+    {"checkpoint", "--checkpoint"},
+    {"checkpoint_every", "--checkpoint-every"},
     {"contours", "--contours"},
     {"correct_level_shift", "--correct-level-shift"},
     {"delta", "--delta"},
@@ -24,6 +26,7 @@ const std::map<std::string, std::string> kFlags{
     {"model", "--model"},
     {"order", "--points-order"},
     {"outside", "--outside"},
+    {"resume", "--resume"},
     {"rho", "--rho"},
     {"roi", "--roi"},
     {"scale", "--points-scale"},

@@ -13,6 +13,7 @@
 #include "cli/option_names.h"
 #include "cli/profile.h"
 #include "cli/provenance.h"
+#include "covol/checkpoints.h"
 #include "covol/error.h"
 #include "covol/evolve.h"
 #include "covol/version.h"
@@ -38,6 +39,9 @@ extern "C" void on_bus_error(int) {
     static_cast<void>(!::write(STDERR_FILENO, kText, sizeof kText - 1));
     ::_exit(kIo);
 }
+
+/// Options of how a run goes on, which its results do not show.
+constexpr const char* kOfTheWay[] = {"checkpoint", "checkpoint-every", "resume"};
 
 /// One line: messages that list several problems are joined.
 std::string one_line(std::string text) {
@@ -320,6 +324,7 @@ void Session::finish() {
     write_report();
     run_.check();
     outputs_.publish();
+    if (run_.checkpoints) run_.checkpoints->remove();
     for (const std::string& path : outputs_.written()) note("wrote " + path);
     if (profile_)
         for (const std::string& line : profile_lines(report_)) progress_->line(line);
@@ -403,17 +408,35 @@ void Session::set_world(const FloatGrid& grid) {
 std::map<std::string, std::string> Session::metadata() const {
     Json options = without_folders(report_.at("options"));
     options["command"] = report_.at("command");
+    std::vector<std::string> own = given();
+    for (const char* name : kOfTheWay) {
+        options.erase(name);
+        std::erase(own, name);
+    }
     const auto text = [](const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); };
     std::map<std::string, std::string> facts{{"covol_version", version()},
                                              {"covol_instruction_set", instruction_set()},
                                              {"covol_options", text(options)},
-                                             {"covol_given", text(given())},
+                                             {"covol_given", text(own)},
                                              {"covol_inputs", text(described_inputs())}};
     if (report_.contains("bricks")) facts["covol_bricks"] = text(report_.at("bricks").at("count"));
     if (!unit_.empty()) facts["covol_unit"] = unit_;
     if (!space_.empty()) facts["covol_space"] = space_;
     if (report_.contains("resolved")) facts["covol_resolved"] = text(report_.at("resolved"));
     return facts;
+}
+
+std::string Session::job_text() const {
+    std::map<std::string, std::string> facts = metadata();
+    Json options = Json::parse(facts.at("covol_options"));
+    for (const CLI::Option* option : command_->get_options())
+        if (option->get_type_name().starts_with("OUT")) options.erase(option->get_single_name());
+    return Json{{"version", facts.at("covol_version")},
+                {"instruction_set", facts.at("covol_instruction_set")},
+                {"options", options},
+                {"inputs", described_inputs()}}
+               .dump(2, ' ', false, Json::error_handler_t::replace) +
+           "\n";
 }
 
 const CLI::App* Session::command(const std::string& name) const {

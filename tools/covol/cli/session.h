@@ -100,6 +100,10 @@ public:
     /// The same as comment lines for meshes and points.
     [[nodiscard]] std::vector<std::string> comments() const;
     [[nodiscard]] std::string comment() const;
+    /// What tells this run from others: version, command, options that change results, digests of the inputs.
+    [[nodiscard]] std::string job_text() const;
+    /// From here on runs keep their states there, until the outputs are in place.
+    void keep_states(std::shared_ptr<Checkpoints> checkpoints) { run_.checkpoints = std::move(checkpoints); }
     /// The command of that name, for its options; null where there is none.
     [[nodiscard]] const CLI::App* command(const std::string& name) const;
     /// Refuses early what cannot fit into --memory-limit, or into what is free: `bytes` for `what` are needed at least.

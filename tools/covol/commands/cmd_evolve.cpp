@@ -6,6 +6,7 @@
 #include "covol/evolve.h"
 #include "covol/vdb_io.h"
 #include "flags/bindings.h"
+#include "flags/checkpoint_flags.h"
 #include "flags/vdb_flags.h"
 
 namespace covol::tool {
@@ -14,6 +15,7 @@ namespace {
 struct EvolveJob {
     std::string band_path, distance_path, edge_path, output;
     EvolveFlags flags;
+    CheckpointFlags checkpoint;
     VdbFlags vdb;
 
     /// A field that is not given has no weight.
@@ -32,6 +34,7 @@ struct EvolveJob {
 
     void run(Session& session) const {
         session.outputs().check("-o", output, OutputKind::Vdb);
+        checkpoint.begin(session);
         const FloatGridPtr u = read_vdb(band_path);
         session.set_world(*u);
         const FloatGridPtr d = distance_path.empty() ? nullptr : read_vdb(distance_path);
@@ -75,6 +78,7 @@ void add_evolve(Session& session) {
     command->add_option("--edge", job->edge_path, "what `covol edge` wrote")->type_name("EDGE.vdb");
     job->flags.bind(*command, true, true);
     command->add_flag("--follow", job->flags.options.follow, "the band follows the surface");
+    job->checkpoint.bind(*command);
     job->vdb.bind(*command);
     session.help().show_first(*command, {"--distance", "--edge", "--theta", "--rho", "--delta", "--tau",
                                          "--attraction-range", "--max-steps", "--tolerance", "--follow"});

@@ -236,7 +236,8 @@ SegmentResult solve_within_limit(const SegmentJob& job, const Image* image, cons
     const WorldBox box = structure.points.empty() ? (image != nullptr ? image->geometry().world_box() : WorldBox{})
                                                   : bounding_box(structure.points);
     if (longest_side(box) < kSmallJob * structure.options.voxel_size.value_or(1)) return in_one();
-    const RunContext inner = quiet(run);
+    RunContext inner = quiet(run);
+    inner.checkpoints = nullptr;
     std::unique_ptr<BrickJob> solver;
     BrickPlan plan;
     try {
@@ -251,6 +252,11 @@ SegmentResult solve_within_limit(const SegmentJob& job, const Image* image, cons
         plan = {};
         return in_one();
     }
+    if (run.checkpoints)
+        throw Error(
+            Errc::InvalidOptions,
+            "--checkpoint: the band is larger than --memory-limit allows at once, and bricks keep states of their "
+            "own: see covol brick");
     (void)streams_mesh(job, plan, session);  // before the work rather than after it
     run.info("about " + std::to_string(plan.active_voxels() / 1000000) +
              " million voxels in the band, more than --memory-limit allows at once: in " +

@@ -159,6 +159,7 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
         ->type_name("N")
         ->default_str("auto");
     bricks.bind(command);
+    checkpoint.bind(command);
     if (!with_image) {
         in_group(command, Group::Clouds);
         add_choice(command, "--holes", holes.policy,
@@ -213,8 +214,13 @@ void SegmentJob::run(Session& session) const {
         throw UsageError("expected files without names: several structures need an image, see covol segment");
     if (images.empty()) session.set_world_of_points();
     if (session.is_planning()) return run_plan(*this, session);
+    if (checkpoint.given() && (session.brick() || is_timelapse(*this)))
+        throw UsageError(
+            "--checkpoint, --resume: bricks and the frames of a time-lapse are put in place one by one, and gone on "
+            "with");
     if (session.brick()) return run_bricks(*this, session);
     if (is_timelapse(*this)) return run_timelapse(*this, session);
+    checkpoint.begin(session);
     run_structures(*this, session, [&](const Image* image, const PreparedStructure& structure, const RunContext& run) {
         return solve_within_limit(*this, image, structure, session, run);
     });

@@ -4,6 +4,7 @@
 
 #include "flags/bindings.h"
 #include "flags/brick_flags.h"
+#include "flags/checkpoint_flags.h"
 #include "flags/cloud_flags.h"
 #include "flags/contour_flags.h"
 #include "flags/evidence_flags.h"
@@ -38,6 +39,7 @@ struct SegmentJob {
     Length min_component;  ///< edge of a cube of the smallest volume that is kept
     EvidenceFlags evidence;
     BrickFlags bricks;
+    CheckpointFlags checkpoint;
     FrameChoice frames;
     std::string output, mask_path, mesh_path, density_path, fields_path, table_path, failed_path, page_path, scene_path;
     VdbFlags vdb;

@@ -1,0 +1,102 @@
+#include "covol/checkpoints.h"
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include "base/number.h"
+#include "covol/error.h"
+#include "covol/file_set.h"
+
+namespace covol {
+namespace fs = std::filesystem;
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr const char* kJobFile = "job.txt";
+
+void remove_flows(const std::string& folder) noexcept {
+    std::error_code status;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder, status))
+        if (entry.path().filename().string().starts_with("flow-")) fs::remove(entry.path(), status);
+}
+
+std::string text_of(const fs::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+
+}  // namespace
+
+struct Checkpoints::State {
+    std::string folder;
+    double every;
+    bool had_states = false;
+    int flows = 0;
+    Clock::time_point last = Clock::now();
+};
+
+Checkpoints::Checkpoints(const std::string& folder, double every, const std::string& job, bool resume)
+    : state_(new State{folder, every}) {
+    if (!(every >= 0) || !std::isfinite(every))
+        throw Error(Errc::InvalidOptions, "`checkpoint_every`: expected >= 0 seconds, got " + detail::number(every));
+    std::error_code status;
+    fs::create_directories(folder, status);
+    if (!fs::is_directory(folder, status))
+        throw Error(Errc::Io, "`checkpoint`: " + folder + ": cannot be made, or is no folder");
+    { const ScratchFolder finishes_what_was_begun(folder); }
+    const fs::path job_file = fs::path(folder) / kJobFile;
+    state_->had_states = fs::exists(job_file, status);
+    if (!state_->had_states) {
+        remove_flows(folder);  // of a run that was killed while it removed them
+        FileSet files;
+        files.write(job_file.string(), [&](const std::string& path) {
+            std::ofstream file(path, std::ios::binary);
+            file << job;
+            file.close();
+            if (!file) throw Error(Errc::Io, "checkpoint: " + path + ": cannot be written");
+        });
+        files.publish();
+        return;
+    }
+    if (!resume)
+        throw Error(Errc::InvalidInput,
+                    "`checkpoint`: " + folder + ": it holds states of a run; `resume` goes on with it, or remove it");
+    if (text_of(job_file) != job)
+        throw Error(Errc::InvalidInput, "`resume`: " + folder +
+                                            ": its states are of a run with other options, inputs, version or "
+                                            "instruction set, which " +
+                                            job_file.string() + " tells");
+}
+
+Checkpoints::~Checkpoints() = default;
+
+bool Checkpoints::had_states() const noexcept { return state_->had_states; }
+
+void Checkpoints::remove() noexcept {
+    std::error_code status;
+    fs::remove(fs::path(state_->folder) / kJobFile, status);  // first: without it the others are nothing
+    remove_flows(state_->folder);
+    fs::remove(state_->folder, status);  // not where something else is in it
+}
+
+int Checkpoints::begin_flow() {
+    restart_clock();
+    return ++state_->flows;
+}
+
+std::string Checkpoints::file(int flow, const char* ending) const {
+    char name[32];
+    std::snprintf(name, sizeof name, "/flow-%02d%s", flow, ending);
+    return state_->folder + name;
+}
+
+bool Checkpoints::is_due() const {
+    return std::chrono::duration<double>(Clock::now() - state_->last).count() >= state_->every;
+}
+
+void Checkpoints::restart_clock() { state_->last = Clock::now(); }
+
+}  // namespace covol

@@ -1,0 +1,60 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <fstream>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+namespace covol::detail {
+
+/// The numbers of a computation, to a file and back: what one sequence of calls writes, the same sequence reads. In the
+/// machine's byte order, with a checksum at the end.
+class StateFile {
+public:
+    enum class Mode { Write, Read };
+    /// @throws Error Io; InvalidInput (no such file, or a damaged one).
+    StateFile(const std::string& path, Mode mode);
+
+    [[nodiscard]] bool reads() const { return mode_ == Mode::Read; }
+
+    template <typename T>
+    void value(T& v) {
+        static_assert(std::is_trivially_copyable_v<T>);
+        bytes(&v, sizeof v);
+    }
+    /// So many, whatever the file says.
+    template <typename T>
+    void array(T* values, std::size_t count) {
+        static_assert(std::is_trivially_copyable_v<T>);
+        bytes(values, count * sizeof(T));
+    }
+    template <typename T>
+    void list(std::vector<T>& values) {
+        std::uint64_t count = values.size();
+        value(count);
+        if (reads()) {
+            expect(count * sizeof(T), count);
+            values.resize(count);
+        }
+        array(values.data(), values.size());
+    }
+    /// A number that is the same when read. @throws Error InvalidInput.
+    void same(std::uint64_t number);
+    /// After the last value. @throws Error Io, InvalidInput.
+    void finish();
+
+private:
+    void bytes(void* data, std::size_t count);
+    /// Before memory is taken: whether the file has so many bytes more.
+    void expect(std::uint64_t bytes, std::uint64_t count) const;
+    [[noreturn]] void fail() const;
+
+    std::string path_;
+    Mode mode_;
+    std::fstream file_;
+    std::uint64_t left_ = 0;  ///< bytes that are not read yet, without the checksum
+    std::uint32_t checksum_ = 0;
+};
+
+}  // namespace covol::detail

@@ -1,0 +1,19 @@
+#pragma once
+#include <string>
+
+#include "cli/session.h"
+
+namespace covol::tool {
+
+/// --checkpoint, --checkpoint-every and --resume.
+struct CheckpointFlags {
+    std::string folder, resumed;
+    double every = 600;  ///< seconds
+
+    void bind(CLI::App& command);
+    [[nodiscard]] bool given() const { return !folder.empty() || !resumed.empty(); }
+    /// From here on the session's runs keep their states. @throws UsageError; what Checkpoints() throws.
+    void begin(Session& session) const;
+};
+
+}  // namespace covol::tool
