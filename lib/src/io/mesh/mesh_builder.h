@@ -52,13 +52,13 @@ public:
     }
 
 private:
-    /// Coordinates far from 0 are kept from a round place near the first vertex on: without loss, for the differences
-    /// of numbers in single precision are such numbers too.
+    /// Coordinates far from 0 are kept from a whole number near the first vertex on: those in single precision without
+    /// loss, for their differences are such numbers too.
     void choose_origin(const Vec3& first) {
-        constexpr double kFar = 1 << 17, kRound = 1024;
+        constexpr double kFar = 1 << 17;
         const bool is_far = std::any_of(first.begin(), first.end(), [](double c) { return std::abs(c) > kFar; });
         for (int a = 0; a < 3; ++a)
-            if (is_far && std::isfinite(first[a])) mesh_.origin[a] = kRound * std::round(first[a] / kRound);
+            if (is_far && std::isfinite(first[a])) mesh_.origin[a] = std::round(first[a]);
     }
 
     const Source& source_;
