@@ -6,7 +6,6 @@ speed.png are made from all the .csv files that are there.
 """
 import argparse
 import csv
-import functools
 import json
 import os
 import pathlib
@@ -104,7 +103,6 @@ class Bench:
         return image, points
 
 
-@functools.cache
 # ---- parts -------------------------------------------------------------------------------------------------------
 
 def google_benchmark(bench, pattern, repetitions, min_time, **environment):

@@ -1,5 +1,6 @@
 """Tables in Markdown, and the line above them that says when, where and of which covol they are."""
 import datetime
+import functools
 import os
 import pathlib
 import platform
@@ -8,6 +9,7 @@ import subprocess
 HERE = pathlib.Path(__file__).resolve().parent
 
 
+@functools.cache
 def provenance():
     model = platform.processor()
     with open("/proc/cpuinfo") as file:

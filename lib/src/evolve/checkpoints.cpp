@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "base/file.h"
 #include "base/number.h"
 #include "covol/error.h"
 #include "covol/file_set.h"
@@ -19,8 +20,10 @@ constexpr const char* kJobFile = "job.txt";
 
 void remove_flows(const std::string& folder) noexcept {
     std::error_code status;
-    for (const fs::directory_entry& entry : fs::directory_iterator(folder, status))
-        if (entry.path().filename().string().starts_with("flow-")) fs::remove(entry.path(), status);
+    for (fs::directory_iterator at(folder, status), end; !status && at != end; at.increment(status)) {
+        std::error_code stays;
+        if (at->path().filename().string().starts_with("flow-")) fs::remove(at->path(), stays);
+    }
 }
 
 std::string text_of(const fs::path& path) {
@@ -51,14 +54,12 @@ Checkpoints::Checkpoints(const std::string& folder, double every, const std::str
     state_->had_states = fs::exists(job_file, status);
     if (!state_->had_states) {
         remove_flows(folder);  // of a run that was killed while it removed them
-        FileSet files;
-        files.write(job_file.string(), [&](const std::string& path) {
-            std::ofstream file(path, std::ios::binary);
+        detail::write_atomically(job_file.string(), [&](const std::string& temporary) {
+            std::ofstream file(temporary, std::ios::binary);
             file << job;
             file.close();
-            if (!file) throw Error(Errc::Io, "checkpoint: " + path + ": cannot be written");
+            if (!file) throw Error(Errc::Io, "`checkpoint`: " + job_file.string() + ": cannot be written");
         });
-        files.publish();
         return;
     }
     if (!resume)

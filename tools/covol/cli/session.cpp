@@ -406,17 +406,12 @@ void Session::set_world(const FloatGrid& grid) {
 }
 
 std::map<std::string, std::string> Session::metadata() const {
-    Json options = without_folders(report_.at("options"));
-    options["command"] = report_.at("command");
     std::vector<std::string> own = given();
-    for (const char* name : kOfTheWay) {
-        options.erase(name);
-        std::erase(own, name);
-    }
+    for (const char* name : kOfTheWay) std::erase(own, name);
     const auto text = [](const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); };
     std::map<std::string, std::string> facts{{"covol_version", version()},
                                              {"covol_instruction_set", instruction_set()},
-                                             {"covol_options", text(options)},
+                                             {"covol_options", text(options_of_result())},
                                              {"covol_given", text(own)},
                                              {"covol_inputs", text(described_inputs())}};
     if (report_.contains("bricks")) facts["covol_bricks"] = text(report_.at("bricks").at("count"));
@@ -426,13 +421,19 @@ std::map<std::string, std::string> Session::metadata() const {
     return facts;
 }
 
+Json Session::options_of_result() const {
+    Json options = without_folders(report_.at("options"));
+    options["command"] = report_.at("command");
+    for (const char* name : kOfTheWay) options.erase(name);
+    return options;
+}
+
 std::string Session::job_text() const {
-    std::map<std::string, std::string> facts = metadata();
-    Json options = Json::parse(facts.at("covol_options"));
+    Json options = options_of_result();
     for (const CLI::Option* option : command_->get_options())
         if (option->get_type_name().starts_with("OUT")) options.erase(option->get_single_name());
-    return Json{{"version", facts.at("covol_version")},
-                {"instruction_set", facts.at("covol_instruction_set")},
+    return Json{{"version", version()},
+                {"instruction_set", instruction_set()},
                 {"options", options},
                 {"inputs", described_inputs()}}
                .dump(2, ' ', false, Json::error_handler_t::replace) +

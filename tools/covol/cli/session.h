@@ -133,6 +133,8 @@ private:
     int tell_failure(int code, const std::string& message);
     [[nodiscard]] std::string interrupted_text() const;
     [[nodiscard]] const Json& described_inputs() const;
+    /// Command and options as provenance has them.
+    [[nodiscard]] Json options_of_result() const;
     [[nodiscard]] std::string memory_text() const;
     [[nodiscard]] std::string memory_limit_name() const;
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -177,14 +178,13 @@ int run_covol(const Words& words, const RunContext& run) {
     if (const int why = ::posix_spawn(&child, self.c_str(), nullptr, nullptr, argv.data(), environ); why != 0)
         throw Error(Errc::Io, self + ": cannot start: " + std::strerror(why));
     int status = 0;
-    for (pid_t ended = 0; ended == 0; ended = ::waitpid(child, &status, WNOHANG)) {
+    pid_t ended = 0;
+    for (bool told = false; (ended = ::waitpid(child, &status, WNOHANG)) == 0;) {
+        if (run.cancelled() && !told) told = ::kill(child, SIGTERM) == 0;
         std::this_thread::sleep_for(std::chrono::milliseconds(20));
-        if (!run.cancelled()) continue;
-        ::kill(child, SIGTERM);
-        ::waitpid(child, &status, 0);
-        break;
     }
     run.check();
+    if (ended < 0) throw Error(Errc::Io, self + ": lost: " + std::strerror(errno));
     return WIFEXITED(status) ? WEXITSTATUS(status) : kDefect;
 }
 

@@ -1,13 +1,12 @@
 #pragma once
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "covol/domain.h"
 #include "covol/mesh.h"
 #include "io/mesh/mesh_source.h"
 
@@ -26,12 +25,18 @@ public:
     void expect_vertices(std::size_t count, bool) override { mesh_.vertices.reserve(count); }
 
     void vertex(const Vec3& position) override {
-        if (vertex_count() == 0) choose_origin(position);
-        std::array<float, 3> p{};
-        for (int a = 0; a < 3; ++a) p[a] = float(position[a] - mesh_.origin[a]);
-        source_.check_finite(vertex_count(), p[0], p[1], p[2]);
+        source_.check_finite(vertex_count(), float(position[0]), float(position[1]), float(position[2]));
+        const std::array<float, 3> p = held(position);
         if (vertex_count() >= std::numeric_limits<std::uint32_t>::max()) source_.fail("more than 2^32 vertices");
         mesh_.vertices.push_back(p);
+    }
+
+    /// A vertex as the mesh has it: relative to its origin, which is a whole number near the first vertex where that is
+    /// far from 0. Numbers in single precision lose nothing, for their differences are such numbers too.
+    std::array<float, 3> held(const Vec3& position) {
+        if (vertex_count() == 0) mesh_.origin = choose_mesh_origin({position, position}, 1);
+        return {float(position[0] - mesh_.origin[0]), float(position[1] - mesh_.origin[1]),
+                float(position[2] - mesh_.origin[2])};
     }
 
     /// A fan; pieces with a repeated corner have no area and are left out.
@@ -52,15 +57,6 @@ public:
     }
 
 private:
-    /// Coordinates far from 0 are kept from a whole number near the first vertex on: those in single precision without
-    /// loss, for their differences are such numbers too.
-    void choose_origin(const Vec3& first) {
-        constexpr double kFar = 1 << 17;
-        const bool is_far = std::any_of(first.begin(), first.end(), [](double c) { return std::abs(c) > kFar; });
-        for (int a = 0; a < 3; ++a)
-            if (is_far && std::isfinite(first[a])) mesh_.origin[a] = std::round(first[a]);
-    }
-
     const Source& source_;
     TriangleMesh mesh_;
 };

@@ -87,18 +87,17 @@ Output& operator<<(Output& out, const std::array<Real, 3>& p) {
 /// Vertices as a file holds them: in single precision, but where the mesh has an origin of its own.
 class Places {
 public:
-    explicit Places(const Vec3& origin) : origin_(origin), is_far_(origin != Vec3{0, 0, 0}) {}
-    [[nodiscard]] bool is_far() const { return is_far_; }
+    explicit Places(const Vec3& origin) : origin_(origin) {}
+    [[nodiscard]] bool is_far() const { return origin_ != Vec3{0, 0, 0}; }
     [[nodiscard]] const Vec3& origin() const { return origin_; }
     [[nodiscard]] Vec3 whole(const std::array<float, 3>& p) const {
         return {origin_[0] + p[0], origin_[1] + p[1], origin_[2] + p[2]};
     }
-    void raw(Output& out, const std::array<float, 3>& p) const { is_far_ ? out.raw(whole(p)) : out.raw(p); }
-    void text(Output& out, const std::array<float, 3>& p) const { is_far_ ? out << whole(p) : out << p; }
+    void raw(Output& out, const std::array<float, 3>& p) const { is_far() ? out.raw(whole(p)) : out.raw(p); }
+    void text(Output& out, const std::array<float, 3>& p) const { is_far() ? out << whole(p) : out << p; }
 
 private:
     Vec3 origin_;
-    bool is_far_;
 };
 
 /// What every format needs: placed vertices, their normals where it has any, one-line comments.

@@ -19,9 +19,10 @@ class StlBuilder {
 public:
     explicit StlBuilder(const Source& source) : mesh_(source) {}
     void corner(const Vec3& p) {
-        const auto bits = [](double c) { return std::bit_cast<std::uint64_t>(c + 0.0); };  // -0 is 0
+        const auto bits = [](float c) { return std::bit_cast<std::uint32_t>(c + 0.0F); };  // -0 is 0
+        const std::array<float, 3> held = mesh_.held(p);
         const auto [at, is_new] =
-            known_.try_emplace({bits(p[0]), bits(p[1]), bits(p[2])}, std::uint32_t(mesh_.vertex_count()));
+            known_.try_emplace({bits(held[0]), bits(held[1]), bits(held[2])}, std::uint32_t(mesh_.vertex_count()));
         if (is_new) mesh_.vertex(p);
         corners_.push_back(at->second);
         if (corners_.size() == 3) {
@@ -32,7 +33,7 @@ public:
     TriangleMesh finish() { return mesh_.finish(); }
 
 private:
-    using Key = std::array<std::uint64_t, 3>;
+    using Key = std::array<std::uint32_t, 3>;
     struct Hash {
         std::size_t operator()(const Key& k) const {
             return ((k[0] * 0x9E3779B97F4A7C15ULL ^ k[1]) * 0x9E3779B97F4A7C15ULL ^ k[2]) * 0x9E3779B97F4A7C15ULL;

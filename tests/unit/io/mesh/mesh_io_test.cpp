@@ -438,6 +438,16 @@ TEST_CASE("glb of other programs: interleaved vertices, short indices, shared po
         }
 }
 
+TEST_CASE("Corners of a text STL that differ beyond single precision are one vertex") {
+    const Folder folder;
+    const std::string facet = "facet normal 0 0 1\nouter loop\n", end = "endloop\nendfacet\n";
+    const TriangleMesh mesh = read_mesh(
+        folder.file("a.stl", "solid a\n" + facet + "vertex 1.00000001 0 0\nvertex 0 1 0\nvertex 0 0 0\n" + end + facet +
+                                 "vertex 1.00000002 0 0\nvertex 0 0 0\nvertex 0 -1 0\n" + end + "endsolid a\n"));
+    CHECK(mesh.vertices.size() == 4);
+    check_refused(folder.file("b.obj", "v 1e300 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n"), "finite");
+}
+
 TEST_CASE("Meshes far from 0 keep their shape in every format but binary STL", "[mesh_io]") {
     const Folder folder;
     TriangleMesh mesh = tetrahedron();
