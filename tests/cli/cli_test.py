@@ -458,7 +458,7 @@ class Reconstruct(Case):
 
 class Steps(Case):
     def test_single_steps_are_segment(self):
-        whole = self.report("segment", self.image, "--points", self.points, "-o", "s.vdb", "--tag-distance", "3vx",
+        whole = self.report("segment", self.image, "--points", self.points, "-o", "s.vdb", "--mesh", "s.ply", "--tag-distance", "3vx",
                             "--delta", "1vx", "--rho", "0")
         # segment() with image and points runs evolve twice, the points alone first.
         # segment() merges close points first; these are apart.

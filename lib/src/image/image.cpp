@@ -53,6 +53,19 @@ void check_geometry(const std::string& where, const ImageGeometry& g) {
     }
 }
 
+std::unique_ptr<ImageFile> open_either_hdf5(const detail::Hdf5Name& name) {
+    return detail::is_itk_hdf5(name) ? detail::open_itk(name.path) : detail::open_hdf5(name);
+}
+
+std::unique_ptr<ImageFile> open_tried_hdf5(const detail::Hdf5Name& name) {
+    detail::try_hdf5(name.path, [&] {
+        RunContext alone;
+        alone.threads = 1;
+        with_threads(alone, [&] { (void)open_either_hdf5(name)->read({{{0, 0, 0}, {0, 0, 0}}}, alone); });
+    });
+    return open_either_hdf5(name);
+}
+
 std::unique_ptr<ImageFile> open_image(const std::string& given, const ReadImageOptions& options,
                                       const RunContext& run) {
     auto [path, grid] = split_grid_name(given);
@@ -75,8 +88,8 @@ std::unique_ptr<ImageFile> open_image(const std::string& given, const ReadImageO
                          std::string("expected a name ending in ") + kReadable + ", got '" + end + "'");
     if (fs::file_size(path) == 0) throw read_error(Errc::InvalidInput, path, "the file is empty");
     if (marked) return detail::open_dicom(path, run);
-    if (hdf5 && !detail::is_itk_hdf5(*hdf5)) return detail::open_hdf5(*hdf5);
-    if (itk || hdf5) return detail::open_itk(path);
+    if (hdf5) return open_tried_hdf5(*hdf5);
+    if (itk) return detail::open_itk(path);
     if (mrc) return detail::open_mrc(path);
     if (tiff) return detail::open_tiff(path, run);
     if (end == ".npy") return detail::open_npy(path);

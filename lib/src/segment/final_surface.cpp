@@ -11,6 +11,7 @@
 #include "covol/compare.h"
 #include "covol/mesh_stream.h"
 #include "covol/start.h"
+#include "holes/share_beyond.h"
 #include "meshing/level_set_distance.h"
 #include "meshing/mesh_distance.h"
 #include "segment/doubts.h"
@@ -56,12 +57,18 @@ void replace_by(Job& job, const TriangleMesh& mesh) {
     mesh_of(job, *start_from_grid(job.domain(), *level_set, job.run));
 }
 
+/// A surface that points alone hold may have holes between them.
+bool may_have_holes(const Job& job) { return !job.points.empty() && job.image == nullptr; }
+
+/// Without stray ones.
+const std::vector<Vec3>& points_of_surface(const Job& job) { return job.cloud ? job.cloud->points : job.points; }
+
 /// How much of the surface no point holds, and what becomes of that.
 void treat_holes(Job& job) {
     SegmentReport& report = job.report();
     TriangleMesh& mesh = job.result.mesh;
     std::vector<float>& distances = job.result.distance_to_points;
-    const std::vector<Vec3>& points = job.cloud ? job.cloud->points : job.points;  // without stray ones
+    const std::vector<Vec3>& points = points_of_surface(job);
     const HolesOptions& options = job.options.holes;
     const double automatic = choose_hole_distance(points, job.h()), distance = options.distance.value_or(automatic);
     const double slack = kFinal.rim_slack * std::min(automatic, distance);
@@ -95,9 +102,21 @@ void treat_holes(Job& job) {
 
 /// Measures the surface. @return the marks' distances to it
 std::vector<double> measure_without_mesh(Job& job, const std::vector<Vec3>& marks) {
-    const StreamedMesh mesh = measure_surface(*job.result.surface, 0, job.run);
-    job.report().surface = mesh.measures;
-    job.report().mesh.triangles = std::int64_t(mesh.triangles);
+    SegmentReport& report = job.report();
+    StreamedMesh mesh;
+    if (may_have_holes(job)) {
+        const std::vector<Vec3>& points = points_of_surface(job);
+        report.holes.distance =
+            job.options.holes.distance ? *job.options.holes.distance : choose_hole_distance(points, job.h());
+        const detail::BeyondPoints measured =
+            detail::measure_beyond(*job.result.surface, points, report.holes.distance, job.run);
+        report.share_without_points = measured.share;
+        mesh = measured.mesh;
+    } else {
+        mesh = measure_surface(*job.result.surface, 0, job.run);
+    }
+    report.surface = mesh.measures;
+    report.mesh.triangles = std::int64_t(mesh.triangles);
     return job.points.empty() ? std::vector<double>{} : detail::distances_to(*job.result.surface, marks);
 }
 
@@ -105,7 +124,7 @@ std::vector<double> measure_without_mesh(Job& job, const std::vector<Vec3>& mark
 std::vector<double> make_mesh(Job& job, const std::vector<Vec3>& marks) {
     SegmentReport& report = job.report();
     mesh_of_surface(job);
-    if (!job.points.empty() && job.image == nullptr) treat_holes(job);
+    if (may_have_holes(job)) treat_holes(job);
     // Parts of each of these run on one thread.
     std::vector<double> distances;
     tbb::parallel_invoke([&] { report.surface = measure(job.result.mesh); },

@@ -12,6 +12,7 @@
 #include "mesh/disjoint_sets.h"
 #include "mesh/vertex_normals.h"
 #include "surface/marching_cubes.h"
+#include "surface/mesh_pieces.h"
 
 namespace covol {
 namespace {
@@ -120,7 +121,7 @@ private:
 /// @param begin  takes the numbers of vertices and triangles, before the first piece
 StreamedMesh stream(const FloatGrid& surface, double isovalue, const RunContext& run,
                     const std::function<void(const StreamedMesh&)>& begin,
-                    const std::function<void(const detail::MeshPiece&)>& take) {
+                    const std::function<void(const StreamedMesh&, const detail::MeshPiece&)>& take) {
     if (!std::isfinite(isovalue))
         throw Error(Errc::InvalidOptions, "stream_mesh: expected a finite isovalue, got " + std::to_string(isovalue));
     StreamedMesh made;
@@ -143,7 +144,7 @@ StreamedMesh stream(const FloatGrid& surface, double isovalue, const RunContext&
             },
             [&](const detail::MeshPiece& piece) {
                 totals->add(piece);
-                take(piece);
+                take(made, piece);
             });
         made.measures = totals->measures();
     });
@@ -169,7 +170,7 @@ StreamedMesh stream_mesh(const std::string& path, const FloatGrid& surface, doub
         std::optional<Writer> writer;
         made = stream(
             surface, isovalue, run, [&](const StreamedMesh& mesh) { writer.emplace(temporary, path, mesh, options); },
-            [&](const detail::MeshPiece& piece) { writer->take(piece); });
+            [&](const StreamedMesh&, const detail::MeshPiece& piece) { writer->take(piece); });
         writer->finish();
     });
     mesh_io::tell_of_origin(path, made.origin, options);
@@ -177,8 +178,13 @@ StreamedMesh stream_mesh(const std::string& path, const FloatGrid& surface, doub
 }
 
 StreamedMesh measure_surface(const FloatGrid& surface, double isovalue, const RunContext& run) {
+    return detail::measure_pieces(surface, isovalue, run, [](const StreamedMesh&, const detail::MeshPiece&) {});
+}
+
+StreamedMesh detail::measure_pieces(const FloatGrid& surface, double isovalue, const RunContext& run,
+                                    const std::function<void(const StreamedMesh&, const MeshPiece&)>& take) {
     return stream(
-        surface, isovalue, run, [](const StreamedMesh&) {}, [](const detail::MeshPiece&) {});
+        surface, isovalue, run, [](const StreamedMesh&) {}, take);
 }
 
 }  // namespace covol

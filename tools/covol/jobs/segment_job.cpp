@@ -38,9 +38,14 @@ SegmentOptions SegmentJob::resolve(double h) const {
     options.correction.least_radius = guess.radius.resolve_above_0(h);
     const double side = min_component.resolve(h, 0);
     options.extract.min_component_volume = side * side * side;
-    options.without_mesh = mesh.plain;
+    options.without_mesh = mesh.plain || !needs_mesh();
     options.without_fields = fields_path.empty() && !evidence.wanted();
     return options;
+}
+
+bool SegmentJob::needs_mesh() const {
+    return !mesh_path.empty() || !page_path.empty() || !scene_path.empty() || evidence.wanted() ||
+           holes.policy != Holes::Close || min_component.given;
 }
 
 void SegmentJob::check_options() const {

@@ -54,6 +54,8 @@ struct SegmentJob {
     void sort_output(bool with_image);
     [[nodiscard]] std::string any_output() const;
     [[nodiscard]] SegmentOptions resolve(double h) const;
+    /// Whether an output, or what is done to the surface, needs its relaxed mesh.
+    [[nodiscard]] bool needs_mesh() const;
     /// Options that are wrong whatever h is are found before anything is read.
     void check_options() const;
     /// Which of the given flags had nothing to do; empty where all had.

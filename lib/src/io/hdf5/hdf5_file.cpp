@@ -14,10 +14,14 @@ namespace {
 constexpr std::uint64_t kMostNumbers = 4096;
 constexpr std::uint64_t kMostText = std::uint64_t(1) << 20;
 
-std::recursive_mutex& library_mutex() {
-    static std::recursive_mutex mutex;
+std::mutex& library_mutex() {
+    static std::mutex mutex;
     return mutex;
 }
+
+// How many locks this thread holds. A recursive mutex would know its owner by a number that is another one in a copy of
+// the process (try_hdf5()).
+thread_local int held_locks = 0;
 
 herr_t refuse_link(const char*, const char*, const char*, const char*, unsigned*, hid_t, void*) { return -1; }
 
@@ -67,14 +71,14 @@ std::vector<std::string> strings_of(const Hdf5Id& attribute) {
 }  // namespace
 
 Hdf5Lock::Hdf5Lock() {
-    library_mutex().lock();
+    if (held_locks++ == 0) library_mutex().lock();
     H5Eget_auto2(H5E_DEFAULT, &print_, &data_);
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
 }
 
 Hdf5Lock::~Hdf5Lock() {
     H5Eset_auto2(H5E_DEFAULT, print_, data_);
-    library_mutex().unlock();
+    if (--held_locks == 0) library_mutex().unlock();
 }
 
 Hdf5Id::Hdf5Id(Hdf5Id&& other) noexcept : id_(std::exchange(other.id_, -1)), close_(other.close_) {}

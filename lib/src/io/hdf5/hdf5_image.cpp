@@ -5,6 +5,7 @@
 #include <sstream>
 #include <utility>
 
+#include "base/child.h"
 #include "base/text.h"
 #include "io/hdf5/hdf5_dataset.h"
 #include "io/hdf5/hdf5_layouts.h"
@@ -149,6 +150,13 @@ std::optional<Hdf5Name> split_hdf5_name(const std::string& text) {
             return Hdf5Name{text.substr(0, begin), text.substr(begin + 1)};
     }
     return std::nullopt;
+}
+
+void try_hdf5(const std::string& path, const std::function<void()>& read) {
+    constexpr double kSeconds = 60;
+    const Hdf5Lock lock;  // no other thread's, in the copy
+    if (try_in_child(read, kSeconds) == Trial::Crashed)
+        throw read_error(Errc::InvalidInput, path, "damaged: the HDF5 library cannot read it");
 }
 
 bool is_itk_hdf5(const Hdf5Name& name) { return name.inside.empty() && Hdf5File(name.path).has("/ITKImage"); }

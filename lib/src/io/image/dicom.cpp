@@ -110,7 +110,7 @@ void fill_plain(const DicomHeader& header, const std::string& unusable, Slice& s
     }
 }
 
-void fill_through_gdcm(const std::string& unusable, Slice& slice) {
+void fill_through_gdcm(const DicomHeader& header, const std::string& unusable, Slice& slice) {
     const WhileAny<QuietGdcm> quiet;
     const auto io = itk::GDCMImageIO::New();
     io->SetFileName(slice.path);
@@ -130,6 +130,10 @@ void fill_through_gdcm(const std::string& unusable, Slice& slice) {
         const std::vector<double> axis = io->GetDirection(a);
         for (unsigned b = 0; b < 3; ++b) slice.direction[b][a] = b < axis.size() ? axis[b] : (a == b ? 1 : 0);
     }
+    // Packed pixels may be many; others are all there.
+    const std::uint64_t bytes = header.integer(kAllocated).value_or(8) / 8;
+    if (!header.encapsulated && voxel_count(slice.size) * slice.components * bytes > header.pixel_bytes)
+        throw Error(Errc::InvalidInput, unusable);
 }
 
 /// The header of one file.
@@ -143,7 +147,7 @@ Slice read_header(const std::string& path) {
     slice.description = header->text(kModality) + " " + header->text(kSeriesDescription);
     const std::vector<double> frames = header->numbers(kFrames);
     if (header->encapsulated || (frames.size() == 1 && frames[0] > 1))
-        fill_through_gdcm(unusable, slice);
+        fill_through_gdcm(*header, unusable, slice);
     else
         fill_plain(*header, unusable, slice);
     return slice;

@@ -26,6 +26,34 @@ constexpr std::string_view kLong[] = {"OB", "OD", "OF", "OL", "OW", "SQ", "UC", 
 
 constexpr std::uint64_t kLongestValue = 1 << 12;
 
+/// What PS3.6 says of the elements of which an image is made. Debian's GDCM ends the program where a file says
+/// otherwise, in a sequence too.
+struct Representation {
+    std::uint32_t tag;
+    std::string_view vr;
+};
+constexpr Representation kRepresentations[] = {
+    {0x00080005, "CS"}, {0x00080008, "CS"}, {0x00082111, "ST"}, {0x00180015, "CS"}, {0x00180088, "DS"},
+    {0x00181063, "DS"}, {0x00181310, "US"}, {0x00181312, "CS"}, {0x0020000D, "UI"}, {0x0020000E, "UI"},
+    {0x00200011, "IS"}, {0x00200013, "IS"}, {0x00200020, "CS"}, {0x00200030, "DS"}, {0x00200032, "DS"},
+    {0x00200035, "DS"}, {0x00200037, "DS"}, {0x00200060, "CS"}, {0x00280002, "US"}, {0x00280004, "CS"},
+    {0x00280005, "US"}, {0x00280006, "US"}, {0x00280008, "IS"}, {0x00280009, "AT"}, {0x00280010, "US"},
+    {0x00280011, "US"}, {0x00280012, "US"}, {0x00280030, "DS"}, {0x00280034, "IS"}, {0x00280100, "US"},
+    {0x00280101, "US"}, {0x00280102, "US"}, {0x00280103, "US"}, {0x00280301, "CS"}, {0x00281050, "DS"},
+    {0x00281051, "DS"}, {0x00281052, "DS"}, {0x00281053, "DS"}, {0x00281054, "LO"}, {0x00281101, "US"},
+    {0x00281102, "US"}, {0x00281103, "US"}, {0x00282110, "CS"}, {0x00282112, "DS"}, {0x00282114, "CS"},
+    {0x00409224, "FD"}, {0x00409225, "FD"}, {0x3004000C, "DS"}, {0x3004000E, "DS"}};
+
+/// Unknown, "UN", goes for all.
+bool is_represented_well(std::uint32_t tag, std::string_view vr) {
+    if (vr == "UN") return true;
+    // The palettes' descriptors are signed where the pixels are.
+    if (vr == "SS" && tag >= 0x00281101 && tag <= 0x00281103) return true;
+    const auto* known = std::lower_bound(std::begin(kRepresentations), std::end(kRepresentations), tag,
+                                         [](const Representation& r, std::uint32_t t) { return r.tag < t; });
+    return known == std::end(kRepresentations) || known->tag != tag || known->vr == vr;
+}
+
 bool is_one_of(const auto& value, const auto& list) {
     return std::find(std::begin(list), std::end(list), value) != std::end(list);
 }
@@ -120,6 +148,7 @@ private:
             if (!read_element(e)) return false;
             if (e.tag == kItemEnd) return in_item && e.length == 0;
             if (e.tag <= last || e.tag >> 16 < 4 || e.tag >> 16 == 0xFFFE) return false;
+            if (explicit_ && !is_represented_well(e.tag, e.vr)) return false;
             last = e.tag;
             if (!walk_value(e, end, depth)) return false;
         }

@@ -78,14 +78,15 @@ std::array<int, 3> axes_of(const std::string& path, const Header& header) {
     std::array<int, 3> axes{};
     int seen = 0;
     for (int a = 0; a < 3; ++a) {
-        axes[a] = header.integer(kAxes + 4 * a) - 1;
-        if (axes[a] >= 0 && axes[a] < 3) seen |= 1 << axes[a];
+        axes[a] = header.integer(kAxes + 4 * a);
+        if (axes[a] >= 1 && axes[a] <= 3) seen |= 1 << axes[a];
     }
     // old programs leave zeros
-    if (axes == std::array<int, 3>{-1, -1, -1}) return {0, 1, 2};
-    if (seen != 7)
+    if (axes == std::array<int, 3>{0, 0, 0}) return {0, 1, 2};
+    if (seen != 0b1110)
         throw read_error(Errc::InvalidInput, path,
                          "expected MAPC, MAPR and MAPS to be 1, 2 and 3 in some order; damaged");
+    for (int& axis : axes) --axis;
     return axes;
 }
 
