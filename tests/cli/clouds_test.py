@@ -140,9 +140,9 @@ class Many(Clouds):
 class Holes(Clouds):
     """What becomes of the surface where no points are."""
 
-    def bowl(self, *more):
+    def bowl(self, *more, mesh=("--mesh", "m.ply")):
         half = [p for p in random_sphere(16000, 11) if p[2] < 0]
-        done = self.reconstruct(half, "--mesh", "m.ply", *more)
+        done = self.reconstruct(half, *mesh, *more)
         self.assertEqual(done.returncode, 0, done.stderr)
         return json.loads(done.stdout)
 
@@ -150,6 +150,16 @@ class Holes(Clouds):
         done = subprocess.run([COVOL, "mesh", "s.vdb", "-o", "again.ply", "--quiet", "--json", "-"], cwd=self.out, capture_output=True, text=True, timeout=300)
         self.assertEqual(done.returncode, 0, done.stderr)
         return json.loads(done.stdout)["surface"]
+
+    def test_share_without_a_mesh(self):
+        """Where no output needs the relaxed mesh the plain surface is measured, a layer at a time."""
+        whole, plain = self.bowl(), self.bowl(mesh=())
+        self.assertEqual(list(plain["mesh"]), ["triangles"])
+        self.assertAlmostEqual(plain["holes"]["surface_without_points"], whole["holes"]["surface_without_points"], delta=0.005)
+        self.assertEqual(plain["holes"]["distance"], whole["holes"]["distance"])
+        for name in ("volume", "area"):
+            self.assertAlmostEqual(plain["surface"][name] / whole["surface"][name], 1, delta=0.003)
+        self.assertEqual(plain["warnings"], whole["warnings"])
 
     def test_close(self):
         report = self.bowl()

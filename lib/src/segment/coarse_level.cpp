@@ -30,7 +30,10 @@ SegmentOptions coarsened(SegmentOptions options) {
     EvolveOptions& evolve = options.evolve;
     evolve.follow = true;
     evolve.tolerance = std::max(evolve.tolerance, kCoarse.coarse_tolerance);
-    if (evolve.tau) *evolve.tau *= kCoarse.refinement;
+    if (evolve.tau)
+        *evolve.tau *= kCoarse.refinement;
+    else if (evolve.rho > 0 && evolve.image_yields.value_or(0) == 0)  // else it grows by itself
+        evolve.tau = kCoarse.coarse_tau * h;
     if (const double range = evolve.attraction_range.value_or(0); range > 0)
         evolve.attraction_range = std::max(range, kCoarse.least_coarse_attraction * h);
     return options;

@@ -86,6 +86,8 @@ struct CoarseLevelHeuristics {
     double least_coarse_attraction = heuristic("coarse_level.least_coarse_attraction", 3.0);
     /// [voxels a step] A surface far from all that pulls moves slowly, too.
     double coarse_tolerance = heuristic("coarse_level.coarse_tolerance", 5e-3);
+    /// [voxels of the coarse level] Time step, where it is automatic: the result is but a start.
+    double coarse_tau = heuristic("coarse_level.coarse_tau", 2.0);
     /// [voxels of the coarse level] That the fine level starts outside of the result.
     double step_back = heuristic("coarse_level.step_back", 2.0);
     /// [voxels] A smaller domain has little to gain, and thin things to lose.

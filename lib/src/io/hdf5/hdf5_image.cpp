@@ -5,8 +5,8 @@
 #include <sstream>
 #include <utility>
 
-#include "base/child.h"
 #include "base/text.h"
+#include "io/child.h"
 #include "io/hdf5/hdf5_dataset.h"
 #include "io/hdf5/hdf5_layouts.h"
 #include "io/pixels/chunks.h"

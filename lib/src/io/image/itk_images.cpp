@@ -168,7 +168,7 @@ public:
                     throw Error(Errc::InvalidInput,
                                 unusable + " (a spacing, origin or direction is not finite, or huge)");
         // Its singular values of an axis that is next to nothing take forever.
-        for (int axis = 0; axis < 3 && integer(nifti::kCodes + 2) > 0; ++axis) {
+        for (int axis = 0; axis < 3 && integer(nifti::kCodes + 2) != 0; ++axis) {
             double square = 0;
             for (std::size_t row = 0; row < 3; ++row)
                 square += std::pow(number(nifti::kSrow + 16 * row + 4 * std::size_t(axis)), 2);

@@ -1,4 +1,4 @@
-#include "base/child.h"
+#include "io/child.h"
 
 #include <fcntl.h>
 #include <sys/resource.h>
