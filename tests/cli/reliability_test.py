@@ -6,6 +6,7 @@ import hashlib
 import os
 import pathlib
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -230,6 +231,18 @@ class Damaged(Case):
             with self.subTest(path.name):
                 self.refuse("mesh" if path.suffix == ".vdb" else "info", path, *(["-o", "o.ply"] if path.suffix == ".vdb" else []),
                             code=3, says="damaged")
+
+    def test_metadata_of_another_length_than_its_type(self):
+        """OpenVDB takes the type's length, and what comes next for the length of a text."""
+        self.segment()
+        data = (self.out / "s.vdb").read_bytes()
+        (self.out / "s.vdb").unlink()
+        kind = b"\x05\0\0\0vec3i"
+        for length in (11, 13, 2**31):
+            path = self.inputs / "metadata.vdb"
+            self.assertIn(kind + struct.pack("<I", 12), data)
+            path.write_bytes(data.replace(kind + struct.pack("<I", 12), kind + struct.pack("<I", length)))
+            self.refuse("info", path, code=3, says="damaged")
 
     def test_a_minute_of_fuzzing(self):
         script = pathlib.Path(__file__).resolve().parents[1] / "fuzz/mutate.py"

@@ -167,12 +167,13 @@ public:
                 if (!(std::abs(number(first + 4 * std::size_t(n))) < 1e9))
                     throw Error(Errc::InvalidInput,
                                 unusable + " (a spacing, origin or direction is not finite, or huge)");
-        // Its singular values of an axis that is next to nothing take forever.
+        // Their singular values take forever where an axis is next to nothing; none at all is well.
         for (int axis = 0; axis < 3 && integer(nifti::kCodes + 2) != 0; ++axis) {
             double square = 0;
             for (std::size_t row = 0; row < 3; ++row)
                 square += std::pow(number(nifti::kSrow + 16 * row + 4 * std::size_t(axis)), 2);
-            if (!(square > 1e-18)) throw Error(Errc::InvalidInput, unusable + " (an axis of its sform has no length)");
+            if (square > 0 && square < 1e-30)
+                throw Error(Errc::InvalidInput, unusable + " (an axis of its sform has no length)");
         }
     }
     [[nodiscard]] bool swap() const { return swap_; }
