@@ -170,7 +170,8 @@ TEST_CASE("segment: without mesh and fields the surface is the same") {
     CHECK(lean.edge == nullptr);
     CHECK(lean.mesh.triangles.empty());
     CHECK(lean.surface->tree().hasSameTopology(whole.surface->tree()));
-    CHECK(lean.report.mesh.triangles == whole.report.mesh.triangles);
+    // Relaxing draws slivers together, two triangles a time.
+    CHECK(lean.report.mesh.triangles == whole.report.mesh.triangles + 2 * whole.report.mesh.collapses);
     CHECK(lean.report.surface.volume == Approx(whole.report.surface.volume).epsilon(3e-4));  // not relaxed
     CHECK(lean.report.surface.genus == 0);
     options.holes.policy = Holes::Open;
