@@ -18,7 +18,7 @@ ALLOWED = {
     "edge/edge.cpp:kHeatTolerance", "evolve/band_solver.cpp:kRounding", "evolve/evolve.cpp:kSmallestStep", "evolve/motion.cpp:kInfinity", "evolve/tracking.cpp:kWidth",
     "guess/guess_correction.cpp:kSolved", "guess/marks_surface.cpp:kInfinity", "guess/marks_surface.cpp:kMostCells",
     "guess/variational.cpp:kAround", "guess/variational.cpp:kLocalShares", "guess/variational.cpp:kNoStep",
-    "guidance/offset_field.cpp:kSolved", "guidance/smooth_image.cpp:kKernelSigmas", "guidance/smooth_image.cpp:kLeastSigma", "holes/holes.cpp:kP95OfSpacing",
+    "guidance/border_profile.cpp:kNothing", "guidance/learning.cpp:kSteepest", "guidance/offset_field.cpp:kSolved", "guidance/smooth_image.cpp:kKernelSigmas", "guidance/smooth_image.cpp:kLeastSigma", "holes/holes.cpp:kP95OfSpacing",
     "meshing/contacts.cpp:kAlong", "meshing/contacts.cpp:kFacing", "meshing/contacts.cpp:kFar", "meshing/contacts.cpp:kRounding",
     "meshing/level.cpp:kConverged", "meshing/level.cpp:kNearFace", "meshing/mesh_distance.cpp:kThinShare", "start/start.cpp:kLeafRadius",
     "start/start.cpp:kSame", "surface/rasterizer.cpp:kCertain", "surface/rasterizer.cpp:kRounding", "tagging/tagging.cpp:kBall",

@@ -33,8 +33,11 @@ struct EvolveOptions {
     int max_steps = 500;      ///< upper bound on time steps, >= 0
     double tolerance = 2e-3;  ///< steady when the zero crossings move less than tolerance * τ a step on the average,
                               ///< or when over 10 steps fewer voxels than that changed sign
-    double solver_tolerance = 1e-3;  ///< a step's solve ends at this residual, relative to that of u before
-    int max_sweeps = 200;            ///< upper bound on a step's sweeps
+    /// A step's solve ends at this residual, relative to that of u before; automatic: 1e-3 where `tau` is given, else
+    /// 1e-2: on the way to rest it is the end that counts, which the solver's error does not move.
+    std::optional<double> solver_tolerance;
+    [[nodiscard]] double solved_to() const { return solver_tolerance.value_or(tau ? 1e-3 : 1e-2); }
+    int max_sweeps = 200;  ///< upper bound on a step's sweeps
     [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 

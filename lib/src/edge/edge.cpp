@@ -25,6 +25,7 @@ using detail::kLeafSize;
 using detail::kPaddedSize;
 using detail::LeafBand;
 using detail::LeafBounds;
+using LeafNode = FloatGrid::TreeType::LeafNodeType;
 
 constexpr double kHeatTolerance = 1e-4;  // relative residual
 constexpr int kMaxHeatSweeps = 100;
@@ -125,11 +126,38 @@ void for_each_padded(const Window& window, const Domain& domain, Work work) {
     });
 }
 
+/// What lies beyond a leaf's faces where nothing is known there: its own outermost layer again, so that nothing flows.
+struct MirroredFaces {
+    alignas(64) float layers[6][kLeafSize];  // only the one that touches the leaf has values
+
+    void mirror(detail::LeafStar& star, int face) {
+        const int stride = face < 2 ? 64 : face < 4 ? 8 : 1;
+        const int a = stride == 64 ? 8 : 64, b = stride == 1 ? 8 : 1;
+        const int from = face % 2 == 0 ? 0 : 7 * stride, to = 7 * stride - from;
+        for (int n = 0; n < kLeafDim; ++n)
+            for (int m = 0; m < kLeafDim; ++m) layers[face][to + n * a + m * b] = star.inner[from + n * a + m * b];
+        star.across[face] = layers[face];
+    }
+};
+
 // One visit of a leaf in an implicit heat step. Where the domain or the window ends in it or next to it, the faces
 // there are closed.
-double relax_heat(const detail::LeafStar& values, const float* before, float t, float omega, const LeafBounds& bounds) {
+double relax_heat(detail::LeafStar values, const float* before, float t, float omega, const LeafBounds& bounds) {
     const detail::SchemeKernels& kernels = detail::kernels();
     if (!bounds.cuts()) return kernels.heat(values, before, t, omega, kInnerSweeps);
+    if (bounds.contains(0, 0, 0) && bounds.contains(7, 7, 7)) {
+        MirroredFaces beyond;
+        double residual = 0.0;
+        for (int sweep = 0; sweep < kInnerSweeps; ++sweep) {
+            for (int a = 0; a < 3; ++a) {
+                if (bounds.lo[a] == 0) beyond.mirror(values, 2 * a);
+                if (bounds.hi[a] == 7) beyond.mirror(values, 2 * a + 1);
+            }
+            const double now = kernels.heat(values, before, t, omega, 1);
+            if (sweep == 0) residual = now;
+        }
+        return residual;
+    }
     static constexpr std::array<unsigned long long, 8> kAll = {~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL};
     alignas(64) detail::Share rows[6 * kLeafSize];
     std::fill(std::begin(rows), std::end(rows),
@@ -168,11 +196,22 @@ void smooth(Window& window, const Domain& domain, double sigma, const RunContext
     }
 }
 
+std::vector<LeafNode*> leaves_of(FloatGrid& grid) {
+    std::vector<LeafNode*> leaves;
+    grid.tree().getNodes(leaves);
+    return leaves;
+}
+
 // K = 1/s² at the percentile of s over the topology's active voxels.
-double contrast_of(const FloatGrid& slopes, double percentile) {
-    std::vector<float> values;
-    values.reserve(slopes.activeVoxelCount());
-    for (auto v = slopes.cbeginValueOn(); v; ++v) values.push_back(*v);
+double contrast_of(FloatGrid& slopes, double percentile) {
+    const std::vector<LeafNode*> leaves = leaves_of(slopes);
+    std::vector<std::size_t> first{0};
+    for (const LeafNode* leaf : leaves) first.push_back(first.back() + leaf->onVoxelCount());
+    std::vector<float> values(first.back());
+    tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t n) {
+        float* to = values.data() + first[n];
+        for (auto v = leaves[n]->cbeginValueOn(); v; ++v) *to++ = *v;
+    });
     const auto at = values.begin() + std::ptrdiff_t(percentile * double(values.size() - 1));
     std::nth_element(values.begin(), at, values.end());
     if (*at > 0.0F) return *at;
@@ -180,7 +219,7 @@ double contrast_of(const FloatGrid& slopes, double percentile) {
     return 0.5 * *std::max_element(values.begin(), values.end());
 }
 
-double automatic_contrast(const FloatGrid& s, const EdgeOptions& options, bool is_line) {
+double automatic_contrast(FloatGrid& s, const EdgeOptions& options, bool is_line) {
     if (options.contrast_percentile) return contrast_of(s, *options.contrast_percentile);
     return is_line ? kEdge.line_share * contrast_of(s, kEdge.line_percentile) : contrast_of(s, kEdge.slope_percentile);
 }
@@ -266,8 +305,10 @@ EdgeResult detect_edges(const Image& image, const FloatGrid& topology, const Edg
                                                 "that the points lie on the image's structure");
         report.edge_k = 1.0 / (report.edge_contrast * report.edge_contrast);
         const auto k = static_cast<float>(report.edge_k);
-        for (auto leaf = result.grid->tree().beginLeaf(); leaf; ++leaf)
-            for (auto v = leaf->beginValueOn(); v; ++v) v.setValue(1.0F / (1.0F + k * *v * *v));
+        const std::vector<LeafNode*> leaves = leaves_of(*result.grid);
+        tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t n) {
+            for (auto v = leaves[n]->beginValueOn(); v; ++v) v.setValue(1.0F / (1.0F + k * *v * *v));
+        });
     });
     return result;
 }

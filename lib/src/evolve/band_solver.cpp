@@ -227,7 +227,7 @@ void BandSolver::hold_to_bounds() {
 
 // @param first  residual at u^{n-1}
 void BandSolver::solve(double omega, double first, Counts& counts) {
-    const double goal = std::max(options_.solver_tolerance * first, kRounding);
+    const double goal = std::max(options_.solved_to() * first, kRounding);
     double start = first;
     bool visit_all = true;
     for (int visit = 0; visit * kSolver.inner_sweeps < options_.max_sweeps; ++visit) {

@@ -65,7 +65,7 @@ public:
             go_on();
             return;
         }
-        if (options.follow) detail::track_surface(u_, domain_, tracking_clamp(options_), run_);
+        if (options.follow) detail::track_surface(u_, domain_, tracking_clamp(options_));
         make_solver();
     }
 
@@ -322,8 +322,9 @@ std::string EvolveOptions::why_invalid() const {
     checks.expect_share("guess_weight", guess_weight);
     checks.expect_not_negative("max_steps", max_steps);
     checks.expect_not_negative("tolerance", tolerance);
-    checks.expect(solver_tolerance > 0 && solver_tolerance < 1, "solver_tolerance", "between 0 and 1",
-                  solver_tolerance);
+    if (solver_tolerance)
+        checks.expect(*solver_tolerance > 0 && *solver_tolerance < 1, "solver_tolerance", "between 0 and 1",
+                      *solver_tolerance);
     checks.expect(max_sweeps >= 1, "max_sweeps", ">= 1", max_sweeps);
     return checks.lines();
 }

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "guidance/heuristics.h"
+#include "guidance/profile_kernel.h"
 
 namespace covol::guidance {
 namespace {
@@ -49,17 +51,24 @@ BorderProfile::BorderProfile(std::vector<MarkedPlace> places) : places_(std::mov
     }
     std::sort(all.begin(), all.end());
     for (int n = 1; n < kLevels && !all.empty(); ++n) edges_.push_back(all[all.size() * n / kLevels]);
+    edges_.resize(kLevels, std::numeric_limits<float>::infinity());
     counts_.resize(places_.size());
     tbb::parallel_for(std::size_t(0), places_.size(), [&](std::size_t n) {
-        to_levels(places_[n].profile);
+        count_levels(places_[n].profile);
         counts_[n] = count(places_[n]);
     });
+    for (const Counts& c : counts_) all_.add(c, 1);
 }
 
-void BorderProfile::to_levels(PatchProfile& p) const {
-    p.levels.resize(p.values.size());
-    for (std::size_t n = 0; n < p.values.size(); ++n)
-        p.levels[n] = std::uint8_t(std::upper_bound(edges_.begin(), edges_.end(), p.values[n]) - edges_.begin());
+void BorderProfile::count_levels(PatchProfile& p) const {
+    p.seen.assign(std::size_t(p.steps()) * kLevels, 0.0F);
+    const float* value = p.values.data();
+    for (int row = 0; row < p.rows; ++row)
+        for (int s = 0; s < p.steps(); ++s, ++value) {
+            int level = 0;
+            for (int n = 0; n < kLevels; ++n) level += edges_[std::size_t(n)] <= *value;
+            ++p.seen[std::size_t(s) * kLevels + std::size_t(std::min(level, kLevels - 1))];
+        }
 }
 
 BorderProfile::Counts BorderProfile::count(const MarkedPlace& place) const {
@@ -67,12 +76,12 @@ BorderProfile::Counts BorderProfile::count(const MarkedPlace& place) const {
     const PatchProfile& p = place.profile;
     const int below = int(std::floor(place.offset));
     const double part = place.offset - below;
-    for (int row = 0; row < p.rows; ++row)
-        for (int s = p.lo; s <= p.hi; ++s) {
-            const int level = p.levels[std::size_t(row) * p.steps() + s - p.lo];
+    for (int s = p.lo; s <= p.hi; ++s) {
+        const float* seen = p.seen.data() + std::size_t(s - p.lo) * kLevels;
+        for (int level = 0; level < kLevels; ++level)
             for (int n = 0; n < 2; ++n) {
                 const int depth = s - below - n;
-                const double weight = (n == 0 ? 1 - part : part) / p.rows;
+                const double weight = (n == 0 ? 1 - part : part) * double(seen[level]) / p.rows;
                 if (std::abs(depth) <= kBorderSteps)
                     c.border[std::size_t(depth + kBorderSteps) * kLevels + level] += weight;
                 if (depth < -kBorderSteps / 2 && depth >= -kBorderSteps - kFarSteps)
@@ -80,7 +89,7 @@ BorderProfile::Counts BorderProfile::count(const MarkedPlace& place) const {
                 if (depth > kBorderSteps / 2 && depth <= kBorderSteps + kFarSteps)
                     c.outside[level] += weight / kFarSteps;
             }
-        }
+    }
     for (int level = 0; level < kLevels; ++level) blur(c.border.data() + level, kDepths, kLevels, kBorder.depth_blur);
     for (int depth = 0; depth < kDepths; ++depth)
         blur(c.border.data() + std::size_t(depth) * kLevels, kLevels, 1, kBorder.level_blur);
@@ -90,9 +99,12 @@ BorderProfile::Counts BorderProfile::count(const MarkedPlace& place) const {
 }
 
 BorderProfile::Counts BorderProfile::sum(const std::vector<double>& weights) const {
-    Counts total;
+    constexpr double kNothing = 1e-12;  // of a place
+    const auto ones = std::count(weights.begin(), weights.end(), 1.0);
+    const double most = 2 * ones > std::ptrdiff_t(weights.size()) ? 1.0 : 0.0;  // all but a few have it
+    Counts total = most > 0 ? all_ : Counts();
     for (std::size_t n = 0; n < counts_.size(); ++n)
-        if (weights[n] > 0) total.add(counts_[n], weights[n]);
+        if (std::abs(weights[n] - most) > kNothing) total.add(counts_[n], weights[n] - most);
     return total;
 }
 
@@ -139,22 +151,23 @@ BorderTable BorderProfile::table(const std::vector<double>& weights, const std::
 }
 
 void BorderTable::likelihood(const PatchProfile& p, int first, std::vector<double>& out) const {
+    static_assert(kLevels % 8 == 0);
     const int steps = p.steps();
+    const auto seen = [&](int s) { return p.seen.data() + std::size_t(s) * kLevels; };
     std::vector<double> in_sum(steps + 1), out_sum(steps + 1);
-    for (int row = 0; row < p.rows; ++row) {
-        const std::uint8_t* level = p.levels.data() + std::size_t(row) * steps;
-        for (int s = 0; s < steps; ++s) {
-            in_sum[s + 1] = in_sum[s] + inside[level[s]];
-            out_sum[s + 1] = out_sum[s] + outside[level[s]];
-        }
-        for (std::size_t n = 0; n < out.size(); ++n) {
-            const int at = first + int(n) - p.lo;
-            const int begin = std::clamp(at - kBorderSteps, 0, steps),
-                      end = std::clamp(at + kBorderSteps + 1, 0, steps);
-            double sum = in_sum[begin] + out_sum[steps] - out_sum[end];
-            for (int s = begin; s < end; ++s) sum += border[std::size_t(s - at + kBorderSteps) * kLevels + level[s]];
-            out[n] += sum / (double(p.rows) * kStepsPerVoxel);
-        }
+    for (int s = 0; s < steps; ++s) {
+        in_sum[s + 1] = in_sum[s] + double(sum_of_products(seen(s), inside.data(), kLevels));
+        out_sum[s + 1] = out_sum[s] + double(sum_of_products(seen(s), outside.data(), kLevels));
+    }
+    const double per_row = 1.0 / (double(p.rows) * kStepsPerVoxel);
+    for (std::size_t n = 0; n < out.size(); ++n) {
+        const int at = first + int(n) - p.lo;
+        const int begin = std::clamp(at - kBorderSteps, 0, steps), end = std::clamp(at + kBorderSteps + 1, 0, steps);
+        double sum = in_sum[begin] + out_sum[steps] - out_sum[end];
+        if (begin < end)
+            sum += double(sum_of_products(seen(begin), border.data() + std::size_t(begin - at + kBorderSteps) * kLevels,
+                                          std::size_t(end - begin) * kLevels));
+        out[n] += sum * per_row;
     }
 }
 

@@ -1,5 +1,4 @@
 #pragma once
-#include <cstdint>
 #include <vector>
 
 #include "covol/fwd.h"
@@ -18,8 +17,8 @@ struct PatchProfile {
     int lo = 0, hi = -1;
     bool image_ends_below = false, image_ends_above = false;  ///< why it is no longer: the border may lie beyond
     int rows = 0;
-    std::vector<float> values;         ///< row by row
-    std::vector<std::uint8_t> levels;  ///< the same as levels of brightness
+    std::vector<float> values;  ///< row by row
+    std::vector<float> seen;    ///< [step][level]: how many rows have that level of brightness there
     [[nodiscard]] int steps() const { return hi - lo + 1; }
     [[nodiscard]] bool empty() const { return rows == 0; }
 };
@@ -45,7 +44,7 @@ struct BorderTable {
 class BorderProfile {
 public:
     explicit BorderProfile(std::vector<MarkedPlace> places);
-    void to_levels(PatchProfile& profile) const;
+    void count_levels(PatchProfile& profile) const;
     /// From all places, weighted by `weights`, shrunk towards the counts of `base` (may be null).
     [[nodiscard]] BorderTable table(const std::vector<double>& weights,
                                     const std::vector<double>* base_weights = nullptr) const;
@@ -62,8 +61,9 @@ private:
     static void normalise(Counts& counts, const Counts* base);
 
     std::vector<MarkedPlace> places_;
-    std::vector<float> edges_;    // between levels
+    std::vector<float> edges_;    // between levels, kLevels of them: the last ones may be infinite
     std::vector<Counts> counts_;  // by place
+    Counts all_;                  // their sum
 };
 
 }  // namespace covol::guidance

@@ -228,8 +228,14 @@ bool Guide::learn(const Scene& scene, bool first) {
         box.max[a] += kGuide.width * h_;
     }
     lesson_.reset();
+    WorldBox later = box;  // the surface moves
+    for (int a = 0; a < 3; ++a) {
+        later.min[a] -= kGuide.moves * h_;
+        later.max[a] += kGuide.moves * h_;
+    }
     const auto try_sigma = [&](double sigma) {
-        SmoothImage image(image_, box, sigma);
+        SmoothImage image = smooth_ && smooth_->covers(box, sigma) ? std::move(*smooth_)
+                                                                   : SmoothImage(image_, first ? later : box, sigma);
         if (image.empty()) return;
         Lesson lesson(scene, on_, image, std::sqrt(guess2_), broad_, 2 * width_);
         if (lesson_ && lesson.sure_gain() <= lesson_->sure_gain()) return;
@@ -345,10 +351,12 @@ void Guide::weigh(bool first) {
     }
     std::vector<Word> words;
     if (first) {
-        for (int n = 0; n < kGuide.priors; ++n) {
-            words.push_back(hear(field, broad_ * std::pow(0.5, n)));
-            if (words.back().response < kGuide.least_response) break;
-        }
+        words.resize(std::size_t(kGuide.priors));
+        tbb::parallel_for(std::size_t(0), words.size(),
+                          [&](std::size_t n) { words[n] = hear(field, broad_ * std::pow(0.5, n)); });
+        const auto deaf =
+            std::find_if(words.begin(), words.end(), [](const Word& w) { return w.response < kGuide.least_response; });
+        if (deaf != words.end()) words.erase(deaf + 1, words.end());
     } else {
         words.push_back(hear(field, prior_));
     }

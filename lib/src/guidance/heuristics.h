@@ -14,6 +14,8 @@ struct GuidanceHeuristics {
     int iterations = heuristic("guidance.iterations", 2);
     /// [voxels] To both sides of the surface in which profiles are read.
     double width = heuristic("guidance.width", 14.0);
+    /// [voxels] Around that, where the image is smoothed at once for the next iteration.
+    double moves = heuristic("guidance.moves", 4.0);
     /// [voxels] In one iteration.
     double longest_offset = heuristic("guidance.longest_offset", 12.0);
     /// [voxels] Of a patch of the surface that has one offset.
@@ -44,6 +46,8 @@ COVOL_HEURISTICS GuidanceHeuristics kGuide{};
 struct LearningHeuristics {
     /// [marks] Fewer say nothing of how the profile varies.
     std::size_t marks_for_places = heuristic("learning.marks_for_places", 40);
+    /// [of the way from the surface] Distance from which on a place is its own part's; less a voxel.
+    double own_share = heuristic("learning.own_share", 0.7);
     /// [marks] Within the radius of a local profile, about.
     int neighbours = heuristic("learning.neighbours", 12);
 };

@@ -17,6 +17,9 @@ namespace covol::guidance {
 namespace {
 
 constexpr int kBeyondRange = 3 * kStepsPerVoxel, kBeyondMark = 8 * kStepsPerVoxel;
+// An interpolated distance changes by at most sqrt(3) of the way, and where it is put together of two by a part of a
+// voxel.
+constexpr double kSteepest = 1.7320508, kSeam = 0.5;
 constexpr std::array<double, 6> kSharpness{0.05, 0.1, 0.2, 0.4, 0.7, 1.0};
 constexpr std::array<double, 4> kStray{0.02, 0.1, 0.25, 0.5};
 
@@ -111,32 +114,41 @@ PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, cons
     const double step = p.voxel[patch] / kStepsPerVoxel, h = scene.domain.voxel_size;
     struct Row {
         int lo = 0, hi = 0;
-        std::vector<float> values;
+        float* values;  // of the middle
     };
+    const std::size_t longest = 2 * std::size_t(reach) + 1;
+    std::vector<float> values(longest * (p.first[patch + 1] - p.first[patch]));
     std::vector<Row> rows;
     std::vector<double> lows, highs;
     int ends_below = 0, ends_above = 0;
     for (std::uint32_t n = p.first[patch]; n < p.first[patch + 1]; ++n) {
         const Vec3 &x = p.places[p.members[n]], &normal = p.normals[p.members[n]];
         Row row;
-        row.values.resize(2 * std::size_t(reach) + 1);
-        if (!image.sample(x, row.values[std::size_t(reach)])) continue;
-        for (const int side : {-1, 1})
+        row.values = values.data() + rows.size() * longest + reach;
+        const SmoothImage::Line line = image.along(x, {step * normal[0], step * normal[1], step * normal[2]});
+        if (!line.sample(0, row.values[0])) continue;
+        for (const int side : {-1, 1}) {
+            int checked = 0;  // the last step before the next look at the distance
             for (int s = 1; s <= reach; ++s) {
-                const double away = s * step;
-                const Vec3 at{x[0] + side * away * normal[0], x[1] + side * away * normal[1],
-                              x[2] + side * away * normal[2]};
-                // Beyond the middle of a gap or of the body another part of the surface is nearer.
-                if (side * sampled(accessor, scene.domain, at) < 0.7 * away - h) break;
-                if (!image.sample(at, row.values[std::size_t(reach + side * s)])) {
+                if (s > checked) {
+                    const double away = s * step;
+                    const Vec3 at{x[0] + side * away * normal[0], x[1] + side * away * normal[1],
+                                  x[2] + side * away * normal[2]};
+                    // Beyond the middle of a gap or of the body another part of the surface is nearer.
+                    const double room = side * sampled(accessor, scene.domain, at) - (kLearning.own_share * away - h);
+                    if (room < 0) break;
+                    checked = s + int(std::max(room - kSeam * h, 0.0) / ((kSteepest + kLearning.own_share) * step));
+                }
+                if (!line.sample(side * s, row.values[side * s])) {
                     ++(side < 0 ? ends_below : ends_above);
                     break;
                 }
                 (side < 0 ? row.lo : row.hi) = side * s;
             }
+        }
         lows.push_back(row.lo);
         highs.push_back(row.hi);
-        rows.push_back(std::move(row));
+        rows.push_back(row);
     }
     PatchProfile profile;
     if (rows.empty()) return profile;
@@ -147,8 +159,7 @@ PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, cons
     profile.image_ends_above = 2 * ends_above > int(rows.size());
     for (const Row& row : rows)
         if (row.lo <= profile.lo && row.hi >= profile.hi) {
-            profile.values.insert(profile.values.end(), row.values.begin() + reach + profile.lo,
-                                  row.values.begin() + reach + profile.hi + 1);
+            profile.values.insert(profile.values.end(), row.values + profile.lo, row.values + profile.hi + 1);
             ++profile.rows;
         }
     return profile;
@@ -239,7 +250,7 @@ Lesson::Answer Lesson::ask(const Scene& scene, std::size_t patch, const SmoothIm
         }
     }
     PatchProfile profile = read_profile(scene, patch, scene.ranges[patch] + kBeyondRange, image);
-    profile_.to_levels(profile);
+    profile_.count_levels(profile);
     const double step = scene.patches.voxel[patch] / kStepsPerVoxel;
     const auto evidence = [&](const BorderTable& table) {
         const Likelihood l = likelihood(profile, table, scene.ranges[patch]);

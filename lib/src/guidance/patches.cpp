@@ -1,6 +1,7 @@
 #include "guidance/patches.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <array>
@@ -64,10 +65,10 @@ Patches make_patches(const TriangleMesh& mesh, const ImageGeometry& g, double wi
     p.places.resize(count);
     p.normals.resize(count);
     const auto normals = compute_vertex_normals(mesh);
-    for (std::size_t v = 0; v < count; ++v) {
+    tbb::parallel_for(std::size_t(0), count, [&](std::size_t v) {
         p.places[v] = mesh.place(v);
         for (int a = 0; a < 3; ++a) p.normals[v][a] = normals[v][a];
-    }
+    });
     const Rows rows(mesh);
     smooth_normals(p.normals, rows, smooth);
 
@@ -86,7 +87,7 @@ Patches make_patches(const TriangleMesh& mesh, const ImageGeometry& g, double wi
         key[3] = 2 * axis + (p.normals[v][axis] > 0);
         keys[v] = {key, std::uint32_t(v)};
     });
-    std::sort(keys.begin(), keys.end());
+    tbb::parallel_sort(keys.begin(), keys.end());
     p.patch.resize(count);
     for (std::size_t n = 0; n < count; ++n) {
         if (n == 0 || keys[n].first != keys[n - 1].first) p.first.push_back(std::uint32_t(n));
@@ -134,7 +135,7 @@ Patches make_patches(const TriangleMesh& mesh, const ImageGeometry& g, double wi
                 crossing.emplace_back(b, a,
                                       float(std::sqrt(detail::squared_distance(p.places[v], p.places[rows.other[n]]))));
         }
-    std::sort(crossing.begin(), crossing.end());
+    tbb::parallel_sort(crossing.begin(), crossing.end());
     for (const auto& [a, b, length] : crossing) {
         if (p.borders.empty() || p.borders.back().a != a || p.borders.back().b != b)
             p.borders.push_back({a, b, 0, std::sqrt(detail::squared_distance(p.centers[a], p.centers[b]))});

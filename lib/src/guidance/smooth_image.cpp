@@ -16,7 +16,7 @@ constexpr double kLeastSigma = 0.3;  // voxels; below it a sampled Gaussian is t
 
 }  // namespace
 
-SmoothImage::SmoothImage(const Image& image, const WorldBox& box, double sigma) {
+SmoothImage::SmoothImage(const Image& image, const WorldBox& box, double sigma) : box_(box), sigma_(sigma) {
     const ImageGeometry& g = image.geometry();
     Vec3 lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
     for (const Vec3& corner : cloud::corners(box)) {
@@ -86,12 +86,27 @@ void SmoothImage::smooth(int axis, double sigma) {
     });
 }
 
-bool SmoothImage::sample(const Vec3& world, float& value) const {
-    Vec3 at;
+SmoothImage::Line SmoothImage::along(const Vec3& first, const Vec3& step) const {
+    Line line;
+    line.image_ = this;
+    for (int a = 0; a < 3; ++a) {
+        const Vec3& row = to_index_[a];
+        line.first_[a] = row[0] * first[0] + row[1] * first[1] + row[2] * first[2] + offset_[a];
+        line.step_[a] = row[0] * step[0] + row[1] * step[1] + row[2] * step[2];
+    }
+    return line;
+}
+
+bool SmoothImage::covers(const WorldBox& box, double sigma) const {
+    bool inside = sigma == sigma_;
+    for (int a = 0; a < 3; ++a) inside = inside && box_.min[a] <= box.min[a] && box.max[a] <= box_.max[a];
+    return inside;
+}
+
+bool SmoothImage::at(const Vec3& at, float& value) const {
     int base[3];
     float w[3];
     for (int a = 0; a < 3; ++a) {
-        at[a] = to_index_[a][0] * world[0] + to_index_[a][1] * world[1] + to_index_[a][2] * world[2] + offset_[a];
         if (!(at[a] >= low_[a] && at[a] <= high_[a])) return false;
         const double inner = std::clamp(at[a], 0.0, double(size_[a] - 1));
         base[a] = std::min(int(inner), std::max(size_[a] - 2, 0));

@@ -13,12 +13,32 @@ public:
     /// @param sigma  Gaussian, world units: along axes whose voxels are longer it hardly smooths
     SmoothImage(const Image& image, const WorldBox& box, double sigma);
 
-    /// False outside the image (half a voxel beyond its last centres).
-    bool sample(const Vec3& world, float& value) const;
+    /// Places at equal steps.
+    class Line {
+    public:
+        /// False outside the image (half a voxel beyond its last centres).
+        bool sample(int step, float& value) const {
+            return image_->at({first_[0] + step * step_[0], first_[1] + step * step_[1], first_[2] + step * step_[2]},
+                              value);
+        }
+
+    private:
+        friend SmoothImage;
+        const SmoothImage* image_ = nullptr;
+        Vec3 first_{}, step_{};  // in indices of the part
+    };
+    /// @param step  world
+    [[nodiscard]] Line along(const Vec3& first, const Vec3& step) const;
     [[nodiscard]] bool empty() const noexcept { return values_.empty(); }
+    /// Whether it is what the same image, this box and `sigma` would give, of this box or a wider one.
+    [[nodiscard]] bool covers(const WorldBox& box, double sigma) const;
 
 private:
     void smooth(int axis, double sigma);
+    bool at(const Vec3& index, float& value) const;
+
+    WorldBox box_;
+    double sigma_;
 
     Matrix3 to_index_{};
     Vec3 offset_{};

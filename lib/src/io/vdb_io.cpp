@@ -13,6 +13,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <mutex>
 #include <set>
 
 #include "base/file.h"
@@ -116,8 +117,7 @@ public:
         try {
             readGrid(grid, entry.descriptor, stream_);
         } catch (...) {
-            // The nodes of a tree that was read in part have children that are not there: it must not be destroyed.
-            static_cast<void>(new vdb::GridBase::Ptr(grid));
+            keep_for_ever(grid);
             throw;
         }
         if (entry.descriptor.isInstance()) {
@@ -137,6 +137,14 @@ private:
         vdb::io::GridDescriptor descriptor;
         vdb::GridBase::Ptr empty_grid;
     };
+
+    /// The nodes of a tree that was read in part have children that are not there: it must not be destroyed.
+    static void keep_for_ever(const vdb::GridBase::Ptr& grid) {
+        static std::mutex mutex;
+        static auto& kept = *new std::vector<vdb::GridBase::Ptr>;
+        const std::lock_guard lock(mutex);
+        kept.push_back(grid);
+    }
 
     void seek_to_grid(const Entry& entry) {
         const std::int64_t at = entry.descriptor.getGridPos();

@@ -31,12 +31,8 @@ using Tag = CGAL::Parallel_tag;
 constexpr std::size_t kFewest = 7;  // points that say anything about a neighbourhood
 
 class Cleaner {
-    /// Called by CGAL, possibly from a thread of its own: false stops it.
-    [[nodiscard]] auto parameters() const {
-        return CGAL::parameters::point_map(PointMap()).callback(std::function<bool(double)>([this](double) {
-            return !run_.cancelled();
-        }));
-    }
+    // CGAL keeps references to what it is given.
+    [[nodiscard]] auto parameters() const { return CGAL::parameters::point_map(point_map_).callback(goes_on_); }
 
 public:
     Cleaner(const std::vector<Vec3>& points, const CloudCleanupOptions& options, const RunContext& run)
@@ -127,6 +123,9 @@ private:
 
     const CloudCleanupOptions& options_;
     const RunContext& run_;
+    const PointMap point_map_{};
+    /// Called by CGAL, possibly from a thread of its own: false stops it.
+    const std::function<bool(double)> goes_on_ = [this](double) { return !run_.cancelled(); };
     std::vector<Entry> entries_;
 };
 

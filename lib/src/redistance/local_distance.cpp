@@ -12,9 +12,7 @@ namespace covol::detail {
 namespace {
 
 constexpr float kFallTolerance = 1e-3F;  // voxels
-constexpr float kLeastCut = 1e-4F;       // voxels
 constexpr float kUnclamped = 0.99F;
-constexpr int kStride[3] = {padded(1, 0, 0) - padded(0, 0, 0), padded(0, 1, 0) - padded(0, 0, 0), 1};
 
 /// A padded leaf of u; beyond the domain there is no surface.
 void load_u(const HaloField& u, const LeafBand& band, const Domain& domain, std::size_t leaf, float* out) {
@@ -53,19 +51,9 @@ void LocalDistance::start(std::size_t leaf) {
         return;
     }
     std::fill_n(d, kLeafSize, width_);
-    float* cuts = cut(leaf);
-    std::fill_n(cuts, 3 * kLeafSize, 0.0F);
     alignas(64) float u[kPaddedSize];
     load_u(u_, band_, domain_, leaf, u);
-    for (int n = 0; n < kLeafSize; ++n) {
-        const float* p = u + padded(n >> 6, n >> 3 & 7, n & 7);
-        for (int axis = 0; axis < 3; ++axis)
-            for (const float q : {p[-kStride[axis]], p[kStride[axis]]}) {
-                if ((q < 0.0F) == (*p < 0.0F)) continue;
-                const float along = std::max(std::abs(*p) / (std::abs(*p) + std::abs(q)), kLeastCut);
-                cuts[axis * kLeafSize + n] = std::max(cuts[axis * kLeafSize + n], 1.0F / along);
-            }
-    }
+    kernels().cut_edges(u, cut(leaf));
 }
 
 void LocalDistance::load_distance(std::size_t leaf, float* out) const {
@@ -77,10 +65,10 @@ void LocalDistance::load_distance(std::size_t leaf, float* out) const {
     load_star_from(distance(leaf), across, out);
 }
 
-// Leaves in two colours; one is visited again when a leaf across a face has changed since.
+// Leaves in two colours; one is visited again when a leaf across a face has changed since, in the rows beside.
 void LocalDistance::spread() {
     const SchemeKernels& kernel = kernels();
-    std::vector<unsigned char> changed(band_.size() + 1, 0);
+    std::vector<RowMask> fell(band_.size() + 1, 0);  // in the last visit
     bool first = true;
     for (std::atomic<bool> again = true; again; first = false) {
         again = false;
@@ -88,41 +76,33 @@ void LocalDistance::spread() {
         for (int colour = 0; colour < 2; ++colour)
             tbb::parallel_for(begins[colour], begins[colour + 1], [&](std::size_t leaf) {
                 if (!zone_[leaf]) return;
-                bool news = first;
-                for (const int slot : kFaceSlots) news |= changed[band_.neighbours(leaf)[slot]] != 0;
-                changed[leaf] = 0;
-                if (!news) return;
+                const RowMask due = first ? ~RowMask{0} : beside(fell, leaf);
+                fell[leaf] = 0;
+                if (due == 0) return;
                 alignas(64) float d[kPaddedSize];
                 load_distance(leaf, d);
-                if (!kernel.eikonal(d, cut(leaf), kFallTolerance)) return;
+                fell[leaf] = kernel.eikonal(d, cut(leaf), due, kFallTolerance);
+                if (fell[leaf] == 0) return;
                 store_inner(d, distances(leaf));
-                changed[leaf] = 1;
                 again = true;
             });
     }
+}
+
+// The rows of a leaf beside which others, across its faces, fell.
+RowMask LocalDistance::beside(const std::vector<RowMask>& fell, std::size_t leaf) const {
+    constexpr RowMask kFirst = 0x0101010101010101ULL;  // j = 0
+    RowMask across[6];
+    for (int face = 0; face < 6; ++face) across[face] = fell[band_.neighbours(leaf)[kFaceSlots[face]]];
+    return across[kMinusI] >> 56 | across[kPlusI] << 56 | (across[kMinusJ] >> 7 & kFirst) |
+           (across[kPlusJ] & kFirst) << 7 | across[kMinusK] | across[kPlusK];
 }
 
 void LocalDistance::settle(std::size_t leaf) {
     alignas(64) float d[kPaddedSize], u[kPaddedSize];
     load_distance(leaf, d);
     load_u(u_, band_, domain_, leaf, u);
-    float* cuts = cut(leaf);
-    for (int n = 0; n < kLeafSize; ++n) {
-        const int p = padded(n >> 6, n >> 3 & 7, n & 7);
-        float distances = d[p], values = std::abs(u[p]);
-        bool is_cut = false;
-        for (int axis = 0; axis < 3; ++axis) {
-            if (cuts[axis * kLeafSize + n] == 0.0F) continue;
-            for (const int q : {p - kStride[axis], p + kStride[axis]}) {
-                if ((u[q] < 0.0F) == (u[p] < 0.0F)) continue;
-                is_cut = true;
-                distances += d[q];
-                values += std::abs(u[q]);
-            }
-        }
-        // Voxel n's cuts are not asked for again.
-        cuts[n] = is_cut && values > 0.0F ? std::abs(u[p]) * distances / values : d[p];
-    }
+    kernels().settle(u, d, cut(leaf));  // its cuts are not asked for again
 }
 
 }  // namespace covol::detail

@@ -5,6 +5,7 @@
 #include "covol/domain.h"
 #include "grid/halo.h"
 #include "grid/leaf_band.h"
+#include "scheme/scheme.h"
 
 namespace covol::detail {
 
@@ -35,8 +36,7 @@ public:
 
     /// The width where the surface is farther.
     [[nodiscard]] const float* distance(std::size_t leaf) const { return scratch_.distances + leaf * kLeafSize; }
-    /// The same, but next to the surface |u| is only scaled: by one factor for a voxel and those across the edges that
-    /// the surface cuts, so that it hardly moves (D. Hartmann, M. Meinke, W. Schroeder 2010, scheme CR-1).
+    /// The same, but next to the surface |u| is only scaled, see SchemeKernels::settle.
     [[nodiscard]] const float* settled(std::size_t leaf) const { return cut(leaf); }
 
 private:
@@ -47,6 +47,7 @@ private:
     void start(std::size_t leaf);
     void load_distance(std::size_t leaf, float* out) const;
     void spread();
+    [[nodiscard]] RowMask beside(const std::vector<RowMask>& fell, std::size_t leaf) const;
     void settle(std::size_t leaf);
 
     const LeafBand& band_;

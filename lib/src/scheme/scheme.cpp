@@ -50,20 +50,30 @@ const SchemeKernels& kernels() {
     return chosen;
 }
 
+// Plane by plane, then row by row, then voxel by voxel: what is copied may have been copied before.
 void mirror_outside(float* values, const int lo[3], const int hi[3]) {
     for (int i = -1; i <= 8; ++i)
-        for (int j = -1; j <= 8; ++j)
-            for (int k = -1; k <= 8; ++k) {
-                const int ci = std::clamp(i, lo[0], hi[0]);
-                const int cj = std::clamp(j, lo[1], hi[1]);
-                const int ck = std::clamp(k, lo[2], hi[2]);
-                if (ci != i || cj != j || ck != k) values[padded(i, j, k)] = values[padded(ci, cj, ck)];
-            }
+        if (const int from = std::clamp(i, lo[0], hi[0]); from != i)
+            std::memcpy(values + padded(i, -1, -4), values + padded(from, -1, -4), 10 * kRow * sizeof(float));
+    for (int j = -1; j <= 8; ++j)
+        if (const int from = std::clamp(j, lo[1], hi[1]); from != j)
+            for (int i = -1; i <= 8; ++i)
+                std::memcpy(values + padded(i, j, -4), values + padded(i, from, -4), kRow * sizeof(float));
+    for (int k = -1; k <= 8; ++k)
+        if (const int from = std::clamp(k, lo[2], hi[2]); from != k)
+            for (int i = -1; i <= 8; ++i)
+                for (int j = -1; j <= 8; ++j) values[padded(i, j, k)] = values[padded(i, j, from)];
 }
 
 void close_faces(Share* c, const int lo[3], const int hi[3]) {
+    const auto is_inner = [&](int axis, int at) { return at > lo[axis] && at < hi[axis]; };
+    const bool inner_k = lo[2] < 0 && hi[2] > 7;
     for (int n = 0; n < kLeafSize; ++n) {
         const int at[3] = {n >> 6, (n >> 3) & 7, n & 7};
+        if (inner_k && is_inner(0, at[0]) && is_inner(1, at[1])) {
+            n += 7;  // the row
+            continue;
+        }
         bool outside = false;
         int closed = 0;
         for (int axis = 0; axis < 3; ++axis) {

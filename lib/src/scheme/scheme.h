@@ -35,6 +35,9 @@ struct LeafStar {
     const float* across[6];
 };
 
+/// Bit 8i+j: the row (i,j) of eight voxels.
+using RowMask = unsigned long long;
+
 struct NextRows {
     const float* b = nullptr;
     const Share* c = nullptr;
@@ -86,9 +89,21 @@ struct SchemeKernels {
     /// Godunov's upwind scheme for |∇d| = 1 in a leaf, in voxels: Gauss-Seidel in four orders of the rows until no
     /// value falls by more than `tolerance` (R. Zhao 2005, with a surface that cuts voxel edges as boundary).
     /// @param d    padded (faces), >= 0; values only fall; the halo is not written
-    /// @param cut  3 x 512, by axis: 1/s where the surface cuts an edge of the voxel along it, s in (0,1] away; else 0
-    /// @return     whether a value fell by more than `tolerance`
-    bool (*eikonal)(float* d, const float* cut, float tolerance);
+    /// @param cut  of cut_edges
+    /// @param due  the rows beside which something has fallen; they are visited, and those beside rows that fall then
+    /// @return     the rows with a value that fell by more than `tolerance`
+    RowMask (*eikonal)(float* d, const float* cut, RowMask due, float tolerance);
+
+    /// @param u    padded (faces)
+    /// @param cut  out, 3 x 512, by axis: 1/s where the zero level set cuts an edge of the voxel along it, s in (0,1]
+    ///             away; else 0
+    void (*cut_edges)(const float* u, float* cut);
+
+    /// |u| where no edge of the voxel is cut replaced by d, else scaled by one factor for the voxel and those across
+    /// its cut edges, so that the zero level set hardly moves (D. Hartmann, M. Meinke, W. Schroeder 2010, scheme CR-1).
+    /// @param u    padded (faces), as d
+    /// @param out  512
+    void (*settle)(const float* u, const float* d, float* out);
 };
 
 /// Homogeneous Neumann in a padded buffer: voxels outside lo..hi (local, inclusive; beyond -1..8 where the boundary is

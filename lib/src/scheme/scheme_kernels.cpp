@@ -13,10 +13,7 @@ namespace {
 
 constexpr int kI = 10 * kRow;  // stride of i in a padded buffer
 constexpr int kJ = kRow;       // stride of j
-constexpr float kTiny = 1e-30F;
-
-/// Bit 8i+j: the row (i,j) of eight voxels.
-using RowMask = unsigned long long;
+constexpr float kTiny = 1e-30F, kFar = 1e30F;
 
 /// Rows with an active voxel.
 inline RowMask active_rows(const unsigned long long* active) {
@@ -338,32 +335,110 @@ inline Lanes arrive(Arrival a, Arrival b, Arrival c) {
     return x;
 }
 
-bool eikonal(float* d, const float* cut, float tolerance) {
+/// The same where no edge is cut: q = 1.
+inline Lanes arrive(Lanes a, Lanes b, Lanes c) {
+    const auto root = [](Lanes x) {
+        const Lanes safe = max(x, Lanes{} + kTiny);
+        return safe * inverse_sqrt(safe);
+    };
+    const Lanes lower = min(a, b), upper = max(a, b), first = min(lower, c);
+    const Lanes second = max(lower, min(upper, c)) - first, third = max(upper, c) - first;
+    const Lanes two = 0.5F * (second + root(2.0F - second * second));
+    const Lanes limit = broadcast(1.0F) > second ? two : broadcast(1.0F);
+    const Lanes both = second + third;
+    const Lanes three = (1.0F / 3) * (both + root(both * both - 3.0F * (second * second + third * third - 1.0F)));
+    return first + (limit > third ? three : limit);
+}
+
+// A neighbour that is higher by less gets nothing: by less than its square.
+constexpr float kDownwind = 0.02F;  // voxels
+
+RowMask eikonal(float* d, const float* cut, RowMask due, float tolerance) {
     const Lanes one = broadcast(1.0F);
-    bool fell = false;
-    for (int order = 0;; ++order) {
-        Lanes largest_fall = Lanes{};
+    RowMask fell = 0;
+    for (int order = 0; due != 0; ++order) {
         const bool up_i = (order & 1) == 0, up_j = (order & 2) == 0;
         for (int n = 0; n < 64; ++n) {
-            const int i = up_i ? n >> 3 : 7 - (n >> 3), j = up_j ? n & 7 : 7 - (n & 7);
+            const int i = up_i ? n >> 3 : 7 - (n >> 3), j = up_j ? n & 7 : 7 - (n & 7), at = 8 * i + j;
+            if ((due >> at & 1U) == 0) continue;
+            due &= ~(RowMask{1} << at);
             float* row = d + padded(i, j, 0);
-            const float* q = cut + (i * 8 + j) * 8;
-            const auto along = [&](int axis, int stride) {
-                const Lanes least = -max(-load(row - stride), -load(row + stride));
-                const Lanes at = load(q + axis * 512);
-                return Arrival{at > 0.0F ? Lanes{} : least, at > 0.0F ? at : one};
+            const float* q = cut + at * 8;
+            const Lanes cut_i = load(q), cut_j = load(q + 512), cut_k = load(q + 1024);
+            const bool is_cut = any((cut_i > 0.0F) | (cut_j > 0.0F) | (cut_k > 0.0F));
+            const auto along = [&](Lanes cuts, Lanes least) {
+                return Arrival{cuts > 0.0F ? Lanes{} : least, cuts > 0.0F ? cuts : one};
             };
-            const Lanes now = load(row);
-            const Arrival ai = along(0, kI), aj = along(1, kJ), ak = along(2, 1);
-            // Nothing comes from where the values are no lower.
-            if (!(largest(now + max(-ai.v, max(-aj.v, -ak.v))) > 0.0F)) continue;
-            const Lanes fall = now - arrive(ai, aj, ak);
-            largest_fall = max(largest_fall, fall);
-            store(row, now - max(fall, Lanes{}));
+            const Lanes least_i = min(load(row - kI), load(row + kI)), least_j = min(load(row - kJ), load(row + kJ));
+            const Arrival ai = along(cut_i, least_i), aj = along(cut_j, least_j);
+            const Lanes before = load(row), below = broadcast(row[-1]), above = broadcast(row[8]);
+            Lanes now = before;
+            // Along k until nothing falls any more.
+            for (bool falls = true; falls;) {
+                const Lanes least_k = min(shifted_up(now, below), shifted_down(now, above));
+                const Arrival ak = along(cut_k, least_k);
+                // Nothing comes from where the values are no lower.
+                if (!any(now > min(ai.v, min(aj.v, ak.v)))) break;
+                const Lanes to = is_cut ? arrive(ai, aj, ak) : arrive(least_i, least_j, least_k);
+                const LaneBits fall = now - to > tolerance;
+                now = min(now, to);
+                const Lanes fallen = fall ? now : broadcast(kFar);
+                falls = any(now > min(shifted_up(fallen, broadcast(kFar)), shifted_down(fallen, broadcast(kFar))) +
+                                      kDownwind);
+            }
+            store(row, now);
+            const LaneBits fall = before - now > tolerance;
+            if (!any(fall)) continue;
+            fell |= RowMask{1} << at;
+            const auto tell = [&](bool is_here, int stride, int shift) {
+                if (is_here && any(fall & (load(row + stride) > now + kDownwind))) due |= RowMask{1} << (at + shift);
+            };
+            tell(i > 0, -kI, -8), tell(i < 7, kI, 8), tell(j > 0, -kJ, -1), tell(j < 7, kJ, 1);
         }
-        // A pass that changes nothing says that every voxel fits its neighbours.
-        if (!(largest(largest_fall) > tolerance)) return fell;
-        fell = true;
+    }
+    return fell;
+}
+
+inline Lanes absolute(Lanes x) { return max(x, -x); }
+
+/// visit(axis, q) for a row's neighbours.
+template <typename Visit>
+inline void for_neighbours(const float* row, Visit visit) {
+    visit(0, load(row - kI)), visit(0, load(row + kI));
+    visit(1, load(row - kJ)), visit(1, load(row + kJ));
+    visit(2, load(row - 1)), visit(2, load(row + 1));
+}
+
+void cut_edges(const float* u, float* cut) {
+    constexpr float kLeast = 1e-4F;  // voxels
+    const Lanes one = broadcast(1.0F);
+    for (int row = 0; row < 64; ++row) {
+        const float* at = u + padded(row >> 3, row & 7, 0);
+        const Lanes p = load(at), size = absolute(p);
+        Lanes most[3] = {};
+        for_neighbours(at, [&](int axis, Lanes q) {
+            const Lanes along = max(size / (size + absolute(q)), broadcast(kLeast));
+            most[axis] = max(most[axis], (q < 0.0F) != (p < 0.0F) ? one / along : Lanes{});
+        });
+        for (int axis = 0; axis < 3; ++axis) store(cut + axis * 512 + row * 8, most[axis]);
+    }
+}
+
+void settle(const float* u, const float* d, float* out) {
+    for (int row = 0; row < 64; ++row) {
+        const int at = padded(row >> 3, row & 7, 0);
+        const Lanes p = load(u + at), size = absolute(p), own = load(d + at);
+        Lanes distances = own, values = size;
+        LaneBits is_cut = LaneBits{};
+        const auto add = [&](int stride) {
+            const Lanes q = load(u + at + stride);
+            const LaneBits differs = (q < 0.0F) != (p < 0.0F);
+            is_cut |= differs;
+            distances += differs ? load(d + at + stride) : Lanes{};
+            values += differs ? absolute(q) : Lanes{};
+        };
+        add(-kI), add(kI), add(-kJ), add(kJ), add(-1), add(1);
+        store(out + row * 8, (is_cut & (values > 0.0F)) ? size * distances / values : own);
     }
 }
 
@@ -372,6 +447,7 @@ bool eikonal(float* d, const float* cut, float tolerance) {
 }  // namespace
 
 extern const SchemeKernels kKernels;
-const SchemeKernels kKernels = {COVOL_TEXT(COVOL_SIMD_NAME), assemble, relax, heat, mean_gradient, eikonal};
+const SchemeKernels kKernels = {
+    COVOL_TEXT(COVOL_SIMD_NAME), assemble, relax, heat, mean_gradient, eikonal, cut_edges, settle};
 
 }  // namespace covol::detail::COVOL_SIMD_NAME

@@ -36,6 +36,16 @@ inline Lanes shifted_up(Lanes v, Lanes edge) { return __builtin_shufflevector(v,
 inline Lanes shifted_down(Lanes v, Lanes edge) { return __builtin_shufflevector(v, edge, 1, 2, 3, 4, 5, 6, 7, 15); }
 inline Lanes broadcast(float x) { return Lanes{} + x; }
 inline Lanes max(Lanes a, Lanes b) { return a > b ? a : b; }
+inline Lanes min(Lanes a, Lanes b) { return a < b ? a : b; }
+inline bool any(LaneBits mask) {
+#if defined(__AVX__)
+    return _mm256_movemask_ps((__m256)mask) != 0;
+#else
+    int bits = 0;
+    for (int k = 0; k < 8; ++k) bits |= mask[k];
+    return bits != 0;
+#endif
+}
 /// Every `stride`-th float.
 inline Lanes load_strided(const float* p, int stride) {
     return Lanes{p[0],          p[stride],     p[2 * stride], p[3 * stride],

@@ -162,6 +162,7 @@ void choose_values(Job& job) {
     if (job.options.guess || ((job.guesses() || job.is_cloud()) && job.guided() && job.uses_points()))
         return;  // nothing flows; a later frame may
     if (chooses_delta) job.choose("delta", number(*evolve.delta), number(delta_voxels) + " voxels");
+    evolve.solver_tolerance = evolve.solved_to();  // before coarse levels have time steps of their own
     if (!evolve.tau) job.choose("tau", number(h), "1 voxel at unit speed; longer while the surface moves slowly");
     if (!options.edge.sigma && job.uses_image()) {
         const double voxels = job.tags() ? kAutomatic.tag_sigma_voxels : 1.0;

@@ -1,4 +1,5 @@
 // Starts other than tagging: the signed distance to a given surface, clamped, in a band around it.
+#include <openvdb/tools/Dense.h>
 #include <openvdb/tools/Interpolation.h>
 #include <tbb/parallel_for.h>
 
@@ -7,8 +8,10 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <map>
 #include <optional>
 #include <set>
+#include <vector>
 
 #include "base/number.h"
 #include "covol/error.h"
@@ -103,8 +106,83 @@ FloatGridPtr start_from_field(const Domain& domain, const std::vector<Coord>& cr
     return detail::make_start(band, u, domain, where);
 }
 
+/// A field's values on leaves, for which it is asked once.
+class SampledLeaves {
+public:
+    explicit SampledLeaves(const Sampler& sample) : sample_(sample) {}
+
+    void ask(const std::vector<Coord>& origins) {
+        std::vector<std::pair<Coord, Values*>> asked;
+        for (const Coord& o : origins)
+            if (const auto [place, is_new] = leaves_.try_emplace(o); is_new) asked.emplace_back(o, &place->second);
+        tbb::parallel_for(std::size_t(0), asked.size(), [&](std::size_t n) {
+            const auto& [o, values] = asked[n];
+            *values = std::make_unique<std::array<float, kLeafSize>>();
+            sample_(o, o.offsetBy(kLeafDim - 1), (*values)->data());
+        });
+    }
+
+    /// @pre asked for
+    [[nodiscard]] const float* leaf(const Coord& origin) const { return leaves_.at(origin)->data(); }
+
+    /// A leaf at a time; those that were not asked for are, and not kept.
+    [[nodiscard]] Sampler sampler() const {
+        return [this](const Coord& lo, const Coord& hi, float* values) {
+            if (const auto known = leaves_.find(lo); known != leaves_.end())
+                std::copy_n(known->second->data(), kLeafSize, values);
+            else
+                sample_(lo, hi, values);
+        };
+    }
+
+private:
+    using Values = std::unique_ptr<std::array<float, kLeafSize>>;
+    const Sampler& sample_;
+    std::map<Coord, Values> leaves_;
+};
+
+/// A leaf and the next layer of voxels.
+class LeafAndNext {
+public:
+    LeafAndNext(const SampledLeaves& sampled, const Coord& origin) {
+        for (int n = 0; n < 8; ++n) leaves_[n] = sampled.leaf(at(origin, n));
+    }
+    /// The leaf, and the seven that the next layer is in.
+    static Coord at(const Coord& origin, int n) {
+        return origin.offsetBy((n >> 2) * kLeafDim, (n >> 1 & 1) * kLeafDim, (n & 1) * kLeafDim);
+    }
+    /// i, j, k 0..8
+    [[nodiscard]] bool is_negative(int i, int j, int k) const {
+        return leaves_[(i >> 3) * 4 + (j >> 3) * 2 + (k >> 3)][(i & 7) << 6 | (j & 7) << 3 | (k & 7)] < 0;
+    }
+    [[nodiscard]] bool is_mixed() const {
+        const bool first = is_negative(0, 0, 0);
+        for (int i = 0; i <= kLeafDim; ++i)
+            for (int j = 0; j <= kLeafDim; ++j)
+                for (int k = 0; k <= kLeafDim; ++k)
+                    if (is_negative(i, j, k) != first) return true;
+        return false;
+    }
+
+private:
+    const float* leaves_[8];
+};
+
+void ask_with_next(SampledLeaves& sampled, const std::vector<Coord>& leaves) {
+    std::vector<Coord> asked;
+    for (const Coord& o : leaves)
+        for (int n = 0; n < 8; ++n) asked.push_back(LeafAndNext::at(o, n));
+    sampled.ask(asked);
+}
+
+/// As crossed_by() above; the values are kept.
+std::vector<Coord> crossed_by(const std::vector<Coord>& leaves, SampledLeaves& sampled) {
+    ask_with_next(sampled, leaves);
+    return filter(leaves, [&](const Coord& o) { return LeafAndNext(sampled, o).is_mixed(); });
+}
+
 /// The leaves that the zero level set passes, found from leaf to leaf from those around the seeds on.
-std::vector<Coord> leaves_crossed_from(const Domain& domain, const std::vector<Vec3>& seeds, const Sampler& sample,
+std::vector<Coord> leaves_crossed_from(const Domain& domain, const std::vector<Vec3>& seeds, SampledLeaves& sampled,
                                        const RunContext& run) {
     constexpr int kSide = kLeafDim + 1;
     const detail::CoordBBox box = detail::box_of(domain);
@@ -124,28 +202,24 @@ std::vector<Coord> leaves_crossed_from(const Domain& domain, const std::vector<V
         run.check();
         const std::vector<Coord> now = std::move(front);
         front.clear();
+        ask_with_next(sampled, now);
         std::vector<std::array<bool, 6>> through(now.size());  // faces, as in kFaceSlots
         std::vector<char> crosses(now.size());
         tbb::parallel_for(std::size_t(0), now.size(), [&](std::size_t n) {
-            std::array<float, kSide * kSide * kSide> values;
-            sample(now[n], now[n].offsetBy(kLeafDim), values.data());
-            const auto negative = [&](int i, int j, int k) {
-                return values[std::size_t((i * kSide + j) * kSide + k)] < 0;
-            };
+            const LeafAndNext leaf(sampled, now[n]);
+            const bool first = leaf.is_negative(0, 0, 0);
             std::array<bool, 6> mixed{};
-            bool any = false;
             for (int a = 0; a < kSide; ++a)
                 for (int b = 0; b < kSide; ++b) {
-                    mixed[0] |= negative(0, a, b) != negative(0, 0, 0);
-                    mixed[1] |= negative(kLeafDim, a, b) != negative(kLeafDim, 0, 0);
-                    mixed[2] |= negative(a, 0, b) != negative(0, 0, 0);
-                    mixed[3] |= negative(a, kLeafDim, b) != negative(0, kLeafDim, 0);
-                    mixed[4] |= negative(a, b, 0) != negative(0, 0, 0);
-                    mixed[5] |= negative(a, b, kLeafDim) != negative(0, 0, kLeafDim);
+                    mixed[0] |= leaf.is_negative(0, a, b) != first;
+                    mixed[1] |= leaf.is_negative(kLeafDim, a, b) != leaf.is_negative(kLeafDim, 0, 0);
+                    mixed[2] |= leaf.is_negative(a, 0, b) != first;
+                    mixed[3] |= leaf.is_negative(a, kLeafDim, b) != leaf.is_negative(0, kLeafDim, 0);
+                    mixed[4] |= leaf.is_negative(a, b, 0) != first;
+                    mixed[5] |= leaf.is_negative(a, b, kLeafDim) != leaf.is_negative(0, 0, kLeafDim);
                 }
-            for (const float v : values) any |= (v < 0) != (values[0] < 0);
             through[n] = mixed;
-            crosses[n] = any;
+            crosses[n] = leaf.is_mixed();
         });
         for (std::size_t n = 0; n < now.size(); ++n) {
             if (!crosses[n]) continue;
@@ -314,7 +388,9 @@ FloatGridPtr start_from_contours(const Domain& domain, const ContourSolid& solid
                     for (int k = lo.z(); k <= hi.z(); ++k)
                         *values++ = float(solid.level(domain.index_to_world({double(i), double(j), double(k)})));
         };
-        result = start_from_field(domain, crossed_by(near, sample), sample, "start_from_contours", run);
+        SampledLeaves sampled(sample);
+        const std::vector<Coord> crossed = crossed_by(near, sampled);
+        result = start_from_field(domain, crossed, sampled.sampler(), "start_from_contours", run);
     });
     return result;
 }
@@ -326,15 +402,16 @@ FloatGridPtr start_from_level(const Domain& domain, const std::vector<Vec3>& see
         const double h = domain.voxel_size;
         const Sampler sample = [&](const Coord& lo, const Coord& hi, float* values) {
             const int count = hi.z() - lo.z() + 1;
-            std::array<double, kLeafDim + 1> row;
+            std::array<double, kLeafDim> row;
             for (int i = lo.x(); i <= hi.x(); ++i)
                 for (int j = lo.y(); j <= hi.y(); ++j) {
                     level(domain.index_to_world({double(i), double(j), double(lo.z())}), {0, 0, h}, count, row.data());
                     for (int k = 0; k < count; ++k) *values++ = float(row[std::size_t(k)]);
                 }
         };
-        result =
-            start_from_field(domain, leaves_crossed_from(domain, seeds, sample, run), sample, "start_from_level", run);
+        SampledLeaves sampled(sample);
+        const std::vector<Coord> crossed = leaves_crossed_from(domain, seeds, sampled, run);
+        result = start_from_field(domain, crossed, sampled.sampler(), "start_from_level", run);
     });
     return result;
 }
@@ -356,16 +433,24 @@ FloatGridPtr start_from_grid(const Domain& domain, const FloatGrid& level_set, c
         candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
         const ToSource to_source(domain, level_set.transform());
         const std::optional<Coord> shift = to_source.shift();
-        candidates = filter(
-            candidates, [&](const Coord& o) { return may_cross(level_set, to_source.box(o, o.offsetBy(kLeafDim))); });
-        const Sampler sample = [&](const Coord& lo, const Coord& hi, float* values) {
-            const auto accessor = level_set.getConstAccessor();
-            for (int i = lo.x(); i <= hi.x(); ++i)
-                for (int j = lo.y(); j <= hi.y(); ++j)
-                    for (int k = lo.z(); k <= hi.z(); ++k)
-                        *values++ = shift ? accessor.getValue(*shift + Coord(i, j, k))
-                                          : openvdb::tools::BoxSampler::sample(accessor, to_source(i, j, k));
-        };
+        Sampler sample;
+        if (shift) {
+            sample = [&](const Coord& lo, const Coord& hi, float* values) {
+                openvdb::tools::Dense<float> block({*shift + lo, *shift + hi}, values);
+                openvdb::tools::copyToDense(level_set, block, true);
+            };
+        } else {
+            candidates = filter(candidates, [&](const Coord& o) {
+                return may_cross(level_set, to_source.box(o, o.offsetBy(kLeafDim)));
+            });
+            sample = [&](const Coord& lo, const Coord& hi, float* values) {
+                const auto accessor = level_set.getConstAccessor();
+                for (int i = lo.x(); i <= hi.x(); ++i)
+                    for (int j = lo.y(); j <= hi.y(); ++j)
+                        for (int k = lo.z(); k <= hi.z(); ++k)
+                            *values++ = openvdb::tools::BoxSampler::sample(accessor, to_source(i, j, k));
+            };
+        }
         result = start_from_field(domain, crossed_by(candidates, sample), sample, "start_from_grid", run);
     });
     return result;

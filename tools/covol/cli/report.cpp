@@ -108,7 +108,7 @@ Json to_json(const SegmentOptions& o) {
             {"follow", e.follow},
             {"max_steps", e.max_steps},
             {"tolerance", e.tolerance},
-            {"solver_tolerance", e.solver_tolerance}};
+            {"solver_tolerance", chosen(e.solver_tolerance)}};
 }
 
 Json to_json(const SegmentReport& r) {

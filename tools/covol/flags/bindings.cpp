@@ -290,8 +290,8 @@ void EvolveFlags::bind(CLI::App& command, bool with_image, bool alone) {
     command.add_option("--tolerance", options.tolerance, "steady below this mean change, in voxels a step of 1vx")
         ->capture_default_str();
     in_group(command, Group::Numerics);
-    command.add_option("--solver-tolerance", options.solver_tolerance, "a step's solve ends at this relative residual")
-        ->capture_default_str();
+    command.add_option("--solver-tolerance", options.solver_tolerance,
+                       "a step's solve ends at this relative residual [0.001 with --tau, else 0.01]");
 }
 
 EvolveOptions EvolveFlags::resolve(double h) const {

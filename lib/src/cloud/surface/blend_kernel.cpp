@@ -34,9 +34,18 @@ COVOL_INLINE void for_rows(const BlendPiece& piece, float h, Visit visit) {
         }
 }
 
+/// How far x lies above the tangent plane of a piece at its foot, and what the quadric adds to that.
+COVOL_INLINE float height_above(const BlendPiece& p, float x, float y, float z) {
+    const auto along = [&](const float(&axis)[3]) __attribute__((always_inline)) {
+        return axis[0] * (x - p.origin[0]) + axis[1] * (y - p.origin[1]) + axis[2] * (z - p.origin[2]);
+    };
+    const float u = along(p.axes[0]), v = along(p.axes[1]);
+    return along(p.axes[2]) - (p.c[0] + u * (p.c[1] + u * p.c[3] + v * p.c[4]) + v * (p.c[2] + v * p.c[5]));
+}
+
 }  // namespace
 
-COVOL_CLONES void blend(const BlendPiece* pieces, std::size_t count, float h, BlendLeaf& leaf) {
+COVOL_CLONES void blend(const BlendPiece* pieces, std::size_t count, float h, float limit, BlendLeaf& leaf) {
     const Float8 z = Float8{0, 1, 2, 3, 4, 5, 6, 7} * h;
     leaf.share.fill(BlendLeaf::kNone);
     leaf.nearest.fill(-1);
@@ -57,9 +66,23 @@ COVOL_CLONES void blend(const BlendPiece* pieces, std::size_t count, float h, Bl
                 nearest = nearer ? Int8{} + std::int32_t(n) : nearest;
             });
     }
-    for (std::size_t v = 0; v < 512; ++v)
-        for (std::size_t a = 0; a < 3; ++a)
-            leaf.normal[a][v] = leaf.nearest[v] < 0 ? 0.0F : pieces[leaf.nearest[v]].axes[2][a];
+    // Rows of which the nearest pieces say that they are far from the surface need not hear the others.
+    bool is_near[64];
+    for (int row = 0; row < 64; ++row) {
+        bool any = false;
+        for (int k = 0; k < 8; ++k) {
+            const std::size_t voxel = std::size_t(row) * 8 + std::size_t(k);
+            const std::int32_t nearest = leaf.nearest[voxel];
+            for (std::size_t a = 0; a < 3; ++a) leaf.normal[a][voxel] = nearest < 0 ? 0.0F : pieces[nearest].axes[2][a];
+            if (nearest < 0) continue;
+            const float height = height_above(pieces[nearest], h * float(row >> 3), h * float(row & 7), h * float(k));
+            any |= std::abs(height) < limit;
+            leaf.sum[voxel] = height;
+            leaf.weight[voxel] = 1;
+        }
+        is_near[row] = any;
+        if (any) at(leaf.sum.data(), row) = at(leaf.weight.data(), row) = Float8{};
+    }
     for (std::size_t n = 0; n < count; ++n) {
         const BlendPiece& p = pieces[n];
         const Float8 up = z - p.foot[2], up2 = up * up, to_z = z - p.origin[2];
@@ -67,6 +90,7 @@ COVOL_CLONES void blend(const BlendPiece* pieces, std::size_t count, float h, Bl
         for_rows(
             p, h, [&](int i, int j, float beside) __attribute__((always_inline)) {
                 const int row = 8 * i + j;
+                if (!is_near[row]) return;
                 const Float8 share = (up2 + beside) * scale;
                 const Float8 same = at(leaf.normal[0].data(), row) * p.axes[2][0] +
                                     at(leaf.normal[1].data(), row) * p.axes[2][1] +

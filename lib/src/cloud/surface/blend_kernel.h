@@ -20,7 +20,7 @@ struct BlendLeaf {
     alignas(32) std::array<float, 512> sum, weight;  ///< of the signed distances to those on the nearest one's side
 };
 
-/// Fills a leaf of voxels of edge h.
-void blend(const BlendPiece* pieces, std::size_t count, float h, BlendLeaf& leaf);
+/// Fills a leaf of voxels of edge h. Rows that are farther than `limit` from their nearest pieces hear of these alone.
+void blend(const BlendPiece* pieces, std::size_t count, float h, float limit, BlendLeaf& leaf);
 
 }  // namespace covol::cloud

@@ -2,6 +2,7 @@
 
 #include <openvdb/openvdb.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +14,7 @@
 #include "cloud/surface/local_fit.h"
 #include "covol/error.h"
 #include "grid/flood_tiles.h"
+#include "grid/leaf_band.h"
 #include "points/point_cells.h"
 
 namespace covol::cloud {
@@ -23,7 +25,8 @@ using Leaf = FloatGrid::TreeType::LeafNodeType;
 /// Quadrics where they act, sorted into cells.
 class CloudField::Pieces {
 public:
-    Pieces(std::vector<Quadric> quadrics, double h) : quadrics_(std::move(quadrics)), cells_(feet(quadrics_), 4 * h) {
+    Pieces(std::vector<Quadric> quadrics, double h)
+        : quadrics_(std::move(quadrics)), h_(h), cells_(feet(quadrics_), 4 * h) {
         std::vector<Quadric> sorted;
         for (const std::uint32_t n : cells_.order()) {
             const Quadric& q = quadrics_[n];
@@ -42,6 +45,24 @@ public:
     [[nodiscard]] const Quadric& operator[](std::size_t n) const { return quadrics_[n]; }
     [[nodiscard]] double reach(std::size_t n) const { return double(reach_[n]); }
     [[nodiscard]] const Vec3& foot(std::size_t n) const { return cells_.sorted()[n]; }
+    /// How far beside its foot a piece may be the nearest: where the surface goes on there is a nearer one.
+    [[nodiscard]] double own_radius(std::size_t n) const {
+        const Quadric& q = quadrics_[n];
+        return std::max({kBlend.beside_of_least * q.least_radius, kBlend.least_reach_voxels * h_,
+                         kBlend.beside_of_apart * q.apart});
+    }
+    /// Half the sides of a box around the foot that holds what the piece alone says of the band around the surface.
+    [[nodiscard]] Vec3 own_box(std::size_t n) const {
+        const Quadric& q = quadrics_[n];
+        const double beside = std::min(own_radius(n), reach(n));
+        const double up = kHalfWidthVoxels * h_ + 0.5 * q.curvature() * beside * beside;
+        Vec3 half;
+        for (int a = 0; a < 3; ++a) {
+            const double along = q.axes[2][a];
+            half[a] = std::min(reach(n), beside * std::sqrt(std::max(0.0, 1 - along * along)) + up * std::abs(along));
+        }
+        return half;
+    }
     /// Those that may reach the box.
     void find(const WorldBox& box, std::vector<PointCells::Range>& ranges) const {
         WorldBox wide = box;
@@ -60,6 +81,7 @@ private:
         return at;
     }
     std::vector<Quadric> quadrics_;
+    double h_;
     PointCells cells_;
     std::vector<float> reach_;
     double longest_ = 0;
@@ -69,46 +91,95 @@ namespace {
 
 constexpr double kMostLeaves = 2e7;  // in a list, before those that are listed twice are gone
 
-/// The leaves of the domain that quadrics reach or the indicator's surface passes.
+/// Leaves of the domain, from boxes of voxels.
+class LeafList {
+public:
+    explicit LeafList(const Domain& domain) : domain_(domain) {}
+
+    void add(const Vec3& low, const Vec3& high) {
+        Coord first, last;
+        for (int a = 0; a < 3; ++a) {
+            first[a] = std::max(int(std::floor(low[a])), domain_.min[a]) & ~7;
+            last[a] = std::min(int(std::ceil(high[a])), domain_.max[a]) & ~7;
+        }
+        if (first == first_ && last == last_) return;  // boxes come in the order of their places
+        first_ = first, last_ = last;
+        for (int i = first.x(); i <= last.x(); i += 8)
+            for (int j = first.y(); j <= last.y(); j += 8)
+                for (int k = first.z(); k <= last.z(); k += 8) leaves_.emplace_back(i, j, k);
+        if (leaves_.size() > 2 * settled_ + 100000) settle();
+    }
+    /// Sorted, each once.
+    std::vector<Coord> take() {
+        settle();
+        return std::move(leaves_);
+    }
+
+private:
+    void settle() {
+        std::sort(leaves_.begin(), leaves_.end());
+        leaves_.erase(std::unique(leaves_.begin(), leaves_.end()), leaves_.end());
+        settled_ = leaves_.size();
+    }
+    const Domain& domain_;
+    std::vector<Coord> leaves_;
+    std::size_t settled_ = 0;
+    Coord first_ = Coord::max(), last_ = Coord::min();
+};
+
+/// The leaves of the domain where quadrics alone have their surface's band, or the indicator's surface passes.
 /// @throws Error InvalidInput where the indicator's cells are so much larger than the voxels that its surface alone has
 /// more leaves than memory holds: of parts that are small and far apart.
 std::vector<Coord> leaves_of(const CloudField::Pieces& pieces, const Indicator& indicator, const Domain& domain) {
-    std::vector<Coord> leaves;
-    const auto add = [&](const Vec3& low, const Vec3& high) {
-        Coord first, last;
-        for (int a = 0; a < 3; ++a) {
-            first[a] = std::max(int(std::floor(low[a])), domain.min[a]) & ~7;
-            last[a] = std::min(int(std::ceil(high[a])), domain.max[a]);
+    constexpr std::size_t kParts = 32;
+    std::vector<std::vector<Coord>> parts(kParts + 1);
+    const double h = domain.voxel_size;
+    tbb::parallel_for(std::size_t(0), kParts, [&](std::size_t part) {
+        LeafList list(domain);
+        for (std::size_t n = part * pieces.size() / kParts; n < (part + 1) * pieces.size() / kParts; ++n) {
+            const Vec3 foot = domain.world_to_index(pieces.foot(n)), half = pieces.own_box(n);
+            list.add(minus(foot, times(1 / h, half)), plus(foot, times(1 / h, half)));
         }
-        for (int i = first.x(); i <= last.x(); i += 8)
-            for (int j = first.y(); j <= last.y(); j += 8)
-                for (int k = first.z(); k <= last.z(); k += 8) leaves.emplace_back(i, j, k);
-    };
-    const auto settle = [&] {
-        std::sort(leaves.begin(), leaves.end());
-        leaves.erase(std::unique(leaves.begin(), leaves.end()), leaves.end());
-    };
-    for (std::size_t n = 0; n < pieces.size(); ++n) {
-        Vec3 low = domain.world_to_index(pieces.foot(n)), high = low;
-        for (int a = 0; a < 3; ++a) {
-            low[a] -= pieces.reach(n) / domain.voxel_size;
-            high[a] += pieces.reach(n) / domain.voxel_size;
-        }
-        add(low, high);
-        if (leaves.size() > 1000000) settle();
-    }
-    const double across = indicator.cell() / domain.voxel_size, in_a_cell = std::pow(across / 8 + 2, 3);
+        parts[part] = list.take();
+    });
+    const double across = indicator.cell() / h, in_a_cell = std::pow(across / 8 + 2, 3);
     double crossed = 0;
+    LeafList list(domain);
     indicator.crossed([&](const WorldBox& box) {
         if ((crossed += in_a_cell) > kMostLeaves)
             throw Error(Errc::InvalidInput,
                         "reconstruct: the points are small parts, far apart: the finest cells that see the whole are " +
                             std::to_string(std::int64_t(across)) +
                             " voxels wide; take the parts one by one, or a larger `voxel_size`");
-        add(domain.world_to_index(box.min), domain.world_to_index(box.max));
+        list.add(domain.world_to_index(box.min), domain.world_to_index(box.max));
     });
-    settle();
+    parts[kParts] = list.take();
+    std::vector<Coord> leaves;
+    for (const std::vector<Coord>& part : parts) leaves.insert(leaves.end(), part.begin(), part.end());
+    tbb::parallel_sort(leaves.begin(), leaves.end());
+    leaves.erase(std::unique(leaves.begin(), leaves.end()), leaves.end());
     return leaves;
+}
+
+/// Steps to the leaves across those faces of a leaf where the band around the surface goes on.
+std::vector<Coord> ways_on(const Leaf& leaf, float limit) {
+    const float* values = leaf.buffer().data();
+    const auto inside = [&](int i, int j, int k) { return std::abs(values[i << 6 | j << 3 | k]) < limit; };
+    bool on[6] = {};
+    for (int a = 0; a < 8; ++a)
+        for (int b = 0; b < 8; ++b) {
+            on[0] |= inside(0, a, b), on[1] |= inside(7, a, b);
+            on[2] |= inside(a, 0, b), on[3] |= inside(a, 7, b);
+            on[4] |= inside(a, b, 0), on[5] |= inside(a, b, 7);
+        }
+    std::vector<Coord> ways;
+    for (int face = 0; face < 6; ++face)
+        if (on[face]) {
+            Coord way(0, 0, 0);
+            way[face / 2] = face % 2 == 0 ? -8 : 8;
+            ways.push_back(way);
+        }
+    return ways;
 }
 
 /// Fills one leaf.
@@ -123,8 +194,8 @@ public:
         const WorldBox box{domain_.index_to_world({double(origin.x()), double(origin.y()), double(origin.z())}),
                            domain_.index_to_world({origin.x() + 7.0, origin.y() + 7.0, origin.z() + 7.0})};
         gather(box);
-        blend(near_.data(), near_.size(), float(h), leaf_);
         const double limit = kHalfWidthVoxels * h;
+        blend(near_.data(), near_.size(), float(h), float(kBlend.far_bands * limit), leaf_);
         for (int at = 0; at < 512; ++at) {
             double own = 0, trust = 0;
             const std::size_t n = std::size_t(at);
@@ -149,16 +220,11 @@ private:
         return 1 - beyond * beyond * (3 - 2 * beyond);
     }
 
-    /// How far a place lies beside the nearest foot, not above it, as a share of what points lie apart: where the
-    /// surface goes on there is a nearer one.
+    /// How far a place lies beside the nearest foot, not above it, as a share of what it may.
     [[nodiscard]] double beside(std::size_t piece, const Vec3& world) const {
-        const Quadric& q = pieces_[piece];
         const Vec3 to = minus(world, pieces_.foot(piece));
-        const double up = dot(to, q.axes[2]);
-        const double expected =
-            std::max({kBlend.beside_of_least * q.least_radius, kBlend.least_reach_voxels * domain_.voxel_size,
-                      kBlend.beside_of_apart * q.apart});
-        return std::sqrt(std::max(0.0, dot(to, to) - up * up)) / expected;
+        const double up = dot(to, pieces_[piece].axes[2]);
+        return std::sqrt(std::max(0.0, dot(to, to) - up * up)) / pieces_.own_radius(piece);
     }
 
     [[nodiscard]] Vec3 place(const Coord& origin, int at) const {
@@ -208,15 +274,35 @@ private:
 /// band.
 FloatGridPtr level_set_of(const CloudField::Pieces& pieces, const Indicator& indicator, const Domain& domain,
                           const RunContext& run) {
-    FloatGridPtr field = make_grid(domain, float(kHalfWidthVoxels * domain.voxel_size), "u");
-    std::vector<Leaf*> leaves;
-    for (const Coord& origin : leaves_of(pieces, indicator, domain)) leaves.push_back(field->tree().touchLeaf(origin));
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 8), [&](const auto& range) {
-        if (run.cancelled()) return;
-        Blend blend(pieces, indicator, domain);
-        for (std::size_t n = range.begin(); n < range.end(); ++n) blend.fill(*leaves[n]);
-    });
-    run.check();
+    const auto limit = float(kHalfWidthVoxels * domain.voxel_size);
+    FloatGridPtr field = make_grid(domain, limit, "u");
+    const openvdb::CoordBBox box = detail::box_of(domain);
+    // From leaf to leaf, as far as the band goes.
+    for (std::vector<Coord> front = leaves_of(pieces, indicator, domain); !front.empty();) {
+        std::vector<Leaf*> leaves;
+        for (const Coord& origin : front) leaves.push_back(field->tree().touchLeaf(origin));
+        std::vector<std::vector<Coord>> ways(leaves.size());
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 8), [&](const auto& range) {
+            if (run.cancelled()) return;
+            Blend blend(pieces, indicator, domain);
+            for (std::size_t n = range.begin(); n < range.end(); ++n) {
+                blend.fill(*leaves[n]);
+                ways[n] = ways_on(*leaves[n], limit);
+            }
+        });
+        run.check();
+        std::vector<Coord> next;
+        for (std::size_t n = 0; n < leaves.size(); ++n)
+            for (const Coord& way : ways[n]) {
+                const Coord origin = front[n] + way;
+                if (box.hasOverlap(openvdb::CoordBBox::createCube(origin, 8)) &&
+                    field->tree().probeConstLeaf(origin) == nullptr)
+                    next.push_back(origin);
+            }
+        std::sort(next.begin(), next.end());
+        next.erase(std::unique(next.begin(), next.end()), next.end());
+        front = std::move(next);
+    }
     detail::flood_tiles(*field, domain);
     return field;
 }

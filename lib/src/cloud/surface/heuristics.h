@@ -73,6 +73,8 @@ struct CloudSurfaceHeuristics {
     double beside_of_least = heuristic("blend.beside_of_least", 0.75);
     /// [distances between nodes] The same.
     double beside_of_apart = heuristic("blend.beside_of_apart", 2);
+    /// [half widths of the band] From the nearest quadric: beyond, the others are not asked.
+    double far_bands = heuristic("blend.far_bands", 1.5);
     /// [reaches] Beyond, the indicator takes over.
     double trusted = heuristic("blend.trusted", 0.6);
     /// [indicator per cell] At the surface; it makes a distance of the indicator.

@@ -55,19 +55,36 @@ struct Level {
 
 struct Scratch {
     std::vector<PointCells::Range> ranges;
+    std::vector<std::uint32_t> kept;
     FitPoints near;  // in radii
 };
 
-Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes, Scratch& scratch) {
-    const double r = level.radius, r2 = r * r;
-    FitPoints& near = scratch.near;
-    near.clear();
+/// Those of the ranges' points within the radius whose normals are on this side. No branch depends on a point: which
+/// of them count is as good as random.
+void keep_near(const Level& level, const Vec3& origin, const Vec3& normal, Scratch& scratch) {
+    std::size_t all = 0;
+    for (const PointCells::Range& range : scratch.ranges) all += range.end - range.begin;
+    scratch.kept.resize(all + 1);
+    std::uint32_t* to_next = scratch.kept.data();
+    const double r2 = level.radius * level.radius;
     for (const PointCells::Range& range : scratch.ranges)
         for (std::uint32_t n = range.begin; n < range.end; ++n) {
             const Vec3 to = minus(level.cells.sorted()[n], origin);
-            if (dot(to, to) >= r2 || dot(level.normals[n], axes[2]) <= 0) continue;
-            near.add(dot(to, axes[0]) / r, dot(to, axes[1]) / r, dot(to, axes[2]) / r, double(level.counts[n]));
+            *to_next = n;
+            to_next += int(dot(to, to) < r2) & int(dot(level.normals[n], normal) > 0);
         }
+    scratch.kept.resize(std::size_t(to_next - scratch.kept.data()));
+}
+
+Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes, Scratch& scratch) {
+    const double r = level.radius;
+    FitPoints& near = scratch.near;
+    near.clear();
+    keep_near(level, origin, axes[2], scratch);
+    for (const std::uint32_t n : scratch.kept) {
+        const Vec3 to = minus(level.cells.sorted()[n], origin);
+        near.add(dot(to, axes[0]) / r, dot(to, axes[1]) / r, dot(to, axes[2]) / r, double(level.counts[n]));
+    }
     Fit result;
     if (near.size < kFit.least_points) return result;
     near.fill_up();
