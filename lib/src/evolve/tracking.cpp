@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "base/large_allocator.h"
 #include "covol/error.h"
 #include "grid/halo.h"
 #include "redistance/local_distance.h"
@@ -57,7 +58,8 @@ std::vector<Coord> track_surface_near(const std::vector<Coord>& stale, FloatGrid
     const HaloField values = gather(region, u, false, [h](const LeafNode* leaf, float tile, float* block) {
         for (int n = 0; n < kLeafSize; ++n) block[n] = (leaf != nullptr ? leaf->getValue(n) : tile) / h;
     });
-    std::vector<float> cuts(zone_size * LocalDistance::kCuts), distances(region.size() * kLeafSize);
+    std::vector<float, LargeAllocator<float>> cuts(zone_size * LocalDistance::kCuts),
+        distances(region.size() * kLeafSize);
     LocalDistance local(region, values, zone, domain, limit, kWidth, {cuts.data(), distances.data(), place.data()});
     local.compute();
 

@@ -33,9 +33,9 @@ void blur(double* values, int count, int stride, double sigma) {
 }  // namespace
 
 void BorderProfile::Counts::add(const Counts& other, double weight) {
-    for (std::size_t n = 0; n < border.size(); ++n) border[n] += weight * other.border[n];
-    for (std::size_t n = 0; n < inside.size(); ++n) inside[n] += weight * other.inside[n];
-    for (std::size_t n = 0; n < outside.size(); ++n) outside[n] += weight * other.outside[n];
+    add_weighted(border.data(), other.border.data(), weight, border.size());
+    add_weighted(inside.data(), other.inside.data(), weight, inside.size());
+    add_weighted(outside.data(), other.outside.data(), weight, outside.size());
 }
 
 BorderProfile::BorderProfile(std::vector<MarkedPlace> places) : places_(std::move(places)) {
@@ -99,7 +99,7 @@ BorderProfile::Counts BorderProfile::count(const MarkedPlace& place) const {
 }
 
 BorderProfile::Counts BorderProfile::sum(const std::vector<double>& weights) const {
-    constexpr double kNothing = 1e-12;  // of a place
+    constexpr double kNothing = 1e-8;  // of a place
     const auto ones = std::count(weights.begin(), weights.end(), 1.0);
     const double most = 2 * ones > std::ptrdiff_t(weights.size()) ? 1.0 : 0.0;  // all but a few have it
     Counts total = most > 0 ? all_ : Counts();

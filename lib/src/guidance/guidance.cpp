@@ -15,6 +15,7 @@
 #include "covol/domain.h"
 #include "covol/start.h"
 #include "covol/surface.h"
+#include "guidance/grid_sampler.h"
 #include "guidance/heuristics.h"
 #include "guidance/learning.h"
 #include "guidance/wide_distance.h"
@@ -151,7 +152,7 @@ bool Guide::place_marks(bool first) {
                 patch[m] = i;
             }
         }
-        residual[m] = value_at(*distance_->grid(), domain_, marks_[m]);
+        residual[m] = GridSampler(*distance_->grid(), domain_)(marks_[m]);
     });
     // Marks of one patch are one mark; those far away mean another surface.
     std::map<std::size_t, std::vector<std::size_t>> by_patch;
@@ -198,9 +199,9 @@ void Guide::set_ranges() {
     home_.assign(count, 0.0);
     std::vector<double> reach(count), broad2(count);
     tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
+        const GridSampler to_start(*start_, domain_);
         for (std::uint32_t n = patches_.first[i]; n < patches_.first[i + 1]; ++n)
-            home_[i] -= value_at(*start_, domain_, patches_.places[patches_.members[n]]) /
-                        (patches_.first[i + 1] - patches_.first[i]);
+            home_[i] -= to_start(patches_.places[patches_.members[n]]) / (patches_.first[i + 1] - patches_.first[i]);
         reach[i] = std::min(0.5 * to_mark_[i] + 2 * patches_.voxel[i], kGuide.longest_offset * h_);
         broad2[i] = squared(0.5 * reach[i]);
     });

@@ -1,7 +1,5 @@
 #include "guidance/learning.h"
 
-#include <openvdb/openvdb.h>
-#include <openvdb/tools/Interpolation.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 #include <limits>
 
 #include "cloud/orientation/heuristics.h"
+#include "guidance/grid_sampler.h"
 #include "guidance/heuristics.h"
 #include "points/kd_tree.h"
 
@@ -22,11 +21,6 @@ constexpr int kBeyondRange = 3 * kStepsPerVoxel, kBeyondMark = 8 * kStepsPerVoxe
 constexpr double kSteepest = 1.7320508, kSeam = 0.5;
 constexpr std::array<double, 6> kSharpness{0.05, 0.1, 0.2, 0.4, 0.7, 1.0};
 constexpr std::array<double, 4> kStray{0.02, 0.1, 0.25, 0.5};
-
-float sampled(const FloatGrid::ConstAccessor& accessor, const Domain& domain, const Vec3& world) {
-    const Vec3 at = domain.world_to_index(world);
-    return openvdb::tools::BoxSampler::sample(accessor, openvdb::Vec3d(at[0], at[1], at[2]));
-}
 
 double median(std::vector<double>& values) {
     const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
@@ -104,13 +98,9 @@ std::vector<MarkedPlace> places_of(const Scene& scene, const std::vector<PatchMa
 
 }  // namespace
 
-double value_at(const FloatGrid& grid, const Domain& domain, const Vec3& world) {
-    return sampled(grid.getConstAccessor(), domain, world);
-}
-
 PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, const SmoothImage& image) {
     const Patches& p = scene.patches;
-    const auto accessor = scene.distance.getConstAccessor();
+    const GridSampler distance(scene.distance, scene.domain);
     const double step = p.voxel[patch] / kStepsPerVoxel, h = scene.domain.voxel_size;
     struct Row {
         int lo = 0, hi = 0;
@@ -135,7 +125,7 @@ PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, cons
                     const Vec3 at{x[0] + side * away * normal[0], x[1] + side * away * normal[1],
                                   x[2] + side * away * normal[2]};
                     // Beyond the middle of a gap or of the body another part of the surface is nearer.
-                    const double room = side * sampled(accessor, scene.domain, at) - (kLearning.own_share * away - h);
+                    const double room = side * distance(at) - (kLearning.own_share * away - h);
                     if (room < 0) break;
                     checked = s + int(std::max(room - kSeam * h, 0.0) / ((kSteepest + kLearning.own_share) * step));
                 }

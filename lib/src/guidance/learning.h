@@ -71,7 +71,4 @@ private:
 /// Reads the profile of a patch as far as its surface is the nearest one and the image reaches.
 [[nodiscard]] PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, const SmoothImage& image);
 
-/// Trilinear.
-[[nodiscard]] double value_at(const FloatGrid& grid, const Domain& domain, const Vec3& world);
-
 }  // namespace covol::guidance

@@ -1,10 +1,16 @@
 #pragma once
-// Sums over the levels of brightness in profiles, eight at a time.
+// Arithmetic of profiles and of the image around them, eight values at a time.
 #include <cstddef>
 
 namespace covol::guidance {
 
 /// Σ a b. @param count  a multiple of 8
 [[nodiscard]] float sum_of_products(const float* a, const float* b, std::size_t count);
+
+/// sums += weight * values
+void add_weighted(double* sums, const double* values, double weight, std::size_t count);
+
+/// out[n] = Σ_k kernel[k] line[n + k], k < taps; what is written must not be read.
+void convolve(const float* line, const float* kernel, std::size_t taps, float* out, std::size_t count);
 
 }  // namespace covol::guidance

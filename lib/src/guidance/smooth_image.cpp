@@ -7,6 +7,7 @@
 
 #include "base/matrix.h"
 #include "base/vector.h"
+#include "guidance/profile_kernel.h"
 
 namespace covol::guidance {
 namespace {
@@ -67,7 +68,7 @@ void SmoothImage::smooth(int axis, double sigma) {
     const std::size_t stride1 = a1 == 0 ? 1 : std::size_t(size_[0]);
     const std::size_t stride2 = a2 == 1 ? std::size_t(size_[0]) : std::size_t(size_[0]) * size_[1];
     tbb::parallel_for(0, size_[a2], [&](int n2) {
-        std::vector<float> line(std::size_t(count) + 2 * radius);
+        std::vector<float> line(std::size_t(count) + 2 * radius), out(line.size());
         for (int n1 = 0; n1 < size_[a1]; ++n1) {
             float* base = values_.data() + n1 * stride1 + n2 * stride2;
             const auto at = [&](int n) { return base[std::size_t(std::clamp(n, 0, count - 1)) * stride]; };
@@ -77,11 +78,8 @@ void SmoothImage::smooth(int axis, double sigma) {
                 line[n + radius] = n < 0        ? 2 * at(0) - at(-n)
                                    : n >= count ? 2 * at(count - 1) - at(2 * (count - 1) - n)
                                                 : at(n);
-            for (int n = 0; n < count; ++n) {
-                float value = 0;
-                for (int k = 0; k <= 2 * radius; ++k) value += kernel[k] * line[n + k];
-                base[n * stride] = value;
-            }
+            convolve(line.data(), kernel.data(), kernel.size(), out.data(), std::size_t(count));
+            for (int n = 0; n < count; ++n) base[n * stride] = out[n];
         }
     });
 }

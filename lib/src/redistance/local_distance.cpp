@@ -11,7 +11,7 @@
 namespace covol::detail {
 namespace {
 
-constexpr float kFallTolerance = 1e-3F;  // voxels
+constexpr float kFallTolerance = 5e-3F;  // voxels
 constexpr float kUnclamped = 0.99F;
 
 /// A padded leaf of u; beyond the domain there is no surface.

@@ -1,6 +1,5 @@
 // Starts other than tagging: the signed distance to a given surface, clamped, in a band around it.
-#include <openvdb/tools/Dense.h>
-#include <openvdb/tools/Interpolation.h>
+#include <openvdb/openvdb.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -9,7 +8,6 @@
 #include <functional>
 #include <limits>
 #include <map>
-#include <optional>
 #include <set>
 #include <vector>
 
@@ -17,6 +15,7 @@
 #include "covol/error.h"
 #include "covol/start.h"
 #include "redistance/signed_distance.h"
+#include "start/other_lattice.h"
 
 namespace covol {
 namespace {
@@ -26,6 +25,7 @@ using detail::kLeafDim;
 using detail::kLeafSize;
 using detail::LeafArray;
 using detail::LeafBand;
+using detail::Sampler;
 
 constexpr auto kWidth = float(kHalfWidthVoxels);
 
@@ -74,9 +74,6 @@ FloatGridPtr start_from_distance(const Domain& domain, const WorldBox& box, cons
     });
     return detail::make_start(band, u, domain, where);
 }
-
-/// Values of a field at the voxels lo..hi of the domain's lattice, k fastest; negative is inside.
-using Sampler = std::function<void(const Coord& lo, const Coord& hi, float* values)>;
 
 /// Those of the leaves whose voxel edges, those to the next leaf included, the zero level set passes.
 std::vector<Coord> crossed_by(const std::vector<Coord>& leaves, const Sampler& sample) {
@@ -236,53 +233,6 @@ std::vector<Coord> leaves_crossed_from(const Domain& domain, const std::vector<V
     return crossed;
 }
 
-/// From voxels of a domain to index space of a grid with a linear transform.
-class ToSource {
-public:
-    ToSource(const Domain& domain, const openvdb::math::Transform& source) {
-        const auto index_of = [&](const Vec3& at) {
-            const Vec3 x = domain.index_to_world(at);
-            return source.worldToIndex(openvdb::Vec3d(x[0], x[1], x[2]));
-        };
-        from_ = index_of({0, 0, 0});
-        along_ = {index_of({1, 0, 0}) - from_, index_of({0, 1, 0}) - from_, index_of({0, 0, 1}) - from_};
-    }
-    openvdb::Vec3d operator()(int i, int j, int k) const {
-        return from_ + double(i) * along_[0] + double(j) * along_[1] + double(k) * along_[2];
-    }
-    /// From a voxel to the source's where the lattices coincide.
-    [[nodiscard]] std::optional<Coord> shift() const {
-        constexpr double kSame = 1e-9;  // of a voxel for each
-        for (int a = 0; a < 3; ++a)
-            for (int b = 0; b < 3; ++b)
-                if (std::abs(along_[std::size_t(a)][b] - (a == b ? 1 : 0)) > kSame) return std::nullopt;
-        const Coord nearest = Coord::round(from_);
-        return (from_ - nearest.asVec3d()).length() < 1e3 * kSame ? std::optional(nearest) : std::nullopt;
-    }
-    /// The source's voxels that interpolation at the voxels lo..hi asks for.
-    [[nodiscard]] openvdb::CoordBBox box(const Coord& lo, const Coord& hi) const {
-        openvdb::BBoxd corners;
-        for (int c = 0; c < 8; ++c)
-            corners.expand((*this)(c & 4 ? hi.x() : lo.x(), c & 2 ? hi.y() : lo.y(), c & 1 ? hi.z() : lo.z()));
-        return {Coord::floor(corners.min()), Coord::floor(corners.max()).offsetBy(1)};
-    }
-
-private:
-    openvdb::Vec3d from_;
-    std::array<openvdb::Vec3d, 3> along_;
-};
-
-/// False where all values in the box have one sign. Boxes that hold more voxels than a leaf with its next layer would
-/// take longer than what they may save.
-bool may_cross(const FloatGrid& grid, const openvdb::CoordBBox& box) {
-    if (box.volume() > 9 * 9 * 9) return true;
-    const auto accessor = grid.getConstAccessor();
-    const bool first = accessor.getValue(box.min()) < 0;
-    for (auto at = box.begin(); at; ++at)
-        if ((accessor.getValue(*at) < 0) != first) return true;
-    return false;
-}
-
 using detail::to_text;
 
 double length(const Vec3& v) { return std::hypot(v[0], v[1], v[2]); }
@@ -431,26 +381,12 @@ FloatGridPtr start_from_grid(const Domain& domain, const FloatGrid& level_set, c
         }
         std::sort(candidates.begin(), candidates.end());
         candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
-        const ToSource to_source(domain, level_set.transform());
-        const std::optional<Coord> shift = to_source.shift();
-        Sampler sample;
-        if (shift) {
-            sample = [&](const Coord& lo, const Coord& hi, float* values) {
-                openvdb::tools::Dense<float> block({*shift + lo, *shift + hi}, values);
-                openvdb::tools::copyToDense(level_set, block, true);
-            };
-        } else {
+        const detail::ToSource to_source(domain, level_set.transform());
+        if (!to_source.shift())
             candidates = filter(candidates, [&](const Coord& o) {
-                return may_cross(level_set, to_source.box(o, o.offsetBy(kLeafDim)));
+                return detail::may_cross(level_set, to_source.box(o, o.offsetBy(kLeafDim)));
             });
-            sample = [&](const Coord& lo, const Coord& hi, float* values) {
-                const auto accessor = level_set.getConstAccessor();
-                for (int i = lo.x(); i <= hi.x(); ++i)
-                    for (int j = lo.y(); j <= hi.y(); ++j)
-                        for (int k = lo.z(); k <= hi.z(); ++k)
-                            *values++ = openvdb::tools::BoxSampler::sample(accessor, to_source(i, j, k));
-            };
-        }
+        const Sampler sample = detail::sampler_of(level_set, to_source);
         result = start_from_field(domain, crossed_by(candidates, sample), sample, "start_from_grid", run);
     });
     return result;

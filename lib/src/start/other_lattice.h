@@ -1,0 +1,41 @@
+#pragma once
+// A level set on another lattice, read on a domain's.
+#include <openvdb/openvdb.h>
+
+#include <array>
+#include <functional>
+#include <optional>
+
+#include "covol/domain.h"
+#include "covol/fwd.h"
+
+namespace covol::detail {
+
+/// Values of a field at the voxels lo..hi of the domain's lattice, k fastest; negative is inside.
+using Sampler = std::function<void(const openvdb::Coord& lo, const openvdb::Coord& hi, float* values)>;
+
+/// From voxels of a domain to index space of a grid with a linear transform.
+class ToSource {
+public:
+    ToSource(const Domain& domain, const openvdb::math::Transform& source);
+    openvdb::Vec3d operator()(int i, int j, int k) const {
+        return from_ + double(i) * along_[0] + double(j) * along_[1] + double(k) * along_[2];
+    }
+    /// From a voxel to the source's where the lattices coincide.
+    [[nodiscard]] std::optional<openvdb::Coord> shift() const;
+    /// The source's voxels that interpolation at the voxels lo..hi asks for.
+    [[nodiscard]] openvdb::CoordBBox box(const openvdb::Coord& lo, const openvdb::Coord& hi) const;
+
+private:
+    openvdb::Vec3d from_;
+    std::array<openvdb::Vec3d, 3> along_;
+};
+
+/// False where all values in the box have one sign. Boxes that hold more voxels than a leaf with its next layer would
+/// take longer than what they may save.
+[[nodiscard]] bool may_cross(const FloatGrid& grid, const openvdb::CoordBBox& box);
+
+/// The grid's values where the lattices coincide, else trilinear ones. Both arguments are kept by reference.
+[[nodiscard]] Sampler sampler_of(const FloatGrid& grid, const ToSource& to_source);
+
+}  // namespace covol::detail
