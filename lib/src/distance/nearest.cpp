@@ -86,6 +86,7 @@ private:
     double radius_;
     std::unordered_map<Key, std::int32_t> lookup_;
     std::unordered_map<Key, Bin> bins_;
+    std::vector<std::array<std::int8_t, 3>> local_;  // of each point, its voxel in its leaf
     std::vector<std::int32_t> colours_[8];
     const std::array<LeafMask, 27> borders_ = border_masks();
 };
@@ -118,9 +119,12 @@ void Sweeper::take(const std::vector<Vec3>& points, const char* where) {
     tbb::parallel_sort(order.begin(), order.end());
     field.points.reserve(order.size());
     field.source.reserve(order.size());
+    local_.reserve(order.size());
     for (std::size_t n = 0; n < order.size(); ++n) {
         field.points.push_back(points[order[n].second]);
         field.source.push_back(order[n].second);
+        const Coord voxel = voxel_of(points[order[n].second]) & (kLeafDim - 1);
+        local_.push_back({std::int8_t(voxel.x()), std::int8_t(voxel.y()), std::int8_t(voxel.z())});
         Bin& bin = bins_[order[n].first];
         if (bin.end == 0) bin.begin = n;
         bin.end = n + 1;
@@ -152,11 +156,18 @@ void Sweeper::seed_leaf(NearestLeaf& leaf) const {
     for (int slot = 0; slot < 27; ++slot) {
         const auto bin = bins_.find(key(neighbour_origin(o, slot)));
         if (bin == bins_.end()) continue;
+        const Coord step = step_of(slot);
         for (std::size_t n = bin->second.begin; n < bin->second.end; ++n) {
+            Coord lo, hi;
+            bool reaches = true;
+            for (int a = 0; a < 3; ++a) {
+                const int at = local_[n][std::size_t(a)] + step[a] * kLeafDim;
+                lo[a] = std::max(at - 1, 0);
+                hi[a] = std::min(at + 1, kLeafDim - 1);
+                reaches = reaches && lo[a] <= hi[a];
+            }
+            if (!reaches) continue;
             const Vec3& p = field.points[n];
-            const Coord v = voxel_of(p) - o;
-            const Coord lo = Coord::maxComponent(v.offsetBy(-1), Coord(0));
-            const Coord hi = Coord::minComponent(v.offsetBy(1), Coord(kLeafDim - 1));
             const float x = float(p[0] - o.x()), y = float(p[1] - o.y()), z = float(p[2] - o.z());
             for (int i = lo.x(); i <= hi.x(); ++i)
                 for (int j = lo.y(); j <= hi.y(); ++j)
@@ -180,9 +191,9 @@ void Sweeper::seed() {
         const Bin bin = bins_.at(key(o));
         std::uint32_t reached = 0;
         for (; n < bin.end; ++n) {
-            const Coord v = voxel_of(field.points[n]) - o;
-            const auto lo = [&](int a) { return v[a] == 0 ? -1 : 0; };
-            const auto hi = [&](int a) { return v[a] == kLeafDim - 1 ? 1 : 0; };
+            const auto& v = local_[n];
+            const auto lo = [&](std::size_t a) { return v[a] == 0 ? -1 : 0; };
+            const auto hi = [&](std::size_t a) { return v[a] == kLeafDim - 1 ? 1 : 0; };
             for (int i = lo(0); i <= hi(0); ++i)
                 for (int j = lo(1); j <= hi(1); ++j)
                     for (int k = lo(2); k <= hi(2); ++k) reached |= 1U << neighbour_slot(i, j, k);
@@ -248,19 +259,9 @@ void Sweeper::visit(NearestLeaf& leaf) {
     NearestBlock block;
     load(leaf, block);
     sweep_nearest(block);
-    alignas(32) float squared[kLeafSize];
-    squared_distances(block, squared);
     const float reach = float(radius_ * radius_);
-    LeafMask changed{};
-    for (int i = 0; i < 8; ++i)
-        for (int j = 0; j < 8; ++j)
-            for (int k = 0; k < 8; ++k) {
-                const int at = leaf_offset(i, j, k);
-                const std::int32_t index = block.index[NearestBlock::offset(i, j, k)];
-                const bool is_news = squared[at] <= reach && (!leaf.visited || index != leaf.nearest[at]);
-                changed[i] |= std::uint64_t(is_news) << (at & 63);
-                leaf.nearest[at] = index;
-            }
+    LeafMask changed;
+    take_points(block, reach, !leaf.visited, leaf.nearest.data(), changed.data());
     leaf.visited = true;
     leaf.wanted = 0;
     // Neighbours may round a tie differently: only a leaf that has changed speaks up, so that this ends.

@@ -179,6 +179,23 @@ COVOL_CLONES void sweep_nearest(NearestBlock& block) {
     for (int i = 7; i >= 0; --i) sweep_slice(block, i, i + 1);
 }
 
+COVOL_CLONES void take_points(const NearestBlock& block, float reach, bool all, std::int32_t* nearest,
+                              std::uint64_t* changed) {
+    const Int8 bit = {1, 2, 4, 8, 16, 32, 64, 128}, any_news = Int8{} - int(all);
+    for (int i = 0; i < 8; ++i) {
+        changed[i] = 0;
+        for (int j = 0; j < 8; ++j) {
+            const Row row(block, i, j);
+            std::int32_t* to = nearest + (i * 8 + j) * 8;
+            const Int8 news = (row.squared <= reach) & (any_news | (row.p.index != load<Int8>(to))) & bit;
+            std::uint64_t bits = 0;
+            for (int k = 0; k < 8; ++k) bits |= std::uint64_t(news[k]);
+            changed[i] |= bits << (8 * j);
+            std::memcpy(to, &row.p.index, sizeof row.p.index);
+        }
+    }
+}
+
 COVOL_CLONES void squared_distances(const NearestBlock& block, float* squared) {
     for (int i = 0; i < 8; ++i)
         for (int j = 0; j < 8; ++j) {

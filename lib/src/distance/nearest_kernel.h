@@ -19,6 +19,10 @@ void sweep_nearest(NearestBlock& block);
 /// point, at a squared distance up to `reach`, from the block's own voxels.
 [[nodiscard]] unsigned faces_with_news(const NearestBlock& block, float reach);
 
+/// Takes the block's points over into `nearest`, 512 of them. @param changed  out, a bit for each voxel: its point is
+/// another one than before (or `all`) and its squared distance is at most `reach`
+void take_points(const NearestBlock& block, float reach, bool all, std::int32_t* nearest, std::uint64_t* changed);
+
 /// Squared distances of the 512 voxels to the points they hold.
 void squared_distances(const NearestBlock& block, float* squared);
 

@@ -7,8 +7,9 @@
 // Normals at vertices: the sum of the triangles' unit normals, weighted by the angle at the vertex.
 namespace covol::meshing {
 
-/// Adds what a triangle contributes to its corners' sums.
-void add_normals(const std::array<Vec3, 3>& corners, const std::array<Vec3*, 3>& sums);
+/// What a triangle contributes to its corners' sums.
+[[nodiscard]] std::array<Vec3, 3> corner_normals(const std::array<Vec3, 3>& corners);
+void add_normals(const std::array<Vec3, 3>& normals, const std::array<Vec3*, 3>& sums);
 [[nodiscard]] std::array<float, 3> unit_normal(const Vec3& sum);
 /// compute_vertex_normals() of a mesh in two parts.
 [[nodiscard]] std::vector<std::array<float, 3>> vertex_normals(const std::vector<std::array<float, 3>>& vertices,

@@ -97,7 +97,7 @@ public:
                 there[k] = meshing::to_vec3(corners[k]);
                 sums[k] = &sums_[n];
             }
-            meshing::add_normals(there, sums);
+            meshing::add_normals(meshing::corner_normals(there), sums);
             file_->triangle(t, corners);
         }
         const auto done = std::ptrdiff_t(piece.done - piece.first);
