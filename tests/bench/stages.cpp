@@ -83,7 +83,10 @@ void time_step(benchmark::State& state) {
         const FloatGridPtr u = scene.u->deepCopy();
         options.max_steps = steps;
         const Stopwatch watch;
-        const EvolveReport report = evolve(*u, {scene.distance.get(), scene.edge.get(), {}}, options, on(state));
+        EvolveFields fields;
+        fields.distance = scene.distance.get();
+        fields.edge = scene.edge.get();
+        const EvolveReport report = evolve(*u, fields, options, on(state));
         return Timed{report, watch.wall(), watch.cpu()};
     };
     EvolveReport few, many;
