@@ -1,16 +1,19 @@
 """Seeded faults in kernels and readers: which of them do the unit tests find?
 
-    /usr/bin/python3 tests/mutants/mutants.py --work FOLDER [--count 50] [--seed 1]
+    /usr/bin/python3 tests/mutants/mutants.py --work FOLDER [--count 50] [--seed 1] [--only N ...]
 
 Clones the repository's last commit into FOLDER, builds its unit tests there, and then changes one operator or constant at a
 time, builds the tests of that module, and runs them. A fault that does not compile is drawn again. Prints a line for each
 and, at the end, those that no test found: gaps, or changes that mean nothing (a bound that is never met with equality).
+Each fault has a number, and is drawn by itself: --only 7 31 has these two again, as long as their files are the same.
 """
 import argparse
+import functools
 import os
 import pathlib
 import random
 import re
+import resource
 import subprocess
 import sys
 
@@ -60,9 +63,12 @@ FAULTS = [
     (r"\btrue\b", "false"), (r"\bfalse\b", "true"), (r" \+= ", " -= "), (r"if \(!", "if ("),
 ]
 SKIPPED = re.compile(r"^\s*(//|/\*|#|using|namespace|template|static_assert|include)|throw |Error\(|run\.report|k\w+ = |\bline\(|memory|reserve")
-SECONDS = 90  # of a test: faults make loops endless
+SECONDS = 120  # of all cores together, of a test: faults make loops endless. A busy machine changes nothing about it.
+BYTES = 12 << 30  # of addresses: others make sizes absurd
+WAITING = 600  # seconds of a test that does not end and computes nothing, either
 
 
+@functools.cache
 def faults_in(path):
     """(line, column, old, new) of each place where one of the faults can be made."""
     found, text = [], path.read_text().splitlines()
@@ -74,6 +80,11 @@ def faults_in(path):
             for match in re.finditer(pattern, code):
                 found.append((number, match.start(), match.group(), new))
     return found
+
+
+def limited():
+    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
+    resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
 
 
 class Build:
@@ -104,8 +115,8 @@ class Build:
         if test.startswith("cli/"):
             command, folder = ["/usr/bin/python3", "-m", "unittest", "-f", test[4:]], self.source / "tests/cli"
         try:
-            return subprocess.run(command, cwd=folder, env={**os.environ, "COVOL": str(self.build / "bin/covol")}, timeout=SECONDS,
-                                  stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode == 0
+            return subprocess.run(command, cwd=folder, env={**os.environ, "COVOL": str(self.build / "bin/covol")}, timeout=WAITING,
+                                  preexec_fn=limited, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode == 0
         except subprocess.TimeoutExpired:
             return False
 
@@ -125,35 +136,48 @@ class Build:
             path.write_text(original)
 
 
+def draws(sources, seed, n):
+    """One (file, fault) after another for fault number n."""
+    chance, modules = random.Random(f"{seed}:{n}"), READERS if n % 2 == 0 else KERNELS
+    while True:
+        name = chance.choice(sorted(modules))
+        if places := faults_in(sources / name):
+            yield name, chance.choice(places)
+
+
+def fault_of(build, seed, n):
+    """@return fault number n, in words, and the test that found it"""
+    sources = build.source / "lib/src"
+    earlier = {next(draws(sources, seed, before)) for before in range(1, n)}
+    for name, fault in draws(sources, seed, n):
+        tests = {**KERNELS, **READERS}[name]
+        by = None if (name, fault) in earlier else build.try_fault(name, tests, fault)
+        if by is not None:
+            number, column, old, new = fault
+            line = (sources / name).read_text().splitlines()[number].strip()
+            return f"{name}:{number + 1}:{column + 1}: '{old.strip()}' to '{new.strip()}' in: {line}", by
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--work", type=pathlib.Path, required=True)
     parser.add_argument("--count", type=int, default=50)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--only", type=int, nargs="+")
     options = parser.parse_args()
     options.work.mkdir(parents=True, exist_ok=True)
     build = Build(options.work.resolve())
     build.make()
-    chance, found, survived = random.Random(options.seed), 0, []
-    while found + len(survived) < options.count:
-        modules = KERNELS if (found + len(survived)) % 2 == 0 else READERS
-        name = chance.choice(sorted(modules))
-        places = faults_in(build.source / "lib/src" / name)
-        if not places:
-            continue
-        fault = chance.choice(places)
-        by = build.try_fault(name, modules[name], fault)
-        if by is None:
-            continue
-        number, column, old, new = fault
-        line = (build.source / "lib/src" / name).read_text().splitlines()[number].strip()
-        text = f"{name}:{number + 1}:{column + 1}: '{old.strip()}' to '{new.strip()}' in: {line}"
-        print(f"{by or 'SURVIVED'}: {text}", flush=True)
+    found, survived = 0, []
+    numbers = options.only or range(1, options.count + 1)
+    for n in numbers:
+        text, by = fault_of(build, options.seed, n)
+        print(f"{n}: {by or 'SURVIVED'}: {text}", flush=True)
         if by:
             found += 1
         else:
-            survived.append(text)
-    print(f"{found} of {options.count} found; not found:", *survived, sep="\n  ")
+            survived.append(f"{n}: {text}")
+    print(f"{found} of {len(numbers)} found; not found:", *survived, sep="\n  ")
 
 
 if __name__ == "__main__":
