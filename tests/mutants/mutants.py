@@ -1,11 +1,12 @@
 """Seeded faults in kernels and readers: which of them do the unit tests find?
 
-    /usr/bin/python3 tests/mutants/mutants.py --work FOLDER [--count 50] [--seed 1] [--only N ...]
+    /usr/bin/python3 tests/mutants/mutants.py --work FOLDER [--count 50] [--seed 1] [--only N ...] [--preset ci]
 
 Clones the repository's last commit into FOLDER, builds its unit tests there, and then changes one operator or constant at a
 time, builds the tests of that module, and runs them. A fault that does not compile is drawn again. Prints a line for each
 and, at the end, those that no test found: gaps, or changes that mean nothing (a bound that is never met with equality).
 Each fault has a number, and is drawn by itself: --only 7 31 has these two again, as long as their files are the same.
+With --preset asan the sanitizers look, too, and the tests of the binary are left out.
 """
 import argparse
 import functools
@@ -82,33 +83,36 @@ def faults_in(path):
     return found
 
 
-def limited():
-    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
-    resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
-
-
 class Build:
-    def __init__(self, folder):
-        self.source, self.build = folder / "source", folder / "source/build-ci"
+    def __init__(self, folder, preset):
+        self.source, self.build, self.preset = folder / "source", folder / f"source/build-{preset}", preset
 
     def make(self):
         if not self.source.exists():
             subprocess.run(["git", "clone", "-q", ROOT, self.source], check=True)
-            subprocess.run(["cmake", "--preset", "ci"], cwd=self.source, check=True, stdout=subprocess.DEVNULL)
+        subprocess.run(["cmake", "--preset", self.preset], cwd=self.source, check=True, stdout=subprocess.DEVNULL)
         # Of a run that was stopped in the middle.
         subprocess.run(["git", "-C", self.source, "checkout", "-q", "--", "lib"], check=True)
         for name in (*KERNELS, *READERS):
             (self.source / "lib/src" / name).touch()
-        tests = sorted({test for tests in {**KERNELS, **READERS}.values() for test in tests})
+        tests = sorted({test for name in (*KERNELS, *READERS) for test in self.tests_of(name)})
         if not self.compile(tests):
             sys.exit("the tests do not build")
         for test in tests:
             if not self.passes(test):
                 sys.exit(f"{test} fails without a fault")
 
+    def tests_of(self, name):
+        return [test for test in {**KERNELS, **READERS}[name] if self.preset != "asan" or not test.startswith("cli/")]
+
     def compile(self, tests):
         targets = sorted({"covol_tool" if test.startswith("cli/") else test for test in tests})
         return subprocess.run(["ninja", "-C", self.build, *targets], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode == 0
+
+    def limit(self):
+        resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
+        if self.preset != "asan":  # which has addresses of its own by the terabyte
+            resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
 
     def passes(self, test):
         command, folder = [self.build / "tests" / test, "-a"], self.build / "tests"
@@ -116,7 +120,7 @@ class Build:
             command, folder = ["/usr/bin/python3", "-m", "unittest", "-f", test[4:]], self.source / "tests/cli"
         try:
             return subprocess.run(command, cwd=folder, env={**os.environ, "COVOL": str(self.build / "bin/covol")}, timeout=WAITING,
-                                  preexec_fn=limited, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode == 0
+                                  preexec_fn=self.limit, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode == 0
         except subprocess.TimeoutExpired:
             return False
 
@@ -150,7 +154,7 @@ def fault_of(build, seed, n):
     sources = build.source / "lib/src"
     earlier = {next(draws(sources, seed, before)) for before in range(1, n)}
     for name, fault in draws(sources, seed, n):
-        tests = {**KERNELS, **READERS}[name]
+        tests = build.tests_of(name)
         by = None if (name, fault) in earlier else build.try_fault(name, tests, fault)
         if by is not None:
             number, column, old, new = fault
@@ -164,9 +168,10 @@ def main():
     parser.add_argument("--count", type=int, default=50)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", type=int, nargs="+")
+    parser.add_argument("--preset", default="ci")
     options = parser.parse_args()
     options.work.mkdir(parents=True, exist_ok=True)
-    build = Build(options.work.resolve())
+    build = Build(options.work.resolve(), options.preset)
     build.make()
     found, survived = 0, []
     numbers = options.only or range(1, options.count + 1)

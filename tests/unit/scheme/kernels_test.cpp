@@ -1,4 +1,5 @@
 // The vectorised kernels against the formulas of the scheme written out plainly in double precision.
+#include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -212,6 +213,28 @@ struct Blocks {
 };
 
 }  // namespace
+
+TEST_CASE("beyond the domain a leaf has the values at its edge, corners and neighbours' voxels included") {
+    std::vector<float> before(kPaddedSize);
+    for (std::size_t n = 0; n < before.size(); ++n) before[n] = float(n);
+    const std::array<std::array<int, 2>, 5> ends{{{-9, 99}, {0, 99}, {-9, 7}, {0, 7}, {3, 5}}};
+    for (const auto& x : ends)
+        for (const auto& y : ends)
+            for (const auto& z : ends) {
+                const int lo[3] = {x[0], y[0], z[0]}, hi[3] = {x[1], y[1], z[1]};
+                std::vector<float> values = before;
+                mirror_outside(values.data(), lo, hi);
+                int wrong = 0;
+                for (int i = -1; i <= 8; ++i)
+                    for (int j = -1; j <= 8; ++j)
+                        for (int k = -1; k <= 8; ++k) {
+                            const int from = padded(std::clamp(i, lo[0], hi[0]), std::clamp(j, lo[1], hi[1]),
+                                                    std::clamp(k, lo[2], hi[2]));
+                            wrong += values[std::size_t(padded(i, j, k))] == before[std::size_t(from)] ? 0 : 1;
+                        }
+                CHECK(wrong == 0);
+            }
+}
 
 TEST_CASE("relaxation converges to the solution of the rows") {
     const Padded u = random_field(8, -3, 3);

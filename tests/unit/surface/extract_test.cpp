@@ -188,9 +188,12 @@ TEST_CASE("the mesh does not depend on the number of threads") {
 TEST_CASE("grids that have no closed surface are refused, an empty one gives an empty mesh") {
     CHECK(extract_mesh(*make_grid({}, 1.0F, "surface")).empty());
     CHECK_THROWS_AS(extract_mesh(*make_grid({}, -1.0F, "surface")), Error);
+    ExtractOptions options;
+    options.min_component_volume = 0.5;  // nothing was there to be too small
+    CHECK(extract_mesh(*make_grid({}, 1.0F, "surface"), options).empty());
     FloatGridPtr grid = make_grid({}, 1.0F, "surface");
     grid->tree().setValue({0, 0, 0}, -1.0F);
-    ExtractOptions options;
+    options = {};
     options.isovalue = 2.0;
     CHECK_THROWS_AS(extract_mesh(*grid, options), Error);
     grid->tree().setValue({1, 0, 0}, std::nanf(""));

@@ -108,16 +108,15 @@ void read_imagej(const TiffFacts& facts, TiffStack& stack) {
 // ---- tifffile -----------------------------------------------------------------------------------------------------
 
 /// tifffile's own description: {"shape": [58, 512, 512], "axes": "ZYX", "spacing": 1.0, "unit": "um"}.
-/// @returns whether it is one.
-bool read_tifffile(const TiffFacts& facts, TiffStack& stack) {
+void read_tifffile(const TiffFacts& facts, TiffStack& stack) {
     const auto json = nlohmann::json::parse(facts.description, nullptr, false);
-    if (!json.is_object() || !json.contains("shape") || !json.at("shape").is_array()) return false;
+    if (!json.is_object() || !json.contains("shape") || !json.at("shape").is_array()) return;
     std::vector<std::uint64_t> shape;
     for (const auto& n : json.at("shape")) shape.push_back(n.is_number_unsigned() ? n.get<std::uint64_t>() : 0);
     std::string axes;
     if (json.contains("axes") && json.at("axes").is_string()) axes = json.at("axes").get<std::string>();
     if (axes.size() != shape.size()) axes = std::string("TCZYX").substr(shape.size() < 5 ? 5 - shape.size() : 0);
-    if (axes.size() != shape.size()) return false;
+    if (axes.size() != shape.size()) return;
     stack.format = "tifffile's TIFF";
     stack.fields.emplace_back("axes", axes);
     std::uint64_t planes = 1;
@@ -146,7 +145,6 @@ bool read_tifffile(const TiffFacts& facts, TiffStack& stack) {
         stack.unit = normal_unit(json.at("unit").get<std::string>());
     // Without a resolution tifffile writes 1/1.
     if (facts.resolution[0] != 1.0F && facts.resolution_unit == 1) read_resolution(facts, stack);
-    return true;
 }
 
 // ---- OME ----------------------------------------------------------------------------------------------------------

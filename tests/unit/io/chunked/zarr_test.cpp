@@ -192,6 +192,22 @@ TEST_CASE("zarr: metadata that is large, deep or no JSON is refused") {
     CHECK(message(zarr_stores::metadata_2(2048, 2048, "|u1", "")).find("1 GiB at most") != std::string::npos);
 }
 
+TEST_CASE("zarr: a shard has 2^22 chunks at most") {
+    const Scratch scratch;
+    const std::string store = zarr_stores::write_3(scratch.path("v3"));
+    const std::string whole = bytes_of(store + "/zarr.json");
+    const auto message = [&](int side) {
+        nlohmann::json meta = nlohmann::json::parse(whole);
+        meta["shape"] = {side, 128, 128};
+        meta["chunk_grid"]["configuration"]["chunk_shape"] = meta["shape"];
+        meta["codecs"][0]["configuration"]["chunk_shape"] = {1, 1, 1};
+        zarr_stores::write(store + "/zarr.json", meta.dump());
+        return message_of([&] { static_cast<void>(read_image_info(store)); });
+    };
+    CHECK(message(256).empty());
+    CHECK(message(257).find("expected at most 4194304 chunks in a shard") != std::string::npos);
+}
+
 TEST_CASE("zarr: a store that is taken away while it is read is no image of fill values") {
     const Scratch scratch;
     const std::string store = scratch.path("large");

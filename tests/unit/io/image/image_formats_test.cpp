@@ -241,6 +241,24 @@ TEST_CASE("damaged MRC and DICOM files end in an Error, never in a crash") {
         60, slice.size() - 84);
 }
 
+TEST_CASE("MRC and DICOM headers of no size, or of no bits, are refused") {
+    const Scratch scratch;
+    for (std::size_t a = 0; a < 3; ++a) {
+        std::string flat = mrc(1);
+        put(flat, 4 * a, std::int32_t(0));
+        CHECK_THAT(message_of([&] { (void)read_image(scratch.write("f.mrc", flat)); }), Catch::Contains("MRC"));
+    }
+    std::string slice = dicom(0), stored, high;
+    element(stored, 0x28, 0x101, "US", word(16));
+    element(high, 0x28, 0x102, "US", word(15));
+    slice.erase(slice.find(high), high.size());
+    slice.replace(slice.find(stored) + 8, 2, word(0));
+    const std::string folder = scratch.path("series");
+    write_series(folder);
+    std::ofstream(folder + "/9.dcm", std::ios::binary) << slice;
+    CHECK_THAT(message_of([&] { (void)read_image(folder); }), Catch::Contains("9.dcm"));
+}
+
 TEST_CASE("damaged HDF5 files end in an Error, never in a crash", "[hdf5]") {
     const Scratch scratch;
     write_hdf5(scratch.path("f.h5"));

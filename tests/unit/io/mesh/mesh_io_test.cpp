@@ -110,6 +110,7 @@ TEST_CASE("glb has two aligned chunks whose sizes agree with the data") {
         return value;
     };
     REQUIRE(data.substr(0, 4) == "glTF");
+    CHECK(word(4) == 2);  // the version
     CHECK(word(8) == data.size());
     const std::uint32_t json = word(12);
     CHECK(json % 4 == 0);
@@ -318,6 +319,8 @@ TEST_CASE("Several meshes share an OBJ or a GLB file, each with its name") {
     const std::string obj = folder.file("s.obj");
     write_meshes(obj, meshes);
     CHECK_THAT(text_of(obj), Catch::Contains("o ve\n") && Catch::Contains("o ex e\n"));
+    // Corners have the normals of their vertices, numbered on from object to object.
+    CHECK_THAT(text_of(obj), Catch::Contains("f 1//1 3//3 2//2\n") && Catch::Contains("f 5//5 7//7 6//6\n"));
     const TriangleMesh both = read_mesh(obj);
     REQUIRE(both.vertices.size() == 8);
     REQUIRE(both.triangles.size() == 8);
