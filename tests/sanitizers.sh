@@ -21,6 +21,6 @@ LSAN_OPTIONS="suppressions=$leaks:print_suppressions=0" UBSAN_OPTIONS=print_stac
     ctest --test-dir build-asan -R '^(unit|property)/' --parallel "${COVOL_JOBS:-$(nproc)}" --timeout 3600 \
     --output-on-failure "$@" || status=$?
 gcovr --root . --filter lib/ --object-directory build-asan --exclude-throw-branches --sort-percentage \
-    --gcov-ignore-parse-errors=all --print-summary -o build-asan/coverage.txt
+    --gcov-ignore-parse-errors --print-summary -o build-asan/coverage.txt
 echo "by file: build-asan/coverage.txt"
 exit "$status"
