@@ -1,6 +1,7 @@
 // Files of the formats that have no writer in Debian's Python, and damaged files of every format.
 #include <itkHDF5ImageIO.h>
 #include <itkImageIOBase.h>
+#include <openvdb/openvdb.h>
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -220,6 +221,16 @@ TEST_CASE("a float grid of a .vdb file is an image on the box of its active voxe
     CHECK(message_of([&] { (void)read_image(scratch.path("empty.vdb")); }).find("no active voxel") !=
           std::string::npos);
     CHECK(message_of([&] { (void)read_image(scratch.path("empty.vdb") + ":x"); }).find("x") != std::string::npos);
+    a->tree().setValue({1, 0, 2}, 3.0F);
+    a->tree().setValue({3, 1, 3}, 4.0F);
+    write_vdb(scratch.path("full.vdb"), {b, a});
+    const Image image = read_image(scratch.path("full.vdb") + ":a");
+    CHECK(image.geometry().size == Index3{3, 2, 2});
+    CHECK(image.geometry().spacing == Vec3{0.5, 0.5, 0.5});
+    CHECK(image.geometry().origin == Vec3{1.5, 2, 4});
+    CHECK(image.at(0, 0, 0) == 3);
+    CHECK(image.at(2, 1, 1) == 4);
+    CHECK(image.at(1, 0, 0) == 7);  // the background
 }
 
 TEST_CASE("damaged MRC and DICOM files end in an Error, never in a crash") {
