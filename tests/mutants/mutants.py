@@ -66,7 +66,7 @@ FAULTS = [
 SKIPPED = re.compile(r"^\s*(//|/\*|#|using|namespace|template|static_assert|include)|throw |Error\(|run\.report|k\w+ = |\bline\(|memory|reserve")
 SECONDS = 120  # of all cores together, of a test: faults make loops endless. A busy machine changes nothing about it.
 BYTES = 12 << 30  # of addresses: others make sizes absurd
-WAITING = 600  # seconds of a test that does not end and computes nothing, either
+WAITING = 3600  # seconds of a test that does not end and computes nothing, either, also where it was stopped for a while
 
 
 @functools.cache
