@@ -140,3 +140,36 @@ TEST_CASE("each voxel ends with the nearer of two points, but for a few between 
     }
     CHECK(wrong < 0.002 * all);
 }
+
+TEST_CASE("points are taken over as a loop would, and those that changed within reach are told") {
+    std::mt19937 random(6);
+    std::uniform_real_distribution<float> place(-3.0F, 10.0F);
+    std::uniform_int_distribution<int> index(0, 2);
+    constexpr float kReach = 20;
+    for (const bool all : {false, true}) {
+        const auto block = no_points();
+        for (int i = 0; i < 8; ++i)
+            for (int j = 0; j < 8; ++j)
+                for (int k = 0; k < 8; ++k)
+                    set(*block, i, j, k, {place(random), place(random), place(random)}, index(random));
+        std::array<std::int32_t, 512> nearest{};
+        for (std::int32_t& n : nearest) n = index(random);
+        const auto before = nearest;
+        std::array<std::uint64_t, 8> changed{};
+        covol::detail::take_points(*block, kReach, all, nearest.data(), changed.data());
+        int told = 0;
+        for (int i = 0; i < 8; ++i)
+            for (int j = 0; j < 8; ++j)
+                for (int k = 0; k < 8; ++k) {
+                    const std::size_t at = std::size_t((i * 8 + j) * 8 + k);
+                    const std::int32_t now = block->index[NearestBlock::offset(i, j, k)];
+                    REQUIRE(nearest[at] == now);
+                    const bool is_news =
+                        (all || now != before[at]) && squared(*block, {i, j, k}, {i, j, k}) <= double(kReach);
+                    REQUIRE((changed[std::size_t(i)] >> (8 * j + k) & 1) == std::uint64_t(is_news));
+                    told += is_news;
+                }
+        CHECK(told > 50);
+        CHECK(told < 450);
+    }
+}

@@ -34,7 +34,7 @@ COVOL_INLINE void for_rows(const BlendPiece& piece, float h, Visit visit) {
         }
 }
 
-/// How far x lies above the tangent plane of a piece at its foot, and what the quadric adds to that.
+/// How far a place lies above a piece's quadric, along its axis.
 COVOL_INLINE float height_above(const BlendPiece& p, float x, float y, float z) {
     const auto along = [&](const float(&axis)[3]) __attribute__((always_inline)) {
         return axis[0] * (x - p.origin[0]) + axis[1] * (y - p.origin[1]) + axis[2] * (z - p.origin[2]);
