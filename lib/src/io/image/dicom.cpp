@@ -161,16 +161,23 @@ std::map<std::string, std::vector<Slice>> list_series(const fs::path& folder, co
     for (const auto& entry : fs::directory_iterator(folder, status))
         if (entry.is_regular_file(status)) paths.push_back(entry.path());
     std::sort(paths.begin(), paths.end());
+    std::size_t passed_over = 0;
+    std::string why;
     for (const fs::path& path : paths) {
         run.check();
-        if (!is_dicom(path.string())) continue;
+        if (!is_dicom(path.string()) || path.filename() == "DICOMDIR") continue;
         try {
             Slice slice = read_header(path.string());
             series[slice.series].push_back(std::move(slice));
         } catch (const Error& error) {
-            run.info(std::string(error.what()) + "; passed over");
+            if (passed_over++ == 0) why = error.what();
         }
     }
+    // A gap between slices is an error; at an end the volume would be shorter without a word.
+    if (passed_over > 0)
+        run.warn(why + "; passed over" +
+                 (passed_over > 1 ? ", and " + std::to_string(passed_over - 1) + " others of the folder" : "") +
+                 ": if it is a slice at an end of the series, the image is without it");
     return series;
 }
 

@@ -271,6 +271,21 @@ TEST_CASE("MRC and DICOM headers of no size, or of no bits, are refused") {
     CHECK_THAT(message_of([&] { (void)read_image(folder); }), Catch::Contains("a slice is missing"));
 }
 
+TEST_CASE("a damaged slice at the end of a DICOM series is warned of") {
+    const Scratch scratch;
+    const std::string folder = scratch.path("series");
+    write_series(folder);
+    std::filesystem::resize_file(folder + "/9.dcm", 200);  // the lowest
+    std::vector<std::string> warnings;
+    RunContext run;
+    run.log = [&](LogLevel level, const std::string& line) {
+        if (level == LogLevel::Warning) warnings.push_back(line);
+    };
+    CHECK(read_image(folder, {}, run).geometry().size[2] == kSize[2] - 1);
+    REQUIRE(warnings.size() == 1);
+    CHECK_THAT(warnings[0], Catch::Contains("9.dcm") && Catch::Contains("passed over"));
+}
+
 TEST_CASE("damaged HDF5 files end in an Error, never in a crash", "[hdf5]") {
     const Scratch scratch;
     write_hdf5(scratch.path("f.h5"));
