@@ -21,7 +21,7 @@ import numpy as np
 
 COVOL = os.environ.get("COVOL", "build/bin/covol")
 ALLOWED = {0, 3, 130}  # done, refused, interrupted
-LOADING = 0.4          # seconds, of the program's libraries; longer on a busy machine
+LOADING = 0.4          # seconds, of the program's libraries on a busy machine
 GROWTH = 24 << 20      # of all jobs together, after the first tenth of them: pools of threads and pages settle
 
 
@@ -69,12 +69,6 @@ class Folder:
         with open(self.path / "errors.txt", "ab") as errors:
             return subprocess.Popen([str(pathlib.Path(COVOL).resolve()), *map(str, words), "--quiet"], cwd=self.path, stdout=subprocess.DEVNULL,
                                     stderr=errors)
-
-    def loading(self):
-        """Seconds in which a signal may come before main(), as long as the machine is as busy as now."""
-        begin = time.monotonic()
-        self.run("--version").wait()
-        return max(LOADING, 3 * (time.monotonic() - begin))
 
     def job(self, n):
         """@return words, outputs"""
@@ -150,7 +144,7 @@ def kills(minutes, seed):
             if code == -signal.SIGKILL and there not in ([], outputs):
                 wrong.append(f"killed, and left {there} of {outputs}")
             # Before main() a signal ends a process that has touched nothing yet.
-            early = how is not None and code == -how and waited < folder.loading() and not there
+            early = how is not None and code == -how and waited < LOADING and not there
             if not early:
                 wrong += folder.problems(code, words, outputs)
             hidden = [entry.name for entry in folder.path.iterdir() if entry.name.startswith(".covol")]
