@@ -65,7 +65,7 @@ public:
             go_on();
             return;
         }
-        if (options.follow) detail::track_surface(u_, domain_, tracking_clamp(options_));
+        if (options.follow) detail::track_surface(u_, domain_, tracking_clamp(options_), run_);
         make_solver();
     }
 

@@ -4,14 +4,11 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <cmath>
-#include <string>
-#include <utility>
 
 #include "base/large_allocator.h"
-#include "covol/error.h"
 #include "grid/halo.h"
 #include "redistance/local_distance.h"
+#include "redistance/redistance.h"
 
 namespace covol::detail {
 
@@ -20,23 +17,15 @@ namespace {
 using LeafNode = FloatGrid::TreeType::LeafNodeType;
 constexpr float kWidth = float(kTrackingWidth);
 
-/// The leaves with a voxel edge that the zero level set cuts.
-std::vector<Coord> crossed_leaves(const FloatGrid& u) {
-    const LeafBand band(u);
-    const HaloField values = gather(band, u, false, [](const LeafNode* leaf, float tile, float* block) {
-        for (int n = 0; n < kLeafSize; ++n) block[n] = leaf != nullptr ? leaf->getValue(n) : tile;
-    });
-    std::vector<unsigned char> is_crossed(band.size());
+void clamp_values(FloatGrid::TreeType& tree, const LeafBand& band, float limit) {
     tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
-        alignas(64) float padded[kPaddedSize], cuts[LocalDistance::kCuts];
-        load_star(values, leaf, padded);
-        kernels().cut_edges(padded, cuts);
-        is_crossed[leaf] = *std::max_element(cuts, cuts + LocalDistance::kCuts) > 0;
+        float* values = tree.probeLeaf(band.origin(leaf))->buffer().data();
+        for (int n = 0; n < kLeafSize; ++n) values[n] = std::clamp(values[n], -limit, limit);
     });
-    std::vector<Coord> crossed;
-    for (std::size_t leaf = 0; leaf < band.size(); ++leaf)
-        if (is_crossed[leaf]) crossed.push_back(band.origin(leaf));
-    return crossed;
+    auto tile = tree.beginValueAll();
+    tile.setMaxDepth(FloatGrid::TreeType::ValueAllIter::LEAF_DEPTH - 1);
+    for (; tile; ++tile) tile.setValue(std::clamp(*tile, -limit, limit));
+    tree.root().setBackground(limit, false);
 }
 
 }  // namespace
@@ -88,25 +77,17 @@ std::vector<Coord> track_surface_near(const std::vector<Coord>& stale, FloatGrid
     return changed;
 }
 
-void track_surface(FloatGrid& u, const Domain& domain, double clamp) {
-    const auto limit = static_cast<float>(clamp * domain.voxel_size);
-    const std::vector<Coord> crossed = crossed_leaves(u), near = dilate_leaves(crossed, 1, domain);
-    const FloatGridPtr next = u.deepCopy();
-    auto& tree = next->tree();
-    std::vector<std::pair<Coord, float>> far;
-    for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
-        if (!std::binary_search(near.begin(), near.end(), leaf->origin()))
-            far.emplace_back(leaf->origin(), leaf->getFirstValue());
-    for (const auto& [origin, value] : far) tree.addTile(1, origin, value, false);
-    auto tile = tree.beginValueAll();
-    tile.setMaxDepth(FloatGrid::TreeType::ValueAllIter::LEAF_DEPTH - 1);
-    for (; tile; ++tile) tile.setValue(std::copysign(limit, *tile));
-    tree.root().setBackground(limit, false);
-    track_surface_near(crossed, *next, domain, clamp);
-    if (tree.leafCount() == 0)
-        throw Error(Errc::InvalidInput,
-                    "evolve: grid '" + u.getName() +
-                        "' has no zero crossing: nothing in the domain is inside, or nothing outside");
+void track_surface(FloatGrid& u, const Domain& domain, double clamp, const RunContext& run) {
+    const FloatGridPtr next = redistance(u, domain, kTrackingWidth, DomainEnd::Open, u.getName().c_str(), run);
+    const LeafBand band(*next);
+    tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
+        const LeafBounds bounds(domain, band.origin(leaf));
+        if (!bounds.cuts()) return;
+        auto* node = next->tree().probeLeaf(band.origin(leaf));
+        for (int n = 0; n < kLeafSize; ++n)
+            if (!bounds.contains(n >> 6, n >> 3 & 7, n & 7)) node->setValueOff(n);
+    });
+    clamp_values(next->tree(), band, static_cast<float>(clamp * domain.voxel_size));
     u.setTree(next->treePtr());
 }
 
