@@ -313,6 +313,12 @@ inline void order(Arrival& a, Arrival& b) {
     a = first;
 }
 
+/// 0 where x is not above it.
+inline Lanes root_of(Lanes x) {
+    const Lanes safe = max(x, Lanes{} + kTiny);
+    return safe * inverse_sqrt(safe);
+}
+
 /// The root x >= v of Σ q² (x - v)² = 1 over the axes whose v lies below it.
 inline Lanes arrive(Arrival a, Arrival b, Arrival c) {
     order(a, b), order(b, c), order(a, b);
@@ -322,9 +328,7 @@ inline Lanes arrive(Arrival a, Arrival b, Arrival c) {
     const auto add_axis = [&](const Arrival& next) {
         const Lanes w = next.q * next.q;
         qq += w, qv += w * next.v, vv += w * next.v * next.v;
-        const Lanes root = qv * qv - qq * (vv - one);
-        const Lanes safe = max(root, Lanes{} + kTiny);
-        const Lanes both = (qv + safe * inverse_sqrt(safe)) / qq;
+        const Lanes both = (qv + root_of(qv * qv - qq * (vv - one))) / qq;
         x = x > next.v ? both : x;
     };
     add_axis(b);
@@ -337,16 +341,12 @@ inline Lanes arrive(Arrival a, Arrival b, Arrival c) {
 
 /// The same where no edge is cut: q = 1.
 inline Lanes arrive(Lanes a, Lanes b, Lanes c) {
-    const auto root = [](Lanes x) {
-        const Lanes safe = max(x, Lanes{} + kTiny);
-        return safe * inverse_sqrt(safe);
-    };
     const Lanes lower = min(a, b), upper = max(a, b), first = min(lower, c);
     const Lanes second = max(lower, min(upper, c)) - first, third = max(upper, c) - first;
-    const Lanes two = 0.5F * (second + root(2.0F - second * second));
+    const Lanes two = 0.5F * (second + root_of(2.0F - second * second));
     const Lanes limit = broadcast(1.0F) > second ? two : broadcast(1.0F);
     const Lanes both = second + third;
-    const Lanes three = (1.0F / 3) * (both + root(both * both - 3.0F * (second * second + third * third - 1.0F)));
+    const Lanes three = (1.0F / 3) * (both + root_of(both * both - 3.0F * (second * second + third * third - 1.0F)));
     return first + (limit > third ? three : limit);
 }
 
