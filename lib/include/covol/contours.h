@@ -39,6 +39,8 @@ public:
 
     /// Negative inside; a signed distance within the plane on a slice, of the same order elsewhere (world units).
     [[nodiscard]] COVOL_API double level(const Vec3& world) const;
+    /// level() of first, first + step, ..., `count` of them.
+    COVOL_API void levels(const Vec3& first, const Vec3& step, int count, float* values) const;
     /// False only where the surface does not meet the ball.
     [[nodiscard]] COVOL_API bool may_meet(const Vec3& center, double radius) const;
     /// Holds the body.

@@ -14,6 +14,7 @@ namespace covol {
 using detail::Polygon;
 using detail::PolygonMoments;
 using detail::SliceGrid;
+using detail::SlicePlace;
 using detail::SolidSlice;
 using detail::Vec2;
 
@@ -53,67 +54,96 @@ public:
     }
 
     [[nodiscard]] double level(double x, double y, double w) const {
-        if (kind_ != Kind::Between && slice().open) return carried_on(x, y, std::abs(w - slice().w));
-        if (kind_ != Kind::Between) return slice().at(data_.grid, x, y) + beyond(std::abs(w - slice().w));
-        const SolidSlice& next = data_.slices[n_ + 1];
-        const double length = next.w - slice().w, t = (w - slice().w) / length;
-        const Vec2& s = slice().shift;
-        if (s == Vec2{0, 0}) {
-            const double here = slice().at(data_.grid, x, y), there = next.at(data_.grid, x, y);
-            const double secant = (there - here) / length;
-            return hermite(here, there, slope_below(x, y, here, secant, length) * length,
-                           slope_above(x, y, there, secant, length) * length, t);
+        if (is_shifted()) {
+            const Vec2& s = slice().shift;
+            const double t = (w - slice().w) / (data_.slices[n_ + 1].w - slice().w);
+            return (1 - t) * at(slice(), place(x - t * s[0], y - t * s[1])) +
+                   t * at(data_.slices[n_ + 1], place(x + (1 - t) * s[0], y + (1 - t) * s[1]));
         }
-        return (1 - t) * slice().at(data_.grid, x - t * s[0], y - t * s[1]) +
-               t * next.at(data_.grid, x + (1 - t) * s[0], y + (1 - t) * s[1]);
+        return level(column(place(x, y)), w);
+    }
+    /// See interval_at().
+    [[nodiscard]] bool holds(double w) const {
+        if (kind_ == Kind::Below) return w < slice().w;
+        return slice().w <= w && (kind_ == Kind::Above || w < data_.slices[n_ + 1].w);
+    }
+    /// Levels over (x, y) for w, which is in this interval, w + dw, ... @return for how many of `count`, those in it
+    [[nodiscard]] int levels_over(double x, double y, double w, double dw, int count, float* values) const {
+        const Column c = is_shifted() ? Column{} : column(place(x, y));
+        int n = 0;
+        double at = w;
+        do values[n] = float(is_shifted() ? level(x, y, at) : level(c, at));
+        while (at = w + dw * ++n, n < count && holds(at));
+        return n;
     }
     /// Of the level within a ball around a position of the plane, whatever w is; upper is not needed on domes.
     [[nodiscard]] std::array<double, 2> range(double x, double y, double radius) const {
-        const double here = slice().at(data_.grid, x, y);
+        const Column c = column(place(x, y));
         if (kind_ != Kind::Between && slice().open) {
             // Neither section's level changes faster than the position does.
             const double height = slice().cap + radius, share = height / std::abs(slice().w - inner().w);
-            return {std::min(here, carried_on(x, y, height)) - (1 + 2 * share) * radius,
+            return {std::min(c.here, carried_on(c, height)) - (1 + 2 * share) * radius,
                     std::numeric_limits<double>::max()};
         }
-        if (kind_ != Kind::Between) return {here - radius, std::numeric_limits<double>::max()};
-        const double there = data_.slices[n_ + 1].at(data_.grid, x, y);
+        if (kind_ != Kind::Between) return {c.here - radius, std::numeric_limits<double>::max()};
         const double reach = radius + std::hypot(slice().shift[0], slice().shift[1]);
-        return {std::min(here, there) - reach, std::max(here, there) + reach};
+        return {std::min(c.here, c.there) - reach, std::max(c.here, c.there) + reach};
     }
     /// The surface's points strictly inside the interval: one for each lattice line that it crosses along the axis its
     /// normal is closest to. In the frame (x, y, w).
     void append_surface(double step, std::vector<Vec3>& points) const;
 
 private:
+    [[nodiscard]] SlicePlace place(double x, double y) const { return place_in(data_.grid, x, y); }
+    [[nodiscard]] double at(const SolidSlice& section, const SlicePlace& p) const { return section.at(data_.grid, p); }
+
+    /// What the level is made of along w over a position of the plane, where the sections are not shifted.
+    struct Column {
+        double here, there;  ///< levels of this slice and the next one; of an open end, the one within
+        double begin, end;   ///< slopes times the length between the two
+    };
+    [[nodiscard]] Column column(const SlicePlace& p) const {
+        const double here = at(slice(), p);
+        if (kind_ != Kind::Between) return {here, slice().open ? at(inner(), p) : 0, 0, 0};
+        const SolidSlice& next = data_.slices[n_ + 1];
+        const double length = next.w - slice().w, there = at(next, p), secant = (there - here) / length;
+        return {here, there, slope_below(p, here, secant, length) * length,
+                slope_above(p, there, secant, length) * length};
+    }
+    [[nodiscard]] double level(const Column& c, double w) const {
+        if (kind_ == Kind::Between)
+            return hermite(c.here, c.there, c.begin, c.end, (w - slice().w) / (data_.slices[n_ + 1].w - slice().w));
+        const double height = std::abs(w - slice().w);
+        return slice().open ? carried_on(c, height) : c.here + beyond(height);
+    }
+    /// Beyond an open end the level goes on as it came.
+    [[nodiscard]] double carried_on(const Column& c, double height) const {
+        return c.here + height / std::abs(slice().w - inner().w) * (c.here - c.there);
+    }
     /// Slopes of the level along w at the interval's two slices; beyond an end slice the dome goes on.
-    [[nodiscard]] double slope_below(double x, double y, double here, double secant, double length) const {
+    [[nodiscard]] double slope_below(const SlicePlace& p, double here, double secant, double length) const {
         if (n_ == 0 && slice().open) return secant;
         if (n_ == 0) return monotone_slope(-slice().depth / slice().cap, slice().cap, secant, length);
         const SolidSlice& before = data_.slices[n_ - 1];
         const double left = slice().w - before.w;
-        return monotone_slope((here - before.at(data_.grid, x, y)) / left, left, secant, length);
+        return monotone_slope((here - at(before, p)) / left, left, secant, length);
     }
-    [[nodiscard]] double slope_above(double x, double y, double there, double secant, double length) const {
+    [[nodiscard]] double slope_above(const SlicePlace& p, double there, double secant, double length) const {
         const SolidSlice& next = data_.slices[n_ + 1];
         if (n_ + 2 == data_.slices.size() && next.open) return secant;
         if (n_ + 2 == data_.slices.size()) return monotone_slope(secant, length, next.depth / next.cap, next.cap);
         const SolidSlice& after = data_.slices[n_ + 2];
         const double right = after.w - next.w;
-        return monotone_slope(secant, length, (after.at(data_.grid, x, y) - there) / right, right);
+        return monotone_slope(secant, length, (at(after, p) - there) / right, right);
     }
     [[nodiscard]] const SolidSlice& slice() const { return data_.slices[n_]; }
     /// The neighbour of an end slice.
     [[nodiscard]] const SolidSlice& inner() const { return data_.slices[kind_ == Kind::Below ? n_ + 1 : n_ - 1]; }
-    /// Beyond an open end the level goes on as it came.
-    [[nodiscard]] double carried_on(double x, double y, double height) const {
-        const double here = slice().at(data_.grid, x, y), share = height / std::abs(slice().w - inner().w);
-        return here + share * (here - inner().at(data_.grid, x, y));
-    }
     [[nodiscard]] double beyond(double height) const {
         const double cap = slice().cap;
         return dome(slice().depth, height / cap) + std::max(0.0, height - cap);
     }
+    [[nodiscard]] bool is_shifted() const { return kind_ == Kind::Between && slice().shift != Vec2{0, 0}; }
     [[nodiscard]] bool may_cross(int i, int j) const;
 
     const ContourSolid::Data& data_;
@@ -123,7 +153,7 @@ private:
 
 /// Whether the surface can pass the columns at a node and at its next ones.
 bool Interval::may_cross(int i, int j) const {
-    if (slice().shift != Vec2{0, 0} && kind_ == Kind::Between) return true;
+    if (is_shifted()) return true;
     const SliceGrid& grid = data_.grid;
     bool inside = false, outside = kind_ != Kind::Between && !slice().open;
     for (int dj = 0; dj <= 1; ++dj)
@@ -132,8 +162,9 @@ bool Interval::may_cross(int i, int j) const {
             const bool here = slice().level[node] < 0;
             bool there = kind_ == Kind::Between ? data_.slices[n_ + 1].level[node] < 0 : here;
             if (kind_ != Kind::Between && slice().open)
-                there = carried_on(grid.origin[0] + grid.cell * (i + di), grid.origin[1] + grid.cell * (j + dj),
-                                   slice().cap) < 0;
+                there = carried_on(
+                            column(place(grid.origin[0] + grid.cell * (i + di), grid.origin[1] + grid.cell * (j + dj))),
+                            slice().cap) < 0;
             inside |= here || there;
             outside |= !here || !there;
         }
@@ -148,11 +179,17 @@ void Interval::append_surface(double step, std::vector<Vec3>& points) const {
         for (int i = 0; i + 1 < grid.nx; ++i) {
             if (!may_cross(i, j)) continue;
             const double x = grid.origin[0] + grid.cell * i, y = grid.origin[1] + grid.cell * j;
+            const std::array<std::array<double, 2>, 3> corners{{{x, y}, {x + grid.cell, y}, {x, y + grid.cell}}};
+            std::array<Column, 3> columns;
+            if (!is_shifted())
+                for (int n = 0; n < 3; ++n) columns[n] = column(place(corners[n][0], corners[n][1]));
+            const auto level_at = [&](int n, double w) {
+                return is_shifted() ? level(corners[n][0], corners[n][1], w) : level(columns[n], w);
+            };
             for (int layer = 0; layer < layers; ++layer) {
                 const double w = begin() + dw * layer;
-                const double here = level(x, y, w);
-                const std::array<double, 3> next{level(x + grid.cell, y, w), level(x, y + grid.cell, w),
-                                                 level(x, y, w + dw)};
+                const double here = level_at(0, w);
+                const std::array<double, 3> next{level_at(1, w), level_at(2, w), level_at(0, w + dw)};
                 if ((next[0] < 0) == (here < 0) && (next[1] < 0) == (here < 0) && (next[2] < 0) == (here < 0)) continue;
                 const std::array<double, 3> slope{(next[0] - here) / grid.cell, (next[1] - here) / grid.cell,
                                                   (next[2] - here) / dw};
@@ -232,6 +269,18 @@ ContourSolid::ContourSolid(std::shared_ptr<const Data> data) : data_(std::move(d
 double ContourSolid::level(const Vec3& world) const {
     const Vec3 p = data_->frame.from_world(world);
     return interval_at(*data_, p[2]).level(p[0], p[1], p[2]);
+}
+
+void ContourSolid::levels(const Vec3& first, const Vec3& step, int count, float* values) const {
+    const Vec3 p = data_->frame.from_world(first);
+    const Vec3 next = data_->frame.from_world({first[0] + step[0], first[1] + step[1], first[2] + step[2]});
+    const Vec3 d{next[0] - p[0], next[1] - p[1], next[2] - p[2]};
+    // Along the slices' normal a column serves all positions in its interval.
+    const bool along_w = d[0] == 0 && d[1] == 0;
+    for (int n = 0; n < count;) {
+        const double x = p[0] + n * d[0], y = p[1] + n * d[1], w = p[2] + n * d[2];
+        n += interval_at(*data_, w).levels_over(x, y, w, d[2], along_w ? count - n : 1, values + n);
+    }
 }
 
 bool ContourSolid::may_meet(const Vec3& center, double radius) const {

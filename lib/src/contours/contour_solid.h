@@ -1,29 +1,45 @@
 #pragma once
 #include <vector>
 
+#include "base/matrix.h"
 #include "contours/slice_field.h"
 #include "covol/contours.h"
 
 namespace covol::detail {
 
 /// Right-angled coordinates (x, y, w) of world length along an image's axes: w is the slices' normal.
-struct SliceFrame {
-    ImageGeometry geometry;
-    int axis = 2;  ///< the slices' normal: i, j or k
-    [[nodiscard]] int x_axis() const { return axis == 0 ? 1 : 0; }
-    [[nodiscard]] int y_axis() const { return axis == 2 ? 1 : 2; }
+class SliceFrame {
+public:
+    SliceFrame() = default;
+    /// @param axis  the slices' normal: i, j or k
+    SliceFrame(const ImageGeometry& geometry, int axis)
+        : geometry_(geometry), axis_(axis), to_axes_(inverse(geometry.direction)) {}
+
+    [[nodiscard]] int axis() const { return axis_; }
+    [[nodiscard]] int x_axis() const { return axis_ == 0 ? 1 : 0; }
+    [[nodiscard]] int y_axis() const { return axis_ == 2 ? 1 : 2; }
     [[nodiscard]] Vec3 from_index(const Vec3& index) const {
-        return {index[x_axis()] * geometry.spacing[x_axis()], index[y_axis()] * geometry.spacing[y_axis()],
-                index[axis] * geometry.spacing[axis]};
+        const Vec3& spacing = geometry_.spacing;
+        return ordered({index[0] * spacing[0], index[1] * spacing[1], index[2] * spacing[2]});
     }
-    [[nodiscard]] Vec3 from_world(const Vec3& world) const { return from_index(geometry.world_to_index(world)); }
+    [[nodiscard]] Vec3 from_world(const Vec3& world) const {
+        const Vec3& o = geometry_.origin;
+        return ordered(multiply(to_axes_, {world[0] - o[0], world[1] - o[1], world[2] - o[2]}));
+    }
     [[nodiscard]] Vec3 to_world(const Vec3& frame) const {
         Vec3 index;
-        index[x_axis()] = frame[0] / geometry.spacing[x_axis()];
-        index[y_axis()] = frame[1] / geometry.spacing[y_axis()];
-        index[axis] = frame[2] / geometry.spacing[axis];
-        return geometry.index_to_world(index);
+        index[x_axis()] = frame[0] / geometry_.spacing[x_axis()];
+        index[y_axis()] = frame[1] / geometry_.spacing[y_axis()];
+        index[axis_] = frame[2] / geometry_.spacing[axis_];
+        return geometry_.index_to_world(index);
     }
+
+private:
+    [[nodiscard]] Vec3 ordered(const Vec3& along) const { return {along[x_axis()], along[y_axis()], along[axis_]}; }
+
+    ImageGeometry geometry_;
+    int axis_ = 2;
+    Matrix3 to_axes_ = ImageGeometry{}.direction;
 };
 
 /// A slice with closed contours.
@@ -37,7 +53,9 @@ struct SolidSlice {
     bool open = false;  ///< no dome: the image ends here, and the body goes on beyond it as its sections tell
     Vec2 shift{0, 0};   ///< to the next slice's section, where the two do not overlap
 
-    [[nodiscard]] double at(const SliceGrid& grid, double x, double y) const { return sample_slice(level, grid, x, y); }
+    [[nodiscard]] double at(const SliceGrid& grid, const SlicePlace& place) const {
+        return sample_slice(level, grid, place);
+    }
 };
 
 }  // namespace covol::detail

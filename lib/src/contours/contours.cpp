@@ -164,7 +164,7 @@ void Densifier::choose_plane() {
     int best = 2;
     for (const int a : {1, 0})
         if (votes[a] > votes[best]) best = a;
-    frame_ = {geometry_, best};
+    frame_ = SliceFrame(geometry_, best);
 }
 
 /// Where a contour runs along a side of the image, in its last row of voxels, the image cuts the section: it goes on
@@ -209,11 +209,11 @@ void Densifier::join_lines() {
         std::vector<Vec3> curve = options_.curve == ContourCurve::Spline
                                       ? detail::centripetal_curve(marks, line.closed, options_.step)
                                       : marks;
-        if (has_image_ && line.closed && line.constant[frame_.axis]) curve = carried_beyond_sides(curve);
+        if (has_image_ && line.closed && line.constant[frame_.axis()]) curve = carried_beyond_sides(curve);
         for (const Vec3& p : detail::subdivide(curve, line.closed, options_.step))
             result_.along.push_back(frame_.to_world(p));
         ++(line.closed ? result_.closed : result_.open);
-        if (!line.closed || !line.constant[frame_.axis]) continue;
+        if (!line.closed || !line.constant[frame_.axis()]) continue;
         Polygon polygon;
         for (const Vec3& p : curve) polygon.push_back({p[0], p[1]});
         loops_.emplace_back(marks.front()[2], std::move(polygon));
@@ -237,7 +237,7 @@ void Densifier::make_solid() {
     auto data = std::make_shared<ContourSolid::Data>();
     data->frame = frame_;
     std::vector<std::vector<Polygon>> polygons;
-    const double same = has_image_ ? kContours.same_slice * geometry_.spacing[frame_.axis]
+    const double same = has_image_ ? kContours.same_slice * geometry_.spacing[frame_.axis()]
                                    : kContours.same_slice_of_extent * options_.step;
     for (auto& [w, polygon] : loops_) {
         if (data->slices.empty() || w - data->slices.back().w > same) {
@@ -330,13 +330,13 @@ void Densifier::cap_ends(ContourSolid::Data& data) {
     auto& slices = data.slices;
     std::vector<double> distances;
     for (std::size_t n = 0; n + 1 < slices.size(); ++n) distances.push_back(slices[n + 1].w - slices[n].w);
-    double gap = geometry_.spacing[frame_.axis];
+    double gap = geometry_.spacing[frame_.axis()];
     if (!distances.empty()) {
         std::nth_element(distances.begin(), distances.begin() + std::ptrdiff_t(distances.size() / 2), distances.end());
         gap = distances[distances.size() / 2];
     }
     result_.slice_distance = gap;
-    const double spacing = geometry_.spacing[frame_.axis];
+    const double spacing = geometry_.spacing[frame_.axis()];
     const auto cap = [&](std::size_t end, std::size_t before) {
         const bool alone = end == before, first = end < before;
         const double distance = std::abs(slices[end].w - slices[before].w);
@@ -346,7 +346,7 @@ void Densifier::cap_ends(ContourSolid::Data& data) {
         // On the image's last slice, or where the next one to be marked would lie beyond it and the sections do not end
         // before.
         const double left =
-            first ? slices[end].w + 0.5 * spacing : (geometry_.size[frame_.axis] - 0.5) * spacing - slices[end].w;
+            first ? slices[end].w + 0.5 * spacing : (geometry_.size[frame_.axis()] - 0.5) * spacing - slices[end].w;
         const double shrinks_by = slices[before].area - slices[end].area;
         const double ends_after = shrinks_by > 0 ? distance * slices[end].area / shrinks_by : 2 * gap;
         slices[end].open = left < spacing || (left <= gap && left < ends_after);
@@ -356,8 +356,8 @@ void Densifier::cap_ends(ContourSolid::Data& data) {
         cap(0, 0);
         if (options_.thickness > 0) slices[0].cap = 0.5 * options_.thickness;
         const bool only_plane =
-            std::all_of(lines_.begin(), lines_.end(), [&](const Line& l) { return l.constant[frame_.axis]; });
-        const bool one_slice = has_image_ && geometry_.size[frame_.axis] == 1;
+            std::all_of(lines_.begin(), lines_.end(), [&](const Line& l) { return l.constant[frame_.axis()]; });
+        const bool one_slice = has_image_ && geometry_.size[frame_.axis()] == 1;
         result_.flat = !(options_.thickness > 0) && only_plane && !one_slice && !has_loose_;
         return;
     }
@@ -370,8 +370,8 @@ void Densifier::summarise() {
     text << result_.marks.size() << " marks on " << result_.closed << " closed and " << result_.open
          << " open contours";
     if (result_.solid)
-        text << ", " << result_.slices << " slices across " << kAxisNames[frame_.axis] << ", " << result_.slice_distance
-             << " apart";
+        text << ", " << result_.slices << " slices across " << kAxisNames[frame_.axis()] << ", "
+             << result_.slice_distance << " apart";
     text << ": " << result_.along.size() << " points along them, " << result_.between.size() << " between";
     result_.summary = text.str();
 }

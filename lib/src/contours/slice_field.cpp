@@ -135,16 +135,13 @@ std::vector<float> signed_distance_of_polygons(const std::vector<Polygon>& polyg
     return values;
 }
 
-double sample_slice(const std::vector<float>& values, const SliceGrid& grid, double x, double y) {
+SlicePlace place_in(const SliceGrid& grid, double x, double y) {
     const double u = (x - grid.origin[0]) / grid.cell, v = (y - grid.origin[1]) / grid.cell;
     const double cu = std::clamp(u, 0.0, double(grid.nx - 1)), cv = std::clamp(v, 0.0, double(grid.ny - 1));
     const int i = std::min(int(cu), grid.nx - 2), j = std::min(int(cv), grid.ny - 2);
-    const double s = cu - i, t = cv - j;
-    const float* row = values.data() + std::size_t(j) * std::size_t(grid.nx) + std::size_t(i);
-    const double inside = (1 - t) * ((1 - s) * double(row[0]) + s * double(row[1])) +
-                          t * ((1 - s) * double(row[grid.nx]) + s * double(row[grid.nx + 1]));
-    if (u == cu && v == cv) return inside;
-    return inside + grid.cell * std::hypot(u - cu, v - cv);
+    const bool is_within = u == cu && v == cv;
+    return {std::size_t(j) * std::size_t(grid.nx) + std::size_t(i), cu - i, cv - j,
+            is_within ? 0 : grid.cell * std::hypot(u - cu, v - cv)};
 }
 
 PolygonMoments moments(const Polygon& polygon) {

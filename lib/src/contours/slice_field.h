@@ -22,8 +22,20 @@ struct SliceGrid {
 [[nodiscard]] std::vector<float> signed_distance_of_polygons(const std::vector<Polygon>& polygons,
                                                              const SliceGrid& grid);
 
+/// A position in a grid's plane, found once for all slices.
+struct SlicePlace {
+    std::size_t node = 0;  ///< of the cell's four the least
+    double s = 0, t = 0;   ///< in the cell
+    double beyond = 0;     ///< distance from the grid, in its units
+};
+[[nodiscard]] SlicePlace place_in(const SliceGrid& grid, double x, double y);
+
 /// Bilinear; beyond the grid the value at its border plus the distance to it.
-[[nodiscard]] double sample_slice(const std::vector<float>& values, const SliceGrid& grid, double x, double y);
+[[nodiscard]] inline double sample_slice(const std::vector<float>& values, const SliceGrid& grid, const SlicePlace& p) {
+    const float *row = values.data() + p.node, *next = row + grid.nx;
+    return (1 - p.t) * ((1 - p.s) * double(row[0]) + p.s * double(row[1])) +
+           p.t * ((1 - p.s) * double(next[0]) + p.s * double(next[1])) + p.beyond;
+}
 
 /// Area by the shoelace formula, and the centroid; a polygon without area has its vertices' mean.
 struct PolygonMoments {

@@ -27,9 +27,7 @@ using detail::LeafBand;
 using detail::LeafBounds;
 using LeafNode = FloatGrid::TreeType::LeafNodeType;
 
-constexpr double kHeatTolerance = 1e-4;  // relative residual
-constexpr int kMaxHeatSweeps = 100;
-constexpr int kInnerSweeps = 2;
+constexpr double kHeatTolerance = 1e-4;  // of the brightness range
 
 // The band's leaves and enough around them, with the normalised image.
 struct Window {
@@ -126,73 +124,89 @@ void for_each_padded(const Window& window, const Domain& domain, Work work) {
     });
 }
 
-/// What lies beyond a leaf's faces where nothing is known there: its own outermost layer again, so that nothing flows.
-struct MirroredFaces {
-    alignas(64) float layers[6][kLeafSize];  // only the one that touches the leaf has values
+/// A leaf and what lies across its faces, where the domain or the window ends in it or next to it: the nearest layer
+/// within again, so that nothing flows.
+class ClosedStar {
+public:
+    ClosedStar(const detail::LeafStar& star, const LeafBounds& bounds) : star_(star) {
+        if (!(bounds.contains(0, 0, 0) && bounds.contains(7, 7, 7))) {
+            const auto within = [&](int at, int a) { return std::max(std::min(at, bounds.hi[a]), bounds.lo[a]) & 7; };
+            for (int n = 0; n < kLeafSize; ++n)
+                inner_[n] = star.inner[within(n >> 6, 0) << 6 | within(n >> 3 & 7, 1) << 3 | within(n & 7, 2)];
+            star_.inner = inner_;
+        }
+        for (int a = 0; a < 3; ++a) {
+            if (bounds.lo[a] == 0) mirror(2 * a);
+            if (bounds.hi[a] == 7) mirror(2 * a + 1);
+        }
+    }
+    ClosedStar(const ClosedStar&) = delete;
+    ClosedStar& operator=(const ClosedStar&) = delete;
+    [[nodiscard]] const detail::LeafStar& star() const { return star_; }
 
-    void mirror(detail::LeafStar& star, int face) {
+private:
+    void mirror(int face) {
         const int stride = face < 2 ? 64 : face < 4 ? 8 : 1;
         const int a = stride == 64 ? 8 : 64, b = stride == 1 ? 8 : 1;
         const int from = face % 2 == 0 ? 0 : 7 * stride, to = 7 * stride - from;
         for (int n = 0; n < kLeafDim; ++n)
-            for (int m = 0; m < kLeafDim; ++m) layers[face][to + n * a + m * b] = star.inner[from + n * a + m * b];
-        star.across[face] = layers[face];
+            for (int m = 0; m < kLeafDim; ++m) layers_[face][to + n * a + m * b] = star_.inner[from + n * a + m * b];
+        star_.across[face] = layers_[face];
     }
+
+    detail::LeafStar star_;
+    alignas(64) float inner_[kLeafSize];
+    alignas(64) float layers_[6][kLeafSize];  // only the one that touches the leaf has values
 };
 
-// One visit of a leaf in an implicit heat step. Where the domain or the window ends in it or next to it, the faces
-// there are closed.
-double relax_heat(detail::LeafStar values, const float* before, float t, float omega, const LeafBounds& bounds) {
-    const detail::SchemeKernels& kernels = detail::kernels();
-    if (!bounds.cuts()) return kernels.heat(values, before, t, omega, kInnerSweeps);
-    if (bounds.contains(0, 0, 0) && bounds.contains(7, 7, 7)) {
-        MirroredFaces beyond;
-        double residual = 0.0;
-        for (int sweep = 0; sweep < kInnerSweeps; ++sweep) {
-            for (int a = 0; a < 3; ++a) {
-                if (bounds.lo[a] == 0) beyond.mirror(values, 2 * a);
-                if (bounds.hi[a] == 7) beyond.mirror(values, 2 * a + 1);
-            }
-            const double now = kernels.heat(values, before, t, omega, 1);
-            if (sweep == 0) residual = now;
-        }
-        return residual;
+// `steps` implicit steps of t h² divide a wave by (1 + 6t (1 - m))^steps, where m in [-1,1] is what the mean of the six
+// neighbours makes of it: a series in Chebyshev's polynomials of that mean, cut where the rest is below the tolerance.
+std::vector<double> heat_series(double t, int steps) {
+    const int nodes = 64 + 16 * int(std::ceil(std::sqrt(6 * t * steps)));
+    std::vector<double> values(nodes);
+    for (int j = 0; j < nodes; ++j) values[j] = std::pow(1 + 6 * t * (1 - std::cos(M_PI * (j + 0.5) / nodes)), -steps);
+    std::vector<double> series(nodes / 2);
+    double rest = 0;
+    for (std::size_t k = 0; k < series.size(); ++k) {
+        for (int j = 0; j < nodes; ++j)
+            series[k] += (k == 0 ? 1.0 : 2.0) / nodes * values[j] * std::cos(M_PI * double(k) * (j + 0.5) / nodes);
+        rest += std::abs(series[k]);
     }
-    static constexpr std::array<unsigned long long, 8> kAll = {~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL, ~0ULL};
-    alignas(64) detail::Share rows[6 * kLeafSize];
-    std::fill(std::begin(rows), std::end(rows),
-              static_cast<detail::Share>(detail::kShareUnit * t / (1.0F + 6.0F * t) + 0.5F));
-    detail::close_faces(rows, bounds.lo, bounds.hi);
-    return kernels.relax(values, before, rows, kAll.data(), omega, kInnerSweeps, {});
+    std::size_t count = 0;
+    while (count < series.size() && rest > kHeatTolerance) rest -= std::abs(series[count++]);
+    series.resize(count);
+    return series;
 }
 
-// I_t = ΔI over time σ²/2 by implicit steps.
+// I_t = ΔI over time σ²/2 by implicit steps; all of them at once (C. W. Clenshaw, Math. Comp. 9, 1955).
 void smooth(Window& window, const Domain& domain, double sigma, const RunContext& run) {
     const double time = 0.5 * sigma * sigma / (domain.voxel_size * domain.voxel_size);
     const int steps = int(std::ceil(time / kEdge.largest_heat_step - 1e-9));
     if (steps == 0) return;
-    const double t = time / steps;
-    const double jacobi = 6.0 * t / (1.0 + 6.0 * t);
-    const auto omega = static_cast<float>(2.0 / (1.0 + std::sqrt(1.0 - jacobi * jacobi)));
-    std::vector<double> residuals(window.band.size());
-    for (int step = 0; step < steps; ++step) {
+    const std::vector<double> series = heat_series(time / steps, steps);
+    const LeafBand& band = window.band;
+    const detail::LeafArray<float> image = window.image.values;
+    detail::LeafArray<float>& newest = window.image.values;  // of which the mean is taken
+    detail::LeafArray<float> other(band.size(), 0.0F, 1);
+    tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
+        for (int n = 0; n < kLeafSize; ++n) newest.leaf(leaf)[n] = float(series.back()) * image.leaf(leaf)[n];
+    });
+    for (std::size_t k = series.size() - 1; k-- > 0;) {
         run.check();
-        run.report("edge", double(step) / steps);
-        const detail::LeafArray<float> before = window.image.values;
-        double first = 0.0;
-        for (int sweep = 0; sweep < kMaxHeatSweeps; ++sweep) {
-            const auto visit = [&](std::size_t leaf) {
-                residuals[leaf] = relax_heat(detail::star_of(window.image, leaf), before.leaf(leaf),
-                                             static_cast<float>(t), omega, known_bounds(domain, window.band, leaf));
+        run.report("edge", 1 - double(k + 1) / double(series.size()));
+        const float share = float(series[k]), weight = k == 0 ? 1.0F / 6 : 1.0F / 3;
+        tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
+            const detail::LeafStar star = detail::star_of(window.image, leaf);
+            const LeafBounds bounds = known_bounds(domain, band, leaf);
+            const auto step = [&](const detail::LeafStar& u) {
+                detail::kernels().mean_step(u, image.leaf(leaf), share, weight, other.leaf(leaf));
             };
-            // Leaves of one colour share no face.
-            tbb::parallel_for(std::size_t(0), window.band.odd_begin(), visit);
-            tbb::parallel_for(window.band.odd_begin(), window.band.size(), visit);
-            double sum = 0.0;
-            for (const double r : residuals) sum += r;
-            if (sweep == 0) first = sum;
-            if (sum <= kHeatTolerance * kHeatTolerance * first) break;
-        }
+            if (bounds.cuts())
+                step(ClosedStar(star, bounds).star());
+            else
+                step(star);
+        });
+        std::swap(newest, other);
     }
 }
 

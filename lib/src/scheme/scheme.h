@@ -80,8 +80,9 @@ struct SchemeKernels {
     double (*relax)(const LeafStar& u, const float* b, const Share* c, const unsigned long long* active, float omega,
                     int inner, const NextRows& next);
 
-    /// As relax, for u_p - t Σ_q (u_q - u_p) = b_p on every voxel: one step of the implicit heat equation.
-    double (*heat)(const LeafStar& u, const float* b, float t, float omega, int inner);
+    /// out = share * image + weight * Σ_q u_q - out on every voxel, the sum over the six neighbours: a step of
+    /// Clenshaw's recurrence in their mean.
+    void (*mean_step)(const LeafStar& u, const float* image, float share, float weight, float* out);
 
     /// Mean over the 24 tetrahedra of |∇u|, per voxel; 512 values. @param u padded, with edges and corners
     void (*mean_gradient)(const float* u, float* out);

@@ -283,14 +283,18 @@ double relax(const LeafStar& u, const float* b, const Share* c, const unsigned l
     });
 }
 
-double heat(const LeafStar& u, const float* b, float t, float omega, int inner) {
-    const float scale = 1.0F / (1.0F + 6.0F * t);
-    const Lanes side = broadcast(scale * t);
-    return relax_rows(u, ~RowMask{0}, omega, inner, [b, t, scale, side](const RowStar& beside, int row) {
-        const Lanes across =
-            (load(beside.minus_i) + load(beside.plus_i)) + (load(beside.minus_j) + load(beside.plus_j));
-        return RowEquation{scale * (load(b + row) + t * across), side, side, Lanes{}};
-    });
+void mean_step(const LeafStar& u, const float* image, float share, float weight, float* out) {
+    for (int i = 0; i < 8; ++i)
+        for (int j = 0; j < 8; ++j) {
+            const int at = (i * 8 + j) * 8;
+            const RowStar beside(u, i, j);
+            const Lanes now = load(u.inner + at);
+            const Lanes below = broadcast(u.across[kMinusK][at + 7]), above = broadcast(u.across[kPlusK][at]);
+            const Lanes sum = (load(beside.minus_i) + load(beside.plus_i)) +
+                              (load(beside.minus_j) + load(beside.plus_j)) +
+                              (shifted_up(now, below) + shifted_down(now, above));
+            store(out + at, share * load(image + at) + (weight * sum - load(out + at)));
+        }
 }
 
 void mean_gradient(const float* u, float* out) {
@@ -448,6 +452,6 @@ void settle(const float* u, const float* d, float* out) {
 
 extern const SchemeKernels kKernels;
 const SchemeKernels kKernels = {
-    COVOL_TEXT(COVOL_SIMD_NAME), assemble, relax, heat, mean_gradient, eikonal, cut_edges, settle};
+    COVOL_TEXT(COVOL_SIMD_NAME), assemble, relax, mean_step, mean_gradient, eikonal, cut_edges, settle};
 
 }  // namespace covol::detail::COVOL_SIMD_NAME

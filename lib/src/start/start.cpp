@@ -332,11 +332,12 @@ FloatGridPtr start_from_contours(const Domain& domain, const ContourSolid& solid
             return solid.may_meet(domain.index_to_world({o.x() + 4.0, o.y() + 4.0, o.z() + 4.0}),
                                   kLeafRadius * domain.voxel_size);
         });
+        const Vec3 step{0, 0, domain.voxel_size};
         const Sampler sample = [&](const Coord& lo, const Coord& hi, float* values) {
+            const int count = hi.z() - lo.z() + 1;
             for (int i = lo.x(); i <= hi.x(); ++i)
-                for (int j = lo.y(); j <= hi.y(); ++j)
-                    for (int k = lo.z(); k <= hi.z(); ++k)
-                        *values++ = float(solid.level(domain.index_to_world({double(i), double(j), double(k)})));
+                for (int j = lo.y(); j <= hi.y(); ++j, values += count)
+                    solid.levels(domain.index_to_world({double(i), double(j), double(lo.z())}), step, count, values);
         };
         SampledLeaves sampled(sample);
         const std::vector<Coord> crossed = crossed_by(near, sampled);
