@@ -193,7 +193,7 @@ PatchHit InterfacePatches::nearest(const Coord& at, const Patch& patch, float bo
     const float beside = std::max(0.0F, std::sqrt(std::max(0.0F, dot(arm, arm) - along * along)) - patch.radius);
     const PatchHit none{std::numeric_limits<float>::infinity(), false};
     if (beyond * beyond + beside * beside >= bound) return none;
-    const PatchHit hit = nearest_on(fan(patch), arm.data());
+    const PatchHit hit = nearest_on(PatchFan(outline(patch)), arm.data());
     return hit.squared < bound ? hit : none;
 }
 

@@ -30,7 +30,7 @@ struct InterfacePatches {
     std::vector<Patch> patches;        ///< ordered by leaf, then by cell
     std::vector<std::array<float, 3>> vertices;
 
-    [[nodiscard]] PatchFan fan(const Patch& patch) const {
+    [[nodiscard]] PatchOutline outline(const Patch& patch) const {
         return {patch.normal.data(), patch.center.data(), vertices.data() + patch.first, static_cast<int>(patch.count)};
     }
     /// From the centre of voxel `at` to the patch; infinitely far where the square is not below `bound`.

@@ -60,34 +60,50 @@ COVOL_INLINE Hit<Real> nearest_of(const PatchFan& fan, const Real (&arm)[3]) {
     return {within < outline ? within : outline, within < outline};
 }
 
+COVOL_INLINE Float8 positive(Float8 x) { return x > 0.0F ? x : Float8{}; }
+
 COVOL_INLINE Float8 ceil_of(Float8 x) {
     const Float8 whole = __builtin_convertvector(__builtin_convertvector(x, Int8), Float8);  // towards 0
     return whole < x ? whole + 1.0F : whole;
 }
 
-/// Positions first, first + 1, ... along an axis that lie in an interval and in the leaf.
+/// Positions first, first + 1, ... along an axis that may lie within `half` of a place that moves from lane to lane.
 struct Positions {
-    Float8 first, last;
+    Float8 first;
     int most;
+    Int8 meet_leaf;
     COVOL_INLINE Positions(Float8 center, float half)
-        : first(ceil_of(center - half)), last(center + half), most(static_cast<int>(2 * half) + 1) {}
-    [[nodiscard]] COVOL_INLINE Int8 are_in(Float8 at) const { return (at <= last) & (at >= 0.0F) & (at <= 7.0F); }
-    [[nodiscard]] COVOL_INLINE Int8 meet_leaf() const { return (first <= 7.0F) & (last >= 0.0F); }
+        : first(ceil_of(center - half)),
+          most(static_cast<int>(2 * half) + 1),
+          meet_leaf((first <= 7.0F) & (center + half >= 0.0F)) {}
 };
+
+COVOL_INLINE Int8 is_in_leaf(Int8 at) { return (at & ~7) == 0; }
+
+/// No more than the squared distance to a polygon that lies in a cylinder, from a position `along` its axis and with
+/// the square `outside` off it.
+COVOL_INLINE Float8 least_square(const PatchCylinder& cylinder, Float8 along, Float8 outside) {
+    const Float8 above = positive((along < 0.0F ? -along : along) - cylinder.patch_height);
+    // (sqrt(q) - r)² >= (q - r²)² / (4 q) for q >= r²: no root.
+    const Float8 excess = positive(outside - cylinder.patch_radius * cylinder.patch_radius);
+    return (1 - 1e-5F) * (above * above + 0.25F * excess * excess / (outside + 1e-12F));
+}
 
 }  // namespace
 
-PatchFan::PatchFan(const float* axis_of, const float* center, const std::array<float, 3>* vertices, int vertex_count)
-    : count(vertex_count) {
+PatchFan::PatchFan(const PatchOutline& outline) { make(outline); }
+
+void PatchFan::make(const PatchOutline& outline) {
+    count = outline.count;
+    const auto* vertices = outline.vertices;
     const auto product = [](const float* a, const float* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; };
-    std::memcpy(axis, axis_of, sizeof axis);
     for (int n = 0; n < count; ++n) {
         Triangle& t = triangles[n];
         const auto& next = vertices[n + 1 < count ? n + 1 : 0];
         float to[3];
         for (int k = 0; k < 3; ++k) {
-            t.from[k] = vertices[n][k] - center[k];
-            to[k] = next[k] - center[k];
+            t.from[k] = vertices[n][k] - outline.center[k];
+            to[k] = next[k] - outline.center[k];
             t.edge[k] = next[k] - vertices[n][k];
         }
         for (int k = 0; k < 3; ++k)
@@ -108,40 +124,54 @@ PatchHit nearest_on(const PatchFan& fan, const float arm[3]) {
 }
 
 // Lanes lie along the axis that the polygon faces most: the cylinder's section moves from lane to lane by the slope.
-COVOL_CLONES void offer_patch(const PatchFan& fan, const PatchCylinder& cylinder, std::int32_t index,
-                              const PatchLeaf& leaf) {
+COVOL_CLONES void offer_patch(const PatchOutline& outline, const PatchCylinder& cylinder, std::int32_t index,
+                              const PatchLeaf& leaf, PatchFan& fan) {
     constexpr int kStride[3] = {64, 8, 1};
-    const auto size = [&](int a) { return std::abs(fan.axis[a]); };
+    const float* axis = outline.axis;
+    const auto size = [&](int a) { return std::abs(axis[a]); };
     const int m = size(0) >= size(1) ? (size(0) >= size(2) ? 0 : 2) : (size(1) >= size(2) ? 1 : 2);
     const int u = (m + 1) % 3, v = (m + 2) % 3;
-    if (fan.axis[m] == 0) return;
-    const float slope_u = fan.axis[u] / fan.axis[m], slope_v = fan.axis[v] / fan.axis[m];
+    if (axis[m] == 0) return;
+    const float slope_u = axis[u] / axis[m], slope_v = axis[v] / axis[m];
     const float radius = cylinder.radius;
-    const float half =
-        cylinder.half_width * size(m) + radius * std::sqrt(std::max(0.0F, 1 - fan.axis[m] * fan.axis[m]));
+    const float half = cylinder.half_width * size(m) + radius * std::sqrt(std::max(0.0F, 1 - axis[m] * axis[m]));
     const Float8 lane = {0, 1, 2, 3, 4, 5, 6, 7};
-    const Float8 along = lane - cylinder.center[m];
-    const Positions at_u(cylinder.center[u] + along * slope_u, radius * std::sqrt(1 + slope_u * slope_u));
-    const Positions at_v(cylinder.center[v] + along * slope_v, radius * std::sqrt(1 + slope_v * slope_v));
-    const Int8 in_m = (along <= half) & (along >= -half) & at_u.meet_leaf() & at_v.meet_leaf();
+    const Float8 arm_m = lane - cylinder.center[m];
+    const Positions at_u(cylinder.center[u] + arm_m * slope_u, radius * std::sqrt(1 + slope_u * slope_u));
+    const Positions at_v(cylinder.center[v] + arm_m * slope_v, radius * std::sqrt(1 + slope_v * slope_v));
+    const Int8 in_m = (arm_m <= half) & (arm_m >= -half) & at_u.meet_leaf & at_v.meet_leaf;
     if (!any(in_m)) return;
+    const Int8 voxel_m = __builtin_convertvector(lane * float(kStride[m]), Int8);
     for (int du = 0; du < at_u.most; ++du) {
         const Float8 pu = at_u.first + float(du);
-        const Int8 in_u = in_m & at_u.are_in(pu);
+        const Int8 iu = __builtin_convertvector(pu, Int8);
+        const Int8 in_u = in_m & is_in_leaf(iu);
         if (!any(in_u)) continue;
+        const Float8 arm_u = pu - cylinder.center[u];
+        const Float8 along_u = arm_m * axis[m] + arm_u * axis[u], square_u = arm_m * arm_m + arm_u * arm_u;
         for (int dv = 0; dv < at_v.most; ++dv) {
             const Float8 pv = at_v.first + float(dv);
-            const Int8 here = in_u & at_v.are_in(pv);
+            const Int8 iv = __builtin_convertvector(pv, Int8);
+            const Float8 arm_v = pv - cylinder.center[v];
+            const Float8 along = along_u + arm_v * axis[v];
+            const Float8 outside = positive(square_u + arm_v * arm_v - along * along);
+            const Int8 here = in_u & is_in_leaf(iv);
             if (!any(here)) continue;
+            const Int8 voxel = here & (voxel_m + iu * kStride[u] + iv * kStride[v]);
+            Float8 known;
+            for (int n = 0; n < 8; ++n) known[n] = leaf.squared[voxel[n]];
+            const Int8 open = here & (least_square(cylinder, along, outside) < known);
+            if (!any(open)) continue;
+            if (fan.count == 0) fan.make(outline);
             Float8 arm[3];
-            arm[m] = along;
-            arm[u] = pu - cylinder.center[u];
-            arm[v] = pv - cylinder.center[v];
+            arm[m] = arm_m;
+            arm[u] = arm_u;
+            arm[v] = arm_v;
             const Hit<Float8> hit = nearest_of(fan, arm);
-            const Int8 voxel = __builtin_convertvector(
-                lane * float(kStride[m]) + pu * float(kStride[u]) + pv * float(kStride[v]), Int8);
+            const Int8 nearer = open & (hit.squared < known);
+            if (!any(nearer)) continue;
             for (int n = 0; n < 8; ++n)
-                if (here[n]) static_cast<void>(leaf.offer(voxel[n], {hit.squared[n], hit.is_interior[n] != 0}, index));
+                if (nearer[n]) leaf.take(voxel[n], {hit.squared[n], hit.is_interior[n] != 0}, index);
         }
     }
 }

@@ -5,7 +5,15 @@
 // Distances to a polygon of the zero level set, plain functions on arrays. Lengths are voxels.
 namespace covol::detail {
 
-/// A polygon of the zero level set as a fan of triangles around its centre.
+/// A polygon of the zero level set.
+struct PatchOutline {
+    const float* axis;    ///< unit normal of the whole polygon
+    const float* center;  ///< three values
+    const std::array<float, 3>* vertices;
+    int count;  ///< 3 to PatchFan::kMaxTriangles
+};
+
+/// The polygon as a fan of triangles around its centre.
 struct PatchFan {
     static constexpr int kMaxTriangles = 12;  ///< a cell has twelve edges
     /// Of the centre and two vertices that follow each other.
@@ -18,12 +26,12 @@ struct PatchFan {
         float inverse_area;                ///< infinite where there is none
         float inverse_from, inverse_edge;  ///< of squared lengths; 0 where there is none
     };
-    float axis[3];  ///< unit normal of the whole polygon
-    int count;
+    int count = 0;  ///< none: not made yet
     Triangle triangles[kMaxTriangles];
 
-    /// @param vertices  3 to kMaxTriangles points
-    PatchFan(const float* axis, const float* center, const std::array<float, 3>* vertices, int count);
+    PatchFan() {}  // NOLINT: the triangles are large and may not be needed
+    explicit PatchFan(const PatchOutline& outline);
+    void make(const PatchOutline& outline);
 };
 
 struct PatchHit {
@@ -36,9 +44,11 @@ struct PatchHit {
 
 /// A cylinder above and below a polygon, in a leaf's voxels, and what the leaf's voxels know.
 struct PatchCylinder {
-    float center[3];
-    float radius;      ///< of the cylinder
-    float half_width;  ///< no voxel farther away asks
+    float center[3];     ///< of the polygon
+    float radius;        ///< of the cylinder
+    float half_width;    ///< no voxel farther away asks
+    float patch_radius;  ///< no part of the polygon is farther from the axis ...
+    float patch_height;  ///< ... nor from the plane through the center
 };
 struct PatchLeaf {
     float* squared;           ///< 512 squared distances
@@ -48,15 +58,20 @@ struct PatchLeaf {
     /// Voxel p takes the patch `index` where that is nearer than the one it has. @return whether it did
     [[nodiscard]] bool offer(int p, const PatchHit& hit, std::int32_t index) const {
         if (!(hit.squared < squared[p])) return false;
+        take(p, hit, index);
+        return true;
+    }
+    void take(int p, const PatchHit& hit, std::int32_t index) const {
         squared[p] = hit.squared;
         patch[p] = index;
         const std::uint64_t bit = std::uint64_t(1) << (p & 63);
         interior[p >> 6] = hit.is_interior ? interior[p >> 6] | bit : interior[p >> 6] & ~bit;
-        return true;
     }
 };
 
 /// Gives the patch `index` to the voxels of the leaf within the cylinder that are nearer to it than to what they have.
-void offer_patch(const PatchFan& fan, const PatchCylinder& cylinder, std::int32_t index, const PatchLeaf& leaf);
+/// @param fan  of the outline; made when it is needed
+void offer_patch(const PatchOutline& outline, const PatchCylinder& cylinder, std::int32_t index, const PatchLeaf& leaf,
+                 PatchFan& fan);
 
 }  // namespace covol::detail

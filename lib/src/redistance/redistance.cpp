@@ -6,6 +6,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 
@@ -53,7 +54,7 @@ public:
     // A voxel whose nearest point lies within a patch lies in the cylinder above and below it. Voxels beside a crease
     // lie in none; they, and those that slack in the patches' normals puts outside, learn from their neighbours.
     void find(const RunContext& run) {
-        tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) { seed(leaf); });
+        seed();
         // Of two voxels above the insides of their patches neither has anything to learn from the other.
         std::vector<LeafMask> beside(band_.size());
         tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t leaf) { beside[leaf] = beside_creases(leaf); });
@@ -79,29 +80,46 @@ private:
         return {squared_.leaf(leaf), patch_.leaf(leaf), interior_[leaf].data()};
     }
 
-    void seed(std::size_t leaf) {
-        const Coord origin = band_.origin(leaf);
-        for (int n = 0; n < 27; ++n) {
-            const Coord from =
-                origin.offsetBy((n / 9 - 1) * kLeafDim, (n / 3 % 3 - 1) * kLeafDim, (n % 3 - 1) * kLeafDim);
-            const auto at = std::lower_bound(interface_.leaves.begin(), interface_.leaves.end(), from);
-            if (at == interface_.leaves.end() || *at != from) continue;
-            const std::size_t m = static_cast<std::size_t>(at - interface_.leaves.begin());
-            for (std::uint32_t patch = interface_.first[m]; patch < interface_.first[m + 1]; ++patch)
-                seed_cylinder(leaf, patch);
+    /// Sources of one colour are three leaves apart: they reach no leaf in common.
+    void seed() {
+        std::array<std::vector<std::size_t>, 27> colours;
+        for (std::size_t n = 0; n < interface_.leaves.size(); ++n) {
+            const Coord at = interface_.leaves[n] >> 3;  // in leaves
+            const auto rest = [&](int a) { return std::size_t((at[a] % 3 + 3) % 3); };
+            colours[rest(0) * 9 + rest(1) * 3 + rest(2)].push_back(n);
+        }
+        for (const std::vector<std::size_t>& colour : colours)
+            tbb::parallel_for(std::size_t(0), colour.size(), [&](std::size_t n) { seed_from(colour[n]); });
+    }
+
+    void seed_from(std::size_t source) {
+        const auto own = static_cast<std::size_t>(band_.find(interface_.leaves[source]));
+        for (std::uint32_t n = interface_.first[source]; n < interface_.first[source + 1]; ++n) {
+            const Patch& patch = interface_.patches[n];
+            const Coord cell = patch.origin - band_.origin(own);
+            int lo[3], hi[3];  // the leaves that the cylinder may meet
+            for (int a = 0; a < 3; ++a) {
+                const float center = patch.center[a] + float(cell[a]);
+                const float reach = half_width_ * std::abs(patch.normal[a]) + patch.radius + kSlack;
+                lo[a] = center - reach < 0 ? -1 : 0;
+                hi[a] = center + reach > kLeafDim - 1 ? 1 : 0;
+            }
+            PatchFan fan;
+            for (int i = lo[0]; i <= hi[0]; ++i)
+                for (int j = lo[1]; j <= hi[1]; ++j)
+                    for (int k = lo[2]; k <= hi[2]; ++k)
+                        if (const std::int32_t leaf = band_.neighbours(own)[neighbour_slot(i, j, k)];
+                            leaf != band_.none())
+                            seed_cylinder(static_cast<std::size_t>(leaf), n, fan);
         }
     }
 
-    void seed_cylinder(std::size_t leaf, std::uint32_t index) {
+    void seed_cylinder(std::size_t leaf, std::uint32_t index, PatchFan& fan) {
         const Patch& patch = interface_.patches[index];
         const Coord cell = patch.origin - band_.origin(leaf);
-        PatchCylinder cylinder{{}, patch.radius + kSlack, half_width_};
-        for (int a = 0; a < 3; ++a) {
-            cylinder.center[a] = patch.center[a] + float(cell[a]);
-            const float reach = half_width_ * std::abs(patch.normal[a]) + cylinder.radius;
-            if (cylinder.center[a] + reach < 0 || cylinder.center[a] - reach > kLeafDim - 1) return;
-        }
-        offer_patch(interface_.fan(patch), cylinder, static_cast<std::int32_t>(index), known_by(leaf));
+        PatchCylinder cylinder{{}, patch.radius + kSlack, half_width_, patch.radius, patch.height};
+        for (int a = 0; a < 3; ++a) cylinder.center[a] = patch.center[a] + float(cell[a]);
+        offer_patch(interface_.outline(patch), cylinder, static_cast<std::int32_t>(index), known_by(leaf), fan);
     }
 
     /// Voxels that are not above the inside of a patch, and their neighbours in the leaf and across its faces.

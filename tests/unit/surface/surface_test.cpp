@@ -151,12 +151,21 @@ TEST_CASE("eight voxels at a time and one by one find the same distance to a pat
                              0.2F * unit(random);
         for (const auto& v : ring)
             for (std::size_t a = 0; a < 3; ++a) center[a] += v[a] / 5;
-        const detail::PatchFan fan(axis.data(), center.data(), ring.data(), 5);
-        detail::PatchCylinder cylinder{{3.4F + unit(random), 3.6F + unit(random), 3.3F + unit(random)}, 1.0F, 3.0F};
+        const detail::PatchOutline outline{axis.data(), center.data(), ring.data(), 5};
+        detail::PatchFan fan(outline);
+        detail::PatchCylinder cylinder{
+            {3.4F + unit(random), 3.6F + unit(random), 3.3F + unit(random)}, 1.0F, 3.0F, 0, 0};
+        for (const auto& v : ring) {
+            float along = 0, all = 0;
+            for (std::size_t a = 0; a < 3; ++a) along += axis[a] * (v[a] - center[a]);
+            for (std::size_t a = 0; a < 3; ++a) all += (v[a] - center[a]) * (v[a] - center[a]);
+            cylinder.patch_height = std::max(cylinder.patch_height, std::abs(along));
+            cylinder.patch_radius = std::max(cylinder.patch_radius, std::sqrt(all - along * along));
+        }
         std::vector<float> squared(512, 9.0F);
         std::vector<std::int32_t> patch(512, -1);
         std::vector<std::uint64_t> interior(8, 0);
-        detail::offer_patch(fan, cylinder, 7, {squared.data(), patch.data(), interior.data()});
+        detail::offer_patch(outline, cylinder, 7, {squared.data(), patch.data(), interior.data()}, fan);
         for (int p = 0; p < 512; ++p) {
             const float arm[3] = {float(p >> 6) - cylinder.center[0], float(p >> 3 & 7) - cylinder.center[1],
                                   float(p & 7) - cylinder.center[2]};
