@@ -11,7 +11,7 @@ import sys
 LAYERS = [
     {"base": ["api", "version", "fwd", "error", "file_set", "option_names", "run", "domain"], "scheme": []},
     {"grid": [], "mesh": ["mesh"], "io": ["vdb_io"], "io/pixels": ["image"]},
-    {"io/chunked": []},
+    {"io/chunked": [], "io/modules": []},
     {"io/hdf5": []},
     {"io/image": [], "io/mesh": ["mesh_io"], "distance": ["distance"]},
     {"image": [], "io/write": ["image_stream"], "io/points": ["points", "points_text", "point_array"], "clip": ["clip"], "edge": ["edge"], "redistance": []},

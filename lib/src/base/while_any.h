@@ -7,8 +7,9 @@ namespace covol::detail {
 
 /// Holds one Switch, which sets something process-wide of another library and sets it back in its destructor, while any
 /// of these lives: calls from several threads that overlap leave it as the first of them found it.
+/// As visible as its Switch, so that shared libraries may count together.
 template <typename Switch>
-class WhileAny {
+class __attribute__((visibility("default"))) WhileAny {
 public:
     WhileAny() {
         const std::lock_guard<std::mutex> lock(state().mutex);

@@ -71,6 +71,7 @@ std::vector<std::string> strings_of(const Hdf5Id& attribute) {
 }  // namespace
 
 Hdf5Lock::Hdf5Lock() {
+    hdf5_module();  // which may throw
     if (held_locks++ == 0) library_mutex().lock();
     H5Eget_auto2(H5E_DEFAULT, &print_, &data_);
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);

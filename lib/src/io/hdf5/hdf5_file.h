@@ -1,11 +1,11 @@
 #pragma once
-#include <hdf5.h>
-
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "io/modules/hdf5_calls.h"
 
 // HDF5 files, through the HDF5 library. Whatever stands in them may be wrong on purpose.
 namespace covol::detail {

@@ -1,9 +1,6 @@
 // DICOM slice by slice: plain pixels are read here, compressed ones and files of several frames through ITK's GDCM
 // reader. Series are put together here too: ITK's own helper neither says what lies in a folder nor finds a missing
 // slice.
-#include <gdcmTrace.h>
-#include <itkGDCMImageIO.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -13,10 +10,9 @@
 #include <optional>
 #include <sstream>
 
-#include "base/while_any.h"
 #include "io/image/dicom_header.h"
 #include "io/image/image_formats.h"
-#include "io/image/itk_call.h"
+#include "io/modules/modules.h"
 
 namespace covol::detail {
 namespace {
@@ -41,22 +37,6 @@ struct Slice {
     PixelPlace place;     ///< slope and intercept are the rescaling
     int unused_bits = 0;  ///< of each stored number, the upper ones
     double position = 0;  ///< along the series' normal
-};
-
-/// GDCM's own messages, which it would print, are off while this lives.
-class QuietGdcm {
-public:
-    QuietGdcm() : warning_(gdcm::Trace::GetWarningFlag()), error_(gdcm::Trace::GetErrorFlag()) { set(false, false); }
-    ~QuietGdcm() { set(warning_, error_); }
-    QuietGdcm(const QuietGdcm&) = delete;
-    QuietGdcm& operator=(const QuietGdcm&) = delete;
-
-private:
-    static void set(bool warning, bool error) {
-        gdcm::Trace::SetWarning(warning);
-        gdcm::Trace::SetError(error);
-    }
-    bool warning_, error_;
 };
 
 /// The smallest type that holds every rescaled value.
@@ -111,24 +91,19 @@ void fill_plain(const DicomHeader& header, const std::string& unusable, Slice& s
 }
 
 void fill_through_gdcm(const DicomHeader& header, const std::string& unusable, Slice& slice) {
-    const WhileAny<QuietGdcm> quiet;
-    const auto io = itk::GDCMImageIO::New();
-    io->SetFileName(slice.path);
-    with_itk(Errc::InvalidInput, unusable, [&] {
-        if (!io->CanReadFile(slice.path.c_str())) throw Error(Errc::InvalidInput, unusable);
-        io->ReadImageInformation();
-    });
-    slice.type = itk_pixel_type(slice.path, *io);
-    slice.components = io->GetNumberOfComponents();
-    for (unsigned a = 0; a < 3; ++a) {
-        const bool there = a < io->GetNumberOfDimensions();
-        const std::uint64_t size = there ? io->GetDimensions(a) : 1;
+    const std::unique_ptr<ItkReader> reader = gdcm_module().open(slice.path, unusable);
+    const ItkHeader& image = reader->header();
+    slice.type = image.type;
+    slice.components = image.components;
+    for (std::size_t a = 0; a < 3; ++a) {
+        const bool there = a < image.size.size();
+        const std::uint64_t size = there ? image.size[a] : 1;
         if (size < 1 || size > 65535) throw Error(Errc::InvalidInput, unusable);
         slice.size[a] = static_cast<std::int32_t>(size);
-        slice.spacing[a] = there ? io->GetSpacing(a) : 1;
-        slice.origin[a] = there ? io->GetOrigin(a) : 0;
-        const std::vector<double> axis = io->GetDirection(a);
-        for (unsigned b = 0; b < 3; ++b) slice.direction[b][a] = b < axis.size() ? axis[b] : (a == b ? 1 : 0);
+        slice.spacing[a] = there ? image.spacing[a] : 1;
+        slice.origin[a] = there ? image.origin[a] : 0;
+        for (std::size_t b = 0; b < 3; ++b)
+            slice.direction[b][a] = there && b < image.axes[a].size() ? image.axes[a][b] : (a == b ? 1 : 0);
     }
     // Packed pixels may be many; others are all there.
     const std::uint64_t bytes = header.integer(kAllocated).value_or(8) / 8;
@@ -310,15 +285,10 @@ private:
             decode_plain(slice, unusable, pixels, values.data());
             return values;
         }
-        const WhileAny<QuietGdcm> quiet;
-        const auto io = itk::GDCMImageIO::New();
-        io->SetFileName(slice.path);
-        with_itk(Errc::InvalidInput, unusable, [&] {
-            io->ReadImageInformation();
-            if (io->GetImageSizeInBytes() < 0 || std::uint64_t(io->GetImageSizeInBytes()) != values.size())
-                throw Error(Errc::InvalidInput, unusable);
-            io->Read(values.data());
-        });
+        const std::unique_ptr<ItkReader> reader = gdcm_module().open(slice.path, unusable);
+        if (reader->header().bytes < 0 || std::uint64_t(reader->header().bytes) != values.size())
+            throw Error(Errc::InvalidInput, unusable);
+        reader->read_all(values.data());
         return values;
     }
 

@@ -1,9 +1,4 @@
 // Formats whose headers ITK reads: NRRD, NIfTI, MetaImage, HDF5.
-#include <itkHDF5ImageIO.h>
-#include <itkMetaImageIO.h>
-#include <itkNiftiImageIO.h>
-#include <itkNrrdImageIO.h>
-
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -11,6 +6,8 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <functional>
+#include <numeric>
 #include <optional>
 #include <sstream>
 #include <vector>
@@ -18,7 +15,7 @@
 #include "base/file.h"
 #include "io/hdf5/hdf5_file.h"
 #include "io/image/image_formats.h"
-#include "io/image/itk_call.h"
+#include "io/modules/modules.h"
 #include "io/pixels/nifti_space.h"
 
 namespace covol::detail {
@@ -26,18 +23,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// ITK's reader and writer for files of this ending. Made directly: a static library has no registered factories.
-itk::ImageIOBase::Pointer make_io(const std::string& extension) {
-    itk::ImageIOBase::Pointer io;
-    if (extension == ".nrrd" || extension == ".nhdr")
-        io = itk::NrrdImageIO::New().GetPointer();
-    else if (extension == ".nii" || extension == ".nii.gz")
-        io = itk::NiftiImageIO::New().GetPointer();
-    else if (extension == ".h5" || extension == ".hdf5")
-        io = itk::HDF5ImageIO::New().GetPointer();
-    else
-        io = itk::MetaImageIO::New().GetPointer();
-    return io;
+/// ITK's reader for files of this ending.
+OpenWithItk* reader_of(const std::string& extension) {
+    if (extension == ".nrrd" || extension == ".nhdr") return itk_module().open_nrrd;
+    if (extension == ".nii" || extension == ".nii.gz") return itk_module().open_nifti;
+    if (extension == ".h5" || extension == ".hdf5") return hdf5_module().open_itk;
+    return itk_module().open_meta;
 }
 
 std::string lower(std::string text) {
@@ -286,11 +277,11 @@ void require_meta_header(const TextHeader& header, const std::string& unusable) 
 /// What only ITK reads: all at once, but HDF5, which is read in boxes.
 class ItkFile : public ImageFile {
 public:
-    ItkFile(std::string path, std::string unusable, ImageInfo info, itk::ImageIOBase::Pointer io, bool in_boxes,
+    ItkFile(std::string path, std::string unusable, ImageInfo info, std::unique_ptr<ItkReader> reader, bool in_boxes,
             std::uint64_t file_bytes)
         : path_(std::move(path)),
           unusable_(std::move(unusable)),
-          io_(std::move(io)),
+          reader_(std::move(reader)),
           in_boxes_(in_boxes),
           file_bytes_(file_bytes) {
         info_ = std::move(info);
@@ -299,33 +290,30 @@ public:
     ~ItkFile() override {
         std::optional<Hdf5Lock> lock;
         if (in_boxes_) lock.emplace();
-        io_ = nullptr;  // closes the file
+        reader_ = nullptr;  // closes the file
     }
     ItkFile(const ItkFile&) = delete;
     ItkFile& operator=(const ItkFile&) = delete;
 
     Pixels read(const PixelRequest& request, const RunContext&) override {
-        const unsigned dimensions = io_->GetNumberOfDimensions();
-        itk::ImageIORegion region(dimensions);
-        for (unsigned a = 0; a < dimensions; ++a) region.SetSize(a, io_->GetDimensions(a));
+        std::vector<std::uint64_t> size = reader_->header().size, begin(size.size(), 0);
         VoxelBox box = whole_box(info_.geometry.size);
-        if (in_boxes_ && dimensions == 3) {
+        if (in_boxes_ && size.size() == 3) {
             box = request.box;
-            for (unsigned a = 0; a < 3; ++a) {
-                region.SetIndex(a, box.min[a]);
-                region.SetSize(a, static_cast<itk::SizeValueType>(box.size()[a]));
+            for (std::size_t a = 0; a < 3; ++a) {
+                begin[a] = std::uint64_t(box.min[a]);
+                size[a] = std::uint64_t(box.size()[a]);
             }
         }
         const auto channels = std::uint64_t(info_.channels);
         const std::uint64_t frame = voxel_count(box.size()) * channels;
         const std::shared_ptr<void> data =
             allocate_pixels(path_, frame * std::uint64_t(info_.frames), info_.type, file_bytes_);
-        io_->SetIORegion(region);
-        if (std::uint64_t(region.GetNumberOfPixels()) != voxel_count(box.size()) * std::uint64_t(info_.frames))
-            throw Error(Errc::InvalidInput, unusable_);
+        const auto count = std::accumulate(size.begin(), size.end(), std::uint64_t(1), std::multiplies<>());
+        if (count != voxel_count(box.size()) * std::uint64_t(info_.frames)) throw Error(Errc::InvalidInput, unusable_);
         std::optional<Hdf5Lock> lock;
         if (in_boxes_) lock.emplace();
-        with_itk(Errc::InvalidInput, unusable_, [&] { io_->Read(data.get()); });
+        reader_->read(begin, size, data.get());
         Pixels pixels;
         pixels.stride = dense_strides(box.size());
         std::uint64_t first = request.frame * frame + request.channel;
@@ -339,44 +327,27 @@ public:
 
 private:
     std::string path_, unusable_;
-    itk::ImageIOBase::Pointer io_;
+    std::unique_ptr<ItkReader> reader_;
     bool in_boxes_;
     std::uint64_t file_bytes_;
 };
 
-}  // namespace
-
-PixelType itk_pixel_type(const std::string& path, const itk::ImageIOBase& io) {
-    using Component = itk::IOComponentEnum;
-    switch (io.GetComponentType()) {
-        case Component::UCHAR: return PixelType::UInt8;
-        case Component::CHAR: return PixelType::Int8;
-        case Component::USHORT: return PixelType::UInt16;
-        case Component::SHORT: return PixelType::Int16;
-        case Component::UINT: return PixelType::UInt32;
-        case Component::INT: return PixelType::Int32;
-        case Component::FLOAT: return PixelType::Float;
-        case Component::DOUBLE: return PixelType::Double;
-        default:
-            throw read_error(Errc::Unsupported, path,
-                             "expected values of 8, 16 or 32 bits, float or double, got " +
-                                 itk::ImageIOBase::GetComponentTypeAsString(io.GetComponentType()));
-    }
-}
-
-ImageGeometry itk_geometry(const std::string& path, const itk::ImageIOBase& io) {
+/// Size, spacing, origin and direction of the first three dimensions. @throws Error InvalidInput when not 3D.
+ImageGeometry itk_geometry(const std::string& path, const ItkHeader& header) {
     std::uint64_t size[3] = {1, 1, 1};
-    for (unsigned a = 0; a < std::min(3U, io.GetNumberOfDimensions()); ++a) size[a] = io.GetDimensions(a);
+    for (std::size_t a = 0; a < std::min<std::size_t>(3, header.size.size()); ++a) size[a] = header.size[a];
     ImageGeometry geometry;
     geometry.size = require_3d(path, size);
-    for (unsigned a = 0; a < 3; ++a) {
-        geometry.spacing[a] = io.GetSpacing(a);
-        geometry.origin[a] = io.GetOrigin(a);
-        const std::vector<double> axis = io.GetDirection(a);
-        for (unsigned b = 0; b < 3; ++b) geometry.direction[b][a] = b < axis.size() ? axis[b] : 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+        geometry.spacing[a] = header.spacing[a];
+        geometry.origin[a] = header.origin[a];
+        const std::vector<double>& axis = header.axes[a];
+        for (std::size_t b = 0; b < 3; ++b) geometry.direction[b][a] = b < axis.size() ? axis[b] : 0;
     }
     return geometry;
 }
+
+}  // namespace
 
 std::unique_ptr<ImageFile> open_itk(const std::string& path) {
     const std::string end = extension(path);
@@ -393,22 +364,18 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path) {
     if (is_nifti) nifti.emplace(begin, unusable);
     std::optional<Hdf5Lock> lock;
     if (is_hdf5) lock.emplace();
-    const itk::ImageIOBase::Pointer io = make_io(end);
-    io->SetFileName(path);
-    with_itk(Errc::InvalidInput, unusable, [&] {
-        if (!io->CanReadFile(path.c_str())) throw Error(Errc::InvalidInput, unusable);
-        io->ReadImageInformation();
-    });
+    std::unique_ptr<ItkReader> reader = reader_of(end)(path, unusable);
+    const ItkHeader& image = reader->header();
 
     ImageInfo info;
-    info.type = itk_pixel_type(path, *io);
-    info.geometry = itk_geometry(path, *io);
-    info.axis_order = io->GetNumberOfDimensions() > 3 ? "XYZT" : "XYZ";
+    info.type = image.type;
+    info.geometry = itk_geometry(path, image);
+    info.axis_order = image.size.size() > 3 ? "XYZT" : "XYZ";
     constexpr std::uint64_t kMost = std::uint64_t(1) << 20;
     std::uint64_t frames = 1;
-    for (unsigned a = 3; a < io->GetNumberOfDimensions(); ++a)
-        if (__builtin_mul_overflow(frames, std::uint64_t(io->GetDimensions(a)), &frames)) frames = kMost + 1;
-    const std::uint64_t channels = io->GetNumberOfComponents();
+    for (std::size_t a = 3; a < image.size.size(); ++a)
+        if (__builtin_mul_overflow(frames, image.size[a], &frames)) frames = kMost + 1;
+    const std::uint64_t channels = image.components;
     if (frames < 1 || frames > kMost || channels < 1 || channels > kMost)
         throw read_error(Errc::InvalidInput, path,
                          "expected 1 to 2^20 frames and channels, the header claims " + std::to_string(frames) +
@@ -416,7 +383,7 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path) {
     info.frames = static_cast<int>(frames);
     info.channels = static_cast<int>(channels);
     if (info.channels > 1) info.axis_order = "C" + info.axis_order;
-    if (io->GetPixelType() == itk::IOPixelEnum::RGB) info.channel_names = {"red", "green", "blue"};
+    if (image.is_rgb) info.channel_names = {"red", "green", "blue"};
 
     std::optional<PixelPlace> place;
     if (is_nifti) {
@@ -441,7 +408,8 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path) {
                              std::to_string(info.channels) + " channels and " + std::to_string(info.frames) +
                              " frames");
     const bool detached = header && !header->data_file().empty();
-    return std::make_unique<ItkFile>(path, unusable, info, io, is_hdf5, detached ? 0 : fs::file_size(path));
+    return std::make_unique<ItkFile>(path, unusable, info, std::move(reader), is_hdf5,
+                                     detached ? 0 : fs::file_size(path));
 }
 
 }  // namespace covol::detail

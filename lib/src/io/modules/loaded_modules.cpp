@@ -1,0 +1,56 @@
+// The modules of the shared library, loaded from a folder beside it.
+#include <dlfcn.h>
+
+#include <filesystem>
+
+#include "covol/error.h"
+#include "covol/version.h"
+#include "io/modules/modules.h"
+
+namespace covol::detail {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The folder has the version in its name: libcovol and its modules must be of one build.
+fs::path folder_of_modules() {
+    Dl_info here{};
+    std::error_code status;
+    if (dladdr(reinterpret_cast<const void*>(&itk_module), &here) == 0) return {};
+    const fs::path library = fs::canonical(here.dli_fname, status);
+    return library.parent_path() / "covol-" COVOL_VERSION_STRING;
+}
+
+/// It stays loaded until the program ends: libraries below it have threads and handlers of their own.
+template <typename Module>
+const Module& load(const std::string& name, const char* formats) {
+    const fs::path path = folder_of_modules() / (name + ".so");
+    void* const library = dlopen(path.c_str(), RTLD_LAZY | RTLD_LOCAL);
+    void* const entry = library == nullptr ? nullptr : dlsym(library, ("covol_" + name).c_str());
+    if (entry == nullptr) {
+        const char* const why = dlerror();
+        throw Error(Errc::Unsupported, "read_image: " + path.string() + ": expected covol's module for " + formats +
+                                           " beside libcovol.so, got: " + (why == nullptr ? "no reason" : why) +
+                                           "; install covol again, with all the libraries that it depends on");
+    }
+    return *static_cast<const Module*>(reinterpret_cast<const void* (*)()>(entry)());
+}
+
+}  // namespace
+
+const ItkModule& itk_module() {
+    static const auto& module = load<ItkModule>("itk", "NRRD, NIfTI and MetaImage");
+    return module;
+}
+
+const GdcmModule& gdcm_module() {
+    static const auto& module = load<GdcmModule>("gdcm", "compressed DICOM");
+    return module;
+}
+
+const Hdf5Module& hdf5_module() {
+    static const auto& module = load<Hdf5Module>("hdf5", "HDF5");
+    return module;
+}
+
+}  // namespace covol::detail
