@@ -9,6 +9,7 @@ import json
 import math
 import os
 import pathlib
+import re
 import shutil
 import struct
 import subprocess
@@ -445,6 +446,31 @@ class Options(Case):
         folder = write_dicom_series(self.folder / "gap", self.data)
         next(p for p in folder.iterdir() if pydicom.dcmread(str(p)).ImagePositionPatient[2] == ORIGIN[2] + 6 * SPACING[2]).unlink()
         self.assertIn("a slice is missing", self.run_covol("info", folder, code=3).stderr)
+
+    def test_a_missing_module_is_an_error(self):
+        """libcovol alone, without the folder of modules beside it."""
+        loaded = subprocess.run(["ldd", COVOL], capture_output=True, text=True, check=True).stdout
+        library = re.search(r"(libcovol\.so\S*) => (\S+)", loaded)
+        if not library:
+            self.skipTest("a static covol has no modules")
+        alone = self.folder / "alone"
+        alone.mkdir()
+        shutil.copy(library.group(2), alone / library.group(1))
+        series = write_dicom_series(self.folder / "packed", self.data)
+        for path in series.iterdir():
+            slice_ = pydicom.dcmread(path)
+            slice_.compress(pydicom.uid.RLELossless)
+            slice_.save_as(path)
+        self.run_covol("info", series)
+        (self.folder / "any.h5").write_bytes(b"\x89HDF\r\n\x1a\n")
+        for image, module, formats in ((self.write_nrrd(), "itk.so", "NRRD, NIfTI and MetaImage"),
+                                       (self.folder / "any.h5", "hdf5.so", "HDF5"), (series, "gdcm.so", "compressed DICOM")):
+            with self.subTest(module):
+                done = subprocess.run([COVOL, "info", image], capture_output=True, text=True, timeout=300,
+                                      env={**os.environ, "LD_LIBRARY_PATH": str(alone)})
+                self.assertEqual(done.returncode, 4, done.stdout + done.stderr)
+                self.assertRegex(done.stderr, rf"alone/covol-[0-9.]+/{module}: expected covol's module for {formats} ")
+                self.assertIn("install covol again", done.stderr)
 
     def test_a_huge_image_takes_little_memory(self):
         """2048^3 bytes on disk (a sparse file), a small ball in it; whole and with --roi."""

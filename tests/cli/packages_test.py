@@ -41,6 +41,7 @@ class Packages(unittest.TestCase):
             run("dpkg", "-x", path, cls.root)
         [library] = (cls.root / "usr/lib").rglob("libcovol.so.*.*.*")
         cls.lib = library.parent
+        cls.modules = sorted(cls.lib.glob("covol-*/*.so"))
         cls.environment = {**os.environ, "LD_LIBRARY_PATH": str(cls.lib), "PYTHONDONTWRITEBYTECODE": "1",
                            "PYTHONPATH": str(cls.root / "usr/lib/python3/dist-packages")}
 
@@ -50,7 +51,8 @@ class Packages(unittest.TestCase):
     def test_fields(self):
         version = self.field("covol", "Version")
         self.assertEqual(run(self.root / "usr/bin/covol", "--version", env=self.environment).split()[-1], version)
-        for library in ("libc6", "libopenvdb10.0", "libtbb12", "libtiff6"):
+        self.assertEqual([module.stem for module in self.modules], ["gdcm", "hdf5", "itk"])
+        for library in ("libc6", "libopenvdb10.0", "libtbb12", "libtiff6", "libgdcm3.0", "libhdf5-103-1", "libinsighttoolkit5.2"):
             self.assertRegex(self.field("covol", "Depends"), rf"\b{re.escape(library)}\b")
         self.assertNotIn("python", self.field("covol", "Depends"))
         self.assertIn(f"covol (= {version})", self.field("libcovol-dev", "Depends"))
@@ -81,7 +83,7 @@ class Packages(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
 
     def test_libraries_are_found(self):
-        for file in [self.root / "usr/bin/covol", *self.lib.glob("*.so*"), *self.root.rglob("_covol*.so")]:
+        for file in [self.root / "usr/bin/covol", *self.lib.glob("*.so*"), *self.modules, *self.root.rglob("_covol*.so")]:
             self.assertNotIn("not found", run("ldd", file, env=self.environment))
             self.assertNotRegex(run("readelf", "-d", file), "RPATH|RUNPATH")
         self.assertIn(str(self.lib), run("ldd", self.root / "usr/bin/covol", env=self.environment))

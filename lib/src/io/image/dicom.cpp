@@ -145,6 +145,7 @@ std::map<std::string, std::vector<Slice>> list_series(const fs::path& folder, co
             Slice slice = read_header(path.string());
             series[slice.series].push_back(std::move(slice));
         } catch (const Error& error) {
+            if (error.code() == Errc::Io) throw;  // no fault of the slice: GDCM's module is missing
             if (passed_over++ == 0) why = error.what();
         }
     }

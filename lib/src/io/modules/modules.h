@@ -56,7 +56,7 @@ struct Hdf5Module {
     const struct Hdf5Calls* calls;
 };
 
-/// Loaded by the first call; several threads may call at once. @throws Error Unsupported (it cannot be loaded).
+/// Loaded by the first call; several threads may call at once. @throws Error Io (it cannot be loaded).
 const ItkModule& itk_module();
 const GdcmModule& gdcm_module();
 const Hdf5Module& hdf5_module();
