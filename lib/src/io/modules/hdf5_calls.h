@@ -29,7 +29,7 @@
 namespace covol::detail {
 
 struct Hdf5Calls {
-#define COVOL_MEMBER(name) decltype(&::name) name;
+#define COVOL_MEMBER(name) decltype(&::name) name;  // NOLINT(bugprone-macro-parentheses)
     COVOL_HDF5_FUNCTIONS(COVOL_MEMBER)
     COVOL_HDF5_NUMBERS(COVOL_MEMBER)
 #undef COVOL_MEMBER
@@ -44,7 +44,7 @@ struct Hdf5Number {
     operator hid_t() const { return *(hdf5_module().calls->*Member); }
 };
 
-#define COVOL_FUNCTION(name) inline constexpr Hdf5Function<decltype(Hdf5Calls::name), &Hdf5Calls::name> name;
+#define COVOL_FUNCTION(name) inline constexpr Hdf5Function<decltype(Hdf5Calls::name), &Hdf5Calls::name> name;  // NOLINT
 COVOL_HDF5_FUNCTIONS(COVOL_FUNCTION)
 #undef COVOL_FUNCTION
 #define COVOL_NUMBER(name) inline constexpr Hdf5Number<&Hdf5Calls::name> name;
