@@ -139,7 +139,7 @@ class Memory(Case):
     """--memory-limit bounds what the program holds, whatever it is busy with."""
 
     # What a program takes that has done nothing, and what a growing one takes between two looks at it.
-    OWN = 100 << 20
+    OWN = 76 << 20
 
     def peak(self, *words):
         """@return exit code, peak of resident memory in bytes, standard error"""
