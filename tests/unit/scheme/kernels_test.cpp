@@ -298,3 +298,31 @@ TEST_CASE("the mean of a wave's neighbours is its exact multiple") {
             CHECK(out[n] == Approx(0.25 * (n % 7) + 2 * mean * std::cos(q * (n >> 6)) - n % 5).margin(2e-6));
     }
 }
+
+TEST_CASE("a plane's distance is found exactly from where it comes") {
+    // Differences of a linear function are exact, whether its front comes along one, two or three axes.
+    const std::array<double, 3> normals[] = {{1, 0, 0},
+                                             {0, -1, 0},
+                                             {0, 0, 1},
+                                             {0.6, 0.8, 0},
+                                             {0.8, 0, -0.6},
+                                             {0, 0.28, 0.96},
+                                             {2. / 3, 1. / 3, 2. / 3},
+                                             {-1. / 3, 2. / 3, -2. / 3}};
+    for (const SchemeKernels* set : available_kernels())
+        for (const auto& n : normals) {
+            const auto plane = [&](int i, int j, int k) { return 20 + n[0] * i + n[1] * j + n[2] * k; };
+            const std::vector<float> uncut(3 * 512, 0.0F);
+            Padded d = fill(plane);
+            for (int i = 0; i < 8; ++i)
+                for (int j = 0; j < 8; ++j)
+                    for (int k = 0; k < 8; ++k) d[padded(i, j, k)] = 100;
+            set->eikonal(d.data(), uncut.data(), ~RowMask{0}, 1e-6F);
+            INFO(set->name << " " << n[0] << " " << n[1] << " " << n[2]);
+            double worst = 0;
+            for (int i = 0; i < 8; ++i)
+                for (int j = 0; j < 8; ++j)
+                    for (int k = 0; k < 8; ++k) worst = std::max(worst, std::abs(d[padded(i, j, k)] - plane(i, j, k)));
+            CHECK(worst < 1e-3);
+        }
+}

@@ -113,6 +113,8 @@ TEST_CASE("tifffile's description: axes, spacing, and what does not fit the page
     CHECK(read_image(path, options).at(0, 0, 0) == 2);
     tifffile(path, 4, R"({"shape": [4, 3, 4]})");  // z, y, x where nothing is said
     CHECK(read_image(path).at(0, 0, 3) == 3);
+    tifffile(path, 4, R"({"shape": [4, 3, 4], "axes": "TYX"})");  // a film of one slice
+    CHECK_THAT(message_of([&] { (void)read_image_info(path); }), Catch::Contains("got 4 x 3 x 1"));
     for (const char* wrong : {R"({"shape": [9, 3, 4], "axes": "ZYX"})", R"({"shape": [1, 1, 1, 4, 3, 4]})",
                               "{\"shape\": 4}", "{", R"({"shape": [0, 3, 4], "axes": "ZYX", "spacing": -1})"}) {
         INFO(wrong);

@@ -181,6 +181,9 @@ TEST_CASE("broken and hostile files give one clear error") {
     check_refused(folder.file("a.ply", ascii + "element x 1000000000000\nend_header\n"), "no triangle");
     check_refused(folder.file("a.ply", ascii + "element vertex 1\n" + vertex + "end_header\n0 zero 0\n"),
                   ":8: expected a number, got 'zero'");
+    check_refused(folder.file("a.ply", ascii + "element vertex 1\n" + vertex + "element face 1\n" + face +
+                                           "end_header\n0 0 0\n3 0 x 0\n"),
+                  "expected a number, got 'x'");
     check_refused(folder.file("a.ply", ascii + "element vertex 1\n" + vertex + "end_header\n0 nan 0\n"), "not finite");
     check_refused(folder.file("a.ply", ascii + "element face 1\n" + face + "end_header\n3 0 1 2\n"),
                   "refers to vertex 0");

@@ -424,6 +424,19 @@ TEST_CASE("the options go before what a format says") {
     CHECK_THROWS_AS(read_points(path, two), Error);
 }
 
+TEST_CASE("ITK-SNAP's line segments are lines of two marks") {
+    const Scratch scratch;
+    const std::string head = "<entry key=\"Format\" value=\"ITK-SNAP Annotation File\" />\n";
+    const std::string begin = "<entry key=\"Point1\" value=\"1.5 2.5 3.5\" />\n",
+                      end = "<entry key=\"Point2\" value=\"4.5 2.5 3.5\" />\n";
+    const PointCloud cloud = read_points(scratch.write("a.annot", head + begin + end));
+    REQUIRE(cloud.points.size() == 2);
+    CHECK(cloud.points[0][0] < cloud.points[1][0]);
+    REQUIRE(cloud.lines.size() == 1);
+    CHECK_FALSE(cloud.lines[0].closed);
+    says(read_error(scratch, "a.annot", head + end), "a Point2 and no Point1");
+}
+
 TEST_CASE("Fiji's areas, lines and points have their own lattice") {
     const Scratch scratch;
     const auto read = [&](const RoiSpec& spec) { return read_points(scratch.write("one.roi", roi(spec))); };
