@@ -78,16 +78,18 @@ public:
     }
     /// Of the level within a ball around a position of the plane, whatever w is; upper is not needed on domes.
     [[nodiscard]] std::array<double, 2> range(double x, double y, double radius) const {
-        const Column c = column(place(x, y));
+        const SlicePlace p = place(x, y);
+        const double here = at(slice(), p);
         if (kind_ != Kind::Between && slice().open) {
             // Neither section's level changes faster than the position does.
             const double height = slice().cap + radius, share = height / std::abs(slice().w - inner().w);
-            return {std::min(c.here, carried_on(c, height)) - (1 + 2 * share) * radius,
+            return {std::min(here, carried_on(column(p), height)) - (1 + 2 * share) * radius,
                     std::numeric_limits<double>::max()};
         }
-        if (kind_ != Kind::Between) return {c.here - radius, std::numeric_limits<double>::max()};
+        if (kind_ != Kind::Between) return {here - radius, std::numeric_limits<double>::max()};
+        const double there = at(data_.slices[n_ + 1], p);
         const double reach = radius + std::hypot(slice().shift[0], slice().shift[1]);
-        return {std::min(c.here, c.there) - reach, std::max(c.here, c.there) + reach};
+        return {std::min(here, there) - reach, std::max(here, there) + reach};
     }
     /// The surface's points strictly inside the interval: one for each lattice line that it crosses along the axis its
     /// normal is closest to. In the frame (x, y, w).

@@ -1,7 +1,6 @@
 #include "redistance/patch_kernel.h"
 
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <type_traits>
 
