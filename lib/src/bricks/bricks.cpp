@@ -173,8 +173,9 @@ struct BrickJob::Parts {
         job.result.u = bricks::assemble(plan, plan.domain, all_of(plan), states);
         if (field) {
             job.report().cloud = cloud;
-            job.result.u = cloud::settle(job.result.u, *job.cloud, job.report().cloud, run);
+            cloud::settle(*job.result.u, *job.cloud, job.report().cloud, run);
             job.origin = StartOrigin::Cloud;
+            make_start_of_field(job);
         }
         job.report().active_voxels = std::int64_t(job.result.u->activeVoxelCount());
         job.report().leaf_count = std::int64_t(job.result.u->tree().leafCount());

@@ -36,7 +36,16 @@ LeafMask across(const LeafMask& mask, int di, int dj, int dk) {
     return result;
 }
 
-/// Spreads `mask` through the open voxels of its leaf.
+/// The voxels of a leaf that lie on the domain's outermost layer.
+LeafMask boundary_layer(const Coord& origin, const CoordBBox& domain) {
+    LeafMask layer = mask_in_box(origin, domain);
+    const LeafMask inner = mask_in_box(origin, {domain.min().offsetBy(1), domain.max().offsetBy(-1)});
+    for (int i = 0; i < 8; ++i) layer[i] &= ~inner[i];
+    return layer;
+}
+
+}  // namespace
+
 void spread(LeafMask& mask, const LeafMask& open) {
     const auto step = [&](int i) {
         std::uint64_t m = mask[i];
@@ -57,16 +66,6 @@ void spread(LeafMask& mask, const LeafMask& open) {
         for (int i = 7; i >= 0; --i) changed |= step(i);
     }
 }
-
-/// The voxels of a leaf that lie on the domain's outermost layer.
-LeafMask boundary_layer(const Coord& origin, const CoordBBox& domain) {
-    LeafMask layer = mask_in_box(origin, domain);
-    const LeafMask inner = mask_in_box(origin, {domain.min().offsetBy(1), domain.max().offsetBy(-1)});
-    for (int i = 0; i < 8; ++i) layer[i] &= ~inner[i];
-    return layer;
-}
-
-}  // namespace
 
 LeafColumns::LeafColumns(const LeafBand& band, const CoordBBox& domain, Extent extent) {
     const auto block = [](const Coord& voxel) { return Coord(voxel.x() >> 3, voxel.y() >> 3, voxel.z() >> 3); };

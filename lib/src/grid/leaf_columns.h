@@ -60,6 +60,9 @@ private:
 /// @pre no interface passes between a leaf and a run.
 [[nodiscard]] std::vector<bool> inside_runs(const LeafColumns& columns, const std::vector<LeafMask>& inside);
 
+/// Spreads `mask` through the open voxels of its leaf, through faces.
+void spread(LeafMask& mask, const LeafMask& open);
+
 /// What a flood has reached.
 struct Flood {
     std::vector<LeafMask> leaves;  ///< by leaf

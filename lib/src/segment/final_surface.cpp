@@ -29,9 +29,13 @@ void relax(Job& job) {
 /// The surface of u, which is given up where nobody wants it.
 void surface_of_flow(Job& job) {
     if (job.result.surface) return;
-    set_clip(*job.result.u, where_it_ends(job));
-    job.result.surface = extract_surface(*job.result.u, job.run);
-    if (job.options.without_fields) job.result.u.reset();
+    FloatGridPtr& u = job.result.u;
+    set_clip(*u, where_it_ends(job));
+    job.result.surface = extract_surface(*u, job.run);
+    if (job.options.without_fields) return u.reset();
+    if (!job.rests_on_field()) return;
+    u = start_from_grid(job.domain(), *u, job.run);
+    set_clip(*u, where_it_ends(job));
 }
 
 void mesh_of_surface(Job& job) {

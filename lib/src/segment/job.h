@@ -74,6 +74,8 @@ struct Job {
             origin == StartOrigin::Guess || origin == StartOrigin::Contours || origin == StartOrigin::Cloud;
         return from_marks && guided() && uses_points() && !follows_lines();
     }
+    /// Until the surface is made, result.u is the cloud's field, no distance: cloud::settled_field().
+    [[nodiscard]] bool rests_on_field() const { return origin == StartOrigin::Cloud && rests(); }
     /// Between closed contours, or null.
     [[nodiscard]] const ContourSolid* body() const {
         return options.contours ? options.contours->solid.get() : nullptr;

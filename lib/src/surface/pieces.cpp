@@ -9,9 +9,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <unordered_map>
 
+#include "grid/leaf_columns.h"
+#include "grid/sign_masks.h"
 #include "surface/heuristics.h"
 
 namespace covol::detail {
@@ -90,7 +93,7 @@ public:
 private:
     using Leaf = FloatGrid::TreeType::LeafNodeType;
     static constexpr int kDim = 8, kVoxels = 512;
-    static constexpr Label kAround = 0;
+    static constexpr Label kAround = 0, kNone = std::numeric_limits<Label>::max();
     /// Blocks of 8^3 along k without a leaf, from the first to before the last.
     struct Gap {
         int begin, end;
@@ -116,41 +119,35 @@ private:
         parents_[std::max(x, y)] = std::min(x, y);
     }
 
-    /// Regions within each leaf.
+    /// Regions within each leaf, numbered by their first voxels.
     void label_leaves() {
         new_label(false);  // kAround
         labels_.resize(leaves_.size());
         std::vector<std::vector<bool>> inside(leaves_.size());  // of each local label
         tbb::parallel_for(std::size_t(0), leaves_.size(), [&](std::size_t n) {
-            const float* values = leaves_[n]->buffer().data();
-            std::array<std::uint16_t, kVoxels> parent;
-            const auto top = [&](std::uint16_t v) {
-                while (parent[v] != v) v = parent[v] = parent[parent[v]];
-                return v;
-            };
+            const LeafMask negative = negative_mask(leaves_[n]->buffer().data());
+            for (std::size_t v = 0; v < kVoxels; ++v) labels_[n][v] = kNone;
             for (int v = 0; v < kVoxels; ++v) {
-                parent[std::size_t(v)] = std::uint16_t(v);
-                for (const auto& [stride, position] : {std::pair{64, v >> 6}, {8, v >> 3 & 7}, {1, v & 7}}) {
-                    if (position == 0 || (values[v] < 0) != (values[v - stride] < 0)) continue;
-                    const std::uint16_t x = top(std::uint16_t(v)), y = top(std::uint16_t(v - stride));
-                    parent[std::max(x, y)] = std::min(x, y);
-                }
-            }
-            for (int v = 0; v < kVoxels; ++v) {
-                const std::uint16_t t = top(std::uint16_t(v));
-                if (t == v) {
-                    labels_[n][std::size_t(v)] = Label(inside[n].size());
-                    inside[n].push_back(values[v] < 0);
-                } else {
-                    labels_[n][std::size_t(v)] = labels_[n][t];
-                }
+                if (labels_[n][std::size_t(v)] != kNone) continue;
+                const bool is_inside = is_on(negative, v);
+                LeafMask same = negative, region{};
+                if (!is_inside)
+                    for (std::uint64_t& word : same) word = ~word;
+                set_on(region, v);
+                spread(region, same);
+                for (int other = v; other < kVoxels; ++other)
+                    if (is_on(region, other)) labels_[n][std::size_t(other)] = Label(inside[n].size());
+                inside[n].push_back(is_inside);
             }
         });
+        std::vector<Label> first(leaves_.size());
         for (std::size_t n = 0; n < leaves_.size(); ++n) {
-            const auto first = Label(parents_.size());
+            first[n] = Label(parents_.size());
             for (const bool is_inside : inside[n]) new_label(is_inside);
-            for (Label& label : labels_[n]) label += first;
         }
+        tbb::parallel_for(std::size_t(0), leaves_.size(), [&](std::size_t n) {
+            for (Label& label : labels_[n]) label += first[n];
+        });
     }
 
     /// What lies between the leaves of a row of blocks has one sign.
@@ -327,9 +324,10 @@ void drop_unmarked_pieces(FloatGrid& level_set, const std::vector<Vec3>& marks) 
 }
 
 std::size_t drop_bare_pieces(FloatGrid& level_set, const std::vector<Vec3>& points, std::size_t least) {
+    Regions regions(level_set);
+    const std::size_t pieces = regions.drop(true, points, least);
     // A cavity in a piece that goes is one no more.
-    const std::size_t pieces = Regions(level_set).drop(true, points, least);
-    return pieces + Regions(level_set).drop(false, points, least);
+    return pieces == 0 ? regions.drop(false, points, least) : pieces + Regions(level_set).drop(false, points, least);
 }
 
 }  // namespace covol::detail

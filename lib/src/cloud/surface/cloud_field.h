@@ -31,9 +31,13 @@ private:
 /// The indicator's alone.
 [[nodiscard]] FloatGridPtr level_set_of(const Indicator& indicator, const Domain& domain, const RunContext& run);
 
-/// Gives the level set of a whole cloud the pieces and handles that points rest on, and makes it a start as those of
-/// start.h.
-[[nodiscard]] FloatGridPtr settle(FloatGridPtr level_set, const CloudOrientation& cloud, CloudReport& report,
-                                  const RunContext& run);
+/// Gives the field of a whole cloud the pieces and handles that points rest on. Of its voxels those whose values are
+/// less than the background stay active.
+void settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport& report, const RunContext& run);
+
+/// The settled field over a domain. Its zero level set is the surface; it is no distance, for which there is
+/// start_from_grid() or extract_surface().
+[[nodiscard]] FloatGridPtr settled_field(const Domain& domain, const CloudOrientation& cloud, CloudReport& report,
+                                         const RunContext& run);
 
 }  // namespace covol::cloud

@@ -1,6 +1,8 @@
 #include "covol/cloud_surface.h"
 
 #include <openvdb/openvdb.h>
+#include <openvdb/tools/Prune.h>
+#include <openvdb/tools/ValueTransformer.h>
 
 #include <algorithm>
 #include <cmath>
@@ -57,41 +59,48 @@ bool is_open(const FloatGrid& level_set, const CloudOrientation& cloud, const Ru
 
 }  // namespace
 
-FloatGridPtr cloud::settle(FloatGridPtr level_set, const CloudOrientation& cloud, CloudReport& report,
-                           const RunContext& run) {
-    const Domain domain = domain_of(*level_set);
+void cloud::settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport& report, const RunContext& run) {
     const Orientation& orientation = cloud.orientation;
     const double share = cloud.encloses ? kBlend.least_resting_share : kBlend.least_resting_open,
                  noises = report.noise / report.spacing;
     const auto least =
         std::size_t(std::max({kBlend.least_resting, share * double(cloud.points.size()), 4 * M_PI * noises * noises}));
-    report.dropped_pieces = detail::drop_bare_pieces(*level_set, cloud.points, least);
+    report.dropped_pieces = detail::drop_bare_pieces(field, cloud.points, least);
     // Before the indicator's topology is held, for it may have lost torn parts, and after, for it may tear others.
     const auto join = [&] {
-        const std::size_t joined =
-            cloud::join_pieces(*level_set, cloud.points, std::max(report.spacing, report.noise), run);
+        const std::size_t joined = cloud::join_pieces(field, cloud.points, std::max(report.spacing, report.noise), run);
         report.joined_pieces += joined;
         return joined > 0;
     };
-    TopologyOf topology{Complexity(*level_set, run), least, cloud.points, run};
-    if (topology.own.pieces > 1 && join()) topology.own = Complexity(*level_set, run);
-    topology.hold(*level_set, *orientation.indicator, report);
+    TopologyOf topology{Complexity(field, run), least, cloud.points, run};
+    if (topology.own.pieces > 1 && join()) topology.own = Complexity(field, run);
+    topology.hold(field, *orientation.indicator, report);
     // Where the points leave gaps, what surrounds a gap makes small handles on a lattice as fine as they are.
-    if (topology.own.all > 1 && !orientation.screened && is_open(*level_set, cloud, run))
-        topology.hold(*level_set,
+    if (topology.own.all > 1 && !orientation.screened && is_open(field, cloud, run))
+        topology.hold(field,
                       *cloud::indicator_of(cloud.points, orientation, kBlend.coarse_spacings * cloud.scale.spacing),
                       report);
     if (topology.own.pieces > 1) join();
-    return start_from_grid(domain, *level_set, run);
+    const float background = field.background();
+    openvdb::tools::foreach (field.tree().beginLeaf(), [background](const FloatGrid::TreeType::LeafIter& leaf) {
+        for (auto value = leaf->beginValueOn(); value; ++value)
+            if (std::abs(*value) >= background) value.setValueOff();
+    });
+    openvdb::tools::pruneLevelSet(field.tree());
+}
+
+FloatGridPtr cloud::settled_field(const Domain& domain, const CloudOrientation& cloud, CloudReport& report,
+                                  const RunContext& run) {
+    FloatGridPtr field = cloud::CloudField(cloud, domain.voxel_size, report, run).on(domain, run);
+    settle(*field, cloud, report, run);
+    return field;
 }
 
 FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cloud, CloudReport& report,
                                 const RunContext& run) {
     FloatGridPtr result;
-    with_threads(run, [&] {
-        const FloatGridPtr field = cloud::CloudField(cloud, domain.voxel_size, report, run).on(domain, run);
-        result = cloud::settle(field, cloud, report, run);
-    });
+    with_threads(run,
+                 [&] { result = start_from_grid(domain, *cloud::settled_field(domain, cloud, report, run), run); });
     return result;
 }
 

@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "cloud/surface/cloud_field.h"
+#include "covol/start.h"
 #include "distance/memory_need.h"
 #include "segment/fields.h"
 #include "segment/heuristics.h"
@@ -40,6 +42,10 @@ void choose_cloud_domain(Job& job) {
                                                         kJob.margin_voxels * job.h());
 }
 
+void make_start_of_field(Job& job) {
+    if (!job.rests_on_field()) job.result.u = start_from_grid(job.domain(), *job.result.u, job.run);
+}
+
 void start_from_cloud(Job& job) {
     job.origin = StartOrigin::Cloud;
     job.options.evolve.follow = true;
@@ -47,7 +53,8 @@ void start_from_cloud(Job& job) {
     CloudReport& report = job.report().cloud;
     {
         Timed timed(job.report().seconds.tag);
-        job.result.u = surface_from_cloud(job.domain(), *job.cloud, report, job.run);
+        job.result.u = cloud::settled_field(job.domain(), *job.cloud, report, job.run);
+        make_start_of_field(job);
     }
     if (!job.rests() && job.uses_points()) {
         if (job.has_automatic_range) {

@@ -14,6 +14,9 @@ void start_from_guess(Job& job);
 /// The domain of a cloud.
 void choose_cloud_domain(Job& job);
 
+/// Where the surface does not rest on it, makes job.result.u, a cloud's settled field, a start as those of start.h.
+void make_start_of_field(Job& job);
+
 /// The surface behind a cloud, oriented by itself.
 void start_from_cloud(Job& job);
 
