@@ -1,26 +1,43 @@
 #pragma once
-#include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 namespace covol::meshing {
 
+/// Sets under union, by any number of threads at once; each is known by its least member. Anderson and Woll, Wait-free
+/// parallel algorithms for the union-find problem, STOC 1991.
 class DisjointSets {
 public:
     explicit DisjointSets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0U); }
+    /// While others unite, one that was the root a moment ago.
     std::uint32_t root(std::uint32_t i) {
-        while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-        return i;
+        for (;;) {
+            const std::uint32_t parent = load(i);
+            if (parent == i) return i;
+            const std::uint32_t next = load(parent);
+            // What is no root any more never becomes one: nobody else links it.
+            if (next != parent) std::atomic_ref(parent_[i]).store(next, std::memory_order_relaxed);
+            i = next;
+        }
     }
     void unite(std::uint32_t a, std::uint32_t b) {
-        a = root(a);
-        b = root(b);
-        if (a != b) parent_[std::max(a, b)] = std::min(a, b);
+        for (;;) {
+            a = root(a);
+            b = root(b);
+            if (a == b) return;
+            if (a < b) std::swap(a, b);
+            std::uint32_t expected = a;
+            if (std::atomic_ref(parent_[a]).compare_exchange_strong(expected, b, std::memory_order_relaxed)) return;
+        }
     }
 
 private:
+    std::uint32_t load(std::uint32_t i) { return std::atomic_ref(parent_[i]).load(std::memory_order_relaxed); }
+
     std::vector<std::uint32_t> parent_;
 };
 

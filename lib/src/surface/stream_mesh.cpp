@@ -1,4 +1,6 @@
 // Meshes from the tree to the file, a layer of leaves at a time.
+#include <tbb/parallel_reduce.h>
+
 #include <cmath>
 #include <functional>
 #include <numeric>
@@ -25,19 +27,26 @@ public:
     explicit Totals(std::uint64_t vertices) : vertices_(vertices), pieces_(vertices) {}
 
     void add(const detail::MeshPiece& piece) {
-        for (const Triangle& t : piece.triangles) {
-            std::array<Vec3, 3> corners{};
-            for (std::size_t k = 0; k < 3; ++k) corners[k] = meshing::to_vec3(piece.positions[t[k] - piece.first]);
-            add(t, corners);
-        }
+        if (piece.triangles.empty()) return;
+        if (triangles_ == 0) origin_ = meshing::to_vec3(piece.positions[piece.triangles.front()[0] - piece.first]);
+        triangles_ += piece.triangles.size();
+        // The same splits, and so the same bits, on any number of threads.
+        const Sums sums = tbb::parallel_deterministic_reduce(
+            tbb::blocked_range<std::size_t>(0, piece.triangles.size(), 4096), Sums{},
+            [&](const tbb::blocked_range<std::size_t>& range, Sums sum) {
+                for (std::size_t n = range.begin(); n < range.end(); ++n) add(piece, piece.triangles[n], sum);
+                return sum;
+            },
+            std::plus<>());
+        sums_ = sums_ + sums;
     }
 
     [[nodiscard]] MeshMeasures measures() {
         MeshMeasures m;
-        m.volume = volume_;
-        m.area = area_;
+        m.volume = sums_.volume;
+        m.area = sums_.area;
         for (std::uint32_t v = 0; v < vertices_; ++v) m.components += pieces_.root(v) == v;
-        m.closed = edges_ == 0;
+        m.closed = sums_.edges == 0;
         m.manifold = m.closed;
         const auto euler = std::int64_t(vertices_) - std::int64_t(triangles_ / 2);
         m.genus = m.closed ? int(m.components - euler / 2) : -1;
@@ -45,13 +54,22 @@ public:
     }
 
 private:
-    void add(const Triangle& t, const std::array<Vec3, 3>& p) {
-        if (triangles_++ == 0) origin_ = p[0];
-        volume_ += meshing::six_volumes(p, origin_) / 6;
-        area_ += meshing::length(meshing::area_normal(p[0], p[1], p[2])) / 2;
+    struct Sums {
+        double volume = 0, area = 0;
+        std::uint64_t edges = 0;
+        friend Sums operator+(const Sums& a, const Sums& b) {
+            return {a.volume + b.volume, a.area + b.area, a.edges + b.edges};
+        }
+    };
+
+    void add(const detail::MeshPiece& piece, const Triangle& t, Sums& sum) {
+        std::array<Vec3, 3> p{};
+        for (std::size_t k = 0; k < 3; ++k) p[k] = meshing::to_vec3(piece.positions[t[k] - piece.first]);
+        sum.volume += meshing::six_volumes(p, origin_) / 6;
+        sum.area += meshing::length(meshing::area_normal(p[0], p[1], p[2])) / 2;
         for (int k = 0; k < 3; ++k) {
             const std::uint32_t a = t[k], b = t[(k + 1) % 3];
-            edges_ += a < b ? mixed(a, b) : -mixed(b, a);
+            sum.edges += a < b ? mixed(a, b) : -mixed(b, a);
         }
         pieces_.unite(t[0], t[1]);
         pieces_.unite(t[1], t[2]);
@@ -66,9 +84,9 @@ private:
         return z ^ z >> 31;
     }
 
-    std::uint64_t vertices_, triangles_ = 0, edges_ = 0;
+    std::uint64_t vertices_, triangles_ = 0;
     Vec3 origin_{};
-    double volume_ = 0, area_ = 0;
+    Sums sums_;
     meshing::DisjointSets pieces_;
 };
 

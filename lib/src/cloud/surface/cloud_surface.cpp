@@ -3,19 +3,25 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Prune.h>
 #include <openvdb/tools/ValueTransformer.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
+#include "base/vector.h"
 #include "cloud/orientation/indicator.h"
 #include "cloud/surface/cloud_field.h"
 #include "cloud/surface/heuristics.h"
 #include "cloud/surface/hold_topology.h"
 #include "cloud/surface/join_pieces.h"
-#include "covol/evidence.h"
-#include "covol/mesh.h"
+#include "covol/error.h"
+#include "covol/mesh_stream.h"
 #include "covol/start.h"
-#include "covol/surface.h"
+#include "mesh/triangle.h"
+#include "points/point_cells.h"
+#include "surface/marching_cubes.h"
+#include "surface/mesh_pieces.h"
 #include "surface/pieces.h"
 
 namespace covol {
@@ -24,12 +30,16 @@ namespace {
 /// Pieces, cavities and handles.
 struct Complexity {
     Complexity(const FloatGrid& level_set, const RunContext& run) {
-        const MeshMeasures m = measure(extract_mesh(level_set, {}, run));
-        pieces = m.components;
-        all = m.components + std::max(0, m.genus);
+        try {
+            const MeshMeasures m = measure_surface(level_set, 0, run).measures;
+            pieces = m.components;
+            all = m.components + std::max(0, m.genus);
+        } catch (const Error& error) {
+            if (error.code() != Errc::InvalidInput) throw;  // no surface
+        }
     }
-    int pieces;  ///< and cavities
-    int all;
+    int pieces = 0;  ///< and cavities
+    int all = 0;
 };
 
 /// Gives a level set the topology of an indicator that has fewer pieces and handles.
@@ -45,16 +55,38 @@ struct TopologyOf {
         const FloatGridPtr rough = cloud::level_set_of(indicator, domain, run);
         detail::drop_bare_pieces(*rough, points, least);
         const Complexity simpler(*rough, run);
-        if (simpler.all >= own.all) return;
+        if (simpler.pieces == 0 || simpler.all >= own.all) return;
         report.held_voxels += cloud::hold_topology(*rough, level_set);
         own = simpler;
     }
 };
 
 /// Whether some of the surface is far from all points.
-bool is_open(const FloatGrid& level_set, const CloudOrientation& cloud, const RunContext& run) {
-    return measure_share_without_points(extract_mesh(level_set, {}, run), cloud.points,
-                                        kBlend.far_spacings * cloud.scale.spacing, run) > kBlend.open_share;
+bool is_open(const FloatGrid& level_set, const CloudOrientation& points, const RunContext& run) {
+    constexpr std::uint64_t kTriangles = 100000;  // so many tell the share to a thousandth
+    const double reach = kBlend.far_spacings * points.scale.spacing;
+    const cloud::PointCells cells(points.points, reach);
+    double all = 0, bare = 0;
+    detail::measure_pieces(level_set, 0, run, [&](const StreamedMesh& mesh, const detail::MeshPiece& piece) {
+        const std::size_t step = std::size_t(1 + mesh.triangles / kTriangles);
+        std::vector<double> area((piece.triangles.size() + step - 1) / step);
+        std::vector<char> is_bare(area.size());
+        tbb::parallel_for(std::size_t(0), area.size(), [&](std::size_t n) {
+            std::array<Vec3, 3> corners;
+            Vec3 middle = mesh.origin;
+            for (std::size_t k = 0; k < 3; ++k) {
+                corners[k] = meshing::to_vec3(piece.positions[piece.triangles[n * step][k] - piece.first]);
+                middle = cloud::plus(middle, cloud::times(1.0 / 3, corners[k]));
+            }
+            area[n] = meshing::length(meshing::area_normal(corners[0], corners[1], corners[2]));
+            is_bare[n] = !cells.any_within(middle, reach);
+        });
+        for (std::size_t n = 0; n < area.size(); ++n) {
+            all += area[n];
+            bare += is_bare[n] * area[n];
+        }
+    });
+    return bare > kBlend.open_share * all;
 }
 
 }  // namespace
