@@ -8,33 +8,116 @@ namespace covol::cloud {
 namespace {
 
 using Double4 = double __attribute__((vector_size(8 * kFitLanes)));
+using Long4 = std::int64_t __attribute__((vector_size(8 * kFitLanes)));
+using detail::Int8;
 
-COVOL_INLINE Double4 load(const std::vector<double>& values, std::size_t at) {
+COVOL_INLINE Double4 load(const double* values) {
     Double4 v;
-    std::memcpy(&v, values.data() + at, sizeof v);
+    std::memcpy(&v, values, sizeof v);
     return v;
 }
 
 COVOL_INLINE double sum_of(Double4 v) { return (v[0] + v[1]) + (v[2] + v[3]); }
 
+COVOL_INLINE Double4 dot(const Double4 (&a)[3], const Double4 (&b)[3]) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/// By a mask of lanes: halves of lanes, those of the mask first.
+struct LanesFirst {
+    alignas(32) std::int32_t halves[16][8] = {};
+    std::size_t count[16] = {};
+
+    constexpr LanesFirst() {
+        for (std::size_t mask = 0; mask < 16; ++mask)
+            for (int lane = 0; lane < 4; ++lane)
+                if (mask >> lane & 1) {
+                    halves[mask][2 * count[mask]] = 2 * lane;
+                    halves[mask][2 * count[mask]++ + 1] = 2 * lane + 1;
+                }
+    }
+};
+constexpr LanesFirst kLanesFirst;
+
 }  // namespace
 
-void FitPoints::clear() {
-    for (std::vector<double>* values : {&u, &v, &t, &count}) values->clear();
+void FitCloud::reserve(std::size_t points) {
+    for (int a = 0; a < 3; ++a) place[a].reserve(points + kFitLanes), normal[a].reserve(points + kFitLanes);
+    count.reserve(points + kFitLanes);
+}
+
+void FitCloud::add(const double (&at)[3], const double (&its_normal)[3], double its_count) {
+    for (int a = 0; a < 3; ++a) {
+        place[a].push_back(at[a]);
+        normal[a].push_back(its_normal[a]);
+    }
+    count.push_back(its_count);
+}
+
+void FitCloud::finish() {
+    for (std::size_t n = 1; n < kFitLanes; ++n) add({0, 0, 0}, {0, 0, 0}, 0);
+}
+
+void FitPoints::clear(std::size_t room) {
+    room += kFitLanes;
+    if (u.size() < room)
+        for (std::vector<double>* values : {&u, &v, &t, &count}) values->resize(room);
     size = 0;
 }
 
 void FitPoints::fill_up() {
-    const std::size_t full = (size + kFitLanes - 1) / kFitLanes * kFitLanes;
-    u.resize(full, 1.0);  // where the weight is 0
-    for (std::vector<double>* values : {&v, &t, &count}) values->resize(full, 0.0);
+    for (std::size_t n = size; n % kFitLanes != 0; ++n) {
+        u[n] = 1;  // where the weight is 0
+        v[n] = t[n] = count[n] = 0;
+    }
+}
+
+COVOL_CLONES void select_near(const FitCloud& cloud, std::size_t begin, std::size_t end, const FitFrame& frame,
+                              FitPoints& near) {
+    // In variables of its own, for what is stored might be any of it.
+    const double scale = 1 / frame.radius;
+    Double4 axes[3][3], origin[3];
+    const double *place[3], *normals[3], *counts = cloud.count.data();
+    for (int a = 0; a < 3; ++a) {
+        place[a] = cloud.place[a].data();
+        normals[a] = cloud.normal[a].data();
+        origin[a] = Double4{} + frame.origin[a];
+        for (int b = 0; b < 3; ++b) axes[a][b] = Double4{} + frame.axes[a][b];
+    }
+    double *u = near.u.data(), *v = near.v.data(), *t = near.t.data(), *count = near.count.data();
+    std::size_t size = near.size;
+    for (std::size_t n = begin; n < end; n += kFitLanes) {
+        Double4 to[3], normal[3];
+        for (int a = 0; a < 3; ++a) {
+            to[a] = (load(place[a] + n) - origin[a]) * scale;
+            normal[a] = load(normals[a] + n);
+        }
+        const Double4 squared = to[0] * to[0] + to[1] * to[1] + to[2] * to[2];
+        const Long4 counts_here =
+            (squared < 1.0) & (dot(axes[2], normal) > 0.0) & (Long4{0, 1, 2, 3} < std::int64_t(end - n));
+        const Long4 bits = counts_here & Long4{1, 2, 4, 8};
+        const auto mask = std::size_t((bits[0] | bits[1]) | (bits[2] | bits[3]));
+        if (mask == 0) continue;
+        Int8 first;
+        std::memcpy(&first, kLanesFirst.halves[mask], sizeof first);
+        const auto keep = [&](double* values, Double4 lanes) __attribute__((always_inline)) {
+            lanes = (Double4)__builtin_shuffle((Int8)lanes, first);
+            std::memcpy(values + size, &lanes, sizeof lanes);
+        };
+        keep(u, dot(axes[0], to));
+        keep(v, dot(axes[1], to));
+        keep(t, dot(axes[2], to));
+        keep(count, load(counts + n));
+        size += kLanesFirst.count[mask];
+    }
+    near.size = size;
 }
 
 COVOL_CLONES FitSums fit_sums(const FitPoints& points) {
     Double4 m[15] = {}, h[6] = {}, squares{}, nears{}, near_squares{};
     for (std::size_t n = 0; n < points.size; n += kFitLanes) {
-        const Double4 u = load(points.u, n), v = load(points.v, n), t = load(points.t, n),
-                      count = load(points.count, n);
+        const Double4 u = load(&points.u[n]), v = load(&points.v[n]), t = load(&points.t[n]),
+                      count = load(&points.count[n]);
         const Double4 uu = u * u, uv = u * v, vv = v * v, inside = 1 - uu - vv - t * t, near = inside * inside;
         const Double4 w = count * near, wuu = w * uu, wuv = w * uv, wvv = w * vv, wt = w * t;
         m[0] += w;
@@ -74,11 +157,11 @@ COVOL_CLONES FitSums fit_sums(const FitPoints& points) {
 COVOL_CLONES FitResidual fit_residual(const FitPoints& points, const double x[6]) {
     Double4 squares{}, weight{}, nears{};
     for (std::size_t n = 0; n < points.size; n += kFitLanes) {
-        const Double4 u = load(points.u, n), v = load(points.v, n), t = load(points.t, n);
+        const Double4 u = load(&points.u[n]), v = load(&points.v[n]), t = load(&points.t[n]);
         const Double4 inside = 1 - u * u - v * v;
         const Double4 off = t - (x[0] + u * (x[1] + u * x[3] + v * x[4]) + v * (x[2] + v * x[5]));
         // Points that fill up have u = 1 and no weight.
-        const Double4 near = inside * inside, w = load(points.count, n) * near;
+        const Double4 near = inside * inside, w = load(&points.count[n]) * near;
         squares += w * off * off;
         weight += w;
         nears += near;

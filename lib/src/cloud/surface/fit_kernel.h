@@ -7,22 +7,37 @@ namespace covol::cloud {
 
 inline constexpr std::size_t kFitLanes = 4;
 
-/// Points in a frame in which the neighbourhood is the unit ball, in arrays whose size is a multiple of kFitLanes,
-/// filled up with points of no count.
+/// A cloud, coordinate by coordinate.
+class FitCloud {
+public:
+    void reserve(std::size_t count);
+    void add(const double (&place)[3], const double (&normal)[3], double count);
+    /// After the last one: vectors of kFitLanes may be read from any point on.
+    void finish();
+
+    std::vector<double> place[3], normal[3], count;
+};
+
+/// Where a quadric is fitted.
+struct FitFrame {
+    double origin[3], axes[3][3];  ///< u, v and the normal
+    double radius;
+};
+
+/// Points in a frame in which the neighbourhood is the unit ball, filled up with points of no count to a multiple of
+/// kFitLanes.
 struct FitPoints {
     std::vector<double> u, v, t, count;
-    std::size_t size = 0;  ///< without those that fill up
+    std::size_t size = 0;  ///< without those that fill up, and without what the arrays hold beyond
 
-    void clear();
-    void add(double at_u, double at_v, double at_t, double its_count) {
-        u.push_back(at_u);
-        v.push_back(at_v);
-        t.push_back(at_t);
-        count.push_back(its_count);
-        ++size;
-    }
+    /// Room for so many. What was there is lost.
+    void clear(std::size_t room);
     void fill_up();
 };
+
+/// Appends the cloud's points begin..end-1 that lie in the ball and whose normals are on the frame's side.
+/// @pre room for all of them
+void select_near(const FitCloud& cloud, std::size_t begin, std::size_t end, const FitFrame& frame, FitPoints& near);
 
 /// Weight of a point: count * near, near = (1 - u^2 - v^2 - t^2)^2.
 struct FitSums {

@@ -40,54 +40,41 @@ struct Fit {
 /// The cloud, thinned for one radius.
 struct Level {
     Level(const OrientedCloud& all, double r) : radius(r), cells(all.points, r) {
-        normals.reserve(all.size());
-        counts.reserve(all.size());
+        sorted.reserve(all.size());
         for (const std::uint32_t n : cells.order()) {
-            normals.push_back(all.normals[n]);
-            counts.push_back(all.counts[n]);
+            const Vec3 &p = all.points[n], &normal = all.normals[n];
+            sorted.add({p[0], p[1], p[2]}, {normal[0], normal[1], normal[2]}, double(all.counts[n]));
         }
+        sorted.finish();
     }
     double radius;
     PointCells cells;
-    std::vector<Vec3> normals;  // in the cells' order
-    std::vector<float> counts;
+    FitCloud sorted;  // in the cells' order
 };
 
 struct Scratch {
     std::vector<PointCells::Range> ranges;
-    std::vector<std::uint32_t> kept;
     FitPoints near;  // in radii
 };
 
-/// Those of the ranges' points within the radius whose normals are on this side. No branch depends on a point: which
-/// of them count is as good as random.
-void keep_near(const Level& level, const Vec3& origin, const Vec3& normal, Scratch& scratch) {
+/// Those of the ranges' points within the radius whose normals are on this side.
+void keep_near(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes, Scratch& scratch) {
     std::size_t all = 0;
     for (const PointCells::Range& range : scratch.ranges) all += range.end - range.begin;
-    scratch.kept.resize(all + 1);
-    std::uint32_t* to_next = scratch.kept.data();
-    const double r2 = level.radius * level.radius;
+    scratch.near.clear(all);
+    FitFrame frame{{origin[0], origin[1], origin[2]}, {}, level.radius};
+    for (std::size_t a = 0; a < 3; ++a) std::copy(axes[a].begin(), axes[a].end(), frame.axes[a]);
     for (const PointCells::Range& range : scratch.ranges)
-        for (std::uint32_t n = range.begin; n < range.end; ++n) {
-            const Vec3 to = minus(level.cells.sorted()[n], origin);
-            *to_next = n;
-            to_next += int(dot(to, to) < r2) & int(dot(level.normals[n], normal) > 0);
-        }
-    scratch.kept.resize(std::size_t(to_next - scratch.kept.data()));
+        select_near(level.sorted, range.begin, range.end, frame, scratch.near);
+    scratch.near.fill_up();
 }
 
 Fit fit(const Level& level, const Vec3& origin, const std::array<Vec3, 3>& axes, Scratch& scratch) {
     const double r = level.radius;
-    FitPoints& near = scratch.near;
-    near.clear();
-    keep_near(level, origin, axes[2], scratch);
-    for (const std::uint32_t n : scratch.kept) {
-        const Vec3 to = minus(level.cells.sorted()[n], origin);
-        near.add(dot(to, axes[0]) / r, dot(to, axes[1]) / r, dot(to, axes[2]) / r, double(level.counts[n]));
-    }
+    const FitPoints& near = scratch.near;
+    keep_near(level, origin, axes, scratch);
     Fit result;
     if (near.size < kFit.least_points) return result;
-    near.fill_up();
     const FitSums sums = fit_sums(near);
     constexpr int kMoment[6][6] = {{0, 1, 2, 3, 4, 5},    {1, 3, 4, 6, 7, 8},    {2, 4, 5, 7, 8, 9},
                                    {3, 6, 7, 10, 11, 12}, {4, 7, 8, 11, 12, 13}, {5, 8, 9, 12, 13, 14}};
@@ -127,7 +114,8 @@ int is_of_majority(const Level& level, const Vec3& origin, const Vec3& normal,
         for (std::uint32_t n = range.begin; n < range.end; ++n) {
             const Vec3 to = minus(level.cells.sorted()[n], origin);
             if (dot(to, to) >= r2 || std::abs(dot(to, normal)) > height) continue;
-            (dot(level.normals[n], normal) > 0 ? same : opposite) += double(level.counts[n]);
+            const Vec3 its{level.sorted.normal[0][n], level.sorted.normal[1][n], level.sorted.normal[2][n]};
+            (dot(its, normal) > 0 ? same : opposite) += level.sorted.count[n];
         }
     return same + opposite < kFit.least_majority ? -1 : same >= opposite;
 }
