@@ -1,10 +1,11 @@
 // Meshes from the tree to the file, a layer of leaves at a time.
-#include <tbb/parallel_reduce.h>
+#include <tbb/parallel_for.h>
 
 #include <cmath>
 #include <functional>
 #include <numeric>
 #include <optional>
+#include <vector>
 
 #include "base/file.h"
 #include "covol/error.h"
@@ -30,23 +31,23 @@ public:
         if (piece.triangles.empty()) return;
         if (triangles_ == 0) origin_ = meshing::to_vec3(piece.positions[piece.triangles.front()[0] - piece.first]);
         triangles_ += piece.triangles.size();
-        // The same splits, and so the same bits, on any number of threads.
-        const Sums sums = tbb::parallel_deterministic_reduce(
-            tbb::blocked_range<std::size_t>(0, piece.triangles.size(), 4096), Sums{},
-            [&](const tbb::blocked_range<std::size_t>& range, Sums sum) {
-                for (std::size_t n = range.begin(); n < range.end(); ++n) add(piece, piece.triangles[n], sum);
-                return sum;
-            },
-            std::plus<>());
-        sums_ = sums_ + sums;
+        parts_.resize(piece.triangles.size());
+        tbb::parallel_for(std::size_t(0), parts_.size(),
+                          [&](std::size_t n) { parts_[n] = add(piece, piece.triangles[n]); });
+        // One by one, as measure() does.
+        for (const Part& part : parts_) {
+            sum_.volume += part.volume;
+            sum_.area += part.area;
+            sum_.edges += part.edges;
+        }
     }
 
     [[nodiscard]] MeshMeasures measures() {
         MeshMeasures m;
-        m.volume = sums_.volume;
-        m.area = sums_.area;
+        m.volume = sum_.volume;
+        m.area = sum_.area;
         for (std::uint32_t v = 0; v < vertices_; ++v) m.components += pieces_.root(v) == v;
-        m.closed = sums_.edges == 0;
+        m.closed = sum_.edges == 0;
         m.manifold = m.closed;
         const auto euler = std::int64_t(vertices_) - std::int64_t(triangles_ / 2);
         m.genus = m.closed ? int(m.components - euler / 2) : -1;
@@ -54,25 +55,24 @@ public:
     }
 
 private:
-    struct Sums {
+    struct Part {
         double volume = 0, area = 0;
         std::uint64_t edges = 0;
-        friend Sums operator+(const Sums& a, const Sums& b) {
-            return {a.volume + b.volume, a.area + b.area, a.edges + b.edges};
-        }
     };
 
-    void add(const detail::MeshPiece& piece, const Triangle& t, Sums& sum) {
+    Part add(const detail::MeshPiece& piece, const Triangle& t) {
+        Part part;
         std::array<Vec3, 3> p{};
         for (std::size_t k = 0; k < 3; ++k) p[k] = meshing::to_vec3(piece.positions[t[k] - piece.first]);
-        sum.volume += meshing::six_volumes(p, origin_) / 6;
-        sum.area += meshing::length(meshing::area_normal(p[0], p[1], p[2])) / 2;
+        part.volume = meshing::six_volumes(p, origin_) / 6;
+        part.area = meshing::length(meshing::area_normal(p[0], p[1], p[2])) / 2;
         for (int k = 0; k < 3; ++k) {
             const std::uint32_t a = t[k], b = t[(k + 1) % 3];
-            sum.edges += a < b ? mixed(a, b) : -mixed(b, a);
+            part.edges += a < b ? mixed(a, b) : -mixed(b, a);
         }
         pieces_.unite(t[0], t[1]);
         pieces_.unite(t[1], t[2]);
+        return part;
     }
 
     /// A number for an edge: sums of such numbers, with signs for the direction, are 0 by chance once in 2^64.
@@ -86,7 +86,8 @@ private:
 
     std::uint64_t vertices_, triangles_ = 0;
     Vec3 origin_{};
-    Sums sums_;
+    Part sum_;
+    std::vector<Part> parts_;  // of the triangles of a piece
     meshing::DisjointSets pieces_;
 };
 

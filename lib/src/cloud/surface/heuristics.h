@@ -43,9 +43,9 @@ struct LocalFitHeuristics {
     double least_majority = heuristic("local_fit.least_majority", 5);
     /// [noises] That the noise is taken to have lowered the points along a bent surface.
     double most_unbent = heuristic("local_fit.most_unbent", 0.5);
-    /// [ratio] Of the first nodes' cells to the last ones'.
-    double widest = heuristic("local_fit.widest", 2);
-    /// [distances between nodes] Least radius of the first ones: there need not be more.
+    /// [ratio] Of the first nodes' cells to the last ones', a power of two.
+    double widest = heuristic("local_fit.widest", 8);
+    /// [distances between nodes] Least radius of all but the last: there need not be more.
     double wide_of_apart = heuristic("local_fit.wide_of_apart", 7);
     /// [cosine] Between normals of quadrics of one sheet.
     double same_sheet = heuristic("local_fit.same_sheet", 0.7);

@@ -362,10 +362,7 @@ std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCl
     const Fitter fitter(cloud, scale.spacing, run);
     std::vector<Quadric> all;
     bare = 0;
-    for (const double times : {kFit.widest, 1.0}) {
-        // Where noise is less, wide neighbourhoods are those of flat parts: they tell less about what lies beside
-        // these.
-        if (times > 1 && scale.noise < scale.spacing) continue;
+    for (double times = kFit.widest;; times = std::max(1.0, times / 2)) {
         const double apart = times * edge;
         OrientedCloud nodes = thinned(places, apart);
         if (!all.empty()) nodes = without_covered(nodes, all);
@@ -377,8 +374,8 @@ std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCl
             q.apart = apart;
             all.push_back(q);
         }
+        if (!(times > 1)) return without_lone(all);
     }
-    return without_lone(all);
 }
 
 }  // namespace covol::cloud

@@ -46,8 +46,8 @@ struct Quadric {
 [[nodiscard]] std::vector<Quadric> fit_quadrics(const OrientedCloud& nodes, const OrientedCloud& cloud, double spacing,
                                                 const RunContext& run);
 
-/// Quadrics all over a cloud, as fit_quadrics() makes them: at nodes taken from cells of the given edge, or of twice as
-/// much where the neighbourhoods are so wide, for noise wants it, that more nodes would tell the same.
+/// Quadrics all over a cloud, as fit_quadrics() makes them: at nodes taken from cells of the given edge, or of two,
+/// four or eight times as much where the neighbourhoods are so wide that more nodes would tell the same.
 /// @param places  the cloud's points, moved to about where the surface is; the nodes are means of them
 /// @param scale   of the cloud's points
 /// @param bare    how many nodes have none
