@@ -109,6 +109,7 @@ class Sweep {
 public:
     Sweep(const FloatGrid& distance, double radius, const std::vector<Vec3>& seeds)
         : box_(detail::box_of(domain_of(distance))),
+          inner_(box_.min().offsetBy(1), box_.max().offsetBy(-1)),
           band_(distance),
           columns_(band_, box_),
           d_(band_.size(), 0.0F),
@@ -143,7 +144,7 @@ private:
     std::int32_t neighbour_label(std::int32_t leaf, int at, int face) const;
     int bucket_of(float d) const { return int(double(d) / h_ * kTagDistance.buckets_per_voxel); }
 
-    const detail::CoordBBox box_;
+    const detail::CoordBBox box_, inner_;
     const detail::LeafBand band_;
     const detail::LeafColumns columns_;
     detail::LeafArray<float> d_;
@@ -233,17 +234,19 @@ void Sweep::enter_voxel(std::int32_t node) {
     const int at = node % kLeafSize;
     const bool is_beyond = !detail::is_on(band_.active(leaf), at);
     const double d = is_beyond ? radius_ : double(d_.leaf(leaf)[at]) / h_;
-    std::int32_t root = -1;
+    std::int32_t root = -1, last = -1;
     int known = 0;
     for (int face = 0; face < 6; ++face) {
         const std::int32_t label = neighbour_label(leaf, at, face);
         if (label < 0) continue;
         ++known;
+        if (label == last) continue;
+        last = label;
         const std::int32_t other = components_.find(label);
         root = root < 0 ? other : components_.merge(root, other, d, is_beyond);
     }
     const Coord voxel = band_.origin(leaf).offsetBy(at >> 6, at >> 3 & 7, at & 7);
-    const bool at_boundary = !detail::CoordBBox(box_.min().offsetBy(1), box_.max().offsetBy(-1)).isInside(voxel);
+    const bool at_boundary = !inner_.isInside(voxel);
     if (root < 0) root = at_boundary ? kExterior : components_.create(d, false);
     components_.grow(root, 1, 6 - 2 * known);
     label_.leaf(leaf)[at] = root;
