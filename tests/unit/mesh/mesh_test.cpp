@@ -1,8 +1,14 @@
 #include "covol/mesh.h"
 
+#include <tbb/parallel_for.h>
+
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <random>
+#include <utility>
+#include <vector>
 
+#include "mesh/disjoint_sets.h"
 #include "support/meshes.h"
 
 using namespace covol;
@@ -110,4 +116,34 @@ TEST_CASE("components below a volume and unused vertices go") {
     remove_small_components(mesh, 1000);
     CHECK(mesh.empty());
     CHECK(mesh.vertices.empty());
+}
+
+TEST_CASE("sets united by many threads are those united one by one, known by their least members") {
+    constexpr std::uint32_t kCount = 200000;
+    std::mt19937 random(3);
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs(kCount * 3 / 4);
+    for (auto& [a, b] : pairs) a = std::uint32_t(random() % kCount), b = std::uint32_t(random() % kCount);
+    // By relabelling, from the least member on.
+    std::vector<std::vector<std::uint32_t>> beside(kCount);
+    for (const auto& [a, b] : pairs) {
+        beside[a].push_back(b);
+        beside[b].push_back(a);
+    }
+    std::vector<std::uint32_t> expected(kCount, kCount), work;
+    for (std::uint32_t n = 0; n < kCount; ++n)
+        for (work.assign(expected[n] == kCount ? 1 : 0, n); !work.empty();) {
+            const std::uint32_t at = work.back();
+            work.pop_back();
+            if (expected[at] != kCount) continue;
+            expected[at] = n;
+            work.insert(work.end(), beside[at].begin(), beside[at].end());
+        }
+    for (int repeat = 0; repeat < 5; ++repeat) {
+        meshing::DisjointSets sets(kCount);
+        tbb::parallel_for(std::size_t(0), pairs.size(),
+                          [&](std::size_t n) { sets.unite(pairs[n].first, pairs[n].second); });
+        bool same = true;
+        for (std::uint32_t n = 0; n < kCount; ++n) same &= sets.root(n) == expected[n];
+        CHECK(same);
+    }
 }

@@ -327,8 +327,8 @@ OrientedCloud near_level(OrientedCloud points, const CloudOrientation& cloud) {
 
 std::vector<Quadric> quadrics_of(const CloudOrientation& cloud, double h, CloudReport& report, const RunContext& run) {
     const OrientedCloud points{cloud.points, cloud.orientation.normals, std::vector<float>(cloud.points.size(), 1.0F)};
-    std::vector<Quadric> quadrics =
-        quadrics_over(near_level(points, cloud), points, kBlend.node_voxels * h, cloud.scale, report.bare_nodes, run);
+    std::vector<Quadric> quadrics = quadrics_over(near_level(points, cloud), points, kBlend.node_voxels * h,
+                                                  cloud.scale.spacing, report.bare_nodes, run);
     std::vector<double> noise, radius;
     for (const Quadric& q : quadrics) {
         noise.push_back(q.noise);

@@ -357,9 +357,9 @@ std::vector<Quadric> fit_quadrics(const OrientedCloud& nodes, const OrientedClou
     return Fitter(cloud, spacing, run).fit(nodes, run);
 }
 
-std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCloud& cloud, double edge,
-                                   const CloudScale& scale, std::size_t& bare, const RunContext& run) {
-    const Fitter fitter(cloud, scale.spacing, run);
+std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCloud& cloud, double edge, double spacing,
+                                   std::size_t& bare, const RunContext& run) {
+    const Fitter fitter(cloud, spacing, run);
     std::vector<Quadric> all;
     bare = 0;
     for (double times = kFit.widest;; times = std::max(1.0, times / 2)) {

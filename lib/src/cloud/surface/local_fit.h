@@ -49,9 +49,9 @@ struct Quadric {
 /// Quadrics all over a cloud, as fit_quadrics() makes them: at nodes taken from cells of the given edge, or of two,
 /// four or eight times as much where the neighbourhoods are so wide that more nodes would tell the same.
 /// @param places  the cloud's points, moved to about where the surface is; the nodes are means of them
-/// @param scale   of the cloud's points
+/// @param spacing as in fit_quadrics()
 /// @param bare    how many nodes have none
 [[nodiscard]] std::vector<Quadric> quadrics_over(const OrientedCloud& places, const OrientedCloud& cloud, double edge,
-                                                 const CloudScale& scale, std::size_t& bare, const RunContext& run);
+                                                 double spacing, std::size_t& bare, const RunContext& run);
 
 }  // namespace covol::cloud

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "cloud/surface/fit_kernel.h"
 #include "points/point_cells.h"
 #include "support/clouds.h"
 #include "support/surface_samples.h"
@@ -280,7 +281,7 @@ TEST_CASE("where neighbourhoods are wide there are fewer quadrics, and none is f
     const OrientedCloud places = oriented(s);
     test::add_noise(s, spacing, 2);
     std::size_t bare = 1000;
-    const std::vector<Quadric> quadrics = quadrics_over(places, oriented(s), edge, {spacing, spacing, 0}, bare, {});
+    const std::vector<Quadric> quadrics = quadrics_over(places, oriented(s), edge, spacing, bare, {});
     CHECK(bare < 20);  // of 10,000 places
     CHECK(double(quadrics.size()) < 0.5 * double(thinned(places, edge).size()));
     for (const Quadric& q : quadrics) {
@@ -315,8 +316,48 @@ TEST_CASE("points far from all others make no quadrics beside those of a sheet")
     }
     std::size_t bare = 0;
     double widest = 0;
-    for (const Quadric& q : quadrics_over(cloud, cloud, spacing, {spacing, 0}, bare, {}))
+    for (const Quadric& q : quadrics_over(cloud, cloud, spacing, spacing, bare, {}))
         widest = std::max(widest, q.least_radius);
     INFO("widest " << widest << " spacing " << spacing);
     CHECK(widest < 6 * spacing);
+}
+
+TEST_CASE("points selected four at a time are those in the ball on the frame's side, in their order") {
+    std::mt19937 random(8);
+    std::uniform_real_distribution<double> some(-1, 1);
+    std::vector<Vec3> places, normals;
+    FitCloud cloud;
+    for (int n = 0; n < 103; ++n) {
+        places.push_back({some(random), some(random), some(random)});
+        normals.push_back({some(random), some(random), some(random)});
+        const Vec3 &p = places.back(), &m = normals.back();
+        cloud.add({p[0], p[1], p[2]}, {m[0], m[1], m[2]}, 1 + n);
+    }
+    cloud.finish();
+    const FitFrame frame{{0.1, -0.2, 0.05}, {{0.6, 0.8, 0}, {-0.8, 0.6, 0}, {0, 0, 1}}, 0.9};
+    FitPoints near;
+    for (std::size_t begin = 0; begin < places.size(); begin += 7)
+        for (std::size_t end = begin; end <= places.size(); ++end) {
+            near.clear(end - begin + 5);
+            select_near(cloud, 0, 5, frame, near);  // what it appends to
+            select_near(cloud, begin, end, frame, near);
+            near.fill_up();
+            std::vector<std::size_t> expected;
+            const auto expect = [&](std::size_t n) {
+                const Vec3 to{places[n][0] - 0.1, places[n][1] + 0.2, places[n][2] - 0.05};
+                if (test::dot(to, to) < 0.81 && normals[n][2] > 0) expected.push_back(n);
+            };
+            for (std::size_t n = 0; n < 5; ++n) expect(n);
+            for (std::size_t n = begin; n < end; ++n) expect(n);
+            REQUIRE(near.size == expected.size());
+            for (std::size_t k = 0; k < expected.size(); ++k) {
+                const std::size_t n = expected[k];
+                const double x = places[n][0] - 0.1, y = places[n][1] + 0.2, z = places[n][2] - 0.05;
+                REQUIRE(near.count[k] == double(1 + n));
+                REQUIRE(near.u[k] == Approx((0.6 * x + 0.8 * y) / 0.9).margin(1e-12));
+                REQUIRE(near.v[k] == Approx((-0.8 * x + 0.6 * y) / 0.9).margin(1e-12));
+                REQUIRE(near.t[k] == Approx(z / 0.9).margin(1e-12));
+            }
+            for (std::size_t k = near.size; k % kFitLanes != 0; ++k) REQUIRE((near.count[k] == 0 && near.u[k] == 1));
+        }
 }
