@@ -32,8 +32,14 @@ void surface_of_flow(Job& job) {
     FloatGridPtr& u = job.result.u;
     set_clip(*u, where_it_ends(job));
     job.result.surface = extract_surface(*u, job.run);
+    const bool is_field = job.rests_on_field();
+    if (is_field) {
+        SegmentReport& report = job.report();
+        report.active_voxels = report.solve.active_voxels = std::int64_t(job.result.surface->activeVoxelCount());
+        report.leaf_count = report.solve.leaf_count = std::int64_t(job.result.surface->tree().leafCount());
+    }
     if (job.options.without_fields) return u.reset();
-    if (!job.rests_on_field()) return;
+    if (!is_field) return;
     u = start_from_grid(job.domain(), *u, job.run);
     set_clip(*u, where_it_ends(job));
 }

@@ -31,12 +31,11 @@ private:
 /// The indicator's alone.
 [[nodiscard]] FloatGridPtr level_set_of(const Indicator& indicator, const Domain& domain, const RunContext& run);
 
-/// Gives the field of a whole cloud the pieces and handles that points rest on. Of its voxels those whose values are
-/// less than the background stay active.
+/// Gives the field of a whole cloud the pieces and handles that points rest on.
 void settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport& report, const RunContext& run);
 
-/// The settled field over a domain. Its zero level set is the surface; it is no distance, for which there is
-/// start_from_grid() or extract_surface().
+/// The settled field over a domain. Its zero level set is the surface; it is no distance, nor are its active voxels a
+/// band, for which there is start_from_grid() or extract_surface().
 [[nodiscard]] FloatGridPtr settled_field(const Domain& domain, const CloudOrientation& cloud, CloudReport& report,
                                          const RunContext& run);
 

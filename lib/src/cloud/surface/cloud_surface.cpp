@@ -1,8 +1,6 @@
 #include "covol/cloud_surface.h"
 
 #include <openvdb/openvdb.h>
-#include <openvdb/tools/Prune.h>
-#include <openvdb/tools/ValueTransformer.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -113,12 +111,6 @@ void cloud::settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport&
                       *cloud::indicator_of(cloud.points, orientation, kBlend.coarse_spacings * cloud.scale.spacing),
                       report);
     if (topology.own.pieces > 1) join();
-    const float background = field.background();
-    openvdb::tools::foreach (field.tree().beginLeaf(), [background](const FloatGrid::TreeType::LeafIter& leaf) {
-        for (auto value = leaf->beginValueOn(); value; ++value)
-            if (std::abs(*value) >= background) value.setValueOff();
-    });
-    openvdb::tools::pruneLevelSet(field.tree());
 }
 
 FloatGridPtr cloud::settled_field(const Domain& domain, const CloudOrientation& cloud, CloudReport& report,
