@@ -126,7 +126,7 @@ private:
         std::vector<std::vector<bool>> inside(leaves_.size());  // of each local label
         tbb::parallel_for(std::size_t(0), leaves_.size(), [&](std::size_t n) {
             const LeafMask negative = negative_mask(leaves_[n]->buffer().data());
-            for (std::size_t v = 0; v < kVoxels; ++v) labels_[n][v] = kNone;
+            labels_[n].fill(kNone);
             for (int v = 0; v < kVoxels; ++v) {
                 if (labels_[n][std::size_t(v)] != kNone) continue;
                 const bool is_inside = is_on(negative, v);

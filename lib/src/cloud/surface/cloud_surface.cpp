@@ -7,7 +7,6 @@
 #include <array>
 #include <cmath>
 
-#include "base/vector.h"
 #include "cloud/orientation/indicator.h"
 #include "cloud/surface/cloud_field.h"
 #include "cloud/surface/heuristics.h"
@@ -74,7 +73,7 @@ bool is_open(const FloatGrid& level_set, const CloudOrientation& points, const R
             Vec3 middle = mesh.origin;
             for (std::size_t k = 0; k < 3; ++k) {
                 corners[k] = meshing::to_vec3(piece.positions[piece.triangles[n * step][k] - piece.first]);
-                middle = cloud::plus(middle, cloud::times(1.0 / 3, corners[k]));
+                middle = meshing::plus(middle, 1.0 / 3, corners[k]);
             }
             area[n] = meshing::length(meshing::area_normal(corners[0], corners[1], corners[2]));
             is_bare[n] = !cells.any_within(middle, reach);

@@ -290,17 +290,24 @@ TEST_CASE("where neighbourhoods are wide there are fewer quadrics, and none is f
         CHECK(q.radius > (times > 1 ? 7 * q.apart : 0));
     }
     // None is farther from a quadric than that one's nodes are apart, but for the cells that nodes are means of.
-    double farthest = 0;
+    double farthest = 0, farthest_beyond = 0;
     for (std::size_t n = 0; n < places.size(); n += 10) {
-        double beyond = 1;
+        double nearest = 1, beyond = 1;
         for (const Quadric& q : quadrics) {
             const Vec3 foot = q.foot();
             const Vec3& p = places.points[n];
-            beyond = std::min(beyond, std::hypot(foot[0] - p[0], foot[1] - p[1], foot[2] - p[2]) - q.apart);
+            const double off = std::hypot(foot[0] - p[0], foot[1] - p[1], foot[2] - p[2]);
+            nearest = std::min(nearest, off);
+            beyond = std::min(beyond, off - q.apart);
         }
-        farthest = std::max(farthest, beyond);
+        farthest = std::max(farthest, nearest);
+        farthest_beyond = std::max(farthest_beyond, beyond);
     }
-    CHECK(farthest < 2 * edge);
+    INFO("farthest " << farthest / edge << ", beyond " << farthest_beyond / edge << " cells");
+    CHECK(farthest < 3 * edge);
+    CHECK(farthest_beyond < 2 * edge);
+    // Without noise they are as close as asked: on a ball no neighbourhood is that wide.
+    for (const Quadric& q : quadrics_over(places, places, edge, spacing, bare, {})) CHECK(q.apart == edge);
 }
 
 TEST_CASE("points far from all others make no quadrics beside those of a sheet") {
