@@ -2,10 +2,11 @@
 
 #include <tbb/parallel_for.h>
 
-#include <Eigen/IterativeLinearSolvers>
+#include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
 
+#include "guidance/conjugate_gradients.h"
 #include "guidance/heuristics.h"
 
 namespace covol::guidance {
@@ -16,8 +17,6 @@ using Sparse = Eigen::SparseMatrix<double>;
 // Conjugate gradients: the field's range is a few patches, so some ten iterations do for any number of patches, where
 // the work of a factorization grows with its 1.5th power (86,000 patches: 8 s to 0.07 s). Incomplete factors take
 // longer to make than they save.
-using Solver = Eigen::ConjugateGradient<Sparse, Eigen::Lower | Eigen::Upper>;
-
 // Of the right-hand side. It is the choice between priors that wants it: with 1e-5 another may win, and the surface of
 // a spleen is 0.05 voxels elsewhere.
 constexpr double kSolved = 1e-8;
@@ -84,19 +83,11 @@ OffsetField::Fit OffsetField::fit(const std::vector<double>& mean, const std::ve
     Fit result{mean, std::vector<double>(count, 0.0), {}};
     const bool asked =
         std::any_of(evidence.begin(), evidence.end(), [](const OffsetEvidence& e) { return !e.density.empty(); });
-    Eigen::VectorXd inverse_deviation(count), prior_mean(count);
-    for (std::size_t i = 0; i < count; ++i) {
-        inverse_deviation[Eigen::Index(i)] = 1 / deviation[i];
-        prior_mean[Eigen::Index(i)] = mean[i];
-    }
+    Eigen::VectorXd inverse_deviation(count);
+    for (std::size_t i = 0; i < count; ++i) inverse_deviation[Eigen::Index(i)] = 1 / deviation[i];
     const Sparse prior = inverse_deviation.asDiagonal() * system_->precision * inverse_deviation.asDiagonal();
-    const Eigen::VectorXd pull = prior * prior_mean;
-    Eigen::Map<Eigen::VectorXd> offset(result.offset.data(), Eigen::Index(count));
-    std::vector<double> site(count, 0.0), believed(count);
-    Sparse matrix;
-    Solver solver;
-    solver.setTolerance(kSolved);
-    solver.analyzePattern(prior);
+    const std::vector<double> pull = product(prior, mean);
+    std::vector<double> site(count, 0.0), believed(count), known(count, 0.0), right(count);
     for (int round = 0; round < (asked ? kOffsets.rounds : 1); ++round) {
         // What the others say about a patch: the field's value there, the surer the more they know.
         for (std::size_t i = 0; i < count; ++i) {
@@ -113,19 +104,15 @@ OffsetField::Fit OffsetField::fit(const std::vector<double>& mean, const std::ve
             site[i] = gained > 0 ? (m / v - centre * believed[i]) / gained : 0;
             result.precision[i] = gained;
         });
-        matrix = prior;
-        Eigen::VectorXd right = pull;
         for (std::size_t i = 0; i < count; ++i) {
-            matrix.coeffRef(Eigen::Index(i), Eigen::Index(i)) += result.precision[i] + fixed_precision[i];
-            right[Eigen::Index(i)] += result.precision[i] * site[i] + fixed_precision[i] * fixed[i];
+            known[i] = result.precision[i] + fixed_precision[i];
+            right[i] = pull[i] + result.precision[i] * site[i] + fixed_precision[i] * fixed[i];
         }
-        solver.factorize(matrix);
-        offset = solver.solveWithGuess(right, offset).eval();
+        conjugate_gradients(prior, known, right, kSolved, result.offset);
     }
     if (shift != nullptr) {
-        const Eigen::Map<const Eigen::VectorXd> shifted(shift->data(), Eigen::Index(count));
-        const Eigen::VectorXd carried = solver.solve(prior * shifted);
-        result.carried.assign(carried.data(), carried.data() + count);
+        result.carried = *shift;
+        conjugate_gradients(prior, known, product(prior, *shift), kSolved, result.carried);
     }
     return result;
 }

@@ -10,14 +10,14 @@
 
 #include "covol/domain.h"
 #include "mesh/corner_table.h"
-#include "mesh/disjoint_sets.h"
+#include "base/disjoint_sets.h"
 #include "mesh/vertex_normals.h"
 
 namespace covol {
 namespace {
 
 using meshing::cross;
-using meshing::DisjointSets;
+using detail::DisjointSets;
 using meshing::dot;
 using meshing::length;
 using meshing::minus;

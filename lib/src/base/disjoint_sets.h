@@ -6,13 +6,14 @@
 #include <utility>
 #include <vector>
 
-namespace covol::meshing {
+namespace covol::detail {
 
 /// Sets under union, by any number of threads at once; each is known by its least member. Anderson and Woll, Wait-free
 /// parallel algorithms for the union-find problem, STOC 1991.
 class DisjointSets {
 public:
     explicit DisjointSets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0U); }
+    [[nodiscard]] std::size_t size() const noexcept { return parent_.size(); }
     /// While others unite, one that was the root a moment ago.
     std::uint32_t root(std::uint32_t i) {
         for (;;) {
@@ -41,4 +42,4 @@ private:
     std::vector<std::uint32_t> parent_;
 };
 
-}  // namespace covol::meshing
+}  // namespace covol::detail

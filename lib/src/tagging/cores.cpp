@@ -1,0 +1,414 @@
+#include "tagging/cores.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <limits>
+#include <numeric>
+#include <tuple>
+
+#include "base/disjoint_sets.h"
+#include "grid/leaf_columns.h"
+#include "tagging/heuristics.h"
+
+namespace covol::detail {
+namespace {
+
+constexpr float kBeyond = std::numeric_limits<float>::infinity();  ///< d of what lies beyond the tube
+constexpr std::int32_t kExterior = 0;                              ///< the first component
+
+/// Two components meet where d falls below this.
+struct Saddle {
+    float d;
+    std::int32_t first, second;  ///< components; second may be kSeed
+};
+constexpr std::int32_t kSeed = -1;  ///< a seed in the first: from there on it is exterior
+
+/// Components under merging.
+class Merging {
+public:
+    static constexpr std::int32_t kNone = -1;
+
+    explicit Merging(const std::vector<float>& peaks) : parts_(peaks.size()), core_of(peaks.size(), kNone) {
+        for (std::size_t n = 0; n < peaks.size(); ++n) parts_[n] = {std::int32_t(n), kNone, std::int32_t(n), peaks[n]};
+        mark_exterior(kExterior);
+    }
+    void mark_exterior(std::int32_t c) { parts_[root(c)].exterior = true; }
+    void merge(std::int32_t a, std::int32_t b, float d) {
+        a = root(a), b = root(b);
+        if (a == b) return;
+        Part &first = parts_[a], &second = parts_[b];
+        if (first.exterior != second.exterior) record(first.exterior ? b : a, d);
+        Part& kept = first.peak >= second.peak ? first : second;
+        Part& gone = &kept == &first ? second : first;
+        parts_[kept.last].next = gone.parent;
+        kept.last = gone.last;
+        kept.exterior = kept.exterior || gone.exterior;
+        gone.parent = kept.parent;
+    }
+
+private:
+    struct Part {
+        std::int32_t parent;
+        std::int32_t next, last;  // of the parts of one component, of a root on
+        float peak;
+        bool exterior = false;
+    };
+    std::int32_t root(std::int32_t c) {
+        while (parts_[c].parent != c) c = parts_[c].parent = parts_[parts_[c].parent].parent;
+        return c;
+    }
+    void record(std::int32_t c, float d) {
+        for (std::int32_t part = c; part != kNone; part = parts_[part].next) core_of[part] = std::int32_t(saddles.size());
+        saddles.push_back(d);
+        peaks.push_back(parts_[c].peak);
+    }
+    std::vector<Part> parts_;
+
+public:
+    std::vector<std::int32_t> core_of;  ///< by component: the core that it was part of when that met the exterior
+    std::vector<float> saddles, peaks;  ///< by core
+};
+
+class CoreFinder {
+public:
+    CoreFinder(const FloatGrid& distance, double radius, const std::vector<Vec3>& seeds)
+        : domain_(domain_of(distance)),
+          box_(box_of(domain_)),
+          inner_(box_.min().offsetBy(1), box_.max().offsetBy(-1)),
+          band_(distance),
+          columns_(band_, box_),
+          d_(band_.size(), 0.0F),
+          label_(band_.size(), kOutside),
+          inside_(band_.size()),
+          beyond_(band_.size()),
+          radius_(radius) {
+        import_values(distance, band_, d_);
+        for (const Vec3& seed : seeds) {
+            const Vec3 at = domain_.world_to_index(seed);
+            seeds_.push_back(Coord::round(openvdb::Vec3d(at[0], at[1], at[2])));
+        }
+    }
+
+    Cores run() {
+        link();
+        Cores result;
+        count_voxels(result);
+        join_beyond();
+        climb();
+        Merging merging(number_peaks());
+        for (const Saddle& saddle : saddles())
+            saddle.second == kSeed ? merging.mark_exterior(saddle.first)
+                                   : merging.merge(saddle.first, saddle.second, saddle.d);
+        measure(merging, result);
+        return result;
+    }
+
+private:
+    // Labels: a voxel to go on to, uphill; ~a component; or kOutside of the domain.
+    static constexpr std::int32_t kOutside = std::numeric_limits<std::int32_t>::max();
+    static constexpr std::int32_t kNothing = std::numeric_limits<std::int32_t>::max();  // in beyond_
+    static constexpr int kShift[3] = {6, 3, 0};
+
+    /// A voxel's neighbour: in a leaf, in the run ~leaf, or kNothing.
+    struct Neighbour {
+        std::int32_t leaf;
+        int at;
+    };
+    [[nodiscard]] Neighbour neighbour(std::size_t leaf, int at, int face) const {
+        const int shift = kShift[face / 2], c = at >> shift & 7;
+        if (face & 1) {
+            if (c < 7) return {std::int32_t(leaf), at + (1 << shift)};
+            return {beyond_[leaf][face], at - (7 << shift)};
+        }
+        if (c > 0) return {std::int32_t(leaf), at - (1 << shift)};
+        return {beyond_[leaf][face], at + (7 << shift)};
+    }
+    [[nodiscard]] static std::int32_t node(std::size_t leaf, int at) { return std::int32_t(leaf * kLeafSize) + at; }
+    [[nodiscard]] Coord voxel(std::size_t leaf, int at) const {
+        return band_.origin(leaf).offsetBy(at >> 6, at >> 3 & 7, at & 7);
+    }
+    [[nodiscard]] bool is_in_tube(std::size_t leaf, int at) const { return is_on(band_.active(leaf), at); }
+    [[nodiscard]] float height(std::size_t leaf, int at) const {
+        return is_in_tube(leaf, at) ? d_.leaf(leaf)[at] : kBeyond;
+    }
+    [[nodiscard]] std::int32_t run_component(std::int32_t piece) { return std::int32_t(joined_.root(1 + piece)); }
+    [[nodiscard]] std::int32_t component(const Neighbour& n) {
+        return n.leaf < 0 ? run_component(~n.leaf) : ~label_.leaf(n.leaf)[n.at];
+    }
+    template <typename Visit>
+    void for_leaves(Visit&& visit) const {
+        tbb::parallel_for(std::size_t(0), band_.size(), visit);
+    }
+
+    void link();
+    void count_voxels(Cores& result) const;
+    void join_beyond();
+    void climb();
+    std::vector<float> number_peaks();
+    std::vector<Saddle> saddles();
+    void measure(const Merging& merging, Cores& result);
+
+    const Domain domain_;
+    const CoordBBox box_, inner_;
+    const LeafBand band_;
+    const LeafColumns columns_;
+    LeafArray<float> d_;
+    LeafArray<std::int32_t> label_;
+    std::vector<LeafMask> inside_;                     // of the domain
+    std::vector<std::array<std::int32_t, 6>> beyond_;  // by leaf and face: a leaf, ~piece of a run, or kNothing
+    DisjointSets joined_{0};                           // of what lies beyond the tube: exterior, runs, parts of leaves
+    std::vector<Coord> seeds_;
+    double radius_;
+};
+
+void CoreFinder::link() {
+    for_leaves([&](std::size_t leaf) {
+        inside_[leaf] = mask_in_box(band_.origin(leaf), box_);
+        beyond_[leaf].fill(kNothing);
+        columns_.for_each_neighbour(columns_.piece_of_leaf(leaf), [&](std::int32_t other, int di, int dj, int dk) {
+            const std::int32_t there = columns_.pieces()[other].leaf;
+            const int face = di != 0 ? (di > 0) : dj != 0 ? 2 + (dj > 0) : 4 + (dk > 0);
+            beyond_[leaf][face] = there >= 0 ? there : ~other;
+        });
+    });
+}
+
+void CoreFinder::count_voxels(Cores& result) const {
+    const double per_length = kTagDistance.buckets_per_voxel / domain_.voxel_size;
+    const auto buckets = std::size_t(radius_ * per_length) + 1;
+    tbb::enumerable_thread_specific<std::vector<std::int64_t>> counts(buckets, 0);
+    for_leaves([&](std::size_t leaf) {
+        std::vector<std::int64_t>& count = counts.local();
+        for (int at = 0; at < kLeafSize; ++at)
+            if (is_on(inside_[leaf], at) && is_in_tube(leaf, at))
+                ++count[std::min(std::size_t(double(d_.leaf(leaf)[at]) * per_length), buckets - 1)];
+    });
+    result.histogram.assign(buckets, 0);
+    for (const std::vector<std::int64_t>& count : counts)
+        for (std::size_t b = 0; b < buckets; ++b) result.histogram[b] += count[b];
+    result.tube_voxels = std::accumulate(result.histogram.begin(), result.histogram.end(), std::int64_t(0));
+}
+
+/// Numbers what lies beyond the tube: its components through faces.
+void CoreFinder::join_beyond() {
+    const auto& pieces = columns_.pieces();
+    std::vector<std::int32_t> first(band_.size() + 1, 0);  // component of a leaf's first part
+    for_leaves([&](std::size_t leaf) {
+        LeafMask left;
+        for (int word = 0; word < 8; ++word) left[word] = inside_[leaf][word] & ~band_.active(leaf)[word];
+        for (int at = 0; at < kLeafSize; ++at) {
+            if (!is_on(left, at)) continue;
+            LeafMask part{};
+            set_on(part, at);
+            spread(part, left);
+            for (int word = 0; word < 8; ++word) {
+                left[word] &= ~part[word];
+                for (std::uint64_t bits = part[word]; bits != 0; bits &= bits - 1)
+                    label_.leaf(leaf)[word << 6 | __builtin_ctzll(bits)] = first[leaf + 1];
+            }
+            ++first[leaf + 1];
+        }
+    });
+    first[0] = 1 + std::int32_t(pieces.size());
+    std::partial_sum(first.begin(), first.end(), first.begin());
+    joined_ = DisjointSets(std::size_t(first.back()));
+
+    const auto is_beyond = [&](std::size_t leaf, int at) { return is_on(inside_[leaf], at) && !is_in_tube(leaf, at); };
+    tbb::parallel_for(std::int32_t(0), std::int32_t(pieces.size()), [&](std::int32_t n) {
+        if (pieces[n].leaf >= 0) return;
+        if (columns_.at_border(pieces[n])) joined_.unite(1 + n, kExterior);
+        columns_.for_each_neighbour(n, [&](std::int32_t other, int, int, int) {
+            if (pieces[other].leaf < 0) joined_.unite(1 + n, 1 + other);
+        });
+    });
+    for_leaves([&](std::size_t leaf) {
+        for (int at = 0; at < kLeafSize; ++at)
+            if (is_beyond(leaf, at)) label_.leaf(leaf)[at] = ~(first[leaf] + label_.leaf(leaf)[at]);
+    });
+    for_leaves([&](std::size_t leaf) {
+        for (int at = 0; at < kLeafSize; ++at) {
+            if (!is_beyond(leaf, at)) continue;
+            const auto own = std::uint32_t(~label_.leaf(leaf)[at]);
+            if (!inner_.isInside(voxel(leaf, at))) joined_.unite(own, kExterior);
+            for (int face = 0; face < 6; ++face) {
+                const Neighbour n = neighbour(leaf, at, face);
+                if (n.leaf == std::int32_t(leaf) || n.leaf == kNothing) continue;
+                if (n.leaf < 0) joined_.unite(own, std::uint32_t(1 + ~n.leaf));
+                else if (is_beyond(n.leaf, n.at)) joined_.unite(own, std::uint32_t(~label_.leaf(n.leaf)[n.at]));
+            }
+        }
+    });
+    for_leaves([&](std::size_t leaf) {
+        for (int at = 0; at < kLeafSize; ++at)
+            if (is_beyond(leaf, at))
+                label_.leaf(leaf)[at] = ~std::int32_t(joined_.root(std::uint32_t(~label_.leaf(leaf)[at])));
+    });
+}
+
+/// Each voxel of the tube gets its highest neighbour, or itself where that is the highest; of equal ones the first.
+void CoreFinder::climb() {
+    for_leaves([&](std::size_t leaf) {
+        for (int at = 0; at < kLeafSize; ++at) {
+            if (!is_on(inside_[leaf], at) || !is_in_tube(leaf, at)) continue;
+            float highest = d_.leaf(leaf)[at];
+            std::int32_t label = node(leaf, at);
+            for (int face = 0; face < 6; ++face) {
+                const Neighbour n = neighbour(leaf, at, face);
+                if (n.leaf == kNothing || (n.leaf >= 0 && !is_on(inside_[n.leaf], n.at))) continue;
+                if (n.leaf < 0 || !is_in_tube(n.leaf, n.at)) {
+                    label = ~component(n);
+                    break;
+                }
+                const float d = d_.leaf(n.leaf)[n.at];
+                if (d < highest || (d == highest && node(n.leaf, n.at) > label)) continue;
+                highest = d;
+                label = node(n.leaf, n.at);
+            }
+            label_.leaf(leaf)[at] = label;
+        }
+    });
+}
+
+/// Makes the peaks components, and labels all voxels with theirs. @return d of all components' peaks
+std::vector<float> CoreFinder::number_peaks() {
+    std::vector<std::int32_t> first(band_.size() + 1, 0);
+    for_leaves([&](std::size_t leaf) {
+        for (int at = 0; at < kLeafSize; ++at) first[leaf + 1] += label_.leaf(leaf)[at] == node(leaf, at);
+    });
+    first[0] = std::int32_t(joined_.size());
+    std::partial_sum(first.begin(), first.end(), first.begin());
+    std::vector<float> peaks(std::size_t(first.back()), kBeyond);
+    for_leaves([&](std::size_t leaf) {
+        for (int at = 0; at < kLeafSize; ++at) {
+            std::int32_t& label = label_.leaf(leaf)[at];
+            if (label != node(leaf, at)) continue;
+            peaks[first[leaf]] = d_.leaf(leaf)[at];
+            label = ~first[leaf]++;
+        }
+    });
+    const auto label_of = [&](std::int32_t n) { return std::atomic_ref(label_.leaf(0)[n]); };
+    for_leaves([&](std::size_t leaf) {
+        for (int at = 0; at < kLeafSize; ++at) {
+            std::int32_t label = label_of(node(leaf, at)).load(std::memory_order_relaxed);
+            if (label < 0 || label == kOutside) continue;
+            while (label >= 0) label = label_of(label).load(std::memory_order_relaxed);
+            label_of(node(leaf, at)).store(label, std::memory_order_relaxed);
+        }
+    });
+    return peaks;
+}
+
+/// By falling d.
+std::vector<Saddle> CoreFinder::saddles() {
+    tbb::enumerable_thread_specific<std::vector<Saddle>> found;
+    for_leaves([&](std::size_t leaf) {
+        std::vector<Saddle>& here = found.local();
+        // The same two meet in many places: the highest one counts.
+        std::array<Saddle, 64> last;
+        last.fill({0.0F, kSeed, kSeed});
+        const auto offer = [&](float d, std::int32_t a, std::int32_t b) {
+            if (a == b) return;
+            const auto [first, second] = std::minmax(a, b);
+            Saddle& kept = last[std::size_t(first * 7 + second) % last.size()];
+            if (kept.first == first && kept.second == second) {
+                kept.d = std::max(kept.d, d);
+                return;
+            }
+            if (kept.first != kSeed) here.push_back(kept);
+            kept = {d, first, second};
+        };
+        for (int at = 0; at < kLeafSize; ++at) {
+            if (!is_on(inside_[leaf], at)) continue;
+            const std::int32_t own = ~label_.leaf(leaf)[at];
+            const float d = height(leaf, at);
+            // Beyond the domain's end lies the exterior: a voxel there is a gap like any other.
+            if (!inner_.isInside(voxel(leaf, at))) offer(d, own, kExterior);
+            for (int face = 0; face < 6; ++face) {
+                const Neighbour n = neighbour(leaf, at, face);
+                if (n.leaf == kNothing) continue;
+                if (n.leaf < 0)
+                    offer(d, own, component(n));
+                else if ((face & 1) && is_on(inside_[n.leaf], n.at))
+                    offer(std::min(d, height(n.leaf, n.at)), own, component(n));
+            }
+        }
+        for (const Saddle& kept : last)
+            if (kept.first != kSeed) here.push_back(kept);
+    });
+    std::vector<Saddle> all;
+    for (const std::vector<Saddle>& some : found) all.insert(all.end(), some.begin(), some.end());
+    for (const Coord& seed : seeds_) {
+        if (!box_.isInside(seed)) continue;
+        const std::int32_t leaf = band_.find(Coord(seed.x() & ~7, seed.y() & ~7, seed.z() & ~7));
+        if (leaf == band_.none()) {
+            all.push_back({kBeyond, run_component(columns_.find(seed)), kSeed});
+            continue;
+        }
+        const int at = leaf_offset(seed.x() & 7, seed.y() & 7, seed.z() & 7);
+        all.push_back({height(leaf, at), ~label_.leaf(leaf)[at], kSeed});
+    }
+    tbb::parallel_sort(all.begin(), all.end(), [](const Saddle& x, const Saddle& y) {
+        return std::tuple(-x.d, x.first, x.second) < std::tuple(-y.d, y.first, y.second);
+    });
+    return all;
+}
+
+void CoreFinder::measure(const Merging& merging, Cores& result) {
+    const std::vector<float>& saddle = merging.saddles;
+    std::vector<std::int64_t> voxels(saddle.size(), 0), faces(saddle.size(), 0);
+    const auto add = [](std::int64_t& sum, std::int64_t n) { std::atomic_ref(sum).fetch_add(n, std::memory_order_relaxed); };
+    for_leaves([&](std::size_t leaf) {
+        for (int at = 0; at < kLeafSize; ++at) {
+            if (!is_on(inside_[leaf], at)) continue;
+            const std::int32_t core = merging.core_of[~label_.leaf(leaf)[at]];
+            if (core == Merging::kNone || !(height(leaf, at) > saddle[core])) continue;
+            int open = 6;
+            for (int face = 0; face < 6; ++face) {
+                const Neighbour n = neighbour(leaf, at, face);
+                if (n.leaf == kNothing) continue;
+                if (n.leaf < 0)
+                    open -= 2;  // and the run's own face
+                else if (is_on(inside_[n.leaf], n.at) && height(n.leaf, n.at) > saddle[core])
+                    --open;
+            }
+            add(voxels[core], 1);
+            add(faces[core], open);
+        }
+        for (const std::int32_t other : beyond_[leaf]) {
+            const std::int32_t core = other < 0 ? merging.core_of[run_component(~other)] : Merging::kNone;
+            if (core != Merging::kNone) add(faces[core], kLeafDim * kLeafDim);
+        }
+    });
+    const auto& pieces = columns_.pieces();
+    for (std::int32_t n = 0; n < std::int32_t(pieces.size()); ++n) {
+        const std::int32_t core = pieces[n].leaf < 0 ? merging.core_of[run_component(n)] : Merging::kNone;
+        if (core != Merging::kNone) voxels[core] += std::int64_t(pieces[n].end - pieces[n].begin) * kLeafSize;
+    }
+    const double h = domain_.voxel_size;
+    for (std::size_t n = 0; n < saddle.size(); ++n)
+        // A voxel surface has 3/2 of a smooth surface's area, on average over directions.
+        if (voxels[n] > 0)
+            result.cores.push_back({saddle[n] / h, std::min(double(merging.peaks[n]), radius_) / h, double(voxels[n]),
+                                    double(faces[n]) * 2.0 / 3.0});
+}
+
+}  // namespace
+
+double Cores::cloud_volume(double distance) const {
+    double n = 0;
+    for (std::size_t bucket = 0;
+         bucket < histogram.size() && double(bucket) < distance * kTagDistance.buckets_per_voxel; ++bucket)
+        n += double(histogram[bucket]);
+    return n;
+}
+
+Cores find_cores(const FloatGrid& distance, double radius, const std::vector<Vec3>& seeds) {
+    return CoreFinder(distance, radius, seeds).run();
+}
+
+}  // namespace covol::detail
