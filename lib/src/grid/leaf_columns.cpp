@@ -51,6 +51,7 @@ void spread(LeafMask& mask, const LeafMask& open) {
         std::uint64_t m = mask[i];
         if (i > 0) m |= mask[i - 1];
         if (i < 7) m |= mask[i + 1];
+        m &= open[i];  // before it goes on within the slice: else it would pass along edges
         for (std::uint64_t before = 0; before != m;) {
             before = m;
             m |= (m << 1 & ~kFirstInRow) | (m >> 1 & ~kLastInRow) | m << 8 | m >> 8;

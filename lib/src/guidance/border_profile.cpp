@@ -1,6 +1,7 @@
 #include "guidance/border_profile.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <cmath>
@@ -49,7 +50,7 @@ BorderProfile::BorderProfile(std::vector<MarkedPlace> places) : places_(std::mov
                  s <= std::min(p.hi, middle + kBorderSteps + kFarSteps); ++s)
                 all.push_back(p.values[std::size_t(row) * p.steps() + s - p.lo]);
     }
-    std::sort(all.begin(), all.end());
+    tbb::parallel_sort(all.begin(), all.end());
     for (int n = 1; n < kLevels && !all.empty(); ++n) edges_.push_back(all[all.size() * n / kLevels]);
     edges_.resize(kLevels, std::numeric_limits<float>::infinity());
     counts_.resize(places_.size());

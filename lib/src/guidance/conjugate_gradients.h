@@ -4,8 +4,8 @@
 
 namespace covol::guidance {
 
-/// Solves (matrix + diagonal) x = right by conjugate gradients on all threads, scaled by its diagonal (M. R. Hestenes and
-/// E. Stiefel 1952). The same bits for any number of threads.
+/// Solves (matrix + diagonal) x = right by conjugate gradients on all threads, scaled by its diagonal (M. R. Hestenes
+/// and E. Stiefel 1952). The same bits for any number of threads.
 /// @param matrix     symmetric, positive definite with the diagonal
 /// @param diagonal   >= 0
 /// @param x          in: where to begin

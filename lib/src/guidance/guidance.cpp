@@ -19,6 +19,7 @@
 #include "guidance/heuristics.h"
 #include "guidance/learning.h"
 #include "guidance/wide_distance.h"
+#include "mesh/triangle.h"
 #include "points/kd_tree.h"
 #include "redistance/redistance.h"
 #include "surface/pieces.h"
@@ -123,9 +124,16 @@ private:
 
 void Guide::cut_surface() {
     const TriangleMesh mesh = extract_mesh(*surface_, {}, run_);
-    const MeshMeasures measures = measure(mesh);
-    area_ = measures.area;
-    size_ = 3 * std::abs(measures.volume) / area_;  // a ball's radius
+    const auto corner = [&](const auto& t, int c) { return mesh.place(t[c]); };
+    double volume = 0;
+    area_ = 0;
+    const Vec3 origin = corner(mesh.triangles.front(), 0);
+    for (const auto& t : mesh.triangles) {
+        const std::array<Vec3, 3> p{corner(t, 0), corner(t, 1), corner(t, 2)};
+        area_ += meshing::length(meshing::area_normal(p[0], p[1], p[2])) / 2;
+        volume += meshing::six_volumes(p, origin) / 6;
+    }
+    size_ = 3 * std::abs(volume) / area_;  // a ball's radius
     const detail::KdTree tree(marks_);
     const auto cut = [&](double width) {
         width_ = width;

@@ -8,16 +8,16 @@
 #include <numbers>
 #include <numeric>
 
+#include "base/disjoint_sets.h"
 #include "covol/domain.h"
 #include "mesh/corner_table.h"
-#include "base/disjoint_sets.h"
 #include "mesh/vertex_normals.h"
 
 namespace covol {
 namespace {
 
-using meshing::cross;
 using detail::DisjointSets;
+using meshing::cross;
 using meshing::dot;
 using meshing::length;
 using meshing::minus;

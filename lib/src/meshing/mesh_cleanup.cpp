@@ -18,11 +18,11 @@
 #include <functional>
 #include <vector>
 
+#include "base/disjoint_sets.h"
 #include "base/valid.h"
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "covol/mesh_relax.h"
-#include "base/disjoint_sets.h"
 #include "meshing/decimate.h"
 #include "meshing/mesh_distance.h"
 #include "meshing/safe_moves.h"

@@ -1,8 +1,6 @@
 #include "surface/pieces.h"
 
 #include <openvdb/openvdb.h>
-#include <openvdb/tools/LevelSetUtil.h>
-
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
@@ -13,6 +11,7 @@
 #include <map>
 #include <unordered_map>
 
+#include "base/disjoint_sets.h"
 #include "grid/leaf_columns.h"
 #include "grid/sign_masks.h"
 #include "surface/heuristics.h"
@@ -20,35 +19,94 @@
 namespace covol::detail {
 namespace {
 
-using Pieces = std::vector<openvdb::MaskGrid::Ptr>;
+using Leaf = FloatGrid::TreeType::LeafNodeType;
 
-/// The connected parts of the active voxels of one sign, the largest first.
-Pieces pieces_of(const FloatGrid& level_set, bool inside) {
-    openvdb::MaskGrid voxels;
-    for (auto leaf = level_set.tree().cbeginLeaf(); leaf; ++leaf) {
-        auto* mask = voxels.tree().touchLeaf(leaf->origin());
-        for (auto value = leaf->cbeginValueOn(); value; ++value)
-            if ((*value < 0) == inside) mask->setValueOn(value.pos());
+/// The connected parts of the active voxels of one sign, through faces.
+class ActivePieces {
+public:
+    struct Piece {
+        std::int64_t voxels = 0;
+        CoordBBox box;
+    };
+
+    ActivePieces(FloatGrid& level_set, bool inside) {
+        level_set.tree().getNodes(leaves_);
+        std::vector<std::vector<LeafMask>> parts(leaves_.size());
+        tbb::parallel_for(std::size_t(0), leaves_.size(), [&](std::size_t n) {
+            LeafMask left = negative_mask(leaves_[n]->buffer().data());
+            for (int word = 0; word < 8; ++word) {
+                if (!inside) left[word] = ~left[word];
+                left[word] &= leaves_[n]->valueMask().getWord<std::uint64_t>(openvdb::Index(word));
+            }
+            for (int word = 0; word < 8; ++word)
+                while (left[word] != 0) {
+                    LeafMask part{};
+                    part[word] = left[word] & -left[word];
+                    spread(part, left);
+                    for (int other = word; other < 8; ++other) left[other] &= ~part[other];
+                    parts[n].push_back(part);
+                }
+        });
+        std::unordered_map<const Leaf*, std::size_t> numbers;
+        for (std::size_t n = 0; n < leaves_.size(); ++n) {
+            numbers.emplace(leaves_[n], n);
+            first_.push_back(parts_.size());
+            parts_.insert(parts_.end(), parts[n].begin(), parts[n].end());
+        }
+        first_.push_back(parts_.size());
+        joined_ = DisjointSets(parts_.size());
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves_.size(), 64), [&](const auto& range) {
+            const auto tree = level_set.getConstAccessor();
+            for (std::size_t n = range.begin(); n < range.end(); ++n)
+                for (int axis = 0; axis < 3; ++axis) {
+                    Coord beyond = leaves_[n]->origin();
+                    beyond[axis] += kLeafDim;
+                    if (const Leaf* next = tree.probeConstLeaf(beyond)) join(n, numbers.at(next), axis);
+                }
+        });
+        pieces_.resize(parts_.size());
+        for (std::size_t n = 0; n < leaves_.size(); ++n)
+            for (std::size_t p = first_[n]; p < first_[n + 1]; ++p) {
+                Piece& piece = pieces_[joined_.root(std::uint32_t(p))];
+                piece.voxels += count_on(parts_[p]);
+                for (int word = 0; word < 8; ++word)
+                    for (std::uint64_t bits = parts_[p][word]; bits != 0; bits &= bits - 1)
+                        piece.box.expand(
+                            leaves_[n]->offsetToGlobalCoord(openvdb::Index(word << 6 | __builtin_ctzll(bits))));
+            }
     }
-    Pieces pieces;
-    openvdb::tools::segmentActiveVoxels(voxels, pieces);
-    return pieces;
-}
 
-bool has_mark(const openvdb::MaskGrid& piece, const FloatGrid& level_set, const std::vector<Vec3>& marks) {
-    openvdb::CoordBBox box = piece.evalActiveVoxelBoundingBox();
-    box.expand(kPieces.mark_voxels);
-    return std::any_of(marks.begin(), marks.end(), [&](const Vec3& m) {
-        return box.isInside(openvdb::Coord::round(level_set.worldToIndex(openvdb::Vec3d(m[0], m[1], m[2]))));
-    });
-}
+    /// By their first parts; those of the others are empty.
+    [[nodiscard]] const std::vector<Piece>& pieces() const { return pieces_; }
+    void set(std::size_t piece, float value) {
+        for (std::size_t n = 0; n < leaves_.size(); ++n)
+            for (std::size_t p = first_[n]; p < first_[n + 1]; ++p) {
+                if (joined_.root(std::uint32_t(p)) != piece) continue;
+                for (int at = 0; at < kLeafSize; ++at)
+                    if (is_on(parts_[p], at)) leaves_[n]->setValueOnly(openvdb::Index(at), value);
+            }
+    }
 
-void erase(const openvdb::MaskGrid& piece, FloatGrid& level_set, bool inside) {
-    const auto limit = float(0.5 * level_set.voxelSize()[0]);
-    auto accessor = level_set.getAccessor();
-    for (auto value = piece.cbeginValueOn(); value; ++value)
-        accessor.setValue(value.getCoord(), inside ? limit : -limit);
-}
+private:
+    void join(std::size_t lower, std::size_t upper, int axis) {
+        for (std::size_t p = first_[lower]; p < first_[lower + 1]; ++p)
+            for (std::size_t q = first_[upper]; q < first_[upper + 1]; ++q)
+                if (any_on(meeting(parts_[p], parts_[q], axis))) joined_.unite(std::uint32_t(p), std::uint32_t(q));
+    }
+    /// The voxels of `lower` whose next along the axis is in `upper`, of the next leaf.
+    static LeafMask meeting(const LeafMask& lower, const LeafMask& upper, int axis) {
+        constexpr LeafMask kNone{};
+        LeafMask result = looking_at(kNone, upper, axis, 1);
+        for (int word = 0; word < 8; ++word) result[word] &= lower[word];
+        return result;
+    }
+
+    std::vector<Leaf*> leaves_;
+    std::vector<std::size_t> first_;  // of each leaf's parts
+    std::vector<LeafMask> parts_;
+    DisjointSets joined_{0};
+    std::vector<Piece> pieces_;
+};
 
 /// The regions of equal sign, 6-connected, of all that lies between the leaves too.
 class Regions {
@@ -91,7 +149,6 @@ public:
     }
 
 private:
-    using Leaf = FloatGrid::TreeType::LeafNodeType;
     static constexpr int kDim = 8, kVoxels = 512;
     static constexpr Label kAround = 0, kNone = std::numeric_limits<Label>::max();
     /// Blocks of 8^3 along k without a leaf, from the first to before the last.
@@ -313,12 +370,23 @@ private:
 }  // namespace
 
 void drop_unmarked_pieces(FloatGrid& level_set, const std::vector<Vec3>& marks) {
+    const auto limit = float(0.5 * level_set.voxelSize()[0]);
+    const auto has_mark = [&](CoordBBox box) {
+        box.expand(kPieces.mark_voxels);
+        return std::any_of(marks.begin(), marks.end(), [&](const Vec3& m) {
+            return box.isInside(Coord::round(level_set.worldToIndex(openvdb::Vec3d(m[0], m[1], m[2]))));
+        });
+    };
     for (const bool inside : {true, false}) {
-        const Pieces pieces = pieces_of(level_set, inside);
-        for (std::size_t n = 1; n < pieces.size(); ++n) {
-            if (double(pieces[n]->activeVoxelCount()) > kPieces.small * double(pieces[0]->activeVoxelCount())) continue;
-            if (has_mark(*pieces[n], level_set, marks)) continue;
-            erase(*pieces[n], level_set, inside);
+        ActivePieces active(level_set, inside);
+        const std::vector<ActivePieces::Piece>& pieces = active.pieces();
+        if (pieces.empty()) continue;
+        const auto main =
+            std::max_element(pieces.begin(), pieces.end(), [](auto& x, auto& y) { return x.voxels < y.voxels; });
+        for (std::size_t n = 0; n < pieces.size(); ++n) {
+            const auto& [voxels, box] = pieces[n];
+            if (voxels == 0 || &pieces[n] == &*main || double(voxels) > kPieces.small * double(main->voxels)) continue;
+            if (!has_mark(box)) active.set(n, inside ? limit : -limit);
         }
     }
 }

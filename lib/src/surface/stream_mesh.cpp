@@ -7,12 +7,12 @@
 #include <optional>
 #include <vector>
 
+#include "base/disjoint_sets.h"
 #include "base/file.h"
 #include "covol/error.h"
 #include "covol/mesh_stream.h"
 #include "io/mesh/mesh_formats.h"
 #include "io/mesh/mesh_stream.h"
-#include "base/disjoint_sets.h"
 #include "mesh/vertex_normals.h"
 #include "surface/marching_cubes.h"
 #include "surface/mesh_pieces.h"

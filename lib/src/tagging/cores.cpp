@@ -63,7 +63,8 @@ private:
         return c;
     }
     void record(std::int32_t c, float d) {
-        for (std::int32_t part = c; part != kNone; part = parts_[part].next) core_of[part] = std::int32_t(saddles.size());
+        for (std::int32_t part = c; part != kNone; part = parts_[part].next)
+            core_of[part] = std::int32_t(saddles.size());
         saddles.push_back(d);
         peaks.push_back(parts_[c].peak);
     }
@@ -238,8 +239,10 @@ void CoreFinder::join_beyond() {
             for (int face = 0; face < 6; ++face) {
                 const Neighbour n = neighbour(leaf, at, face);
                 if (n.leaf == std::int32_t(leaf) || n.leaf == kNothing) continue;
-                if (n.leaf < 0) joined_.unite(own, std::uint32_t(1 + ~n.leaf));
-                else if (is_beyond(n.leaf, n.at)) joined_.unite(own, std::uint32_t(~label_.leaf(n.leaf)[n.at]));
+                if (n.leaf < 0)
+                    joined_.unite(own, std::uint32_t(1 + ~n.leaf));
+                else if (is_beyond(n.leaf, n.at))
+                    joined_.unite(own, std::uint32_t(~label_.leaf(n.leaf)[n.at]));
             }
         }
     });
@@ -361,7 +364,9 @@ std::vector<Saddle> CoreFinder::saddles() {
 void CoreFinder::measure(const Merging& merging, Cores& result) {
     const std::vector<float>& saddle = merging.saddles;
     std::vector<std::int64_t> voxels(saddle.size(), 0), faces(saddle.size(), 0);
-    const auto add = [](std::int64_t& sum, std::int64_t n) { std::atomic_ref(sum).fetch_add(n, std::memory_order_relaxed); };
+    const auto add = [](std::int64_t& sum, std::int64_t n) {
+        std::atomic_ref(sum).fetch_add(n, std::memory_order_relaxed);
+    };
     for_leaves([&](std::size_t leaf) {
         for (int at = 0; at < kLeafSize; ++at) {
             if (!is_on(inside_[leaf], at)) continue;

@@ -22,7 +22,7 @@ struct Core {
 
 /// What a cloud encloses, at any tag distance.
 struct Cores {
-    std::vector<Core> cores;  ///< by falling saddle
+    std::vector<Core> cores;              ///< by falling saddle
     std::vector<std::int64_t> histogram;  ///< voxels of the tube by d, in buckets of buckets_per_voxel
     std::int64_t tube_voxels = 0;
 

@@ -4,12 +4,16 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <map>
+#include <random>
+#include <vector>
 
 #include "covol/start.h"
 #include "covol/surface.h"
 #include "guidance/wide_distance.h"
 #include "support/clouds.h"
 #include "support/shapes.h"
+#include "surface/heuristics.h"
 #include "surface/pieces.h"
 
 using namespace covol;
@@ -87,4 +91,65 @@ TEST_CASE("small pieces and cavities go where no mark is near", "[guidance]") {
     const FloatGridPtr marked = made();
     detail::drop_unmarked_pieces(*marked, {{27.5, 0, 0}});
     CHECK(sides(*marked) == std::pair(true, false));
+}
+
+TEST_CASE("of a random field the pieces go that a plain search through faces finds", "[guidance]") {
+    using openvdb::Coord;
+    const std::uint64_t seed = GENERATE(1U, 2U, 3U);
+    CAPTURE(seed);
+    std::mt19937_64 random(seed);
+    std::uniform_real_distribution<float> uniform(-1, 1);
+    const Domain domain = cube(13, 1);
+    const openvdb::CoordBBox box(Coord(-13), Coord(13));
+    const FloatGridPtr u = make_grid(domain, 40, "u");
+    std::map<Coord, float> expected;  // active ones
+    const float bias = seed == 2 ? 0.45F : 0.5F;
+    for (auto at = box.begin(); at; ++at) {
+        const float value = uniform(random) + ((*at)[0] < 0 ? bias : -bias);
+        if (uniform(random) > -0.95F) {
+            u->tree().setValueOn(*at, value);
+            expected[*at] = value;
+        } else {
+            u->tree().setValueOff(*at, value);
+        }
+    }
+    const std::vector<Vec3> marks{{-9, -8, 3}, {10, 2, -6}};
+
+    std::size_t gone = 0;
+    for (const bool inside : {true, false}) {
+        std::vector<std::vector<Coord>> pieces;
+        std::map<Coord, bool> seen;
+        for (const auto& [start, value] : expected) {
+            if ((value < 0) != inside || seen[start]) continue;
+            std::vector<Coord> piece{start};
+            seen[start] = true;
+            for (std::size_t n = 0; n < piece.size(); ++n)
+                for (int face = 0; face < 6; ++face) {
+                    Coord next = piece[n];
+                    next[face / 2] += face % 2 ? 1 : -1;
+                    const auto there = expected.find(next);
+                    if (there == expected.end() || (there->second < 0) != inside || seen[next]) continue;
+                    seen[next] = true;
+                    piece.push_back(next);
+                }
+            pieces.push_back(piece);
+        }
+        std::sort(pieces.begin(), pieces.end(), [](auto& x, auto& y) { return x.size() > y.size(); });
+        for (std::size_t n = 1; n < pieces.size(); ++n) {
+            openvdb::CoordBBox around;
+            for (const Coord& c : pieces[n]) around.expand(c);
+            around.expand(kPieces.mark_voxels);
+            const bool marked = std::any_of(marks.begin(), marks.end(), [&](const Vec3& m) {
+                return around.isInside(Coord::round(openvdb::Vec3d(m[0], m[1], m[2])));
+            });
+            if (marked || double(pieces[n].size()) > kPieces.small * double(pieces[0].size())) continue;
+            ++gone;
+            for (const Coord& c : pieces[n]) expected[c] = inside ? 0.5F : -0.5F;
+        }
+    }
+    CHECK(gone > 100);
+    detail::drop_unmarked_pieces(*u, marks);
+    CHECK(u->activeVoxelCount() == expected.size());
+    for (const auto& [at, value] : expected)
+        if (u->tree().getValue(at) != value) FAIL_CHECK(at << ": " << u->tree().getValue(at) << ", expected " << value);
 }

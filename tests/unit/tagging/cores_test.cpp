@@ -18,7 +18,8 @@ using openvdb::Coord;
 
 namespace {
 
-/// {d > level} without a tree: its components through faces, that of all that reaches the domain's end being the exterior.
+/// {d > level} without a tree: its components through faces, that of all that reaches the domain's end being the
+/// exterior.
 class Flooded {
 public:
     struct Component {
@@ -67,7 +68,8 @@ public:
     }
     [[nodiscard]] std::vector<Component> enclosed() const {
         std::vector<Component> all;
-        std::copy_if(components_.begin(), components_.end(), std::back_inserter(all), [](auto& c) { return !c.exterior; });
+        std::copy_if(components_.begin(), components_.end(), std::back_inserter(all),
+                     [](auto& c) { return !c.exterior; });
         return all;
     }
 
@@ -130,11 +132,13 @@ TEST_CASE("cores have the saddle, the size and the peak of a plain flood, with r
     CHECK(main > 0.1 * 4.0 / 3.0 * 3.14159 * 21 * 21 * 21);
     for (const detail::Core& core : cores) {
         const auto is_it = [&](const Flooded::Component& c) {
-            return double(c.voxels) == core.volume && double(c.faces) * 2 / 3 == core.area && std::abs(c.peak - core.peak) < 1e-6;
+            return double(c.voxels) == core.volume && double(c.faces) * 2 / 3 == core.area &&
+                   std::abs(c.peak - core.peak) < 1e-6;
         };
         const auto above = Flooded(*d, radius, core.saddle, seed_voxel).enclosed();
         CHECK(std::any_of(above.begin(), above.end(), is_it));
-        // A little below it has an opening: no enclosed component holds that peak. What goes beyond the tube has no own.
+        // A little below it has an opening: no enclosed component holds that peak. What goes beyond the tube has no
+        // own.
         if (core.peak == radius) continue;
         const auto below = Flooded(*d, radius, std::nextafter(float(core.saddle), 0.0F), seed_voxel).enclosed();
         CHECK(std::none_of(below.begin(), below.end(), [&](const Flooded::Component& c) {
@@ -143,7 +147,8 @@ TEST_CASE("cores have the saddle, the size and the peak of a plain flood, with r
     }
     // No larger one is enclosed where the largest opens, but for one that a seed opens.
     if (has_seed) return;
-    for (const auto& c : Flooded(*d, radius, cores.front().saddle, seed_voxel).enclosed()) CHECK(double(c.voxels) <= main);
+    for (const auto& c : Flooded(*d, radius, cores.front().saddle, seed_voxel).enclosed())
+        CHECK(double(c.voxels) <= main);
 }
 
 TEST_CASE("cores are the same for any number of threads") {
