@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <optional>
 
 #include "base/valid.h"
@@ -124,20 +125,18 @@ private:
 
 void Guide::cut_surface() {
     const TriangleMesh mesh = extract_mesh(*surface_, {}, run_);
-    const auto corner = [&](const auto& t, int c) { return mesh.place(t[c]); };
+    const SurfaceVertices vertices = vertices_of(mesh, kGuide.normal_rounds);
+    const auto place = [&](std::uint32_t v) { return vertices.places[v]; };
+    const Vec3 origin = place(mesh.triangles.front()[0]);
     double volume = 0;
-    area_ = 0;
-    const Vec3 origin = corner(mesh.triangles.front(), 0);
-    for (const auto& t : mesh.triangles) {
-        const std::array<Vec3, 3> p{corner(t, 0), corner(t, 1), corner(t, 2)};
-        area_ += meshing::length(meshing::area_normal(p[0], p[1], p[2])) / 2;
-        volume += meshing::six_volumes(p, origin) / 6;
-    }
+    for (const auto& t : mesh.triangles)
+        volume += meshing::six_volumes({place(t[0]), place(t[1]), place(t[2])}, origin) / 6;
+    area_ = std::accumulate(vertices.area.begin(), vertices.area.end(), 0.0);
     size_ = 3 * std::abs(volume) / area_;  // a ball's radius
     const detail::KdTree tree(marks_);
     const auto cut = [&](double width) {
         width_ = width;
-        patches_ = make_patches(mesh, image_.geometry(), width, kGuide.normal_rounds);
+        patches_ = cut_patches(vertices, image_.geometry(), width);
         to_mark_.resize(patches_.size());
         tbb::parallel_for(std::size_t(0), patches_.size(),
                           [&](std::size_t i) { to_mark_[i] = std::sqrt(tree.nearest(patches_.centers[i])); });
@@ -146,6 +145,7 @@ void Guide::cut_surface() {
     };
     cut(kGuide.patch_width * h_);
     if (spacing_ > kGuide.patches_per_spacing * width_) cut(spacing_ / kGuide.patches_per_spacing);
+    find_borders(vertices, patches_);
 }
 
 bool Guide::place_marks(bool first) {

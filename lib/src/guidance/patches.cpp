@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <compare>
 #include <numeric>
 #include <tuple>
 
+#include "mesh/triangle.h"
 #include "points/kd_tree.h"
 
 namespace covol::guidance {
@@ -19,33 +21,27 @@ Vec3 unit(const Vec3& v, const Vec3& fallback) {
     return n > 1e-12 ? Vec3{v[0] / n, v[1] / n, v[2] / n} : fallback;
 }
 
-/// Neighbours of each vertex in compressed rows, each once.
-struct Rows {
-    std::vector<std::uint32_t> first, other;
-    explicit Rows(const TriangleMesh& mesh) : first(mesh.vertices.size() + 1, 0) {
-        for (const auto& t : mesh.triangles)
-            for (int c = 0; c < 3; ++c) ++first[t[c] + 1];
-        std::partial_sum(first.begin(), first.end(), first.begin());
-        other.resize(first.back());
-        std::vector<std::uint32_t> fill(first.begin(), first.end() - 1);
-        // In a closed surface every edge leaves each of its ends in exactly one triangle.
-        for (const auto& t : mesh.triangles)
-            for (int c = 0; c < 3; ++c) other[fill[t[c]]++] = t[(c + 1) % 3];
-    }
-};
-
-void smooth_normals(std::vector<Vec3>& normals, const Rows& rows, int rounds) {
-    std::vector<Vec3> next(normals.size());
+void smooth_normals(SurfaceVertices& surface, int rounds) {
+    std::vector<Vec3>& normals = surface.normals;
+    std::vector<Vec3> smoothed(normals.size());
     for (int round = 0; round < rounds; ++round) {
         tbb::parallel_for(std::size_t(0), normals.size(), [&](std::size_t v) {
             Vec3 sum = normals[v];
-            for (std::uint32_t n = rows.first[v]; n < rows.first[v + 1]; ++n)
-                for (int a = 0; a < 3; ++a) sum[a] += normals[rows.other[n]][a];
-            next[v] = unit(sum, normals[v]);
+            for (std::uint32_t n = surface.first[v]; n < surface.first[v + 1]; ++n)
+                for (int a = 0; a < 3; ++a) sum[a] += normals[surface.next[n]][a];
+            smoothed[v] = unit(sum, normals[v]);
         });
-        normals.swap(next);
+        normals.swap(smoothed);
     }
 }
+
+/// A cell of the image's lattice, and which way the surface faces: the two sides of a sheet are two patches.
+struct VertexKey {
+    std::uint64_t ij, k_face;
+    std::uint32_t vertex;
+    auto operator<=>(const VertexKey&) const = default;
+    [[nodiscard]] bool is_with(const VertexKey& other) const { return ij == other.ij && k_face == other.k_face; }
+};
 
 }  // namespace
 
@@ -59,81 +55,96 @@ double voxel_along(const ImageGeometry& g, const Vec3& d) {
     return std::sqrt(sum);
 }
 
-Patches make_patches(const TriangleMesh& mesh, const ImageGeometry& g, double width, int smooth) {
-    Patches p;
+SurfaceVertices vertices_of(const TriangleMesh& mesh, int smooth) {
+    SurfaceVertices surface;
     const std::size_t count = mesh.vertices.size();
-    p.places.resize(count);
-    p.normals.resize(count);
+    surface.places.resize(count);
+    surface.normals.resize(count);
     const auto normals = compute_vertex_normals(mesh);
     tbb::parallel_for(std::size_t(0), count, [&](std::size_t v) {
-        p.places[v] = mesh.place(v);
-        for (int a = 0; a < 3; ++a) p.normals[v][a] = normals[v][a];
+        surface.places[v] = mesh.place(v);
+        for (int a = 0; a < 3; ++a) surface.normals[v][a] = normals[v][a];
     });
-    const Rows rows(mesh);
-    smooth_normals(p.normals, rows, smooth);
 
-    // A cell of the image's lattice, and which way the surface faces: the two sides of a sheet are two patches.
-    using Key = std::array<std::int32_t, 4>;
-    std::vector<std::pair<Key, std::uint32_t>> keys(count);
+    surface.first.assign(count + 1, 0);
+    for (const auto& t : mesh.triangles)
+        for (int c = 0; c < 3; ++c) ++surface.first[t[c] + 1];
+    std::partial_sum(surface.first.begin(), surface.first.end(), surface.first.begin());
+    surface.next.resize(surface.first.back());
+    std::vector<std::uint32_t> fill(surface.first.begin(), surface.first.end() - 1);
+    surface.area.assign(count, 0);
+    for (const auto& t : mesh.triangles) {
+        const double area =
+            meshing::length(meshing::area_normal(surface.places[t[0]], surface.places[t[1]], surface.places[t[2]]));
+        for (int c = 0; c < 3; ++c) {
+            // In a closed surface every edge leaves each of its ends in exactly one triangle.
+            surface.next[fill[t[c]]++] = t[(c + 1) % 3];
+            surface.area[t[c]] += area / 6;
+        }
+    }
+    smooth_normals(surface, smooth);
+    return surface;
+}
+
+Patches cut_patches(const SurfaceVertices& surface, const ImageGeometry& g, double width) {
+    Patches p;
+    p.places = surface.places;
+    p.normals = surface.normals;
+    const std::size_t count = p.places.size();
+    std::vector<VertexKey> keys(count);
     std::array<double, 3> cell;
     for (int a = 0; a < 3; ++a) cell[a] = std::max(width / g.spacing[a], 1.0);
     tbb::parallel_for(std::size_t(0), count, [&](std::size_t v) {
         const Vec3 at = g.world_to_index(p.places[v]);
-        Key key;
-        for (int a = 0; a < 3; ++a) key[a] = int(std::floor(at[a] / cell[a]));
+        std::array<std::uint64_t, 3> number;  // in order, negative ones first
+        for (int a = 0; a < 3; ++a)
+            number[a] = std::uint32_t(std::int32_t(std::floor(at[a] / cell[a]))) ^ (std::uint32_t(1) << 31);
         int axis = 0;
         for (int a = 1; a < 3; ++a)
             if (std::abs(p.normals[v][a]) > std::abs(p.normals[v][axis])) axis = a;
-        key[3] = 2 * axis + (p.normals[v][axis] > 0);
-        keys[v] = {key, std::uint32_t(v)};
+        const auto face = std::uint64_t(2 * axis + (p.normals[v][axis] > 0));
+        keys[v] = {number[0] << 32 | number[1], number[2] << 32 | face, std::uint32_t(v)};
     });
     tbb::parallel_sort(keys.begin(), keys.end());
     p.patch.resize(count);
+    p.members.resize(count);
     for (std::size_t n = 0; n < count; ++n) {
-        if (n == 0 || keys[n].first != keys[n - 1].first) p.first.push_back(std::uint32_t(n));
-        p.members.push_back(keys[n].second);
-        p.patch[keys[n].second] = std::uint32_t(p.first.size() - 1);
+        if (n == 0 || !keys[n].is_with(keys[n - 1])) p.first.push_back(std::uint32_t(n));
+        p.members[n] = keys[n].vertex;
+        p.patch[keys[n].vertex] = std::uint32_t(p.first.size() - 1);
     }
     const std::size_t patches = p.first.size();
     p.first.push_back(std::uint32_t(count));
 
-    std::vector<double> vertex_area(count, 0);
-    for (const auto& t : mesh.triangles) {
-        const Vec3 &a = p.places[t[0]], &b = p.places[t[1]], &c = p.places[t[2]];
-        const Vec3 u{b[0] - a[0], b[1] - a[1], b[2] - a[2]}, w{c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-        const double area =
-            0.5 * std::hypot(u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]);
-        for (int n = 0; n < 3; ++n) vertex_area[t[n]] += area / 3;
-    }
     p.centers.assign(patches, {0, 0, 0});
     p.directions.assign(patches, {0, 0, 0});
     p.area.assign(patches, 0);
     p.voxel.resize(patches);
-    for (std::size_t i = 0; i < patches; ++i) {
+    tbb::parallel_for(std::size_t(0), patches, [&](std::size_t i) {
         for (std::uint32_t n = p.first[i]; n < p.first[i + 1]; ++n) {
             const std::uint32_t v = p.members[n];
             for (int a = 0; a < 3; ++a) {
                 p.centers[i][a] += p.places[v][a];
                 p.directions[i][a] += p.normals[v][a];
             }
-            p.area[i] += vertex_area[v];
+            p.area[i] += surface.area[v];
         }
         for (int a = 0; a < 3; ++a) p.centers[i][a] /= p.first[i + 1] - p.first[i];
         p.directions[i] = unit(p.directions[i], p.normals[p.members[p.first[i]]]);
         p.voxel[i] = voxel_along(g, p.directions[i]);
-    }
+    });
+    return p;
+}
 
+void find_borders(const SurfaceVertices& surface, Patches& p) {
     // The border between two patches crosses the edges that join them, each about an edge's length of it.
     std::vector<std::tuple<std::uint32_t, std::uint32_t, float>> crossing;
-    for (std::size_t v = 0; v < count; ++v)
-        for (std::uint32_t n = rows.first[v]; n < rows.first[v + 1]; ++n) {
-            const std::uint32_t a = p.patch[v], b = p.patch[rows.other[n]];
-            if (a < b)
-                crossing.emplace_back(a, b,
-                                      float(std::sqrt(detail::squared_distance(p.places[v], p.places[rows.other[n]]))));
-            if (b < a)
-                crossing.emplace_back(b, a,
-                                      float(std::sqrt(detail::squared_distance(p.places[v], p.places[rows.other[n]]))));
+    for (std::size_t v = 0; v < p.places.size(); ++v)
+        for (std::uint32_t n = surface.first[v]; n < surface.first[v + 1]; ++n) {
+            const std::uint32_t a = p.patch[v], b = p.patch[surface.next[n]];
+            if (a == b) continue;
+            const double length = std::sqrt(detail::squared_distance(p.places[v], p.places[surface.next[n]]));
+            crossing.emplace_back(std::min(a, b), std::max(a, b), float(length));
         }
     tbb::parallel_sort(crossing.begin(), crossing.end());
     for (const auto& [a, b, length] : crossing) {
@@ -147,7 +158,6 @@ Patches make_patches(const TriangleMesh& mesh, const ImageGeometry& g, double wi
         p.neighbours[border.a].push_back(border.b);
         p.neighbours[border.b].push_back(border.a);
     }
-    return p;
 }
 
 }  // namespace covol::guidance

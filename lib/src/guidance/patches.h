@@ -7,6 +7,17 @@
 
 namespace covol::guidance {
 
+/// A surface's vertices: what does not depend on how it is cut.
+struct SurfaceVertices {
+    std::vector<Vec3> places, normals;
+    std::vector<double> area;                ///< a third of the triangles around it
+    std::vector<std::uint32_t> first, next;  ///< vertex v has the neighbours next[first[v] .. first[v+1]), each once
+};
+
+/// @param mesh    closed, outward
+/// @param smooth  rounds of averaging of normals
+[[nodiscard]] SurfaceVertices vertices_of(const TriangleMesh& mesh, int smooth);
+
 /// A surface cut into patches about two voxels wide: what has one offset of its own.
 struct Patches {
     // by vertex
@@ -27,10 +38,12 @@ struct Patches {
     [[nodiscard]] std::size_t size() const { return centers.size(); }
 };
 
-/// @param mesh    closed, outward
+/// Without borders: see find_borders().
 /// @param width   of the patches; at least one voxel of the image along each of its axes
-/// @param smooth  rounds of averaging of normals
-[[nodiscard]] Patches make_patches(const TriangleMesh& mesh, const ImageGeometry& geometry, double width, int smooth);
+[[nodiscard]] Patches cut_patches(const SurfaceVertices& vertices, const ImageGeometry& geometry, double width);
+
+/// Fills borders and neighbours.
+void find_borders(const SurfaceVertices& vertices, Patches& patches);
 
 /// The edge of the image's voxels along a unit vector.
 [[nodiscard]] double voxel_along(const ImageGeometry& geometry, const Vec3& direction);
