@@ -8,20 +8,24 @@
 
 namespace covol::detail {
 
+/// Bit n: the n-th of 64 values is below zero.
+inline std::uint64_t negative_slice(const float* v) {
+    std::uint64_t bits = 0;
+#if defined(__SSE2__)
+    for (int n = 0; n < 64; n += 4) {
+        const __m128 below = _mm_cmplt_ps(_mm_loadu_ps(v + n), _mm_setzero_ps());
+        bits |= std::uint64_t(_mm_movemask_ps(below)) << n;
+    }
+#else
+    for (int n = 0; n < 64; ++n) bits |= std::uint64_t(v[n] < 0.0F) << n;
+#endif
+    return bits;
+}
+
 /// The voxels of a leaf below zero.
 inline LeafMask negative_mask(const float* values) {
-    LeafMask mask{};
-    for (int word = 0; word < 8; ++word) {
-        const float* v = values + 64 * word;
-#if defined(__SSE2__)
-        for (int n = 0; n < 64; n += 4) {
-            const __m128 below = _mm_cmplt_ps(_mm_loadu_ps(v + n), _mm_setzero_ps());
-            mask[word] |= std::uint64_t(_mm_movemask_ps(below)) << n;
-        }
-#else
-        for (int n = 0; n < 64; ++n) mask[word] |= std::uint64_t(v[n] < 0.0F) << n;
-#endif
-    }
+    LeafMask mask;
+    for (int word = 0; word < 8; ++word) mask[word] = negative_slice(values + 64 * word);
     return mask;
 }
 

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "grid/cube_cases.h"
+#include "grid/sign_masks.h"
 
 namespace covol::detail {
 namespace {
@@ -36,20 +37,43 @@ public:
 
     /// False when no cell has a crossing.
     bool load(const Coord& origin) {
-        for (int block = 0; block < 8; ++block) load_block(origin, {block >> 2 & 1, block >> 1 & 1, block & 1});
+        std::array<Block, 8> blocks;
+        for (int block = 0; block < 8; ++block)
+            blocks[block] = find_block(origin, {block >> 2 & 1, block >> 1 & 1, block & 1});
+        // Most leaves of a wide band lie on one side of the surface.
         const openvdb::CoordBBox box(origin, origin.offsetBy(kLeafDim));
-        if (!domain_.isInside(box)) clip(origin);
-        int inside = 0;
-        for (const float v : values_) inside += v < 0;
-        return inside != 0 && inside != kSide * kSide * kSide;
+        const bool is_cut = !domain_.isInside(box), first = blocks[0].first() < 0;
+        if (!(is_cut && first) &&
+            std::all_of(blocks.begin(), blocks.end(), [&](const Block& block) { return block.is_all(first); }))
+            return false;
+        for (const Block& block : blocks) copy(block);
+        if (is_cut) clip(origin);
+        bool any = false, all = true;
+        for (int row = 0; row < kSide * kSide; ++row) {
+            const float* v = values_.data() + std::size_t(row) * kSide;
+            int bits = 0;
+            for (int k = 0; k < kSide; ++k) bits |= (v[k] < 0) << k;
+            negative_[row] = bits;
+            any |= bits != 0;
+            all &= bits == (1 << kSide) - 1;
+        }
+        return any && !all;
+    }
+
+    /// Bit k says that the corners of the cell (i, j, k) are not on one side.
+    [[nodiscard]] unsigned crossed(int i, int j) const {
+        const int* row = negative_.data() + i * kSide + j;
+        int any = row[0] | row[1] | row[kSide] | row[kSide + 1], all = row[0] & row[1] & row[kSide] & row[kSide + 1];
+        any |= any >> 1;
+        all &= all >> 1;
+        return unsigned(any & ~all) & ((1U << kLeafDim) - 1);
     }
 
     /// Bit c says that corner c of the cell is inside.
     [[nodiscard]] int signs(int i, int j, int k) const {
-        const float* at = values_.data() + cell_voxel(i, j, k);
-        int result = 0;
-        for (int c = 0; c < 8; ++c) result |= (at[kCornerOffset[c]] < 0) << c;
-        return result;
+        const int* row = negative_.data() + i * kSide + j;
+        const auto along_k = [k](int bits) { return bits >> k & 3; };
+        return along_k(row[0]) | along_k(row[1]) << 2 | along_k(row[kSide]) << 4 | along_k(row[kSide + 1]) << 6;
     }
 
     /// A corner of the cell lies outside the domain.
@@ -69,20 +93,45 @@ public:
     }
 
 private:
-    void load_block(const Coord& origin, const std::array<int, 3>& side) {
+    /// What the cells need of one of the eight leaves, or tiles, around them.
+    struct Block {
+        const float* buffer;  ///< null: of one value
+        float constant;
+        std::array<int, 3> size;
+        float* to;
+
+        [[nodiscard]] float first() const { return buffer ? buffer[0] : constant; }
+        [[nodiscard]] bool is_all(bool negative) const {
+            if (!buffer) return (constant < 0) == negative;
+            if (size[1] == kLeafDim && size[2] == kLeafDim) {  // whole slices
+                const LeafMask mask = size[0] == kLeafDim ? negative_mask(buffer) : LeafMask{negative_slice(buffer)};
+                const std::uint64_t all = negative ? ~std::uint64_t(0) : 0;
+                return std::all_of(mask.begin(), mask.begin() + size[0],
+                                   [all](std::uint64_t word) { return word == all; });
+            }
+            for (int i = 0; i < size[0]; ++i)
+                for (int j = 0; j < size[1]; ++j)
+                    for (int k = 0; k < size[2]; ++k)
+                        if ((buffer[leaf_offset(i, j, k)] < 0) != negative) return false;
+            return true;
+        }
+    };
+    [[nodiscard]] Block find_block(const Coord& origin, const std::array<int, 3>& side) {
         const Coord from = origin.offsetBy(side[0] * kLeafDim, side[1] * kLeafDim, side[2] * kLeafDim);
         const auto* leaf = accessor_.probeConstLeaf(from);
-        const float* buffer = leaf ? leaf->buffer().data() : nullptr;
-        const float constant = leaf ? 0.0F : accessor_.getValue(from);
-        const std::array<int, 3> n = {side[0] ? 1 : kLeafDim, side[1] ? 1 : kLeafDim, side[2] ? 1 : kLeafDim};
-        for (int i = 0; i < n[0]; ++i)
-            for (int j = 0; j < n[1]; ++j) {
-                float* to =
-                    values_.data() + cell_voxel(i + side[0] * kLeafDim, j + side[1] * kLeafDim, side[2] * kLeafDim);
-                if (buffer)
-                    std::copy_n(buffer + leaf_offset(i, j, 0), n[2], to);
+        return {leaf ? leaf->buffer().data() : nullptr,
+                leaf ? 0.0F : accessor_.getValue(from),
+                {side[0] ? 1 : kLeafDim, side[1] ? 1 : kLeafDim, side[2] ? 1 : kLeafDim},
+                values_.data() + cell_voxel(side[0] * kLeafDim, side[1] * kLeafDim, side[2] * kLeafDim)};
+    }
+    static void copy(const Block& block) {
+        for (int i = 0; i < block.size[0]; ++i)
+            for (int j = 0; j < block.size[1]; ++j) {
+                float* to = block.to + cell_voxel(i, j, 0);
+                if (block.buffer)
+                    std::copy_n(block.buffer + leaf_offset(i, j, 0), block.size[2], to);
                 else
-                    std::fill_n(to, n[2], constant);
+                    std::fill_n(to, block.size[2], block.constant);
             }
     }
 
@@ -96,6 +145,7 @@ private:
     FloatGrid::ConstAccessor accessor_;
     openvdb::CoordBBox domain_;
     std::array<float, kSide * kSide * kSide> values_;
+    std::array<int, kSide * kSide> negative_;  // bit k of row i * kSide + j
 };
 
 /// Calls visit(i, j, k, case) for the cells with a crossing, in OpenVDB's order.
@@ -103,9 +153,9 @@ template <typename Visit>
 void for_each_cell(const CellValues& values, DomainEnd end, const Visit& visit) {
     for (int i = 0; i < kLeafDim; ++i)
         for (int j = 0; j < kLeafDim; ++j)
-            for (int k = 0; k < kLeafDim; ++k)
-                if (const int signs = values.signs(i, j, k); signs != 0 && signs != 255)
-                    if (end == DomainEnd::Closed || !values.sticks_out(i, j, k)) visit(i, j, k, kCubeCases[signs]);
+            for (unsigned cells = values.crossed(i, j); cells != 0; cells &= cells - 1)
+                if (const int k = __builtin_ctz(cells); end == DomainEnd::Closed || !values.sticks_out(i, j, k))
+                    visit(i, j, k, kCubeCases[values.signs(i, j, k)]);
 }
 
 Patch make_patch(const Coord& origin, const Point* points, int count, std::uint32_t first) {

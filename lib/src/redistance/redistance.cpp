@@ -14,6 +14,7 @@
 #include "grid/flood_tiles.h"
 #include "grid/leaf_band.h"
 #include "grid/leaf_propagation.h"
+#include "grid/sign_masks.h"
 #include "redistance/interface_patches.h"
 
 namespace covol::detail {
@@ -159,8 +160,7 @@ LeafMask inside_mask(const FloatGrid::ConstAccessor& accessor, const Coord& orig
                      DomainEnd end) {
     LeafMask inside{};
     if (const auto* leaf = accessor.probeConstLeaf(origin)) {
-        const float* values = leaf->buffer().data();
-        for (int p = 0; p < kLeafSize; ++p) inside[p >> 6] |= std::uint64_t(values[p] < 0) << (p & 63);
+        inside = negative_mask(leaf->buffer().data());
     } else if (accessor.getValue(origin) < 0) {
         inside.fill(~std::uint64_t(0));
     }

@@ -19,6 +19,7 @@ namespace covol::detail {
 namespace {
 
 constexpr float kBeyond = std::numeric_limits<float>::infinity();  ///< d of what lies beyond the tube
+constexpr float kNowhere = -kBeyond;                               ///< d of what lies outside the domain
 constexpr std::int32_t kExterior = 0;                              ///< the first component
 
 /// Two components meet where d falls below this.
@@ -86,6 +87,7 @@ public:
           d_(band_.size(), 0.0F),
           label_(band_.size(), kOutside),
           inside_(band_.size()),
+          tube_(band_.size()),
           beyond_(band_.size()),
           radius_(radius) {
         import_values(distance, band_, d_);
@@ -133,10 +135,17 @@ private:
     [[nodiscard]] Coord voxel(std::size_t leaf, int at) const {
         return band_.origin(leaf).offsetBy(at >> 6, at >> 3 & 7, at & 7);
     }
-    [[nodiscard]] bool is_in_tube(std::size_t leaf, int at) const { return is_on(band_.active(leaf), at); }
-    [[nodiscard]] float height(std::size_t leaf, int at) const {
-        return is_in_tube(leaf, at) ? d_.leaf(leaf)[at] : kBeyond;
-    }
+    [[nodiscard]] bool is_in_tube(std::size_t leaf, int at) const { return is_on(tube_[leaf], at); }
+    /// d of a leaf and of the voxels across its faces.
+    struct Heights {
+        static constexpr int kSide = kLeafDim + 2;
+        static constexpr int kStep[6] = {-kSide * kSide, kSide* kSide, -kSide, kSide, -1, 1};  // by face
+        std::array<float, kSide * kSide * kSide> d;
+        [[nodiscard]] const float* at(int voxel) const {
+            return d.data() + ((voxel >> 6) + 1) * kSide * kSide + ((voxel >> 3 & 7) + 1) * kSide + (voxel & 7) + 1;
+        }
+    };
+    void load(std::size_t leaf, Heights& heights) const;
     [[nodiscard]] std::int32_t run_component(std::int32_t piece) { return std::int32_t(joined_.root(1 + piece)); }
     [[nodiscard]] std::int32_t component(const Neighbour& n) {
         return n.leaf < 0 ? run_component(~n.leaf) : ~label_.leaf(n.leaf)[n.at];
@@ -160,7 +169,7 @@ private:
     const LeafColumns columns_;
     LeafArray<float> d_;
     LeafArray<std::int32_t> label_;
-    std::vector<LeafMask> inside_;                     // of the domain
+    std::vector<LeafMask> inside_, tube_;              // of the domain
     std::vector<std::array<std::int32_t, 6>> beyond_;  // by leaf and face: a leaf, ~piece of a run, or kNothing
     DisjointSets joined_{0};                           // of what lies beyond the tube: exterior, runs, parts of leaves
     std::vector<Coord> seeds_;
@@ -170,6 +179,9 @@ private:
 void CoreFinder::link() {
     for_leaves([&](std::size_t leaf) {
         inside_[leaf] = mask_in_box(band_.origin(leaf), box_);
+        for (int word = 0; word < 8; ++word) tube_[leaf][word] = inside_[leaf][word] & band_.active(leaf)[word];
+        for (int at = 0; at < kLeafSize; ++at)
+            if (!is_in_tube(leaf, at)) d_.leaf(leaf)[at] = is_on(inside_[leaf], at) ? kBeyond : kNowhere;
         beyond_[leaf].fill(kNothing);
         columns_.for_each_neighbour(columns_.piece_of_leaf(leaf), [&](std::int32_t other, int di, int dj, int dk) {
             const std::int32_t there = columns_.pieces()[other].leaf;
@@ -179,6 +191,26 @@ void CoreFinder::link() {
     });
 }
 
+void CoreFinder::load(std::size_t leaf, Heights& heights) const {
+    const float* own = d_.leaf(leaf);
+    for (int row = 0; row < kLeafDim * kLeafDim; ++row)
+        std::copy_n(own + row * kLeafDim, kLeafDim, heights.d.data() + (heights.at(row * kLeafDim) - heights.d.data()));
+    constexpr int kStride[3] = {64, 8, 1};
+    for (int face = 0; face < 6; ++face) {
+        const int axis = face / 2, last = (kLeafDim - 1) * kStride[axis], u = axis == 0 ? 8 : 64, v = axis == 2 ? 8 : 1;
+        const std::int32_t other = beyond_[leaf][face];
+        const float* from = other >= 0 && other != kNothing ? d_.leaf(other) : nullptr;
+        const float constant = other == kNothing ? kNowhere : kBeyond;
+        for (int a = 0; a < kLeafDim; ++a)
+            for (int b = 0; b < kLeafDim; ++b) {
+                const int place = a * u + b * v, near = place + (face & 1 ? last : 0),
+                          far = place + (face & 1 ? 0 : last);
+                heights.d[std::size_t(heights.at(near) - heights.d.data() + Heights::kStep[face])] =
+                    from ? from[far] : constant;
+            }
+    }
+}
+
 void CoreFinder::count_voxels(Cores& result) const {
     const double per_length = kTagDistance.buckets_per_voxel / domain_.voxel_size;
     const auto buckets = std::size_t(radius_ * per_length) + 1;
@@ -186,7 +218,7 @@ void CoreFinder::count_voxels(Cores& result) const {
     for_leaves([&](std::size_t leaf) {
         std::vector<std::int64_t>& count = counts.local();
         for (int at = 0; at < kLeafSize; ++at)
-            if (is_on(inside_[leaf], at) && is_in_tube(leaf, at))
+            if (is_in_tube(leaf, at))
                 ++count[std::min(std::size_t(double(d_.leaf(leaf)[at]) * per_length), buckets - 1)];
     });
     result.histogram.assign(buckets, 0);
@@ -201,7 +233,7 @@ void CoreFinder::join_beyond() {
     std::vector<std::int32_t> first(band_.size() + 1, 0);  // component of a leaf's first part
     for_leaves([&](std::size_t leaf) {
         LeafMask left;
-        for (int word = 0; word < 8; ++word) left[word] = inside_[leaf][word] & ~band_.active(leaf)[word];
+        for (int word = 0; word < 8; ++word) left[word] = inside_[leaf][word] & ~tube_[leaf][word];
         for (int at = 0; at < kLeafSize; ++at) {
             if (!is_on(left, at)) continue;
             LeafMask part{};
@@ -219,7 +251,7 @@ void CoreFinder::join_beyond() {
     std::partial_sum(first.begin(), first.end(), first.begin());
     joined_ = DisjointSets(std::size_t(first.back()));
 
-    const auto is_beyond = [&](std::size_t leaf, int at) { return is_on(inside_[leaf], at) && !is_in_tube(leaf, at); };
+    const auto is_beyond = [&](std::size_t leaf, int at) { return d_.leaf(leaf)[at] == kBeyond; };
     tbb::parallel_for(std::int32_t(0), std::int32_t(pieces.size()), [&](std::int32_t n) {
         if (pieces[n].leaf >= 0) return;
         if (columns_.at_border(pieces[n])) joined_.unite(1 + n, kExterior);
@@ -256,19 +288,22 @@ void CoreFinder::join_beyond() {
 /// Each voxel of the tube gets its highest neighbour, or itself where that is the highest; of equal ones the first.
 void CoreFinder::climb() {
     for_leaves([&](std::size_t leaf) {
+        Heights heights;
+        load(leaf, heights);
         for (int at = 0; at < kLeafSize; ++at) {
-            if (!is_on(inside_[leaf], at) || !is_in_tube(leaf, at)) continue;
-            float highest = d_.leaf(leaf)[at];
+            if (!is_in_tube(leaf, at)) continue;
+            const float* here = heights.at(at);
+            float highest = *here;
             std::int32_t label = node(leaf, at);
             for (int face = 0; face < 6; ++face) {
+                const float d = here[Heights::kStep[face]];
+                if (d < highest) continue;
                 const Neighbour n = neighbour(leaf, at, face);
-                if (n.leaf == kNothing || (n.leaf >= 0 && !is_on(inside_[n.leaf], n.at))) continue;
-                if (n.leaf < 0 || !is_in_tube(n.leaf, n.at)) {
+                if (d == kBeyond) {
                     label = ~component(n);
                     break;
                 }
-                const float d = d_.leaf(n.leaf)[n.at];
-                if (d < highest || (d == highest && node(n.leaf, n.at) > label)) continue;
+                if (d == highest && node(n.leaf, n.at) > label) continue;
                 highest = d;
                 label = node(n.leaf, n.at);
             }
@@ -328,7 +363,7 @@ std::vector<Saddle> CoreFinder::saddles() {
         for (int at = 0; at < kLeafSize; ++at) {
             if (!is_on(inside_[leaf], at)) continue;
             const std::int32_t own = ~label_.leaf(leaf)[at];
-            const float d = height(leaf, at);
+            const float d = d_.leaf(leaf)[at];
             // Beyond the domain's end lies the exterior: a voxel there is a gap like any other.
             if (!inner_.isInside(voxel(leaf, at))) offer(d, own, kExterior);
             for (int face = 0; face < 6; ++face) {
@@ -337,7 +372,7 @@ std::vector<Saddle> CoreFinder::saddles() {
                 if (n.leaf < 0)
                     offer(d, own, component(n));
                 else if ((face & 1) && is_on(inside_[n.leaf], n.at))
-                    offer(std::min(d, height(n.leaf, n.at)), own, component(n));
+                    offer(std::min(d, d_.leaf(n.leaf)[n.at]), own, component(n));
             }
         }
         for (const Saddle& kept : last)
@@ -353,7 +388,7 @@ std::vector<Saddle> CoreFinder::saddles() {
             continue;
         }
         const int at = leaf_offset(seed.x() & 7, seed.y() & 7, seed.z() & 7);
-        all.push_back({height(leaf, at), ~label_.leaf(leaf)[at], kSeed});
+        all.push_back({d_.leaf(leaf)[at], ~label_.leaf(leaf)[at], kSeed});
     }
     tbb::parallel_sort(all.begin(), all.end(), [](const Saddle& x, const Saddle& y) {
         return std::tuple(-x.d, x.first, x.second) < std::tuple(-y.d, y.first, y.second);
@@ -368,25 +403,39 @@ void CoreFinder::measure(const Merging& merging, Cores& result) {
         std::atomic_ref(sum).fetch_add(n, std::memory_order_relaxed);
     };
     for_leaves([&](std::size_t leaf) {
-        for (int at = 0; at < kLeafSize; ++at) {
-            if (!is_on(inside_[leaf], at)) continue;
-            const std::int32_t core = merging.core_of[~label_.leaf(leaf)[at]];
-            if (core == Merging::kNone || !(height(leaf, at) > saddle[core])) continue;
-            int open = 6;
-            for (int face = 0; face < 6; ++face) {
-                const Neighbour n = neighbour(leaf, at, face);
-                if (n.leaf == kNothing) continue;
-                if (n.leaf < 0)
-                    open -= 2;  // and the run's own face
-                else if (is_on(inside_[n.leaf], n.at) && height(n.leaf, n.at) > saddle[core])
-                    --open;
+        Heights heights;
+        load(leaf, heights);
+        std::int32_t last = Merging::kNone;
+        std::int64_t sum_voxels = 0, sum_faces = 0;
+        const auto flush = [&](std::int32_t next) {
+            if (last != Merging::kNone) {
+                add(voxels[last], sum_voxels);
+                add(faces[last], sum_faces);
             }
-            add(voxels[core], 1);
-            add(faces[core], open);
+            sum_voxels = sum_faces = 0;
+            last = next;
+        };
+        for (int at = 0; at < kLeafSize; ++at) {
+            const float* here = heights.at(at);
+            if (*here == kNowhere) continue;
+            const std::int32_t core = merging.core_of[~label_.leaf(leaf)[at]];
+            if (core == Merging::kNone || !(*here > saddle[core])) continue;
+            if (core != last) flush(core);
+            ++sum_voxels;
+            for (const int step : Heights::kStep) sum_faces += !(here[step] > saddle[core]);
         }
-        for (const std::int32_t other : beyond_[leaf]) {
+        flush(Merging::kNone);
+        // A run's faces to a leaf show where no voxel of the core is.
+        for (int face = 0; face < 6; ++face) {
+            const std::int32_t other = beyond_[leaf][face];
             const std::int32_t core = other < 0 ? merging.core_of[run_component(~other)] : Merging::kNone;
-            if (core != Merging::kNone) add(faces[core], kLeafDim * kLeafDim);
+            if (core == Merging::kNone) continue;
+            const int axis = face / 2, stride = axis == 0 ? 64 : axis == 1 ? 8 : 1;
+            int open = 0;
+            for (int at = 0; at < kLeafSize; ++at)
+                if (at / stride % kLeafDim == (face & 1 ? kLeafDim - 1 : 0))
+                    open += !(d_.leaf(leaf)[at] > saddle[core]);
+            add(faces[core], open);
         }
     });
     const auto& pieces = columns_.pieces();
