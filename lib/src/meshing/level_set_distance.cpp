@@ -5,22 +5,28 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 
 #include "covol/error.h"
 #include "covol/surface.h"
+#include "grid/sign_masks.h"
 #include "meshing/mesh_distance.h"
 #include "points/kd_tree.h"
 
 namespace covol::detail {
 namespace {
 
-/// Where edges of the lattice cut the surface.
-std::vector<Vec3> crossings_of(const FloatGrid& surface) {
-    std::vector<Vec3> crossings;
+constexpr std::size_t kFewPoints = 2048;  // whose way to every leaf takes less than a tree of all crossings
+
+using Leaf = FloatGrid::TreeType::LeafNodeType;
+
+/// Where edges of the lattice cut the surface, from voxels of this leaf on.
+void add_crossings(const FloatGrid& surface, const Leaf& leaf, std::vector<Vec3>& crossings) {
     const auto at = surface.getConstAccessor();
-    for (auto value = surface.cbeginValueOn(); value; ++value) {
+    for (auto value = leaf.cbeginValueOn(); value; ++value) {
         const double here = double(*value);
         if (std::abs(here) > 2 * surface.voxelSize()[0]) continue;
         for (int axis = 0; axis < 3; ++axis) {
@@ -34,6 +40,45 @@ std::vector<Vec3> crossings_of(const FloatGrid& surface) {
             crossings.push_back({world[0], world[1], world[2]});
         }
     }
+}
+
+/// Squared distances, in voxels, from a place to the nearest and to the farthest point of the box of a leaf's edges.
+struct LeafReach {
+    double nearest = 0, farthest = 0;
+    LeafReach(const openvdb::Vec3d& at, const openvdb::Coord& origin) {
+        for (int a = 0; a < 3; ++a) {
+            const double below = origin[a] - at[a], above = at[a] - (origin[a] + kLeafDim);
+            nearest += std::pow(std::max({below, above, 0.0}), 2);
+            farthest += std::pow(std::max(-below, -above), 2);
+        }
+    }
+};
+
+/// The crossings among which each of these points finds its nearest one.
+std::vector<Vec3> crossings_near(const FloatGrid& surface, const std::vector<Vec3>& points) {
+    std::vector<const Leaf*> leaves;
+    surface.tree().getNodes(leaves);
+    std::vector<char> is_wanted(leaves.size(), 1);
+    if (points.size() <= kFewPoints) {
+        std::vector<char> is_cut(leaves.size());
+        tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t n) {
+            const int negative = count_on(negative_mask(leaves[n]->buffer().data()));
+            is_cut[n] = 0 < negative && negative < kLeafSize;
+            is_wanted[n] = 0;
+        });
+        tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t p) {
+            const openvdb::Vec3d at = surface.worldToIndex(openvdb::Vec3d(points[p][0], points[p][1], points[p][2]));
+            double bound = std::numeric_limits<double>::infinity();
+            for (std::size_t n = 0; n < leaves.size(); ++n)
+                if (is_cut[n]) bound = std::min(bound, LeafReach(at, leaves[n]->origin()).farthest);
+            for (std::size_t n = 0; n < leaves.size(); ++n)
+                if (LeafReach(at, leaves[n]->origin()).nearest <= bound)
+                    std::atomic_ref(is_wanted[n]).store(1, std::memory_order_relaxed);
+        });
+    }
+    std::vector<Vec3> crossings;
+    for (std::size_t n = 0; n < leaves.size(); ++n)
+        if (is_wanted[n]) add_crossings(surface, *leaves[n], crossings);
     return crossings;
 }
 
@@ -58,7 +103,9 @@ std::vector<double> distances_to(const FloatGrid& surface, const std::vector<Vec
     for (std::size_t n = 0; n < points.size(); ++n)
         if (is_far[n]) far.push_back(n);
     if (far.empty()) return distances;
-    const KdTree crossings(crossings_of(surface));
+    std::vector<Vec3> places;
+    for (const std::size_t n : far) places.push_back(points[n]);
+    const KdTree crossings(crossings_near(surface, places));
     tbb::parallel_for(Range(0, far.size(), 64), [&](const Range& range) {
         for (std::size_t n = range.begin(); n != range.end(); ++n)
             distances[far[n]] = std::sqrt(crossings.nearest(points[far[n]]));
