@@ -63,6 +63,19 @@ private:
 /// Spreads `mask` through the open voxels of its leaf, through faces.
 void spread(LeafMask& mask, const LeafMask& open);
 
+/// Calls visit(part) for each part of a leaf's mask that hangs together through faces, by their first voxels.
+template <typename Visit>
+void for_each_part(LeafMask mask, Visit&& visit) {
+    for (std::size_t word = 0; word < mask.size(); ++word)
+        while (mask[word] != 0) {
+            LeafMask part{};
+            part[word] = mask[word] & -mask[word];
+            spread(part, mask);
+            for (std::size_t other = word; other < mask.size(); ++other) mask[other] &= ~part[other];
+            visit(part);
+        }
+}
+
 /// What a flood has reached.
 struct Flood {
     std::vector<LeafMask> leaves;  ///< by leaf

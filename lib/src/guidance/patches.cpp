@@ -28,7 +28,7 @@ void smooth_normals(SurfaceVertices& surface, int rounds) {
         tbb::parallel_for(std::size_t(0), normals.size(), [&](std::size_t v) {
             Vec3 sum = normals[v];
             for (std::uint32_t n = surface.first[v]; n < surface.first[v + 1]; ++n)
-                for (int a = 0; a < 3; ++a) sum[a] += normals[surface.next[n]][a];
+                for (int a = 0; a < 3; ++a) sum[a] += normals[surface.neighbours[n]][a];
             smoothed[v] = unit(sum, normals[v]);
         });
         normals.swap(smoothed);
@@ -70,7 +70,7 @@ SurfaceVertices vertices_of(const TriangleMesh& mesh, int smooth) {
     for (const auto& t : mesh.triangles)
         for (int c = 0; c < 3; ++c) ++surface.first[t[c] + 1];
     std::partial_sum(surface.first.begin(), surface.first.end(), surface.first.begin());
-    surface.next.resize(surface.first.back());
+    surface.neighbours.resize(surface.first.back());
     std::vector<std::uint32_t> fill(surface.first.begin(), surface.first.end() - 1);
     surface.area.assign(count, 0);
     for (const auto& t : mesh.triangles) {
@@ -78,7 +78,7 @@ SurfaceVertices vertices_of(const TriangleMesh& mesh, int smooth) {
             meshing::length(meshing::area_normal(surface.places[t[0]], surface.places[t[1]], surface.places[t[2]]));
         for (int c = 0; c < 3; ++c) {
             // In a closed surface every edge leaves each of its ends in exactly one triangle.
-            surface.next[fill[t[c]]++] = t[(c + 1) % 3];
+            surface.neighbours[fill[t[c]]++] = t[(c + 1) % 3];
             surface.area[t[c]] += area / 6;
         }
     }
@@ -141,9 +141,9 @@ void find_borders(const SurfaceVertices& surface, Patches& p) {
     std::vector<std::tuple<std::uint32_t, std::uint32_t, float>> crossing;
     for (std::size_t v = 0; v < p.places.size(); ++v)
         for (std::uint32_t n = surface.first[v]; n < surface.first[v + 1]; ++n) {
-            const std::uint32_t a = p.patch[v], b = p.patch[surface.next[n]];
+            const std::uint32_t a = p.patch[v], b = p.patch[surface.neighbours[n]];
             if (a == b) continue;
-            const double length = std::sqrt(detail::squared_distance(p.places[v], p.places[surface.next[n]]));
+            const double length = std::sqrt(detail::squared_distance(p.places[v], p.places[surface.neighbours[n]]));
             crossing.emplace_back(std::min(a, b), std::max(a, b), float(length));
         }
     tbb::parallel_sort(crossing.begin(), crossing.end());

@@ -10,8 +10,8 @@ namespace covol::guidance {
 /// A surface's vertices: what does not depend on how it is cut.
 struct SurfaceVertices {
     std::vector<Vec3> places, normals;
-    std::vector<double> area;                ///< a third of the triangles around it
-    std::vector<std::uint32_t> first, next;  ///< vertex v has the neighbours next[first[v] .. first[v+1]), each once
+    std::vector<double> area;                      ///< a third of the triangles around it
+    std::vector<std::uint32_t> first, neighbours;  ///< of vertex v neighbours[first[v] .. first[v+1]), each once
 };
 
 /// @param mesh    closed, outward

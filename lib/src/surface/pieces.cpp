@@ -25,86 +25,80 @@ using Leaf = FloatGrid::TreeType::LeafNodeType;
 class ActivePieces {
 public:
     struct Piece {
-        std::int64_t voxels = 0;
-        CoordBBox box;
+        std::size_t first, last;  // parts
+        std::int64_t voxels;
     };
 
     ActivePieces(FloatGrid& level_set, bool inside) {
-        level_set.tree().getNodes(leaves_);
-        std::vector<std::vector<LeafMask>> parts(leaves_.size());
-        tbb::parallel_for(std::size_t(0), leaves_.size(), [&](std::size_t n) {
-            LeafMask left = negative_mask(leaves_[n]->buffer().data());
+        std::vector<Leaf*> leaves;
+        level_set.tree().getNodes(leaves);
+        std::vector<std::vector<LeafMask>> masks(leaves.size());
+        tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t n) {
+            LeafMask mask = negative_mask(leaves[n]->buffer().data());
             for (int word = 0; word < 8; ++word) {
-                if (!inside) left[word] = ~left[word];
-                left[word] &= leaves_[n]->valueMask().getWord<std::uint64_t>(openvdb::Index(word));
+                if (!inside) mask[word] = ~mask[word];
+                mask[word] &= leaves[n]->valueMask().getWord<std::uint64_t>(openvdb::Index(word));
             }
-            for (int word = 0; word < 8; ++word)
-                while (left[word] != 0) {
-                    LeafMask part{};
-                    part[word] = left[word] & -left[word];
-                    spread(part, left);
-                    for (int other = word; other < 8; ++other) left[other] &= ~part[other];
-                    parts[n].push_back(part);
-                }
+            for_each_part(mask, [&](const LeafMask& part) { masks[n].push_back(part); });
         });
         std::unordered_map<const Leaf*, std::size_t> numbers;
-        for (std::size_t n = 0; n < leaves_.size(); ++n) {
-            numbers.emplace(leaves_[n], n);
-            first_.push_back(parts_.size());
-            parts_.insert(parts_.end(), parts[n].begin(), parts[n].end());
+        std::vector<std::size_t> first;  // of each leaf's parts
+        for (std::size_t n = 0; n < leaves.size(); ++n) {
+            numbers.emplace(leaves[n], n);
+            first.push_back(parts_.size());
+            for (const LeafMask& mask : masks[n]) parts_.push_back({mask, leaves[n], 0});
         }
-        first_.push_back(parts_.size());
-        joined_ = DisjointSets(parts_.size());
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves_.size(), 64), [&](const auto& range) {
+        first.push_back(parts_.size());
+
+        DisjointSets joined(parts_.size());
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 64), [&](const auto& range) {
             const auto tree = level_set.getConstAccessor();
             for (std::size_t n = range.begin(); n < range.end(); ++n)
                 for (int axis = 0; axis < 3; ++axis) {
-                    Coord beyond = leaves_[n]->origin();
+                    Coord beyond = leaves[n]->origin();
                     beyond[axis] += kLeafDim;
-                    if (const Leaf* next = tree.probeConstLeaf(beyond)) join(n, numbers.at(next), axis);
+                    const Leaf* next = tree.probeConstLeaf(beyond);
+                    if (next == nullptr) continue;
+                    const std::size_t upper = numbers.at(next);
+                    for (std::size_t p = first[n]; p < first[n + 1]; ++p)
+                        for (std::size_t q = first[upper]; q < first[upper + 1]; ++q)
+                            if (meet(parts_[p].mask, parts_[q].mask, axis))
+                                joined.unite(std::uint32_t(p), std::uint32_t(q));
                 }
         });
-        pieces_.resize(parts_.size());
-        for (std::size_t n = 0; n < leaves_.size(); ++n)
-            for (std::size_t p = first_[n]; p < first_[n + 1]; ++p) {
-                Piece& piece = pieces_[joined_.root(std::uint32_t(p))];
-                piece.voxels += count_on(parts_[p]);
-                for (int word = 0; word < 8; ++word)
-                    for (std::uint64_t bits = parts_[p][word]; bits != 0; bits &= bits - 1)
-                        piece.box.expand(
-                            leaves_[n]->offsetToGlobalCoord(openvdb::Index(word << 6 | __builtin_ctzll(bits))));
-            }
+        for (std::size_t p = 0; p < parts_.size(); ++p) parts_[p].piece = joined.root(std::uint32_t(p));
+        std::stable_sort(parts_.begin(), parts_.end(), [](const Part& x, const Part& y) { return x.piece < y.piece; });
+        for (std::size_t p = 0; p < parts_.size(); ++p) {
+            if (p == 0 || parts_[p].piece != parts_[p - 1].piece) pieces_.push_back({p, p, 0});
+            ++pieces_.back().last;
+            pieces_.back().voxels += count_on(parts_[p].mask);
+        }
     }
 
-    /// By their first parts; those of the others are empty.
-    [[nodiscard]] const std::vector<Piece>& pieces() const { return pieces_; }
-    void set(std::size_t piece, float value) {
-        for (std::size_t n = 0; n < leaves_.size(); ++n)
-            for (std::size_t p = first_[n]; p < first_[n + 1]; ++p) {
-                if (joined_.root(std::uint32_t(p)) != piece) continue;
-                for (int at = 0; at < kLeafSize; ++at)
-                    if (is_on(parts_[p], at)) leaves_[n]->setValueOnly(openvdb::Index(at), value);
-            }
+    [[nodiscard]] const std::vector<Piece>& all() const { return pieces_; }
+    /// Calls visit(leaf, offset) for each voxel of a piece.
+    template <typename Visit>
+    void for_voxels(const Piece& piece, Visit&& visit) const {
+        for (std::size_t p = piece.first; p < piece.last; ++p)
+            for (int at = 0; at < kLeafSize; ++at)
+                if (is_on(parts_[p].mask, at)) visit(*parts_[p].leaf, openvdb::Index(at));
     }
 
 private:
-    void join(std::size_t lower, std::size_t upper, int axis) {
-        for (std::size_t p = first_[lower]; p < first_[lower + 1]; ++p)
-            for (std::size_t q = first_[upper]; q < first_[upper + 1]; ++q)
-                if (any_on(meeting(parts_[p], parts_[q], axis))) joined_.unite(std::uint32_t(p), std::uint32_t(q));
-    }
-    /// The voxels of `lower` whose next along the axis is in `upper`, of the next leaf.
-    static LeafMask meeting(const LeafMask& lower, const LeafMask& upper, int axis) {
+    struct Part {
+        LeafMask mask;
+        Leaf* leaf;
+        std::uint32_t piece;
+    };
+    /// A voxel of `lower` has its next along the axis in `upper`, of the next leaf.
+    static bool meet(const LeafMask& lower, const LeafMask& upper, int axis) {
         constexpr LeafMask kNone{};
-        LeafMask result = looking_at(kNone, upper, axis, 1);
-        for (int word = 0; word < 8; ++word) result[word] &= lower[word];
-        return result;
+        LeafMask both = looking_at(kNone, upper, axis, 1);
+        for (int word = 0; word < 8; ++word) both[word] &= lower[word];
+        return any_on(both);
     }
 
-    std::vector<Leaf*> leaves_;
-    std::vector<std::size_t> first_;  // of each leaf's parts
-    std::vector<LeafMask> parts_;
-    DisjointSets joined_{0};
+    std::vector<Part> parts_;  // by piece
     std::vector<Piece> pieces_;
 };
 
@@ -378,15 +372,17 @@ void drop_unmarked_pieces(FloatGrid& level_set, const std::vector<Vec3>& marks) 
         });
     };
     for (const bool inside : {true, false}) {
-        ActivePieces active(level_set, inside);
-        const std::vector<ActivePieces::Piece>& pieces = active.pieces();
-        if (pieces.empty()) continue;
-        const auto main =
-            std::max_element(pieces.begin(), pieces.end(), [](auto& x, auto& y) { return x.voxels < y.voxels; });
-        for (std::size_t n = 0; n < pieces.size(); ++n) {
-            const auto& [voxels, box] = pieces[n];
-            if (voxels == 0 || &pieces[n] == &*main || double(voxels) > kPieces.small * double(main->voxels)) continue;
-            if (!has_mark(box)) active.set(n, inside ? limit : -limit);
+        const ActivePieces pieces(level_set, inside);
+        std::int64_t most = 0;
+        for (const ActivePieces::Piece& piece : pieces.all()) most = std::max(most, piece.voxels);
+        for (const ActivePieces::Piece& piece : pieces.all()) {
+            if (double(piece.voxels) > kPieces.small * double(most)) continue;
+            CoordBBox box;
+            pieces.for_voxels(piece,
+                              [&](const Leaf& leaf, openvdb::Index at) { box.expand(leaf.offsetToGlobalCoord(at)); });
+            if (has_mark(box)) continue;
+            pieces.for_voxels(piece,
+                              [&](Leaf& leaf, openvdb::Index at) { leaf.setValueOnly(at, inside ? limit : -limit); });
         }
     }
 }

@@ -29,13 +29,16 @@ struct Saddle {
 };
 constexpr std::int32_t kSeed = -1;  ///< a seed in the first: from there on it is exterior
 
-/// Components under merging.
+/// Components under merging, from their peaks' d on.
 class Merging {
 public:
     static constexpr std::int32_t kNone = -1;
 
-    explicit Merging(const std::vector<float>& peaks) : parts_(peaks.size()), core_of(peaks.size(), kNone) {
-        for (std::size_t n = 0; n < peaks.size(); ++n) parts_[n] = {std::int32_t(n), kNone, std::int32_t(n), peaks[n]};
+    std::vector<std::int32_t> core_of;  ///< by component: the core that it was part of when that met the exterior
+    std::vector<float> saddles, peaks;  ///< by core
+
+    explicit Merging(const std::vector<float>& d) : core_of(d.size(), kNone), parts_(d.size()) {
+        for (std::size_t n = 0; n < d.size(); ++n) parts_[n] = {std::int32_t(n), kNone, std::int32_t(n), d[n]};
         mark_exterior(kExterior);
     }
     void mark_exterior(std::int32_t c) { parts_[root(c)].exterior = true; }
@@ -70,10 +73,6 @@ private:
         peaks.push_back(parts_[c].peak);
     }
     std::vector<Part> parts_;
-
-public:
-    std::vector<std::int32_t> core_of;  ///< by component: the core that it was part of when that met the exterior
-    std::vector<float> saddles, peaks;  ///< by core
 };
 
 class CoreFinder {
@@ -232,20 +231,14 @@ void CoreFinder::join_beyond() {
     const auto& pieces = columns_.pieces();
     std::vector<std::int32_t> first(band_.size() + 1, 0);  // component of a leaf's first part
     for_leaves([&](std::size_t leaf) {
-        LeafMask left;
-        for (int word = 0; word < 8; ++word) left[word] = inside_[leaf][word] & ~tube_[leaf][word];
-        for (int at = 0; at < kLeafSize; ++at) {
-            if (!is_on(left, at)) continue;
-            LeafMask part{};
-            set_on(part, at);
-            spread(part, left);
-            for (int word = 0; word < 8; ++word) {
-                left[word] &= ~part[word];
+        LeafMask beyond;
+        for (int word = 0; word < 8; ++word) beyond[word] = inside_[leaf][word] & ~tube_[leaf][word];
+        for_each_part(beyond, [&](const LeafMask& part) {
+            for (int word = 0; word < 8; ++word)
                 for (std::uint64_t bits = part[word]; bits != 0; bits &= bits - 1)
                     label_.leaf(leaf)[word << 6 | __builtin_ctzll(bits)] = first[leaf + 1];
-            }
             ++first[leaf + 1];
-        }
+        });
     });
     first[0] = 1 + std::int32_t(pieces.size());
     std::partial_sum(first.begin(), first.end(), first.begin());

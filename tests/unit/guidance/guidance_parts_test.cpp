@@ -10,6 +10,7 @@
 
 #include "covol/start.h"
 #include "covol/surface.h"
+#include "guidance/patches.h"
 #include "guidance/wide_distance.h"
 #include "support/clouds.h"
 #include "support/shapes.h"
@@ -152,4 +153,54 @@ TEST_CASE("of a random field the pieces go that a plain search through faces fin
     CHECK(u->activeVoxelCount() == expected.size());
     for (const auto& [at, value] : expected)
         if (u->tree().getValue(at) != value) FAIL_CHECK(at << ": " << u->tree().getValue(at) << ", expected " << value);
+}
+
+TEST_CASE("a surface cut into patches keeps its vertices and its area, and knows which patches meet", "[guidance]") {
+    const double h = 0.5, radius = 8;
+    const TriangleMesh mesh = extract_mesh(*start_from_sphere(cube(24, h), {0, 0, 0}, radius));
+    const guidance::SurfaceVertices vertices = guidance::vertices_of(mesh, 3);
+    ImageGeometry geometry;
+    geometry.size = {40, 40, 40};
+    geometry.spacing = {0.5, 0.5, 0.5};
+    geometry.origin = {-10, -10, -10};
+    guidance::Patches patches = guidance::cut_patches(vertices, geometry, 2.0);
+    guidance::find_borders(vertices, patches);
+
+    std::vector<int> met(mesh.vertices.size(), 0);
+    double area = 0;
+    for (std::size_t i = 0; i < patches.size(); ++i) {
+        for (std::uint32_t n = patches.first[i]; n < patches.first[i + 1]; ++n) {
+            const std::uint32_t v = patches.members[n];
+            ++met[v];
+            CHECK(patches.patch[v] == i);
+            // Of one cell of four voxels: at most its diagonal apart.
+            CHECK(length({patches.places[v][0] - patches.centers[i][0], patches.places[v][1] - patches.centers[i][1],
+                          patches.places[v][2] - patches.centers[i][2]}) < 2.0 * std::sqrt(3.0));
+        }
+        area += patches.area[i];
+        // The mean normal of a part of a sphere.
+        const Vec3& c = patches.centers[i];
+        const double along =
+            (c[0] * patches.directions[i][0] + c[1] * patches.directions[i][1] + c[2] * patches.directions[i][2]) /
+            length(c);
+        CHECK(along > 0.99);
+    }
+    CHECK(std::all_of(met.begin(), met.end(), [](int n) { return n == 1; }));
+    CHECK(area == Approx(measure(mesh).area));
+    CHECK(patches.size() > 100);
+
+    std::map<std::pair<std::uint32_t, std::uint32_t>, double> lengths;
+    for (const auto& t : mesh.triangles)
+        for (int c = 0; c < 3; ++c) {
+            const std::uint32_t v = t[c], w = t[(c + 1) % 3], a = patches.patch[v], b = patches.patch[w];
+            if (a == b) continue;
+            const Vec3 x = mesh.place(v), y = mesh.place(w);
+            lengths[std::minmax(a, b)] += 0.5 * length({x[0] - y[0], x[1] - y[1], x[2] - y[2]}) / std::sqrt(3.0);
+        }
+    REQUIRE(patches.borders.size() == lengths.size());
+    for (const auto& border : patches.borders) {
+        CHECK(border.length == Approx(lengths.at({border.a, border.b})).epsilon(1e-5));
+        for (const auto& [one, other] : {std::pair(border.a, border.b), std::pair(border.b, border.a)})
+            CHECK(std::count(patches.neighbours[one].begin(), patches.neighbours[one].end(), other) == 1);
+    }
 }
