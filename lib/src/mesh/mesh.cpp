@@ -8,16 +8,16 @@
 #include <numbers>
 #include <numeric>
 
-#include "base/disjoint_sets.h"
 #include "covol/domain.h"
 #include "mesh/corner_table.h"
+#include "mesh/disjoint_sets.h"
 #include "mesh/vertex_normals.h"
 
 namespace covol {
 namespace {
 
-using detail::DisjointSets;
 using meshing::cross;
+using meshing::DisjointSets;
 using meshing::dot;
 using meshing::length;
 using meshing::minus;

@@ -18,11 +18,11 @@
 #include <functional>
 #include <vector>
 
-#include "base/disjoint_sets.h"
 #include "base/valid.h"
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "covol/mesh_relax.h"
+#include "mesh/disjoint_sets.h"
 #include "meshing/decimate.h"
 #include "meshing/mesh_distance.h"
 #include "meshing/safe_moves.h"
@@ -264,7 +264,7 @@ int count_self_intersections(const TriangleMesh& mesh) {
 
 Crossings count_crossings(const TriangleMesh& mesh) {
     check_indices(mesh, "count_self_intersections");
-    detail::DisjointSets pieces(mesh.vertices.size());
+    meshing::DisjointSets pieces(mesh.vertices.size());
     for (const auto& t : mesh.triangles) {
         pieces.unite(t[0], t[1]);
         pieces.unite(t[1], t[2]);

@@ -7,12 +7,12 @@
 #include <optional>
 #include <vector>
 
-#include "base/disjoint_sets.h"
 #include "base/file.h"
 #include "covol/error.h"
 #include "covol/mesh_stream.h"
 #include "io/mesh/mesh_formats.h"
 #include "io/mesh/mesh_stream.h"
+#include "mesh/disjoint_sets.h"
 #include "mesh/vertex_normals.h"
 #include "surface/marching_cubes.h"
 #include "surface/mesh_pieces.h"
@@ -88,7 +88,7 @@ private:
     Vec3 origin_{};
     Part sum_;
     std::vector<Part> parts_;  // of the triangles of a piece
-    detail::DisjointSets pieces_;
+    meshing::DisjointSets pieces_;
 };
 
 /// Takes pieces of the mesh, writes their triangles and those of their vertices that are done.

@@ -11,12 +11,14 @@
 #include <numeric>
 #include <tuple>
 
-#include "base/disjoint_sets.h"
 #include "grid/leaf_columns.h"
+#include "mesh/disjoint_sets.h"
 #include "tagging/heuristics.h"
 
 namespace covol::detail {
 namespace {
+
+using meshing::DisjointSets;
 
 constexpr float kBeyond = std::numeric_limits<float>::infinity();  ///< d of what lies beyond the tube
 constexpr float kNowhere = -kBeyond;                               ///< d of what lies outside the domain
