@@ -39,7 +39,7 @@ void conjugate_gradients(const Eigen::SparseMatrix<double>& matrix, const std::v
     const std::size_t n = right.size();
     std::vector<double> residual(n), scale(n), direction(n), image(n), scaled(n), sums;
     const double right2 = sum_over(n, sums, [&](std::size_t i) { return right[i] * right[i]; });
-    if (!(right2 > 0)) {
+    if (right2 == 0) {
         std::fill(x.begin(), x.end(), 0.0);
         return;
     }

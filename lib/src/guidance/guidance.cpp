@@ -127,7 +127,7 @@ void Guide::cut_surface() {
     const TriangleMesh mesh = extract_mesh(*surface_, {}, run_);
     const SurfaceVertices vertices = vertices_of(mesh, kGuide.normal_rounds);
     const auto place = [&](std::uint32_t v) { return vertices.places[v]; };
-    const Vec3 origin = place(mesh.triangles.front()[0]);
+    const Vec3 origin = mesh.empty() ? Vec3{} : place(mesh.triangles.front()[0]);
     double volume = 0;
     for (const auto& t : mesh.triangles)
         volume += meshing::six_volumes({place(t[0]), place(t[1]), place(t[2])}, origin) / 6;

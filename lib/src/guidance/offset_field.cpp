@@ -14,11 +14,10 @@ namespace {
 
 using Sparse = Eigen::SparseMatrix<double>;
 
-// Conjugate gradients: the field's range is a few patches, so some ten iterations do for any number of patches, where
-// the work of a factorization grows with its 1.5th power (86,000 patches: 8 s to 0.07 s). Incomplete factors take
-// longer to make than they save.
-// Of the right-hand side. It is the choice between priors that wants it: with 1e-5 another may win, and the surface of
-// a spleen is 0.05 voxels elsewhere.
+// Of the right-hand side, for conjugate gradients: the field's range is a few patches, so some ten iterations do for
+// any number of patches, where the work of a factorization grows with its 1.5th power (86,000 patches: 8 s to 0.07 s).
+// Incomplete factors take longer to make than they save. It is the choice between priors that wants so small a rest:
+// with 1e-5 another may win, and the surface of a spleen is 0.05 voxels elsewhere.
 constexpr double kSolved = 1e-8;
 
 }  // namespace

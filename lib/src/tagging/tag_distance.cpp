@@ -84,7 +84,8 @@ TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Dom
         run.check();
         const DistanceResult tube = compute_distance(points, analysis_domain(points, domain, a), {radius}, run);
         if (tube.grid->tree().leafCount() == 0) break;
-        const Cores analysis = detail::find_cores(*tube.grid, radius, exterior_seeds);
+        Cores analysis;
+        with_threads(run, [&] { analysis = detail::find_cores(*tube.grid, radius, exterior_seeds); });
         const Verdict verdict = judge(analysis);
         if (verdict.cores > 0) {
             choice.tag_distance = std::max(1.05 * verdict.saddle * a + 0.5 * a, 1.5 * h);
