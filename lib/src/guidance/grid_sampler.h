@@ -16,19 +16,18 @@ public:
         : accessor_(grid.getConstUnsafeAccessor()), domain_(domain) {}
 
     [[nodiscard]] double operator()(const Vec3& world) const {
+        const Vec3 at = domain_.world_to_index(world);
         double part[3];
         openvdb::Coord first;
         bool in_one_leaf = true;
         for (int a = 0; a < 3; ++a) {
-            const double at = (world[a] - domain_.origin[a]) / domain_.voxel_size, below = std::floor(at);
-            first[a] = int(below);
-            part[a] = at - below;
+            first[a] = int(std::floor(at[a]));
+            part[a] = at[a] - first[a];
             in_one_leaf = in_one_leaf && (first[a] & 7) != 7;
         }
         const auto* leaf = in_one_leaf ? accessor_.probeConstLeaf(first) : nullptr;
         if (leaf == nullptr)
-            return double(openvdb::tools::BoxSampler::sample(
-                accessor_, openvdb::Vec3d(first[0] + part[0], first[1] + part[1], first[2] + part[2])));
+            return double(openvdb::tools::BoxSampler::sample(accessor_, openvdb::Vec3d(at[0], at[1], at[2])));
         // The same, where no value has to be looked for.
         const float* v = leaf->buffer().data() + leaf->coordToOffset(first);
         const auto between = [](float a, float b, double weight) { return a + float(double(b - a) * weight); };

@@ -125,7 +125,7 @@ private:
 
 void Guide::cut_surface() {
     const TriangleMesh mesh = extract_mesh(*surface_, {}, run_);
-    const SurfaceVertices vertices = vertices_of(mesh, kGuide.normal_rounds);
+    SurfaceVertices vertices = vertices_of(mesh, kGuide.normal_rounds);
     const auto place = [&](std::uint32_t v) { return vertices.places[v]; };
     const Vec3 origin = mesh.empty() ? Vec3{} : place(mesh.triangles.front()[0]);
     double volume = 0;
@@ -145,7 +145,7 @@ void Guide::cut_surface() {
     };
     cut(kGuide.patch_width * h_);
     if (spacing_ > kGuide.patches_per_spacing * width_) cut(spacing_ / kGuide.patches_per_spacing);
-    find_borders(vertices, patches_);
+    find_borders(std::move(vertices), patches_);
 }
 
 bool Guide::place_marks(bool first) {

@@ -9,6 +9,7 @@
 #include <compare>
 #include <numeric>
 #include <tuple>
+#include <utility>
 
 #include "mesh/triangle.h"
 #include "points/kd_tree.h"
@@ -88,21 +89,19 @@ SurfaceVertices vertices_of(const TriangleMesh& mesh, int smooth) {
 
 Patches cut_patches(const SurfaceVertices& surface, const ImageGeometry& g, double width) {
     Patches p;
-    p.places = surface.places;
-    p.normals = surface.normals;
-    const std::size_t count = p.places.size();
+    const std::size_t count = surface.places.size();
     std::vector<VertexKey> keys(count);
     std::array<double, 3> cell;
     for (int a = 0; a < 3; ++a) cell[a] = std::max(width / g.spacing[a], 1.0);
     tbb::parallel_for(std::size_t(0), count, [&](std::size_t v) {
-        const Vec3 at = g.world_to_index(p.places[v]);
+        const Vec3 at = g.world_to_index(surface.places[v]);
         std::array<std::uint64_t, 3> number;  // in order, negative ones first
         for (int a = 0; a < 3; ++a)
             number[a] = std::uint32_t(std::int32_t(std::floor(at[a] / cell[a]))) ^ (std::uint32_t(1) << 31);
         int axis = 0;
         for (int a = 1; a < 3; ++a)
-            if (std::abs(p.normals[v][a]) > std::abs(p.normals[v][axis])) axis = a;
-        const auto face = std::uint64_t(2 * axis + (p.normals[v][axis] > 0));
+            if (std::abs(surface.normals[v][a]) > std::abs(surface.normals[v][axis])) axis = a;
+        const auto face = std::uint64_t(2 * axis + (surface.normals[v][axis] > 0));
         keys[v] = {number[0] << 32 | number[1], number[2] << 32 | face, std::uint32_t(v)};
     });
     tbb::parallel_sort(keys.begin(), keys.end());
@@ -124,19 +123,21 @@ Patches cut_patches(const SurfaceVertices& surface, const ImageGeometry& g, doub
         for (std::uint32_t n = p.first[i]; n < p.first[i + 1]; ++n) {
             const std::uint32_t v = p.members[n];
             for (int a = 0; a < 3; ++a) {
-                p.centers[i][a] += p.places[v][a];
-                p.directions[i][a] += p.normals[v][a];
+                p.centers[i][a] += surface.places[v][a];
+                p.directions[i][a] += surface.normals[v][a];
             }
             p.area[i] += surface.area[v];
         }
         for (int a = 0; a < 3; ++a) p.centers[i][a] /= p.first[i + 1] - p.first[i];
-        p.directions[i] = unit(p.directions[i], p.normals[p.members[p.first[i]]]);
+        p.directions[i] = unit(p.directions[i], surface.normals[p.members[p.first[i]]]);
         p.voxel[i] = voxel_along(g, p.directions[i]);
     });
     return p;
 }
 
-void find_borders(const SurfaceVertices& surface, Patches& p) {
+void find_borders(SurfaceVertices&& surface, Patches& p) {
+    p.places = std::move(surface.places);
+    p.normals = std::move(surface.normals);
     // The border between two patches crosses the edges that join them, each about an edge's length of it.
     std::vector<std::tuple<std::uint32_t, std::uint32_t, float>> crossing;
     for (std::size_t v = 0; v < p.places.size(); ++v)

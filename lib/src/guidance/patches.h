@@ -38,12 +38,12 @@ struct Patches {
     [[nodiscard]] std::size_t size() const { return centers.size(); }
 };
 
-/// Without borders: see find_borders().
+/// By patch alone, without borders: a surface may be cut more than once before find_borders().
 /// @param width   of the patches; at least one voxel of the image along each of its axes
 [[nodiscard]] Patches cut_patches(const SurfaceVertices& vertices, const ImageGeometry& geometry, double width);
 
-/// Fills borders and neighbours.
-void find_borders(const SurfaceVertices& vertices, Patches& patches);
+/// Fills borders and neighbours, and what is by vertex, from the vertices that were cut.
+void find_borders(SurfaceVertices&& vertices, Patches& patches);
 
 /// The edge of the image's voxels along a unit vector.
 [[nodiscard]] double voxel_along(const ImageGeometry& geometry, const Vec3& direction);

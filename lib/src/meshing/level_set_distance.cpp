@@ -23,12 +23,12 @@ constexpr std::size_t kFewPoints = 2048;  // whose way to every leaf takes less 
 
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
-/// Where edges of the lattice cut the surface, from voxels of this leaf on.
-void add_crossings(const FloatGrid& surface, const Leaf& leaf, std::vector<Vec3>& crossings) {
+/// Where edges of the lattice cut the surface, from voxels of this leaf on, with values up to `limit`.
+void add_crossings(const FloatGrid& surface, const Leaf& leaf, double limit, std::vector<Vec3>& crossings) {
     const auto at = surface.getConstAccessor();
     for (auto value = leaf.cbeginValueOn(); value; ++value) {
         const double here = double(*value);
-        if (std::abs(here) > 2 * surface.voxelSize()[0]) continue;
+        if (std::abs(here) > limit) continue;
         for (int axis = 0; axis < 3; ++axis) {
             openvdb::Coord next = value.getCoord();
             ++next[axis];
@@ -40,6 +40,21 @@ void add_crossings(const FloatGrid& surface, const Leaf& leaf, std::vector<Vec3>
             crossings.push_back({world[0], world[1], world[2]});
         }
     }
+}
+
+/// add_crossings() finds some, in the leaf itself.
+bool has_crossing(const Leaf& leaf, double limit) {
+    const float* values = leaf.buffer().data();
+    const LeafMask negative = negative_mask(values);
+    for (int axis = 0; axis < 3; ++axis) {
+        const LeafMask changes = sign_changes(negative, axis);
+        for (int word = 0; word < 8; ++word)
+            for (std::uint64_t bits = changes[word]; bits != 0; bits &= bits - 1) {
+                const int at = word << 6 | __builtin_ctzll(bits);
+                if (leaf.isValueOn(openvdb::Index(at)) && !(std::abs(double(values[at])) > limit)) return true;
+            }
+    }
+    return false;
 }
 
 /// Squared distances, in voxels, from a place to the nearest and to the farthest point of the box of a leaf's edges.
@@ -56,14 +71,14 @@ struct LeafReach {
 
 /// The crossings among which each of these points finds its nearest one.
 std::vector<Vec3> crossings_near(const FloatGrid& surface, const std::vector<Vec3>& points) {
+    const double limit = 2 * surface.voxelSize()[0];
     std::vector<const Leaf*> leaves;
     surface.tree().getNodes(leaves);
     std::vector<char> is_wanted(leaves.size(), 1);
     if (points.size() <= kFewPoints) {
         std::vector<char> is_cut(leaves.size());
         tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t n) {
-            const int negative = count_on(negative_mask(leaves[n]->buffer().data()));
-            is_cut[n] = 0 < negative && negative < kLeafSize;
+            is_cut[n] = has_crossing(*leaves[n], limit);
             is_wanted[n] = 0;
         });
         tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t p) {
@@ -78,7 +93,7 @@ std::vector<Vec3> crossings_near(const FloatGrid& surface, const std::vector<Vec
     }
     std::vector<Vec3> crossings;
     for (std::size_t n = 0; n < leaves.size(); ++n)
-        if (is_wanted[n]) add_crossings(surface, *leaves[n], crossings);
+        if (is_wanted[n]) add_crossings(surface, *leaves[n], limit, crossings);
     return crossings;
 }
 

@@ -11,6 +11,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "grid/halo.h"
 #include "grid/leaf_columns.h"
 #include "mesh/disjoint_sets.h"
 #include "tagging/heuristics.h"
@@ -85,12 +86,13 @@ public:
           inner_(box_.min().offsetBy(1), box_.max().offsetBy(-1)),
           band_(distance),
           columns_(band_, box_),
-          d_(band_.size(), 0.0F),
+          d_(band_.size(), kBeyond, 2),
           label_(band_.size(), kOutside),
           inside_(band_.size()),
           tube_(band_.size()),
           beyond_(band_.size()),
           radius_(radius) {
+        d_.fill_block(band_.size() + 1, kNowhere);
         import_values(distance, band_, d_);
         for (const Vec3& seed : seeds) {
             const Vec3 at = domain_.world_to_index(seed);
@@ -137,13 +139,17 @@ private:
         return band_.origin(leaf).offsetBy(at >> 6, at >> 3 & 7, at & 7);
     }
     [[nodiscard]] bool is_in_tube(std::size_t leaf, int at) const { return is_on(tube_[leaf], at); }
-    /// d of a leaf and of the voxels across its faces.
+    /// d of a leaf and of the voxels across its faces: a padded buffer.
     struct Heights {
-        static constexpr int kSide = kLeafDim + 2;
-        static constexpr int kStep[6] = {-kSide * kSide, kSide* kSide, -kSide, kSide, -1, 1};  // by face
-        std::array<float, kSide * kSide * kSide> d;
+        static constexpr int kStep[6] = {padded(-1, 0, 0) - padded(0, 0, 0),
+                                         padded(1, 0, 0) - padded(0, 0, 0),
+                                         padded(0, -1, 0) - padded(0, 0, 0),
+                                         padded(0, 1, 0) - padded(0, 0, 0),
+                                         -1,
+                                         1};  // by face
+        std::array<float, kPaddedSize> d;
         [[nodiscard]] const float* at(int voxel) const {
-            return d.data() + ((voxel >> 6) + 1) * kSide * kSide + ((voxel >> 3 & 7) + 1) * kSide + (voxel & 7) + 1;
+            return d.data() + padded(voxel >> 6, voxel >> 3 & 7, voxel & 7);
         }
     };
     void load(std::size_t leaf, Heights& heights) const;
@@ -168,7 +174,7 @@ private:
     const CoordBBox box_, inner_;
     const LeafBand band_;
     const LeafColumns columns_;
-    LeafArray<float> d_;
+    LeafArray<float> d_;  // then a block of a run, and one of what lies outside the domain
     LeafArray<std::int32_t> label_;
     std::vector<LeafMask> inside_, tube_;              // of the domain
     std::vector<std::array<std::int32_t, 6>> beyond_;  // by leaf and face: a leaf, ~piece of a run, or kNothing
@@ -193,23 +199,12 @@ void CoreFinder::link() {
 }
 
 void CoreFinder::load(std::size_t leaf, Heights& heights) const {
-    const float* own = d_.leaf(leaf);
-    for (int row = 0; row < kLeafDim * kLeafDim; ++row)
-        std::copy_n(own + row * kLeafDim, kLeafDim, heights.d.data() + (heights.at(row * kLeafDim) - heights.d.data()));
-    constexpr int kStride[3] = {64, 8, 1};
+    const float* across[6];
     for (int face = 0; face < 6; ++face) {
-        const int axis = face / 2, last = (kLeafDim - 1) * kStride[axis], u = axis == 0 ? 8 : 64, v = axis == 2 ? 8 : 1;
         const std::int32_t other = beyond_[leaf][face];
-        const float* from = other >= 0 && other != kNothing ? d_.leaf(other) : nullptr;
-        const float constant = other == kNothing ? kNowhere : kBeyond;
-        for (int a = 0; a < kLeafDim; ++a)
-            for (int b = 0; b < kLeafDim; ++b) {
-                const int place = a * u + b * v, near = place + (face & 1 ? last : 0),
-                          far = place + (face & 1 ? 0 : last);
-                heights.d[std::size_t(heights.at(near) - heights.d.data() + Heights::kStep[face])] =
-                    from ? from[far] : constant;
-            }
+        across[face] = d_.leaf(other == kNothing ? band_.size() + 1 : other < 0 ? band_.size() : std::size_t(other));
     }
+    load_star_from(d_.leaf(leaf), across, heights.d.data());
 }
 
 void CoreFinder::count_voxels(Cores& result) const {

@@ -158,13 +158,13 @@ TEST_CASE("of a random field the pieces go that a plain search through faces fin
 TEST_CASE("a surface cut into patches keeps its vertices and its area, and knows which patches meet", "[guidance]") {
     const double h = 0.5, radius = 8;
     const TriangleMesh mesh = extract_mesh(*start_from_sphere(cube(24, h), {0, 0, 0}, radius));
-    const guidance::SurfaceVertices vertices = guidance::vertices_of(mesh, 3);
+    guidance::SurfaceVertices vertices = guidance::vertices_of(mesh, 3);
     ImageGeometry geometry;
     geometry.size = {40, 40, 40};
     geometry.spacing = {0.5, 0.5, 0.5};
     geometry.origin = {-10, -10, -10};
     guidance::Patches patches = guidance::cut_patches(vertices, geometry, 2.0);
-    guidance::find_borders(vertices, patches);
+    guidance::find_borders(std::move(vertices), patches);
 
     std::vector<int> met(mesh.vertices.size(), 0);
     double area = 0;

@@ -31,3 +31,17 @@ TEST_CASE("distances to a level set beyond its band: of a few points those of ma
         REQUIRE(of_many[n] < exact + 0.12 * h);
     }
 }
+
+TEST_CASE("a change of sign that is no cut edge does not stand for the surface") {
+    const double h = 0.25;
+    const Domain domain = make_domain({{-6, -6, -6}, {6, 6, 6}}, h);
+    const FloatGridPtr surface = extract_surface(*start_from_sphere(domain, {0, 0, 0}, 4));
+    const openvdb::Coord apart(80, 80, 80);  // as where a body is cut off: deep inside, next to what is outside
+    surface->tree().setValueOn(apart, float(-2.5 * h));
+    const openvdb::Vec3d at = surface->indexToWorld(apart + openvdb::Coord(2, 3, 1));
+    std::vector<Vec3> points{{at[0], at[1], at[2]}};
+    const double alone = detail::distances_to(*surface, points).front();
+    points.resize(5000, points.front());
+    CHECK(alone == detail::distances_to(*surface, points).front());
+    CHECK(alone == Approx(at.length() - 4).margin(0.12 * h));
+}
