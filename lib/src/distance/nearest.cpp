@@ -1,6 +1,7 @@
 #include "distance/nearest.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
@@ -93,20 +94,33 @@ private:
 
 /// Keeps the points that can reach the box, sorted by leaf; widens the box so that it holds them all.
 void Sweeper::take(const std::vector<Vec3>& points, const char* where) {
-    CoordBBox wide = box_;
-    std::vector<std::int32_t> kept;
-    kept.reserve(points.size());
-    for (std::size_t n = 0; n < points.size(); ++n) {
+    const auto reaches = [this](const Vec3& p) {
         double squared = 0;
         for (int a = 0; a < 3; ++a) {
-            const double out = std::max({box_.min()[a] - points[n][a], points[n][a] - box_.max()[a], 0.0});
+            const double out = std::max({box_.min()[a] - p[a], p[a] - box_.max()[a], 0.0});
             squared += out * out;
         }
-        if (squared > radius_ * radius_) continue;
-        kept.push_back(std::int32_t(n));
-        wide.min() = Coord::minComponent(wide.min(), voxel_of(points[n]));
-        wide.max() = Coord::maxComponent(wide.max(), voxel_of(points[n]));
-    }
+        return squared <= radius_ * radius_;
+    };
+    const auto both = [](CoordBBox one, const CoordBBox& other) {
+        one.expand(other);
+        return one;
+    };
+    constexpr std::size_t kAtOnce = 4096;  // points
+    std::vector<Coord> voxels(points.size());
+    std::vector<unsigned char> is_kept(points.size());
+    const CoordBBox wide = tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, points.size(), kAtOnce), box_,
+        [&](const auto& range, CoordBBox box) {
+            for (std::size_t n = range.begin(); n != range.end(); ++n) {
+                is_kept[n] = reaches(points[n]);
+                if (!is_kept[n]) continue;
+                voxels[n] = voxel_of(points[n]);
+                box.expand(voxels[n]);
+            }
+            return box;
+        },
+        both);
     box_ = wide;
     for (int a = 0; a < 3; ++a)
         if ((std::int64_t(box_.max()[a]) - box_.min()[a]) / kLeafDim + 4 > kMaxLeavesPerAxis)
@@ -114,20 +128,26 @@ void Sweeper::take(const std::vector<Vec3>& points, const char* where) {
                         std::string(where) + ": the domain has " +
                             std::to_string(std::int64_t(box_.max()[a]) - box_.min()[a] + 1) +
                             " voxels along an axis, expected at most 2^24; use a larger voxel size");
-    std::vector<std::pair<Key, std::int32_t>> order(kept.size());
-    for (std::size_t n = 0; n < kept.size(); ++n) order[n] = {key(leaf_origin(voxel_of(points[kept[n]]))), kept[n]};
+    std::vector<std::pair<Key, std::int32_t>> order;
+    order.reserve(points.size());
+    for (std::size_t n = 0; n < points.size(); ++n)
+        if (is_kept[n]) order.emplace_back(key(leaf_origin(voxels[n])), std::int32_t(n));
     tbb::parallel_sort(order.begin(), order.end());
-    field.points.reserve(order.size());
-    field.source.reserve(order.size());
-    local_.reserve(order.size());
-    for (std::size_t n = 0; n < order.size(); ++n) {
-        field.points.push_back(points[order[n].second]);
-        field.source.push_back(order[n].second);
-        const Coord voxel = voxel_of(points[order[n].second]) & (kLeafDim - 1);
-        local_.push_back({std::int8_t(voxel.x()), std::int8_t(voxel.y()), std::int8_t(voxel.z())});
-        Bin& bin = bins_[order[n].first];
-        if (bin.end == 0) bin.begin = n;
-        bin.end = n + 1;
+    field.points.resize(order.size());
+    field.source.resize(order.size());
+    local_.resize(order.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, order.size(), kAtOnce), [&](const auto& range) {
+        for (std::size_t n = range.begin(); n != range.end(); ++n) {
+            const auto source = std::size_t(order[n].second);
+            const Coord voxel = voxels[source] & (kLeafDim - 1);
+            field.points[n] = points[source];
+            field.source[n] = order[n].second;
+            local_[n] = {std::int8_t(voxel.x()), std::int8_t(voxel.y()), std::int8_t(voxel.z())};
+        }
+    });
+    for (std::size_t n = 0, end; n < order.size(); n = end) {
+        for (end = n + 1; end < order.size() && order[end].first == order[n].first;) ++end;
+        bins_[order[n].first] = {n, end};
     }
 }
 

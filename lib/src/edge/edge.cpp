@@ -12,6 +12,7 @@
 #include "base/valid.h"
 #include "covol/error.h"
 #include "edge/heuristics.h"
+#include "edge/nth_value.h"
 #include "grid/halo.h"
 #include "scheme/scheme.h"
 
@@ -88,14 +89,13 @@ Window sample_window(const Image& image, const FloatGrid& topology, const Domain
 std::array<double, 2> brightness_range(const Window& window) {
     constexpr std::size_t kSamples = 4'000'000;
     const std::size_t all = window.band.size() * kLeafSize, step = all / kSamples + 1;
-    std::vector<float> values;
-    values.reserve(all / step + 1);
-    for (std::size_t n = 0; n < all; n += step)
-        values.push_back(window.image.values.leaf(n / kLeafSize)[n % kLeafSize]);
+    std::vector<float> values((all + step - 1) / step);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, values.size(), 4096), [&](const auto& range) {
+        for (std::size_t n = range.begin(); n != range.end(); ++n)
+            values[n] = window.image.values.leaf(n * step / kLeafSize)[n * step % kLeafSize];
+    });
     const auto value_at = [&](double fraction) {
-        const auto nth = values.begin() + std::lround(fraction * double(values.size() - 1));
-        std::nth_element(values.begin(), nth, values.end());
-        return double(*nth);
+        return double(detail::nth_value(values, std::size_t(std::lround(fraction * double(values.size() - 1)))));
     };
     const double low = value_at(kEdge.low_percentile), high = value_at(kEdge.high_percentile);
     if (low < high) return {low, high};
@@ -226,9 +226,8 @@ double contrast_of(FloatGrid& slopes, double percentile) {
         float* to = values.data() + first[n];
         for (auto v = leaves[n]->cbeginValueOn(); v; ++v) *to++ = *v;
     });
-    const auto at = values.begin() + std::ptrdiff_t(percentile * double(values.size() - 1));
-    std::nth_element(values.begin(), at, values.end());
-    if (*at > 0.0F) return *at;
+    const float at = detail::nth_value(values, std::size_t(percentile * double(values.size() - 1)));
+    if (at > 0.0F) return at;
     // Edges rarer than the percentile: half of the steepest one.
     return 0.5 * *std::max_element(values.begin(), values.end());
 }

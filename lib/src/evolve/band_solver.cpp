@@ -11,6 +11,7 @@
 #include <limits>
 
 #include "covol/error.h"
+#include "evolve/change_kernel.h"
 #include "evolve/finite.h"
 #include "evolve/heuristics.h"
 #include "evolve/state_file.h"
@@ -78,10 +79,7 @@ void check_finite(const LeafBand& band, const HaloField& field, const char* what
         [&](const tbb::blocked_range<std::size_t>& range, std::size_t found) {
             for (std::size_t leaf = range.begin(); leaf != range.end() && found == none; ++leaf) {
                 const float* values = field.values.leaf(leaf);
-                // A sum is finite when every value is; else it takes a closer look.
-                float sum = 0.0F;
-                for (int n = 0; n < kLeafSize; ++n) sum += values[n];
-                if (std::isfinite(sum)) continue;
+                if (all_finite(values)) continue;
                 for (int n = 0; n < kLeafSize && found == none; ++n)
                     if (is_on(band.active(leaf), n) && !std::isfinite(values[n])) found = leaf;
             }

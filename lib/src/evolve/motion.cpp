@@ -8,6 +8,7 @@
 #include <functional>
 #include <limits>
 
+#include "evolve/change_kernel.h"
 #include "evolve/heuristics.h"
 #include "evolve/state_file.h"
 #include "grid/sign_masks.h"
@@ -43,14 +44,9 @@ Flips sum_over_leaves(std::size_t leaves, Count count) {
 
 LeafMotion motion_of(const float* now, const float* before, bool is_active) {
     LeafMotion motion;
-    // A sum is finite when every value is, and takes no branches.
-    float sum = 0.0F, largest = 0.0F;
-    for (int n = 0; n < kLeafSize; ++n) {
-        sum += now[n];
-        largest = std::max(largest, std::abs(now[n] - before[n]));
-    }
-    motion.finite = std::isfinite(sum);
-    motion.largest = largest;
+    const Change change = change_of(now, before);
+    motion.finite = change.finite;
+    motion.largest = change.largest;
     const LeafMask negative = negative_mask(now);
     for (int word = 0; word < 8; ++word) {
         motion.negative |= negative[word] != 0;

@@ -2,6 +2,7 @@
 
 #include <openvdb/tree/LeafManager.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <string>
@@ -31,6 +32,8 @@ void require_packable(const std::vector<Coord>& origins) {
                                                "voxel size");
     }
 }
+
+constexpr std::size_t kNextKeys = 8;  // that are looked at before a search
 
 bool is_odd(const Coord& origin) { return ((origin.x() ^ origin.y() ^ origin.z()) >> 3) & 1; }
 
@@ -64,23 +67,39 @@ LeafBand::LeafBand(std::vector<Coord> origins) : origins_(std::move(origins)) {
 void LeafBand::index() {
     require_packable(origins_);
     lookup_.resize(origins_.size());
-    for (std::size_t i = 0; i < origins_.size(); ++i) lookup_[i] = {pack(origins_[i]), static_cast<std::int32_t>(i)};
-    std::sort(lookup_.begin(), lookup_.end());
-    neighbours_.resize(origins_.size());
     tbb::parallel_for(std::size_t(0), origins_.size(), [&](std::size_t i) {
-        for (int di = -1; di <= 1; ++di)
-            for (int dj = -1; dj <= 1; ++dj)
-                for (int dk = -1; dk <= 1; ++dk)
-                    neighbours_[i][neighbour_slot(di, dj, dk)] =
-                        find(origins_[i].offsetBy(di * kLeafDim, dj * kLeafDim, dk * kLeafDim));
+        lookup_[i] = {pack(origins_[i]), static_cast<std::int32_t>(i)};
+    });
+    tbb::parallel_sort(lookup_);
+    neighbours_.resize(origins_.size());
+    // In the order of the keys, a leaf's neighbours follow those of the leaf before: nine places move on.
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, lookup_.size(), 256), [&](const auto& range) {
+        std::array<std::size_t, 9> places{};
+        for (std::size_t n = range.begin(); n != range.end(); ++n) {
+            const std::int32_t leaf = lookup_[n].second;
+            for (int slot = 0; slot < 27; ++slot) {
+                const Coord across = origins_[leaf].offsetBy((slot / 9 - 1) * kLeafDim, (slot / 3 % 3 - 1) * kLeafDim,
+                                                             (slot % 3 - 1) * kLeafDim);
+                neighbours_[leaf][slot] = find_from(places[slot / 3], pack(across));
+            }
+        }
     });
 }
 
+// @param place  in, out: of the first entry whose key is not below `key`; the search begins there
+std::int32_t LeafBand::find_from(std::size_t& place, std::uint64_t key) const {
+    const auto is_below = [](const auto& entry, std::uint64_t k) { return entry.first < k; };
+    const std::size_t end = lookup_.size(), last = std::min(place + kNextKeys, end);
+    const bool is_ahead = place == 0 || lookup_[place - 1].first < key;
+    while (is_ahead && place < last && lookup_[place].first < key) ++place;
+    if (!is_ahead || place == last)
+        place = std::size_t(std::lower_bound(lookup_.begin(), lookup_.end(), key, is_below) - lookup_.begin());
+    return place < end && lookup_[place].first == key ? lookup_[place].second : none();
+}
+
 std::int32_t LeafBand::find(const Coord& origin) const {
-    const std::uint64_t key = pack(origin);
-    const auto at = std::lower_bound(lookup_.begin(), lookup_.end(), key,
-                                     [](const auto& entry, std::uint64_t k) { return entry.first < k; });
-    return at != lookup_.end() && at->first == key ? at->second : none();
+    std::size_t place = lookup_.size();
+    return find_from(place, pack(origin));
 }
 
 std::int64_t LeafBand::active_count() const {

@@ -68,6 +68,7 @@ public:
 
 private:
     void index();
+    [[nodiscard]] std::int32_t find_from(std::size_t& place, std::uint64_t key) const;
     std::vector<Coord> origins_;
     std::vector<std::array<std::int32_t, 27>> neighbours_;
     std::vector<LeafMask> active_;

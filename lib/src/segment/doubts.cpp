@@ -2,6 +2,7 @@
 
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -43,9 +44,10 @@ void find_marks_off(Job& job, const std::vector<Vec3>& marks, const std::vector<
 }
 
 void find_bias(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& distances) {
+    const std::vector<double> levels = levels_at(*job.result.surface, marks);
     double sum = 0, squares = 0;
     for (std::size_t n = 0; n < marks.size(); ++n) {
-        const double d = std::copysign(distances[n], level_at(*job.result.surface, marks[n]));
+        const double d = std::copysign(distances[n], levels[n]);
         sum += d;
         squares += d * d;
     }
@@ -66,14 +68,15 @@ struct Normals {
 
 Normals normals_at(const Job& job, const std::vector<Vec3>& marks) {
     const std::size_t every = std::max<std::size_t>(1, marks.size() / kDoubts.support_marks);
+    std::vector<Vec3> beside;  // of each, before and behind along each axis
+    for (std::size_t n = 0; n < marks.size(); n += every)
+        for (int a = 0; a < 3; ++a)
+            for (const double step : {-0.5, 0.5}) beside.emplace_back(marks[n])[std::size_t(a)] += step * job.h();
+    const std::vector<double> levels = levels_at(*job.result.surface, beside);
     Normals found;
-    for (std::size_t n = 0; n < marks.size(); n += every) {
+    for (std::size_t n = 0, first = 0; n < marks.size(); n += every, first += 6) {
         Vec3 normal{};
-        for (int a = 0; a < 3; ++a) {
-            Vec3 before = marks[n], behind = marks[n];
-            before[a] -= 0.5 * job.h(), behind[a] += 0.5 * job.h();
-            normal[a] = level_at(*job.result.surface, behind) - level_at(*job.result.surface, before);
-        }
+        for (std::size_t a = 0; a < 3; ++a) normal[a] = levels[first + 2 * a + 1] - levels[first + 2 * a];
         const double length = std::hypot(normal[0], normal[1], normal[2]);
         if (!(length > 0.5 * job.h())) continue;  // off the band
         for (double& c : normal) c /= length;
@@ -117,9 +120,15 @@ void find_silent_image(Job& job) {
 
 }  // namespace
 
-double level_at(const FloatGrid& u, const Vec3& world) {
-    return openvdb::tools::BoxSampler::sample(u.getConstAccessor(),
-                                              u.worldToIndex(openvdb::Vec3d(world[0], world[1], world[2])));
+std::vector<double> levels_at(const FloatGrid& u, const std::vector<Vec3>& places) {
+    std::vector<double> levels(places.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, places.size(), 256), [&](const auto& range) {
+        const auto accessor = u.getConstAccessor();
+        for (std::size_t n = range.begin(); n != range.end(); ++n)
+            levels[n] = openvdb::tools::BoxSampler::sample(
+                accessor, u.worldToIndex(openvdb::Vec3d(places[n][0], places[n][1], places[n][2])));
+    });
+    return levels;
 }
 
 void doubt(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& distances) {
@@ -133,8 +142,9 @@ void doubt(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& 
 
 bool misses_marks(const Job& job, const FloatGrid& u) {
     const double beyond = std::min(off(job), 0.9 * double(u.background()));
-    std::size_t far = 0;
-    for (const Vec3& mark : job.trusted) far += std::abs(level_at(u, mark)) > beyond;
+    const std::vector<double> levels = levels_at(u, job.trusted);
+    const auto far =
+        std::count_if(levels.begin(), levels.end(), [&](double level) { return std::abs(level) > beyond; });
     return double(far) > kDoubts.missed_share * double(job.trusted.size());
 }
 

@@ -11,8 +11,8 @@ namespace covol::pipeline {
 /// @param distances  of each to the surface
 void doubt(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& distances);
 
-/// Of a level set, trilinear.
-[[nodiscard]] double level_at(const FloatGrid& u, const Vec3& world);
+/// Of a level set, trilinear. @param places  world units
+[[nodiscard]] std::vector<double> levels_at(const FloatGrid& u, const std::vector<Vec3>& places);
 
 /// Whether so many marks lie off the zero level set of `u` that it cannot be what they mark.
 [[nodiscard]] bool misses_marks(const Job& job, const FloatGrid& u);

@@ -52,7 +52,7 @@ EvolveReport approach_and_evolve(Job& job, const EvolveFields& fields) {
 /// Of places to the zero level set; in its band, so clamped.
 double mean_distance(const std::vector<Vec3>& places, const FloatGrid& u) {
     double sum = 0;
-    for (const Vec3& place : places) sum += std::abs(level_at(u, place));
+    for (const double level : levels_at(u, places)) sum += std::abs(level);
     return sum / double(places.size());
 }
 

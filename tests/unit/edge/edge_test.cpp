@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "covol/error.h"
+#include "edge/nth_value.h"
 #include "support/dense_reference.h"
 #include "support/scratch.h"
 #include "support/shapes.h"
@@ -303,4 +305,20 @@ TEST_CASE("marks tell lines from borders, and both from noise") {
     std::uniform_real_distribution<double> grey(0, 1);
     CHECK(feature_on_sheet(image_on(domain, [&](const Vec3&) { return grey(random); })).feature == EdgeFeature::Slope);
     CHECK(detect_feature(image_on(domain, sheet), {}, {}, 1).feature == EdgeFeature::Slope);
+}
+
+TEST_CASE("a value of a rank is that of a sort") {
+    std::mt19937 random(5);
+    std::normal_distribution<float> normal(0.0F, 100.0F);
+    for (const std::size_t count : {1, 2, 1000, 150'000}) {
+        std::vector<float> values(count);
+        for (float& v : values) v = random() % 4 == 0 ? std::round(normal(random)) : normal(random);
+        std::vector<float> sorted = values;
+        std::sort(sorted.begin(), sorted.end());
+        for (const double share : {0.0, 0.01, 0.3, 0.5, 0.999, 1.0}) {
+            const auto n = std::size_t(share * double(count - 1));
+            CAPTURE(count, share);
+            CHECK(detail::nth_value(values, n) == sorted[n]);
+        }
+    }
 }

@@ -8,8 +8,10 @@
 #include <cstdio>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "covol/error.h"
+#include "evolve/change_kernel.h"
 #include "support/both_solvers.h"
 #include "support/scratch.h"
 #include "support/shapes.h"
@@ -466,4 +468,23 @@ TEST_CASE("where the distance is not known the image keeps its full weight") {
     CHECK(max_difference(u, run_dense(p, 2)) < 1e-4 * kH);
     CHECK(u.at(2, 8, 8) == Approx(p.u.at(2, 8, 8)).margin(1e-5));
     CHECK(u.at(12, 8, 8) > p.u.at(12, 8, 8) + kH);
+}
+
+TEST_CASE("the change of a leaf is its largest, and one value that is not finite is seen anywhere") {
+    std::vector<float> before(512), now(512);
+    for (std::size_t n = 0; n < 512; ++n) now[n] = before[n] = float(n) - 200.0F;
+    now[301] -= 3.5F;
+    now[17] += 2.0F;
+    detail::Change change = detail::change_of(now.data(), before.data());
+    CHECK(change.largest == 3.5F);
+    CHECK(change.finite);
+    CHECK(detail::all_finite(now.data()));
+    for (const float wrong : {std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity(),
+                              std::numeric_limits<float>::quiet_NaN()})
+        for (const std::size_t at : {0, 7, 100, 511}) {
+            std::vector<float> broken = now;
+            broken[at] = wrong;
+            CHECK_FALSE(detail::change_of(broken.data(), before.data()).finite);
+            CHECK_FALSE(detail::all_finite(broken.data()));
+        }
 }
