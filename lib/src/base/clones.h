@@ -19,6 +19,14 @@ namespace covol::detail {
 using Float8 = float __attribute__((vector_size(32)));
 using Int8 = std::int32_t __attribute__((vector_size(32)));
 
+/// From an address of any alignment.
+template <typename Vector, typename T>
+COVOL_INLINE Vector load(const T* from) {
+    Vector v;
+    __builtin_memcpy(&v, from, sizeof v);
+    return v;
+}
+
 COVOL_INLINE bool any(Int8 mask) {
     using Long4 = std::int64_t __attribute__((vector_size(32)));
     const Long4 m = (Long4)mask;

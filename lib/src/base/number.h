@@ -6,6 +6,12 @@
 
 namespace covol::detail {
 
+/// floor() is a call where the instruction set has no rounding. @pre |x| < 2^31
+inline int round_down(double x) {
+    const int i = int(x);
+    return i - (double(i) > x);
+}
+
 /// A number as messages show it: six digits.
 inline std::string number(double value) {
     std::ostringstream text;

@@ -9,6 +9,7 @@
 #include <string>
 #include <unordered_map>
 
+#include "base/number.h"
 #include "covol/error.h"
 #include "distance/nearest_kernel.h"
 
@@ -17,33 +18,16 @@ namespace {
 
 constexpr std::int64_t kMaxLeavesPerAxis = 1 << 21;
 
-/// Neighbours across the faces -i, +i, -j, +j, -k, +k.
-constexpr int kFaceSlots[6] = {neighbour_slot(-1, 0, 0), neighbour_slot(1, 0, 0),  neighbour_slot(0, -1, 0),
-                               neighbour_slot(0, 1, 0),  neighbour_slot(0, 0, -1), neighbour_slot(0, 0, 1)};
-
 Coord leaf_origin(const Coord& voxel) { return voxel & ~(kLeafDim - 1); }
 
-/// floor() is a call where the instruction set has no rounding.
-int round_down(double x) {
-    const int i = int(x);
-    return i - (double(i) > x);
-}
-
 Coord voxel_of(const Vec3& p) { return {round_down(p[0] + 0.5), round_down(p[1] + 0.5), round_down(p[2] + 0.5)}; }
-
-Coord step_of(int slot) { return {slot / 9 - 1, slot / 3 % 3 - 1, slot % 3 - 1}; }
-
-Coord neighbour_origin(const Coord& origin, int slot) {
-    const Coord step = step_of(slot);
-    return origin.offsetBy(step.x() * kLeafDim, step.y() * kLeafDim, step.z() * kLeafDim);
-}
 
 /// The voxels of a leaf that touch each of its 26 neighbours.
 std::array<LeafMask, 27> border_masks() {
     std::array<LeafMask, 27> masks{};
     const auto touches = [](int voxel, int step) { return step == 0 || voxel == (step < 0 ? 0 : 7); };
     for (int slot = 0; slot < 27; ++slot) {
-        const Coord step = step_of(slot);
+        const Coord step = neighbour_step(slot);
         for (int i = 0; i < 8; ++i)
             for (int j = 0; j < 8; ++j)
                 for (int k = 0; k < 8; ++k)
@@ -176,7 +160,7 @@ void Sweeper::seed_leaf(NearestLeaf& leaf) const {
     for (int slot = 0; slot < 27; ++slot) {
         const auto bin = bins_.find(key(neighbour_origin(o, slot)));
         if (bin == bins_.end()) continue;
-        const Coord step = step_of(slot);
+        const Coord step = neighbour_step(slot);
         for (std::size_t n = bin->second.begin; n < bin->second.end; ++n) {
             Coord lo, hi;
             bool reaches = true;
@@ -265,7 +249,7 @@ void Sweeper::load(const NearestLeaf& leaf, NearestBlock& block) const {
     constexpr int kFirst[3] = {-1, 0, 8}, kLast[3] = {-1, 7, 8};
     for (int slot = 0; slot < 27; ++slot) {
         if (slot == 13) continue;
-        const Coord s = step_of(slot).offsetBy(1);
+        const Coord s = neighbour_step(slot).offsetBy(1);
         const NearestLeaf* other = leaf.neighbours[slot] < 0 ? nullptr : &field.leaves[leaf.neighbours[slot]];
         for (int i = kFirst[s.x()]; i <= kLast[s.x()]; ++i)
             for (int j = kFirst[s.y()]; j <= kLast[s.y()]; ++j)

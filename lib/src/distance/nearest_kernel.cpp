@@ -7,13 +7,6 @@
 namespace covol::detail {
 namespace {
 
-template <typename Vector, typename T>
-COVOL_INLINE Vector load(const T* from) {
-    Vector v;
-    std::memcpy(&v, from, sizeof v);
-    return v;
-}
-
 /// The points of the eight voxels of one row along k.
 struct Points8 {
     Float8 x, y, z;

@@ -1,7 +1,6 @@
 #include "evolve/change_kernel.h"
 
 #include <algorithm>
-#include <cstring>
 #include <limits>
 
 #include "base/clones.h"
@@ -10,12 +9,6 @@ namespace covol::detail {
 namespace {
 
 constexpr int kLanes = 8, kValues = 512;  // of a leaf
-
-COVOL_INLINE Float8 load(const float* from) {
-    Float8 values;
-    std::memcpy(&values, from, sizeof values);
-    return values;
-}
 
 COVOL_INLINE Float8 size_of(const Float8& x) { return x < 0.0F ? -x : x; }
 
@@ -28,7 +21,7 @@ COVOL_CLONES Change change_of(const float* now, const float* before) {
     Float8 largest{};
     Int8 beyond{};
     for (int n = 0; n < kValues; n += kLanes) {
-        const Float8 value = load(now + n), size = size_of(value - load(before + n));
+        const Float8 value = load<Float8>(now + n), size = size_of(value - load<Float8>(before + n));
         largest = largest < size ? size : largest;
         beyond |= ~is_finite(value);
     }
@@ -39,7 +32,7 @@ COVOL_CLONES Change change_of(const float* now, const float* before) {
 
 COVOL_CLONES bool all_finite(const float* values) {
     Int8 beyond{};
-    for (int n = 0; n < kValues; n += kLanes) beyond |= ~is_finite(load(values + n));
+    for (int n = 0; n < kValues; n += kLanes) beyond |= ~is_finite(load<Float8>(values + n));
     return !any(beyond);
 }
 

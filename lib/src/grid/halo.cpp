@@ -11,10 +11,6 @@ namespace {
 
 bool is_face(int slot) { return std::find(std::begin(kFaceSlots), std::end(kFaceSlots), slot) != std::end(kFaceSlots); }
 
-Coord neighbour_origin(const Coord& origin, int slot) {
-    return origin.offsetBy((slot / 9 - 1) * kLeafDim, (slot / 3 % 3 - 1) * kLeafDim, (slot % 3 - 1) * kLeafDim);
-}
-
 // Row (i,j) of the padded buffer lies in leaf row (li,lj) of the neighbour (di,dj).
 struct RowSource {
     int d, local;

@@ -77,11 +77,8 @@ void LeafBand::index() {
         std::array<std::size_t, 9> places{};
         for (std::size_t n = range.begin(); n != range.end(); ++n) {
             const std::int32_t leaf = lookup_[n].second;
-            for (int slot = 0; slot < 27; ++slot) {
-                const Coord across = origins_[leaf].offsetBy((slot / 9 - 1) * kLeafDim, (slot / 3 % 3 - 1) * kLeafDim,
-                                                             (slot % 3 - 1) * kLeafDim);
-                neighbours_[leaf][slot] = find_from(places[slot / 3], pack(across));
-            }
+            for (int slot = 0; slot < 27; ++slot)
+                neighbours_[leaf][slot] = find_from(places[slot / 3], pack(neighbour_origin(origins_[leaf], slot)));
         }
     });
 }

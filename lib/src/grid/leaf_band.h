@@ -37,6 +37,12 @@ inline bool any_on(const LeafMask& mask) {
 
 /// Index of the neighbour at leaf offset (di,dj,dk), each -1..1, among 27; 13 is the leaf itself.
 inline constexpr int neighbour_slot(int di, int dj, int dk) { return (di + 1) * 9 + (dj + 1) * 3 + (dk + 1); }
+/// The step in leaves to the neighbour at a slot, and the neighbour's origin.
+inline Coord neighbour_step(int slot) { return {slot / 9 - 1, slot / 3 % 3 - 1, slot % 3 - 1}; }
+inline Coord neighbour_origin(const Coord& origin, int slot) {
+    const Coord step = neighbour_step(slot);
+    return origin.offsetBy(step.x() * kLeafDim, step.y() * kLeafDim, step.z() * kLeafDim);
+}
 /// The slots across the faces, in the order -i, +i, -j, +j, -k, +k.
 inline constexpr int kFaceSlots[6] = {neighbour_slot(-1, 0, 0), neighbour_slot(1, 0, 0),  neighbour_slot(0, -1, 0),
                                       neighbour_slot(0, 1, 0),  neighbour_slot(0, 0, -1), neighbour_slot(0, 0, 1)};

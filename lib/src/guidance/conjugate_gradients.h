@@ -4,16 +4,33 @@
 
 namespace covol::guidance {
 
+/// half * diag(weight) * half, of a symmetric matrix. The product itself is never made: it has three times the entries.
+class SquaredMatrix {
+public:
+    /// @param half    symmetric
+    /// @param weight  > 0, of each row
+    SquaredMatrix(Eigen::SparseMatrix<double> half, std::vector<double> weight);
+
+    [[nodiscard]] const std::vector<double>& diagonal() const { return diagonal_; }
+    /// On all threads. @param between  out: weight * half * x
+    void multiply_half(const std::vector<double>& x, std::vector<double>& between) const;
+    /// A row's entry of half * between.
+    [[nodiscard]] double finish(std::size_t row, const std::vector<double>& between) const;
+    /// The whole product, on all threads.
+    [[nodiscard]] std::vector<double> operator*(const std::vector<double>& x) const;
+
+private:
+    Eigen::SparseMatrix<double> half_;
+    std::vector<double> weight_, diagonal_;
+};
+
 /// Solves (matrix + diagonal) x = right by conjugate gradients on all threads, scaled by its diagonal (M. R. Hestenes
 /// and E. Stiefel 1952). The same bits for any number of threads.
-/// @param matrix     symmetric, positive definite with the diagonal
+/// @param matrix     positive definite with the diagonal
 /// @param diagonal   >= 0
 /// @param x          in: where to begin
 /// @param tolerance  of the residual, relative to the right-hand side
-void conjugate_gradients(const Eigen::SparseMatrix<double>& matrix, const std::vector<double>& diagonal,
+void conjugate_gradients(const SquaredMatrix& matrix, const std::vector<double>& diagonal,
                          const std::vector<double>& right, double tolerance, std::vector<double>& x);
-
-/// matrix * x, on all threads, of a symmetric matrix.
-[[nodiscard]] std::vector<double> product(const Eigen::SparseMatrix<double>& matrix, const std::vector<double>& x);
 
 }  // namespace covol::guidance

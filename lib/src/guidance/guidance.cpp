@@ -207,7 +207,7 @@ void Guide::set_ranges() {
     home_.assign(count, 0.0);
     std::vector<double> reach(count), broad2(count);
     tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
-        const GridSampler to_start(*start_, domain_);
+        GridSampler to_start(*start_, domain_);
         for (std::uint32_t n = patches_.first[i]; n < patches_.first[i + 1]; ++n)
             home_[i] -= to_start(patches_.places[patches_.members[n]]) / (patches_.first[i + 1] - patches_.first[i]);
         reach[i] = std::min(0.5 * to_mark_[i] + 2 * patches_.voxel[i], kGuide.longest_offset * h_);
@@ -360,12 +360,8 @@ void Guide::weigh(bool first) {
     }
     std::vector<Word> words;
     if (first) {
-        words.resize(std::size_t(kGuide.priors));
-        tbb::parallel_for(std::size_t(0), words.size(),
-                          [&](std::size_t n) { words[n] = hear(field, broad_ * std::pow(0.5, n)); });
-        const auto deaf =
-            std::find_if(words.begin(), words.end(), [](const Word& w) { return w.response < kGuide.least_response; });
-        if (deaf != words.end()) words.erase(deaf + 1, words.end());
+        do words.push_back(hear(field, broad_ * std::pow(0.5, words.size())));
+        while (int(words.size()) < kGuide.priors && words.back().response >= kGuide.least_response);
     } else {
         words.push_back(hear(field, prior_));
     }

@@ -100,7 +100,7 @@ std::vector<MarkedPlace> places_of(const Scene& scene, const std::vector<PatchMa
 
 PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, const SmoothImage& image) {
     const Patches& p = scene.patches;
-    const GridSampler distance(scene.distance, scene.domain);
+    GridSampler distance(scene.distance, scene.domain);
     const double step = p.voxel[patch] / kStepsPerVoxel, h = scene.domain.voxel_size;
     struct Row {
         int lo = 0, hi = 0;

@@ -5,6 +5,7 @@
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "guidance/conjugate_gradients.h"
 #include "guidance/heuristics.h"
@@ -22,14 +23,9 @@ constexpr double kSolved = 1e-8;
 
 }  // namespace
 
-struct OffsetField::System {
-    Sparse precision;  // of the field of unit variance
-};
-
 // A Matern field of smoothness 1 (F. Lindgren, H. Rue, J. Lindström 2011): (kappa^2 - Laplace) f = white noise, on the
 // patches as finite volumes. Its variance is 1 / (4 pi kappa^2 tau^2).
-OffsetField::OffsetField(const Patches& patches, double range)
-    : patches_(patches), system_(std::make_unique<System>()) {
+OffsetField::OffsetField(const Patches& patches, double range) : patches_(patches) {
     const std::size_t count = patches.size();
     const double kappa = std::sqrt(8.0) / range;
     std::vector<double> diagonal(count);
@@ -45,10 +41,10 @@ OffsetField::OffsetField(const Patches& patches, double range)
     for (std::size_t i = 0; i < count; ++i) entries.emplace_back(int(i), int(i), diagonal[i]);
     Sparse half{Eigen::Index(count), Eigen::Index(count)};
     half.setFromTriplets(entries.begin(), entries.end());
-    Eigen::VectorXd inverse_area(count);
-    for (std::size_t i = 0; i < count; ++i) inverse_area[Eigen::Index(i)] = 1 / std::max(patches.area[i], 1e-12);
     const double tau2 = 1 / (4 * M_PI * kappa * kappa);
-    system_->precision = tau2 * (half * inverse_area.asDiagonal() * half);
+    std::vector<double> weight(count);
+    for (std::size_t i = 0; i < count; ++i) weight[i] = tau2 / std::max(patches.area[i], 1e-12);
+    precision_ = std::make_unique<SquaredMatrix>(std::move(half), std::move(weight));
 }
 
 OffsetField::~OffsetField() = default;
@@ -82,10 +78,17 @@ OffsetField::Fit OffsetField::fit(const std::vector<double>& mean, const std::ve
     Fit result{mean, std::vector<double>(count, 0.0), {}};
     const bool asked =
         std::any_of(evidence.begin(), evidence.end(), [](const OffsetEvidence& e) { return !e.density.empty(); });
-    Eigen::VectorXd inverse_deviation(count);
-    for (std::size_t i = 0; i < count; ++i) inverse_deviation[Eigen::Index(i)] = 1 / deviation[i];
-    const Sparse prior = inverse_deviation.asDiagonal() * system_->precision * inverse_deviation.asDiagonal();
-    const std::vector<double> pull = product(prior, mean);
+    // In units of the deviation: the field of unit variance.
+    const auto to_units = [&](std::vector<double> values) {
+        for (std::size_t i = 0; i < count; ++i) values[i] /= deviation[i];
+        return values;
+    };
+    const auto from_units = [&](std::vector<double> values) {
+        for (std::size_t i = 0; i < count; ++i) values[i] *= deviation[i];
+        return values;
+    };
+    std::vector<double> field = to_units(mean);
+    const std::vector<double> pull = *precision_ * field;
     std::vector<double> site(count, 0.0), believed(count), known(count, 0.0), right(count);
     for (int round = 0; round < (asked ? kOffsets.rounds : 1); ++round) {
         // What the others say about a patch: the field's value there, the surer the more they know.
@@ -104,14 +107,16 @@ OffsetField::Fit OffsetField::fit(const std::vector<double>& mean, const std::ve
             result.precision[i] = gained;
         });
         for (std::size_t i = 0; i < count; ++i) {
-            known[i] = result.precision[i] + fixed_precision[i];
-            right[i] = pull[i] + result.precision[i] * site[i] + fixed_precision[i] * fixed[i];
+            known[i] = (result.precision[i] + fixed_precision[i]) * deviation[i] * deviation[i];
+            right[i] = pull[i] + (result.precision[i] * site[i] + fixed_precision[i] * fixed[i]) * deviation[i];
         }
-        conjugate_gradients(prior, known, right, kSolved, result.offset);
+        conjugate_gradients(*precision_, known, right, kSolved, field);
+        result.offset = from_units(field);
     }
     if (shift != nullptr) {
-        result.carried = *shift;
-        conjugate_gradients(prior, known, product(prior, *shift), kSolved, result.carried);
+        std::vector<double> carried = to_units(*shift);
+        conjugate_gradients(*precision_, known, *precision_ * carried, kSolved, carried);
+        result.carried = from_units(std::move(carried));
     }
     return result;
 }

@@ -6,6 +6,8 @@
 
 namespace covol::guidance {
 
+class SquaredMatrix;
+
 /// Where a patch's border may be by the image: a density over offsets, relative to that of an image that says nothing.
 struct OffsetEvidence {
     double first = 0, step = 1;  ///< offsets first + n * step, world units
@@ -34,9 +36,8 @@ public:
                           const std::vector<double>& fixed_precision, const std::vector<double>* shift) const;
 
 private:
-    struct System;
     const Patches& patches_;
-    std::unique_ptr<System> system_;
+    std::unique_ptr<SquaredMatrix> precision_;  // of the field of unit variance
 };
 
 /// Mean and variance of a density times a normal one. @return its mass relative to the normal one's.

@@ -7,8 +7,6 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <map>
-#include <set>
 #include <vector>
 
 #include "base/number.h"
@@ -16,6 +14,7 @@
 #include "covol/start.h"
 #include "redistance/signed_distance.h"
 #include "start/other_lattice.h"
+#include "start/sampled_leaves.h"
 
 namespace covol {
 namespace {
@@ -25,6 +24,7 @@ using detail::kLeafDim;
 using detail::kLeafSize;
 using detail::LeafArray;
 using detail::LeafBand;
+using detail::SampledLeaves;
 using detail::Sampler;
 
 constexpr auto kWidth = float(kHalfWidthVoxels);
@@ -85,12 +85,12 @@ std::vector<Coord> crossed_by(const std::vector<Coord>& leaves, const Sampler& s
 }
 
 /// A start from a field whose zero level set is the surface.
-/// @param crossed  the leaves that it passes, see crossed_by()
-FloatGridPtr start_from_field(const Domain& domain, const std::vector<Coord>& crossed, const Sampler& sample,
-                              const char* where, const RunContext& run) {
+/// @param beside  the leaves that it passes and those around them
+FloatGridPtr start_on(const Domain& domain, const std::vector<Coord>& beside, const Sampler& sample, const char* where,
+                      const RunContext& run) {
     run.check();
     const detail::CoordBBox box = detail::box_of(domain);
-    const LeafBand band(detail::dilate_leaves(crossed, 1, domain));
+    const LeafBand band(beside);
     LeafArray<float> phi(band.size(), 0.0F);
     std::vector<detail::LeafMask> inside_domain(band.size());
     tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
@@ -103,134 +103,15 @@ FloatGridPtr start_from_field(const Domain& domain, const std::vector<Coord>& cr
     return detail::make_start(band, u, domain, where);
 }
 
-/// A field's values on leaves, for which it is asked once.
-class SampledLeaves {
-public:
-    explicit SampledLeaves(const Sampler& sample) : sample_(sample) {}
-
-    void ask(const std::vector<Coord>& origins) {
-        std::vector<std::pair<Coord, Values*>> asked;
-        for (const Coord& o : origins)
-            if (const auto [place, is_new] = leaves_.try_emplace(o); is_new) asked.emplace_back(o, &place->second);
-        tbb::parallel_for(std::size_t(0), asked.size(), [&](std::size_t n) {
-            const auto& [o, values] = asked[n];
-            *values = std::make_unique<std::array<float, kLeafSize>>();
-            sample_(o, o.offsetBy(kLeafDim - 1), (*values)->data());
-        });
-    }
-
-    /// @pre asked for
-    [[nodiscard]] const float* leaf(const Coord& origin) const { return leaves_.at(origin)->data(); }
-
-    /// A leaf at a time; those that were not asked for are, and not kept.
-    [[nodiscard]] Sampler sampler() const {
-        return [this](const Coord& lo, const Coord& hi, float* values) {
-            if (const auto known = leaves_.find(lo); known != leaves_.end())
-                std::copy_n(known->second->data(), kLeafSize, values);
-            else
-                sample_(lo, hi, values);
-        };
-    }
-
-private:
-    using Values = std::unique_ptr<std::array<float, kLeafSize>>;
-    const Sampler& sample_;
-    std::map<Coord, Values> leaves_;
-};
-
-/// A leaf and the next layer of voxels.
-class LeafAndNext {
-public:
-    LeafAndNext(const SampledLeaves& sampled, const Coord& origin) {
-        for (int n = 0; n < 8; ++n) leaves_[n] = sampled.leaf(at(origin, n));
-    }
-    /// The leaf, and the seven that the next layer is in.
-    static Coord at(const Coord& origin, int n) {
-        return origin.offsetBy((n >> 2) * kLeafDim, (n >> 1 & 1) * kLeafDim, (n & 1) * kLeafDim);
-    }
-    /// i, j, k 0..8
-    [[nodiscard]] bool is_negative(int i, int j, int k) const {
-        return leaves_[(i >> 3) * 4 + (j >> 3) * 2 + (k >> 3)][(i & 7) << 6 | (j & 7) << 3 | (k & 7)] < 0;
-    }
-    [[nodiscard]] bool is_mixed() const {
-        const bool first = is_negative(0, 0, 0);
-        for (int i = 0; i <= kLeafDim; ++i)
-            for (int j = 0; j <= kLeafDim; ++j)
-                for (int k = 0; k <= kLeafDim; ++k)
-                    if (is_negative(i, j, k) != first) return true;
-        return false;
-    }
-
-private:
-    const float* leaves_[8];
-};
-
-void ask_with_next(SampledLeaves& sampled, const std::vector<Coord>& leaves) {
-    std::vector<Coord> asked;
-    for (const Coord& o : leaves)
-        for (int n = 0; n < 8; ++n) asked.push_back(LeafAndNext::at(o, n));
-    sampled.ask(asked);
+/// @param crossed  the leaves that the surface passes, sorted
+FloatGridPtr start_from_field(const Domain& domain, const std::vector<Coord>& crossed, const Sampler& sample,
+                              const char* where, const RunContext& run) {
+    return start_on(domain, detail::dilate_leaves(crossed, 1, domain), sample, where, run);
 }
-
-/// As crossed_by() above; the values are kept.
-std::vector<Coord> crossed_by(const std::vector<Coord>& leaves, SampledLeaves& sampled) {
-    ask_with_next(sampled, leaves);
-    return filter(leaves, [&](const Coord& o) { return LeafAndNext(sampled, o).is_mixed(); });
-}
-
-/// The leaves that the zero level set passes, found from leaf to leaf from those around the seeds on.
-std::vector<Coord> leaves_crossed_from(const Domain& domain, const std::vector<Vec3>& seeds, SampledLeaves& sampled,
-                                       const RunContext& run) {
-    constexpr int kSide = kLeafDim + 1;
-    const detail::CoordBBox box = detail::box_of(domain);
-    const auto in_domain = [&](const Coord& o) { return detail::any_on(detail::mask_in_box(o, box)); };
-    std::set<Coord> known;
-    std::vector<Coord> front, crossed;
-    const auto visit = [&](const Coord& o) {
-        if (in_domain(o) && known.insert(o).second) front.push_back(o);
-    };
-    for (const Vec3& seed : seeds) {
-        const Vec3 at = domain.world_to_index(seed);
-        const Coord center = Coord::floor(openvdb::Vec3d(at[0], at[1], at[2])) & ~(kLeafDim - 1);
-        for (int n = 0; n < 27; ++n)
-            visit(center.offsetBy((n / 9 - 1) * kLeafDim, (n / 3 % 3 - 1) * kLeafDim, (n % 3 - 1) * kLeafDim));
-    }
-    while (!front.empty()) {
-        run.check();
-        const std::vector<Coord> now = std::move(front);
-        front.clear();
-        ask_with_next(sampled, now);
-        std::vector<std::array<bool, 6>> through(now.size());  // faces, as in kFaceSlots
-        std::vector<char> crosses(now.size());
-        tbb::parallel_for(std::size_t(0), now.size(), [&](std::size_t n) {
-            const LeafAndNext leaf(sampled, now[n]);
-            const bool first = leaf.is_negative(0, 0, 0);
-            std::array<bool, 6> mixed{};
-            for (int a = 0; a < kSide; ++a)
-                for (int b = 0; b < kSide; ++b) {
-                    mixed[0] |= leaf.is_negative(0, a, b) != first;
-                    mixed[1] |= leaf.is_negative(kLeafDim, a, b) != leaf.is_negative(kLeafDim, 0, 0);
-                    mixed[2] |= leaf.is_negative(a, 0, b) != first;
-                    mixed[3] |= leaf.is_negative(a, kLeafDim, b) != leaf.is_negative(0, kLeafDim, 0);
-                    mixed[4] |= leaf.is_negative(a, b, 0) != first;
-                    mixed[5] |= leaf.is_negative(a, b, kLeafDim) != leaf.is_negative(0, 0, kLeafDim);
-                }
-            through[n] = mixed;
-            crosses[n] = leaf.is_mixed();
-        });
-        for (std::size_t n = 0; n < now.size(); ++n) {
-            if (!crosses[n]) continue;
-            crossed.push_back(now[n]);
-            for (int face = 0; face < 6; ++face) {
-                if (!through[n][std::size_t(face)]) continue;
-                Coord next = now[n];
-                next[face / 2] += face % 2 == 0 ? -kLeafDim : kLeafDim;
-                visit(next);
-            }
-        }
-    }
-    std::sort(crossed.begin(), crossed.end());
-    return crossed;
+FloatGridPtr start_from_field(const Domain& domain, const std::vector<Coord>& crossed, SampledLeaves& sampled,
+                              const char* where, const RunContext& run) {
+    const std::vector<Coord> beside = detail::dilate_leaves(crossed, 1, domain);
+    return start_on(domain, beside, sampled.sampler(crossed, beside), where, run);
 }
 
 using detail::to_text;
@@ -340,8 +221,7 @@ FloatGridPtr start_from_contours(const Domain& domain, const ContourSolid& solid
                     solid.levels(domain.index_to_world({double(i), double(j), double(lo.z())}), step, count, values);
         };
         SampledLeaves sampled(sample);
-        const std::vector<Coord> crossed = crossed_by(near, sampled);
-        result = start_from_field(domain, crossed, sampled.sampler(), "start_from_contours", run);
+        result = start_from_field(domain, sampled.crossed_by(near), sampled, "start_from_contours", run);
     });
     return result;
 }
@@ -352,17 +232,19 @@ FloatGridPtr start_from_level(const Domain& domain, const std::vector<Vec3>& see
     with_threads(run, [&] {
         const double h = domain.voxel_size;
         const Sampler sample = [&](const Coord& lo, const Coord& hi, float* values) {
-            const int count = hi.z() - lo.z() + 1;
+            // A row takes as long as eight values: along the last axis, but of a layer across that along the other.
+            const bool is_layer = lo.z() == hi.z();
+            const int count = is_layer ? hi.y() - lo.y() + 1 : hi.z() - lo.z() + 1;
+            const Vec3 step = is_layer ? Vec3{0, h, 0} : Vec3{0, 0, h};
             std::array<double, kLeafDim> row;
             for (int i = lo.x(); i <= hi.x(); ++i)
-                for (int j = lo.y(); j <= hi.y(); ++j) {
-                    level(domain.index_to_world({double(i), double(j), double(lo.z())}), {0, 0, h}, count, row.data());
-                    for (int k = 0; k < count; ++k) *values++ = float(row[std::size_t(k)]);
+                for (int j = lo.y(); j <= (is_layer ? lo.y() : hi.y()); ++j) {
+                    level(domain.index_to_world({double(i), double(j), double(lo.z())}), step, count, row.data());
+                    for (int n = 0; n < count; ++n) *values++ = float(row[std::size_t(n)]);
                 }
         };
         SampledLeaves sampled(sample);
-        const std::vector<Coord> crossed = leaves_crossed_from(domain, seeds, sampled, run);
-        result = start_from_field(domain, crossed, sampled.sampler(), "start_from_level", run);
+        result = start_from_field(domain, sampled.crossed_from(domain, seeds, run), sampled, "start_from_level", run);
     });
     return result;
 }

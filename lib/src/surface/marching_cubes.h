@@ -233,8 +233,7 @@ private:
             auto& mine = found.local();
             for (std::size_t b = range.begin(); b < range.end(); ++b)
                 for (int n = 0; n < 27; ++n) {
-                    const Coord step(n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1);
-                    const Coord origin = blocks_[b].origin + Coord(step.x() * 8, step.y() * 8, step.z() * 8);
+                    const Coord step = neighbour_step(n), origin = neighbour_origin(blocks_[b].origin, n);
                     if (n == 13 || accessor.probeConstLeaf(origin) != nullptr) continue;
                     if (rim_differs(blocks_[b].inside, step, is_inside(accessor.getValue(origin))))
                         mine.push_back(origin);

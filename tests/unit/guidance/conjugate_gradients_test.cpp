@@ -14,8 +14,8 @@ namespace {
 
 using Sparse = Eigen::SparseMatrix<double>;
 
-/// (1 + L)^2 on a ring with some chords: symmetric, positive definite.
-Sparse stiff_matrix(int n) {
+/// 1 + L on a ring with some chords: symmetric, positive definite.
+Sparse half_of(int n) {
     std::mt19937_64 random(7);
     std::vector<Eigen::Triplet<double>> entries;
     const auto couple = [&](int a, int b, double weight) {
@@ -31,23 +31,26 @@ Sparse stiff_matrix(int n) {
     }
     Sparse half(n, n);
     half.setFromTriplets(entries.begin(), entries.end());
-    return half * half;
+    return half;
 }
 
 }  // namespace
 
 TEST_CASE("conjugate gradients solve what a factorization solves, from anywhere, the same for any number of threads") {
     const int n = GENERATE(1, 5, 1023, 3000);
-    const Sparse matrix = n < 3 ? Sparse(Eigen::MatrixXd::Constant(1, 1, 4.0).sparseView()) : stiff_matrix(n);
+    const Sparse half = n < 3 ? Sparse(Eigen::MatrixXd::Constant(1, 1, 4.0).sparseView()) : half_of(n);
     std::mt19937_64 random(3);
     std::uniform_real_distribution<double> uniform(-1, 1);
-    std::vector<double> diagonal(n), right(n), begin(n);
+    std::vector<double> weight(n), diagonal(n), right(n), begin(n);
     for (int i = 0; i < n; ++i) {
         diagonal[i] = i % 3 ? std::abs(uniform(random)) * 50 : 0;
         right[i] = uniform(random);
         begin[i] = 10 * uniform(random);
+        weight[i] = 1 + 0.9 * uniform(random);
     }
-    Sparse whole = matrix;
+    const guidance::SquaredMatrix matrix(half, weight);
+    const Sparse product = half * Eigen::Map<const Eigen::VectorXd>(weight.data(), n).asDiagonal() * half;
+    Sparse whole = product;
     for (int i = 0; i < n; ++i) whole.coeffRef(i, i) += diagonal[i];
     const Eigen::SimplicialLDLT<Sparse> factors(whole);
     const Eigen::VectorXd exact = factors.solve(Eigen::Map<const Eigen::VectorXd>(right.data(), n));
@@ -64,9 +67,12 @@ TEST_CASE("conjugate gradients solve what a factorization solves, from anywhere,
     CHECK(solve(2) == one);
     CHECK(solve(8) == one);
 
-    const std::vector<double> image = guidance::product(matrix, begin);
-    const Eigen::VectorXd expected = matrix * Eigen::Map<const Eigen::VectorXd>(begin.data(), n);
-    for (int i = 0; i < n; ++i) REQUIRE(image[i] == Approx(expected[i]).margin(1e-9));
+    const std::vector<double> image = matrix * begin;
+    const Eigen::VectorXd expected = product * Eigen::Map<const Eigen::VectorXd>(begin.data(), n);
+    for (int i = 0; i < n; ++i) {
+        REQUIRE(image[i] == Approx(expected[i]).margin(1e-9));
+        REQUIRE(matrix.diagonal()[i] == Approx(product.coeff(i, i)).epsilon(1e-12));
+    }
 
     std::vector<double> nothing = begin;
     guidance::conjugate_gradients(matrix, diagonal, std::vector<double>(n, 0.0), 1e-8, nothing);

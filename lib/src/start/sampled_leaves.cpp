@@ -1,0 +1,222 @@
+#include "start/sampled_leaves.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+namespace covol::detail {
+namespace {
+
+constexpr int kFaces = 6, kSide = kLeafDim + 1, kEnd = kLeafDim - 1;
+
+/// The voxels of a leaf's outermost layer, local.
+CoordBBox layer_at(int face) {
+    CoordBBox layer(Coord(0), Coord(kEnd));
+    if (face % 2 == 0)
+        layer.max()[face / 2] = 0;
+    else
+        layer.min()[face / 2] = kEnd;
+    return layer;
+}
+
+/// visit(voxel's offset in its leaf) of a box in it, as a sampler goes.
+template <typename Visit>
+void for_each_in(const CoordBBox& box, const Visit& visit) {
+    for (int i = box.min().x(); i <= box.max().x(); ++i)
+        for (int j = box.min().y(); j <= box.max().y(); ++j)
+            for (int k = box.min().z(); k <= box.max().z(); ++k) visit(leaf_offset(i, j, k));
+}
+
+/// What a distance reads of a leaf that the surface does not pass. A voxel next to the surface lies in a crossed leaf,
+/// or in the first layer behind one; and its slope is that of the voxels beside it.
+LeafParts parts_beside(const std::vector<Coord>& crossed, const Coord& origin) {
+    const auto is_crossed = [&](const Coord& o) { return std::binary_search(crossed.begin(), crossed.end(), o); };
+    LeafParts parts = 0;
+    for (int face = 0; face < kFaces; ++face) {
+        const Coord across = neighbour_origin(origin, kFaceSlots[face]);
+        bool is_needed = is_crossed(across);
+        for (int side = 0; side < kFaces && !is_needed; ++side)
+            is_needed = side / 2 != face / 2 && is_crossed(neighbour_origin(across, kFaceSlots[side]));
+        if (is_needed) parts |= 1U << face;
+    }
+    return parts;
+}
+
+}  // namespace
+
+/// A leaf and the next layer of voxels.
+class SampledLeaves::WithNext {
+public:
+    WithNext(const SampledLeaves& sampled, const Coord& origin) {
+        for (int n = 0; n < 8; ++n) leaves_[n] = sampled.leaves_.at(at(origin, n)).values->data();
+    }
+    /// The leaf, and the seven that the next layer is in.
+    static Coord at(const Coord& origin, int n) {
+        return origin.offsetBy((n >> 2) * kLeafDim, (n >> 1 & 1) * kLeafDim, (n & 1) * kLeafDim);
+    }
+    /// i, j, k 0..8
+    [[nodiscard]] bool is_negative(int i, int j, int k) const {
+        return leaves_[(i >> 3) * 4 + (j >> 3) * 2 + (k >> 3)][leaf_offset(i & 7, j & 7, k & 7)] < 0;
+    }
+    [[nodiscard]] bool is_mixed() const {
+        const bool first = is_negative(0, 0, 0);
+        for (int i = 0; i < kSide; ++i)
+            for (int j = 0; j < kSide; ++j)
+                for (int k = 0; k < kSide; ++k)
+                    if (is_negative(i, j, k) != first) return true;
+        return false;
+    }
+    /// The faces, as in kFaceSlots, that the surface passes.
+    [[nodiscard]] std::array<bool, kFaces> mixed_faces() const {
+        std::array<bool, kFaces> mixed{};
+        for (int face = 0; face < kFaces; ++face) {
+            const int axis = face / 2;
+            Coord at(0);
+            at[axis] = face % 2 * kLeafDim;
+            const bool first = is_negative(at.x(), at.y(), at.z());
+            for (int a = 0; a < kSide; ++a)
+                for (int b = 0; b < kSide; ++b) {
+                    at[(axis + 1) % 3] = a;
+                    at[(axis + 2) % 3] = b;
+                    mixed[face] = mixed[face] || is_negative(at.x(), at.y(), at.z()) != first;
+                }
+        }
+        return mixed;
+    }
+
+private:
+    const float* leaves_[8];
+};
+
+void SampledLeaves::sample(const Coord& origin, Entry& entry) const {
+    if ((entry.asked & kWholeLeaf) != 0) {
+        sample_(origin, origin.offsetBy(kEnd), entry.values->data());
+        entry.known = kWholeLeaf | (kWholeLeaf - 1);
+        return;
+    }
+    std::array<float, kLeafDim * kLeafDim> layer;
+    for (int face = 0; face < kFaces; ++face) {
+        if ((entry.asked & ~entry.known & 1U << face) == 0) continue;
+        const CoordBBox box = layer_at(face);
+        sample_(origin + box.min(), origin + box.max(), layer.data());
+        const float* next = layer.data();
+        for_each_in(box, [&](int at) { (*entry.values)[at] = *next++; });
+    }
+    entry.known |= entry.asked;
+}
+
+void SampledLeaves::ask(const std::vector<Wish>& wishes) {
+    std::vector<std::pair<const Coord, Entry>*> due;
+    for (const Wish& wish : wishes) {
+        const auto entry = leaves_.try_emplace(wish.origin).first;
+        const bool is_due = entry->second.asked != entry->second.known;
+        entry->second.asked |= wish.parts;
+        if (!is_due && (entry->second.asked & ~entry->second.known) != 0) due.push_back(&*entry);
+    }
+    tbb::parallel_for(std::size_t(0), due.size(), [&](std::size_t n) {
+        Entry& entry = due[n]->second;
+        if (entry.values == nullptr) entry.values = std::make_unique<Values>();
+        sample(due[n]->first, entry);
+        entry.asked = entry.known;
+    });
+}
+
+void SampledLeaves::ask_with_next(const std::vector<Coord>& leaves) {
+    std::vector<Wish> wishes;
+    for (const Coord& o : leaves)
+        for (int n = 0; n < 8; ++n) wishes.push_back({WithNext::at(o, n), n == 0 ? kWholeLeaf : kFirstLayers});
+    ask(wishes);
+}
+
+std::vector<Coord> SampledLeaves::crossed_by(const std::vector<Coord>& leaves) {
+    ask_with_next(leaves);
+    std::vector<char> crosses(leaves.size());
+    tbb::parallel_for(std::size_t(0), leaves.size(),
+                      [&](std::size_t n) { crosses[n] = WithNext(*this, leaves[n]).is_mixed(); });
+    std::vector<Coord> crossed;
+    for (std::size_t n = 0; n < leaves.size(); ++n)
+        if (crosses[n]) crossed.push_back(leaves[n]);
+    return crossed;
+}
+
+std::vector<Coord> SampledLeaves::crossed_from(const Domain& domain, const std::vector<Vec3>& seeds,
+                                               const RunContext& run) {
+    const CoordBBox box = box_of(domain);
+    std::map<Coord, bool> crosses;  // of the leaves that were visited
+    std::vector<Coord> front;
+    const auto visit = [&](const Coord& o) {
+        if (any_on(mask_in_box(o, box)) && crosses.try_emplace(o, false).second) front.push_back(o);
+    };
+    const auto follow = [&] {
+        while (!front.empty()) {
+            run.check();
+            const std::vector<Coord> now = crossed_by(std::exchange(front, {}));
+            std::vector<std::array<bool, kFaces>> through(now.size());
+            tbb::parallel_for(std::size_t(0), now.size(),
+                              [&](std::size_t n) { through[n] = WithNext(*this, now[n]).mixed_faces(); });
+            for (std::size_t n = 0; n < now.size(); ++n) {
+                crosses[now[n]] = true;
+                for (int face = 0; face < kFaces; ++face)
+                    if (through[n][std::size_t(face)]) visit(neighbour_origin(now[n], kFaceSlots[face]));
+            }
+        }
+    };
+    std::set<Coord> homes;
+    for (const Vec3& seed : seeds) {
+        const Vec3 at = domain.world_to_index(seed);
+        homes.insert(Coord::floor(openvdb::Vec3d(at[0], at[1], at[2])) & ~(kLeafDim - 1));
+    }
+    for (const Coord& home : homes) visit(home);
+    follow();
+    for (const Coord& home : homes)
+        if (const auto found = crosses.find(home); found == crosses.end() || !found->second)
+            for (int slot = 0; slot < 27; ++slot) visit(neighbour_origin(home, slot));
+    follow();
+    std::vector<Coord> crossed;
+    for (const auto& [origin, does_cross] : crosses)
+        if (does_cross) crossed.push_back(origin);
+    return crossed;
+}
+
+bool SampledLeaves::Entry::has_one_sign() const {
+    bool is_any_negative = false, is_any_positive = false;
+    const auto look = [&](int at) { ((*values)[at] < 0 ? is_any_negative : is_any_positive) = true; };
+    for (int face = 0; face < kFaces; ++face)
+        if ((known & 1U << face) != 0) for_each_in(layer_at(face), look);
+    return is_any_negative != is_any_positive;
+}
+
+Sampler SampledLeaves::sampler(const std::vector<Coord>& crossed, const std::vector<Coord>& beside) {
+    std::vector<Wish> wishes(beside.size());
+    tbb::parallel_for(std::size_t(0), beside.size(), [&](std::size_t n) {
+        const bool is_crossed = std::binary_search(crossed.begin(), crossed.end(), beside[n]);
+        // A leaf of which nothing is read, for its sign.
+        const LeafParts parts = is_crossed ? kWholeLeaf : std::max(parts_beside(crossed, beside[n]), 1U);
+        wishes[n] = {beside[n], parts};
+    });
+    ask(wishes);
+    std::vector<Wish> others;  // that another part of the surface passes
+    for (const Wish& wish : wishes)
+        if (const Entry& entry = leaves_.at(wish.origin); (entry.known & kWholeLeaf) == 0 && !entry.has_one_sign())
+            others.push_back({wish.origin, kWholeLeaf});
+    ask(others);
+    return [this](const Coord& lo, const Coord&, float* values) {
+        const Entry& entry = leaves_.at(lo);
+        const Values& known = *entry.values;
+        if ((entry.known & kWholeLeaf) != 0) {
+            std::copy(known.begin(), known.end(), values);
+            return;
+        }
+        int some = 0;
+        for (int face = 0; face < kFaces; ++face)
+            if ((entry.known & 1U << face) != 0) for_each_in(layer_at(face), [&](int at) { some = at; });
+        std::fill_n(values, kLeafSize, known[std::size_t(some)] < 0 ? -1.0F : 1.0F);
+        for (int face = 0; face < kFaces; ++face)
+            if ((entry.known & 1U << face) != 0)
+                for_each_in(layer_at(face), [&](int at) { values[at] = known[std::size_t(at)]; });
+    };
+}
+
+}  // namespace covol::detail

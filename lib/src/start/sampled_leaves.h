@@ -1,0 +1,58 @@
+#pragma once
+#include <array>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "covol/domain.h"
+#include "covol/run.h"
+#include "grid/leaf_band.h"
+#include "start/other_lattice.h"
+
+namespace covol::detail {
+
+/// Parts of a leaf, as bits: its outermost layer of voxels at a face, 1 << the face's place in kFaceSlots, or all of
+/// it.
+using LeafParts = unsigned;
+inline constexpr LeafParts kFirstLayers = 0b010101, kWholeLeaf = 1U << 6;
+
+/// A field's values on leaves, for which it is asked once, and in no more parts of a leaf than are needed: of most
+/// leaves beside a surface that is their layer next to it.
+class SampledLeaves {
+public:
+    /// @param sample  kept by reference
+    explicit SampledLeaves(const Sampler& sample) : sample_(sample) {}
+
+    struct Wish {
+        Coord origin;
+        LeafParts parts;
+    };
+    void ask(const std::vector<Wish>& wishes);
+    /// Those of the leaves whose voxel edges, those to the next leaf included, the zero level set passes.
+    [[nodiscard]] std::vector<Coord> crossed_by(const std::vector<Coord>& leaves);
+    /// As crossed_by(), found from leaf to leaf, from those with a seed on, or where the surface does not pass the
+    /// seed's leaf, from the 26 around it. Sorted.
+    [[nodiscard]] std::vector<Coord> crossed_from(const Domain& domain, const std::vector<Vec3>& seeds,
+                                                  const RunContext& run);
+    /// A leaf at a time, of those that crossed leaves touch: each value that a distance to the surface reads, and the
+    /// sign everywhere.
+    /// @param crossed  all of them, sorted
+    /// @param beside   dilate_leaves(crossed, 1)
+    [[nodiscard]] Sampler sampler(const std::vector<Coord>& crossed, const std::vector<Coord>& beside);
+
+private:
+    using Values = std::array<float, kLeafSize>;
+    struct Entry {
+        LeafParts known = 0, asked = 0;
+        std::unique_ptr<Values> values;
+        [[nodiscard]] bool has_one_sign() const;
+    };
+    class WithNext;
+    void sample(const Coord& origin, Entry& entry) const;
+    void ask_with_next(const std::vector<Coord>& leaves);
+
+    const Sampler& sample_;
+    std::map<Coord, Entry> leaves_;
+};
+
+}  // namespace covol::detail

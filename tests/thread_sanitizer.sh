@@ -1,0 +1,46 @@
+#!/usr/bin/env bash
+# The unit and property tests under the thread sanitizer. Half an hour to build and as long to run, on two cores: for once
+# a week.
+#
+#   bash tests/thread_sanitizer.sh [WORDS FOR CTEST ...]
+#
+# TBB synchronizes by its own atomics, which the sanitizer sees only where TBB is compiled with it: the version that is
+# installed is built from Debian's source (deb-src lists are made from the machine's own, in the build folder). What is
+# suppressed, and why, stands in tests/thread_sanitizer.supp; OpenVDB's library is not instrumented and not reported on.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+jobs=${COVOL_JOBS:-$(nproc)}
+build=$PWD/build-tsan tbb=$PWD/build-tsan/tbb
+
+bash tests/install_packages.sh
+
+tbb_library() { find "$tbb" -name libtbb.so.12 -printf '%h\n' -quit 2> /dev/null || true; }
+if [ -z "$(tbb_library)" ]; then
+    version=$(dpkg-query -W -f '${source:Version}' libtbb12)
+    rm -rf "$tbb"
+    mkdir -p "$tbb"/{sources,lists/partial,cache}
+    for list in /etc/apt/sources.list /etc/apt/sources.list.d/*.list; do
+        [ -f "$list" ] && sed -n 's/^deb /deb-src /p' "$list" > "$tbb/sources/$(basename "$list" .list).list"
+    done
+    for list in /etc/apt/sources.list.d/*.sources; do
+        [ -f "$list" ] && sed 's/^Types:.*/Types: deb-src/' "$list" > "$tbb/sources/$(basename "$list")"
+    done
+    apt=(apt-get -qq -o Dir::Etc::SourceList=/dev/null -o "Dir::Etc::SourceParts=$tbb/sources"
+        -o "Dir::State::Lists=$tbb/lists" -o "Dir::Cache=$tbb/cache" -o APT::Sandbox::User=)
+    "${apt[@]}" update
+    (cd "$tbb" && "${apt[@]}" source --download-only "onetbb=$version")
+    dpkg-source -x "$tbb"/onetbb_*.dsc "$tbb/source"
+    cmake -S "$tbb/source" -B "$tbb/build" -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DTBB_SANITIZE=thread \
+        -DTBB_TEST=OFF -DTBB_STRICT=OFF -DTBBMALLOC_BUILD=OFF
+    cmake --build "$tbb/build" --parallel "$jobs"
+fi
+
+cmake --preset tsan --log-level=WARNING
+cmake --build --preset tsan --parallel "$jobs"
+# Without address randomization, where that can be had: where it is wide, the sanitizer finds no place for its memory.
+fixed=(setarch --addr-no-randomize)
+"${fixed[@]}" true 2> /dev/null || fixed=()
+TSAN_OPTIONS="suppressions=$PWD/tests/thread_sanitizer.supp ignore_noninstrumented_modules=1 second_deadlock_stack=1" \
+    LD_LIBRARY_PATH=$(tbb_library) \
+    "${fixed[@]}" ctest --test-dir "$build" -R '^(unit|property)/' --parallel "$jobs" --timeout 7200 \
+    --output-on-failure "$@"
