@@ -11,13 +11,10 @@ namespace {
 
 constexpr int kFaces = 6, kSide = kLeafDim + 1, kEnd = kLeafDim - 1;
 
-/// The voxels of a leaf's outermost layer, local.
-CoordBBox layer_at(int face) {
+/// The voxels of a leaf's first layer across an axis, local.
+CoordBBox first_layer(int axis) {
     CoordBBox layer(Coord(0), Coord(kEnd));
-    if (face % 2 == 0)
-        layer.max()[face / 2] = 0;
-    else
-        layer.min()[face / 2] = kEnd;
+    layer.max()[axis] = 0;
     return layer;
 }
 
@@ -27,21 +24,6 @@ void for_each_in(const CoordBBox& box, const Visit& visit) {
     for (int i = box.min().x(); i <= box.max().x(); ++i)
         for (int j = box.min().y(); j <= box.max().y(); ++j)
             for (int k = box.min().z(); k <= box.max().z(); ++k) visit(leaf_offset(i, j, k));
-}
-
-/// What a distance reads of a leaf that the surface does not pass. A voxel next to the surface lies in a crossed leaf,
-/// or in the first layer behind one; and its slope is that of the voxels beside it.
-LeafParts parts_beside(const std::vector<Coord>& crossed, const Coord& origin) {
-    const auto is_crossed = [&](const Coord& o) { return std::binary_search(crossed.begin(), crossed.end(), o); };
-    LeafParts parts = 0;
-    for (int face = 0; face < kFaces; ++face) {
-        const Coord across = neighbour_origin(origin, kFaceSlots[face]);
-        bool is_needed = is_crossed(across);
-        for (int side = 0; side < kFaces && !is_needed; ++side)
-            is_needed = side / 2 != face / 2 && is_crossed(neighbour_origin(across, kFaceSlots[side]));
-        if (is_needed) parts |= 1U << face;
-    }
-    return parts;
 }
 
 }  // namespace
@@ -97,9 +79,9 @@ void SampledLeaves::sample(const Coord& origin, Entry& entry) const {
         return;
     }
     std::array<float, kLeafDim * kLeafDim> layer;
-    for (int face = 0; face < kFaces; ++face) {
-        if ((entry.asked & ~entry.known & 1U << face) == 0) continue;
-        const CoordBBox box = layer_at(face);
+    for (int axis = 0; axis < 3; ++axis) {
+        if ((entry.asked & ~entry.known & 1U << axis) == 0) continue;
+        const CoordBBox box = first_layer(axis);
         sample_(origin + box.min(), origin + box.max(), layer.data());
         const float* next = layer.data();
         for_each_in(box, [&](int at) { (*entry.values)[at] = *next++; });
@@ -183,24 +165,22 @@ std::vector<Coord> SampledLeaves::crossed_from(const Domain& domain, const std::
 bool SampledLeaves::Entry::has_one_sign() const {
     bool is_any_negative = false, is_any_positive = false;
     const auto look = [&](int at) { ((*values)[at] < 0 ? is_any_negative : is_any_positive) = true; };
-    for (int face = 0; face < kFaces; ++face)
-        if ((known & 1U << face) != 0) for_each_in(layer_at(face), look);
+    for (int axis = 0; axis < 3; ++axis)
+        if ((known & 1U << axis) != 0) for_each_in(first_layer(axis), look);
     return is_any_negative != is_any_positive;
 }
 
-Sampler SampledLeaves::sampler(const std::vector<Coord>& crossed, const std::vector<Coord>& beside) {
-    std::vector<Wish> wishes(beside.size());
-    tbb::parallel_for(std::size_t(0), beside.size(), [&](std::size_t n) {
-        const bool is_crossed = std::binary_search(crossed.begin(), crossed.end(), beside[n]);
-        // A leaf of which nothing is read, for its sign.
-        const LeafParts parts = is_crossed ? kWholeLeaf : std::max(parts_beside(crossed, beside[n]), 1U);
-        wishes[n] = {beside[n], parts};
-    });
+// What a distance reads lies in crossed leaves and in the first layers behind them: were a voxel next to the surface,
+// or one that its slope is taken from, in another leaf, that leaf would be crossed.
+Sampler SampledLeaves::sampler(const std::vector<Coord>& beside) {
+    std::vector<Wish> wishes;
+    for (const Coord& o : beside)
+        if (leaves_.find(o) == leaves_.end()) wishes.push_back({o, kOneLayer});
     ask(wishes);
     std::vector<Wish> others;  // that another part of the surface passes
-    for (const Wish& wish : wishes)
-        if (const Entry& entry = leaves_.at(wish.origin); (entry.known & kWholeLeaf) == 0 && !entry.has_one_sign())
-            others.push_back({wish.origin, kWholeLeaf});
+    for (const Coord& o : beside)
+        if (const Entry& entry = leaves_.at(o); (entry.known & kWholeLeaf) == 0 && !entry.has_one_sign())
+            others.push_back({o, kWholeLeaf});
     ask(others);
     return [this](const Coord& lo, const Coord&, float* values) {
         const Entry& entry = leaves_.at(lo);
@@ -209,13 +189,11 @@ Sampler SampledLeaves::sampler(const std::vector<Coord>& crossed, const std::vec
             std::copy(known.begin(), known.end(), values);
             return;
         }
-        int some = 0;
-        for (int face = 0; face < kFaces; ++face)
-            if ((entry.known & 1U << face) != 0) for_each_in(layer_at(face), [&](int at) { some = at; });
-        std::fill_n(values, kLeafSize, known[std::size_t(some)] < 0 ? -1.0F : 1.0F);
-        for (int face = 0; face < kFaces; ++face)
-            if ((entry.known & 1U << face) != 0)
-                for_each_in(layer_at(face), [&](int at) { values[at] = known[std::size_t(at)]; });
+        // The first voxel lies in each first layer.
+        std::fill_n(values, kLeafSize, known[0] < 0 ? -1.0F : 1.0F);
+        for (int axis = 0; axis < 3; ++axis)
+            if ((entry.known & 1U << axis) != 0)
+                for_each_in(first_layer(axis), [&](int at) { values[at] = known[std::size_t(at)]; });
     };
 }
 

@@ -11,13 +11,12 @@
 
 namespace covol::detail {
 
-/// Parts of a leaf, as bits: its outermost layer of voxels at a face, 1 << the face's place in kFaceSlots, or all of
-/// it.
+/// Parts of a leaf, as bits: its first layer of voxels across each axis, and all of it.
 using LeafParts = unsigned;
-inline constexpr LeafParts kFirstLayers = 0b010101, kWholeLeaf = 1U << 6;
+inline constexpr LeafParts kOneLayer = 0b0001, kFirstLayers = 0b0111, kWholeLeaf = 0b1000;
 
 /// A field's values on leaves, for which it is asked once, and in no more parts of a leaf than are needed: of most
-/// leaves beside a surface that is their layer next to it.
+/// leaves beside a surface that is a layer.
 class SampledLeaves {
 public:
     /// @param sample  kept by reference
@@ -34,11 +33,9 @@ public:
     /// seed's leaf, from the 26 around it. Sorted.
     [[nodiscard]] std::vector<Coord> crossed_from(const Domain& domain, const std::vector<Vec3>& seeds,
                                                   const RunContext& run);
-    /// A leaf at a time, of those that crossed leaves touch: each value that a distance to the surface reads, and the
-    /// sign everywhere.
-    /// @param crossed  all of them, sorted
-    /// @param beside   dilate_leaves(crossed, 1)
-    [[nodiscard]] Sampler sampler(const std::vector<Coord>& crossed, const std::vector<Coord>& beside);
+    /// A leaf at a time: each value that a distance to the surface reads, and the sign everywhere.
+    /// @param beside  the leaves that were found to be crossed, and those around them
+    [[nodiscard]] Sampler sampler(const std::vector<Coord>& beside);
 
 private:
     using Values = std::array<float, kLeafSize>;

@@ -111,7 +111,7 @@ FloatGridPtr start_from_field(const Domain& domain, const std::vector<Coord>& cr
 FloatGridPtr start_from_field(const Domain& domain, const std::vector<Coord>& crossed, SampledLeaves& sampled,
                               const char* where, const RunContext& run) {
     const std::vector<Coord> beside = detail::dilate_leaves(crossed, 1, domain);
-    return start_on(domain, beside, sampled.sampler(crossed, beside), where, run);
+    return start_on(domain, beside, sampled.sampler(beside), where, run);
 }
 
 using detail::to_text;

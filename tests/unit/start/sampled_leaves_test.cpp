@@ -10,6 +10,7 @@
 
 #include "covol/start.h"
 #include "grid/leaf_band.h"
+#include "redistance/signed_distance.h"
 #include "support/clouds.h"
 
 using namespace covol;
@@ -17,10 +18,13 @@ using namespace covol::test;
 
 namespace {
 
+const Domain kDomain = make_domain({{0, 0, 0}, {48, 47, 46}}, 1.0);
+
 using Level = std::function<double(const Vec3&)>;
 
 /// The level set's start from all values of the domain, and no leaf left out.
-FloatGridPtr start_from_all(const Domain& domain, const Level& level) {
+FloatGridPtr start_from_all(const Level& level) {
+    const Domain& domain = kDomain;
     FloatGridPtr all = make_grid(domain, 100, "all");
     auto values = all->getAccessor();
     for (int i = domain.min[0] - 9; i <= domain.max[0] + 9; ++i)
@@ -40,23 +44,14 @@ double ball(const Vec3& x, const Vec3& center, double radius) {
     return std::hypot(x[0] - center[0], x[1] - center[1], x[2] - center[2]) - radius;
 }
 
-LevelRow row_of(const Level& level, std::atomic<int>& rows) {
-    return [level, &rows](const Vec3& from, const Vec3& step, int count, double* values) {
-        for (int n = 0; n < count; ++n)
-            values[n] = level({from[0] + n * step[0], from[1] + n * step[1], from[2] + n * step[2]});
-        ++rows;
-    };
-}
+struct Body {
+    const char* name;
+    Level level;
+    std::vector<Vec3> seeds;
+};
 
-}  // namespace
-
-TEST_CASE("a start from a function asked on parts of leaves is that from all its values") {
-    struct Body {
-        const char* name;
-        Level level;
-        std::vector<Vec3> seeds;
-    };
-    const auto body = GENERATE(
+std::vector<Body> bodies() {
+    return {
         Body{"a ball",
              [](const Vec3& x) {
                  return ball(x, {21.3, 19.9, 23.1}, 13.7);
@@ -82,12 +77,58 @@ TEST_CASE("a start from a function asked on parts of leaves is that from all its
              [](const Vec3& x) {
                  return ball(x, {20.2, 20.1, 20.3}, 1.2);
              },
-             {{15, 20, 20}}});
+             {{15, 20, 20}}}};
+}
+
+LevelRow row_of(const Level& level, std::atomic<int>& rows) {
+    return [level, &rows](const Vec3& from, const Vec3& step, int count, double* values) {
+        for (int n = 0; n < count; ++n)
+            values[n] = level({from[0] + n * step[0], from[1] + n * step[1], from[2] + n * step[2]});
+        ++rows;
+    };
+}
+
+}  // namespace
+
+TEST_CASE("a start from a function asked on parts of leaves is that from all its values") {
+    const Body body = GENERATE(from_range(bodies()));
     INFO(body.name);
-    const Domain domain = make_domain({{0, 0, 0}, {48, 47, 46}}, 1.0);
     std::atomic<int> rows{0};
-    const FloatGridPtr start = start_from_level(domain, body.seeds, row_of(body.level, rows));
-    CHECK(identical(*start, *start_from_all(domain, body.level)));
+    const FloatGridPtr start = start_from_level(kDomain, body.seeds, row_of(body.level, rows));
+    CHECK(identical(*start, *start_from_all(body.level)));
+}
+
+TEST_CASE("a distance reads nothing that was not asked, where no leaf but the crossed ones was looked at") {
+    using namespace covol::detail;
+    const Body body = GENERATE(from_range(bodies()));
+    INFO(body.name);
+    const Sampler sample = [&](const Coord& lo, const Coord& hi, float* values) {
+        for (auto voxel = CoordBBox(lo, hi).begin(); voxel; ++voxel)
+            *values++ = float(body.level(world_of(kDomain, *voxel)));
+    };
+    std::vector<Coord> all;
+    for (int n = 0; n < 6 * 6 * 6; ++n) all.emplace_back(n / 36 * kLeafDim, n / 6 % 6 * kLeafDim, n % 6 * kLeafDim);
+    SampledLeaves every(sample), few(sample);
+    const std::vector<Coord> crossed = every.crossed_by(all);
+    REQUIRE(few.crossed_by(crossed) == crossed);
+
+    const std::vector<Coord> beside = dilate_leaves(crossed, 1, kDomain);
+    const Sampler parts = few.sampler(beside);
+    const LeafBand band(beside);
+    const CoordBBox box = box_of(kDomain);
+    const auto distance = [&](const Sampler& values) {
+        LeafArray<float> phi(band.size(), 0.0F);
+        std::vector<LeafMask> inside;
+        for (std::size_t leaf = 0; leaf < band.size(); ++leaf) {
+            values(band.origin(leaf), band.origin(leaf).offsetBy(kLeafDim - 1), phi.leaf(leaf));
+            inside.push_back(mask_in_box(band.origin(leaf), box));
+        }
+        return signed_distance(band, phi, inside, box, 3, {});
+    };
+    const LeafArray<float> expected = distance(sample), got = distance(parts);
+    int wrong = 0;
+    for (std::size_t n = 0; n < band.size() * kLeafSize; ++n) wrong += expected.leaf(0)[n] != got.leaf(0)[n];
+    CHECK(wrong == 0);
 }
 
 TEST_CASE("beside a surface a function is not asked for whole leaves") {
