@@ -44,7 +44,8 @@ struct Bin {
 
 class Sweeper {
 public:
-    Sweeper(const CoordBBox& box, double radius) : box_(box), radius_(radius) {}
+    Sweeper(const CoordBBox& box, double radius, const std::function<bool(const Coord&)>& enters)
+        : box_(box), radius_(radius), enters_(enters) {}
 
     void take(const std::vector<Vec3>& points, const char* where);
     void seed();
@@ -57,10 +58,10 @@ private:
         const auto at = [&](int a) { return Key((origin[a] >> 3) - (box_.min()[a] >> 3) + 1); };
         return at(0) << 44 | at(1) << 22 | at(2);
     }
-    bool meets_box(const Coord& origin) const {
+    bool may_enter(const Coord& origin) const {
         for (int a = 0; a < 3; ++a)
             if (origin[a] > box_.max()[a] || origin[a] + kLeafDim - 1 < box_.min()[a]) return false;
-        return true;
+        return !enters_ || enters_(origin);
     }
     std::int32_t touch(const Coord& origin);
     void seed_leaf(NearestLeaf& leaf) const;
@@ -69,6 +70,7 @@ private:
 
     CoordBBox box_;
     double radius_;
+    const std::function<bool(const Coord&)>& enters_;
     std::unordered_map<Key, std::int32_t> lookup_;
     std::unordered_map<Key, Bin> bins_;
     std::vector<std::array<std::int8_t, 3>> local_;  // of each point, its voxel in its leaf
@@ -204,7 +206,7 @@ void Sweeper::seed() {
         }
         for (int slot = 0; slot < 27; ++slot) {
             const Coord origin = neighbour_origin(o, slot);
-            if ((reached >> slot & 1) && meets_box(origin)) touch(origin);
+            if ((reached >> slot & 1) && may_enter(origin)) touch(origin);
         }
     }
     tbb::parallel_for(std::size_t(0), field.leaves.size(), [&](std::size_t n) { seed_leaf(field.leaves[n]); });
@@ -300,7 +302,7 @@ void Sweeper::sweep(const RunContext& run) {
                         field.leaves[leaf.neighbours[slot]].queued = true;
                     } else {
                         const Coord origin = neighbour_origin(leaf.origin, slot);
-                        if (meets_box(origin)) touch(origin);
+                        if (may_enter(origin)) touch(origin);
                     }
                 }
             }
@@ -312,8 +314,8 @@ void Sweeper::sweep(const RunContext& run) {
 }  // namespace
 
 NearestField nearest_points(const std::vector<Vec3>& points, const CoordBBox& box, double radius, const char* where,
-                            const RunContext& run) {
-    Sweeper sweeper(box, radius);
+                            const RunContext& run, const std::function<bool(const Coord&)>& enters) {
+    Sweeper sweeper(box, radius, enters);
     sweeper.take(points, where);
     sweeper.seed();
     sweeper.sweep(run);

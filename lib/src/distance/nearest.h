@@ -1,5 +1,6 @@
 #pragma once
 #include <deque>
+#include <functional>
 #include <vector>
 
 #include "covol/run.h"
@@ -33,9 +34,11 @@ struct NearestField {
 /// @param points  index space, finite. Points outside `box` count: the tube is followed outside of it where they need
 /// it.
 /// @param where   the caller's name, for messages.
+/// @param enters  which leaves, by their origins, are in it; null: all
 /// @throws Error InvalidInput when the box is longer than 2^24 voxels; Cancelled.
 [[nodiscard]] NearestField nearest_points(const std::vector<Vec3>& points, const CoordBBox& box, double radius,
-                                          const char* where, const RunContext& run);
+                                          const char* where, const RunContext& run,
+                                          const std::function<bool(const Coord&)>& enters = nullptr);
 
 /// Squared distances, in voxels, of a leaf's voxels to the points they hold; huge where there is none.
 void squared_distances(const NearestField& field, const NearestLeaf& leaf, float* squared);

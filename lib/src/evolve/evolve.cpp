@@ -22,7 +22,7 @@
 #include "evolve/flow_states.h"
 #include "evolve/heuristics.h"
 #include "evolve/motion.h"
-#include "evolve/tracking.h"
+#include "redistance/tracking.h"
 #include "scheme/scheme.h"
 
 namespace covol {
@@ -65,7 +65,10 @@ public:
             go_on();
             return;
         }
-        if (options.follow) detail::track_surface(u_, domain_, tracking_clamp(options_), run_);
+        if (options.follow && (options.theta > 0 || options.rho > 0))
+            detail::track_surface(u_, domain_, tracking_clamp(options_));
+        else if (options.follow)
+            detail::track_surface_exactly(u_, domain_, tracking_clamp(options_), run_);
         make_solver();
     }
 

@@ -1,45 +1,95 @@
 // Morphological closing of a tagged body: the exterior, grown back by the tag distance.
 #include <openvdb/openvdb.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <memory>
 
 #include "covol/band.h"
-#include "covol/distance.h"
 #include "covol/error.h"
+#include "distance/memory_need.h"
+#include "distance/nearest.h"
 #include "grid/flood_tiles.h"
-#include "redistance/redistance.h"
+#include "grid/sign_masks.h"
+#include "redistance/interface_patches.h"
+#include "redistance/tracking.h"
 #include "tagging/heuristics.h"
 
 namespace covol {
+namespace {
+
+using Leaf = FloatGrid::TreeType::LeafNodeType;
+
+/// The voxels of a level set's leaf, or of the tile in its place, below zero.
+detail::LeafMask inside_of(const FloatGrid& level_set, const detail::Coord& origin) {
+    if (const Leaf* leaf = level_set.tree().probeConstLeaf(origin)) return detail::negative_mask(leaf->buffer().data());
+    detail::LeafMask mask;
+    mask.fill(level_set.tree().getValue(origin) < 0.0F ? ~std::uint64_t(0) : 0);
+    return mask;
+}
+
+/// Inside the body D - d, which is the signed distance to its closing, d that to its surface; outside of it anything
+/// positive will do. No lower than -reach, no higher than reach. Null where no voxel is deeper than D.
+/// @param surface  points of the body's surface, index space
+FloatGridPtr grown_exterior(const FloatGrid& body, const std::vector<Vec3>& surface, const Domain& domain, float D,
+                            float reach, const RunContext& run) {
+    const detail::CoordBBox box = detail::box_of(domain);
+    const auto h = float(domain.voxel_size);
+    // What is nearest to a voxel inside is seen from there through the inside.
+    const detail::NearestField field =
+        detail::nearest_points(surface, box, double(D + reach) / h, "distance", run,
+                               [&](const detail::Coord& origin) { return detail::any_on(inside_of(body, origin)); });
+    std::vector<std::unique_ptr<Leaf>> leaves(field.leaves.size());
+    std::atomic<bool> any{false};
+    tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t n) {
+        const detail::NearestLeaf& nearest = field.leaves[n];
+        alignas(32) float d[detail::kLeafSize];
+        detail::squared_distances(field, nearest, d);
+        const detail::LeafMask inside = inside_of(body, nearest.origin),
+                               valid = detail::mask_in_box(nearest.origin, box);
+        bool is_near = false, is_deep = false;
+        for (int at = 0; at < detail::kLeafSize; ++at) {
+            const float depth = detail::is_on(valid, at) ? std::min(h * std::sqrt(d[at]), D + reach) : D + reach;
+            d[at] = std::min(detail::is_on(inside, at) ? D - depth : D, reach);
+            is_near |= depth < D + reach;
+            is_deep |= d[at] < 0.0F;
+        }
+        if (is_deep) any = true;
+        if (!is_near) return;
+        leaves[n] = std::make_unique<Leaf>(nearest.origin, reach, false);
+        std::copy_n(d, detail::kLeafSize, leaves[n]->buffer().data());
+    });
+    if (!any) return nullptr;
+    FloatGridPtr grown = make_grid(domain, reach, "band");
+    grown->setGridClass(openvdb::GRID_LEVEL_SET);
+    for (auto& leaf : leaves)
+        if (leaf) grown->tree().addLeaf(leaf.release());
+    detail::flood_tiles(*grown, domain);
+    return grown;
+}
+
+}  // namespace
 
 FloatGridPtr close_by_ball(const FloatGrid& band, double tag_distance, const RunContext& run) {
     const Domain domain = domain_of(band);
-    const double h = domain.voxel_size, reach = kClosing.reach_voxels * h;
-    const detail::InterfacePatches tagged = detail::find_interface(band, domain, detail::DomainEnd::Open, run);
-    if (tagged.patches.empty()) return nullptr;
-    std::vector<Vec3> surface(tagged.patches.size());
-    for (std::size_t n = 0; n < surface.size(); ++n) {
-        const detail::Patch& p = tagged.patches[n];
-        surface[n] = domain.index_to_world(
-            {p.origin[0] + double(p.center[0]), p.origin[1] + double(p.center[1]), p.origin[2] + double(p.center[2])});
-    }
-    // Inside the tagged body D - d is the signed distance to the closing; outside it anything positive will do.
-    const FloatGridPtr grown = compute_distance(surface, domain, {tag_distance + reach}, run).grid;
-    const auto D = static_cast<float>(tag_distance);
-    const auto inside = band.getConstAccessor();
-    bool any = false;
-    for (auto leaf = grown->tree().beginLeaf(); leaf; ++leaf)
-        for (auto v = leaf->beginValueAll(); v; ++v) {
-            const float value = inside.getValue(v.getCoord()) < 0.0F ? D - *v : D;
-            any |= value < 0.0F;
-            v.setValue(std::min(value, static_cast<float>(reach)));
-        }
-    if (!any) return nullptr;
-    grown->tree().root().setBackground(static_cast<float>(reach), false);
-    detail::flood_tiles(*grown, domain);
+    const double reach = kClosing.reach_voxels * domain.voxel_size;
     FloatGridPtr closed;
     with_threads(run, [&] {
-        closed = detail::redistance(*grown, domain, kClosing.half_width, detail::DomainEnd::Open, "band", run);
+        std::vector<Vec3> surface;
+        {
+            const detail::InterfacePatches tagged = detail::find_interface(band, domain, detail::DomainEnd::Open, run);
+            for (const detail::Patch& p : tagged.patches)
+                surface.push_back(
+                    domain.index_to_world({p.origin[0] + double(p.center[0]), p.origin[1] + double(p.center[1]),
+                                           p.origin[2] + double(p.center[2])}));
+        }
+        if (surface.empty()) return;
+        detail::require_tube_memory(surface, domain, {tag_distance + reach, 0, false}, "close_by_ball", run);
+        for (Vec3& p : surface) p = domain.world_to_index(p);
+        closed = grown_exterior(band, surface, domain, float(tag_distance), float(reach), run);
+        if (closed) detail::track_surface(*closed, domain, kClosing.half_width);
     });
     return closed;
 }

@@ -1,0 +1,101 @@
+#include "redistance/tracking.h"
+
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "covol/error.h"
+#include "covol/start.h"
+#include "support/clouds.h"
+
+using namespace covol;
+using namespace covol::test;
+
+namespace {
+
+constexpr double kH = 0.5, kClamp = 3;
+const Domain kDomain = make_domain({{-12, -12, -12}, {12, 9, 12}}, kH);  // its end cuts the second ball
+
+/// Two balls, the sign of a distance and a multiple of it, in leaves as far as they reach from the surface.
+FloatGridPtr two_balls(double reach, float scale) {
+    FloatGridPtr u = make_grid(kDomain, float(scale * reach * kH), "u");
+    auto values = u->getAccessor();
+    const auto level = [](const Vec3& x) {
+        return std::min(std::hypot(x[0] + 4, x[1] + 3, x[2] + 2) - 4.3, std::hypot(x[0] - 4, x[1] - 6, x[2]) - 5.1);
+    };
+    const openvdb::CoordBBox box({kDomain.min[0], kDomain.min[1], kDomain.min[2]},
+                                 {kDomain.max[0], kDomain.max[1], kDomain.max[2]});
+    for (auto voxel = box.begin(); voxel; ++voxel) {
+        const double d = std::clamp(level(world_of(kDomain, *voxel)), -reach * kH, reach * kH);
+        if (std::abs(d) < reach * kH)
+            values.setValue(*voxel, scale * float(d));
+        else if (d < 0)
+            values.setValueOff(*voxel, scale * float(d));
+    }
+    return u;
+}
+
+struct Difference {
+    double largest = 0, crossing = 0;
+    int signs = 0, apart = 0;
+};
+
+/// Of two bands: their values in voxels, where their surfaces cut voxel edges, signs, and voxels that one alone has.
+Difference difference(const FloatGrid& one, const FloatGrid& other) {
+    Difference result;
+    const openvdb::CoordBBox box({kDomain.min[0], kDomain.min[1], kDomain.min[2]},
+                                 {kDomain.max[0] - 1, kDomain.max[1] - 1, kDomain.max[2] - 1});
+    const auto a = one.getConstAccessor(), b = other.getConstAccessor();
+    for (auto voxel = box.begin(); voxel; ++voxel) {
+        const float u = a.getValue(*voxel), v = b.getValue(*voxel);
+        result.signs += (u < 0) != (v < 0);
+        result.apart += a.isValueOn(*voxel) != b.isValueOn(*voxel);
+        result.largest = std::max(result.largest, std::abs(double(u) - v) / kH);
+        for (int axis = 0; axis < 3; ++axis) {
+            openvdb::Coord next = *voxel;
+            ++next[axis];
+            const float un = a.getValue(next), vn = b.getValue(next);
+            if ((u < 0) != (un < 0) && (v < 0) != (vn < 0))
+                result.crossing =
+                    std::max(result.crossing, std::abs(double(u) / (double(u) - un) - double(v) / (double(v) - vn)));
+        }
+    }
+    return result;
+}
+
+}  // namespace
+
+TEST_CASE("a band is tracked to first order as by exact distances, from whatever profile and however wide") {
+    const double reach = GENERATE(3.0, 14.0);
+    const float scale = GENERATE(1.0F, 0.07F);
+    INFO(reach << " voxels, scaled by " << scale);
+    FloatGridPtr fast = two_balls(reach, scale), exact = two_balls(reach, scale);
+    detail::track_surface(*fast, kDomain, kClamp);
+    detail::track_surface_exactly(*exact, kDomain, kClamp, {});
+    const Difference apart = difference(*fast, *exact);
+    CHECK(apart.signs == 0);
+    // Neither may move the surface; it is in the groove between the balls that they do.
+    const FloatGridPtr before = two_balls(reach, scale);
+    CHECK(difference(*fast, *before).crossing <= difference(*exact, *before).crossing);
+    CHECK(difference(*exact, *before).crossing < 0.03);
+    CHECK(apart.largest < 0.25);
+    const auto active = double(exact->activeVoxelCount());
+    CHECK(apart.apart < 0.1 * active);
+    CHECK(fast->background() == exact->background());
+    CHECK(double(fast->tree().leafCount()) <= 1.1 * double(exact->tree().leafCount()));
+    for (auto value = fast->cbeginValueOn(); value; ++value)
+        for (int a = 0; a < 3; ++a) {
+            REQUIRE(value.getCoord()[a] >= kDomain.min[a]);
+            REQUIRE(value.getCoord()[a] <= kDomain.max[a]);
+        }
+}
+
+TEST_CASE("a level set without a surface is refused, and stays as it was") {
+    FloatGridPtr u = make_grid(kDomain, 1.5F, "u");
+    u->tree().setValue({3, 4, 5}, 0.7F);
+    const FloatGridPtr before = u->deepCopy();
+    CHECK_THROWS_AS(detail::track_surface(*u, kDomain, kClamp), Error);
+    CHECK(identical(*u, *before));
+}
