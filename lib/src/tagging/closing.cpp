@@ -89,7 +89,7 @@ FloatGridPtr close_by_ball(const FloatGrid& band, double tag_distance, const Run
         detail::require_tube_memory(surface, domain, {tag_distance + reach, 0, false}, "close_by_ball", run);
         for (Vec3& p : surface) p = domain.world_to_index(p);
         closed = grown_exterior(band, surface, domain, float(tag_distance), float(reach), run);
-        if (closed) detail::track_surface(*closed, domain, kClosing.half_width);
+        if (closed) detail::track_surface(*closed, domain, detail::kTrackingWidth);
     });
     return closed;
 }

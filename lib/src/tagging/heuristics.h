@@ -40,8 +40,6 @@ COVOL_HEURISTICS TaggingHeuristics kTagging{};
 struct ClosingHeuristics {
     /// [voxels] Beyond D, enough for a band around the closing's surface.
     double reach_voxels = heuristic("closing.reach_voxels", 6.0);
-    /// [voxels] Of the band that is made.
-    double half_width = heuristic("closing.half_width", 5.0);
 };
 COVOL_HEURISTICS ClosingHeuristics kClosing{};
 
