@@ -7,7 +7,8 @@
 // Vectors are only passed to functions that are inlined, so that their calling convention does not matter.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
-#if defined(__x86_64__) && defined(__gnu_linux__)
+// Under the thread sanitizer there is one: it would instrument the functions that choose, which run before it is ready.
+#if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__SANITIZE_THREAD__)
 #define COVOL_CLONES __attribute__((target_clones("default", "avx2")))
 #else
 #define COVOL_CLONES
