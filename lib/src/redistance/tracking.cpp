@@ -46,14 +46,13 @@ std::vector<Coord> crossed_leaves(const FloatGrid& u) {
     });
     std::vector<char> crosses(band.size(), 0);
     tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
-        for (int face = 0; face < 6; ++face) {
+        for (int face = 0; face < 6 && !crosses[leaf]; ++face) {
             LeafMask beyond;
             if (const std::int32_t next = band.neighbours(leaf)[kFaceSlots[face]]; next != band.none())
                 beyond = negative[next];
             else
                 beyond.fill(u.tree().getValue(neighbour_origin(band.origin(leaf), kFaceSlots[face])) < 0 ? ~0ULL : 0);
-            if (looking_at(negative[leaf], beyond, face / 2, face % 2 == 0 ? -1 : 1) != negative[leaf])
-                crosses[leaf] = 1;
+            crosses[leaf] = looking_at(negative[leaf], beyond, face / 2, face % 2 == 0 ? -1 : 1) != negative[leaf];
         }
     });
     std::vector<Coord> result;

@@ -22,11 +22,6 @@ public:
     /// @param sample  kept by reference
     explicit SampledLeaves(const Sampler& sample) : sample_(sample) {}
 
-    struct Wish {
-        Coord origin;
-        LeafParts parts;
-    };
-    void ask(const std::vector<Wish>& wishes);
     /// Those of the leaves whose voxel edges, those to the next leaf included, the zero level set passes.
     [[nodiscard]] std::vector<Coord> crossed_by(const std::vector<Coord>& leaves);
     /// As crossed_by(), found from leaf to leaf, from those with a seed on, or where the surface does not pass the
@@ -44,7 +39,12 @@ private:
         std::unique_ptr<Values> values;
         [[nodiscard]] bool has_one_sign() const;
     };
+    struct Wish {
+        Coord origin;
+        LeafParts parts;
+    };
     class WithNext;
+    void ask(const std::vector<Wish>& wishes);
     void sample(const Coord& origin, Entry& entry) const;
     void ask_with_next(const std::vector<Coord>& leaves);
 
