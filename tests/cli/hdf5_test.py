@@ -255,11 +255,13 @@ class Plain(Case):
         cuts = [good[:len(good) * n // 8] for n in range(8)]
         places = np.concatenate([rng.integers(0, len(good), 8), rng.integers(0, 2048, 24)])
         flips = [good[:p] + bytes([good[p] ^ 1 << int(rng.integers(8))]) + good[p + 1:] for p in places]
-        for n, bad in enumerate(cuts + flips):
+        # The library keeps objects of a damaged header, and complained when the process ended.
+        header = [good[:p] + bytes([good[p] ^ 128]) + good[p + 1:] for p in range(800, 832)]
+        for n, bad in enumerate(cuts + flips + header):
             self.path("bad.h5").write_bytes(bad)
             done = subprocess.run([zarr_test.COVOL, "info", "bad.h5", "--quiet"], capture_output=True, text=True, cwd=self.folder, timeout=60)
             self.assertIn(done.returncode, (0, 3), f"{n}: {done.stderr}")
-            self.assertNotIn("HDF5-DIAG", done.stderr)
+            self.assertEqual([line for line in done.stderr.splitlines() if not line.startswith("covol: ")], [], n)
             if n < len(cuts):
                 self.assertEqual(done.returncode, 3)
             failures += done.returncode == 3

@@ -292,6 +292,17 @@ class WrongInSilence(Case):
         warnings, _ = self.warnings(self.values, marks)
         self.assertNotEqual(warnings, [])
 
+    def test_marks_that_went_astray(self):
+        """The surface goes where they are, and the image has no say; who made them has to look."""
+        far = np.array(CENTER) + [[0.45 * SIZE * H, 0, 0], [0, 0.46 * SIZE * H, 0.45 * SIZE * H]]
+        small = np.array(CENTER) + 0.4 * (self.marks - CENTER)
+        for marks, astray in ((small, 0), (np.concatenate([small, far]), 2)):
+            warnings, _ = self.warnings(self.values, marks)
+            found = [w for w in warnings if "lie apart from all others" in w]
+            self.assertEqual(len(found), astray > 0, warnings)
+            if astray:
+                self.assertTrue(found[0].startswith(f"2 of {len(marks)} marks"), found)
+
     def test_values_that_single_precision_does_not_hold(self):
         warnings, _ = self.warnings(self.values + 1e9, self.marks)
         self.assertIn("subtract an offset", " ".join(warnings))

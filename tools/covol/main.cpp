@@ -1,7 +1,12 @@
+#include <cstdio>
+#include <cstdlib>
+
 #include "commands/commands.h"
 
-int main(int argc, char** argv) {
-    using namespace covol::tool;
+namespace covol::tool {
+namespace {
+
+int run(int argc, char** argv) {
     Session session;
     add_segment(session);
     add_reconstruct(session);
@@ -23,4 +28,14 @@ int main(int argc, char** argv) {
     add_brick(session);
     add_rerun(session);
     return session.main(argc, argv);
+}
+
+}  // namespace
+}  // namespace covol::tool
+
+int main(int argc, char** argv) {
+    const int code = covol::tool::run(argc, argv);
+    // Libraries are not closed: that of HDF5 complains there of objects that a damaged file has left in disorder.
+    std::fflush(nullptr);
+    std::_Exit(code);
 }

@@ -96,6 +96,15 @@ struct SpacingStatistics {
 /// @pre no exact duplicates
 [[nodiscard]] COVOL_API SpacingStatistics measure_spacing(const std::vector<Vec3>& points);
 
+struct IsolatedPoint {
+    std::size_t index = 0;  ///< among the points
+    double distance = 0;    ///< to the nearest of those that are not isolated
+};
+/// Marks of 10 to 4,000 that lie apart from all others, alone or at most three together, a tenth of them at most: where
+/// a click went astray. Single linkage: what joins such marks to the others is more than twice as long as the longest
+/// link between these, or six times the median link. @return the farthest first
+[[nodiscard]] COVOL_API std::vector<IsolatedPoint> find_isolated_points(const std::vector<Vec3>& points);
+
 /// Writes .xyz, .csv or binary .ply by the name's end; whole or not at all.
 COVOL_API void write_points(const std::string& path, const std::vector<Vec3>& points, const std::string& comment = {});
 

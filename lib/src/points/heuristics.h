@@ -43,6 +43,25 @@ struct SpacingHeuristics {
 };
 COVOL_HEURISTICS SpacingHeuristics kPointSpacing{};
 
+/// Marks that a click went astray for: isolated_points.cpp.
+struct IsolatedHeuristics {
+    /// [points] Fewer tell nothing of what is usual.
+    std::size_t least_points = heuristic("isolated.least_points", 10);
+    /// [points] More are no marks, but a cloud.
+    std::size_t most_points = heuristic("isolated.most_points", 4000);
+    /// [points] That are linked more closely, and apart from the others, at most: four already enclose something.
+    std::size_t most_together = heuristic("isolated.most_together", 3);
+    /// [share of the points] That lie apart, at most.
+    double most_share = heuristic("isolated.most_share", 0.1);
+    /// [ratio] Of the shortest link to one of them to the longest between the others: of marks on seven structures,
+    /// evenly and on outlines, successive links differ by 1.4 at most.
+    double gap = heuristic("isolated.gap", 2.0);
+    /// [median links] The same where many lie apart, each elsewhere: of marks on these structures links have 2.6 at
+    /// most.
+    double far = heuristic("isolated.far", 6.0);
+};
+COVOL_HEURISTICS IsolatedHeuristics kIsolated{};
+
 /// Cleaning on demand: cloud_cleanup.cpp.
 struct CleanupHeuristics {
     /// [passes] Of removing outliers; each lowers the mean distance that they have raised.

@@ -21,10 +21,10 @@ double off(const Job& job) {
     return std::max(kDoubts.off_voxels * edge, kDoubts.off_noise * job.result.report.cloud.noise);
 }
 
-std::string place(const Job& job, const SegmentReport::MarksOff& marks) {
-    if (job.image == nullptr) return "at " + detail::to_text(marks.farthest_world);
-    return "on slice " + std::to_string(std::lround(marks.farthest_index[2])) + ", at voxel " +
-           detail::to_text(marks.farthest_index);
+std::string place(const Job& job, const Vec3& mark) {
+    if (job.image == nullptr) return "at " + detail::to_text(mark);
+    const Vec3 index = job.image->geometry().world_to_index(mark);
+    return "on slice " + std::to_string(std::lround(index[2])) + ", at voxel " + detail::to_text(index);
 }
 
 void find_marks_off(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& distances) {
@@ -40,7 +40,7 @@ void find_marks_off(Job& job, const std::vector<Vec3>& marks, const std::vector<
     if (found.count == 0) return;
     job.warn(std::to_string(found.count) + " of " + std::to_string(marks.size()) + " marks lie more than " +
              number(found.beyond) + " off the surface, the farthest " + number(found.farthest) + " " +
-             place(job, found) + ": look there whether the mark is wrong, or mark more beside it");
+             place(job, found.farthest_world) + ": look there whether the mark is wrong, or mark more beside it");
 }
 
 void find_bias(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& distances) {
@@ -129,6 +129,20 @@ std::vector<double> levels_at(const FloatGrid& u, const std::vector<Vec3>& place
                 accessor, u.worldToIndex(openvdb::Vec3d(places[n][0], places[n][1], places[n][2])));
     });
     return levels;
+}
+
+void doubt_isolated_marks(Job& job) {
+    const std::vector<IsolatedPoint> isolated = find_isolated_points(job.given);
+    if (isolated.empty()) return;
+    constexpr std::size_t kTold = 3;
+    std::string places;
+    for (std::size_t n = 0; n < std::min(isolated.size(), kTold); ++n)
+        places += (n == 0 ? "" : "; ") + place(job, job.given[isolated[n].index]) + ", " +
+                  number(isolated[n].distance) + " away";
+    if (isolated.size() > kTold) places += "; ...";
+    job.warn(std::to_string(isolated.size()) + " of " + std::to_string(job.given.size()) +
+             " marks lie apart from all others (" + places +
+             "): the surface goes there, too; look whether they are mistakes, or mark more beside them");
 }
 
 void doubt(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& distances) {

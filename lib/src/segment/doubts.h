@@ -11,6 +11,9 @@ namespace covol::pipeline {
 /// @param distances  of each to the surface
 void doubt(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& distances);
 
+/// The same of marks that lie where no others are, before anything is made of them.
+void doubt_isolated_marks(Job& job);
+
 /// Of a level set, trilinear. @param places  world units
 [[nodiscard]] std::vector<double> levels_at(const FloatGrid& u, const std::vector<Vec3>& places);
 

@@ -85,6 +85,7 @@ void run_steps(Job& job, FloatGridPtr& start) {
     Timed total(job.report().seconds.total);
     check_input(job);
     choose_values(job);
+    if (!job.cloud) doubt_isolated_marks(job);
     make_start(job);  // distance and band
     choose_edge_feature(job);
     const std::optional<FineStart> without_coarse = pass_coarse_levels(job);

@@ -204,8 +204,14 @@ void check_points(const std::string& path, const std::string& image_path, const 
     if (distinct.size() < 4) {
         findings.problem(std::to_string(distinct.size()) + " distinct points enclose no volume");
     } else {
+        const std::vector<IsolatedPoint> isolated = find_isolated_points(distinct);
+        for (const auto& [index, distance] : isolated) {
+            const auto& [x, y, z] = distinct[index];
+            findings.remark("the point " + to_text(x) + " " + to_text(y) + " " + to_text(z) +
+                            " lies apart from all others, " + to_text(distance) + " away: it may be a mistake");
+        }
         const SpacingStatistics s = measure_spacing(distinct);
-        if (s.max > kFarPoint * s.median)
+        if (isolated.empty() && s.max > kFarPoint * s.median)
             findings.remark("a point lies " + std::to_string(s.max) + " from its nearest neighbour, the median is " +
                             std::to_string(s.median) + ": it may be an outlier");
     }

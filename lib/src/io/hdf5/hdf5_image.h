@@ -16,7 +16,8 @@ struct Hdf5Name {
 std::optional<Hdf5Name> split_hdf5_name(const std::string& text);
 
 /// The HDF5 library reads and writes outside its buffers where a file is damaged: what would be read of it is read in a
-/// copy of this process first, which may crash. @throws Error InvalidInput (it did, or took a minute).
+/// copy of this process first, which may crash. @throws Error InvalidInput (it did, or took a minute), and what `read`
+/// threw: the library keeps objects of damaged headers, which this process then has not seen.
 void try_hdf5(const std::string& path, const std::function<void()>& read);
 
 /// Whether the file as a whole is an image in ITK's layout, which ITK reads. @throws Error InvalidInput.

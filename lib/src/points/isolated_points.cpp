@@ -1,0 +1,108 @@
+// Points that a click went astray for: single linkage, whose links are the edges of the shortest spanning tree.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "covol/points.h"
+#include "points/heuristics.h"
+#include "points/kd_tree.h"
+
+namespace covol {
+namespace {
+
+struct Link {
+    double length;
+    std::size_t from, to;
+};
+
+/// Prim's algorithm, which asks for all distances once; the shortest link first.
+std::vector<Link> shortest_tree(const std::vector<Vec3>& points) {
+    std::vector<double> squared(points.size(), std::numeric_limits<double>::infinity());
+    std::vector<std::size_t> nearest(points.size(), 0), left(points.size() - 1);
+    std::iota(left.begin(), left.end(), std::size_t(1));
+    std::vector<Link> links;
+    for (std::size_t last = 0; !left.empty();) {
+        std::size_t next = 0;
+        for (std::size_t k = 0; k < left.size(); ++k) {
+            const std::size_t n = left[k];
+            const double d = detail::squared_distance(points[n], points[last]);
+            if (d < squared[n]) {
+                squared[n] = d;
+                nearest[n] = last;
+            }
+            if (squared[n] < squared[left[next]]) next = k;
+        }
+        last = left[next];
+        links.push_back({std::sqrt(squared[last]), nearest[last], last});
+        left[next] = left.back();
+        left.pop_back();
+    }
+    std::sort(links.begin(), links.end(),
+              [](const Link& a, const Link& b) { return a.length != b.length ? a.length < b.length : a.to < b.to; });
+    return links;
+}
+
+/// Points that links join.
+class Groups {
+public:
+    explicit Groups(std::size_t points) : parent_(points), size_(points, 1) {
+        std::iota(parent_.begin(), parent_.end(), std::size_t(0));
+    }
+    std::size_t of(std::size_t point) {
+        while (parent_[point] != point) point = parent_[point] = parent_[parent_[point]];
+        return point;
+    }
+    void join(const Link& link) {
+        const std::size_t a = of(link.from), b = of(link.to);
+        large_ -= is_large(a) + is_large(b);
+        parent_[b] = a;
+        size_[a] += size_[b];
+        large_ += is_large(a);
+        if (size_[a] > size_[largest_]) largest_ = a;
+    }
+    [[nodiscard]] std::size_t largest() const { return largest_; }
+    /// Whether all others have no more points than clicks that went astray together, and few in all.
+    [[nodiscard]] bool largest_is_all_but_few() const {
+        return large_ == 1 && double(size_[largest_]) >= (1 - kIsolated.most_share) * double(size_.size());
+    }
+
+private:
+    [[nodiscard]] int is_large(std::size_t group) const { return size_[group] > kIsolated.most_together; }
+
+    std::vector<std::size_t> parent_, size_;
+    std::size_t largest_ = 0;
+    int large_ = 0;
+};
+
+std::vector<IsolatedPoint> points_outside(std::size_t group, Groups& groups, const std::vector<Vec3>& points) {
+    std::vector<IsolatedPoint> outside;
+    for (std::size_t n = 0; n < points.size(); ++n) {
+        if (groups.of(n) == group) continue;
+        double squared = std::numeric_limits<double>::infinity();
+        for (std::size_t m = 0; m < points.size(); ++m)
+            if (groups.of(m) == group) squared = std::min(squared, detail::squared_distance(points[n], points[m]));
+        outside.push_back({n, std::sqrt(squared)});
+    }
+    std::stable_sort(outside.begin(), outside.end(),
+                     [](const IsolatedPoint& a, const IsolatedPoint& b) { return a.distance > b.distance; });
+    return outside;
+}
+
+}  // namespace
+
+std::vector<IsolatedPoint> find_isolated_points(const std::vector<Vec3>& points) {
+    if (points.size() < kIsolated.least_points || points.size() > kIsolated.most_points) return {};
+    const std::vector<Link> links = shortest_tree(points);
+    const double usual = links[links.size() / 2].length;
+    Groups groups(points.size());
+    for (std::size_t n = 0; n + 1 < links.size(); ++n) {
+        groups.join(links[n]);
+        const double next = links[n + 1].length;
+        const bool is_long = next > kIsolated.gap * links[n].length || next > kIsolated.far * usual;
+        if (is_long && groups.largest_is_all_but_few()) return points_outside(groups.largest(), groups, points);
+    }
+    return {};
+}
+
+}  // namespace covol

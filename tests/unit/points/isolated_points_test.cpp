@@ -1,0 +1,90 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+
+#include "covol/points.h"
+#include "support/clouds.h"
+
+using namespace covol;
+
+namespace {
+
+/// Marks on a sphere of radius 10 around 0.
+std::vector<Vec3> sphere(int count, unsigned seed) {
+    std::vector<Vec3> marks = test::box_cloud(count, {{-1, -1, -1}, {1, 1, 1}}, seed);
+    for (Vec3& m : marks) {
+        const double length = std::hypot(m[0], m[1], m[2]);
+        for (double& x : m) x *= 10 / length;
+    }
+    return marks;
+}
+
+std::vector<std::size_t> indices(const std::vector<IsolatedPoint>& isolated) {
+    std::vector<std::size_t> found;
+    for (const IsolatedPoint& one : isolated) found.push_back(one.index);
+    std::sort(found.begin(), found.end());
+    return found;
+}
+
+}  // namespace
+
+TEST_CASE("Marks on a body are not isolated") {
+    for (const int count : {10, 20, 60, 300})
+        for (unsigned seed = 0; seed < 30; ++seed) {
+            CAPTURE(count, seed);
+            CHECK(find_isolated_points(sphere(count, seed)).empty());
+        }
+    CHECK(find_isolated_points({}).empty());
+    CHECK(find_isolated_points(std::vector<Vec3>(50, Vec3{1, 2, 3})).empty());
+}
+
+TEST_CASE("Marks of contours on slices far apart are not isolated") {
+    std::vector<Vec3> marks;
+    for (int slice = 0; slice < 4; ++slice)
+        for (int n = 0; n < 24; ++n)
+            marks.push_back({10 * std::cos(n * 0.2618), 10 * std::sin(n * 0.2618), 25.0 * slice});
+    CHECK(find_isolated_points(marks).empty());
+}
+
+TEST_CASE("Marks of two bodies are not isolated") {
+    std::vector<Vec3> marks = sphere(60, 1);
+    for (const Vec3& m : sphere(12, 2)) marks.push_back({m[0] + 100, m[1], m[2]});
+    CHECK(find_isolated_points(marks).empty());
+}
+
+TEST_CASE("Marks far from all others are found, the farthest first") {
+    for (const int count : {20, 60, 300})
+        for (unsigned seed = 0; seed < 10; ++seed) {
+            CAPTURE(count, seed);
+            std::vector<Vec3> marks = sphere(count, seed);
+            marks.push_back({0, 0, 40});
+            marks.insert(marks.begin() + 5, Vec3{60, 0, 0});
+            const std::vector<IsolatedPoint> isolated = find_isolated_points(marks);
+            REQUIRE(isolated.size() == 2);
+            CHECK(isolated[0].index == 5);
+            CHECK(isolated[0].distance > 50 - 1e-9);
+            CHECK(isolated[0].distance < 58);
+            CHECK(isolated[1].index == marks.size() - 1);
+        }
+}
+
+TEST_CASE("Many marks anywhere in an image are found where the body is small") {
+    for (unsigned seed = 0; seed < 10; ++seed) {
+        CAPTURE(seed);
+        std::vector<Vec3> marks = sphere(285, seed);
+        std::vector<std::size_t> stray;
+        for (const Vec3& m : test::box_cloud(15, {{-80, -80, -80}, {80, 80, 80}}, seed + 100)) {
+            if (std::hypot(m[0], m[1], m[2]) > 25) stray.push_back(marks.size());
+            marks.push_back(m);
+        }
+        const std::vector<std::size_t> found = indices(find_isolated_points(marks));
+        CHECK(std::includes(found.begin(), found.end(), stray.begin(), stray.end()));
+        CHECK((found.empty() || found.front() >= 285));
+    }
+}
+
+TEST_CASE("The order of marks says nothing") {
+    std::vector<Vec3> marks = sphere(80, 3);
+    marks.push_back({0, 50, 0});
+    std::reverse(marks.begin(), marks.end());
+    CHECK(indices(find_isolated_points(marks)) == std::vector<std::size_t>{0});
+}
