@@ -263,11 +263,11 @@ class WrongInSilence(Case):
         cls.noise = rng.normal(100, 30, SIZE**3).astype(np.float32)
         cls.marks = np.array(sphere_points(300))
 
-    def warnings(self, values, marks):
+    def warnings(self, values, marks, *options):
         image, points = self.inputs / "i.nrrd", self.inputs / "m.xyz"
         write_nrrd(image, (SIZE,) * 3, np.asarray(values, "<f4").tobytes(), kind="float")
         write_xyz(points, map(tuple, marks))
-        report = self.report("segment", image, "--points", points, "-o", "s.vdb")
+        report = self.report("segment", image, "--points", points, "-o", "s.vdb", *options)
         return report.get("warnings", []), report["fit"]["image_support"]
 
     def test_what_belongs_together_is_not_doubted(self):
@@ -302,6 +302,8 @@ class WrongInSilence(Case):
             self.assertEqual(len(found), astray > 0, warnings)
             if astray:
                 self.assertTrue(found[0].startswith(f"2 of {len(marks)} marks"), found)
+                warnings, _ = self.warnings(self.values, marks, "--remove-outliers")
+                self.assertEqual([w for w in warnings if "lie apart" in w], [])
 
     def test_values_that_single_precision_does_not_hold(self):
         warnings, _ = self.warnings(self.values + 1e9, self.marks)

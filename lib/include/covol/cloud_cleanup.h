@@ -20,8 +20,9 @@ enum class CloudSmoothing {
 /// What clean_cloud() does, in this order; every step is off unless asked for.
 struct CloudCleanupOptions {
     bool duplicates = true;     ///< Exact duplicates become one.
-    double outlier_factor = 0;  ///< > 0: points whose root mean square distance to `neighbours` others exceeds this
-                                ///< many times the cloud's mean distance to them go, until none is left; >= 1.
+    double outlier_factor = 0;  ///< > 0: those of find_isolated_points() go, and points whose root mean square distance
+                                ///< to `neighbours` others exceeds this many times the cloud's mean distance to them,
+                                ///< until none is left; >= 1.
     double simplify = 0;        ///< > 0: one point stays in each cell of a lattice of this edge, world units.
     CloudSmoothing smooth = CloudSmoothing::None;
     double wlop_share = 0.25;  ///< Of the points, that WLOP makes anew, in (0,1].

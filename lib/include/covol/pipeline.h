@@ -124,7 +124,14 @@ struct SegmentReport {
     /// Probability that the image varies more at a mark than five voxels beside it, along the surface's normal; 0.5
     /// where it shows nothing there. None without an image and marks.
     std::optional<double> image_support;
-    std::vector<std::string> warnings;  ///< what a person has to look at, in plain words
+    /// Where the image's slope along the surface's normals at the marks is steepest on the mean.
+    struct ImageBorder {
+        int voxels = 0;     ///< from the marks, outward; of the image, or steps of voxel_size where that is longer
+        double share = 1;   ///< of the slope there that the marks have where they lie, within a voxel
+        double errors = 0;  ///< standard errors of the mean that both differ by
+    };
+    std::optional<ImageBorder> image_border;  ///< none as image_support
+    std::vector<std::string> warnings;        ///< what a person has to look at, in plain words
     SeedCheck seeds;
     CorrectionReport correction;      ///< of SegmentOptions::guess
     double share_without_points = 0;  ///< of the closed surface's area: farther than holes.distance from every point

@@ -11,6 +11,7 @@ namespace covol::detail {
 namespace {
 
 constexpr int kWindow = 4, kBeside = 10;  // half steps
+constexpr int kReach = 10, kSlopes = 2 * kReach + 1;
 
 /// Where the samples of a place lie, as voxels of the image, and their values.
 class Profile {
@@ -49,10 +50,50 @@ public:
         return most - least;
     }
 
+    /// Between the two voxels before and the two behind; none where they leave the image.
+    [[nodiscard]] std::optional<double> slope(int around) const {
+        double difference = 0;
+        for (const int at : {1, 2})
+            for (const int side : {-1, 1}) {
+                const std::optional<Index3> index = voxel(around + side * at);
+                if (!index) return {};
+                difference += side * image_.at((*index)[0], (*index)[1], (*index)[2]);
+            }
+        return difference;
+    }
+
 private:
     const Image& image_;
     Vec3 middle_, half_;
 };
+
+/// With the voxels that lie up to `reach` half steps before and behind, loaded.
+std::vector<Profile> profiles_of(const Image& image, const std::vector<Vec3>& places, const std::vector<Vec3>& normals,
+                                 double step, int reach, const RunContext& run) {
+    std::vector<Profile> profiles;
+    profiles.reserve(places.size());
+    std::vector<Vec3> needed;
+    for (std::size_t n = 0; n < places.size(); ++n) {
+        profiles.emplace_back(image, places[n], normals[n], step);
+        for (int at = -reach; at <= reach; at += 2)
+            if (const std::optional<Index3> voxel = profiles.back().voxel(at))
+                needed.push_back(
+                    image.geometry().index_to_world({double((*voxel)[0]), double((*voxel)[1]), double((*voxel)[2])}));
+    }
+    image.load(needed, run);
+    return profiles;
+}
+
+using Slopes = std::array<std::optional<double>, kSlopes>;
+
+/// Over the lines that have one there; 0 where these are fewer than half.
+double mean_slope(const std::vector<Slopes>& lines, int at) {
+    double sum = 0;
+    std::size_t count = 0;
+    for (const Slopes& line : lines)
+        if (line[at]) sum += *line[at], ++count;
+    return 2 * count < lines.size() ? 0 : sum / double(count);
+}
 
 /// Probability that one of `first` exceeds one of `second`.
 double probability_above(const std::vector<double>& first, std::vector<double> second) {
@@ -69,17 +110,7 @@ double probability_above(const std::vector<double>& first, std::vector<double> s
 
 ImageSupport measure_support(const Image& image, const std::vector<Vec3>& places, const std::vector<Vec3>& normals,
                              double step, const RunContext& run) {
-    std::vector<Profile> profiles;
-    profiles.reserve(places.size());
-    std::vector<Vec3> needed;
-    for (std::size_t n = 0; n < places.size(); ++n) {
-        profiles.emplace_back(image, places[n], normals[n], step);
-        for (int at = -kBeside - kWindow; at <= kBeside + kWindow; at += 2)
-            if (const std::optional<Index3> voxel = profiles.back().voxel(at))
-                needed.push_back(
-                    image.geometry().index_to_world({double((*voxel)[0]), double((*voxel)[1]), double((*voxel)[2])}));
-    }
-    image.load(needed, run);
+    const std::vector<Profile> profiles = profiles_of(image, places, normals, step, kBeside + kWindow, run);
     using Ranges = std::array<std::optional<double>, 3>;
     std::vector<Ranges> ranges(places.size());
     tbb::parallel_for(std::size_t(0), places.size(), [&](std::size_t n) {
@@ -99,6 +130,41 @@ ImageSupport measure_support(const Image& image, const std::vector<Vec3>& places
     const double a = double(at_places.size()), b = double(beside.size());
     support.error = std::sqrt((a + b + 1) / (12 * a * b));
     return support;
+}
+
+SteepestSlope find_steepest_slope(const Image& image, const std::vector<Vec3>& places, const std::vector<Vec3>& normals,
+                                  double step, const RunContext& run) {
+    const std::vector<Profile> profiles = profiles_of(image, places, normals, step, 2 * kReach + 2, run);
+    std::vector<Slopes> lines(places.size());
+    tbb::parallel_for(std::size_t(0), places.size(), [&](std::size_t n) {
+        for (int at = 0; at < kSlopes; ++at) lines[n][at] = profiles[n].slope(2 * (at - kReach));
+    });
+    std::array<double, kSlopes> mean{};
+    for (int at = 0; at < kSlopes; ++at) mean[at] = mean_slope(lines, at);
+    const auto steepest = [&](int first, int last) {
+        int found = first;
+        for (int at = first; at <= last; ++at)
+            if (std::abs(mean[at]) > std::abs(mean[found])) found = at;
+        return found;
+    };
+    const int own = steepest(kReach - 1, kReach + 1), most = steepest(0, kSlopes - 1);
+    SteepestSlope result;
+    result.at = most - kReach;
+    const auto along = [&](const Slopes& line, int at) { return mean[at] < 0 ? -*line[at] : *line[at]; };
+    double sum = 0, squares = 0;
+    for (const Slopes& line : lines) {
+        if (!line[own] || !line[most]) continue;
+        const double more = along(line, most) - along(line, own);
+        sum += more;
+        squares += more * more;
+        ++result.lines;
+    }
+    if (own == most || mean[most] == 0 || result.lines == 0) return result;
+    result.share = std::abs(mean[own] / mean[most]);
+    const auto count = double(result.lines);
+    const double variance = std::max(0.0, squares / count - sum * sum / (count * count));
+    result.errors = variance > 0 ? sum / count / std::sqrt(variance / count) : 0;
+    return result;
 }
 
 }  // namespace covol::detail

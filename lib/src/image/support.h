@@ -22,4 +22,17 @@ struct ImageSupport {
 [[nodiscard]] ImageSupport measure_support(const Image& image, const std::vector<Vec3>& places,
                                            const std::vector<Vec3>& normals, double step, const RunContext& run);
 
+/// Where an image's slope is steepest, on the mean of lines across a surface: marks on a border have it where they are.
+struct SteepestSlope {
+    std::size_t lines = 0;  ///< that count: with the surface, and the place of the steepest slope, in the image
+    double share = 1;       ///< of the mean slope there that the surface has, within a step; its sign does not count
+    int at = 0;             ///< steps from the surface, along the normals
+    double errors = 0;      ///< standard errors of the mean that both differ by
+};
+
+/// Mean slope at whole steps up to ten before and behind each place along its normal; from nearest voxels, two on each
+/// side. Arguments and errors as of measure_support().
+[[nodiscard]] SteepestSlope find_steepest_slope(const Image& image, const std::vector<Vec3>& places,
+                                                const std::vector<Vec3>& normals, double step, const RunContext& run);
+
 }  // namespace covol::detail

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <set>
 #include <utility>
 
 #include "base/valid.h"
@@ -42,6 +43,7 @@ public:
     }
 
     void remove_outliers(CloudCleanupReport& report) {
+        report.outliers += remove_isolated();
         while (report.outlier_passes < kCleanup.most_passes && entries_.size() >= kFewest) {
             run_.check();
             const double mean = CGAL::compute_average_spacing<Tag>(entries_, neighbours(), parameters());
@@ -106,6 +108,13 @@ public:
     }
 
 private:
+    /// Neighbours of few points are too far off to tell.
+    std::size_t remove_isolated() {
+        std::set<std::size_t> isolated;
+        for (const IsolatedPoint& one : find_isolated_points(points())) isolated.insert(entries_[one.index].second);
+        return std::erase_if(entries_, [&](const Entry& entry) { return isolated.contains(entry.second); });
+    }
+
     [[nodiscard]] unsigned neighbours() const {
         return static_cast<unsigned>(std::min<std::size_t>(std::size_t(options_.neighbours), entries_.size() - 1));
     }

@@ -102,6 +102,9 @@ void find_strange_image(Job& job, const std::vector<Vec3>& marks) {
     const detail::ImageSupport support = detail::measure_support(*job.image, at.places, at.normals, job.h(), job.run);
     if (support.places == 0) return;
     job.report().image_support = support.share;
+    const detail::SteepestSlope border =
+        detail::find_steepest_slope(*job.image, at.places, at.normals, job.h(), job.run);
+    job.report().image_border = {border.at, border.share, border.errors};
     const GuidanceReport& guidance = job.report().guidance;
     const char* const look = ": look whether the marks belong to this image, channel and space";
     if (support.share + kDoubts.support_errors * support.error < kDoubts.image_support)
@@ -110,6 +113,10 @@ void find_strange_image(Job& job, const std::vector<Vec3>& marks) {
     else if (guidance.used && guidance.gain < kDoubts.least_gain)
         job.warn("what the image shows at some marks hardly foretells where the others lie (gain " +
                  number(guidance.gain) + " nats a mark)" + look);
+    else if (border.share < kDoubts.border_share && border.errors > kDoubts.border_errors)
+        job.warn("the image has steeper borders " + std::to_string(std::abs(border.at)) + " voxels " +
+                 (border.at < 0 ? "inside" : "outside") + " the marks, all along (where they lie it has " +
+                 number(std::round(100 * border.share)) + " % of that)" + look + ", and are of its size");
 }
 
 void find_silent_image(Job& job) {
@@ -142,7 +149,8 @@ void doubt_isolated_marks(Job& job) {
     if (isolated.size() > kTold) places += "; ...";
     job.warn(std::to_string(isolated.size()) + " of " + std::to_string(job.given.size()) +
              " marks lie apart from all others (" + places +
-             "): the surface goes there, too; look whether they are mistakes, or mark more beside them");
+             "): the surface goes there, too; look whether they are mistakes" +
+             (job.options.contours ? "" : ", which `outlier_factor` leaves out") + ", or mark more beside them");
 }
 
 void doubt(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& distances) {

@@ -25,6 +25,7 @@ const std::map<std::string, std::string> kFlags{
     {"min_component_volume", "--min-component"},
     {"model", "--model"},
     {"order", "--points-order"},
+    {"outlier_factor", "--remove-outliers"},
     {"outside", "--outside"},
     {"resume", "--resume"},
     {"rho", "--rho"},

@@ -128,6 +128,9 @@ Json to_json(const SegmentReport& r) {
     if (r.point_count > 0) json["fit"]["points_to_surface"] = to_json(r.fit);
     if (r.point_count > 0) json["fit"]["points_to_surface"]["bias"] = r.fit.bias;
     if (r.image_support) json["fit"]["image_support"] = *r.image_support;
+    if (r.image_border)
+        json["fit"]["image_border"] = {
+            {"voxels", r.image_border->voxels}, {"share", r.image_border->share}, {"errors", r.image_border->errors}};
     if (r.marks_off.beyond > 0)
         json["fit"]["marks_off"] = {{"count", r.marks_off.count},
                                     {"beyond", r.marks_off.beyond},

@@ -41,8 +41,9 @@ void CloudFlags::bind(CLI::App& command, bool with_most) {
     const std::string factor = "3";
     command
         .add_flag("--remove-outliers{" + factor + "}", outlier_factor,
-                  "drop points whose distance to their " + std::to_string(lib.neighbours) +
-                      " neighbours is more than " + factor + " (or FACTOR) times the cloud's mean")
+                  "drop marks that lie apart from all others, and points whose distance to their " +
+                      std::to_string(lib.neighbours) + " neighbours is more than " + factor +
+                      " (or FACTOR) times the cloud's mean")
         ->option_text("[=FACTOR]");
     if (with_most)
         command
