@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <set>
 #include <utility>
 
@@ -134,7 +133,13 @@ private:
     const RunContext& run_;
     const PointMap point_map_{};
     /// Called by CGAL, possibly from a thread of its own: false stops it.
-    const std::function<bool(double)> goes_on_ = [this](double) { return !run_.cancelled(); };
+    struct GoesOn {
+        const RunContext& run;
+        bool operator()(double) const { return !run.cancelled(); }
+    };
+    // No std::function: CGAL 5.5 keeps a reference to its own copy of one, which is gone by then; of others it makes
+    // one that stays.
+    const GoesOn goes_on_{run_};
     std::vector<Entry> entries_;
 };
 

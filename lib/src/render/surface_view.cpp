@@ -100,7 +100,7 @@ private:
 
     void find_hits(int n, const Vec3& middle) {
         const Vec3 &to_eye = camera_.basis.to_eye, origin = plus(middle, times(reach_, to_eye));
-        double from = 0;
+        double from = openvdb::math::Delta<double>::value();  // 0 is before all that a ray meets
         const double h = fields_[n].voxel_size();
         const int most = bodies_[n].opacity >= 1 ? 1 : kMostHits;
         for (int tries = 0, found = 0; tries < kMostHits && found < most; ++tries) {

@@ -172,13 +172,14 @@ inline Lanes lanes_of(unsigned bits) {
 /// a * scale, rounded alike for all faces, so that what is symmetric stays so. A row that rounds up to 1 or more gets
 /// one unit less on each face.
 inline void store_shares(const Lanes a[6], Lanes scale, Share* c) {
-    LaneBits share[6], total = LaneBits{};
+    // Unsigned: shares of what is not finite, which nobody uses, may overflow.
+    UnsignedLanes share[6], total = UnsignedLanes{};
     for (int f = 0; f < 6; ++f) {
-        share[f] = __builtin_convertvector(a[f] * scale + 0.5F, LaneBits);
+        share[f] = UnsignedLanes(__builtin_convertvector(a[f] * scale + 0.5F, LaneBits));
         total += share[f];
     }
-    const LaneBits full = total >= kShareUnit;  // -1 where true
-    for (int f = 0; f < 6; ++f) store(c + f * 8, share[f] + (full & (share[f] > 0)));
+    const LaneBits full = LaneBits(total) >= kShareUnit;  // -1 where true
+    for (int f = 0; f < 6; ++f) store(c + f * 8, LaneBits(share[f] + UnsignedLanes(full & (share[f] != 0))));
 }
 
 RowFacts assemble(const float* u, const float* phi, const float* g, const float* rho, const unsigned long long* active,

@@ -14,6 +14,7 @@ typedef float Lanes __attribute__((vector_size(32)));                           
 typedef float LooseLanes __attribute__((vector_size(32), aligned(4), may_alias));  // the same at any address
 typedef unsigned short LooseShorts __attribute__((vector_size(16), aligned(2), may_alias));
 typedef int LaneBits __attribute__((vector_size(32)));
+typedef unsigned UnsignedLanes __attribute__((vector_size(32)));
 // NOLINTEND(modernize-use-using)
 
 inline Lanes load(const float* p) { return *reinterpret_cast<const LooseLanes*>(p); }
