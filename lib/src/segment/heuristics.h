@@ -120,8 +120,8 @@ struct DoubtsHeuristics {
     /// them: 0.73 to 1 for 31 nuclei, a brain, a spleen, a spinal cord and three tissues; below 0.5 for half of these
     /// where the marks are of a body 0.6 times as large, for nearly all where it is 1.5 times.
     double border_share = heuristic("doubts.border_share", 0.6);
-    /// [standard errors] Between both, on the mean of the marks.
-    double border_errors = heuristic("doubts.border_errors", 3.0);
+    /// [standard errors] Between both, on the mean of the marks: the largest of twenty stays below in noise.
+    double border_errors = heuristic("doubts.border_errors", 4.0);
     /// [nats] Of guidance: 0 to 0.06 with noise in place of the image, 0.08 to 1.2 with marks of its own, on the same.
     double least_gain = heuristic("doubts.least_gain", 0.05);
 };

@@ -47,7 +47,7 @@ CloudCleanupOptions with_smoothing(CloudSmoothing smooth) {
 }  // namespace
 
 TEST_CASE("far points go, points of the surface stay in their order") {
-    const std::vector<Vec3> good = sphere(2000, 0, 1);
+    const std::vector<Vec3> good = sphere(5000, 0, 1);
     std::vector<Vec3> points = good;
     std::mt19937 random(2);
     std::uniform_real_distribution<double> uniform(2, 40);
@@ -56,11 +56,21 @@ TEST_CASE("far points go, points of the surface stay in their order") {
     CloudCleanupReport report;
     const std::vector<Vec3> cleaned = clean_cloud(points, with_outliers(3), {}, &report);
     CHECK(cleaned == good);
-    CHECK(report.given == 2025);
+    CHECK(report.given == 5025);
     CHECK(report.outliers == 25);
-    CHECK(report.kept == 2000);
+    CHECK(report.kept == 5000);
     CHECK(report.outlier_passes >= 2);
     CHECK(clean_cloud(good, with_outliers(3)) == good);
+}
+
+TEST_CASE("marks that lie apart from all others go, however few there are") {
+    const std::vector<Vec3> good = sphere(30, 0, 4);
+    std::vector<Vec3> points = good;
+    points.insert(points.begin() + 7, {9, 0, 0});
+    points.push_back({0, -6, 5});
+    CloudCleanupReport report;
+    CHECK(clean_cloud(points, with_outliers(3), {}, &report) == good);
+    CHECK(report.outliers == 2);
 }
 
 TEST_CASE("one point stays in each cell") {

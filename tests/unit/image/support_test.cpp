@@ -1,0 +1,84 @@
+#include "image/support.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <functional>
+#include <random>
+
+using namespace covol;
+using detail::find_steepest_slope;
+using detail::SteepestSlope;
+
+namespace {
+
+/// 48^3 voxels of edge 0.5, values by (x in voxels), and noise.
+Image slab(const std::function<double(double)>& value, double noise = 0.05) {
+    ImageGeometry geometry;
+    geometry.size = {48, 48, 48};
+    geometry.spacing = {0.5, 0.5, 0.5};
+    std::mt19937 random(7);
+    std::normal_distribution<float> some(0, float(noise));
+    std::vector<float> values;
+    for (int k = 0; k < 48; ++k)
+        for (int j = 0; j < 48; ++j)
+            for (int i = 0; i < 48; ++i) values.push_back(float(value(i)) + some(random));
+    return Image::from_values(geometry, values.data());
+}
+
+/// Of marks in the plane x, of normal +-x.
+SteepestSlope slope_at(const Image& image, double x_voxels, double normal = 1) {
+    std::vector<Vec3> places, normals;
+    for (int n = 0; n < 60; ++n) {
+        places.push_back({0.5 * x_voxels, 2 + 0.31 * n, 3 + 0.17 * n});
+        normals.push_back({normal, 0, 0});
+    }
+    return find_steepest_slope(image, places, normals, 0.5, {});
+}
+
+}  // namespace
+
+TEST_CASE("Marks on a border have the steepest slope where they are") {
+    const Image image = slab([](double x) { return x > 20.3 ? 1 : 0; });
+    for (const double off : {-0.7, 0.0, 0.6}) {
+        CAPTURE(off);
+        const SteepestSlope found = slope_at(image, 20.5 + off);
+        CHECK(found.lines == 60);
+        CHECK(std::abs(found.at) <= 1);
+        CHECK(found.share == 1);
+    }
+}
+
+TEST_CASE("Marks beside a border have it elsewhere, whatever its sign, outward along the normals") {
+    for (const double sign : {1.0, -1.0}) {
+        const Image image = slab([&](double x) { return x > 20.5 ? sign : 0; });
+        const SteepestSlope behind = slope_at(image, 26.5), before = slope_at(image, 26.5, -1);
+        CHECK(std::abs(behind.at + 6) <= 1);
+        CHECK(std::abs(before.at - 6) <= 1);
+        for (const SteepestSlope& found : {behind, before}) {
+            CHECK(found.share < 0.2);
+            CHECK(found.errors > 10);
+        }
+    }
+}
+
+TEST_CASE("The steeper of two borders is found, and how much less steep the own one is") {
+    const Image image = slab([](double x) { return (x > 20.5 ? 1.0 : 0.0) + (x > 27.5 ? 4.0 : 0.0); });
+    const SteepestSlope found = slope_at(image, 20.5);
+    CHECK(std::abs(found.at - 7) <= 1);
+    CHECK(found.share == Approx(0.25).margin(0.03));
+    CHECK(slope_at(image, 27.5).share == 1);
+}
+
+TEST_CASE("In noise nothing is steeper by more than chance") {
+    const Image image = slab([](double) { return 0; }, 1);
+    CHECK(slope_at(image, 24).errors < 4);
+}
+
+TEST_CASE("Lines that leave the image do not count, and no line is no answer") {
+    const Image image = slab([](double x) { return x > 3.5 ? 1 : 0; });
+    CHECK(slope_at(image, 3.5).share == 1);
+    const SteepestSlope none = slope_at(image, 500);
+    CHECK(none.lines == 0);
+    CHECK(none.share == 1);
+    CHECK(find_steepest_slope(image, {}, {}, 0.5, {}).lines == 0);
+}
