@@ -85,4 +85,13 @@ Trial try_in_child(const std::function<void()>& work, double seconds) {
     return trial;
 }
 
+void try_reading(const std::string& path, const char* library, const std::function<void()>& read) {
+    constexpr double kSeconds = 60;
+    const Trial trial = try_in_child(read, kSeconds);
+    if (trial.crashed)
+        throw Error(Errc::InvalidInput,
+                    "read_image: " + path + ": damaged: the " + library + " library cannot read it");
+    if (trial.refused) throw Error(*trial.refused);
+}
+
 }  // namespace covol::detail

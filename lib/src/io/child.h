@@ -1,6 +1,7 @@
 #pragma once
 #include <functional>
 #include <optional>
+#include <string>
 
 #include "covol/error.h"
 
@@ -16,5 +17,9 @@ struct Trial {
 /// do with one. Only the calling thread goes on in the copy, so `work` must need no other, nor a lock that one may
 /// hold. Where the system gives no copy the work counts as done.
 [[nodiscard]] Trial try_in_child(const std::function<void()>& work, double seconds);
+
+/// Tries whether `library` can read the image `path`. @throws Error InvalidInput where it crashed, or took a minute,
+/// and what `read` threw.
+void try_reading(const std::string& path, const char* library, const std::function<void()>& read);
 
 }  // namespace covol::detail

@@ -4,12 +4,14 @@
 
 #include <catch2/catch.hpp>
 #include <csignal>
+#include <cstdlib>
 #include <stdexcept>
 
 using covol::Errc;
 using covol::Error;
 using covol::detail::Trial;
 using covol::detail::try_in_child;
+using covol::detail::try_reading;
 
 TEST_CASE("Work in a copy of the process leaves this one alone") {
     int here = 1;
@@ -38,4 +40,15 @@ TEST_CASE("Work that crashes, leaves or hangs in a copy of the process is told o
     CHECK(try_in_child([] { raise(SIGSEGV); }, 10).crashed);
     CHECK(try_in_child([] { _exit(3); }, 10).crashed);
     CHECK(try_in_child([] { pause(); }, 0.05).crashed);
+}
+
+TEST_CASE("A file that crashes its library is damaged") {
+    CHECK_NOTHROW(try_reading("a.dcm", "GDCM", [] {}));
+    try {
+        try_reading("a.dcm", "GDCM", [] { std::abort(); });
+        FAIL("not refused");
+    } catch (const Error& error) {
+        CHECK(error.code() == Errc::InvalidInput);
+        CHECK(std::string(error.what()) == "read_image: a.dcm: damaged: the GDCM library cannot read it");
+    }
 }

@@ -153,11 +153,8 @@ std::optional<Hdf5Name> split_hdf5_name(const std::string& text) {
 }
 
 void try_hdf5(const std::string& path, const std::function<void()>& read) {
-    constexpr double kSeconds = 60;
     const Hdf5Lock lock;  // no other thread's, in the copy
-    const Trial trial = try_in_child(read, kSeconds);
-    if (trial.crashed) throw read_error(Errc::InvalidInput, path, "damaged: the HDF5 library cannot read it");
-    if (trial.refused) throw Error(*trial.refused);
+    try_reading(path, "HDF5", read);
 }
 
 bool is_itk_hdf5(const Hdf5Name& name) { return name.inside.empty() && Hdf5File(name.path).has("/ITKImage"); }

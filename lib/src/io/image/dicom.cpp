@@ -10,6 +10,7 @@
 #include <optional>
 #include <sstream>
 
+#include "io/child.h"
 #include "io/image/dicom_header.h"
 #include "io/image/image_formats.h"
 #include "io/modules/modules.h"
@@ -91,7 +92,10 @@ void fill_plain(const DicomHeader& header, const std::string& unusable, Slice& s
 }
 
 void fill_through_gdcm(const DicomHeader& header, const std::string& unusable, Slice& slice) {
-    const std::unique_ptr<ItkReader> reader = gdcm_module().open(slice.path, unusable);
+    // It stops at assertions where values contradict each other.
+    const GdcmModule& gdcm = gdcm_module();
+    try_reading(slice.path, "GDCM", [&] { (void)gdcm.open(slice.path, unusable); });
+    const std::unique_ptr<ItkReader> reader = gdcm.open(slice.path, unusable);
     const ItkHeader& image = reader->header();
     slice.type = image.type;
     slice.components = image.components;
