@@ -117,8 +117,9 @@ struct DoubtsHeuristics {
     /// [marks] At which the image is looked at, evenly taken: more tell nothing new.
     std::size_t support_marks = heuristic("doubts.support_marks", 3000);
     /// [share of the slope] That the image has where the marks lie, of where it is steepest within ten voxels beside
-    /// them: 0.73 to 1 for 31 nuclei, a brain, a spleen, a spinal cord and three tissues; below 0.5 for half of these
-    /// where the marks are of a body 0.6 times as large, for nearly all where it is 1.5 times.
+    /// them: 0.73 to 1 for 27 nuclei, a brain, a spleen, a spinal cord and three tissues (0.31 for a nucleus with poor
+    /// labels); below 0.5 for 15 of these 34 where the marks are of a body 0.6 times as large, for 25 where it is 1.5
+    /// times.
     double border_share = heuristic("doubts.border_share", 0.6);
     /// [standard errors] Between both, on the mean of the marks: the largest of twenty stays below in noise.
     double border_errors = heuristic("doubts.border_errors", 4.0);
