@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "covol/points.h"
+#include "mesh/disjoint_sets.h"
 #include "points/heuristics.h"
 #include "points/kd_tree.h"
 
@@ -43,39 +44,35 @@ std::vector<Link> shortest_tree(const std::vector<Vec3>& points) {
     return links;
 }
 
-/// Points that links join.
+/// Points that links join, each group known by its least.
 class Groups {
 public:
-    explicit Groups(std::size_t points) : parent_(points), size_(points, 1) {
-        std::iota(parent_.begin(), parent_.end(), std::size_t(0));
-    }
-    std::size_t of(std::size_t point) {
-        while (parent_[point] != point) point = parent_[point] = parent_[parent_[point]];
-        return point;
-    }
+    explicit Groups(std::size_t points) : sets_(points), size_(points, 1) {}
+    std::uint32_t of(std::size_t point) { return sets_.root(std::uint32_t(point)); }
     void join(const Link& link) {
-        const std::size_t a = of(link.from), b = of(link.to);
-        large_ -= is_large(a) + is_large(b);
-        parent_[b] = a;
-        size_[a] += size_[b];
-        large_ += is_large(a);
-        if (size_[a] > size_[largest_]) largest_ = a;
+        const auto [least, other] = std::minmax({of(link.from), of(link.to)});
+        sets_.unite(least, other);
+        large_ -= is_large(least) + is_large(other);
+        size_[least] += size_[other];
+        large_ += is_large(least);
+        if (size_[least] > size_[largest_]) largest_ = least;
     }
-    [[nodiscard]] std::size_t largest() const { return largest_; }
+    [[nodiscard]] std::uint32_t largest() const { return largest_; }
     /// Whether all others have no more points than clicks that went astray together, and few in all.
     [[nodiscard]] bool largest_is_all_but_few() const {
         return large_ == 1 && double(size_[largest_]) >= (1 - kIsolated.most_share) * double(size_.size());
     }
 
 private:
-    [[nodiscard]] int is_large(std::size_t group) const { return size_[group] > kIsolated.most_together; }
+    [[nodiscard]] int is_large(std::uint32_t group) const { return size_[group] > kIsolated.most_together; }
 
-    std::vector<std::size_t> parent_, size_;
-    std::size_t largest_ = 0;
+    meshing::DisjointSets sets_;
+    std::vector<std::size_t> size_;
+    std::uint32_t largest_ = 0;
     int large_ = 0;
 };
 
-std::vector<IsolatedPoint> points_outside(std::size_t group, Groups& groups, const std::vector<Vec3>& points) {
+std::vector<IsolatedPoint> points_outside(std::uint32_t group, Groups& groups, const std::vector<Vec3>& points) {
     std::vector<IsolatedPoint> outside;
     for (std::size_t n = 0; n < points.size(); ++n) {
         if (groups.of(n) == group) continue;
