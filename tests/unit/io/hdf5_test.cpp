@@ -244,6 +244,23 @@ TEST_CASE("datasets of their own: types, filters, chunks that are missing", "[hd
     CHECK(read_image_info(path + ":/gzip").chunk_size == Index3{4, 2, 2});
 }
 
+TEST_CASE("a chunk that was never written is none that a damaged index hides", "[hdf5]") {
+    const Scratch scratch;
+    const std::string path = scratch.path("a.h5");
+    const std::vector<hsize_t> shape{kShape.begin(), kShape.end()};
+    {
+        const Writer file(path);
+        file.dataset("a", shape, H5T_STD_U16LE, ramp(shape), in_chunks([](hid_t how) { H5Pset_deflate(how, 4); }));
+    }
+    check_ramp(path, 0);
+    std::string bytes = bytes_of(path);
+    const std::size_t node = bytes.find(std::string("TREE\1", 5));  // of chunks; a group's has a 0
+    REQUIRE(node != std::string::npos);
+    bytes[node] = 'F';
+    scratch.write("b.h5", bytes);
+    says(scratch.path("b.h5"), "the index of its chunks cannot be read");
+}
+
 TEST_CASE("filters that the library knows by number alone are undone here", "[hdf5]") {
     const Scratch scratch;
     const std::string path = scratch.path("a.h5");

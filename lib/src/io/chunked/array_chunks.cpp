@@ -2,6 +2,7 @@
 
 #include <openvdb/math/Half.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -46,10 +47,12 @@ void convert_row(const ChunkedArray& array, const char* from, std::uint64_t step
     if (array.swap) swap_bytes(to, count, array.stored_bytes());
 }
 
-Index3 chunk_size_of(const ChunkedArray& array, const ArrayAxes& axes) {
-    Index3 size;
-    for (int a = 0; a < 3; ++a) size[a] = static_cast<std::int32_t>(array.chunk[axes.space[a]]);
-    return size;
+/// The one chunk of an axis may be longer than the image, by any amount in a damaged file: what is beyond is not held.
+Index3 chunk_size_of(const ChunkedArray& array, const ArrayAxes& axes, const Index3& size) {
+    Index3 chunk;
+    for (int a = 0; a < 3; ++a)
+        chunk[a] = static_cast<std::int32_t>(std::min<std::uint64_t>(array.chunk[axes.space[a]], size[a]));
+    return chunk;
 }
 
 }  // namespace
@@ -90,7 +93,7 @@ ArrayAxes describe_axes(const std::string& path, const std::string& letters, con
 
 ArrayChunks::ArrayChunks(const std::string& path, const ChunkedArray& array, const ArrayAxes& axes, const Index3& size,
                          std::uint64_t channel, std::uint64_t frame)
-    : ChunkSource(path, array.type, size, chunk_size_of(array, axes)),
+    : ChunkSource(path, array.type, size, chunk_size_of(array, axes, size)),
       array_(array),
       axes_(axes),
       place_(array.shape.size(), 0) {

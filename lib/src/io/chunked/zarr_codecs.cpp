@@ -32,6 +32,26 @@ struct Packed {
     }
 };
 
+/// Of one byte, by the codec's format: zlib's 258 bytes take two bits at least, LZ4 adds 255 to a length with a byte,
+/// zstd repeats a byte over a block of 128 KiB with 4. Blosc may hold zstd.
+std::uint64_t most_unpacked_of_byte(ZarrCodec codec) {
+    switch (codec) {
+        case ZarrCodec::Deflate: return 1032;
+        case ZarrCodec::Lz4: return 255;
+        case ZarrCodec::Blosc:
+        case ZarrCodec::Zstd: return 32768;
+        case ZarrCodec::Crc32c: break;
+    }
+    return 1;
+}
+
+/// The last codec gives all of the chunk, which it cannot from next to nothing. @throws Error InvalidInput.
+void check_ratio(const Packed& packed, ZarrCodec codec) {
+    if (packed.most / most_unpacked_of_byte(codec) > packed.bytes.size())
+        throw packed.damaged("packed", std::to_string(packed.bytes.size()) + " bytes cannot hold a chunk of " +
+                                           std::to_string(packed.most));
+}
+
 Bytes unpack_blosc(const Packed& packed) {
     std::size_t claimed = 0;
     const Bytes& in = packed.bytes;
@@ -170,6 +190,7 @@ void take_crc32c(const std::string& path, const std::string& what, Bytes& bytes)
 Bytes unpack(const std::string& path, const std::vector<ZarrCodec>& codecs, Bytes packed, std::uint64_t expected) {
     for (std::size_t n = codecs.size(); n-- > 0;) {
         const Packed piece{path, packed, n == 0 ? expected : most_packed_bytes(expected)};
+        if (n == 0) check_ratio(piece, codecs[n]);
         switch (codecs[n]) {
             case ZarrCodec::Blosc: packed = unpack_blosc(piece); break;
             case ZarrCodec::Zstd: packed = unpack_zstd(piece); break;

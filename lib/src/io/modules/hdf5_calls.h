@@ -11,7 +11,7 @@
     X(H5open) X(H5check_version) X(H5Aclose) X(H5Aexists_by_name) X(H5Aget_space) X(H5Aget_type) \
     X(H5Aopen_by_name) X(H5Aread) X(H5Dget_chunk_storage_size) X(H5Dget_create_plist) X(H5Dget_offset) \
     X(H5Dget_space) X(H5Dget_type) X(H5Dread) X(H5Dread_chunk) X(H5Dvlen_reclaim) X(H5Eget_auto2) \
-    X(H5Eset_auto2) X(H5Fclose) X(H5Fopen) X(H5Iget_type) X(H5Lget_info) X(H5Literate_by_name) X(H5Oclose) \
+    X(H5Eset_auto2) X(H5Ewalk2) X(H5Fclose) X(H5Fopen) X(H5Iget_type) X(H5Lget_info) X(H5Literate_by_name) X(H5Oclose) \
     X(H5Oexists_by_name) X(H5Oget_info_by_name2) X(H5Oopen) X(H5Pclose) X(H5Pcreate) X(H5Pfill_value_defined) \
     X(H5Pget_chunk) X(H5Pget_external_count) X(H5Pget_fill_value) X(H5Pget_filter2) X(H5Pget_layout) \
     X(H5Pget_nfilters) X(H5Pset_elink_cb) X(H5Pset_fclose_degree) X(H5Pset_file_locking) X(H5Sclose) \
@@ -21,7 +21,7 @@
     X(H5Tset_ebias) X(H5Tset_fields) X(H5Tset_order) X(H5Tset_size) X(H5Zfilter_avail) X(H5Zget_filter_info)
 // Variables, set by H5open(), behind H5T_NATIVE_DOUBLE and the like.
 #define COVOL_HDF5_NUMBERS(X) \
-    X(H5P_CLS_FILE_ACCESS_ID_g) X(H5P_CLS_LINK_ACCESS_ID_g) X(H5T_IEEE_F32LE_g) X(H5T_IEEE_F64LE_g) \
+    X(H5E_CANTALLOC_g) X(H5E_DATASET_g) X(H5P_CLS_FILE_ACCESS_ID_g) X(H5P_CLS_LINK_ACCESS_ID_g) X(H5T_IEEE_F32LE_g) X(H5T_IEEE_F64LE_g) \
     X(H5T_NATIVE_DOUBLE_g) X(H5T_STD_I8LE_g) X(H5T_STD_I16LE_g) X(H5T_STD_I32LE_g) X(H5T_STD_I64LE_g) \
     X(H5T_STD_U8LE_g) X(H5T_STD_U16LE_g) X(H5T_STD_U32LE_g) X(H5T_STD_U64LE_g)
 // clang-format on

@@ -138,6 +138,28 @@ TEST_CASE("zarr: a damaged chunk is an error with its path, or other grey values
     }
 }
 
+TEST_CASE("zarr: of a chunk that is longer than the array only the array is held") {
+    const Scratch scratch;
+    const std::string store = scratch.path("a");
+    for (const std::string& codec : kCodecs) {
+        INFO(codec);
+        zarr_stores::write(store + "/.zarray", zarr_stores::metadata_2(5, 8, "<u2", codec, "7"));
+        zarr_stores::write(store + "/0.0.0", zarr_stores::pack(codec, zarr_stores::random_bytes(1024, 0)));
+        const Image image = read_image(store);
+        CHECK(image.chunks()->size == Index3{5, 5, 5});
+        for (const Index3& v : {Index3{0, 0, 0}, Index3{4, 0, 0}, Index3{0, 4, 0}, Index3{1, 2, 4}, Index3{4, 4, 4}})
+            CHECK(image.at(v[0], v[1], v[2]) == voxel(v[0], v[1], v[2]));
+        // 256 MiB that the store does not have, and that a few bytes do not give
+        zarr_stores::write(store + "/.zarray", zarr_stores::metadata_2(5, 512, "<u2", codec, "7"));
+        CHECK(message_of([&] { static_cast<void>(read_image(store)); }).find("0.0.0: ") != std::string::npos);
+        if (!codec.empty())
+            CHECK(message_of([&] { static_cast<void>(read_image(store)); }).find("cannot hold") != std::string::npos);
+        fs::remove(store + "/0.0.0");
+        CHECK(read_image(store).range() == std::array<double, 2>{7, 7});
+        CHECK(read_image(store).chunks()->size == Index3{5, 5, 5});
+    }
+}
+
 TEST_CASE("zarr: damaged shards are errors wherever they are damaged") {
     const Scratch scratch;
     const std::string store = zarr_stores::write_3(scratch.path("v3")), shard = store + "/c/0/0/0";
