@@ -244,6 +244,25 @@ class Damaged(Case):
             path.write_bytes(data.replace(kind + struct.pack("<I", 12), kind + struct.pack("<I", length)))
             self.refuse("info", path, code=3, says="damaged")
 
+    def test_what_is_kept_of_leaves_for_delayed_loading(self):
+        """OpenVDB takes as much memory as it says, reads behind its blocks, and takes what follows for the next text."""
+        self.segment()
+        data = (self.out / "s.vdb").read_bytes()
+        (self.out / "s.vdb").unlink()
+        kind = b"\x0d\0\0\0__delayedload"
+        begin = data.index(kind) + len(kind)
+        length, leaves, packed = struct.unpack_from("<3I", data, begin)
+        self.assertEqual(packed, 0)  # a byte for each leaf, as it is; then eight for each in a block of Blosc's
+        block = begin + 12 + leaves
+        header = struct.unpack_from("<5I", data, block)  # packed size; versions; size, size of its blocks, packed size
+        self.assertEqual(header[2::2], (8 * leaves, header[0]))
+        for place, value in ((begin + 4, leaves + 1), (begin + 4, 2**32 - 1), (begin + 8, 2**32 - 2), (begin + 8, 7), (begin + 8, leaves),
+                             (block, 2**32 - 2), (block, 7), (block, header[0] - 1), (block + 8, 2**31 - 1), (block + 16, header[0] + 100)):
+            path = self.inputs / "leaves.vdb"
+            path.write_bytes(data[:place] + struct.pack("<I", value) + data[place + 4:])
+            with self.subTest(place=place - begin, value=value):
+                self.refuse("info", path, code=3, says="damaged")
+
     def test_a_minute_of_fuzzing(self):
         script = pathlib.Path(__file__).resolve().parents[1] / "fuzz/mutate.py"
         done = subprocess.run([sys.executable, script, "--covol", COVOL, "--seconds", "1.5", "--seed", "3", "--keep",

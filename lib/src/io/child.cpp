@@ -1,38 +1,54 @@
 #include "io/child.h"
 
 #include <fcntl.h>
+#include <poll.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
-#include <climits>
+#include <chrono>
 #include <csignal>
 #include <cstring>
-#include <ctime>
+#include <new>
+#include <utility>
 
 namespace covol::detail {
 namespace {
 
-// One write to an empty pipe, which takes this much without a reader: the code, and the message.
-void send(int pipe, const Error& error) {
-    char text[PIPE_BUF];
-    text[0] = static_cast<char>(error.code());
-    const std::size_t length = std::min(std::strlen(error.what()), sizeof text - 1);
-    std::memcpy(text + 1, error.what(), length);
-    [[maybe_unused]] const ssize_t written = write(pipe, text, length + 1);
-}
+enum State : std::uint32_t { kWaiting, kBegun, kDone, kRefused, kOther, kCrashed };
 
-std::optional<Error> receive(int pipe) {
-    char text[PIPE_BUF];
-    const ssize_t length = read(pipe, text, sizeof text);
-    if (length < 1) return std::nullopt;
-    return Error(static_cast<Errc>(text[0]), std::string(text + 1, std::size_t(length) - 1));
-}
+/// What copy and parent know of a piece of work; zeros are one that waits.
+struct Slot {
+    std::uint32_t state;
+    std::int32_t code;
+    char text[4096];
 
-[[noreturn]] void be_child(const std::function<void()>& work, int pipe) {
+    [[nodiscard]] State now() { return State(std::atomic_ref(state).load(std::memory_order_acquire)); }
+    void set(State next) { std::atomic_ref(state).store(next, std::memory_order_release); }
+    [[nodiscard]] bool ended() { return now() > kBegun; }
+};
+
+/// Pieces [begin, end) of the work.
+struct Batch {
+    const std::function<void(std::size_t)>& work;
+    Slot* slots;
+    std::size_t begin, end;
+
+    [[nodiscard]] std::size_t first_not_ended() const {
+        std::size_t n = begin;
+        while (n < end && slots[n].ended()) ++n;
+        return n;
+    }
+};
+
+[[noreturn]] void be_child(const Batch& batch) {
     for (const int crash : {SIGABRT, SIGBUS, SIGFPE, SIGILL, SIGSEGV}) std::signal(crash, SIG_DFL);
     for (const int stop : {SIGINT, SIGTERM, SIGHUP}) std::signal(stop, SIG_IGN);  // the parent's: not a crash
     prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -40,58 +56,117 @@ std::optional<Error> receive(int pipe) {
     setrlimit(RLIMIT_CORE, &none);
     if (const int null = open("/dev/null", O_RDWR); null >= 0)
         for (int standard = 0; standard < 3; ++standard) dup2(null, standard);
-    try {
-        work();
-    } catch (const Error& error) {
-        send(pipe, error);
-    } catch (...) {
+    for (std::size_t n = batch.begin; n < batch.end; ++n) {
+        Slot& slot = batch.slots[n];
+        slot.set(kBegun);
+        try {
+            batch.work(n);
+            slot.set(kDone);
+        } catch (const Error& error) {
+            slot.code = static_cast<std::int32_t>(error.code());
+            std::strncpy(slot.text, error.what(), sizeof slot.text - 1);
+            slot.set(kRefused);
+        } catch (...) {
+            slot.set(kOther);
+        }
     }
     _exit(0);  // no destructor, no flush: all of that is the parent's
 }
 
-/// @return whether it ended by itself, within the time
-bool wait_for(pid_t child, double seconds) {
-    int status = 0;
-    timespec pause{0, 100'000};
-    double waited = 0;
-    for (;;) {
-        const pid_t ended = waitpid(child, &status, WNOHANG);
-        if (ended == child) return WIFEXITED(status) && WEXITSTATUS(status) == 0;
-        if (ended < 0 && errno != EINTR) return true;  // somebody else waited for it
-        if (waited > seconds) break;
-        nanosleep(&pause, nullptr);
-        waited += 1e-9 * double(pause.tv_nsec);
-        if (pause.tv_nsec < 20'000'000) pause.tv_nsec *= 2;
+/// Until the copy ends; one that takes too long for a piece, or whose run is cancelled, is killed.
+/// @param pipe  hung up when it ends
+void wait_for(pid_t child, int pipe, const Batch& batch, double seconds, const RunContext& run) {
+    using Clock = std::chrono::steady_clock;
+    constexpr int kLongestPause = 20;  // milliseconds: an end of the pipe may be in another copy, too
+    std::size_t piece = batch.begin;
+    Clock::time_point since = Clock::now();
+    while (!run.cancelled()) {
+        const pid_t ended = waitpid(child, nullptr, WNOHANG);
+        if (ended == child || (ended < 0 && errno != EINTR)) return;
+        if (const std::size_t now_at = batch.first_not_ended(); now_at != piece) {
+            piece = now_at;
+            since = Clock::now();
+        }
+        if (std::chrono::duration<double>(Clock::now() - since).count() > seconds) break;
+        pollfd hung_up{pipe, 0, 0};
+        if (poll(&hung_up, 1, kLongestPause) > 0) usleep(100);  // it is about to end
     }
     kill(child, SIGKILL);
-    waitpid(child, &status, 0);
-    return false;
+    waitpid(child, nullptr, 0);
+}
+
+/// Does the batch in a copy. @returns the first piece whose end is not known when that has ended
+std::size_t run_copy(const Batch& batch, double seconds, const RunContext& run) {
+    int ends[2];
+    const pid_t child = pipe2(ends, O_CLOEXEC) == 0 ? fork() : -2;
+    if (child == 0) be_child(batch);
+    if (child != -2) close(ends[1]);
+    if (child > 0) wait_for(child, ends[0], batch, seconds, run);
+    if (child != -2) close(ends[0]);
+    if (child < 0) {
+        for (std::size_t n = batch.begin; n < batch.end; ++n) batch.slots[n].set(kOther);
+    } else if (const std::size_t n = batch.first_not_ended(); n < batch.end && !run.cancelled()) {
+        batch.slots[n].set(kCrashed);
+    }
+    return batch.first_not_ended();
 }
 
 }  // namespace
 
-Trial try_in_child(const std::function<void()>& work, double seconds) {
-    int ends[2];
-    if (pipe2(ends, O_CLOEXEC | O_NONBLOCK) != 0) return {};
-    const pid_t child = fork();
-    if (child == 0) be_child(work, ends[1]);
-    close(ends[1]);
-    Trial trial;
-    if (child > 0) {
-        trial.crashed = !wait_for(child, seconds);
-        trial.refused = receive(ends[0]);
+SharedMemory::SharedMemory(std::uint64_t bytes) : bytes_(std::max<std::uint64_t>(bytes, 1)) {
+    void* const place = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (place == MAP_FAILED) throw std::bad_alloc();
+    data_ = static_cast<char*>(place);
+}
+
+SharedMemory::SharedMemory(SharedMemory&& other) noexcept
+    : data_(std::exchange(other.data_, nullptr)), bytes_(other.bytes_) {}
+
+SharedMemory::~SharedMemory() {
+    if (data_ != nullptr) munmap(data_, bytes_);
+}
+
+std::vector<Trial> try_in_children(std::size_t count, const std::function<void(std::size_t)>& work, double seconds,
+                                   const RunContext& run) {
+    const SharedMemory memory(count * sizeof(Slot));
+    auto* const slots = reinterpret_cast<Slot*>(memory.data());
+    const auto do_pieces = [&](std::size_t begin, std::size_t end) {
+        for (Batch batch{work, slots, begin, end}; batch.begin < batch.end && !run.cancelled();)
+            batch.begin = run_copy(batch, seconds, run);
+    };
+    // A copy costs milliseconds; a few batches for each thread keep all busy.
+    constexpr std::size_t kMostOfCopy = 16, kBatchesOfThread = 4;
+    const auto threads = std::size_t(tbb::this_task_arena::max_concurrency());
+    const std::size_t pieces = std::clamp<std::size_t>(count / (kBatchesOfThread * threads), 1, kMostOfCopy);
+    if (count == 1)
+        do_pieces(0, 1);  // by this thread: it may hold locks
+    else
+        tbb::parallel_for(std::size_t(0), (count + pieces - 1) / pieces,
+                          [&](std::size_t b) { do_pieces(b * pieces, std::min((b + 1) * pieces, count)); });
+    run.check();
+    std::vector<Trial> trials(count);
+    for (std::size_t n = 0; n < count; ++n) {
+        const State state = slots[n].now();
+        trials[n].crashed = state == kCrashed;
+        if (state == kRefused) trials[n].refused = Error(static_cast<Errc>(slots[n].code), slots[n].text);
+        if (state == kOther) work(n);
     }
-    close(ends[0]);
-    return trial;
+    return trials;
+}
+
+Trial try_in_child(const std::function<void()>& work, double seconds) {
+    return try_in_children(
+               1, [&](std::size_t) { work(); }, seconds, RunContext())
+        .front();
+}
+
+std::optional<Error> reading_error(const Trial& trial, const std::string& path, const char* library) {
+    if (!trial.crashed) return trial.refused;
+    return Error(Errc::InvalidInput, "read_image: " + path + ": damaged: the " + library + " library cannot read it");
 }
 
 void try_reading(const std::string& path, const char* library, const std::function<void()>& read) {
-    constexpr double kSeconds = 60;
-    const Trial trial = try_in_child(read, kSeconds);
-    if (trial.crashed)
-        throw Error(Errc::InvalidInput,
-                    "read_image: " + path + ": damaged: the " + library + " library cannot read it");
-    if (trial.refused) throw Error(*trial.refused);
+    if (const auto error = reading_error(try_in_child(read, kMostSecondsInChild), path, library)) throw Error(*error);
 }
 
 }  // namespace covol::detail

@@ -1,9 +1,13 @@
 #pragma once
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "covol/error.h"
+#include "covol/run.h"
 
 namespace covol::detail {
 
@@ -13,10 +17,41 @@ struct Trial {
     std::optional<Error> refused;  ///< what it threw; the message cut after some 4,000 characters
 };
 
-/// Calls `work` in a copy of this process, which is then given up: what a library that crashes on damaged files would
-/// do with one. Only the calling thread goes on in the copy, so `work` must need no other, nor a lock that one may
-/// hold. Where the system gives no copy the work counts as done.
-[[nodiscard]] Trial try_in_child(const std::function<void()>& work, double seconds);
+/// Zeros that copies of this process share with it: what they write there stays.
+class SharedMemory {
+public:
+    /// @throws std::bad_alloc
+    explicit SharedMemory(std::uint64_t bytes);
+    SharedMemory(SharedMemory&& other) noexcept;
+    SharedMemory& operator=(SharedMemory&&) = delete;
+    ~SharedMemory();
+
+    [[nodiscard]] char* data() const noexcept { return data_; }
+
+private:
+    char* data_ = nullptr;
+    std::uint64_t bytes_;
+};
+
+/// Calls work(0) to work(count - 1) in copies of this process, which are then given up, but for what they wrote into
+/// SharedMemory: what a library that crashes on damaged files would do with them. A copy does a few pieces, and as many
+/// are at work at once as the caller's arena has threads. Only the calling thread goes on in a copy, so `work` must
+/// need no other, nor a lock that one may hold. Where the system gives no copy, and where a piece throws what is no
+/// Error, it is done in this process.
+/// @param seconds  that one piece may take
+/// @returns how each ended
+/// @throws Error Cancelled, and what is thrown in this process.
+std::vector<Trial> try_in_children(std::size_t count, const std::function<void(std::size_t)>& work, double seconds,
+                                   const RunContext& run);
+
+/// One piece, by this thread.
+Trial try_in_child(const std::function<void()>& work, double seconds);
+
+/// Seconds that a library may take for what is tried in a copy.
+constexpr double kMostSecondsInChild = 60;
+
+/// Why `library` cannot read the image `path`; nothing where it can.
+std::optional<Error> reading_error(const Trial& trial, const std::string& path, const char* library);
 
 /// Tries whether `library` can read the image `path`. @throws Error InvalidInput where it crashed, or took a minute,
 /// and what `read` threw.

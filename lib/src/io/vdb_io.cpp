@@ -1,7 +1,6 @@
 #include "covol/vdb_io.h"
 
 #include <openvdb/io/Archive.h>
-#include <openvdb/io/DelayedLoadMetadata.h>
 #include <openvdb/io/File.h>
 #include <openvdb/io/GridDescriptor.h>
 #include <openvdb/openvdb.h>
@@ -175,39 +174,8 @@ private:
         walk();
         stream_.seekg(here);
     }
-    std::uint32_t read_length() {
-        std::uint32_t length = 0;
-        stream_.read(reinterpret_cast<char*>(&length), sizeof(length));
-        return length;
-    }
-    /// @return its length; the stream is at its beginning
-    std::uint32_t find_text(const char* what) {
-        const std::uint32_t length = read_length();
-        if (length > file_bytes_ - stream_.tellg())
-            OPENVDB_THROW(vdb::IoError, "a " << what << " of " << length << " bytes does not fit into the file");
-        return length;
-    }
-    void skip_text(const char* what) { stream_.seekg(find_text(what), std::ios::cur); }
-    // OpenVDB reads as many bytes as a value's type has, whatever length the file gives it.
-    void skip_metadata() {
-        const std::uint32_t count = read_length();
-        for (std::uint32_t n = 0; n < count; ++n) {
-            skip_text("metadata name");
-            std::string type(find_text("metadata type"), '\0');
-            stream_.read(type.data(), std::streamsize(type.size()));
-            const std::uint32_t length = find_text("metadata value");
-            const auto begin = stream_.tellg();
-            if (type == vdb::io::DelayedLoadMetadata::staticTypeName() && length > 0) {
-                constexpr std::int64_t kLeastLeaf = 64;  // bytes: its mask
-                if (read_length() > file_bytes_ / kLeastLeaf)
-                    OPENVDB_THROW(vdb::IoError, "more leaves than fit into the file");
-            } else if (type != "string" && vdb::Metadata::isRegisteredType(type)) {
-                const vdb::Metadata::Ptr value = vdb::Metadata::createMetadata(type);
-                if (value->size() != length) OPENVDB_THROW(vdb::IoError, "a " << type << " of " << length << " bytes");
-            }
-            stream_.seekg(begin + std::streamoff(length));
-        }
-    }
+    void skip_text(const char* what) { detail::skip_vdb_text(stream_, what, file_bytes_); }
+    void skip_metadata() { detail::skip_vdb_metadata(stream_, file_bytes_); }
 
     vdb::io::StreamMetadata::Ptr tags_ = std::make_shared<vdb::io::StreamMetadata>();
     std::ifstream stream_;

@@ -1,6 +1,9 @@
 #include "io/vdb_walk.h"
 
+#include <blosc.h>
+#include <openvdb/Metadata.h>
 #include <openvdb/io/Compression.h>
+#include <openvdb/io/DelayedLoadMetadata.h>
 
 #include <array>
 #include <bit>
@@ -31,6 +34,57 @@ std::int64_t count_on(const Mask& mask) {
     return count;
 }
 
+template <typename T>
+T read(std::istream& stream) {
+    T value{};
+    stream.read(reinterpret_cast<char*>(&value), sizeof(T));
+    return value;
+}
+
+/// @return the length of a text or value; the stream is at its beginning
+std::uint32_t read_length(std::istream& stream, const std::string& what, std::int64_t file_bytes) {
+    const auto length = read<std::uint32_t>(stream);
+    if (length > file_bytes - std::int64_t(stream.tellg()))
+        throw std::runtime_error("a " + what + " of " + std::to_string(length) + " bytes does not fit into the file");
+    return length;
+}
+
+/// OpenVDB reads a byte into a bool.
+void check_bool(std::uint8_t value) {
+    if (value > 1) throw std::runtime_error("expected 0 or 1 for false or true, got " + std::to_string(value));
+}
+
+/// Blosc's own header: versions, flags and size of an element; bytes; bytes of a block; packed bytes.
+void check_blosc_header(const std::array<std::uint32_t, 4>& header, std::int64_t bytes, std::int64_t packed) {
+    if (std::int64_t(header[1]) != bytes || std::int64_t(header[3]) != packed)
+        throw std::runtime_error("a block's header has other sizes than it");
+}
+
+/// What OpenVDB keeps of each leaf for delayed loading: two arrays, either packed behind its packed size, or as it is
+/// behind a 0; the second may be missing.
+/// @param length  of it all; more than 0
+void walk_delayed_load(std::istream& stream, std::int64_t length, std::int64_t file_bytes) {
+    constexpr std::int64_t kLeastLeaf = 64;  // bytes: its mask
+    constexpr std::uint32_t kMissing = 0xFFFFFFFF;
+    using vdb_io::DelayedLoadMetadata;
+    const auto begin = stream.tellg();
+    const std::int64_t leaves = read<std::uint32_t>(stream);
+    if (leaves > file_bytes / kLeastLeaf) throw std::runtime_error("more leaves than fit into the file");
+    for (const std::size_t width :
+         {sizeof(DelayedLoadMetadata::MaskType), sizeof(DelayedLoadMetadata::CompressedSizeType)}) {
+        const auto packed = read<std::uint32_t>(stream);
+        if (width > 1 && packed == kMissing) return;
+        const std::int64_t bytes = leaves * std::int64_t(width), stored = packed > 0 ? packed : bytes;
+        const auto at = stream.tellg();
+        if (stored > length - (at - begin)) throw std::runtime_error("more bytes for its leaves than there are");
+        if (packed > 0) {
+            if (stored < BLOSC_MIN_HEADER_LENGTH) throw std::runtime_error("a block without a header");
+            check_blosc_header(read<std::array<std::uint32_t, 4>>(stream), bytes, stored);
+        }
+        stream.seekg(at + std::streamoff(stored));
+    }
+}
+
 class Walk {
 public:
     Walk(std::istream& stream, const VdbTreeLayout& layout, ValueBytes value)
@@ -40,7 +94,10 @@ public:
         skip(sizeof(std::int32_t));  // number of buffers
         skip(value_.whole);          // background
         const auto tiles = read<std::uint32_t>(), children = read<std::uint32_t>();
-        skip(std::int64_t(tiles) * (3 * std::int64_t(sizeof(std::int32_t)) + value_.whole + 1));
+        for (std::uint32_t n = 0; n < tiles; ++n) {
+            skip(3 * std::int64_t(sizeof(std::int32_t)) + value_.whole);
+            check_bool(read<std::uint8_t>());
+        }
         for (std::uint32_t n = 0; n < children; ++n) {
             skip(3 * sizeof(std::int32_t));
             internal_node(5);
@@ -57,9 +114,7 @@ private:
 
     template <typename T>
     T read() {
-        T value{};
-        stream_.read(reinterpret_cast<char*>(&value), sizeof(T));
-        return value;
+        return detail::read<T>(stream_);
     }
     void skip(std::int64_t bytes) {
         if (bytes < 0 || bytes > layout_.file_bytes - std::int64_t(stream_.tellg()))
@@ -106,15 +161,13 @@ private:
         const auto packed = read<std::int64_t>();
         if (packed <= 0) {  // as it is
             if (packed != -bytes)
-                throw std::runtime_error("expected a block of " + std::to_string(bytes) + " bytes, got " +
-                                         std::to_string(-packed));
+                throw std::runtime_error("expected a block of " + std::to_string(bytes) +
+                                         " bytes as it is, its length says " + std::to_string(packed));
             return skip(bytes);
         }
         if (!blosc) return skip(packed);
-        // Blosc's own header: versions, flags and size of an element; bytes; bytes of a block; packed bytes
         const auto header = read<std::array<std::uint32_t, 4>>();
-        if (std::int64_t(header[1]) != bytes || std::int64_t(header[3]) != packed)
-            throw std::runtime_error("a block's header has other sizes than it");
+        check_blosc_header(header, bytes, packed);
         skip(packed - std::int64_t(sizeof(header)));
     }
 
@@ -125,6 +178,30 @@ private:
 };
 
 }  // namespace
+
+void skip_vdb_text(std::istream& stream, const char* what, std::int64_t file_bytes) {
+    stream.seekg(read_length(stream, what, file_bytes), std::ios::cur);
+}
+
+void skip_vdb_metadata(std::istream& stream, std::int64_t file_bytes) {
+    const auto count = read<std::uint32_t>(stream);
+    for (std::uint32_t n = 0; n < count; ++n) {
+        skip_vdb_text(stream, "metadata name", file_bytes);
+        std::string type(read_length(stream, "metadata type", file_bytes), '\0');
+        stream.read(type.data(), std::streamsize(type.size()));
+        const std::uint32_t length = read_length(stream, "metadata value", file_bytes);
+        const auto begin = stream.tellg();
+        if (type == vdb_io::DelayedLoadMetadata::staticTypeName()) {
+            if (length > 0) walk_delayed_load(stream, length, file_bytes);
+        } else if (type != "string" && openvdb::Metadata::isRegisteredType(type)) {
+            const openvdb::Metadata::Ptr value = openvdb::Metadata::createMetadata(type);
+            if (value->size() != length)
+                throw std::runtime_error("a " + type + " of " + std::to_string(length) + " bytes");
+            if (type == openvdb::BoolMetadata::staticTypeName()) check_bool(read<std::uint8_t>(stream));
+        }
+        stream.seekg(begin + std::streamoff(length));
+    }
+}
 
 void walk_vdb_tree(std::istream& stream, const VdbTreeLayout& layout) {
     if (const auto type = kTypes.find(layout.type); type != kTypes.end()) Walk(stream, layout, type->second).tree();

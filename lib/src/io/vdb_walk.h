@@ -3,7 +3,17 @@
 #include <istream>
 #include <string>
 
+// What OpenVDB takes from a file without a look, lengths above all, is looked at here before. Each function begins
+// where the stream stands, and throws a std::exception where something does not fit; the stream throws at the file's
+// end.
 namespace covol::detail {
+
+/// A text behind its length. @param what  for the message
+void skip_vdb_text(std::istream& stream, const char* what, std::int64_t file_bytes);
+
+/// A list of metadata: names, types and values. OpenVDB reads as many bytes as a value's type has, whatever length the
+/// file gives it.
+void skip_vdb_metadata(std::istream& stream, std::int64_t file_bytes);
 
 /// How a tree lies in a .vdb file.
 struct VdbTreeLayout {

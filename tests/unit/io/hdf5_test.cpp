@@ -244,7 +244,7 @@ TEST_CASE("datasets of their own: types, filters, chunks that are missing", "[hd
     CHECK(read_image_info(path + ":/gzip").chunk_size == Index3{4, 2, 2});
 }
 
-TEST_CASE("a chunk that was never written is none that a damaged index hides", "[hdf5]") {
+TEST_CASE("chunks that a damaged index hides are not taken for missing ones", "[hdf5]") {
     const Scratch scratch;
     const std::string path = scratch.path("a.h5");
     const std::vector<hsize_t> shape{kShape.begin(), kShape.end()};

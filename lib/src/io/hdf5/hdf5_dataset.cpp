@@ -63,15 +63,16 @@ Hdf5Id number_type(hid_t type) {
     return {is_enum ? H5Tget_super(type) : H5Tcopy(type), H5Tclose};
 }
 
-/// Whether the call that just failed did so for a chunk that was never written, and not for an index that is damaged:
-/// HDF5 1.10 fails for both, and 1.12 for the second alone. Reading a voxel would tell, too, but fills a whole chunk.
+/// Whether H5Dget_chunk_storage_size(), which just failed, did so for a chunk that was never written, and not for an
+/// index that is damaged: HDF5 1.10 fails for both, and 1.12 for the second alone. It complains of the first itself,
+/// and of the second after a function that it called. Reading a voxel would tell, too, but fills a whole chunk.
 bool is_of_missing_chunk() {
-    const auto is_first = [](unsigned, const H5E_error2_t* error, void* found) -> herr_t {
-        *static_cast<bool*>(found) = error->maj_num == H5E_DATASET && error->min_num == H5E_CANTALLOC;
+    const auto look_at_first = [](unsigned, const H5E_error2_t* error, void* found) -> herr_t {
+        *static_cast<bool*>(found) = error->func_name == std::string_view("H5D__get_chunk_storage_size");
         return 1;  // no further
     };
     bool found = false;
-    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, is_first, &found);
+    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, look_at_first, &found);
     return found;
 }
 

@@ -1,6 +1,6 @@
 // DICOM slice by slice: plain pixels are read here, compressed ones and files of several frames through ITK's GDCM
-// reader. Series are put together here too: ITK's own helper neither says what lies in a folder nor finds a missing
-// slice.
+// reader (gdcm_images.h). Series are put together here too: ITK's own helper neither says what lies in a folder nor
+// finds a missing slice.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -9,11 +9,11 @@
 #include <map>
 #include <optional>
 #include <sstream>
+#include <variant>
 
-#include "io/child.h"
 #include "io/image/dicom_header.h"
+#include "io/image/gdcm_images.h"
 #include "io/image/image_formats.h"
-#include "io/modules/modules.h"
 
 namespace covol::detail {
 namespace {
@@ -91,12 +91,8 @@ void fill_plain(const DicomHeader& header, const std::string& unusable, Slice& s
     }
 }
 
-void fill_through_gdcm(const DicomHeader& header, const std::string& unusable, Slice& slice) {
-    // It stops at assertions where values contradict each other.
-    const GdcmModule& gdcm = gdcm_module();
-    try_reading(slice.path, "GDCM", [&] { (void)gdcm.open(slice.path, unusable); });
-    const std::unique_ptr<ItkReader> reader = gdcm.open(slice.path, unusable);
-    const ItkHeader& image = reader->header();
+/// By what GDCM says of the file's image.
+void fill_from_gdcm(const DicomHeader& header, const ItkHeader& image, const std::string& unusable, Slice& slice) {
     slice.type = image.type;
     slice.components = image.components;
     for (std::size_t a = 0; a < 3; ++a) {
@@ -115,42 +111,66 @@ void fill_through_gdcm(const DicomHeader& header, const std::string& unusable, S
         throw Error(Errc::InvalidInput, unusable);
 }
 
-/// The header of one file.
-Slice read_header(const std::string& path) {
-    const std::string unusable = "read_image: " + path + ": damaged, truncated, or not a DICOM image";
-    const std::optional<DicomHeader> header = read_dicom_header(path);
-    if (!header) throw Error(Errc::InvalidInput, unusable);
-    Slice slice;
-    slice.path = path;
-    slice.series = header->text(kSeriesUid);
-    slice.description = header->text(kModality) + " " + header->text(kSeriesDescription);
-    const std::vector<double> frames = header->numbers(kFrames);
-    if (header->encapsulated || (frames.size() == 1 && frames[0] > 1))
-        fill_through_gdcm(*header, unusable, slice);
-    else
-        fill_plain(*header, unusable, slice);
-    return slice;
+using SliceOrError = std::variant<Slice, Error>;
+
+/// The headers of some files.
+std::vector<SliceOrError> read_headers(const std::vector<std::string>& paths, const RunContext& run) {
+    std::vector<SliceOrError> slices;
+    std::vector<GdcmFile> for_gdcm;
+    std::vector<std::pair<std::size_t, DicomHeader>> waiting;  // their places among the slices
+    for (const std::string& path : paths) {
+        run.check();
+        const std::string unusable = "read_image: " + path + ": damaged, truncated, or not a DICOM image";
+        try {
+            std::optional<DicomHeader> header = read_dicom_header(path);
+            if (!header) throw Error(Errc::InvalidInput, unusable);
+            Slice slice;
+            slice.path = path;
+            slice.series = header->text(kSeriesUid);
+            slice.description = header->text(kModality) + " " + header->text(kSeriesDescription);
+            const std::vector<double> frames = header->numbers(kFrames);
+            if (header->encapsulated || (frames.size() == 1 && frames[0] > 1)) {
+                for_gdcm.push_back({path, unusable});
+                waiting.emplace_back(slices.size(), std::move(*header));
+            } else {
+                fill_plain(*header, unusable, slice);
+            }
+            slices.emplace_back(std::move(slice));
+        } catch (const Error& error) {
+            slices.emplace_back(error);
+        }
+    }
+    if (waiting.empty()) return slices;
+    const std::vector<std::variant<ItkHeader, Error>> images = gdcm_headers(for_gdcm, run);
+    for (std::size_t n = 0; n < images.size(); ++n) {
+        SliceOrError& slice = slices[waiting[n].first];
+        try {
+            if (const Error* error = std::get_if<Error>(&images[n])) throw Error(*error);
+            fill_from_gdcm(waiting[n].second, std::get<ItkHeader>(images[n]), for_gdcm[n].unusable,
+                           std::get<Slice>(slice));
+        } catch (const Error& error) {
+            slice = error;
+        }
+    }
+    return slices;
 }
 
 /// All usable files of a folder, by series.
 std::map<std::string, std::vector<Slice>> list_series(const fs::path& folder, const RunContext& run) {
-    std::map<std::string, std::vector<Slice>> series;
     std::error_code status;
-    std::vector<fs::path> paths;
+    std::vector<std::string> paths;
     for (const auto& entry : fs::directory_iterator(folder, status))
-        if (entry.is_regular_file(status)) paths.push_back(entry.path());
+        if (entry.is_regular_file(status) && is_dicom(entry.path().string()) && entry.path().filename() != "DICOMDIR")
+            paths.push_back(entry.path().string());
     std::sort(paths.begin(), paths.end());
+    std::map<std::string, std::vector<Slice>> series;
     std::size_t passed_over = 0;
     std::string why;
-    for (const fs::path& path : paths) {
-        run.check();
-        if (!is_dicom(path.string()) || path.filename() == "DICOMDIR") continue;
-        try {
-            Slice slice = read_header(path.string());
-            series[slice.series].push_back(std::move(slice));
-        } catch (const Error& error) {
-            if (error.code() == Errc::Io) throw;  // no fault of the slice: GDCM's module is missing
-            if (passed_over++ == 0) why = error.what();
+    for (SliceOrError& slice : read_headers(paths, run)) {
+        if (const Error* error = std::get_if<Error>(&slice)) {
+            if (passed_over++ == 0) why = error->what();
+        } else {
+            series[std::get<Slice>(slice).series].push_back(std::move(std::get<Slice>(slice)));
         }
     }
     // A gap between slices is an error; at an end the volume would be shorter without a word.
@@ -186,21 +206,25 @@ public:
 
     Pixels read(const PixelRequest& request, const RunContext& run) override {
         const Index3 n = request.box.size();
-        const bool single = slices_.size() == 1;
-        const Index3& size = info_.geometry.size;
         const std::shared_ptr<void> data = allocate_pixels(path_, voxel_count(n), info_.type, 0);
         auto* out = static_cast<char*>(data.get());
-        if (single) {
-            const std::vector<char> stored = decode(slices_.front());
+        if (slices_.size() == 1) {
+            const Index3& size = info_.geometry.size;
+            const Decoded decoded(*this, 0, 1, run);
             for (int k = request.box.min[2]; k <= request.box.max[2]; ++k)
-                out = copy(slices_.front(), stored.data(),
+                out = copy(slices_.front(), decoded.of(0),
                            std::uint64_t(k) * std::uint64_t(size[0]) * std::uint64_t(size[1]), request, out);
-        } else {
-            for (int k = request.box.min[2]; k <= request.box.max[2]; ++k) {
-                run.check();
-                const Slice& slice = slices_[std::size_t(k)];
-                out = copy(slice, decode(slice).data(), 0, request, out);
-            }
+            return {data, dense_strides(n), false};
+        }
+        constexpr std::uint64_t kMostAtOnce = std::uint64_t(256) << 20;
+        const auto end = std::size_t(request.box.max[2]) + 1;
+        const std::uint64_t most = kMostAtOnce / bytes_of(slices_.front());
+        for (auto begin = std::size_t(request.box.min[2]); begin < end;) {
+            run.report("image", double(begin - std::size_t(request.box.min[2])) / double(n[2]));
+            const std::size_t count = std::clamp<std::size_t>(most, 1, end - begin);
+            const Decoded decoded(*this, begin, count, run);
+            for (std::size_t k = 0; k < count; ++k) out = copy(slices_[begin + k], decoded.of(k), 0, request, out);
+            begin += count;
         }
         return {data, dense_strides(n), false};
     }
@@ -280,27 +304,56 @@ private:
         }
     }
 
-    /// All pixels of one file, rescaled.
-    [[nodiscard]] std::vector<char> decode(const Slice& slice) const {
-        const std::string unusable = "read_image: " + slice.path + ": damaged or truncated";
-        const std::uint64_t pixels = voxel_count(slice.size) * slice.components;
-        allocate_pixels(slice.path, pixels, slice.type, fs::file_size(slice.path));  // refuses absurd sizes
-        std::vector<char> values(pixels * pixel_bytes(slice.type));
-        if (slice.plain) {
-            decode_plain(slice, unusable, pixels, values.data());
-            return values;
+    /// All pixels of some files, rescaled.
+    class Decoded {
+    public:
+        Decoded(const DicomSeries& series, std::size_t begin, std::size_t count, const RunContext& run)
+            : plain_(count), packed_(series.packed_of(begin, count), run), pixels_(count) {
+            for (std::size_t n = 0, packed = 0; n < count; ++n) {
+                run.check();
+                const Slice& slice = series.slices_[begin + n];
+                if (slice.plain) plain_[n] = decode_plain(slice);
+                pixels_[n] = slice.plain ? plain_[n].data() : packed_.of(packed++);
+            }
         }
-        const std::unique_ptr<ItkReader> reader = gdcm_module().open(slice.path, unusable);
-        if (reader->header().bytes < 0 || std::uint64_t(reader->header().bytes) != values.size())
-            throw Error(Errc::InvalidInput, unusable);
-        reader->read_all(values.data());
-        return values;
+        [[nodiscard]] const char* of(std::size_t n) const { return pixels_[n]; }
+
+    private:
+        std::vector<std::vector<char>> plain_;
+        GdcmPixels packed_;
+        std::vector<const char*> pixels_;
+    };
+
+    [[nodiscard]] static std::uint64_t pixels_of(const Slice& slice) {
+        return voxel_count(slice.size) * slice.components;
+    }
+    [[nodiscard]] static std::uint64_t bytes_of(const Slice& slice) {
+        return pixels_of(slice) * pixel_bytes(slice.type);
+    }
+    [[nodiscard]] static std::string unusable(const Slice& slice) {
+        return "read_image: " + slice.path + ": damaged or truncated";
+    }
+    static void refuse_absurd_size(const Slice& slice) {
+        allocate_pixels(slice.path, pixels_of(slice), slice.type, fs::file_size(slice.path));
     }
 
-    static void decode_plain(const Slice& slice, const std::string& unusable, std::uint64_t pixels, char* out) {
+    /// Those that GDCM decodes.
+    [[nodiscard]] std::vector<GdcmFile> packed_of(std::size_t begin, std::size_t count) const {
+        std::vector<GdcmFile> files;
+        for (std::size_t n = begin; n < begin + count; ++n)
+            if (const Slice& slice = slices_[n]; !slice.plain) {
+                refuse_absurd_size(slice);
+                files.push_back({slice.path, unusable(slice), bytes_of(slice)});
+            }
+        return files;
+    }
+
+    static std::vector<char> decode_plain(const Slice& slice) {
+        refuse_absurd_size(slice);
         const PixelPlace& place = slice.place;
-        std::vector<char> stored(pixels * place.stored_bytes());
-        if (!read_bytes(place, stored.size(), stored.data())) throw Error(Errc::InvalidInput, unusable);
+        const std::uint64_t pixels = pixels_of(slice);
+        std::vector<char> stored(pixels * place.stored_bytes()), values(bytes_of(slice));
+        if (!read_bytes(place, stored.size(), stored.data())) throw Error(Errc::InvalidInput, unusable(slice));
         if (place.swap) swap_bytes(stored.data(), pixels, place.stored_bytes());
         with_pixel_type(place.type, [&](auto from) {
             with_pixel_type(slice.type, [&](auto to) {
@@ -308,7 +361,7 @@ private:
                 using To = decltype(to);
                 if constexpr (std::is_integral_v<From>) {
                     const auto* source = reinterpret_cast<const From*>(stored.data());
-                    auto* target = reinterpret_cast<To*>(out);
+                    auto* target = reinterpret_cast<To*>(values.data());
                     const int unused = slice.unused_bits;
                     for (std::uint64_t n = 0; n < pixels; ++n) {
                         // what lies in the unused bits is no part of the number
@@ -318,6 +371,7 @@ private:
                 }
             });
         });
+        return values;
     }
 
     char* copy(const Slice& slice, const char* stored, std::uint64_t first, const PixelRequest& request,
@@ -354,7 +408,9 @@ bool is_dicom(const std::string& path) {
 
 std::unique_ptr<ImageFile> open_dicom(const std::string& path, const RunContext& run) {
     if (!fs::is_directory(path)) {
-        const Slice own = read_header(path);
+        const SliceOrError read = read_headers({path}, run).front();
+        if (const Error* error = std::get_if<Error>(&read)) throw Error(*error);
+        const Slice& own = std::get<Slice>(read);
         if (own.size[2] > 1) return std::make_unique<DicomSeries>(path, std::vector<Slice>{own});
         const fs::path folder = fs::path(path).has_parent_path() ? fs::path(path).parent_path() : fs::path(".");
         return std::make_unique<DicomSeries>(path, list_series(folder, run)[own.series]);

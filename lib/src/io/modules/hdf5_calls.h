@@ -21,7 +21,7 @@
     X(H5Tset_ebias) X(H5Tset_fields) X(H5Tset_order) X(H5Tset_size) X(H5Zfilter_avail) X(H5Zget_filter_info)
 // Variables, set by H5open(), behind H5T_NATIVE_DOUBLE and the like.
 #define COVOL_HDF5_NUMBERS(X) \
-    X(H5E_CANTALLOC_g) X(H5E_DATASET_g) X(H5P_CLS_FILE_ACCESS_ID_g) X(H5P_CLS_LINK_ACCESS_ID_g) X(H5T_IEEE_F32LE_g) X(H5T_IEEE_F64LE_g) \
+    X(H5P_CLS_FILE_ACCESS_ID_g) X(H5P_CLS_LINK_ACCESS_ID_g) X(H5T_IEEE_F32LE_g) X(H5T_IEEE_F64LE_g) \
     X(H5T_NATIVE_DOUBLE_g) X(H5T_STD_I8LE_g) X(H5T_STD_I16LE_g) X(H5T_STD_I32LE_g) X(H5T_STD_I64LE_g) \
     X(H5T_STD_U8LE_g) X(H5T_STD_U16LE_g) X(H5T_STD_U32LE_g) X(H5T_STD_U64LE_g)
 // clang-format on
