@@ -16,6 +16,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstring>
+#include <ctime>
 #include <new>
 #include <utility>
 
@@ -73,21 +74,34 @@ struct Batch {
     _exit(0);  // no destructor, no flush: all of that is the parent's
 }
 
+/// Seconds that the process has computed; 0 where the system does not say.
+double computed_by(pid_t process) {
+    clockid_t clock = 0;
+    timespec time{};
+    if (clock_getcpuclockid(process, &clock) != 0 || clock_gettime(clock, &time) != 0) return 0;
+    return double(time.tv_sec) + 1e-9 * double(time.tv_nsec);
+}
+
 /// Until the copy ends; one that takes too long for a piece, or whose run is cancelled, is killed.
 /// @param pipe  hung up when it ends
 void wait_for(pid_t child, int pipe, const Batch& batch, double seconds, const RunContext& run) {
     using Clock = std::chrono::steady_clock;
-    constexpr int kLongestPause = 20;  // milliseconds: an end of the pipe may be in another copy, too
+    constexpr int kLongestPause = 20;   // milliseconds: an end of the pipe may be in another copy, too
+    constexpr double kMostPauses = 10;  // of a copy that computes nothing: a slow disk, or a lock for ever
     std::size_t piece = batch.begin;
     Clock::time_point since = Clock::now();
+    double computed_before = 0;
     while (!run.cancelled()) {
         const pid_t ended = waitpid(child, nullptr, WNOHANG);
         if (ended == child || (ended < 0 && errno != EINTR)) return;
+        const double computed = computed_by(child);
         if (const std::size_t now_at = batch.first_not_ended(); now_at != piece) {
             piece = now_at;
             since = Clock::now();
+            computed_before = computed;
         }
-        if (std::chrono::duration<double>(Clock::now() - since).count() > seconds) break;
+        if (computed - computed_before > seconds) break;
+        if (std::chrono::duration<double>(Clock::now() - since).count() > kMostPauses * seconds) break;
         pollfd hung_up{pipe, 0, 0};
         if (poll(&hung_up, 1, kLongestPause) > 0) usleep(100);  // it is about to end
     }
@@ -166,7 +180,7 @@ std::optional<Error> reading_error(const Trial& trial, const std::string& path, 
 }
 
 void try_reading(const std::string& path, const char* library, const std::function<void()>& read) {
-    if (const auto error = reading_error(try_in_child(read, kMostSecondsInChild), path, library)) throw Error(*error);
+    if (const auto error = reading_error(try_in_child(read, kMostSecondsForHeader), path, library)) throw Error(*error);
 }
 
 }  // namespace covol::detail

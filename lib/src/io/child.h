@@ -13,7 +13,7 @@ namespace covol::detail {
 
 /// How a piece of work ended that was tried in a copy of this process.
 struct Trial {
-    bool crashed = false;          ///< it ended by a signal, or not within the time
+    bool crashed = false;          ///< it ended by a signal, or took too long
     std::optional<Error> refused;  ///< what it threw; the message cut after some 4,000 characters
 };
 
@@ -38,7 +38,7 @@ private:
 /// are at work at once as the caller's arena has threads. Only the calling thread goes on in a copy, so `work` must
 /// need no other, nor a lock that one may hold. Where the system gives no copy, and where a piece throws what is no
 /// Error, it is done in this process.
-/// @param seconds  that one piece may take
+/// @param seconds  that one piece may compute; waiting, it may take ten times as long
 /// @returns how each ended
 /// @throws Error Cancelled, and what is thrown in this process.
 std::vector<Trial> try_in_children(std::size_t count, const std::function<void(std::size_t)>& work, double seconds,
@@ -47,14 +47,14 @@ std::vector<Trial> try_in_children(std::size_t count, const std::function<void(s
 /// One piece, by this thread.
 Trial try_in_child(const std::function<void()>& work, double seconds);
 
-/// Seconds that a library may take for what is tried in a copy.
-constexpr double kMostSecondsInChild = 60;
+/// Seconds that a library may compute for a header, or a voxel: far beyond what sound files need.
+constexpr double kMostSecondsForHeader = 10;
 
 /// Why `library` cannot read the image `path`; nothing where it can.
 std::optional<Error> reading_error(const Trial& trial, const std::string& path, const char* library);
 
-/// Tries whether `library` can read the image `path`. @throws Error InvalidInput where it crashed, or took a minute,
-/// and what `read` threw.
+/// Tries whether `library` can read the image `path`. @throws Error InvalidInput where it crashed, or took
+/// kMostSecondsForHeader, and what `read` threw.
 void try_reading(const std::string& path, const char* library, const std::function<void()>& read);
 
 }  // namespace covol::detail

@@ -100,6 +100,13 @@ TEST_CASE("Work that crashes, leaves or hangs in a copy of the process is told o
     CHECK(try_in_child([] { raise(SIGSEGV); }, 10).crashed);
     CHECK(try_in_child([] { _exit(3); }, 10).crashed);
     CHECK(try_in_child([] { pause(); }, 0.05).crashed);
+    volatile bool for_ever = true;
+    CHECK(try_in_child(
+              [&] {
+                  while (for_ever) continue;
+              },
+              0.05)
+              .crashed);
 }
 
 TEST_CASE("A file that crashes its library is damaged") {

@@ -1,5 +1,6 @@
 #include "io/image/gdcm_images.h"
 
+#include <algorithm>
 #include <memory>
 
 namespace covol::detail {
@@ -62,7 +63,7 @@ std::vector<std::variant<ItkHeader, Error>> gdcm_headers(const std::vector<GdcmF
         if (reader->header().size.size() > FlatHeader::kMost) throw Error(Errc::InvalidInput, files[n].unusable);
         flat[n].take(reader->header());
     };
-    const std::vector<Trial> trials = try_in_children(files.size(), read, kMostSecondsInChild, run);
+    const std::vector<Trial> trials = try_in_children(files.size(), read, kMostSecondsForHeader, run);
     std::vector<std::variant<ItkHeader, Error>> headers;
     for (std::size_t n = 0; n < files.size(); ++n) {
         if (const auto error = reading_error(trials[n], files[n].path, "GDCM"))
@@ -83,7 +84,11 @@ GdcmPixels::GdcmPixels(const std::vector<GdcmFile>& files, const RunContext& run
             throw Error(Errc::InvalidInput, files[n].unusable);
         reader->read_all(memory_.data() + begin_[n]);
     };
-    const std::vector<Trial> trials = try_in_children(files.size(), decode, kMostSecondsInChild, run);
+    constexpr double kSecondsOfByte = 1e-6;  // JPEG 2000 takes a twentieth of it
+    std::uint64_t most = 0;
+    for (const GdcmFile& file : files) most = std::max(most, file.bytes);
+    const double seconds = kMostSecondsForHeader + kSecondsOfByte * double(most);
+    const std::vector<Trial> trials = try_in_children(files.size(), decode, seconds, run);
     for (std::size_t n = 0; n < files.size(); ++n)
         if (const auto error = reading_error(trials[n], files[n].path, "GDCM")) throw Error(*error);
 }
