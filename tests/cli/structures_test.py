@@ -208,6 +208,13 @@ class Structures(Case):
         done = self.run_covol("segment", self.scene, "--points", "left=1.xyz", "-o", self.out / "s.vdb", "--rho", 0, cwd=self.inputs)
         self.assertNotIn("left: ", done.stderr)
 
+    def test_the_last_file_is_read_before_the_first_is_solved(self):
+        line, broken = self.inputs / "line.xyz", self.inputs / "broken.xyz"
+        write_points(line, [(0.137 * n, 0.11, 0.07) for n in range(30)])
+        broken.write_text("1 2 3\n1 2 x\n")
+        self.refuse("segment", self.scene, "--points", f"line={line}", f"right={self.right}", "-o", "s.vdb", code=3, says="line: ")
+        self.refuse("segment", self.scene, "--points", f"line={line}", f"right={broken}", "-o", "s.vdb", code=3, says="broken.xyz")
+
     def test_one_named_structure(self):
         report = self.report("segment", self.scene, "--points", f"the left={self.left}", "-o", "s.vdb", "--rho", 0, "--mesh",
                              "m.ply", "--mask", "m.nrrd")

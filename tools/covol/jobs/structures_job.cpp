@@ -169,6 +169,20 @@ StructurePreparer::StructurePreparer(const SegmentJob& job, const std::vector<St
       paint_(job, geometry_) {}
 
 PreparedStructure StructurePreparer::prepare(std::size_t n, const RunContext& run) {
+    PreparedStructure prepared = read_marks_of(n, run);
+    add_guess(n, prepared, run);
+    return prepared;
+}
+
+void StructurePreparer::add_guess(std::size_t n, PreparedStructure& prepared, const RunContext& run) const {
+    const StructureInput& input = inputs_[n];
+    if (input.guess.empty()) return;
+    prepared.guess = read_guess(input.guess, job_.guess.label, geometry_, job_.image.options.spacing[0] > 0, run);
+    prepared.options.guess = prepared.guess->start;
+    prepared.output.input["guess"] = {{"path", input.guess}, {"label", prepared.guess->label}};
+}
+
+PreparedStructure StructurePreparer::read_marks_of(std::size_t n, const RunContext& run) {
     const ImageGeometry* const geometry = image_ != nullptr ? &geometry_ : nullptr;
     const StructureInput& input = inputs_[n];
     PreparedStructure prepared;
@@ -201,11 +215,6 @@ PreparedStructure StructurePreparer::prepare(std::size_t n, const RunContext& ru
     options.inside = std::move(seeds.inside);
     options.outside = std::move(seeds.outside);
     paint_.add_seeds(inputs_, n, options, run);
-    if (!input.guess.empty()) {
-        prepared.guess = read_guess(input.guess, job_.guess.label, geometry_, job_.image.options.spacing[0] > 0, run);
-        options.guess = prepared.guess->start;
-        s.input["guess"] = {{"path", input.guess}, {"label", prepared.guess->label}};
-    }
     options.exterior_seeds = input.exterior_seeds;
     options.start = starts_[n].start;
     if (!options.evolve.delta) options.evolve.delta = starts_[n].delta;
@@ -228,9 +237,16 @@ StructuresOutput segment_structures(const SegmentJob& job, const std::vector<Str
         output.is_anatomical = is_anatomical(image->path(), job.image.options, run);
     }
     StructurePreparer preparer(job, inputs, image, starts, session);
+    const auto speaking = [&](std::size_t n) {
+        return speaking_for(inputs[n].name, inputs.size() > kMostInLines, run);
+    };
+    // All marks before the first is solved: what is wrong with the last file is told at once.
+    std::vector<PreparedStructure> structures;
+    for (std::size_t n = 0; n < inputs.size(); ++n) structures.push_back(preparer.read_marks_of(n, speaking(n)));
     for (std::size_t n = 0; n < inputs.size(); ++n) {
-        const RunContext own = speaking_for(inputs[n].name, inputs.size() > kMostInLines, run);
-        PreparedStructure prepared = preparer.prepare(n, own);
+        const RunContext own = speaking(n);
+        PreparedStructure prepared = std::move(structures[n]);
+        preparer.add_guess(n, prepared, own);
         StructureOutput& s = prepared.output;
         try {
             s.result = solve(image, prepared, own);

@@ -28,6 +28,9 @@ public:
                       const std::vector<StructureStart>& starts, Session& session);
     /// @throws UsageError where there are neither an image nor marks; Error.
     [[nodiscard]] PreparedStructure prepare(std::size_t n, const RunContext& run);
+    /// All but the guess, which may be a whole label image.
+    [[nodiscard]] PreparedStructure read_marks_of(std::size_t n, const RunContext& run);
+    void add_guess(std::size_t n, PreparedStructure& prepared, const RunContext& run) const;
     /// @pre one has been prepared
     [[nodiscard]] double voxel_size() const { return voxel_size_.value(); }
 
