@@ -16,6 +16,7 @@
 #include "covol/surface.h"
 #include "grid/flood_tiles.h"
 #include "segment/automatic.h"
+#include "segment/doubts.h"
 #include "segment/fields.h"
 #include "segment/final_surface.h"
 #include "segment/flow.h"
@@ -314,6 +315,7 @@ SegmentResult BrickJob::join(const BrickPlan& plan, const BrickStates& states, b
     job.options.without_mesh = job.options.without_mesh || without_mesh;
     detail::require_valid(job.options, "bricks");
     with_threads(run, [&] {
+        if (!job.is_cloud()) doubt_isolated_marks(job);
         job.report().domain = plan.domain;
         job.origin = StartOrigin::CoarseLevel;
         const bool in_parts = job.options.without_mesh && job.options.without_fields && !parts_->field;

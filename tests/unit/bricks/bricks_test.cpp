@@ -216,3 +216,22 @@ TEST_CASE("a cloud in bricks is the cloud in one piece, bit by bit") {
 TEST_CASE("what rests on all marks at once is refused in bricks") {
     CHECK_THROWS_AS(BrickJob(ball_image(), marks_on_ball(200), {}, {}), Error);
 }
+
+TEST_CASE("bricks tell of a mark that went astray, as a job in one piece does") {
+    const Image image = ball_image();
+    std::vector<Vec3> points = marks_on_ball(3000);
+    points.push_back({50, 50, 50});
+    SegmentOptions options;
+    options.model = Model::Paper;
+    options.without_mesh = true;
+    BrickJob job(image, points, options, {});
+    BrickOptions bricks;
+    bricks.most_voxels = 60000;
+    const BrickPlan plan = job.plan(bricks);
+    std::vector<FloatGridPtr> states;
+    solve_all(job, plan, states);
+    const std::vector<std::string> warnings = job.join(plan, [&](std::size_t n) { return states[n]; }).report.warnings;
+    CHECK(std::any_of(warnings.begin(), warnings.end(), [](const std::string& warning) {
+        return warning.starts_with("1 of 3001 marks lie apart from all others");
+    }));
+}
