@@ -6,12 +6,15 @@ for a file, a single allocation above 64 MB and ten times the largest file, or 5
 """
 import argparse
 import concurrent.futures
+import io
+import lzma
 import os
 import pathlib
 import re
 import struct
 import subprocess
 import sys
+import tarfile
 import tempfile
 import zipfile
 
@@ -176,6 +179,23 @@ def fuzz(program, end, seeds, seconds, limit, keep, corpus):
         return executions, computed, covered[0], covered[-1], findings
 
 
+def pack(program, seeds, corpus, most, target):
+    """The smallest files that reach all edges which the corpus does, `most` for each format, as one archive: tests/cli/corpus_test.py."""
+    with tempfile.TemporaryDirectory(prefix="covol-pack-") as name, tarfile.open(target, "w:xz", preset=9 | lzma.PRESET_EXTREME) as archive:
+        for end in sorted(seeds):
+            (merged := pathlib.Path(name) / end).mkdir()
+            (begin := pathlib.Path(name) / f"{end}-seeds").mkdir()
+            for n, data in enumerate(seeds[end]):
+                (begin / str(n)).write_bytes(data)
+            folders = [begin] + [corpus / end] * (corpus / end).is_dir()
+            subprocess.run([program, "-merge=1", merged, *folders], env=os.environ | {"COVOL_FUZZ_FORMAT": end}, cwd=name, check=True,
+                           capture_output=True)
+            for n, path in enumerate(sorted(merged.iterdir(), key=lambda path: (path.stat().st_size, path.name))[:most]):
+                entry = tarfile.TarInfo(f"{end}/{n:03}")
+                entry.size = path.stat().st_size
+                archive.addfile(entry, io.BytesIO(path.read_bytes()))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--program", type=pathlib.Path, required=True, help="covol_fuzz_readers")
@@ -186,10 +206,14 @@ def main():
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--keep", type=pathlib.Path, default=pathlib.Path("fuzz-findings"))
     parser.add_argument("--corpus", type=pathlib.Path)
+    parser.add_argument("--pack", type=pathlib.Path, help="fuzz nothing: make this .tar.xz of the best files of --corpus")
+    parser.add_argument("--pack-most", type=int, default=60, help="files of a format")
     options = parser.parse_args()
     found = []
     with tempfile.TemporaryDirectory(prefix="covol-seeds-") as name:
         seeds = seeds_of(os.path.abspath(options.covol), pathlib.Path(name))
+        if options.pack:
+            return pack(options.program.resolve(), seeds, options.corpus.resolve(), options.pack_most, options.pack)
         chosen = options.formats.split(",") if options.formats else sorted(seeds)
         if unknown := set(chosen) - set(seeds):
             parser.error(f"--formats: no reader for {', '.join(sorted(unknown))}; there are {', '.join(sorted(seeds))}")
