@@ -131,6 +131,15 @@ def seeds_of(covol, folder):
     return seeds
 
 
+def add_kept(seeds, path):
+    """What was found worth keeping before: tests/fuzz/corpus.tar.xz."""
+    if not path.is_file():
+        return
+    with tarfile.open(path) as archive:
+        for entry in archive.getmembers():
+            seeds[entry.name.split("/")[0]].append(archive.extractfile(entry).read())
+
+
 def run_once(words, environment, work):
     """@return seconds of computing, its children's too, and what it says"""
     with tempfile.TemporaryFile("w+", errors="replace") as said:
@@ -212,6 +221,7 @@ def main():
     found = []
     with tempfile.TemporaryDirectory(prefix="covol-seeds-") as name:
         seeds = seeds_of(os.path.abspath(options.covol), pathlib.Path(name))
+        add_kept(seeds, HERE / "corpus.tar.xz")
         if options.pack:
             return pack(options.program.resolve(), seeds, options.corpus.resolve(), options.pack_most, options.pack)
         chosen = options.formats.split(",") if options.formats else sorted(seeds)

@@ -28,6 +28,7 @@ struct GuessReport {
     std::size_t marks = 0;        ///< that hold the surface
     std::size_t cut_marks = 0;    ///< that lie in the cut, inside the body: left out
     std::size_t patches = 0;      ///< surfaces of a part of the marks; 0: one of all of them
+    bool held_around = false;     ///< by itself the surface would go on beyond the marks, and not close
     std::size_t wrong_seeds = 0;  ///< places of GuessOptions that lie on the wrong side in spite of all
     std::string summary;          ///< one line for people
 };

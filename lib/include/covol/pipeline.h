@@ -131,7 +131,9 @@ struct SegmentReport {
         double errors = 0;  ///< standard errors of the mean that both differ by
     };
     std::optional<ImageBorder> image_border;  ///< none as image_support
-    std::vector<std::string> warnings;        ///< what a person has to look at, in plain words
+    /// Share of a surface through marks alone that lies farther from all of them than half of their box's diagonal.
+    std::optional<double> surface_beyond_marks;
+    std::vector<std::string> warnings;  ///< what a person has to look at, in plain words
     SeedCheck seeds;
     CorrectionReport correction;      ///< of SegmentOptions::guess
     double share_without_points = 0;  ///< of the closed surface's area: farther than holes.distance from every point

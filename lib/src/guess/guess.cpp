@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <utility>
 
@@ -9,6 +10,7 @@
 #include "covol/start.h"
 #include "guess/heuristics.h"
 #include "guess/marks_surface.h"
+#include "points/kd_tree.h"
 
 namespace covol {
 namespace {
@@ -60,6 +62,32 @@ bool hold_seeds(const guess::MarksSurface& surface, const GuessOptions& options,
     hold(options.inside, -1);
     hold(options.outside, 1);
     return any;
+}
+
+double distance_to_nearest(const std::vector<Vec3>& marks, const Vec3& to) {
+    double squared = std::numeric_limits<double>::infinity();
+    for (const Vec3& m : marks) squared = std::min(squared, detail::squared_distance(m, to));
+    return std::sqrt(squared);
+}
+
+/// Where the surface goes on beyond its marks, places around them become constraints, outside by about their distance:
+/// marks as few or as rough leave surfaces of less energy that run through the world and never close.
+/// @return whether it does
+bool hold_around(const guess::MarksSurface& surface, const GuessOptions& options, guess::ImpreciseMarks& known) {
+    std::vector<Vec3> around;
+    for (const Vec3& place : guess::points_around(known.marks)) {
+        bool in_world = true;
+        for (int a = 0; a < 3 && options.end; ++a)
+            in_world = in_world && place[a] >= options.end->min[a] && place[a] <= options.end->max[a];
+        if (in_world) around.push_back(place);
+    }
+    if (std::all_of(around.begin(), around.end(), [&](const Vec3& place) { return surface.value(place) > 0; }))
+        return false;
+    for (const Vec3& place : around) {
+        known.seeds.push_back(place);
+        known.seed_value.push_back(distance_to_nearest(known.marks, place));
+    }
+    return true;
 }
 
 std::size_t count_wrong(const guess::MarksSurface& surface, const GuessOptions& options) {
@@ -127,6 +155,8 @@ Guess guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks, con
         report.marks = result.marks.size();
         report.cut_marks = marks.size() - result.marks.size();
         auto surface = std::make_unique<guess::MarksSurface>(known, run);
+        report.held_around = hold_around(*surface, options, known);
+        if (report.held_around) surface = std::make_unique<guess::MarksSurface>(known, run);
         for (int round = 0; round < kGuess.seed_rounds && hold_seeds(*surface, options, known); ++round)
             surface = std::make_unique<guess::MarksSurface>(known, run);
         report.patches = surface->patches();
@@ -140,6 +170,7 @@ Guess guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks, con
     });
     report.summary = std::to_string(report.marks) + " marks, the surface through them that bends least";
     if (report.patches > 0) report.summary += ", in " + std::to_string(report.patches) + " overlapping parts";
+    if (report.held_around) report.summary += ", kept from going on beyond them";
     if (report.cut_marks > 0)
         report.summary += "; " + std::to_string(report.cut_marks) + " others lie in the cut where the image ends";
     return result;

@@ -24,7 +24,7 @@ using Point = Eigen::Vector3d;
 
 constexpr int kPolynomial = 4;  // 1, x, y, z: what the energy does not see
 constexpr double kLocalShares[] = {0.5, 0.25, 0.125};
-constexpr double kAround[] = {1.15, 1.5};  // of the farthest mark
+constexpr double kAround[] = {1.15, 1.5};
 
 /// Least-energy interpolation at fixed nodes: the energy of values v and gradients g is that of
 /// g^T H g + 2 c^T g + constant.
@@ -219,8 +219,8 @@ Expansion expansion(const HermiteSystem& system, const Vector& values, const Vec
 
 using Inside = std::function<bool(const Point& in_unit_ball)>;
 
-/// On ellipsoids around all marks, as far as the world reaches.
-bool has_one_sign_around(const std::vector<Point>& nodes, Index marks, const Expansion& f, const Inside& in_world) {
+/// Points on an ellipsoid about 0 around the first `marks` nodes, times its size.
+std::vector<Point> ellipsoid_around(const std::vector<Point>& nodes, Index marks, double times) {
     // Marks with a variance of 1 along each axis lie in a ball.
     Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
     for (Index n = 0; n < marks; ++n)
@@ -229,20 +229,27 @@ bool has_one_sign_around(const std::vector<Point>& nodes, Index marks, const Exp
     const Eigen::Matrix3d from_ball = axes.operatorSqrt(), to_ball = axes.operatorInverseSqrt();
     double reach = 0;
     for (Index n = 0; n < marks; ++n) reach = std::max(reach, (to_ball * nodes[std::size_t(n)]).norm());
-    constexpr double kNoStep[3] = {0, 0, 0};
-    int positive = 0, count = 0;
+    std::vector<Point> points;
     for (int n = 0; n < kVariational.directions; ++n) {  // a Fibonacci lattice
         const double z = 1 - (2 * n + 1) / double(kVariational.directions), phi = n * 2.399963229728653;
         const Point direction(std::sqrt(1 - z * z) * std::cos(phi), std::sqrt(1 - z * z) * std::sin(phi), z);
-        for (const double around : kAround) {
-            const Point at = around * reach * (from_ball * direction);
+        points.emplace_back(times * reach * (from_ball * direction));
+    }
+    return points;
+}
+
+/// On ellipsoids around all marks, as far as the world reaches.
+bool has_one_sign_around(const std::vector<Point>& nodes, Index marks, const Expansion& f, const Inside& in_world) {
+    constexpr double kNoStep[3] = {0, 0, 0};
+    int positive = 0, count = 0;
+    for (const double around : kAround)
+        for (const Point& at : ellipsoid_around(nodes, marks, around)) {
             if (!in_world(at)) continue;
             double value = 0;
             f.row(at.data(), kNoStep, 1, &value);
             positive += value > 0;
             ++count;
         }
-    }
     return positive == 0 || positive == count;
 }
 
@@ -302,6 +309,17 @@ bool span_space(const std::vector<Vec3>& marks) {
     for (const Vec3& m : marks) spread += (to_point(m) - mean) * (to_point(m) - mean).transpose();
     const Point axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues();
     return axes[0] > kVariational.flat * axes[2];
+}
+
+std::vector<Vec3> points_around(const std::vector<Vec3>& marks) {
+    Point middle = Point::Zero();
+    for (const Vec3& m : marks) middle += to_point(m) / double(marks.size());
+    std::vector<Point> nodes;
+    for (const Vec3& m : marks) nodes.emplace_back(to_point(m) - middle);
+    std::vector<Vec3> around;
+    for (const Point& p : ellipsoid_around(nodes, Index(marks.size()), kAround[1]))
+        around.push_back({middle[0] + p[0], middle[1] + p[1], middle[2] + p[2]});
+    return around;
 }
 
 void Expansion::negate() {

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "image/support.h"
+#include "points/kd_tree.h"
 #include "segment/heuristics.h"
 
 namespace covol::pipeline {
@@ -59,6 +60,43 @@ void find_bias(Job& job, const std::vector<Vec3>& marks, const std::vector<doubl
         return;
     job.warn("the marks lie " + number(std::abs(bias) / job.h()) + " voxels " + (bias > 0 ? "outside" : "inside") +
              " the surface on the mean: it is too " + (bias > 0 ? "small" : "large"));
+}
+
+/// One place of the surface for each leaf that it passes.
+std::vector<Vec3> places_on(const FloatGrid& surface) {
+    std::vector<Vec3> places;
+    for (auto leaf = surface.tree().cbeginLeaf(); leaf; ++leaf) {
+        float least = float(surface.voxelSize()[0]);
+        openvdb::Coord at;
+        bool found = false;
+        for (auto value = leaf->cbeginValueOn(); value; ++value)
+            if (std::abs(*value) < least) {
+                least = std::abs(*value);
+                at = value.getCoord();
+                found = true;
+            }
+        if (!found) continue;
+        const openvdb::Vec3d world = surface.indexToWorld(at);
+        places.push_back({world[0], world[1], world[2]});
+    }
+    return places;
+}
+
+/// A surface through marks may bend least where it goes on for ever.
+void find_surface_beyond(Job& job, const std::vector<Vec3>& marks) {
+    const WorldBox box = bounding_box(marks);
+    const double diagonal = std::hypot(box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]);
+    const double far = kDoubts.far_diagonals * diagonal;
+    const std::vector<Vec3> places = places_on(*job.result.surface);
+    const detail::KdTree tree(marks);
+    const auto beyond =
+        std::count_if(places.begin(), places.end(), [&](const Vec3& place) { return tree.nearest(place) > far * far; });
+    const double share = double(beyond) / double(std::max<std::size_t>(1, places.size()));
+    job.report().surface_beyond_marks = share;
+    if (share > kDoubts.far_share)
+        job.warn(number(std::round(100 * share)) + " % of the surface lie farther than " + number(far) +
+                 ", half of what the marks measure across, from every mark: it goes on where nothing is marked; mark "
+                 "more there, or give a place outside the body (`outside`)");
 }
 
 /// Some of the marks, and the surface's normals there.
@@ -156,6 +194,7 @@ void doubt_isolated_marks(Job& job) {
 void doubt(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& distances) {
     find_marks_off(job, marks, distances);
     find_bias(job, marks, distances);
+    if (job.origin == StartOrigin::Guess) find_surface_beyond(job, marks);
     if (job.image == nullptr || !job.uses_image()) return;
     find_lost_precision(job);
     find_strange_image(job, marks);

@@ -105,6 +105,10 @@ struct DoubtsHeuristics {
     double bias_errors = heuristic("doubts.bias_errors", 4.0);
     /// [noises of a cloud] That far off there is something else.
     double off_noise = heuristic("doubts.off_noise", 4.0);
+    /// [diagonals of the marks' box] From every mark: there the surface is not the marks' any more.
+    double far_diagonals = heuristic("doubts.far_diagonals", 0.5);
+    /// [share of the surface] That far off.
+    double far_share = heuristic("doubts.far_share", 0.05);
     /// [share of the marks] That a surface may miss.
     double missed_share = heuristic("doubts.missed_share", 0.1);
     /// [share of the image's range] Of a step of single precision, above which borders are lost.

@@ -107,6 +107,31 @@ TEST_CASE("exact points are met without bias, however few") {
                 }
 }
 
+TEST_CASE("rough marks in thick slices enclose a body") {
+    // A knobbly body: by their energy alone many such surfaces run through the world and do not close.
+    const Shape shape = ellipsoid("ellipsoid", {18, 13, 16});
+    const Vec3 spacing{0.8, 0.8, 6.5};
+    int held = 0;
+    for (const int count : {20, 60})
+        for (unsigned seed = 1; seed <= 12; ++seed) {
+            std::vector<Vec3> marks = draw(shape, count, seed);
+            std::mt19937 random(seed);
+            std::uniform_real_distribution<double> off(-0.5, 0.5), knob(0.75, 1.25);
+            for (Vec3& mark : marks) {
+                const double times = knob(random);
+                for (int a = 0; a < 3; ++a) mark[a] = times * mark[a] + off(random) * spacing[a];
+            }
+            GuessReport report;
+            const FloatGridPtr guess = guess_from_marks(cube_domain(120, 1.0), marks, precision(spacing), report).u;
+            const double volume = measure(extract_mesh(*extract_surface(*guess), {})).volume / shape.volume;
+            held += report.held_around;
+            INFO(count << " marks, seed " << seed << ": volume " << volume << ", held " << report.held_around);
+            CHECK(volume > 0.5);
+            CHECK(volume < 2);
+        }
+    CHECK(held > 0);
+}
+
 TEST_CASE("what encloses nothing is refused with a reason") {
     const Domain domain = cube_domain(40, 1.0);
     GuessReport report;

@@ -187,6 +187,7 @@ Json to_json(const SegmentReport& r) {
             json["holes"]["loops"].push_back({{"length", loop.length}, {"edges", loop.edges}});
     }
     if (r.seeds.inside + r.seeds.outside > 0) json["seeds"] = to_json(r.seeds);
+    if (r.surface_beyond_marks) json["fit"]["surface_beyond_marks"] = *r.surface_beyond_marks;
     if (r.share_without_points > 0) json["fit"]["surface_without_points"] = r.share_without_points;
     return json;
 }
