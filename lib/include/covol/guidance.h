@@ -15,7 +15,8 @@ namespace covol {
 struct GuidanceOptions {
     /// a mark lies within half of this of the border it means, along each axis, >= 0; automatic: one voxel of the image
     std::optional<double> mark_precision;
-    /// how far from the guess the border is looked for, >= 0; automatic: by the distance to the marks
+    /// how far from the guess the border is looked for, >= 0, and so twice the deviation that it may have; automatic:
+    /// by the distance to the marks, and as far as the image says
     std::optional<double> range;
     double weight = 1;  ///< in [0,1]: share of what the image says that counts; 0 leaves the guess as it is
     /// Empty when usable, else one line for each bad field: "weight: expected 0 to 1, got 2".

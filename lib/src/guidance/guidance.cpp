@@ -353,10 +353,12 @@ std::vector<double> Guide::local_error2(const Word& word) const {
 void Guide::weigh(bool first) {
     const std::size_t count = patches_.size();
     const OffsetField field(patches_, std::max(spacing_, 4 * h_));
-    std::vector<double> distance2(count), least2(count);
+    std::vector<double> distance2(count), least2(count), most2(count, std::numeric_limits<double>::infinity());
     for (std::size_t i = 0; i < count; ++i) {
         distance2[i] = squared(to_mark_[i]);
-        least2[i] = squared(kGuide.share_of_sagitta * distance2[i] / (2 * size_));
+        const double sagitta = distance2[i] / (2 * size_);
+        least2[i] = squared(kGuide.share_of_sagitta * sagitta);
+        if (options_.range) most2[i] = squared(std::min(sagitta, 0.5 * *options_.range));
     }
     std::vector<Word> words;
     if (first) {
@@ -367,7 +369,8 @@ void Guide::weigh(bool first) {
     }
     double slope2 = 0;
     for (const Word& w : words) slope2 = std::max(slope2, w.slope2);
-    const double needed2 = guess2_ + std::max(slope2 * mean(distance2), mean(least2));
+    double needed2 = guess2_ + std::max(slope2 * mean(distance2), mean(least2));
+    if (options_.range) needed2 = std::min(needed2, guess2_ + mean(most2));
     Word chosen = words.front();
     for (const Word& w : words)
         if (w.response >= kGuide.least_response && w.prior2 >= needed2 &&
@@ -376,7 +379,8 @@ void Guide::weigh(bool first) {
     prior_ = std::sqrt(chosen.prior2);
 
     std::vector<double> guess2(count), deviation(count), zero(count, 0.0);
-    for (std::size_t i = 0; i < count; ++i) guess2[i] = guess2_ + std::max(slope2 * distance2[i], least2[i]);
+    for (std::size_t i = 0; i < count; ++i)
+        guess2[i] = guess2_ + std::min(std::max(slope2 * distance2[i], least2[i]), most2[i]);
     const double mean2 = mean(guess2);
     const std::vector<double> error2 = local_error2(chosen);
     for (std::size_t i = 0; i < count; ++i)

@@ -174,6 +174,11 @@ Trial try_in_child(const std::function<void()>& work, double seconds) {
         .front();
 }
 
+double most_seconds_for_pixels(std::uint64_t bytes) {
+    constexpr double kSecondsOfByte = 1e-6;
+    return kMostSecondsForHeader + kSecondsOfByte * double(bytes);
+}
+
 std::optional<Error> reading_error(const Trial& trial, const std::string& path, const char* library) {
     if (!trial.crashed) return trial.refused;
     return Error(Errc::InvalidInput, "read_image: " + path + ": damaged: the " + library + " library cannot read it");

@@ -49,6 +49,8 @@ Trial try_in_child(const std::function<void()>& work, double seconds);
 
 /// Seconds that a library may compute for a header, or a voxel: far beyond what sound files need.
 constexpr double kMostSecondsForHeader = 10;
+/// The same for pixels of so many bytes: text and JPEG 2000 take a twentieth of it.
+[[nodiscard]] double most_seconds_for_pixels(std::uint64_t bytes);
 
 /// Why `library` cannot read the image `path`; nothing where it can.
 std::optional<Error> reading_error(const Trial& trial, const std::string& path, const char* library);

@@ -148,7 +148,7 @@ void find_strange_image(Job& job, const std::vector<Vec3>& marks) {
     if (support.share + kDoubts.support_errors * support.error < kDoubts.image_support)
         job.warn("the image varies more five voxels beside the marks than where they lie (in " +
                  number(std::round(100 * (1 - support.share))) + " of 100 pairs)" + look);
-    else if (guidance.used && guidance.gain < kDoubts.least_gain)
+    else if (guidance.used && guidance.gain < kDoubts.least_gain && support.share < kDoubts.clear_support)
         job.warn("what the image shows at some marks hardly foretells where the others lie (gain " +
                  number(guidance.gain) + " nats a mark)" + look);
     else if (border.share < kDoubts.border_share && border.errors > kDoubts.border_errors)

@@ -84,6 +84,9 @@ void ask_image(Job& job) {
     GuidanceOptions options;
     if (job.options.mark_precision) options.mark_precision = *job.options.mark_precision / kUniformDeviation;
     options.weight = job.options.evolve.rho;
+    // The image may not say how wrong the body between contours is: where it shows another border, it says very.
+    if (job.origin == StartOrigin::Contours && job.options.contours->slice_distance > 0)
+        options.range = kFlow.contour_range * job.options.contours->slice_distance;
     GuidanceReport& report = job.report().guidance;
     job.result.u = guide(*job.result.u, marks, *job.image, options, report, job.run);
     job.choose("image", report.used ? "used" : "not used", report.reason);

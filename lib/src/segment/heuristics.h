@@ -73,6 +73,8 @@ struct FlowHeuristics {
     double least_of_grown = heuristic("flow.least_of_grown", 0.5);
     /// [voxels] Farther from its marks than the start: what flowed has left them.
     double leaves_voxels = heuristic("flow.leaves_voxels", 0.25);
+    /// [distances between marked slices] How far the image may move the body between contours in one pass.
+    double contour_range = heuristic("flow.contour_range", 0.25);
 };
 COVOL_HEURISTICS FlowHeuristics kFlow{};
 
@@ -129,6 +131,9 @@ struct DoubtsHeuristics {
     double border_errors = heuristic("doubts.border_errors", 4.0);
     /// [nats] Of guidance: 0 to 0.06 with noise in place of the image, 0.08 to 1.2 with marks of its own, on the same.
     double least_gain = heuristic("doubts.least_gain", 0.05);
+    /// [probability] The support above which a low gain alone says nothing: at most 0.62 where marks that were shifted,
+    /// mirrored or put anywhere have one, 0.59 to 0.86 for marks of their own on dim nuclei, which have one, too.
+    double clear_support = heuristic("doubts.clear_support", 0.65);
 };
 COVOL_HEURISTICS DoubtsHeuristics kDoubts{};
 

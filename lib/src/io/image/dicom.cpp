@@ -206,6 +206,7 @@ public:
 
     Pixels read(const PixelRequest& request, const RunContext& run) override {
         const Index3 n = request.box.size();
+        for (const Slice& slice : slices_) refuse_absurd_size(slice);
         const std::shared_ptr<void> data = allocate_pixels(path_, voxel_count(n), info_.type, 0);
         auto* out = static_cast<char*>(data.get());
         if (slices_.size() == 1) {
@@ -341,15 +342,12 @@ private:
     [[nodiscard]] std::vector<GdcmFile> packed_of(std::size_t begin, std::size_t count) const {
         std::vector<GdcmFile> files;
         for (std::size_t n = begin; n < begin + count; ++n)
-            if (const Slice& slice = slices_[n]; !slice.plain) {
-                refuse_absurd_size(slice);
+            if (const Slice& slice = slices_[n]; !slice.plain)
                 files.push_back({slice.path, unusable(slice), bytes_of(slice)});
-            }
         return files;
     }
 
     static std::vector<char> decode_plain(const Slice& slice) {
-        refuse_absurd_size(slice);
         const PixelPlace& place = slice.place;
         const std::uint64_t pixels = pixels_of(slice);
         std::vector<char> stored(pixels * place.stored_bytes()), values(bytes_of(slice));

@@ -84,11 +84,9 @@ GdcmPixels::GdcmPixels(const std::vector<GdcmFile>& files, const RunContext& run
             throw Error(Errc::InvalidInput, files[n].unusable);
         reader->read_all(memory_.data() + begin_[n]);
     };
-    constexpr double kSecondsOfByte = 1e-6;  // JPEG 2000 takes a twentieth of it
     std::uint64_t most = 0;
     for (const GdcmFile& file : files) most = std::max(most, file.bytes);
-    const double seconds = kMostSecondsForHeader + kSecondsOfByte * double(most);
-    const std::vector<Trial> trials = try_in_children(files.size(), decode, seconds, run);
+    const std::vector<Trial> trials = try_in_children(files.size(), decode, most_seconds_for_pixels(most), run);
     for (std::size_t n = 0; n < files.size(); ++n)
         if (const auto error = reading_error(trials[n], files[n].path, "GDCM")) throw Error(*error);
 }

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "base/file.h"
+#include "io/child.h"
 #include "io/hdf5/hdf5_file.h"
 #include "io/image/image_formats.h"
 #include "io/modules/modules.h"
@@ -274,7 +275,8 @@ void require_meta_header(const TextHeader& header, const std::string& unusable) 
         throw Error(Errc::InvalidInput, unusable + " (expected 1 to 10 as NDims, got " + dimensions + ")");
 }
 
-/// What only ITK reads: all at once, but HDF5, which is read in boxes.
+/// What only ITK reads: all at once, in a copy of the process, for its readers of text and of lists crash at damaged
+/// files; but HDF5 in boxes.
 class ItkFile : public ImageFile {
 public:
     ItkFile(std::string path, std::string unusable, ImageInfo info, std::unique_ptr<ItkReader> reader, bool in_boxes,
@@ -307,13 +309,17 @@ public:
         }
         const auto channels = std::uint64_t(info_.channels);
         const std::uint64_t frame = voxel_count(box.size()) * channels;
-        const std::shared_ptr<void> data =
-            allocate_pixels(path_, frame * std::uint64_t(info_.frames), info_.type, file_bytes_);
+        const std::uint64_t pixels_of_all = frame * std::uint64_t(info_.frames);
+        std::shared_ptr<void> data = allocate_pixels(path_, pixels_of_all, info_.type, file_bytes_);
         const auto count = std::accumulate(size.begin(), size.end(), std::uint64_t(1), std::multiplies<>());
         if (count != voxel_count(box.size()) * std::uint64_t(info_.frames)) throw Error(Errc::InvalidInput, unusable_);
-        std::optional<Hdf5Lock> lock;
-        if (in_boxes_) lock.emplace();
-        reader_->read(begin, size, data.get());
+        if (in_boxes_) {
+            const Hdf5Lock lock;
+            reader_->read(begin, size, data.get());
+        } else {
+            data = nullptr;
+            data = read_in_child(begin, size, pixels_of_all * pixel_bytes(info_.type));
+        }
         Pixels pixels;
         pixels.stride = dense_strides(box.size());
         std::uint64_t first = request.frame * frame + request.channel;
@@ -326,6 +332,15 @@ public:
     }
 
 private:
+    [[nodiscard]] std::shared_ptr<void> read_in_child(const std::vector<std::uint64_t>& begin,
+                                                      const std::vector<std::uint64_t>& size, std::uint64_t bytes) {
+        const auto memory = std::make_shared<SharedMemory>(bytes);
+        const Trial trial =
+            try_in_child([&] { reader_->read(begin, size, memory->data()); }, most_seconds_for_pixels(bytes));
+        if (const auto error = reading_error(trial, path_, "ITK")) throw Error(*error);
+        return {memory, memory->data()};
+    }
+
     std::string path_, unusable_;
     std::unique_ptr<ItkReader> reader_;
     bool in_boxes_;
@@ -364,7 +379,10 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path) {
     if (is_nifti) nifti.emplace(begin, unusable);
     std::optional<Hdf5Lock> lock;
     if (is_hdf5) lock.emplace();
-    std::unique_ptr<ItkReader> reader = reader_of(end)(path, unusable);
+    OpenWithItk* const open = reader_of(end);
+    // Its readers abort, or do not end, where headers contradict themselves; HDF5's was tried before.
+    if (!is_hdf5) try_reading(path, "ITK", [&] { (void)open(path, unusable); });
+    std::unique_ptr<ItkReader> reader = open(path, unusable);
     const ItkHeader& image = reader->header();
 
     ImageInfo info;

@@ -30,7 +30,7 @@ public:
             return false;
         const std::uint64_t block_bytes = width_ * height_ * samples_ * bytes_;
         const tmsize_t told = tiled_ ? TIFFTileSize(tiff_.get()) : TIFFStripSize(tiff_.get());
-        if (told < 0 || std::uint64_t(told) != block_bytes) return false;
+        if (told < 0 || std::uint64_t(told) != block_bytes || block_bytes > most_in_file()) return false;
         block_.resize(block_bytes);
         const auto first_x = std::uint64_t(box_.min[0]), first_y = std::uint64_t(box_.min[1]);
         for (std::uint64_t y = first_y / height_ * height_; y <= std::uint64_t(box_.max[1]); y += height_)
@@ -42,6 +42,14 @@ public:
     }
 
 private:
+    /// Bytes that the file can hold, by its own size.
+    [[nodiscard]] std::uint64_t most_in_file() const {
+        constexpr std::uint64_t kMostOfByte = 32768;  // zstd's, which is beyond those of the other codecs
+        const std::uint64_t bytes = TIFFGetSizeProc(tiff_.get())(TIFFClientdata(tiff_.get()));
+        const bool packed = tiff_.tag<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE) != COMPRESSION_NONE;
+        return packed ? kMostOfByte * bytes : bytes;
+    }
+
     bool decode(std::uint64_t x, std::uint64_t y) {
         const auto column = static_cast<std::uint32_t>(x), row = static_cast<std::uint32_t>(y);
         const auto plane = static_cast<std::uint16_t>(plane_);
