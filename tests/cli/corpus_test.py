@@ -1,24 +1,27 @@
 """Files that guided fuzzing found worth keeping: none crashes its reader, hangs it or makes it take memory."""
 import os
 import pathlib
+import shutil
 import subprocess
 import tarfile
 import tempfile
 import unittest
 
-CORPUS = pathlib.Path(__file__).resolve().parents[1] / "fuzz/corpus.tar.xz"
+FUZZ = pathlib.Path(__file__).resolve().parents[1] / "fuzz"
 
 
 class Corpus(unittest.TestCase):
     def test_each_file(self):
         with tempfile.TemporaryDirectory(prefix="covol-corpus-") as folder:
-            with tarfile.open(CORPUS) as archive:
+            with tarfile.open(FUZZ / "corpus.tar.xz") as archive:
                 archive.extractall(folder)
+            for path in (FUZZ / "regressions/pixels").iterdir():  # damaged behind their headers
+                shutil.copy(path, pathlib.Path(folder) / path.suffix[1:])
             formats = sorted(pathlib.Path(folder).iterdir())
             self.assertGreaterEqual(len(formats), 20)
             done = subprocess.run([os.environ["COVOL_READ_CORPUS"], folder], capture_output=True, text=True, errors="replace", timeout=600)
-            lines = done.stdout.splitlines()
-            self.assertEqual(done.returncode, 0, "\n".join(lines[-20:]) + done.stderr[-2000:])
+            lines = [line for line in done.stdout.splitlines() if folder in line]  # OpenVDB warns among them
+            self.assertEqual(done.returncode, 0, done.stdout[-2000:] + done.stderr[-2000:])
             self.assertEqual(len(lines), sum(len(list(one.iterdir())) for one in formats))
 
 
