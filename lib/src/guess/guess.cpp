@@ -70,20 +70,24 @@ double distance_to_nearest(const std::vector<Vec3>& marks, const Vec3& to) {
     return std::sqrt(squared);
 }
 
-/// Where the surface goes on beyond its marks, places around them become constraints, outside by about their distance:
-/// marks as few or as rough leave surfaces of less energy that run through the world and never close.
+/// Around the marks, as far as the world reaches.
+std::vector<Vec3> places_around(const std::vector<Vec3>& marks, double times, const GuessOptions& options) {
+    std::vector<Vec3> places = guess::points_around(marks, times);
+    std::erase_if(places, [&](const Vec3& place) {
+        for (int a = 0; a < 3 && options.end; ++a)
+            if (place[a] < options.end->min[a] || place[a] > options.end->max[a]) return true;
+        return false;
+    });
+    return places;
+}
+
+/// Where the surface goes on far beyond its marks, places around them become constraints, outside by about their
+/// distance: marks that are few or rough leave surfaces of less energy that run through the world and never close.
 /// @return whether it does
 bool hold_around(const guess::MarksSurface& surface, const GuessOptions& options, guess::ImpreciseMarks& known) {
-    std::vector<Vec3> around;
-    for (const Vec3& place : guess::points_around(known.marks)) {
-        bool in_world = true;
-        for (int a = 0; a < 3 && options.end; ++a)
-            in_world = in_world && place[a] >= options.end->min[a] && place[a] <= options.end->max[a];
-        if (in_world) around.push_back(place);
-    }
-    if (std::all_of(around.begin(), around.end(), [&](const Vec3& place) { return surface.value(place) > 0; }))
-        return false;
-    for (const Vec3& place : around) {
+    const std::vector<Vec3> far = places_around(known.marks, kGuess.runs_on, options);
+    if (std::all_of(far.begin(), far.end(), [&](const Vec3& place) { return surface.value(place) > 0; })) return false;
+    for (const Vec3& place : places_around(known.marks, kGuess.held_at, options)) {
         known.seeds.push_back(place);
         known.seed_value.push_back(distance_to_nearest(known.marks, place));
     }

@@ -14,6 +14,11 @@ struct GuessHeuristics {
     double least_slope = heuristic("guess.least_slope", 0.05);
     /// [rounds] Of telling marks in the cut from marks on the surface.
     int cut_rounds = heuristic("guess.cut_rounds", 2);
+    /// [ellipsoids around the marks] A surface that goes on beyond does not close; half a ball's marks close it
+    /// within 2.
+    double runs_on = heuristic("guess.runs_on", 3.0);
+    /// [ellipsoids around the marks] Where it is held then.
+    double held_at = heuristic("guess.held_at", 1.5);
     /// [rounds] Of holding seeds that lie on the wrong side.
     int seed_rounds = heuristic("guess.seed_rounds", 4);
     /// [marks] Off the cuts, to say what is inside of them.

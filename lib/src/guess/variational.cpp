@@ -311,13 +311,13 @@ bool span_space(const std::vector<Vec3>& marks) {
     return axes[0] > kVariational.flat * axes[2];
 }
 
-std::vector<Vec3> points_around(const std::vector<Vec3>& marks) {
+std::vector<Vec3> points_around(const std::vector<Vec3>& marks, double times) {
     Point middle = Point::Zero();
     for (const Vec3& m : marks) middle += to_point(m) / double(marks.size());
     std::vector<Point> nodes;
     for (const Vec3& m : marks) nodes.emplace_back(to_point(m) - middle);
     std::vector<Vec3> around;
-    for (const Point& p : ellipsoid_around(nodes, Index(marks.size()), kAround[1]))
+    for (const Point& p : ellipsoid_around(nodes, Index(marks.size()), times))
         around.push_back({middle[0] + p[0], middle[1] + p[1], middle[2] + p[2]});
     return around;
 }

@@ -9,9 +9,8 @@ namespace covol::guess {
 /// Whether marks can have a body between them: at least four, not all in one plane.
 [[nodiscard]] bool span_space(const std::vector<Vec3>& marks);
 
-/// Points on an ellipsoid around the marks, half as large again: a body that the marks are all over ends before.
-/// @pre span_space(marks)
-[[nodiscard]] std::vector<Vec3> points_around(const std::vector<Vec3>& marks);
+/// Points on an ellipsoid around the marks, times its size. @pre span_space(marks)
+[[nodiscard]] std::vector<Vec3> points_around(const std::vector<Vec3>& marks, double times);
 
 /// What a surface through marks has to meet. Lengths in one unit, any.
 struct Constraints {
