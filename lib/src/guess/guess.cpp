@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <utility>
 
@@ -64,12 +63,6 @@ bool hold_seeds(const guess::MarksSurface& surface, const GuessOptions& options,
     return any;
 }
 
-double distance_to_nearest(const std::vector<Vec3>& marks, const Vec3& to) {
-    double squared = std::numeric_limits<double>::infinity();
-    for (const Vec3& m : marks) squared = std::min(squared, detail::squared_distance(m, to));
-    return std::sqrt(squared);
-}
-
 /// Around the marks, as far as the world reaches.
 std::vector<Vec3> places_around(const std::vector<Vec3>& marks, double times, const GuessOptions& options) {
     std::vector<Vec3> places = guess::points_around(marks, times);
@@ -87,9 +80,10 @@ std::vector<Vec3> places_around(const std::vector<Vec3>& marks, double times, co
 bool hold_around(const guess::MarksSurface& surface, const GuessOptions& options, guess::ImpreciseMarks& known) {
     const std::vector<Vec3> far = places_around(known.marks, kGuess.runs_on, options);
     if (std::all_of(far.begin(), far.end(), [&](const Vec3& place) { return surface.value(place) > 0; })) return false;
+    const detail::KdTree tree(known.marks);
     for (const Vec3& place : places_around(known.marks, kGuess.held_at, options)) {
         known.seeds.push_back(place);
-        known.seed_value.push_back(distance_to_nearest(known.marks, place));
+        known.seed_value.push_back(std::sqrt(tree.nearest(place)));
     }
     return true;
 }

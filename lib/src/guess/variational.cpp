@@ -24,7 +24,7 @@ using Point = Eigen::Vector3d;
 
 constexpr int kPolynomial = 4;  // 1, x, y, z: what the energy does not see
 constexpr double kLocalShares[] = {0.5, 0.25, 0.125};
-constexpr double kAround[] = {1.15, 1.5};
+constexpr double kAround[] = {1.15, 1.5};  // of the farthest mark
 
 /// Least-energy interpolation at fixed nodes: the energy of values v and gradients g is that of
 /// g^T H g + 2 c^T g + constant.

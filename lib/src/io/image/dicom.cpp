@@ -211,21 +211,15 @@ public:
         auto* out = static_cast<char*>(data.get());
         if (slices_.size() == 1) {
             const Index3& size = info_.geometry.size;
-            const Decoded decoded(*this, 0, 1, run);
-            for (int k = request.box.min[2]; k <= request.box.max[2]; ++k)
-                out = copy(slices_.front(), decoded.of(0),
-                           std::uint64_t(k) * std::uint64_t(size[0]) * std::uint64_t(size[1]), request, out);
-            return {data, dense_strides(n), false};
-        }
-        constexpr std::uint64_t kMostAtOnce = std::uint64_t(256) << 20;
-        const auto end = std::size_t(request.box.max[2]) + 1;
-        const std::uint64_t most = kMostAtOnce / bytes_of(slices_.front());
-        for (auto begin = std::size_t(request.box.min[2]); begin < end;) {
-            run.report("image", double(begin - std::size_t(request.box.min[2])) / double(n[2]));
-            const std::size_t count = std::clamp<std::size_t>(most, 1, end - begin);
-            const Decoded decoded(*this, begin, count, run);
-            for (std::size_t k = 0; k < count; ++k) out = copy(slices_[begin + k], decoded.of(k), 0, request, out);
-            begin += count;
+            for_each_decoded(0, 1, run, [&](const Slice& slice, const char* pixels) {
+                for (int k = request.box.min[2]; k <= request.box.max[2]; ++k)
+                    out = copy(slice, pixels, std::uint64_t(k) * std::uint64_t(size[0]) * std::uint64_t(size[1]),
+                               request, out);
+            });
+        } else {
+            for_each_decoded(
+                std::size_t(request.box.min[2]), std::size_t(request.box.max[2]) + 1, run,
+                [&](const Slice& slice, const char* pixels) { out = copy(slice, pixels, 0, request, out); });
         }
         return {data, dense_strides(n), false};
     }
@@ -305,25 +299,23 @@ private:
         }
     }
 
-    /// All pixels of some files, rescaled.
-    class Decoded {
-    public:
-        Decoded(const DicomSeries& series, std::size_t begin, std::size_t count, const RunContext& run)
-            : plain_(count), packed_(series.packed_of(begin, count), run), pixels_(count) {
-            for (std::size_t n = 0, packed = 0; n < count; ++n) {
+    /// Calls use(slice, pixels) for slices [begin, end) with all pixels of each, rescaled: plain ones one by one,
+    /// packed ones some at once.
+    template <typename Use>
+    void for_each_decoded(std::size_t begin, std::size_t end, const RunContext& run, const Use& use) const {
+        constexpr std::uint64_t kMostAtOnce = std::uint64_t(256) << 20;
+        const std::uint64_t most = kMostAtOnce / bytes_of(slices_.front());
+        for (std::size_t first = begin; first < end;) {
+            run.report("image", double(first - begin) / double(end - begin));
+            const std::size_t last = first + std::clamp<std::size_t>(most, 1, end - first);
+            const GdcmPixels packed(packed_of(first, last), run);
+            for (std::size_t next = 0; first < last; ++first) {
                 run.check();
-                const Slice& slice = series.slices_[begin + n];
-                if (slice.plain) plain_[n] = decode_plain(slice);
-                pixels_[n] = slice.plain ? plain_[n].data() : packed_.of(packed++);
+                const Slice& slice = slices_[first];
+                use(slice, slice.plain ? decode_plain(slice).data() : packed.of(next++));
             }
         }
-        [[nodiscard]] const char* of(std::size_t n) const { return pixels_[n]; }
-
-    private:
-        std::vector<std::vector<char>> plain_;
-        GdcmPixels packed_;
-        std::vector<const char*> pixels_;
-    };
+    }
 
     [[nodiscard]] static std::uint64_t pixels_of(const Slice& slice) {
         return voxel_count(slice.size) * slice.components;
@@ -339,9 +331,9 @@ private:
     }
 
     /// Those that GDCM decodes.
-    [[nodiscard]] std::vector<GdcmFile> packed_of(std::size_t begin, std::size_t count) const {
+    [[nodiscard]] std::vector<GdcmFile> packed_of(std::size_t begin, std::size_t end) const {
         std::vector<GdcmFile> files;
-        for (std::size_t n = begin; n < begin + count; ++n)
+        for (std::size_t n = begin; n < end; ++n)
             if (const Slice& slice = slices_[n]; !slice.plain)
                 files.push_back({slice.path, unusable(slice), bytes_of(slice)});
         return files;

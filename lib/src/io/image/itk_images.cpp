@@ -317,7 +317,6 @@ public:
             const Hdf5Lock lock;
             reader_->read(begin, size, data.get());
         } else {
-            data = nullptr;
             data = read_in_child(begin, size, pixels_of_all * pixel_bytes(info_.type));
         }
         Pixels pixels;
