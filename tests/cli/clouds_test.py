@@ -62,9 +62,14 @@ class Few(Clouds):
                     share = surface["volume"] / (4 / 3 * math.pi * RADIUS ** 3)
                     self.assertAlmostEqual(share, 1, delta=within)
 
-    def test_from_a_thousand_on_the_spacing_is_the_voxel_size(self):
-        done = self.reconstruct(random_sphere(1200, 1))
-        self.assertIn("(the median distance between neighbouring points)", json.loads(done.stdout)["automatic"]["voxel_size"])
+    def test_voxels_are_finer_than_few_points_lie_apart(self):
+        for more, times in (((), 2), (("--model", "paper"), 1)):
+            done = self.reconstruct(random_sphere(1000, 1), *more)
+            said = json.loads(done.stdout)["automatic"]["voxel_size"]
+            h, reason = re.fullmatch(r"([0-9.]+) \((.*)\)", said).groups()
+            spacing = float(h) * times if times == 1 else float(re.search(r"points, ([0-9.]+),", reason).group(1))
+            self.assertAlmostEqual(spacing / float(h), times, places=4)
+            self.assertTrue(reason.startswith("finer than the" if times > 1 else "the median distance between neighbouring points"))
 
     def test_two_dozen(self):
         for seed in range(8):
@@ -83,6 +88,96 @@ class Few(Clouds):
 
 def shell_share(surface):
     return surface["volume"] / (4 / 3 * math.pi * RADIUS ** 3)
+
+
+def random_knot(count, tube, noise, seed):
+    """Points on a trefoil's tube, off it by `noise`. @return them, and the tube's volume"""
+    draw = random.Random(seed)
+    at = lambda t: (math.sin(t) + 2 * math.sin(2 * t), math.cos(t) - 2 * math.cos(2 * t), -math.sin(3 * t))
+    along = lambda t: (math.cos(t) + 4 * math.cos(2 * t), -math.sin(t) + 4 * math.sin(2 * t), -3 * math.cos(3 * t))
+    points = []
+    while len(points) < count:
+        t = 2 * math.pi * draw.random()
+        tangent = along(t)
+        if 6 * draw.random() > math.hypot(*tangent):
+            continue  # evenly along the knot
+        unit = [x / math.hypot(*tangent) for x in tangent]
+        across = [draw.gauss(0, 1) for _ in range(3)]
+        share = sum(a * b for a, b in zip(across, unit))
+        across = [a - share * b for a, b in zip(across, unit)]
+        radius = (tube + noise * draw.gauss(0, 1)) / math.hypot(*across)
+        points.append(tuple(c + radius * a for c, a in zip(at(t), across)))
+    places = [at(2 * math.pi * n / 3000) for n in range(3001)]
+    return points, math.pi * tube ** 2 * sum(map(math.dist, places, places[1:]))
+
+
+def random_bowl(count, thickness, noise, seed):
+    """Points on half a hollow ball of radius 1, its rim included, off it by `noise`. @return them, and its volume"""
+    draw, inner = random.Random(seed), 1 - thickness
+    areas = (2 * math.pi, 2 * math.pi * inner ** 2, math.pi * (1 - inner ** 2))
+    points = []
+    while len(points) < count:
+        side, off = draw.choices(range(3), areas)[0], noise * draw.gauss(0, 1)
+        if side < 2:
+            v = [draw.gauss(0, 1) for _ in range(3)]
+            radius = ((1, inner)[side] + off) / math.hypot(*v)
+            points.append((radius * v[0], radius * v[1], -radius * abs(v[2])))
+        else:
+            radius, angle = math.sqrt(inner ** 2 + (1 - inner ** 2) * draw.random()), 2 * math.pi * draw.random()
+            points.append((radius * math.cos(angle), radius * math.sin(angle), off))
+    return points, 2 / 3 * math.pi * (1 - inner ** 3)
+
+
+class Thin(Clouds):
+    """A few hundred points on bodies that bend more than their points lie apart: none of it is taken for noise."""
+
+    def check(self, made, genus, within):
+        points, volume = made
+        surface = self.surface(points)
+        self.assertEqual((surface["components"], surface["genus"]), (1, genus))
+        self.assertAlmostEqual(surface["volume"] / volume, 1, delta=within)
+
+    def test_knot(self):
+        for seed in range(3):
+            for count, noise, within in ((400, 0, 0.04), (600, 0.01, 0.03), (1500, 0.03, 0.03)):
+                with self.subTest(count=count, noise=noise, seed=seed):
+                    self.check(random_knot(count, 0.4, noise, seed), 1, within)
+
+    def test_bowl(self):
+        for seed in range(3):
+            for count, noise, within in ((300, 0, 0.06), (600, 0, 0.03), (600, 0.01, 0.05), (1500, 0.01, 0.03)):
+                with self.subTest(count=count, noise=noise, seed=seed):
+                    self.check(random_bowl(count, 0.15, noise, seed), 0, within)
+
+    def test_a_wall_that_noise_pierces_is_doubted(self):
+        points, _ = random_bowl(600, 0.15, 0.03, 1)
+        done = self.reconstruct(points)
+        self.assertIn("handles", " ".join(json.loads(done.stdout).get("warnings", [])))
+
+    def test_noise_is_told_from_shape(self):
+        # The mean distance of the surface to the ball is less than half of what the points are off.
+        points = [tuple(x * (1 + 0.03 * random.Random(n).gauss(0, 1)) for x in p) for n, p in enumerate(random_sphere(1500, 2))]
+        self.assertEqual(self.reconstruct(points, "--mesh", "s.ply").returncode, 0)
+        write_xyz(self.out / "ball.xyz", random_sphere(5000, 3))
+        done = subprocess.run([COVOL, "compare", "ball.xyz", "s.ply", "--quiet", "--json", "-"], cwd=self.out, capture_output=True,
+                              text=True, timeout=300)
+        self.assertLess(json.loads(done.stdout)["fit"]["points_to_surface"]["mean"], 0.5 * 0.03 * RADIUS * math.sqrt(2 / math.pi))
+
+
+def random_folds(count, waves, depth, seed):
+    """Points, evenly by area, on the unit sphere with folds along its normals."""
+    draw = random.Random(seed)
+    unit = lambda v: [x / math.hypot(*v) for x in v]
+    cross = lambda a, b: (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+    at = lambda v: [(1 + depth * math.cos(waves * v[0]) * math.cos(waves * v[1]) * math.cos(waves * v[2])) * x for x in v]
+    away = lambda v, side: [(a - b) / 1e-4 for a, b in zip(at(unit([x + 1e-4 * y for x, y in zip(v, side)])), at(v))]
+    points = []
+    while len(points) < count:
+        v = unit([draw.gauss(0, 1) for _ in range(3)])
+        side = unit(cross(v, (1, 0, 0) if abs(v[0]) < 0.7 else (0, 1, 0)))
+        if 9 * draw.random() < math.hypot(*cross(away(v, side), away(v, cross(v, side)))):
+            points.append(tuple(at(v)))
+    return points
 
 
 class Many(Clouds):
@@ -121,6 +216,13 @@ class Many(Clouds):
         self.assertIn("from every point", done.stderr)
         surface = json.loads(done.stdout)["surface"]
         self.assertEqual((surface["closed"], surface["components"], surface["genus"]), (True, 1, 0))
+
+    def test_folds_are_no_views(self):
+        # Deep folds with their bottom open: normals waver in them, and what can be seen from outside is a ball.
+        points = [p for p in random_folds(14000, 16, 0.3, 2) if p[2] > -0.6]
+        report = json.loads(self.reconstruct(points).stdout)
+        self.assertTrue(report["cloud"]["encloses"])
+        self.assertLess(report["fit"]["points_to_surface"]["mean"], 0.8 * report["resolved"]["voxel_size"])
 
     def test_few_points_when_asked(self):
         report = self.report(random_sphere(800, 6), "--init", "cloud")

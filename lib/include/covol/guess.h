@@ -18,6 +18,8 @@ struct GuessOptions {
     /// Standard deviation of a mark along three directions, as world vectors (an image's axes, times a share of its
     /// spacing).
     std::array<Vec3, 3> deviation{};
+    /// The largest that it may be, where marks fit each other badly; up to `deviation`: as it is said.
+    double most_deviation = 0;
     std::vector<Vec3> inside, outside;  ///< places whose side is known
     /// The world's end: where the body is cut off. Marks in the cut are told from marks on the surface.
     std::optional<WorldBox> end;

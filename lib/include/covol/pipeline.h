@@ -86,6 +86,9 @@ struct SegmentOptions {
     /// levels of voxel size 2h, 4h, ... that the flow passes first, >= 0; automatic: 1 for a sphere or a box, else 0
     std::optional<int> coarse_levels;
     [[nodiscard]] COVOL_API std::string why_invalid() const;
+    /// Whether points alone are tagged, or belong to contours or another start, and are neither guessed from nor a
+    /// cloud: choose_voxel_size().
+    [[nodiscard]] COVOL_API bool tags_points() const;
 };
 
 struct SegmentReport {
@@ -161,8 +164,11 @@ public:
 };
 
 /// h and how it was found: the image's smallest spacing, or for points alone the median distance to the nearest other
-/// point, coarser where the scan is noisy (measure_cloud_scale(); for tagging choose_scan_voxel_size()), finer by
-/// sqrt(n / 1000) for n < 1000 points. @throws Error InvalidInput when there are fewer than two distinct points.
+/// point. More than 4,000 points that are noisy get a coarser one (measure_cloud_scale()), up to 4,000 a finer one, by
+/// sqrt(n / 4000): the surface between them is known. `tagged`: the surface is found by neither a guess nor a cloud,
+/// but by tagging, contours or another start; up to 4,000 points get a coarser one where they are noisy
+/// (choose_scan_voxel_size()), or a finer one by sqrt(n / 1000).
+/// @throws Error InvalidInput when there are fewer than two distinct points.
 struct VoxelSizeChoice {
     double voxel_size = 0;
     std::string reason;  ///< one line for people

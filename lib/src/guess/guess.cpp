@@ -41,6 +41,8 @@ guess::ImpreciseMarks imprecise(const std::vector<Vec3>& marks, const GuessOptio
     guess::ImpreciseMarks result;
     result.marks = marks;
     result.deviation = options.deviation;
+    if (const double said = longest(options.deviation); options.most_deviation > said && said > 0)
+        result.most_factor = options.most_deviation * options.most_deviation / (said * said);
     if (options.end) result.world = &*options.end;
     return result;
 }

@@ -57,6 +57,8 @@ struct MarksSurfaceHeuristics {
     std::size_t core_marks = heuristic("marks_surface.core_marks", 12);
     /// [ratio] Between variances of the marks that are tried.
     double variance_step = heuristic("marks_surface.variance_step", 4);
+    /// [parts] That are asked how imprecise marks are.
+    std::size_t tried_parts = heuristic("marks_surface.tried_parts", 16);
     /// [of the given variance] Below which marks are exact.
     double least_factor = heuristic("marks_surface.least_factor", 1e-3);
     /// [of a part's weight at its centre] Of the whole among parts.

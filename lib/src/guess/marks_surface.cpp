@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <numeric>
 
 #include "guess/heuristics.h"
 #include "guess/wendland.h"
@@ -37,8 +38,7 @@ std::vector<std::size_t> spread_out(const std::vector<Vec3>& points, std::size_t
 }
 
 /// The part of the marks with these numbers, with the variance along the normals where these are known.
-Constraints part_of(const ImpreciseMarks& all, const std::vector<std::size_t>& chosen,
-                    const std::vector<Vec3>& normals) {
+Constraints part_of(const ImpreciseMarks& all, const std::vector<std::size_t>& chosen, const Normals& normals) {
     Constraints part;
     const double mean_variance = (dot(all.deviation[0], all.deviation[0]) + dot(all.deviation[1], all.deviation[1]) +
                                   dot(all.deviation[2], all.deviation[2])) /
@@ -91,9 +91,10 @@ struct LikeliestVariance {
     std::unique_ptr<VariationalSurface> surface;  ///< with it
 };
 
-/// Exact marks are likelier by a factor of sqrt(kMarks.variance_step) each with a variance that is kMarks.variance_step
-/// times smaller; a step is taken where they show half of that. (What is said is never enlarged: a surface that is
-/// truly rough looks like imprecise marks.)
+/// What is enough to believe in another variance: exact marks are likelier by a factor of sqrt(kMarks.variance_step)
+/// each with a variance that is kMarks.variance_step times smaller; a step is taken where they show half of that.
+double step_shows(double marks) { return 0.5 * 0.5 * marks * std::log(kMarks.variance_step); }
+
 LikeliestVariance likeliest_variance(const VariationalSurface& said, const ImpreciseMarks& marks,
                                      const std::vector<std::size_t>& chosen,
                                      const std::function<Constraints(Constraints)>& complete, const RunContext& run) {
@@ -101,9 +102,9 @@ LikeliestVariance likeliest_variance(const VariationalSurface& said, const Impre
     const auto with = [&](double factor) {
         Constraints part = complete(part_of(marks, chosen, normals));
         for (double& v : part.variance) v *= factor;
-        return std::make_unique<VariationalSurface>(part, at(normals, chosen));
+        return std::make_unique<VariationalSurface>(part, at(normals, chosen), Search::Near);
     };
-    const double enough = 0.5 * 0.5 * double(chosen.size()) * std::log(kMarks.variance_step);
+    const double enough = step_shows(double(chosen.size()));
     LikeliestVariance best{1, with(1)};
     while (best.factor > kMarks.least_factor) {
         run.check();
@@ -112,6 +113,34 @@ LikeliestVariance likeliest_variance(const VariationalSurface& said, const Impre
         best = {best.factor / kMarks.variance_step, std::move(finer)};
     }
     return best;
+}
+
+/// The share of their variance, at least 1, that marks likely have that fit each other worse than was said: of
+/// neighbourhoods, which are dense enough to tell what is imprecise from what is rough.
+double likeliest_coarser_factor(const ImpreciseMarks& marks, const Normals& normals, const RunContext& run) {
+    const std::vector<std::size_t> centers = spread_out(marks.marks, kMarks.tried_parts);
+    std::vector<std::vector<std::size_t>> near;
+    for (const std::size_t center : centers) near.push_back(nearest(marks.marks, center, kMarks.patch_marks));
+    const auto log_likelihood = [&](double factor) {
+        run.check();
+        std::vector<double> of_part(near.size());
+        tbb::parallel_for(std::size_t(0), near.size(), [&](std::size_t n) {
+            Constraints part = part_of(marks, near[n], normals);
+            for (double& v : part.variance) v *= factor;
+            of_part[n] = VariationalSurface(part, at(normals, near[n]), Search::Near).log_likelihood();
+        });
+        return std::accumulate(of_part.begin(), of_part.end(), 0.0);
+    };
+    const double enough = step_shows(double(near.size() * near.front().size()));
+    double factor = 1, best = log_likelihood(1);
+    while (factor < marks.most_factor) {
+        const double coarser = std::min(factor * kMarks.variance_step, marks.most_factor);
+        const double likelihood = log_likelihood(coarser);
+        if (likelihood - best < enough) break;
+        factor = coarser;
+        best = likelihood;
+    }
+    return factor;
 }
 
 }  // namespace
@@ -131,16 +160,23 @@ MarksSurface::MarksSurface(const ImpreciseMarks& marks, const RunContext& run) {
     };
     const std::vector<std::size_t> few = spread_out(marks.marks, kMarks.oriented);
     const Constraints unoriented = with_seeds(part_of(marks, few, {}));
-    const VariationalSurface first(unoriented);
+    const VariationalSurface first(unoriented, {}, Search::Wide);
     const LikeliestVariance likeliest = likeliest_variance(first, marks, few, with_seeds, run);
     const VariationalSurface& oriented = *likeliest.surface;
     variance_factor_ = likeliest.factor;
-    const std::vector<Vec3> normals = normals_of(oriented, marks.marks);
     const std::vector<std::size_t> many = spread_out(marks.marks, kMarks.whole);
-    const Constraints part = with_factor(with_seeds(part_of(marks, many, normals)));
-    whole_ = std::make_unique<VariationalSurface>(part, at(normals, many), oriented.amplitude());
-    offset_ = mean_value(*whole_, part);
-    run.check();
+    const auto make_whole = [&](const Normals& normals, double amplitude) {
+        const Constraints part = with_factor(with_seeds(part_of(marks, many, normals)));
+        whole_ = std::make_unique<VariationalSurface>(part, at(normals, many), Search::Wide, amplitude);
+        offset_ = mean_value(*whole_, part);
+        run.check();
+    };
+    make_whole(normals_of(oriented, marks.marks), oriented.amplitude());
+    if (marks.most_factor > 1 && variance_factor_ == 1) {
+        const Normals normals = normals_of(*whole_, marks.marks);
+        variance_factor_ = likeliest_coarser_factor(marks, normals, run);
+        if (variance_factor_ > 1) make_whole(normals, 0);
+    }
     if (marks.marks.size() > kMarks.whole) make_patches(marks, run);
 }
 
@@ -170,9 +206,9 @@ void MarksSurface::make_patches(const ImpreciseMarks& marks, const RunContext& r
             part.known_value.push_back(whole_->value(mark) - offset_);
             part.known_gradient.push_back(whole_->gradient(mark));
         }
-        made[p] =
-            std::make_unique<Patch>(Patch{marks.marks[places[p].center], places[p].radius,
-                                          VariationalSurface(part, at(normals, places[p].marks), whole_->amplitude())});
+        made[p] = std::make_unique<Patch>(
+            Patch{marks.marks[places[p].center], places[p].radius,
+                  VariationalSurface(part, at(normals, places[p].marks), Search::Near, whole_->amplitude())});
     });
     run.check();
     for (auto& patch : made) patches_.push_back(std::move(*patch));

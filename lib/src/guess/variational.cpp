@@ -269,20 +269,25 @@ Vector away_from_neighbours(const std::vector<Point>& nodes, Index marks, double
     return directions;
 }
 
-/// Of first guesses the one that ends at the least energy. A body ends: where some ends have one sign all around, far
-/// from the marks, the others are no bodies.
+/// Of first guesses, `known` ones among them unless there are none, the one that ends at the least energy. A body ends:
+/// where some ends have one sign all around, far from the marks, the others are no bodies.
 Gradients least_energy(const HermiteSystem& system, const Vector& values, const Vector& c,
-                       const std::vector<Point>& nodes, Index marks, const Vector& outward, const Inside& in_world) {
-    std::vector<Gradients> ends{descend(system.energy(), c, outward)};
+                       const std::vector<Point>& nodes, Index marks, const Vector& outward, const Vector& known,
+                       const Inside& in_world) {
+    std::vector<Vector> guesses{outward};
+    if (known.size() > 0) guesses.push_back(known);
     for (const double share : kLocalShares)
         if (share * double(marks) >= kVariational.least_local)
-            ends.push_back(descend(system.energy(), c, away_from_neighbours(nodes, marks, share)));
+            guesses.push_back(away_from_neighbours(nodes, marks, share));
     const Matrix modes = flattest_modes(system.energy(), outward);
-    for (Index k = 0; k < std::min<Index>(kVariational.modes, modes.cols()); ++k)
-        ends.push_back(descend(system.energy(), c, modes.col(k)));
-    Gradients best;
-    for (Gradients& end : ends) {
+    for (Index k = 0; k < std::min<Index>(kVariational.modes, modes.cols()); ++k) guesses.push_back(modes.col(k));
+    std::vector<Gradients> ends(guesses.size());
+    tbb::parallel_for(std::size_t(0), guesses.size(), [&](std::size_t n) {
+        Gradients& end = ends[n] = descend(system.energy(), c, guesses[n]);
         end.closed = has_one_sign_around(nodes, marks, expansion(system, values, end.unit, nodes), in_world);
+    });
+    Gradients best;
+    for (const Gradients& end : ends) {
         const bool better = end.closed != best.closed ? end.closed : end.energy < best.energy;
         if (better || !std::isfinite(best.energy)) best = end;
     }
@@ -340,8 +345,9 @@ void Expansion::row(const double* from, const double* step, int count, double* v
     }
 }
 
-VariationalSurface::VariationalSurface(const Constraints& given, const std::vector<Vec3>& normals, double amplitude) {
-    if (normals.empty()) check_spread(given.marks);  // a part of a surface may be flat
+VariationalSurface::VariationalSurface(const Constraints& given, const Normals& normals, Search search,
+                                       double amplitude) {
+    if (search == Search::Wide) check_spread(given.marks);  // a part of a surface may be flat
     const auto marks = Index(given.marks.size()), count = marks + Index(given.seeds.size());
     for (const Vec3& m : given.marks)
         for (int a = 0; a < 3; ++a) center_[a] += m[a] / double(marks);
@@ -384,8 +390,8 @@ VariationalSurface::VariationalSurface(const Constraints& given, const std::vect
         if (round > 0)
             found = descend(system.energy(), c, found.unit);
         else
-            found = normals.empty() ? least_energy(system, values, c, nodes, marks, outward, in_world)
-                                    : descend(system.energy(), c, known);
+            found = search == Search::Wide ? least_energy(system, values, c, nodes, marks, outward, known, in_world)
+                                           : descend(system.energy(), c, known);
         if (round + 1 == rounds) f_ = expansion(system, values, found.unit - before, nodes);
         if (amplitude > 0) continue;
         unit_amplitude = std::max((found.energy + constant) / system.freedom(), 1e-12);
@@ -393,7 +399,7 @@ VariationalSurface::VariationalSurface(const Constraints& given, const std::vect
     }
     amplitude_ = unit_amplitude / radius_;
     // Without seeds nothing tells the sides apart but that the outside goes on for ever.
-    if (given.seeds.empty() && normals.empty() && given.known_value.empty()) {
+    if (given.seeds.empty() && search == Search::Wide) {
         double far = 0;
         for (int corner = 0; corner < 8; ++corner)
             far += value({center_[0] + (corner & 4 ? 3 : -3) * radius_, center_[1] + (corner & 2 ? 3 : -3) * radius_,

@@ -35,6 +35,14 @@ struct Expansion {
     void negate();
 };
 
+using Normals = std::vector<Vec3>;  ///< of each mark
+
+/// Where the gradients of least energy are looked for.
+enum class Search {
+    Near,  ///< beside the first guess
+    Wide,  ///< beside others, too
+};
+
 /// The function whose zero level set passes the marks and bends least: variational implicit surfaces from points
 /// without normals (Huang, Carr, Ju, "Variational implicit point set surfaces", ACM Trans. Graph. 38(4), 2019).
 ///
@@ -47,14 +55,13 @@ struct Expansion {
 /// value given the marks: energy over its degrees of freedom.
 class VariationalSurface {
 public:
-    /// @param normals  a first guess of the gradients' directions, or empty: then several are tried (the flattest modes
-    /// of the
-    ///                 energy, and away from the centroid)
+    /// @param normals  a first guess of the gradients' directions, or empty
+    /// @param search   whether others are tried as well (the flattest modes of the energy, away from the centroid, away
+    ///                 from neighbours): of the ends that close, the one of least energy is kept
     /// @param amplitude  variance of f per length: f is as likely as amplitude * |x|^3 is its covariance; 0: from the
     /// marks
     /// @throws Error InvalidInput (fewer than four distinct marks, or all in one plane); Numerical.
-    explicit VariationalSurface(const Constraints& constraints, const std::vector<Vec3>& normals = {},
-                                double amplitude = 0);
+    VariationalSurface(const Constraints& constraints, const Normals& normals, Search search, double amplitude = 0);
 
     /// About a distance beside the marks; negative inside (the side that does not reach to infinity).
     [[nodiscard]] double value(const Vec3& at) const;

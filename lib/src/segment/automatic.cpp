@@ -144,7 +144,7 @@ void choose_values(Job& job) {
     if (!options.voxel_size) {
         options.voxel_size_may_grow = true;
         const VoxelSizeChoice choice =
-            job.image != nullptr ? choose_voxel_size(*job.image) : choose_voxel_size(job.points, job.tags());
+            job.image != nullptr ? choose_voxel_size(*job.image) : choose_voxel_size(job.points, options.tags_points());
         options.voxel_size = choice.voxel_size;
         job.choose("voxel_size", number(job.h()), choice.reason);
     }
@@ -189,24 +189,28 @@ VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool ta
     if (distinct.size() < 2)
         throw Error(Errc::InvalidInput, "choose_voxel_size: expected an image or at least 2 distinct points, got " +
                                             std::to_string(distinct.size()));
-    constexpr const char* kNearest = "the median distance between neighbouring points";
-    if (!tagged && distinct.size() > kAutomatic.most_guess_marks) {
+    const auto nearest = [](double spacing) {
+        return VoxelSizeChoice{spacing, "the median distance between neighbouring points"};
+    };
+    const auto finer = [&](double spacing, double enough) {
+        const double times = std::sqrt(double(distinct.size()) / enough);
+        if (times >= 1) return nearest(spacing);
+        return VoxelSizeChoice{times * spacing, "finer than the median distance between neighbouring points, " +
+                                                    number(spacing) + ", for there are few"};
+    };
+    if (distinct.size() > kAutomatic.most_guess_marks) {
         const CloudScale scale = measure_cloud_scale(distinct);
         const double h = kAutomatic.cloud_noise * scale.noise;
-        if (h > scale.nearest)
-            return {h, number(kAutomatic.cloud_noise) + " times the noise of the points, " + number(scale.noise)};
-        return {scale.nearest, kNearest};
+        if (h <= scale.nearest) return nearest(scale.nearest);
+        return {h, number(kAutomatic.cloud_noise) + " times the noise of the points, " + number(scale.noise)};
     }
     const double spacing = measure_spacing(distinct).median;
+    // A guess is known between its points, noise or not: it has as many voxels as one of the most points.
+    if (!tagged) return finer(spacing, double(kAutomatic.most_guess_marks));
     const ScanVoxelSize scan = choose_scan_voxel_size(distinct, spacing);
-    if (scan.voxel_size <= spacing) {
-        // A surface of few points is so few spacings wide that in voxels as large as they are curvature would outweigh
-        // them.
-        const double finer = std::sqrt(double(distinct.size()) / kAutomatic.few_points);
-        if (finer >= 1) return {spacing, kNearest};
-        return {finer * spacing, "finer than the median distance between neighbouring points, " + number(spacing) +
-                                     ", for there are few"};
-    }
+    // A surface of few points is so few spacings wide that in voxels as large as they are curvature would outweigh
+    // them.
+    if (scan.voxel_size <= spacing) return finer(spacing, kAutomatic.few_points);
     return {scan.voxel_size, "points lie " + number(scan.thickness) +
                                  " from their local plane on the mean, noise wider than their median distance " +
                                  number(spacing)};

@@ -176,6 +176,12 @@ void make_surface(Job& job) {
         job.warn(
             "the surface through the marks falls into " + std::to_string(report.surface.components) +
             " pieces: where they are one body, mark between them; several bodies are better marked each by itself");
+    if (const int genus = report.surface.genus; job.origin == StartOrigin::Guess && genus > 1 &&
+                                                double(report.guess.marks) < kFinal.marks_of_handle * double(genus))
+        job.warn(
+            "the surface has " + std::to_string(genus) + " handles on " + std::to_string(report.guess.marks) +
+            " marks: where the body has no holes its walls are thinner than the marks are off; more marks there, or "
+            "better ones, close them");
     report.seeds = check_seeds(*job.result.surface, job.options.inside, job.options.outside);
     if (const std::string warning = report.seeds.warning(); !warning.empty()) job.warn("seeds: " + warning);
     if (report.share_without_points > kFinal.warn_without_points)

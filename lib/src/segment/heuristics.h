@@ -13,7 +13,7 @@ struct AutomaticHeuristics {
     /// [voxels] Range of the points after tagging with an image: what is farther from marks is the image's. Measured on
     /// brain, spleen and nucleus with 300 points each.
     double tag_attraction_voxels = heuristic("automatic.tag_attraction_voxels", 8.0);
-    /// [points] Fewer get a voxel size at which their surface has as many voxels as this many would.
+    /// [points] Fewer that are tagged get a voxel size at which their surface has as many voxels as this many would.
     double few_points = heuristic("automatic.few_points", 1000);
     /// [cells of the indicator] Voxel size of a cloud that encloses nothing.
     double view_voxel = heuristic("automatic.view_voxel", 0.5);
@@ -158,6 +158,8 @@ struct FinalSurfaceHeuristics {
     double warn_without_points = heuristic("final_surface.warn_without_points", 0.02);
     /// [distances between points and a hole] Half a spacing, where it is automatic.
     double rim_slack = heuristic("final_surface.rim_slack", 1.0 / 6);
+    /// [marks] For each handle, where there are several, of a surface through them, below which they are doubted.
+    double marks_of_handle = heuristic("final_surface.marks_of_handle", 100);
 };
 COVOL_HEURISTICS FinalSurfaceHeuristics kFinal{};
 
@@ -165,6 +167,8 @@ COVOL_HEURISTICS FinalSurfaceHeuristics kFinal{};
 struct StartsHeuristics {
     /// [voxels] That a cut guess goes on beyond the image.
     int guess_beyond_voxels = heuristic("starts.guess_beyond_voxels", 8);
+    /// [longest sides] Of the domain around points alone: what closes beyond them, as the other half of a ball does.
+    double guess_margin = heuristic("starts.guess_margin", 1.0);
     /// [voxels] That a cut tagged body goes on beyond the image, for a band at a right angle to the face.
     double tagged_beyond_voxels = heuristic("starts.tagged_beyond_voxels", 6.0);
     /// [voxels] Weight of curvature from a start that lies at the edges.

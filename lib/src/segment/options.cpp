@@ -28,4 +28,10 @@ std::string SegmentOptions::why_invalid() const {
     return checks.lines();
 }
 
+bool SegmentOptions::tags_points() const {
+    const bool from_points =
+        start.kind == Start::Kind::Auto || start.kind == Start::Kind::Guess || start.kind == Start::Kind::Cloud;
+    return !from_points || model == Model::Paper || contours != nullptr || tag_distance.has_value();
+}
+
 }  // namespace covol

@@ -233,15 +233,32 @@ TEST_CASE("segment: a set cancel flag ends it with Cancelled") {
     CHECK(code_of([&] { (void)reconstruct(sphere_points(1200), {}, run); }) == Errc::Cancelled);
 }
 
+TEST_CASE("points are tagged, or guessed from") {
+    SegmentOptions options;
+    CHECK_FALSE(options.tags_points());
+    options.start.kind = Start::Kind::Guess;
+    CHECK_FALSE(options.tags_points());
+    options.tag_distance = 3;
+    CHECK(options.tags_points());
+    options = {};
+    options.model = Model::Paper;
+    CHECK(options.tags_points());
+    options = {};
+    options.start.kind = Start::Kind::Sphere;
+    CHECK(options.tags_points());
+}
+
 TEST_CASE("choose_voxel_size: image before points, median spacing of distinct points") {
     const Image image = ball_image(2.0);
     CHECK(choose_voxel_size(image).voxel_size == 2.0);
-    // Three distinct points: as many voxels as a thousand would have.
-    CHECK(choose_voxel_size({{0, 0, 0}, {3, 0, 0}, {0, 0, 0}, {6, 0, 0}}).voxel_size ==
-          Approx(3 * std::sqrt(3.0 / 1000)));
+    // Three distinct points: as many voxels as 4,000 would have, or a thousand that are tagged.
+    const std::vector<Vec3> three{{0, 0, 0}, {3, 0, 0}, {0, 0, 0}, {6, 0, 0}};
+    CHECK(choose_voxel_size(three).voxel_size == Approx(3 * std::sqrt(3.0 / 4000)));
+    CHECK(choose_voxel_size(three, true).voxel_size == Approx(3 * std::sqrt(3.0 / 1000)));
     std::vector<Vec3> plate;
     for (int i = 0; i < 40; ++i)
         for (int j = 0; j < 25; ++j) plate.push_back({3.0 * i, 3.0 * j, 0});
-    CHECK(choose_voxel_size(plate).voxel_size == Approx(3));
+    CHECK(choose_voxel_size(plate, true).voxel_size == Approx(3));
+    CHECK(choose_voxel_size(plate).voxel_size == Approx(1.5));
     CHECK(code_of([] { (void)choose_voxel_size({{1, 1, 1}, {1, 1, 1}}); }) == Errc::InvalidInput);
 }

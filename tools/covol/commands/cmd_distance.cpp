@@ -29,7 +29,7 @@ struct DistanceJob {
 
     double voxel_size(const ImageGeometry* geometry, const std::vector<Vec3>& cloud, Session& session) const {
         if (geometry == nullptr || (domain.voxel_size.given && !domain.voxel_size.in_voxels))
-            return domain.resolve_voxel_size(nullptr, cloud, session);
+            return domain.resolve_voxel_size(nullptr, cloud, true, session);
         const double finest = *std::min_element(geometry->spacing.begin(), geometry->spacing.end());
         return domain.voxel_size.resolve(finest, finest);
     }

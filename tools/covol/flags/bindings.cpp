@@ -196,11 +196,12 @@ void DomainFlags::bind(CLI::App& command, bool with_margin) {
         add_length(command, "--margin", margin, "", "between the points and the domain's boundary [D + 6vx]");
 }
 
-double DomainFlags::resolve_voxel_size(const Image* image, const std::vector<Vec3>& points, Session& session) const {
+double DomainFlags::resolve_voxel_size(const Image* image, const std::vector<Vec3>& points, bool tagged,
+                                       Session& session) const {
     if (voxel_size.given && !(voxel_size.value > 0))
         throw Error(Errc::InvalidOptions, "--voxel-size: expected > 0, got " + to_text(voxel_size.value));
     if (voxel_size.given && !voxel_size.in_voxels) return voxel_size.value;
-    const VoxelSizeChoice choice = image != nullptr ? choose_voxel_size(*image) : choose_voxel_size(points);
+    const VoxelSizeChoice choice = image != nullptr ? choose_voxel_size(*image) : choose_voxel_size(points, tagged);
     const double h = voxel_size.resolve(choice.voxel_size, choice.voxel_size);
     const std::string line =
         to_text(h) + " (" + (voxel_size.given ? to_text(voxel_size.value) + " times " : "") + choice.reason + ")";

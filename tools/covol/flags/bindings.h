@@ -76,7 +76,8 @@ struct DomainFlags {
     std::optional<Vec3> lattice_origin;
     void bind(CLI::App& command, bool with_margin);
     /// h, where --voxel-size may be relative ("2vx") to the automatic one. Says which in `session`.
-    [[nodiscard]] double resolve_voxel_size(const Image* image, const std::vector<Vec3>& points,
+    /// @param tagged  of choose_voxel_size()
+    [[nodiscard]] double resolve_voxel_size(const Image* image, const std::vector<Vec3>& points, bool tagged,
                                             Session& session) const;
 };
 

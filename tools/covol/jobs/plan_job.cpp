@@ -108,7 +108,7 @@ StructurePlan plan_structure(const SegmentJob& job, const StructureInput& input,
         throw Error(Errc::InvalidInput,
                     "plan: expected points or contours, got none: how far a surface moves that starts without marks "
                     "is not known before");
-    const double h = given_h > 0 ? given_h : job.domain.resolve_voxel_size(nullptr, marks.given, session);
+    const double h = given_h > 0 ? given_h : job.resolve_voxel_size(nullptr, marks, session);
     const double coarse = std::max(h, longest_side(bounding_box(marks.given)) / kPilotVoxels);
     const Pilot coarser = run_pilot(job, input, geometry, 2 * coarse, session, quiet);
     const Pilot pilot = run_pilot(job, input, geometry, coarse, session, quiet);

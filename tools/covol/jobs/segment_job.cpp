@@ -7,11 +7,17 @@
 #include "cli/report.h"
 #include "covol/error.h"
 #include "jobs/brick_job.h"
+#include "jobs/marks.h"
 #include "jobs/plan_job.h"
 #include "jobs/structures_job.h"
 #include "jobs/timelapse_job.h"
 
 namespace covol::tool {
+
+double SegmentJob::resolve_voxel_size(const Image* input_image, const Marks& marks, Session& session) const {
+    const bool tagged = !marks.drawn.empty() || resolve(1).tags_points();
+    return domain.resolve_voxel_size(input_image, marks.given, tagged, session);
+}
 
 SegmentOptions SegmentJob::resolve(double h) const {
     SegmentOptions options;

@@ -194,7 +194,7 @@ PreparedStructure StructurePreparer::read_marks_of(std::size_t n, const RunConte
     Marks marks = read_marks(input.points, input.contours, job_.cloud, geometry, run);
     session_.add_seconds("read", reading.seconds());
     if (image_ == nullptr && marks.given.empty()) throw UsageError("expected an image, points or contours, got none");
-    if (!voxel_size_) voxel_size_ = job_.domain.resolve_voxel_size(image_, marks.given, session_);
+    if (!voxel_size_) voxel_size_ = job_.resolve_voxel_size(image_, marks, session_);
     const double h = *voxel_size_;
     const std::shared_ptr<const Contours> painted = paint_.own_contours(input, marks, h, run);
     if (!painted) paint_.add_outlines(input, marks, run);

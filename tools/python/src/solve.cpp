@@ -84,7 +84,10 @@ private:
             const std::vector<Vec3> world = to_world_of(lines);
             all.insert(all.end(), world.begin(), world.end());
         }
-        const VoxelSizeChoice choice = image_ ? choose_voxel_size(*image_) : choose_voxel_size(all);
+        SegmentOptions asked = given_.resolve(1, image_.has_value()).options;
+        if (const auto start = start_of(marks_.init, "init")) asked.start = *start;
+        const VoxelSizeChoice choice =
+            image_ ? choose_voxel_size(*image_) : choose_voxel_size(all, !drawn_.empty() || asked.tags_points());
         run_.info("voxel_size: " + choice.reason);
         return wanted.resolve(choice.voxel_size, choice.voxel_size);
     }

@@ -243,6 +243,17 @@ bool does_enclose(const CloudOrientation& cloud) {
            cloud::share_bare(*cloud.orientation.indicator, cloud.points, reach) < kOrientation.bare;
 }
 
+/// Share of the points that the indicator's level 1/2 passes by at more than that distance.
+double share_passed(const Indicator& indicator, const std::vector<Vec3>& points, double reach) {
+    std::vector<char> passed(points.size());
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
+        const Indicator::Sample at = indicator.at(points[n]);
+        const double slope = std::hypot(at.gradient[0], at.gradient[1], at.gradient[2]);
+        passed[n] = std::abs(at.inside - 0.5) > reach * slope;
+    });
+    return double(std::count(passed.begin(), passed.end(), 1)) / double(points.size());
+}
+
 /// Every few points of those that lie together, and what each stands for.
 struct Sample {
     Sample(const std::vector<Vec3>& all, double spacing, std::size_t every)
@@ -277,7 +288,14 @@ void choose_orientation(CloudOrientation& cloud, const PointHints& hints, const 
             report.used = false;
             report.why_not = "parts of them are turned as a whole";
         }
-        if (!report.used && !cloud.encloses) cloud.orientation = cloud::orient_by_views(cloud.points, cloud.scale, run);
+        if (!report.used && !cloud.encloses) {
+            Orientation seen = cloud::orient_by_views(cloud.points, cloud.scale, run);
+            // Normals waver in the folds of a closed surface, too; but there views pass by most points.
+            const double reach = kOrientation.passed_reach * cloud.scale.spacing;
+            cloud.encloses = share_passed(*cloud.orientation.indicator, cloud.points, reach) <
+                             kOrientation.fewer_passed * share_passed(*seen.indicator, cloud.points, reach);
+            if (!cloud.encloses) cloud.orientation = std::move(seen);
+        }
     }
     if (report.used) {
         cloud.orientation = std::move(given.orientation);

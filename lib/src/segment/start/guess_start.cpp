@@ -1,4 +1,5 @@
 // The start from few marks: the surface through them that bends least.
+#include "covol/orientation.h"
 #include "distance/memory_need.h"
 #include "segment/fields.h"
 #include "segment/heuristics.h"
@@ -29,8 +30,8 @@ void start_from_guess(Job& job) {
     job.origin = StartOrigin::Guess;
     job.options.evolve.follow = true;
     const WorldBox box = bounding_box(job.points);
-    const double extent = longest_side(box);
-    job.report().domain = job.domain_with_chosen_margin(0.25 * extent + kJob.margin_voxels * job.h());
+    job.report().domain =
+        job.domain_with_chosen_margin(kStarts.guess_margin * longest_side(box) + kJob.margin_voxels * job.h());
     double area = 0;  // of a ball of that size, at most
     for (int a = 0; a < 3; ++a) {
         const double u = box.max[(a + 1) % 3] - box.min[(a + 1) % 3], v = box.max[(a + 2) % 3] - box.min[(a + 2) % 3];
@@ -39,6 +40,8 @@ void start_from_guess(Job& job) {
     detail::require_band_memory(area, job.h(), "segment", job.run);
     GuessOptions options;
     options.deviation = deviation(job);
+    if (job.image == nullptr && !job.options.mark_precision)
+        options.most_deviation = measure_cloud_scale(job.points, job.run).noise;
     options.inside = job.options.inside;
     options.outside = job.options.outside;
     options.outside.insert(options.outside.end(), job.options.exterior_seeds.begin(), job.options.exterior_seeds.end());
