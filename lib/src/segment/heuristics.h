@@ -167,8 +167,8 @@ COVOL_HEURISTICS FinalSurfaceHeuristics kFinal{};
 struct StartsHeuristics {
     /// [voxels] That a cut guess goes on beyond the image.
     int guess_beyond_voxels = heuristic("starts.guess_beyond_voxels", 8);
-    /// [longest sides] Of the domain around points alone: what closes beyond them, as the other half of a ball does.
-    double guess_margin = heuristic("starts.guess_margin", 1.0);
+    /// [longest sides] Of the domain around points alone: a surface that goes on beyond is cut there.
+    double guess_margin = heuristic("starts.guess_margin", 0.25);
     /// [voxels] That a cut tagged body goes on beyond the image, for a band at a right angle to the face.
     double tagged_beyond_voxels = heuristic("starts.tagged_beyond_voxels", 6.0);
     /// [voxels] Weight of curvature from a start that lies at the edges.
