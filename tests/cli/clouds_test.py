@@ -63,13 +63,14 @@ class Few(Clouds):
                     self.assertAlmostEqual(share, 1, delta=within)
 
     def test_voxels_are_finer_than_few_points_lie_apart(self):
-        for more, times in (((), 2), (("--model", "paper"), 1)):
-            done = self.reconstruct(random_sphere(1000, 1), *more)
-            said = json.loads(done.stdout)["automatic"]["voxel_size"]
-            h, reason = re.fullmatch(r"([0-9.]+) \((.*)\)", said).groups()
-            spacing = float(h) * times if times == 1 else float(re.search(r"points, ([0-9.]+),", reason).group(1))
-            self.assertAlmostEqual(spacing / float(h), times, places=4)
-            self.assertTrue(reason.startswith("finer than the" if times > 1 else "the median distance between neighbouring points"))
+        points, said = random_sphere(1000, 1), []
+        for more in ((), ("--model", "paper")):
+            automatic = json.loads(self.reconstruct(points, *more).stdout)["automatic"]["voxel_size"]
+            said.append(re.fullmatch(r"([0-9.]+) \((.*)\)", automatic).groups())
+        (finer, why_finer), (spacing, why) = said
+        self.assertAlmostEqual(float(spacing) / float(finer), 2, places=4)
+        self.assertTrue(why_finer.startswith("finer than the median distance"))
+        self.assertEqual(why, "the median distance between neighbouring points")
 
     def test_two_dozen(self):
         for seed in range(8):
