@@ -225,6 +225,23 @@ class Many(Clouds):
         self.assertTrue(report["cloud"]["encloses"])
         self.assertLess(report["fit"]["points_to_surface"]["mean"], 0.8 * report["resolved"]["voxel_size"])
 
+    def test_folds_are_no_noise(self):
+        # Walls less than three points apart are smoothed away; noise as thick as that, and what is met, is not told of.
+        told = "lie on sheets"
+        folds = self.reconstruct(random_folds(10000, 20, 0.3, 1))
+        self.assertIn(told, folds.stderr)
+        report = json.loads(folds.stdout)
+        self.assertGreater(report["fit"]["points_to_surface"]["mean"], report["resolved"]["voxel_size"])
+        self.assertNotIn(told, self.reconstruct(random_folds(10000, 12, 0.3, 1)).stderr)
+        draw = random.Random(7)
+        for noise in 0.03, 0.1:
+            ball = [tuple(factor * x for x in p)
+                    for p in random_sphere(6000, 7) for factor in [1 + draw.gauss(0, noise)]]
+            done = self.reconstruct(ball)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertGreater(json.loads(done.stdout)["cloud"]["noise"], json.loads(done.stdout)["cloud"]["nearest"])
+            self.assertNotIn(told, done.stderr)
+
     def test_few_points_when_asked(self):
         report = self.report(random_sphere(800, 6), "--init", "cloud")
         self.assertTrue(report["automatic"]["start"].startswith("cloud"))

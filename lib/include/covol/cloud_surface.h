@@ -14,6 +14,9 @@ struct CloudReport {
     double turned = 0;               ///< Orientation::turned
     double noise = 0;                ///< standard deviation of the points from the surface, median
     double radius = 0;               ///< of the neighbourhoods that were averaged, median
+    double nearest = 0;              ///< CloudScale::nearest
+    double near_reach = 0;           ///< CloudScale::near_reach
+    double near_noise = 0;           ///< CloudScale::near_noise
     int iterations = 0;              ///< of the orientation
     bool encloses = true;            ///< CloudOrientation::encloses
     double indicator_cell = 0;       ///< of its finest lattice

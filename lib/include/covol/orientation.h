@@ -15,6 +15,9 @@ struct CloudScale {
     double spacing = 0;  ///< world units: 1 / sqrt(points per area)
     double noise = 0;    ///< standard deviation along the normal
     double nearest = 0;  ///< median distance to the nearest other point
+    /// The twelve nearest points of a point: median of their reach, and of their standard deviation from a quadric,
+    /// which is 0.33 of that where they fill a ball
+    double near_reach = 0, near_noise = 0;
 };
 /// From quadrics through neighbourhoods of a sample of the points: that radius at which they are most of a sheet.
 [[nodiscard]] COVOL_API CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext& run = {});

@@ -163,6 +163,19 @@ void find_silent_image(Job& job) {
         job.warn("the image had no say between the marks: " + guidance.reason);
 }
 
+/// Noise fills space as far as it reaches; what is smoothed like it, though the nearest points lie on sheets, are
+/// folds.
+void find_folds(Job& job) {
+    const CloudReport& cloud = job.report().cloud;
+    if (cloud.noise > cloud.nearest && cloud.noise > kDoubts.folded_noise * cloud.near_noise &&
+        cloud.near_noise < kDoubts.sheet * cloud.near_reach)
+        job.warn("the surface is smoothed as if the points had noise of " + number(cloud.noise) +
+                 ", but the nearest of them lie on sheets (" + number(cloud.near_noise) + " off them within " +
+                 number(cloud.near_reach) +
+                 "): folds or walls closer together than two or three points are lost; sample more densely there, or "
+                 "give normals");
+}
+
 }  // namespace
 
 std::vector<double> levels_at(const FloatGrid& u, const std::vector<Vec3>& places) {
@@ -195,6 +208,7 @@ void doubt(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& 
     find_marks_off(job, marks, distances);
     find_bias(job, marks, distances);
     if (job.origin == StartOrigin::Guess) find_surface_beyond(job, marks);
+    if (job.origin == StartOrigin::Cloud) find_folds(job);
     if (job.image == nullptr || !job.uses_image()) return;
     find_lost_precision(job);
     find_strange_image(job, marks);

@@ -159,6 +159,9 @@ Json to_json(const SegmentReport& r) {
     if (r.cloud.spacing > 0)
         json["cloud"] = {{"spacing", r.cloud.spacing},
                          {"noise", r.cloud.noise},
+                         {"nearest", r.cloud.nearest},
+                         {"near_reach", r.cloud.near_reach},
+                         {"near_noise", r.cloud.near_noise},
                          {"encloses", r.cloud.encloses},
                          {"averaged_within", r.cloud.radius},
                          {"stray_points", r.cloud.stray},

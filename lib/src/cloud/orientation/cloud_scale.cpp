@@ -10,12 +10,13 @@
 #include "cloud/orientation/heuristics.h"
 #include "covol/orientation.h"
 #include "covol/points.h"
-#include "points/point_cells.h"
+#include "points/neighbours.h"
 
 namespace covol {
 namespace {
 
-constexpr double kCellRadii = 2;  // edge of the cells that points are sorted into, in first radii
+constexpr double kCellRadii = 2;      // edge of the cells that points are sorted into, in first radii
+constexpr std::size_t kNearest = 12;  // twice the unknowns of a quadric
 
 /// Standard deviation of points from the quadric over the plane of the last two axes that fits them best.
 double off_quadric(const std::vector<Eigen::Vector3d>& points, const Eigen::Matrix3d& axes) {
@@ -35,8 +36,27 @@ double off_quadric(const std::vector<Eigen::Vector3d>& points, const Eigen::Matr
     return std::sqrt(std::max(0.0, left) / double(points.size() - 6));
 }
 
+/// The same over the plane that fits them best.
+double off_sheet(const std::vector<Eigen::Vector3d>& points) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+    for (const Eigen::Vector3d& p : points) {
+        sum += p;
+        squares += p * p.transpose();
+    }
+    const double count = double(points.size());
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares / count -
+                                                              sum * sum.transpose() / (count * count));
+    return off_quadric(points, axes.eigenvectors());
+}
+
+Eigen::Vector3d from_to(const Vec3& from, const Vec3& to) {
+    return {to[0] - from[0], to[1] - from[1], to[2] - from[2]};
+}
+
 struct Around {
-    double count = 0;  ///< of points; 0: too few
+    double reach = 0;  ///< of the points
+    double count = 0;  ///< of them; 0: too few
     double noise = 0;  ///< their standard deviation from a quadric
 };
 
@@ -44,22 +64,32 @@ Around look_around(const cloud::PointCells& cells, const Vec3& at, double radius
     std::vector<cloud::PointCells::Range> ranges;
     cells.find(at, radius, ranges);
     std::vector<Eigen::Vector3d> near;
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
     for (const auto& range : ranges)
         for (std::uint32_t p = range.begin; p < range.end; ++p) {
-            const Vec3& q = cells.sorted()[p];
-            const Eigen::Vector3d v(q[0] - at[0], q[1] - at[1], q[2] - at[2]);
-            if (v.squaredNorm() > radius * radius) continue;
-            near.emplace_back(v / radius);
-            sum += near.back();
-            squares += near.back() * near.back().transpose();
+            const Eigen::Vector3d v = from_to(at, cells.sorted()[p]);
+            if (v.squaredNorm() <= radius * radius) near.emplace_back(v / radius);
         }
     if (near.size() < kCloudScale.least) return {};
-    const double count = double(near.size());
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares / count -
-                                                              sum * sum.transpose() / (count * count));
-    return {count, radius * off_quadric(near, axes.eigenvectors())};
+    return {radius, double(near.size()), radius * off_sheet(near)};
+}
+
+/// Every few points and the nearest of each, where there are so many.
+std::vector<Around> look_at_nearest(const std::vector<Vec3>& points, const cloud::PointCells& cells, double nearest,
+                                    std::size_t step) {
+    std::vector<Around> around(cells.sorted().size());
+    cloud::for_nearest(
+        cells, 2 * nearest, kNearest - 1,
+        [&](std::uint32_t point, const std::vector<cloud::Neighbour>& near) {
+            if (near.size() + 1 < kNearest) return;
+            const double reach = std::sqrt(near.back().squared);
+            std::vector<Eigen::Vector3d> places{Eigen::Vector3d::Zero()};
+            for (const cloud::Neighbour& other : near)
+                places.push_back(from_to(points[point], cells.sorted()[other.at]) / reach);
+            around[point] = {reach, kNearest, reach * off_sheet(places)};
+        },
+        [&](std::size_t n) { return n % step == 0; });
+    std::erase_if(around, [](const Around& a) { return a.count == 0; });
+    return around;
 }
 
 template <typename Value>
@@ -79,6 +109,9 @@ CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext
     const std::size_t step = std::max<std::size_t>(1, points.size() / kCloudScale.samples);
     double radius = kCloudScale.first_spacings * nearest, best = 1;
     const cloud::PointCells cells(points, kCellRadii * radius);
+    const std::vector<Around> closest = look_at_nearest(points, cells, nearest, step);
+    scale.near_reach = median_of(closest, [](const Around& a) { return a.reach; });
+    scale.near_noise = median_of(closest, [](const Around& a) { return a.noise; });
     for (int n = 0; n < kCloudScale.radii; ++n, radius *= kCloudScale.growth) {
         run.check();
         std::vector<Around> around((points.size() + step - 1) / step);

@@ -66,11 +66,19 @@ const float* row_of(const std::vector<float>& values, std::size_t at) {
 /// Gauss-Seidel in red and black order: (6 + screen) u - sum of neighbours = right.
 void sweep(const Lattice& l, std::vector<float>& u, const std::vector<float>& right, const std::vector<float>& screen) {
     const Strides s(l);
-    for (int colour = 0; colour < 2; ++colour)
+    // Vectors hold both colours, and those of a row and of the rows beside it may not be written and read at once:
+    // every second row rests. Rows that are not beside each other do not wait for each other's colours.
+    const auto sweep_rows = [&](int parity, int first_colour, int last_colour) {
         for_rows(l, [&](int i, int j, std::size_t row) {
-            sweep_row(u.data() + row + 1, right.data() + row + 1, row_of(screen, row + 1), s.row(), s.inner(),
-                      std::size_t((i + j + colour) & 1));
+            if (((i + j) & 1) != parity) return;
+            for (int colour = first_colour; colour <= last_colour; ++colour)
+                sweep_row(u.data() + row + 1, right.data() + row + 1, row_of(screen, row + 1), s.row(), s.inner(),
+                          std::size_t((parity + colour) & 1));
         });
+    };
+    sweep_rows(0, 0, 0);
+    sweep_rows(1, 0, 1);
+    sweep_rows(0, 1, 1);
 }
 
 void find_residual(const Lattice& l, const std::vector<float>& u, const std::vector<float>& right,

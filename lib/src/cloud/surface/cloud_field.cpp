@@ -345,6 +345,9 @@ CloudField::CloudField(const CloudOrientation& cloud, double h, CloudReport& rep
     : indicator_(cloud.orientation.screened ? cloud.orientation.screened : cloud.orientation.indicator) {
     report.spacing = cloud.scale.spacing;
     report.noise = cloud.scale.noise;
+    report.nearest = cloud.scale.nearest;
+    report.near_reach = cloud.scale.near_reach;
+    report.near_noise = cloud.scale.near_noise;
     report.stray = cloud.stray;
     report.encloses = cloud.encloses;
     report.layered = cloud.orientation.layered;
