@@ -239,7 +239,8 @@ class Many(Clouds):
                     for p in random_sphere(6000, 7) for factor in [1 + draw.gauss(0, noise)]]
             done = self.reconstruct(ball)
             self.assertEqual(done.returncode, 0, done.stderr)
-            self.assertGreater(json.loads(done.stdout)["cloud"]["noise"], json.loads(done.stdout)["cloud"]["nearest"])
+            cloud = json.loads(done.stdout)["cloud"]
+            self.assertGreater(cloud["noise"], cloud["nearest"])
             self.assertNotIn(told, done.stderr)
 
     def test_few_points_when_asked(self):

@@ -15,7 +15,7 @@ struct CloudScale {
     double spacing = 0;  ///< world units: 1 / sqrt(points per area)
     double noise = 0;    ///< standard deviation along the normal
     double nearest = 0;  ///< median distance to the nearest other point
-    /// The twelve nearest points of a point: median of their reach, and of their standard deviation from a quadric,
+    /// A point and the eleven nearest: median of how far they reach, and of their standard deviation from a quadric,
     /// which is 0.33 of that where they fill a ball
     double near_reach = 0, near_noise = 0;
 };

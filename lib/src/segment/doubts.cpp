@@ -172,8 +172,7 @@ void find_folds(Job& job) {
         job.warn("the surface is smoothed as if the points had noise of " + number(cloud.noise) +
                  ", but the nearest of them lie on sheets (" + number(cloud.near_noise) + " off them within " +
                  number(cloud.near_reach) +
-                 "): folds or walls closer together than two or three points are lost; sample more densely there, or "
-                 "give normals");
+                 "): folds or walls closer together than two or three points are lost; sample more densely there");
 }
 
 }  // namespace

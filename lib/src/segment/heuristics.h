@@ -135,8 +135,8 @@ struct DoubtsHeuristics {
     /// mirrored or put anywhere have one, 0.59 to 0.86 for marks of their own on dim nuclei, which have one, too.
     double clear_support = heuristic("doubts.clear_support", 0.65);
     /// [reaches] Deviation of twelve neighbouring points of a cloud from a quadric, below which they are a sheet: 0.33
-    /// where they fill a ball, 0.26 and more where noise is as wide as the nearest points lie apart, 0.05 to 0.24 in
-    /// folds that were smoothed as noise.
+    /// where they fill a ball, 0.26 and more where noise is as wide as the nearest points lie apart, 0.11 to 0.247
+    /// in folds that were smoothed as noise.
     double sheet = heuristic("doubts.sheet", 0.25);
     /// [ratio] Of the noise that was found to that deviation, above which folds were taken for it: up to 1.5 for noise
     /// of so thin sheets, 2.0 to 11 for folds, shells and scans that do not fit.

@@ -1,4 +1,5 @@
 // Quadrics through neighbourhoods: how far apart the points of a cloud lie on its surface, and how far off it.
+#include <tbb/concurrent_vector.h>
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Cholesky>
@@ -76,7 +77,7 @@ Around look_around(const cloud::PointCells& cells, const Vec3& at, double radius
 /// Every few points and the nearest of each, where there are so many.
 std::vector<Around> look_at_nearest(const std::vector<Vec3>& points, const cloud::PointCells& cells, double nearest,
                                     std::size_t step) {
-    std::vector<Around> around(cells.sorted().size());
+    tbb::concurrent_vector<Around> around;  // in any order: medians are what is asked
     cloud::for_nearest(
         cells, 2 * nearest, kNearest - 1,
         [&](std::uint32_t point, const std::vector<cloud::Neighbour>& near) {
@@ -85,11 +86,10 @@ std::vector<Around> look_at_nearest(const std::vector<Vec3>& points, const cloud
             std::vector<Eigen::Vector3d> places{Eigen::Vector3d::Zero()};
             for (const cloud::Neighbour& other : near)
                 places.push_back(from_to(points[point], cells.sorted()[other.at]) / reach);
-            around[point] = {reach, kNearest, reach * off_sheet(places)};
+            around.push_back({reach, kNearest, reach * off_sheet(places)});
         },
         [&](std::size_t n) { return n % step == 0; });
-    std::erase_if(around, [](const Around& a) { return a.count == 0; });
-    return around;
+    return {around.begin(), around.end()};
 }
 
 template <typename Value>

@@ -50,13 +50,17 @@ struct Strides {
     std::size_t i, j;
 };
 
-/// visit(i, j, first) for each row of inner nodes along k, `first` its node k = 0.
+/// visit(i, j, first) for each row of inner nodes along k of a plane, `first` its node k = 0.
+template <typename Visit>
+void for_rows_of(const Lattice& l, int i, Visit visit) {
+    const Strides s(l);
+    for (int j = 1; j + 1 < l.nodes[1]; ++j) visit(i, j, std::size_t(i) * s.i + std::size_t(j) * s.j);
+}
+
+/// The same of all inner planes.
 template <typename Visit>
 void for_rows(const Lattice& l, Visit visit) {
-    const Strides s(l);
-    tbb::parallel_for(1, l.nodes[0] - 1, [&](int i) {
-        for (int j = 1; j + 1 < l.nodes[1]; ++j) visit(i, j, std::size_t(i) * s.i + std::size_t(j) * s.j);
-    });
+    tbb::parallel_for(1, l.nodes[0] - 1, [&](int i) { for_rows_of(l, i, visit); });
 }
 
 const float* row_of(const std::vector<float>& values, std::size_t at) {
@@ -66,19 +70,21 @@ const float* row_of(const std::vector<float>& values, std::size_t at) {
 /// Gauss-Seidel in red and black order: (6 + screen) u - sum of neighbours = right.
 void sweep(const Lattice& l, std::vector<float>& u, const std::vector<float>& right, const std::vector<float>& screen) {
     const Strides s(l);
-    // Vectors hold both colours, and those of a row and of the rows beside it may not be written and read at once:
-    // every second row rests. Rows that are not beside each other do not wait for each other's colours.
-    const auto sweep_rows = [&](int parity, int first_colour, int last_colour) {
-        for_rows(l, [&](int i, int j, std::size_t row) {
-            if (((i + j) & 1) != parity) return;
-            for (int colour = first_colour; colour <= last_colour; ++colour)
-                sweep_row(u.data() + row + 1, right.data() + row + 1, row_of(screen, row + 1), s.row(), s.inner(),
-                          std::size_t((parity + colour) & 1));
+    const auto sweep_plane = [&](int plane, int colour) {
+        for_rows_of(l, plane, [&](int i, int j, std::size_t row) {
+            sweep_row(u.data() + row + 1, right.data() + row + 1, row_of(screen, row + 1), s.row(), s.inner(),
+                      std::size_t((i + j + colour) & 1));
         });
     };
-    sweep_rows(0, 0, 0);
-    sweep_rows(1, 0, 1);
-    sweep_rows(0, 1, 1);
+    // Rows are read and written in vectors of both colours: planes beside each other may not be swept at once. The
+    // order of colours holds all the same, for each second plane has what it needs of both planes beside it.
+    const int end = l.nodes[0] - 1;
+    tbb::parallel_for(1, end, 2, [&](int i) { sweep_plane(i, 0); });
+    tbb::parallel_for(2, end, 2, [&](int i) {
+        sweep_plane(i, 0);
+        sweep_plane(i, 1);
+    });
+    tbb::parallel_for(1, end, 2, [&](int i) { sweep_plane(i, 1); });
 }
 
 void find_residual(const Lattice& l, const std::vector<float>& u, const std::vector<float>& right,
