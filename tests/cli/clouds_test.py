@@ -181,6 +181,19 @@ def random_folds(count, waves, depth, seed):
     return points
 
 
+def fold_normals(points, waves, depth):
+    """Outward, of random_folds()."""
+    def height(p):
+        length = math.hypot(*p)
+        return length - 1 - depth * math.prod(math.cos(waves * x / length) for x in p)
+
+    normals = []
+    for p in points:
+        slope = [height([x + 1e-6 * (a == b) for b, x in enumerate(p)]) - height(p) for a in range(3)]
+        normals.append(tuple(x / math.hypot(*slope) for x in slope))
+    return normals
+
+
 class Many(Clouds):
     """Enough points for a surface of their own."""
 
@@ -242,6 +255,12 @@ class Many(Clouds):
             cloud = json.loads(done.stdout)["cloud"]
             self.assertGreater(cloud["noise"], cloud["nearest"])
             self.assertNotIn(told, done.stderr)
+
+    def test_folds_are_met(self):
+        # Neighbourhoods with sheets of two folds in them, whose sides are known: a quadric through them lies between.
+        for seed in 1, 2:
+            report = self.report(random_folds(8000, 16, 0.3, seed))
+            self.assertLess(report["fit"]["points_to_surface"]["mean"], 0.6 * report["resolved"]["voxel_size"])
 
     def test_few_points_when_asked(self):
         report = self.report(random_sphere(800, 6), "--init", "cloud")
@@ -352,6 +371,15 @@ class Normals(Clouds):
         self.assertAlmostEqual(report["cloud"]["normals"]["agree"], 0.5, delta=0.05)
         self.assertIn("file not used: half of them", said)
         self.assertAlmostEqual(shell_share(report["surface"]), 1, delta=0.01)
+
+    def test_normals_of_narrow_folds(self):
+        # The sides that the points tell by themselves are wrong here, and are against a twentieth of these.
+        points = random_folds(10000, 20, 0.3, 1)
+        report, said = self.report("p.xyz", self.rows(points, fold_normals(points, 20, 0.3)))
+        self.assertTrue(report["cloud"]["normals"]["used"])
+        self.assertNotIn("file not used", said)
+        self.assertLess(report["fit"]["points_to_surface"]["mean"], 0.6 * report["resolved"]["voxel_size"])
+        self.assertEqual((report["surface"]["components"], report["surface"]["genus"]), (1, 0))
 
     def test_normals_stay_with_their_points_where_a_cloud_is_thinned(self):
         points = random_sphere(12000, 23)

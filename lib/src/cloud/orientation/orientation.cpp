@@ -282,16 +282,19 @@ void choose_orientation(CloudOrientation& cloud, const PointHints& hints, const 
     if (!is_certain) {
         cloud.orientation = orient(cloud.points, cloud.scale, run);
         cloud.encloses = does_enclose(cloud);
+        const double reach = kOrientation.passed_reach * cloud.scale.spacing;
         if (report.used && cloud.encloses &&
             1 - cloud::agreeing(cloud.points, given.orientation.normals, cloud.orientation, false) >
-                kOrientation.contradicted) {
+                kOrientation.contradicted &&
+            // In narrow folds it is these that are wrong.
+            share_passed(*cloud.orientation.indicator, cloud.points, reach) <=
+                share_passed(*given.orientation.indicator, cloud.points, reach)) {
             report.used = false;
             report.why_not = "parts of them are turned as a whole";
         }
         if (!report.used && !cloud.encloses) {
             Orientation seen = cloud::orient_by_views(cloud.points, cloud.scale, run);
             // Normals waver in the folds of a closed surface, too; but there views pass by most points.
-            const double reach = kOrientation.passed_reach * cloud.scale.spacing;
             cloud.encloses = share_passed(*cloud.orientation.indicator, cloud.points, reach) <
                              kOrientation.fewer_passed * share_passed(*seen.indicator, cloud.points, reach);
             if (!cloud.encloses) cloud.orientation = std::move(seen);

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "base/median.h"
 #include "base/vector.h"
@@ -311,6 +312,7 @@ FloatGridPtr level_set_of(const CloudField::Pieces& pieces, const Indicator& ind
 /// be nodes all through the layer that they fill.
 OrientedCloud near_level(OrientedCloud points, const CloudOrientation& cloud) {
     const double most = kBlend.most_noises * cloud.scale.noise;
+    points.squares_off.clear();
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
         Vec3 place = points.points[n];
         for (int step = 0; step < kBlend.level_steps; ++step) {
@@ -325,8 +327,20 @@ OrientedCloud near_level(OrientedCloud points, const CloudOrientation& cloud) {
     return points;
 }
 
+/// Of the points to the indicator's level 1/2, by its slope; infinite where it has none.
+std::vector<float> squared_distances(const std::vector<Vec3>& points, const Indicator& indicator) {
+    std::vector<float> squares(points.size());
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
+        const auto [inside, gradient] = indicator.at(points[n]);
+        const double steep = dot(gradient, gradient), off = 0.5 - inside;
+        squares[n] = steep > 0 ? float(off * off / steep) : std::numeric_limits<float>::infinity();
+    });
+    return squares;
+}
+
 std::vector<Quadric> quadrics_of(const CloudOrientation& cloud, double h, CloudReport& report, const RunContext& run) {
-    const OrientedCloud points{cloud.points, cloud.orientation.normals, std::vector<float>(cloud.points.size(), 1.0F)};
+    const OrientedCloud points{cloud.points, cloud.orientation.normals, std::vector<float>(cloud.points.size(), 1.0F),
+                               squared_distances(cloud.points, *cloud.orientation.indicator)};
     std::vector<Quadric> quadrics = quadrics_over(near_level(points, cloud), points, kBlend.node_voxels * h,
                                                   cloud.scale.spacing, report.bare_nodes, run);
     std::vector<double> noise, radius;

@@ -6,6 +6,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "base/median.h"
 #include "base/vector.h"
@@ -44,12 +45,17 @@ struct Level {
         for (const std::uint32_t n : cells.order()) {
             const Vec3 &p = all.points[n], &normal = all.normals[n];
             sorted.add({p[0], p[1], p[2]}, {normal[0], normal[1], normal[2]}, double(all.counts[n]));
+            if (!all.squares_off.empty()) squares_off.push_back(all.squares_off[n]);
         }
         sorted.finish();
+    }
+    [[nodiscard]] Vec3 normal(std::uint32_t n) const {
+        return {sorted.normal[0][n], sorted.normal[1][n], sorted.normal[2][n]};
     }
     double radius;
     PointCells cells;
     FitCloud sorted;  // in the cells' order
+    std::vector<float> squares_off;  // the same, or empty
 };
 
 struct Scratch {
@@ -114,10 +120,27 @@ int is_of_majority(const Level& level, const Vec3& origin, const Vec3& normal,
         for (std::uint32_t n = range.begin; n < range.end; ++n) {
             const Vec3 to = minus(level.cells.sorted()[n], origin);
             if (dot(to, to) >= r2 || std::abs(dot(to, normal)) > height) continue;
-            const Vec3 its{level.sorted.normal[0][n], level.sorted.normal[1][n], level.sorted.normal[2][n]};
-            (dot(its, normal) > 0 ? same : opposite) += level.sorted.count[n];
+            (dot(level.normal(n), normal) > 0 ? same : opposite) += level.sorted.count[n];
         }
     return same + opposite < kFit.least_majority ? -1 : same >= opposite;
+}
+
+/// Distance of the neighbourhood's points on this side of a sheet to the indicator's surface, root mean square.
+double off_indicator(const Level& level, const Vec3& origin, const Vec3& normal,
+                     const std::vector<PointCells::Range>& ranges) {
+    if (level.squares_off.empty()) return std::numeric_limits<double>::infinity();
+    const double r2 = level.radius * level.radius;
+    double squares = 0, weight = 0;
+    for (const PointCells::Range& range : ranges)
+        for (std::uint32_t n = range.begin; n < range.end; ++n) {
+            const Vec3 to = minus(level.cells.sorted()[n], origin);
+            const double near = 1 - dot(to, to) / r2;
+            if (near <= 0 || dot(level.normal(n), normal) <= 0) continue;
+            const double w = level.sorted.count[n] * near * near;
+            squares += w * double(level.squares_off[n]);
+            weight += w;
+        }
+    return std::sqrt(squares / weight);
 }
 
 Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& normal, Scratch& scratch) {
@@ -162,6 +185,9 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
         if (!agrees) break;
         if (seen.empty() &&
             (std::abs(now.c[0]) > kFit.most_height * level.radius || dot(best.axes[2], normal) < kFit.least_cosine))
+            return best;
+        if (seen.empty() &&
+            now.misfit > kFit.off_indicator * off_indicator(level, point, best.axes[2], scratch.ranges))
             return best;
         if (seen.empty()) best.noise = now.noise;  // wider, it has the surface's own shape in it
         seen.push_back({now.c[0], now.deviation, now.misfit});
@@ -297,9 +323,10 @@ Vec3 Quadric::foot() const {
 
 OrientedCloud thinned(const OrientedCloud& cloud, double edge) {
     const PointCells cells(cloud.points, edge);
+    const bool is_off_known = !cloud.squares_off.empty();
     struct Mean {
         Vec3 point{0, 0, 0}, normal{0, 0, 0};
-        double count = 0;
+        double count = 0, squares_off = 0;
     };
     const auto add_cell = [&](std::size_t n, OrientedCloud& result) {
         std::array<Mean, 6> means;  // by the direction that is closest to the normal's
@@ -317,6 +344,7 @@ OrientedCloud thinned(const OrientedCloud& cloud, double edge) {
                 mean.normal[a] += c * normal[a];
             }
             mean.count += c;
+            if (is_off_known) mean.squares_off += c * double(cloud.squares_off[point]);
         }
         // Normals that are close, on either side of the limit between two directions, are one side of a sheet.
         for (std::size_t m = 0; m < 6; ++m)
@@ -327,6 +355,7 @@ OrientedCloud thinned(const OrientedCloud& cloud, double edge) {
                         means[m].normal[a] += means[o].normal[a];
                     }
                     means[m].count += means[o].count;
+                    means[m].squares_off += means[o].squares_off;
                     means[o] = {};
                 }
         for (const Mean& mean : means) {
@@ -335,6 +364,7 @@ OrientedCloud thinned(const OrientedCloud& cloud, double edge) {
                 {mean.point[0] / mean.count, mean.point[1] / mean.count, mean.point[2] / mean.count});
             result.normals.push_back(unit(mean.normal));
             result.counts.push_back(float(mean.count));
+            if (is_off_known) result.squares_off.push_back(float(mean.squares_off / mean.count));
         }
     };
     constexpr std::size_t kCells = 4096;
@@ -348,6 +378,7 @@ OrientedCloud thinned(const OrientedCloud& cloud, double edge) {
         result.points.insert(result.points.end(), part.points.begin(), part.points.end());
         result.normals.insert(result.normals.end(), part.normals.begin(), part.normals.end());
         result.counts.insert(result.counts.end(), part.counts.begin(), part.counts.end());
+        result.squares_off.insert(result.squares_off.end(), part.squares_off.begin(), part.squares_off.end());
     }
     return result;
 }

@@ -16,7 +16,7 @@ using namespace covol::cloud;
 namespace {
 
 OrientedCloud oriented(const test::SurfaceSample& s) {
-    return {s.points, s.normals, std::vector<float>(s.points.size(), 1.0F)};
+    return {s.points, s.normals, std::vector<float>(s.points.size(), 1.0F), {}};
 }
 
 /// Every so many of a cloud's points.
@@ -131,7 +131,7 @@ TEST_CASE("an exact paraboloid is found as it is") {
         cloud.normals.push_back(test::unit({-0.6 * p[0] + 0.2 * p[1], 0.2 * p[0] - 0.2 * p[1], 1}));
         cloud.counts.push_back(1);
     }
-    const OrientedCloud node{{{0, 0, 0.01}}, {test::unit({0.3, -0.2, 1})}, {1}};
+    const OrientedCloud node{{{0, 0, 0.01}}, {test::unit({0.3, -0.2, 1})}, {1}, {}};
     const double spacing = std::sqrt(4.0 / 3000);
     const Quadric q = fit_quadrics(node, cloud, spacing, {}).front();
     REQUIRE(q.radius > 0);
@@ -177,6 +177,26 @@ TEST_CASE("two sheets back to back do not mix") {
         CHECK(cosines / double(fitted) > 0.96);
         CHECK(std::sqrt(squares / double(fitted)) < 0.1 * spacing);
         CHECK(widest > 2 * apart);  // they were in reach
+    }
+}
+
+TEST_CASE("no quadric through the sheets of two folds that the indicator tells apart") {
+    for (const bool told : {true, false}) {
+        const std::size_t each = 3000;
+        const double spacing = std::sqrt(4.0 / each);
+        OrientedCloud cloud;
+        for (const Vec3& p : test::box_cloud(2 * int(each), {{-1, -1, 0}, {1, 1, 0}}, 9)) {
+            // Their normals are on one side: what is between them is a narrow gap.
+            cloud.points.push_back({p[0], p[1], (cloud.size() % 2 ? 0.5 : -0.5) * spacing});
+            cloud.normals.push_back({0, 0, 1});
+            cloud.counts.push_back(1);
+            if (told) cloud.squares_off.push_back(float(0.01 * spacing * spacing));
+        }
+        const std::vector<Quadric> quadrics = fit_quadrics(cloud, cloud, spacing, {});
+        const auto fitted =
+            std::count_if(quadrics.begin(), quadrics.end(), [](const Quadric& q) { return q.radius > 0; });
+        INFO(fitted << " of " << quadrics.size());
+        CHECK((told ? double(fitted) < 0.01 * double(each) : double(fitted) > 0.9 * double(each)));
     }
 }
 
