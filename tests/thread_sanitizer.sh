@@ -37,10 +37,12 @@ fi
 
 cmake --preset tsan --log-level=WARNING
 cmake --build --preset tsan --parallel "$jobs"
+# Left out: after an exception out of std::call_once() the sanitizer's own pthread_once() waits for ever.
+left_out='chunks: NaN is an error of who asks for its chunk'
 # Without address randomization, where that can be had: where it is wide, the sanitizer finds no place for its memory.
 fixed=(setarch --addr-no-randomize)
 "${fixed[@]}" true 2> /dev/null || fixed=()
 TSAN_OPTIONS="suppressions=$PWD/tests/thread_sanitizer.supp ignore_noninstrumented_modules=1 second_deadlock_stack=1" \
     LD_LIBRARY_PATH=$(tbb_library) \
-    "${fixed[@]}" ctest --test-dir "$build" -R '^(unit|property)/' --parallel "$jobs" --timeout 7200 \
+    "${fixed[@]}" ctest --test-dir "$build" -R '^(unit|property)/' -E "$left_out" --parallel "$jobs" --timeout 7200 \
     --output-on-failure "$@"

@@ -241,7 +241,7 @@ class Many(Clouds):
     def test_folds_are_no_noise(self):
         # Walls less than three points apart are smoothed away; noise as thick as that, and what is met, is not told of.
         told = "lie on sheets"
-        folds = self.reconstruct(random_folds(10000, 20, 0.3, 1))
+        folds = self.reconstruct(random_folds(10000, 30, 0.2, 1))
         self.assertIn(told, folds.stderr)
         report = json.loads(folds.stdout)
         self.assertGreater(report["fit"]["points_to_surface"]["mean"], report["resolved"]["voxel_size"])
@@ -257,10 +257,11 @@ class Many(Clouds):
             self.assertNotIn(told, done.stderr)
 
     def test_folds_are_met(self):
-        # Neighbourhoods with sheets of two folds in them, whose sides are known: a quadric through them lies between.
+        # On cells that are too fine their walls run into each other, and a quadric through two of them lies between.
         for seed in 1, 2:
             report = self.report(random_folds(8000, 16, 0.3, seed))
             self.assertLess(report["fit"]["points_to_surface"]["mean"], 0.6 * report["resolved"]["voxel_size"])
+            self.assertEqual((report["surface"]["components"], report["surface"]["genus"]), (1, 0))
 
     def test_few_points_when_asked(self):
         report = self.report(random_sphere(800, 6), "--init", "cloud")

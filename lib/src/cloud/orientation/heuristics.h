@@ -104,6 +104,22 @@ struct OrientationHeuristics {
     /// [ratio] Of what is beyond that, against the share of normals that turned, among tries: walls that run into each
     /// other turn less than those that waver.
     double off_weight = heuristic("orientation.off_weight", 2);
+    /// [cells] Of the lattice on which tries are compared, in those of the first: too fine for walls to run together.
+    double strain_cells = heuristic("orientation.strain_cells", 0.67);
+    /// [ratio] Of a normal that turns there, against a point that the surface passes by.
+    double strain_turned = heuristic("orientation.strain_turned", 3);
+    /// [share of the points] Strain at which a try without doubt is the last; of walls that run into each other 0.003
+    /// and more.
+    double no_strain = heuristic("orientation.no_strain", 0.001);
+    /// [ratio] Of two tries' strains that noise alone may make; of walls that run into each other and such that do not
+    /// 1.3 and more.
+    double same_strain = heuristic("orientation.same_strain", 1.2);
+    /// [cells] Of the first lattice, above which the one that was chosen is too coarse for what its normals tell.
+    double coarse = heuristic("orientation.coarse", 1.2);
+    /// [spacings] Noise below which a surface may be as fine as the tries were compared.
+    double little_noise = heuristic("orientation.little_noise", 0.5);
+    /// [share of the points] That a surface passes by and that ask for that.
+    double many_passed = heuristic("orientation.many_passed", 0.02);
     /// [points] That iterate, on the surface in the square of a lattice's cell.
     double sampled_per_cell = heuristic("orientation.sampled_per_cell", 4);
     /// [points] Fewest of those: where parts lie so far apart that the lattice has each in a cell.

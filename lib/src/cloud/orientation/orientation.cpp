@@ -307,6 +307,37 @@ void choose_orientation(CloudOrientation& cloud, const PointHints& hints, const 
     report.agree = cloud::agreeing(cloud.points, given.given, cloud.orientation, report.inward);
 }
 
+/// What speaks against normals on a lattice finer than theirs: points that their surface passes by, and normals that
+/// their indicator turns. Where walls of folds were taken for each other there are more of both, whatever they have on
+/// their own.
+double strain(const std::vector<Vec3>& points, std::vector<Vec3> normals, std::vector<double> areas, double cell,
+              double reach) {
+    Orientation o;
+    o.normals = std::move(normals);
+    o.areas = std::move(areas);
+    o.indicator = cloud::indicator_of(points, o, cell);
+    const double turned = 1 - cloud::agreeing(points, o.normals, o, false);
+    return share_passed(*o.indicator, points, reach) + kOrientation.strain_turned * turned;
+}
+
+struct Tried {
+    Orientation orientation;
+    double strain = 0;
+};
+
+/// The one of least doubt of those that are hardly more strained than any.
+Orientation& choose(std::vector<Tried>& all) {
+    const double least = std::min_element(all.begin(), all.end(), [](const Tried& a, const Tried& b) {
+                             return a.strain < b.strain;
+                         })->strain;
+    Tried* best = nullptr;
+    for (Tried& t : all)
+        if (t.strain <= kOrientation.same_strain * least &&
+            (best == nullptr || doubt(t.orientation) < doubt(best->orientation)))
+            best = &t;
+    return best->orientation;
+}
+
 }  // namespace
 
 Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run) {
@@ -323,12 +354,14 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
         const bool is_sharp = scale.noise < kOrientation.sharp * scale.spacing;
         const double most = std::max(1.0, double(points.size() / kOrientation.least_sampled));
         const Sample sample(points, scale.spacing, std::size_t(std::clamp(1 / share, 1.0, most)));
-        std::vector<std::pair<int, double>> tried;
+        const double reach = kOrientation.passed_reach * std::max(scale.spacing, scale.noise);
+        std::vector<std::pair<int, double>> lattices;
+        std::vector<Tried> tried;
         for (const Try& attempt : kTries) {
             const int cells =
                 cloud::cells_along(points, std::max(first * attempt.cell, kOrientation.least_spacings * scale.spacing));
-            if (std::count(tried.begin(), tried.end(), std::pair{cells, attempt.enclosed}) > 0) continue;
-            tried.emplace_back(cells, attempt.enclosed);
+            if (std::count(lattices.begin(), lattices.end(), std::pair{cells, attempt.enclosed}) > 0) continue;
+            lattices.emplace_back(cells, attempt.enclosed);
             Orientation now;
             now.areas = sample.areas;
             Iteration iteration(sample.points);
@@ -338,15 +371,29 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
             if (is_sharp) iteration.mend(scale.spacing * std::sqrt(double(sample.step)), now);
             now.indicator = cloud::make_indicator(iteration.last());
             now.off_half = std::abs(cloud::mean_at(iteration.last(), sample.points) - 0.5);
-            if (tried.size() == 1 || doubt(now) < doubt(best)) best = std::move(now);
-            if (is_settled(best)) break;
+            const bool settled = is_settled(now);
+            if (settled && attempt.cell == 1) {
+                tried = {{std::move(now), 0}};
+                break;
+            }
+            const double its = strain(points, normals_of(*now.indicator, points, kOrientation.surely_enclosed),
+                                      sample.all_areas(), kOrientation.strain_cells * first, reach);
+            tried.push_back({std::move(now), its});
+            if (settled && its < kOrientation.no_strain) break;
         }
+        best = std::move(choose(tried));
         const double half = std::accumulate(best.areas.begin(), best.areas.end(), 0.0) /
                             std::accumulate(sample.areas.begin(), sample.areas.end(), 0.0);
         best.areas = sample.all_areas();
         for (double& area : best.areas) area *= half;
         best.normals = normals_of(*best.indicator, points, kOrientation.surely_enclosed);
         if (best.mended > 0) best.mended = cloud::mend_torn(points, scale.spacing, best.normals);
+        // Their lattice may be too coarse for what they tell.
+        if (best.indicator->cell() > kOrientation.coarse * cell)
+            best.indicator = cloud::indicator_of(points, best, first);
+        if (tried.size() > 1 && scale.noise < kOrientation.little_noise * scale.spacing &&
+            share_passed(*best.indicator, points, reach) > kOrientation.many_passed)
+            best.indicator = cloud::indicator_of(points, best, kOrientation.strain_cells * first);
     });
     return best;
 }

@@ -22,8 +22,8 @@ struct LocalFitHeuristics {
     /// [radii] Misfit above which the neighbourhood is no sheet; points that fill a ball have 0.45.
     double sheet_share = heuristic("local_fit.sheet_share", 0.3);
     /// [ratio] Of the misfit to the points' distance to the indicator's surface, above which the neighbourhood is more
-    /// than one sheet; 1.5 to 4 bring folds as close, and change the errors of smooth shapes by a hundredth.
-    double off_indicator = heuristic("local_fit.off_indicator", 2);
+    /// than one sheet. Less, and it is noise that the indicator follows; from 4 on some folds are passed by.
+    double off_indicator = heuristic("local_fit.off_indicator", 3);
     /// [standard deviations] That wider fits may differ from narrower ones; 1 to 2 change the errors by a tenth.
     double agreement = heuristic("local_fit.agreement", 1.5);
     /// [ratio] Of the misfit, beyond which the wider fit itself is off.

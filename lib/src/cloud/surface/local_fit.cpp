@@ -54,7 +54,7 @@ struct Level {
     }
     double radius;
     PointCells cells;
-    FitCloud sorted;  // in the cells' order
+    FitCloud sorted;                 // in the cells' order
     std::vector<float> squares_off;  // the same, or empty
 };
 
@@ -186,8 +186,7 @@ Quadric choose(const std::vector<Level>& levels, const Vec3& point, const Vec3& 
         if (seen.empty() &&
             (std::abs(now.c[0]) > kFit.most_height * level.radius || dot(best.axes[2], normal) < kFit.least_cosine))
             return best;
-        if (seen.empty() &&
-            now.misfit > kFit.off_indicator * off_indicator(level, point, best.axes[2], scratch.ranges))
+        if (seen.empty() && now.misfit > kFit.off_indicator * off_indicator(level, point, best.axes[2], scratch.ranges))
             return best;
         if (seen.empty()) best.noise = now.noise;  // wider, it has the surface's own shape in it
         seen.push_back({now.c[0], now.deviation, now.misfit});
