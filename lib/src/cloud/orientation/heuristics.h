@@ -108,8 +108,8 @@ struct OrientationHeuristics {
     double strain_cells = heuristic("orientation.strain_cells", 0.67);
     /// [ratio] Of a normal that turns there, against a point that the surface passes by.
     double strain_turned = heuristic("orientation.strain_turned", 3);
-    /// [share of the points] Strain at which a try without doubt is the last; of walls that run into each other 0.003
-    /// and more.
+    /// [share of the points] Strain at which a try on finer cells that is not in doubt is the last; of walls that run
+    /// into each other 0.003 and more.
     double no_strain = heuristic("orientation.no_strain", 0.001);
     /// [ratio] Of two tries' strains that noise alone may make; of walls that run into each other and such that do not
     /// 1.3 and more.

@@ -372,7 +372,7 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
             now.indicator = cloud::make_indicator(iteration.last());
             now.off_half = std::abs(cloud::mean_at(iteration.last(), sample.points) - 0.5);
             const bool settled = is_settled(now);
-            if (settled && attempt.cell == 1) {
+            if (settled && attempt.cell >= 1) {
                 tried = {{std::move(now), 0}};
                 break;
             }
