@@ -274,6 +274,17 @@ struct Sample {
     std::vector<double> areas;
 };
 
+/// The indicator that was found may be too coarse for what its normals tell.
+void refine(CloudOrientation& cloud) {
+    Orientation& o = cloud.orientation;
+    const double first = first_cell(cloud.scale), noise = cloud.scale.noise, spacing = cloud.scale.spacing;
+    const double cell = cloud::indicator_lattice(cloud.points, cloud::cells_along(cloud.points, first)).cell;
+    if (o.indicator->cell() > kOrientation.coarse * cell) o.indicator = cloud::indicator_of(cloud.points, o, first);
+    if (!is_settled(o) && noise < kOrientation.little_noise * spacing &&
+        share_passed(*o.indicator, cloud.points, kOrientation.passed_reach * spacing) > kOrientation.many_passed)
+        o.indicator = cloud::indicator_of(cloud.points, o, kOrientation.strain_cells * first);
+}
+
 /// By the hints where they are consistent and nothing that is certain contradicts them, else by itself, else by views.
 void choose_orientation(CloudOrientation& cloud, const PointHints& hints, const RunContext& run) {
     cloud::GivenSides given = cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale), run);
@@ -299,6 +310,7 @@ void choose_orientation(CloudOrientation& cloud, const PointHints& hints, const 
                              kOrientation.fewer_passed * share_passed(*seen.indicator, cloud.points, reach);
             if (!cloud.encloses) cloud.orientation = std::move(seen);
         }
+        if (!report.used && cloud.encloses) refine(cloud);
     }
     if (report.used) {
         cloud.orientation = std::move(given.orientation);
@@ -388,12 +400,6 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
         for (double& area : best.areas) area *= half;
         best.normals = normals_of(*best.indicator, points, kOrientation.surely_enclosed);
         if (best.mended > 0) best.mended = cloud::mend_torn(points, scale.spacing, best.normals);
-        // Their lattice may be too coarse for what they tell.
-        if (best.indicator->cell() > kOrientation.coarse * cell)
-            best.indicator = cloud::indicator_of(points, best, first);
-        if (tried.size() > 1 && scale.noise < kOrientation.little_noise * scale.spacing &&
-            share_passed(*best.indicator, points, reach) > kOrientation.many_passed)
-            best.indicator = cloud::indicator_of(points, best, kOrientation.strain_cells * first);
     });
     return best;
 }
