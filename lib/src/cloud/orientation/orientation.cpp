@@ -337,17 +337,11 @@ struct Tried {
     double strain = 0;
 };
 
-/// The one of least doubt of those that are hardly more strained than any.
-Orientation& choose(std::vector<Tried>& all) {
-    const double least = std::min_element(all.begin(), all.end(), [](const Tried& a, const Tried& b) {
-                             return a.strain < b.strain;
-                         })->strain;
-    Tried* best = nullptr;
-    for (Tried& t : all)
-        if (t.strain <= kOrientation.same_strain * least &&
-            (best == nullptr || doubt(t.orientation) < doubt(best->orientation)))
-            best = &t;
-    return best->orientation;
+/// Leaves those that are hardly more strained than any.
+void keep_least_strained(std::vector<Tried>& tried) {
+    double least = tried.front().strain;
+    for (const Tried& t : tried) least = std::min(least, t.strain);
+    std::erase_if(tried, [&](const Tried& t) { return t.strain > kOrientation.same_strain * least; });
 }
 
 }  // namespace
@@ -385,15 +379,19 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
             now.off_half = std::abs(cloud::mean_at(iteration.last(), sample.points) - 0.5);
             const bool settled = is_settled(now);
             if (settled && attempt.cell >= 1) {
-                tried = {{std::move(now), 0}};
+                tried.clear();
+                tried.push_back({std::move(now), 0});
                 break;
             }
             const double its = strain(points, normals_of(*now.indicator, points, kOrientation.surely_enclosed),
                                       sample.all_areas(), kOrientation.strain_cells * first, reach);
             tried.push_back({std::move(now), its});
+            keep_least_strained(tried);  // each has an indicator, which is large
             if (settled && its < kOrientation.no_strain) break;
         }
-        best = std::move(choose(tried));
+        best = std::move(std::min_element(tried.begin(), tried.end(), [](const Tried& a, const Tried& b) {
+                             return doubt(a.orientation) < doubt(b.orientation);
+                         })->orientation);
         const double half = std::accumulate(best.areas.begin(), best.areas.end(), 0.0) /
                             std::accumulate(sample.areas.begin(), sample.areas.end(), 0.0);
         best.areas = sample.all_areas();
