@@ -194,6 +194,25 @@ def fold_normals(points, waves, depth):
     return normals
 
 
+def random_scan_from_the_air(count, seed):
+    """Points on hills with houses, as from above: roofs, and nothing of the walls. A square with edge 100."""
+    draw = random.Random(seed)
+    ground = lambda x, y: 3 * math.sin(x / 23) * math.cos(y / 31) + 0.02 * x
+    houses = [(draw.uniform(10, 90), draw.uniform(10, 90), draw.uniform(4, 12), draw.uniform(4, 12), draw.uniform(4, 15),
+               draw.uniform(0, math.pi)) for _ in range(9)]
+    points = []
+    for _ in range(count):
+        x, y = draw.uniform(0, 100), draw.uniform(0, 100)
+        z = ground(x, y)
+        for a, b, length, width, height, turn in houses:
+            u = (x - a) * math.cos(turn) + (y - b) * math.sin(turn)
+            v = (y - b) * math.cos(turn) - (x - a) * math.sin(turn)
+            if abs(u) < length and abs(v) < width:
+                z = ground(a, b) + height
+        points.append((x, y, z + draw.gauss(0, 0.02)))
+    return points
+
+
 class Many(Clouds):
     """Enough points for a surface of their own."""
 
@@ -230,6 +249,16 @@ class Many(Clouds):
         self.assertIn("from every point", done.stderr)
         surface = json.loads(done.stdout)["surface"]
         self.assertEqual((surface["closed"], surface["components"], surface["genus"]), (True, 1, 0))
+
+    def test_from_the_air(self):
+        # What closes it is larger than the scan, leaves the domain, and would turn roofs as a whole.
+        for seed in 1, 3:
+            report = self.report(random_scan_from_the_air(5000, seed))
+            self.assertIn("from every point", " ".join(report["warnings"]))
+            self.assertEqual((report["surface"]["closed"], report["surface"]["components"]), (True, 1))
+            self.assertLess(report["surface"]["area"], 4 * 100 ** 2)  # that, and as much below it, and walls
+            self.assertLess(report["fit"]["points_to_surface"]["mean"], 0.25 * report["resolved"]["voxel_size"])
+            self.assertLess(report["fit"]["marks_off"]["count"], 0.02 * 5000)
 
     def test_folds_are_no_views(self):
         # Deep folds with their bottom open: normals waver in them, and what can be seen from outside is a ball.

@@ -63,7 +63,7 @@ void replace_by(Job& job, const TriangleMesh& mesh) {
     FloatGridPtr level_set = start_from_mesh(job.domain(), mesh, job.run);
     mesh_of(job, *level_set);
     if (complexity(measure(job.result.mesh)) <= before) return;
-    cloud::hold_topology(*rough, *level_set);
+    cloud::hold_topology(*rough, *level_set, job.run);
     mesh_of(job, *start_from_grid(job.domain(), *level_set, job.run));
 }
 

@@ -237,10 +237,14 @@ double doubt(const Orientation& o, double weight = kOrientation.off_weight) {
 }
 bool is_settled(const Orientation& o) { return doubt(o, 1) < kGivenSides.few_turned; }
 
-bool does_enclose(const CloudOrientation& cloud) {
+/// Share of the surface that lies far from every point.
+double share_bare(const CloudOrientation& cloud) {
     const double reach = kOrientation.bare_reach * std::max(cloud.scale.spacing, cloud.scale.noise);
-    return doubt(cloud.orientation) < kOrientation.settled ||
-           cloud::share_bare(*cloud.orientation.indicator, cloud.points, reach) < kOrientation.bare;
+    return cloud::share_bare(*cloud.orientation.indicator, cloud.points, reach);
+}
+
+bool does_enclose(const CloudOrientation& cloud) {
+    return doubt(cloud.orientation) < kOrientation.settled || share_bare(cloud) < kOrientation.bare;
 }
 
 /// Share of the points that the indicator's level 1/2 passes by at more than that distance.
@@ -285,6 +289,30 @@ void refine(CloudOrientation& cloud) {
         o.indicator = cloud::indicator_of(cloud.points, o, kOrientation.strain_cells * first);
 }
 
+/// Of points that enclose nothing as they are oriented.
+/// @param reach  distance at which a surface passes a point by
+void choose_by_views(CloudOrientation& cloud, double reach, const RunContext& run) {
+    const double passed = share_passed(*cloud.orientation.indicator, cloud.points, reach);
+    const bool mostly_bare = share_bare(cloud) > kOrientation.mostly_bare;
+    if (mostly_bare && passed > 0) {
+        // What closes a scan of one side is larger than the scan, and turns parts of it; where they were seen from
+        // tells.
+        cloud::GivenSides seen = cloud::given_sides(cloud.points, cloud::hints_by_views(cloud.points, cloud.scale),
+                                                    cloud.scale, first_cell(cloud.scale), run);
+        if (seen.report.used && share_passed(*seen.orientation.indicator, cloud.points, reach) <
+                                    std::min(passed, kOrientation.many_passed)) {
+            cloud.orientation = std::move(seen.orientation);
+            cloud.encloses = true;
+            return;
+        }
+    }
+    Orientation seen = cloud::orient_by_views(cloud.points, cloud.scale, run);
+    // Normals waver in the folds of a closed surface, too; but there views pass by most points.
+    cloud.encloses = (!mostly_bare || passed < kOrientation.many_passed) &&
+                     passed < kOrientation.fewer_passed * share_passed(*seen.indicator, cloud.points, reach);
+    if (!cloud.encloses) cloud.orientation = std::move(seen);
+}
+
 /// By the hints where they are consistent and nothing that is certain contradicts them, else by itself, else by views.
 void choose_orientation(CloudOrientation& cloud, const PointHints& hints, const RunContext& run) {
     cloud::GivenSides given = cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale), run);
@@ -303,13 +331,7 @@ void choose_orientation(CloudOrientation& cloud, const PointHints& hints, const 
             report.used = false;
             report.why_not = "parts of them are turned as a whole";
         }
-        if (!report.used && !cloud.encloses) {
-            Orientation seen = cloud::orient_by_views(cloud.points, cloud.scale, run);
-            // Normals waver in the folds of a closed surface, too; but there views pass by most points.
-            cloud.encloses = share_passed(*cloud.orientation.indicator, cloud.points, reach) <
-                             kOrientation.fewer_passed * share_passed(*seen.indicator, cloud.points, reach);
-            if (!cloud.encloses) cloud.orientation = std::move(seen);
-        }
+        if (!report.used && !cloud.encloses) choose_by_views(cloud, reach, run);
         if (!report.used && cloud.encloses) refine(cloud);
     }
     if (report.used) {

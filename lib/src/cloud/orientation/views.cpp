@@ -31,6 +31,12 @@ std::vector<Vec3> directions() {
     return all;
 }
 
+/// Of length 1; 0 where as much is free on one side as on the other.
+std::vector<Vec3> towards(std::vector<Vec3> free) {
+    for (Vec3& way : free) way = std::sqrt(dot(way, way)) > kViews.least_free ? unit(way) : Vec3{0, 0, 0};
+    return free;
+}
+
 /// The cells with points, as a dense mask.
 class Occupied {
 public:
@@ -106,15 +112,17 @@ double share_free(const std::vector<Vec3>& points, const std::vector<Vec3>& dire
     return double(std::count(free.begin(), free.end(), 1)) / double(std::max<std::ptrdiff_t>(told, 1));
 }
 
+PointHints hints_by_views(const std::vector<Vec3>& points, const CloudScale& scale) {
+    return {{}, towards(free_directions(points, kViews.view_spacings * apart(scale)))};
+}
+
 Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& scale, const RunContext& run) {
     Orientation result;
     const double between = apart(scale);
     const std::vector<Vec3> free = free_directions(points, kViews.view_spacings * between);
     run.check();
     result.areas = areas_of(points, scale.spacing);
-    result.normals.resize(points.size());
-    for (std::size_t n = 0; n < points.size(); ++n)
-        if (std::sqrt(dot(free[n], free[n])) > kViews.least_free) result.normals[n] = unit(free[n]);
+    result.normals = towards(free);
     WindingField coarse(indicator_lattice(points, cells_along(points, kViews.coarse_spacings * between)));
     solve(coarse, points, result, kIndicator.cycles_from_nothing);
     const double half = scale_to_half(coarse, points);

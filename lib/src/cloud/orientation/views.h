@@ -14,6 +14,9 @@ namespace covol::cloud {
 [[nodiscard]] double share_free(const std::vector<Vec3>& points, const std::vector<Vec3>& directions,
                                 const CloudScale& scale);
 
+/// As if each point's sensor had been where it can be seen from; 0 where that is from nowhere, or from all around.
+[[nodiscard]] PointHints hints_by_views(const std::vector<Vec3>& points, const CloudScale& scale);
+
 /// Normals towards where each point can be seen from, and their indicator, solved for once. `screened` is the indicator
 /// that is drawn to 1/2 at the points as well (Kazhdan and Hoppe, Screened Poisson surface reconstruction, ACM Trans.
 /// Graph. 32(3), 2013): closer to them, with more handles where layers of the scan differ.

@@ -189,6 +189,8 @@ public:
     Blend(const CloudField::Pieces& pieces, const Indicator& indicator, const Domain& domain)
         : pieces_(pieces), indicator_(indicator), domain_(domain) {}
 
+    /// Values within the domain; beyond its end is outside, so that what reaches it is closed there.
+
     void fill(Leaf& leaf) {
         const double h = domain_.voxel_size;
         const Coord origin = leaf.origin();
@@ -210,11 +212,19 @@ public:
                 value += (1 - trust) *
                          std::clamp((0.5 - indicator_.inside(place(origin, at))) * indicator_.cell() / kBlend.slope,
                                     -limit, limit);
-            leaf.setValueOn(openvdb::Index(at), float(value));
+            leaf.setValueOn(openvdb::Index(at), float(std::max(value, std::min(beyond_end(origin, at) * h, limit))));
         }
     }
 
 private:
+    /// Of the domain, in voxels; less than 0 within.
+    [[nodiscard]] double beyond_end(const Coord& origin, int at) const {
+        const Coord voxel = origin.offsetBy(at >> 6, at >> 3 & 7, at & 7);
+        int beyond = std::numeric_limits<int>::min();
+        for (int a = 0; a < 3; ++a) beyond = std::max({beyond, domain_.min[a] - voxel[a], voxel[a] - domain_.max[a]});
+        return beyond - 0.5;
+    }
+
     /// 1 below the share that is trusted, 0 from 1 on.
     static double faded(double share) {
         const double beyond = std::clamp((share - kBlend.trusted) / (1 - kBlend.trusted), 0.0, 1.0);
@@ -273,11 +283,15 @@ private:
 
 /// The pieces' distance where they act, what the indicator's level 1/2 says of it elsewhere; not yet a level set's
 /// band.
-FloatGridPtr level_set_of(const CloudField::Pieces& pieces, const Indicator& indicator, const Domain& domain,
+FloatGridPtr level_set_of(const CloudField::Pieces& pieces, const Indicator& indicator, const Domain& within,
                           const RunContext& run) {
-    const auto limit = float(kHalfWidthVoxels * domain.voxel_size);
-    FloatGridPtr field = make_grid(domain, limit, "u");
-    const openvdb::CoordBBox box = detail::box_of(domain);
+    const auto limit = float(kHalfWidthVoxels * within.voxel_size);
+    FloatGridPtr field = make_grid(within, limit, "u");
+    // A surface that leaves it is closed so far beyond that no value within tells.
+    constexpr int kBeyond = int(kHalfWidthVoxels) + 1;
+    const Domain domain = widened(within, kBeyond);
+    openvdb::CoordBBox box = detail::box_of(domain);
+    box.expand(kBeyond);
     // From leaf to leaf, as far as the band goes.
     for (std::vector<Coord> front = leaves_of(pieces, indicator, domain); !front.empty();) {
         std::vector<Leaf*> leaves;

@@ -53,7 +53,7 @@ struct TopologyOf {
         detail::drop_bare_pieces(*rough, points, least);
         const Complexity simpler(*rough, run);
         if (simpler.pieces == 0 || simpler.all >= own.all) return;
-        report.held_voxels += cloud::hold_topology(*rough, level_set);
+        report.held_voxels += cloud::hold_topology(*rough, level_set, run);
         own = simpler;
     }
 };

@@ -18,6 +18,8 @@ namespace {
 
 using openvdb::Coord;
 
+constexpr std::size_t kCheckEvery = 10'000;  // voxels, between two looks at whether the run was cancelled
+
 /// The 26 neighbours of a voxel, one bit each, and which of them are neighbours of each other.
 struct Neighbourhood {
     std::array<Coord, 26> offset;
@@ -94,7 +96,7 @@ struct Waiting {
 
 /// How deep voxels lie below or above target's surface, in voxels, along chains of neighbours among them (Dijkstra):
 /// its values end with its band.
-FloatGrid::Ptr depth_of(const std::vector<Coord>& voxels, const FloatGrid& target) {
+FloatGrid::Ptr depth_of(const std::vector<Coord>& voxels, const FloatGrid& target, const RunContext& run) {
     FloatGrid::Ptr depth = FloatGrid::create(std::numeric_limits<float>::max());
     auto depth_at = depth->getAccessor();
     auto target_at = target.getConstAccessor();
@@ -108,7 +110,8 @@ FloatGrid::Ptr depth_of(const std::vector<Coord>& voxels, const FloatGrid& targe
         depth_at.setValueOn(at, is_beside ? std::abs(value) / h : std::numeric_limits<float>::max());
         if (is_beside) queue.push({-std::abs(value) / h, at});
     }
-    while (!queue.empty()) {
+    for (std::size_t turns = 1; !queue.empty(); ++turns) {
+        if (turns % kCheckEvery == 0) run.check();
         const auto [less, at] = queue.top();
         queue.pop();
         if (-less > depth_at.getValue(at)) continue;
@@ -125,14 +128,19 @@ FloatGrid::Ptr depth_of(const std::vector<Coord>& voxels, const FloatGrid& targe
 
 }  // namespace
 
-std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target) {
+std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target, const RunContext& run) {
     auto rough_at = rough.getConstAccessor();
     auto target_at = target.getAccessor();
+    // Where a surface is cut off, as at a domain's end, what lies beyond has no side.
+    openvdb::CoordBBox box = target.evalActiveVoxelBoundingBox();
+    box.expand(rough.evalActiveVoxelBoundingBox());
     openvdb::MaskGrid kept;  // voxels that have rough's sign still, and not target's
     auto kept_at = kept.getAccessor();
     std::vector<Coord> found;
     const auto compare = [&](const Coord& at) {
-        if ((rough_at.getValue(at) < 0) == (target_at.getValue(at) < 0) || kept_at.isValueOn(at)) return;
+        if ((rough_at.getValue(at) < 0) == (target_at.getValue(at) < 0) || !box.isInside(at) || kept_at.isValueOn(at))
+            return;
+        if (found.size() % kCheckEvery == 0) run.check();
         kept_at.setValueOn(at);
         found.push_back(at);
     };
@@ -145,12 +153,13 @@ std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target) {
         for (std::uint32_t face = kAround.faces; face != 0; face &= face - 1)
             compare(Coord(found[n]) + kAround.offset[std::size_t(__builtin_ctz(face))]);
     // The deepest first: what is left in the end, to keep two fronts apart, are the narrowest places.
-    const FloatGrid::Ptr depth = depth_of(found, target);
+    const FloatGrid::Ptr depth = depth_of(found, target, run);
     auto depth_at = depth->getConstAccessor();
     std::priority_queue<Waiting> queue;
     for (const Coord& at : found) queue.push({depth_at.getValue(at), at});
-    std::size_t left = found.size();
+    std::size_t left = found.size(), turns = 0;
     while (!queue.empty()) {
+        if (++turns % kCheckEvery == 0) run.check();
         const Coord at = queue.top().at;
         queue.pop();
         if (!kept_at.isValueOn(at)) continue;

@@ -2,6 +2,7 @@
 #include <cstddef>
 
 #include "covol/domain.h"
+#include "covol/run.h"
 
 namespace covol::cloud {
 
@@ -12,6 +13,7 @@ namespace covol::cloud {
 /// extract_mesh() joins voxels. The deepest voxels of target turn first, so that cuts and fillings lie where it is
 /// narrowest. Both are active near their surface and signed everywhere.
 /// @return the number of voxels that keep rough's sign; their value is small
-std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target);
+/// @throws Error Cancelled
+std::size_t hold_topology(const FloatGrid& rough, FloatGrid& target, const RunContext& run);
 
 }  // namespace covol::cloud

@@ -2,10 +2,12 @@
 
 #include <openvdb/openvdb.h>
 
+#include <atomic>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <random>
 
+#include "covol/error.h"
 #include "covol/mesh.h"
 #include "covol/surface.h"
 
@@ -59,7 +61,7 @@ TEST_CASE("hold_topology: whatever the target is, pieces and handles stay those 
             level_set([&](int i, int j, int k) { return !is_border(i, j, k) && random() % 2 == 0; });
         for (const auto& [rough, genus] : {std::pair{ball, 0}, std::pair{ring, 1}}) {
             const FloatGridPtr held = noise->deepCopy();
-            const std::size_t left = cloud::hold_topology(*rough, *held);
+            const std::size_t left = cloud::hold_topology(*rough, *held, {});
             CHECK(left > 0);
             const MeshMeasures m = measure(extract_mesh(*held));
             CHECK(m.closed);
@@ -83,7 +85,28 @@ TEST_CASE("hold_topology: what keeps two pieces apart lies where the target is n
         std::size_t least = 0;
         for (int j = 0; j < kSide; ++j)
             for (int k = 0; k < kSide; ++k) least += bar(narrow, j, k);
-        CHECK(cloud::hold_topology(*rough, *target) == least);
+        CHECK(cloud::hold_topology(*rough, *target, {}) == least);
         CHECK(measure(extract_mesh(*target)).components == 2);
+    }
+}
+
+TEST_CASE("hold_topology: where a surface is cut off, what lies beyond is left alone, and a cancelled run ends") {
+    const FloatGridPtr rough = level_set([](int, int, int k) { return k < 8; });
+    FloatGridPtr target = level_set([](int i, int j, int k) { return k < 12 && away(i, j, k) > 4; });
+    const std::size_t all = target->activeVoxelCount();
+    // As a flood leaves it: inside goes on without end in one of the two.
+    target->tree().root().addTile(openvdb::Coord(0, 0, -4096), -3.0F, false);
+    static_cast<void>(cloud::hold_topology(*rough, *target, {}));
+    CHECK(target->activeVoxelCount() == all);
+    CHECK(target->evalActiveVoxelBoundingBox().min() == openvdb::Coord(0, 0, 0));
+
+    const std::atomic<bool> cancel = true;
+    RunContext run;
+    run.cancel = &cancel;
+    try {
+        static_cast<void>(cloud::hold_topology(*rough, *level_set([](int, int, int k) { return k < 12; }), run));
+        FAIL("not cancelled");
+    } catch (const Error& error) {
+        CHECK(error.code() == Errc::Cancelled);
     }
 }
