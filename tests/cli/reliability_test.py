@@ -152,7 +152,8 @@ class Memory(Case):
 
     def test_is_not_passed(self):
         self.run_covol("phantom", "torus", "--size", 224, "--count", 150000, "-o", "t.nrrd", "--points", "t.ply")
-        self.run_covol("segment", "t.nrrd", "--points", "t.ply", "--init", "tag", "--max-steps", 1, "-o", "t.vdb", "--mesh", "m.ply")
+        self.run_covol("segment", "t.nrrd", "--points", "t.ply", "--init", "tag", "--max-steps", 1, "-o", "t.vdb", "--mesh", "m.ply",
+                       "--mask", "k.nrrd")
         jobs = {
             "tagged": ["segment", "t.nrrd", "--points", "t.ply", "--init", "tag", "-o", "o.vdb"],
             "cloud": ["reconstruct", "t.ply", "-o", "o.vdb"],
@@ -165,8 +166,10 @@ class Memory(Case):
             "flow": ["segment", "t.nrrd", "--points", "t.ply", "--model", "paper", "-o", "o.vdb"],
             "page": ["segment", "t.nrrd", "--points", "t.ply", "--init", "tag", "--max-steps", 3, "-o", "o.vdb", "--report", "o.html"],
             "compare meshes": ["compare", "m.ply", "m.ply"],
+            "compare masks": ["compare", "k.nrrd", "k.nrrd"],
+            "rerun": ["rerun", "t.vdb"],
         }
-        self.stay_within(jobs, 6)
+        self.stay_within(jobs, 8)
 
     def test_is_not_passed_by_single_steps(self):
         self.run_covol("phantom", "torus", "--size", 448, "--count", 200000, "-o", "t.nrrd", "--points", "t.ply")

@@ -29,6 +29,8 @@ namespace {
 
 using Words = std::vector<std::string>;
 
+constexpr int kOneBrick = 1'000'000'000;  // voxels, more than any band that a run holds at once
+
 /// What a file says of the run that made it.
 struct Provenance {
     std::string version, instruction_set, command;
@@ -243,6 +245,13 @@ struct RerunJob {
         Words quiet = words;
         quiet.push_back("--quiet");
         if (session.run().threads > 0) quiet.insert(quiet.end(), {"--threads", std::to_string(session.run().threads)});
+        if (const auto limit = session.memory_limit()) {
+            quiet.insert(quiet.end(), {"--memory-limit", std::to_string(*limit)});
+            // a run that went on in bricks would end with other bits
+            if (session.command(made.command)->get_option_no_throw("--brick-voxels") != nullptr &&
+                std::find(made.given.begin(), made.given.end(), "brick-voxels") == made.given.end())
+                quiet.insert(quiet.end(), {"--brick-voxels", std::to_string(kOneBrick)});
+        }
         const Stopwatch watch;
         const int code = run_covol(quiet, session.run());
         if (code != kDone)
