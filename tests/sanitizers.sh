@@ -1,26 +1,38 @@
 #!/usr/bin/env bash
-# The unit and property tests under the address and undefined-behaviour sanitizers, and the lines of lib/ that they reach.
+# The unit and property tests under the address and undefined-behaviour sanitizers.
 #
-#   bash tests/sanitizers.sh [WORDS FOR CTEST ...]
+#   bash tests/sanitizers.sh [WORDS FOR CTEST ...]   all of them, and the lines of lib/ that they reach: an hour and more
+#   bash tests/sanitizers.sh --quick                 the programs that take less than 20 s (tests/CMakeLists.txt): for CI
 #
 # Leaks are looked for, too, but for what the libraries of HDF5 and OpenVDB lose of a file that is damaged: the first keeps
 # objects of its header, the second the node that it was reading. The tests' own code is under the address sanitizer alone
 # (COVOL_TEST_FLAGS in CMakePresets.json).
 set -euo pipefail
 cd "$(dirname "$0")/.."
-
-bash tests/install_packages.sh gcovr
-cmake --preset asan --log-level=WARNING
-cmake --build --preset asan --parallel "${COVOL_JOBS:-$(nproc)}"
-find build-asan -name '*.gcda' -delete
+jobs=${COVOL_JOBS:-$(nproc)}
 leaks=$(mktemp)
 trap 'rm -f "$leaks"' EXIT
 printf 'leak:libhdf5\nleak:libopenvdb\n' > "$leaks"
+export LSAN_OPTIONS="suppressions=$leaks:print_suppressions=0" UBSAN_OPTIONS=print_stacktrace=1
+
+if [[ ${1:-} == --quick ]]; then
+    bash tests/install_packages.sh
+    cmake --preset asan --log-level=WARNING
+    cmake --build --preset asan --parallel "$jobs" --target quick_tests
+    # Each program's tests in one process; what it says is shown where it fails.
+    run='text=$("$0" 2>&1) || { echo "$0: exit code $?"; printf "%s\n" "$text"; exit 1; }'
+    xargs --max-args=1 --max-procs="$jobs" bash -c "$run" < build-asan/tests/quick_tests.txt
+    echo "covol: $(wc -l < build-asan/tests/quick_tests.txt) test programs passed under the sanitizers"
+    exit
+fi
+
+bash tests/install_packages.sh gcovr
+cmake --preset coverage --log-level=WARNING
+cmake --build --preset coverage --parallel "$jobs"
+find build-coverage -name '*.gcda' -delete
 status=0
-LSAN_OPTIONS="suppressions=$leaks:print_suppressions=0" UBSAN_OPTIONS=print_stacktrace=1 \
-    ctest --test-dir build-asan -R '^(unit|property)/' --parallel "${COVOL_JOBS:-$(nproc)}" --timeout 3600 \
-    --output-on-failure "$@" || status=$?
-gcovr --root . --filter lib/ --object-directory build-asan --exclude-throw-branches --sort-percentage \
-    --gcov-ignore-parse-errors --print-summary -o build-asan/coverage.txt
-echo "by file: build-asan/coverage.txt"
+ctest --test-dir build-coverage -R '^(unit|property)/' --parallel "$jobs" --timeout 3600 --output-on-failure "$@" || status=$?
+gcovr --root . --filter lib/ --object-directory build-coverage --exclude-throw-branches --sort-percentage \
+    --gcov-ignore-parse-errors --print-summary -o build-coverage/coverage.txt
+echo "by file: build-coverage/coverage.txt"
 exit "$status"

@@ -1,12 +1,16 @@
-"""Many jobs: in one process without growth, eight at once, and random ones that are killed.
+"""Many jobs: in one process without growth, eight at once, five kinds killed at random moments over their old outputs, and
+random ones that are killed or interrupted.
 
-    COVOL=build/bin/covol PYTHONPATH=build/python /usr/bin/python3 tests/soak/soak.py [--jobs 2000] [--minutes 20] [--seed 1]
+    COVOL=build/bin/covol PYTHONPATH=build/python /usr/bin/python3 tests/soak/soak.py [--jobs 2000] [--kills 100]
+        [--minutes 20] [--seed 1] [--only one_process|eight_at_once|old_or_new|random_kills]
 
 Prints what it did, a line for each part, and ends with exit code 1 where anything went wrong. Needs numpy, for the first
 part the Python module (left out, with a word, where it is not there).
 """
 import argparse
 import gc
+import hashlib
+import json
 import os
 import pathlib
 import random
@@ -33,7 +37,7 @@ def one_process(jobs, seed):
     try:
         import covol
     except ImportError:
-        return "the Python module is not on the path: left out", True
+        return "the Python module is not on the path: left out", []
     warnings.simplefilter("ignore")
     generator = random.Random(seed)
     image, points, _ = covol.phantom("sphere", 32, 400)
@@ -53,7 +57,7 @@ def one_process(jobs, seed):
             held.append(resident())
     begin, end = held[len(held) // 10 + 1], held[-1]
     shown = ", ".join(str(bytes >> 20) for bytes in held)
-    return f"{jobs} jobs in one process, MiB held along the way: {shown}", end - begin < GROWTH
+    return f"{jobs} jobs in one process, MiB held along the way: {shown}", [] if end - begin < GROWTH else ["GREW"]
 
 
 class Folder:
@@ -119,7 +123,72 @@ def eight_at_once(seed):
         return f"32 jobs, eight at once: {len(wrong)} went wrong", wrong
 
 
-def kills(minutes, seed):
+class Kind:
+    """One kind of job, with two choices of options that write different things over each other."""
+
+    def __init__(self, folder, words, choices, outputs):
+        self.folder, self.words, self.choices, self.outputs = folder, words, choices, outputs
+        self.sets, self.seconds = [], 0.0
+        for choice in (0, 1):
+            begin = time.monotonic()
+            code = self.start(choice).wait()
+            assert code == 0, f"exit code {code}: {words}"
+            self.seconds = max(self.seconds, time.monotonic() - begin)
+            self.sets.append(self.state())
+        assert all(self.sets[0][name] != self.sets[1][name] for name in outputs), self.sets
+
+    def start(self, choice):
+        return self.folder.run(*self.words, *self.choices[choice])
+
+    def state(self):
+        """Of each output, a folder of files too; of a report the surface, for it holds times."""
+        def digest(path):
+            if path.suffix == ".json" and path.parent == self.folder.path:
+                return json.dumps(json.loads(path.read_bytes())["surface"], sort_keys=True)
+            return hashlib.sha256(path.read_bytes()).hexdigest()
+        found = {}
+        for name in self.outputs:
+            path = self.folder.path / name
+            files = sorted(file for file in path.rglob("*") if file.is_file()) if path.is_dir() else [path] if path.exists() else []
+            found[name] = [(str(file.relative_to(self.folder.path)), digest(file)) for file in files]
+        return found
+
+
+def old_or_new(kills, seed):
+    """Each job is killed at a moment of its own time, at random, and begins the next time over what it left."""
+    with tempfile.TemporaryDirectory(prefix="covol_soak_") as path:
+        folder, wrong, lines = Folder(path, seed), [], []
+        for words, choices, outputs in (
+            (["segment", "sphere.nrrd", "--points", "sphere.xyz", "--init", "tag", "--max-steps", "4", "-o", "s.vdb", "--mesh", "s.ply",
+              "--mask", "s.ome.zarr", "--json", "s.json"], (["--delta", "1vx"], ["--delta", "3vx"]), ["s.vdb", "s.ply", "s.ome.zarr", "s.json"]),
+            (["reconstruct", "torus.xyz", "-o", "r.vdb", "--mesh", "r.stl", "--json", "r.json"],
+             (["--voxel-size", "0.04"], ["--voxel-size", "0.05"]), ["r.vdb", "r.stl", "r.json"]),
+            (["mesh", "start.vdb", "-o", "m.ply"], (["--target-edge", "2vx"], ["--target-edge", "3vx"]), ["m.ply"]),
+            (["convert"], (["sphere.nrrd", "c.vdb"], ["torus.nrrd", "c.vdb"]), ["c.vdb"]),
+            (["render", "start.vdb", "-o", "p.png"], (["--size", "1600x1200"], ["--size", "1200x1600"]), ["p.png"]),
+        ):
+            kind = Kind(folder, words, choices, outputs)
+            last, killed, new = 1, 0, 0
+            while killed < kills:
+                run = kind.start(1 - last)
+                time.sleep(folder.generator.uniform(0, kind.seconds))
+                run.kill()
+                code = run.wait()
+                folder.run("phantom", "sphere", "--size", "16", "-o", "next.nrrd").wait()  # clears up after it
+                hidden = [entry.name for entry in folder.path.iterdir() if entry.name.startswith(".covol")]
+                state = kind.state()
+                if hidden or state not in kind.sets:
+                    wrong.append(f"{words[0]}, kill {killed}: left {hidden}, {state}")
+                    kind.start(last).wait()  # from here on again
+                    state = kind.state()
+                killed += code != 0
+                new += state == kind.sets[1 - last] and code != 0
+                last = kind.sets.index(state)
+            lines.append(f"{words[0]}: {killed} kills within {kind.seconds:.2f} s, {new} of them with the new outputs in place")
+        return "\n".join(lines), wrong
+
+
+def random_kills(minutes, seed):
     with tempfile.TemporaryDirectory(prefix="covol_soak_") as path:
         folder, wrong, ended = Folder(path, seed), [], {}
         deadline, n = time.monotonic() + 60 * minutes, 0
@@ -162,14 +231,20 @@ def kills(minutes, seed):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--jobs", type=int, default=2000)
+    parser.add_argument("--kills", type=int, default=100)
     parser.add_argument("--minutes", type=float, default=20)
     parser.add_argument("--seed", type=int, default=1)
+    parts = {
+        "one_process": lambda o: one_process(o.jobs, o.seed),
+        "eight_at_once": lambda o: eight_at_once(o.seed),
+        "old_or_new": lambda o: old_or_new(o.kills, o.seed),
+        "random_kills": lambda o: random_kills(o.minutes, o.seed),
+    }
+    parser.add_argument("--only", choices=parts)
     options = parser.parse_args()
     failed = False
-    text, good = one_process(options.jobs, options.seed)
-    print(text, "" if good else "GREW", flush=True)
-    failed |= not good
-    for text, wrong in (eight_at_once(options.seed), kills(options.minutes, options.seed)):
+    for name in [options.only] if options.only else parts:
+        text, wrong = parts[name](options)
         print("\n".join([text, *wrong]), flush=True)
         failed |= bool(wrong)
     return 1 if failed else 0
