@@ -4,6 +4,8 @@
 #   bash tests/sanitizers.sh [WORDS FOR CTEST ...]   all of them, and the lines of lib/ that they reach: an hour and more
 #   bash tests/sanitizers.sh --quick                 the programs that take less than 20 s (tests/CMakeLists.txt): for CI
 #
+# The quick pass leaves out the checks of each pointer that is followed, which take a third of the time to compile, and of
+# which the address sanitizer sees most.
 # Leaks are looked for, too, but for what the libraries of HDF5 and OpenVDB lose of a file that is damaged: the first keeps
 # objects of its header, the second the node that it was reading. The tests' own code is under the address sanitizer alone
 # (COVOL_TEST_FLAGS in CMakePresets.json).

@@ -49,8 +49,9 @@ std::vector<Vec3> plane_normals(const std::vector<Vec3>& points, const std::vect
 /// Normals and what their indicator function says of them.
 class Jury {
 public:
-    Jury(const std::vector<Vec3>& points, std::vector<Vec3> normals, const CloudScale& scale)
+    Jury(const std::vector<Vec3>& points, std::vector<Vec3> normals, const CloudScale& scale, const RunContext& run)
         : points_(points),
+          run_(run),
           field_(indicator_lattice(
               points, cells_along(points, kGivenSides.vote_spacings * std::max(scale.spacing, scale.noise)))) {
         voice_.normals = std::move(normals);
@@ -107,11 +108,12 @@ private:
         std::vector<Vec3> vectors(points_.size());
         for (std::size_t n = 0; n < vectors.size(); ++n)
             vectors[n] = speaks[n] ? times(voice_.areas[n], voice_.normals[n]) : Vec3{0, 0, 0};
-        field_.solve(points_, vectors, kIndicator.cycles_from_nothing);
+        field_.solve(points_, vectors, kIndicator.cycles_from_nothing, run_);
         scale_to_half(field_, points_);
     }
 
     const std::vector<Vec3>& points_;
+    const RunContext& run_;
     WindingField field_;
     Orientation voice_;
 };
@@ -133,8 +135,8 @@ double torn(const std::vector<Vec3>& points, const std::vector<Vec3>& normals, d
 }
 
 /// What the indicator of an orientation's normals says; areas are scaled as it is.
-void find_indicator(WindingField& field, const std::vector<Vec3>& points, Orientation& result) {
-    solve(field, points, result, kIndicator.cycles_from_nothing);
+void find_indicator(WindingField& field, const std::vector<Vec3>& points, Orientation& result, const RunContext& run) {
+    solve(field, points, result, kIndicator.cycles_from_nothing, run);
     const double half = scale_to_half(field, points);
     for (double& area : result.areas) area *= half;
     result.indicator = make_indicator(field);
@@ -143,9 +145,9 @@ void find_indicator(WindingField& field, const std::vector<Vec3>& points, Orient
 
 /// @param given  normals; @return whether they are used
 bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, const CloudScale& scale, double cell,
-         GivenSides& result) {
+         GivenSides& result, const RunContext& run) {
     result.given = given;
-    Jury jury(points, given, scale);
+    Jury jury(points, given, scale, run);
     result.report.foreseen = jury.foreseen(result.report);
     result.report.why_not.clear();
     if (result.report.foreseen < kGivenSides.least_foreseen) {
@@ -155,14 +157,14 @@ bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, const 
     jury.settle();
     Orientation& own = result.orientation = std::move(jury.voice());
     WindingField field(indicator_lattice(points, cells_along(points, cell)));
-    find_indicator(field, points, own);
+    find_indicator(field, points, own, run);
     result.torn = torn(points, own.normals, scale.spacing);
     own.turned = 1 - agreeing(points, own.normals, own, false);
     // Noise that carries points across a thin part leaves them with the other side's normals.
     for (int n = 0; own.turned > kGivenSides.few_turned && n < kGivenSides.smoothings; ++n) {
         for (std::size_t p = 0; p < points.size(); ++p)
             own.normals[p] = unit(times(-1, own.indicator->at(points[p]).gradient));
-        if (n + 1 < kGivenSides.smoothings) find_indicator(field, points, own);
+        if (n + 1 < kGivenSides.smoothings) find_indicator(field, points, own, run);
     }
     result.report.used = true;
     return true;
@@ -189,7 +191,7 @@ GivenSides given_sides(const std::vector<Vec3>& points, const PointHints& hints,
     result.report.sensors = count_told(hints.to_sensor);
     const auto least = kGivenSides.least_told * double(points.size());
     if (double(result.report.normals) >= least && result.report.normals > 0 &&
-        use(points, hints.normals, scale, cell, result))
+        use(points, hints.normals, scale, cell, result, run))
         return result;
     run.check();
     if (double(result.report.sensors) < least || result.report.sensors == 0) return result;
@@ -197,7 +199,7 @@ GivenSides given_sides(const std::vector<Vec3>& points, const PointHints& hints,
         if (result.report.normals == 0) result.report.why_not = "from the sensor most points cannot be seen";
         return result;
     }
-    result.report.from_sensor = use(points, plane_normals(points, hints.to_sensor, scale), scale, cell, result);
+    result.report.from_sensor = use(points, plane_normals(points, hints.to_sensor, scale), scale, cell, result, run);
     return result;
 }
 

@@ -89,17 +89,18 @@ std::shared_ptr<const Indicator> make_indicator(const WindingField& field) {
         std::make_unique<const Indicator::Values>(Indicator::Values{field.indicator()}));
 }
 
-void solve(WindingField& field, const std::vector<Vec3>& points, const Orientation& orientation, int cycles) {
+void solve(WindingField& field, const std::vector<Vec3>& points, const Orientation& orientation, int cycles,
+           const RunContext& run) {
     std::vector<Vec3> vectors(points.size());
     tbb::parallel_for(std::size_t(0), points.size(),
                       [&](std::size_t n) { vectors[n] = times(orientation.areas[n], orientation.normals[n]); });
-    field.solve(points, vectors, cycles);
+    field.solve(points, vectors, cycles, run);
 }
 
 std::shared_ptr<const Indicator> indicator_of(const std::vector<Vec3>& points, const Orientation& orientation,
-                                              double cell) {
+                                              double cell, const RunContext& run) {
     WindingField field(indicator_lattice(points, cells_along(points, cell)));
-    solve(field, points, orientation, kIndicator.cycles_from_nothing);
+    solve(field, points, orientation, kIndicator.cycles_from_nothing, run);
     scale_to_half(field, points);
     return make_indicator(field);
 }

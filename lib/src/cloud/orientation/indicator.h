@@ -11,7 +11,8 @@ namespace covol::cloud {
 [[nodiscard]] Lattice indicator_lattice(const std::vector<Vec3>& points, int cells);
 
 /// The indicator of normals and areas, from the field's last solution.
-void solve(WindingField& field, const std::vector<Vec3>& points, const Orientation& orientation, int cycles);
+void solve(WindingField& field, const std::vector<Vec3>& points, const Orientation& orientation, int cycles,
+           const RunContext& run);
 
 /// Half of the indicator's step is at the points, whichever way they are turned. @return the factor
 double scale_to_half(WindingField& field, const std::vector<Vec3>& points);
@@ -26,6 +27,7 @@ double scale_to_half(WindingField& field, const std::vector<Vec3>& points);
 
 /// The indicator of normals as they are, on cells of another size.
 [[nodiscard]] std::shared_ptr<const Indicator> indicator_of(const std::vector<Vec3>& points,
-                                                            const Orientation& orientation, double cell);
+                                                            const Orientation& orientation, double cell,
+                                                            const RunContext& run);
 
 }  // namespace covol::cloud

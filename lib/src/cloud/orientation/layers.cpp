@@ -104,7 +104,7 @@ std::vector<char> turn_layers(WindingField& field, const std::vector<Vec3>& poin
         run.check();
         turn(patch, orientation);
         WindingField now(field.indicator().lattice);
-        solve(now, points, orientation, kIndicator.cycles_from_nothing);
+        solve(now, points, orientation, kIndicator.cycles_from_nothing, run);
         scale_to_half(now, points);
         const Level level(now, cells);
         const PointCells surface(level.middles, kLayers.farthest_layer * between);

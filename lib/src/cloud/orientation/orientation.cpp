@@ -48,20 +48,19 @@ struct Stage {
 
 class Iteration {
 public:
-    explicit Iteration(const std::vector<Vec3>& points) : points_(points) {}
+    Iteration(const std::vector<Vec3>& points, const RunContext& run) : points_(points), run_(run) {}
 
-    void run(const Stage& stage, Orientation& result, const RunContext& run) {
+    void run(const Stage& stage, Orientation& result) {
         const Lattice lattice = cloud::indicator_lattice(points_, stage.cells);
         WindingField field(lattice);
         if (last_) field.start_from(last_->indicator());
         stage_ = stage;
         if (result.normals.empty()) first_guess(lattice, result);
         for (int n = 0; n < stage.iterations; ++n) {
-            run.check();
             ++result.iterations;
             if (turn(field, result, kOrientation.cycles) < kOrientation.steady) break;
         }
-        turn_patches(field, result, run);
+        turn_patches(field, result);
         if (stage.is_last) turn(field, result, kOrientation.last_cycles);
         last_.emplace(std::move(field));
     }
@@ -86,7 +85,7 @@ private:
 
     /// The indicator of the normals.
     void solve(WindingField& field, Orientation& result, int cycles) {
-        cloud::solve(field, points_, result, cycles);
+        cloud::solve(field, points_, result, cycles, run_);
         const double half = cloud::scale_to_half(field, points_);
         for (double& area : result.areas) area *= half;
     }
@@ -112,11 +111,10 @@ private:
     /// Where the indicator is not 1/2 on the mean over a patch, the patch may be turned as a whole, and stay so: it
     /// makes its own normals. Each such patch is turned to try, all at once, and stays turned where that brings it
     /// closer to 1/2.
-    void turn_patches(WindingField& field, Orientation& result, const RunContext& run) {
+    void turn_patches(WindingField& field, Orientation& result) {
         const PointCells cells(points_, kOrientation.patch_cells * field.indicator().lattice.cell);
         const std::vector<std::vector<std::uint32_t>> beside = neighbours_of(cells);
         for (int round = 0; round < kOrientation.patch_rounds; ++round) {
-            run.check();
             turn(field, result, kOrientation.patch_cycles);  // the indicator of what the normals are now
             const std::vector<double> off = mean_off(cells, field.indicator());
             const std::vector<int> patch = patches_of(cells, beside, off);
@@ -211,6 +209,7 @@ private:
     }
 
     const std::vector<Vec3>& points_;
+    const RunContext& run_;
     Stage stage_{};
     std::optional<WindingField> last_;
 };
@@ -279,14 +278,15 @@ struct Sample {
 };
 
 /// The indicator that was found may be too coarse for what its normals tell.
-void refine(CloudOrientation& cloud) {
+void refine(CloudOrientation& cloud, const RunContext& run) {
     Orientation& o = cloud.orientation;
     const double first = first_cell(cloud.scale), noise = cloud.scale.noise, spacing = cloud.scale.spacing;
     const double cell = cloud::indicator_lattice(cloud.points, cloud::cells_along(cloud.points, first)).cell;
-    if (o.indicator->cell() > kOrientation.coarse * cell) o.indicator = cloud::indicator_of(cloud.points, o, first);
+    if (o.indicator->cell() > kOrientation.coarse * cell)
+        o.indicator = cloud::indicator_of(cloud.points, o, first, run);
     if (!is_settled(o) && noise < kOrientation.little_noise * spacing &&
         share_passed(*o.indicator, cloud.points, kOrientation.passed_reach * spacing) > kOrientation.many_passed)
-        o.indicator = cloud::indicator_of(cloud.points, o, kOrientation.strain_cells * first);
+        o.indicator = cloud::indicator_of(cloud.points, o, kOrientation.strain_cells * first, run);
 }
 
 /// Of points that enclose nothing as they are oriented.
@@ -332,7 +332,7 @@ void choose_orientation(CloudOrientation& cloud, const PointHints& hints, const 
             report.why_not = "parts of them are turned as a whole";
         }
         if (!report.used && !cloud.encloses) choose_by_views(cloud, reach, run);
-        if (!report.used && cloud.encloses) refine(cloud);
+        if (!report.used && cloud.encloses) refine(cloud, run);
     }
     if (report.used) {
         cloud.orientation = std::move(given.orientation);
@@ -345,11 +345,11 @@ void choose_orientation(CloudOrientation& cloud, const PointHints& hints, const 
 /// their indicator turns. Where walls of folds were taken for each other there are more of both, whatever they have on
 /// their own.
 double strain(const std::vector<Vec3>& points, std::vector<Vec3> normals, std::vector<double> areas, double cell,
-              double reach) {
+              double reach, const RunContext& run) {
     Orientation o;
     o.normals = std::move(normals);
     o.areas = std::move(areas);
-    o.indicator = cloud::indicator_of(points, o, cell);
+    o.indicator = cloud::indicator_of(points, o, cell, run);
     const double turned = 1 - cloud::agreeing(points, o.normals, o, false);
     return share_passed(*o.indicator, points, reach) + kOrientation.strain_turned * turned;
 }
@@ -392,10 +392,10 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
             lattices.emplace_back(cells, attempt.enclosed);
             Orientation now;
             now.areas = sample.areas;
-            Iteration iteration(sample.points);
+            Iteration iteration(sample.points, run);
             for (const Stage& stage : {Stage{cells * 2 / 3, 12, false, attempt.enclosed},
                                        Stage{cells, 8, true, kOrientation.surely_enclosed}})
-                iteration.run(stage, now, run);
+                iteration.run(stage, now);
             if (is_sharp) iteration.mend(scale.spacing * std::sqrt(double(sample.step)), now);
             now.indicator = cloud::make_indicator(iteration.last());
             now.off_half = std::abs(cloud::mean_at(iteration.last(), sample.points) - 0.5);
@@ -406,7 +406,7 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
                 break;
             }
             const double its = strain(points, normals_of(*now.indicator, points, kOrientation.surely_enclosed),
-                                      sample.all_areas(), kOrientation.strain_cells * first, reach);
+                                      sample.all_areas(), kOrientation.strain_cells * first, reach, run);
             tried.push_back({std::move(now), its});
             keep_least_strained(tried);  // each has an indicator, which is large
             if (settled && its < kOrientation.no_strain) break;

@@ -124,7 +124,7 @@ Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& s
     result.areas = areas_of(points, scale.spacing);
     result.normals = towards(free);
     WindingField coarse(indicator_lattice(points, cells_along(points, kViews.coarse_spacings * between)));
-    solve(coarse, points, result, kIndicator.cycles_from_nothing);
+    solve(coarse, points, result, kIndicator.cycles_from_nothing, run);
     const double half = scale_to_half(coarse, points);
     for (double& area : result.areas) area *= half;
     const std::vector<char> turned = turn_layers(coarse, points, free, between, result, run);
@@ -146,7 +146,7 @@ Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& s
     result.turned = double(against) / double(points.size());
     fine.start_from(coarse.indicator());
     fine.screen(points, screen);
-    solve(fine, points, result, kIndicator.cycles_from_nothing);
+    solve(fine, points, result, kIndicator.cycles_from_nothing, run);
     result.screened = make_indicator(fine);
     return result;
 }

@@ -280,7 +280,8 @@ void WindingField::cycle(std::size_t n) {
     for (int sweeps = 0; sweeps < kWinding.sweeps; ++sweeps) sweep(l, u, level.right, level.screen);
 }
 
-void WindingField::solve(const std::vector<Vec3>& points, const std::vector<Vec3>& vectors, int cycles) {
+void WindingField::solve(const std::vector<Vec3>& points, const std::vector<Vec3>& vectors, int cycles,
+                         const RunContext& run) {
     Level& finest = levels_.front();
     const Lattice& l = finest.solution.lattice;
     std::fill(finest.right.begin(), finest.right.end(), 0.0F);
@@ -291,7 +292,10 @@ void WindingField::solve(const std::vector<Vec3>& points, const std::vector<Vec3
                  (z * b.w[0][i] * b.w[1][j]) * b.d[2]);
     });
     for (std::size_t n = 0; n < finest.screen.size(); ++n) finest.right[n] += 0.5F * finest.screen[n];
-    for (int n = 0; n < cycles; ++n) cycle(0);
+    for (int n = 0; n < cycles; ++n) {
+        run.check();
+        cycle(0);
+    }
 }
 
 void WindingField::start_from(const LatticeField& other) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "covol/domain.h"
+#include "covol/run.h"
 
 namespace covol::cloud {
 
@@ -50,7 +51,9 @@ public:
     /// Solves for the indicator, starting from the last solution.
     /// @param vectors  area * outward unit normal, world units squared
     /// @param cycles   V-cycles of multigrid
-    void solve(const std::vector<Vec3>& points, const std::vector<Vec3>& vectors, int cycles);
+    /// @throws Error Cancelled
+    void solve(const std::vector<Vec3>& points, const std::vector<Vec3>& vectors, int cycles,
+               const RunContext& run = {});
     /// From now on the indicator is drawn to 1/2 at the points; weight 1 on each node as strongly as its neighbours
     /// draw it to themselves.
     void screen(const std::vector<Vec3>& points, const std::vector<double>& weights);

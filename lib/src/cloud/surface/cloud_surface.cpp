@@ -106,9 +106,9 @@ void cloud::settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport&
     topology.hold(field, *orientation.indicator, report);
     // Where the points leave gaps, what surrounds a gap makes small handles on a lattice as fine as they are.
     if (topology.own.all > 1 && !orientation.screened && is_open(field, cloud, run))
-        topology.hold(field,
-                      *cloud::indicator_of(cloud.points, orientation, kBlend.coarse_spacings * cloud.scale.spacing),
-                      report);
+        topology.hold(
+            field, *cloud::indicator_of(cloud.points, orientation, kBlend.coarse_spacings * cloud.scale.spacing, run),
+            report);
     if (topology.own.pieces > 1) join();
 }
 

@@ -29,7 +29,7 @@ struct Layers {
     std::vector<char> turn(double spacing) {
         orientation.areas = areas_of(points, spacing);
         WindingField field(indicator_lattice(points, 80));
-        solve(field, points, orientation, kIndicator.cycles_from_nothing);
+        solve(field, points, orientation, kIndicator.cycles_from_nothing, {});
         const double half = scale_to_half(field, points);
         for (double& area : orientation.areas) area *= half;
         const std::vector<char> turned = turn_layers(field, points, free, spacing, orientation, {});
