@@ -190,7 +190,6 @@ public:
         : pieces_(pieces), indicator_(indicator), domain_(domain) {}
 
     /// Values within the domain; beyond its end is outside, so that what reaches it is closed there.
-
     void fill(Leaf& leaf) {
         const double h = domain_.voxel_size;
         const Coord origin = leaf.origin();
