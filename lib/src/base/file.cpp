@@ -49,7 +49,10 @@ fs::path folder_of(const fs::path& target) {
     const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
     std::error_code status;
     if (!fs::is_directory(folder, status))
-        throw Error(Errc::Io, target.string() + ": cannot write: the folder " + folder.string() + " does not exist");
+        throw Error(Errc::Io,
+                    target.string() + ": cannot write: " +
+                        (status == std::errc::filename_too_long ? status.message()
+                                                                : "the folder " + folder.string() + " does not exist"));
     return folder;
 }
 

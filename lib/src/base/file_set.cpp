@@ -47,6 +47,14 @@ private:
     int file_;
 };
 
+/// What libraries do not say of a write that failed.
+std::string why_no_room(const std::string& said) {
+    const int why = errno;
+    if (why != ENOSPC && why != EDQUOT && why != EFBIG) return {};
+    const std::string text = std::strerror(why);
+    return said.find(text) == std::string::npos ? ": " + text : std::string();
+}
+
 void flush_folder(const fs::path& folder) {
     const Descriptor file(folder, O_RDONLY | O_DIRECTORY);
     if (file.get() >= 0) ::fsync(file.get());
@@ -185,10 +193,11 @@ void FileSet::write(const std::string& path, const std::function<void(const std:
     const fs::path scratch = state_->folders.try_emplace(folder, folder).first->second.path();
     const fs::path temporary = scratch / target.filename();
     state_->writing = {path, target, temporary};
+    errno = 0;
     try {
         write(temporary.string());
     } catch (const Error& error) {
-        throw Error(error.code(), shown(error.what()));
+        throw Error(error.code(), shown(error.what()) + why_no_room(error.what()));
     }
     std::error_code status;
     if (fs::exists(target, status) && fs::is_directory(target, status) != fs::is_directory(temporary, status))
@@ -198,6 +207,12 @@ void FileSet::write(const std::string& path, const std::function<void(const std:
 
 void FileSet::publish() {
     std::vector<State::File>& files = state_->files;
+    // Of two runs that end at the same time with the same outputs, one set after the other; the folders have an order.
+    std::vector<std::unique_ptr<Descriptor>> one_at_a_time;
+    for (const auto& [folder, scratch] : state_->folders) {
+        one_at_a_time.push_back(std::make_unique<Descriptor>(folder, O_RDONLY | O_DIRECTORY));
+        ::flock(one_at_a_time.back()->get(), LOCK_EX);
+    }
     for (const auto& [folder, scratch] : state_->folders) {
         std::string names;
         for (const State::File& file : files)

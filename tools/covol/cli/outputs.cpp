@@ -98,7 +98,10 @@ void Outputs::check(const std::string& flag, const std::string& path, OutputKind
         if (fs::equivalent(target, input, status))
             throw Error(Errc::InvalidOptions, flag + ": " + path + ": is an input of this run; choose another name");
     if (!fs::is_directory(folder, status))
-        throw Error(Errc::Io, flag + ": " + path + ": cannot write: the folder " + folder.string() + " does not exist");
+        throw Error(Errc::Io,
+                    flag + ": " + path + ": cannot write: " +
+                        (status == std::errc::filename_too_long ? status.message()
+                                                                : "the folder " + folder.string() + " does not exist"));
     if (::access(folder.c_str(), W_OK) != 0)
         throw Error(Errc::Io, flag + ": " + path + ": cannot write: no permission to write in " + folder.string());
     if (std::find(checked_.begin(), checked_.end(), target.string()) != checked_.end())

@@ -11,6 +11,7 @@
 #include "cli/grid_metadata.h"
 #include "cli/nearest.h"
 #include "cli/option_names.h"
+#include "cli/process.h"
 #include "cli/profile.h"
 #include "cli/provenance.h"
 #include "covol/checkpoints.h"
@@ -226,6 +227,9 @@ int Session::main(int argc, char** argv) {
     for (const int signal : {SIGINT, SIGTERM, SIGHUP})
         if (std::signal(signal, on_signal) == SIG_IGN) std::signal(signal, SIG_IGN);  // as nohup wants it
     std::signal(SIGBUS, on_bus_error);
+    std::signal(SIGXFSZ, SIG_IGN);  // a write beyond the limit of a file's size is an error
+    keep_standard_streams();
+    if (const std::string few = too_few_files(); !few.empty()) return fail(exit_code_of(Errc::Io), few);
     // What follows `plan` and `brick` is a whole command line, with the options of its command.
     std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
     command_line_ = "covol";
@@ -377,6 +381,7 @@ void Session::say(const std::string& line) {
     if (json_path_ == "-") return progress_->line(line);  // standard output is the report's
     progress_->clear();
     std::cout << line << std::endl;
+    if (!std::cout) throw Error(Errc::Io, "standard output: cannot write");
 }
 
 void Session::warn(const std::string& message) {

@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <map>
@@ -168,6 +169,16 @@ Words command_line(const std::string& path, const Provenance& run, const CLI::Ap
     return words;
 }
 
+fs::path temporary_folder() {
+    std::error_code status;
+    fs::path folder = fs::temp_directory_path(status);
+    if (!status) return folder;
+    const char* const named = std::getenv("TMPDIR");
+    throw Error(Errc::Io, std::string("the folder for temporary files (TMPDIR), ") +
+                              (named != nullptr ? named : "/tmp") + ": " + status.message() +
+                              "; name another one, or keep the result with -o");
+}
+
 /// @return exit code @throws Error Cancelled
 int run_covol(const Words& words, const RunContext& run) {
     std::string self = fs::read_symlink("/proc/self/exe").string();
@@ -236,7 +247,7 @@ struct RerunJob {
             if (std::find(places.begin(), places.end(), folder.string()) == places.end())
                 places.push_back(folder.string());
         const auto scratch =
-            std::make_shared<ScratchFolder>(kept.empty() ? fs::temp_directory_path() : fs::path(kept).parent_path());
+            std::make_shared<ScratchFolder>(kept.empty() ? temporary_folder() : fs::path(kept).parent_path());
         const Words words =
             command_line(path, made, session.command(made.command), Inputs(made, places), scratch->path().string());
         std::string shown = "covol";

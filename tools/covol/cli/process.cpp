@@ -1,0 +1,32 @@
+#include "cli/process.h"
+
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+
+namespace covol::tool {
+
+void keep_standard_streams() {
+    for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+        if (::fcntl(stream, F_GETFD) < 0 && errno == EBADF)
+            // The lowest number that is free; to read where one writes, so that an attempt is an error.
+            static_cast<void>(::open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY));
+}
+
+std::string too_few_files() {
+    constexpr rlim_t kLeast = 16, kEnough = 4096;
+    rlimit limit{};
+    if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) return {};
+    if (limit.rlim_cur < std::min(limit.rlim_max, kEnough)) {
+        limit.rlim_cur = std::min(limit.rlim_max, kEnough);
+        static_cast<void>(::setrlimit(RLIMIT_NOFILE, &limit));
+    }
+    if (limit.rlim_cur >= kLeast) return {};
+    return "this process may open " + std::to_string(limit.rlim_cur) + " files at once (ulimit -n), expected " +
+           std::to_string(kLeast) + " or more: Too many open files";
+}
+
+}  // namespace covol::tool
