@@ -149,7 +149,7 @@ struct OrientationHeuristics {
     /// 0.83 to 0.97, of thin noisy shells 0.44.
     double fewer_passed = heuristic("orientation.fewer_passed", 1.0 / 3);
     /// [share of the area] Without points, above which what closes them is larger than what they are on: of closed
-    /// shapes up to 0.04, of such with a part missing 0.17 to 0.3, of scans from the air 0.66 to 0.85.
+    /// shapes up to 0.04, of scans of some sides 0.14 to 0.37, of those from the air 0.66 to 0.85.
     double mostly_bare = heuristic("orientation.mostly_bare", 0.5);
     /// [spacings] Distance from a point at which the surface passes it by.
     double passed_reach = heuristic("orientation.passed_reach", 1.5);
