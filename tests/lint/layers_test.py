@@ -39,7 +39,7 @@ SEGMENT = {"segment", "segment/start"}
 HEAVY = re.compile(r"#\s*include\s*[<\"](openvdb/(?!version\.h)|tbb/|oneapi/|OpenMesh/|CGAL/|itk|CLI/|nlohmann/)")
 LOUD = re.compile(r"\bstd::(cout|cerr|clog)\b|(?<![\w:])(printf|puts|putchar)\s*\(|\bfprintf\s*\(\s*std(out|err)"
                   r"|(?<![\w.])(std::|::)?(exit|_Exit|quick_exit|abort|terminate)\s*\(")
-GPL_FILES = {"cloud_cleanup.cpp", "mesh_cleanup.cpp", "mesh_distance.cpp"}
+GPL_FILES = {"cloud_cleanup.cpp", "convex_hull.cpp", "mesh_cleanup.cpp", "mesh_distance.cpp"}
 INCLUDE = re.compile(r"#\s*include\s*\"([\w/]+)\.h\"")
 
 

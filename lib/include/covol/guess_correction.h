@@ -29,6 +29,7 @@ struct CorrectionReport {
     double before_mean = 0, before_max = 0;       ///< distances of the marks to the guess, world units
     double after_mean = 0, after_max = 0;         ///< to the corrected surface
     double least_radius = 0, largest_radius = 0;  ///< within which marks act, world units
+    double depth = 0;  ///< of the guess: radius of the largest ball inside, world units, to within 8 voxels
 };
 
 /// A mask after a correction, in its own geometry.
@@ -40,15 +41,18 @@ struct CorrectedMask {
 /// A guess, corrected where marks say so: s - c, with s the guess's signed distance and c a smooth sum of bumps of
 /// compact support (Wendland, Adv. Comput. Math. 4, 1995, C2) around the marks.
 ///
-/// The radius of a bump is three times the distance between mark and guess, for s - c stays monotone across the surface
+/// The radius of a bump is 2.2 times the distance between mark and guess, for s - c stays monotone across the surface
 /// while c is flatter than s (a bump's slope is at most 2.11 of its height by its radius), and not below the least one.
 /// Marks of equal size are solved for together (kriging with the marks' precision as the noise), far ones first, and
-/// those that the bigger bumps met hold their place under the smaller ones. Beyond all bumps c is exactly 0.
+/// those that the bigger bumps met hold their place under the smaller ones. Beyond all bumps c is exactly 0. What comes
+/// in beyond the convex hull of guess and marks is halved: a part that is missing is filled up to its marks, and what
+/// is right beside it is not inflated.
 class GuessCorrection {
 public:
     struct Data;
     COVOL_API explicit GuessCorrection(std::shared_ptr<const Data> data);
-    /// c, world units: how far out the surface moves there. Exactly 0 where no mark acts.
+    /// c, world units: how far out the marks move the surface there, before it is held at the hull. Exactly 0 where no
+    /// mark acts.
     [[nodiscard]] COVOL_API double shift(const Vec3& world) const;
     /// Of the guess; negative inside.
     [[nodiscard]] COVOL_API double guess(const Vec3& world) const;

@@ -10,10 +10,12 @@
 #include <numeric>
 
 #include "base/valid.h"
+#include "clip/clipped.h"
 #include "covol/error.h"
 #include "covol/start.h"
 #include "guess/heuristics.h"
 #include "guess/wendland.h"
+#include "points/convex_hull.h"
 #include "points/kd_tree.h"
 
 namespace covol {
@@ -32,8 +34,8 @@ struct Bump {
 /// The signed distance to the guess, however far.
 class FarDistance {
 public:
-    explicit FarDistance(const FloatGridPtr& guess)
-        : guess_(guess), exact_(kCorrection.exact_voxels * guess->voxelSize()[0]), surface_(crossings(*guess)) {}
+    FarDistance(const FloatGridPtr& guess, const std::vector<Vec3>& crossings)
+        : guess_(guess), exact_(kCorrection.exact_voxels * guess->voxelSize()[0]), surface_(crossings) {}
 
     [[nodiscard]] double at(const Vec3& world) const {
         const double near = double(openvdb::tools::BoxSampler::sample(
@@ -43,33 +45,79 @@ public:
         return std::copysign(std::max(exact_, std::sqrt(surface_.nearest(world))), near);
     }
 
-private:
-    /// Where the edges of the lattice cross the surface.
-    static std::vector<Vec3> crossings(const FloatGrid& guess) {
-        std::vector<Vec3> points;
-        const auto accessor = guess.getConstAccessor();
-        for (auto at = guess.cbeginValueOn(); at; ++at) {
-            const openvdb::Coord c = at.getCoord();
-            const double here = double(*at);
-            for (int a = 0; a < 3; ++a) {
-                openvdb::Coord next = c;
-                ++next[a];
-                const double there = double(accessor.getValue(next));
-                if ((here < 0) == (there < 0)) continue;
-                openvdb::Vec3d p = c.asVec3d();
-                p[a] += here / (here - there);
-                const openvdb::Vec3d w = guess.transform().indexToWorld(p);
-                points.push_back({w[0], w[1], w[2]});
-            }
+    /// The radius of the largest ball inside, to within the width of a leaf (8 voxels).
+    [[nodiscard]] double depth() const {
+        double lowest = 0;
+        const auto visit = [&](const openvdb::Coord& c) {
+            const openvdb::Vec3d w = guess_->indexToWorld(c);
+            lowest = std::min(lowest, at({w[0], w[1], w[2]}));
+        };
+        for (auto leaf = guess_->tree().cbeginLeaf(); leaf; ++leaf) {
+            const float* const values = leaf->buffer().data();
+            const auto deepest = std::min_element(values, values + Leaf::SIZE);
+            if (*deepest < 0) visit(leaf->offsetToGlobalCoord(openvdb::Index(deepest - values)));
         }
-        if (points.empty()) throw Error(Errc::InvalidInput, "correct_guess: expected a guess with a surface, got none");
-        return points;
+        auto tile = guess_->tree().cbeginValueAll();
+        tile.setMaxDepth(FloatGrid::TreeType::ValueAllCIter::LEAF_DEPTH - 1);
+        for (; tile; ++tile) {
+            if (!(*tile < 0)) continue;
+            openvdb::CoordBBox box;
+            tile.getBoundingBox(box);
+            constexpr int kStep = int(Leaf::DIM);
+            for (int i = box.min().x(); i <= box.max().x(); i += kStep)
+                for (int j = box.min().y(); j <= box.max().y(); j += kStep)
+                    for (int k = box.min().z(); k <= box.max().z(); k += kStep)
+                        visit({i + kStep / 2, j + kStep / 2, k + kStep / 2});
+        }
+        return -lowest;
     }
 
+private:
     FloatGridPtr guess_;
     double exact_;
     detail::KdTree surface_;
 };
+
+/// Where the edges of the lattice cross the surface, world units.
+std::vector<Vec3> find_crossings(const FloatGrid& guess) {
+    std::vector<Vec3> points;
+    const auto accessor = guess.getConstAccessor();
+    for (auto at = guess.cbeginValueOn(); at; ++at) {
+        const openvdb::Coord c = at.getCoord();
+        const double here = double(*at);
+        for (int a = 0; a < 3; ++a) {
+            openvdb::Coord next = c;
+            ++next[a];
+            const double there = double(accessor.getValue(next));
+            if ((here < 0) == (there < 0)) continue;
+            openvdb::Vec3d p = c.asVec3d();
+            p[a] += here / (here - there);
+            const openvdb::Vec3d w = guess.transform().indexToWorld(p);
+            points.push_back({w[0], w[1], w[2]});
+        }
+    }
+    if (points.empty()) throw Error(Errc::InvalidInput, "correct_guess: expected a guess with a surface, got none");
+    return points;
+}
+
+/// Facets of a convex hull.
+using Facets = std::vector<HalfSpace>;
+
+/// Those that some place within `radius` has outside, or less than `depth` inside.
+Facets find_near(const Facets& hull, const Vec3& center, double radius, double depth) {
+    Facets near;
+    std::copy_if(hull.begin(), hull.end(), std::back_inserter(near),
+                 [&](const HalfSpace& facet) { return detail::along(facet, center) > -radius - depth; });
+    return near;
+}
+
+/// The level after the bumps have moved the guess out by `move`: halfway between the bumps' own level and that of the
+/// hull of guess and marks where the bumps pass beyond the hull. Bumps by themselves inflate what is right beside a
+/// part that is missing, the hull alone has flat facets between the marks.
+double corrected_level(double guess, double move, const Facets& hull, const Vec3& world) {
+    const double level = guess - move;
+    return move > 0 ? std::max(level, 0.5 * (level + detail::depth_in(hull, world))) : level;
+}
 
 double sum_of(const std::vector<Bump>& bumps, const Vec3& world) {
     double sum = 0;
@@ -198,9 +246,10 @@ std::array<double, 2> mean_and_max(const std::vector<Target>& marks, const std::
 }  // namespace
 
 struct GuessCorrection::Data {
-    Data(const FloatGridPtr& start) : grid(start), distance(start) {}
+    Data(const FloatGridPtr& start, const std::vector<Vec3>& surface) : grid(start), distance(start, surface) {}
     FloatGridPtr grid;
     FarDistance distance;
+    Facets hull;  ///< of the guess, the marks and the seeds that act
     std::vector<Bump> bumps;
     CorrectionReport report;
 };
@@ -236,17 +285,18 @@ FloatGridPtr GuessCorrection::start(const RunContext& run) const {
         tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t n) {
             const Vec3 middle = domain.index_to_world(
                 {leaves[n]->origin().x() + 3.5, leaves[n]->origin().y() + 3.5, leaves[n]->origin().z() + 3.5});
+            const double reach = 3.5 * std::sqrt(3.0) * domain.voxel_size;
             std::vector<Bump> near;
             for (const Bump& b : data_->bumps)
-                if (std::sqrt(detail::squared_distance(b.center, middle)) <
-                    b.radius + 3.5 * std::sqrt(3.0) * domain.voxel_size)
-                    near.push_back(b);
+                if (std::sqrt(detail::squared_distance(b.center, middle)) < b.radius + reach) near.push_back(b);
+            const Facets facets = find_near(data_->hull, middle, reach, clamp);
             for (openvdb::Index at = 0; at < Leaf::SIZE; ++at) {
                 const openvdb::Coord c = leaves[n]->offsetToGlobalCoord(at);
                 const Vec3 world = domain.index_to_world({double(c.x()), double(c.y()), double(c.z())});
                 const double move = sum_of(near, world);
-                if (move != 0)
-                    leaves[n]->setValueOn(at, float(std::clamp(data_->distance.at(world) - move, -clamp, clamp)));
+                if (move == 0) continue;
+                const double level = corrected_level(data_->distance.at(world), move, facets, world);
+                leaves[n]->setValueOn(at, float(std::clamp(level, -clamp, clamp)));
             }
         });
     });
@@ -265,7 +315,8 @@ GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>
                               const std::vector<Vec3>& inside, const std::vector<Vec3>& outside,
                               const CorrectionOptions& options, const RunContext& run) {
     detail::require_valid(options, "correct_guess");
-    auto data = std::make_shared<GuessCorrection::Data>(guess);
+    const std::vector<Vec3> surface = find_crossings(*guess);
+    auto data = std::make_shared<GuessCorrection::Data>(guess, surface);
     with_threads(run, [&] {
         const double h = guess->voxelSize()[0];
         const double precision = options.precision.value_or(kCorrection.precision_voxels * h);
@@ -291,7 +342,11 @@ GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>
             }
             if (targets.size() == before) break;
         }
+        std::vector<Vec3> all = surface;
+        for (const Target& target : targets) all.push_back(target.at);
+        data->hull = detail::convex_hull(all);
         CorrectionReport& report = data->report;
+        report.depth = data->distance.depth();
         report.marks = marks.size();
         report.seeds = targets.size() - marks.size();
         const auto before = mean_and_max(on_surface, {}), after = mean_and_max(on_surface, data->bumps);
@@ -318,6 +373,9 @@ CorrectedMask GuessCorrection::apply(const Image& mask, int label, const RunCont
             std::int32_t* value = result.values.data() + std::size_t(k) * std::size_t(nj) * std::size_t(ni);
             for (int j = 0; j < nj; ++j) {
                 const std::vector<Bump> bumps = beside(data_->bumps, geometry, j, k);
+                const Vec3 middle = geometry.index_to_world({0.5 * (ni - 1), double(j), double(k)});
+                const Facets facets =
+                    bumps.empty() ? Facets{} : find_near(data_->hull, middle, 0.5 * (ni - 1) * geometry.spacing[0], 0);
                 for (int i = 0; i < ni; ++i, ++value) {
                     const double old = mask.at(i, j, k);
                     if (old != std::floor(old) || std::abs(old) > 2147483647.0) broken = true;
@@ -326,7 +384,7 @@ CorrectedMask GuessCorrection::apply(const Image& mask, int label, const RunCont
                     const double move = sum_of(bumps, world);
                     if (move == 0) continue;
                     ++near;
-                    const double before = data_->distance.at(world), now = before - move;
+                    const double before = data_->distance.at(world), now = corrected_level(before, move, facets, world);
                     if ((before < 0) == (now < 0)) continue;
                     if (now < 0 && *value == 0) {
                         *value = label;

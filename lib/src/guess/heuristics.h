@@ -32,7 +32,7 @@ struct CorrectionHeuristics {
     double precision_voxels = heuristic("correction.precision_voxels", 0.5);
     /// [distances between mark and guess] Radius of a bump: above 2.11 the level set stays one (its slope does not
     /// change sign), see the public header.
-    double radius_of_residual = heuristic("correction.radius_of_residual", 3.0);
+    double radius_of_residual = heuristic("correction.radius_of_residual", 2.2);
     /// [ratio] Bumps whose radii differ by less are solved for together.
     double level_ratio = heuristic("correction.level_ratio", 2.0);
     /// [voxels] How far beyond a seed the surface is put.

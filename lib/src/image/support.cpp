@@ -11,7 +11,7 @@ namespace covol::detail {
 namespace {
 
 constexpr int kWindow = 4, kBeside = 10;  // half steps
-constexpr int kReach = 10, kSlopes = 2 * kReach + 1;
+constexpr int kReach = 10, kPlaces = 2 * kReach + 1;
 
 /// Where the samples of a place lie, as voxels of the image, and their values.
 class Profile {
@@ -61,6 +61,18 @@ public:
             }
         return difference;
     }
+    /// Of the three voxels around a place, less the means of the three around two voxels before and behind, times 3;
+    /// none where they leave the image.
+    [[nodiscard]] std::optional<double> ridge(int around) const {
+        double sum = 0;
+        for (const int beside : {-4, 0, 4})
+            for (int at = -1; at <= 1; ++at) {
+                const std::optional<Index3> index = voxel(around + beside + at);
+                if (!index) return {};
+                sum += (beside == 0 ? 1.0 : -0.5) * image_.at((*index)[0], (*index)[1], (*index)[2]);
+            }
+        return sum;
+    }
 
 private:
     const Image& image_;
@@ -84,13 +96,13 @@ std::vector<Profile> profiles_of(const Image& image, const std::vector<Vec3>& pl
     return profiles;
 }
 
-using Slopes = std::array<std::optional<double>, kSlopes>;
+using Strengths = std::array<std::optional<double>, kPlaces>;
 
 /// Over the lines that have one there; 0 where these are fewer than half.
-double mean_slope(const std::vector<Slopes>& lines, int at) {
+double mean_strength(const std::vector<Strengths>& lines, int at) {
     double sum = 0;
     std::size_t count = 0;
-    for (const Slopes& line : lines)
+    for (const Strengths& line : lines)
         if (line[at]) sum += *line[at], ++count;
     return 2 * count < lines.size() ? 0 : sum / double(count);
 }
@@ -132,27 +144,33 @@ ImageSupport measure_support(const Image& image, const std::vector<Vec3>& places
     return support;
 }
 
-SteepestSlope find_steepest_slope(const Image& image, const std::vector<Vec3>& places, const std::vector<Vec3>& normals,
-                                  double step, const RunContext& run) {
-    const std::vector<Profile> profiles = profiles_of(image, places, normals, step, 2 * kReach + 2, run);
-    std::vector<Slopes> lines(places.size());
+StrongestBorder find_strongest_border(const Image& image, const std::vector<Vec3>& places,
+                                      const std::vector<Vec3>& normals, double step, EdgeFeature feature,
+                                      const RunContext& run) {
+    const bool is_line = feature == EdgeFeature::BrightLine || feature == EdgeFeature::DarkLine;
+    const std::vector<Profile> profiles =
+        profiles_of(image, places, normals, step, 2 * kReach + (is_line ? 5 : 2), run);
+    std::vector<Strengths> lines(places.size());
     tbb::parallel_for(std::size_t(0), places.size(), [&](std::size_t n) {
-        for (int at = 0; at < kSlopes; ++at) lines[n][at] = profiles[n].slope(2 * (at - kReach));
+        for (int at = 0; at < kPlaces; ++at) {
+            const int around = 2 * (at - kReach);
+            lines[n][at] = is_line ? profiles[n].ridge(around) : profiles[n].slope(around);
+        }
     });
-    std::array<double, kSlopes> mean{};
-    for (int at = 0; at < kSlopes; ++at) mean[at] = mean_slope(lines, at);
-    const auto steepest = [&](int first, int last) {
+    std::array<double, kPlaces> mean{};
+    for (int at = 0; at < kPlaces; ++at) mean[at] = mean_strength(lines, at);
+    const auto strongest = [&](int first, int last) {
         int found = first;
         for (int at = first; at <= last; ++at)
             if (std::abs(mean[at]) > std::abs(mean[found])) found = at;
         return found;
     };
-    const int own = steepest(kReach - 1, kReach + 1), most = steepest(0, kSlopes - 1);
-    SteepestSlope result;
+    const int own = strongest(kReach - 1, kReach + 1), most = strongest(0, kPlaces - 1);
+    StrongestBorder result;
     result.at = most - kReach;
-    const auto along = [&](const Slopes& line, int at) { return mean[at] < 0 ? -*line[at] : *line[at]; };
+    const auto along = [&](const Strengths& line, int at) { return mean[at] < 0 ? -*line[at] : *line[at]; };
     double sum = 0, squares = 0;
-    for (const Slopes& line : lines) {
+    for (const Strengths& line : lines) {
         if (!line[own] || !line[most]) continue;
         const double more = along(line, most) - along(line, own);
         sum += more;

@@ -2,6 +2,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "covol/edge.h"
 #include "covol/image.h"
 
 namespace covol::detail {
@@ -22,17 +23,22 @@ struct ImageSupport {
 [[nodiscard]] ImageSupport measure_support(const Image& image, const std::vector<Vec3>& places,
                                            const std::vector<Vec3>& normals, double step, const RunContext& run);
 
-/// Where an image's slope is steepest, on the mean of lines across a surface: marks on a border have it where they are.
-struct SteepestSlope {
-    std::size_t lines = 0;  ///< that count: with the surface, and the place of the steepest slope, in the image
-    double share = 1;       ///< of the mean slope there that the surface has, within a step; its sign does not count
+/// Where an image has its strongest border, on the mean of lines across a surface: marks on a border have it where they
+/// are.
+struct StrongestBorder {
+    std::size_t lines = 0;  ///< that count: with the surface, and the place of the strongest border, in the image
+    double share = 1;       ///< of the mean strength there that the surface has, within a step; its sign does not count
     int at = 0;             ///< steps from the surface, along the normals
     double errors = 0;      ///< standard errors of the mean that both differ by
 };
 
-/// Mean slope at whole steps up to ten before and behind each place along its normal; from nearest voxels, two on each
-/// side. Arguments and errors as of measure_support().
-[[nodiscard]] SteepestSlope find_steepest_slope(const Image& image, const std::vector<Vec3>& places,
-                                                const std::vector<Vec3>& normals, double step, const RunContext& run);
+/// Mean strength of a border at whole steps up to ten before and behind each place along its normal; from nearest
+/// voxels. Its strength is the slope, between two voxels on each side; of a line, whose middle has none and whose sides
+/// have two, it is the brightness there less that two voxels before and behind. Arguments and errors as of
+/// measure_support().
+/// @param feature  what the marks lie on, as detect_feature() finds it
+[[nodiscard]] StrongestBorder find_strongest_border(const Image& image, const std::vector<Vec3>& places,
+                                                    const std::vector<Vec3>& normals, double step, EdgeFeature feature,
+                                                    const RunContext& run);
 
 }  // namespace covol::detail

@@ -49,6 +49,8 @@ struct IsolatedHeuristics {
     std::size_t least_points = heuristic("isolated.least_points", 10);
     /// [points] More are no marks, but a cloud.
     std::size_t most_points = heuristic("isolated.most_points", 4000);
+    /// [longest links] Marks that lie closer to each other are one that was read or clicked twice.
+    double same_place = heuristic("isolated.same_place", 1e-3);
     /// [points] That are linked more closely, and apart from the others, at most: four already enclose something.
     std::size_t most_together = heuristic("isolated.most_together", 3);
     /// [share of the points] That lie apart, at most.

@@ -47,7 +47,7 @@ std::vector<Link> shortest_tree(const std::vector<Vec3>& points) {
 /// Points that links join, each group known by its least.
 class Groups {
 public:
-    explicit Groups(std::size_t points) : sets_(points), size_(points, 1) {}
+    explicit Groups(std::size_t points) : sets_(points), size_(points, 1), places_(points) {}
     std::uint32_t of(std::size_t point) { return sets_.root(std::uint32_t(point)); }
     void join(const Link& link) {
         const auto [least, other] = std::minmax({of(link.from), of(link.to)});
@@ -57,17 +57,24 @@ public:
         large_ += is_large(least);
         if (size_[least] > size_[largest_]) largest_ = least;
     }
+    /// Two points at one place count once. @pre no link between places was joined
+    void merge(const Link& link) {
+        sets_.unite(of(link.from), of(link.to));
+        --places_;
+    }
+    [[nodiscard]] std::size_t places() const { return places_; }
     [[nodiscard]] std::uint32_t largest() const { return largest_; }
     /// Whether all others have no more points than clicks that went astray together, and few in all.
     [[nodiscard]] bool largest_is_all_but_few() const {
-        return large_ == 1 && double(size_[largest_]) >= (1 - kIsolated.most_share) * double(size_.size());
+        return large_ == 1 && double(size_[largest_]) >= (1 - kIsolated.most_share) * double(places_);
     }
 
 private:
     [[nodiscard]] int is_large(std::uint32_t group) const { return size_[group] > kIsolated.most_together; }
 
     meshing::DisjointSets sets_;
-    std::vector<std::size_t> size_;
+    std::vector<std::size_t> size_;  ///< places of each group
+    std::size_t places_;
     std::uint32_t largest_ = 0;
     int large_ = 0;
 };
@@ -91,9 +98,16 @@ std::vector<IsolatedPoint> points_outside(std::uint32_t group, Groups& groups, c
 std::vector<IsolatedPoint> find_isolated_points(const std::vector<Vec3>& points) {
     if (points.size() < kIsolated.least_points || points.size() > kIsolated.most_points) return {};
     const std::vector<Link> links = shortest_tree(points);
-    const double usual = links[links.size() / 2].length;
     Groups groups(points.size());
-    for (std::size_t n = 0; n + 1 < links.size(); ++n) {
+    // Marks that were read or clicked twice: beside the distance between them every other one is long.
+    const auto first =
+        std::size_t(std::upper_bound(links.begin(), links.end(), kIsolated.same_place * links.back().length,
+                                     [](double length, const Link& link) { return length < link.length; }) -
+                    links.begin());
+    for (std::size_t n = 0; n < first; ++n) groups.merge(links[n]);
+    if (groups.places() < kIsolated.least_points) return {};
+    const double usual = links[(first + links.size()) / 2].length;
+    for (std::size_t n = first; n + 1 < links.size(); ++n) {
         groups.join(links[n]);
         const double next = links[n + 1].length;
         const bool is_long = next > kIsolated.gap * links[n].length || next > kIsolated.far * usual;

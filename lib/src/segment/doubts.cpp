@@ -140,10 +140,11 @@ void find_strange_image(Job& job, const std::vector<Vec3>& marks) {
     const detail::ImageSupport support = detail::measure_support(*job.image, at.places, at.normals, job.h(), job.run);
     if (support.places == 0) return;
     job.report().image_support = support.share;
-    const detail::SteepestSlope border =
-        detail::find_steepest_slope(*job.image, at.places, at.normals, job.h(), job.run);
-    job.report().image_border = {border.at, border.share, border.errors};
     const GuidanceReport& guidance = job.report().guidance;
+    const EdgeFeature feature = guidance.used ? guidance.feature.feature : job.options.edge.feature;
+    const detail::StrongestBorder border =
+        detail::find_strongest_border(*job.image, at.places, at.normals, job.h(), feature, job.run);
+    job.report().image_border = {border.at, border.share, border.errors};
     const char* const look = ": look whether the marks belong to this image, channel and space";
     if (support.share + kDoubts.support_errors * support.error < kDoubts.image_support)
         job.warn("the image varies more five voxels beside the marks than where they lie (in " +

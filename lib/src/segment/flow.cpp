@@ -143,14 +143,14 @@ bool has_lost(const Job& job, const FloatGrid& start) {
            mean_distance(job.trusted, start) + kFlow.leaves_voxels * job.h();
 }
 
-void check_flow(const Job& job) {
+void check_flow(Job& job) {
     const EvolveReport& solved = job.result.report.solve;
     if (has_vanished(job))
         throw Error(Errc::InvalidInput, "segment: the surface vanished after " + std::to_string(solved.steps) +
                                             " steps: " + why_vanished(job));
     if (solved.stop_reason == StopReason::MaxSteps)
-        job.run.warn("not steady after " + std::to_string(solved.steps) + " steps: the last change was " +
-                     number(solved.last_change) + " voxels");
+        job.warn("not steady after " + std::to_string(solved.steps) + " steps: the last change was " +
+                 number(solved.last_change) + " voxels");
 }
 
 }  // namespace covol::pipeline

@@ -12,6 +12,6 @@ void flow(Job& job);
 [[nodiscard]] bool has_lost(const Job& job, const FloatGrid& start);
 
 /// @throws Error InvalidInput (the surface vanished).
-void check_flow(const Job& job);
+void check_flow(Job& job);
 
 }  // namespace covol::pipeline

@@ -137,15 +137,18 @@ class Lines:
 
 # ---- scores --------------------------------------------------------------------------------------------------------
 
+def dice(one, other):
+    return float(2 * np.count_nonzero(one & other) / (np.count_nonzero(one) + np.count_nonzero(other)))
+
+
 def score(structure, mask):
     """Dice, and the larger of the two directed 95 % distances between the surfaces; 0 and no distance where nothing is there."""
     if mask is None or not mask.any():
         return {"dice": 0.0, "p95": math.inf}
-    dice = 2 * np.count_nonzero(mask & structure.truth) / (np.count_nonzero(mask) + np.count_nonzero(structure.truth))
     vertices = half_surface(mask)[0] * structure.spacing
     there = structure.surface_tree.query(some(vertices))[0]
     back = cKDTree(vertices).query(some(structure.surface_tree.data))[0]
-    return {"dice": float(dice), "p95": max(float(np.percentile(d, 95)) for d in (there, back)) / structure.h}
+    return {"dice": dice(mask, structure.truth), "p95": max(float(np.percentile(d, 95)) for d in (there, back)) / structure.h}
 
 
 def some(positions, enough=20_000):

@@ -73,10 +73,10 @@ TEST_CASE("marks on the guess leave it alone, and hold it beside others", "[gues
     const FloatGridPtr guess = start_from_sphere(cube(), kMiddle, kRadius);
     const Vec3 on = at(kRadius, 1.5, 0.3), off = at(kRadius + 5, 1.5, 0.6);  // 4.8 apart along the ball
     CHECK(std::abs(correct_guess(guess, {on}, {}, {}).shift(on)) < 0.1);
-    // One bump, three times as wide as the mark is off; d: from mark to mark.
+    // One bump of the least radius, 12 voxels, more than 2.2 times what the mark is off; d: from mark to mark.
     const GuessCorrection one = correct_guess(guess, {off}, {}, {});
     const double d = std::sqrt(std::pow(on[0] - off[0], 2) + std::pow(on[1] - off[1], 2) + std::pow(on[2] - off[2], 2)),
-                 t = d / 15;
+                 t = d / 12;
     CHECK(one.shift(on) == Approx(one.shift(off) * std::pow(1 - t, 4) * (4 * t + 1))
                                .epsilon(0.05));  // and a narrower one for what that left
     const GuessCorrection both = correct_guess(guess, {on, off}, {}, {});
@@ -105,6 +105,55 @@ TEST_CASE("many marks of another surface give that surface", "[guess]") {
         for (double phi = 0; phi < 6.2; phi += 0.4)
             worst = std::max(worst, std::abs(value_at(*start, at(radius(theta), theta, phi))));
     CHECK(worst < within);
+}
+
+TEST_CASE("a part that is missing is filled, and what is right beside it is not inflated", "[guess]") {
+    // A ball without its cap, a quarter of it and 0.65 radii high, and ten marks anywhere on the cap.
+    constexpr double kPlane = 0.347 * kRadius;
+    ImageGeometry geometry = ball_mask(kRadius).geometry();
+    std::vector<std::uint8_t> values;
+    for (int k = 0; k < kSize; ++k)
+        for (int j = 0; j < kSize; ++j)
+            for (int i = 0; i < kSize; ++i)
+                values.push_back(length({double(i), double(j), double(k)}) < kRadius && k - kMiddle[2] < kPlane);
+    const Image mask = Image::from_values(geometry, values.data());
+    const FloatGridPtr guess = start_from_mask(cube(), mask);
+    const auto dice = [&](const auto& value) {
+        std::size_t both = 0, sum = 0, n = 0;
+        for (int k = 0; k < kSize; ++k)
+            for (int j = 0; j < kSize; ++j)
+                for (int i = 0; i < kSize; ++i, ++n) {
+                    const bool in_ball = length({double(i), double(j), double(k)}) < kRadius, in = value(n) != 0;
+                    both += in_ball && in;
+                    sum += std::size_t(in_ball) + std::size_t(in);
+                }
+        return 2.0 * double(both) / double(sum);
+    };
+    const double given = dice([&](std::size_t n) { return values[n]; });
+    std::mt19937 random(11);
+    std::uniform_real_distribution<double> uniform(0, 1);
+    for (int draw = 0; draw < 10; ++draw) {
+        std::vector<Vec3> marks;
+        while (marks.size() < 10) {
+            const double height = kPlane + (kRadius - kPlane) * uniform(random);  // Archimedes: even on the sphere
+            marks.push_back(at(kRadius, std::acos(height / kRadius), 6.2831853 * uniform(random)));
+        }
+        CAPTURE(draw);
+        const GuessCorrection correction = correct_guess(guess, marks, {}, {});
+        CHECK(correction.report().depth == Approx(0.5 * (kRadius + kPlane)).margin(2));
+        const CorrectedMask corrected = correction.apply(mask, 1);
+        CHECK(dice([&](std::size_t n) { return corrected.values[n]; }) > given + 0.06);
+        const FloatGridPtr start = correction.start();
+        for (const Vec3& mark : marks) CHECK(std::abs(value_at(*start, mark)) < 0.8);
+        // The half of the ball away from the cap, and the level set says what the mask does.
+        CHECK(std::abs(value_at(*start, at(kRadius, 2.6, 1))) < 0.6);
+        std::size_t n = 0, differ = 0;
+        for (int k = 0; k < kSize; ++k)
+            for (int j = 0; j < kSize; ++j)
+                for (int i = 0; i < kSize; ++i, ++n)
+                    differ += (start->tree().getValue({i, j, k}) < 0) != (corrected.values[n] != 0);
+        CHECK(differ < 60);
+    }
 }
 
 TEST_CASE("voxels beyond the marks' reach keep their value to the bit", "[guess]") {

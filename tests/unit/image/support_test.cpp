@@ -6,8 +6,8 @@
 #include <random>
 
 using namespace covol;
-using detail::find_steepest_slope;
-using detail::SteepestSlope;
+using detail::find_strongest_border;
+using detail::StrongestBorder;
 
 namespace {
 
@@ -26,13 +26,14 @@ Image slab(const std::function<double(double)>& value, double noise = 0.05) {
 }
 
 /// Of marks in the plane x, of normal +-x.
-SteepestSlope slope_at(const Image& image, double x_voxels, double normal = 1) {
+StrongestBorder border_at(const Image& image, double x_voxels, double normal = 1,
+                          EdgeFeature feature = EdgeFeature::Slope) {
     std::vector<Vec3> places, normals;
     for (int n = 0; n < 60; ++n) {
         places.push_back({0.5 * x_voxels, 2 + 0.31 * n, 3 + 0.17 * n});
         normals.push_back({normal, 0, 0});
     }
-    return find_steepest_slope(image, places, normals, 0.5, {});
+    return find_strongest_border(image, places, normals, 0.5, feature, {});
 }
 
 }  // namespace
@@ -41,7 +42,7 @@ TEST_CASE("Marks on a border have the steepest slope where they are") {
     const Image image = slab([](double x) { return x > 20.3 ? 1 : 0; });
     for (const double off : {-0.7, 0.0, 0.6}) {
         CAPTURE(off);
-        const SteepestSlope found = slope_at(image, 20.5 + off);
+        const StrongestBorder found = border_at(image, 20.5 + off);
         CHECK(found.lines == 60);
         CHECK(std::abs(found.at) <= 1);
         CHECK(found.share == 1);
@@ -51,10 +52,10 @@ TEST_CASE("Marks on a border have the steepest slope where they are") {
 TEST_CASE("Marks beside a border have it elsewhere, whatever its sign, outward along the normals") {
     for (const double sign : {1.0, -1.0}) {
         const Image image = slab([&](double x) { return x > 20.5 ? sign : 0; });
-        const SteepestSlope behind = slope_at(image, 26.5), before = slope_at(image, 26.5, -1);
+        const StrongestBorder behind = border_at(image, 26.5), before = border_at(image, 26.5, -1);
         CHECK(std::abs(behind.at + 6) <= 1);
         CHECK(std::abs(before.at - 6) <= 1);
-        for (const SteepestSlope& found : {behind, before}) {
+        for (const StrongestBorder& found : {behind, before}) {
             CHECK(found.share < 0.2);
             CHECK(found.errors > 10);
         }
@@ -63,22 +64,35 @@ TEST_CASE("Marks beside a border have it elsewhere, whatever its sign, outward a
 
 TEST_CASE("The steeper of two borders is found, and how much less steep the own one is") {
     const Image image = slab([](double x) { return (x > 20.5 ? 1.0 : 0.0) + (x > 27.5 ? 4.0 : 0.0); });
-    const SteepestSlope found = slope_at(image, 20.5);
+    const StrongestBorder found = border_at(image, 20.5);
     CHECK(std::abs(found.at - 7) <= 1);
     CHECK(found.share == Approx(0.25).margin(0.03));
-    CHECK(slope_at(image, 27.5).share == 1);
+    CHECK(border_at(image, 27.5).share == 1);
+}
+
+TEST_CASE("Marks on the middle of a line have its strength, not the slopes of its sides") {
+    for (const double sign : {1.0, -1.0}) {
+        const Image image = slab([&](double x) { return sign * std::exp(-(x - 22) * (x - 22) / 8); });
+        const EdgeFeature feature = sign > 0 ? EdgeFeature::BrightLine : EdgeFeature::DarkLine;
+        CHECK(border_at(image, 22).share < 0.7);  // as a slope
+        CHECK(border_at(image, 22, 1, feature).share == 1);
+        const StrongestBorder beside = border_at(image, 28, 1, feature);
+        CHECK(std::abs(beside.at + 6) <= 1);
+        CHECK(beside.share < 0.5);
+        CHECK(beside.errors > 10);
+    }
 }
 
 TEST_CASE("In noise nothing is steeper by more than chance") {
     const Image image = slab([](double) { return 0; }, 1);
-    CHECK(slope_at(image, 24).errors < 4);
+    CHECK(border_at(image, 24).errors < 4);
 }
 
 TEST_CASE("Lines that leave the image do not count, and no line is no answer") {
     const Image image = slab([](double x) { return x > 3.5 ? 1 : 0; });
-    CHECK(slope_at(image, 3.5).share == 1);
-    const SteepestSlope none = slope_at(image, 500);
+    CHECK(border_at(image, 3.5).share == 1);
+    const StrongestBorder none = border_at(image, 500);
     CHECK(none.lines == 0);
     CHECK(none.share == 1);
-    CHECK(find_steepest_slope(image, {}, {}, 0.5, {}).lines == 0);
+    CHECK(find_strongest_border(image, {}, {}, 0.5, EdgeFeature::Slope, {}).lines == 0);
 }

@@ -37,6 +37,22 @@ TEST_CASE("Marks on a body are not isolated") {
     CHECK(find_isolated_points(std::vector<Vec3>(50, Vec3{1, 2, 3})).empty());
 }
 
+TEST_CASE("Marks that are given twice are not isolated, and count once") {
+    for (const int count : {20, 60, 300})
+        for (const double apart : {0.0, 1e-6, 1e-3})
+            for (unsigned seed = 0; seed < 10; ++seed) {
+                CAPTURE(count, apart, seed);
+                const std::vector<Vec3> once = sphere(count, seed);
+                std::vector<Vec3> some = once, all = once, with_stray = once;
+                some.push_back({once[3][0] + apart, once[3][1], once[3][2]});
+                for (const Vec3& m : once) all.push_back({m[0], m[1] - apart, m[2]});
+                CHECK(find_isolated_points(some).empty());
+                CHECK(find_isolated_points(all).empty());
+                with_stray.insert(with_stray.end(), 4, Vec3{0, 0, 60});
+                CHECK(indices(find_isolated_points(with_stray)).size() == 4);
+            }
+}
+
 TEST_CASE("Marks of contours on slices far apart are not isolated") {
     std::vector<Vec3> marks;
     for (int slice = 0; slice < 4; ++slice)

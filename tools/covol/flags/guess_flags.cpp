@@ -30,10 +30,9 @@ void GuessFlags::bind(CLI::App& command) {
     command.add_option("--guess-label", label, "of a mask with several labels the one to correct; the others stay")
         ->check(CLI::PositiveNumber.description(""))
         ->type_name("LABEL");
-    add_length(
-        command, "--guess-radius", radius, "",
-        "a mark acts on the guess at least so far around it [" + to_text(kCorrectionVoxels) +
-            "vx, or two of the image's widest spacing; three times its distance to the guess where that is more]");
+    add_length(command, "--guess-radius", radius, "",
+               "a mark acts on the guess at least so far around it [" + to_text(kCorrectionVoxels) +
+                   "vx, or two of the image's widest spacing; 2.2 times its distance to the guess where that is more]");
 }
 
 Guess read_guess(const std::string& path, int label, const ImageGeometry& image, bool force, const RunContext& run) {
@@ -66,7 +65,8 @@ Json to_json(const CorrectionReport& r) {
             {"seeds", r.seeds},
             {"marks_to_guess", {{"mean", r.before_mean}, {"max", r.before_max}}},
             {"marks_to_corrected", {{"mean", r.after_mean}, {"max", r.after_max}}},
-            {"radius", {{"least", r.least_radius}, {"largest", r.largest_radius}}}};
+            {"radius", {{"least", r.least_radius}, {"largest", r.largest_radius}}},
+            {"depth", r.depth}};
 }
 
 }  // namespace covol::tool

@@ -56,7 +56,7 @@ ColumnName parse_name(string_view text) {
 }
 
 bool means_voxels(const std::string& unit) {
-    for (const char* word : {"px", "pixel", "pixels", "vx", "voxel", "voxels", "index"})
+    for (const char* word : {"px", "pix", "pixel", "pixels", "vx", "vox", "voxel", "voxels", "index"})
         if (unit == word) return true;
     return false;
 }
@@ -138,6 +138,7 @@ std::optional<Columns> find_columns(const std::vector<string_view>& fields) {
     columns.rule = header.names(columns.at);
     if (in_voxels) {
         columns.space = PointSpace::Index;
+        columns.order = PointOrder::XYZ;  // the names leave nothing open
         if (slices) columns.rule += ", slices from 0";
     } else if (slices) {
         // Fiji's Results: slices from 1; X and Y in the image's unit wherever the image has one

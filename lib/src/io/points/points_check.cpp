@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <sstream>
 #include <vector>
 
@@ -76,6 +77,7 @@ public:
         for (const Reading& reading : candidates) {
             if (!found.empty() && rank(reading) > rank(found.front())) break;
             if (rank(reading).first && is_speck(reading)) continue;
+            if (in_voxels(reading.options) && is_in_one_voxel(reading)) continue;
             if (fits(reading)) found.push_back(reading);
         }
         // Voxels counted from 1 are told only where counting from 0 does not do.
@@ -133,25 +135,43 @@ private:
                            [&](const Vec3& p) { return is_inside(place(reading.options, p)); });
     }
 
+    /// The box of the points in the image's voxels.
+    [[nodiscard]] WorldBox index_box(const Reading& reading) const {
+        std::vector<Vec3> index;
+        for (const Vec3& p : cloud_.points) index.push_back(geometry_.world_to_index(place(reading.options, p)));
+        return bounding_box(index);
+    }
+
     /// Made so small that fitting says nothing.
     [[nodiscard]] bool is_speck(const Reading& reading) const {
         constexpr double kLeast = 0.02;  // of the image's edge
-        std::vector<Vec3> index;
-        for (const Vec3& p : cloud_.points) index.push_back(geometry_.world_to_index(place(reading.options, p)));
-        const WorldBox box = bounding_box(index);
+        const WorldBox box = index_box(reading);
         for (int a = 0; a < 3; ++a)
             if (box.max[a] - box.min[a] >= kLeast * geometry_.size[a]) return false;
         return true;
     }
 
+    /// Numbers below 1, as of a small image in millimetres, all fit into the first voxel.
+    [[nodiscard]] bool is_in_one_voxel(const Reading& reading) const {
+        return cloud_.points.size() > 1 && longest_side(index_box(reading)) < 1;
+    }
+
+    /// An axis on which all points have one place says nothing.
     [[nodiscard]] int axes_on_centres(const ReadPointsOptions& reading) const {
         constexpr double kTolerance = 0.01;  // voxels
-        std::array<bool, 3> on{true, true, true};
+        std::array<bool, 3> on{true, true, true}, differ{false, false, false};
+        std::optional<Vec3> first;
         for (const Vec3& p : cloud_.points) {
             const Vec3 index = geometry_.world_to_index(place(reading, p));
-            for (int a = 0; a < 3; ++a) on[a] = on[a] && std::abs(index[a] - std::round(index[a])) < kTolerance;
+            if (!first) first = index;
+            for (int a = 0; a < 3; ++a) {
+                on[a] = on[a] && std::abs(index[a] - std::round(index[a])) < kTolerance;
+                differ[a] = differ[a] || std::round(index[a]) != std::round((*first)[a]);
+            }
         }
-        return int(on[0]) + int(on[1]) + int(on[2]);
+        int count = 0;
+        for (int a = 0; a < 3; ++a) count += int(on[a] && differ[a]);
+        return count;
     }
 
     static bool in_voxels(const ReadPointsOptions& reading) {

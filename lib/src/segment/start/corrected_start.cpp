@@ -21,8 +21,16 @@ CorrectionOptions correction(const Job& job) {
     return options;
 }
 
-GuessCorrection corrected(const Job& job, const FloatGridPtr& guess, const std::vector<Vec3>& marks) {
-    return correct_guess(guess, marks, job.options.inside, job.options.outside, correction(job), job.run);
+GuessCorrection corrected(Job& job, const FloatGridPtr& guess, const std::vector<Vec3>& marks) {
+    GuessCorrection made =
+        correct_guess(guess, marks, job.options.inside, job.options.outside, correction(job), job.run);
+    const CorrectionReport& report = made.report();
+    if (report.before_max > kDoubts.far_from_guess * report.depth)
+        job.warn("a mark lies " + number(report.before_max) +
+                 " from the guess, whose largest ball inside has a radius of " + number(report.depth) +
+                 ": so far from it the guess says little, and its correction may be worse than the guess itself; mark "
+                 "more there, or begin from the marks alone");
+    return made;
 }
 
 std::string distances(const CorrectionReport& report) {

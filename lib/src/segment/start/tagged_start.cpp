@@ -186,7 +186,7 @@ void start_by_tagging(Job& job) {
     BandResult tagged = tag_interior(*job.result.distance, {D, seeds_beyond(job, D)}, job.run);
     job.report().band = tagged.report;
     job.result.u = tagged.grid;
-    if (tagged.report.leaks) job.run.warn(tagged.report.leak());
+    if (tagged.report.leaks) job.warn(tagged.report.leak());
     if (D > kStarts.close_from_voxels * job.h()) start_from_closing(job, D);
     job.report().tag.tag_distance = D;
 }

@@ -164,3 +164,24 @@ TEST_CASE("what the advice asks for, reads the file rightly") {
         return Vec3{i[2], i[1], i[0]};
     });
 }
+
+TEST_CASE("numbers that are small in the image's unit are not taken for voxels") {
+    // Micrometres in millimetres: all lie in the first voxel if they are read as voxels.
+    ImageGeometry geometry = small_image();
+    geometry.spacing = {1e-4, 1e-4, 5e-4};
+    std::vector<Vec3> points;
+    for (const Vec3& p : marks()) points.push_back(geometry.index_to_world(p));
+    CHECK(verdict(cloud_of(points), geometry).empty());
+    // ... nor where they lie outside.
+    for (Vec3& p : points) p[0] += 1;
+    CHECK(verdict(cloud_of(points), geometry).find("Index") == std::string::npos);
+}
+
+TEST_CASE("marks of one slice do not say on which axis they were counted") {
+    ImageGeometry geometry = small_image();
+    geometry.spacing = {0.1, 0.1, 0.4};
+    std::vector<Vec3> points;
+    for (int n = 0; n < 24; ++n)
+        points.push_back({4.03 + 2.02 * std::cos(0.2618 * n), 4.01 + 2.53 * std::sin(0.2618 * n), 3});
+    CHECK(verdict(cloud_of(points), geometry).empty());
+}
