@@ -119,6 +119,14 @@ double corrected_level(double guess, double move, const Facets& hull, const Vec3
     return move > 0 ? std::max(level, 0.5 * (level + detail::depth_in(hull, world))) : level;
 }
 
+/// Whether that level is negative, found without the hull where the guess or the bumps alone decide.
+bool comes_inside(double guess, double move, const Facets& hull, const Vec3& world) {
+    const double level = guess - move;
+    if (!(level < 0) || guess < 0) return level < 0;
+    return std::none_of(hull.begin(), hull.end(),
+                        [&](const HalfSpace& facet) { return level + detail::along(facet, world) >= 0; });
+}
+
 double sum_of(const std::vector<Bump>& bumps, const Vec3& world) {
     double sum = 0;
     for (const Bump& b : bumps) {
@@ -369,13 +377,10 @@ CorrectedMask GuessCorrection::apply(const Image& mask, int label, const RunCont
     std::atomic<bool> broken = false;
     with_threads(run, [&, ni = ni, nj = nj, nk = nk] {
         tbb::parallel_for(0, nk, [&](int k) {
-            std::size_t in = 0, out = 0, near = 0;
+            std::size_t came = 0, went = 0, near = 0;
             std::int32_t* value = result.values.data() + std::size_t(k) * std::size_t(nj) * std::size_t(ni);
             for (int j = 0; j < nj; ++j) {
                 const std::vector<Bump> bumps = beside(data_->bumps, geometry, j, k);
-                const Vec3 middle = geometry.index_to_world({0.5 * (ni - 1), double(j), double(k)});
-                const Facets facets =
-                    bumps.empty() ? Facets{} : find_near(data_->hull, middle, 0.5 * (ni - 1) * geometry.spacing[0], 0);
                 for (int i = 0; i < ni; ++i, ++value) {
                     const double old = mask.at(i, j, k);
                     if (old != std::floor(old) || std::abs(old) > 2147483647.0) broken = true;
@@ -384,19 +389,20 @@ CorrectedMask GuessCorrection::apply(const Image& mask, int label, const RunCont
                     const double move = sum_of(bumps, world);
                     if (move == 0) continue;
                     ++near;
-                    const double before = data_->distance.at(world), now = corrected_level(before, move, facets, world);
-                    if ((before < 0) == (now < 0)) continue;
-                    if (now < 0 && *value == 0) {
+                    const double before = data_->distance.at(world);
+                    const bool in = comes_inside(before, move, data_->hull, world);
+                    if ((before < 0) == in) continue;
+                    if (in && *value == 0) {
                         *value = label;
-                        ++in;
-                    } else if (now >= 0 && *value == label) {
+                        ++came;
+                    } else if (!in && *value == label) {
                         *value = 0;
-                        ++out;
+                        ++went;
                     }
                 }
             }
-            added += in;
-            removed += out;
+            added += came;
+            removed += went;
             reached += near;
         });
     });
