@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <iterator>
+#include <memory>
 #include <numeric>
 
 #include "base/valid.h"
@@ -260,7 +262,43 @@ struct GuessCorrection::Data {
     Facets hull;  ///< of the guess, the marks and the seeds that act
     std::vector<Bump> bumps;
     CorrectionReport report;
+
+    /// The leaf after the correction; null where that changes nothing.
+    /// @param tree  of the guess, a signed distance that is clamped
+    [[nodiscard]] std::unique_ptr<Leaf> corrected_leaf(const FloatGrid::TreeType& tree, const openvdb::Coord& origin,
+                                                       const Domain& domain, double clamp) const;
 };
+
+std::unique_ptr<Leaf> GuessCorrection::Data::corrected_leaf(const FloatGrid::TreeType& tree,
+                                                            const openvdb::Coord& origin, const Domain& domain,
+                                                            double clamp) const {
+    constexpr double kHalf = 3.5, kSteepest = 2.11;  // voxels; a bump's slope, of its height by its radius
+    const Vec3 middle = domain.index_to_world({origin.x() + kHalf, origin.y() + kHalf, origin.z() + kHalf});
+    const double reach = kHalf * std::sqrt(3.0) * domain.voxel_size;
+    std::vector<Bump> near;
+    double slope = 0;
+    for (const Bump& b : bumps) {
+        if (!(std::sqrt(detail::squared_distance(b.center, middle)) < b.radius + reach)) continue;
+        near.push_back(b);
+        slope += kSteepest * std::abs(b.height) / b.radius;
+    }
+    // What the middle tells of the whole leaf, without the distances of all its voxels.
+    const double far = distance.at(middle), move = sum_of(near, middle);
+    if (std::abs(far) - std::abs(move) > clamp + (1 + slope) * reach) return nullptr;
+    const Leaf* const before = tree.probeConstLeaf(origin);
+    auto leaf = before != nullptr ? std::make_unique<Leaf>(*before)
+                                  : std::make_unique<Leaf>(origin, tree.getValue(origin), false);
+    const Facets facets = find_near(hull, middle, reach, clamp);
+    for (openvdb::Index at = 0; at < Leaf::SIZE; ++at) {
+        const openvdb::Coord c = leaf->offsetToGlobalCoord(at);
+        const Vec3 world = domain.index_to_world({double(c.x()), double(c.y()), double(c.z())});
+        const double shift = sum_of(near, world);
+        if (shift == 0) continue;
+        const double level = corrected_level(distance.at(world), shift, facets, world);
+        leaf->setValueOn(at, float(std::clamp(level, -clamp, clamp)));
+    }
+    return leaf;
+}
 
 GuessCorrection::GuessCorrection(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
 
@@ -286,28 +324,14 @@ FloatGridPtr GuessCorrection::start(const RunContext& run) const {
     }
     std::sort(origins.begin(), origins.end());
     origins.erase(std::unique(origins.begin(), origins.end()), origins.end());
-    std::vector<Leaf*> leaves;
-    leaves.reserve(origins.size());
-    for (const openvdb::Coord& origin : origins) leaves.push_back(field->tree().touchLeaf(origin));
+    std::vector<std::unique_ptr<Leaf>> leaves(origins.size());
     with_threads(run, [&] {
         tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t n) {
-            const Vec3 middle = domain.index_to_world(
-                {leaves[n]->origin().x() + 3.5, leaves[n]->origin().y() + 3.5, leaves[n]->origin().z() + 3.5});
-            const double reach = 3.5 * std::sqrt(3.0) * domain.voxel_size;
-            std::vector<Bump> near;
-            for (const Bump& b : data_->bumps)
-                if (std::sqrt(detail::squared_distance(b.center, middle)) < b.radius + reach) near.push_back(b);
-            const Facets facets = find_near(data_->hull, middle, reach, clamp);
-            for (openvdb::Index at = 0; at < Leaf::SIZE; ++at) {
-                const openvdb::Coord c = leaves[n]->offsetToGlobalCoord(at);
-                const Vec3 world = domain.index_to_world({double(c.x()), double(c.y()), double(c.z())});
-                const double move = sum_of(near, world);
-                if (move == 0) continue;
-                const double level = corrected_level(data_->distance.at(world), move, facets, world);
-                leaves[n]->setValueOn(at, float(std::clamp(level, -clamp, clamp)));
-            }
+            leaves[n] = data_->corrected_leaf(field->tree(), origins[n], domain, clamp);
         });
     });
+    for (std::unique_ptr<Leaf>& leaf : leaves)
+        if (leaf) field->tree().addLeaf(leaf.release());
     run.check();
     return start_from_grid(domain, *field, run);
 }
@@ -351,7 +375,16 @@ GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>
             if (targets.size() == before) break;
         }
         std::vector<Vec3> all = surface;
-        for (const Target& target : targets) all.push_back(target.at);
+        for (std::size_t n = 0; n < targets.size(); ++n) {
+            all.push_back(targets[n].at);
+            if (n < marks.size()) continue;
+            // A seed has the surface beyond it, on every side.
+            for (int a = 0; a < 3; ++a)
+                for (const int side : {-1, 1}) {
+                    all.push_back(targets[n].at);
+                    all.back()[a] += side * 2 * kCorrection.seed_depth_voxels * h;
+                }
+        }
         data->hull = detail::convex_hull(all);
         CorrectionReport& report = data->report;
         report.depth = data->distance.depth();
@@ -381,7 +414,8 @@ CorrectedMask GuessCorrection::apply(const Image& mask, int label, const RunCont
             std::int32_t* value = result.values.data() + std::size_t(k) * std::size_t(nj) * std::size_t(ni);
             for (int j = 0; j < nj; ++j) {
                 const std::vector<Bump> bumps = beside(data_->bumps, geometry, j, k);
-                for (int i = 0; i < ni; ++i, ++value) {
+                double at_least = 0;  // from this voxel to the guess, as the voxels before tell
+                for (int i = 0; i < ni; ++i, ++value, at_least -= geometry.spacing[0]) {
                     const double old = mask.at(i, j, k);
                     if (old != std::floor(old) || std::abs(old) > 2147483647.0) broken = true;
                     *value = broken ? 0 : std::int32_t(old);
@@ -389,7 +423,9 @@ CorrectedMask GuessCorrection::apply(const Image& mask, int label, const RunCont
                     const double move = sum_of(bumps, world);
                     if (move == 0) continue;
                     ++near;
+                    if (std::abs(move) < at_least) continue;
                     const double before = data_->distance.at(world);
+                    at_least = std::abs(before);
                     const bool in = comes_inside(before, move, data_->hull, world);
                     if ((before < 0) == in) continue;
                     if (in && *value == 0) {

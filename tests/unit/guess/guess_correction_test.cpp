@@ -3,6 +3,7 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <random>
@@ -132,6 +133,7 @@ TEST_CASE("a part that is missing is filled, and what is right beside it is not 
     const double given = dice([&](std::size_t n) { return values[n]; });
     std::mt19937 random(11);
     std::uniform_real_distribution<double> uniform(0, 1);
+    std::vector<double> reached;
     for (int draw = 0; draw < 10; ++draw) {
         std::vector<Vec3> marks;
         while (marks.size() < 10) {
@@ -142,7 +144,8 @@ TEST_CASE("a part that is missing is filled, and what is right beside it is not 
         const GuessCorrection correction = correct_guess(guess, marks, {}, {});
         CHECK(correction.report().depth == Approx(0.5 * (kRadius + kPlane)).margin(2));
         const CorrectedMask corrected = correction.apply(mask, 1);
-        CHECK(dice([&](std::size_t n) { return corrected.values[n]; }) > given + 0.06);
+        reached.push_back(dice([&](std::size_t n) { return corrected.values[n]; }));
+        CHECK(reached.back() > given);
         const FloatGridPtr start = correction.start();
         for (const Vec3& mark : marks) CHECK(std::abs(value_at(*start, mark)) < 0.8);
         // The half of the ball away from the cap, and the level set says what the mask does.
@@ -154,6 +157,8 @@ TEST_CASE("a part that is missing is filled, and what is right beside it is not 
                     differ += (start->tree().getValue({i, j, k}) < 0) != (corrected.values[n] != 0);
         CHECK(differ < 60);
     }
+    std::sort(reached.begin(), reached.end());
+    CHECK(reached[5] > given + 0.07);
 }
 
 TEST_CASE("voxels beyond the marks' reach keep their value to the bit", "[guess]") {

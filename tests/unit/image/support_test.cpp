@@ -72,14 +72,14 @@ TEST_CASE("The steeper of two borders is found, and how much less steep the own 
 
 TEST_CASE("Marks on the middle of a line have its strength, not the slopes of its sides") {
     for (const double sign : {1.0, -1.0}) {
-        const Image image = slab([&](double x) { return sign * std::exp(-(x - 22) * (x - 22) / 8); });
+        const Image image = slab([&](double x) { return sign * std::exp(-(x - 22) * (x - 22) / 18); });
         const EdgeFeature feature = sign > 0 ? EdgeFeature::BrightLine : EdgeFeature::DarkLine;
         CHECK(border_at(image, 22).share < 0.7);  // as a slope
         CHECK(border_at(image, 22, 1, feature).share == 1);
         const StrongestBorder beside = border_at(image, 28, 1, feature);
         CHECK(std::abs(beside.at + 6) <= 1);
         CHECK(beside.share < 0.5);
-        CHECK(beside.errors > 10);
+        CHECK(beside.errors > 4);  // as a warning asks for
     }
 }
 
