@@ -47,6 +47,10 @@ public:
         return std::copysign(std::max(exact_, std::sqrt(surface_.nearest(world))), near);
     }
 
+    /// By how much more than the way between them the distances of two places may differ: near the surface they are
+    /// interpolated, elsewhere they are those to crossings.
+    [[nodiscard]] double slack() const { return exact_; }
+
     /// The radius of the largest ball inside, to within the width of a leaf (8 voxels).
     [[nodiscard]] double depth() const {
         double lowest = 0;
@@ -284,7 +288,7 @@ std::unique_ptr<Leaf> GuessCorrection::Data::corrected_leaf(const FloatGrid::Tre
     }
     // What the middle tells of the whole leaf, without the distances of all its voxels.
     const double far = distance.at(middle), move = sum_of(near, middle);
-    if (std::abs(far) - std::abs(move) > clamp + (1 + slope) * reach) return nullptr;
+    if (std::abs(far) - std::abs(move) > clamp + (1 + slope) * reach + distance.slack()) return nullptr;
     const Leaf* const before = tree.probeConstLeaf(origin);
     auto leaf = before != nullptr ? std::make_unique<Leaf>(*before)
                                   : std::make_unique<Leaf>(origin, tree.getValue(origin), false);
@@ -425,7 +429,7 @@ CorrectedMask GuessCorrection::apply(const Image& mask, int label, const RunCont
                     ++near;
                     if (std::abs(move) < at_least) continue;
                     const double before = data_->distance.at(world);
-                    at_least = std::abs(before);
+                    at_least = std::abs(before) - data_->distance.slack();
                     const bool in = comes_inside(before, move, data_->hull, world);
                     if ((before < 0) == in) continue;
                     if (in && *value == 0) {
