@@ -3,6 +3,7 @@
     COVOL=build/bin/covol python3 -m unittest tests/cli/sphere_holes_test.py
     COVOL_DATA=FOLDER ... with the spheres at 260^3 in FOLDER/phantoms
 """
+import json
 import os
 import pathlib
 import shutil
@@ -58,6 +59,16 @@ class SphereHoles(unittest.TestCase):
             with self.subTest(kind=kind):
                 shell = self.expect_points_met(folder / f"sphere_{kind}.nrrd", folder / f"sphere_{kind}_points.xyz", kind, 0.01)
                 self.assertLess(shell, 0.3)
+
+    @unittest.skipUnless(DATA, "SKIPPED: COVOL_DATA is not set")
+    def test_marks_on_the_middle_of_a_shell_belong_to_the_image(self):
+        """The steepest slopes are beside a line, not on it; that is no reason to doubt the marks."""
+        folder = pathlib.Path(DATA or "").resolve() / "phantoms"
+        for kind in KINDS:
+            with self.subTest(kind=kind):
+                self.run_covol("segment", folder / f"sphere_{kind}.nrrd", "--points", folder / f"sphere_{kind}_points.xyz",
+                               "-o", "s.vdb", "--json", "r.json")
+                self.assertEqual(json.loads((self.out / "r.json").read_text()).get("warnings", []), [])
 
     def test_the_image_alone_spans_flat_discs(self):
         # The smallest surface across a round hole is the disc that its rim bounds; the sphere's cap is 2.7 voxels higher.

@@ -45,6 +45,8 @@ def test_the_program_gives_the_same(tmp_path, program, kind, options):
     theirs = json.loads(report.read_text())
     for part in ("resolved", "grid", "surface", "fit"):
         assert result.report[part] == theirs[part]
+    assert result.warnings == theirs.get("warnings", [])
+    assert any("not steady" in line for line in result.warnings) == ("max_steps" in options)
     # arrays in memory are the same job
     read, marks = covol.read_image(image), covol.read_points(points)
     again = covol.segment(np.array(read.array), marks.array, spacing=read.spacing, origin=read.origin, **options)
