@@ -22,7 +22,7 @@ namespace covol {
 
 struct BrickOptions {
     std::int64_t most_voxels = 8'000'000;  ///< > 0: of the band in a brick, its neighbours' layers not counted
-    int overlap = 16;                      ///< voxels, a multiple of 8, > 0: layers of its neighbours around a brick
+    int overlap = 16;                      ///< voxels, a multiple of 8, 8 to 2^23: layers of its neighbours
     double tolerance = 0.05;               ///< voxels, > 0: neighbours agree when their surfaces lie closer
     int most_sweeps = 4;                   ///< >= 1
     [[nodiscard]] COVOL_API std::string why_invalid() const;

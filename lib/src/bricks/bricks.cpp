@@ -138,7 +138,9 @@ std::vector<std::size_t> all_of(const BrickPlan& plan) {
 std::string BrickOptions::why_invalid() const {
     detail::FieldChecks checks;
     checks.expect(most_voxels > 0, "most_voxels", "> 0", double(most_voxels));
-    checks.expect(overlap > 0 && overlap % 8 == 0, "overlap", "a multiple of 8, > 0", overlap);
+    constexpr int kFarthestVoxel = 1 << 23;  // of a lattice
+    checks.expect(overlap > 0 && overlap % 8 == 0 && overlap <= kFarthestVoxel, "overlap", "a multiple of 8, 8 to 2^23",
+                  overlap);
     checks.expect_positive("tolerance", tolerance);
     checks.expect(most_sweeps >= 1, "most_sweeps", ">= 1", most_sweeps);
     return checks.lines();
