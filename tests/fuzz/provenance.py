@@ -281,8 +281,6 @@ def names(box, values, rng):
         (box.here / "p.seg.nrrd").write_bytes(re.sub(rb"(Segment0_Name:=).*", lambda m: m[1] + label, data, count=1))
         words = ["segment", "ball.nrrd", "--painted", "p.seg.nrrd", "--max-steps", "2"]
     else:
-        words = [*box.job, "--points", f"{first}=ball.xyz", f"{name()}=ball.xyz"]
-        words.remove("ball.xyz")
         words = ["segment", "ball.nrrd", "--points", f"{first}=ball.xyz", f"{name()}=ball.xyz", "--init", "tag", "--max-steps", "2"]
     yield ([*words, "-o", "n.vdb", "--mesh", "n.ply", "--mask", "n.nii.gz", "--report", "n.html", "--table", "n.csv", "--usda", "n.usda", "--memory-limit", "900M"],
            ["inputs/n(_[A-Za-z0-9_]+)?\\.(vdb|ply|html|csv|usda|nii\\.gz|txt)"])

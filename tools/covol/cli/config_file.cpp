@@ -159,6 +159,8 @@ private:
                 value += peek();
         }
         ++at_;
+        if (std::string_view(" \t\r\n,]=#").find(peek()) == std::string_view::npos)
+            fail("expected a blank or the end of the line behind a text in quotes");
         return value;
     }
 
@@ -174,11 +176,12 @@ private:
         const std::string_view number = text_.substr(std::min(at_ + 1, text_.size()), digits);
         std::uint32_t code = 0;
         const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), code, 16);
-        const bool whole = digits > 0 && number.size() == digits && error == std::errc() &&
-                           end == number.data() + number.size();
+        const bool whole =
+            digits > 0 && number.size() == digits && error == std::errc() && end == number.data() + number.size();
         if (!whole || code == 0 || code > 0x10FFFF || (code >= 0xD800 && code < 0xE000))
-            fail("a backslash in double quotes begins an escape of TOML such as \\\\ or \\u00b5; a text in 'single "
-                 "quotes' has none");
+            fail(
+                "a backslash in double quotes begins an escape of TOML such as \\\\ or \\u00b5; a text in 'single "
+                "quotes' has none");
         add_utf8(code, value);
         at_ += digits;
     }
@@ -251,8 +254,7 @@ std::vector<CLI::ConfigItem> ConfigFile::from_config(std::istream& input) const 
     std::vector<CLI::ConfigItem> items;
     Reader reader(text);
     while (std::optional<Entry> entry = reader.next()) {
-        const bool is_common =
-            entry->section.empty() && program_.get_option_no_throw("--" + entry->name) != nullptr;
+        const bool is_common = entry->section.empty() && program_.get_option_no_throw("--" + entry->name) != nullptr;
         if (!entry->section.empty() && entry->section != command) continue;
         CLI::ConfigItem item;
         if (!is_common) item.parents = {command};

@@ -81,8 +81,12 @@ const char* role_name(OptionRole role) {
 
 nlohmann::ordered_json to_json(const CLI::Option& option, bool first) {
     const OptionHelp help = help_of(option);
-    return {{"names", help.names},           {"value", help.value},       {"text", help.text},
-            {"default", help.default_value}, {"required", help.required}, {"first", first},
+    return {{"names", help.names},
+            {"value", help.value},
+            {"text", help.text},
+            {"default", help.default_value},
+            {"required", help.required},
+            {"first", first},
             {"role", role_name(role_of(option))}};
 }
 

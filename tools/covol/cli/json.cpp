@@ -26,8 +26,8 @@ Json parse_json(const std::string& text, const std::string& what) {
 Json read_json(const std::string& path, std::uintmax_t most_bytes) {
     std::error_code status;
     if (!std::filesystem::is_regular_file(path, status) || std::filesystem::file_size(path, status) > most_bytes)
-        throw Error(Errc::Io, path + ": cannot read; expected a file of at most " + std::to_string(most_bytes >> 20U) +
-                                  " MiB");
+        throw Error(Errc::Io,
+                    path + ": cannot read; expected a file of at most " + std::to_string(most_bytes >> 20U) + " MiB");
     std::ifstream file(path, std::ios::binary);
     const std::string text{std::istreambuf_iterator<char>(file), {}};
     if (!file) throw Error(Errc::Io, path + ": cannot read");

@@ -99,7 +99,8 @@ Json options_of(const CLI::App& command) {
 std::vector<std::string> inputs_of(const CLI::App& command) {
     std::vector<std::string> inputs;
     for (const CLI::Option* option : command.get_options()) {
-        if (const OptionRole role = role_of(*option); role == OptionRole::Output || role == OptionRole::Conduct) continue;
+        if (const OptionRole role = role_of(*option); role == OptionRole::Output || role == OptionRole::Conduct)
+            continue;
         for (const std::string& text : option->results()) {
             const std::vector<std::string> frames = files_of_frames(text);
             inputs.insert(inputs.end(), frames.begin(), frames.end());

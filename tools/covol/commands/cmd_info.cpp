@@ -31,8 +31,8 @@ const char* name_of(PointSpace space) {
 void describe_vdb(const std::string& path, Session& session) {
     Json& grids = session.report()["grids"] = Json::array();
     for (const VdbGridInfo& g : list_vdb(path)) {
-        session.say(safe_text(g.name + ": " + g.type + ", " + (g.grid_class.empty() ? "no class" : g.grid_class)) + ", " +
-                    std::to_string(g.active_voxels) + " active voxels of " + std::to_string(g.voxel_size) +
+        session.say(safe_text(g.name + ": " + g.type + ", " + (g.grid_class.empty() ? "no class" : g.grid_class)) +
+                    ", " + std::to_string(g.active_voxels) + " active voxels of " + std::to_string(g.voxel_size) +
                     (g.uniform ? "" : " (not uniform)") + ", " + triple(g.min) + " to " + triple(g.max));
         grids.push_back({{"name", g.name},
                          {"type", g.type},
@@ -66,9 +66,9 @@ Json range_of(const std::string& path, ReadImageOptions options, int channel, co
     const std::optional<ChunkCount> chunks = image.chunks();
     const bool named = std::size_t(channel) < info.channel_names.size();
     std::ostringstream text;
-    text << (info.channels > 1
-                 ? "channel " + std::to_string(channel) + (named ? " " + safe_text(info.channel_names[channel]) : "") + ": "
-                 : "values: ")
+    text << (info.channels > 1 ? "channel " + std::to_string(channel) +
+                                     (named ? " " + safe_text(info.channel_names[channel]) : "") + ": "
+                               : "values: ")
          << range[0] << " to " << range[1] << (info.frames > 1 ? ", frame " + std::to_string(options.frame) : "");
     if (chunks && chunks->read < chunks->total) text << ", of " << chunks->read << " of " << chunks->total << " chunks";
     session.say(text.str());
@@ -80,9 +80,9 @@ void describe_image(const std::string& path, const ImageFlags& flags, Session& s
     const ImageInfo info = read_image_info(path, flags.options, session.run());
     const ImageGeometry& g = info.geometry;
     std::ostringstream text;
-    text << safe_text(info.format) << ", " << triple(g.size) << " voxels, " << to_string(info.type) << ", " << info.channels
-         << " channel(s), " << info.frames << " frame(s), stored as " << info.axis_order << "\nspacing "
-         << triple(g.spacing) << " " << (g.unit.empty() ? "(no unit)" : safe_text(g.unit))
+    text << safe_text(info.format) << ", " << triple(g.size) << " voxels, " << to_string(info.type) << ", "
+         << info.channels << " channel(s), " << info.frames << " frame(s), stored as " << info.axis_order
+         << "\nspacing " << triple(g.spacing) << " " << (g.unit.empty() ? "(no unit)" : safe_text(g.unit))
          << (g.spacing_known ? "" : " (not known)") << ", origin " << triple(g.origin) << "\naxes: i runs along "
          << axis_text(g, 0) << ", j along " << axis_text(g, 1) << ", k along " << axis_text(g, 2)
          << " of the world (LPS), which goes from " << triple(g.world_box().min) << " to " << triple(g.world_box().max);

@@ -52,7 +52,8 @@ Words values_of(const std::string& path, const std::string& name, const Json& va
 
 /// A name without a folder, which no option is taken for: it stands behind a folder or `--name=` everywhere.
 bool is_file_name(const std::string& name) {
-    return !name.empty() && name != "." && name != ".." && name.find_first_of(std::string("/\0", 2)) == std::string::npos;
+    return !name.empty() && name != "." && name != ".." &&
+           name.find_first_of(std::string("/\0", 2)) == std::string::npos;
 }
 
 Provenance read_provenance(const std::string& path) {
@@ -110,8 +111,8 @@ public:
             }
         if (const std::string pattern = placed_frames(value, begin); !pattern.empty()) return pattern;
         if (!names_no_file(value))
-            refuse(source_, "'" + option + "' names " + value +
-                                ", which is none of the inputs that it lists (covol_inputs)");
+            refuse(source_,
+                   "'" + option + "' names " + value + ", which is none of the inputs that it lists (covol_inputs)");
         return value;
     }
 
@@ -144,7 +145,8 @@ private:
             if (!parts || !is_frame(name, *parts)) continue;
             const std::string own = fs::path(path).parent_path().string();
             if (!folder.empty() && own != folder)
-                refuse(source_, value + ": expected the files of all frames in one folder, got " + folder + " and " + own);
+                refuse(source_,
+                       value + ": expected the files of all frames in one folder, got " + folder + " and " + own);
             folder = own;
         }
         return folder.empty() ? "" : value.substr(0, begin) + folder + "/" + value.substr(begin);

@@ -50,7 +50,8 @@ const Json& three(const Json& json, const char* name) {
 Index3 index_of(const Json& json, const char* name) {
     constexpr std::int64_t kFarthest = 1 << 24;  // lattices reach half as far
     Index3 index{};
-    for (int a = 0; a < 3; ++a) index[a] = whole(Json{{name, three(json, name)[std::size_t(a)]}}, name, -kFarthest, kFarthest);
+    for (int a = 0; a < 3; ++a)
+        index[a] = whole(Json{{name, three(json, name)[std::size_t(a)]}}, name, -kFarthest, kFarthest);
     return index;
 }
 
@@ -90,9 +91,8 @@ Json to_json(const Brick& brick) {
 }
 
 Brick brick_of(const Json& json, const Domain& domain, std::size_t bricks) {
-    Brick brick{{index_of(json, "min"), index_of(json, "max")},
-                whole<std::int64_t>(json, "active_voxels", 0, kMostVoxels),
-                {}};
+    Brick brick{
+        {index_of(json, "min"), index_of(json, "max")}, whole<std::int64_t>(json, "active_voxels", 0, kMostVoxels), {}};
     for (int a = 0; a < 3; ++a)
         if (brick.core.min[a] > brick.core.max[a] || brick.core.min[a] < domain.min[a] ||
             brick.core.max[a] > domain.max[a])

@@ -187,7 +187,8 @@ void tell_plan(const BrickPlan& plan, Session& session) {
 std::string outputs_of_join(const Session& session) {
     std::string names;
     for (const std::string& name : session.given())
-        if (name != "output" && session.has_role(name, OptionRole::Output)) names += (names.empty() ? "--" : ", --") + name;
+        if (name != "output" && session.has_role(name, OptionRole::Output))
+            names += (names.empty() ? "--" : ", --") + name;
     return names;
 }
 
