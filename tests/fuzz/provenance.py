@@ -42,7 +42,9 @@ class Sandbox:
         self.make("phantom", "sphere", "--size", "20", "--count", "300", "-o", "ball.nrrd", "--points", "ball.xyz")
         self.job = ["segment", "ball.nrrd", "--points", "ball.xyz", "--init", "tag", "--max-steps", "2"]
         self.make(*self.job, "--theta", "0.5", "--density", "s.vdb", "--exterior-seed", "1,1,1", "-o", "s.vdb", "--json", "report.json")
-        self.make("segment", "ball.nrrd", "--points", "a=ball.xyz", "b=ball.xyz", "--init", "tag", "--max-steps", "2", "-o", "two.vdb", "--mask", "two.seg.nrrd")
+        points = [[float(x) for x in line.split()] for line in (self.here / "ball.xyz").read_text().splitlines() if not line.startswith("#")]
+        (self.here / "small.xyz").write_text("".join("%r %r %r\n" % tuple(x / 3 for x in point) for point in points))
+        self.make("segment", "ball.nrrd", "--points", "a=ball.xyz", "b=small.xyz", "--init", "tag", "--max-steps", "2", "-o", "two.vdb", "--mask", "two.seg.nrrd")
         self.make("brick", "plan", *self.job, "--model", "paper", "--brick-voxels", "3000", "-o", "plan")
         self.make("brick", "run", "plan")
         self.make(*self.job, "-o", "c.vdb", "--save-config", "c.toml")
@@ -281,7 +283,7 @@ def names(box, values, rng):
         (box.here / "p.seg.nrrd").write_bytes(re.sub(rb"(Segment0_Name:=).*", lambda m: m[1] + label, data, count=1))
         words = ["segment", "ball.nrrd", "--painted", "p.seg.nrrd", "--max-steps", "2"]
     else:
-        words = ["segment", "ball.nrrd", "--points", f"{first}=ball.xyz", f"{name()}=ball.xyz", "--init", "tag", "--max-steps", "2"]
+        words = ["segment", "ball.nrrd", "--points", f"{first}=ball.xyz", f"{name()}=small.xyz", "--init", "tag", "--max-steps", "2"]
     yield ([*words, "-o", "n.vdb", "--mesh", "n.ply", "--mask", "n.nii.gz", "--report", "n.html", "--table", "n.csv", "--usda", "n.usda", "--memory-limit", "900M"],
            ["inputs/n(_[A-Za-z0-9_]+)?\\.(vdb|ply|html|csv|usda|nii\\.gz|txt)"])
     yield ["info", "n.vdb"], []

@@ -73,7 +73,8 @@ public:
     /// Solves the whole coarsely and splits it. @throws Error as segment() and reconstruct(), InvalidOptions.
     [[nodiscard]] COVOL_API BrickPlan plan(const BrickOptions& options) const;
     /// One sweep of one brick, from its own and its neighbours' last states, or from the coarse solve where `states`
-    /// has none. @return its state: no leaf where no surface passes it
+    /// has none. @return its state: no leaf where no surface passes it @throws Error InvalidInput (a plan of a job with
+    /// another voxel size)
     [[nodiscard]] COVOL_API FloatGridPtr solve(const BrickPlan& plan, std::size_t brick, const BrickStates& states,
                                                BrickReport& report) const;
     /// Joins the states of all bricks and finishes the surface as segment() does. The job's last work.

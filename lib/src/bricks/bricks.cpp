@@ -171,6 +171,14 @@ struct BrickJob::Parts {
         });
     }
 
+    /// A plan may come from elsewhere. @throws Error InvalidInput
+    void require_plan_of_this_job(const BrickPlan& plan) const {
+        if (plan.domain.voxel_size != job.h())
+            throw Error(Errc::InvalidInput, "bricks: the plan's voxels have an edge of " +
+                                                number(plan.domain.voxel_size) + ", those of its job " +
+                                                number(job.h()) + ": plan again, with `voxel_size`");
+    }
+
     /// What segment() leaves after the flow, all at once.
     void join(const BrickPlan& plan, const BrickStates& states) {
         job.result.u = bricks::assemble(plan, plan.domain, all_of(plan), states);
@@ -273,6 +281,7 @@ BrickPlan BrickJob::plan(const BrickOptions& options) const {
 FloatGridPtr BrickJob::solve(const BrickPlan& plan, std::size_t brick, const BrickStates& states,
                              BrickReport& report) const {
     const RunContext& run = parts_->run;
+    parts_->require_plan_of_this_job(plan);
     const VoxelBox core = plan.bricks.at(brick).core;
     const Domain kept = bricks::around(plan.domain, core, 8);
     FloatGridPtr state = make_grid(kept, float(kHalfWidthVoxels * plan.domain.voxel_size), "u");
@@ -314,6 +323,7 @@ FloatGridPtr BrickJob::solve(const BrickPlan& plan, std::size_t brick, const Bri
 SegmentResult BrickJob::join(const BrickPlan& plan, const BrickStates& states, bool without_mesh) {
     const RunContext& run = parts_->run;
     Job& job = parts_->job;
+    parts_->require_plan_of_this_job(plan);
     job.options.without_mesh = job.options.without_mesh || without_mesh;
     detail::require_valid(job.options, "bricks");
     with_threads(run, [&] {

@@ -84,7 +84,8 @@ void add_metadata(const fs::path& folder, Digest& hash) {
 }  // namespace
 
 std::pair<std::size_t, std::size_t> path_within(const std::string& text) {
-    std::size_t begin = text.find('=') + 1;
+    const std::size_t equals = text.find('=');
+    std::size_t begin = text.find('/') > equals ? equals + 1 : 0;  // a structure's name holds no slash
     for (const char* kind : {"mesh:", "mask:", "vdb:"})
         if (text.compare(begin, std::string(kind).size(), kind) == 0) begin += std::string(kind).size();
     return {begin, std::min(text.find(":/", begin), text.size())};
