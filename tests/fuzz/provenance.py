@@ -69,7 +69,7 @@ class Sandbox:
     def restore(self):
         for path in sorted(self.root.rglob("*"), reverse=True):
             name = str(path.relative_to(self.root))
-            if name not in self.kept:
+            if name not in self.kept or path.is_symlink():
                 shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink(missing_ok=True)
         for name, data in self.kept.items():
             path = self.root / name
@@ -285,7 +285,7 @@ def names(box, values, rng):
     else:
         words = ["segment", "ball.nrrd", "--points", f"{first}=ball.xyz", f"{name()}=small.xyz", "--init", "tag", "--max-steps", "2"]
     yield ([*words, "-o", "n.vdb", "--mesh", "n.ply", "--mask", "n.nii.gz", "--report", "n.html", "--table", "n.csv", "--usda", "n.usda", "--memory-limit", "900M"],
-           ["inputs/n(_[A-Za-z0-9_]+)?\\.(vdb|ply|html|csv|usda|nii\\.gz|txt)"])
+           ["inputs/n(_[A-Za-z0-9_]+)?(\\.nii)?\\.(vdb|ply|html|csv|usda|nii\\.gz|txt)"])
     yield ["info", "n.vdb"], []
 
 
