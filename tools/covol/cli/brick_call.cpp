@@ -119,9 +119,13 @@ std::string plan_file(const std::string& folder) { return folder + "/plan.json";
 
 Json read_plan_file(const std::string& folder) {
     constexpr std::uintmax_t kMostBytes = std::uintmax_t(1) << 26U;
-    Json plan = read_json(plan_file(folder), kMostBytes);
-    if (!plan.is_object()) throw Error(Errc::InvalidInput, plan_file(folder) + ": expected a plan of covol brick plan");
-    return plan;
+    try {
+        Json plan = read_json(plan_file(folder), kMostBytes);
+        if (!plan.is_object()) throw Error(Errc::InvalidInput, plan_file(folder) + ": got no object");
+        return plan;
+    } catch (const Error& error) {
+        throw Error(error.code(), plan_file(folder) + ": expected a plan of covol brick plan: " + error.what());
+    }
 }
 
 std::optional<BrickCall> take_brick_call(std::vector<std::string>& words, const CLI::App& program) {

@@ -119,7 +119,17 @@ Domain domain_of_plan(const Json& json) {
     return domain;
 }
 
-Json input_of(const std::string& path) { return {{"path", path}, {"bytes", std::filesystem::file_size(path)}}; }
+/// Of a folder, such as a Zarr store, 0.
+std::uintmax_t bytes_of(const std::string& path, std::error_code& status) {
+    return fs::is_directory(path, status) ? 0 : fs::file_size(path, status);
+}
+
+Json input_of(const std::string& path) {
+    std::error_code status;
+    const std::uintmax_t bytes = bytes_of(path, status);
+    if (status) throw Error(Errc::Io, path + ": cannot read: " + status.message());
+    return {{"path", path}, {"bytes", bytes}};
+}
 
 /// What a sweep says of a brick.
 struct BrickFacts {
@@ -156,7 +166,7 @@ void check_inputs(const Json& plan, const std::string& path) {
     for (const Json& input : plan.at("inputs")) {
         const std::string name = input.at("path").get<std::string>();
         std::error_code status;
-        const std::uintmax_t bytes = std::filesystem::file_size(name, status);
+        const std::uintmax_t bytes = bytes_of(name, status);
         if (status)
             throw Error(Errc::Io, name + ": cannot read; " + path +
                                       " was planned with it: run covol brick where the plan was made");
