@@ -76,6 +76,12 @@ class Bricks(Case):
             self.assertEqual(low, other)
             self.assertTrue(np.array_equal(one, two), path)
 
+    def test_a_folder_as_an_input(self):
+        self.run_covol("phantom", "sphere", "--size", "40", "--count", "5000", "-o", "t.zarr", "--points", "t.xyz")
+        self.run_covol("brick", "plan", "segment", "t.zarr", "--points", "t.xyz", "--model", "paper", "--brick-voxels", "20000", "-o", "plan")
+        self.run_covol("brick", "run", "plan")
+        self.run_covol("brick", "join", "plan", "-o", "t.vdb")
+
     def test_bricks_by_number(self):
         planned = self.plan("plan")
         error = self.run_covol("brick", "run", "plan", "0", "--sweep", "2", code=3).stderr

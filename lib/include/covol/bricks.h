@@ -22,7 +22,7 @@ namespace covol {
 
 struct BrickOptions {
     std::int64_t most_voxels = 8'000'000;  ///< > 0: of the band in a brick, its neighbours' layers not counted
-    int overlap = 16;                      ///< voxels, a multiple of 8, > 0: layers of its neighbours around a brick
+    int overlap = 16;                      ///< voxels, a multiple of 8, 8 to 2^23: layers of its neighbours
     double tolerance = 0.05;               ///< voxels, > 0: neighbours agree when their surfaces lie closer
     int most_sweeps = 4;                   ///< >= 1
     [[nodiscard]] COVOL_API std::string why_invalid() const;
@@ -73,7 +73,8 @@ public:
     /// Solves the whole coarsely and splits it. @throws Error as segment() and reconstruct(), InvalidOptions.
     [[nodiscard]] COVOL_API BrickPlan plan(const BrickOptions& options) const;
     /// One sweep of one brick, from its own and its neighbours' last states, or from the coarse solve where `states`
-    /// has none. @return its state: no leaf where no surface passes it
+    /// has none. @return its state: no leaf where no surface passes it @throws Error InvalidInput (a plan of a job with
+    /// another voxel size)
     [[nodiscard]] COVOL_API FloatGridPtr solve(const BrickPlan& plan, std::size_t brick, const BrickStates& states,
                                                BrickReport& report) const;
     /// Joins the states of all bricks and finishes the surface as segment() does. The job's last work.

@@ -138,7 +138,9 @@ std::vector<std::size_t> all_of(const BrickPlan& plan) {
 std::string BrickOptions::why_invalid() const {
     detail::FieldChecks checks;
     checks.expect(most_voxels > 0, "most_voxels", "> 0", double(most_voxels));
-    checks.expect(overlap > 0 && overlap % 8 == 0, "overlap", "a multiple of 8, > 0", overlap);
+    constexpr int kFarthestVoxel = 1 << 23;  // of a lattice
+    checks.expect(overlap > 0 && overlap % 8 == 0 && overlap <= kFarthestVoxel, "overlap", "a multiple of 8, 8 to 2^23",
+                  overlap);
     checks.expect_positive("tolerance", tolerance);
     checks.expect(most_sweeps >= 1, "most_sweeps", ">= 1", most_sweeps);
     return checks.lines();
@@ -167,6 +169,14 @@ struct BrickJob::Parts {
             choose_cloud_domain(job);
             field = std::make_unique<const cloud::CloudField>(*job.cloud, job.h(), cloud, run);
         });
+    }
+
+    /// A plan may come from elsewhere. @throws Error InvalidInput
+    void require_plan_of_this_job(const BrickPlan& plan) const {
+        if (plan.domain.voxel_size != job.h())
+            throw Error(Errc::InvalidInput, "bricks: the plan's voxels have an edge of " +
+                                                number(plan.domain.voxel_size) + ", those of its job " +
+                                                number(job.h()) + ": plan again, with `voxel_size`");
     }
 
     /// What segment() leaves after the flow, all at once.
@@ -271,6 +281,7 @@ BrickPlan BrickJob::plan(const BrickOptions& options) const {
 FloatGridPtr BrickJob::solve(const BrickPlan& plan, std::size_t brick, const BrickStates& states,
                              BrickReport& report) const {
     const RunContext& run = parts_->run;
+    parts_->require_plan_of_this_job(plan);
     const VoxelBox core = plan.bricks.at(brick).core;
     const Domain kept = bricks::around(plan.domain, core, 8);
     FloatGridPtr state = make_grid(kept, float(kHalfWidthVoxels * plan.domain.voxel_size), "u");
@@ -312,6 +323,7 @@ FloatGridPtr BrickJob::solve(const BrickPlan& plan, std::size_t brick, const Bri
 SegmentResult BrickJob::join(const BrickPlan& plan, const BrickStates& states, bool without_mesh) {
     const RunContext& run = parts_->run;
     Job& job = parts_->job;
+    parts_->require_plan_of_this_job(plan);
     job.options.without_mesh = job.options.without_mesh || without_mesh;
     detail::require_valid(job.options, "bricks");
     with_threads(run, [&] {

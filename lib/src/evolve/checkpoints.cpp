@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <string_view>
 
 #include "base/file.h"
 #include "base/number.h"
@@ -17,18 +18,30 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr const char* kJobFile = "job.txt";
+constexpr std::string_view kFlow = "flow-";
+
+/// Whether file() gives such a name: other files of a folder are not ours.
+bool is_of_flow(const std::string& name) {
+    const std::size_t digits = name.find_first_not_of("0123456789", std::min(kFlow.size(), name.size()));
+    if (!name.starts_with(kFlow) || digits == std::string::npos || digits < kFlow.size() + 2) return false;
+    const std::string ending = name.substr(digits);
+    return ending == ".vdb" || ending == ".state";
+}
 
 void remove_flows(const std::string& folder) noexcept {
     std::error_code status;
     for (fs::directory_iterator at(folder, status), end; !status && at != end; at.increment(status)) {
         std::error_code stays;
-        if (at->path().filename().string().starts_with("flow-")) fs::remove(at->path(), stays);
+        if (is_of_flow(at->path().filename().string())) fs::remove(at->path(), stays);
     }
 }
 
-std::string text_of(const fs::path& path) {
+/// Whether the file holds that text, and nothing else is at the path; nothing of a stranger's file is believed.
+bool holds(const fs::path& path, const std::string& text) {
+    std::error_code status;
+    if (!fs::is_regular_file(path, status) || fs::file_size(path, status) != text.size()) return false;
     std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
+    return std::string(std::istreambuf_iterator<char>(file), {}) == text;
 }
 
 }  // namespace
@@ -65,7 +78,7 @@ Checkpoints::Checkpoints(const std::string& folder, double every, const std::str
     if (!resume)
         throw Error(Errc::InvalidInput,
                     "`checkpoint`: " + folder + ": it holds states of a run; `resume` goes on with it, or remove it");
-    if (text_of(job_file) != job)
+    if (!holds(job_file, job))
         throw Error(Errc::InvalidInput, "`resume`: " + folder +
                                             ": its states are of a run with other options, inputs, version or "
                                             "instruction set, which " +

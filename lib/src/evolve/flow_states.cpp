@@ -24,7 +24,7 @@ FloatGridPtr named(const FloatGrid& grid, const char* name) {
 
 bool FlowStates::any() const {
     std::error_code status;
-    return all_ != nullptr && std::filesystem::exists(all_->file(number_, kNumbers), status);
+    return all_ != nullptr && std::filesystem::is_regular_file(all_->file(number_, kNumbers), status);
 }
 
 FlowStates::Grids FlowStates::read_grids() const {

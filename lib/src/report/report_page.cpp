@@ -9,6 +9,7 @@
 #include "base/valid.h"
 #include "base/vector.h"
 #include "covol/error.h"
+#include "covol/safe_text.h"
 #include "covol/version.h"
 #include "report/cluster.h"
 #include "report/encoding.h"
@@ -75,7 +76,7 @@ Json to_json(const PageStructure& structure, const Vec3& origin, const ReportPag
         values[name] = {{"min", own.min}, {"max", own.max}, {"data", pack(own.steps)}};
     }
     Json json{
-        {"name", structure.name},
+        {"name", safe_text(structure.name)},
         {"color", structure.color},
         {"mesh",
          {{"vertices", coded.vertex_count},
@@ -143,9 +144,9 @@ Json data_of(const ReportPage& page, const ReportPageOptions& options, ReportPag
     Json facts = Json::parse(page.facts, nullptr, false);
     if (!facts.is_object())
         throw Error(Errc::InvalidInput, "write_report_page: facts: expected a JSON object, got something else");
-    Json data{{"covol", version()},        {"title", page.title},
-              {"unit", page.unit},         {"anatomical", page.is_anatomical},
-              {"facts", std::move(facts)}, {"structures", Json::array()}};
+    Json data{{"covol", version()},           {"title", safe_text(page.title)},
+              {"unit", safe_text(page.unit)}, {"anatomical", page.is_anatomical},
+              {"facts", std::move(facts)},    {"structures", Json::array()}};
     double all = 0;
     for (const PageStructure& structure : page.structures) all += double(structure.mesh->triangles.size());
     for (const PageStructure& structure : page.structures) {
@@ -190,7 +191,7 @@ ReportPageSummary write_report_page(const std::string& path, const ReportPage& p
     const std::string_view viewer = detail::viewer();
     constexpr std::string_view kTitle = "{{title}}", kData = "{{data}}";
     const std::size_t title = viewer.find(kTitle), script = viewer.find(kData);
-    const std::string safe_title = detail::escape_html(page.title);
+    const std::string safe_title = detail::escape_html(safe_text(page.title));
     detail::write_atomically(path, [&](const std::string& temporary) {
         std::ofstream file(temporary, std::ios::binary);
         file << viewer.substr(0, title) << safe_title

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "covol/safe_text.h"
 #include "covol/start.h"
 #include "covol/surface.h"
 #include "report/cluster.h"
@@ -190,7 +191,7 @@ TEST_CASE("coded slices know where their voxels lie in the world") {
 }
 
 TEST_CASE("no name, path or fact ends the script it stands in") {
-    const std::string evil = "</script><script>alert(1)</script><!--<img src=x onerror=alert(1)>&amp;\xff\"'";
+    const std::string evil = "</script><script>alert(1)</script><!--<img src=x onerror=alert(1)>&amp;\xff\x1b[31m\"'";
     const TriangleMesh mesh = sphere();
     ReportPage page;
     page.title = evil;
@@ -202,8 +203,9 @@ TEST_CASE("no name, path or fact ends the script it stands in") {
     CHECK(made.bytes == text.size());
     for (const char* word : {"<script", "</script", "<!--", "<img", "onerror=alert(1)>"})
         CHECK(count_of(text, word) == count_of(viewer, word));
+    CHECK(count_of(text, "\x1b") == 0);
     const json data = data_of(text);
-    CHECK(data["structures"][0]["name"] == json::parse(json(evil).dump(-1, ' ', true, json::error_handler_t::replace)));
+    CHECK(data["structures"][0]["name"] == safe_text(evil));
     CHECK(data["facts"]["input"]["path"].get<std::string>().starts_with("</script>"));
     CHECK(scratch.file_count() == 1);
 }

@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <charconv>
-#include <fstream>
-#include <nlohmann/json.hpp>
 #include <set>
 
 #include "cli/arguments.h"
+#include "cli/job_options.h"
 #include "covol/error.h"
 
 namespace covol::tool {
@@ -36,61 +35,41 @@ std::string take_option(Words& words, const std::set<std::string>& names) {
     return {};
 }
 
-/// Takes options off, each with the values that follow it.
-void drop_options(Words& words, const std::set<std::string>& names) {
-    for (auto word = words.begin(); word != words.end();) {
-        if (!is_option(*word) || !names.contains(name_of(*word))) {
-            ++word;
-            continue;
-        }
-        auto end = word + 1;
-        if (word->find('=') == std::string::npos)
-            while (end != words.end() && !is_option(*end)) ++end;
-        word = words.erase(word, end);
-    }
-}
-
-/// Of one process, and no part of a job.
-void drop_common(Words& words) {
-    drop_options(words, {"--threads", "--json", "--memory-limit", "--save-config"});
-    std::erase(words, "--quiet");
-    std::erase(words, "--profile");
-}
-
 template <typename Number>
 bool parse_whole(const std::string& text, Number& value) {
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     return error == std::errc() && end == text.data() + text.size();
 }
 
-Words job_words(const std::string& folder) {
+/// The job of a plan. It may be a stranger's: what it asks for beyond settings and inputs is refused.
+JobOptions job_of_plan(const std::string& folder, const CLI::App& program, const CLI::App*& command) {
     const std::string path = plan_file(folder);
-    std::ifstream file(path);
-    if (!file) throw Error(Errc::Io, path + ": cannot read; expected the folder of a covol brick plan");
-    const auto plan = nlohmann::json::parse(file, nullptr, false);
-    if (!plan.is_object() || !plan.contains("job") || !plan["job"].is_array() || plan["job"].empty())
-        throw Error(Errc::InvalidInput, path + ": expected a plan of covol brick plan");
-    Words words;
-    for (const auto& word : plan["job"]) {
-        if (!word.is_string()) throw Error(Errc::InvalidInput, path + ": job: expected words");
-        words.push_back(word.get<std::string>());
-    }
-    return words;
+    const Json plan = read_plan_file(folder);
+    if (!plan.contains("job"))
+        throw Error(Errc::InvalidInput, path + ": expected a plan of covol brick plan, got no job");
+    JobOptions job = job_from_json(plan["job"], path);
+    if (job.command != "segment" && job.command != "reconstruct")
+        throw Error(Errc::InvalidInput, path + ": job: expected segment or reconstruct, got '" + job.command + "'");
+    command = program.get_subcommand(job.command);
+    for (const auto& [name, values] : job.values)
+        if (role_of(option_of_job(*command, name, path)) == OptionRole::Output)
+            throw Error(Errc::Unsupported, path + ": it asks for --" + name +
+                                               ", a file to write: name it behind brick join, a plan does not");
+    return job;
 }
 
 BrickCall plan_call(Words& words) {
     if (words.empty() || (words[0] != "segment" && words[0] != "reconstruct"))
         throw UsageError("brick plan: expected segment or reconstruct with its options, and -o FOLDER");
     BrickCall call;
-    call.job = words;
-    call.folder = take_option(call.job, {"-o", "--output"});
-    drop_common(call.job);
+    Words rest = words;
+    call.folder = take_option(rest, {"-o", "--output"});
     if (call.folder.empty() && std::find(words.begin(), words.end(), "--help") == words.end())
         throw UsageError("brick plan: expected -o FOLDER");
     return call;
 }
 
-BrickCall run_call(Words& words) {
+BrickCall run_call(Words& words, const CLI::App& program) {
     BrickCall call;
     call.step = BrickCall::Step::Run;
     if (const std::string sweep = take_option(words, {"--sweep"}); !sweep.empty())
@@ -105,27 +84,32 @@ BrickCall run_call(Words& words) {
             throw UsageError("brick run: expected numbers of bricks, got " + words[end]);
         call.bricks.push_back(brick);
     }
-    Words all = job_words(call.folder);
-    all.insert(all.end(), {"-o", call.folder});
-    all.insert(all.end(), words.begin() + std::ptrdiff_t(end), words.end());
-    words = std::move(all);
+    const CLI::App* command = nullptr;
+    const JobOptions job = job_of_plan(call.folder, program, command);
+    words.erase(words.begin(), words.begin() + std::ptrdiff_t(end));
+    words.push_back("--output=" + call.folder);
+    words = words_of(job, *command, plan_file(call.folder), words);
     return call;
 }
 
-BrickCall join_call(Words& words) {
+BrickCall join_call(Words& words, const CLI::App& program) {
     BrickCall call;
     call.step = BrickCall::Step::Join;
     if (words.empty() || is_option(words[0])) throw UsageError("brick join: expected the folder of a plan");
     call.folder = words[0];
     words.erase(words.begin());
-    std::set<std::string> given;
-    for (const std::string& word : words)
-        if (is_option(word)) given.insert(name_of(word));
-    if (!given.contains("-o") && !given.contains("--output")) throw UsageError("brick join: expected -o OUT.vdb");
-    Words all = job_words(call.folder);
-    drop_options(all, given);  // what is said now goes first
-    all.insert(all.end(), words.begin(), words.end());
-    words = std::move(all);
+    const std::string output = take_option(words, {"-o", "--output"});
+    if (output.empty()) throw UsageError("brick join: expected -o OUT.vdb");
+    const CLI::App* command = nullptr;
+    JobOptions job = job_of_plan(call.folder, program, command);
+    // What is said now goes first.
+    for (const std::string& word : words) {
+        const CLI::Option* option = is_option(word) ? command->get_option_no_throw(name_of(word)) : nullptr;
+        if (option == nullptr) continue;
+        std::erase_if(job.values, [&](const auto& own) { return own.first == option->get_single_name(); });
+    }
+    words.push_back("--output=" + output);
+    words = words_of(job, *command, plan_file(call.folder), words);
     return call;
 }
 
@@ -133,13 +117,24 @@ BrickCall join_call(Words& words) {
 
 std::string plan_file(const std::string& folder) { return folder + "/plan.json"; }
 
-std::optional<BrickCall> take_brick_call(std::vector<std::string>& words) {
+Json read_plan_file(const std::string& folder) {
+    constexpr std::uintmax_t kMostBytes = std::uintmax_t(1) << 26U;
+    try {
+        Json plan = read_json(plan_file(folder), kMostBytes);
+        if (!plan.is_object()) throw Error(Errc::InvalidInput, plan_file(folder) + ": got no object");
+        return plan;
+    } catch (const Error& error) {
+        throw Error(error.code(), plan_file(folder) + ": expected a plan of covol brick plan: " + error.what());
+    }
+}
+
+std::optional<BrickCall> take_brick_call(std::vector<std::string>& words, const CLI::App& program) {
     if (words.size() < 2 || words[0] != "brick" || is_option(words[1])) return {};
     const std::string step = words[1];
     words.erase(words.begin(), words.begin() + 2);
     if (step == "plan") return plan_call(words);
-    if (step == "run") return run_call(words);
-    if (step == "join") return join_call(words);
+    if (step == "run") return run_call(words, program);
+    if (step == "join") return join_call(words, program);
     throw UsageError("brick: expected plan, run or join, got " + step);
 }
 

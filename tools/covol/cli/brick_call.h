@@ -1,8 +1,11 @@
 #pragma once
+#include <CLI/CLI.hpp>
 #include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "cli/json.h"
 
 namespace covol::tool {
 
@@ -13,15 +16,18 @@ struct BrickCall {
     std::string folder;
     std::vector<std::size_t> bricks;  ///< of run; empty: all
     int sweep = 0;                    ///< of run; 0: as many as it takes
-    std::vector<std::string> job;     ///< of plan: the words that run and join go on with
 };
 
 /// Takes what belongs to `brick` off the words behind the program's name; what is left is the command line of a segment
-/// or reconstruct, of run and join with the words that the plan keeps.
-/// @return nothing, and the same words, where they are another command's. @throws UsageError, Error InvalidInput, Io.
-[[nodiscard]] std::optional<BrickCall> take_brick_call(std::vector<std::string>& words);
+/// or reconstruct, of run and join with the settings and inputs that the plan keeps.
+/// @param program  whose commands' options a plan may name
+/// @return nothing, and the same words, where they are another command's.
+/// @throws UsageError, Error InvalidInput, Unsupported (the plan asks for more than that), Io.
+[[nodiscard]] std::optional<BrickCall> take_brick_call(std::vector<std::string>& words, const CLI::App& program);
 
-/// The file in a plan's folder that has the job's words, and all else.
+/// The file in a plan's folder that has the job, and all else.
 [[nodiscard]] std::string plan_file(const std::string& folder);
+/// What is in it. @throws Error InvalidInput, Io.
+[[nodiscard]] Json read_plan_file(const std::string& folder);
 
 }  // namespace covol::tool

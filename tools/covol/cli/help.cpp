@@ -4,6 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "cli/job_options.h"
+
 namespace covol::tool {
 namespace {
 
@@ -72,10 +74,20 @@ std::string usage(const CLI::App& command, const std::string& name) {
     return text + " [OPTIONS]\n";
 }
 
+const char* role_name(OptionRole role) {
+    constexpr std::array kNames{"setting", "input", "output", "conduct"};
+    return kNames[std::size_t(role)];
+}
+
 nlohmann::ordered_json to_json(const CLI::Option& option, bool first) {
     const OptionHelp help = help_of(option);
-    return {{"names", help.names},           {"value", help.value},       {"text", help.text},
-            {"default", help.default_value}, {"required", help.required}, {"first", first}};
+    return {{"names", help.names},
+            {"value", help.value},
+            {"text", help.text},
+            {"default", help.default_value},
+            {"required", help.required},
+            {"first", first},
+            {"role", role_name(role_of(option))}};
 }
 
 }  // namespace

@@ -8,7 +8,9 @@
 #include <iostream>
 
 #include "cli/arguments.h"
+#include "cli/config_file.h"
 #include "cli/grid_metadata.h"
+#include "cli/job_options.h"
 #include "cli/nearest.h"
 #include "cli/option_names.h"
 #include "cli/process.h"
@@ -17,6 +19,7 @@
 #include "covol/checkpoints.h"
 #include "covol/error.h"
 #include "covol/evolve.h"
+#include "covol/safe_text.h"
 #include "covol/version.h"
 
 namespace covol::tool {
@@ -41,39 +44,20 @@ extern "C" void on_bus_error(int) {
     ::_exit(kIo);
 }
 
-/// Options of how a run goes on, which its results do not show.
-constexpr const char* kOfTheWay[] = {"checkpoint", "checkpoint-every", "resume"};
+/// Names of the options that have this role.
+std::vector<std::string> names_of(const CLI::App& command, OptionRole role) {
+    std::vector<std::string> names;
+    for (const CLI::Option* option : command.get_options())
+        if (role_of(*option) == role) names.push_back(option->get_single_name());
+    return names;
+}
 
-/// One line: messages that list several problems are joined.
+/// One line for a terminal: messages that list several problems are joined.
 std::string one_line(std::string text) {
     while (!text.empty() && text.back() == '\n') text.pop_back();
     for (std::size_t at = 0; (at = text.find('\n', at)) != std::string::npos;) text.replace(at, 1, "; ");
-    return text;
+    return safe_text(text);
 }
-
-/// A configuration file holds the flags of the subcommand that runs, without a section or in [subcommand];
-/// sections of other subcommands are skipped.
-class CommandConfig : public CLI::ConfigTOML {
-public:
-    explicit CommandConfig(const CLI::App& app) : app_(app) {}
-    std::vector<CLI::ConfigItem> from_config(std::istream& input) const override {
-        const std::vector<const CLI::App*> chosen = app_.get_subcommands([](const CLI::App*) { return true; });
-        std::string command;
-        for (const CLI::App* sub : chosen)
-            if (app_.got_subcommand(const_cast<CLI::App*>(sub))) command = sub->get_name();
-        std::vector<CLI::ConfigItem> items;
-        for (CLI::ConfigItem& item : CLI::ConfigTOML::from_config(input)) {
-            if (item.name == "++" || item.name == "--") continue;  // marks of sections
-            const bool common = app_.get_option_no_throw("--" + item.name) != nullptr;
-            if (item.parents.empty() && !common) item.parents = {command};
-            if (item.parents.empty() || item.parents.front() == command) items.push_back(std::move(item));
-        }
-        return items;
-    }
-
-private:
-    const CLI::App& app_;
-};
 
 Json to_value(const std::string& text) {
     if (text == "true") return true;
@@ -115,8 +99,11 @@ Json options_of(const CLI::App& command) {
 std::vector<std::string> inputs_of(const CLI::App& command) {
     std::vector<std::string> inputs;
     for (const CLI::Option* option : command.get_options()) {
-        if (option->get_type_name().starts_with("OUT")) continue;
-        for (const std::string& text : option->results())
+        if (const OptionRole role = role_of(*option); role == OptionRole::Output || role == OptionRole::Conduct)
+            continue;
+        for (const std::string& text : option->results()) {
+            const std::vector<std::string> frames = files_of_frames(text);
+            inputs.insert(inputs.end(), frames.begin(), frames.end());
             for (const std::size_t begin : {std::size_t(0), text.find('=') + 1, text.find(':') + 1})
                 for (const std::size_t end : {text.size(), text.rfind(':'), text.find(":/")}) {
                     if (end == std::string::npos || end <= begin) continue;
@@ -127,6 +114,7 @@ std::vector<std::string> inputs_of(const CLI::App& command) {
                         std::find(inputs.begin(), inputs.end(), path) == inputs.end())
                         inputs.push_back(path);
                 }
+        }
     }
     return inputs;
 }
@@ -138,15 +126,6 @@ void expect_values(const CLI::App& app) {
         if (option->get_expected_min() > 0 && std::find(given.begin(), given.end(), "") != given.end())
             throw UsageError(option->get_name() + ": expected a value, got ''");
     }
-}
-
-/// A word as a shell reads it back.
-std::string shell_quoted(const std::string& word) {
-    constexpr const char* kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_./:=,+@%-";
-    if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
-    std::string quoted = "'";
-    for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    return quoted + "'";
 }
 
 constexpr int kReportSchema = 1;              // grows when a field of the report goes or means something else
@@ -205,7 +184,7 @@ void Session::add_common_flags() {
         ->type_name("FILE")
         ->configurable(false);
     app_.allow_config_extras(CLI::config_extras_mode::error);
-    app_.config_formatter(std::make_shared<CommandConfig>(app_));
+    app_.config_formatter(std::make_shared<ConfigFile>(app_));
 }
 
 CLI::App* Session::add_command(const std::string& name, const std::string& description, std::function<void()> body) {
@@ -240,7 +219,7 @@ int Session::main(int argc, char** argv) {
     std::vector<std::string> given;
     try {
         check_blanks(words);
-        brick_ = take_brick_call(words);
+        brick_ = take_brick_call(words, app_);
         given = words;
         std::reverse(words.begin(), words.end());  // as CLI11 wants them
         app_.parse(std::move(words));
@@ -343,6 +322,11 @@ std::vector<std::string> Session::given() const {
     return names;
 }
 
+bool Session::has_role(const std::string& option, OptionRole role) const {
+    const std::vector<std::string> names = names_of(*command_, role);
+    return std::find(names.begin(), names.end(), option) != names.end();
+}
+
 void Session::write_report() {
     if (json_path_.empty()) return;
     const std::string text = report_.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
@@ -350,7 +334,7 @@ void Session::write_report() {
         outputs_.add(json_path_, [text](const std::string& path) { write_text(path, text); });
         return outputs_.write_queued();
     }
-    std::cout << text << std::flush;
+    std::cout << safe_lines(text) << std::flush;
     if (!std::cout) throw Error(Errc::Io, "standard output: cannot write");
 }
 
@@ -374,13 +358,13 @@ int Session::tell_failure(int code, const std::string& message) {
 }
 
 void Session::note(const std::string& line) {
-    if (!quiet_) progress_->line("covol: " + outputs_.shown(with_flags(line)));
+    if (!quiet_) progress_->line("covol: " + one_line(outputs_.shown(with_flags(line))));
 }
 
 void Session::say(const std::string& line) {
-    if (json_path_ == "-") return progress_->line(line);  // standard output is the report's
+    if (json_path_ == "-") return progress_->line(safe_lines(line));  // standard output is the report's
     progress_->clear();
-    std::cout << line << std::endl;
+    std::cout << safe_lines(line) << std::endl;
     if (!std::cout) throw Error(Errc::Io, "standard output: cannot write");
 }
 
@@ -389,7 +373,7 @@ void Session::warn(const std::string& message) {
     // A file that is opened twice says the same twice.
     for (const Json& said : report_["warnings"])
         if (said == line) return;
-    progress_->line("covol: warning: " + line);
+    progress_->line("covol: warning: " + one_line(line));
     report_["warnings"].push_back(line);
 }
 
@@ -412,7 +396,7 @@ void Session::set_world(const FloatGrid& grid) {
 
 std::map<std::string, std::string> Session::metadata() const {
     std::vector<std::string> own = given();
-    for (const char* name : kOfTheWay) std::erase(own, name);
+    for (const std::string& name : names_of(*command_, OptionRole::Conduct)) std::erase(own, name);
     const auto text = [](const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); };
     std::map<std::string, std::string> facts{{"covol_version", version()},
                                              {"covol_instruction_set", instruction_set()},
@@ -429,14 +413,13 @@ std::map<std::string, std::string> Session::metadata() const {
 Json Session::options_of_result() const {
     Json options = without_folders(report_.at("options"));
     options["command"] = report_.at("command");
-    for (const char* name : kOfTheWay) options.erase(name);
+    for (const std::string& name : names_of(*command_, OptionRole::Conduct)) options.erase(name);
     return options;
 }
 
 std::string Session::job_text() const {
     Json options = options_of_result();
-    for (const CLI::Option* option : command_->get_options())
-        if (option->get_type_name().starts_with("OUT")) options.erase(option->get_single_name());
+    for (const std::string& name : names_of(*command_, OptionRole::Output)) options.erase(name);
     return Json{{"version", version()},
                 {"instruction_set", instruction_set()},
                 {"options", options},
@@ -457,7 +440,7 @@ const Json& Session::described_inputs() const {
 
 std::vector<std::string> Session::comments() const {
     std::vector<std::string> lines;
-    for (const auto& [key, value] : metadata()) lines.push_back(key + " " + value);
+    for (const auto& [key, value] : metadata()) lines.push_back(safe_text(key + " " + value));
     return lines;
 }
 

@@ -12,6 +12,7 @@
 
 #include "cli/brick_call.h"
 #include "cli/help.h"
+#include "cli/job_options.h"
 #include "cli/json.h"
 #include "cli/memory.h"
 #include "cli/outputs.h"
@@ -82,6 +83,10 @@ public:
     [[nodiscard]] const std::string& command_line() const noexcept { return command_line_; }
     /// Names of the options that the command line or a configuration file gave, without dashes.
     [[nodiscard]] std::vector<std::string> given() const;
+    /// What was given, as data: settings and inputs.
+    [[nodiscard]] JobOptions job() const { return job_of(*command_); }
+    /// Of an option of the command that runs.
+    [[nodiscard]] bool has_role(const std::string& option, OptionRole role) const;
     // note() and warn() put flags for the options that a line of the library names.
     /// Progress and remarks: silent with --quiet.
     void note(const std::string& line);

@@ -8,6 +8,7 @@
 #include "commands/commands.h"
 #include "covol/error.h"
 #include "covol/mesh_cleanup.h"
+#include "covol/safe_text.h"
 #include "covol/surface.h"
 #include "covol/vdb_io.h"
 #include "flags/bindings.h"
@@ -44,7 +45,7 @@ public:
 
 private:
     void add(const char* severity, const std::string& text, const std::string& mend = {}) {
-        session_.say(std::string(severity) + ": " + text + (mend.empty() ? "" : "; " + mend));
+        session_.say(std::string(severity) + ": " + safe_text(text) + (mend.empty() ? "" : "; " + mend));
         Json finding{{"severity", severity}, {"text", text}};
         if (!mend.empty()) finding["mend"] = mend;
         session_.report()["findings"].push_back(finding);

@@ -6,6 +6,7 @@
 #include "cli/file_kind.h"
 #include "cli/report.h"
 #include "commands/commands.h"
+#include "covol/safe_text.h"
 #include "covol/vdb_io.h"
 #include "flags/bindings.h"
 
@@ -30,8 +31,8 @@ const char* name_of(PointSpace space) {
 void describe_vdb(const std::string& path, Session& session) {
     Json& grids = session.report()["grids"] = Json::array();
     for (const VdbGridInfo& g : list_vdb(path)) {
-        session.say(g.name + ": " + g.type + ", " + (g.grid_class.empty() ? "no class" : g.grid_class) + ", " +
-                    std::to_string(g.active_voxels) + " active voxels of " + std::to_string(g.voxel_size) +
+        session.say(safe_text(g.name + ": " + g.type + ", " + (g.grid_class.empty() ? "no class" : g.grid_class)) +
+                    ", " + std::to_string(g.active_voxels) + " active voxels of " + std::to_string(g.voxel_size) +
                     (g.uniform ? "" : " (not uniform)") + ", " + triple(g.min) + " to " + triple(g.max));
         grids.push_back({{"name", g.name},
                          {"type", g.type},
@@ -65,9 +66,9 @@ Json range_of(const std::string& path, ReadImageOptions options, int channel, co
     const std::optional<ChunkCount> chunks = image.chunks();
     const bool named = std::size_t(channel) < info.channel_names.size();
     std::ostringstream text;
-    text << (info.channels > 1
-                 ? "channel " + std::to_string(channel) + (named ? " " + info.channel_names[channel] : "") + ": "
-                 : "values: ")
+    text << (info.channels > 1 ? "channel " + std::to_string(channel) +
+                                     (named ? " " + safe_text(info.channel_names[channel]) : "") + ": "
+                               : "values: ")
          << range[0] << " to " << range[1] << (info.frames > 1 ? ", frame " + std::to_string(options.frame) : "");
     if (chunks && chunks->read < chunks->total) text << ", of " << chunks->read << " of " << chunks->total << " chunks";
     session.say(text.str());
@@ -79,16 +80,16 @@ void describe_image(const std::string& path, const ImageFlags& flags, Session& s
     const ImageInfo info = read_image_info(path, flags.options, session.run());
     const ImageGeometry& g = info.geometry;
     std::ostringstream text;
-    text << info.format << ", " << triple(g.size) << " voxels, " << to_string(info.type) << ", " << info.channels
-         << " channel(s), " << info.frames << " frame(s), stored as " << info.axis_order << "\nspacing "
-         << triple(g.spacing) << " " << (g.unit.empty() ? "(no unit)" : g.unit)
+    text << safe_text(info.format) << ", " << triple(g.size) << " voxels, " << to_string(info.type) << ", "
+         << info.channels << " channel(s), " << info.frames << " frame(s), stored as " << info.axis_order
+         << "\nspacing " << triple(g.spacing) << " " << (g.unit.empty() ? "(no unit)" : safe_text(g.unit))
          << (g.spacing_known ? "" : " (not known)") << ", origin " << triple(g.origin) << "\naxes: i runs along "
          << axis_text(g, 0) << ", j along " << axis_text(g, 1) << ", k along " << axis_text(g, 2)
          << " of the world (LPS), which goes from " << triple(g.world_box().min) << " to " << triple(g.world_box().max);
     const bool in_chunks = info.chunk_size[0] > 0;
     if (in_chunks) text << "\nchunks of " << triple(info.chunk_size) << " voxels";
-    for (const std::string& level : info.levels) text << "\nlevel " << level;
-    for (const auto& [field, value] : info.fields) text << "\n  " << field << ": " << value;
+    for (const std::string& level : info.levels) text << "\nlevel " << safe_text(level);
+    for (const auto& [field, value] : info.fields) text << "\n  " << safe_text(field) << ": " << safe_text(value);
     session.say(text.str());
 
     Json& report = session.report()["image"] = to_json(g);
@@ -128,7 +129,7 @@ void describe_points(const std::string& path, const PointFlags& flags, Session& 
     std::ostringstream text;
     const auto closed =
         std::count_if(cloud.lines.begin(), cloud.lines.end(), [](const MarkLine& l) { return l.closed; });
-    text << cloud.points.size() << " points, " << distinct.size() << " distinct, " << cloud.rule;
+    text << cloud.points.size() << " points, " << distinct.size() << " distinct, " << safe_text(cloud.rule);
     if (!cloud.lines.empty()) text << "\n" << cloud.lines.size() << " lines, " << closed << " of them closed";
     text << "\nfrom " << triple(box.min) << " to " << triple(box.max);
     Json& report = session.report()["points"];

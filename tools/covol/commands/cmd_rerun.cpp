@@ -1,27 +1,22 @@
 #include <openvdb/openvdb.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <bit>
-#include <cerrno>
-#include <chrono>
 #include <cmath>
-#include <csignal>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <map>
-#include <thread>
 
 #include "cli/arguments.h"
+#include "cli/child_run.h"
+#include "cli/job_options.h"
 #include "cli/json.h"
 #include "cli/provenance.h"
 #include "commands/commands.h"
 #include "covol/error.h"
 #include "covol/evolve.h"
 #include "covol/file_set.h"
+#include "covol/safe_text.h"
 #include "covol/version.h"
 
 namespace covol::tool {
@@ -32,11 +27,10 @@ using Words = std::vector<std::string>;
 
 constexpr int kOneBrick = 1'000'000'000;  // voxels, more than any band that a run holds at once
 
-/// What a file says of the run that made it.
+/// What a file says of the run that made it. Anybody may have written it.
 struct Provenance {
-    std::string version, instruction_set, command;
-    std::map<std::string, Json> options;                      ///< words, numbers, flags, or lists of them, none empty
-    Words given;                                              ///< which of them
+    std::string version, instruction_set;
+    JobOptions job;                                           ///< what was given
     std::vector<std::pair<std::string, std::string>> inputs;  ///< name, digest
 };
 
@@ -44,11 +38,22 @@ struct Provenance {
     throw Error(Errc::Unsupported, path + ": " + why);
 }
 
-void check_value(const std::string& path, const std::string& name, const Json& value) {
+/// The words of a value, which is a text, a number, a truth value, or a list of these.
+Words values_of(const std::string& path, const std::string& name, const Json& value) {
     const auto is_one = [](const Json& one) { return one.is_string() || one.is_number() || one.is_boolean(); };
-    if (is_one(value) || (value.is_array() && !value.empty() && std::all_of(value.begin(), value.end(), is_one)))
-        return;
-    refuse(path, "its metadata is damaged: expected words or numbers of '" + name + "', got " + value.dump());
+    const bool is_list = value.is_array() && !value.empty() && std::all_of(value.begin(), value.end(), is_one);
+    if (!is_one(value) && !is_list)
+        refuse(path, "its metadata is damaged: expected words or numbers of '" + name + "', got " + value.dump());
+    Words words;
+    for (const Json& one : is_list ? value : Json::array({value}))
+        words.push_back(one.is_string() ? one.get<std::string>() : one.dump());
+    return words;
+}
+
+/// A name without a folder, which no option is taken for: it stands behind a folder or `--name=` everywhere.
+bool is_file_name(const std::string& name) {
+    return !name.empty() && name != "." && name != ".." &&
+           name.find_first_of(std::string("/\0", 2)) == std::string::npos;
 }
 
 Provenance read_provenance(const std::string& path) {
@@ -63,61 +68,99 @@ Provenance read_provenance(const std::string& path) {
         const auto found = grid->metadata.find(name);
         return found == grid->metadata.end() ? std::string() : found->second;
     };
+    const auto json = [&](const char* name) { return parse_json(fact(name), path + ": its metadata, " + name); };
     if (!fact("covol_bricks").empty())
         refuse(path, "it was made in bricks; plan, run and join them again (covol brick)");
-    Provenance all{fact("covol_version"), fact("covol_instruction_set"), {}, {}, {}, {}};
+    Provenance all{fact("covol_version"), fact("covol_instruction_set"), {}, {}};
     try {
-        all.options = Json::parse(fact("covol_options")).get<std::map<std::string, Json>>();
-        all.given = Json::parse(fact("covol_given")).get<Words>();
-        for (const Json& input : Json::parse(fact("covol_inputs"))) {
+        const auto options = json("covol_options").get<std::map<std::string, Json>>();
+        for (const Json& input : json("covol_inputs")) {
             all.inputs.emplace_back(input.at("name").get<std::string>(), input.at("digest").get<std::string>());
-            const std::string& name = all.inputs.back().first;
-            if (name.empty() || fs::path(name).filename() != name)
-                refuse(path, "'" + name + "': expected a file's name");
+            if (!is_file_name(all.inputs.back().first))
+                refuse(path, "'" + all.inputs.back().first + "': expected a file's name");
         }
-        all.command = all.options.at("command").get<std::string>();
-        for (const std::string& name : all.given) check_value(path, name, all.options.at(name));
+        all.job.command = options.at("command").get<std::string>();
+        for (const std::string& name : json("covol_given").get<Words>())
+            all.job.values.emplace_back(name, values_of(path, name, options.at(name)));
     } catch (const Json::exception& error) {
         refuse(path, std::string("its metadata is damaged: ") + error.what());
     } catch (const std::out_of_range&) {
         refuse(path, "its metadata is damaged: options are missing in covol_options");
     }
-    if (all.command == "rerun") refuse(path, "a rerun made it: repeat the run that it repeated");
+    if (all.job.command == "rerun") refuse(path, "a rerun made it: repeat the run that it repeated");
     return all;
 }
 
 /// Where the inputs of a run are now.
 class Inputs {
 public:
-    Inputs(const Provenance& run, std::vector<std::string> folders) : folders_(std::move(folders)) {
+    Inputs(std::string source, const Provenance& run, std::vector<std::string> folders)
+        : source_(std::move(source)), folders_(std::move(folders)) {
         for (const auto& [name, digest] : run.inputs) found_.emplace_back(name, find(name, digest));
     }
 
-    /// The value of an option with the path of the file that it names.
-    [[nodiscard]] std::string placed(const std::string& value) const {
-        const auto [begin, end] = path_within(value);
+    /// The value of an option with the path of the file that it names. @throws Error where that is none of the inputs
+    [[nodiscard]] std::string placed(const std::string& option, const std::string& value) const {
+        if (value == "-") refuse(source_, "an input of that run came through a pipe");
+        const std::size_t begin = path_within(value).first;
         for (const auto& [name, path] : found_)
             for (const std::size_t from : {begin, std::size_t(0)}) {
-                const bool is_named = value.compare(from, name.size(), name) == 0;
-                const std::size_t after = from + name.size();
-                // a grid's name or a dataset's place may follow, or the slash of a folder
-                if (is_named && (after >= value.size() || value[after] == ':' || value[after] == '/'))
-                    return value.substr(0, from) + path + value.substr(after);
+                if (value.compare(from, name.size(), name) != 0) continue;
+                const std::string rest = value.substr(from + name.size());
+                if (is_within_file(rest)) return value.substr(0, from) + path + rest;
             }
-        // names with the number of a frame in them
-        if (value.find('{') != std::string::npos)
-            return value.substr(0, begin) + folders_.front() + "/" + value.substr(begin);
+        if (const std::string pattern = placed_frames(value, begin); !pattern.empty()) return pattern;
+        if (!names_no_file(value))
+            refuse(source_,
+                   "'" + option + "' names " + value + ", which is none of the inputs that it lists (covol_inputs)");
         return value;
     }
 
 private:
+    /// A grid's name or a dataset's place, or the slash of a folder.
+    static bool is_within_file(const std::string& rest) {
+        return rest.empty() || rest == "/" || (rest.front() == ':' && rest.find("..") == std::string::npos);
+    }
+
+    /// A position, or a word or shape to start from.
+    static bool names_no_file(const std::string& value) {
+        try {
+            const Start start = parse_start("", value);
+            return start.path.empty();
+        } catch (const std::exception&) {
+        }
+        try {
+            static_cast<void>(parse_vec3("", split_name(value).value));
+            return true;
+        } catch (const std::exception&) {
+            return false;
+        }
+    }
+
+    /// NAME=marks_{frame}.csv where inputs with such names lie in one folder; else nothing.
+    [[nodiscard]] std::string placed_frames(const std::string& value, std::size_t begin) const {
+        const auto parts = around_frame(value.substr(begin));
+        std::string folder;
+        for (const auto& [name, path] : found_) {
+            if (!parts || !is_frame(name, *parts)) continue;
+            const std::string own = fs::path(path).parent_path().string();
+            if (!folder.empty() && own != folder)
+                refuse(source_,
+                       value + ": expected the files of all frames in one folder, got " + folder + " and " + own);
+            folder = own;
+        }
+        return folder.empty() ? "" : value.substr(0, begin) + folder + "/" + value.substr(begin);
+    }
+
     [[nodiscard]] std::string find(const std::string& name, const std::string& digest) const {
         std::string seen;
         for (const std::string& folder : folders_) {
-            const fs::path path = fs::path(folder) / name;
-            if (!fs::exists(path)) continue;
+            // Behind a slash no part of a folder's name is taken for a structure's (NAME=FILE).
+            const fs::path path = fs::absolute(folder) / name;
+            std::error_code status;
+            if (!fs::is_regular_file(path, status) && !fs::is_directory(path, status)) continue;
             if (digest_of(path.string()) == digest) return path.string();
-            seen += (seen.empty() ? "" : ", ") + path.string();
+            seen += (seen.empty() ? "" : ", ") + (fs::path(folder) / name).string();
         }
         std::string where;
         for (const std::string& folder : folders_) where += (where.empty() ? "" : ", ") + folder;
@@ -127,46 +170,34 @@ private:
         throw Error(Errc::InvalidInput, seen + ": not the file that the run read: expected " + digest);
     }
 
+    std::string source_;
     std::vector<std::string> folders_;
     std::vector<std::pair<std::string, std::string>> found_;
 };
 
-Words values_of(const Json& value) {
-    Words words;
-    for (const Json& one : value.is_array() ? value : Json::array({value}))
-        words.push_back(one.is_string() ? one.get<std::string>() : one.dump());
-    return words;
-}
-
-/// The command line of the run, with those of its outputs that are .vdb, in that folder.
-Words command_line(const std::string& path, const Provenance& run, const CLI::App* command, const Inputs& inputs,
-                   const std::string& folder) {
-    if (command == nullptr) refuse(path, "this covol has no command '" + run.command + "'");
-    Words words{run.command}, positional;
-    for (const std::string& name : run.given) {
-        const CLI::Option* option = command->get_option_no_throw("--" + name);
-        const bool is_positional = option == nullptr;
-        if (is_positional) option = command->get_option_no_throw(name);
-        if (option == nullptr) refuse(path, "this covol has no option '" + name + "' of '" + run.command + "'");
-        Words values = values_of(run.options.at(name));
-        const bool is_output = option->get_type_name().starts_with("OUT");
-        if (is_output && name != "output" && fs::path(values.front()).extension() != ".vdb") continue;
-        for (std::string& value : values) {
-            if (value == "-") refuse(path, "an input of that run came through a pipe");
-            // only a file's name is written down; that of a stranger's file may be a path
-            value = is_output ? (fs::path(folder) / fs::path(value).filename()).string() : inputs.placed(value);
+/// The job with its inputs where they are now, and those of its outputs that are .vdb in that folder; the others are
+/// left out. @throws Error for what no file may ask for
+JobOptions job_here(const std::string& path, const JobOptions& given, const CLI::App& command, const Inputs& inputs,
+                    const fs::path& folder) {
+    JobOptions job{given.command, {}};
+    bool makes_vdb = false;
+    for (const auto& [name, values] : given.values) {
+        const OptionRole role = role_of(option_of_job(command, name, path));
+        Words placed;
+        for (const std::string& value : values) {
+            if (role == OptionRole::Input) placed.push_back(inputs.placed(name, value));
+            if (role == OptionRole::Setting) placed.push_back(value);
+            if (role != OptionRole::Output || fs::path(value).extension() != ".vdb") continue;
+            // Only a file's name is written down; that of a stranger's file may be a path.
+            const std::string file = fs::path(value).filename().string();
+            if (!is_file_name(file)) refuse(path, "'" + name + "': expected a file's name, got " + value);
+            placed.push_back((folder / file).string());
+            makes_vdb = true;
         }
-        if (is_positional) {
-            positional.insert(positional.end(), values.begin(), values.end());
-        } else if (option->get_expected_max() == 0) {
-            words.push_back("--" + name + (values.front() == "true" ? "" : "=" + values.front()));
-        } else {
-            words.push_back("--" + name);
-            words.insert(words.end(), values.begin(), values.end());
-        }
+        if (!placed.empty()) job.values.emplace_back(name, placed);
     }
-    words.insert(words.begin() + 1, positional.begin(), positional.end());
-    return words;
+    if (!makes_vdb) refuse(path, "the run of '" + given.command + "' that it tells of makes no .vdb");
+    return job;
 }
 
 fs::path temporary_folder() {
@@ -177,28 +208,6 @@ fs::path temporary_folder() {
     throw Error(Errc::Io, std::string("the folder for temporary files (TMPDIR), ") +
                               (named != nullptr ? named : "/tmp") + ": " + status.message() +
                               "; name another one, or keep the result with -o");
-}
-
-/// @return exit code @throws Error Cancelled
-int run_covol(const Words& words, const RunContext& run) {
-    std::string self = fs::read_symlink("/proc/self/exe").string();
-    Words all{self};
-    all.insert(all.end(), words.begin(), words.end());
-    std::vector<char*> argv;
-    for (std::string& word : all) argv.push_back(word.data());
-    argv.push_back(nullptr);
-    pid_t child = 0;
-    if (const int why = ::posix_spawn(&child, self.c_str(), nullptr, nullptr, argv.data(), environ); why != 0)
-        throw Error(Errc::Io, self + ": cannot start: " + std::strerror(why));
-    int status = 0;
-    pid_t ended = 0;
-    for (bool told = false; (ended = ::waitpid(child, &status, WNOHANG)) == 0;) {
-        if (run.cancelled() && !told) told = ::kill(child, SIGTERM) == 0;
-        std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    }
-    run.check();
-    if (ended < 0) throw Error(Errc::Io, self + ": lost: " + std::strerror(errno));
-    return WIFEXITED(status) ? WEXITSTATUS(status) : kDefect;
 }
 
 /// Where two grids of one name differ.
@@ -246,25 +255,18 @@ struct RerunJob {
         for (const fs::path& folder : {own.empty() ? fs::path(".") : own, fs::path(".")})
             if (std::find(places.begin(), places.end(), folder.string()) == places.end())
                 places.push_back(folder.string());
+        const CLI::App* const command = session.command(made.job.command);
+        if (command == nullptr) refuse(path, "this covol has no command '" + made.job.command + "'");
+        const Inputs inputs(path, made, places);
         const auto scratch =
-            std::make_shared<ScratchFolder>(kept.empty() ? temporary_folder() : fs::path(kept).parent_path());
-        const Words words =
-            command_line(path, made, session.command(made.command), Inputs(made, places), scratch->path().string());
+            std::make_shared<KeptFolder>(kept.empty() ? temporary_folder() : fs::path(kept).parent_path());
+        const Words words = words_of(job_here(path, made.job, *command, inputs, scratch->path()), *command, path,
+                                     how_it_runs(made.job, *command, session));
         std::string shown = "covol";
-        for (const std::string& word : words) shown += " " + word;
+        for (const std::string& word : words) shown += " " + shell_quoted(word);
         session.note("running " + shown);
-        Words quiet = words;
-        quiet.push_back("--quiet");
-        if (session.run().threads > 0) quiet.insert(quiet.end(), {"--threads", std::to_string(session.run().threads)});
-        if (const auto limit = session.memory_limit()) {
-            quiet.insert(quiet.end(), {"--memory-limit", std::to_string(*limit)});
-            // a run that went on in bricks would end with other bits
-            if (session.command(made.command)->get_option_no_throw("--brick-voxels") != nullptr &&
-                std::find(made.given.begin(), made.given.end(), "brick-voxels") == made.given.end())
-                quiet.insert(quiet.end(), {"--brick-voxels", std::to_string(kOneBrick)});
-        }
         const Stopwatch watch;
-        const int code = run_covol(quiet, session.run());
+        const int code = run_this_program(words, session.run());
         if (code != kDone)
             throw Error(Errc::InvalidInput, path + ": its run ends with exit code " + std::to_string(code) + " now");
         session.add_seconds("run", watch.seconds());
@@ -274,8 +276,22 @@ struct RerunJob {
     }
 
 private:
+    static Words how_it_runs(const JobOptions& job, const CLI::App& command, const Session& session) {
+        Words words{"--quiet"};
+        if (session.run().threads > 0) words.push_back("--threads=" + std::to_string(session.run().threads));
+        if (const auto limit = session.memory_limit()) {
+            words.push_back("--memory-limit=" + std::to_string(*limit));
+            // a run that went on in bricks would end with other bits
+            const bool given = std::any_of(job.values.begin(), job.values.end(),
+                                           [](const auto& option) { return option.first == "brick-voxels"; });
+            if (!given && command.get_option_no_throw("--brick-voxels") != nullptr)
+                words.push_back("--brick-voxels=" + std::to_string(kOneBrick));
+        }
+        return words;
+    }
+
     /// The file of that name; of a run with one .vdb that was renamed since, that one.
-    [[nodiscard]] std::string result_in(const ScratchFolder& scratch) const {
+    [[nodiscard]] std::string result_in(const KeptFolder& scratch) const {
         std::vector<fs::path> made;
         for (const fs::directory_entry& entry : fs::directory_iterator(scratch.path()))
             if (entry.path().extension() == ".vdb") made.push_back(entry.path());
@@ -300,7 +316,7 @@ private:
             voxels += one->activeVoxelCount();
             if (found.same_layout && found.voxels == 0) continue;
             same = false;
-            session.say(info.name + ": " +
+            session.say(safe_text(info.name) + ": " +
                         (found.same_layout ? std::to_string(found.voxels) + " voxels differ, by up to " +
                                                  std::to_string(found.largest)
                                            : "other voxels are active than before"));

@@ -5,8 +5,9 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
+#include <limits>
 
+#include "covol/domain.h"
 #include "covol/error.h"
 #include "covol/vdb_io.h"
 #include "covol/version.h"
@@ -14,7 +15,51 @@
 namespace covol::tool {
 namespace {
 
-constexpr std::uintmax_t kMostBytes = std::uintmax_t(1) << 30;  // of a plan's text
+namespace fs = std::filesystem;
+
+constexpr std::uintmax_t kMostFactsBytes = 1 << 20;  // of what a sweep says of a brick
+constexpr std::int64_t kMostVoxels = std::int64_t(1) << 40;
+
+/// A whole number of JSON, in a range. @throws std::out_of_range, as Json does for what is missing
+template <typename Number = int>
+Number whole(const Json& json, const char* name, std::int64_t low, std::int64_t high) {
+    const Json& value = json.at(name);
+    const bool fits = value.is_number_unsigned() ? value.get<std::uint64_t>() <= std::uint64_t(high)
+                                                 : value.is_number_integer() && value.get<std::int64_t>() <= high;
+    if (!fits || value.get<std::int64_t>() < low)
+        throw std::out_of_range(std::string(name) + ": expected a whole number, " + std::to_string(low) + " to " +
+                                std::to_string(high) + ", got " + value.dump().substr(0, 40));
+    return Number(value.get<std::int64_t>());
+}
+
+double real(const Json& json, const char* name) {
+    const Json& value = json.at(name);
+    if (!value.is_number())
+        throw std::out_of_range(std::string(name) + ": expected a number, got " + value.dump().substr(0, 40));
+    return value.get<double>();
+}
+
+/// One for each axis.
+const Json& three(const Json& json, const char* name) {
+    const Json& value = json.at(name);
+    if (!value.is_array() || value.size() != 3)
+        throw std::out_of_range(std::string(name) + ": expected three numbers, got " + value.dump().substr(0, 40));
+    return value;
+}
+
+Index3 index_of(const Json& json, const char* name) {
+    constexpr std::int64_t kFarthest = 1 << 24;  // lattices reach half as far
+    Index3 index{};
+    for (int a = 0; a < 3; ++a)
+        index[a] = whole(Json{{name, three(json, name)[std::size_t(a)]}}, name, -kFarthest, kFarthest);
+    return index;
+}
+
+Vec3 place_of(const Json& json, const char* name) {
+    Vec3 place{};
+    for (int a = 0; a < 3; ++a) place[a] = real(Json{{name, three(json, name)[std::size_t(a)]}}, name);
+    return place;
+}
 
 Json to_json(const EdgeOptions& edge) {
     Json json{{"feature", int(edge.feature)}, {"low", edge.low}, {"high", edge.high}};
@@ -26,13 +71,11 @@ Json to_json(const EdgeOptions& edge) {
 
 EdgeOptions edge_of(const Json& json) {
     EdgeOptions edge;
-    const int feature = json.at("feature").get<int>();
-    if (feature < 0 || feature > int(EdgeFeature::DarkLine)) throw std::out_of_range("feature");
-    edge.feature = EdgeFeature(feature);
-    edge.low = json.at("low").get<double>();
-    edge.high = json.at("high").get<double>();
+    edge.feature = EdgeFeature(whole(json, "feature", 0, int(EdgeFeature::DarkLine)));
+    edge.low = real(json, "low");
+    edge.high = real(json, "high");
     const auto optional = [&](const char* name) {
-        return json.contains(name) ? std::optional(json.at(name).get<double>()) : std::nullopt;
+        return json.contains(name) ? std::optional(real(json, name)) : std::nullopt;
     };
     edge.sigma = optional("sigma");
     edge.edge_k = optional("edge_k");
@@ -47,41 +90,95 @@ Json to_json(const Brick& brick) {
             {"neighbours", brick.neighbours}};
 }
 
-Brick brick_of(const Json& json) {
-    return {{json.at("min").get<Index3>(), json.at("max").get<Index3>()},
-            json.at("active_voxels").get<std::int64_t>(),
-            json.at("neighbours").get<std::vector<std::size_t>>()};
+Brick brick_of(const Json& json, const Domain& domain, std::size_t bricks) {
+    Brick brick{
+        {index_of(json, "min"), index_of(json, "max")}, whole<std::int64_t>(json, "active_voxels", 0, kMostVoxels), {}};
+    for (int a = 0; a < 3; ++a)
+        if (brick.core.min[a] > brick.core.max[a] || brick.core.min[a] < domain.min[a] ||
+            brick.core.max[a] > domain.max[a])
+            throw std::out_of_range("bricks: expected boxes within that of the plan");
+    const Json& neighbours = json.at("neighbours");
+    if (!neighbours.is_array() || neighbours.size() >= bricks)
+        throw std::out_of_range("neighbours: expected a list of other bricks");
+    for (const Json& neighbour : neighbours)
+        brick.neighbours.push_back(
+            whole<std::size_t>(Json{{"neighbours", neighbour}}, "neighbours", 0, std::int64_t(bricks) - 1));
+    return brick;
 }
 
-Json input_of(const std::string& path) { return {{"path", path}, {"bytes", std::filesystem::file_size(path)}}; }
+/// A lattice that grids can have, and voxels that lie on it. @throws Error
+Domain domain_of_plan(const Json& json) {
+    const Domain domain{real(json, "voxel_size"), place_of(json, "origin"), index_of(json, "min"),
+                        index_of(json, "max")};
+    for (int a = 0; a < 3; ++a)
+        if (domain.min[a] > domain.max[a]) throw std::out_of_range("min: expected voxels up to max, got none");
+    const Domain same = covering(domain, domain.world_box());
+    if (same.min != domain.min || same.max != domain.max)
+        throw std::out_of_range("origin: expected one that " + std::to_string(domain.voxel_size) +
+                                " is not too small for");
+    return domain;
+}
 
-Json read_json(const std::string& path) {
+/// Of a folder, such as a Zarr store, 0.
+std::uintmax_t bytes_of(const std::string& path, std::error_code& status) {
+    return fs::is_directory(path, status) ? 0 : fs::file_size(path, status);
+}
+
+Json input_of(const std::string& path) {
     std::error_code status;
-    if (std::filesystem::file_size(path, status) > kMostBytes || status)
-        throw Error(Errc::Io, path + ": cannot read; expected a file of covol brick");
-    std::ifstream file(path);
-    Json json = Json::parse(file, nullptr, false);
-    if (!json.is_object()) throw Error(Errc::InvalidInput, path + ": expected JSON of covol brick; it is damaged");
-    return json;
+    const std::uintmax_t bytes = bytes_of(path, status);
+    if (status) throw Error(Errc::Io, path + ": cannot read: " + status.message());
+    return {{"path", path}, {"bytes", bytes}};
+}
+
+/// What a sweep says of a brick.
+struct BrickFacts {
+    bool same = false;
+    int steps = 0;
+    double seconds = 0;
+    std::string stop_reason;
+};
+
+BrickFacts read_facts(const std::string& path) {
+    const Json json = read_json(path, kMostFactsBytes);
+    try {
+        BrickFacts facts;
+        facts.same = json.at("same").get<bool>();
+        if (json.contains("steps")) facts.steps = whole(json, "steps", 0, std::numeric_limits<int>::max());
+        if (json.contains("seconds")) facts.seconds = real(json, "seconds");
+        if (json.contains("stop_reason")) facts.stop_reason = json["stop_reason"].get<std::string>();
+        return facts;
+    } catch (const std::exception& error) {
+        throw Error(Errc::InvalidInput, path + ": expected what covol brick run says of a brick: " + error.what());
+    }
+}
+
+/// A plan that came with links in it must not lead elsewhere.
+void make_folder_of(const std::string& file) {
+    const fs::path folder = fs::path(file).parent_path();
+    std::error_code status;
+    fs::create_directories(folder, status);
+    if (!fs::is_directory(fs::symlink_status(folder, status)))
+        throw Error(Errc::Io, folder.string() + ": cannot write: expected a folder, got a link or a file");
 }
 
 void check_inputs(const Json& plan, const std::string& path) {
     for (const Json& input : plan.at("inputs")) {
         const std::string name = input.at("path").get<std::string>();
         std::error_code status;
-        const std::uintmax_t bytes = std::filesystem::file_size(name, status);
+        const std::uintmax_t bytes = bytes_of(name, status);
         if (status)
             throw Error(Errc::Io, name + ": cannot read; " + path +
                                       " was planned with it: run covol brick where the plan was made");
-        if (bytes != input.at("bytes").get<std::uintmax_t>())
+        if (bytes != whole<std::uintmax_t>(input, "bytes", 0, std::numeric_limits<std::int64_t>::max()))
             throw Error(Errc::InvalidInput, name + ": has another size than when " + path + " was made: plan again");
     }
 }
 
 }  // namespace
 
-void BrickFolder::write_plan(const BrickPlan& plan, const std::vector<std::string>& job,
-                             const std::vector<std::string>& inputs, const WriteVdbOptions& options) const {
+void BrickFolder::write_plan(const BrickPlan& plan, const JobOptions& job, const std::vector<std::string>& inputs,
+                             const WriteVdbOptions& options) const {
     const std::string file = plan_file(path_);
     std::error_code status;
     if (std::filesystem::exists(file, status))
@@ -90,7 +187,7 @@ void BrickFolder::write_plan(const BrickPlan& plan, const std::vector<std::strin
     if (status) throw Error(Errc::Io, path_ + ": cannot make the folder: " + status.message());
     write_vdb(path_ + "/coarse.vdb", {plan.coarse}, options);
     Json json{{"covol", version()},
-              {"job", job},
+              {"job", to_json(job)},
               {"inputs", Json::array()},
               {"overlap", plan.options.overlap},
               {"tolerance", plan.options.tolerance},
@@ -110,24 +207,26 @@ void BrickFolder::write_plan(const BrickPlan& plan, const std::vector<std::strin
 
 BrickPlan BrickFolder::read_plan() const {
     const std::string file = plan_file(path_);
-    const Json json = read_json(file);
+    const Json json = read_plan_file(path_);
+    constexpr int kMostInt = std::numeric_limits<int>::max();
     BrickPlan plan;
     try {
         check_inputs(json, file);
-        plan.options.overlap = json.at("overlap").get<int>();
-        plan.options.tolerance = json.at("tolerance").get<double>();
-        plan.options.most_sweeps = json.at("most_sweeps").get<int>();
-        plan.options.most_voxels = json.at("most_voxels").get<std::int64_t>();
+        plan.options.overlap = whole(json, "overlap", 0, kMostInt);
+        plan.options.tolerance = real(json, "tolerance");
+        plan.options.most_sweeps = whole(json, "most_sweeps", 0, kMostInt);
+        plan.options.most_voxels = whole<std::int64_t>(json, "most_voxels", 0, kMostVoxels);
         plan.has_sweeps = json.at("has_sweeps").get<bool>();
-        plan.domain = {json.at("voxel_size").get<double>(), json.at("origin").get<Vec3>(), json.at("min").get<Index3>(),
-                       json.at("max").get<Index3>()};
+        plan.domain = domain_of_plan(json);
         plan.edge = edge_of(json.at("edge"));
-        for (const Json& brick : json.at("bricks")) plan.bricks.push_back(brick_of(brick));
-        for (const Brick& brick : plan.bricks)
-            for (const std::size_t neighbour : brick.neighbours) (void)plan.bricks.at(neighbour);
-    } catch (const nlohmann::json::exception& error) {
+        const Json& bricks = json.at("bricks");
+        if (!bricks.is_array() || bricks.empty()) throw std::out_of_range("bricks: expected a list of them, got none");
+        for (const Json& brick : bricks) plan.bricks.push_back(brick_of(brick, plan.domain, bricks.size()));
+        if (const std::string why = plan.edge.why_invalid(); !why.empty()) throw std::out_of_range(why);
+    } catch (const Error& error) {
+        if (error.code() == Errc::Io) throw;
         throw Error(Errc::InvalidInput, file + ": expected a plan of covol brick plan: " + error.what());
-    } catch (const std::out_of_range& error) {
+    } catch (const std::exception& error) {
         throw Error(Errc::InvalidInput, file + ": expected a plan of covol brick plan: " + error.what());
     }
     if (const std::string why = plan.options.why_invalid(); !why.empty())
@@ -149,7 +248,7 @@ bool BrickFolder::is_done(int sweep, std::size_t brick) const {
 
 int BrickFolder::sweep_of_state(int sweep, std::size_t brick) const {
     while (sweep > 0 && is_done(sweep, brick)) {
-        if (!read_json(name(sweep, brick, ".json")).value("same", false)) return sweep;
+        if (!read_facts(name(sweep, brick, ".json")).same) return sweep;
         --sweep;
     }
     return 0;
@@ -162,8 +261,7 @@ FloatGridPtr BrickFolder::state(int sweep, std::size_t brick) const {
 
 void BrickFolder::write_state(int sweep, std::size_t brick, const FloatGridPtr& state, Json facts) const {
     const std::string file = name(sweep, brick, ".vdb");
-    std::error_code status;
-    std::filesystem::create_directories(std::filesystem::path(file).parent_path(), status);
+    make_folder_of(file);
     write_vdb(file, {state});
     facts["same"] = false;
     write_text(name(sweep, brick, ".json"), facts.dump() + "\n");
@@ -171,8 +269,7 @@ void BrickFolder::write_state(int sweep, std::size_t brick, const FloatGridPtr& 
 
 void BrickFolder::write_same(int sweep, std::size_t brick, Json facts) const {
     const std::string file = name(sweep, brick, ".json");
-    std::error_code status;
-    std::filesystem::create_directories(std::filesystem::path(file).parent_path(), status);
+    make_folder_of(file);
     facts["same"] = true;
     write_text(file, facts.dump() + "\n");
 }
@@ -183,10 +280,10 @@ BrickFolder::Spent BrickFolder::spent(int sweep, std::size_t bricks) const {
         int steps = 0;
         std::string last;
         for (int s = 1; s <= sweep; ++s) {
-            const Json facts = read_json(name(s, n, ".json"));
-            steps += facts.value("steps", 0);
-            all.seconds += facts.value("seconds", 0.0);
-            last = facts.value("stop_reason", last);
+            const BrickFacts facts = read_facts(name(s, n, ".json"));
+            steps += std::min(facts.steps, std::numeric_limits<int>::max() - steps);
+            all.seconds += facts.seconds;
+            if (!facts.stop_reason.empty()) last = facts.stop_reason;
         }
         all.steps = std::max(all.steps, steps);
         all.unsteady += last == to_string(StopReason::MaxSteps) ? 1 : 0;

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/job_options.h"
 #include "cli/session.h"
 #include "covol/bricks.h"
 #include "covol/vdb_io.h"
@@ -17,8 +18,9 @@ public:
     explicit BrickFolder(std::string path) : path_(std::move(path)) {}
 
     /// Makes the folder. @throws Error InvalidOptions where it has a plan already, Io.
-    void write_plan(const BrickPlan& plan, const std::vector<std::string>& job, const std::vector<std::string>& inputs,
+    void write_plan(const BrickPlan& plan, const JobOptions& job, const std::vector<std::string>& inputs,
                     const WriteVdbOptions& options) const;
+    /// A plan may be a stranger's: every number in it is one that a plan can have.
     /// @throws Error InvalidInput (damaged; an input that is not as large as it was), Io.
     [[nodiscard]] BrickPlan read_plan() const;
 

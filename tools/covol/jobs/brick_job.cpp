@@ -183,6 +183,15 @@ void tell_plan(const BrickPlan& plan, Session& session) {
                 std::to_string(largest / 1000 * 1000) + ", which takes about " + megabytes(memory));
 }
 
+/// Outputs that were named where the job is planned, which is not where they are made.
+std::string outputs_of_join(const Session& session) {
+    std::string names;
+    for (const std::string& name : session.given())
+        if (name != "output" && session.has_role(name, OptionRole::Output))
+            names += (names.empty() ? "--" : ", --") + name;
+    return names;
+}
+
 }  // namespace
 
 void run_bricks(const SegmentJob& job, Session& session) {
@@ -207,7 +216,10 @@ void run_bricks(const SegmentJob& job, Session& session) {
             StructurePreparer(job, inputs, pixels, starts, session).prepare(0, session.run());
         const BrickPlan plan =
             make_job(pixels, structure, session.run())->plan(job.bricks.resolve(session.memory_limit()));
-        folder.write_plan(plan, call.job, session.inputs(), {});
+        folder.write_plan(plan, session.job(), session.inputs(), {});
+        if (const std::string outputs = outputs_of_join(session); !outputs.empty())
+            session.note("the plan keeps settings and inputs alone; name what is to be written behind brick join: " +
+                         outputs);
         return tell_plan(plan, session);
     }
     const RunContext inner = quiet(session.run());

@@ -3,13 +3,16 @@
 #include <algorithm>
 #include <set>
 
+#include "covol/safe_text.h"
 #include "covol/structures.h"
 #include "covol/vdb_io.h"
 
 namespace covol::tool {
 namespace {
 
-StructureInput& find_or_add(std::vector<StructureInput>& inputs, const std::string& name, const SegmentJob& job) {
+/// @param given  the name, as somebody wrote it or a file of labels has it
+StructureInput& find_or_add(std::vector<StructureInput>& inputs, const std::string& given, const SegmentJob& job) {
+    const std::string name = safe_text(given);  // it goes into files, tables and onto terminals
     for (StructureInput& input : inputs)
         if (input.name == name) return input;
     StructureInput added;
@@ -37,7 +40,8 @@ void number_labels(std::vector<StructureInput>& inputs) {
 }
 
 /// The structure that a text NAME=... belongs to.
-StructureInput& owner_of(std::vector<StructureInput>& inputs, const std::string& flag, const std::string& name) {
+StructureInput& owner_of(std::vector<StructureInput>& inputs, const std::string& flag, const std::string& given) {
+    const std::string name = safe_text(given);
     const auto at =
         std::find_if(inputs.begin(), inputs.end(), [&](const StructureInput& input) { return input.name == name; });
     if (at == inputs.end()) throw UsageError(flag + ": no structure is called '" + name + "'");

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <sstream>
 
+#include "covol/safe_text.h"
 #include "covol/structures.h"
 #include "jobs/length_unit.h"
 
@@ -20,6 +21,14 @@ std::string asset(const std::string& file, const fs::path& folder) {
     const fs::path near = fs::absolute(file).lexically_normal().lexically_relative(folder);
     const std::string name = near.empty() ? fs::absolute(file).string() : near.generic_string();
     return "@@@" + std::string(name.starts_with("..") || name.starts_with("/") ? "" : "./") + name + "@@@";
+}
+
+/// Between the quotes of a string.
+std::string in_quotes(const std::string& text) {
+    std::string safe = safe_text(text);
+    std::replace_if(
+        safe.begin(), safe.end(), [](char c) { return c == '"' || c == '\\'; }, '_');
+    return safe;
 }
 
 /// What a prim may be called.
@@ -64,7 +73,7 @@ std::string to_usda(const UsdScene& scene, const std::string& path, const std::s
              << "\n    timeCodesPerSecond = " << kFramesPerSecond << "\n    framesPerSecond = " << kFramesPerSecond
              << "\n";
     }
-    text << "    customLayerData = {\n        string covol_unit = \"" << (unit.empty() ? "not stated" : unit)
+    text << "    customLayerData = {\n        string covol_unit = \"" << (unit.empty() ? "not stated" : in_quotes(unit))
          << "\"\n    }\n)\n\ndef Volume \"" << volume << "\"\n{\n";
     for (const auto& [grid, field] : scene.fields)
         text << "    rel field:" << identifier(grid) << " = </" << volume << "/" << identifier(grid) << ">\n";

@@ -11,6 +11,7 @@
 
 #include "base/file.h"
 #include "covol/error.h"
+#include "covol/safe_text.h"
 #include "io/mesh/mesh_formats.h"
 #include "mesh/vertex_normals.h"
 
@@ -97,6 +98,8 @@ std::vector<std::string> mesh_io::one_line_each(std::vector<std::string> comment
     for (std::string& comment : comments)
         std::replace_if(
             comment.begin(), comment.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
+    std::transform(comments.begin(), comments.end(), comments.begin(),
+                   [](const std::string& c) { return safe_text(c); });
     return comments;
 }
 

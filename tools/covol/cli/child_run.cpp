@@ -1,0 +1,85 @@
+#include "cli/child_run.h"
+
+#include <fcntl.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <thread>
+
+#include "cli/session.h"
+#include "covol/error.h"
+
+namespace covol::tool {
+namespace fs = std::filesystem;
+namespace {
+
+/// @param alive  hung up when the process that made the folder is gone
+[[noreturn]] void keep(const fs::path& folder, int alive) {
+    for (const int stop : {SIGINT, SIGTERM, SIGHUP}) std::signal(stop, SIG_IGN);
+    ::setsid();  // what is sent to the group is not for this process
+    // Its streams would keep readers waiting, and its lock others from clearing up.
+    ::dup2(alive, STDIN_FILENO);
+    ::close_range(STDIN_FILENO + 1, ~0U, 0);
+    char nothing = 0;
+    while (::read(STDIN_FILENO, &nothing, 1) < 0 && errno == EINTR) {
+    }
+    constexpr int kMostTries = 500, kPause = 10000;  // of microseconds: a run within may still be ending
+    std::error_code status;
+    for (int n = 0; n < kMostTries; ++n) {
+        fs::remove_all(folder, status);
+        if (!fs::exists(fs::symlink_status(folder, status))) break;
+        ::usleep(kPause);
+    }
+    ::_exit(0);
+}
+
+}  // namespace
+
+KeptFolder::KeptFolder(const fs::path& beside) : folder_(beside) {
+    int ends[2];
+    if (::pipe2(ends, O_CLOEXEC) != 0) return;
+    keeper_ = ::fork();
+    if (keeper_ == 0) keep(folder_->path(), ends[0]);
+    ::close(ends[0]);
+    pipe_ = ends[1];
+}
+
+KeptFolder::~KeptFolder() {
+    folder_.reset();
+    if (pipe_ < 0) return;
+    ::close(pipe_);
+    while (keeper_ > 0 && ::waitpid(keeper_, nullptr, 0) < 0 && errno == EINTR) {
+    }
+}
+
+int run_this_program(const std::vector<std::string>& words, const RunContext& run) {
+    const std::string self = fs::read_symlink("/proc/self/exe").string();
+    std::vector<std::string> all{self};
+    all.insert(all.end(), words.begin(), words.end());
+    std::vector<char*> argv;
+    for (std::string& word : all) argv.push_back(word.data());
+    argv.push_back(nullptr);
+    const pid_t parent = ::getpid(), child = ::fork();
+    if (child == 0) {
+        ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+        if (::getppid() == parent) ::execv(self.c_str(), argv.data());
+        ::_exit(kIo);
+    }
+    if (child < 0) throw Error(Errc::Io, self + ": cannot start: " + std::strerror(errno));
+    int status = 0;
+    pid_t ended = 0;
+    for (bool told = false; (ended = ::waitpid(child, &status, WNOHANG)) == 0;) {
+        if (run.cancelled() && !told) told = ::kill(child, SIGTERM) == 0;
+        std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    run.check();
+    if (ended < 0) throw Error(Errc::Io, self + ": lost: " + std::strerror(errno));
+    return WIFEXITED(status) ? WEXITSTATUS(status) : kDefect;
+}
+
+}  // namespace covol::tool
