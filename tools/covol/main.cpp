@@ -1,12 +1,14 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "cli/thread_limit.h"
 #include "commands/commands.h"
 
 namespace covol::tool {
 namespace {
 
 int run(int argc, char** argv) {
+    tell_of_missing_threads();
     Session session;
     add_segment(session);
     add_reconstruct(session);

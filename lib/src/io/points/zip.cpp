@@ -12,6 +12,8 @@ namespace {
 constexpr std::uint32_t kEndSignature = 0x06054b50, kEntrySignature = 0x02014b50, kLocalSignature = 0x04034b50;
 constexpr std::uint64_t kEndSize = 22, kEntrySize = 46, kLocalSize = 30;
 constexpr std::uint64_t kLargestRatio = 1032;  // of deflate
+// Outlines and their names pack to between a half and a tenth.
+constexpr std::uint64_t kLargestArchiveRatio = 16, kAlways = std::uint64_t(16) << 20;
 
 struct Entry {
     std::string name;
@@ -88,14 +90,21 @@ void for_each_in_zip(const std::string& path, std::string_view archive,
     const std::uint64_t end = find_end(bytes, path);
     const int count = bytes.at<std::uint16_t>(end + 10);
     std::uint64_t at = bytes.at<std::uint32_t>(end + 16);
-    std::uint64_t total = 0;
+    const std::uint64_t most = kAlways + kLargestArchiveRatio * bytes.size();
+    std::uint64_t total = 0, unpacked = 0;
     for (int n = 0; n < count; ++n) {
         const Entry entry = read_entry(bytes, at, path);
         at += kEntrySize + entry.name.size() + bytes.at<std::uint16_t>(at + 30) + bytes.at<std::uint16_t>(at + 32);
         // Entries that share their bytes are how a small archive becomes a huge one.
         total += entry.packed;
         if (total > bytes.size()) fail(path, "the archive's entries overlap");
-        if (wanted(entry.name)) use(entry.name, unpack(bytes, entry, path));
+        if (!wanted(entry.name)) continue;
+        unpacked += entry.size;
+        if (unpacked > most)
+            throw Error(Errc::Unsupported, "read_points: " + path + ": an archive of " + std::to_string(bytes.size()) +
+                                               " bytes claims to hold more than " + std::to_string(most) +
+                                               ", which no marks do; unpack it, and give its files");
+        use(entry.name, unpack(bytes, entry, path));
     }
 }
 
