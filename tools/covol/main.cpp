@@ -8,7 +8,7 @@ namespace covol::tool {
 namespace {
 
 int run(int argc, char** argv) {
-    tell_of_missing_threads();
+    expect_temporary_files();
     Session session;
     add_segment(session);
     add_reconstruct(session);

@@ -6,7 +6,6 @@
 #include <csignal>
 #include <filesystem>
 #include <iostream>
-#include <system_error>
 
 #include "cli/arguments.h"
 #include "cli/grid_metadata.h"
@@ -197,7 +196,7 @@ void Session::add_common_flags() {
     app_.add_option("--json", json_path_, "write the report to this file, - is standard output")->type_name("FILE|-");
     app_.add_option(
             "--memory-limit", memory_limit_text_,
-            "stop when more memory is needed, 8G for example; segment and reconstruct go on in bricks [what is free]")
+            "stop when more memory is needed, 8G for example; segment and reconstruct go on in bricks [80 % of what is free]")
         ->type_name("SIZE");
     app_.add_option("--save-config", save_config_path_, "write the options of this run to a TOML file")
         ->type_name("FILE")
@@ -262,7 +261,6 @@ int Session::main(int argc, char** argv) {
 }
 
 int Session::execute() {
-    std::unique_ptr<ThreadLimit> thread_limit;
     std::unique_ptr<MemoryGuard> guard;
     try {
         progress_ = std::make_unique<Progress>(quiet_);
@@ -277,20 +275,20 @@ int Session::execute() {
         };
         memory_bound_ = choose_memory_bound(memory_limit_text_);
         run_.memory_budget = memory_bound_.bytes;
-        thread_limit = std::make_unique<ThreadLimit>(threads_);
         guard = std::make_unique<MemoryGuard>(memory_bound_.bytes, cancel_requested, [this] {
             if (has_last_word_.test_and_set()) return;  // the process ends by itself
             const int code = tell_failure(kBadInput, memory_text());
             ScratchFolder::remove_all();
             ::_exit(code);
         });
+        const ThreadCount threads = limit_threads(threads_);  // when the guard has its own
         inputs_ = inputs_of(*command_);
         outputs_.protect(inputs_);
         if (json_path_ != "-") outputs_.check("--json", json_path_, OutputKind::Text);
         outputs_.check("--save-config", save_config_path_, OutputKind::Text);
         start_report();
-        if (thread_limit->possible() < thread_limit->wanted())
-            note("on " + std::to_string(thread_limit->possible()) + " of " + std::to_string(thread_limit->wanted()) +
+        if (threads.possible < threads.wanted)
+            note("on " + std::to_string(threads.possible) + " of " + std::to_string(threads.wanted) +
                  " threads: " + kNoThread);
         if (!guard->watches()) warn(std::string("memory is not watched: ") + kNoThread);
         bodies_.at(command_)();
@@ -305,10 +303,8 @@ int Session::execute() {
         return fail(exit_code_of(error.code()), error.code() == Errc::Cancelled ? interrupted_text() : error.what());
     } catch (const std::bad_alloc&) {
         return fail(kBadInput, "out of memory; use a larger --voxel-size or a --roi");
-    } catch (const std::system_error& error) {
-        if (error.code() == std::errc::resource_unavailable_try_again) return fail(kIo, kNoThread);
-        return fail(kDefect, std::string("internal error: ") + error.what());
     } catch (const std::exception& error) {
+        if (is_missing_thread(error)) return fail(kIo, kNoThread);
         return fail(kDefect, std::string("internal error: ") + error.what());
     }
 }
