@@ -209,6 +209,19 @@ class SmallFiles(Limited):
             "attributes": {}}))
         self.refused("convert", store, "o.vdb")
 
+    def test_a_grid_of_tiles(self):
+        import pyopenvdb as vdb
+        grid = vdb.FloatGrid(3.0)
+        grid.name, grid.gridClass = "band", vdb.GridClass.LEVEL_SET
+        grid.fill((0, 0, 0), (4095, 4095, 4095), -3.0, True)
+        grid.fill((8192, 0, 0), (8195, 3, 3), -3.0, True)
+        vdb.write(str(self.inputs / "tiles.vdb"), grids=[grid])
+        tiles = self.inputs / "tiles.vdb"
+        self.assertLess(tiles.stat().st_size, 20000)
+        self.refused("evolve", tiles, "-o", "o.vdb", "--rho", 0, "--theta", 0)
+        self.refused("convert", tiles, "o.nrrd")
+        self.refused("segment", tiles, "--points", self.points, "-o", "o.vdb")
+
     def test_thin_voxels(self):
         path = self.inputs / "thin.nrrd"
         write_nrrd(path, (16, 14, 12), bytes(range(16)) * 14 * 12)

@@ -24,7 +24,8 @@ Function* own(const char* name) {
 }  // namespace
 
 extern "C" {
-int pthread_create(pthread_t* thread, const pthread_attr_t* attributes, void* (*start)(void*), void* argument) noexcept {
+int pthread_create(pthread_t* thread, const pthread_attr_t* attributes, void* (*start)(void*),
+                   void* argument) noexcept {
     return fails() ? EAGAIN : own<decltype(pthread_create)>("pthread_create")(thread, attributes, start, argument);
 }
 pid_t fork() noexcept {

@@ -53,7 +53,7 @@ MinMax scan_slices(const VoxelBox& box, int count, const Visit& visit) {
     return all;
 }
 
-constexpr double kSamples = 4e6;  ///< for percentiles
+constexpr double kSamples = 4e6;         ///< for percentiles
 constexpr double kQuickBytes = 1 << 28;  ///< that are read in a second or two
 
 }  // namespace
@@ -158,9 +158,9 @@ std::array<double, 2> Image::percentiles(double low, double high) const {
 
 std::array<double, 2> Image::range() const {
     const double all_slices = held_.size()[2];
-    const int slices =
-        mapped_ ? int(std::clamp(kQuickBytes / double(slice_bytes()), std::min(3.0, all_slices), all_slices))
-                : held_.size()[2];
+    const int slices = mapped_
+                           ? int(std::clamp(kQuickBytes / double(slice_bytes()), std::min(3.0, all_slices), all_slices))
+                           : held_.size()[2];
     return detail::with_pixel_type(type_, [&](auto pixel) {
         if (chunks_) {
             const auto values = values_of_chunks<decltype(pixel)>(std::numeric_limits<double>::infinity());

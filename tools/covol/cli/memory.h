@@ -28,7 +28,8 @@ struct MemoryBound {
 /// when it passes the limit. What goes on beyond it, in a library that knows nothing of cancellation, is given up.
 class MemoryGuard {
 public:
-    /// limit = 0, or the system makes no thread: no guard. @param give_up  ends the process; called by the guard's thread
+    /// limit = 0, or the system makes no thread: no guard. @param give_up  ends the process; called by the guard's
+    /// thread
     MemoryGuard(std::uint64_t limit, std::atomic<bool>& cancel, std::function<void()> give_up);
     ~MemoryGuard();
     MemoryGuard(const MemoryGuard&) = delete;

@@ -150,8 +150,8 @@ std::string shell_quoted(const std::string& word) {
     return quoted + "'";
 }
 
-constexpr int kReportSchema = 1;              // grows when a field of the report goes or means something else
-constexpr int kMostThreads = 1024;            // TBB runs out of stacks long after
+constexpr int kReportSchema = 1;    // grows when a field of the report goes or means something else
+constexpr int kMostThreads = 1024;  // TBB runs out of stacks long after
 
 }  // namespace
 
@@ -194,9 +194,9 @@ void Session::add_common_flags() {
     app_.add_flag("--strict", strict_,
                   "exit code 5 where anything was warned of, a flow that is not steady or a surface off its marks");
     app_.add_option("--json", json_path_, "write the report to this file, - is standard output")->type_name("FILE|-");
-    app_.add_option(
-            "--memory-limit", memory_limit_text_,
-            "stop when more memory is needed, 8G for example; segment and reconstruct go on in bricks [80 % of what is free]")
+    app_.add_option("--memory-limit", memory_limit_text_,
+                    "stop when more memory is needed, 8G for example; segment and reconstruct go on in bricks [80 % of "
+                    "what is free]")
         ->type_name("SIZE");
     app_.add_option("--save-config", save_config_path_, "write the options of this run to a TOML file")
         ->type_name("FILE")

@@ -14,7 +14,6 @@
 #include "cli/help.h"
 #include "cli/json.h"
 #include "cli/memory.h"
-#include "cli/memory.h"
 #include "cli/outputs.h"
 #include "cli/progress.h"
 #include "covol/error.h"

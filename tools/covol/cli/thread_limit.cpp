@@ -72,8 +72,8 @@ ThreadCount limit_threads(int threads) {
     count.possible = std::max(1, count_possible(count.wanted));
     // Never destroyed: TBB would make the threads then.
     if (count.possible < count.wanted)
-        static_cast<void>(new tbb::global_control(tbb::global_control::max_allowed_parallelism,
-                                                  std::size_t(count.possible)));
+        static_cast<void>(
+            new tbb::global_control(tbb::global_control::max_allowed_parallelism, std::size_t(count.possible)));
     return count;
 }
 

@@ -20,10 +20,12 @@ namespace covol::tool {
 namespace {
 
 // Measured: docs/benchmarks.md, Plans.
-constexpr double kBandBytes = 130;    ///< peak memory for each voxel of the band, mesh and files included
-constexpr double kTubeBytes = 12;     ///< for each voxel of a distance tube
-constexpr double kBaseBytes = 1e8;    ///< the program itself
-constexpr double kFlowTime = 1.3;     ///< a flow with an image over one without
+constexpr double kBandBytes = 108;       ///< peak memory for each voxel of the band, mesh and files included
+constexpr double kTubeBytes = 12;        ///< for each voxel of a distance tube
+constexpr double kBaseBytes = 6.5e7;     ///< the program itself
+constexpr double kGuessBandBytes = 335;  ///< in place of kBandBytes while a guess learns from the image
+constexpr double kCloudBytes = 8.5e7, kCloudPointBytes = 200;  ///< a cloud's orientation, and for each of its points
+constexpr double kFlowTime = 1.3;                              ///< a flow with an image over one without
 constexpr double kGuessTime = 2.8;    ///< the same of a guess, which learns what the image shows at the marks
 constexpr double kPilotVoxels = 128;  ///< across the marks' box, on the finer of the two lattices
 constexpr double kReachVoxels = 12;   ///< how far from the surface the image is sampled
@@ -34,13 +36,14 @@ constexpr std::int64_t kMappedBytes = 1 << 16;  ///< of a file that the system p
 /// What the marks alone came to on a coarse lattice.
 struct Pilot {
     double voxel_size = 0, active_voxels = 0, tube_voxels = 0, seconds = 0;
-    bool is_guess = false;
+    bool is_guess = false, is_cloud = false;
     FloatGridPtr surface;
 };
 
 struct StructurePlan {
     std::string name;
     double active_voxels = 0, tube_voxels = 0, seconds = 0;
+    double bytes_while_solved = 0;   ///< beyond those of its band
     double smoothed_voxels = 0;      ///< of the image
     std::set<std::uint64_t> blocks;  ///< that are read
 };
@@ -74,6 +77,7 @@ Pilot run_pilot(const SegmentJob& job, const StructureInput& input, const ImageG
                 0,
                 watch.seconds(),
                 start == Start::Kind::Guess,
+                start == Start::Kind::Cloud,
                 result.surface};
     if (result.distance) pilot.tube_voxels = double(result.distance->activeVoxelCount());
     return pilot;
@@ -189,11 +193,16 @@ StructurePlan plan_structure(const SegmentJob& job, const StructureInput& input,
     plan.tube_voxels = pilot.tube_voxels * finer * finer * finer;
     plan.seconds = fixed + growing / (c * c) * finer * finer;
     if (image != nullptr) plan.seconds *= pilot.is_guess ? kGuessTime : kFlowTime;
+    plan.bytes_while_solved = kTubeBytes * plan.tube_voxels - kBandBytes * plan.active_voxels;
+    if (pilot.is_cloud) plan.bytes_while_solved = kCloudBytes + kCloudPointBytes * double(marks.given.size());
     if (image == nullptr) return plan;
-    if (pilot.is_guess)
+    if (pilot.is_guess) {
         plan_smoothing(*pilot.surface, *image, kGuessVoxels * h, plan);
-    else
+        plan.bytes_while_solved =
+            (kGuessBandBytes - kBandBytes) * plan.active_voxels + kGuessBytes * plan.smoothed_voxels;
+    } else {
         plan_samples(*pilot.surface, *image, kReachVoxels * h, plan);
+    }
     return plan;
 }
 
@@ -236,13 +245,12 @@ void run_plan(const SegmentJob& job, Session& session) {
         session.say("image: " + size_text(n) + " " + to_string(image->type) + ", " + image->format + ", " +
                     bytes_text(image_bytes) + " unpacked");
     }
-    double voxels = 0, tube = 0, smoothed = 0, seconds = 0;
+    double voxels = 0, while_solved = 0, seconds = 0;
     std::set<std::uint64_t> blocks;
     for (const StructureInput& input : structures_of(job, job.painted.read(session.run()))) {
         const StructurePlan one = plan_structure(job, input, image ? &*image : nullptr, given_h, session, quiet);
         voxels += one.active_voxels;
-        tube = std::max(tube, one.tube_voxels);
-        smoothed = std::max(smoothed, one.smoothed_voxels);
+        while_solved = std::max(while_solved, one.bytes_while_solved);
         seconds += one.seconds;
         blocks.insert(one.blocks.begin(), one.blocks.end());
     }
@@ -263,8 +271,7 @@ void run_plan(const SegmentJob& job, Session& session) {
                         " unpacked");
         }
     }
-    const double memory = kBaseBytes + held + mapped +
-                          std::max({kBandBytes * voxels, kTubeBytes * tube, kGuessBytes * smoothed});
+    const double memory = kBaseBytes + held + mapped + kBandBytes * voxels + while_solved;
     plan["mapped_bytes"] = std::llround(mapped);
     plan["active_voxels"] = std::llround(voxels);
     plan["memory_bytes"] = std::llround(memory);

@@ -22,9 +22,7 @@ bool keeps_names(const std::string& path) {
     return false;
 }
 
-std::string labels_path(const std::string& mask) {
-    return with_ending(mask, "_labels.txt");
-}
+std::string labels_path(const std::string& mask) { return with_ending(mask, "_labels.txt"); }
 
 FloatGridPtr named(FloatGridPtr grid, const std::string& name) {
     grid->setName(name);

@@ -61,7 +61,8 @@ std::string inflate(const Entry& entry, std::string_view packed, const std::stri
     return content;
 }
 
-std::string unpack(const Bytes& bytes, const Entry& entry, const std::string& path) {
+/// The entry's packed bytes, which may hold what it says that they do.
+std::string_view find_packed(const Bytes& bytes, const Entry& entry, const std::string& path) {
     const auto unsupported = [&](const char* what) {
         throw Error(Errc::Unsupported, "read_points: " + path + ": entry " + quote(entry.name) + " is " + what);
     };
@@ -75,6 +76,10 @@ std::string unpack(const Bytes& bytes, const Entry& entry, const std::string& pa
     if (entry.size > kLargestRatio * entry.packed + 1024 || (entry.method == 0 && entry.size != entry.packed))
         fail(path, "entry " + quote(entry.name) + ": " + std::to_string(entry.packed) + " bytes cannot hold " +
                        std::to_string(entry.size));
+    return packed;
+}
+
+std::string unpack(const Entry& entry, std::string_view packed, const std::string& path) {
     const std::string content = entry.method == 0 ? std::string(packed) : inflate(entry, packed, path);
     if (crc32(0, reinterpret_cast<const Bytef*>(content.data()), static_cast<uInt>(content.size())) != entry.checksum)
         fail(path, "entry " + quote(entry.name) + " does not agree with its checksum; the archive is damaged");
@@ -99,12 +104,13 @@ void for_each_in_zip(const std::string& path, std::string_view archive,
         total += entry.packed;
         if (total > bytes.size()) fail(path, "the archive's entries overlap");
         if (!wanted(entry.name)) continue;
+        const std::string_view packed = find_packed(bytes, entry, path);
         unpacked += entry.size;
         if (unpacked > most)
             throw Error(Errc::Unsupported, "read_points: " + path + ": an archive of " + std::to_string(bytes.size()) +
                                                " bytes claims to hold more than " + std::to_string(most) +
                                                ", which no marks do; unpack it, and give its files");
-        use(entry.name, unpack(bytes, entry, path));
+        use(entry.name, unpack(entry, packed, path));
     }
 }
 
