@@ -321,6 +321,17 @@ class LargeImages(Limited):
         self.assertTrue(json.loads((self.out / "r.json").read_text())["image"]["range_is_estimate"])
         self.assertNotIn("estimate", self.run_covol("info", self.image).stdout)
 
+    def test_plan_knows_of_mapped_pages(self):
+        # The system maps more of them at once where it has read them before; docs/benchmarks.md has how good plans are.
+        job = ["segment", self.large, "--points", self.inputs / "large.xyz", "-o", "s.vdb", "--quiet", "--json"]
+        self.run_covol("plan", *job, "plan.json")
+        planned = json.loads((self.out / "plan.json").read_text())["plan"]
+        self.assertGreater(planned["mapped_bytes"], 10 * MIB)
+        self.run_covol(*job, "job.json")
+        ratio = planned["memory_bytes"] / json.loads((self.out / "job.json").read_text())["peak_rss_bytes"]
+        self.assertGreater(ratio, 0.75)
+        self.assertLess(ratio, 1.5)
+
 
 del Limited, Case  # have no tests
 
