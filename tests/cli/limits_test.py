@@ -104,6 +104,11 @@ class ControlGroups(Limited):
             code, _, text = self.peak("info", "t.nrrd", preexec_fn=lambda: processes.write_text(str(os.getpid())))
             self.assertEqual(code, 0, text)
 
+    def test_what_began_the_program_does_not_count(self):
+        held = bytearray(os.urandom(1)) * (400 * MIB)
+        self.assertLess(self.report("info", self.image)["peak_rss_bytes"], 200 * MIB)
+        del held
+
     def test_a_limit_of_address_space(self):
         before = self.files()
         code, _, text = self.peak("convert", "t.nrrd", "o.vdb", "--quiet", preexec_fn=lambda: resource.setrlimit(
@@ -278,6 +283,22 @@ class Places(Case):
                 nibabel.save(nibabel.Nifti1Image(np.zeros((4, 4, 4), np.uint8), affine), path)
                 self.run_covol("info", path, code=3)
         self.refuse("info", self.image, "--spacing", "1e26,1,1", code=3, says="spacing")
+
+    def test_grids(self):
+        import pyopenvdb as vdb
+        for size, origin, says in ((1e26, 0, "voxels up to"), (1, 1.8e19, "origin"), (1, 1000, "")):
+            with self.subTest((size, origin)):
+                grid = vdb.FloatGrid(0.0)
+                grid.name = "u"
+                grid.fill((0, 0, 0), (3, 3, 3), 1.0)
+                grid.transform = vdb.createLinearTransform(voxelSize=size)
+                grid.transform.postTranslate((origin, 0, 0))
+                path = self.inputs / "grid.vdb"
+                vdb.write(str(path), grids=[grid])
+                if says:
+                    self.refuse("convert", path, "o.nrrd", code=3, says=says)
+                else:
+                    self.run_covol("convert", path, "o.nrrd")
 
     def test_far_places_that_numbers_hold(self):
         # National grids in metres with voxels of a millimetre; a stage in nanometres.

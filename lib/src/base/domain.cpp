@@ -6,7 +6,6 @@
 #include <cmath>
 #include <sstream>
 
-#include "base/world_limits.h"
 #include "covol/error.h"
 
 namespace covol {
@@ -177,13 +176,6 @@ Domain domain_of(const FloatGrid& grid) {
     Domain d;
     d.voxel_size = h[0];
     d.origin = {origin[0], origin[1], origin[2]};
-    if (h[0] > detail::kLargestLength || !detail::is_within(d.origin, detail::farthest_origin(h[0]))) {
-        std::ostringstream text;
-        text << "domain_of: grid '" << grid.getName() << "': expected voxels up to " << detail::kLargestLength
-             << " in size and an origin within " << detail::farthest_origin(h[0]) << " of 0, got " << h[0] << " and "
-             << origin;
-        throw Error(Errc::InvalidInput, text.str());
-    }
     const auto lo = grid.getMetadata<openvdb::Vec3IMetadata>(kMinKey);
     const auto hi = grid.getMetadata<openvdb::Vec3IMetadata>(kMaxKey);
     const bool stated = lo && hi;

@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "base/memory_budget.h"
 #include "covol/fwd.h"
+#include "limits/memory_budget.h"
 
 namespace covol::detail {
 

@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "base/matrix.h"
-#include "base/memory_budget.h"
 #include "base/vector.h"
 #include "guidance/profile_kernel.h"
+#include "limits/memory_budget.h"
 
 namespace covol::guidance {
 namespace {

@@ -7,9 +7,7 @@
 
 #include "base/file.h"
 #include "base/matrix.h"
-#include "base/memory_budget.h"
 #include "base/number.h"
-#include "base/world_limits.h"
 #include "covol/error.h"
 #include "covol/vdb_io.h"
 #include "io/chunked/zarr.h"
@@ -17,6 +15,8 @@
 #include "io/image/image_formats.h"
 #include "io/image/tiff.h"
 #include "io/pixels/chunks.h"
+#include "limits/memory_budget.h"
+#include "limits/world_limits.h"
 
 namespace covol {
 namespace {

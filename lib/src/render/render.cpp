@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/memory_budget.h"
 #include "base/text.h"
 #include "base/valid.h"
 #include "base/vector.h"
 #include "covol/error.h"
+#include "limits/memory_budget.h"
 #include "render/draw/decorations.h"
 #include "render/draw/layout.h"
 #include "render/level_set.h"

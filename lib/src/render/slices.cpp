@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "base/memory_budget.h"
+#include "limits/memory_budget.h"
 #include "render/draw/decorations.h"
 #include "render/level_set.h"
 #include "render/marks.h"

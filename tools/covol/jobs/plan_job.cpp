@@ -24,8 +24,8 @@ constexpr double kBandBytes = 108;       ///< peak memory for each voxel of the 
 constexpr double kTubeBytes = 12;        ///< for each voxel of a distance tube
 constexpr double kBaseBytes = 6.5e7;     ///< the program itself
 constexpr double kGuessBandBytes = 335;  ///< in place of kBandBytes while a guess learns from the image
-constexpr double kCloudBytes = 8.5e7, kCloudPointBytes = 200;  ///< a cloud's orientation, and for each of its points
-constexpr double kFlowTime = 1.3;                              ///< a flow with an image over one without
+constexpr double kCloudPointBytes = 4000, kMostCloudBytes = 1e8;  ///< for each point of a cloud, and of all
+constexpr double kFlowTime = 1.3;                                 ///< a flow with an image over one without
 constexpr double kGuessTime = 2.8;    ///< the same of a guess, which learns what the image shows at the marks
 constexpr double kPilotVoxels = 128;  ///< across the marks' box, on the finer of the two lattices
 constexpr double kReachVoxels = 12;   ///< how far from the surface the image is sampled
@@ -194,7 +194,8 @@ StructurePlan plan_structure(const SegmentJob& job, const StructureInput& input,
     plan.seconds = fixed + growing / (c * c) * finer * finer;
     if (image != nullptr) plan.seconds *= pilot.is_guess ? kGuessTime : kFlowTime;
     plan.bytes_while_solved = kTubeBytes * plan.tube_voxels - kBandBytes * plan.active_voxels;
-    if (pilot.is_cloud) plan.bytes_while_solved = kCloudBytes + kCloudPointBytes * double(marks.given.size());
+    if (pilot.is_cloud)
+        plan.bytes_while_solved = std::min(kCloudPointBytes * double(marks.given.size()), kMostCloudBytes);
     if (image == nullptr) return plan;
     if (pilot.is_guess) {
         plan_smoothing(*pilot.surface, *image, kGuessVoxels * h, plan);

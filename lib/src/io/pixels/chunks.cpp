@@ -10,7 +10,7 @@
 #include <cstring>
 #include <mutex>
 
-#include "base/memory_budget.h"
+#include "limits/memory_budget.h"
 
 namespace covol::detail {
 namespace {

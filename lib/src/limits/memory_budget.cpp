@@ -1,4 +1,4 @@
-#include "base/memory_budget.h"
+#include "limits/memory_budget.h"
 
 #include "base/number.h"
 #include "covol/error.h"
