@@ -286,13 +286,12 @@ class Places(Case):
 
     def test_grids(self):
         import pyopenvdb as vdb
-        for size, origin, says in ((1e26, 0, "voxels up to"), (1, 1.8e19, "origin"), (1, 1000, "")):
+        for size, origin, says in ((1e26, 0, "voxels up to"), (1, 1e11, "origin"), (1, 1000, "")):
             with self.subTest((size, origin)):
                 grid = vdb.FloatGrid(0.0)
                 grid.name = "u"
                 grid.fill((0, 0, 0), (3, 3, 3), 1.0)
-                grid.transform = vdb.createLinearTransform(voxelSize=size)
-                grid.transform.postTranslate((origin, 0, 0))
+                grid.transform = vdb.createLinearTransform([[size, 0, 0, 0], [0, size, 0, 0], [0, 0, size, 0], [origin, 0, 0, 1]])
                 path = self.inputs / "grid.vdb"
                 vdb.write(str(path), grids=[grid])
                 if says:
