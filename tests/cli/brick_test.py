@@ -102,9 +102,21 @@ class Bricks(Case):
         self.assertRegex(said, f"not steady after [0-9]+ steps: [0-9]+ of {planned['bricks']} bricks")
         self.assertEqual(json.loads((self.out / "s.json").read_text())["solve"]["stop_reason"], "max_steps")
 
+    def test_the_surface_has_the_same_bits_whatever_else_is_made(self):
+        self.plan("plan")
+        self.run_covol("brick", "run", "plan")
+        self.run_covol("brick", "join", "plan", "-o", "alone.vdb")
+        alone = self.values(self.out / "alone.vdb")
+        for more in (["--mesh", "s.ply"], ["--mesh", "s.ply", "--plain"], ["--fields", "f.vdb"]):
+            with self.subTest(more):
+                self.run_covol("brick", "join", "plan", "-o", "joined.vdb", *more)
+                low, joined = self.values(self.out / "joined.vdb")
+                self.assertEqual(low, alone[0])
+                self.assertEqual(np.count_nonzero(joined != alone[1]), 0)
+
     def test_within_a_memory_limit(self):
         run = self.run_covol(*self.job, "-o", "s.vdb", "--mesh", "s.ply", "--memory-limit", "175M", "--json", "s.json")
-        self.assertIn("bricks", run.stderr)
+        self.assertRegex(run.stderr, r"about [1-9][0-9]+000 voxels in the band, .* in [0-9]+ bricks")
         report = json.loads((self.out / "s.json").read_text())
         self.assertTrue(report["surface"]["closed"])
         self.assertIn("bricks", report["automatic"])

@@ -19,8 +19,8 @@ class Plan(Case):
 
     def check(self, planned, report):
         self.assertLess(abs(planned["active_voxels"] / report["grid"]["active_voxels"] - 1), 0.4)
-        self.assertGreater(planned["memory_bytes"], 0.6 * report["peak_rss_bytes"])
-        self.assertLess(planned["memory_bytes"], 2.5 * report["peak_rss_bytes"])
+        self.assertGreater(planned["memory_bytes"], 0.7 * report["peak_rss_bytes"])
+        self.assertLess(planned["memory_bytes"], 1.5 * report["peak_rss_bytes"])
         self.assertGreater(planned["seconds"], 0)
 
     def test_cloud(self):

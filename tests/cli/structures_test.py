@@ -134,6 +134,14 @@ class Structures(Case):
         self.assertRegex(text, r'(?m)^ +1 +\d+ +\d+ +\d+ +1 +1 +1 +"left"$')
         self.assertRegex(text, r'(?m)^ +2 +\d+ +\d+ +\d+ +1 +1 +1 +"right"$')
 
+    def test_names_beside_masks_of_long_endings(self):
+        for mask, labels in (("m.nii.gz", "m_labels.txt"), ("M.OME.TIF", "M_labels.txt"), ("a.b.mha", "a.b_labels.txt")):
+            self.run_covol(*self.two("--mask", mask, "--max-steps", 1))
+            self.assertIn("left", (self.out / labels).read_text())
+            self.assertEqual(self.files(), sorted([mask, labels, "s.vdb"]))
+            for name in self.files():
+                (self.out / name).unlink()
+
     def test_segmentation_for_slicer(self):
         self.run_covol(*self.two("--mask", "m.seg.nrrd"))
         keys = nrrd_keys(self.out / "m.seg.nrrd")

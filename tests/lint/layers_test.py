@@ -10,6 +10,7 @@ import sys
 # level and of those below.
 LAYERS = [
     {"base": ["api", "version", "fwd", "error", "file_set", "option_names", "run", "domain", "safe_text"], "scheme": []},
+    {"limits": []},
     {"grid": [], "mesh": ["mesh"], "io": ["vdb_io"], "io/pixels": ["image"]},
     {"io/chunked": [], "io/modules": []},
     {"io/hdf5": []},

@@ -1,12 +1,14 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "cli/thread_limit.h"
 #include "commands/commands.h"
 
 namespace covol::tool {
 namespace {
 
 int run(int argc, char** argv) {
+    expect_temporary_files();
     Session session;
     add_segment(session);
     add_reconstruct(session);

@@ -121,7 +121,7 @@ public:
     /// large images are subsampled on a regular lattice; of large images in chunks the chunks that were read so far
     /// count, or some on a regular lattice where none was).
     [[nodiscard]] COVOL_API std::array<double, 2> percentiles(double low, double high) const;
-    /// Smallest and largest value of the held voxels, with the same words on chunks.
+    /// Smallest and largest value of the held voxels; of a mapped file of some slices, of chunks as above.
     [[nodiscard]] COVOL_API std::array<double, 2> range() const;
     /// The held voxels as an image of their own; shares their memory.
     [[nodiscard]] COVOL_API Image cropped() const;

@@ -30,6 +30,7 @@ using namespace pipeline;
 
 constexpr double kCoarseVoxels = 400;     // most across the points, on the lattice of the coarse solve
 constexpr double kLeastFactor = 2;        // voxels: least size of that lattice's voxels
+constexpr int kStateLayers = 8;           // around a brick, that its state holds
 constexpr int kSurfaceLayers = 8;         // around a brick: its distance to the surface rests on no more
 constexpr std::size_t kEdgeSamples = 64;  // coarse leaves at which the image is looked at to fix what g means
 
@@ -108,10 +109,24 @@ std::vector<Vec3> points_near(const Job& job, const Domain& part) {
     return near;
 }
 
+/// In the plan's order, in which states that overlap are summed: sums of three depend on it in their last bits.
 std::vector<std::size_t> with_neighbours(const BrickPlan& plan, std::size_t brick) {
     std::vector<std::size_t> all = plan.bricks[brick].neighbours;
     all.push_back(brick);
+    std::sort(all.begin(), all.end());
     return all;
+}
+
+/// Bricks whose states reach into `part`, in the plan's order.
+std::vector<std::size_t> bricks_reaching(const BrickPlan& plan, const Domain& part) {
+    std::vector<std::size_t> found;
+    for (std::size_t n = 0; n < plan.bricks.size(); ++n) {
+        const Domain kept = bricks::around(plan.domain, plan.bricks[n].core, kStateLayers);
+        bool reaches = true;
+        for (int a = 0; a < 3; ++a) reaches = reaches && kept.min[a] <= part.max[a] && kept.max[a] >= part.min[a];
+        if (reaches) found.push_back(n);
+    }
+    return found;
 }
 
 /// The level set that a brick starts from; null where there is none.
@@ -179,7 +194,7 @@ struct BrickJob::Parts {
                                                 number(job.h()) + ": plan again, with `voxel_size`");
     }
 
-    /// What segment() leaves after the flow, all at once.
+    /// The field on all of the lattice.
     void join(const BrickPlan& plan, const BrickStates& states) {
         job.result.u = bricks::assemble(plan, plan.domain, all_of(plan), states);
         if (field) {
@@ -192,7 +207,7 @@ struct BrickJob::Parts {
         job.report().leaf_count = std::int64_t(job.result.u->tree().leafCount());
     }
 
-    /// The surface brick by brick: nothing but it is held of the whole.
+    /// The surface brick by brick: nothing but it is held of the whole, unless fields are wanted.
     void join_surfaces(const BrickPlan& plan, const BrickStates& states) {
         FloatGridPtr surface = make_grid(plan.domain, float(kHalfWidthVoxels * plan.domain.voxel_size), "surface");
         surface->setGridClass(openvdb::GRID_LEVEL_SET);
@@ -201,8 +216,8 @@ struct BrickJob::Parts {
             run.check();
             run.report("join", double(n) / double(plan.bricks.size()));
             const VoxelBox& core = plan.bricks[n].core;
-            const FloatGridPtr u = bricks::assemble(plan, bricks::around(plan.domain, core, kSurfaceLayers),
-                                                    with_neighbours(plan, n), states);
+            const Domain part = bricks::around(plan.domain, core, kSurfaceLayers);
+            const FloatGridPtr u = bricks::assemble(plan, part, bricks_reaching(plan, part), states);
             if (u->tree().leafCount() == 0) continue;
             bricks::count(*u, core, job.report().active_voxels, job.report().leaf_count);
             set_clip(*u, clip);
@@ -214,6 +229,9 @@ struct BrickJob::Parts {
         }
         detail::flood_tiles(*surface, plan.domain);
         job.result.surface = surface;
+        if (job.options.without_fields) return;
+        job.result.u = bricks::assemble(plan, plan.domain, all_of(plan), states);
+        set_clip(*job.result.u, clip);
     }
 
     /// The coarser lattice on which the whole is some hundred voxels wide.
@@ -283,7 +301,7 @@ FloatGridPtr BrickJob::solve(const BrickPlan& plan, std::size_t brick, const Bri
     const RunContext& run = parts_->run;
     parts_->require_plan_of_this_job(plan);
     const VoxelBox core = plan.bricks.at(brick).core;
-    const Domain kept = bricks::around(plan.domain, core, 8);
+    const Domain kept = bricks::around(plan.domain, core, kStateLayers);
     FloatGridPtr state = make_grid(kept, float(kHalfWidthVoxels * plan.domain.voxel_size), "u");
     with_threads(run, [&] {
         const Timed timed(report.seconds);
@@ -330,8 +348,8 @@ SegmentResult BrickJob::join(const BrickPlan& plan, const BrickStates& states, b
         if (!job.is_cloud()) doubt_isolated_marks(job);
         job.report().domain = plan.domain;
         job.origin = StartOrigin::CoarseLevel;
-        const bool in_parts = job.options.without_mesh && job.options.without_fields && !parts_->field;
-        in_parts ? parts_->join_surfaces(plan, states) : parts_->join(plan, states);
+        // Whatever else is made of the surface, it has the same bits.
+        parts_->field ? parts_->join(plan, states) : parts_->join_surfaces(plan, states);
         if (job.report().leaf_count == 0)
             throw Error(Errc::InvalidInput,
                         "bricks: the surface vanished in all of them; lower `delta`, or start closer to the edges "

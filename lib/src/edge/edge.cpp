@@ -13,6 +13,7 @@
 #include "covol/error.h"
 #include "edge/heuristics.h"
 #include "edge/nth_value.h"
+#include "grid/active_tiles.h"
 #include "grid/halo.h"
 #include "scheme/scheme.h"
 
@@ -287,6 +288,7 @@ EdgeResult detect_edges(const Image& image, const FloatGrid& topology, const Edg
 
         result.grid = make_grid(domain, 1.0F, "edge");
         result.grid->topologyUnion(topology);
+        detail::require_memory_of_tiles(*result.grid, "detect_edges", run);
         result.grid->tree().voxelizeActiveTiles();
         const detail::SchemeKernels& kernels = detail::kernels();
         const bool is_line = options.feature == EdgeFeature::BrightLine || options.feature == EdgeFeature::DarkLine;

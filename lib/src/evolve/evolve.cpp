@@ -22,6 +22,7 @@
 #include "evolve/flow_states.h"
 #include "evolve/heuristics.h"
 #include "evolve/motion.h"
+#include "grid/active_tiles.h"
 #include "redistance/tracking.h"
 #include "scheme/scheme.h"
 
@@ -349,6 +350,7 @@ EvolveReport evolve(FloatGrid& u, const EvolveFields& fields, const EvolveOption
     detail::require_valid(options, "evolve");
     EvolveReport report;
     with_threads(run, [&] {
+        detail::require_memory_of_tiles(u, "evolve", run);
         u.tree().voxelizeActiveTiles();
         report = Evolver(u, fields, options, run).run();
     });

@@ -243,8 +243,9 @@ bool Guide::learn(const Scene& scene, bool first) {
         later.max[a] += kGuide.moves * h_;
     }
     const auto try_sigma = [&](double sigma) {
-        SmoothImage image = smooth_ && smooth_->covers(box, sigma) ? std::move(*smooth_)
-                                                                   : SmoothImage(image_, first ? later : box, sigma);
+        SmoothImage image = smooth_ && smooth_->covers(box, sigma)
+                                ? std::move(*smooth_)
+                                : SmoothImage(image_, first ? later : box, sigma, run_);
         if (image.empty()) return;
         Lesson lesson(scene, on_, image, std::sqrt(guess2_), broad_, 2 * width_);
         if (lesson_ && lesson.sure_gain() <= lesson_->sure_gain()) return;

@@ -8,6 +8,7 @@
 #include "base/matrix.h"
 #include "base/vector.h"
 #include "guidance/profile_kernel.h"
+#include "limits/memory_budget.h"
 
 namespace covol::guidance {
 namespace {
@@ -17,7 +18,8 @@ constexpr double kLeastSigma = 0.3;  // voxels; below it a sampled Gaussian is t
 
 }  // namespace
 
-SmoothImage::SmoothImage(const Image& image, const WorldBox& box, double sigma) : box_(box), sigma_(sigma) {
+SmoothImage::SmoothImage(const Image& image, const WorldBox& box, double sigma, const RunContext& run)
+    : box_(box), sigma_(sigma) {
     const ImageGeometry& g = image.geometry();
     Vec3 lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
     for (const Vec3& corner : cloud::corners(box)) {
@@ -44,8 +46,11 @@ SmoothImage::SmoothImage(const Image& image, const WorldBox& box, double sigma) 
         low_[a] = -0.5 - first[a];
         high_[a] = g.size[a] - 0.5 - first[a];
     }
+    detail::require_memory(sizeof(float) * double(size_[0]) * size_[1] * size_[2],
+                           "guide: a smoothed copy of " + image.path() + " around the marks",
+                           "use a coarser image, a smaller `roi`, or `rho` 0", run);
     values_.resize(std::size_t(size_[0]) * size_[1] * size_[2]);
-    image.load({first, {first[0] + size_[0] - 1, first[1] + size_[1] - 1, first[2] + size_[2] - 1}});
+    image.load({first, {first[0] + size_[0] - 1, first[1] + size_[1] - 1, first[2] + size_[2] - 1}}, run);
     tbb::parallel_for(0, size_[2], [&](int k) {
         const Index3 low{first[0], first[1], first[2] + k};
         image.copy({low, {first[0] + size_[0] - 1, first[1] + size_[1] - 1, first[2] + k}},

@@ -3,6 +3,7 @@
 
 #include "covol/domain.h"
 #include "covol/image.h"
+#include "covol/run.h"
 
 namespace covol::guidance {
 
@@ -11,7 +12,8 @@ class SmoothImage {
 public:
     /// @param box    world; what is sampled
     /// @param sigma  Gaussian, world units: along axes whose voxels are longer it hardly smooths
-    SmoothImage(const Image& image, const WorldBox& box, double sigma);
+    /// @throws Error InvalidOptions when it takes more than run.memory_budget
+    SmoothImage(const Image& image, const WorldBox& box, double sigma, const RunContext& run = {});
 
     /// Places at equal steps.
     class Line {

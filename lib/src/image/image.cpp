@@ -7,6 +7,7 @@
 
 #include "base/file.h"
 #include "base/matrix.h"
+#include "base/number.h"
 #include "covol/error.h"
 #include "covol/vdb_io.h"
 #include "io/chunked/zarr.h"
@@ -14,6 +15,8 @@
 #include "io/image/image_formats.h"
 #include "io/image/tiff.h"
 #include "io/pixels/chunks.h"
+#include "limits/memory_budget.h"
+#include "limits/world_limits.h"
 
 namespace covol {
 namespace {
@@ -31,16 +34,10 @@ bool is_one_of(const std::string& text, std::initializer_list<const char*> list)
     return std::any_of(list.begin(), list.end(), [&](const char* known) { return text == known; });
 }
 
-/// @throws Error InvalidInput, Unsupported unless spacing is positive, origin finite and the axes perpendicular.
-void check_geometry(const std::string& where, const ImageGeometry& g) {
+/// @throws Error Unsupported unless the axes are perpendicular and of length 1.
+void check_direction(const std::string& where, const ImageGeometry& g) {
     constexpr double kTolerance = 1e-3;
-    for (int a = 0; a < 3; ++a) {
-        if (!(g.spacing[a] > 0) || !std::isfinite(g.spacing[a]))
-            throw Error(Errc::InvalidInput, where + ": spacing: expected a positive spacing, got " +
-                                                std::to_string(g.spacing[a]) + " along axis " + std::to_string(a));
-        if (!std::isfinite(g.origin[a]))
-            throw Error(Errc::InvalidInput, where + ": origin: expected finite numbers, got " +
-                                                std::to_string(g.origin[a]) + " along axis " + std::to_string(a));
+    for (int a = 0; a < 3; ++a)
         for (int b = 0; b <= a; ++b) {
             double dot = 0;
             for (int c = 0; c < 3; ++c) dot += g.direction[c][a] * g.direction[c][b];
@@ -50,7 +47,30 @@ void check_geometry(const std::string& where, const ImageGeometry& g) {
                                 ": direction: expected perpendicular axes of length 1, got sheared or degenerate "
                                 "ones; resample the image");
         }
+}
+
+/// @throws Error InvalidInput, Unsupported unless numbers hold the lattice well.
+void check_geometry(const std::string& where, const ImageGeometry& g) {
+    const auto refuse = [&](const char* what, const std::string& expected, double got, int axis, const char* advice) {
+        throw Error(Errc::InvalidInput, where + ": " + what + ": expected " + expected + ", got " +
+                                            detail::number(got) + " along axis " + std::to_string(axis) + "; " +
+                                            advice);
+    };
+    double finest = detail::kLargestLength;
+    for (int a = 0; a < 3; ++a) {
+        if (!(g.spacing[a] >= detail::kLeastLength && g.spacing[a] * g.size[a] <= detail::kLargestLength))
+            refuse("spacing",
+                   "from " + detail::number(detail::kLeastLength) + ", with " + std::to_string(g.size[a]) +
+                       " voxels up to " + detail::number(detail::kLargestLength / g.size[a]),
+                   g.spacing[a], a, "state it in another unit (`spacing`)");
+        finest = std::min(finest, g.spacing[a]);
     }
+    const double farthest = detail::farthest_origin(finest);
+    for (int a = 0; a < 3; ++a)
+        if (!(std::abs(g.origin[a]) <= farthest))
+            refuse("origin", "within " + detail::number(farthest) + " of 0", g.origin[a], a,
+                   "farther away voxels cannot be told apart well: move the image");
+    check_direction(where, g);
 }
 
 std::unique_ptr<ImageFile> open_either_hdf5(const detail::Hdf5Name& name) {
@@ -354,6 +374,8 @@ Image read_image(const std::string& path, const ReadImageOptions& options, const
         const std::unique_ptr<ImageFile> file = open_image(path, options, run);
         const ImageInfo info = corrected_info(path, *file, options, run);
         const PixelRequest request = choose_pixels(path, info, options);
+        detail::require_memory(double(file->bytes_to_hold(request)), "read_image: " + path + ": the image",
+                               "choose a part with `roi`, or downsample it", run);
         const detail::Pixels pixels = file->read(request, run);
         image.geometry_ = info.geometry;
         image.type_ = info.type;

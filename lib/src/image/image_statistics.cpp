@@ -40,17 +40,21 @@ MinMax scan_row(const T* row, std::int32_t count, std::int64_t stride) {
     return {double(lo), double(hi), finite};
 }
 
-/// Slices in parallel; visit(k) gives each slice's.
+/// `count` slices, spread evenly, in parallel; visit(k) gives each slice's.
 template <typename Visit>
-MinMax scan_slices(const VoxelBox& box, const Visit& visit) {
-    std::vector<MinMax> slices(std::size_t(box.size()[2]));
-    tbb::parallel_for(std::size_t(0), slices.size(), [&](std::size_t n) { slices[n] = visit(box.min[2] + int(n)); });
+MinMax scan_slices(const VoxelBox& box, int count, const Visit& visit) {
+    std::vector<MinMax> slices(std::size_t(std::max(count, 0)));
+    const auto steps = std::int64_t(std::max(count, 2) - 1);
+    tbb::parallel_for(std::size_t(0), slices.size(), [&](std::size_t n) {
+        slices[n] = visit(box.min[2] + int(std::int64_t(n) * (box.size()[2] - 1) / steps));
+    });
     MinMax all;
     for (const MinMax& slice : slices) all.add(slice);
     return all;
 }
 
-constexpr double kSamples = 4e6;  ///< for percentiles
+constexpr double kSamples = 4e6;         ///< for percentiles
+constexpr double kQuickBytes = 1 << 28;  ///< that are read in a second or two
 
 }  // namespace
 
@@ -153,13 +157,17 @@ std::array<double, 2> Image::percentiles(double low, double high) const {
 }
 
 std::array<double, 2> Image::range() const {
+    const double all_slices = held_.size()[2];
+    const int slices = mapped_
+                           ? int(std::clamp(kQuickBytes / double(slice_bytes()), std::min(3.0, all_slices), all_slices))
+                           : held_.size()[2];
     return detail::with_pixel_type(type_, [&](auto pixel) {
         if (chunks_) {
             const auto values = values_of_chunks<decltype(pixel)>(std::numeric_limits<double>::infinity());
             const auto [low, high] = std::minmax_element(values.begin(), values.end());
             return std::array<double, 2>{double(*low), double(*high)};
         }
-        const MinMax all = scan_slices(held_, [&](int k) {
+        const MinMax all = scan_slices(held_, slices, [&](int k) {
             MinMax slice;
             expect_slice(k);
             for (int j = held_.min[1]; j <= held_.max[1]; ++j)
@@ -184,7 +192,7 @@ void Image::require_finite() const {
                 forget_slice(k);
                 return slice;
             };
-            if (scan_slices(held_, slice_is_finite).finite) return;
+            if (scan_slices(held_, held_.size()[2], slice_is_finite).finite) return;
             for (int k = held_.min[2]; k <= held_.max[2]; ++k)
                 for (int j = held_.min[1]; j <= held_.max[1]; ++j)
                     for (int i = held_.min[0]; i <= held_.max[0]; ++i)

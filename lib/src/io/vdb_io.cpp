@@ -14,12 +14,14 @@
 #include <fstream>
 #include <mutex>
 #include <set>
+#include <sstream>
 
 #include "base/file.h"
 #include "covol/error.h"
 #include "covol/version.h"
 #include "io/nanovdb.h"
 #include "io/vdb_walk.h"
+#include "limits/world_limits.h"
 
 namespace covol {
 namespace {
@@ -305,6 +307,21 @@ VdbGridInfo describe(Reader& reader, std::size_t n) {
     return info;
 }
 
+/// @throws Error InvalidInput unless numbers hold the grid's lattice well; transforms that are not linear have none.
+void check_place(const std::string& path, const FloatGrid& grid) {
+    const auto& transform = grid.transform();
+    if (!transform.isLinear()) return;
+    const vdb::Vec3d size = transform.voxelSize(), origin = transform.indexToWorld(vdb::Vec3d(0, 0, 0));
+    const double finest = std::min({size[0], size[1], size[2]}), coarsest = std::max({size[0], size[1], size[2]});
+    const double farthest = detail::farthest_origin(finest);
+    if (coarsest <= detail::kLargestLength && detail::is_within({origin[0], origin[1], origin[2]}, farthest)) return;
+    std::ostringstream text;
+    text << "read_vdb: " << path << ": grid '" << grid.getName() << "': expected voxels up to "
+         << detail::kLargestLength << " in size and an origin within " << farthest << " of 0, got " << size << " and "
+         << origin;
+    throw Error(Errc::InvalidInput, text.str());
+}
+
 }  // namespace
 
 void write_vdb(const std::string& path, const std::vector<FloatGridPtr>& grids, const WriteVdbOptions& options) {
@@ -366,6 +383,7 @@ FloatGridPtr read_vdb(const std::string& given, const std::string& wanted_name) 
                                                     list_grids(reader));
             FloatGridPtr grid = vdb::gridPtrCast<FloatGrid>(reader.read_whole(n));
             if (!grid) throw Error(Errc::InvalidInput, unusable("read_vdb", path));
+            check_place(path, *grid);
             return grid;
         }
         const std::string wanted = name.empty() ? "a float grid" : "a grid named '" + name + "'";

@@ -7,6 +7,7 @@
 #include "base/valid.h"
 #include "base/vector.h"
 #include "covol/error.h"
+#include "limits/memory_budget.h"
 #include "render/draw/decorations.h"
 #include "render/draw/layout.h"
 #include "render/level_set.h"
@@ -430,10 +431,8 @@ Picture render(const RenderScene& scene, const RenderOptions& options, const Run
         if (structure.opacity && !(*structure.opacity >= 0 && *structure.opacity <= 1))
             throw Error(Errc::InvalidOptions,
                         "render: opacity: expected 0 to 1, got " + detail::number(*structure.opacity));
-    const double bytes = figure::kBytesPerPixel * options.width * options.height;
-    if (run.memory_budget > 0 && bytes > double(run.memory_budget))
-        throw Error(Errc::InvalidOptions, "render: a picture of that size takes " + detail::number(bytes) +
-                                              " bytes, more than the memory budget: make it smaller");
+    detail::require_memory(figure::kBytesPerPixel * options.width * options.height, "render: a picture of that size",
+                           "make it smaller", run);
     Picture picture;
     with_threads(run, [&] { picture = figure::Drawing(scene, options, run).go(); });
     return picture;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "limits/memory_budget.h"
 #include "render/draw/decorations.h"
 #include "render/level_set.h"
 #include "render/marks.h"
@@ -32,6 +33,8 @@ public:
         box.min[n] = box.max[n] = std::clamp(int(std::lround(plane.index)), box.min[n], box.max[n]);
         image.load(box, run);
         const Index3 size = box.size();
+        detail::require_memory(sizeof(float) * double(size[0]) * size[1] * size[2],
+                               "render: the plane through " + image.path(), "choose a part of it", run);
         values_.resize(std::size_t(size[0]) * size[1] * size[2]);
         image.copy(box, values_.data());
         std::size_t stride = 1;

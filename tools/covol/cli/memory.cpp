@@ -9,8 +9,13 @@
 #include <chrono>
 #include <cstdlib>
 #include <fstream>
+#include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
+
+#include "cli/arguments.h"
+#include "cli/free_memory.h"
 
 namespace covol::tool {
 namespace {
@@ -18,6 +23,7 @@ namespace {
 // Fresh pages come at some gigabytes a second; a look takes two microseconds.
 constexpr auto kInterval = std::chrono::milliseconds(1);
 constexpr std::uint64_t kSlack = 32;  // a part of the limit, for what ends by itself
+constexpr std::uint64_t kUsablePercent = 80;
 
 /// Pages of this process, read again and again.
 class PageCount {
@@ -49,31 +55,27 @@ private:
 std::uint64_t held_memory() { return PageCount().held(); }
 
 std::uint64_t peak_rss() {
+    // The system's own figure, ru_maxrss, also counts what began this program held before.
+    std::ifstream status("/proc/self/status");
+    for (std::string line; std::getline(status, line);)
+        if (line.starts_with("VmHWM:")) return std::strtoull(line.c_str() + 6, nullptr, 10) * 1024;
     rusage usage{};
     ::getrusage(RUSAGE_SELF, &usage);
     return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
 }
 
-std::uint64_t available_memory() {
-    std::uint64_t available = 0;
-    std::ifstream machine("/proc/meminfo");
-    for (std::string name, unit; machine >> name;) {
-        std::uint64_t kilobytes = 0;
-        machine >> kilobytes;
-        std::getline(machine, unit);
-        if (name == "MemAvailable:") available = kilobytes * 1024;
-    }
-    // The caches of a control group count as its use and are given back on demand: only its limit is sure.
-    for (const char* path : {"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"}) {
-        std::uint64_t limit = 0;
-        if (std::ifstream(path) >> limit) available = std::min(available, limit);
-    }
-    return available;
+MemoryBound choose_memory_bound(const std::string& given) {
+    if (!given.empty()) return {parse_bytes("--memory-limit", given), "--memory-limit " + given};
+    const std::optional<FreeMemory> free = find_free_memory();
+    if (!free) return {};
+    const std::uint64_t bytes = std::max<std::uint64_t>(1, held_memory() + free->bytes / 100 * kUsablePercent);
+    return {bytes, std::to_string(bytes >> 20) + " MiB, " + std::to_string(kUsablePercent) + " % of what " +
+                       free->where + " has free (--memory-limit sets another bound)"};
 }
 
 MemoryGuard::MemoryGuard(std::uint64_t limit, std::atomic<bool>& cancel, std::function<void()> give_up) {
     if (limit == 0) return;
-    watcher_ = std::thread([this, limit, &cancel, give_up = std::move(give_up)] {
+    const auto watch = [this, limit, &cancel, give_up = std::move(give_up)] {
         const PageCount pages;
         std::unique_lock lock(mutex_);
         while (!wake_.wait_for(lock, kInterval, [this] { return done_; })) {
@@ -83,7 +85,12 @@ MemoryGuard::MemoryGuard(std::uint64_t limit, std::atomic<bool>& cancel, std::fu
             cancel = true;
             if (held > limit + limit / kSlack) give_up();
         }
-    });
+    };
+    try {
+        watcher_ = std::thread(watch);
+    } catch (const std::system_error&) {
+        watches_ = false;
+    }
 }
 
 MemoryGuard::~MemoryGuard() {

@@ -16,6 +16,7 @@
 #include "cli/process.h"
 #include "cli/profile.h"
 #include "cli/provenance.h"
+#include "cli/thread_limit.h"
 #include "covol/checkpoints.h"
 #include "covol/error.h"
 #include "covol/evolve.h"
@@ -128,9 +129,8 @@ void expect_values(const CLI::App& app) {
     }
 }
 
-constexpr int kReportSchema = 1;              // grows when a field of the report goes or means something else
-constexpr std::uint64_t kUsablePercent = 95;  // of the free memory: beyond it the system would end us without a word
-constexpr int kMostThreads = 1024;            // TBB runs out of stacks long after
+constexpr int kReportSchema = 1;    // grows when a field of the report goes or means something else
+constexpr int kMostThreads = 1024;  // TBB runs out of stacks long after
 
 }  // namespace
 
@@ -173,9 +173,9 @@ void Session::add_common_flags() {
     app_.add_flag("--strict", strict_,
                   "exit code 5 where anything was warned of, a flow that is not steady or a surface off its marks");
     app_.add_option("--json", json_path_, "write the report to this file, - is standard output")->type_name("FILE|-");
-    app_.add_option(
-            "--memory-limit", memory_limit_text_,
-            "stop when more memory is needed, 8G for example; segment and reconstruct go on in bricks [what is free]")
+    app_.add_option("--memory-limit", memory_limit_text_,
+                    "stop when more memory is needed, 8G for example; segment and reconstruct go on in bricks [80 % of "
+                    "what is free]")
         ->type_name("SIZE");
     app_.add_option("--save-config", save_config_path_, "write the options of this run to a TOML file")
         ->type_name("FILE")
@@ -252,20 +252,24 @@ int Session::execute() {
         run_.log = [this](LogLevel level, const std::string& line) {
             level == LogLevel::Warning ? warn(line) : note(line);
         };
-        if (!memory_limit_text_.empty()) memory_limit_ = parse_bytes("--memory-limit", memory_limit_text_);
-        if (memory_limit_ == 0) memory_limit_ = available_memory() / 100 * kUsablePercent;
-        run_.memory_budget = memory_limit_;
-        guard = std::make_unique<MemoryGuard>(memory_limit_, cancel_requested, [this] {
+        memory_bound_ = choose_memory_bound(memory_limit_text_);
+        run_.memory_budget = memory_bound_.bytes;
+        guard = std::make_unique<MemoryGuard>(memory_bound_.bytes, cancel_requested, [this] {
             if (has_last_word_.test_and_set()) return;  // the process ends by itself
             const int code = tell_failure(kBadInput, memory_text());
             ScratchFolder::remove_all();
             ::_exit(code);
         });
+        const ThreadCount threads = limit_threads(threads_);  // when the guard has its own
         inputs_ = inputs_of(*command_);
         outputs_.protect(inputs_);
         if (json_path_ != "-") outputs_.check("--json", json_path_, OutputKind::Text);
         outputs_.check("--save-config", save_config_path_, OutputKind::Text);
         start_report();
+        if (threads.possible < threads.wanted)
+            note("on " + std::to_string(threads.possible) + " of " + std::to_string(threads.wanted) +
+                 " threads: " + kNoThread);
+        if (!guard->watches()) warn(std::string("memory is not watched: ") + kNoThread);
         bodies_.at(command_)();
         run_.check();
         finish();
@@ -279,6 +283,7 @@ int Session::execute() {
     } catch (const std::bad_alloc&) {
         return fail(kBadInput, "out of memory; use a larger --voxel-size or a --roi");
     } catch (const std::exception& error) {
+        if (is_missing_thread(error)) return fail(kIo, kNoThread);
         return fail(kDefect, std::string("internal error: ") + error.what());
     }
 }
@@ -339,7 +344,7 @@ void Session::write_report() {
 }
 
 std::string Session::memory_text() const {
-    return "more memory is needed than " + memory_limit_name() + "; use a larger --voxel-size or a --roi";
+    return "more memory is needed than " + memory_bound_.name + "; use a larger --voxel-size or a --roi";
 }
 
 std::string Session::interrupted_text() const {
@@ -451,19 +456,13 @@ std::string Session::comment() const {
 }
 
 std::optional<std::uint64_t> Session::memory_limit() const {
-    return memory_limit_text_.empty() ? std::nullopt : std::optional(memory_limit_);
+    return memory_limit_text_.empty() ? std::nullopt : std::optional(memory_bound_.bytes);
 }
 
-void Session::require_memory(std::uint64_t bytes, const std::string& what) const {
-    if (memory_limit_ > 0 && bytes > memory_limit_)
-        throw Error(Errc::InvalidOptions,
-                    what + " alone needs " + std::to_string(bytes) + " bytes, more than " + memory_limit_name());
-}
-
-std::string Session::memory_limit_name() const {
-    return memory_limit_text_.empty() ? "this machine has free, " + std::to_string(memory_limit_ >> 20) +
-                                            " MiB (--memory-limit sets another bound)"
-                                      : "--memory-limit " + memory_limit_text_;
+void Session::require_memory(double bytes, const std::string& what) const {
+    if (run_.memory_budget > 0 && bytes > double(run_.memory_budget))
+        throw Error(Errc::InvalidOptions, what + " needs " + std::to_string(std::llround(bytes / (1 << 20))) +
+                                              " MiB of memory, more than " + memory_bound_.name);
 }
 
 void Session::add_seconds(const std::string& name, double seconds) {

@@ -112,7 +112,7 @@ public:
     /// The command of that name, for its options; null where there is none.
     [[nodiscard]] const CLI::App* command(const std::string& name) const;
     /// Refuses early what cannot fit into --memory-limit, or into what is free: `bytes` for `what` are needed at least.
-    void require_memory(std::uint64_t bytes, const std::string& what) const;
+    void require_memory(double bytes, const std::string& what) const;
     /// Adds to seconds.<name> of the report; seconds.total is the whole run's.
     void add_seconds(const std::string& name, double seconds);
     /// The command stands behind `covol plan`: it says what it would take, and makes nothing.
@@ -141,7 +141,6 @@ private:
     /// Command and options as provenance has them.
     [[nodiscard]] Json options_of_result() const;
     [[nodiscard]] std::string memory_text() const;
-    [[nodiscard]] std::string memory_limit_name() const;
 
     CLI::App app_;
     std::shared_ptr<Help> help_ = std::make_shared<Help>();
@@ -151,7 +150,7 @@ private:
     int threads_ = 0;
     bool quiet_ = false, profile_ = false, strict_ = false, planning_ = false;
     std::string json_path_, save_config_path_, memory_limit_text_;
-    std::uint64_t memory_limit_ = 0;  ///< bytes: as given, else what the machine has free
+    MemoryBound memory_bound_;
 
     std::optional<BrickCall> brick_;
     std::vector<std::string> inputs_;

@@ -148,13 +148,15 @@ void check_image(const std::string& path, const ImageFlags& flags, const RunCont
     facts.unit = g.unit;
     facts.has_spacing = g.spacing_known;
     facts.is_rotated = !g.is_axis_aligned();
-    facts.format = read_image_info(path, flags.options, run).format;
+    const ImageInfo info = read_image_info(path, flags.options, run);
+    facts.format = info.format;
     facts.has_segments = header_holds(path, "Segment0_ID");
     facts.is_big_tiff = header_holds(path, std::string("II+\0", 4)) || header_holds(path, std::string("MM\0+", 4));
     facts.has_display_range = has_display_range(path, facts, range[1]);
     const std::optional<ChunkCount> chunks = image.chunks();
-    const bool is_sample = chunks && chunks->read < chunks->total;
-    if (is_sample)
+    const bool of_chunks = chunks && chunks->read < chunks->total;
+    const bool is_sample = of_chunks || (!chunks && info.bytes_to_hold == 0);  // of a mapped file some slices
+    if (of_chunks)
         findings.remark("of " + std::to_string(chunks->total) + " chunks " + std::to_string(chunks->read) +
                         " were read: what is wrong with the others is found when they are");
     if (range[0] == range[1] && !is_sample)

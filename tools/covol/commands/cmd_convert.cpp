@@ -37,6 +37,8 @@ struct ConvertJob {
         session.set_world(pixels.geometry());
         const double finest = choose_voxel_size(pixels).voxel_size;
         const double h = voxel_size.resolve(finest, finest);
+        session.require_memory(bytes_of_grid(pixels.geometry(), h),
+                               "a grid with voxels of " + to_text(h) + " for all of the image");
         const FloatGridPtr grid = to_grid(pixels, h, session.run());
         session.report()["image"] = to_json(pixels.geometry());
         session.report()["grid"] = {{"voxel_size", h}, {"domain", to_json(domain_of(*grid))}};
@@ -46,7 +48,8 @@ struct ConvertJob {
     void vdb_to_image(Session& session) const {
         const FloatGridPtr grid = read_vdb(input, grid_name);
         const ImageGeometry geometry = like.empty() ? geometry_of(*grid) : image.read_geometry(like, session.run());
-        session.require_memory(4 * std::uint64_t(geometry.size[0]) * geometry.size[1] * geometry.size[2], "the image");
+        session.require_memory(sizeof(float) * double(geometry.size[0]) * geometry.size[1] * geometry.size[2],
+                               "the image");
         const auto values = std::make_shared<std::vector<float>>(sample(*grid, geometry, session.run()));
         session.report()["image"] = to_json(geometry);
         session.outputs().add(

@@ -57,7 +57,10 @@ std::string axis_text(const ImageGeometry& g, int axis) {
     return text.str();
 }
 
-/// Smallest and largest value of one channel.
+/// A large file that is mapped: not all of it is read for the range of its values.
+bool is_range_of_slices(const ImageInfo& info) { return info.bytes_to_hold == 0 && info.chunk_size[0] == 0; }
+
+/// Smallest and largest value of one channel, of a large file an estimate.
 Json range_of(const std::string& path, ReadImageOptions options, int channel, const ImageInfo& info, Session& session) {
     options.channel = channel;
     if (info.frames > 1) options.frame = std::max(options.frame, 0);
@@ -70,8 +73,12 @@ Json range_of(const std::string& path, ReadImageOptions options, int channel, co
                                      (named ? " " + safe_text(info.channel_names[channel]) : "") + ": "
                                : "values: ")
          << range[0] << " to " << range[1] << (info.frames > 1 ? ", frame " + std::to_string(options.frame) : "");
-    if (chunks && chunks->read < chunks->total) text << ", of " << chunks->read << " of " << chunks->total << " chunks";
+    const bool of_chunks = chunks && chunks->read < chunks->total, of_slices = is_range_of_slices(info);
+    if (of_chunks) text << ", of " << chunks->read << " of " << chunks->total << " chunks";
+    if (of_slices) text << ", of slices spread over the file";
+    if (of_chunks || of_slices) text << ": an estimate";
     session.say(text.str());
+    session.report()["image"]["range_is_estimate"] = of_chunks || of_slices;
     return {range[0], range[1]};
 }
 

@@ -1,7 +1,4 @@
 #include <algorithm>
-#include <array>
-#include <cstdio>
-#include <filesystem>
 
 #include "commands/commands.h"
 #include "covol/error.h"
@@ -9,6 +6,7 @@
 #include "covol/structures.h"
 #include "flags/bindings.h"
 #include "jobs/level_sets.h"
+#include "jobs/name_tag.h"
 #include "jobs/page.h"
 
 namespace covol::tool {
@@ -83,10 +81,7 @@ private:
     /// "turn_0001.png" of "turn.png"; the name as it is where there is one picture.
     [[nodiscard]] std::string frame_path(int n) const {
         if (turntable == 0) return output;
-        const std::filesystem::path path(output);
-        std::array<char, 16> number{};
-        std::snprintf(number.data(), number.size(), "_%04d", n + 1);
-        return (path.parent_path() / (path.stem().string() + number.data() + path.extension().string())).string();
+        return with_suffix(output, "_" + padded(n + 1, 4));
     }
 
     /// What the .vdb says of its lengths.

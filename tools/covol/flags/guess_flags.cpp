@@ -45,7 +45,9 @@ Guess read_guess(const std::string& path, int label, const ImageGeometry& image,
             throw Error(Errc::InvalidInput, "--guess: " + path + ": expected a mask, mesh or level set, got points");
         case FileKind::Image: break;
     }
-    guess.mask = placed_on(read_image(path, {}, RunContext{}), image, force);
+    RunContext silent = run;
+    silent.log = {};
+    guess.mask = placed_on(read_image(path, {}, silent), image, force);
     const std::vector<LabelName> labels = find_painted_labels(*guess.mask);
     if (label == 0 && labels.size() > 1)
         throw Error(Errc::InvalidInput, "--guess: " + path + ": expected one label, got " + list_of(labels) +

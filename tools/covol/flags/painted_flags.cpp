@@ -24,11 +24,13 @@ void PaintedFlags::bind(CLI::App& command) {
 
 std::vector<std::shared_ptr<const PaintedFile>> PaintedFlags::read(const RunContext& run) const {
     std::vector<std::shared_ptr<const PaintedFile>> files;
+    RunContext silent = run;
+    silent.log = {};
     for (const std::string& text : paths) {
         run.check();
         const Named named = split_name(text);
         auto file = std::make_shared<PaintedFile>(
-            PaintedFile{named.value, named.name, read_image(named.value, {}, RunContext{}), {}});
+            PaintedFile{named.value, named.name, read_image(named.value, {}, silent), {}});
         for (LabelName& label : find_painted_labels(file->image))
             if (label.label != options.outside_label) file->labels.push_back(std::move(label));
         if (!named.name.empty()) {

@@ -127,6 +127,14 @@ void tell_of_seams(const BrickPlan& plan, const BrickFolder& folder, int sweep, 
         session.note(text.str() + "; their mean is taken");
 }
 
+/// "about 12 million voxels"
+std::string about_voxels(std::int64_t count) {
+    constexpr std::int64_t kMillion = 1'000'000, kThousand = 1'000;
+    const auto rounded = [&](std::int64_t unit) { return std::to_string((count + unit / 2) / unit); };
+    if (count >= 10 * kMillion) return "about " + rounded(kMillion) + " million voxels";
+    return "about " + (count < kThousand ? std::to_string(count) : rounded(kThousand) + "000") + " voxels";
+}
+
 std::string megabytes(double bytes) { return std::to_string(std::llround(bytes / 1e6)) + " MB"; }
 
 /// Whether the mesh has to be streamed. @throws Error where the joined surface takes more than --memory-limit even so
@@ -134,9 +142,8 @@ bool streams_mesh(const SegmentJob& job, const BrickPlan& plan, const Session& s
     const auto voxels = double(plan.active_voxels()), limit = double(session.run().memory_budget);
     if (job.mesh.plain || memory_of_joined_mesh(voxels) < limit) return job.mesh.plain;
     const auto refuse = [&](double bytes, const std::string& what) {
-        throw Error(Errc::InvalidOptions, "bricks: " + what + " of a band of " +
-                                              std::to_string(plan.active_voxels() / 1000000) +
-                                              " million voxels takes about " + megabytes(bytes) + ", more than the " +
+        throw Error(Errc::InvalidOptions, "bricks: " + what + " of a band of " + about_voxels(plan.active_voxels()) +
+                                              " takes about " + megabytes(bytes) + ", more than the " +
                                               megabytes(limit) + " of --memory-limit, or that are free");
     };
     if (memory_of_joined(voxels) > limit)
@@ -178,9 +185,8 @@ void tell_plan(const BrickPlan& plan, Session& session) {
             {"active_voxels", plan.active_voxels()},
             {"largest_brick", largest},
             {"memory_bytes", std::llround(memory)}};
-    session.say("bricks: " + std::to_string(plan.bricks.size()) + ", band: about " +
-                std::to_string(plan.active_voxels() / 1000 * 1000) + " voxels, the largest brick " +
-                std::to_string(largest / 1000 * 1000) + ", which takes about " + megabytes(memory));
+    session.say("bricks: " + std::to_string(plan.bricks.size()) + ", band: " + about_voxels(plan.active_voxels()) +
+                ", the largest brick " + about_voxels(largest) + ", which takes about " + megabytes(memory));
 }
 
 /// Outputs that were named where the job is planned, which is not where they are made.
@@ -270,8 +276,7 @@ SegmentResult solve_within_limit(const SegmentJob& job, const Image* image, cons
             "--checkpoint: the band is larger than --memory-limit allows at once, and bricks keep states of their "
             "own: see covol brick");
     (void)streams_mesh(job, plan, session);  // before the work rather than after it
-    run.info("about " + std::to_string(plan.active_voxels() / 1000000) +
-             " million voxels in the band, more than --memory-limit allows at once: in " +
+    run.info(about_voxels(plan.active_voxels()) + " in the band, more than --memory-limit allows at once: in " +
              std::to_string(plan.bricks.size()) + " bricks");
     const ScratchFolder scratch(std::filesystem::path(job.any_output()).parent_path());
     const BrickFolder folder((scratch.path() / "bricks").string());

@@ -34,6 +34,15 @@ void fill_leaf(const Image& image, const Domain& domain, FloatGrid::TreeType::Le
 
 }  // namespace
 
+double bytes_of_grid(const ImageGeometry& geometry, double h) {
+    const Domain domain = make_domain(geometry.world_box(), h);
+    double leaves = 1;
+    for (int a = 0; a < 3; ++a) leaves *= (domain.max[a] >> 3) - (domain.min[a] >> 3) + 1.0;
+    // and the list of them, and nodes above them
+    constexpr double kBytesOfLeaf = kLeaf * kLeaf * kLeaf * sizeof(float) + 128;
+    return leaves * kBytesOfLeaf;
+}
+
 FloatGridPtr to_grid(const Image& image, double h, const RunContext& run) {
     const Domain domain = make_domain(image.geometry().world_box(), h);
     FloatGridPtr grid = make_grid(domain, 0.0F, "density");

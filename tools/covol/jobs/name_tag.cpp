@@ -46,12 +46,28 @@ std::string padded(int number, int digits) {
     return text;
 }
 
+namespace {
+
+/// A path in front of its ending, and that ending: of "out.nii.gz" it is ".nii.gz".
+struct SplitPath {
+    std::string before, ending;
+};
+
+SplitPath split_ending(std::string path) {
+    while (path.size() > 1 && path.back() == '/') path.pop_back();  // as a shell completes a folder
+    const std::size_t end = path.size() - long_ending(path).size();
+    return {path.substr(0, end), path.substr(end)};
+}
+
+}  // namespace
+
 std::string with_suffix(const std::string& path, const std::string& suffix) {
-    const std::filesystem::path whole(path);
-    std::string name = whole.filename().string();
-    const std::size_t end = long_ending(name).size();
-    if (end == 0) return path + suffix;
-    return (whole.parent_path() / name.insert(name.size() - end, suffix)).string();
+    const SplitPath split = split_ending(path);
+    return split.before + suffix + split.ending;
+}
+
+std::string with_ending(const std::string& path, const std::string& ending) {
+    return split_ending(path).before + ending;
 }
 
 bool has_frame_pattern(const std::string& path) { return find_placeholder(path).begin != std::string::npos; }

@@ -6,6 +6,8 @@ namespace covol::tool {
 
 /// "out.ply", "_ve" -> "out_ve.ply"; endings of two parts (.nii.gz, .seg.nrrd) stay whole.
 [[nodiscard]] std::string with_suffix(const std::string& path, const std::string& suffix);
+/// "out.nii.gz", ".txt" -> "out.txt"
+[[nodiscard]] std::string with_ending(const std::string& path, const std::string& ending);
 
 /// "marks_{frame:03}.csv", 7 -> "marks_007.csv"; {frame} and {frame:03d} are understood too.
 /// @throws UsageError when braces hold something else.

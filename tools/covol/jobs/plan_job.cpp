@@ -20,25 +20,32 @@ namespace covol::tool {
 namespace {
 
 // Measured: docs/benchmarks.md, Plans.
-constexpr double kBandBytes = 130;    ///< peak memory for each voxel of the band, mesh and files included
-constexpr double kTubeBytes = 12;     ///< for each voxel of a distance tube
-constexpr double kBaseBytes = 1e8;    ///< the program itself
-constexpr double kFlowTime = 1.3;     ///< a flow with an image over one without
+constexpr double kBandBytes = 108;       ///< peak memory for each voxel of the band, mesh and files included
+constexpr double kTubeBytes = 12;        ///< for each voxel of a distance tube
+constexpr double kBaseBytes = 6.5e7;     ///< the program itself
+constexpr double kGuessBandBytes = 335;  ///< in place of kBandBytes while a guess learns from the image
+constexpr double kCloudPointBytes = 4000, kMostCloudBytes = 1e8;  ///< for each point of a cloud, and of all
+constexpr double kFlowTime = 1.3;                                 ///< a flow with an image over one without
 constexpr double kGuessTime = 2.8;    ///< the same of a guess, which learns what the image shows at the marks
 constexpr double kPilotVoxels = 128;  ///< across the marks' box, on the finer of the two lattices
 constexpr double kReachVoxels = 12;   ///< how far from the surface the image is sampled
+constexpr double kGuessVoxels = 25;   ///< the same of a guess, which smooths all of the image's part around it
+constexpr double kGuessBytes = 8;     ///< for each voxel of that part: two copies
+constexpr std::int64_t kMappedBytes = 1 << 16;  ///< of a file that the system puts into memory at once
 
 /// What the marks alone came to on a coarse lattice.
 struct Pilot {
     double voxel_size = 0, active_voxels = 0, tube_voxels = 0, seconds = 0;
-    bool is_guess = false;
+    bool is_guess = false, is_cloud = false;
     FloatGridPtr surface;
 };
 
 struct StructurePlan {
     std::string name;
-    double active_voxels = 0, tube_voxels = 0, seconds = 0, area = 0;
-    std::set<std::uint64_t> chunks;
+    double active_voxels = 0, tube_voxels = 0, seconds = 0;
+    double bytes_while_solved = 0;   ///< beyond those of its band
+    double smoothed_voxels = 0;      ///< of the image
+    std::set<std::uint64_t> blocks;  ///< that are read
 };
 
 Pilot run_pilot(const SegmentJob& job, const StructureInput& input, const ImageGeometry* geometry, double h,
@@ -70,34 +77,97 @@ Pilot run_pilot(const SegmentJob& job, const StructureInput& input, const ImageG
                 0,
                 watch.seconds(),
                 start == Start::Kind::Guess,
+                start == Start::Kind::Cloud,
                 result.surface};
     if (result.distance) pilot.tube_voxels = double(result.distance->activeVoxelCount());
     return pilot;
 }
 
-/// The chunks that hold what lies within `reach` of the surface.
-std::set<std::uint64_t> chunks_near(const FloatGrid& surface, const ImageInfo& image, double reach) {
-    std::set<std::uint64_t> chunks;
-    const ImageGeometry& g = image.geometry;
-    Index3 counts;
-    for (int a = 0; a < 3; ++a) counts[a] = (g.size[a] - 1) / image.chunk_size[a] + 1;
+/// What is read of a large image at once: a chunk, or the pages of a mapped file that come together. 0: all of it.
+Index3 block_of(const ImageInfo& image) {
+    if (image.bytes_to_hold > 0 || image.chunk_size[0] > 0) return image.chunk_size;
+    const auto voxels = std::int32_t(kMappedBytes / std::int64_t(bytes_of(image.type)));
+    const Index3& n = image.geometry.size;
+    return {std::min(n[0], voxels), std::clamp(voxels / n[0], 1, n[1]), 1};
+}
+
+double voxels_of(const Index3& size) { return double(size[0]) * size[1] * size[2]; }
+
+/// Blocks of an image that hold given places.
+class Blocks {
+public:
+    explicit Blocks(const ImageInfo& image) : geometry_(image.geometry), block_(block_of(image)) {
+        for (int a = 0; a < 3; ++a) counts_[a] = (geometry_.size[a] - 1) / block_[a] + 1;
+    }
+    [[nodiscard]] double count() const { return voxels_of(counts_); }
+
+    /// Those with voxels from `low` to `high`, in indices.
+    void add(const Vec3& low, const Vec3& high) {
+        Index3 first, last;
+        for (int a = 0; a < 3; ++a) {
+            const double end = geometry_.size[a] - 1;
+            first[a] = int(std::clamp(low[a], 0.0, end)) / block_[a];
+            last[a] = int(std::clamp(high[a], 0.0, end)) / block_[a];
+        }
+        for (int k = first[2]; k <= last[2]; ++k)
+            for (int j = first[1]; j <= last[1]; ++j)
+                for (int i = first[0]; i <= last[0]; ++i)
+                    found.insert((std::uint64_t(k) * counts_[1] + j) * counts_[0] + i);
+    }
+
+    std::set<std::uint64_t> found;
+
+private:
+    const ImageGeometry& geometry_;
+    Index3 block_, counts_{};
+};
+
+/// Calls visit(low, high) with the image's indices within `reach` of each place of the surface.
+template <typename Visit>
+void for_each_place(const FloatGrid& surface, const ImageGeometry& g, double reach, const Visit& visit) {
     const double h = surface.voxelSize()[0];
     for (auto value = surface.cbeginValueOn(); value; ++value) {
         if (std::abs(*value) > h) continue;
         const openvdb::Vec3d w = surface.indexToWorld(value.getCoord());
         const Vec3 at = g.world_to_index({w[0], w[1], w[2]});
-        Index3 first, last;
+        Vec3 low, high;
         for (int a = 0; a < 3; ++a) {
-            const double voxels = (reach + h) / g.spacing[a], end = g.size[a] - 1;
-            first[a] = int(std::clamp(at[a] - voxels, 0.0, end)) / image.chunk_size[a];
-            last[a] = int(std::clamp(at[a] + voxels, 0.0, end)) / image.chunk_size[a];
+            low[a] = at[a] - reach / g.spacing[a];
+            high[a] = at[a] + reach / g.spacing[a];
         }
-        for (int k = first[2]; k <= last[2]; ++k)
-            for (int j = first[1]; j <= last[1]; ++j)
-                for (int i = first[0]; i <= last[0]; ++i)
-                    chunks.insert((std::uint64_t(k) * counts[1] + j) * counts[0] + i);
+        visit(low, high);
     }
-    return chunks;
+}
+
+/// What a flow reads: what lies within `reach` of the surface.
+void plan_samples(const FloatGrid& surface, const ImageInfo& image, double reach, StructurePlan& plan) {
+    if (block_of(image)[0] == 0) return;
+    Blocks blocks(image);
+    for_each_place(surface, image.geometry, reach + surface.voxelSize()[0],
+                   [&](const Vec3& low, const Vec3& high) { blocks.add(low, high); });
+    plan.blocks = std::move(blocks.found);
+}
+
+/// What a guess reads and smooths: the part of the image within `reach` of the surface's box.
+void plan_smoothing(const FloatGrid& surface, const ImageInfo& image, double reach, StructurePlan& plan) {
+    Vec3 lowest, highest;
+    lowest.fill(1e300);
+    highest.fill(-1e300);
+    for_each_place(surface, image.geometry, reach, [&](const Vec3& low, const Vec3& high) {
+        for (int a = 0; a < 3; ++a) {
+            lowest[a] = std::min(lowest[a], low[a]);
+            highest[a] = std::max(highest[a], high[a]);
+        }
+    });
+    plan.smoothed_voxels = 1;
+    for (int a = 0; a < 3; ++a) {
+        const double end = image.geometry.size[a] - 1;
+        plan.smoothed_voxels *= std::clamp(highest[a], 0.0, end) - std::clamp(lowest[a], 0.0, end) + 1;
+    }
+    if (block_of(image)[0] == 0) return;
+    Blocks blocks(image);
+    blocks.add(lowest, highest);
+    plan.blocks = std::move(blocks.found);
 }
 
 StructurePlan plan_structure(const SegmentJob& job, const StructureInput& input, const ImageInfo* image, double given_h,
@@ -123,8 +193,17 @@ StructurePlan plan_structure(const SegmentJob& job, const StructureInput& input,
     plan.tube_voxels = pilot.tube_voxels * finer * finer * finer;
     plan.seconds = fixed + growing / (c * c) * finer * finer;
     if (image != nullptr) plan.seconds *= pilot.is_guess ? kGuessTime : kFlowTime;
-    if (image != nullptr && image->chunk_size[0] > 0)
-        plan.chunks = chunks_near(*pilot.surface, *image, kReachVoxels * h);
+    plan.bytes_while_solved = kTubeBytes * plan.tube_voxels - kBandBytes * plan.active_voxels;
+    if (pilot.is_cloud)
+        plan.bytes_while_solved = std::min(kCloudPointBytes * double(marks.given.size()), kMostCloudBytes);
+    if (image == nullptr) return plan;
+    if (pilot.is_guess) {
+        plan_smoothing(*pilot.surface, *image, kGuessVoxels * h, plan);
+        plan.bytes_while_solved =
+            (kGuessBandBytes - kBandBytes) * plan.active_voxels + kGuessBytes * plan.smoothed_voxels;
+    } else {
+        plan_samples(*pilot.surface, *image, kReachVoxels * h, plan);
+    }
     return plan;
 }
 
@@ -167,40 +246,41 @@ void run_plan(const SegmentJob& job, Session& session) {
         session.say("image: " + size_text(n) + " " + to_string(image->type) + ", " + image->format + ", " +
                     bytes_text(image_bytes) + " unpacked");
     }
-    double voxels = 0, tube = 0, seconds = 0;
-    std::set<std::uint64_t> chunks;
+    double voxels = 0, while_solved = 0, seconds = 0;
+    std::set<std::uint64_t> blocks;
     for (const StructureInput& input : structures_of(job, job.painted.read(session.run()))) {
         const StructurePlan one = plan_structure(job, input, image ? &*image : nullptr, given_h, session, quiet);
         voxels += one.active_voxels;
-        tube = std::max(tube, one.tube_voxels);
+        while_solved = std::max(while_solved, one.bytes_while_solved);
         seconds += one.seconds;
-        chunks.insert(one.chunks.begin(), one.chunks.end());
+        blocks.insert(one.blocks.begin(), one.blocks.end());
     }
-    double held = image ? double(image->bytes_to_hold) : 0;
-    if (image && image->chunk_size[0] > 0) {
-        const Index3& c = image->chunk_size;
-        double total = 1, each = pixel_bytes;
-        for (int a = 0; a < 3; ++a) {
-            total *= (image->geometry.size[a] - 1) / c[a] + 1;
-            each *= c[a];
+    double held = image ? double(image->bytes_to_hold) : 0, mapped = 0;
+    if (image && block_of(*image)[0] > 0) {
+        const double each = voxels_of(block_of(*image)) * pixel_bytes, total = Blocks(*image).count();
+        const bool in_chunks = image->chunk_size[0] > 0, lazily = image->bytes_to_hold == 0;
+        const double read = lazily ? double(blocks.size()) : total;
+        if (!in_chunks) mapped = read * each;
+        if (in_chunks && lazily) held = read * each;
+        if (in_chunks) {
+            plan["image"]["chunks"] = {{"size", image->chunk_size},
+                                       {"read", std::llround(read)},
+                                       {"of", std::llround(total)},
+                                       {"unpacked_bytes", std::llround(read * each)}};
+            session.say("chunks of " + size_text(image->chunk_size) + ": about " + std::to_string(std::llround(read)) +
+                        " of " + std::to_string(std::llround(total)) + " are read, " + bytes_text(read * each) +
+                        " unpacked");
         }
-        const bool lazily = image->bytes_to_hold == 0;
-        const double read = lazily ? double(chunks.size()) : total;
-        if (lazily) held = read * each;
-        plan["image"]["chunks"] = {{"size", c},
-                                   {"read", std::llround(read)},
-                                   {"of", std::llround(total)},
-                                   {"unpacked_bytes", std::llround(read * each)}};
-        session.say("chunks of " + size_text(c) + ": about " + std::to_string(std::llround(read)) + " of " +
-                    std::to_string(std::llround(total)) + " are read, " + bytes_text(read * each) + " unpacked");
     }
-    const double memory = kBaseBytes + held + std::max(kBandBytes * voxels, kTubeBytes * tube);
+    const double memory = kBaseBytes + held + mapped + kBandBytes * voxels + while_solved;
+    plan["mapped_bytes"] = std::llround(mapped);
     plan["active_voxels"] = std::llround(voxels);
     plan["memory_bytes"] = std::llround(memory);
     plan["seconds"] = seconds;
     session.say("band: about " + std::to_string(std::llround(voxels / 1000) * 1000) + " voxels");
     session.say("memory: about " + bytes_text(memory) +
-                (held > 0 ? ", of which the image takes " + bytes_text(held) : ""));
+                (held > 0 ? ", of which the image takes " + bytes_text(held) : "") +
+                (mapped > 0 ? ", of which " + bytes_text(mapped) + " are pages of the image's file" : ""));
     std::ostringstream time;
     time << "time: about " << std::setprecision(2) << seconds << " s on this machine, without reading a packed image";
     session.say(time.str());

@@ -198,7 +198,7 @@ Image SegmentJob::read(const std::string& path, const ReadImageOptions& options,
         const double finest = *std::min_element(spacing.begin(), spacing.end());
         needed.roi = sampled_box(*domain.roi, domain.voxel_size.resolve(finest, finest));
     }
-    session.require_memory(read_image_info(path, needed, session.run()).bytes_to_hold, "the image");
+    session.require_memory(double(read_image_info(path, needed, session.run()).bytes_to_hold), "the image");
     Image pixels = read_image(path, needed, session.run());
     session.set_world(pixels.geometry());
     Json& input = session.report()["input"]["image"];

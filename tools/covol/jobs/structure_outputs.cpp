@@ -22,9 +22,7 @@ bool keeps_names(const std::string& path) {
     return false;
 }
 
-std::string labels_path(const std::string& mask) {
-    return std::filesystem::path(with_suffix(mask, "_labels")).replace_extension(".txt").string();
-}
+std::string labels_path(const std::string& mask) { return with_ending(mask, "_labels.txt"); }
 
 FloatGridPtr named(FloatGridPtr grid, const std::string& name) {
     grid->setName(name);

@@ -10,6 +10,8 @@
 #include <cstring>
 #include <mutex>
 
+#include "limits/memory_budget.h"
+
 namespace covol::detail {
 namespace {
 
@@ -202,11 +204,9 @@ void ChunkedVoxels::load(const std::vector<VoxelBox>& boxes, const RunContext& r
     }
     std::sort(missing.begin(), missing.end());
     missing.erase(std::unique(missing.begin(), missing.end()), missing.end());
-    const std::uint64_t bytes = missing.size() * voxel_count(source_->chunk_size()) * pixel_bytes(source_->type());
-    if (run.memory_budget > 0 && bytes > run.memory_budget)
-        throw read_error(Errc::InvalidOptions, source_->path(),
-                         "the parts that are needed take " + std::to_string(bytes >> 20) + " MiB, the budget is " +
-                             std::to_string(run.memory_budget >> 20) + " MiB; choose a part with `roi`");
+    require_memory(
+        double(missing.size()) * double(voxel_count(source_->chunk_size())) * double(pixel_bytes(source_->type())),
+        "read_image: " + source_->path() + ": what is asked for of it", "choose a part with `roi`", run);
     std::vector<std::vector<std::uint64_t>> groups;
     const std::uint64_t in_layer = std::uint64_t(counts_[0]) * counts_[1];
     for (const std::uint64_t number : missing) {

@@ -12,6 +12,8 @@ namespace {
 constexpr std::uint32_t kEndSignature = 0x06054b50, kEntrySignature = 0x02014b50, kLocalSignature = 0x04034b50;
 constexpr std::uint64_t kEndSize = 22, kEntrySize = 46, kLocalSize = 30;
 constexpr std::uint64_t kLargestRatio = 1032;  // of deflate
+// Outlines and their names pack to between a half and a tenth.
+constexpr std::uint64_t kLargestArchiveRatio = 16, kAlways = std::uint64_t(16) << 20;
 
 struct Entry {
     std::string name;
@@ -59,7 +61,8 @@ std::string inflate(const Entry& entry, std::string_view packed, const std::stri
     return content;
 }
 
-std::string unpack(const Bytes& bytes, const Entry& entry, const std::string& path) {
+/// The entry's packed bytes, which may hold what it says that they do.
+std::string_view find_packed(const Bytes& bytes, const Entry& entry, const std::string& path) {
     const auto unsupported = [&](const char* what) {
         throw Error(Errc::Unsupported, "read_points: " + path + ": entry " + quote(entry.name) + " is " + what);
     };
@@ -73,6 +76,10 @@ std::string unpack(const Bytes& bytes, const Entry& entry, const std::string& pa
     if (entry.size > kLargestRatio * entry.packed + 1024 || (entry.method == 0 && entry.size != entry.packed))
         fail(path, "entry " + quote(entry.name) + ": " + std::to_string(entry.packed) + " bytes cannot hold " +
                        std::to_string(entry.size));
+    return packed;
+}
+
+std::string unpack(const Entry& entry, std::string_view packed, const std::string& path) {
     const std::string content = entry.method == 0 ? std::string(packed) : inflate(entry, packed, path);
     if (crc32(0, reinterpret_cast<const Bytef*>(content.data()), static_cast<uInt>(content.size())) != entry.checksum)
         fail(path, "entry " + quote(entry.name) + " does not agree with its checksum; the archive is damaged");
@@ -88,14 +95,22 @@ void for_each_in_zip(const std::string& path, std::string_view archive,
     const std::uint64_t end = find_end(bytes, path);
     const int count = bytes.at<std::uint16_t>(end + 10);
     std::uint64_t at = bytes.at<std::uint32_t>(end + 16);
-    std::uint64_t total = 0;
+    const std::uint64_t most = kAlways + kLargestArchiveRatio * bytes.size();
+    std::uint64_t total = 0, unpacked = 0;
     for (int n = 0; n < count; ++n) {
         const Entry entry = read_entry(bytes, at, path);
         at += kEntrySize + entry.name.size() + bytes.at<std::uint16_t>(at + 30) + bytes.at<std::uint16_t>(at + 32);
         // Entries that share their bytes are how a small archive becomes a huge one.
         total += entry.packed;
         if (total > bytes.size()) fail(path, "the archive's entries overlap");
-        if (wanted(entry.name)) use(entry.name, unpack(bytes, entry, path));
+        if (!wanted(entry.name)) continue;
+        const std::string_view packed = find_packed(bytes, entry, path);
+        unpacked += entry.size;
+        if (unpacked > most)
+            throw Error(Errc::Unsupported, "read_points: " + path + ": an archive of " + std::to_string(bytes.size()) +
+                                               " bytes claims to hold more than " + std::to_string(most) +
+                                               ", which no marks do; unpack it, and give its files");
+        use(entry.name, unpack(entry, packed, path));
     }
 }
 

@@ -1,0 +1,88 @@
+#include "cli/thread_limit.h"
+
+#include <tbb/global_control.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstdlib>
+#include <cstring>
+#include <future>
+#include <string>
+#include <system_error>
+#include <thread>
+#include <vector>
+
+#include "cli/session.h"
+#include "covol/file_set.h"
+
+namespace covol::tool {
+namespace {
+
+/// How many of so many threads can be there at once beside those that are.
+int count_possible(int wanted) {
+    std::promise<void> all_there;
+    const std::shared_future<void> end = all_there.get_future().share();
+    std::vector<std::thread> threads;
+    threads.reserve(std::size_t(std::max(0, wanted)));
+    try {
+        while (int(threads.size()) < wanted) threads.emplace_back([end] { end.wait(); });
+    } catch (const std::system_error&) {
+        // so many it is
+    }
+    all_there.set_value();
+    for (std::thread& thread : threads) thread.join();
+    return int(threads.size());
+}
+
+std::atomic<bool> may_have_files = false;
+
+/// For threads that cannot be made where no exception is caught: in TBB, and in libraries that make some as they are
+/// loaded.
+[[noreturn]] void on_terminate() {
+    try {
+        if (const std::exception_ptr thrown = std::current_exception()) std::rethrow_exception(thrown);
+    } catch (const std::exception& error) {
+        if (is_missing_thread(error)) {
+            for (const char* part : {"covol: error: ", kNoThread, "\n"})
+                static_cast<void>(!::write(STDERR_FILENO, part, std::strlen(part)));
+            if (may_have_files) ScratchFolder::remove_all();
+            ::_exit(kIo);
+        }
+        for (const char* part : {"covol: error: internal error: ", error.what(), "\n"})
+            static_cast<void>(!::write(STDERR_FILENO, part, std::strlen(part)));
+    } catch (...) {
+        // abort() says enough
+    }
+    std::abort();
+}
+
+void before_libraries(int, char**, char**) { std::set_terminate(on_terminate); }
+
+// Run by the loader before anything of a library is: log4cplus, which OpenVDB brings, makes threads as it is loaded.
+[[gnu::used, gnu::section(".preinit_array")]] void (*const early)(int, char**, char**) = before_libraries;
+
+}  // namespace
+
+ThreadCount limit_threads(int threads) {
+    const auto most = int(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+    ThreadCount count;
+    count.wanted = threads > 0 ? std::min(threads, most) : most;
+    // One more than TBB makes: a reader tries files in a copy of the process.
+    count.possible = std::max(1, count_possible(count.wanted));
+    // Never destroyed: TBB would make the threads then.
+    if (count.possible < count.wanted)
+        static_cast<void>(
+            new tbb::global_control(tbb::global_control::max_allowed_parallelism, std::size_t(count.possible)));
+    return count;
+}
+
+bool is_missing_thread(const std::exception& error) {
+    if (const auto* system = dynamic_cast<const std::system_error*>(&error))
+        return system->code() == std::errc::resource_unavailable_try_again;
+    return std::string(error.what()).starts_with("pthread_create has failed");  // TBB's
+}
+
+void expect_temporary_files() { may_have_files = true; }
+
+}  // namespace covol::tool
