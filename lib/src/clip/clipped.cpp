@@ -23,10 +23,6 @@ openvdb::CoordBBox voxels_of(const Domain& d) {
     return {Coord(d.min[0], d.min[1], d.min[2]), Coord(d.max[0], d.max[1], d.max[2])};
 }
 
-double along(const HalfSpace& plane, const Vec3& x) {
-    return plane.normal[0] * x[0] + plane.normal[1] * x[1] + plane.normal[2] * x[2] - plane.offset;
-}
-
 Vec3 projected(const Clip& clip, Vec3 x) {
     for (int round = 0; round < kProjections; ++round) {
         bool moved = false;
@@ -311,12 +307,6 @@ std::optional<LatticeClip> on_lattice(const Clip& planes, const Domain& domain) 
 }
 
 }  // namespace
-
-double depth_in(const Clip& clip, const Vec3& x) {
-    double depth = -std::numeric_limits<double>::infinity();
-    for (const HalfSpace& plane : clip) depth = std::max(depth, along(plane, x));
-    return depth;
-}
 
 int LatticeClip::face_layer(int axis, bool upper) const {
     return upper ? int(std::ceil(high[axis] - kLeastCell)) : int(std::floor(low[axis] + kLeastCell));

@@ -10,6 +10,10 @@ struct PaintedHeuristics {
     int narrowest = heuristic("painted.narrowest", 3);
     /// [ratio] Of the widest patch to a run of painted slices, at least, for them to be slices.
     int thin_run = heuristic("painted.thin_run", 3);
+    /// [of the largest section] A section that is taken for as large.
+    double about_largest = heuristic("painted.about_largest", 0.9);
+    /// [of the widest ends] Ends that are taken for as wide.
+    double as_wide = heuristic("painted.as_wide", 0.98);
 };
 COVOL_HEURISTICS PaintedHeuristics kPainted{};
 

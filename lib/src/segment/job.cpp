@@ -53,4 +53,12 @@ Domain Job::domain_with_chosen_margin(double automatic) const {
     return domain_with_margin(options.margin.value_or(automatic));
 }
 
+Clip Job::where_it_ends() const {
+    Clip all = image != nullptr ? make_clip(image->geometry()) : Clip{};
+    if (!options.roi) return all;
+    const Clip region = make_clip(*options.roi);
+    all.insert(all.end(), region.begin(), region.end());
+    return all;
+}
+
 }  // namespace covol::pipeline

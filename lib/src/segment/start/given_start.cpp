@@ -60,6 +60,7 @@ void start_as_given(Job& job) {
         Timed timed(job.report().seconds.tag);
         job.result.u = start_grid(job.options.start, job.domain(), job.run);
     }
+    note_border(job);
     const bool is_rough = job.options.start.kind == Start::Kind::Sphere || job.options.start.kind == Start::Kind::Box;
     if (is_rough) grow_to_edges(job);
     if (!job.uses_points()) return;

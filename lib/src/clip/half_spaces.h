@@ -1,0 +1,47 @@
+#pragma once
+// Half-spaces, and directions beside and within their planes.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "base/vector.h"
+#include "covol/clip.h"
+
+namespace covol::detail {
+
+/// n·x - offset: how far beyond the plane a position lies, negative within.
+[[nodiscard]] inline double along(const HalfSpace& plane, const Vec3& x) {
+    return cloud::dot(plane.normal, x) - plane.offset;
+}
+
+/// Largest n·x - offset: the distance to the clip's boundary inside (negative), no more than that outside.
+[[nodiscard]] inline double depth_in(const Clip& clip, const Vec3& x) {
+    double depth = -std::numeric_limits<double>::infinity();
+    for (const HalfSpace& plane : clip) depth = std::max(depth, along(plane, x));
+    return depth;
+}
+
+[[nodiscard]] inline Vec3 moved(const Vec3& x, const Vec3& direction, double by) {
+    return cloud::plus(x, cloud::times(by, direction));
+}
+
+/// Two perpendicular directions in the plane; of a plane along two of the world's axes, these.
+[[nodiscard]] inline std::array<Vec3, 2> directions_in(const HalfSpace& plane) {
+    const Vec3& n = plane.normal;
+    int across = 0;
+    for (int a = 1; a < 3; ++a)
+        if (std::abs(n[a]) > std::abs(n[across])) across = a;
+    std::array<Vec3, 2> found;
+    for (int i = 0, a = 0; a < 3; ++a) {
+        if (a == across) continue;
+        Vec3 direction{0, 0, 0};
+        direction[a] = 1;
+        direction = moved(direction, n, -n[a]);
+        if (i == 1) direction = moved(direction, found[0], -cloud::dot(direction, found[0]));
+        found[i++] = cloud::unit(direction);
+    }
+    return found;
+}
+
+}  // namespace covol::detail
