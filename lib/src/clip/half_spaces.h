@@ -26,6 +26,22 @@ namespace covol::detail {
     return cloud::plus(x, cloud::times(by, direction));
 }
 
+/// The nearest position in the clip, found by projecting onto its planes in turn; of a box it is exact.
+[[nodiscard]] inline Vec3 projected(const Clip& clip, Vec3 x) {
+    constexpr int kProjections = 8;
+    for (int round = 0; round < kProjections; ++round) {
+        bool any = false;
+        for (const HalfSpace& plane : clip) {
+            const double beyond = along(plane, x);
+            if (!(beyond > 0)) continue;
+            for (int a = 0; a < 3; ++a) x[a] -= beyond * plane.normal[a];
+            any = true;
+        }
+        if (!any) break;
+    }
+    return x;
+}
+
 /// Two perpendicular directions in the plane; of a plane along two of the world's axes, these.
 [[nodiscard]] inline std::array<Vec3, 2> directions_in(const HalfSpace& plane) {
     const Vec3& n = plane.normal;

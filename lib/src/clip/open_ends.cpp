@@ -6,9 +6,7 @@
 
 namespace covol::detail {
 
-double ImageFace::depth(const Vec3& x) const {
-    return -along(plane, x);
-}
+double ImageFace::depth(const Vec3& x) const { return -along(plane, x); }
 
 std::vector<ImageFace> faces_of(const ImageGeometry& geometry) {
     const Clip clip = make_clip(geometry);  // two for each axis

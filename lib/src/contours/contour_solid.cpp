@@ -119,8 +119,8 @@ private:
         return slice().open ? std::max(carried_on(c, height), height - slice().end) : c.here + beyond(height);
     }
     /// Beyond an open end a wall that came inward goes on as it came. One that went outward slows down as a paraboloid
-    /// does whose pole is the wall of the slice before, and leans outward by 45 degrees at most: bodies are round, and a
-    /// section that grew fast does not grow for ever.
+    /// does whose pole is the wall of the slice before, and leans outward by 45 degrees at most: bodies are round, and
+    /// a section that grew fast does not grow for ever.
     [[nodiscard]] double carried_on(const Column& c, double height) const {
         const double t = height / std::abs(slice().w - inner().w), change = c.here - c.there;
         return c.here + (change > 0 ? t * change : std::max((std::sqrt(1 + t) - 1) * change, -height));
@@ -319,7 +319,8 @@ WorldBox ContourSolid::box() const {
         if (end->open) wider = std::max(wider, end->end);
     for (const double x : {grid.origin[0] - wider, grid.origin[0] + grid.cell * (grid.nx - 1) + wider})
         for (const double y : {grid.origin[1] - wider, grid.origin[1] + grid.cell * (grid.ny - 1) + wider})
-            for (const double w : {slices.front().w - slices.front().highest(), slices.back().w + slices.back().highest()})
+            for (const double w :
+                 {slices.front().w - slices.front().highest(), slices.back().w + slices.back().highest()})
                 corners.push_back(data_->frame.to_world({x, y, w}));
     return bounding_box(corners);
 }

@@ -1,8 +1,12 @@
 #include "covol/guess.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <memory>
+#include <numbers>
+#include <set>
 #include <utility>
 
 #include "base/valid.h"
@@ -102,9 +106,44 @@ std::size_t count_wrong(const guess::MarksSurface& surface, const InImage& optio
     return wrong;
 }
 
+/// The marks beside each face, and under null those beside none, in their order.
+std::map<const HalfSpace*, std::vector<Vec3>> by_face(const std::vector<Vec3>& marks, const InImage& options) {
+    std::map<const HalfSpace*, std::vector<Vec3>> found;
+    for (const Vec3& mark : marks) found[end_beside(mark, options)].push_back(mark);
+    return found;
+}
+
+/// Whether marks that lie around this one within the face's plane leave no way out.
+bool is_surrounded(const Vec3& mark, const std::vector<Vec3>& others, const HalfSpace& face) {
+    const auto [u, v] = detail::directions_in(face);
+    std::vector<std::array<double, 2>> around;  // squared distance, direction
+    for (const Vec3& other : others) {
+        const Vec3 to = cloud::minus(other, mark);
+        const double x = cloud::dot(to, u), y = cloud::dot(to, v);
+        if (x != 0 || y != 0) around.push_back({x * x + y * y, std::atan2(y, x)});
+    }
+    const std::size_t count = std::min(kGuess.around, around.size());
+    std::partial_sort(around.begin(), around.begin() + std::ptrdiff_t(count), around.end());
+    std::vector<double> directions;
+    for (std::size_t n = 0; n < count; ++n) directions.push_back(around[n][1]);
+    std::sort(directions.begin(), directions.end());
+    double gap =
+        directions.empty() ? 2 * std::numbers::pi : directions.front() + 2 * std::numbers::pi - directions.back();
+    for (std::size_t n = 1; n < directions.size(); ++n) gap = std::max(gap, directions[n] - directions[n - 1]);
+    return gap < kGuess.way_out * std::numbers::pi;
+}
+
+/// Whether marks beside a face lie along a line around an area, not all over it: then they are the outline of the cut,
+/// whatever the others say.
+bool is_outline(const std::vector<Vec3>& marks, const HalfSpace& face) {
+    if (marks.size() < kGuess.least_outline) return false;
+    const auto surrounded =
+        std::count_if(marks.begin(), marks.end(), [&](const Vec3& mark) { return is_surrounded(mark, marks, face); });
+    return double(surrounded) <= kGuess.surrounded_share * double(marks.size());
+}
+
 /// How far inside the body's section a mark lies, measured within the plane of the cut: negative, or positive outside.
-double within_section(const guess::MarksSurface& body, const Vec3& mark, const HalfSpace& cut,
-                      const InImage& options) {
+double within_section(const guess::MarksSurface& body, const Vec3& mark, const HalfSpace& cut, const InImage& options) {
     double slope = 0;
     for (const Vec3& direction : detail::directions_in(cut)) {
         const double step = std::max(deviation_along(options, direction), 1e-12);
@@ -115,11 +154,13 @@ double within_section(const guess::MarksSurface& body, const Vec3& mark, const H
 }
 
 /// Marks in the cut lie inside the section of the body that the others mark: the surface need not pass them.
-std::vector<Vec3> without_cut_marks(const std::vector<Vec3>& marks, const InImage& options,
-                                    const RunContext& run) {
+std::vector<Vec3> without_cut_marks(const std::vector<Vec3>& marks, const InImage& options, const RunContext& run) {
     if (options.faces.empty()) return marks;
     std::vector<Vec3> sure, doubtful;
-    for (const Vec3& mark : marks) (end_beside(mark, options) != nullptr ? doubtful : sure).push_back(mark);
+    std::set<const HalfSpace*> all_over;
+    for (const auto& [face, of_face] : by_face(marks, options))
+        if (face != nullptr && !is_outline(of_face, *face)) all_over.insert(face);
+    for (const Vec3& mark : marks) (all_over.contains(end_beside(mark, options)) ? doubtful : sure).push_back(mark);
     if (doubtful.empty() || sure.size() < kGuess.least_outline || !guess::span_space(sure)) return marks;
     std::vector<Vec3> held = sure, before;
     for (int round = 0; round < kGuess.cut_rounds && held != before;

@@ -369,9 +369,8 @@ VariationalSurface::VariationalSurface(const Constraints& given, const Normals& 
     }
 
     const Inside in_world = [&](const Point& p) {
-        return detail::depth_in(given.world,
-                                {center_[0] + radius_ * p[0], center_[1] + radius_ * p[1], center_[2] + radius_ * p[2]}) <=
-               0;
+        return detail::depth_in(given.world, {center_[0] + radius_ * p[0], center_[1] + radius_ * p[1],
+                                              center_[2] + radius_ * p[2]}) <= 0;
     };
     Vector outward(3 * marks);
     for (Index n = 0; n < marks; ++n) outward.segment<3>(3 * n) = nodes[std::size_t(n)];

@@ -4,7 +4,7 @@
 
 namespace covol {
 
-/// What painted labels mean: painted.cpp.
+/// What painted labels mean: painted.cpp, whole_runs.cpp.
 struct PaintedHeuristics {
     /// [voxels] A patch that is nowhere wider says little about a cross-section.
     int narrowest = heuristic("painted.narrowest", 3);

@@ -15,8 +15,8 @@
 #include "painted/heuristics.h"
 #include "painted/outline.h"
 #include "painted/paint.h"
-#include "painted/whole_runs.h"
 #include "painted/segments.h"
+#include "painted/whole_runs.h"
 
 namespace covol {
 namespace {

@@ -198,8 +198,8 @@ std::vector<char> are_inside(const FloatGrid& u, const std::vector<Vec3>& places
     std::vector<char> inside;
     const auto accessor = u.getConstAccessor();
     for (const Vec3& p : places)
-        inside.push_back(
-            accessor.getValue(openvdb::Coord::round(u.worldToIndex(openvdb::Vec3d(p[0], p[1], p[2])))) < 0);
+        inside.push_back(accessor.getValue(openvdb::Coord::round(u.worldToIndex(openvdb::Vec3d(p[0], p[1], p[2])))) <
+                         0);
     return inside;
 }
 
@@ -226,11 +226,11 @@ void require_outside(const Job& job) {
         unsaid += tree.nearest(places[n]) > far * far;
     }
     if (2 * unsaid <= places.size()) return;
-    throw Error(Errc::InvalidInput,
-                "segment: the surface is inside out: " +
-                    number(std::round(100.0 * double(unsaid) / double(places.size()))) +
-                    " % of the image's border would be inside, where neither marks nor seeds say so; mark more of the "
-                    "body, or give places outside of it (`outside`)");
+    throw Error(
+        Errc::InvalidInput,
+        "segment: the surface is inside out: " + number(std::round(100.0 * double(unsaid) / double(places.size()))) +
+            " % of the image's border would be inside, where neither marks nor seeds say so; mark more of the "
+            "body, or give places outside of it (`outside`)");
 }
 
 std::vector<double> levels_at(const FloatGrid& u, const std::vector<Vec3>& places) {

@@ -17,8 +17,8 @@ void doubt_isolated_marks(Job& job);
 /// Notes what of the image's border a start that the caller named holds already: job.said_inside.
 void note_border(Job& job);
 
-/// Of a surface that came out inside out: most of the image's border is inside, and neither marks, nor seeds, nor a start
-/// that was named, say so.
+/// Of a surface that came out inside out: most of the image's border is inside, and neither marks, nor seeds, nor a
+/// start that was named, say so.
 /// @throws Error InvalidInput
 void require_outside(const Job& job);
 

@@ -95,6 +95,8 @@ struct Job {
     [[nodiscard]] Domain domain_with_chosen_margin(double automatic) const;
     /// Where a solid ends whatever the marks say: the image's box, turned as the image is, and the region of interest.
     [[nodiscard]] Clip where_it_ends() const;
+    /// Whether the image's axes are none of the world's: its domain holds places outside of it.
+    [[nodiscard]] bool is_turned() const;
     /// `fine`, on the lattice of this job's larger voxels; it, too, is the same for all parts.
     [[nodiscard]] Domain coarsened(const Domain& fine) const;
 };

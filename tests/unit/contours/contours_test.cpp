@@ -438,8 +438,8 @@ TEST_CASE("a body that the image cuts ends beyond it, in an image that is turned
         const Contours c = drawing.densify(0.5);
         const auto level = [&](double x, double k) { return c.solid->level(g.index_to_world({x, 45, k})); };
         CHECK(level(40, -0.4) < -7);
-        CHECK(level(40, -3) < 0);      // a band's width beyond the image its wall is still there
-        CHECK(level(40, -40) > 0);     // and it ends
+        CHECK(level(40, -3) < 0);   // a band's width beyond the image its wall is still there
+        CHECK(level(40, -40) > 0);  // and it ends
         CHECK(level(40, -1000) > 0);
         CHECK(c.solid->may_meet(g.index_to_world({40, 45, -1000}), 5) == false);
         check_bounds(*c.solid, g.index_to_world({40, 45, 0}), 60);
@@ -461,14 +461,16 @@ TEST_CASE("a section that widens towards the image's end does not grow for ever"
     check_bounds(*c.solid, {30, 30, 57}, 100);
     // One that narrows goes on to, as it came.
     const Contours cone = Drawing(cube(60)).circle(30, 30, 54, 20).circle(30, 30, 57, 14).densify(1);
-    for (const double k : {58.0, 59.0}) CHECK(cone.solid->level({30 + 14 - 2 * (k - 57), 30, k}) == Approx(0).margin(0.1));
+    for (const double k : {58.0, 59.0})
+        CHECK(cone.solid->level({30 + 14 - 2 * (k - 57), 30, k}) == Approx(0).margin(0.1));
 }
 
 TEST_CASE("the start from contours in the corner of an image is not inside out") {
     // As on a nucleus of a worm: two contours of a small body, one of them along the image's side.
     Drawing drawing(cube(60));
     drawing.add({{5, 59, 55}, {1.5, 59, 55}, {0.5, 58, 55}, {4, 57, 55}});
-    drawing.add({{8, 59, 58}, {3, 59, 58}, {-0.5, 57.5, 58}, {-0.5, 52, 58}, {1, 49, 58}, {4.5, 51, 58}, {8.5, 54, 58}});
+    drawing.add(
+        {{8, 59, 58}, {3, 59, 58}, {-0.5, 57.5, 58}, {-0.5, 52, 58}, {1, 49, 58}, {4.5, 51, 58}, {8.5, 54, 58}});
     const Contours c = drawing.densify(1, ContourCurve::Spline);
     REQUIRE(c.solid != nullptr);
     check_bounds(*c.solid, {4, 56, 57}, 60);

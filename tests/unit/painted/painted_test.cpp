@@ -271,19 +271,26 @@ TEST_CASE("what a brush leaves is no cross-section", "[painted]") {
     };
     for (const double r : {2.5, 3.5, 5.0, 6.2, 8.0, 11.0}) {
         INFO("radius " << r);
-        CHECK(is_scribble([&](int i, int j, int k) { return beside(i, j, k, {30, 30, 30}, {30, 30, 30}) < r ? 1 : 0; }));
+        CHECK(is_scribble([&](int i, int j, int k) {
+            return beside(i, j, k, {30, 30, 30}, {30, 30, 30}) < r ? 1 : 0;
+        }));
         CHECK(is_scribble([&](int i, int j, int k) {
             return beside(i, j, k, {30.5, 30.5, 30.5}, {30.5, 30.5, 30.5}) < r ? 1 : 0;
         }));
         // Dragged along a slice, and along its normal.
-        CHECK(is_scribble([&](int i, int j, int k) { return beside(i, j, k, {15, 20, 30}, {44, 30, 30}) < r ? 1 : 0; }));
-        CHECK(is_scribble([&](int i, int j, int k) { return beside(i, j, k, {30, 30, 15}, {30, 30, 44}) < r ? 1 : 0; }));
+        CHECK(is_scribble([&](int i, int j, int k) {
+            return beside(i, j, k, {15, 20, 30}, {44, 30, 30}) < r ? 1 : 0;
+        }));
+        CHECK(is_scribble([&](int i, int j, int k) {
+            return beside(i, j, k, {30, 30, 15}, {30, 30, 44}) < r ? 1 : 0;
+        }));
     }
-    CHECK(is_scribble([](int i, int j, int k) { return std::max({std::abs(i - 30), std::abs(j - 30), std::abs(k - 30)}) < 5 ? 1 : 0; }));
-    // A stroke that was repeated on neighbouring slices.
     CHECK(is_scribble([](int i, int j, int k) {
-        return k > 20 && k < 27 && std::abs(j - 30) <= 1 && i > 22 && i < 36 ? 1 : 0;
+        return std::max({std::abs(i - 30), std::abs(j - 30), std::abs(k - 30)}) < 5 ? 1 : 0;
     }));
+    // A stroke that was repeated on neighbouring slices.
+    CHECK(is_scribble(
+        [](int i, int j, int k) { return k > 20 && k < 27 && std::abs(j - 30) <= 1 && i > 22 && i < 36 ? 1 : 0; }));
 }
 
 TEST_CASE("slices with strokes beside slices painted as a whole", "[painted]") {

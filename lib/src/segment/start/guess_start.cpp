@@ -52,8 +52,8 @@ void start_from_guess(Job& job) {
         job.report().domain = widened(job.domain(), kStarts.guess_beyond_voxels);
     {
         Timed timed(job.report().seconds.tag);
-        Guess guess = guess::guess_in_image(job.domain(), job.points, options, job.where_it_ends(), job.report().guess,
-                                            job.run);
+        Guess guess =
+            guess::guess_in_image(job.domain(), job.points, options, job.where_it_ends(), job.report().guess, job.run);
         job.result.u = std::move(guess.u);
         job.on_surface = std::move(guess.marks);
     }
