@@ -8,6 +8,7 @@
 #include <cmath>
 #include <vector>
 
+#include "clip/half_spaces.h"
 #include "grid/leaf_band.h"
 
 namespace covol::detail {
@@ -292,6 +293,12 @@ std::optional<LatticeClip> on_lattice(const Clip& planes, const Domain& domain) 
 }
 
 }  // namespace
+
+double depth_in(const Clip& clip, const Vec3& x) {
+    double depth = -std::numeric_limits<double>::infinity();
+    for (const HalfSpace& plane : clip) depth = std::max(depth, along(plane, x));
+    return depth;
+}
 
 int LatticeClip::face_layer(int axis, bool upper) const {
     return upper ? int(std::ceil(high[axis] - kLeastCell)) : int(std::floor(low[axis] + kLeastCell));

@@ -1,9 +1,7 @@
 #pragma once
 // Half-spaces, and directions beside and within their planes.
-#include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "base/vector.h"
 #include "covol/clip.h"
@@ -13,13 +11,6 @@ namespace covol::detail {
 /// n·x - offset: how far beyond the plane a position lies, negative within.
 [[nodiscard]] inline double along(const HalfSpace& plane, const Vec3& x) {
     return cloud::dot(plane.normal, x) - plane.offset;
-}
-
-/// Largest n·x - offset: the distance to the clip's boundary inside (negative), no more than that outside.
-[[nodiscard]] inline double depth_in(const Clip& clip, const Vec3& x) {
-    double depth = -std::numeric_limits<double>::infinity();
-    for (const HalfSpace& plane : clip) depth = std::max(depth, along(plane, x));
-    return depth;
 }
 
 [[nodiscard]] inline Vec3 moved(const Vec3& x, const Vec3& direction, double by) {

@@ -11,6 +11,7 @@
 
 #include "base/valid.h"
 #include "base/vector.h"
+#include "clip/clipped.h"
 #include "clip/half_spaces.h"
 #include "covol/start.h"
 #include "guess/guess_in_image.h"
@@ -139,7 +140,7 @@ bool is_outline(const std::vector<Vec3>& marks, const HalfSpace& face) {
     if (marks.size() < kGuess.least_outline) return false;
     const auto surrounded =
         std::count_if(marks.begin(), marks.end(), [&](const Vec3& mark) { return is_surrounded(mark, marks, face); });
-    return double(surrounded) <= kGuess.surrounded_share * double(marks.size());
+    return double(surrounded) < kGuess.surrounded_share * double(marks.size());
 }
 
 /// How far inside the body's section a mark lies, measured within the plane of the cut: negative, or positive outside.

@@ -10,7 +10,7 @@
 #include <limits>
 #include <string>
 
-#include "clip/half_spaces.h"
+#include "clip/clipped.h"
 #include "covol/error.h"
 #include "guess/heuristics.h"
 #include "guess/triharmonic.h"

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/number.h"
+#include "clip/clipped.h"
 #include "clip/half_spaces.h"
 #include "covol/error.h"
 #include "covol/start.h"
