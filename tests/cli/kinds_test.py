@@ -76,7 +76,7 @@ class Painted(KindsCase):
 
     def test_slices_side_by_side_become_a_body(self):
         # The ball reaches over 28 slices; all but the first and the last two are painted, or the middle ones.
-        for first, last, least in ((12, 36, 0.95), (16, 32, 0.9)):
+        for first, last in ((12, 36), (16, 32)):
             with self.subTest(first):
                 some = np.zeros((SIZE,) * 3, bool)
                 some[first:last] = ball()[first:last]
@@ -85,7 +85,7 @@ class Painted(KindsCase):
                 self.assertEqual(told["slices"][0]["axis"], "z")
                 self.assertEqual(told["slices"][0]["slices"], list(range(first, last)))
                 self.assertEqual(told["scribbled"], 0)
-                self.assertGreater(dice(read_labels(self.out / "m.nrrd") > 0, ball()), least)
+                self.assertGreater(dice(read_labels(self.out / "m.nrrd") > 0, ball()), 0.99 * dice(some, ball()))
 
     def test_says_what_it_understood(self):
         paint = self.labels("paint.nrrd", on_slices(ball(), 4, 2))
