@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "painted/heuristics.h"
 
@@ -14,8 +15,9 @@ struct End {
     bool blunt = false;   ///< larger than that of any ellipsoid which ends before the next slice
 };
 
-/// @param areas  of the slices, from the end on
-End end_of(const std::vector<std::size_t>& areas) {
+/// @param areas      of the slices, from the end on
+/// @param elongated  the sections are: across a tube's side they shrink as its chords do, not as their squares
+End end_of(const std::vector<std::size_t>& areas, bool elongated) {
     const auto largest = double(*std::max_element(areas.begin(), areas.end()));
     // The ellipsoid's middle lies beside the first slice that is about as large as any, and its end, at most a slice
     // beyond the last one: a section w from the middle has 1 - (w / (w + 1))^2 of the largest.
@@ -24,19 +26,21 @@ End end_of(const std::vector<std::size_t>& areas) {
         if (double(area) >= kPainted.about_largest * largest) break;
         ++w;
     }
-    const double fraction = double(areas.front()) / largest;
-    return {fraction, w == 0 || fraction > (2 * w + 1) / ((w + 1) * (w + 1))};
+    const double fraction = double(areas.front()) / largest, of_round = (2 * w + 1) / ((w + 1) * (w + 1));
+    return {fraction, w == 0 || fraction > (elongated ? std::sqrt(of_round) : of_round)};
 }
 
 /// How wide the ends are across the axis, the mean of the fractions; 0 where none is blunt.
 double blunt_ends(const Paint& piece, int axis) {
     const AxisPaint look = look_across(piece, axis);
-    // Of two slices each is as large as any.
-    if (look.widest <= kOutline.widest_stroke || look.voxels.size() < 3) return 0;
+    // A stroke, or a wall of strokes on neighbouring slices.
+    if (look.widest <= kOutline.widest_stroke || int(look.voxels.size()) <= kOutline.widest_stroke) return 0;
+    const auto largest = *std::max_element(look.voxels.begin(), look.voxels.end());
+    const bool elongated = double(largest) > kPainted.elongated * look.widest * look.widest;
     std::vector<End> ends;
-    if (piece.box().min[axis] > 0) ends.push_back(end_of(look.voxels));
+    if (piece.box().min[axis] > 0) ends.push_back(end_of(look.voxels, elongated));
     if (piece.box().max[axis] < piece.image_size()[axis] - 1)
-        ends.push_back(end_of({look.voxels.rbegin(), look.voxels.rend()}));
+        ends.push_back(end_of({look.voxels.rbegin(), look.voxels.rend()}, elongated));
     if (ends.empty()) return 1;
     double sum = 0;
     for (const End& end : ends) sum += end.fraction;

@@ -26,7 +26,7 @@ Image blank_image() {
 FloatGridPtr inverted_ball(const Image& image, const Vec3& center, double radius) {
     const FloatGridPtr u = start_from_sphere(make_domain(image.geometry().world_box(), 1), center, radius);
     for (auto value = u->beginValueAll(); value; ++value) value.setValue(-*value);
-    u->tree().root().setBackground(-u->background(), true);
+    u->tree().root().setBackground(-u->background(), false);
     return u;
 }
 
