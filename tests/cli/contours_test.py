@@ -109,6 +109,17 @@ class Bodies(ContoursCase):
         self.assertLess(abs(report["surface"]["volume"] / ELLIPSOID - 1), 0.02)
         self.assertLess(report["fit"]["points_to_surface"]["p95"], 0.4)
 
+    def test_a_small_body_in_the_corner_is_not_inside_out(self):
+        # Two outlines, the second one far larger than the first and beside the image's last slice.
+        k, radius = SIZES[2] - 3, 4.0
+        corner = (SIZES[0] - 1 - 0.7 * radius / SPACING[0], SIZES[1] - 1 - 0.7 * radius / SPACING[1])
+        lines = [outline(r, at, centre=corner) for r, at in ((0.9, k - 2), (radius, k))]
+        lines = [[(min(x, SIZES[0] - 0.5), min(y, SIZES[1] - 0.5), at) for x, y, at in line] for line in lines]
+        report = self.report("segment", self.solid, "--contours", self.table("corner.csv", lines), "-o", "s.vdb", "--rho", 0)
+        # 45 degrees over two slices and a half at most, beyond a disc of that radius.
+        self.assertLess(report["surface"]["volume"], math.pi * (radius + 2.5 * SPACING[2]) ** 2 * 5 * SPACING[2])
+        self.assertEqual(report["surface"]["components"], 1)
+
     def test_skipped_slices(self):
         for step in (2, 4, 7):
             with self.subTest(step=step):

@@ -74,6 +74,19 @@ class Painted(KindsCase):
         self.assertEqual(sorted(np.unique(mask)), [0, 4])
         self.assertGreater(dice(mask > 0, ball()), 0.96)
 
+    def test_slices_side_by_side_become_a_body(self):
+        # The ball reaches over 28 slices; all but the first and the last two are painted, or the middle ones.
+        for first, last in ((12, 36), (16, 32)):
+            with self.subTest(first):
+                some = np.zeros((SIZE,) * 3, bool)
+                some[first:last] = ball()[first:last]
+                report = self.report("segment", self.image, "--painted", self.labels("run.nrrd", some), "-o", "s.vdb", "--mask", "m.nrrd")
+                told, = report["input"]["painted"]
+                self.assertEqual(told["slices"][0]["axis"], "z")
+                self.assertEqual(told["slices"][0]["slices"], list(range(first, last)))
+                self.assertEqual(told["scribbled"], 0)
+                self.assertGreater(dice(read_labels(self.out / "m.nrrd") > 0, ball()), 0.99 * dice(some, ball()))
+
     def test_says_what_it_understood(self):
         paint = self.labels("paint.nrrd", on_slices(ball(), 4, 2))
         result = self.run_covol("segment", self.image, "--painted", paint, "-o", "s.vdb")
@@ -212,6 +225,23 @@ class Starts(KindsCase):
         self.assertIn("--delta, --tau did nothing", done.stderr)
         done = self.run_covol("segment", self.image, "--points", self.marks(60), "--delta", "0.1vx", "--model", "paper", "-o", "s.vdb")
         self.assertNotIn("did nothing", done.stderr)
+
+    def test_an_outline_on_the_first_slice_is_the_outline_of_the_cut(self):
+        # A ball that the first slice cuts off below its middle; three outlines, the first of them on that slice.
+        z = np.arange(SIZE) * H + ORIGIN[2]
+        center = (0.0, 0.0, z[0] + 3.0)
+        image = self.inputs / "cut.nrrd"
+        write_nrrd(image, (SIZE,) * 3, ball_image(center, RADIUS).tobytes(), spacing=H, origin=ORIGIN)
+        turns = 2 * np.pi * np.arange(16) / 16
+        marks = []
+        for height in (0.0, 4.0, 8.0):
+            r = np.sqrt(RADIUS ** 2 - (height - 3.0) ** 2)
+            marks += [(r * np.cos(t), r * np.sin(t), z[0] + height) for t in turns]
+        path = self.inputs / "outlines.csv"
+        write_points(path, marks)
+        report = self.report("segment", image, "--points", path, "--rho", 0, "-o", "s.vdb", "--mask", "m.nrrd")
+        self.assertNotIn("lie in the cut", report["automatic"]["guess"])
+        self.assertGreater(dice(read_labels(self.out / "m.nrrd") > 0, ball(center)), 0.95)
 
     def test_two_bodies_are_told(self):
         path = self.inputs / "two.csv"

@@ -61,7 +61,9 @@ struct Painted {
 /// A slice counts as painted as a whole when it holds an area: a patch wider than 2 voxels that is no stroke (one is at
 /// most 4 voxels wide, and 6 times as long). Slices across an axis are taken as such where they lie apart, or in runs
 /// that are thin against the widest patch (a third of its width, in voxels and in length): a ball of paint has
-/// neither. Several axes may hold such slices. All other paint is a scribble.
+/// neither. Several axes may hold such slices. Where none does, thick runs across one axis are taken as such if the
+/// paint ends bluntly across it: if its sections, carried on as an ellipsoid's, would go on in the next slice. All
+/// other paint is a scribble.
 ///
 /// Each patch's outline runs between the painted voxels and their neighbours, smoothed along itself without shrinking
 /// (a local quadratic over 8 voxels to either side, less on small patches), by at most half a voxel anywhere. At the

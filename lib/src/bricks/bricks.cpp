@@ -211,7 +211,7 @@ struct BrickJob::Parts {
     void join_surfaces(const BrickPlan& plan, const BrickStates& states) {
         FloatGridPtr surface = make_grid(plan.domain, float(kHalfWidthVoxels * plan.domain.voxel_size), "surface");
         surface->setGridClass(openvdb::GRID_LEVEL_SET);
-        const Clip clip = where_it_ends(job);
+        const Clip clip = job.where_it_ends();
         for (std::size_t n = 0; n < plan.bricks.size(); ++n) {
             run.check();
             run.report("join", double(n) / double(plan.bricks.size()));

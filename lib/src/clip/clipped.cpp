@@ -8,6 +8,7 @@
 #include <cmath>
 #include <vector>
 
+#include "clip/half_spaces.h"
 #include "grid/leaf_band.h"
 
 namespace covol::detail {
@@ -17,24 +18,9 @@ using Accessor = FloatGrid::ConstAccessor;
 
 constexpr double kLeastCell = 0.1;      // voxels: a layer closer to the face than this is moved onto it
 constexpr float kSameDistance = 1e-3F;  // voxels: a distance that is the face's own
-constexpr int kProjections = 8;         // onto the planes in turn; boxes need one
 
 openvdb::CoordBBox voxels_of(const Domain& d) {
     return {Coord(d.min[0], d.min[1], d.min[2]), Coord(d.max[0], d.max[1], d.max[2])};
-}
-
-Vec3 projected(const Clip& clip, Vec3 x) {
-    for (int round = 0; round < kProjections; ++round) {
-        bool moved = false;
-        for (const HalfSpace& plane : clip) {
-            const double beyond = along(plane, x);
-            if (!(beyond > 0)) continue;
-            for (int a = 0; a < 3; ++a) x[a] -= beyond * plane.normal[a];
-            moved = true;
-        }
-        if (!moved) break;
-    }
-    return x;
 }
 
 /// Trilinear samples of a grid that is known on a domain, carried on linearly beyond the last voxel centres.

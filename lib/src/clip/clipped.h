@@ -45,11 +45,6 @@ inline constexpr int kCarriedOn = 4;  ///< a band's half width, and one more
 /// @return none where nothing is cut, or the clip is not aligned with the lattice.
 [[nodiscard]] std::optional<Uncut> uncut(const FloatGrid& surface, FaceLayer layer);
 
-/// n·x - offset: the distance to the plane, positive outside the half-space.
-[[nodiscard]] inline double along(const HalfSpace& plane, const Vec3& x) {
-    return plane.normal[0] * x[0] + plane.normal[1] * x[1] + plane.normal[2] * x[2] - plane.offset;
-}
-
 /// Largest n·x - offset: the distance to the clip's boundary inside (negative), no more than that outside.
 [[nodiscard]] double depth_in(const Clip& clip, const Vec3& x);
 

@@ -2,18 +2,11 @@
 
 #include <algorithm>
 
+#include "clip/half_spaces.h"
+
 namespace covol::detail {
-namespace {
 
-Vec3 moved(const Vec3& x, const Vec3& direction, double by) {
-    return {x[0] + by * direction[0], x[1] + by * direction[1], x[2] + by * direction[2]};
-}
-
-}  // namespace
-
-double ImageFace::depth(const Vec3& x) const {
-    return plane.offset - plane.normal[0] * x[0] - plane.normal[1] * x[1] - plane.normal[2] * x[2];
-}
+double ImageFace::depth(const Vec3& x) const { return -along(plane, x); }
 
 std::vector<ImageFace> faces_of(const ImageGeometry& geometry) {
     const Clip clip = make_clip(geometry);  // two for each axis

@@ -82,7 +82,7 @@ public:
         const double here = at(slice(), p);
         if (kind_ != Kind::Between && slice().open) {
             // Neither section's level changes faster than the position does.
-            const double height = slice().cap + radius, share = height / std::abs(slice().w - inner().w);
+            const double height = slice().end + radius, share = height / std::abs(slice().w - inner().w);
             return {std::min(here, carried_on(column(p), height)) - (1 + 2 * share) * radius,
                     std::numeric_limits<double>::max()};
         }
@@ -106,7 +106,7 @@ private:
     };
     [[nodiscard]] Column column(const SlicePlace& p) const {
         const double here = at(slice(), p);
-        if (kind_ != Kind::Between) return {here, slice().open ? at(inner(), p) : 0, 0, 0};
+        if (kind_ != Kind::Between) return {here, slice().open && !is_apart() ? at(inner(), p) : here, 0, 0};
         const SolidSlice& next = data_.slices[n_ + 1];
         const double length = next.w - slice().w, there = at(next, p), secant = (there - here) / length;
         return {here, there, slope_below(p, here, secant, length) * length,
@@ -116,11 +116,14 @@ private:
         if (kind_ == Kind::Between)
             return hermite(c.here, c.there, c.begin, c.end, (w - slice().w) / (data_.slices[n_ + 1].w - slice().w));
         const double height = std::abs(w - slice().w);
-        return slice().open ? carried_on(c, height) : c.here + beyond(height);
+        return slice().open ? std::max(carried_on(c, height), height - slice().end) : c.here + beyond(height);
     }
-    /// Beyond an open end the level goes on as it came.
+    /// Beyond an open end a wall that came inward goes on as it came. One that went outward slows down as a paraboloid
+    /// does whose pole is the wall of the slice before, and leans outward by 45 degrees at most: bodies are round, and
+    /// a section that grew fast does not grow for ever.
     [[nodiscard]] double carried_on(const Column& c, double height) const {
-        return c.here + height / std::abs(slice().w - inner().w) * (c.here - c.there);
+        const double t = height / std::abs(slice().w - inner().w), change = c.here - c.there;
+        return c.here + (change > 0 ? t * change : std::max((std::sqrt(1 + t) - 1) * change, -height));
     }
     /// Slopes of the level along w at the interval's two slices; beyond an end slice the dome goes on.
     [[nodiscard]] double slope_below(const SlicePlace& p, double here, double secant, double length) const {
@@ -141,6 +144,8 @@ private:
     [[nodiscard]] const SolidSlice& slice() const { return data_.slices[n_]; }
     /// The neighbour of an end slice.
     [[nodiscard]] const SolidSlice& inner() const { return data_.slices[kind_ == Kind::Below ? n_ + 1 : n_ - 1]; }
+    /// Whether an end slice's section does not overlap its neighbour's, which then tells nothing of where it goes.
+    [[nodiscard]] bool is_apart() const { return kind_ == Kind::Below ? slice().apart : inner().apart; }
     [[nodiscard]] double beyond(double height) const {
         const double cap = slice().cap;
         return dome(slice().depth, height / cap) + std::max(0.0, height - cap);
@@ -294,7 +299,8 @@ bool ContourSolid::may_meet(const Vec3& center, double radius) const {
         high = std::max(high, most);
     };
     const auto& slices = data_->slices;
-    if (p[2] + radius < slices.front().w - slices.front().cap || p[2] - radius > slices.back().w + slices.back().cap)
+    if (p[2] + radius < slices.front().w - slices.front().highest() ||
+        p[2] - radius > slices.back().w + slices.back().highest())
         return false;
     include(interval_at(*data_, p[2] - radius));
     auto above = std::upper_bound(slices.begin(), slices.end(), p[2] - radius,
@@ -307,13 +313,14 @@ WorldBox ContourSolid::box() const {
     const SliceGrid& grid = data_->grid;
     const auto& slices = data_->slices;
     std::vector<Vec3> corners;
-    // An open end may widen.
+    // An open end may widen, by as much as it is high.
     double wider = 0;
     for (const SolidSlice* end : {&slices.front(), &slices.back()})
-        if (end->open) wider = std::max(wider, end->cap);
+        if (end->open) wider = std::max(wider, end->end);
     for (const double x : {grid.origin[0] - wider, grid.origin[0] + grid.cell * (grid.nx - 1) + wider})
         for (const double y : {grid.origin[1] - wider, grid.origin[1] + grid.cell * (grid.ny - 1) + wider})
-            for (const double w : {slices.front().w - slices.front().cap, slices.back().w + slices.back().cap})
+            for (const double w :
+                 {slices.front().w - slices.front().highest(), slices.back().w + slices.back().highest()})
                 corners.push_back(data_->frame.to_world({x, y, w}));
     return bounding_box(corners);
 }

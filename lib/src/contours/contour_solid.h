@@ -47,15 +47,19 @@ struct SolidSlice {
     double w = 0;              ///< where it lies along the normal
     std::vector<float> level;  ///< signed distance within the plane, on the grid
     std::size_t polygons = 0;
-    double area = 0;    ///< inside
-    double depth = 0;   ///< of the deepest node inside
-    double cap = 0;     ///< height of the dome, on the first and the last slice; of what goes on where there is none
-    bool open = false;  ///< no dome: the image ends here, and the body goes on beyond it as its sections tell
-    Vec2 shift{0, 0};   ///< to the next slice's section, where the two do not overlap
+    double area = 0;     ///< inside
+    double depth = 0;    ///< of the deepest node inside
+    double cap = 0;      ///< height of the dome, on the first and the last slice; of what goes on where there is none
+    bool open = false;   ///< no dome: the image ends here, and the body goes on beyond it as its sections tell
+    double end = 0;      ///< height of the flat end of what goes on, beyond all that a band at the image's end reads
+    bool apart = false;  ///< this section and the next slice's do not overlap
+    Vec2 shift{0, 0};    ///< to the next slice's section, where it is carried over to that
 
     [[nodiscard]] double at(const SliceGrid& grid, const SlicePlace& place) const {
         return sample_slice(level, grid, place);
     }
+    /// Beyond it nothing is inside.
+    [[nodiscard]] double highest() const { return open ? end : cap; }
 };
 
 }  // namespace covol::detail

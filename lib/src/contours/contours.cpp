@@ -306,6 +306,7 @@ void Densifier::link_slices(ContourSolid::Data& data, const std::vector<std::vec
     });
     std::size_t carried = 0, ended = 0;
     for (std::size_t n = 0; n + 1 < data.slices.size(); ++n) {
+        data.slices[n].apart = apart[n] != 0;
         if (!apart[n]) continue;
         if (polygons[n].size() != 1 || polygons[n + 1].size() != 1) {
             ++ended;
@@ -350,7 +351,9 @@ void Densifier::cap_ends(ContourSolid::Data& data) {
         const double shrinks_by = slices[before].area - slices[end].area;
         const double ends_after = shrinks_by > 0 ? distance * slices[end].area / shrinks_by : 2 * gap;
         slices[end].open = left < spacing || (left <= gap && left < ends_after);
-        if (slices[end].open) slices[end].cap = left + kContours.open_cells * options_.step;
+        if (!slices[end].open) return;
+        slices[end].cap = left + kContours.open_cells * options_.step;
+        slices[end].end = left + kContours.end_cells * options_.step;
     };
     if (slices.size() == 1) {
         cap(0, 0);

@@ -16,6 +16,8 @@ struct ContoursHeuristics {
     double side_cells = heuristic("contours.side_cells", 10);
     /// [cells] That a body goes on beyond the image's end: more than a band's half width.
     double open_cells = heuristic("contours.open_cells", 6);
+    /// [cells] That its flat end lies beyond the image's: a band's half width more than the domain goes on.
+    double end_cells = heuristic("contours.end_cells", 10);
 };
 COVOL_HEURISTICS ContoursHeuristics kContours{};
 

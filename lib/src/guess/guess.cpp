@@ -1,12 +1,20 @@
 #include "covol/guess.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <memory>
+#include <numbers>
+#include <set>
 #include <utility>
 
 #include "base/valid.h"
+#include "base/vector.h"
+#include "clip/clipped.h"
+#include "clip/half_spaces.h"
 #include "covol/start.h"
+#include "guess/guess_in_image.h"
 #include "guess/heuristics.h"
 #include "guess/marks_surface.h"
 #include "points/kd_tree.h"
@@ -14,42 +22,48 @@
 namespace covol {
 namespace {
 
+/// The options, and the faces at which the body is cut off, which need not lie along the world's axes.
+struct InImage : GuessOptions {
+    InImage(const GuessOptions& options, Clip clip) : GuessOptions(options), faces(std::move(clip)) {}
+    Clip faces;
+};
+
 double longest(const std::array<Vec3, 3>& axes) {
     double most = 0;
     for (const Vec3& a : axes) most = std::max(most, std::hypot(a[0], a[1], a[2]));
     return most;
 }
 
-/// The standard deviation of a mark's place along an axis of the world.
-double deviation_along(const GuessOptions& options, int axis) {
+/// The standard deviation of a mark's place along a direction.
+double deviation_along(const InImage& options, const Vec3& direction) {
     double sd = 0;
-    for (const Vec3& a : options.deviation) sd = std::hypot(sd, a[std::size_t(axis)]);
+    for (const Vec3& a : options.deviation) sd = std::hypot(sd, cloud::dot(a, direction));
     return sd;
 }
 
-/// The axis across the world's end that a mark is so close to that it may lie in the cut; -1: none.
-int end_beside(const Vec3& mark, const GuessOptions& options) {
-    for (int a = 0; a < 3; ++a) {
+/// The face that a mark is so close to that it may lie in the cut, or null.
+const HalfSpace* end_beside(const Vec3& mark, const InImage& options) {
+    for (const HalfSpace& face : options.faces) {
         // half a voxel from its centre to its end, and what the hand is off
-        const double near = 4 * deviation_along(options, a);
-        if (mark[a] < options.end->min[a] + near || mark[a] > options.end->max[a] - near) return a;
+        const double near = 4 * deviation_along(options, face.normal);
+        if (detail::along(face, mark) > -near) return &face;
     }
-    return -1;
+    return nullptr;
 }
 
-guess::ImpreciseMarks imprecise(const std::vector<Vec3>& marks, const GuessOptions& options) {
+guess::ImpreciseMarks imprecise(const std::vector<Vec3>& marks, const InImage& options) {
     guess::ImpreciseMarks result;
     result.marks = marks;
     result.deviation = options.deviation;
     if (const double said = longest(options.deviation); options.most_deviation > said && said > 0)
         result.most_factor = options.most_deviation * options.most_deviation / (said * said);
-    if (options.end) result.world = &*options.end;
+    result.world = options.faces;
     return result;
 }
 
 /// Adds those seeds to the constraints that lie on the wrong side, or on none: a little inside, or outside.
 /// @return whether there were any
-bool hold_seeds(const guess::MarksSurface& surface, const GuessOptions& options, guess::ImpreciseMarks& known) {
+bool hold_seeds(const guess::MarksSurface& surface, const InImage& options, guess::ImpreciseMarks& known) {
     const double beyond = longest(options.deviation) / kUniformDeviation;
     bool any = false;
     const auto hold = [&](const std::vector<Vec3>& seeds, double side) {
@@ -66,20 +80,16 @@ bool hold_seeds(const guess::MarksSurface& surface, const GuessOptions& options,
 }
 
 /// Around the marks, as far as the world reaches.
-std::vector<Vec3> places_around(const std::vector<Vec3>& marks, double times, const GuessOptions& options) {
+std::vector<Vec3> places_around(const std::vector<Vec3>& marks, double times, const InImage& options) {
     std::vector<Vec3> places = guess::points_around(marks, times);
-    std::erase_if(places, [&](const Vec3& place) {
-        for (int a = 0; a < 3 && options.end; ++a)
-            if (place[a] < options.end->min[a] || place[a] > options.end->max[a]) return true;
-        return false;
-    });
+    std::erase_if(places, [&](const Vec3& place) { return detail::depth_in(options.faces, place) > 0; });
     return places;
 }
 
 /// Where the surface goes on far beyond its marks, places around them become constraints, outside by about their
 /// distance: marks that are few or rough leave surfaces of less energy that run through the world and never close.
 /// @return whether it does
-bool hold_around(const guess::MarksSurface& surface, const GuessOptions& options, guess::ImpreciseMarks& known) {
+bool hold_around(const guess::MarksSurface& surface, const InImage& options, guess::ImpreciseMarks& known) {
     const std::vector<Vec3> far = places_around(known.marks, kGuess.runs_on, options);
     if (std::all_of(far.begin(), far.end(), [&](const Vec3& place) { return surface.value(place) > 0; })) return false;
     const detail::KdTree tree(known.marks);
@@ -90,33 +100,68 @@ bool hold_around(const guess::MarksSurface& surface, const GuessOptions& options
     return true;
 }
 
-std::size_t count_wrong(const guess::MarksSurface& surface, const GuessOptions& options) {
+std::size_t count_wrong(const guess::MarksSurface& surface, const InImage& options) {
     std::size_t wrong = 0;
     for (const Vec3& seed : options.inside) wrong += !(surface.value(seed) < 0);
     for (const Vec3& seed : options.outside) wrong += !(surface.value(seed) > 0);
     return wrong;
 }
 
+/// The marks beside each face, and under null those beside none, in their order.
+std::map<const HalfSpace*, std::vector<Vec3>> by_face(const std::vector<Vec3>& marks, const InImage& options) {
+    std::map<const HalfSpace*, std::vector<Vec3>> found;
+    for (const Vec3& mark : marks) found[end_beside(mark, options)].push_back(mark);
+    return found;
+}
+
+/// Whether marks that lie around this one within the face's plane leave no way out.
+bool is_surrounded(const Vec3& mark, const std::vector<Vec3>& others, const HalfSpace& face) {
+    const auto [u, v] = detail::directions_in(face);
+    std::vector<std::array<double, 2>> around;  // squared distance, direction
+    for (const Vec3& other : others) {
+        const Vec3 to = cloud::minus(other, mark);
+        const double x = cloud::dot(to, u), y = cloud::dot(to, v);
+        if (x != 0 || y != 0) around.push_back({x * x + y * y, std::atan2(y, x)});
+    }
+    const std::size_t count = std::min(kGuess.around, around.size());
+    std::partial_sort(around.begin(), around.begin() + std::ptrdiff_t(count), around.end());
+    std::vector<double> directions;
+    for (std::size_t n = 0; n < count; ++n) directions.push_back(around[n][1]);
+    std::sort(directions.begin(), directions.end());
+    double gap =
+        directions.empty() ? 2 * std::numbers::pi : directions.front() + 2 * std::numbers::pi - directions.back();
+    for (std::size_t n = 1; n < directions.size(); ++n) gap = std::max(gap, directions[n] - directions[n - 1]);
+    return gap < kGuess.way_out * std::numbers::pi;
+}
+
+/// Whether marks beside a face lie along a line around an area, not all over it: then they are the outline of the cut,
+/// whatever the others say.
+bool is_outline(const std::vector<Vec3>& marks, const HalfSpace& face) {
+    if (marks.size() < kGuess.least_outline) return false;
+    const auto surrounded =
+        std::count_if(marks.begin(), marks.end(), [&](const Vec3& mark) { return is_surrounded(mark, marks, face); });
+    return double(surrounded) < kGuess.surrounded_share * double(marks.size());
+}
+
 /// How far inside the body's section a mark lies, measured within the plane of the cut: negative, or positive outside.
-double within_section(const guess::MarksSurface& body, const Vec3& mark, int across, const GuessOptions& options) {
+double within_section(const guess::MarksSurface& body, const Vec3& mark, const HalfSpace& cut, const InImage& options) {
     double slope = 0;
-    for (int a = 0; a < 3; ++a) {
-        if (a == across) continue;
-        const double step = std::max(deviation_along(options, a), 1e-12);
-        Vec3 low = mark, high = mark;
-        low[a] -= step;
-        high[a] += step;
+    for (const Vec3& direction : detail::directions_in(cut)) {
+        const double step = std::max(deviation_along(options, direction), 1e-12);
+        const Vec3 low = detail::moved(mark, direction, -step), high = detail::moved(mark, direction, step);
         slope = std::hypot(slope, (body.value(high) - body.value(low)) / (2 * step));
     }
     return body.value(mark) / std::max(slope, kGuess.least_slope);
 }
 
 /// Marks in the cut lie inside the section of the body that the others mark: the surface need not pass them.
-std::vector<Vec3> without_cut_marks(const std::vector<Vec3>& marks, const GuessOptions& options,
-                                    const RunContext& run) {
-    if (!options.end) return marks;
+std::vector<Vec3> without_cut_marks(const std::vector<Vec3>& marks, const InImage& options, const RunContext& run) {
+    if (options.faces.empty()) return marks;
     std::vector<Vec3> sure, doubtful;
-    for (const Vec3& mark : marks) (end_beside(mark, options) >= 0 ? doubtful : sure).push_back(mark);
+    std::set<const HalfSpace*> all_over;
+    for (const auto& [face, of_face] : by_face(marks, options))
+        if (face != nullptr && !is_outline(of_face, *face)) all_over.insert(face);
+    for (const Vec3& mark : marks) (all_over.contains(end_beside(mark, options)) ? doubtful : sure).push_back(mark);
     if (doubtful.empty() || sure.size() < kGuess.least_outline || !guess::span_space(sure)) return marks;
     std::vector<Vec3> held = sure, before;
     for (int round = 0; round < kGuess.cut_rounds && held != before;
@@ -124,11 +169,11 @@ std::vector<Vec3> without_cut_marks(const std::vector<Vec3>& marks, const GuessO
         const guess::MarksSurface body(imprecise(held, options), run);
         before = std::exchange(held, sure);
         for (const Vec3& mark : doubtful) {
-            const int across = end_beside(mark, options);
+            const HalfSpace& cut = *end_beside(mark, options);
             double voxel = 0;
-            for (int a = 0; a < 3; ++a)
-                if (a != across) voxel = std::max(voxel, deviation_along(options, a) / kUniformDeviation);
-            if (within_section(body, mark, across, options) > -kGuess.inside_voxels * voxel) held.push_back(mark);
+            for (const Vec3& direction : detail::directions_in(cut))
+                voxel = std::max(voxel, deviation_along(options, direction) / kUniformDeviation);
+            if (within_section(body, mark, cut, options) > -kGuess.inside_voxels * voxel) held.push_back(mark);
         }
     }
     return held;
@@ -147,6 +192,12 @@ bool can_enclose(const std::vector<Vec3>& marks) { return guess::span_space(mark
 
 Guess guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks, const GuessOptions& options,
                        GuessReport& report, const RunContext& run) {
+    return guess::guess_in_image(domain, marks, options, options.end ? make_clip(*options.end) : Clip{}, report, run);
+}
+
+Guess guess::guess_in_image(const Domain& domain, const std::vector<Vec3>& marks, const GuessOptions& given,
+                            const Clip& image, GuessReport& report, const RunContext& run) {
+    const InImage options(given, image);
     detail::require_valid(options, "guess");
     Guess result;
     with_threads(run, [&] {

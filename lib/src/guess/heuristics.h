@@ -21,7 +21,14 @@ struct GuessHeuristics {
     double held_at = heuristic("guess.held_at", 1.5);
     /// [rounds] Of holding seeds that lie on the wrong side.
     int seed_rounds = heuristic("guess.seed_rounds", 4);
-    /// [marks] Off the cuts, to say what is inside of them.
+    /// [marks] Nearest to one in a cut, in whose directions there may be a way out.
+    std::size_t around = heuristic("guess.around", 8);
+    /// [pi] The least angle that is one: beside a straight line of marks it is pi.
+    double way_out = heuristic("guess.way_out", 5.0 / 6);
+    /// [of the marks in a cut] Without a way out, less of its outline: of twelve marks and more all over it they are a
+    /// sixth and more.
+    double surrounded_share = heuristic("guess.surrounded_share", 0.125);
+    /// [marks] Off the cuts, to say what is inside of them; in a cut, for an outline.
     std::size_t least_outline = heuristic("guess.least_outline", 8);
 };
 COVOL_HEURISTICS GuessHeuristics kGuess{};

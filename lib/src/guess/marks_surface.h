@@ -18,7 +18,7 @@ struct ImpreciseMarks {
     std::vector<Vec3> seeds;  ///< places that are inside (value < 0) or outside
     std::vector<double> seed_value;
 
-    const WorldBox* world = nullptr;  ///< beyond its end nothing is known; may be null
+    Clip world;  ///< beyond its end nothing is known
 
     [[nodiscard]] double variance_along(const Vec3& unit) const;
 };

@@ -10,6 +10,7 @@
 #include <limits>
 #include <string>
 
+#include "clip/clipped.h"
 #include "covol/error.h"
 #include "guess/heuristics.h"
 #include "guess/triharmonic.h"
@@ -368,11 +369,8 @@ VariationalSurface::VariationalSurface(const Constraints& given, const Normals& 
     }
 
     const Inside in_world = [&](const Point& p) {
-        for (int a = 0; a < 3 && given.world != nullptr; ++a) {
-            const double at = center_[a] + radius_ * p[a];
-            if (at < given.world->min[a] || at > given.world->max[a]) return false;
-        }
-        return true;
+        return detail::depth_in(given.world, {center_[0] + radius_ * p[0], center_[1] + radius_ * p[1],
+                                              center_[2] + radius_ * p[2]}) <= 0;
     };
     Vector outward(3 * marks);
     for (Index n = 0; n < marks; ++n) outward.segment<3>(3 * n) = nodes[std::size_t(n)];

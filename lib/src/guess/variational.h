@@ -2,7 +2,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "covol/domain.h"
+#include "covol/clip.h"
 
 namespace covol::guess {
 
@@ -18,8 +18,8 @@ struct Constraints {
     std::vector<double> variance;  ///< of each mark's place along the normal, length^2; the same count
     std::vector<Vec3> seeds;       ///< f is about `seed_value` there
     std::vector<double> seed_value;
-    /// Beyond its end nothing is known of the body, it may go on. Null: the world has no end.
-    const WorldBox* world = nullptr;
+    /// Beyond its end nothing is known of the body, it may go on. Empty: the world has no end.
+    Clip world;
     /// What is known of f beforehand at the marks, its value and its gradient: the energy is that of what f adds to it,
     /// and value() leaves it out. Empty: nothing.
     std::vector<double> known_value;

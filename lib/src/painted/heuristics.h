@@ -4,12 +4,18 @@
 
 namespace covol {
 
-/// What painted labels mean: painted.cpp.
+/// What painted labels mean: painted.cpp, whole_runs.cpp.
 struct PaintedHeuristics {
     /// [voxels] A patch that is nowhere wider says little about a cross-section.
     int narrowest = heuristic("painted.narrowest", 3);
     /// [ratio] Of the widest patch to a run of painted slices, at least, for them to be slices.
     int thin_run = heuristic("painted.thin_run", 3);
+    /// [of the largest section] A section that is taken for as large.
+    double about_largest = heuristic("painted.about_largest", 0.9);
+    /// [squares of its width] A section that is larger is longer than wide: a disc has 1.3 to 1.8.
+    double elongated = heuristic("painted.elongated", 2);
+    /// [of the widest ends] Ends that are taken for as wide.
+    double as_wide = heuristic("painted.as_wide", 0.98);
 };
 COVOL_HEURISTICS PaintedHeuristics kPainted{};
 

@@ -7,19 +7,22 @@
 #include <cmath>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <sstream>
 
 #include "base/file.h"
 #include "covol/error.h"
 #include "painted/heuristics.h"
 #include "painted/outline.h"
+#include "painted/paint.h"
 #include "painted/segments.h"
+#include "painted/whole_runs.h"
 
 namespace covol {
 namespace {
 
-using painted::Patch;
-using painted::Slice;
+using painted::AxisPaint;
+using painted::Paint;
 
 constexpr std::size_t kMostListed = 8;
 constexpr const char* kAxisNames[3] = {"x", "y", "z"};
@@ -92,118 +95,7 @@ std::map<int, VoxelBox> boxes_of(const Image& labels) {
     return all;
 }
 
-/// The paint of one label in its box.
-class Paint {
-public:
-    Paint(const Image& labels, int label, const VoxelBox& box)
-        : box_(box), n_(box.size()), image_(labels.geometry().size) {
-        inside_.resize(std::size_t(n_[0]) * std::size_t(n_[1]) * std::size_t(n_[2]));
-        tbb::parallel_for(0, n_[2], [&](int k) {
-            for (int j = 0; j < n_[1]; ++j)
-                for (int i = 0; i < n_[0]; ++i)
-                    inside_[at({i, j, k})] = labels.at(box.min[0] + i, box.min[1] + j, box.min[2] + k) == label;
-        });
-        voxels = std::size_t(std::count(inside_.begin(), inside_.end(), 1));
-    }
-
-    std::size_t voxels = 0;
-
-    [[nodiscard]] const VoxelBox& box() const { return box_; }
-
-    /// Counted from the image's first slice.
-    [[nodiscard]] Slice slice(int axis, int number) const {
-        const auto [x, y] = plane(axis);
-        Slice cut;
-        cut.nx = n_[x];
-        cut.ny = n_[y];
-        cut.inside.reserve(std::size_t(cut.nx) * std::size_t(cut.ny));
-        Index3 p;
-        p[axis] = number - box_.min[axis];
-        for (p[y] = 0; p[y] < n_[y]; ++p[y])
-            for (p[x] = 0; p[x] < n_[x]; ++p[x]) cut.inside.push_back(inside_[at(p)]);
-        return cut;
-    }
-    /// Whether the box's sides within the slices are the image's.
-    [[nodiscard]] std::array<bool, 4> ends(int axis) const {
-        const auto [x, y] = plane(axis);
-        return {box_.min[x] == 0, box_.max[x] == image_[x] - 1, box_.min[y] == 0, box_.max[y] == image_[y] - 1};
-    }
-    void erase(int axis, int number) {
-        const auto [x, y] = plane(axis);
-        Index3 p;
-        p[axis] = number - box_.min[axis];
-        for (p[y] = 0; p[y] < n_[y]; ++p[y])
-            for (p[x] = 0; p[x] < n_[x]; ++p[x]) inside_[at(p)] = 0;
-    }
-    /// Positions, in voxels of the image, of those that have a neighbour outside.
-    [[nodiscard]] std::vector<Vec3> outer() const {
-        std::vector<Vec3> found;
-        Index3 p;
-        for (p[2] = 0; p[2] < n_[2]; ++p[2])
-            for (p[1] = 0; p[1] < n_[1]; ++p[1])
-                for (p[0] = 0; p[0] < n_[0]; ++p[0])
-                    if (inside_[at(p)] && !is_enclosed(p))
-                        found.push_back(
-                            {double(box_.min[0] + p[0]), double(box_.min[1] + p[1]), double(box_.min[2] + p[2])});
-        return found;
-    }
-
-    static std::array<int, 2> plane(int axis) { return {axis == 0 ? 1 : 0, axis == 2 ? 1 : 2}; }
-
-private:
-    [[nodiscard]] std::size_t at(const Index3& p) const {
-        return (std::size_t(p[2]) * std::size_t(n_[1]) + std::size_t(p[1])) * std::size_t(n_[0]) + std::size_t(p[0]);
-    }
-    [[nodiscard]] bool is_enclosed(const Index3& p) const {
-        for (int a = 0; a < 3; ++a)
-            for (const int step : {-1, 1}) {
-                Index3 q = p;
-                q[a] += step;
-                if (q[a] < 0 || q[a] >= n_[a] || !inside_[at(q)]) return false;
-            }
-        return true;
-    }
-
-    VoxelBox box_;
-    Index3 n_;
-    Index3 image_;
-    std::vector<std::uint8_t> inside_;
-};
-
-/// What the slices across one axis hold.
-struct AxisPaint {
-    std::vector<int> areas;    ///< slices with an area
-    std::vector<int> painted;  ///< with any paint
-    std::vector<char> small;   ///< by painted slice: patches that are neither areas nor strokes, alone
-    int widest = 0;            ///< voxels
-    int longest_run = 0;       ///< of neighbouring slices with an area
-};
-
-AxisPaint look_across(const Paint& paint, int axis) {
-    const int first = paint.box().min[axis], count = paint.box().size()[axis];
-    std::vector<std::vector<Patch>> found(static_cast<std::size_t>(count));
-    tbb::parallel_for(0, count, [&](int n) { found[std::size_t(n)] = painted::patches(paint.slice(axis, first + n)); });
-    AxisPaint result;
-    int run = 0;
-    for (int n = 0; n < count; ++n) {
-        bool has_area = false, has_stroke = false;
-        for (const Patch& patch : found[std::size_t(n)]) {
-            has_stroke |= patch.stroke;
-            if (patch.stroke || patch.width < kPainted.narrowest) continue;
-            has_area = true;
-            result.widest = std::max(result.widest, patch.width);
-        }
-        run = has_area ? run + 1 : 0;
-        result.longest_run = std::max(result.longest_run, run);
-        if (has_area) result.areas.push_back(first + n);
-        if (found[std::size_t(n)].empty()) continue;
-        result.painted.push_back(first + n);
-        result.small.push_back(!has_area && !has_stroke);
-    }
-    return result;
-}
-
-/// Whether the slices across the axis were painted one by one.
+/// Whether the slices across the axis were painted one by one, apart or in thin runs.
 bool is_sliced(const AxisPaint& paint, int axis, const ImageGeometry& geometry) {
     if (paint.areas.empty()) return false;
     if (paint.longest_run == 1) return true;
@@ -276,10 +168,13 @@ PaintedLabel understand(const Image& labels, const LabelName& name, const VoxelB
     const std::string source = labels.path() + ": " + name.name;
     if (as != PaintedAs::Scribbles) {
         std::array<AxisPaint, 3> axes;
-        for (int a = 0; a < 3; ++a) axes[a] = look_across(paint, a);
+        for (int a = 0; a < 3; ++a) axes[a] = painted::look_across(paint, a);
         for (const int a : {2, 1, 0})
             if (axes[a].widest >= kPainted.narrowest && is_sliced(axes[a], a, labels.geometry()))
                 result.views.push_back(view_of(paint, a, with_tips(axes[a]), source));
+        if (result.views.empty())
+            if (const std::optional<int> a = painted::find_whole_runs(paint, labels.geometry()))
+                result.views.push_back(view_of(paint, *a, with_tips(axes[*a]), source));
         if (result.views.empty() && as == PaintedAs::Slices) {
             // The axis along which the fewest slices of the paint's box hold any.
             const auto share = [&](int a) { return double(axes[a].painted.size()) / box.size()[a]; };

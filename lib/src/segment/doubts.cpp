@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "covol/error.h"
 #include "image/support.h"
 #include "points/kd_tree.h"
 #include "segment/heuristics.h"
@@ -176,7 +177,62 @@ void find_folds(Job& job) {
                  "): folds or walls closer together than two or three points are lost; sample more densely there");
 }
 
+/// Places all over the outermost voxels of the image, world units.
+std::vector<Vec3> places_on_border(const ImageGeometry& geometry) {
+    constexpr int kPlaces = 24;  // along an edge
+    std::vector<Vec3> places;
+    for (int axis = 0; axis < 3; ++axis)
+        for (const bool upper : {false, true})
+            for (int i = 0; i < kPlaces; ++i)
+                for (int j = 0; j < kPlaces; ++j) {
+                    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+                    Vec3 index;
+                    index[axis] = upper ? geometry.size[axis] - 1 : 0;
+                    index[u] = (i + 0.5) / kPlaces * geometry.size[u] - 0.5;
+                    index[v] = (j + 0.5) / kPlaces * geometry.size[v] - 0.5;
+                    places.push_back(geometry.index_to_world(index));
+                }
+    return places;
+}
+
+std::vector<char> are_inside(const FloatGrid& u, const std::vector<Vec3>& places) {
+    std::vector<char> inside;
+    const auto accessor = u.getConstAccessor();
+    for (const Vec3& p : places)
+        inside.push_back(accessor.getValue(openvdb::Coord::round(u.worldToIndex(openvdb::Vec3d(p[0], p[1], p[2])))) <
+                         0);
+    return inside;
+}
+
 }  // namespace
+
+void note_border(Job& job) {
+    if (job.image != nullptr) job.said_inside = are_inside(*job.result.u, places_on_border(job.image->geometry()));
+}
+
+void require_outside(const Job& job) {
+    if (job.image == nullptr || job.options.roi) return;
+    const std::vector<Vec3> places = places_on_border(job.image->geometry());
+    const std::vector<char> inside = are_inside(*job.result.u, places);
+    if (2 * std::count(inside.begin(), inside.end(), 1) <= std::ptrdiff_t(places.size())) return;
+    std::vector<Vec3> said = job.given;
+    said.insert(said.end(), job.options.inside.begin(), job.options.inside.end());
+    const WorldBox box = bounding_box(said.empty() ? places : said);
+    const double far =
+        kDoubts.far_diagonals * std::hypot(box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]);
+    const detail::KdTree tree(said);
+    std::size_t unsaid = 0;
+    for (std::size_t n = 0; n < places.size(); ++n) {
+        if (!inside[n] || (!job.said_inside.empty() && job.said_inside[n])) continue;
+        unsaid += tree.nearest(places[n]) > far * far;
+    }
+    if (2 * unsaid <= places.size()) return;
+    throw Error(
+        Errc::InvalidInput,
+        "segment: the surface is inside out: " + number(std::round(100.0 * double(unsaid) / double(places.size()))) +
+            " % of the image's border would be inside, where neither marks nor seeds say so; mark more of the "
+            "body, or give places outside of it (`outside`)");
+}
 
 std::vector<double> levels_at(const FloatGrid& u, const std::vector<Vec3>& places) {
     std::vector<double> levels(places.size());

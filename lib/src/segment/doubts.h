@@ -14,6 +14,14 @@ void doubt(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& 
 /// The same of marks that lie where no others are, before anything is made of them.
 void doubt_isolated_marks(Job& job);
 
+/// Notes what of the image's border a start that the caller named holds already: job.said_inside.
+void note_border(Job& job);
+
+/// Of a surface that came out inside out: most of the image's border is inside, and neither marks, nor seeds, nor a
+/// start that was named, say so.
+/// @throws Error InvalidInput
+void require_outside(const Job& job);
+
 /// Of a level set, trilinear. @param places  world units
 [[nodiscard]] std::vector<double> levels_at(const FloatGrid& u, const std::vector<Vec3>& places);
 

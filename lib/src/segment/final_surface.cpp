@@ -30,7 +30,7 @@ void relax(Job& job) {
 void surface_of_flow(Job& job) {
     if (job.result.surface) return;
     FloatGridPtr& u = job.result.u;
-    set_clip(*u, where_it_ends(job));
+    set_clip(*u, job.where_it_ends());
     job.result.surface = extract_surface(*u, job.run);
     const bool is_field = job.rests_on_field();
     if (is_field) {
@@ -41,7 +41,7 @@ void surface_of_flow(Job& job) {
     if (job.options.without_fields) return u.reset();
     if (!is_field) return;
     u = start_from_grid(job.domain(), *u, job.run);
-    set_clip(*u, where_it_ends(job));
+    set_clip(*u, job.where_it_ends());
 }
 
 void mesh_of_surface(Job& job) {
@@ -151,14 +151,6 @@ void give_up_fields(Job& job) {
 }
 
 }  // namespace
-
-Clip where_it_ends(const Job& job) {
-    Clip all = job.image != nullptr ? make_clip(job.image->geometry()) : Clip{};
-    if (!job.options.roi) return all;
-    const Clip region = make_clip(*job.options.roi);
-    all.insert(all.end(), region.begin(), region.end());
-    return all;
-}
 
 void make_surface(Job& job) {
     SegmentReport& report = job.report();

@@ -1,5 +1,7 @@
 #include "segment/job.h"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace covol::pipeline {
@@ -51,6 +53,22 @@ Domain Job::coarsened(const Domain& fine) const {
 
 Domain Job::domain_with_chosen_margin(double automatic) const {
     return domain_with_margin(options.margin.value_or(automatic));
+}
+
+bool Job::is_turned() const {
+    if (image == nullptr) return false;
+    for (const auto& row : image->geometry().direction)
+        for (const double x : row)
+            if (std::min(std::abs(x), std::abs(std::abs(x) - 1)) > 1e-6) return true;
+    return false;
+}
+
+Clip Job::where_it_ends() const {
+    Clip all = image != nullptr ? make_clip(image->geometry()) : Clip{};
+    if (!options.roi) return all;
+    const Clip region = make_clip(*options.roi);
+    all.insert(all.end(), region.begin(), region.end());
+    return all;
 }
 
 }  // namespace covol::pipeline

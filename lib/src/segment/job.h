@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/number.h"
+#include "covol/clip.h"
 #include "covol/pipeline.h"
 
 namespace covol::pipeline {
@@ -42,6 +43,7 @@ struct Job {
     std::optional<CloudOrientation> cloud;  ///< of points alone, many or asked for
     FloatGridPtr obstacle, floor;           ///< of the flow, as in EvolveFields, or null
     FloatGridPtr trusted_distance;          ///< to the trusted marks, or null
+    std::vector<char> said_inside;          ///< of places_on_border(): in the start that the caller named; else empty
 
     SegmentReport& report() { return result.report; }
     [[nodiscard]] const Domain& domain() const { return result.report.domain; }
@@ -91,6 +93,10 @@ struct Job {
     [[nodiscard]] Domain domain_with_margin(double margin) const;
     /// The same with the margin of the options where they have one.
     [[nodiscard]] Domain domain_with_chosen_margin(double automatic) const;
+    /// Where a solid ends whatever the marks say: the image's box, turned as the image is, and the region of interest.
+    [[nodiscard]] Clip where_it_ends() const;
+    /// Whether the image's axes are none of the world's: its domain holds places outside of it.
+    [[nodiscard]] bool is_turned() const;
     /// `fine`, on the lattice of this job's larger voxels; it, too, is the same for all parts.
     [[nodiscard]] Domain coarsened(const Domain& fine) const;
 };

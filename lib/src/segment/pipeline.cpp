@@ -93,6 +93,7 @@ void run_steps(Job& job, FloatGridPtr& start) {
     compute_trusted_distance(job);
     if (job.options.keep_failed) start = job.result.u->deepCopy();
     solve(job, without_coarse);
+    require_outside(job);
     make_surface(job);
 }
 

@@ -1,5 +1,6 @@
 // Starts other than tagging: the signed distance to a given surface, clamped, in a band around it.
 #include <openvdb/openvdb.h>
+#include <openvdb/tools/Interpolation.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -10,9 +11,12 @@
 #include <vector>
 
 #include "base/number.h"
+#include "clip/clipped.h"
+#include "clip/half_spaces.h"
 #include "covol/error.h"
 #include "covol/start.h"
 #include "redistance/signed_distance.h"
+#include "start/carry_on.h"
 #include "start/other_lattice.h"
 #include "start/sampled_leaves.h"
 
@@ -271,6 +275,47 @@ FloatGridPtr start_from_grid(const Domain& domain, const FloatGrid& level_set, c
             });
         const Sampler sample = detail::sampler_of(level_set, to_source);
         result = start_from_field(domain, crossed_by(candidates, sample), sample, "start_from_grid", run);
+    });
+    return result;
+}
+
+FloatGridPtr detail::carried_beyond(const FloatGrid& start, const Domain& domain, const Clip& image,
+                                    const RunContext& run) {
+    constexpr double kLeafRadius = 4.5 * 1.7320508;  // voxels, as above
+    const double h = domain.voxel_size;
+    // A start that ends where the image does is itself again a voxel and a half within.
+    Clip within = image;
+    for (HalfSpace& plane : within) plane.offset -= 1.5 * h;
+    FloatGridPtr result;
+    with_threads(run, [&] {
+        std::vector<Coord> candidates = filter(leaves_in(domain, domain.world_box()), [&](const Coord& o) {
+            const Vec3 middle = domain.index_to_world({o.x() + 4.0, o.y() + 4.0, o.z() + 4.0});
+            return depth_in(within, middle) > -kLeafRadius * h;
+        });
+        std::vector<Coord> own;
+        for (auto leaf = start.tree().cbeginLeaf(); leaf; ++leaf) own.push_back(leaf->origin());
+        std::sort(own.begin(), own.end());
+        const std::vector<Coord> beside = dilate_leaves(own, 1, domain);
+        candidates.insert(candidates.end(), beside.begin(), beside.end());
+        std::sort(candidates.begin(), candidates.end());
+        candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
+        const Sampler sample = [&](const Coord& lo, const Coord& hi, float* values) {
+            const auto accessor = start.getConstAccessor();
+            for (int i = lo.x(); i <= hi.x(); ++i)
+                for (int j = lo.y(); j <= hi.y(); ++j)
+                    for (int k = lo.z(); k <= hi.z(); ++k) {
+                        const Vec3 at = domain.index_to_world({double(i), double(j), double(k)});
+                        if (!(depth_in(within, at) > 0)) {
+                            *values++ = accessor.getValue(Coord(i, j, k));
+                            continue;
+                        }
+                        const Vec3 inner = domain.world_to_index(projected(within, at));
+                        *values++ =
+                            openvdb::tools::BoxSampler::sample(accessor, openvdb::Vec3d(inner[0], inner[1], inner[2]));
+                    }
+        };
+        const std::vector<Coord> crossed = crossed_by(candidates, sample);
+        if (!crossed.empty()) result = start_from_field(domain, crossed, sample, "carried_beyond", run);
     });
     return result;
 }

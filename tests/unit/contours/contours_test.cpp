@@ -413,6 +413,75 @@ TEST_CASE("a dome ends where the shrinking section would") {
     CHECK(compute_cap_height(3, 0, 4, 4) == 4);
 }
 
+// ---- beyond the image's end -----------------------------------------------------------------------------------------
+
+/// Whether all that is inside lies in box(), and no ball that the surface crosses is denied.
+void check_bounds(const ContourSolid& solid, const Vec3& middle, double far) {
+    const WorldBox box = solid.box();
+    std::mt19937 random(11);
+    std::uniform_real_distribution<double> away(-far, far);
+    for (int n = 0; n < 20000; ++n) {
+        const Vec3 p{middle[0] + away(random), middle[1] + away(random), middle[2] + away(random)};
+        bool within = true;
+        for (int a = 0; a < 3; ++a) within = within && p[a] >= box.min[a] - 1e-6 && p[a] <= box.max[a] + 1e-6;
+        const double level = solid.level(p);
+        if (!within) CHECK(level > 0);
+        const Vec3 q{p[0] + 3, p[1] + 2, p[2] - 3};
+        if ((level < 0) != (solid.level(q) < 0)) CHECK(solid.may_meet(p, distance(p, q)));
+    }
+}
+
+TEST_CASE("a body that the image cuts ends beyond it, in an image that is turned as in one that is not") {
+    for (const ImageGeometry& g : {turned_geometry(), cube(80)}) {
+        Drawing drawing(g);
+        for (int k = 0; k < 12; k += 2) drawing.circle(40, 45, k, 8 - 0.3 * k);
+        const Contours c = drawing.densify(0.5);
+        const auto level = [&](double x, double k) { return c.solid->level(g.index_to_world({x, 45, k})); };
+        CHECK(level(40, -0.4) < -5);
+        CHECK(level(40, -3) < 0);   // a band's width beyond the image its wall is still there
+        CHECK(level(40, -40) > 0);  // and it ends
+        CHECK(level(40, -1000) > 0);
+        CHECK(c.solid->may_meet(g.index_to_world({40, 45, -1000}), 5) == false);
+        check_bounds(*c.solid, g.index_to_world({40, 45, 0}), 60);
+    }
+}
+
+TEST_CASE("a section that widens towards the image's end does not grow for ever") {
+    // From a radius of 2 to one of 9 over three slices; the image ends 2.5 beyond the second.
+    const Contours c = Drawing(cube(60)).circle(30, 30, 54, 2).circle(30, 30, 57, 9).densify(1);
+    const auto radius_at = [&](double k) {
+        double r = 0;
+        while (c.solid->level({30 + r, 30, k}) < 0 && r < 1000) r += 0.05;
+        return r;
+    };
+    CHECK(radius_at(57) == Approx(9).margin(0.2));
+    CHECK(radius_at(59.4) > 9.5);
+    CHECK(radius_at(59.4) < 9 + 2.4 + 0.2);  // by 45 degrees at most
+    for (double k = 60; k < 80; k += 1) CHECK(radius_at(k) < 9 + (k - 57) + 0.2);
+    check_bounds(*c.solid, {30, 30, 57}, 100);
+    // One that narrows goes on to, as it came.
+    const Contours cone = Drawing(cube(60)).circle(30, 30, 54, 20).circle(30, 30, 57, 14).densify(1);
+    for (const double k : {58.0, 59.0})
+        CHECK(cone.solid->level({30 + 14 - 2 * (k - 57), 30, k}) == Approx(0).margin(0.1));
+}
+
+TEST_CASE("the start from contours in the corner of an image is not inside out") {
+    // As on a nucleus of a worm: two contours of a small body, one of them along the image's side.
+    Drawing drawing(cube(60));
+    drawing.add({{5, 59, 55}, {1.5, 59, 55}, {0.5, 58, 55}, {4, 57, 55}});
+    drawing.add(
+        {{8, 59, 58}, {3, 59, 58}, {-0.5, 57.5, 58}, {-0.5, 52, 58}, {1, 49, 58}, {4.5, 51, 58}, {8.5, 54, 58}});
+    const Contours c = drawing.densify(1, ContourCurve::Spline);
+    REQUIRE(c.solid != nullptr);
+    check_bounds(*c.solid, {4, 56, 57}, 60);
+    const FloatGridPtr u = start_from_contours(make_domain(cube(60).world_box(), 1), *c.solid);
+    const auto accessor = u->getConstAccessor();
+    CHECK(accessor.getValue({4, 56, 58}) < 0);
+    for (const int x : {20, 59})
+        for (const int y : {0, 35})
+            for (const int z : {0, 30, 59}) CHECK(accessor.getValue({x, y, z}) > 0);
+}
+
 TEST_CASE("one slice makes a lens, two slices a body") {
     const Contours one = Drawing(cube(60)).circle(30, 30, 20, 10).densify(1);
     CHECK(one.slices == 1);

@@ -229,6 +229,70 @@ TEST_CASE("paint in places is a scribble", "[painted]") {
               .views.empty());
 }
 
+TEST_CASE("slices side by side that were painted as a whole", "[painted]") {
+    const int axis = GENERATE(0, 1, 2);
+    const auto of = [&](int i, int j, int k) { return axis == 0 ? i : axis == 1 ? j : k; };
+    const auto views = [](const Label& label, const ImageGeometry& geometry = lattice({40, 40, 40})) {
+        return understood(painting(geometry, label)).labels[0].views;
+    };
+    // Of a ball of 14 slices the middle eight, of one of 20 all but the first, half of one, a bent tube.
+    const Label both = [&](int i, int j, int k) {
+        return of(i, j, k) > 15 && of(i, j, k) < 24 && in_ball(i, j, k, 19.5, 7) ? 1 : 0;
+    };
+    const Label half = [&](int i, int j, int k) { return of(i, j, k) > 19 && in_ball(i, j, k, 19.5, 10) ? 1 : 0; };
+    const Label tube = [&](int i, int j, int k) {
+        const double w = of(i, j, k), x = axis == 0 ? j : i, y = axis == 2 ? j : k;
+        return w > 8 && w < 30 && std::hypot(x - 14 - 0.3 * w, y - 20) < 6 ? 1 : 0;
+    };
+    for (const Label& label : {both, half, tube}) {
+        const std::vector<PaintedView> found = views(label);
+        REQUIRE(found.size() == 1);
+        CHECK(found[0].axis == axis);
+    }
+    // Through the whole image.
+    CHECK(views([](int i, int j, int) { return std::hypot(i - 19.5, j - 19.5) < 8 ? 1 : 0; }).size() == 1);
+}
+
+TEST_CASE("what a brush leaves is no cross-section", "[painted]") {
+    const auto is_scribble = [](const Label& label) {
+        return understood(painting(lattice({60, 60, 60}), label)).labels[0].views.empty();
+    };
+    const auto beside = [](int i, int j, int k, const Vec3& from, const Vec3& to) {
+        double along = 0, length = 0;
+        const Vec3 p{double(i), double(j), double(k)};
+        for (int a = 0; a < 3; ++a) {
+            along += (p[a] - from[a]) * (to[a] - from[a]);
+            length += (to[a] - from[a]) * (to[a] - from[a]);
+        }
+        const double t = length > 0 ? std::clamp(along / length, 0.0, 1.0) : 0;
+        double away = 0;
+        for (int a = 0; a < 3; ++a) away = std::hypot(away, from[a] + t * (to[a] - from[a]) - p[a]);
+        return away;
+    };
+    for (const double r : {2.5, 3.5, 5.0, 6.2, 8.0, 11.0}) {
+        INFO("radius " << r);
+        CHECK(is_scribble([&](int i, int j, int k) {
+            return beside(i, j, k, {30, 30, 30}, {30, 30, 30}) < r ? 1 : 0;
+        }));
+        CHECK(is_scribble([&](int i, int j, int k) {
+            return beside(i, j, k, {30.5, 30.5, 30.5}, {30.5, 30.5, 30.5}) < r ? 1 : 0;
+        }));
+        // Dragged along a slice, and along its normal.
+        CHECK(is_scribble([&](int i, int j, int k) {
+            return beside(i, j, k, {15, 20, 30}, {44, 30, 30}) < r ? 1 : 0;
+        }));
+        CHECK(is_scribble([&](int i, int j, int k) {
+            return beside(i, j, k, {30, 30, 15}, {30, 30, 44}) < r ? 1 : 0;
+        }));
+    }
+    CHECK(is_scribble([](int i, int j, int k) {
+        return std::max({std::abs(i - 30), std::abs(j - 30), std::abs(k - 30)}) < 5 ? 1 : 0;
+    }));
+    // A stroke that was repeated on neighbouring slices.
+    CHECK(is_scribble(
+        [](int i, int j, int k) { return k > 20 && k < 27 && std::abs(j - 30) <= 1 && i > 22 && i < 36 ? 1 : 0; }));
+}
+
 TEST_CASE("slices with strokes beside slices painted as a whole", "[painted]") {
     const Painted result = understood(painting(lattice({40, 40, 40}), [](int i, int j, int k) {
         if (k % 10 == 0) return in_ball(i, j, k, 19.5, 16) ? 1 : 0;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "segment/doubts.h"
 #include "segment/heuristics.h"
 #include "segment/start/starts.h"
 
@@ -53,7 +54,8 @@ void start_from_corrected_guess(Job& job) {
     job.report().domain = job.domain_with_chosen_margin(2 * kJob.margin_voxels * job.h());
     Timed timed(job.report().seconds.tag);
     job.options.correction = correction(job);
-    const FloatGridPtr guess = start_grid(*job.options.guess, job.domain(), job.run);
+    const FloatGridPtr guess = job.result.u = start_grid(*job.options.guess, job.domain(), job.run);
+    note_border(job);
     job.result.correction =
         std::make_shared<const GuessCorrection>(corrected(job, guess, job.options.contours ? job.trusted : job.points));
     job.result.u = job.result.correction->start(job.run);

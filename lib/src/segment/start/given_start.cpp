@@ -54,15 +54,16 @@ double known_area(const Start& start) {
 void start_as_given(Job& job) {
     job.origin = StartOrigin::Given;
     job.options.evolve.follow = true;
-    job.report().domain = job.domain_with_chosen_margin(2 * kJob.margin_voxels * job.h());
+    choose_domain_of_flow(job);
     detail::require_band_memory(known_area(job.options.start), job.h(), "segment", job.run);
     {
         Timed timed(job.report().seconds.tag);
         job.result.u = start_grid(job.options.start, job.domain(), job.run);
     }
+    note_border(job);
     const bool is_rough = job.options.start.kind == Start::Kind::Sphere || job.options.start.kind == Start::Kind::Box;
     if (is_rough) grow_to_edges(job);
-    if (!job.uses_points()) return;
+    if (!job.uses_points()) return carry_beyond_turned_image(job);
     if (job.guided() && !is_rough && job.trusted.size() <= kAutomatic.most_guess_marks &&
         !misses_marks(job, *job.result.u)) {
         correct_start(job);
@@ -70,6 +71,7 @@ void start_as_given(Job& job) {
         job.origin = StartOrigin::Guess;
         return job.choose("start", "near its marks", "it is a guess that they correct, and nothing flows");
     }
+    carry_beyond_turned_image(job);
     find_distance(job, tube_for_start(job));
 }
 

@@ -1,6 +1,7 @@
 // The start from few marks: the surface through them that bends least.
 #include "covol/orientation.h"
 #include "distance/memory_need.h"
+#include "guess/guess_in_image.h"
 #include "segment/fields.h"
 #include "segment/heuristics.h"
 #include "segment/start/starts.h"
@@ -45,14 +46,14 @@ void start_from_guess(Job& job) {
     options.inside = job.options.inside;
     options.outside = job.options.outside;
     options.outside.insert(options.outside.end(), job.options.exterior_seeds.begin(), job.options.exterior_seeds.end());
-    if (job.image != nullptr || job.options.roi) options.end = job.domain().world_box();
     // A body that the image cuts goes on beyond it: at the image's end itself its wall would be closed, and the image
     // asked about a cap. The clip at the end makes the cut.
     if (job.image != nullptr && !job.options.roi)
         job.report().domain = widened(job.domain(), kStarts.guess_beyond_voxels);
     {
         Timed timed(job.report().seconds.tag);
-        Guess guess = guess_from_marks(job.domain(), job.points, options, job.report().guess, job.run);
+        Guess guess =
+            guess::guess_in_image(job.domain(), job.points, options, job.where_it_ends(), job.report().guess, job.run);
         job.result.u = std::move(guess.u);
         job.on_surface = std::move(guess.marks);
     }

@@ -7,7 +7,7 @@ namespace covol::pipeline {
 void start_from_seeds(Job& job) {
     job.origin = StartOrigin::Given;
     job.options.evolve.follow = true;
-    job.report().domain = job.domain_with_chosen_margin(2 * kJob.margin_voxels * job.h());
+    choose_domain_of_flow(job);
     {
         Timed timed(job.report().seconds.tag);
         job.result.u = covol::start_from_seeds(job.domain(), job.options.inside, job.options.outside, job.run);
@@ -17,6 +17,7 @@ void start_from_seeds(Job& job) {
                    ? "there are no marks, and no seeds outside: a little around the seeds inside"
                    : "there are no marks: halfway between seeds inside and outside");
     if (job.options.outside.empty()) grow_to_edges(job);
+    carry_beyond_turned_image(job);
 }
 
 }  // namespace covol::pipeline

@@ -35,6 +35,13 @@ void start_as_given(Job& job);
 /// A start inside an object grows to the object's edges, where the image alone decides and shows any.
 void grow_to_edges(Job& job);
 
+/// The domain of a start that flows: that of an image which is turned reaches a little beyond it on all sides.
+void choose_domain_of_flow(Job& job);
+
+/// Before it flows a start in an image which is turned goes on beyond its end, as in one that is not it does at the
+/// domain's end.
+void carry_beyond_turned_image(Job& job);
+
 /// Halfway between the seeds, where there are no marks.
 void start_from_seeds(Job& job);
 

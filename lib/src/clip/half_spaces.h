@@ -1,0 +1,54 @@
+#pragma once
+// Half-spaces, and directions beside and within their planes.
+#include <array>
+#include <cmath>
+
+#include "base/vector.h"
+#include "covol/clip.h"
+
+namespace covol::detail {
+
+/// n·x - offset: how far beyond the plane a position lies, negative within.
+[[nodiscard]] inline double along(const HalfSpace& plane, const Vec3& x) {
+    return cloud::dot(plane.normal, x) - plane.offset;
+}
+
+[[nodiscard]] inline Vec3 moved(const Vec3& x, const Vec3& direction, double by) {
+    return cloud::plus(x, cloud::times(by, direction));
+}
+
+/// The nearest position in the clip, found by projecting onto its planes in turn; of a box it is exact.
+[[nodiscard]] inline Vec3 projected(const Clip& clip, Vec3 x) {
+    constexpr int kProjections = 8;
+    for (int round = 0; round < kProjections; ++round) {
+        bool any = false;
+        for (const HalfSpace& plane : clip) {
+            const double beyond = along(plane, x);
+            if (!(beyond > 0)) continue;
+            for (int a = 0; a < 3; ++a) x[a] -= beyond * plane.normal[a];
+            any = true;
+        }
+        if (!any) break;
+    }
+    return x;
+}
+
+/// Two perpendicular directions in the plane; of a plane along two of the world's axes, these.
+[[nodiscard]] inline std::array<Vec3, 2> directions_in(const HalfSpace& plane) {
+    const Vec3& n = plane.normal;
+    int across = 0;
+    for (int a = 1; a < 3; ++a)
+        if (std::abs(n[a]) > std::abs(n[across])) across = a;
+    std::array<Vec3, 2> found;
+    for (int i = 0, a = 0; a < 3; ++a) {
+        if (a == across) continue;
+        Vec3 direction{0, 0, 0};
+        direction[a] = 1;
+        direction = moved(direction, n, -n[a]);
+        if (i == 1) direction = moved(direction, found[0], -cloud::dot(direction, found[0]));
+        found[i++] = cloud::unit(direction);
+    }
+    return found;
+}
+
+}  // namespace covol::detail

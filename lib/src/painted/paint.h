@@ -1,0 +1,61 @@
+#pragma once
+// The paint of one label, whole and slice by slice.
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "covol/image.h"
+#include "painted/outline.h"
+
+namespace covol::painted {
+
+/// The paint of one label in its box.
+class Paint {
+public:
+    Paint(const Image& labels, int label, const VoxelBox& box);
+
+    std::size_t voxels = 0;
+
+    [[nodiscard]] const VoxelBox& box() const { return box_; }
+    [[nodiscard]] const Index3& image_size() const { return image_; }
+
+    /// Counted from the image's first slice.
+    [[nodiscard]] Slice slice(int axis, int number) const;
+    /// Whether the box's sides within the slices are the image's.
+    [[nodiscard]] std::array<bool, 4> ends(int axis) const;
+    void erase(int axis, int number);
+    /// Positions, in voxels of the image, of those that have a neighbour outside.
+    [[nodiscard]] std::vector<Vec3> outer() const;
+    /// The connected parts (neighbours by face, edge or corner), each in its own box.
+    [[nodiscard]] std::vector<Paint> pieces() const;
+
+    static std::array<int, 2> plane(int axis) { return {axis == 0 ? 1 : 0, axis == 2 ? 1 : 2}; }
+
+private:
+    /// A part of an image of this size. @param voxels  of it, at least one
+    Paint(const Index3& image, const std::vector<Index3>& voxels);
+
+    [[nodiscard]] std::size_t at(const Index3& p) const {
+        return (std::size_t(p[2]) * std::size_t(n_[1]) + std::size_t(p[1])) * std::size_t(n_[0]) + std::size_t(p[0]);
+    }
+    [[nodiscard]] bool holds(const Index3& p) const;
+    [[nodiscard]] bool is_enclosed(const Index3& p) const;
+
+    VoxelBox box_;
+    Index3 n_;
+    Index3 image_;
+    std::vector<std::uint8_t> inside_;
+};
+
+/// What the slices across one axis hold.
+struct AxisPaint {
+    std::vector<int> areas;           ///< slices with an area
+    std::vector<int> painted;         ///< with any paint
+    std::vector<std::size_t> voxels;  ///< by painted slice
+    std::vector<char> small;          ///< by painted slice: patches that are neither areas nor strokes, alone
+    int widest = 0;                   ///< voxels
+    int longest_run = 0;              ///< of neighbouring slices with an area
+};
+[[nodiscard]] AxisPaint look_across(const Paint& paint, int axis);
+
+}  // namespace covol::painted

@@ -1,0 +1,81 @@
+#include "painted/whole_runs.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "painted/heuristics.h"
+
+namespace covol::painted {
+namespace {
+
+/// An end of a piece's slices.
+struct End {
+    double fraction = 0;  ///< of the end slice's section to the largest one
+    bool blunt = false;   ///< larger than that of any ellipsoid which ends before the next slice
+};
+
+/// @param areas      of the slices, from the end on
+/// @param elongated  the sections are: across a tube's side they shrink as its chords do, not as their squares
+End end_of(const std::vector<std::size_t>& areas, bool elongated) {
+    const auto largest = double(*std::max_element(areas.begin(), areas.end()));
+    // The ellipsoid's middle lies beside the first slice that is about as large as any, and its end, at most a slice
+    // beyond the last one: a section w from the middle has 1 - (w / (w + 1))^2 of the largest.
+    double w = 0;
+    for (const std::size_t area : areas) {
+        if (double(area) >= kPainted.about_largest * largest) break;
+        ++w;
+    }
+    const double fraction = double(areas.front()) / largest, of_round = (2 * w + 1) / ((w + 1) * (w + 1));
+    return {fraction, w == 0 || fraction > (elongated ? std::sqrt(of_round) : of_round)};
+}
+
+/// How wide the ends are across the axis, the mean of the fractions; 0 where none is blunt.
+double blunt_ends(const Paint& piece, int axis) {
+    const AxisPaint look = look_across(piece, axis);
+    // A stroke, or a wall of strokes on neighbouring slices.
+    if (look.widest <= kOutline.widest_stroke || int(look.voxels.size()) <= kOutline.widest_stroke) return 0;
+    const auto largest = *std::max_element(look.voxels.begin(), look.voxels.end());
+    const bool elongated = double(largest) > kPainted.elongated * look.widest * look.widest;
+    std::vector<End> ends;
+    if (piece.box().min[axis] > 0) ends.push_back(end_of(look.voxels, elongated));
+    if (piece.box().max[axis] < piece.image_size()[axis] - 1)
+        ends.push_back(end_of({look.voxels.rbegin(), look.voxels.rend()}, elongated));
+    if (ends.empty()) return 1;
+    double sum = 0;
+    for (const End& end : ends) sum += end.fraction;
+    const bool any = std::any_of(ends.begin(), ends.end(), [](const End& end) { return end.blunt; });
+    return any ? sum / double(ends.size()) : 0;
+}
+
+/// Whether the box is as long along all axes, up to a voxel.
+bool is_cube(const VoxelBox& box, const Vec3& spacing) {
+    const Index3 n = box.size();
+    const std::array<double, 3> side{n[0] * spacing[0], n[1] * spacing[1], n[2] * spacing[2]};
+    return *std::max_element(side.begin(), side.end()) - *std::min_element(side.begin(), side.end()) <=
+           *std::max_element(spacing.begin(), spacing.end());
+}
+
+}  // namespace
+
+std::optional<int> find_whole_runs(const Paint& paint, const ImageGeometry& geometry) {
+    std::array<double, 3> wide{0, 0, 0}, blunt{0, 0, 0};  // means of the fractions, and voxels of the pieces
+    for (const Paint& piece : paint.pieces())
+        for (int a = 0; a < 3; ++a) {
+            const double ends = blunt_ends(piece, a);
+            wide[a] += ends * double(piece.voxels) / double(paint.voxels);
+            if (ends > 0) blunt[a] += double(piece.voxels);
+        }
+    for (int a = 0; a < 3; ++a)
+        if (2 * blunt[a] <= double(paint.voxels)) wide[a] = 0;
+    const double widest = *std::max_element(wide.begin(), wide.end());
+    if (widest == 0) return {};
+    const auto is_widest = [&](int a) { return wide[a] >= kPainted.as_wide * widest; };
+    const int count = is_widest(0) + is_widest(1) + is_widest(2);
+    if (count > 1 && is_cube(paint.box(), geometry.spacing)) return {};
+    for (const int a : {2, 1, 0})
+        if (is_widest(a)) return a;
+    return {};
+}
+
+}  // namespace covol::painted

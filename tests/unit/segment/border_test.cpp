@@ -1,0 +1,73 @@
+#include <openvdb/openvdb.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "covol/error.h"
+#include "covol/start.h"
+#include "segment/doubts.h"
+#include "support/scratch.h"
+
+using namespace covol;
+using pipeline::Job;
+
+namespace {
+
+constexpr int kSize = 32;
+
+Image blank_image() {
+    ImageGeometry geometry;
+    geometry.size = {kSize, kSize, kSize};
+    const std::vector<std::uint8_t> values(std::size_t(kSize) * kSize * kSize, 0);
+    return Image::from_values(geometry, values.data());
+}
+
+/// A small ball, in a corner of the image or elsewhere, turned inside out.
+FloatGridPtr inverted_ball(const Image& image, const Vec3& center, double radius) {
+    const FloatGridPtr u = start_from_sphere(make_domain(image.geometry().world_box(), 1), center, radius);
+    for (auto value = u->beginValueAll(); value; ++value) value.setValue(-*value);
+    u->tree().root().setBackground(-u->background(), false);
+    return u;
+}
+
+std::vector<Vec3> marks_around(const Vec3& center, double radius) {
+    std::vector<Vec3> marks;
+    for (int a = 0; a < 3; ++a)
+        for (const double side : {-radius, radius}) {
+            marks.push_back(center);
+            marks.back()[a] += side;
+        }
+    return marks;
+}
+
+}  // namespace
+
+TEST_CASE("a surface that is inside out is refused unless something says so") {
+    const Image image = blank_image();
+    const RunContext run;
+    const Vec3 center{6, 25, 24};
+    const std::vector<Vec3> marks = marks_around(center, 5);
+    {
+        Job job(&image, marks, {}, run);
+        job.result.u = start_from_sphere(make_domain(image.geometry().world_box(), 1), center, 5);
+        CHECK_NOTHROW(pipeline::require_outside(job));
+        job.result.u = inverted_ball(image, center, 5);
+        CHECK(message_of([&] { pipeline::require_outside(job); }).find("is inside out: ") != std::string::npos);
+    }
+    {
+        // Marks or seeds all over the border, or a start that was named, mean it.
+        Job marked(&image, marks_around({15.5, 15.5, 15.5}, 15), {}, run);
+        marked.result.u = inverted_ball(image, center, 5);
+        CHECK_NOTHROW(pipeline::require_outside(marked));
+        SegmentOptions seeds;
+        seeds.inside = marks_around({15.5, 15.5, 15.5}, 15);
+        Job seeded(&image, marks, seeds, run);
+        seeded.result.u = inverted_ball(image, center, 5);
+        CHECK_NOTHROW(pipeline::require_outside(seeded));
+        Job named(&image, {}, {}, run);
+        named.result.u = inverted_ball(image, center, 5);
+        CHECK_THROWS_AS(pipeline::require_outside(named), Error);
+        pipeline::note_border(named);
+        CHECK_NOTHROW(pipeline::require_outside(named));
+    }
+}
