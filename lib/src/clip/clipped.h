@@ -45,4 +45,7 @@ inline constexpr int kCarriedOn = 4;  ///< a band's half width, and one more
 /// @return none where nothing is cut, or the clip is not aligned with the lattice.
 [[nodiscard]] std::optional<Uncut> uncut(const FloatGrid& surface, FaceLayer layer);
 
+/// Largest n·x - offset: the distance to the clip's boundary inside (negative), no more than that outside.
+[[nodiscard]] double depth_in(const Clip& clip, const Vec3& x);
+
 }  // namespace covol::detail

@@ -12,6 +12,7 @@
 #include <numeric>
 
 #include "base/valid.h"
+#include "clip/clipped.h"
 #include "clip/half_spaces.h"
 #include "covol/error.h"
 #include "covol/start.h"
