@@ -27,7 +27,7 @@ void remove_flows(const std::string& folder) noexcept {
 }
 
 std::string text_of(const fs::path& path) {
-    std::ifstream file(path, std::ios::binary);
+    std::ifstream file = open_regular_file(path.string());
     return {std::istreambuf_iterator<char>(file), {}};
 }
 

@@ -8,6 +8,7 @@
 
 #include "cli/arguments.h"
 #include "covol/error.h"
+#include "covol/file_set.h"
 
 namespace covol::tool {
 namespace {
@@ -65,7 +66,7 @@ bool parse_whole(const std::string& text, Number& value) {
 
 Words job_words(const std::string& folder) {
     const std::string path = plan_file(folder);
-    std::ifstream file(path);
+    std::ifstream file = open_regular_file(path);
     if (!file) throw Error(Errc::Io, path + ": cannot read; expected the folder of a covol brick plan");
     const auto plan = nlohmann::json::parse(file, nullptr, false);
     if (!plan.is_object() || !plan.contains("job") || !plan["job"].is_array() || plan["job"].empty())

@@ -125,6 +125,8 @@ private:
     static void add_help_flags(CLI::App& app);
     void add_common_flags();
     int execute();
+    int run_command_line(int argc, char** argv);
+    void catch_signals();
     void start_report();
     void finish();
     void write_report();
@@ -156,7 +158,7 @@ private:
 
     RunContext run_;
     std::unique_ptr<Progress> progress_;
-    Outputs outputs_;
+    Outputs outputs_{run_};
     Json report_;
     Stopwatch since_start_;
     int exit_code_ = kDone;

@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "covol/error.h"
+#include "covol/file_set.h"
 #include "covol/vdb_io.h"
 #include "covol/version.h"
 
@@ -105,7 +106,7 @@ void BrickFolder::write_plan(const BrickPlan& plan, const std::vector<std::strin
               {"bricks", Json::array()}};
     for (const std::string& input : inputs) json["inputs"].push_back(input_of(input));
     for (const Brick& brick : plan.bricks) json["bricks"].push_back(to_json(brick));
-    write_text(file, json.dump(1) + "\n");
+    write_text_file(file, json.dump(1) + "\n");
 }
 
 BrickPlan BrickFolder::read_plan() const {
@@ -166,7 +167,7 @@ void BrickFolder::write_state(int sweep, std::size_t brick, const FloatGridPtr& 
     std::filesystem::create_directories(std::filesystem::path(file).parent_path(), status);
     write_vdb(file, {state});
     facts["same"] = false;
-    write_text(name(sweep, brick, ".json"), facts.dump() + "\n");
+    write_text_file(name(sweep, brick, ".json"), facts.dump() + "\n");
 }
 
 void BrickFolder::write_same(int sweep, std::size_t brick, Json facts) const {
@@ -174,7 +175,7 @@ void BrickFolder::write_same(int sweep, std::size_t brick, Json facts) const {
     std::error_code status;
     std::filesystem::create_directories(std::filesystem::path(file).parent_path(), status);
     facts["same"] = true;
-    write_text(file, facts.dump() + "\n");
+    write_text_file(file, facts.dump() + "\n");
 }
 
 BrickFolder::Spent BrickFolder::spent(int sweep, std::size_t bricks) const {

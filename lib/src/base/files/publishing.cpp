@@ -1,0 +1,254 @@
+#include "base/files/publishing.h"
+
+#include <cstdint>
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <random>
+#include <sstream>
+
+#include "base/file.h"
+#include "base/files/folder_lock.h"
+#include "base/files/scratch.h"
+#include "covol/error.h"
+#include "covol/file_set.h"
+
+namespace covol::detail {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr const char* kManifestMagic = "covol manifest, format 2";
+constexpr const char* kCommitMagic = "covol commit, format 2";
+constexpr const char* kEnd = "end";
+// Longer than a run takes to clear a folder. The one that waits holds the lock of another folder.
+constexpr std::chrono::milliseconds kShortPatience{2000};
+
+bool is_newer(const fs::path& path, const fs::path& than) {
+    std::error_code status;
+    const auto time = fs::last_write_time(path, status);
+    if (status) return false;  // not there
+    return time > fs::last_write_time(than, status) || status;
+}
+
+/// Texts with a zero behind each: names may hold anything else.
+class Fields {
+public:
+    explicit Fields(const fs::path& path) {
+        struct stat entry {};
+        const Descriptor file(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK);
+        const bool own = file.get() >= 0 && ::fstat(file.get(), &entry) == 0 && S_ISREG(entry.st_mode) &&
+                         entry.st_uid == ::geteuid();
+        if (!own) return;
+        std::ifstream stream(path, std::ios::binary);
+        text_.assign(std::istreambuf_iterator<char>(stream), {});
+    }
+    [[nodiscard]] bool empty() const { return at_ >= text_.size(); }
+    std::string next() {
+        const std::size_t begin = std::min(at_, text_.size()), end = std::min(text_.find('\0', begin), text_.size());
+        at_ = end + 1;
+        return text_.substr(begin, end - begin);
+    }
+    FileId next_id() {
+        FileId id;
+        std::istringstream numbers(next());
+        numbers >> id.device >> id.inode;
+        return numbers ? id : FileId{};
+    }
+
+private:
+    std::string text_;
+    std::size_t at_ = 0;
+};
+
+std::optional<Manifest> read_manifest(const fs::path& scratch) {
+    Fields fields(scratch / kManifest);
+    if (fields.next() != kManifestMagic) return std::nullopt;
+    Manifest manifest;
+    manifest.set = fields.next();
+    const FileId counts = fields.next_id();  // of scratch folders, of files
+    for (dev_t n = 0; n < counts.device && !fields.empty(); ++n) {
+        ScratchPlace place{fields.next(), {}, {}};
+        place.id = fields.next_id();
+        place.folder = fields.next_id();
+        manifest.scratches.push_back(std::move(place));
+    }
+    for (ino_t n = 0; n < counts.inode && !fields.empty(); ++n) {
+        const FileId file = fields.next_id();
+        manifest.files.push_back({file.inode, fields.next()});
+        if (!is_output_name(manifest.files.back().name)) return std::nullopt;
+    }
+    if (fields.next() != kEnd || manifest.scratches.empty()) return std::nullopt;
+    return manifest;
+}
+
+std::optional<Fate> read_commit(const fs::path& first, const std::string& set) {
+    Fields fields(first / kCommit);
+    if (fields.next() != kCommitMagic || fields.next() != set) return std::nullopt;
+    return fields.next() == "complete" ? Fate::Complete : Fate::PutBack;
+}
+
+/// What a process that was killed in FileSet::publish() left in one scratch folder, of which this process has the lock,
+/// as well as that of the folder around it.
+class Remains {
+public:
+    Remains(fs::path scratch, const RunContext& run) : scratch_(std::move(scratch)), run_(run) {
+        manifest_ = read_manifest(scratch_);
+    }
+
+    /// @returns whether the folder may be removed
+    bool finish() {
+        if (!manifest_) return !fs::exists(fs::symlink_status(scratch_ / kManifest));
+        const std::size_t self = own_number();
+        if (self == manifest_->scratches.size()) return false;  // it is about another folder
+        bool known = true;
+        const std::optional<Fate> fate = self == 0 ? read_commit(scratch_, manifest_->set) : fate_elsewhere(known);
+        if (!known) return false;
+        if (!fate) return true;  // nothing was put in place yet
+        bool others = true;
+        for (std::size_t n = 1; n < manifest_->scratches.size(); ++n)
+            if (n != self) others = finish_other(manifest_->scratches[n], *fate, true) && others;
+        const bool done = put(*fate);
+        if (self == 0) return done && others;
+        if (done) ::unlink((scratch_ / kManifest).c_str());
+        // The commit goes last: without it what is left elsewhere would be thrown away.
+        static_cast<void>(finish_other(manifest_->scratches[0], *fate, done && others));
+        return done;
+    }
+
+private:
+    [[nodiscard]] std::size_t own_number() const {
+        const FileId own = id_of(scratch_);
+        std::size_t n = 0;
+        while (n < manifest_->scratches.size() && manifest_->scratches[n].id != own) ++n;
+        return n;
+    }
+
+    [[nodiscard]] bool any_in_place() const {
+        for (const Manifest::File& file : manifest_->files)
+            if (id_of(scratch_.parent_path() / file.name).inode == file.inode) return true;
+        return false;
+    }
+
+    /// What the commit says, in another folder. @param known  false: that folder cannot be seen now
+    [[nodiscard]] std::optional<Fate> fate_elsewhere(bool& known) const {
+        const ScratchPlace& first = manifest_->scratches.front();
+        known = id_of(first.path.parent_path()) == first.folder;
+        if (known) {
+            const FileId id = id_of(first.path);
+            if (id == first.id) return read_commit(first.path, manifest_->set);
+            // It is gone once all is in place, and where it was thrown away before anything was.
+            if (!any_in_place()) return std::nullopt;
+        }
+        known = any_in_place();
+        return Fate::Complete;
+    }
+
+    /// Puts this folder's files in place, or back. @returns whether that is done
+    bool put(Fate fate) {
+        const fs::path folder = scratch_.parent_path(), manifest = scratch_ / kManifest;
+        bool done = true;
+        for (const Manifest::File& file : manifest_->files) {
+            const fs::path temporary = scratch_ / file.name, target = folder / file.name;
+            if (is_newer(target, manifest)) continue;  // what was put there since is not ours to replace
+            if (fate == Fate::Complete && id_of(temporary).inode == file.inode)
+                done = exchange(temporary, target) && done;
+            if (fate == Fate::PutBack && id_of(target).inode == file.inode)
+                done = exchange_back(temporary, target) && done;
+            // Where a file system cannot exchange two files at once, this was cut short half way.
+            if (fate == Fate::PutBack && id_of(target) == FileId{} && id_of(temporary) != FileId{} &&
+                id_of(temporary).inode != file.inode)
+                done = ::rename(temporary.c_str(), target.c_str()) == 0 && done;
+        }
+        flush_folder(folder);
+        return done;
+    }
+
+    /// The same in another folder of the set, if that is free. @returns whether that is done
+    [[nodiscard]] bool finish_other(const ScratchPlace& place, Fate fate, bool may_remove) const {
+        const fs::path folder = place.path.parent_path();
+        if (id_of(folder) != place.folder) return false;
+        try {
+            const FolderLock lock(folder, run_, kShortPatience);
+            const FileId id = id_of(place.path);
+            if (id == FileId{}) return true;
+            if (!lock.is_locked() || id != place.id) return false;
+            const DeadScratch dead(place.path);
+            if (dead.state() != DeadScratch::State::Dead) return false;
+            Remains other(place.path, run_);
+            if (other.manifest_ && other.manifest_->set != manifest_->set) return false;
+            if (other.manifest_ && !other.put(fate)) return false;
+            if (!may_remove) return true;
+            ::unlink((place.path / kManifest).c_str());
+            dead.remove();
+            return true;
+        } catch (const Error& error) {
+            if (error.code() == Errc::Cancelled) throw;
+            return false;
+        }
+    }
+
+    fs::path scratch_;
+    const RunContext& run_;
+    std::optional<Manifest> manifest_;
+};
+
+}  // namespace
+
+std::string new_set_number() {
+    std::random_device random;
+    std::string text;
+    for (int n = 0; n < 4; ++n) text += (n > 0 ? "-" : "") + std::to_string(random());
+    return text;
+}
+
+void write_manifest(const fs::path& scratch, const Manifest& manifest) {
+    std::string text;
+    const auto add = [&](const std::string& field) { text += field + '\0'; };
+    add(kManifestMagic);
+    add(manifest.set);
+    add(std::to_string(manifest.scratches.size()) + " " + std::to_string(manifest.files.size()));
+    for (const ScratchPlace& place : manifest.scratches) {
+        add(place.path.string());
+        add(place.id.text());
+        add(place.folder.text());
+    }
+    for (const Manifest::File& file : manifest.files) {
+        add(FileId{0, file.inode}.text());
+        add(file.name);
+    }
+    add(kEnd);
+    write_text_file((scratch / kManifest).string(), text);
+    flush_folder(scratch);
+}
+
+void write_commit(const fs::path& first, const std::string& set, Fate fate) {
+    write_text_file((first / kCommit).string(), kCommitMagic + std::string(1, '\0') + set + '\0' +
+                                                    (fate == Fate::Complete ? "complete" : "put back") + '\0');
+    flush_folder(first);
+}
+
+bool exchange(const fs::path& from, const fs::path& to) {
+    if (id_of(to) == FileId{}) return ::rename(from.c_str(), to.c_str()) == 0;
+    return swap_paths(from.string(), to.string());
+}
+
+bool exchange_back(const fs::path& from, const fs::path& to) {
+    if (id_of(from) == FileId{}) return ::rename(to.c_str(), from.c_str()) == 0;
+    return swap_paths(from.string(), to.string());
+}
+
+void clear_after_the_dead(const fs::path& folder, const RunContext& run) {
+    std::vector<fs::path> found;
+    std::error_code status;
+    for (fs::directory_iterator at(folder, status), end; !status && at != end; at.increment(status))
+        if (is_scratch_name(at->path().filename().string())) found.push_back(at->path());
+    for (const fs::path& scratch : found) {
+        const DeadScratch dead(scratch);
+        if (dead.state() == DeadScratch::State::Unstarted ||
+            (dead.state() == DeadScratch::State::Dead && Remains(scratch, run).finish()))
+            dead.remove();
+    }
+}
+
+}  // namespace covol::detail
