@@ -188,8 +188,11 @@ class Waits(Files):
             (self.out / name).write_text(text)
             with self.subTest(name):
                 self.fails("info", name, code=4, says="pipe")
-                self.fails("convert", name, "o.nrrd", code=4, says="pipe")
-        os.mkfifo(self.out / "store")
+                self.fails("convert", name, "o.vdb", code=4, says="pipe")
+        self.run_covol(*PHANTOM, "-o", "chunk.zarr")
+        chunk = max((p for p in (self.out / "chunk.zarr").rglob("*") if p.is_file()), key=lambda p: p.stat().st_size)
+        chunk.unlink()
+        os.mkfifo(chunk)
         (self.out / "v.zarr").mkdir()
         for name in (".zarray", "zarr.json", ".zattrs"):
             os.mkfifo(self.out / "v.zarr" / name)
@@ -213,10 +216,10 @@ class Waits(Files):
             with self.subTest("mesh " + end):
                 self.fails("check", "p." + end, code=4, says="p." + end)
         mask = ["segment", self.image, "-o", "o.vdb"]
-        for code, args in ((4, ["info", "v.zarr"]), (3, ["info", "folder"]), (4, ["brick", "run", "plan"]),
+        for code, args in ((3, ["info", "v.zarr"]), (4, ["convert", "chunk.zarr", "o.vdb"]), (3, ["info", "folder"]), (4, ["brick", "run", "plan"]),
                            (4, ["report", self.image, "--points", "marks.xyz", "-o", "o.html", "--run-report", "p.json"]),
                            (3, [*mask, *LINE, "--checkpoint", "states"]), (4, [*mask, "--painted", "p.nrrd"]),
-                           (4, [*mask, "--guess", "p.nrrd"]), (4, [*mask, *LINE, "--inside-seeds", "p.csv"]),
+                           (4, [*mask, "--guess", "p.nrrd"]), (4, [*mask, *LINE, "--inside", "p.csv"]),
                            (4, ["rerun", "p.vdb"])):
             with self.subTest(args[0] + " " + str(args[-1])):
                 self.fails(*args, code=code, says="")
@@ -332,7 +335,7 @@ class Places(Files):
                 self.keeps(image, names[0], names[17], names[-1])
 
     def test_a_zarr_store(self):
-        self.run_covol("convert", self.image, "in.zarr")
+        self.run_covol("phantom", "sphere", "--size", SIZE, "-o", "in.zarr")
         inside = sorted(str(p.relative_to(self.out)) for p in (self.out / "in.zarr").rglob("*") if p.is_file())
         self.keeps("in.zarr", *inside[:3])
         # Nothing new comes into it either: a chunk may be missing there.

@@ -42,7 +42,8 @@ public:
     enum class Clears { All, Listed };
     /// @param beside  the folder to make it in @throws Error Io (another program locks that folder for more than a
     /// minute), Cancelled.
-    explicit ScratchFolder(const std::filesystem::path& beside, const RunContext& run = {}, Clears clears = Clears::All);
+    explicit ScratchFolder(const std::filesystem::path& beside, const RunContext& run = {},
+                           Clears clears = Clears::All);
     ~ScratchFolder();
     ScratchFolder(const ScratchFolder&) = delete;
     ScratchFolder& operator=(const ScratchFolder&) = delete;

@@ -18,7 +18,8 @@
 using namespace covol;
 namespace fs = std::filesystem;
 
-/// In support/kill_at.cpp: kills this process before the number-th call from here on that puts files in place; 0: never.
+/// In support/kill_at.cpp: kills this process before the number-th call from here on that puts files in place; 0:
+/// never.
 extern "C" void covol_kill_before(long number);
 
 namespace {
@@ -378,7 +379,8 @@ TEST_CASE("file_set: a lock of another program is waited for, and told; then it 
     cancel = false;
     run.log = [&](LogLevel, const std::string&) { ::flock(held, LOCK_UN); };
     FileSet set;
-    set.write(folder.path("a"), [](const std::string& to) { std::ofstream(to) << "new"; }, run);
+    set.write(
+        folder.path("a"), [](const std::string& to) { std::ofstream(to) << "new"; }, run);
     ::flock(held, LOCK_EX);
     set.publish(run);
     CHECK(bytes_of(folder.path("a")) == "new");

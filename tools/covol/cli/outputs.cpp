@@ -118,7 +118,8 @@ void Outputs::check_store(const std::string& flag, const std::string& path, cons
                                   ": cannot write: something that is no Zarr store is there; choose "
                                   "another name");
     for (const std::string& input : inputs_) {
-        std::vector<std::string> files = may_refer_elsewhere(input) ? files_of(input, target) : std::vector<std::string>{};
+        std::vector<std::string> files =
+            may_refer_elsewhere(input) ? files_of(input, target) : std::vector<std::string>{};
         files.push_back(input);
         for (const std::string& file : files)
             if (lies_in(file, target))
@@ -198,6 +199,7 @@ void Outputs::add(const std::string& path, std::function<void(const std::string&
 
 bool Outputs::write(const std::string& path, const std::function<void(const std::string&)>& write) {
     if (path.empty()) return false;
+    check_inputs("output", path, place_of_output(path).path);
     files_.write(path, write, run_);  // nothing else is in it before write_queued()
     files_.publish(run_);
     kept_.push_back(path);
@@ -206,10 +208,13 @@ bool Outputs::write(const std::string& path, const std::function<void(const std:
 
 void Outputs::write_queued() {
     for (Pending& output : pending_)
-        if (is_special(output.path))
+        if (is_special(output.path)) {
             devices_.push_back(std::move(output));
-        else
+        } else {
+            // Others may be read than were known at the start.
+            check_inputs("output", output.path, place_of_output(output.path).path);
             files_.write(output.path, output.write, run_);
+        }
     pending_.clear();
 }
 
@@ -223,17 +228,15 @@ void Outputs::publish() {
 void write_stream(int stream, const std::string& text, const std::string& name, const RunContext& run) {
     for (std::size_t done = 0; done < text.size();) {
         pollfd ready{stream, POLLOUT, 0};
-        constexpr int kPause = 50;  // milliseconds
-        if (::poll(&ready, 1, kPause) == 0) {
-            run.check();
-            continue;
-        }
+        constexpr int kPause = 50;                          // milliseconds
+        const bool waits = ::poll(&ready, 1, kPause) <= 0;  // or a signal came
+        run.check();
+        if (waits) continue;
         // So much goes into a pipe that is ready, whoever reads it.
         const ssize_t wrote = ::write(stream, text.data() + done, std::min<std::size_t>(text.size() - done, PIPE_BUF));
         if (wrote < 0 && errno != EINTR && errno != EAGAIN)
             throw Error(Errc::Io, name + ": cannot write: " + std::strerror(errno));
         done += std::size_t(std::max<ssize_t>(wrote, 0));
-        run.check();
     }
 }
 

@@ -164,8 +164,8 @@ const std::string& standard_input(const RunContext& run) {
     std::vector<char> piece(1 << 16);
     while (!done) {
         pollfd ready{STDIN_FILENO, POLLIN, 0};
-        constexpr int kPause = 50;  // milliseconds
-        const bool waits = ::poll(&ready, 1, kPause) == 0;
+        constexpr int kPause = 50;                          // milliseconds
+        const bool waits = ::poll(&ready, 1, kPause) <= 0;  // or a signal came
         run.check();
         if (waits) continue;
         const ssize_t got = ::read(STDIN_FILENO, piece.data(), piece.size());

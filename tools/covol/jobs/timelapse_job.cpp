@@ -58,8 +58,9 @@ public:
             go(frame);
         }
         session_.report()["frames"] = reports_;
-        session_.outputs().add(job_.table_path,
-                               [text = table_.text(), &run = session_.run()](const std::string& path) { write_text(path, text, run); });
+        session_.outputs().add(job_.table_path, [text = table_.text(), &run = session_.run()](const std::string& path) {
+            write_text(path, text, run);
+        });
         write_scene(scene_, job_, session_);
         if (failed_ == int(frames_.size()))
             throw Error(first_error_, "no frame could be segmented; the first: " + first_message_);

@@ -30,8 +30,8 @@ std::string holder_of(const FileId& file) {
         long process = 0;
         // "1: FLOCK  ADVISORY  WRITE 712 fe:01:1234 0 EOF"; "->" marks those that wait
         if (line.find(place) == std::string::npos ||
-            std::sscanf(line.c_str(), "%*d: %15s %*s %*s %ld", kind, &process) != 2 || std::strcmp(kind, "FLOCK") != 0 ||
-            process <= 0)
+            std::sscanf(line.c_str(), "%*d: %15s %*s %*s %ld", kind, &process) != 2 ||
+            std::strcmp(kind, "FLOCK") != 0 || process <= 0)
             continue;
         std::string name;
         std::getline(std::ifstream("/proc/" + std::to_string(process) + "/comm"), name);
@@ -58,7 +58,8 @@ FolderLock::FolderLock(const fs::path& folder, const RunContext& run, std::chron
                                       std::to_string((waited.count() + 500) / 1000) +
                                       " s; expected it to be free; end that program, or choose another folder");
         if (waited >= kUntilSaid && !said) {
-            run.info(folder.string() + ": waiting for " + holder_of(id()) + ", which has a lock (flock) on this folder");
+            run.info(folder.string() + ": waiting for " + holder_of(id()) +
+                     ", which has a lock (flock) on this folder");
             said = true;
         }
         std::this_thread::sleep_for(std::min(kPause, patience));

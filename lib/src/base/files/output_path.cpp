@@ -81,7 +81,8 @@ fs::path path_of_output(const std::string& path) {
 }
 
 void keep_attributes(const fs::path& replaced, const fs::path& made) {
-    struct stat old {}, now {};
+    struct stat old {
+    }, now{};
     if (::lstat(replaced.c_str(), &old) != 0 || ::lstat(made.c_str(), &now) != 0) return;
     if ((old.st_mode & S_IFMT) != (now.st_mode & S_IFMT) || (!S_ISREG(old.st_mode) && !S_ISDIR(old.st_mode))) return;
     constexpr auto kSame = static_cast<uid_t>(-1);

@@ -9,8 +9,8 @@
 // How files of several folders are put in place together (FileSet::publish()), and how the next run goes on where a
 // process was killed meanwhile.
 //
-// Each scratch folder gets a manifest: the set's number, all scratch folders of the set, and inode and name of each file
-// that it will put in place. Then one file in the first of them, the commit, says that the set is to be completed.
+// Each scratch folder gets a manifest: the set's number, all scratch folders of the set, and inode and name of each
+// file that it will put in place. Then one file in the first of them, the commit, says that the set is to be completed.
 // Before that file is there the outputs are the old ones, and what was written is thrown away; after that each folder's
 // files are put in place, by whoever comes next to any of the folders. A manifest only ever speaks of files in its own
 // scratch folder and the folder around it: of the others it says where they are, and these have manifests of their own,
@@ -23,8 +23,8 @@ struct ScratchPlace {
 };
 
 struct Manifest {
-    std::string set;                     ///< a random number
-    std::vector<ScratchPlace> scratches; ///< the first has the commit
+    std::string set;                      ///< a random number
+    std::vector<ScratchPlace> scratches;  ///< the first has the commit
     struct File {
         ino_t inode = 0;  ///< of the new file; where it has its name in the folder around, it is in its place
         std::string name;

@@ -57,14 +57,13 @@ std::string scratch_mark(const FileId& folder, bool all) {
 }
 
 DeadScratch::DeadScratch(const fs::path& folder)
-    : folder_(folder),
-      lock_(folder / kScratchLock, O_RDWR | O_NOFOLLOW | O_NONBLOCK),
-      state_(read_state()) {}
+    : folder_(folder), lock_(folder / kScratchLock, O_RDWR | O_NOFOLLOW | O_NONBLOCK), state_(read_state()) {}
 
 DeadScratch::State DeadScratch::read_state() {
-    struct stat own {}, lock {};
-    if (!is_scratch_name(folder_.filename().string()) || ::lstat(folder_.c_str(), &own) != 0 ||
-        !S_ISDIR(own.st_mode) || own.st_uid != ::geteuid())
+    struct stat own {
+    }, lock{};
+    if (!is_scratch_name(folder_.filename().string()) || ::lstat(folder_.c_str(), &own) != 0 || !S_ISDIR(own.st_mode) ||
+        own.st_uid != ::geteuid())
         return State::Foreign;
     std::error_code status;
     // Its process ended before it had a lock.

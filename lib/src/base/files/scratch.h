@@ -22,8 +22,8 @@ constexpr const char* kCommit = ".covol-commit";
 /// What a scratch folder's lock begins with.
 [[nodiscard]] std::string scratch_mark(const FileId& folder, bool all);
 
-/// The lock of a scratch folder: a file that begins with scratch_mark(), of this user, with the names behind it that may
-/// be removed.
+/// The lock of a scratch folder: a file that begins with scratch_mark(), of this user, with the names behind it that
+/// may be removed.
 class DeadScratch {
 public:
     enum class State {

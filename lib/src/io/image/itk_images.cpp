@@ -388,8 +388,8 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path) {
                              std::to_string(info.channels) + " channels and " + std::to_string(info.frames) +
                              " frames");
     const bool detached = header && !header->data_file().empty();
-    auto file = std::make_unique<ItkFile>(path, unusable, info, std::move(reader), is_hdf5,
-                                          detached ? 0 : fs::file_size(path));
+    auto file =
+        std::make_unique<ItkFile>(path, unusable, info, std::move(reader), is_hdf5, detached ? 0 : fs::file_size(path));
     file->refer_to(files);
     return file;
 }

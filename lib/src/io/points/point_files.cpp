@@ -22,8 +22,7 @@ std::string read_text(const std::string& path) {
     std::error_code status;
     if (!fs::exists(path, status)) throw Error(Errc::Io, "read_points: " + path + ": no such file");
     std::ifstream file = open_regular_file(path);
-    if (!file)
-        throw Error(Errc::Io, "read_points: " + path + ": cannot be opened");
+    if (!file) throw Error(Errc::Io, "read_points: " + path + ": cannot be opened");
     std::string text(fs::file_size(path), '\0');
     file.read(text.data(), static_cast<std::streamsize>(text.size()));
     text.resize(static_cast<std::size_t>(file.gcount()));
