@@ -14,6 +14,7 @@ import unittest
 
 import numpy as np
 
+import image_formats_test as formats
 from cli_test import COVOL, ORIGIN, H, SIZE, Case, ball_bytes
 
 PROGRAM = str(pathlib.Path(COVOL).resolve())
@@ -333,6 +334,30 @@ class Places(Files):
         for image in "list.mhd", "numbers.mhd", "list.nhdr", "numbers.nhdr":
             with self.subTest(image):
                 self.keeps(image, names[0], names[17], names[-1])
+
+    @unittest.skipIf(formats.MISSING, formats.MISSING)
+    def test_series_and_sets(self):
+        data = np.full(formats.SIZE[::-1], 7, np.uint8)
+        data[3:9, 5:20, 5:20] = 200
+        names = sorted("series/" + path.name for path in formats.write_dicom_series(self.out / "series", data).iterdir())
+        for image in "series", names[0]:
+            with self.subTest(image):
+                self.keeps(image, names[0], names[7], names[-1])
+        # Others in that folder are none of the image.
+        (self.out / "series/notes.json").write_text("old")
+        self.run_covol("info", "series", "--json", "series/notes.json")
+        self.assertNotEqual(self.text("series/notes.json"), "old")
+        names = ["part0.ome.tif", "part1.ome.tif"]
+        slices = formats.SIZE[2]
+        xml = formats.ome_xml([(names[k % 2], k // 2) for k in range(slices)])
+        for n, name in enumerate(names):
+            with formats.tifffile.TiffWriter(str(self.out / name)) as tiff:
+                for k in range(n, slices, 2):
+                    tiff.write(data[k], contiguous=False, metadata=None, description=xml if k == n else None)
+        self.keeps(names[0], *names)
+        (self.out / names[1]).unlink()
+        os.mkfifo(self.out / names[1])
+        self.fails("info", names[0], code=3, says="")
 
     def test_a_zarr_store(self):
         self.run_covol("phantom", "sphere", "--size", SIZE, "-o", "in.zarr")

@@ -9,7 +9,8 @@ import sys
 # Folders of lib/src from the bottom up, with the public headers that they implement; a file may include headers of its own
 # level and of those below.
 LAYERS = [
-    {"base": ["api", "version", "fwd", "error", "file_set", "option_names", "run", "domain"], "base/files": [], "scheme": []},
+    {"base": ["api", "version", "fwd", "error", "option_names", "run", "domain"], "scheme": []},
+    {"files": ["file_set"]},
     {"grid": [], "mesh": ["mesh"], "io": ["vdb_io"], "io/pixels": ["image"]},
     {"io/chunked": [], "io/modules": []},
     {"io/hdf5": []},

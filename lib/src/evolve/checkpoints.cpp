@@ -6,10 +6,10 @@
 #include <filesystem>
 #include <fstream>
 
-#include "base/file.h"
 #include "base/number.h"
 #include "covol/error.h"
 #include "covol/file_set.h"
+#include "files/atomic.h"
 
 namespace covol {
 namespace fs = std::filesystem;

@@ -15,9 +15,9 @@
 #include <mutex>
 #include <set>
 
-#include "base/file.h"
 #include "covol/error.h"
 #include "covol/version.h"
+#include "files/atomic.h"
 #include "io/nanovdb.h"
 #include "io/vdb_walk.h"
 

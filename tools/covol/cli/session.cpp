@@ -226,16 +226,8 @@ void Session::add_grid(const std::string& path, const FloatGridPtr& grid, WriteV
 int Session::main(int argc, char** argv) {
     const int code = run_command_line(argc, argv);
     std::cout.flush();
-    // Help, version and what else was asked for there.
     if (!std::cout && !has_last_word_.test()) return fail(kIo, "standard output: cannot write");
     return code;
-}
-
-/// Not before there is something to end well: until then a signal ends the program at once, also where it waits for a
-/// configuration that comes through a pipe.
-void Session::catch_signals() {
-    for (const int signal : {SIGINT, SIGTERM, SIGHUP})
-        if (std::signal(signal, on_signal) == SIG_IGN) std::signal(signal, SIG_IGN);  // as nohup wants it
 }
 
 int Session::run_command_line(int argc, char** argv) {
@@ -274,7 +266,7 @@ int Session::run_command_line(int argc, char** argv) {
 }
 
 int Session::execute() {
-    catch_signals();
+    catch_signals(on_signal);
     std::unique_ptr<MemoryGuard> guard;
     try {
         progress_ = std::make_unique<Progress>(quiet_);

@@ -126,7 +126,6 @@ private:
     void add_common_flags();
     int execute();
     int run_command_line(int argc, char** argv);
-    void catch_signals();
     void start_report();
     void finish();
     void write_report();

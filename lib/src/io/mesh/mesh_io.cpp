@@ -12,6 +12,7 @@
 #include "base/file.h"
 #include "covol/error.h"
 #include "covol/file_set.h"
+#include "files/atomic.h"
 #include "io/mesh/mesh_formats.h"
 #include "mesh/vertex_normals.h"
 

@@ -1,4 +1,4 @@
-#include "base/files/scratch.h"
+#include "files/scratch.h"
 
 #include <sys/file.h>
 

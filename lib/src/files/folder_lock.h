@@ -2,8 +2,8 @@
 #include <chrono>
 #include <filesystem>
 
-#include "base/files/descriptor.h"
 #include "covol/run.h"
+#include "files/descriptor.h"
 
 namespace covol::detail {
 

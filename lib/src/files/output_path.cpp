@@ -1,4 +1,4 @@
-#include "base/files/output_path.h"
+#include "files/output_path.h"
 
 #include <sys/stat.h>
 #include <sys/vfs.h>

@@ -1,10 +1,11 @@
 #pragma once
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
 
-#include "base/files/descriptor.h"
 #include "covol/run.h"
+#include "files/descriptor.h"
 
 // How files of several folders are put in place together (FileSet::publish()), and how the next run goes on where a
 // process was killed meanwhile.
@@ -22,11 +23,21 @@ struct ScratchPlace {
     FileId id, folder;  ///< its own, and that of the folder around it
 };
 
+/// A file as it is now. 0, 0: there is none.
+struct Stamp {
+    ino_t inode = 0;
+    std::int64_t changed = 0;  ///< its contents, nanoseconds
+    bool operator==(const Stamp&) const = default;
+    [[nodiscard]] std::string text() const { return std::to_string(inode) + " " + std::to_string(changed); }
+};
+[[nodiscard]] Stamp stamp_of(const std::filesystem::path& path);
+
 struct Manifest {
     std::string set;                      ///< a random number
     std::vector<ScratchPlace> scratches;  ///< the first has the commit
     struct File {
-        ino_t inode = 0;  ///< of the new file; where it has its name in the folder around, it is in its place
+        Stamp made, replaced;  ///< the new file, and what it is to replace; with its name in the folder around,
+                               ///< `made` is in its place, and another than these two was put there since
         std::string name;
     };
     std::vector<File> files;

@@ -1,4 +1,4 @@
-#include "base/files/folder_lock.h"
+#include "files/folder_lock.h"
 
 #include <sys/file.h>
 #include <sys/sysmacros.h>

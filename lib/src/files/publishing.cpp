@@ -1,4 +1,4 @@
-#include "base/files/publishing.h"
+#include "files/publishing.h"
 
 #include <cstdint>
 #include <cstdio>
@@ -7,12 +7,13 @@
 #include <optional>
 #include <random>
 #include <sstream>
+#include <utility>
 
 #include "base/file.h"
-#include "base/files/folder_lock.h"
-#include "base/files/scratch.h"
 #include "covol/error.h"
 #include "covol/file_set.h"
+#include "files/folder_lock.h"
+#include "files/scratch.h"
 
 namespace covol::detail {
 namespace fs = std::filesystem;
@@ -23,13 +24,6 @@ constexpr const char* kCommitMagic = "covol commit, format 2";
 constexpr const char* kEnd = "end";
 // Longer than a run takes to clear a folder. The one that waits holds the lock of another folder.
 constexpr std::chrono::milliseconds kShortPatience{2000};
-
-bool is_newer(const fs::path& path, const fs::path& than) {
-    std::error_code status;
-    const auto time = fs::last_write_time(path, status);
-    if (status) return false;  // not there
-    return time > fs::last_write_time(than, status) || status;
-}
 
 /// Texts with a zero behind each: names may hold anything else.
 class Fields {
@@ -50,13 +44,22 @@ public:
         return text_.substr(begin, end - begin);
     }
     FileId next_id() {
-        FileId id;
-        std::istringstream numbers(next());
-        numbers >> id.device >> id.inode;
-        return numbers ? id : FileId{};
+        const auto [device, inode] = next_pair<dev_t, ino_t>();
+        return {device, inode};
+    }
+    Stamp next_stamp() {
+        const auto [inode, changed] = next_pair<ino_t, std::int64_t>();
+        return {inode, changed};
     }
 
 private:
+    template <typename A, typename B>
+    std::pair<A, B> next_pair() {
+        std::pair<A, B> pair;
+        std::istringstream numbers(next());
+        return numbers >> pair.first >> pair.second ? pair : std::pair<A, B>{};
+    }
+
     std::string text_;
     std::size_t at_ = 0;
 };
@@ -74,8 +77,8 @@ std::optional<Manifest> read_manifest(const fs::path& scratch) {
         manifest.scratches.push_back(std::move(place));
     }
     for (ino_t n = 0; n < counts.inode && !fields.empty(); ++n) {
-        const FileId file = fields.next_id();
-        manifest.files.push_back({file.inode, fields.next()});
+        const Stamp made = fields.next_stamp(), replaced = fields.next_stamp();
+        manifest.files.push_back({made, replaced, fields.next()});
         if (!is_output_name(manifest.files.back().name)) return std::nullopt;
     }
     if (fields.next() != kEnd || manifest.scratches.empty()) return std::nullopt;
@@ -126,7 +129,7 @@ private:
 
     [[nodiscard]] bool any_in_place() const {
         for (const Manifest::File& file : manifest_->files)
-            if (id_of(scratch_.parent_path() / file.name).inode == file.inode) return true;
+            if (stamp_of(scratch_.parent_path() / file.name).inode == file.made.inode) return true;
         return false;
     }
 
@@ -146,18 +149,17 @@ private:
 
     /// Puts this folder's files in place, or back. @returns whether that is done
     bool put(Fate fate) {
-        const fs::path folder = scratch_.parent_path(), manifest = scratch_ / kManifest;
+        const fs::path folder = scratch_.parent_path();
         bool done = true;
         for (const Manifest::File& file : manifest_->files) {
             const fs::path temporary = scratch_ / file.name, target = folder / file.name;
-            if (is_newer(target, manifest)) continue;  // what was put there since is not ours to replace
-            if (fate == Fate::Complete && id_of(temporary).inode == file.inode)
+            const Stamp there = stamp_of(target), here = stamp_of(temporary);
+            // What was put there since is not ours to replace.
+            if (fate == Fate::Complete && here == file.made && (there == file.replaced || there == Stamp{}))
                 done = exchange(temporary, target) && done;
-            if (fate == Fate::PutBack && id_of(target).inode == file.inode)
-                done = exchange_back(temporary, target) && done;
-            // Where a file system cannot exchange two files at once, this was cut short half way.
-            if (fate == Fate::PutBack && id_of(target) == FileId{} && id_of(temporary) != FileId{} &&
-                id_of(temporary).inode != file.inode)
+            if (fate == Fate::PutBack && there == file.made) done = exchange_back(temporary, target) && done;
+            // Where a file system cannot exchange two files at once, that was cut short half way.
+            if (fate == Fate::PutBack && there == Stamp{} && here == file.replaced && here != Stamp{})
                 done = ::rename(temporary.c_str(), target.c_str()) == 0 && done;
         }
         flush_folder(folder);
@@ -195,6 +197,13 @@ private:
 
 }  // namespace
 
+Stamp stamp_of(const fs::path& path) {
+    struct stat entry {};
+    if (::lstat(path.c_str(), &entry) != 0) return {};
+    constexpr std::int64_t kNanoseconds = 1'000'000'000;
+    return {entry.st_ino, entry.st_mtim.tv_sec * kNanoseconds + entry.st_mtim.tv_nsec};
+}
+
 std::string new_set_number() {
     std::random_device random;
     std::string text;
@@ -214,7 +223,8 @@ void write_manifest(const fs::path& scratch, const Manifest& manifest) {
         add(place.folder.text());
     }
     for (const Manifest::File& file : manifest.files) {
-        add(FileId{0, file.inode}.text());
+        add(file.made.text());
+        add(file.replaced.text());
         add(file.name);
     }
     add(kEnd);

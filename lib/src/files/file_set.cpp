@@ -7,12 +7,12 @@
 #include <map>
 #include <utility>
 
-#include "base/file.h"
-#include "base/files/folder_lock.h"
-#include "base/files/output_path.h"
-#include "base/files/publishing.h"
-#include "base/files/scratch.h"
 #include "covol/error.h"
+#include "files/atomic.h"
+#include "files/folder_lock.h"
+#include "files/output_path.h"
+#include "files/publishing.h"
+#include "files/scratch.h"
 
 namespace covol {
 namespace fs = std::filesystem;
@@ -61,7 +61,8 @@ struct FileSet::State {
             manifest.files.clear();
             for (const File& file : files)
                 if (file.temporary.parent_path() == folder.scratch.path())
-                    manifest.files.push_back({detail::id_of(file.temporary).inode, file.target.filename().string()});
+                    manifest.files.push_back({detail::stamp_of(file.temporary), detail::stamp_of(file.target),
+                                              file.target.filename().string()});
             detail::write_manifest(folder.scratch.path(), manifest);
         }
         return manifest.set;

@@ -5,11 +5,11 @@
 #include <mutex>
 #include <set>
 
-#include "base/files/folder_lock.h"
-#include "base/files/publishing.h"
-#include "base/files/scratch.h"
 #include "covol/error.h"
 #include "covol/file_set.h"
+#include "files/folder_lock.h"
+#include "files/publishing.h"
+#include "files/scratch.h"
 
 namespace covol {
 namespace fs = std::filesystem;

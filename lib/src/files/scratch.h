@@ -2,7 +2,7 @@
 #include <filesystem>
 #include <string>
 
-#include "base/files/descriptor.h"
+#include "files/descriptor.h"
 
 // What a ScratchFolder is on the disk, so that the next run knows one that a dead process left.
 namespace covol::detail {
