@@ -5,7 +5,6 @@
 
 #include <compare>
 #include <filesystem>
-#include <string>
 #include <utility>
 
 namespace covol::detail {
@@ -35,7 +34,6 @@ struct FileId {
     dev_t device = 0;
     ino_t inode = 0;
     auto operator<=>(const FileId&) const = default;
-    [[nodiscard]] std::string text() const { return std::to_string(device) + " " + std::to_string(inode); }
 };
 
 /// Of what the path names itself, a symbolic link for example.

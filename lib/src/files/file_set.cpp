@@ -56,7 +56,7 @@ struct FileSet::State {
     [[nodiscard]] std::string write_manifests() const {
         detail::Manifest manifest{detail::new_set_number(), {}, {}};
         for (const auto& [id, folder] : folders)
-            manifest.scratches.push_back({folder.scratch.path(), detail::id_of(folder.scratch.path()), id});
+            manifest.scratches.push_back({folder.scratch.path(), detail::id_of(folder.scratch.path()).inode, id.inode});
         for (const auto& [id, folder] : folders) {
             manifest.files.clear();
             for (const File& file : files)
@@ -94,6 +94,9 @@ FileSet::~FileSet() = default;
 void FileSet::write(const std::string& path, const std::function<void(const std::string&)>& write,
                     const RunContext& run) {
     fs::path target = detail::path_of_output(path);
+    if (!detail::is_output_name(target.filename().string()))
+        throw Error(Errc::Io, path + ": cannot write: names that begin with " + detail::kHiddenPrefix +
+                                  " are covol's own; choose another name");
     const fs::path folder = target.parent_path();
     ScratchFolder& scratch = state_->folders.try_emplace(detail::id_of(folder), folder, run).first->second.scratch;
     const fs::path temporary = scratch.path() / target.filename();

@@ -43,20 +43,17 @@ public:
         at_ = end + 1;
         return text_.substr(begin, end - begin);
     }
-    FileId next_id() {
-        const auto [device, inode] = next_pair<dev_t, ino_t>();
-        return {device, inode};
-    }
+    std::uint64_t next_number() { return parse_pair<std::uint64_t, std::uint64_t>(next() + " 0").first; }
     Stamp next_stamp() {
-        const auto [inode, changed] = next_pair<ino_t, std::int64_t>();
+        const auto [inode, changed] = parse_pair<ino_t, std::int64_t>(next());
         return {inode, changed};
     }
 
 private:
     template <typename A, typename B>
-    std::pair<A, B> next_pair() {
+    static std::pair<A, B> parse_pair(const std::string& text) {
         std::pair<A, B> pair;
-        std::istringstream numbers(next());
+        std::istringstream numbers(text);
         return numbers >> pair.first >> pair.second ? pair : std::pair<A, B>{};
     }
 
@@ -69,14 +66,14 @@ std::optional<Manifest> read_manifest(const fs::path& scratch) {
     if (fields.next() != kManifestMagic) return std::nullopt;
     Manifest manifest;
     manifest.set = fields.next();
-    const FileId counts = fields.next_id();  // of scratch folders, of files
-    for (dev_t n = 0; n < counts.device && !fields.empty(); ++n) {
-        ScratchPlace place{fields.next(), {}, {}};
-        place.id = fields.next_id();
-        place.folder = fields.next_id();
+    const std::uint64_t scratches = fields.next_number(), files = fields.next_number();
+    for (std::uint64_t n = 0; n < scratches && !fields.empty(); ++n) {
+        ScratchPlace place{fields.next(), 0, 0};
+        place.inode = fields.next_number();
+        place.folder = fields.next_number();
         manifest.scratches.push_back(std::move(place));
     }
-    for (ino_t n = 0; n < counts.inode && !fields.empty(); ++n) {
+    for (std::uint64_t n = 0; n < files && !fields.empty(); ++n) {
         const Stamp made = fields.next_stamp(), replaced = fields.next_stamp();
         manifest.files.push_back({made, replaced, fields.next()});
         if (!is_output_name(manifest.files.back().name)) return std::nullopt;
@@ -121,9 +118,9 @@ public:
 
 private:
     [[nodiscard]] std::size_t own_number() const {
-        const FileId own = id_of(scratch_);
+        const ino_t own = id_of(scratch_).inode;
         std::size_t n = 0;
-        while (n < manifest_->scratches.size() && manifest_->scratches[n].id != own) ++n;
+        while (n < manifest_->scratches.size() && manifest_->scratches[n].inode != own) ++n;
         return n;
     }
 
@@ -136,10 +133,9 @@ private:
     /// What the commit says, in another folder. @param known  false: that folder cannot be seen now
     [[nodiscard]] std::optional<Fate> fate_elsewhere(bool& known) const {
         const ScratchPlace& first = manifest_->scratches.front();
-        known = id_of(first.path.parent_path()) == first.folder;
+        known = id_of(first.path.parent_path()).inode == first.folder;
         if (known) {
-            const FileId id = id_of(first.path);
-            if (id == first.id) return read_commit(first.path, manifest_->set);
+            if (id_of(first.path).inode == first.inode) return read_commit(first.path, manifest_->set);
             // It is gone once all is in place, and where it was thrown away before anything was.
             if (!any_in_place()) return std::nullopt;
         }
@@ -169,12 +165,12 @@ private:
     /// The same in another folder of the set, if that is free. @returns whether that is done
     [[nodiscard]] bool finish_other(const ScratchPlace& place, Fate fate, bool may_remove) const {
         const fs::path folder = place.path.parent_path();
-        if (id_of(folder) != place.folder) return false;
+        if (id_of(folder).inode != place.folder) return false;
         try {
             const FolderLock lock(folder, run_, kShortPatience);
             const FileId id = id_of(place.path);
             if (id == FileId{}) return true;
-            if (!lock.is_locked() || id != place.id) return false;
+            if (!lock.is_locked() || id.inode != place.inode) return false;
             const DeadScratch dead(place.path);
             if (dead.state() != DeadScratch::State::Dead) return false;
             Remains other(place.path, run_);
@@ -216,11 +212,12 @@ void write_manifest(const fs::path& scratch, const Manifest& manifest) {
     const auto add = [&](const std::string& field) { text += field + '\0'; };
     add(kManifestMagic);
     add(manifest.set);
-    add(std::to_string(manifest.scratches.size()) + " " + std::to_string(manifest.files.size()));
+    add(std::to_string(manifest.scratches.size()));
+    add(std::to_string(manifest.files.size()));
     for (const ScratchPlace& place : manifest.scratches) {
         add(place.path.string());
-        add(place.id.text());
-        add(place.folder.text());
+        add(std::to_string(place.inode));
+        add(std::to_string(place.folder));
     }
     for (const Manifest::File& file : manifest.files) {
         add(file.made.text());

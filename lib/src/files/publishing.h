@@ -20,7 +20,8 @@ namespace covol::detail {
 
 struct ScratchPlace {
     std::filesystem::path path;
-    FileId id, folder;  ///< its own, and that of the folder around it
+    ino_t inode = 0,
+          folder = 0;  ///< its own, and that of the folder around it: devices have other numbers after a start
 };
 
 /// A file as it is now. 0, 0: there is none.

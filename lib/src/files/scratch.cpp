@@ -52,8 +52,8 @@ bool is_output_name(const std::string& name) {
            !name.starts_with(kHiddenPrefix);
 }
 
-std::string scratch_mark(const FileId& folder, bool all) {
-    return std::string(kMagic) + folder.text() + "\n" + (all ? kAll : kListed);
+std::string scratch_mark(ino_t folder, bool all) {
+    return std::string(kMagic) + std::to_string(folder) + "\n" + (all ? kAll : kListed);
 }
 
 DeadScratch::DeadScratch(const fs::path& folder)
@@ -76,7 +76,7 @@ DeadScratch::State DeadScratch::read_state() {
     if (text.empty()) return contents(folder_).empty() ? State::Unstarted : State::Foreign;
     for (const bool all : {true, false}) {
         // A copy of such a folder has another inode.
-        const std::string mark = scratch_mark({own.st_dev, own.st_ino}, all);
+        const std::string mark = scratch_mark(own.st_ino, all);
         if (!text.starts_with(mark)) continue;
         names_ = std::string(1, '\0') + text.substr(mark.size());
         all_ = all;

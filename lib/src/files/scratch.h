@@ -20,7 +20,7 @@ constexpr const char* kCommit = ".covol-commit";
 [[nodiscard]] bool is_output_name(const std::string& name);
 
 /// What a scratch folder's lock begins with.
-[[nodiscard]] std::string scratch_mark(const FileId& folder, bool all);
+[[nodiscard]] std::string scratch_mark(ino_t folder, bool all);
 
 /// The lock of a scratch folder: a file that begins with scratch_mark(), of this user, with the names behind it that
 /// may be removed.

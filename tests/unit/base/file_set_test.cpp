@@ -198,6 +198,8 @@ TEST_CASE("file_set: a set in two folders that is killed at any call is old or n
             }
             for (const std::string& name : names)
                 if (name != "two/fresh") folder.write(name, "old");
+            // As of a server whose clock is ahead.
+            fs::last_write_time(folder.path("one/c"), fs::file_time_type::clock::now() + std::chrono::hours(1));
             killed = dies([&] {
                 FileSet set;
                 for (const std::string& name : names) write(set, folder.path(name), "new");
@@ -279,6 +281,7 @@ TEST_CASE("file_set: of a set that is completed, what was put there since stays"
         }
         met = true;
         folder.write("c", "another's");
+        fs::last_write_time(root / "c", fs::file_time_type::clock::now() - std::chrono::hours(1));  // a copy, say
         { const ScratchFolder next(root); }
         CHECK(bytes_of(folder.path("b")) == "new");
         CHECK(bytes_of(folder.path("c")) == "another's");
