@@ -357,7 +357,7 @@ class Places(Files):
         self.keeps(names[0], *names)
         (self.out / names[1]).unlink()
         os.mkfifo(self.out / names[1])
-        self.fails("info", names[0], code=3, says="")
+        self.fails("info", names[0], code=4, says=names[1] + ": is not a regular file")
 
     def test_a_zarr_store(self):
         self.run_covol("phantom", "sphere", "--size", SIZE, "-o", "in.zarr")

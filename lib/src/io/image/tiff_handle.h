@@ -4,9 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <cstdio>
-#include <filesystem>
 #include <string>
-#include <system_error>
 
 #include "covol/error.h"
 
@@ -22,12 +20,7 @@ public:
         TIFFOpenOptionsSetWarningHandlerExtR(options, &Tiff::drop_message, this);
         if (largest_allocation > 0)
             TIFFOpenOptionsSetMaxSingleMemAlloc(options, static_cast<tmsize_t>(largest_allocation));
-        std::error_code status;
-        // A named pipe would be waited for.
-        if (mode[0] == 'r' && std::filesystem::exists(path, status) && !std::filesystem::is_regular_file(path, status))
-            message_ = path + ": not a regular file";
-        else
-            handle_ = TIFFOpenExt(path.c_str(), mode, options);
+        handle_ = TIFFOpenExt(path.c_str(), mode, options);
         TIFFOpenOptionsFree(options);
     }
     ~Tiff() { close(); }
