@@ -78,12 +78,13 @@ struct FileSet::State {
         while (count-- > 0) static_cast<void>(detail::exchange_back(files[count].temporary, files[count].target));
     }
 
-    /// The commit goes last but one: without it what is left elsewhere would be thrown away.
+    /// The commit goes last: without it what is left elsewhere would be thrown away.
     void remove_manifests() const noexcept {
         for (auto folder = folders.rbegin(); folder != folders.rend(); ++folder) {
             const fs::path& scratch = folder->second.scratch.path();
-            if (std::next(folder) == folders.rend()) ::unlink((scratch / detail::kCommit).c_str());
             ::unlink((scratch / detail::kManifest).c_str());
+            const fs::path commit = scratch / detail::kCommit;
+            if (detail::id_of(commit) != detail::FileId{}) ::unlink(commit.c_str());
         }
     }
 };
@@ -123,7 +124,8 @@ void FileSet::publish(const RunContext& run) {
     const std::string set = state_->write_manifests();
     // A thread that ends the process must leave the rest to the next run.
     for (auto& [id, folder] : state_->folders) folder.scratch.keep_for_next_run();
-    detail::write_commit(state_->folders.begin()->second.scratch.path(), set, detail::Fate::Complete);
+    if (state_->folders.size() > 1)
+        detail::write_commit(state_->folders.begin()->second.scratch.path(), set, detail::Fate::Complete);
     for (std::size_t n = 0; n < files.size(); ++n)
         if (!detail::exchange(files[n].temporary, files[n].target)) {
             const int why = errno;

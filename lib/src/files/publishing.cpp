@@ -102,7 +102,9 @@ public:
         const std::size_t self = own_number();
         if (self == manifest_->scratches.size()) return false;  // it is about another folder
         bool known = true;
-        const std::optional<Fate> fate = self == 0 ? read_commit(scratch_, manifest_->set) : fate_elsewhere(known);
+        std::optional<Fate> fate = self == 0 ? read_commit(scratch_, manifest_->set) : fate_elsewhere(known);
+        // In one folder the manifest itself says that the set is to be completed.
+        if (!fate && manifest_->scratches.size() == 1) fate = Fate::Complete;
         if (!known) return false;
         if (!fate) return true;  // nothing was put in place yet
         bool others = true;

@@ -13,9 +13,9 @@
 // Each scratch folder gets a manifest: the set's number, all scratch folders of the set, and inode and name of each
 // file that it will put in place. Then one file in the first of them, the commit, says that the set is to be completed.
 // Before that file is there the outputs are the old ones, and what was written is thrown away; after that each folder's
-// files are put in place, by whoever comes next to any of the folders. A manifest only ever speaks of files in its own
-// scratch folder and the folder around it: of the others it says where they are, and these have manifests of their own,
-// in folders of this user with a lock that this process could take.
+// files are put in place, by whoever comes next to any of the folders. In one folder the manifest is the commit. A
+// manifest only ever speaks of files in its own scratch folder and the folder around it: of the others it says where
+// they are, and these have manifests of their own, in folders of this user with a lock that this process could take.
 namespace covol::detail {
 
 struct ScratchPlace {

@@ -346,7 +346,7 @@ TEST_CASE("file_set: a manifest that is not of this folder moves nothing") {
             set.publish();
         });
         const fs::path left = scratch_in(folder.path("one"));
-        if (!left.empty() && fs::exists(left / ".covol-commit")) break;
+        if (!left.empty() && fs::exists(left / ".covol-publish")) break;
         { const ScratchFolder clears(folder.path("one")); }
         folder.write("one/a", "old");
     }
