@@ -448,8 +448,8 @@ class Streams(Files):
                  f"plan segment {self.image} --points marks.xyz -o t.vdb", "rerun s.vdb --inputs " + str(self.inputs),
                  "phantom sphere --size 16 -o t.nrrd --json -", f"info {self.image} --json -",
                  f"segment {self.image} --points marks.xyz --init tag --max-steps 1 -o t.vdb --json -",
-                 "phantom sphere --size 16 -o t.nrrd --json /dev/stdout",
-                 "phantom sphere --size 16 -o t.nrrd --save-config /dev/stdout"]
+                 "phantom sphere --size 16 -o t.nrrd --json /dev/fd/1",
+                 "phantom sphere --size 16 -o t.nrrd --save-config /dev/fd/1"]
         return [text.split() for text in texts]
 
     def test_standard_output_is_full_or_closed(self):
@@ -476,7 +476,7 @@ class Streams(Files):
         with open(self.out / "log", "w") as log:
             log.write("before\n")
             log.flush()
-            subprocess.run([PROGRAM, *PHANTOM, "-o", "x.nrrd", "--json", "/dev/stdout"], cwd=self.out, stdout=log, check=True,
+            subprocess.run([PROGRAM, *PHANTOM, "-o", "x.nrrd", "--json", "/dev/fd/1"], cwd=self.out, stdout=log, check=True,
                            stderr=subprocess.DEVNULL)
             log.write("after\n")
         text = self.text("log")
