@@ -16,7 +16,7 @@ ALLOWED = {
     "cloud/orientation/cloud_scale.cpp:kCellRadii", "cloud/surface/cloud_field.cpp:kMostLeaves", "segment/automatic.cpp:kMostReach",
     "contours/contour_curve.cpp:kLongestPiece", "contours/slice_field.cpp:kSeedPiece",
     "edge/edge.cpp:kHeatTolerance", "evolve/band_solver.cpp:kRounding", "evolve/evolve.cpp:kSmallestStep", "evolve/motion.cpp:kInfinity",
-    "guess/guess_correction.cpp:kSolved", "guess/marks_surface.cpp:kInfinity", "guess/marks_surface.cpp:kMostCells",
+    "guess/guess_correction.cpp:kSolved", "guess/guess_correction.cpp:kSteepestBump", "guess/marks_surface.cpp:kInfinity", "guess/marks_surface.cpp:kMostCells",
     "guess/variational.cpp:kAround", "guess/variational.cpp:kLocalShares", "guess/variational.cpp:kNoStep",
     "guidance/border_profile.cpp:kNothing", "guidance/learning.cpp:kSteepest", "guidance/offset_field.cpp:kSolved", "guidance/smooth_image.cpp:kKernelSigmas", "guidance/smooth_image.cpp:kLeastSigma", "holes/holes.cpp:kP95OfSpacing",
     "meshing/contacts.cpp:kAlong", "meshing/contacts.cpp:kFacing", "meshing/contacts.cpp:kFar", "meshing/contacts.cpp:kRounding",

@@ -9,13 +9,13 @@ import sys
 # Folders of lib/src from the bottom up, with the public headers that they implement; a file may include headers of its own
 # level and of those below.
 LAYERS = [
-    {"base": ["api", "version", "fwd", "error", "file_set", "option_names", "run", "domain", "safe_text"], "scheme": []},
-    {"limits": []},
+    {"base": ["api", "version", "fwd", "error", "option_names", "run", "domain", "safe_text"], "scheme": []},
+    {"files": ["file_set"], "limits": []},
     {"grid": [], "mesh": ["mesh"], "io": ["vdb_io"], "io/pixels": ["image"]},
     {"io/chunked": [], "io/modules": []},
     {"io/hdf5": []},
     {"io/image": [], "io/mesh": ["mesh_io"], "distance": ["distance"]},
-    {"image": [], "io/write": ["image_stream"], "io/points": ["points", "points_text", "point_array"], "clip": ["clip"], "edge": ["edge"], "redistance": []},
+    {"image": ["image_files"], "io/write": ["image_stream"], "io/points": ["points", "points_text", "point_array"], "clip": ["clip"], "edge": ["edge"], "redistance": []},
     {"points": ["scan_noise", "cloud_cleanup"], "surface": ["surface", "mesh_stream"], "evolve": ["evolve", "checkpoints"], "tagging": ["band"]},
     {"contours": ["contours", "seeds"], "meshing": ["mesh_relax", "mesh_cleanup"], "holes": ["holes"], "cloud/orientation": ["orientation"]},
     {"start": ["start"], "painted": ["painted"], "analysis": ["compare", "evidence", "structures", "phantom"], "render/draw": ["picture"]},

@@ -1,5 +1,5 @@
-/// Preloaded into a program: kills it before its KILL_AT-th call (from 1) of those that put files in place, as a power
-/// cut or the system's out-of-memory killer would. 0 or unset: never.
+/// Preloaded into a program, or part of it: kills it before its KILL_AT-th call (from 1) of those that put files in
+/// place, as a power cut or the system's out-of-memory killer would. 0 or unset: never.
 #include <dlfcn.h>
 #include <sys/types.h>
 
@@ -9,10 +9,17 @@
 
 namespace {
 
+struct Count {
+    std::atomic<long> last{std::getenv("KILL_AT") == nullptr ? 0 : std::atol(std::getenv("KILL_AT"))};
+    std::atomic<long> calls{0};
+};
+Count& counted() {
+    static Count all;
+    return all;
+}
+
 void count() {
-    static const long last = std::getenv("KILL_AT") == nullptr ? 0 : std::atol(std::getenv("KILL_AT"));
-    static std::atomic<long> calls{0};
-    if (++calls == last) std::raise(SIGKILL);
+    if (++counted().calls == counted().last) std::raise(SIGKILL);
 }
 
 template <class... Arguments>
@@ -24,6 +31,11 @@ int pass_on(const char* name, Arguments... arguments) {
 }  // namespace
 
 extern "C" {
+/// Counts anew.
+void covol_kill_before(long number) {
+    counted().calls = 0;
+    counted().last = number;
+}
 int fsync(int file) { return pass_on("fsync", file); }
 int rename(const char* from, const char* to) noexcept { return pass_on("rename", from, to); }
 int renameat2(int from_folder, const char* from, int to_folder, const char* to, unsigned flags) noexcept {

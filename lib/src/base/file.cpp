@@ -1,17 +1,11 @@
 #include "base/file.h"
 
 #include <fcntl.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
-#include <cstring>
 #include <filesystem>
-#include <random>
-
-#include "covol/error.h"
-#include "covol/file_set.h"
 
 namespace covol::detail {
 namespace fs = std::filesystem;
@@ -40,82 +34,6 @@ bool swap_paths(const std::string& one, const std::string& other) {
     static_cast<void>(std::rename(aside.c_str(), other.c_str()));
     errno = why;
     return false;
-}
-
-namespace {
-
-/// @throws Error Io when it does not exist.
-fs::path folder_of(const fs::path& target) {
-    const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
-    std::error_code status;
-    if (!fs::is_directory(folder, status))
-        throw Error(Errc::Io,
-                    target.string() + ": cannot write: " +
-                        (status == std::errc::filename_too_long ? status.message()
-                                                                : "the folder " + folder.string() + " does not exist"));
-    return folder;
-}
-
-/// Makes an empty file beside `target`, with a hidden name that nobody can foresee, and that no one else has.
-std::string new_file_beside(const fs::path& target) {
-    const fs::path folder = folder_of(target);
-    const std::string whole = target.filename().string();
-    // The ending, that writers go by; a name may be as long as the file system allows.
-    constexpr std::size_t kEnd = 32;
-    const std::string end = whole.substr(whole.size() - std::min(whole.size(), kEnd));
-    std::random_device random;
-    for (;;) {
-        const std::string name = ".covol-" + std::to_string(random()) + "-" + end;
-        const int file = ::open((folder / name).c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-        if (file >= 0) {
-            ::close(file);
-            return (folder / name).string();
-        }
-        if (errno != EEXIST) throw Error(Errc::Io, target.string() + ": cannot write: " + std::strerror(errno));
-    }
-}
-
-}  // namespace
-
-void write_folder_atomically(const std::string& path, bool may_replace,
-                             const std::function<void(const std::string&)>& write) {
-    std::error_code status;
-    const bool exists = fs::exists(fs::symlink_status(path, status));
-    if (exists && (!fs::is_directory(path, status) || fs::is_symlink(path, status) || !may_replace))
-        throw Error(Errc::Io, path + ": cannot write: something else is there, and not replaced; choose another name");
-    const ScratchFolder scratch(folder_of(path));
-    const std::string temporary = (scratch.path() / fs::path(path).filename()).string();
-    if (!fs::create_directory(temporary, status)) throw Error(Errc::Io, path + ": cannot write: " + status.message());
-    write(temporary);
-    // All files of it reach the disk before its name does.
-    const int folder = ::open(temporary.c_str(), O_RDONLY | O_DIRECTORY);
-    const bool flushed = folder >= 0 && ::syncfs(folder) == 0;
-    const int why = errno;
-    if (folder >= 0) ::close(folder);
-    if (!flushed) throw Error(Errc::Io, path + ": cannot write: " + std::strerror(why));
-    if (exists ? !swap_paths(temporary, path) : std::rename(temporary.c_str(), path.c_str()) != 0)
-        throw Error(Errc::Io, path + ": cannot write: " + std::strerror(errno));
-}
-
-void write_atomically(const std::string& path, const std::function<void(const std::string&)>& write) {
-    const fs::path target(path);
-    std::error_code status;
-    if (fs::is_directory(target, status)) throw Error(Errc::Io, path + ": cannot write: it is a folder");
-    if (fs::exists(target, status) && !fs::is_regular_file(target, status))
-        throw Error(Errc::Io, path + ": cannot write: it is not a regular file");
-    const std::string temporary = new_file_beside(target);
-    struct Remover {
-        const std::string& name;
-        ~Remover() { ::unlink(name.c_str()); }
-    } remover{temporary};
-    write(temporary);
-    const int file = ::open(temporary.c_str(), O_RDONLY);
-    const bool flushed = file >= 0 && ::fsync(file) == 0;
-    const int why = errno;
-    if (file >= 0) ::close(file);
-    if (!flushed) throw Error(Errc::Io, path + ": cannot write: " + std::strerror(why));
-    if (std::rename(temporary.c_str(), path.c_str()) != 0)
-        throw Error(Errc::Io, path + ": cannot write: " + std::strerror(errno));
 }
 
 }  // namespace covol::detail

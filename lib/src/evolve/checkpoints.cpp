@@ -7,10 +7,10 @@
 #include <fstream>
 #include <string_view>
 
-#include "base/file.h"
 #include "base/number.h"
 #include "covol/error.h"
 #include "covol/file_set.h"
+#include "files/atomic.h"
 
 namespace covol {
 namespace fs = std::filesystem;
@@ -40,7 +40,7 @@ void remove_flows(const std::string& folder) noexcept {
 bool holds(const fs::path& path, const std::string& text) {
     std::error_code status;
     if (!fs::is_regular_file(path, status) || fs::file_size(path, status) != text.size()) return false;
-    std::ifstream file(path, std::ios::binary);
+    std::ifstream file = open_regular_file(path.string());
     return std::string(std::istreambuf_iterator<char>(file), {}) == text;
 }
 

@@ -26,7 +26,8 @@ namespace {
 
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 
-constexpr double kSolved = 1e-6;  // of the right-hand side
+constexpr double kSolved = 1e-6;        // of the right-hand side
+constexpr double kSteepestBump = 2.11;  // largest slope, of the height by the radius: Wendland's function has it
 constexpr int kMostIterations = 1000;
 
 struct Bump {
@@ -277,15 +278,15 @@ struct GuessCorrection::Data {
 std::unique_ptr<Leaf> GuessCorrection::Data::corrected_leaf(const FloatGrid::TreeType& tree,
                                                             const openvdb::Coord& origin, const Domain& domain,
                                                             double clamp) const {
-    constexpr double kHalf = 3.5, kSteepest = 2.11;  // voxels; a bump's slope, of its height by its radius
-    const Vec3 middle = domain.index_to_world({origin.x() + kHalf, origin.y() + kHalf, origin.z() + kHalf});
-    const double reach = kHalf * std::sqrt(3.0) * domain.voxel_size;
+    const double half = 0.5 * (Leaf::DIM - 1);
+    const Vec3 middle = domain.index_to_world({origin.x() + half, origin.y() + half, origin.z() + half});
+    const double reach = half * std::sqrt(3.0) * domain.voxel_size;
     std::vector<Bump> near;
     double slope = 0;
     for (const Bump& b : bumps) {
         if (!(std::sqrt(detail::squared_distance(b.center, middle)) < b.radius + reach)) continue;
         near.push_back(b);
-        slope += kSteepest * std::abs(b.height) / b.radius;
+        slope += kSteepestBump * std::abs(b.height) / b.radius;
     }
     // What the middle tells of the whole leaf, without the distances of all its voxels.
     const double far = distance.at(middle), move = sum_of(near, middle);
@@ -314,7 +315,7 @@ const CorrectionReport& GuessCorrection::report() const { return data_->report; 
 FloatGridPtr GuessCorrection::start(const RunContext& run) const {
     const Domain domain = domain_of(*data_->grid);
     const FloatGridPtr field = data_->grid->deepCopy();
-    const double clamp = kHalfWidthVoxels * domain.voxel_size;
+    const double clamp = halfWidthVoxels * domain.voxel_size;
     std::vector<openvdb::Coord> origins;
     for (const Bump& b : data_->bumps) {
         openvdb::Coord first, last;

@@ -9,6 +9,7 @@
 #include "base/matrix.h"
 #include "base/number.h"
 #include "covol/error.h"
+#include "covol/image_files.h"
 #include "covol/vdb_io.h"
 #include "io/chunked/zarr.h"
 #include "io/hdf5/hdf5_image.h"
@@ -404,6 +405,13 @@ ImageInfo read_image_info(const std::string& path, const ReadImageOptions& optio
     if (info.frames > 1 && first.frame < 0) first.frame = 0;
     info.bytes_to_hold = file->bytes_to_hold(choose_pixels(path, info, first));
     return info;
+}
+
+std::vector<std::string> list_image_files(const std::string& path, const RunContext& run) {
+    // BigDataViewer's description; the file itself is not opened for that.
+    if (const auto hdf5 = detail::split_hdf5_name(path))
+        return {fs::path(hdf5->path).replace_extension(".xml").string()};
+    return open_image(path, {}, run)->files();
 }
 
 }  // namespace covol

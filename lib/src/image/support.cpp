@@ -145,9 +145,9 @@ ImageSupport measure_support(const Image& image, const std::vector<Vec3>& places
 }
 
 StrongestBorder find_strongest_border(const Image& image, const std::vector<Vec3>& places,
-                                      const std::vector<Vec3>& normals, double step, EdgeFeature feature,
+                                      const std::vector<Vec3>& normals, double step, BorderKind kind,
                                       const RunContext& run) {
-    const bool is_line = feature == EdgeFeature::BrightLine || feature == EdgeFeature::DarkLine;
+    const bool is_line = kind == BorderKind::Line;
     const std::vector<Profile> profiles =
         profiles_of(image, places, normals, step, 2 * kReach + (is_line ? 5 : 2), run);
     std::vector<Strengths> lines(places.size());

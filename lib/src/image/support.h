@@ -2,7 +2,6 @@
 #include <cstddef>
 #include <vector>
 
-#include "covol/edge.h"
 #include "covol/image.h"
 
 namespace covol::detail {
@@ -23,6 +22,10 @@ struct ImageSupport {
 [[nodiscard]] ImageSupport measure_support(const Image& image, const std::vector<Vec3>& places,
                                            const std::vector<Vec3>& normals, double step, const RunContext& run);
 
+/// What a border is: the slope between two brightnesses, or the middle of a line, which has none and whose sides have
+/// two.
+enum class BorderKind { Slope, Line };
+
 /// Where an image has its strongest border, on the mean of lines across a surface: marks on a border have it where they
 /// are.
 struct StrongestBorder {
@@ -33,12 +36,10 @@ struct StrongestBorder {
 };
 
 /// Mean strength of a border at whole steps up to ten before and behind each place along its normal; from nearest
-/// voxels. Its strength is the slope, between two voxels on each side; of a line, whose middle has none and whose sides
-/// have two, it is the brightness there less that two voxels before and behind. Arguments and errors as of
-/// measure_support().
-/// @param feature  what the marks lie on, as detect_feature() finds it
+/// voxels. The strength of a slope is the difference of two voxels on each side, that of a line the difference of its
+/// brightness from that two voxels before and behind. Arguments and errors as of measure_support().
 [[nodiscard]] StrongestBorder find_strongest_border(const Image& image, const std::vector<Vec3>& places,
-                                                    const std::vector<Vec3>& normals, double step, EdgeFeature feature,
+                                                    const std::vector<Vec3>& normals, double step, BorderKind kind,
                                                     const RunContext& run);
 
 }  // namespace covol::detail

@@ -16,9 +16,9 @@
 #include <set>
 #include <sstream>
 
-#include "base/file.h"
 #include "covol/error.h"
 #include "covol/version.h"
+#include "files/atomic.h"
 #include "io/nanovdb.h"
 #include "io/vdb_walk.h"
 #include "limits/world_limits.h"

@@ -4,6 +4,7 @@
 #include <fstream>
 
 #include "base/file.h"
+#include "covol/file_set.h"
 
 namespace covol::painted {
 
@@ -13,7 +14,7 @@ std::map<int, std::string> segment_names(const std::string& path) {
     if (extension != ".nrrd" && extension != ".nhdr") return names;
     std::map<std::string, std::string> name_of;  // by "Segment3"
     std::map<std::string, int> label_of;
-    std::ifstream file(path, std::ios::binary);
+    std::ifstream file = open_regular_file(path);
     std::string line;
     while (std::getline(file, line)) {
         if (!line.empty() && line.back() == '\r') line.pop_back();

@@ -5,12 +5,12 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "base/file.h"
 #include "base/valid.h"
 #include "base/vector.h"
 #include "covol/error.h"
 #include "covol/safe_text.h"
 #include "covol/version.h"
+#include "files/atomic.h"
 #include "report/cluster.h"
 #include "report/encoding.h"
 #include "report/mesh_codec.h"

@@ -143,8 +143,9 @@ void find_strange_image(Job& job, const std::vector<Vec3>& marks) {
     job.report().image_support = support.share;
     const GuidanceReport& guidance = job.report().guidance;
     const EdgeFeature feature = guidance.used ? guidance.feature.feature : job.options.edge.feature;
-    const detail::StrongestBorder border =
-        detail::find_strongest_border(*job.image, at.places, at.normals, job.h(), feature, job.run);
+    const detail::StrongestBorder border = detail::find_strongest_border(
+        *job.image, at.places, at.normals, job.h(),
+        feature > EdgeFeature::Slope ? detail::BorderKind::Line : detail::BorderKind::Slope, job.run);
     job.report().image_border = {border.at, border.share, border.errors};
     const char* const look = ": look whether the marks belong to this image, channel and space";
     if (support.share + kDoubts.support_errors * support.error < kDoubts.image_support)

@@ -10,6 +10,7 @@
 #include "base/file.h"
 #include "covol/error.h"
 #include "covol/mesh_stream.h"
+#include "files/atomic.h"
 #include "io/mesh/mesh_formats.h"
 #include "io/mesh/mesh_stream.h"
 #include "mesh/disjoint_sets.h"

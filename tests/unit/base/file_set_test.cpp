@@ -1,19 +1,30 @@
 #include "covol/file_set.h"
 
+#include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <catch2/catch.hpp>
 #include <csignal>
+#include <cstdlib>
 
 #include "covol/error.h"
+#include "files/folder_lock.h"
 #include "support/scratch.h"
 
 using namespace covol;
 namespace fs = std::filesystem;
 
+/// In support/kill_at.cpp: kills this process before the number-th call from here on that puts files in place; 0:
+/// never.
+extern "C" void covol_kill_before(long number);
+
 namespace {
+
+void kill_before(long number) { covol_kill_before(number); }
 
 void write(FileSet& set, const std::string& path, const std::string& text) {
     set.write(path, [&](const std::string& to) { std::ofstream(to) << text; });
@@ -31,6 +42,21 @@ void die_after(const Body& body) {
     int status = 0;
     ::waitpid(child, &status, 0);
     REQUIRE(WIFSIGNALED(status));
+}
+
+/// Runs `body` in a process of its own. @returns whether it was killed (kill_before())
+template <typename Body>
+bool dies(const Body& body) {
+    const pid_t child = ::fork();
+    REQUIRE(child >= 0);
+    if (child == 0) {
+        body();
+        ::_exit(0);
+    }
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    REQUIRE((WIFSIGNALED(status) || WEXITSTATUS(status) == 0));
+    return WIFSIGNALED(status);
 }
 
 fs::path scratch_in(const fs::path& folder) {
@@ -157,32 +183,301 @@ TEST_CASE("file_set: a process that ends without unwinding can remove its folder
     CHECK(bytes_of(folder.path("a")) == "old a");
 }
 
-TEST_CASE("file_set: a set that was killed while it was put in place is completed") {
+TEST_CASE("file_set: a set in two folders that is killed at any call is old or new in both, whichever is met next") {
+    const Scratch folder;
+    const std::vector<std::string> names{"one/a", "two/b", "one/c", "two/fresh"};
+    int news = 0, olds = 0;
+    for (const std::string met : {"one", "two"}) {
+        bool killed = true;
+        for (long call = 1; killed; ++call) {
+            INFO("killed before call " << call << ", then a run in " << met);
+            REQUIRE(call < 500);
+            for (const char* name : {"one", "two"}) {
+                fs::remove_all(folder.path(name));
+                fs::create_directory(folder.path(name));
+            }
+            for (const std::string& name : names)
+                if (name != "two/fresh") folder.write(name, "old");
+            // As of a server whose clock is ahead.
+            fs::last_write_time(folder.path("one/c"), fs::file_time_type::clock::now() + std::chrono::hours(1));
+            killed = dies([&] {
+                FileSet set;
+                for (const std::string& name : names) write(set, folder.path(name), "new");
+                kill_before(call);
+                set.publish();
+                kill_before(0);
+            });
+            { const ScratchFolder next(folder.path(met)); }
+            const std::string state = bytes_of(folder.path(names[0]));
+            CHECK((state == "old" || state == "new"));
+            for (const std::string& name : names) {
+                INFO(name);
+                if (name == "two/fresh" && state == "old")
+                    CHECK_FALSE(fs::exists(folder.path(name)));
+                else
+                    CHECK(bytes_of(folder.path(name)) == state);
+            }
+            (state == "new" ? news : olds) += 1;
+            // What is left over in the others goes with the next run there, and changes nothing.
+            for (const char* name : {"one", "two"}) {
+                { const ScratchFolder clears(folder.path(name)); }
+                CHECK(scratch_in(folder.path(name)).empty());
+            }
+            for (const std::string& name : names)
+                CHECK((bytes_of(folder.path(name)) == state) == fs::exists(folder.path(name)));
+        }
+    }
+    // Kills before the commit, between renames and while it cleared up were all met.
+    CHECK(olds > 2 * 5);
+    CHECK(news > 2 * 5);
+}
+
+TEST_CASE("file_set: a recovery that is killed itself goes on") {
+    const Scratch folder;
+    const std::vector<std::string> names{"one/a", "two/b", "one/c"};
+    long last = 0;
+    for (long first = 12; first < 40; first += 4)
+        for (long second = 1; second < 30; second += 5) {
+            INFO("killed before call " << first << ", the next run before call " << second);
+            for (const char* name : {"one", "two"}) fs::create_directory(folder.path(name));
+            for (const std::string& name : names) folder.write(name, "old");
+            if (dies([&] {
+                    FileSet set;
+                    for (const std::string& name : names) write(set, folder.path(name), "new");
+                    kill_before(first);
+                    set.publish();
+                    kill_before(0);
+                }))
+                last = first;
+            dies([&] {
+                kill_before(second);
+                const ScratchFolder next(folder.path("two"));
+                kill_before(0);
+            });
+            for (const char* name : {"one", "two"}) {
+                { const ScratchFolder clears(folder.path(name)); }
+                CHECK(scratch_in(folder.path(name)).empty());
+            }
+            for (const std::string& name : names) CHECK(bytes_of(folder.path(name)) == bytes_of(folder.path(names[0])));
+        }
+    CHECK(last > 20);
+}
+
+TEST_CASE("file_set: of a set that is completed, what was put there since stays") {
     const Scratch folder;
     const fs::path root = folder.path("");
-    for (const char* name : {"a", "b", "c"}) folder.write(name, std::string("old ") + name);
+    bool met = false;
+    for (long call = 1; call < 100 && !met; ++call) {
+        for (const char* name : {"a", "b", "c"}) folder.write(name, "old");
+        dies([&] {
+            FileSet set;
+            for (const char* name : {"a", "b", "c"}) write(set, folder.path(name), "new");
+            kill_before(call);
+            set.publish();
+        });
+        if (bytes_of(folder.path("a")) != "new" || bytes_of(folder.path("c")) != "old") {
+            const ScratchFolder clears(root);
+            continue;
+        }
+        met = true;
+        folder.write("c", "another's");
+        fs::last_write_time(root / "c", fs::file_time_type::clock::now() - std::chrono::hours(1));  // a copy, say
+        { const ScratchFolder next(root); }
+        CHECK(bytes_of(folder.path("b")) == "new");
+        CHECK(bytes_of(folder.path("c")) == "another's");
+        CHECK(folder.file_count() == 3);
+    }
+    CHECK(met);
+}
+
+TEST_CASE("file_set: only what covol made is cleared") {
+    const Scratch folder;
+    const fs::path root = folder.path("");
+    // Those of a user: names of all kinds, and copies of one that covol left.
     die_after([&] {
         FileSet* set = new FileSet;
-        for (const char* name : {"a", "b", "c"}) write(*set, folder.path(name), std::string("new ") + name);
+        write(*set, folder.path("a"), "half of a set");
     });
-    // As in the middle of publish(): the manifest is there, one file is in its place.
-    const fs::path scratch = scratch_in(root);
-    std::string manifest;
-    for (const char* name : {"a", "b", "c"}) {
-        struct stat entry {};
-        REQUIRE(::stat((scratch / name).c_str(), &entry) == 0);
-        manifest += std::to_string(entry.st_ino) + " " + name + '\0';
+    const fs::path left = scratch_in(root);
+    REQUIRE_FALSE(left.empty());
+    const std::vector<fs::path> kept{root / ".covol-notes", root / ".covol-abcdef", root / ".covol-abcde",
+                                     root / ".covol-abcdefg", root / ".covol-abc.ef"};
+    for (const fs::path& path : kept) {
+        fs::create_directory(path);
+        std::ofstream(path / "diary") << "important";
     }
-    std::ofstream(scratch / ".covol-publish") << manifest;
-    fs::rename(scratch / "a", root / "x");
-    fs::rename(root / "a", scratch / "a");
-    fs::rename(root / "x", root / "a");
-    fs::last_write_time(root / "c", fs::file_time_type::clock::now() + std::chrono::hours(1));  // another's since
-    const ScratchFolder next(root);
-    CHECK(bytes_of(folder.path("a")) == "new a");
-    CHECK(bytes_of(folder.path("b")) == "new b");
-    CHECK(bytes_of(folder.path("c")) == "old c");
-    CHECK_FALSE(fs::exists(scratch));
+    fs::copy(left, root / ".covol-copied");
+    fs::create_directory(root / ".covol-locked");
+    std::ofstream(root / ".covol-locked/.covol-lock") << "another program's";
+    fs::create_directory(root / "outside");
+    std::ofstream(root / "outside/file") << "important";
+    fs::create_directory_symlink(root / "outside", root / ".covol-linked");
+    std::ofstream(root / ".covol-single") << "a file";
+    fs::create_directory(root / ".covol-empty1");  // as a process leaves it that is killed at once
+    fs::create_directory(root / ".covol-empty1.5");
+    // A link in one that covol left leads nowhere, and what covol did not list stays.
+    fs::create_directory_symlink(root / "outside", left / "a.zarr");
+    std::ofstream(left / "a stranger's") << "important";
+    { const ScratchFolder next(root); }
+    for (const fs::path& path : kept) CHECK(bytes_of(path / "diary") == "important");
+    CHECK(fs::exists(root / ".covol-copied/a"));
+    CHECK(fs::exists(root / ".covol-locked/.covol-lock"));
+    CHECK(bytes_of(root / "outside/file") == "important");
+    CHECK(fs::is_symlink(root / ".covol-linked"));
+    CHECK(fs::exists(root / ".covol-single"));
+    CHECK_FALSE(fs::exists(root / ".covol-empty1"));
+    CHECK(fs::exists(root / ".covol-empty1.5"));
+    CHECK(bytes_of(left / "a stranger's") == "important");
+    CHECK_FALSE(fs::exists(left / "a"));
+}
+
+TEST_CASE("file_set: a manifest that is not of this folder moves nothing") {
+    const Scratch folder;
+    for (const char* name : {"one", "two"}) {
+        fs::create_directory(folder.path(name));
+        folder.write(std::string(name) + "/a", "old");
+    }
+    for (long call = 1;; ++call) {
+        REQUIRE(call < 100);
+        dies([&] {
+            FileSet set;
+            write(set, folder.path("one/a"), "new");
+            kill_before(call);
+            set.publish();
+        });
+        const fs::path left = scratch_in(folder.path("one"));
+        if (!left.empty() && fs::exists(left / ".covol-publish")) break;
+        { const ScratchFolder clears(folder.path("one")); }
+        folder.write("one/a", "old");
+    }
+    // Moved into another folder, as a stranger's archive might bring it.
+    const fs::path left = scratch_in(folder.path("one")), moved = fs::path(folder.path("two")) / left.filename();
+    fs::copy(left, moved, fs::copy_options::recursive);
+    { const ScratchFolder next(folder.path("two")); }
+    CHECK(bytes_of(folder.path("two/a")) == "old");
+    CHECK(fs::exists(moved));
+}
+
+TEST_CASE("file_set: a lock of another program is waited for, and told; then it is an error, or cancelled") {
+    const Scratch folder;
+    const fs::path root = folder.path("");
+    folder.write("a", "old");
+    const int held = ::open(root.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    REQUIRE(::flock(held, LOCK_EX) == 0);
+    std::vector<std::string> said;
+    std::atomic<bool> cancel = false;
+    RunContext run;
+    run.cancel = &cancel;
+    run.log = [&](LogLevel level, const std::string& line) {
+        CHECK(level == LogLevel::Info);
+        said.push_back(line);
+    };
+    const std::string why = message_of([&] { detail::FolderLock(root, run, std::chrono::milliseconds(1200)); });
+    CHECK(why.find("has had a lock (flock) on this folder for 1 s") != std::string::npos);
+    REQUIRE(said.size() == 1);
+    CHECK(said.front().find("waiting for process " + std::to_string(::getpid())) != std::string::npos);
+    run.log = [&](LogLevel, const std::string&) { cancel = true; };
+    CHECK(code_of([&] { wait_for_folder(root, run); }) == Errc::Cancelled);
+    cancel = false;
+    run.log = [&](LogLevel, const std::string&) { ::flock(held, LOCK_UN); };
+    FileSet set;
+    set.write(
+        folder.path("a"), [](const std::string& to) { std::ofstream(to) << "new"; }, run);
+    ::flock(held, LOCK_EX);
+    set.publish(run);
+    CHECK(bytes_of(folder.path("a")) == "new");
+    ::close(held);
+}
+
+TEST_CASE("file_set: one folder by two names is one folder") {
+    const Scratch folder;
+    fs::create_directory(folder.path("one"));
+    fs::create_directory_symlink(folder.path("one"), folder.path("also"));
+    FileSet set;
+    write(set, folder.path("one/a"), "new a");
+    write(set, folder.path("also/b"), "new b");
+    set.publish();
+    CHECK(bytes_of(folder.path("one/a")) == "new a");
+    CHECK(bytes_of(folder.path("one/b")) == "new b");
+}
+
+TEST_CASE("place_of_output: as the system does it") {
+    const Scratch folder;
+    const fs::path root = fs::canonical(folder.path(""));
+    fs::create_directories(root / "deep/inner");
+    fs::create_directory_symlink(root / "deep/inner", root / "link");
+    std::ofstream(root / "file") << "old";
+    fs::create_symlink("file", root / "to_file");
+    fs::create_symlink("deep/nothing", root / "dangling");
+    fs::create_symlink("no/nothing", root / "nowhere");
+    fs::create_symlink("round", root / "round");
+    fs::create_directory_symlink("deep", root / "to_folder");
+    const auto place = [&](const char* name) { return place_of_output((root / name).string()).path; };
+    CHECK(place("link/../q") == root / "deep/q");
+    CHECK(place("to_file") == root / "file");
+    CHECK(place("dangling") == root / "deep/nothing");
+    CHECK(place("to_folder/") == root / "deep");
+    CHECK(place("new") == root / "new");
+    CHECK(place_of_output("/dev/stdout").is_stream);
+    CHECK_FALSE(place_of_output("/dev/null").is_stream);
+    CHECK(message_of([&] { place("nowhere"); }).find("does not exist") != std::string::npos);
+    CHECK(message_of([&] { place("round"); }).find("symbolic links") != std::string::npos);
+    CHECK(message_of([&] { place("no/q"); }).find("does not exist") != std::string::npos);
+}
+
+TEST_CASE("file_set, write_text_file: a link stays, and what it points to is replaced; permissions stay") {
+    const Scratch folder;
+    const fs::path root = folder.path("");
+    const auto mode_of = [&](const std::string& name) {
+        struct stat entry {};
+        REQUIRE(::stat(folder.path(name).c_str(), &entry) == 0);
+        return entry.st_mode & 07777;
+    };
+    for (const bool in_set : {true, false}) {
+        const auto put = [&](const std::string& name, const std::string& text) {
+            if (!in_set) return write_text_file(folder.path(name), text);
+            FileSet set;
+            write(set, folder.path(name), text);
+            set.publish();
+        };
+        for (const mode_t mode : {0600, 0640, 0444, 0666, 0755}) {
+            folder.write("file", "old");
+            ::chmod(folder.path("file").c_str(), mode);
+            put("file", "new");
+            CHECK(mode_of("file") == mode);
+            CHECK(bytes_of(folder.path("file")) == "new");
+            fs::remove(root / "file");
+        }
+        folder.write("file", "old");
+        ::chmod(folder.path("file").c_str(), 0600);
+        fs::create_symlink("file", root / "link");
+        fs::create_symlink("made", root / "dangling");
+        put("link", "through the link");
+        put("dangling", "through the other");
+        CHECK(fs::read_symlink(root / "link") == "file");
+        CHECK(fs::read_symlink(root / "dangling") == "made");
+        CHECK(bytes_of(folder.path("file")) == "through the link");
+        CHECK(bytes_of(folder.path("made")) == "through the other");
+        CHECK(mode_of("file") == 0600);
+        for (const char* name : {"file", "link", "made", "dangling"}) fs::remove(root / name);
+    }
+    if (::geteuid() == 0) {
+        folder.write("file", "old");
+        REQUIRE(::chown(folder.path("file").c_str(), 1234, 2345) == 0);
+        write_text_file(folder.path("file"), "new");
+        struct stat entry {};
+        REQUIRE(::stat(folder.path("file").c_str(), &entry) == 0);
+        CHECK(entry.st_uid == 1234);
+        CHECK(entry.st_gid == 2345);
+        // Another user's link in a folder for all, as the kernel has it.
+        fs::create_directory(root / "tmp");
+        ::chmod((root / "tmp").c_str(), 01777);
+        fs::create_symlink(root / "file", root / "tmp/link");
+        REQUIRE(::lchown((root / "tmp/link").c_str(), 1234, 2345) == 0);
+        CHECK(message_of([&] { write_text_file((root / "tmp/link").string(), "x"); }).find("another user's") !=
+              std::string::npos);
+        CHECK(bytes_of(folder.path("file")) == "new");
+    }
 }
 
 TEST_CASE("write_text_file: whole, with the permissions of any new file") {

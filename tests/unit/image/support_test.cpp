@@ -6,6 +6,7 @@
 #include <random>
 
 using namespace covol;
+using detail::BorderKind;
 using detail::find_strongest_border;
 using detail::StrongestBorder;
 
@@ -26,14 +27,13 @@ Image slab(const std::function<double(double)>& value, double noise = 0.05) {
 }
 
 /// Of marks in the plane x, of normal +-x.
-StrongestBorder border_at(const Image& image, double x_voxels, double normal = 1,
-                          EdgeFeature feature = EdgeFeature::Slope) {
+StrongestBorder border_at(const Image& image, double x_voxels, double normal = 1, BorderKind kind = BorderKind::Slope) {
     std::vector<Vec3> places, normals;
     for (int n = 0; n < 60; ++n) {
         places.push_back({0.5 * x_voxels, 2 + 0.31 * n, 3 + 0.17 * n});
         normals.push_back({normal, 0, 0});
     }
-    return find_strongest_border(image, places, normals, 0.5, feature, {});
+    return find_strongest_border(image, places, normals, 0.5, kind, {});
 }
 
 }  // namespace
@@ -73,10 +73,9 @@ TEST_CASE("The steeper of two borders is found, and how much less steep the own 
 TEST_CASE("Marks on the middle of a line have its strength, not the slopes of its sides") {
     for (const double sign : {1.0, -1.0}) {
         const Image image = slab([&](double x) { return sign * std::exp(-(x - 22) * (x - 22) / 18); });
-        const EdgeFeature feature = sign > 0 ? EdgeFeature::BrightLine : EdgeFeature::DarkLine;
         CHECK(border_at(image, 22).share < 0.7);  // as a slope
-        CHECK(border_at(image, 22, 1, feature).share == 1);
-        const StrongestBorder beside = border_at(image, 28, 1, feature);
+        CHECK(border_at(image, 22, 1, BorderKind::Line).share == 1);
+        const StrongestBorder beside = border_at(image, 28, 1, BorderKind::Line);
         CHECK(std::abs(beside.at + 6) <= 1);
         CHECK(beside.share < 0.5);
         CHECK(beside.errors > 4);  // as a warning asks for
@@ -94,5 +93,5 @@ TEST_CASE("Lines that leave the image do not count, and no line is no answer") {
     const StrongestBorder none = border_at(image, 500);
     CHECK(none.lines == 0);
     CHECK(none.share == 1);
-    CHECK(find_strongest_border(image, {}, {}, 0.5, EdgeFeature::Slope, {}).lines == 0);
+    CHECK(find_strongest_border(image, {}, {}, 0.5, BorderKind::Slope, {}).lines == 0);
 }

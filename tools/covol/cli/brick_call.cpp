@@ -7,6 +7,7 @@
 #include "cli/arguments.h"
 #include "cli/job_options.h"
 #include "covol/error.h"
+#include "covol/file_set.h"
 
 namespace covol::tool {
 namespace {

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 
 namespace covol::tool {
 
@@ -27,6 +28,11 @@ std::string too_few_files() {
     if (limit.rlim_cur >= kLeast) return {};
     return "this process may open " + std::to_string(limit.rlim_cur) + " files at once (ulimit -n), expected " +
            std::to_string(kLeast) + " or more: Too many open files";
+}
+
+void catch_signals(void (*handler)(int)) {
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP})
+        if (std::signal(signal, handler) == SIG_IGN) std::signal(signal, SIG_IGN);  // as nohup wants it
 }
 
 }  // namespace covol::tool

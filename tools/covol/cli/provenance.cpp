@@ -10,6 +10,7 @@
 #include <set>
 
 #include "covol/error.h"
+#include "covol/file_set.h"
 
 namespace covol::tool {
 namespace fs = std::filesystem;
@@ -38,7 +39,7 @@ private:
 };
 
 void add_file(const fs::path& path, Digest& hash) {
-    std::ifstream file(path, std::ios::binary);
+    std::ifstream file = open_regular_file(path.string());
     std::error_code status;
     const std::uint64_t bytes = fs::file_size(path, status);
     const bool whole = bytes <= kPieces * kPiece;

@@ -203,8 +203,13 @@ void Session::add_grid(const std::string& path, const FloatGridPtr& grid, WriteV
 }
 
 int Session::main(int argc, char** argv) {
-    for (const int signal : {SIGINT, SIGTERM, SIGHUP})
-        if (std::signal(signal, on_signal) == SIG_IGN) std::signal(signal, SIG_IGN);  // as nohup wants it
+    const int code = run_command_line(argc, argv);
+    std::cout.flush();
+    if (!std::cout && !has_last_word_.test()) return fail(kIo, "standard output: cannot write");
+    return code;
+}
+
+int Session::run_command_line(int argc, char** argv) {
     std::signal(SIGBUS, on_bus_error);
     std::signal(SIGXFSZ, SIG_IGN);  // a write beyond the limit of a file's size is an error
     keep_standard_streams();
@@ -240,6 +245,7 @@ int Session::main(int argc, char** argv) {
 }
 
 int Session::execute() {
+    catch_signals(on_signal);
     std::unique_ptr<MemoryGuard> guard;
     try {
         progress_ = std::make_unique<Progress>(quiet_);
@@ -263,6 +269,7 @@ int Session::execute() {
         const ThreadCount threads = limit_threads(threads_);  // when the guard has its own
         inputs_ = inputs_of(*command_);
         outputs_.protect(inputs_);
+        outputs_.protect(app_.get_config_ptr()->results());
         if (json_path_ != "-") outputs_.check("--json", json_path_, OutputKind::Text);
         outputs_.check("--save-config", save_config_path_, OutputKind::Text);
         start_report();
@@ -301,8 +308,10 @@ void Session::finish() {
     const Stopwatch watch;
     if (!save_config_path_.empty())
         outputs_.add(save_config_path_, [this](const std::string& path) {
-            write_text(path, std::string("# covol ") + version() + ", " + command_->get_name() + "\n" +
-                                 command_->config_to_str(false, true));
+            write_text(path,
+                       std::string("# covol ") + version() + ", " + command_->get_name() + "\n" +
+                           command_->config_to_str(false, true),
+                       run_);
         });
     outputs_.write_queued();
     add_seconds("write", watch.seconds());
@@ -336,11 +345,11 @@ void Session::write_report() {
     if (json_path_.empty()) return;
     const std::string text = report_.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
     if (json_path_ != "-") {
-        outputs_.add(json_path_, [text](const std::string& path) { write_text(path, text); });
+        outputs_.add(json_path_, [this, text](const std::string& path) { write_text(path, text, run_); });
         return outputs_.write_queued();
     }
-    std::cout << safe_lines(text) << std::flush;
-    if (!std::cout) throw Error(Errc::Io, "standard output: cannot write");
+    std::cout.flush();
+    write_stream(STDOUT_FILENO, safe_lines(text), "standard output", run_);
 }
 
 std::string Session::memory_text() const {

@@ -130,6 +130,7 @@ private:
     static void add_help_flags(CLI::App& app);
     void add_common_flags();
     int execute();
+    int run_command_line(int argc, char** argv);
     void start_report();
     void finish();
     void write_report();
@@ -160,7 +161,7 @@ private:
 
     RunContext run_;
     std::unique_ptr<Progress> progress_;
-    Outputs outputs_;
+    Outputs outputs_{run_};
     Json report_;
     Stopwatch since_start_;
     int exit_code_ = kDone;

@@ -5,6 +5,7 @@
 #include "commands/commands.h"
 #include "covol/edge.h"
 #include "covol/error.h"
+#include "covol/file_set.h"
 #include "covol/mesh_relax.h"
 #include "covol/structures.h"
 #include "covol/surface.h"
@@ -87,7 +88,7 @@ private:
 
     /// What the run's report tells; fields that are not what covol writes are left out.
     [[nodiscard]] Json with_run(Json facts) const {
-        std::ifstream file(run_report, std::ios::binary);
+        std::ifstream file = open_regular_file(run_report);
         if (!file) throw Error(Errc::Io, "--run-report: " + run_report + ": cannot open");
         const Json told = Json::parse(file, nullptr, false);
         if (!told.is_object() || !told.contains("covol"))

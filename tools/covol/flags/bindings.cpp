@@ -1,8 +1,11 @@
 #include "flags/bindings.h"
 
+#include <poll.h>
+#include <unistd.h>
+
+#include <cerrno>
 #include <cmath>
-#include <iostream>
-#include <iterator>
+#include <cstring>
 
 #include "covol/error.h"
 #include "covol/mesh_stream.h"
@@ -154,9 +157,23 @@ void PointFlags::bind_options(CLI::App& command) {
 
 namespace {
 
-/// All of it; it is there once.
-const std::string& standard_input() {
-    static const std::string text{std::istreambuf_iterator<char>(std::cin), std::istreambuf_iterator<char>()};
+/// All of it; it is there once. Whoever writes it may take long.
+const std::string& standard_input(const RunContext& run) {
+    static std::string text;
+    static bool done = false;
+    std::vector<char> piece(1 << 16);
+    while (!done) {
+        pollfd ready{STDIN_FILENO, POLLIN, 0};
+        constexpr int kPause = 50;                          // milliseconds
+        const bool waits = ::poll(&ready, 1, kPause) <= 0;  // or a signal came
+        run.check();
+        if (waits) continue;
+        const ssize_t got = ::read(STDIN_FILENO, piece.data(), piece.size());
+        if (got < 0 && (errno == EINTR || errno == EAGAIN)) continue;
+        if (got < 0) throw Error(Errc::Io, std::string("standard input: cannot read: ") + std::strerror(errno));
+        text.append(piece.data(), std::size_t(got));
+        done = got == 0;
+    }
     return text;
 }
 
@@ -166,7 +183,7 @@ WorldPoints read_world_points(const PointFlags& flags, const ImageGeometry* geom
     WorldPoints all;
     for (const std::string& path : flags.paths) {
         run.check();
-        const PointCloud cloud = path == "-" ? parse_points(standard_input(), "standard input", flags.options)
+        const PointCloud cloud = path == "-" ? parse_points(standard_input(run), "standard input", flags.options)
                                              : read_points(path, flags.options);
         if (!cloud.lines.empty())
             run.warn(path + ": its marks form " + std::to_string(cloud.lines.size()) +

@@ -9,6 +9,7 @@
 
 #include "covol/domain.h"
 #include "covol/error.h"
+#include "covol/file_set.h"
 #include "covol/vdb_io.h"
 #include "covol/version.h"
 
@@ -202,7 +203,7 @@ void BrickFolder::write_plan(const BrickPlan& plan, const JobOptions& job, const
               {"bricks", Json::array()}};
     for (const std::string& input : inputs) json["inputs"].push_back(input_of(input));
     for (const Brick& brick : plan.bricks) json["bricks"].push_back(to_json(brick));
-    write_text(file, json.dump(1) + "\n");
+    write_text_file(file, json.dump(1) + "\n");
 }
 
 BrickPlan BrickFolder::read_plan() const {
@@ -264,14 +265,14 @@ void BrickFolder::write_state(int sweep, std::size_t brick, const FloatGridPtr& 
     make_folder_of(file);
     write_vdb(file, {state});
     facts["same"] = false;
-    write_text(name(sweep, brick, ".json"), facts.dump() + "\n");
+    write_text_file(name(sweep, brick, ".json"), facts.dump() + "\n");
 }
 
 void BrickFolder::write_same(int sweep, std::size_t brick, Json facts) const {
     const std::string file = name(sweep, brick, ".json");
     make_folder_of(file);
     facts["same"] = true;
-    write_text(file, facts.dump() + "\n");
+    write_text_file(file, facts.dump() + "\n");
 }
 
 BrickFolder::Spent BrickFolder::spent(int sweep, std::size_t bricks) const {

@@ -7,6 +7,7 @@
 #include <sstream>
 #include <string_view>
 
+#include "covol/file_set.h"
 #include "jobs/length_unit.h"
 
 namespace covol::tool {
@@ -218,7 +219,7 @@ const std::vector<Rule>& rules() {
 std::string header_of(const std::string& path) {
     constexpr std::size_t kHeader = 1 << 16;
     std::string text(kHeader, '\0');
-    std::ifstream file(path, std::ios::binary);
+    std::ifstream file = open_regular_file(path);
     file.read(text.data(), std::streamsize(text.size()));
     text.resize(std::size_t(std::max<std::streamsize>(file.gcount(), 0)));
     return text;

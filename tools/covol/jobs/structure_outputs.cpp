@@ -173,8 +173,8 @@ void hand_over_labels(const std::shared_ptr<const StructuresOutput>& output, con
                     run);
     });
     if (named && !keeps_names(path))
-        sink(labels_path(path), [output](const std::string& file) {
-            write_text(file, make_itksnap_labels(output->names(), output->labels()));
+        sink(labels_path(path), [output, run](const std::string& file) {
+            write_text(file, make_itksnap_labels(output->names(), output->labels()), run);
         });
 }
 
@@ -261,11 +261,11 @@ void hand_over(const SegmentJob& job, const std::shared_ptr<const StructuresOutp
     sink(tagged(job.fields_path), [output, vdb](const std::string& file) { write_vdb(file, fields_of(*output), vdb); });
     hand_over_meshes(job, output, tagged(job.mesh_path), session, sink);
     hand_over_labels(output, tagged(job.mask_path), job.images.empty() ? "" : job.images.front(), session.run(), sink);
-    sink(tagged(job.evidence.path), [output](const std::string& file) {
+    sink(tagged(job.evidence.path), [output, &session](const std::string& file) {
         std::vector<EvidenceOf> surfaces;
         for (const StructureOutput& s : output->structures)
             surfaces.push_back({s.name.empty() ? s.grid : s.name, &*s.evidence});
-        write_text(file, evidence_csv(surfaces));
+        write_text(file, evidence_csv(surfaces), session.run());
     });
     // The last one, so that it tells of as much as there is to tell.
     sink(tagged(job.page_path), [output, &session, title = title_of(job) + tagged.suffix](const std::string& file) {

@@ -305,11 +305,11 @@ void run_structures(const SegmentJob& job, Session& session, const Solver& solve
     UsdScene scene;
     add_to_scene(scene, job, *output, {});
     write_scene(scene, job, session);
-    outputs.add(job.table_path, [output](const std::string& file) {
+    outputs.add(job.table_path, [output, &session](const std::string& file) {
         Table table(result_columns());
         for (const StructureOutput& s : output->structures)
             add_result(table.row(), s.name.empty() ? s.grid : s.name, s.label, s.result.report);
-        write_text(file, table.text());
+        write_text(file, table.text(), session.run());
     });
 }
 

@@ -58,8 +58,9 @@ public:
             go(frame);
         }
         session_.report()["frames"] = reports_;
-        session_.outputs().add(job_.table_path,
-                               [text = table_.text()](const std::string& path) { write_text(path, text); });
+        session_.outputs().add(job_.table_path, [text = table_.text(), &run = session_.run()](const std::string& path) {
+            write_text(path, text, run);
+        });
         write_scene(scene_, job_, session_);
         if (failed_ == int(frames_.size()))
             throw Error(first_error_, "no frame could be segmented; the first: " + first_message_);
@@ -83,6 +84,13 @@ private:
     }
 
     void check() {
+        for (const Frame& frame : frames_) {
+            std::vector<std::string> read{frame.path};
+            for (const StructureInput& input : inputs_)
+                for (const auto* paths : {&input.points.paths, &input.contours.paths})
+                    for (const std::string& path : *paths) read.push_back(with_frame(path, frame.number));
+            session_.outputs().protect(read);
+        }
         for (const Frame& frame : frames_) check_outputs(job_, inputs_, tag(frame), session_.outputs());
         session_.outputs().check("--table", job_.table_path, OutputKind::Table);
         check_scene(job_, session_.outputs());

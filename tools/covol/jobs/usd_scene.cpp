@@ -108,8 +108,8 @@ void write_scene(const UsdScene& scene, const SegmentJob& job, Session& session)
     const auto unit = facts.find("covol_unit");
     // The path that was asked for: files are named as seen from there.
     session.outputs().add(job.scene_path,
-                          [text = to_usda(scene, job.scene_path, unit == facts.end() ? "" : unit->second)](
-                              const std::string& path) { write_text(path, text); });
+                          [text = to_usda(scene, job.scene_path, unit == facts.end() ? "" : unit->second),
+                           &session](const std::string& path) { write_text(path, text, session.run()); });
 }
 
 }  // namespace covol::tool

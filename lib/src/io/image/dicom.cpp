@@ -184,6 +184,9 @@ std::map<std::string, std::vector<Slice>> list_series(const fs::path& folder, co
 class DicomSeries : public ImageFile {
 public:
     DicomSeries(std::string path, std::vector<Slice> slices) : path_(std::move(path)), slices_(std::move(slices)) {
+        std::vector<std::string> files;
+        for (const Slice& slice : slices_) files.push_back(slice.path);
+        refer_to(std::move(files));
         check_alike();
         const Slice& first = slices_.front();
         info_.format = "DICOM";

@@ -13,9 +13,11 @@
 #include <vector>
 
 #include "base/file.h"
+#include "base/text.h"
 #include "io/child.h"
 #include "io/hdf5/hdf5_file.h"
 #include "io/image/image_formats.h"
+#include "io/image/text_header.h"
 #include "io/modules/modules.h"
 #include "io/pixels/nifti_space.h"
 
@@ -31,54 +33,6 @@ OpenWithItk* reader_of(const std::string& extension) {
     if (extension == ".h5" || extension == ".hdf5") return hdf5_module().open_itk;
     return itk_module().open_meta;
 }
-
-std::string lower(std::string text) {
-    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
-    return text;
-}
-
-/// The lines of a NRRD's or MetaImage's text header, for what ITK keeps to itself.
-struct TextHeader {
-    std::vector<std::string> lines;  ///< as written
-    std::uint64_t end = 0;           ///< where the pixels begin, when they are in the same file
-
-    explicit TextHeader(const std::string& path) {
-        constexpr std::size_t kMost = 1000;
-        std::ifstream file(path, std::ios::binary);
-        std::string line;
-        while (lines.size() < kMost && std::getline(file, line) && !line.empty() && line != "\r") {
-            lines.push_back(line);
-            if (lower(line).rfind("elementdatafile", 0) == 0) break;
-        }
-        if (file) end = static_cast<std::uint64_t>(file.tellg());
-    }
-    /// What follows "key", one of ":", ":=" or "=", and blanks; empty when there is no such line. Keys are lower case.
-    [[nodiscard]] std::string value(const std::string& key) const {
-        for (const std::string& line : lines) {
-            if (lower(line.substr(0, key.size())) != key) continue;
-            const std::size_t separator = line.find_first_not_of(' ', key.size());
-            if (separator == std::string::npos || (line[separator] != ':' && line[separator] != '=')) continue;
-            const std::size_t begin = line.find_first_not_of(":= ", separator);
-            const std::size_t last = line.find_last_not_of(" \r");
-            return begin == std::string::npos ? "" : line.substr(begin, last + 1 - begin);
-        }
-        return {};
-    }
-    /// The first of the keys that there is.
-    [[nodiscard]] std::string value_of(std::initializer_list<const char*> keys) const {
-        for (const char* key : keys)
-            if (std::string found = value(key); !found.empty()) return found;
-        return {};
-    }
-    [[nodiscard]] bool says(const std::string& key, const std::string& wanted) const {
-        return lower(value(key)).rfind(wanted, 0) == 0;
-    }
-    /// The file with the pixels, as written; empty when they follow the header.
-    [[nodiscard]] std::string data_file() const {
-        const std::string name = value_of({"data file", "datafile", "elementdatafile"});
-        return lower(name) == "local" ? "" : name;
-    }
-};
 
 /// Unit, whether there is a spacing at all, and the fields that were used.
 void read_text_header(const TextHeader& header, ImageInfo& info) {
@@ -369,7 +323,12 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path) {
     const bool is_nifti = end.rfind(".nii", 0) == 0, is_meta = end.rfind(".mh", 0) == 0;
     const bool is_nrrd = end == ".nrrd" || end == ".nhdr", is_hdf5 = !is_nifti && !is_meta && !is_nrrd;
     std::optional<TextHeader> header;
-    if (is_nrrd || is_meta) header.emplace(path);
+    std::vector<std::string> files;
+    if (is_nrrd || is_meta) {
+        header.emplace(path);
+        files = header->data_files();
+        require_regular_files(path, files);
+    }
     if (is_meta) require_meta_header(*header, unusable);
     PixelPlace begin;
     begin.path = path;
@@ -417,7 +376,11 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path) {
         read_text_header(*header, info);
         place = is_meta ? meta_pixels(path, *header, info.type) : nrrd_pixels(path, *header, info.type, info.channels);
     }
-    if (place) return open_placed(path, info, *place);
+    if (place) {
+        std::unique_ptr<ImageFile> placed = open_placed(path, info, *place);
+        placed->refer_to(files);
+        return placed;
+    }
     constexpr std::uint64_t kMostPixels = std::uint64_t(1) << 48;
     if (std::uint64_t(info.channels) * std::uint64_t(info.frames) > kMostPixels / voxel_count(info.geometry.size))
         throw read_error(Errc::InvalidInput, path,
@@ -425,8 +388,10 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path) {
                              std::to_string(info.channels) + " channels and " + std::to_string(info.frames) +
                              " frames");
     const bool detached = header && !header->data_file().empty();
-    return std::make_unique<ItkFile>(path, unusable, info, std::move(reader), is_hdf5,
-                                     detached ? 0 : fs::file_size(path));
+    auto file =
+        std::make_unique<ItkFile>(path, unusable, info, std::move(reader), is_hdf5, detached ? 0 : fs::file_size(path));
+    file->refer_to(files);
+    return file;
 }
 
 }  // namespace covol::detail

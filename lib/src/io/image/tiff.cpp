@@ -66,6 +66,9 @@ public:
         if (contiguous_ == 0) pages_ = list_pages(path, *tiff_);
         facts.pages = contiguous_ > 0 ? imagej_images(facts.description) : pages_.size();
         stack_ = describe_tiff(facts);
+        std::vector<std::string> files = stack_.files;
+        files.insert(files.end(), stack_.descriptions.begin(), stack_.descriptions.end());
+        refer_to(std::move(files));
         fill_info();
     }
 

@@ -108,7 +108,8 @@ std::unique_ptr<Tiff> open_for_reading(const std::string& path) {
     constexpr std::uint64_t kLeastLimit = std::uint64_t(1) << 28;
     std::error_code status;
     const std::uint64_t bytes = std::filesystem::file_size(path, status);
-    if (status) throw read_error(Errc::Io, path, "no such file");
+    if (status)
+        throw read_error(Errc::Io, path, std::filesystem::exists(path) ? "is not a regular file" : "no such file");
     // m: not mapped, for pages of packed tiles that were read once would stay in memory
     auto tiff = std::make_unique<Tiff>(path, "rm", std::max(kLeastLimit, 4 * bytes));
     if (tiff->get() == nullptr)

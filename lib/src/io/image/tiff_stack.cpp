@@ -184,7 +184,8 @@ OmePixels parse_ome(const std::string& xml) {
     return ome;
 }
 
-OmePixels read_ome_xml(const TiffFacts& facts) {
+/// @param files  the one that is read for it is added
+OmePixels read_ome_xml(const TiffFacts& facts, std::vector<std::string>& files) {
     OmePixels ome = parse_ome(facts.description);
     if (!ome.pixels.name.empty() || ome.metadata_file.empty()) return ome;
     constexpr std::uintmax_t kLargest = std::uintmax_t(256) << 20;
@@ -193,6 +194,7 @@ OmePixels read_ome_xml(const TiffFacts& facts) {
     const std::uintmax_t bytes = fs::file_size(other, status);
     if (status || bytes > kLargest)
         throw read_error(Errc::Io, facts.path, "its description lies in " + other.string() + ", which cannot be read");
+    files.push_back(other.string());
     std::string xml(bytes, '\0');
     std::ifstream(other, std::ios::binary).read(xml.data(), static_cast<std::streamsize>(bytes));
     return parse_ome(xml);
@@ -256,7 +258,7 @@ private:
 };
 
 void read_ome(const TiffFacts& facts, TiffStack& stack) {
-    const OmePixels ome = read_ome_xml(facts);
+    const OmePixels ome = read_ome_xml(facts, stack.descriptions);
     const XmlTag& pixels = ome.pixels;
     if (pixels.name.empty()) return;
     const auto value = [&](const std::string& key) {

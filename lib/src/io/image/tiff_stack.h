@@ -26,8 +26,9 @@ struct TiffStack {
     Vec3 origin{0, 0, 0};
     std::string unit;
     std::vector<std::string> channel_names;
-    std::vector<std::string> files;  ///< paths; the first is the file itself
-    std::vector<Plane> planes;       ///< where pages are not simply in order: slices * channels * frames, else empty
+    std::vector<std::string> files;         ///< paths; the first is the file itself
+    std::vector<std::string> descriptions;  ///< paths of files with OME's description of this one
+    std::vector<Plane> planes;  ///< where pages are not simply in order: slices * channels * frames, else empty
     std::vector<std::pair<std::string, std::string>> fields;  ///< what was used of the header
 
     /// The plane's number in `order`.

@@ -11,7 +11,9 @@
 
 #include "base/file.h"
 #include "covol/error.h"
+#include "covol/file_set.h"
 #include "covol/safe_text.h"
+#include "files/atomic.h"
 #include "io/mesh/mesh_formats.h"
 #include "mesh/vertex_normals.h"
 
@@ -26,7 +28,7 @@ std::string read_file(const std::string& path) {
     std::error_code status;
     const auto size = std::filesystem::file_size(path, status);
     if (status) throw Error(Errc::Io, "read_mesh: " + path + ": cannot be opened: " + status.message());
-    std::ifstream file(path, std::ios::binary);
+    std::ifstream file = open_regular_file(path);
     std::string text(size, '\0');
     if (!file || !file.read(text.data(), std::streamsize(size)))
         throw Error(Errc::Io, "read_mesh: " + path + ": cannot be read");

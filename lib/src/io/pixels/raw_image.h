@@ -43,8 +43,15 @@ public:
     /// Memory that read() takes: all of the box, unless a format knows better.
     [[nodiscard]] virtual std::uint64_t bytes_to_hold(const PixelRequest& request) const;
 
+    /// Files that are read beside the one that was given, or of the folder that was given.
+    [[nodiscard]] const std::vector<std::string>& files() const noexcept { return files_; }
+    void refer_to(std::vector<std::string> files) { files_ = std::move(files); }
+
 protected:
     ImageInfo info_;
+
+private:
+    std::vector<std::string> files_;
 };
 
 /// Calls visit(T{}) with the C++ type of `type`.

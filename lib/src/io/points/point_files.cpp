@@ -9,6 +9,7 @@
 
 #include "base/file.h"
 #include "covol/error.h"
+#include "covol/file_set.h"
 #include "io/points/point_formats.h"
 #include "io/points/point_text.h"
 
@@ -20,9 +21,8 @@ namespace fs = std::filesystem;
 std::string read_text(const std::string& path) {
     std::error_code status;
     if (!fs::exists(path, status)) throw Error(Errc::Io, "read_points: " + path + ": no such file");
-    std::ifstream file(path, std::ios::binary);
-    if (!fs::is_regular_file(path, status) || !file)
-        throw Error(Errc::Io, "read_points: " + path + ": cannot be opened");
+    std::ifstream file = open_regular_file(path);
+    if (!file) throw Error(Errc::Io, "read_points: " + path + ": cannot be opened");
     std::string text(fs::file_size(path), '\0');
     file.read(text.data(), static_cast<std::streamsize>(text.size()));
     text.resize(static_cast<std::size_t>(file.gcount()));

@@ -8,6 +8,7 @@
 #include "covol/error.h"
 #include "covol/image.h"
 #include "covol/image_stream.h"
+#include "files/atomic.h"
 #include "io/chunked/zarr.h"
 #include "io/pixels/raw_image.h"
 #include "io/write/image_writers.h"

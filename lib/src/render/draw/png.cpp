@@ -1,8 +1,8 @@
 #include <png.h>
 
-#include "base/file.h"
 #include "covol/error.h"
 #include "covol/picture.h"
+#include "files/atomic.h"
 
 namespace covol {
 

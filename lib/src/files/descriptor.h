@@ -1,0 +1,55 @@
+#pragma once
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <compare>
+#include <filesystem>
+#include <utility>
+
+namespace covol::detail {
+
+/// An open file or folder.
+class Descriptor {
+public:
+    Descriptor(const std::filesystem::path& path, int flags, mode_t mode = 0666)
+        : file_(::open(path.c_str(), flags | O_CLOEXEC, mode)) {}
+    Descriptor(Descriptor&& other) noexcept : file_(other.release()) {}
+    ~Descriptor() { close(); }
+    Descriptor(const Descriptor&) = delete;
+    Descriptor& operator=(const Descriptor&) = delete;
+    [[nodiscard]] int get() const noexcept { return file_; }
+    /// Gives the descriptor away.
+    int release() noexcept { return std::exchange(file_, -1); }
+    void close() {
+        if (file_ >= 0) ::close(release());
+    }
+
+private:
+    int file_;
+};
+
+/// What a file or folder is, by whatever path. 0, 0: there is none.
+struct FileId {
+    dev_t device = 0;
+    ino_t inode = 0;
+    auto operator<=>(const FileId&) const = default;
+};
+
+/// Of what the path names itself, a symbolic link for example.
+inline FileId id_of(const std::filesystem::path& path) {
+    struct stat entry {};
+    return ::lstat(path.c_str(), &entry) == 0 ? FileId{entry.st_dev, entry.st_ino} : FileId{};
+}
+
+inline FileId id_of(int file) {
+    struct stat entry {};
+    return ::fstat(file, &entry) == 0 ? FileId{entry.st_dev, entry.st_ino} : FileId{};
+}
+
+inline void flush_folder(const std::filesystem::path& folder) {
+    const Descriptor file(folder, O_RDONLY | O_DIRECTORY);
+    if (file.get() >= 0) ::fsync(file.get());
+}
+
+}  // namespace covol::detail

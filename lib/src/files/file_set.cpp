@@ -1,0 +1,166 @@
+#include "covol/file_set.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <map>
+#include <utility>
+
+#include "covol/error.h"
+#include "files/atomic.h"
+#include "files/folder_lock.h"
+#include "files/output_path.h"
+#include "files/publishing.h"
+#include "files/scratch.h"
+
+namespace covol {
+namespace fs = std::filesystem;
+namespace {
+
+/// What libraries do not say of a write that failed.
+std::string why_no_room(const std::string& said) {
+    const int why = errno;
+    if (why != ENOSPC && why != EDQUOT && why != EFBIG) return {};
+    const std::string text = std::strerror(why);
+    return said.find(text) == std::string::npos ? ": " + text : std::string();
+}
+
+struct Folder {
+    Folder(const fs::path& folder, const RunContext& run)
+        : path(folder), scratch(folder, run, ScratchFolder::Clears::Listed) {}
+    fs::path path;
+    ScratchFolder scratch;
+};
+
+}  // namespace
+
+struct FileSet::State {
+    struct File {
+        std::string path;  ///< as it was given
+        fs::path target, temporary;
+    };
+    /// By what they are, in the same order for all processes.
+    std::map<detail::FileId, Folder> folders;
+    std::vector<File> files;
+    File writing;
+
+    [[nodiscard]] std::vector<std::unique_ptr<detail::FolderLock>> lock_folders(const RunContext& run) const {
+        std::vector<std::unique_ptr<detail::FolderLock>> locks;
+        for (const auto& [id, folder] : folders)
+            locks.push_back(std::make_unique<detail::FolderLock>(folder.path, run));
+        return locks;
+    }
+
+    /// The manifest of each scratch folder. @returns the set's number
+    [[nodiscard]] std::string write_manifests() const {
+        detail::Manifest manifest{detail::new_set_number(), {}, {}};
+        for (const auto& [id, folder] : folders)
+            manifest.scratches.push_back({folder.scratch.path(), detail::id_of(folder.scratch.path()).inode, id.inode});
+        for (const auto& [id, folder] : folders) {
+            manifest.files.clear();
+            for (const File& file : files)
+                if (file.temporary.parent_path() == folder.scratch.path())
+                    manifest.files.push_back({detail::stamp_of(file.temporary), detail::stamp_of(file.target),
+                                              file.target.filename().string()});
+            detail::write_manifest(folder.scratch.path(), manifest);
+        }
+        return manifest.set;
+    }
+
+    /// Puts back what was there before the first `count` files took its place.
+    void put_back(std::size_t count, const std::string& set) noexcept {
+        try {
+            detail::write_commit(folders.begin()->second.scratch.path(), set, detail::Fate::PutBack);
+        } catch (const std::exception&) {
+            // A kill from here on would be taken for one on the way forwards.
+        }
+        while (count-- > 0) static_cast<void>(detail::exchange_back(files[count].temporary, files[count].target));
+    }
+
+    /// The commit goes last: without it what is left elsewhere would be thrown away.
+    void remove_manifests() const noexcept {
+        for (auto folder = folders.rbegin(); folder != folders.rend(); ++folder) {
+            const fs::path& scratch = folder->second.scratch.path();
+            ::unlink((scratch / detail::kManifest).c_str());
+            const fs::path commit = scratch / detail::kCommit;
+            if (detail::id_of(commit) != detail::FileId{}) ::unlink(commit.c_str());
+        }
+    }
+};
+
+FileSet::FileSet() : state_(std::make_unique<State>()) {}
+FileSet::~FileSet() = default;
+
+void FileSet::write(const std::string& path, const std::function<void(const std::string&)>& write,
+                    const RunContext& run) {
+    fs::path target = detail::path_of_output(path);
+    if (!detail::is_output_name(target.filename().string()))
+        throw Error(Errc::Io, path + ": cannot write: names that begin with " + detail::kHiddenPrefix +
+                                  " are covol's own; choose another name");
+    const fs::path folder = target.parent_path();
+    ScratchFolder& scratch = state_->folders.try_emplace(detail::id_of(folder), folder, run).first->second.scratch;
+    const fs::path temporary = scratch.path() / target.filename();
+    scratch.list(target.filename().string());
+    state_->writing = {path, target, temporary};
+    errno = 0;
+    try {
+        write(temporary.string());
+    } catch (const Error& error) {
+        throw Error(error.code(), shown(error.what()) + why_no_room(error.what()));
+    }
+    std::error_code status;
+    if (fs::exists(target, status) && fs::is_directory(target, status) != fs::is_directory(temporary, status))
+        throw Error(Errc::Io, path + ": cannot write: something of another kind is there");
+    state_->files.push_back({path, std::move(target), temporary});
+}
+
+void FileSet::publish(const RunContext& run) {
+    std::vector<State::File>& files = state_->files;
+    if (files.empty()) return state_->folders.clear();
+    // Of two runs that end at the same time with the same outputs, one set after the other.
+    const auto one_at_a_time = state_->lock_folders(run);
+    for (const State::File& file : files) detail::keep_attributes(file.target, file.temporary);
+    const std::string set = state_->write_manifests();
+    // A thread that ends the process must leave the rest to the next run.
+    for (auto& [id, folder] : state_->folders) folder.scratch.keep_for_next_run();
+    if (state_->folders.size() > 1)
+        detail::write_commit(state_->folders.begin()->second.scratch.path(), set, detail::Fate::Complete);
+    for (std::size_t n = 0; n < files.size(); ++n)
+        if (!detail::exchange(files[n].temporary, files[n].target)) {
+            const int why = errno;
+            state_->put_back(n, set);
+            state_->remove_manifests();
+            throw Error(Errc::Io, files[n].path + ": cannot write: " + std::strerror(why));
+        }
+    for (const auto& [id, folder] : state_->folders) detail::flush_folder(folder.path);
+    // What was replaced goes with the folders, and no one is to put it back.
+    state_->remove_manifests();
+    files.clear();
+    state_->folders.clear();
+}
+
+std::string FileSet::shown(std::string text) const {
+    const std::string temporary = state_->writing.temporary.string();
+    if (temporary.empty()) return text;
+    for (std::size_t at = 0; (at = text.find(temporary, at)) != std::string::npos; at += state_->writing.path.size())
+        text.replace(at, temporary.size(), state_->writing.path);
+    return text;
+}
+
+std::vector<std::string> FileSet::paths() const {
+    std::vector<std::string> paths;
+    for (const State::File& file : state_->files) paths.push_back(file.path);
+    return paths;
+}
+
+void write_text_file(const std::string& path, const std::string& text) {
+    detail::write_atomically(path, [&](const std::string& temporary) {
+        std::ofstream file(temporary, std::ios::binary);
+        file << text;
+        file.close();
+        if (!file) throw Error(Errc::Io, path + ": cannot write: " + std::strerror(errno));
+    });
+}
+
+}  // namespace covol

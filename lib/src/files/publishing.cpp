@@ -1,0 +1,263 @@
+#include "files/publishing.h"
+
+#include <cstdint>
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <random>
+#include <sstream>
+#include <utility>
+
+#include "base/file.h"
+#include "covol/error.h"
+#include "covol/file_set.h"
+#include "files/folder_lock.h"
+#include "files/scratch.h"
+
+namespace covol::detail {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr const char* kManifestMagic = "covol manifest, format 2";
+constexpr const char* kCommitMagic = "covol commit, format 2";
+constexpr const char* kEnd = "end";
+// Longer than a run takes to clear a folder. The one that waits holds the lock of another folder.
+constexpr std::chrono::milliseconds kShortPatience{2000};
+
+/// Texts with a zero behind each: names may hold anything else.
+class Fields {
+public:
+    explicit Fields(const fs::path& path) {
+        struct stat entry {};
+        const Descriptor file(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK);
+        const bool own = file.get() >= 0 && ::fstat(file.get(), &entry) == 0 && S_ISREG(entry.st_mode) &&
+                         entry.st_uid == ::geteuid();
+        if (!own) return;
+        std::ifstream stream(path, std::ios::binary);
+        text_.assign(std::istreambuf_iterator<char>(stream), {});
+    }
+    [[nodiscard]] bool empty() const { return at_ >= text_.size(); }
+    std::string next() {
+        const std::size_t begin = std::min(at_, text_.size()), end = std::min(text_.find('\0', begin), text_.size());
+        at_ = end + 1;
+        return text_.substr(begin, end - begin);
+    }
+    std::uint64_t next_number() { return parse_pair<std::uint64_t, std::uint64_t>(next() + " 0").first; }
+    Stamp next_stamp() {
+        const auto [inode, changed] = parse_pair<ino_t, std::int64_t>(next());
+        return {inode, changed};
+    }
+
+private:
+    template <typename A, typename B>
+    static std::pair<A, B> parse_pair(const std::string& text) {
+        std::pair<A, B> pair;
+        std::istringstream numbers(text);
+        return numbers >> pair.first >> pair.second ? pair : std::pair<A, B>{};
+    }
+
+    std::string text_;
+    std::size_t at_ = 0;
+};
+
+std::optional<Manifest> read_manifest(const fs::path& scratch) {
+    Fields fields(scratch / kManifest);
+    if (fields.next() != kManifestMagic) return std::nullopt;
+    Manifest manifest;
+    manifest.set = fields.next();
+    const std::uint64_t scratches = fields.next_number(), files = fields.next_number();
+    for (std::uint64_t n = 0; n < scratches && !fields.empty(); ++n) {
+        ScratchPlace place{fields.next(), 0, 0};
+        place.inode = fields.next_number();
+        place.folder = fields.next_number();
+        manifest.scratches.push_back(std::move(place));
+    }
+    for (std::uint64_t n = 0; n < files && !fields.empty(); ++n) {
+        const Stamp made = fields.next_stamp(), replaced = fields.next_stamp();
+        manifest.files.push_back({made, replaced, fields.next()});
+        if (!is_output_name(manifest.files.back().name)) return std::nullopt;
+    }
+    if (fields.next() != kEnd || manifest.scratches.empty()) return std::nullopt;
+    return manifest;
+}
+
+std::optional<Fate> read_commit(const fs::path& first, const std::string& set) {
+    Fields fields(first / kCommit);
+    if (fields.next() != kCommitMagic || fields.next() != set) return std::nullopt;
+    return fields.next() == "complete" ? Fate::Complete : Fate::PutBack;
+}
+
+/// What a process that was killed in FileSet::publish() left in one scratch folder, of which this process has the lock,
+/// as well as that of the folder around it.
+class Remains {
+public:
+    Remains(fs::path scratch, const RunContext& run) : scratch_(std::move(scratch)), run_(run) {
+        manifest_ = read_manifest(scratch_);
+    }
+
+    /// @returns whether the folder may be removed
+    bool finish() {
+        if (!manifest_) return !fs::exists(fs::symlink_status(scratch_ / kManifest));
+        const std::size_t self = own_number();
+        if (self == manifest_->scratches.size()) return false;  // it is about another folder
+        bool known = true;
+        std::optional<Fate> fate = self == 0 ? read_commit(scratch_, manifest_->set) : fate_elsewhere(known);
+        // In one folder the manifest itself says that the set is to be completed.
+        if (!fate && manifest_->scratches.size() == 1) fate = Fate::Complete;
+        if (!known) return false;
+        if (!fate) return true;  // nothing was put in place yet
+        bool others = true;
+        for (std::size_t n = 1; n < manifest_->scratches.size(); ++n)
+            if (n != self) others = finish_other(manifest_->scratches[n], *fate, true) && others;
+        const bool done = put(*fate);
+        if (self == 0) return done && others;
+        if (done) ::unlink((scratch_ / kManifest).c_str());
+        // The commit goes last: without it what is left elsewhere would be thrown away.
+        static_cast<void>(finish_other(manifest_->scratches[0], *fate, done && others));
+        return done;
+    }
+
+private:
+    [[nodiscard]] std::size_t own_number() const {
+        const ino_t own = id_of(scratch_).inode;
+        std::size_t n = 0;
+        while (n < manifest_->scratches.size() && manifest_->scratches[n].inode != own) ++n;
+        return n;
+    }
+
+    [[nodiscard]] bool any_in_place() const {
+        for (const Manifest::File& file : manifest_->files)
+            if (stamp_of(scratch_.parent_path() / file.name).inode == file.made.inode) return true;
+        return false;
+    }
+
+    /// What the commit says, in another folder. @param known  false: that folder cannot be seen now
+    [[nodiscard]] std::optional<Fate> fate_elsewhere(bool& known) const {
+        const ScratchPlace& first = manifest_->scratches.front();
+        known = id_of(first.path.parent_path()).inode == first.folder;
+        if (known) {
+            if (id_of(first.path).inode == first.inode) return read_commit(first.path, manifest_->set);
+            // It is gone once all is in place, and where it was thrown away before anything was.
+            if (!any_in_place()) return std::nullopt;
+        }
+        known = any_in_place();
+        return Fate::Complete;
+    }
+
+    /// Puts this folder's files in place, or back. @returns whether that is done
+    bool put(Fate fate) {
+        const fs::path folder = scratch_.parent_path();
+        bool done = true;
+        for (const Manifest::File& file : manifest_->files) {
+            const fs::path temporary = scratch_ / file.name, target = folder / file.name;
+            const Stamp there = stamp_of(target), here = stamp_of(temporary);
+            // What was put there since is not ours to replace.
+            if (fate == Fate::Complete && here == file.made && (there == file.replaced || there == Stamp{}))
+                done = exchange(temporary, target) && done;
+            if (fate == Fate::PutBack && there == file.made) done = exchange_back(temporary, target) && done;
+            // Where a file system cannot exchange two files at once, that was cut short half way.
+            if (fate == Fate::PutBack && there == Stamp{} && here == file.replaced && here != Stamp{})
+                done = ::rename(temporary.c_str(), target.c_str()) == 0 && done;
+        }
+        flush_folder(folder);
+        return done;
+    }
+
+    /// The same in another folder of the set, if that is free. @returns whether that is done
+    [[nodiscard]] bool finish_other(const ScratchPlace& place, Fate fate, bool may_remove) const {
+        const fs::path folder = place.path.parent_path();
+        if (id_of(folder).inode != place.folder) return false;
+        try {
+            const FolderLock lock(folder, run_, kShortPatience);
+            const FileId id = id_of(place.path);
+            if (id == FileId{}) return true;
+            if (!lock.is_locked() || id.inode != place.inode) return false;
+            const DeadScratch dead(place.path);
+            if (dead.state() != DeadScratch::State::Dead) return false;
+            Remains other(place.path, run_);
+            if (other.manifest_ && other.manifest_->set != manifest_->set) return false;
+            if (other.manifest_ && !other.put(fate)) return false;
+            if (!may_remove) return true;
+            ::unlink((place.path / kManifest).c_str());
+            dead.remove();
+            return true;
+        } catch (const Error& error) {
+            if (error.code() == Errc::Cancelled) throw;
+            return false;
+        }
+    }
+
+    fs::path scratch_;
+    const RunContext& run_;
+    std::optional<Manifest> manifest_;
+};
+
+}  // namespace
+
+Stamp stamp_of(const fs::path& path) {
+    struct stat entry {};
+    if (::lstat(path.c_str(), &entry) != 0) return {};
+    constexpr std::int64_t kNanoseconds = 1'000'000'000;
+    return {entry.st_ino, entry.st_mtim.tv_sec * kNanoseconds + entry.st_mtim.tv_nsec};
+}
+
+std::string new_set_number() {
+    std::random_device random;
+    std::string text;
+    for (int n = 0; n < 4; ++n) text += (n > 0 ? "-" : "") + std::to_string(random());
+    return text;
+}
+
+void write_manifest(const fs::path& scratch, const Manifest& manifest) {
+    std::string text;
+    const auto add = [&](const std::string& field) { text += field + '\0'; };
+    add(kManifestMagic);
+    add(manifest.set);
+    add(std::to_string(manifest.scratches.size()));
+    add(std::to_string(manifest.files.size()));
+    for (const ScratchPlace& place : manifest.scratches) {
+        add(place.path.string());
+        add(std::to_string(place.inode));
+        add(std::to_string(place.folder));
+    }
+    for (const Manifest::File& file : manifest.files) {
+        add(file.made.text());
+        add(file.replaced.text());
+        add(file.name);
+    }
+    add(kEnd);
+    write_text_file((scratch / kManifest).string(), text);
+    flush_folder(scratch);
+}
+
+void write_commit(const fs::path& first, const std::string& set, Fate fate) {
+    write_text_file((first / kCommit).string(), kCommitMagic + std::string(1, '\0') + set + '\0' +
+                                                    (fate == Fate::Complete ? "complete" : "put back") + '\0');
+    flush_folder(first);
+}
+
+bool exchange(const fs::path& from, const fs::path& to) {
+    if (id_of(to) == FileId{}) return ::rename(from.c_str(), to.c_str()) == 0;
+    return swap_paths(from.string(), to.string());
+}
+
+bool exchange_back(const fs::path& from, const fs::path& to) {
+    if (id_of(from) == FileId{}) return ::rename(to.c_str(), from.c_str()) == 0;
+    return swap_paths(from.string(), to.string());
+}
+
+void clear_after_the_dead(const fs::path& folder, const RunContext& run) {
+    std::vector<fs::path> found;
+    std::error_code status;
+    for (fs::directory_iterator at(folder, status), end; !status && at != end; at.increment(status))
+        if (is_scratch_name(at->path().filename().string())) found.push_back(at->path());
+    for (const fs::path& scratch : found) {
+        const DeadScratch dead(scratch);
+        if (dead.state() == DeadScratch::State::Unstarted ||
+            (dead.state() == DeadScratch::State::Dead && Remains(scratch, run).finish()))
+            dead.remove();
+    }
+}
+
+}  // namespace covol::detail
