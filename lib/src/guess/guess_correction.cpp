@@ -315,7 +315,7 @@ const CorrectionReport& GuessCorrection::report() const { return data_->report; 
 FloatGridPtr GuessCorrection::start(const RunContext& run) const {
     const Domain domain = domain_of(*data_->grid);
     const FloatGridPtr field = data_->grid->deepCopy();
-    const double clamp = halfWidthVoxels * domain.voxel_size;
+    const double clamp = kHalfWidthVoxels * domain.voxel_size;
     std::vector<openvdb::Coord> origins;
     for (const Bump& b : data_->bumps) {
         openvdb::Coord first, last;
