@@ -103,6 +103,11 @@ class Provenance(Stranger):
                 grids.unlink()
                 (self.out / name).unlink()
 
+    def test_what_is_kept_replaces_no_input(self):
+        self.make()
+        self.run_covol("segment", "ball.nrrd", "--points", "ball.xyz", "--init", "vdb:s.vdb", "-o", "t.vdb", "--max-steps", "2", "--quiet")
+        self.untouched("rerun", "t.vdb", "-o", "s.vdb", says="is an input of this run")
+
     def test_only_files_with_their_digest_are_inputs(self):
         facts = self.make()
         self.write(inputs=[*facts["inputs"], {"name": "..", "digest": "xxh128:0"}])

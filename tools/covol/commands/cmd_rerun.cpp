@@ -116,6 +116,12 @@ public:
         return value;
     }
 
+    [[nodiscard]] std::vector<std::string> paths() const {
+        std::vector<std::string> all;
+        for (const auto& [name, path] : found_) all.push_back(path);
+        return all;
+    }
+
 private:
     /// A grid's name or a dataset's place, or the slash of a folder.
     static bool is_within_file(const std::string& rest) {
@@ -242,7 +248,6 @@ struct RerunJob {
     std::vector<std::string> folders;
 
     void run(Session& session) const {
-        session.outputs().check("-o", kept, OutputKind::Vdb);
         const Provenance made = read_provenance(path);
         if (made.version != version())
             session.warn(path + ": covol " + made.version + " wrote it, this is " + version() + ": bits may differ");
@@ -258,6 +263,8 @@ struct RerunJob {
         const CLI::App* const command = session.command(made.job.command);
         if (command == nullptr) refuse(path, "this covol has no command '" + made.job.command + "'");
         const Inputs inputs(path, made, places);
+        session.outputs().protect(inputs.paths());
+        session.outputs().check("-o", kept, OutputKind::Vdb);
         const auto scratch =
             std::make_shared<KeptFolder>(kept.empty() ? temporary_folder() : fs::path(kept).parent_path());
         const Words words = words_of(job_here(path, made.job, *command, inputs, scratch->path()), *command, path,
