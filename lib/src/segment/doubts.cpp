@@ -208,7 +208,7 @@ std::vector<char> are_inside(const FloatGrid& u, const std::vector<Vec3>& places
 }  // namespace
 
 void note_border(Job& job) {
-    if (job.image != nullptr) job.said_inside = are_inside(*job.result.u, places_on_border(job.image->geometry()));
+    if (job.image != nullptr) job.border_in_start = are_inside(*job.result.u, places_on_border(job.image->geometry()));
 }
 
 void require_outside(const Job& job) {
@@ -216,23 +216,23 @@ void require_outside(const Job& job) {
     const std::vector<Vec3> places = places_on_border(job.image->geometry());
     const std::vector<char> inside = are_inside(*job.result.u, places);
     if (2 * std::count(inside.begin(), inside.end(), 1) <= std::ptrdiff_t(places.size())) return;
-    std::vector<Vec3> said = job.given;
-    said.insert(said.end(), job.options.inside.begin(), job.options.inside.end());
-    const WorldBox box = bounding_box(said.empty() ? places : said);
+    std::vector<Vec3> known = job.given;
+    known.insert(known.end(), job.options.inside.begin(), job.options.inside.end());
+    const WorldBox box = bounding_box(known.empty() ? places : known);
     const double far =
         kDoubts.far_diagonals * std::hypot(box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]);
-    const detail::KdTree tree(said);
-    std::size_t unsaid = 0;
+    const detail::KdTree tree(known);
+    std::size_t unexpected = 0;
     for (std::size_t n = 0; n < places.size(); ++n) {
-        if (!inside[n] || (!job.said_inside.empty() && job.said_inside[n])) continue;
-        unsaid += tree.nearest(places[n]) > far * far;
+        if (!inside[n] || (!job.border_in_start.empty() && job.border_in_start[n])) continue;
+        unexpected += tree.nearest(places[n]) > far * far;
     }
-    if (2 * unsaid <= places.size()) return;
-    throw Error(
-        Errc::InvalidInput,
-        "segment: the surface is inside out: " + number(std::round(100.0 * double(unsaid) / double(places.size()))) +
-            " % of the image's border would be inside, where neither marks nor seeds say so; mark more of the "
-            "body, or give places outside of it (`outside`)");
+    if (2 * unexpected <= places.size()) return;
+    throw Error(Errc::InvalidInput,
+                "segment: the surface is inside out: " +
+                    number(std::round(100.0 * double(unexpected) / double(places.size()))) +
+                    " % of the image's border would be inside, where neither marks nor seeds say so; mark more of the "
+                    "body, or give places outside of it (`outside`)");
 }
 
 std::vector<double> levels_at(const FloatGrid& u, const std::vector<Vec3>& places) {

@@ -14,7 +14,7 @@ void doubt(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& 
 /// The same of marks that lie where no others are, before anything is made of them.
 void doubt_isolated_marks(Job& job);
 
-/// Notes what of the image's border a start that the caller named holds already: job.said_inside.
+/// Notes what of the image's border a start that the caller named holds already: job.border_in_start.
 void note_border(Job& job);
 
 /// Of a surface that came out inside out: most of the image's border is inside, and neither marks, nor seeds, nor a

@@ -43,7 +43,7 @@ struct Job {
     std::optional<CloudOrientation> cloud;  ///< of points alone, many or asked for
     FloatGridPtr obstacle, floor;           ///< of the flow, as in EvolveFields, or null
     FloatGridPtr trusted_distance;          ///< to the trusted marks, or null
-    std::vector<char> said_inside;          ///< of places_on_border(): in the start that the caller named; else empty
+    std::vector<char> border_in_start;      ///< of places_on_border(): in the start that the caller named; else empty
 
     SegmentReport& report() { return result.report; }
     [[nodiscard]] const Domain& domain() const { return result.report.domain; }
