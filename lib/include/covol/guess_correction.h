@@ -41,12 +41,13 @@ struct CorrectedMask {
 /// A guess, corrected where marks say so: s - c, with s the guess's signed distance and c a smooth sum of bumps of
 /// compact support (Wendland, Adv. Comput. Math. 4, 1995, C2) around the marks.
 ///
-/// The radius of a bump is 2.2 times the distance between mark and guess, for s - c stays monotone across the surface
-/// while c is flatter than s (a bump's slope is at most 2.11 of its height by its radius), and not below the least one.
+/// The radius of a bump is 3 times the distance between mark and guess inward and 2.2 times outward, for s - c stays
+/// monotone across the surface while c is flatter than s (a bump's slope is at most 2.11 of its height by its radius),
+/// and not below the least one.
 /// Marks of equal size are solved for together (kriging with the marks' precision as the noise), far ones first, and
-/// those that the bigger bumps met hold their place under the smaller ones. Beyond all bumps c is exactly 0. What comes
-/// in beyond the convex hull of guess and marks is halved: a part that is missing is filled up to its marks, and what
-/// is right beside it is not inflated.
+/// those that the bigger bumps met hold their place under the smaller ones. Beyond all bumps c is exactly 0. Where a
+/// bump is wider than the least radius, what comes in beyond the convex hull of guess and marks is halved: a part that
+/// is missing is filled up to its marks, and what is right beside it is not inflated.
 class GuessCorrection {
 public:
     struct Data;

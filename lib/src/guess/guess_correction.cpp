@@ -108,8 +108,29 @@ std::vector<Vec3> find_crossings(const FloatGrid& guess) {
     return points;
 }
 
+/// A place and how far out the surface has to move there.
+struct Target {
+    Vec3 at;
+    double shift;
+};
+
 /// Facets of a convex hull.
 using Facets = std::vector<HalfSpace>;
+
+/// Of a guess, and of what it is moved through: `marks` marks, and the seeds behind them.
+Facets hull_of(std::vector<Vec3> surface, const std::vector<Target>& targets, std::size_t marks, double h) {
+    for (std::size_t n = 0; n < targets.size(); ++n) {
+        surface.push_back(targets[n].at);
+        if (n < marks) continue;
+        // A seed has the surface beyond it, on every side.
+        for (int a = 0; a < 3; ++a)
+            for (const int side : {-1, 1}) {
+                surface.push_back(targets[n].at);
+                surface.back()[a] += side * 2 * kCorrection.seed_depth_voxels * h;
+            }
+    }
+    return detail::convex_hull(surface);
+}
 
 /// Those that some place within `radius` has outside, or less than `depth` inside.
 Facets find_near(const Facets& hull, const Vec3& center, double radius, double depth) {
@@ -143,12 +164,6 @@ double sum_of(const std::vector<Bump>& bumps, const Vec3& world) {
     }
     return sum;
 }
-
-/// A place and how far out the surface has to move there.
-struct Target {
-    Vec3 at;
-    double shift;
-};
 
 /// Heights of equal bumps at the targets that give the wanted shifts, up to noise: (K + noise I) heights = shifts.
 std::vector<double> solve(const std::vector<Target>& targets, double radius, double noise) {
@@ -197,16 +212,16 @@ std::vector<double> solve(const std::vector<Target>& targets, double radius, dou
 void add_bumps(std::vector<Bump>& bumps, const std::vector<Target>& targets, double least_radius, double precision) {
     std::vector<Target> met, open = targets;
     const auto radius_of = [&](double shift) {
-        return std::max(least_radius, kCorrection.radius_of_residual * std::abs(shift));
+        return std::max(least_radius,
+                        (shift > 0 ? kCorrection.radius_outward : -kCorrection.radius_of_residual) * shift);
     };
     while (!open.empty()) {
         std::vector<double> left;
-        double largest = 0;
+        double radius = least_radius;
         for (const Target& t : open) {
             left.push_back(t.shift - sum_of(bumps, t.at));
-            largest = std::max(largest, std::abs(left.back()));
+            radius = std::max(radius, radius_of(left.back()));
         }
-        const double radius = radius_of(largest);
         std::vector<Target> group = met, later;
         double square = 0, fourth = 0;  // of residuals
         std::size_t now = 0;
@@ -265,7 +280,7 @@ struct GuessCorrection::Data {
     Data(const FloatGridPtr& start, const std::vector<Vec3>& surface) : grid(start), distance(start, surface) {}
     FloatGridPtr grid;
     FarDistance distance;
-    Facets hull;  ///< of the guess, the marks and the seeds that act
+    Facets hull;  ///< of the guess, the marks and the seeds that act; empty where none of them is far
     std::vector<Bump> bumps;
     CorrectionReport report;
 
@@ -380,18 +395,6 @@ GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>
             }
             if (targets.size() == before) break;
         }
-        std::vector<Vec3> all = surface;
-        for (std::size_t n = 0; n < targets.size(); ++n) {
-            all.push_back(targets[n].at);
-            if (n < marks.size()) continue;
-            // A seed has the surface beyond it, on every side.
-            for (int a = 0; a < 3; ++a)
-                for (const int side : {-1, 1}) {
-                    all.push_back(targets[n].at);
-                    all.back()[a] += side * 2 * kCorrection.seed_depth_voxels * h;
-                }
-        }
-        data->hull = detail::convex_hull(all);
         CorrectionReport& report = data->report;
         report.depth = data->distance.depth();
         report.marks = marks.size();
@@ -403,6 +406,7 @@ GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>
         report.after_max = after[1];
         report.least_radius = least;
         for (const Bump& b : data->bumps) report.largest_radius = std::max(report.largest_radius, b.radius);
+        if (report.largest_radius > least) data->hull = hull_of(surface, targets, marks.size(), h);
     });
     return GuessCorrection(data);
 }

@@ -74,7 +74,7 @@ TEST_CASE("marks on the guess leave it alone, and hold it beside others", "[gues
     const FloatGridPtr guess = start_from_sphere(cube(), kMiddle, kRadius);
     const Vec3 on = at(kRadius, 1.5, 0.3), off = at(kRadius + 5, 1.5, 0.6);  // 4.8 apart along the ball
     CHECK(std::abs(correct_guess(guess, {on}, {}, {}).shift(on)) < 0.1);
-    // One bump of the least radius, 12 voxels, more than 2.2 times what the mark is off; d: from mark to mark.
+    // One bump of the least radius, 12 voxels, more than that times 2.2; d: from mark to mark.
     const GuessCorrection one = correct_guess(guess, {off}, {}, {});
     const double d = std::sqrt(std::pow(on[0] - off[0], 2) + std::pow(on[1] - off[1], 2) + std::pow(on[2] - off[2], 2)),
                  t = d / 12;

@@ -32,7 +32,8 @@ void GuessFlags::bind(CLI::App& command) {
         ->type_name("LABEL");
     add_length(command, "--guess-radius", radius, "",
                "a mark acts on the guess at least so far around it [" + to_text(kCorrectionVoxels) +
-                   "vx, or two of the image's widest spacing; 2.2 times its distance to the guess where that is more]");
+                   "vx, or two of the image's widest spacing; 3 times its distance to the guess if it lies inside, 2.2 "
+                   "times outside, where that is more]");
 }
 
 Guess read_guess(const std::string& path, int label, const ImageGeometry& image, bool force, const RunContext& run) {
