@@ -41,8 +41,7 @@ struct CorrectionHeuristics {
     /// one (its slope does not change sign), see the public header.
     double radius_of_residual = heuristic("correction.radius_of_residual", 3.0);
     /// [distances between mark and guess] The same outward, where a wide bump inflates what is right beside a part that
-    /// is missing: of 110 masks that lacked a quarter, ten marks made 24 worse with 3.0 and without the hull, 13 with
-    /// 3.0 and the hull, 2 with both.
+    /// is missing (tests/bench/marks/correction.py).
     double radius_outward = heuristic("correction.radius_outward", 2.2);
     /// [ratio] Bumps whose radii differ by less are solved for together.
     double level_ratio = heuristic("correction.level_ratio", 2.0);
