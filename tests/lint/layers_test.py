@@ -20,7 +20,7 @@ LAYERS = [
     {"contours": ["contours", "seeds"], "meshing": ["mesh_relax", "mesh_cleanup"], "holes": ["holes"], "cloud/orientation": ["orientation"]},
     {"start": ["start"], "painted": ["painted"], "analysis": ["compare", "evidence", "structures", "phantom"], "render/draw": ["picture"]},
     {"guess": ["guess", "guess_correction"], "guidance": ["guidance"], "cloud/surface": ["cloud_surface"], "report": ["report_page"], "render": ["render"]},
-    {"segment": ["pipeline"], "segment/start": []},
+    {"segment": ["pipeline"], "segment/start": [], "segment/solve": [], "segment/result": []},
     {"bricks": ["bricks"]},
 ]
 LEVEL = {folder: level for level, folders in enumerate(LAYERS) for folder in folders}
@@ -28,15 +28,19 @@ FOLDER = {header: folder for folders in LAYERS for folder, headers in folders.it
 MOST_FILES, MOST_LINES = 20, 500
 # The modules of segment(), in the same way; segment/pipeline.cpp is above them all.
 PIPELINE = [
-    ["heuristics", "job", "options"],
-    ["automatic", "fields", "vanished"],
-    ["doubts"],
-    ["starts", "given_start", "grown_start", "guess_start", "cloud_start", "corrected_start", "seed_start", "contour_start", "tagged_start", "flow"],
-    ["final_surface"],
+    ["heuristics", "options", "problem", "step", "vanished"],
+    ["choices"],
+    ["start_surface"],
+    ["doubts", "fields"],
+    ["starts", "named_start", "grown_start", "guess_start", "cloud_start", "corrected_start", "seed_start", "contour_start", "tagged_start"],
+    ["flow"],
     ["coarse_level"],
+    ["solve"],
+    ["final_surface"],
+    ["report"],
 ]
 PIPELINE_LEVEL = {name: level for level, names in enumerate(PIPELINE) for name in names}
-SEGMENT = {"segment", "segment/start"}
+SEGMENT = {"segment", "segment/start", "segment/solve", "segment/result"}
 HEAVY = re.compile(r"#\s*include\s*[<\"](openvdb/(?!version\.h)|tbb/|oneapi/|OpenMesh/|CGAL/|itk|CLI/|nlohmann/)")
 LOUD = re.compile(r"\bstd::(cout|cerr|clog)\b|(?<![\w:])(printf|puts|putchar)\s*\(|\bfprintf\s*\(\s*std(out|err)"
                   r"|(?<![\w.])(std::|::)?(exit|_Exit|quick_exit|abort|terminate)\s*\(")
@@ -107,10 +111,10 @@ def self_test():
     for loud in ('std::cout << 1;', 'printf("x");', "std::exit(1);", "fprintf(stderr, 1);", "abort();"):
         assert LOUD.search(loud), loud
     root = pathlib.Path("/r")
-    fields, solve, edge = (root / "lib/src" / name for name in ("segment/fields.cpp", "segment/pipeline.cpp", "edge/edge.cpp"))
-    assert not misplaced(fields, "segment/job", root) and not misplaced(solve, "segment/flow", root) and not misplaced(edge, "grid/halo", root)
-    assert misplaced(fields, "segment/flow", root) and misplaced(solve, "segment/none", root)
-    assert misplaced(edge, "segment/job", root) and misplaced(edge, "covol/pipeline", root) and misplaced(edge, "nowhere/x", root)
+    fields, solve, edge = (root / "lib/src" / name for name in ("segment/solve/fields.cpp", "segment/pipeline.cpp", "edge/edge.cpp"))
+    assert not misplaced(fields, "segment/problem", root) and not misplaced(solve, "segment/solve/flow", root) and not misplaced(edge, "grid/halo", root)
+    assert misplaced(fields, "segment/solve/flow", root) and misplaced(solve, "segment/none", root)
+    assert misplaced(edge, "segment/problem", root) and misplaced(edge, "covol/pipeline", root) and misplaced(edge, "nowhere/x", root)
     assert misplaced(edge, "redistance/redistance", root)  # of the same level, in another room
     for quiet in ('std::snprintf(text, 3, "x");', "run.exit_code(3);", "std::fprintf(file, 1);"):
         assert not LOUD.search(quiet), quiet

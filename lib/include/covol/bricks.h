@@ -61,7 +61,7 @@ using BrickStates = std::function<FloatGridPtr(std::size_t brick)>;
 /// the starts that flow; not of guesses and contours, whose surface rests on all marks at once.
 class BrickJob {
 public:
-    /// Chooses what is left to be chosen; of a cloud that takes its orientation. The image has to outlive the job.
+    /// Chooses what is left to be chosen; of a cloud that takes its orientation.
     /// @throws Error as segment() and reconstruct(); Unsupported where the job can't be done in bricks
     COVOL_API BrickJob(const Image& image, const std::vector<Vec3>& points, const SegmentOptions& options,
                        const RunContext& run);
@@ -77,11 +77,11 @@ public:
     /// another voxel size)
     [[nodiscard]] COVOL_API FloatGridPtr solve(const BrickPlan& plan, std::size_t brick, const BrickStates& states,
                                                BrickReport& report) const;
-    /// Joins the states of all bricks and finishes the surface as segment() does. The job's last work.
+    /// Joins the states of all bricks and finishes the surface as segment() does.
     /// @param without_mesh  as SegmentOptions::without_mesh, where that is not set already
     /// @throws Error InvalidInput (no surface is left)
     [[nodiscard]] COVOL_API SegmentResult join(const BrickPlan& plan, const BrickStates& states,
-                                               bool without_mesh = false);
+                                               bool without_mesh = false) const;
 
 private:
     struct Parts;

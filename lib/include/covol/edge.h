@@ -22,6 +22,9 @@ enum class EdgeFeature {
 
 /// "auto", "slope", "bright-line", "dark-line"
 [[nodiscard]] COVOL_API const char* to_string(EdgeFeature feature);
+[[nodiscard]] inline bool is_line(EdgeFeature feature) {
+    return feature == EdgeFeature::BrightLine || feature == EdgeFeature::DarkLine;
+}
 
 struct EdgeOptions {
     EdgeFeature feature = EdgeFeature::Automatic;

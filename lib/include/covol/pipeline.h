@@ -157,8 +157,12 @@ struct SegmentResult {
 /// there was, null where there was none.
 class COVOL_API SegmentFailed : public Error {
 public:
-    SegmentFailed(const Error& error, FloatGridPtr start_, const SegmentResult& made)
-        : Error(error), start(std::move(start_)), u(made.u), distance(made.distance), edge(made.edge) {}
+    SegmentFailed(const Error& error, FloatGridPtr start_, FloatGridPtr u_, FloatGridPtr distance_, FloatGridPtr edge_)
+        : Error(error),
+          start(std::move(start_)),
+          u(std::move(u_)),
+          distance(std::move(distance_)),
+          edge(std::move(edge_)) {}
     FloatGridPtr start;              ///< the level set before the flow
     FloatGridPtr u, distance, edge;  ///< as they were last
 };

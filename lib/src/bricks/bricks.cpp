@@ -7,6 +7,7 @@
 #include <cmath>
 #include <optional>
 
+#include "base/no_surface.h"
 #include "base/valid.h"
 #include "bricks/split.h"
 #include "bricks/states.h"
@@ -15,12 +16,9 @@
 #include "covol/start.h"
 #include "covol/surface.h"
 #include "grid/flood_tiles.h"
-#include "segment/automatic.h"
 #include "segment/doubts.h"
-#include "segment/fields.h"
-#include "segment/final_surface.h"
-#include "segment/flow.h"
 #include "segment/heuristics.h"
+#include "segment/result/report.h"
 #include "segment/start/starts.h"
 
 namespace covol {
@@ -34,28 +32,23 @@ constexpr int kStateLayers = 8;           // around a brick, that its state hold
 constexpr int kSurfaceLayers = 8;         // around a brick: its distance to the surface rests on no more
 constexpr std::size_t kEdgeSamples = 64;  // coarse leaves at which the image is looked at to fix what g means
 
-/// What is solved with, or without, an image.
-SegmentResult solve_whole(const Job& job, const SegmentOptions& options) {
-    return job.image != nullptr ? segment(*job.image, job.given, options, job.run)
-                                : reconstruct(job.given, options, job.run);
-}
-
-void require_bricks_can(const Job& job) {
+void require_bricks_can(const Problem& problem, const Resolved& resolved) {
     const auto refuse = [](const std::string& what) {
         throw Error(Errc::Unsupported, "bricks: " + what +
                                            ": such a surface rests on all of them at once; solve it in one piece, "
                                            "with a larger `voxel_size` where memory does not do");
     };
-    if (job.options.contours) refuse("contours, got some");
-    if (job.options.guess) refuse("expected no guess to correct, got one");
-    if (job.guesses())
-        refuse(std::to_string(job.points.size()) + " marks are a guess; `model = Paper`, or more marks, flow");
+    if (problem.options.contours) refuse("contours, got some");
+    if (problem.options.guess) refuse("expected no guess to correct, got one");
+    if (resolved.choices.start == StartMethod::Guess)
+        refuse(std::to_string(resolved.marks.attracting.size()) +
+               " marks are a guess; `model = Paper`, or more marks, flow");
 }
 
 /// The voxels of one lattice that a coarse solve's domain covers.
-Domain fine_domain(const Job& job, const Domain& coarse) {
-    const Domain own = job.domain_with_chosen_margin(0);
-    if (job.image == nullptr && !job.options.roi) return covering(own, coarse.world_box());
+Domain fine_domain(const Problem& problem, const Resolved& resolved, const Domain& coarse) {
+    const Domain own = problem.domain(resolved.choices.h, resolved.marks.attracting, 0);
+    if (problem.image == nullptr && !problem.options.roi) return covering(own, coarse.world_box());
     // A body that the image cuts is solved beyond its end, too.
     const double beyond = own.world_box().min[0] - coarse.world_box().min[0];
     return beyond > 2 * coarse.voxel_size ? widened(own, kStarts.tagged_beyond_voxels) : own;
@@ -76,32 +69,41 @@ FloatGridPtr sample_band(const FloatGrid& coarse, const Domain& domain, const Ru
         if (part.min[0] > part.max[0] || part.min[1] > part.max[1] || part.min[2] > part.max[2]) continue;
         try {
             band->topologyUnion(*start_from_grid(part, coarse, run));
-        } catch (const Error& error) {
-            if (error.code() != Errc::InvalidInput) throw;  // no surface in that leaf
+        } catch (const NoSurface&) {  // none in that leaf
         }
     }
     return band;
 }
 
+/// What all flows in bricks have in common: a band that follows a surface that is near its end.
+StartFacts facts_of_brick(const Choices& choices, const Domain& domain, std::vector<Vec3> points) {
+    StartFacts facts;
+    facts.origin = StartOrigin::CoarseLevel;
+    facts.domain = domain;
+    facts.flow = choices.evolve;
+    facts.flow.follow = true;
+    if (points.empty()) facts.flow.theta = 0;
+    facts.marks.attracting = std::move(points);
+    return facts;
+}
+
 /// K and the range of intensities, as they would be found on all of the band.
-EdgeOptions fixed_edge(const Job& job, const FloatGrid& coarse, const Domain& domain) {
-    if (!job.uses_image()) return job.options.edge;
-    Job sample(job.image, job.points, job.options, job.run);
-    sample.report().domain = domain;
-    sample.options.evolve.follow = true;
-    sample.result.u = sample_band(coarse, domain, job.run);
-    find_edges(sample);
-    return sample.options.edge;
+EdgeOptions fixed_edge(const Problem& problem, const Choices& choices, const FloatGrid& coarse, const Domain& domain) {
+    if (!uses_image(choices.evolve)) return choices.edge;
+    return find_edges(problem, facts_of_brick(choices, domain, {}), *sample_band(coarse, domain, problem.run),
+                      choices.edge)
+        .options;
 }
 
 /// Points that act in the part.
-std::vector<Vec3> points_near(const Job& job, const Domain& part) {
-    const double range = job.attraction_range();
-    if (!(range > 0)) return job.points;
-    const double reach = range + band_slack(job);
+std::vector<Vec3> points_near(const Resolved& resolved, const Domain& part) {
+    const std::vector<Vec3>& points = resolved.marks.attracting;
+    const double range = resolved.choices.evolve.attraction_range.value_or(0);
+    if (!(range > 0)) return points;
+    const double reach = range + band_slack(resolved.choices.h);
     std::vector<Vec3> near;
     const WorldBox box = part.world_box();
-    for (const Vec3& p : job.points) {
+    for (const Vec3& p : points) {
         bool acts = true;
         for (int a = 0; a < 3; ++a) acts = acts && p[a] > box.min[a] - reach && p[a] < box.max[a] + reach;
         if (acts) near.push_back(p);
@@ -136,8 +138,7 @@ FloatGridPtr start_of(const BrickPlan& plan, std::size_t brick, const BrickState
         states(brick) != nullptr ? bricks::assemble(plan, part, with_neighbours(plan, brick), states) : plan.coarse;
     try {
         return start_from_grid(part, *known, run);
-    } catch (const Error& error) {
-        if (error.code() != Errc::InvalidInput) throw;
+    } catch (const NoSurface&) {
         return nullptr;
     }
 }
@@ -169,49 +170,62 @@ std::int64_t BrickPlan::active_voxels() const {
 
 struct BrickJob::Parts {
     RunContext run;
-    SegmentOptions given;
-    Job job;
+    std::optional<Image> image;
+    std::vector<Vec3> points;
+    SegmentOptions options;
+    Problem problem;
+    Resolved resolved;
     CloudReport cloud;
     std::unique_ptr<const cloud::CloudField> field;
 
-    Parts(const Image* image, const std::vector<Vec3>& points, const SegmentOptions& options, const RunContext& context)
-        : run(context), given(options), job(image, points, options, run) {
+    Parts(std::optional<Image> image_or_none, const std::vector<Vec3>& world_points,
+          const SegmentOptions& segment_options, const RunContext& context)
+        : run(context),
+          image(std::move(image_or_none)),
+          points(world_points),
+          options(segment_options),
+          problem(image ? &*image : nullptr, points, options, run) {
         with_threads(run, [&] {
-            check_input(job);
-            choose_values(job);
-            require_bricks_can(job);
-            if (!job.is_cloud()) return;
-            choose_cloud_domain(job);
-            field = std::make_unique<const cloud::CloudField>(*job.cloud, job.h(), cloud, run);
+            resolved = resolve(problem);
+            require_bricks_can(problem, resolved);
+            const Choices& choices = resolved.choices;
+            if (choices.cloud) field = std::make_unique<const cloud::CloudField>(*choices.cloud, choices.h, cloud, run);
         });
     }
 
+    [[nodiscard]] double h() const { return resolved.choices.h; }
+
     /// A plan may come from elsewhere. @throws Error InvalidInput
     void require_plan_of_this_job(const BrickPlan& plan) const {
-        if (plan.domain.voxel_size != job.h())
+        if (plan.domain.voxel_size != h())
             throw Error(Errc::InvalidInput, "bricks: the plan's voxels have an edge of " +
-                                                number(plan.domain.voxel_size) + ", those of its job " +
-                                                number(job.h()) + ": plan again, with `voxel_size`");
+                                                number(plan.domain.voxel_size) + ", those of its job " + number(h()) +
+                                                ": plan again, with `voxel_size`");
     }
 
     /// The field on all of the lattice.
-    void join(const BrickPlan& plan, const BrickStates& states) {
-        job.result.u = bricks::assemble(plan, plan.domain, all_of(plan), states);
+    [[nodiscard]] Solution join(const BrickPlan& plan, const BrickStates& states) const {
+        Solution solution = solution_on(plan);
+        StartFacts& facts = solution.start;
+        solution.u = bricks::assemble(plan, plan.domain, all_of(plan), states);
         if (field) {
-            job.report().cloud = cloud;
-            cloud::settle(*job.result.u, *job.cloud, job.report().cloud, run);
-            job.origin = StartOrigin::Cloud;
-            make_start_of_field(job);
+            facts.origin = StartOrigin::Cloud;
+            facts.cloud = cloud;
+            cloud::settle(*solution.u, *resolved.choices.cloud, facts.cloud, run);
+            if (!rests(problem, facts, EdgeFeature::Slope)) solution.u = start_from_grid(plan.domain, *solution.u, run);
         }
-        job.report().active_voxels = std::int64_t(job.result.u->activeVoxelCount());
-        job.report().leaf_count = std::int64_t(job.result.u->tree().leafCount());
+        solution.solve = report_of_rest(*solution.u);
+        return solution;
     }
 
     /// The surface brick by brick: nothing but it is held of the whole, unless fields are wanted.
-    void join_surfaces(const BrickPlan& plan, const BrickStates& states) {
+    /// @param solution  gets u, and the size of its band
+    [[nodiscard]] FloatGridPtr join_surfaces(const BrickPlan& plan, const BrickStates& states,
+                                             Solution& solution) const {
         FloatGridPtr surface = make_grid(plan.domain, float(kHalfWidthVoxels * plan.domain.voxel_size), "surface");
         surface->setGridClass(openvdb::GRID_LEVEL_SET);
-        const Clip clip = job.where_it_ends();
+        const Clip clip = problem.clip();
+        solution.solve.stop_reason = StopReason::Steady;
         for (std::size_t n = 0; n < plan.bricks.size(); ++n) {
             run.check();
             run.report("join", double(n) / double(plan.bricks.size()));
@@ -219,68 +233,79 @@ struct BrickJob::Parts {
             const Domain part = bricks::around(plan.domain, core, kSurfaceLayers);
             const FloatGridPtr u = bricks::assemble(plan, part, bricks_reaching(plan, part), states);
             if (u->tree().leafCount() == 0) continue;
-            bricks::count(*u, core, job.report().active_voxels, job.report().leaf_count);
+            bricks::count(*u, core, solution.solve.active_voxels, solution.solve.leaf_count);
             set_clip(*u, clip);
             try {
                 bricks::copy_leaves(*extract_surface(*u, run), core, *surface);
-            } catch (const Error& error) {
-                if (error.code() != Errc::InvalidInput) throw;  // a neighbour's band reaches it, and no surface does
+            } catch (const NoSurface&) {  // a neighbour's band reaches it, and no surface does
             }
         }
         detail::flood_tiles(*surface, plan.domain);
-        job.result.surface = surface;
-        if (job.options.without_fields) return;
-        job.result.u = bricks::assemble(plan, plan.domain, all_of(plan), states);
-        set_clip(*job.result.u, clip);
+        if (problem.options.without_fields) return surface;
+        solution.u = bricks::assemble(plan, plan.domain, all_of(plan), states);
+        set_clip(*solution.u, clip);
+        return surface;
+    }
+
+    /// Of all bricks.
+    [[nodiscard]] Solution solution_on(const BrickPlan& plan) const {
+        Solution solution;
+        solution.start = facts_of_brick(resolved.choices, plan.domain, resolved.marks.attracting);
+        solution.start.flow = resolved.choices.evolve;
+        solution.edges.options = resolved.choices.edge;
+        return solution;
     }
 
     /// The coarser lattice on which the whole is some hundred voxels wide.
     [[nodiscard]] double coarse_factor() const {
-        const WorldBox box = job.points.empty() ? job.image->geometry().world_box() : bounding_box(job.points);
+        const std::vector<Vec3>& attracting = resolved.marks.attracting;
+        const WorldBox box = attracting.empty() ? problem.image->geometry().world_box() : bounding_box(attracting);
         double factor = kLeastFactor;
-        while (longest_side(box) > kCoarseVoxels * factor * job.h()) factor *= 2;
+        while (longest_side(box) > kCoarseVoxels * factor * h()) factor *= 2;
         return factor;
     }
 
     void plan_cloud(BrickPlan& plan) const {
         plan.has_sweeps = false;
-        plan.domain = job.domain();
+        plan.domain = choose_cloud_domain(problem, h(), resolved.marks.attracting);
         Domain lattice = plan.domain;
         lattice.voxel_size *= coarse_factor();
         CloudReport unused;
-        plan.coarse = surface_from_cloud(covering(lattice, plan.domain.world_box()), *job.cloud, unused, run);
+        plan.coarse =
+            surface_from_cloud(covering(lattice, plan.domain.world_box()), *resolved.choices.cloud, unused, run);
     }
 
     void plan_flow(BrickPlan& plan) const {
-        SegmentOptions options = given;
-        options.voxel_size_may_grow = false;
-        options.without_mesh = true;
-        options.holes = {};
-        options.extract = {};
-        options.without_fields = false;
+        SegmentOptions coarse_options = options;
+        coarse_options.voxel_size_may_grow = false;
+        coarse_options.without_mesh = true;
+        coarse_options.holes = {};
+        coarse_options.extract = {};
+        coarse_options.without_fields = false;
         // Where the structure is too fine for so coarse a lattice, a finer one may do.
         for (double factor = coarse_factor();; factor /= 2) {
-            options.voxel_size = factor * job.h();
+            coarse_options.voxel_size = factor * h();
             try {
-                const SegmentResult coarse = solve_whole(job, options);
+                const SegmentResult coarse =
+                    image ? segment(*image, points, coarse_options, run) : reconstruct(points, coarse_options, run);
                 plan.coarse = coarse.u;
-                plan.domain = fine_domain(job, coarse.report.domain);
+                plan.domain = fine_domain(problem, resolved, coarse.report.domain);
                 break;
             } catch (const Error& error) {
                 if (error.code() == Errc::Cancelled || factor <= kLeastFactor) throw;
-                run.info("coarse solve at " + number(*options.voxel_size) + ": " + error.what());
+                run.info("coarse solve at " + number(*coarse_options.voxel_size) + ": " + error.what());
             }
         }
-        plan.edge = fixed_edge(job, *plan.coarse, plan.domain);
+        plan.edge = fixed_edge(problem, resolved.choices, *plan.coarse, plan.domain);
     }
 };
 
 BrickJob::BrickJob(const Image& image, const std::vector<Vec3>& points, const SegmentOptions& options,
                    const RunContext& run)
-    : parts_(std::make_unique<Parts>(&image, points, options, run)) {}
+    : parts_(std::make_unique<Parts>(image, points, options, run)) {}
 
 BrickJob::BrickJob(const std::vector<Vec3>& points, const SegmentOptions& options, const RunContext& run)
-    : parts_(std::make_unique<Parts>(nullptr, points, options, run)) {}
+    : parts_(std::make_unique<Parts>(std::nullopt, points, options, run)) {}
 
 BrickJob::~BrickJob() = default;
 
@@ -299,6 +324,7 @@ BrickPlan BrickJob::plan(const BrickOptions& options) const {
 FloatGridPtr BrickJob::solve(const BrickPlan& plan, std::size_t brick, const BrickStates& states,
                              BrickReport& report) const {
     const RunContext& run = parts_->run;
+    const Resolved& resolved = parts_->resolved;
     parts_->require_plan_of_this_job(plan);
     const VoxelBox core = plan.bricks.at(brick).core;
     const Domain kept = bricks::around(plan.domain, core, kStateLayers);
@@ -312,57 +338,54 @@ FloatGridPtr BrickJob::solve(const BrickPlan& plan, std::size_t brick, const Bri
             return;
         }
         const Domain part = bricks::around(plan.domain, core, plan.options.overlap);
-        const FloatGridPtr start = start_of(plan, brick, states, part, run);
-        if (!start) return;
-        Job job(parts_->job.image, points_near(parts_->job, part), parts_->job.options, run);
-        job.origin = StartOrigin::CoarseLevel;
-        job.report().domain = part;
-        job.options.edge = plan.edge;
-        job.options.evolve.follow = true;
-        if (job.points.empty()) job.options.evolve.theta = 0;
-        job.result.u = start;
-        const bricks::Frame frame = bricks::make_frame(*start, part, plan.domain);
-        job.floor = frame.floor;
-        job.obstacle = frame.obstacle;
-        if (job.uses_points()) find_distance(job, tube_for_start(job));
-        find_edges(job);
-        flow(job);
-        report.stop_reason = job.report().solve.stop_reason;
-        report.steps = job.report().solve.steps;
-        report.active_voxels = job.report().solve.active_voxels;
-        if (has_vanished(job)) return;
-        job.result.u->setName("u");
-        state = bricks::leaves_within(*job.result.u, {kept.min, kept.max});
+        StartSurface start;
+        start.u = start_of(plan, brick, states, part, run);
+        if (!start.u) return;
+        start.facts = facts_of_brick(resolved.choices, part, points_near(resolved, part));
+        const bricks::Frame frame = bricks::make_frame(*start.u, part, plan.domain);
+        start.floor = frame.floor;
+        start.obstacle = frame.obstacle;
+        start.distance = find_distance_for_flow(start.facts, *start.u, start.facts.report, run);
+        const Solution solution = flow(parts_->problem, std::move(start), plan.edge);
+        report.stop_reason = solution.solve.stop_reason;
+        report.steps = solution.solve.steps;
+        report.active_voxels = solution.solve.active_voxels;
+        if (solution.has_vanished()) return;
+        solution.u->setName("u");
+        state = bricks::leaves_within(*solution.u, {kept.min, kept.max});
         set_domain(*state, kept);
     });
     return state;
 }
 
-SegmentResult BrickJob::join(const BrickPlan& plan, const BrickStates& states, bool without_mesh) {
+SegmentResult BrickJob::join(const BrickPlan& plan, const BrickStates& states, bool without_mesh) const {
     const RunContext& run = parts_->run;
-    Job& job = parts_->job;
+    const Choices& choices = parts_->resolved.choices;
     parts_->require_plan_of_this_job(plan);
-    job.options.without_mesh = job.options.without_mesh || without_mesh;
-    detail::require_valid(job.options, "bricks");
+    SegmentOptions options = parts_->options;
+    options.without_mesh = options.without_mesh || without_mesh;
+    const Problem problem(parts_->problem.image, parts_->points, options, run);
+    SegmentResult result;
     with_threads(run, [&] {
-        if (!job.is_cloud()) doubt_isolated_marks(job);
-        job.report().domain = plan.domain;
-        job.origin = StartOrigin::CoarseLevel;
+        StepReport before = choices.report;
+        if (!choices.cloud) before.remarks.add(doubt_isolated_marks(problem));
         // Whatever else is made of the surface, it has the same bits.
-        parts_->field ? parts_->join(plan, states) : parts_->join_surfaces(plan, states);
-        if (job.report().leaf_count == 0)
+        FloatGridPtr surface;
+        Solution solution = parts_->field ? parts_->join(plan, states) : parts_->solution_on(plan);
+        if (!parts_->field) surface = parts_->join_surfaces(plan, states, solution);
+        if (solution.solve.leaf_count == 0)
             throw Error(Errc::InvalidInput,
                         "bricks: the surface vanished in all of them; lower `delta`, or start closer to the edges "
                         "(`start`)");
-        SegmentReport& report = job.report();
-        report.solve.stop_reason = StopReason::Steady;
-        report.solve.active_voxels = report.active_voxels;
-        report.solve.leaf_count = report.leaf_count;
-        job.choose("bricks", std::to_string(plan.bricks.size()), "solved apart and joined");
-        make_surface(job);
-        report.resolved = job.options;
+        solution.report.remarks.choose("bricks", std::to_string(plan.bricks.size()), "solved apart and joined", run);
+        Surface made = make_surface(problem, choices, solution, surface);
+        result.report = measure(problem, choices, before, solution, made);
+        result.u = std::move(made.u);
+        result.surface = std::move(made.level_set);
+        result.mesh = std::move(made.mesh);
+        result.distance_to_points = std::move(made.distance_to_points);
     });
-    return std::move(job.result);
+    return result;
 }
 
 }  // namespace covol

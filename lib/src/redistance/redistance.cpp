@@ -10,6 +10,7 @@
 #include <cmath>
 #include <string>
 
+#include "base/no_surface.h"
 #include "covol/error.h"
 #include "grid/flood_tiles.h"
 #include "grid/leaf_band.h"
@@ -186,8 +187,7 @@ FloatGridPtr redistance(const FloatGrid& u, const Domain& domain, double half_wi
                                             std::to_string(u.background()));
     const InterfacePatches interface = find_interface(u, domain, end, run);
     if (interface.patches.empty())
-        throw Error(Errc::InvalidInput,
-                    std::string(name) + ": grid '" + u.getName() +
+        throw NoSurface(std::string(name) + ": grid '" + u.getName() +
                         "' has no zero crossing: nothing in the domain is inside, or nothing outside");
     LeafBand band(band_leaves(interface, half_width));
     NearestPatches nearest(interface, band, half_width);

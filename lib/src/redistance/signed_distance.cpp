@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 
+#include "base/no_surface.h"
 #include "covol/error.h"
 #include "distance/nearest.h"
 #include "grid/leaf_propagation.h"
@@ -238,7 +239,7 @@ FloatGridPtr make_start(const LeafBand& band, LeafArray<float>& u, const Domain&
         }
     });
     if (std::none_of(active.begin(), active.end(), any_on))
-        throw Error(Errc::InvalidInput, std::string(where) + ": no surface lies in the domain");
+        throw NoSurface(std::string(where) + ": no surface lies in the domain");
     const LeafColumns columns(band, box, LeafColumns::Extent::Domain);
     return make_band(band, columns, u, active, inside_runs(columns, inside), domain, kWidth);
 }

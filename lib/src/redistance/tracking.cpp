@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "base/large_allocator.h"
+#include "base/no_surface.h"
 #include "covol/error.h"
 #include "grid/halo.h"
 #include "grid/leaf_propagation.h"
@@ -128,9 +129,9 @@ void track_surface(FloatGrid& u, const Domain& domain, double clamp) {
     static_assert(kTrackingWidth < kLeafDim);
     const std::vector<Coord> near = dilate_leaves(crossed_leaves(u), 1, domain);
     if (!remake(LeafBand(near), std::vector<unsigned char>(near.size(), 1), u, domain, clamp))
-        throw Error(Errc::InvalidInput, "grid '" + u.getName() +
-                                            "' has no zero crossing: nothing in the domain is inside, or nothing "
-                                            "outside");
+        throw NoSurface("grid '" + u.getName() +
+                        "' has no zero crossing: nothing in the domain is inside, or nothing "
+                        "outside");
     std::vector<Coord> far;
     for (auto leaf = u.tree().cbeginLeaf(); leaf; ++leaf)
         if (!std::binary_search(near.begin(), near.end(), leaf->origin())) far.push_back(leaf->origin());

@@ -1,31 +1,35 @@
 #pragma once
+// What speaks against a start or a result.
+#include <string>
 #include <vector>
 
-#include "segment/job.h"
+#include "segment/start/start_surface.h"
 
 namespace covol::pipeline {
 
-/// What speaks against the result: marks that lie off the surface, or on one side of it, and an image that does not
-/// show what they mark. Goes into the report, and to people.
-/// @param marks      world units
-/// @param distances  of each to the surface
-void doubt(Job& job, const std::vector<Vec3>& marks, const std::vector<double>& distances);
+/// Where a mark lies, in words: on a slice, at a voxel of the image, or in the world.
+[[nodiscard]] std::string place_of(const Problem& problem, const Vec3& mark);
 
-/// The same of marks that lie where no others are, before anything is made of them.
-void doubt_isolated_marks(Job& job);
+/// Warns of marks that lie where no others are, before anything is made of them.
+[[nodiscard]] Remarks doubt_isolated_marks(const Problem& problem);
 
-/// Notes what of the image's border a start that the caller named holds already: job.border_in_start.
-void note_border(Job& job);
+/// Which of some places all over the image's border lie inside `u`; empty where there is no image.
+[[nodiscard]] std::vector<char> inside_on_border(const Problem& problem, const FloatGrid& u);
 
 /// Of a surface that came out inside out: most of the image's border is inside, and neither marks, nor seeds, nor a
 /// start that was named, say so.
+/// @param in_start  inside_on_border() of the start that was named, or empty
 /// @throws Error InvalidInput
-void require_outside(const Job& job);
+void require_outside(const Problem& problem, const FloatGrid& u, const std::vector<char>& in_start);
 
 /// Of a level set, trilinear. @param places  world units
 [[nodiscard]] std::vector<double> levels_at(const FloatGrid& u, const std::vector<Vec3>& places);
 
-/// Whether so many marks lie off the zero level set of `u` that it cannot be what they mark.
-[[nodiscard]] bool misses_marks(const Job& job, const FloatGrid& u);
+/// How far a mark may lie from the surface that it marks, world units.
+/// @param noise  of a cloud, else 0
+[[nodiscard]] double largest_error_of_marks(const Problem& problem, double h, double noise);
+
+/// Whether so many trusted marks lie off the zero level set of `u` that it cannot be what they mark.
+[[nodiscard]] bool misses_marks(const Problem& problem, const StartFacts& start, const FloatGrid& u);
 
 }  // namespace covol::pipeline

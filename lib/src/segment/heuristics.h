@@ -6,7 +6,7 @@
 
 namespace covol {
 
-/// Values left to us: automatic.cpp.
+/// Values left to us: choices.cpp.
 struct AutomaticHeuristics {
     /// [marks] Of a guess, or of a start that they correct: more take long, and are dense.
     std::size_t most_guess_marks = heuristic("automatic.most_guess_marks", 4000);
@@ -39,7 +39,7 @@ struct AutomaticHeuristics {
 };
 COVOL_HEURISTICS AutomaticHeuristics kAutomatic{};
 
-/// Distance and edge detector of a run: fields.cpp.
+/// Distance and edge detector of a run: solve/fields.cpp.
 struct FieldsHeuristics {
     /// [voxels] Voxel of the coarse distance field that tells how far a tube has to reach.
     double coarse_factor = heuristic("fields.coarse_factor", 8.0);
@@ -52,14 +52,14 @@ struct FieldsHeuristics {
 };
 COVOL_HEURISTICS FieldsHeuristics kFields{};
 
-/// The domain: job.h.
+/// The domain: problem.h and start/.
 struct JobHeuristics {
     /// [voxels] Between D and the domain's boundary, for points alone.
     double margin_voxels = heuristic("job.margin_voxels", 6.0);
 };
 COVOL_HEURISTICS JobHeuristics kJob{};
 
-/// The flow of a run: flow.cpp.
+/// The flow of a run: solve/.
 struct FlowHeuristics {
     /// [tau] Time step of the points' own approach.
     double approach_tau = heuristic("flow.approach_tau", 3.0);
@@ -78,7 +78,7 @@ struct FlowHeuristics {
 };
 COVOL_HEURISTICS FlowHeuristics kFlow{};
 
-/// The coarse level: coarse_level.cpp.
+/// The coarse level: solve/coarse_level.cpp.
 struct CoarseLevelHeuristics {
     /// [ratio] Of its voxel size.
     double refinement = heuristic("coarse_level.refinement", 2.0);
@@ -97,7 +97,7 @@ struct CoarseLevelHeuristics {
 };
 COVOL_HEURISTICS CoarseLevelHeuristics kCoarse{};
 
-/// Warnings about marks: doubts.cpp.
+/// Warnings about marks: doubts.cpp and result/report.cpp.
 struct DoubtsHeuristics {
     /// [longest edges of the image's voxel] No hand is so far off.
     double off_voxels = heuristic("doubts.off_voxels", 2.0);
@@ -148,7 +148,7 @@ struct DoubtsHeuristics {
 };
 COVOL_HEURISTICS DoubtsHeuristics kDoubts{};
 
-/// Clouds without an inside: vanished.cpp.
+/// Clouds without an inside: solve/vanished.cpp.
 struct VanishedHeuristics {
     /// [longest extents] Thinner clouds are flat.
     double thin_share = heuristic("vanished.thin_share", 0.02);
@@ -163,7 +163,7 @@ struct VanishedHeuristics {
 };
 COVOL_HEURISTICS VanishedHeuristics kVanished{};
 
-/// What is told of the surface: final_surface.cpp.
+/// What is told of the surface: result/.
 struct FinalSurfaceHeuristics {
     /// [share of the area] Without points, above which there is a warning.
     double warn_without_points = heuristic("final_surface.warn_without_points", 0.02);

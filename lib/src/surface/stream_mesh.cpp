@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/file.h"
+#include "base/no_surface.h"
 #include "covol/error.h"
 #include "covol/mesh_stream.h"
 #include "files/atomic.h"
@@ -154,8 +155,7 @@ StreamedMesh stream(const FloatGrid& surface, double isovalue, const RunContext&
         cubes.stream(
             [&](std::uint64_t vertices, std::uint64_t triangles) {
                 if (triangles == 0)
-                    throw Error(Errc::InvalidInput,
-                                "stream_mesh: grid '" + surface.getName() + "': no surface at this level");
+                    throw NoSurface("stream_mesh: grid '" + surface.getName() + "': no surface at this level");
                 made.origin = cubes.origin();
                 made.vertices = vertices;
                 made.triangles = triangles;

@@ -9,7 +9,7 @@
 #include "support/scratch.h"
 
 using namespace covol;
-using pipeline::Job;
+using pipeline::Problem;
 
 namespace {
 
@@ -46,28 +46,20 @@ TEST_CASE("a surface that is inside out is refused unless something says so") {
     const Image image = blank_image();
     const RunContext run;
     const Vec3 center{6, 25, 24};
-    const std::vector<Vec3> marks = marks_around(center, 5);
-    {
-        Job job(&image, marks, {}, run);
-        job.result.u = start_from_sphere(make_domain(image.geometry().world_box(), 1), center, 5);
-        CHECK_NOTHROW(pipeline::require_outside(job));
-        job.result.u = inverted_ball(image, center, 5);
-        CHECK(message_of([&] { pipeline::require_outside(job); }).find("is inside out: ") != std::string::npos);
-    }
-    {
-        // Marks or seeds all over the border, or a start that was named, mean it.
-        Job marked(&image, marks_around({15.5, 15.5, 15.5}, 15), {}, run);
-        marked.result.u = inverted_ball(image, center, 5);
-        CHECK_NOTHROW(pipeline::require_outside(marked));
-        SegmentOptions seeds;
-        seeds.inside = marks_around({15.5, 15.5, 15.5}, 15);
-        Job seeded(&image, marks, seeds, run);
-        seeded.result.u = inverted_ball(image, center, 5);
-        CHECK_NOTHROW(pipeline::require_outside(seeded));
-        Job named(&image, {}, {}, run);
-        named.result.u = inverted_ball(image, center, 5);
-        CHECK_THROWS_AS(pipeline::require_outside(named), Error);
-        pipeline::note_border(named);
-        CHECK_NOTHROW(pipeline::require_outside(named));
-    }
+    const std::vector<Vec3> marks = marks_around(center, 5), all_over = marks_around({15.5, 15.5, 15.5}, 15), none;
+    const FloatGridPtr inverted = inverted_ball(image, center, 5);
+    const SegmentOptions plain;
+    const Problem problem(&image, marks, plain, run);
+    CHECK_NOTHROW(pipeline::require_outside(
+        problem, *start_from_sphere(make_domain(image.geometry().world_box(), 1), center, 5), {}));
+    CHECK(message_of([&] { pipeline::require_outside(problem, *inverted, {}); }).find("is inside out: ") !=
+          std::string::npos);
+    // Marks or seeds all over the border, or a start that was named, mean it.
+    CHECK_NOTHROW(pipeline::require_outside(Problem(&image, all_over, plain, run), *inverted, {}));
+    SegmentOptions seeds;
+    seeds.inside = all_over;
+    CHECK_NOTHROW(pipeline::require_outside(Problem(&image, marks, seeds, run), *inverted, {}));
+    const Problem named(&image, none, plain, run);
+    CHECK_THROWS_AS(pipeline::require_outside(named, *inverted, {}), Error);
+    CHECK_NOTHROW(pipeline::require_outside(named, *inverted, pipeline::inside_on_border(named, *inverted)));
 }

@@ -18,7 +18,7 @@ Evidence judge(const SegmentResult& result, const std::vector<Vec3>& marks, cons
     options.reach = range > 0 ? range : kReachVoxels * *used.voxel_size;
     options.suggestions = suggestions;
     // Brightness is nowhere 0 as slopes are, and g falls below 1/2 before there is a line.
-    if (used.edge.feature > EdgeFeature::Slope) options.weak_edge = kWeakLine;
+    if (is_line(used.edge.feature)) options.weak_edge = kWeakLine;
     // Where the image had no weight its edges are looked up now.
     const FloatGridPtr g = result.edge ? result.edge : detect_edges(image, *result.surface, used.edge, run).grid;
     return assess_evidence(result.mesh, marks, *g, image.geometry(), options, run);

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 
+#include "base/no_surface.h"
 #include "cloud/orientation/indicator.h"
 #include "cloud/surface/cloud_field.h"
 #include "cloud/surface/heuristics.h"
@@ -31,8 +32,7 @@ struct Complexity {
             const MeshMeasures m = measure_surface(level_set, 0, run).measures;
             pieces = m.components;
             all = m.components + std::max(0, m.genus);
-        } catch (const Error& error) {
-            if (error.code() != Errc::InvalidInput) throw;  // no surface
+        } catch (const NoSurface&) {  // none, of no complexity
         }
     }
     int pieces = 0;  ///< and cavities

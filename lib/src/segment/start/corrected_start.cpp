@@ -2,6 +2,7 @@
 #include <openvdb/openvdb.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "segment/doubts.h"
 #include "segment/heuristics.h"
@@ -10,27 +11,34 @@
 namespace covol::pipeline {
 namespace {
 
-CorrectionOptions correction(const Job& job) {
-    CorrectionOptions options = job.options.correction;
+CorrectionOptions correction_options(const Problem& problem, double h) {
+    CorrectionOptions options = problem.options.correction;
     if (options.least_radius) return options;
-    double least = kCorrectionVoxels * job.h();
-    if (job.image != nullptr) {
-        const Vec3& spacing = job.image->geometry().spacing;
+    double least = kCorrectionVoxels * h;
+    if (problem.image != nullptr) {
+        const Vec3& spacing = problem.image->geometry().spacing;
         least = std::max(least, kStarts.radius_spacings * *std::max_element(spacing.begin(), spacing.end()));
     }
     options.least_radius = least;
     return options;
 }
 
-GuessCorrection corrected(Job& job, const FloatGridPtr& guess, const std::vector<Vec3>& marks) {
-    GuessCorrection made =
-        correct_guess(guess, marks, job.options.inside, job.options.outside, correction(job), job.run);
-    const CorrectionReport& report = made.report();
+/// Replaces u by itself, corrected.
+GuessCorrection correct(const Problem& problem, const std::vector<Vec3>& marks, StartSurface& start) {
+    const RunContext& run = problem.run;
+    const Timed timed(start.facts.report.seconds.tag);
+    start.facts.correction_options = correction_options(problem, start.h());
+    GuessCorrection made = correct_guess(start.u, marks, problem.options.inside, problem.options.outside,
+                                         start.facts.correction_options, run);
+    const CorrectionReport& report = start.facts.correction_report = made.report();
     if (report.before_max > kDoubts.far_from_guess * report.depth)
-        job.warn("a mark lies " + number(report.before_max) +
-                 " from the guess, whose largest ball inside has a radius of " + number(report.depth) +
-                 ": so far from it the guess says little, and its correction may be worse than the guess itself; mark "
-                 "more there, or begin from the marks alone");
+        start.facts.report.remarks.warn(
+            "a mark lies " + number(report.before_max) + " from the guess, whose largest ball inside has a radius of " +
+                number(report.depth) +
+                ": so far from it the guess says little, and its correction may be worse than the guess itself; mark "
+                "more there, or begin from the marks alone",
+            run);
+    start.u = made.start(run);
     return made;
 }
 
@@ -41,29 +49,33 @@ std::string distances(const CorrectionReport& report) {
 
 }  // namespace
 
-void correct_start(Job& job) {
-    Timed timed(job.report().seconds.tag);
-    const GuessCorrection correction = corrected(job, job.result.u, job.trusted);
-    job.result.u = correction.start(job.run);
-    job.report().correction = correction.report();
-    job.choose("correction", "of the start", distances(correction.report()));
+void correct_start(const Problem& problem, StartSurface& start) {
+    const GuessCorrection made = correct(problem, start.facts.marks.trusted, start);
+    start.facts.report.remarks.choose("correction", "of the start", distances(made.report()), problem.run);
 }
 
-void start_from_corrected_guess(Job& job) {
-    job.origin = StartOrigin::Corrected;
-    job.report().domain = job.domain_with_chosen_margin(2 * kJob.margin_voxels * job.h());
-    Timed timed(job.report().seconds.tag);
-    job.options.correction = correction(job);
-    const FloatGridPtr guess = job.result.u = start_grid(*job.options.guess, job.domain(), job.run);
-    note_border(job);
-    job.result.correction =
-        std::make_shared<const GuessCorrection>(corrected(job, guess, job.options.contours ? job.trusted : job.points));
-    job.result.u = job.result.correction->start(job.run);
-    const CorrectionReport& report = job.report().correction = job.result.correction->report();
-    job.choose("start", "guess",
-               "corrected within " + number(report.least_radius) + " to " + number(report.largest_radius) + " of " +
-                   std::to_string(report.marks) + " marks and " + std::to_string(report.seeds) +
-                   " seeds that it had on the wrong side; " + distances(report));
+StartSurface start_from_corrected_guess(const Problem& problem, const Choices& choices, MarkSets marks) {
+    StartSurface start;
+    StartFacts& facts = start.facts;
+    facts.origin = StartOrigin::Corrected;
+    facts.marks = std::move(marks);
+    facts.flow = choices.evolve;
+    facts.domain = problem.domain(choices.h, facts.marks.attracting, 2 * kJob.margin_voxels * choices.h);
+    {
+        const Timed timed(facts.report.seconds.tag);
+        start.u = start_grid(*problem.options.guess, facts.domain, problem.run);
+    }
+    facts.border_inside = inside_on_border(problem, *start.u);
+    facts.correction = std::make_shared<const GuessCorrection>(
+        correct(problem, problem.options.contours ? facts.marks.trusted : facts.marks.attracting, start));
+    const CorrectionReport& report = facts.correction_report;
+    facts.report.remarks.choose("start", "guess",
+                                "corrected within " + number(report.least_radius) + " to " +
+                                    number(report.largest_radius) + " of " + std::to_string(report.marks) +
+                                    " marks and " + std::to_string(report.seeds) +
+                                    " seeds that it had on the wrong side; " + distances(report),
+                                problem.run);
+    return start;
 }
 
 }  // namespace covol::pipeline

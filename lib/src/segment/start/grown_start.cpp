@@ -6,19 +6,23 @@
 namespace covol::pipeline {
 
 // Where nothing is near, curvature would close the start before it meets an edge.
-void grow_to_edges(Job& job) {
-    if (!job.guided() || !job.uses_image() || job.uses_points()) return;
-    Timed timed(job.report().seconds.tag);
+void grow_to_edges(const Problem& problem, const Choices& choices, StartSurface& start) {
+    StartFacts& facts = start.facts;
+    if (!problem.is_guided() || !uses_image(facts.flow) || uses_points(facts.flow)) return;
+    const RunContext& run = problem.run;
+    Remarks& remarks = facts.report.remarks;
+    const Timed timed(facts.report.seconds.tag);
     const detail::GrownStart grown =
-        detail::grow_to_edges(*job.image, *job.result.u, job.options.edge.sigma.value_or(job.h()), job.run);
-    if (!grown.level_set) return job.choose("growth", "none", grown.why);
-    job.choose("growth", "to edges", grown.why);
-    job.origin = StartOrigin::Grown;
-    job.result.u = grown.level_set;
-    if (!job.report().automatic.contains("delta")) return;
-    const double delta = kStarts.grown_delta_voxels * job.h();
-    job.options.evolve.delta = delta;
-    job.choose("delta", number(delta), number(kStarts.grown_delta_voxels) + " voxels: the start lies at the edges");
+        detail::grow_to_edges(*problem.image, *start.u, choices.edge.sigma.value_or(choices.h), run);
+    if (!grown.level_set) return remarks.choose("growth", "none", grown.why, run);
+    remarks.choose("growth", "to edges", grown.why, run);
+    facts.origin = StartOrigin::Grown;
+    start.u = grown.level_set;
+    if (problem.options.evolve.delta) return;
+    const double delta = kStarts.grown_delta_voxels * choices.h;
+    facts.flow.delta = delta;
+    remarks.choose("delta", number(delta), number(kStarts.grown_delta_voxels) + " voxels: the start lies at the edges",
+                   run);
 }
 
 }  // namespace covol::pipeline

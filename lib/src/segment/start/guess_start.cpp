@@ -1,64 +1,84 @@
 // The start from few marks: the surface through them that bends least.
+#include <utility>
+
 #include "covol/orientation.h"
 #include "distance/memory_need.h"
 #include "guess/guess_in_image.h"
-#include "segment/fields.h"
 #include "segment/heuristics.h"
+#include "segment/solve/fields.h"
 #include "segment/start/starts.h"
 
 namespace covol::pipeline {
 namespace {
 
 /// How well marks are placed, along the image's axes; without an image, of what the voxel size says.
-std::array<Vec3, 3> deviation(const Job& job) {
+std::array<Vec3, 3> deviation(const Problem& problem, double h) {
     std::array<Vec3, 3> axes{};
     for (int a = 0; a < 3; ++a) {
-        const std::optional<double>& given = job.options.mark_precision;
-        if (job.image == nullptr || given) {
-            axes[a][a] = given.value_or(kUniformDeviation * job.h());
+        const std::optional<double>& given = problem.options.mark_precision;
+        if (problem.image == nullptr || given) {
+            axes[a][a] = given.value_or(kUniformDeviation * h);
             continue;
         }
-        const ImageGeometry& geometry = job.image->geometry();
+        const ImageGeometry& geometry = problem.image->geometry();
         for (int row = 0; row < 3; ++row)
             axes[a][row] = kUniformDeviation * geometry.spacing[a] * geometry.direction[row][a];
     }
     return axes;
 }
 
-}  // namespace
+GuessOptions guess_options(const Problem& problem, double h, const std::vector<Vec3>& marks) {
+    const SegmentOptions& asked = problem.options;
+    GuessOptions options;
+    options.deviation = deviation(problem, h);
+    if (problem.image == nullptr && !asked.mark_precision)
+        options.most_deviation = measure_cloud_scale(marks, problem.run).noise;
+    options.inside = asked.inside;
+    options.outside = asked.outside;
+    options.outside.insert(options.outside.end(), asked.exterior_seeds.begin(), asked.exterior_seeds.end());
+    return options;
+}
 
-void start_from_guess(Job& job) {
-    job.origin = StartOrigin::Guess;
-    job.options.evolve.follow = true;
-    const WorldBox box = bounding_box(job.points);
-    job.report().domain =
-        job.domain_with_chosen_margin(kStarts.guess_margin * longest_side(box) + kJob.margin_voxels * job.h());
-    double area = 0;  // of a ball of that size, at most
+/// Of a ball as large as the box, at most.
+double largest_area(const WorldBox& box) {
+    double area = 0;
     for (int a = 0; a < 3; ++a) {
         const double u = box.max[(a + 1) % 3] - box.min[(a + 1) % 3], v = box.max[(a + 2) % 3] - box.min[(a + 2) % 3];
         area += u * v;
     }
-    detail::require_band_memory(area, job.h(), "segment", job.run);
-    GuessOptions options;
-    options.deviation = deviation(job);
-    if (job.image == nullptr && !job.options.mark_precision)
-        options.most_deviation = measure_cloud_scale(job.points, job.run).noise;
-    options.inside = job.options.inside;
-    options.outside = job.options.outside;
-    options.outside.insert(options.outside.end(), job.options.exterior_seeds.begin(), job.options.exterior_seeds.end());
+    return area;
+}
+
+}  // namespace
+
+StartSurface start_from_guess(const Problem& problem, const Choices& choices, MarkSets marks) {
+    const RunContext& run = problem.run;
+    const double h = choices.h;
+    StartSurface start;
+    StartFacts& facts = start.facts;
+    facts.origin = StartOrigin::Guess;
+    facts.marks = std::move(marks);
+    facts.flow = choices.evolve;
+    facts.flow.follow = true;
+    const std::vector<Vec3>& points = facts.marks.attracting;
+    const WorldBox box = bounding_box(points);
+    facts.domain = problem.domain(h, points, kStarts.guess_margin * longest_side(box) + kJob.margin_voxels * h);
     // A body that the image cuts goes on beyond it: at the image's end itself its wall would be closed, and the image
     // asked about a cap. The clip at the end makes the cut.
-    if (job.image != nullptr && !job.options.roi)
-        job.report().domain = widened(job.domain(), kStarts.guess_beyond_voxels);
+    if (problem.image != nullptr && !problem.options.roi)
+        facts.domain = widened(facts.domain, kStarts.guess_beyond_voxels);
+    detail::require_band_memory(largest_area(box), h, "segment", run);
     {
-        Timed timed(job.report().seconds.tag);
-        Guess guess =
-            guess::guess_in_image(job.domain(), job.points, options, job.where_it_ends(), job.report().guess, job.run);
-        job.result.u = std::move(guess.u);
-        job.on_surface = std::move(guess.marks);
+        const Timed timed(facts.report.seconds.tag);
+        Guess guess = guess::guess_in_image(facts.domain, points, guess_options(problem, h, points), problem.clip(),
+                                            facts.guess, run);
+        start.u = std::move(guess.u);
+        facts.on_surface = std::move(guess.marks);
     }
-    if (!job.rests() && job.uses_points()) find_distance(job, tube_for_start(job));
-    job.choose("guess", job.report().guess.summary, "");
+    if (!rests(problem, facts, EdgeFeature::Slope))
+        start.distance = find_distance_for_flow(facts, *start.u, facts.report, run);
+    facts.report.remarks.choose("guess", facts.guess.summary, "", run);
+    return start;
 }
 
 }  // namespace covol::pipeline

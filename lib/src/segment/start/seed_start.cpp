@@ -1,23 +1,33 @@
 // The start from seeds alone; the image decides from there.
+#include <utility>
+
+#include "covol/start.h"
 #include "segment/heuristics.h"
 #include "segment/start/starts.h"
 
 namespace covol::pipeline {
 
-void start_from_seeds(Job& job) {
-    job.origin = StartOrigin::Given;
-    job.options.evolve.follow = true;
-    choose_domain_of_flow(job);
+StartSurface start_from_seeds(const Problem& problem, const Choices& choices, MarkSets marks) {
+    const SegmentOptions& options = problem.options;
+    StartSurface start;
+    StartFacts& facts = start.facts;
+    facts.origin = StartOrigin::Given;
+    facts.marks = std::move(marks);
+    facts.flow = choices.evolve;
+    facts.flow.follow = true;
+    facts.domain = choose_domain_of_flow(problem, choices.h, facts.marks.attracting);
     {
-        Timed timed(job.report().seconds.tag);
-        job.result.u = covol::start_from_seeds(job.domain(), job.options.inside, job.options.outside, job.run);
+        const Timed timed(facts.report.seconds.tag);
+        start.u = covol::start_from_seeds(facts.domain, options.inside, options.outside, problem.run);
     }
-    job.choose("start", "seeds",
-               job.options.outside.empty()
-                   ? "there are no marks, and no seeds outside: a little around the seeds inside"
-                   : "there are no marks: halfway between seeds inside and outside");
-    if (job.options.outside.empty()) grow_to_edges(job);
-    carry_beyond_turned_image(job);
+    facts.report.remarks.choose("start", "seeds",
+                                options.outside.empty()
+                                    ? "there are no marks, and no seeds outside: a little around the seeds inside"
+                                    : "there are no marks: halfway between seeds inside and outside",
+                                problem.run);
+    if (options.outside.empty()) grow_to_edges(problem, choices, start);
+    start.u = carried_beyond_turned_image(problem, facts.domain, start.u);
+    return start;
 }
 
 }  // namespace covol::pipeline

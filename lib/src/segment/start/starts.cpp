@@ -1,35 +1,33 @@
 #include "segment/start/starts.h"
 
+#include <utility>
+
 #include "segment/heuristics.h"
 #include "start/carry_on.h"
 
 namespace covol::pipeline {
 
-void choose_domain_of_flow(Job& job) {
-    Domain& domain = job.report().domain = job.domain_with_chosen_margin(2 * kJob.margin_voxels * job.h());
-    if (job.is_turned() && !job.options.roi) domain = widened(domain, int(kJob.margin_voxels));
+Domain choose_domain_of_flow(const Problem& problem, double h, const std::vector<Vec3>& points) {
+    const Domain domain = problem.domain(h, points, 2 * kJob.margin_voxels * h);
+    return problem.is_turned() && !problem.options.roi ? widened(domain, int(kJob.margin_voxels)) : domain;
 }
 
-void carry_beyond_turned_image(Job& job) {
-    if (!job.is_turned() || job.rests()) return;
-    if (const FloatGridPtr whole =
-            detail::carried_beyond(*job.result.u, job.domain(), make_clip(job.image->geometry()), job.run))
-        job.result.u = whole;
+FloatGridPtr carried_beyond_turned_image(const Problem& problem, const Domain& domain, FloatGridPtr u) {
+    if (!problem.is_turned()) return u;
+    const FloatGridPtr whole = detail::carried_beyond(*u, domain, make_clip(problem.image->geometry()), problem.run);
+    return whole ? whole : u;
 }
 
-void make_start(Job& job) {
-    if (job.options.guess)
-        start_from_corrected_guess(job);
-    else if (job.has_seeds_alone())
-        start_from_seeds(job);
-    else if (job.guesses())
-        start_from_guess(job);
-    else if (job.is_cloud())
-        start_from_cloud(job);
-    else if (!job.tags())
-        start_as_given(job);
-    else if (!start_from_contours(job))
-        start_by_tagging(job);
+StartSurface make_start(const Problem& problem, const Choices& choices, MarkSets marks) {
+    switch (choices.start) {
+        case StartMethod::Corrected: return start_from_corrected_guess(problem, choices, std::move(marks));
+        case StartMethod::Seeds: return start_from_seeds(problem, choices, std::move(marks));
+        case StartMethod::Guess: return start_from_guess(problem, choices, std::move(marks));
+        case StartMethod::Cloud: return start_from_cloud(problem, choices, std::move(marks));
+        case StartMethod::Named: return start_as_named(problem, choices, std::move(marks));
+        case StartMethod::Tagged: break;
+    }
+    return start_from_contours_or_tags(problem, choices, std::move(marks));
 }
 
 }  // namespace covol::pipeline

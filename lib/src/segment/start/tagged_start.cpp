@@ -4,58 +4,53 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "clip/open_ends.h"
 #include "covol/distance.h"
-#include "segment/fields.h"
+#include "covol/start.h"
 #include "segment/heuristics.h"
+#include "segment/solve/fields.h"
 #include "segment/start/starts.h"
 
 namespace covol::pipeline {
 namespace {
 
-std::vector<Vec3> all_seeds(const Job& job) {
-    std::vector<Vec3> seeds = job.options.exterior_seeds;
-    seeds.insert(seeds.end(), job.hole_seeds.begin(), job.hole_seeds.end());
-    seeds.insert(seeds.end(), job.options.outside.begin(), job.options.outside.end());
-    return seeds;
-}
+void append(const std::vector<Vec3>& more, std::vector<Vec3>& all) { all.insert(all.end(), more.begin(), more.end()); }
 
-/// Holes narrower than D are no exterior, and seeds outside may lie as close to the border as they like; a seed of the
-/// exterior that the user gave is tag_interior()'s to judge.
-std::vector<Vec3> seeds_beyond(const Job& job, double D) {
-    std::vector<Vec3> seeds = job.options.exterior_seeds;
-    const auto d_at = job.result.distance->getConstAccessor();
-    std::vector<Vec3> others = job.hole_seeds;
-    others.insert(others.end(), job.options.outside.begin(), job.options.outside.end());
-    for (const Vec3& seed : others) {
-        const Vec3 at = job.domain().world_to_index(seed);
-        if (d_at.getValue(openvdb::Coord::round(openvdb::Vec3d(at[0], at[1], at[2]))) > D) seeds.push_back(seed);
+/// What tags the points of one problem.
+struct Tagger {
+    const Problem& problem;
+    double h;
+    std::vector<Vec3> exterior;  ///< seeds that the caller says lie beyond D
+    std::vector<Vec3> outside;   ///< seeds that may lie as close to the border as they like
+
+    [[nodiscard]] std::vector<Vec3> all_seeds() const {
+        std::vector<Vec3> seeds = exterior;
+        append(outside, seeds);
+        return seeds;
     }
-    return seeds;
-}
 
-void choose_tag(Job& job) {
-    Timed timed(job.report().seconds.tag);
-    // Wide enough for any D below a quarter of the cloud: the final domain is made once D is known.
-    const Domain wide =
-        job.domain_with_margin(0.25 * longest_side(bounding_box(job.points)) + kJob.margin_voxels * job.h());
-    job.report().tag = choose_tag_distance(job.points, wide, all_seeds(job), job.run);
-    job.options.tag_distance = job.report().tag.tag_distance;
-    job.choose("tag_distance", number(job.report().tag.tag_distance), job.report().tag.reason);
-}
+    /// Holes narrower than D are no exterior; a seed of the exterior that the user gave is tag_interior()'s to judge.
+    [[nodiscard]] std::vector<Vec3> seeds_beyond(double D, const FloatGrid& distance, const Domain& domain) const {
+        std::vector<Vec3> seeds = exterior;
+        const auto d_at = distance.getConstAccessor();
+        for (const Vec3& seed : outside) {
+            const Vec3 at = domain.world_to_index(seed);
+            if (d_at.getValue(openvdb::Coord::round(openvdb::Vec3d(at[0], at[1], at[2]))) > D) seeds.push_back(seed);
+        }
+        return seeds;
+    }
 
-// The tagged surface lies D outside the points, as far as the widest gap is large. Its closing by a ball of radius D
-// touches them, needs a band of a few voxels instead of {d <= D + 3h}, and leaves the flow a short way.
-void start_from_closing(Job& job, double D) {
-    FloatGridPtr closed = close_by_ball(*job.result.u, D, job.run);
-    if (!closed) return;
-    job.result.u = closed;
-    job.options.evolve.follow = true;
-    job.choose("start", "closing",
-               "of the tagged surface by a ball of radius D, for D is wider than " + number(kStarts.close_from_voxels) +
-                   " voxels");
-}
+    [[nodiscard]] TagDistanceChoice choose(const std::vector<Vec3>& points, const Domain& domain) const {
+        return choose_tag_distance(points, domain, all_seeds(), problem.run);
+    }
+
+    [[nodiscard]] BandResult tag(const std::vector<Vec3>& points, const Domain& domain, double D) const {
+        const FloatGridPtr d = compute_distance(points, domain, {D + band_slack(h)}, problem.run).grid;
+        return tag_interior(*d, {D, all_seeds()}, problem.run);
+    }
+};
 
 // ---- bodies that the image cuts off -------------------------------------------------------------------------------
 
@@ -76,119 +71,163 @@ struct CutBody {
     FloatGridPtr level_set;    ///< on a domain wider than the image
     BandReport band;
     TagDistanceChoice tag;
+    const char* how = "";
 };
 
 /// @param beyond  points outside the image that close the cloud there
 /// @return none where it encloses nothing all the same
-std::optional<CutBody> tag_with(Job& job, const std::vector<Vec3>& beyond) {
-    std::vector<Vec3> closed = job.points;
-    closed.insert(closed.end(), beyond.begin(), beyond.end());
-    const double h = job.h();
-    CutBody body{.beyond = beyond, .level_set = nullptr, .band = {}, .tag = {}};
-    if (job.options.tag_distance) {
-        body.tag.tag_distance = *job.options.tag_distance;
+std::optional<CutBody> tag_with(const Tagger& tagger, const std::vector<Vec3>& points, const Domain& domain,
+                                std::vector<Vec3> beyond, const char* how) {
+    std::vector<Vec3> closed = points;
+    append(beyond, closed);
+    CutBody body{.beyond = std::move(beyond), .level_set = nullptr, .band = {}, .tag = {}, .how = how};
+    if (const std::optional<double>& given = tagger.problem.options.tag_distance) {
+        body.tag.tag_distance = *given;
     } else {
-        body.tag = choose_tag_distance(
-            closed, around(job.domain(), closed, 0.25 * longest_side(bounding_box(closed)) + kJob.margin_voxels * h),
-            all_seeds(job), job.run);
+        body.tag = tagger.choose(
+            closed, around(domain, closed, 0.25 * longest_side(bounding_box(closed)) + kJob.margin_voxels * tagger.h));
         if (!body.tag.encloses) return {};
     }
     const double D = body.tag.tag_distance;
-    const Domain wide = around(job.domain(), closed, D + kJob.margin_voxels * h);
-    const FloatGridPtr d = compute_distance(closed, wide, {D + band_slack(job)}, job.run).grid;
-    BandResult tagged = tag_interior(*d, {D, all_seeds(job)}, job.run);
+    const BandResult tagged = tagger.tag(closed, around(domain, closed, D + kJob.margin_voxels * tagger.h), D);
     if (tagged.report.leaks) return {};
     body.band = tagged.report;
-    body.level_set = close_by_ball(*tagged.grid, D, job.run);
+    body.level_set = close_by_ball(*tagged.grid, D, tagger.problem.run);
     if (!body.level_set) body.level_set = tagged.grid;
     return body;
 }
 
 /// Whether the points, with the image's end as a hole wherever it cuts them, enclose a body all the same.
-bool encloses_alone(const Job& job) {
-    if (!job.options.tag_distance)
-        return choose_tag_distance(job.points, job.domain(), all_seeds(job), job.run).encloses;
-    const double D = *job.options.tag_distance;
-    return !tag_interior(*compute_distance(job.points, job.domain(), {D + band_slack(job)}, job.run).grid,
-                         {D, all_seeds(job)}, job.run)
-                .report.leaks;
+bool encloses_alone(const Tagger& tagger, const std::vector<Vec3>& points, const Domain& domain) {
+    if (const std::optional<double>& D = tagger.problem.options.tag_distance)
+        return !tagger.tag(points, domain, *D).report.leaks;
+    return tagger.choose(points, domain).encloses;
+}
+
+std::optional<CutBody> find_cut_body(const Tagger& tagger, const std::vector<Vec3>& points, const Domain& domain,
+                                     const std::vector<detail::ImageFace>& faces) {
+    const auto is_at_end = [&](const Vec3& p) {
+        return std::any_of(faces.begin(), faces.end(), [&](const auto& f) { return detail::on_end_slice(f, p); });
+    };
+    if (std::any_of(points.begin(), points.end(), is_at_end)) {
+        std::optional<CutBody> body =
+            tag_with(tagger, points, domain, detail::carried_on(points, faces, kStarts.tagged_beyond_voxels * tagger.h),
+                     "their section on the image's end slices goes on beyond it");
+        if (body) return body;
+    }
+    std::vector<Vec3> images =
+        detail::mirrored(points, faces, kStarts.mirror_spacings * measure_spacing(points).median);
+    if (images.empty() || encloses_alone(tagger, points, domain)) return {};
+    return tag_with(tagger, points, domain, std::move(images),
+                    "with their mirror image beyond the image's end they enclose a body");
 }
 
 /// Marks within the section on an end slice, and those that carry them on, say that the body goes on there; a surface
 /// they are not.
-void drop_cap_marks(Job& job, const std::vector<detail::ImageFace>& faces) {
-    const double deep = kStarts.cap_depth_voxels * job.h();
-    const auto level = job.result.u->getConstAccessor();
+/// @param beyond  the points that carry them on
+MarkSets with_cut(MarkSets marks, const std::vector<Vec3>& beyond, const StartSurface& start,
+                  const std::vector<detail::ImageFace>& faces, Remarks& remarks, const RunContext& run) {
+    const double deep = kStarts.cap_depth_voxels * start.h();
+    const auto level = start.u->getConstAccessor();
     const auto caps = [&](const Vec3& p) {
-        const Vec3 at = job.domain().world_to_index(p);
+        const Vec3 at = start.facts.domain.world_to_index(p);
         return std::any_of(faces.begin(), faces.end(),
                            [&](const auto& face) { return face.depth(p) <= face.spacing; }) &&
                level.getValue(openvdb::Coord::round(openvdb::Vec3d(at[0], at[1], at[2]))) < -deep;
     };
-    const auto dropped = std::count_if(job.marks.begin(), job.marks.end(), caps);
-    std::erase_if(job.points, caps);
-    std::erase_if(job.trusted, caps);
+    const auto dropped = std::count_if(marks.attracting.begin(), marks.attracting.end(), caps);
+    for (std::vector<Vec3>* const set : {&marks.attracting, &marks.trusted}) {
+        append(beyond, *set);
+        std::erase_if(*set, caps);
+    }
     if (dropped > 0)
-        job.choose("cap_marks", std::to_string(dropped),
-                   "marks within the section on the image's end slices close the body there and do not pull");
+        remarks.choose("cap_marks", std::to_string(dropped),
+                       "marks within the section on the image's end slices close the body there and do not pull", run);
+    return marks;
 }
 
 // The flood would come in through the cut, or stop between a face and a surface that leaves the image slowly.
-bool start_from_cut_body(Job& job) {
-    if (job.image == nullptr || job.options.roi) return false;
-    const std::vector<detail::ImageFace> faces = detail::faces_of(job.image->geometry());
-    const auto is_at_end = [&](const Vec3& p) {
-        return std::any_of(faces.begin(), faces.end(), [&](const auto& f) { return detail::on_end_slice(f, p); });
-    };
-    const bool has_ends = std::any_of(job.points.begin(), job.points.end(), is_at_end);
+std::optional<StartSurface> start_from_cut_body(const Tagger& tagger, const Choices& choices, const MarkSets& marks) {
+    const Problem& problem = tagger.problem;
+    if (problem.image == nullptr || problem.options.roi) return {};
+    const std::vector<detail::ImageFace> faces = detail::faces_of(problem.image->geometry());
+    StartSurface start;
+    StartFacts& facts = start.facts;
     std::optional<CutBody> body;
-    const char* how = "their section on the image's end slices goes on beyond it";
     {
-        Timed timed(job.report().seconds.tag);
-        job.report().domain = job.domain_with_chosen_margin(0);
-        if (has_ends)
-            body = tag_with(job, detail::carried_on(job.points, faces, kStarts.tagged_beyond_voxels * job.h()));
-        if (!body) {
-            how = "with their mirror image beyond the image's end they enclose a body";
-            const std::vector<Vec3> images =
-                detail::mirrored(job.points, faces, kStarts.mirror_spacings * measure_spacing(job.points).median);
-            if (!images.empty() && !encloses_alone(job)) body = tag_with(job, images);
-        }
-        if (!body) return false;
+        const Timed timed(facts.report.seconds.tag);
+        const Domain domain = problem.domain(tagger.h, marks.attracting, 0);
+        body = find_cut_body(tagger, marks.attracting, domain, faces);
+        if (!body) return {};
         // At the image's end itself the flow would turn the wall to a right angle.
-        job.report().domain = widened(job.domain(), kStarts.tagged_beyond_voxels);
-        job.result.u = start_from_grid(job.domain(), *body->level_set, job.run);
-        job.points.insert(job.points.end(), body->beyond.begin(), body->beyond.end());
-        job.trusted.insert(job.trusted.end(), body->beyond.begin(), body->beyond.end());
+        facts.domain = widened(domain, kStarts.tagged_beyond_voxels);
+        start.u = start_from_grid(facts.domain, *body->level_set, problem.run);
     }
-    job.choose("start", "cut body", how);
-    if (!job.options.tag_distance) job.choose("tag_distance", number(body->tag.tag_distance), body->tag.reason);
-    job.options.tag_distance = body->tag.tag_distance;
-    job.report().tag = body->tag;
-    job.report().band = body->band;
-    job.options.evolve.follow = true;
-    drop_cap_marks(job, faces);
-    if (const double D = body->tag.tag_distance; job.uses_points()) find_distance(job, D + band_slack(job), D);
-    return true;
+    Remarks& remarks = facts.report.remarks;
+    const double D = body->tag.tag_distance;
+    remarks.choose("start", "cut body", body->how, problem.run);
+    if (!problem.options.tag_distance) remarks.choose("tag_distance", number(D), body->tag.reason, problem.run);
+    facts.origin = StartOrigin::Tagged;
+    facts.tag_distance = D;
+    facts.tag = body->tag;
+    facts.band = body->band;
+    facts.flow = choices.evolve;
+    facts.flow.follow = true;
+    facts.marks = with_cut(marks, body->beyond, start, faces, remarks, problem.run);
+    if (uses_points(facts.flow))
+        start.distance =
+            find_distance(facts.marks.attracting, facts.domain, D + band_slack(tagger.h), D, facts.report, problem.run);
+    return start;
 }
 
 }  // namespace
 
-void start_by_tagging(Job& job) {
-    job.origin = StartOrigin::Tagged;
-    const bool is_automatic = !job.options.tag_distance;
-    if (start_from_cut_body(job)) return;
-    if (is_automatic) choose_tag(job);
-    const double D = *job.options.tag_distance;
-    job.report().domain = job.domain_with_chosen_margin(D + kJob.margin_voxels * job.h());
-    find_distance(job, D + band_slack(job), D);
-    Timed timed(job.report().seconds.tag);
-    BandResult tagged = tag_interior(*job.result.distance, {D, seeds_beyond(job, D)}, job.run);
-    job.report().band = tagged.report;
-    job.result.u = tagged.grid;
-    if (tagged.report.leaks) job.warn(tagged.report.leak());
-    if (D > kStarts.close_from_voxels * job.h()) start_from_closing(job, D);
-    job.report().tag.tag_distance = D;
+StartSurface start_by_tagging(const Problem& problem, const Choices& choices, MarkSets marks,
+                              const std::vector<Vec3>& hole_seeds) {
+    const RunContext& run = problem.run;
+    const double h = choices.h;
+    Tagger tagger{problem, h, problem.options.exterior_seeds, hole_seeds};
+    append(problem.options.outside, tagger.outside);
+    if (std::optional<StartSurface> cut = start_from_cut_body(tagger, choices, marks)) return std::move(*cut);
+    StartSurface start;
+    StartFacts& facts = start.facts;
+    Remarks& remarks = facts.report.remarks;
+    facts.origin = StartOrigin::Tagged;
+    facts.marks = std::move(marks);
+    facts.flow = choices.evolve;
+    const std::vector<Vec3>& points = facts.marks.attracting;
+    facts.tag_distance = problem.options.tag_distance;
+    if (!facts.tag_distance) {
+        const Timed timed(facts.report.seconds.tag);
+        // Wide enough for any D below a quarter of the cloud: the final domain is made once D is known.
+        facts.tag = tagger.choose(
+            points,
+            problem.domain_with_margin(h, points, 0.25 * longest_side(bounding_box(points)) + kJob.margin_voxels * h));
+        facts.tag_distance = facts.tag.tag_distance;
+        remarks.choose("tag_distance", number(facts.tag.tag_distance), facts.tag.reason, run);
+    }
+    const double D = facts.tag.tag_distance = *facts.tag_distance;
+    facts.domain = problem.domain(h, points, D + kJob.margin_voxels * h);
+    start.distance = find_distance(points, facts.domain, D + band_slack(h), D, facts.report, run);
+    const Timed timed(facts.report.seconds.tag);
+    const BandResult tagged =
+        tag_interior(*start.distance, {D, tagger.seeds_beyond(D, *start.distance, facts.domain)}, run);
+    facts.band = tagged.report;
+    facts.encloses = problem.options.tag_distance ? !tagged.report.leaks : facts.tag.encloses;
+    start.u = tagged.grid;
+    if (tagged.report.leaks) remarks.warn(tagged.report.leak(), run);
+    if (D <= kStarts.close_from_voxels * h) return start;
+    // The tagged surface lies D outside the points, as far as the widest gap is large. Its closing by a ball of radius
+    // D touches them, needs a band of a few voxels instead of {d <= D + 3h}, and leaves the flow a short way.
+    if (const FloatGridPtr closed = close_by_ball(*start.u, D, run)) {
+        start.u = closed;
+        facts.flow.follow = true;
+        remarks.choose("start", "closing",
+                       "of the tagged surface by a ball of radius D, for D is wider than " +
+                           number(kStarts.close_from_voxels) + " voxels",
+                       run);
+    }
+    return start;
 }
 
 }  // namespace covol::pipeline

@@ -1,4 +1,4 @@
-#include "segment/vanished.h"
+#include "segment/solve/vanished.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>

@@ -1,0 +1,239 @@
+#include "segment/choices.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "base/median.h"
+#include "covol/error.h"
+#include "covol/scan_noise.h"
+#include "segment/heuristics.h"
+
+namespace covol {
+namespace pipeline {
+namespace {
+
+constexpr double kMostReach = 1 << 22;  // voxels from a lattice's origin, with room around
+
+bool is_named(Start::Kind kind) {
+    return kind == Start::Kind::Sphere || kind == Start::Kind::Box || kind == Start::Kind::Mesh ||
+           kind == Start::Kind::Mask || kind == Start::Kind::Vdb;
+}
+
+/// What there is decides which terms of Eq. (3) can act.
+EvolveOptions with_terms_that_act(const Problem& problem, bool has_points, Remarks& remarks) {
+    EvolveOptions evolve = problem.options.evolve;
+    if (!has_points && evolve.theta > 0) {
+        evolve.theta = 0;
+        remarks.choose("theta", "0", "there are no points", problem.run);
+    }
+    if (problem.image == nullptr && evolve.rho > 0) {
+        evolve.rho = 0;
+        remarks.choose("rho", "0", "there is no image", problem.run);
+    }
+    return evolve;
+}
+
+// One wild point makes a domain that no lattice holds.
+void check_extent(const std::vector<Vec3>& points, double h) {
+    if (points.size() < 8 || std::sqrt(3.0) * longest_side(bounding_box(points)) < kMostReach * h) return;
+    Vec3 middle{};
+    for (int a = 0; a < 3; ++a) {
+        std::vector<double> values;
+        for (const Vec3& p : points) values.push_back(p[a]);
+        middle[a] = cloud::median(std::move(values));
+    }
+    std::vector<double> away;
+    for (const Vec3& p : points) away.push_back(std::hypot(p[0] - middle[0], p[1] - middle[1], p[2] - middle[2]));
+    const auto farthest = std::max_element(away.begin(), away.end()) - away.begin();
+    const double far = away[std::size_t(farthest)];
+    std::nth_element(away.begin(), away.begin() + std::ptrdiff_t(away.size() * 99 / 100), away.end());
+    const double most = away[away.size() * 99 / 100];
+    if (far < kAutomatic.wild_point * most || far < kMostReach * h) return;
+    throw Error(Errc::InvalidInput, "points: " + detail::to_text(points[std::size_t(farthest)]) + " lies " +
+                                        number(far) + " from the middle of all points, " + number(far / most) +
+                                        " times as far as 99 % of them: leave it out, if it is a mistake");
+}
+
+// Points without an image that enclose something tell inside from outside themselves.
+bool is_cloud(const Problem& problem, const EvolveOptions& evolve, const std::vector<Vec3>& points) {
+    const SegmentOptions& o = problem.options;
+    if (o.start.kind == Start::Kind::Cloud) {
+        if (problem.image == nullptr) return true;
+        throw Error(Errc::InvalidOptions, "segment: the start 'cloud' is for points without an image");
+    }
+    const bool has_seeds = !o.exterior_seeds.empty() || !o.inside.empty() || !o.outside.empty();
+    return o.start.kind == Start::Kind::Auto && problem.is_guided() && !o.contours && !o.tag_distance && !has_seeds &&
+           problem.image == nullptr && uses_points(evolve) && points.size() > kAutomatic.most_guess_marks &&
+           can_enclose(points);
+}
+
+// Tagging needs marks that lie closer together than the body is thick anywhere, by far; the guess does not.
+StartMethod guess_or_tag(const Problem& problem, const std::vector<Vec3>& points, Remarks& remarks) {
+    const SegmentOptions& o = problem.options;
+    if (o.start.kind == Start::Kind::Guess) return StartMethod::Guess;
+    if (o.start.kind == Start::Kind::Tag || !problem.is_guided() || o.contours || o.tag_distance ||
+        points.size() > kAutomatic.most_guess_marks)
+        return StartMethod::Tagged;
+    // A layer: tagging tells what it needs.
+    if (problem.image == nullptr && !can_enclose(points)) return StartMethod::Tagged;
+    remarks.choose("start", "guess",
+                   std::to_string(points.size()) + " marks, at most " + std::to_string(kAutomatic.most_guess_marks),
+                   problem.run);
+    return StartMethod::Guess;
+}
+
+std::vector<Vec3> merged(const std::vector<Vec3>& points, double h, const RunContext& run) {
+    std::vector<Vec3> kept = merge_close_points(points, kAutomatic.merge_voxels * h);
+    if (kept.size() < points.size())
+        run.info("points: " + std::to_string(kept.size()) + " of " + std::to_string(points.size()) +
+                 " kept, the others are closer than half of " + number(kAutomatic.merge_voxels * h));
+    return kept;
+}
+
+// A thick layer of points, or several beside each other, has its surface in the middle.
+std::vector<Vec3> without_noise(std::vector<Vec3> points, double h, Remarks& remarks, const RunContext& run) {
+    const double radius = kAutomatic.scan_radius_voxels * h, thickness = measure_layer_thickness(points, radius, run);
+    if (!(thickness > kAutomatic.noisy_share * h)) return points;
+    points = average_layers(points, radius, run);
+    remarks.choose("points_averaged", "within " + number(radius),
+                   "they lie " + number(thickness) + " from their local plane on the mean, more than " +
+                       number(kAutomatic.noisy_share) + " voxels",
+                   run);
+    return points;
+}
+
+double choose_attraction_range(const EvolveOptions& evolve, bool tags, double h, Remarks& remarks,
+                               const RunContext& run) {
+    if (!uses_points(evolve)) return 0;
+    if (tags && !uses_image(evolve)) {
+        remarks.choose("attraction_range", "0", "unlimited: the band around the points bounds it", run);
+        return 0;
+    }
+    const double voxels = tags ? kAutomatic.tag_attraction_voxels : kAutomatic.attraction_voxels;
+    remarks.choose("attraction_range", number(voxels * h),
+                   number(voxels) + (tags ? " voxels: farther from marks the image decides" : " voxels"), run);
+    return voxels * h;
+}
+
+/// With lengths, times and weights of a flow.
+Choices with_flow(const Problem& problem, Choices c) {
+    const RunContext& run = problem.run;
+    Remarks& remarks = c.report.remarks;
+    const bool tags = c.start == StartMethod::Tagged, guesses = c.start == StartMethod::Guess;
+    const double delta_voxels = tags || guesses ? kAutomatic.tag_delta_voxels : 1.0;  // there it is close to its end
+    if (!c.evolve.delta) c.evolve.delta = delta_voxels * c.h;
+    const bool rests = (guesses || c.start == StartMethod::Cloud) && problem.is_guided() && uses_points(c.evolve);
+    if (rests || c.start == StartMethod::Corrected) return c;  // nothing flows; a later frame may
+    if (!problem.options.evolve.delta)
+        remarks.choose("delta", number(*c.evolve.delta), number(delta_voxels) + " voxels", run);
+    c.evolve.solver_tolerance = c.evolve.solved_to();  // before coarse levels have time steps of their own
+    if (!c.evolve.tau)
+        remarks.choose("tau", number(c.h), "1 voxel at unit speed; longer while the surface moves slowly", run);
+    if (!c.edge.sigma && uses_image(c.evolve)) {
+        const double voxels = tags ? kAutomatic.tag_sigma_voxels : 1.0;
+        c.edge.sigma = voxels * c.h;
+        remarks.choose("sigma", number(*c.edge.sigma), number(voxels) + " voxels", run);
+    }
+    if (!c.evolve.attraction_range)
+        c.evolve.attraction_range = choose_attraction_range(c.evolve, tags, c.h, remarks, run);
+    if (!c.evolve.image_yields) {
+        const bool yields = tags && uses_points(c.evolve) && uses_image(c.evolve);
+        c.evolve.image_yields = yields ? 1.0 : 0.0;
+        if (yields) remarks.choose("image_yields", "1", "near marks the marks know better than the edges", run);
+    }
+    return c;
+}
+
+}  // namespace
+
+Resolved resolve(const Problem& problem) {
+    const SegmentOptions& options = problem.options;
+    const RunContext& run = problem.run;
+    Choices c;
+    Remarks& remarks = c.report.remarks;
+    MarkSets marks = problem.marks();
+    std::vector<Vec3>& points = marks.attracting;
+    const bool has_points = !points.empty(), has_start = is_named(options.start.kind) || options.guess;
+    if (!has_points && !has_start && options.inside.empty())
+        throw Error(Errc::InvalidInput,
+                    "segment: the start 'tag' expects points, got none; give points, contours or seeds inside, or "
+                    "choose another start (sphere, box, mesh, mask or vdb)");
+    c.evolve = with_terms_that_act(problem, has_points, remarks);
+    c.edge = options.edge;
+    if (options.voxel_size) {
+        c.h = *options.voxel_size;
+    } else {
+        const VoxelSizeChoice choice = problem.image != nullptr ? choose_voxel_size(*problem.image)
+                                                                : choose_voxel_size(points, options.tags_points());
+        c.h = choice.voxel_size;
+        remarks.choose("voxel_size", number(c.h), choice.reason, run);
+    }
+    check_sides(options.inside, options.outside, kAutomatic.same_seed_voxels * c.h);
+    if (problem.image == nullptr) check_extent(points, c.h);
+    if (options.guess) {
+        c.start = StartMethod::Corrected;
+    } else if (has_start) {
+        c.start = StartMethod::Named;
+    } else if (!has_points) {
+        c.start = StartMethod::Seeds;
+    } else if (is_cloud(problem, c.evolve, points)) {
+        const Timed timed(c.report.seconds.tag);
+        c.start = StartMethod::Cloud;
+        c.cloud = orient_cloud(points, options.contours ? PointHints{} : options.hints, run);
+        // The indicator is all that there is to see of a cloud that encloses nothing.
+        const double h = c.cloud->encloses ? 0 : kAutomatic.view_voxel * c.cloud->orientation.screened->cell();
+        if (h > c.h && (!options.voxel_size || options.voxel_size_may_grow)) {
+            c.h = h;
+            remarks.choose("voxel_size", number(h), number(kAutomatic.view_voxel) + " cells of the indicator", run);
+        }
+    }
+    points = merged(points, c.h, run);
+    c.measured_marks = options.contours ? problem.given : points;
+    if (c.start == StartMethod::Tagged) c.start = guess_or_tag(problem, points, remarks);
+    if (problem.image == nullptr && c.start == StartMethod::Tagged)
+        points = without_noise(std::move(points), c.h, remarks, run);
+    return {with_flow(problem, std::move(c)), std::move(marks)};
+}
+
+}  // namespace pipeline
+
+VoxelSizeChoice choose_voxel_size(const Image& image) {
+    const Vec3& spacing = image.geometry().spacing;
+    return {*std::min_element(spacing.begin(), spacing.end()), "the image's smallest spacing"};
+}
+
+VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool tagged) {
+    using pipeline::number;
+    const std::vector<Vec3> distinct = merge_close_points(world_points, 0);
+    if (distinct.size() < 2)
+        throw Error(Errc::InvalidInput, "choose_voxel_size: expected an image or at least 2 distinct points, got " +
+                                            std::to_string(distinct.size()));
+    const auto nearest = [](double spacing) {
+        return VoxelSizeChoice{spacing, "the median distance between neighbouring points"};
+    };
+    const auto finer = [&](double spacing, double enough) {
+        const double times = std::sqrt(double(distinct.size()) / enough);
+        if (times >= 1) return nearest(spacing);
+        return VoxelSizeChoice{times * spacing, "finer than the median distance between neighbouring points, " +
+                                                    number(spacing) + ", for there are few"};
+    };
+    if (distinct.size() > kAutomatic.most_guess_marks) {
+        const CloudScale scale = measure_cloud_scale(distinct);
+        const double h = kAutomatic.cloud_noise * scale.noise;
+        if (h <= scale.nearest) return nearest(scale.nearest);
+        return {h, number(kAutomatic.cloud_noise) + " times the noise of the points, " + number(scale.noise)};
+    }
+    const double spacing = measure_spacing(distinct).median;
+    // A guess is known between its points, noise or not: it has as many voxels as one of the most points.
+    if (!tagged) return finer(spacing, double(kAutomatic.most_guess_marks));
+    const ScanVoxelSize scan = choose_scan_voxel_size(distinct, spacing);
+    // A surface of few points is so few spacings wide that in voxels as large as they are curvature would outweigh
+    // them.
+    if (scan.voxel_size <= spacing) return finer(spacing, kAutomatic.few_points);
+    return {scan.voxel_size, "points lie " + number(scan.thickness) +
+                                 " from their local plane on the mean, noise wider than their median distance " +
+                                 number(spacing)};
+}
+
+}  // namespace covol

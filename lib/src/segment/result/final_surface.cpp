@@ -1,0 +1,173 @@
+#include "segment/result/final_surface.h"
+
+#include <openvdb/openvdb.h>
+#include <tbb/parallel_invoke.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "cloud/surface/hold_topology.h"
+#include "covol/clip.h"
+#include "covol/compare.h"
+#include "covol/mesh_stream.h"
+#include "covol/start.h"
+#include "holes/share_beyond.h"
+#include "meshing/level_set_distance.h"
+#include "meshing/mesh_distance.h"
+#include "segment/heuristics.h"
+
+namespace covol::pipeline {
+namespace {
+
+constexpr std::size_t kLoopsToTell = 8;
+
+int complexity(const MeshMeasures& m) { return m.components + std::max(0, m.genus); }
+
+/// What a surface is made with, and the surface as far as it is made.
+struct Maker {
+    const Problem& problem;
+    const Choices& choices;
+    const Domain& domain;
+    const std::vector<Vec3>& points;  ///< that attract, without stray ones
+    Surface made;
+
+    [[nodiscard]] const SegmentOptions& options() const { return problem.options; }
+    [[nodiscard]] const RunContext& run() const { return problem.run; }
+
+    /// @param is_field  u is the field of a cloud
+    void take_level_set(FloatGridPtr u, const FloatGridPtr& known, bool is_field) {
+        if (known) {
+            made.level_set = known;
+            made.u = std::move(u);
+            return;
+        }
+        set_clip(*u, problem.clip());
+        made.level_set = extract_surface(*u, run());
+        const FloatGrid& band = is_field ? *made.level_set : *u;
+        made.active_voxels = std::int64_t(band.activeVoxelCount());
+        made.leaf_count = std::int64_t(band.tree().leafCount());
+        if (options().without_fields) return;
+        made.u = std::move(u);
+        if (!is_field) return;
+        made.u = start_from_grid(domain, *made.u, run());
+        set_clip(*made.u, problem.clip());
+    }
+
+    void relax() { made.mesh_report = relax_mesh(made.mesh, *made.level_set, {options().extract.isovalue}, run()); }
+
+    void take_mesh() {
+        made.mesh = extract_mesh(*made.level_set, options().extract, run());
+        relax();
+    }
+
+    void take_surface_of(const FloatGrid& level_set) {
+        made.level_set = extract_surface(level_set, run());
+        take_mesh();
+    }
+
+    /// Makes level set and mesh those of another closed mesh, with no more pieces and handles than they had.
+    void replace_by(const TriangleMesh& mesh) {
+        const int before = complexity(measure(made.mesh));
+        const FloatGridPtr rough = made.level_set;
+        const FloatGridPtr level_set = start_from_mesh(domain, mesh, run());
+        take_surface_of(*level_set);
+        if (complexity(measure(made.mesh)) <= before) return;
+        cloud::hold_topology(*rough, *level_set, run());
+        take_surface_of(*start_from_grid(domain, *level_set, run()));
+    }
+
+    /// A surface that points alone hold may have holes between them.
+    [[nodiscard]] bool may_have_holes() const { return !points.empty() && problem.image == nullptr; }
+
+    /// How much of the surface no point holds, and what becomes of that.
+    void treat_holes() {
+        const HolesOptions& asked = options().holes;
+        HolesReport& holes = made.holes;
+        const double automatic = choose_hole_distance(points, choices.h), distance = asked.distance.value_or(automatic);
+        const double slack = kFinal.rim_slack * std::min(automatic, distance);
+        made.distance_to_points = measure_distances(made.mesh, points, run());
+        made.share_without_points = measure_share_beyond(made.mesh, made.distance_to_points, distance);
+        holes.policy = asked.policy;
+        holes.distance = distance;
+        if (asked.policy == Holes::Close) return;
+        if (asked.policy == Holes::Open) {
+            const double volume = measure(made.mesh).volume;
+            made.mesh = trim_holes(made.mesh, made.distance_to_points, distance, slack, holes, run());
+            if (holes.share > 0) {
+                holes.closed_volume = volume;
+                relax();
+            }
+        }
+        if (asked.policy == Holes::Flat) {
+            const TriangleMesh flat = flatten_holes(made.mesh, made.distance_to_points, distance, slack, holes, run());
+            if (holes.share > 0) replace_by(flat);
+        }
+        if (holes.share > 0) made.distance_to_points = measure_distances(made.mesh, points, run());
+        tell_of_holes();
+    }
+
+    void tell_of_holes() {
+        const HolesReport& holes = made.holes;
+        std::string lengths;
+        for (std::size_t n = 0; n < holes.loops.size() && n < kLoopsToTell; ++n)
+            lengths += (n > 0 ? ", " : "") + number(holes.loops[n].length);
+        made.report.remarks.choose("holes", to_string(holes.policy),
+                                   holes.loops.empty()
+                                       ? "none: all of the surface is within " + number(holes.distance) + " of points"
+                                       : std::to_string(holes.loops.size()) + " rims, of length " + lengths +
+                                             (holes.loops.size() > kLoopsToTell ? ", ..." : "") +
+                                             (holes.policy == Holes::Open ? "; the level set stays closed" : ""),
+                                   run());
+    }
+
+    void measure_without_mesh() {
+        StreamedMesh mesh;
+        if (may_have_holes()) {
+            made.holes.distance =
+                options().holes.distance ? *options().holes.distance : choose_hole_distance(points, choices.h);
+            const detail::BeyondPoints measured =
+                detail::measure_beyond(*made.level_set, points, made.holes.distance, run());
+            made.share_without_points = measured.share;
+            mesh = measured.mesh;
+        } else {
+            mesh = measure_surface(*made.level_set, 0, run());
+        }
+        made.measures = mesh.measures;
+        made.mesh_report.triangles = std::int64_t(mesh.triangles);
+        if (!points.empty()) made.mark_distances = detail::distances_to(*made.level_set, choices.measured_marks);
+    }
+
+    void make_and_measure_mesh() {
+        take_mesh();
+        if (may_have_holes()) treat_holes();
+        // Parts of each of these run on one thread.
+        tbb::parallel_invoke([&] { made.measures = measure(made.mesh); },
+                             [&] {
+                                 if (!points.empty())
+                                     made.mark_distances = detail::distances_to(made.mesh, choices.measured_marks);
+                             });
+        if (made.holes.closed_volume > 0) made.measures.volume = made.holes.closed_volume;
+    }
+};
+
+}  // namespace
+
+Surface make_surface(const Problem& problem, const Choices& choices, Solution& solution, const FloatGridPtr& known) {
+    const bool is_field =
+        solution.start.origin == StartOrigin::Cloud && rests(problem, solution.start, solution.edges.options.feature);
+    const std::vector<Vec3>& points = choices.cloud ? choices.cloud->points : solution.start.marks.attracting;
+    Maker maker{problem, choices, solution.start.domain, points, {}};
+    maker.made.active_voxels = solution.solve.active_voxels;
+    maker.made.leaf_count = solution.solve.leaf_count;
+    double seconds = 0;
+    {
+        const Timed timed(seconds);
+        if (problem.options.without_fields) solution.distance = solution.edges.grid = nullptr;
+        maker.take_level_set(std::move(solution.u), known, is_field);
+        problem.options.without_mesh ? maker.measure_without_mesh() : maker.make_and_measure_mesh();
+    }
+    maker.made.report.seconds.surface = seconds;
+    return std::move(maker.made);
+}
+
+}  // namespace covol::pipeline

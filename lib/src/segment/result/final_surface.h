@@ -1,0 +1,28 @@
+#pragma once
+// The surface of a solution: its distance, its mesh, and what becomes of holes in it.
+#include <vector>
+
+#include "segment/solve/flow.h"
+
+namespace covol::pipeline {
+
+struct Surface {
+    FloatGridPtr u;                         ///< that it is made of; null without fields
+    FloatGridPtr level_set;                 ///< the distance to it
+    TriangleMesh mesh;                      ///< empty without a mesh
+    std::vector<float> distance_to_points;  ///< at the mesh's vertices; of points without an image
+    std::vector<double> mark_distances;     ///< of Choices::measured_marks to it; empty where nothing attracts
+    std::int64_t active_voxels = 0, leaf_count = 0;
+    MeshMeasures measures;
+    RelaxReport mesh_report;
+    HolesReport holes;
+    double share_without_points = 0;
+    StepReport report;
+};
+
+/// @param solution  its u, distance and edges are given up where the options want no fields
+/// @param known     the surface of u where that was made already, or null
+[[nodiscard]] Surface make_surface(const Problem& problem, const Choices& choices, Solution& solution,
+                                   const FloatGridPtr& known = nullptr);
+
+}  // namespace covol::pipeline

@@ -1,0 +1,311 @@
+#include "segment/result/report.h"
+
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "covol/compare.h"
+#include "image/support.h"
+#include "meshing/mesh_distance.h"
+#include "points/kd_tree.h"
+#include "segment/doubts.h"
+#include "segment/heuristics.h"
+
+namespace covol::pipeline {
+namespace {
+
+/// One place of the surface for each leaf that it passes.
+std::vector<Vec3> places_on(const FloatGrid& surface) {
+    std::vector<Vec3> places;
+    for (auto leaf = surface.tree().cbeginLeaf(); leaf; ++leaf) {
+        float least = float(surface.voxelSize()[0]);
+        openvdb::Coord at;
+        bool found = false;
+        for (auto value = leaf->cbeginValueOn(); value; ++value)
+            if (std::abs(*value) < least) {
+                least = std::abs(*value);
+                at = value.getCoord();
+                found = true;
+            }
+        if (!found) continue;
+        const openvdb::Vec3d world = surface.indexToWorld(at);
+        places.push_back({world[0], world[1], world[2]});
+    }
+    return places;
+}
+
+/// What of the marks, and of the image at them, speaks against a surface.
+class Doubts {
+public:
+    Doubts(const Problem& problem, const Choices& choices, const Solution& solution, const Surface& surface,
+           SegmentReport& report, Remarks& remarks)
+        : problem_(problem),
+          marks_(choices.measured_marks),
+          h_(choices.h),
+          solution_(solution),
+          surface_(surface),
+          report_(report),
+          remarks_(remarks) {}
+
+    void of_marks() {
+        find_marks_off();
+        find_bias();
+        if (solution_.start.origin == StartOrigin::Guess) find_surface_beyond();
+        if (solution_.start.origin == StartOrigin::Cloud) find_folds();
+        if (problem_.image == nullptr || !uses_image(solution_.start.flow)) return;
+        find_lost_precision();
+        find_strange_image();
+        find_silent_image();
+    }
+
+    void of_surface() {
+        find_pieces();
+        find_seeds();
+        find_holes();
+    }
+
+private:
+    void warn(const std::string& line) { remarks_.warn(line, problem_.run); }
+
+    void find_marks_off() {
+        const std::vector<double>& distances = surface_.mark_distances;
+        SegmentReport::MarksOff& found = report_.marks_off;
+        found.beyond = largest_error_of_marks(problem_, h_, solution_.start.cloud.noise);
+        for (std::size_t n = 0; n < marks_.size(); ++n) {
+            found.count += distances[n] > found.beyond;
+            if (distances[n] <= found.farthest) continue;
+            found.farthest = distances[n];
+            found.farthest_world = found.farthest_index = marks_[n];
+        }
+        if (problem_.image != nullptr)
+            found.farthest_index = problem_.image->geometry().world_to_index(found.farthest_world);
+        if (found.count == 0) return;
+        warn(std::to_string(found.count) + " of " + std::to_string(marks_.size()) + " marks lie more than " +
+             number(found.beyond) + " off the surface, the farthest " + number(found.farthest) + " " +
+             place_of(problem_, found.farthest_world) +
+             ": look there whether the mark is wrong, or mark more beside it");
+    }
+
+    void find_bias() {
+        const std::vector<double> levels = levels_at(*surface_.level_set, marks_);
+        double sum = 0, squares = 0;
+        for (std::size_t n = 0; n < marks_.size(); ++n) {
+            const double d = std::copysign(surface_.mark_distances[n], levels[n]);
+            sum += d;
+            squares += d * d;
+        }
+        const auto count = double(marks_.size());
+        const double bias = sum / count, error = std::sqrt(std::max(0.0, squares / count - bias * bias) / count);
+        report_.fit.bias = bias;
+        if (std::abs(bias) < kDoubts.bias_voxels * std::max(h_, solution_.start.cloud.noise) ||
+            std::abs(bias) < kDoubts.bias_errors * error)
+            return;
+        warn("the marks lie " + number(std::abs(bias) / h_) + " voxels " + (bias > 0 ? "outside" : "inside") +
+             " the surface on the mean: it is too " + (bias > 0 ? "small" : "large"));
+    }
+
+    /// A surface through marks may bend least where it goes on for ever.
+    void find_surface_beyond() {
+        const WorldBox box = bounding_box(marks_);
+        const double diagonal = std::hypot(box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]);
+        const double far = kDoubts.far_diagonals * diagonal;
+        const std::vector<Vec3> places = places_on(*surface_.level_set);
+        const detail::KdTree tree(marks_);
+        const auto beyond = std::count_if(places.begin(), places.end(),
+                                          [&](const Vec3& place) { return tree.nearest(place) > far * far; });
+        const double share = double(beyond) / double(std::max<std::size_t>(1, places.size()));
+        report_.surface_beyond_marks = share;
+        if (share > kDoubts.far_share)
+            warn(number(std::round(100 * share)) + " % of the surface lie farther than " + number(far) +
+                 ", half of what the marks measure across, from every mark: it goes on where nothing is marked; mark "
+                 "more there, or give a place outside the body (`outside`)");
+    }
+
+    /// Noise fills space as far as it reaches; what is smoothed like it, though the nearest points lie on sheets, are
+    /// folds.
+    void find_folds() {
+        const CloudReport& cloud = solution_.start.cloud;
+        if (cloud.noise > cloud.nearest && cloud.noise > kDoubts.folded_noise * cloud.near_noise &&
+            cloud.near_noise < kDoubts.sheet * cloud.near_reach)
+            warn("the surface is smoothed as if the points had noise of " + number(cloud.noise) +
+                 ", but the nearest of them lie on sheets (" + number(cloud.near_noise) + " off them within " +
+                 number(cloud.near_reach) +
+                 "): folds or walls closer together than two or three points are lost; sample more densely there");
+    }
+
+    /// Values are computed on in single precision.
+    void find_lost_precision() {
+        const auto [low, high] = problem_.image->percentiles(0.01, 0.99);
+        const double largest = std::max(std::abs(low), std::abs(high));
+        const double step = largest * std::numeric_limits<float>::epsilon();
+        if (high > low && step > kDoubts.lost_precision * (high - low))
+            warn("the image's values lie between " + number(low) + " and " + number(high) +
+                 ", where single precision has steps of " + number(step) + ": subtract an offset first");
+    }
+
+    /// Some of the marks, and the surface's normals there.
+    struct Normals {
+        std::vector<Vec3> places, normals;
+    };
+
+    [[nodiscard]] Normals normals_at_marks() const {
+        const std::size_t every = std::max<std::size_t>(1, marks_.size() / kDoubts.support_marks);
+        std::vector<Vec3> beside;  // of each, before and behind along each axis
+        for (std::size_t n = 0; n < marks_.size(); n += every)
+            for (int a = 0; a < 3; ++a)
+                for (const double step : {-0.5, 0.5}) beside.emplace_back(marks_[n])[std::size_t(a)] += step * h_;
+        const std::vector<double> levels = levels_at(*surface_.level_set, beside);
+        Normals found;
+        for (std::size_t n = 0, first = 0; n < marks_.size(); n += every, first += 6) {
+            Vec3 normal{};
+            for (std::size_t a = 0; a < 3; ++a) normal[a] = levels[first + 2 * a + 1] - levels[first + 2 * a];
+            const double length = std::hypot(normal[0], normal[1], normal[2]);
+            if (!(length > 0.5 * h_)) continue;  // off the band
+            for (double& c : normal) c /= length;
+            found.places.push_back(marks_[n]);
+            found.normals.push_back(normal);
+        }
+        return found;
+    }
+
+    /// Marks of another image, of another channel or space, look like marks: the image knows better.
+    void find_strange_image() {
+        const Normals at = normals_at_marks();
+        const detail::ImageSupport support =
+            detail::measure_support(*problem_.image, at.places, at.normals, h_, problem_.run);
+        if (support.places == 0) return;
+        report_.image_support = support.share;
+        const GuidanceReport& guidance = solution_.guidance;
+        const EdgeFeature feature = guidance.used ? guidance.feature.feature : solution_.edges.options.feature;
+        const detail::StrongestBorder border = detail::find_strongest_border(
+            *problem_.image, at.places, at.normals, h_,
+            is_line(feature) ? detail::BorderKind::Line : detail::BorderKind::Slope, problem_.run);
+        report_.image_border = {border.at, border.share, border.errors};
+        const char* const look = ": look whether the marks belong to this image, channel and space";
+        if (support.share + kDoubts.support_errors * support.error < kDoubts.image_support)
+            warn("the image varies more five voxels beside the marks than where they lie (in " +
+                 number(std::round(100 * (1 - support.share))) + " of 100 pairs)" + look);
+        else if (guidance.used && guidance.gain < kDoubts.least_gain && support.share < kDoubts.clear_support)
+            warn("what the image shows at some marks hardly foretells where the others lie (gain " +
+                 number(guidance.gain) + " nats a mark)" + look);
+        else if (border.share < kDoubts.border_share && border.errors > kDoubts.border_errors)
+            warn("the image has steeper borders " + std::to_string(std::abs(border.at)) + " voxels " +
+                 (border.at < 0 ? "inside" : "outside") + " the marks, all along (where they lie it has " +
+                 number(std::round(100 * border.share)) + " % of that)" + look + ", and are of its size");
+    }
+
+    void find_silent_image() {
+        if (solution_.was_asked && !solution_.guidance.used)
+            warn("the image had no say between the marks: " + solution_.guidance.reason);
+    }
+
+    void find_pieces() {
+        if (solution_.start.origin != StartOrigin::Guess) return;
+        const std::size_t marks = solution_.start.guess.marks;
+        if (surface_.measures.components > 1)
+            warn(
+                "the surface through the marks falls into " + std::to_string(surface_.measures.components) +
+                " pieces: where they are one body, mark between them; several bodies are better marked each by itself");
+        if (const int genus = surface_.measures.genus;
+            genus > 1 && double(marks) < kFinal.marks_of_handle * double(genus))
+            warn("the surface has " + std::to_string(genus) + " handles on " + std::to_string(marks) +
+                 " marks: where the body has no holes its walls are thinner than the marks are off; more marks there, "
+                 "or better ones, close them");
+    }
+
+    void find_seeds() {
+        report_.seeds = check_seeds(*surface_.level_set, problem_.options.inside, problem_.options.outside);
+        if (const std::string warning = report_.seeds.warning(); !warning.empty()) warn("seeds: " + warning);
+    }
+
+    void find_holes() {
+        if (surface_.share_without_points <= kFinal.warn_without_points) return;
+        const HolesReport& holes = surface_.holes;
+        warn(number(std::round(1000 * surface_.share_without_points) / 10) + " % of the surface lie farther than " +
+             number(holes.distance) + " from every point: " +
+             (holes.policy == Holes::Close  ? "there curvature alone closes it"
+              : holes.policy == Holes::Flat ? "there flat patches close it"
+                                            : "there the mesh is open, the level set closed by curvature alone"));
+    }
+
+    const Problem& problem_;
+    const std::vector<Vec3>& marks_;
+    const double h_;
+    const Solution& solution_;
+    const Surface& surface_;
+    SegmentReport& report_;
+    Remarks& remarks_;
+};
+
+Start::Kind kind_of(StartMethod method, Start::Kind asked) {
+    switch (method) {
+        case StartMethod::Guess: return Start::Kind::Guess;
+        case StartMethod::Cloud: return Start::Kind::Cloud;
+        case StartMethod::Tagged: return Start::Kind::Tag;
+        case StartMethod::Corrected:
+        case StartMethod::Seeds:
+        case StartMethod::Named: break;
+    }
+    return asked;
+}
+
+}  // namespace
+
+SegmentOptions resolved_options(const Problem& problem, const Choices& choices, const Solution& solution) {
+    SegmentOptions used = problem.options;
+    used.voxel_size = choices.h;
+    used.start.kind = kind_of(choices.start, used.start.kind);
+    used.evolve = solution.start.flow;
+    used.edge = solution.edges.options;
+    used.tag_distance = solution.start.tag_distance ? solution.start.tag_distance : used.tag_distance;
+    used.coarse_levels = solution.coarse_levels;
+    used.correction = solution.start.correction_options;
+    return used;
+}
+
+SegmentReport measure(const Problem& problem, const Choices& choices, const StepReport& before,
+                      const Solution& solution, const Surface& surface) {
+    const StartFacts& start = solution.start;
+    SegmentReport report;
+    StepReport steps = before;
+    for (const StepReport* step : {&start.report, &solution.report, &surface.report}) steps.add(*step);
+    report.coarse = solution.coarse;
+    report.domain = start.domain;
+    report.active_voxels = surface.active_voxels;
+    report.leaf_count = surface.leaf_count;
+    report.point_count = problem.given.size();
+    if (const auto& contours = problem.options.contours)
+        report.densified = contours->along.size() + contours->between.size();
+    report.guess = start.guess;
+    report.cloud = start.cloud;
+    report.guidance = solution.guidance;
+    report.tag = start.tag;
+    report.band = start.band;
+    report.edge = solution.edges.found;
+    report.solve = solution.solve;
+    report.solve.active_voxels = surface.active_voxels;
+    report.solve.leaf_count = surface.leaf_count;
+    report.surface = surface.measures;
+    report.mesh = surface.mesh_report;
+    report.correction = start.correction_report;
+    report.share_without_points = surface.share_without_points;
+    report.holes = surface.holes;
+    report.resolved = resolved_options(problem, choices, solution);
+    {
+        const Timed timed(steps.seconds.surface);
+        Doubts doubts(problem, choices, solution, surface, report, steps.remarks);
+        if (!surface.mark_distances.empty()) {
+            report.fit = detail::statistics_of(surface.mark_distances);
+            doubts.of_marks();
+        }
+        doubts.of_surface();
+    }
+    report.seconds = steps.seconds;
+    std::move(steps.remarks).move_to(report);
+    return report;
+}
+
+}  // namespace covol::pipeline

@@ -1,0 +1,128 @@
+#include "segment/solve/solve.h"
+
+#include <openvdb/openvdb.h>
+
+#include <optional>
+#include <utility>
+
+#include "covol/error.h"
+#include "segment/doubts.h"
+#include "segment/heuristics.h"
+#include "segment/solve/coarse_level.h"
+#include "segment/start/starts.h"
+
+namespace covol::pipeline {
+namespace {
+
+Solution flow_by_levels(const Problem& problem, StartSurface start, const EdgeOptions& edge, Reached* reached) {
+    CoarsePass coarse = pass_coarse_levels(problem, start, edge);
+    Solution solution;
+    if (coarse.u) {
+        solution = flow(problem, from_coarse_level(start, coarse.u), edge, reached);
+        if (solution.has_vanished()) {
+            coarse.reports.back().why_not = "the surface vanished after it";
+            problem.run.info("coarse level left out: the surface vanished after it");
+            solution = flow(problem, std::move(start), edge, reached);
+        }
+    } else {
+        solution = flow(problem, std::move(start), edge, reached);
+    }
+    solution.coarse = std::move(coarse.reports);
+    solution.coarse_levels = coarse.levels;
+    solution.report.add(coarse.report);
+    return solution;
+}
+
+/// What was found before `later` took its place stays in the report.
+Solution after(const Solution& earlier, Solution later) {
+    StepReport report = earlier.report;
+    report.add(later.report);
+    later.report = report;
+    later.coarse = earlier.coarse;
+    later.coarse_levels = earlier.coarse_levels;
+    if (!later.edges.grid) later.edges = earlier.edges;
+    if (!later.distance) later.distance = earlier.distance;
+    return later;
+}
+
+/// A start that was good by itself, in place of a flow that lost it.
+/// @param u  of that start
+Solution start_instead(const Problem& problem, const Solution& lost, const FloatGridPtr& u, Reached* reached) {
+    if (lost.start.origin == StartOrigin::Grown) {
+        Solution kept = lost;
+        kept.u = u;
+        kept.solve = report_of_rest(*u);
+        kept.solve.stop_reason = StopReason::NotRun;
+        kept.report.remarks.warn("the flow closed what had grown to the image's edges: this is that start itself",
+                                 problem.run);
+        return kept;
+    }
+    EdgeOptions edge = lost.edges.options;
+    edge.feature = EdgeFeature::Slope;
+    StepReport report;
+    report.remarks.choose("edge_feature", to_string(edge.feature),
+                          "along lines the surface left the marks: the body between them rests instead", problem.run);
+    Solution rested = flow(problem, {lost.start, u, lost.distance, nullptr, nullptr}, edge, reached);
+    report.add(rested.report);
+    rested.report = report;
+    rested.edges = lost.edges;
+    rested.edges.options = edge;
+    return after(lost, std::move(rested));
+}
+
+/// The start through the marks that bends least; none where they have none, or it passes them no better.
+std::optional<StartSurface> better_guess(const Problem& problem, const Choices& choices, const Solution& solution) {
+    try {
+        StartSurface guess = start_from_guess(problem, choices, solution.start.marks);
+        if (!solution.has_vanished() && misses_marks(problem, guess.facts, *guess.u)) return {};
+        return guess;
+    } catch (const Error& error) {
+        if (error.code() != Errc::InvalidInput) throw;
+        problem.run.info(std::string("no guess instead: ") + error.what());
+        return {};
+    }
+}
+
+Solution guess_instead(const Problem& problem, const Choices& choices, Solution solution, Reached* reached) {
+    const StartFacts& facts = solution.start;
+    const bool vanished = solution.has_vanished();
+    if (!problem.is_guided() || !uses_points(facts.flow) || facts.marks.trusted.size() < 4 ||
+        rests(problem, facts, solution.edges.options.feature))
+        return solution;
+    if (!vanished && (facts.origin == StartOrigin::Contours || !misses_marks(problem, facts, *solution.u)))
+        return solution;
+    std::optional<StartSurface> guess = better_guess(problem, choices, solution);
+    if (!guess) return solution;
+    guess->facts.tag = facts.tag;
+    guess->facts.tag_distance = facts.tag_distance;
+    guess->facts.band = facts.band;
+    StepReport report = facts.report;
+    report.add(guess->facts.report);
+    guess->facts.report = report;
+    solution.report.remarks.warn(
+        std::string("the surface ") +
+            (vanished ? "vanished" : "left more than " + number(100 * kDoubts.missed_share) + " % of the marks") +
+            ": this is the one through the marks that bends least instead",
+        problem.run);
+    Solution guessed = flow(problem, std::move(*guess), solution.edges.options, reached);
+    return after(solution, std::move(guessed));
+}
+
+}  // namespace
+
+Solution solve(const Problem& problem, const Choices& choices, StartSurface start, const EdgeOptions& edge,
+               Reached* reached) {
+    const StartOrigin origin = start.facts.origin;
+    const bool is_good = origin == StartOrigin::Grown || (origin == StartOrigin::Contours && problem.is_guided() &&
+                                                          uses_image(start.facts.flow) && is_line(edge.feature));
+    const FloatGridPtr kept = is_good ? start.u->deepCopy() : nullptr;
+    Solution solution = flow_by_levels(problem, std::move(start), edge, reached);
+    solution = kept && has_lost(solution, *kept) ? start_instead(problem, solution, kept, reached)
+                                                 : guess_instead(problem, choices, std::move(solution), reached);
+    problem.run.check();
+    solution.u->setName("u");
+    check_flow(problem, choices, solution);
+    return solution;
+}
+
+}  // namespace covol::pipeline

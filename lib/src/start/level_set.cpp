@@ -1,0 +1,100 @@
+#include "covol/level_set.h"
+
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/Composite.h>
+#include <openvdb/tools/Interpolation.h>
+#include <openvdb/tools/ValueTransformer.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "base/number.h"
+#include "covol/error.h"
+#include "covol/mesh_stream.h"
+#include "covol/start.h"
+#include "covol/surface.h"
+#include "redistance/redistance.h"
+
+namespace covol {
+namespace {
+
+openvdb::Vec3d to_vdb(const Vec3& p) { return {p[0], p[1], p[2]}; }
+
+/// The other on the lattice of the first; null where none of it lies in the domain of that.
+FloatGridPtr on_lattice_of(const LevelSet& first, const LevelSet& other, const RunContext& run) {
+    const Domain domain = first.domain();
+    return domain == other.domain() ? other.grid().deepCopy() : start_from_grid(domain, other.grid(), run);
+}
+
+template <typename Combine>
+LevelSet combined(const LevelSet& a, const LevelSet& b, const RunContext& run, const Combine& combine) {
+    const FloatGridPtr mine = a.grid().deepCopy(), theirs = on_lattice_of(a, b, run);
+    combine(*mine, *theirs);
+    return LevelSet::from(*mine, run);
+}
+
+}  // namespace
+
+LevelSet LevelSet::from(const FloatGrid& u, const RunContext& run) { return LevelSet(extract_surface(u, run)); }
+
+LevelSet::LevelSet(FloatGridPtr distance) : grid_(std::move(distance)) {
+    const auto require = [](bool is_met, const std::string& expected, const std::string& got) {
+        if (!is_met) throw Error(Errc::InvalidInput, "LevelSet: expected " + expected + ", got " + got);
+    };
+    require(grid_ != nullptr, "a grid", "none");
+    require(grid_->getGridClass() == openvdb::GRID_LEVEL_SET, "a grid of class level set",
+            "'" + openvdb::GridBase::gridClassToString(grid_->getGridClass()) + "'");
+    const double width = kHalfWidthVoxels * domain_of(*grid_).voxel_size;
+    require(std::abs(grid_->background() - width) <= 1e-4 * width, "a background of " + detail::number(width),
+            detail::number(grid_->background()));
+}
+
+Domain LevelSet::domain() const { return domain_of(*grid_); }
+
+std::vector<double> LevelSet::sample(std::span<const Vec3> places) const {
+    std::vector<double> levels(places.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, places.size(), 256), [&](const auto& range) {
+        const auto accessor = grid_->getConstAccessor();
+        for (std::size_t n = range.begin(); n != range.end(); ++n)
+            levels[n] = openvdb::tools::BoxSampler::sample(accessor, grid_->worldToIndex(to_vdb(places[n])));
+    });
+    return levels;
+}
+
+double LevelSet::sample(const Vec3& place) const {
+    return openvdb::tools::BoxSampler::sample(grid_->getConstAccessor(), grid_->worldToIndex(to_vdb(place)));
+}
+
+LevelSet LevelSet::offset(double distance, const RunContext& run) const {
+    if (!std::isfinite(distance))
+        throw Error(Errc::InvalidOptions, "offset: expected a finite distance, got " + detail::number(distance));
+    const Domain own = domain();
+    FloatGridPtr moved;
+    with_threads(run, [&] {
+        const double half_width = kHalfWidthVoxels + std::abs(distance) / own.voxel_size;
+        moved = detail::redistance(*grid_, own, half_width, detail::DomainEnd::Closed, "offset", run);
+        const auto shift = float(distance);
+        openvdb::tools::foreach(moved->beginValueAll(), [shift](const auto& value) { value.setValue(*value - shift); });
+        moved->tree().root().setBackground(moved->background() - shift, false);
+    });
+    return from(*moved, run);
+}
+
+LevelSet LevelSet::united(const LevelSet& other, const RunContext& run) const {
+    return combined(*this, other, run, [](FloatGrid& a, FloatGrid& b) { openvdb::tools::csgUnion(a, b); });
+}
+
+LevelSet LevelSet::intersected(const LevelSet& other, const RunContext& run) const {
+    return combined(*this, other, run, [](FloatGrid& a, FloatGrid& b) { openvdb::tools::csgIntersection(a, b); });
+}
+
+LevelSet LevelSet::without(const LevelSet& other, const RunContext& run) const {
+    return combined(*this, other, run, [](FloatGrid& a, FloatGrid& b) { openvdb::tools::csgDifference(a, b); });
+}
+
+MeshMeasures LevelSet::measure(const RunContext& run) const { return measure_surface(*grid_, 0, run).measures; }
+
+}  // namespace covol

@@ -1,0 +1,81 @@
+// LevelSet against closed forms of balls.
+#include "covol/level_set.h"
+
+#include <openvdb/openvdb.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <numbers>
+
+#include "covol/error.h"
+#include "covol/start.h"
+#include "support/scratch.h"
+
+using namespace covol;
+
+namespace {
+
+constexpr double kH = 0.25;
+const Domain kDomain = make_domain({{-6, -6, -6}, {6, 6, 6}}, kH);
+
+LevelSet ball(const Vec3& center, double radius, const Domain& domain = kDomain) {
+    return LevelSet::from(*start_from_sphere(domain, center, radius));
+}
+
+double volume_of(double radius) { return 4 * std::numbers::pi / 3 * std::pow(radius, 3); }
+
+/// Of the lens that two balls of that radius share.
+double lens(double radius, double apart) {
+    return std::numbers::pi * (4 * radius + apart) * std::pow(2 * radius - apart, 2) / 12;
+}
+
+}  // namespace
+
+TEST_CASE("LevelSet: samples are the distance, clamped at the band's half width") {
+    const LevelSet surface = ball({0.1, 0, -0.2}, 3);
+    const std::vector<Vec3> places{{3.1, 0, -0.2}, {0.1, 3.3, -0.2}, {0.1, 0, 2.5}, {0.1, 0, -0.2}, {5.5, 5.5, 5.5}};
+    const std::vector<double> expected{0, 0.3, -0.3, -kHalfWidthVoxels * kH, kHalfWidthVoxels * kH},
+        found = surface.sample(places);
+    for (std::size_t n = 0; n < places.size(); ++n) {
+        CHECK(std::abs(found[n] - expected[n]) < 0.02 * kH);
+        CHECK(surface.sample(places[n]) == found[n]);
+    }
+}
+
+TEST_CASE("LevelSet: an offset ball is the ball of the other radius, beyond the band too") {
+    const LevelSet surface = ball({0.1, 0, -0.2}, 3);
+    for (const double distance : {-2.0, -0.4, 0.0, 0.4, 2.0}) {
+        const LevelSet moved = surface.offset(distance);
+        CHECK(std::abs(moved.measure().volume / volume_of(3 + distance) - 1) < 0.01);
+        CHECK(std::abs(moved.sample({3.1 + distance, 0, -0.2})) < 0.03 * kH);
+        CHECK(moved.domain() == surface.domain());
+    }
+    CHECK_THROWS_AS(surface.offset(-3.5), Error);
+    CHECK_THROWS_AS(surface.offset(std::nan("")), Error);
+}
+
+TEST_CASE("LevelSet: unions, intersections and differences have their volumes, and are distances") {
+    const double apart = 3;
+    const LevelSet a = ball({-1.5, 0, 0}, 2.5), b = ball({1.5, 0, 0}, 2.5);
+    // On another lattice: what it is combined with is resampled.
+    const LevelSet other = ball({1.5, 0, 0}, 2.5, make_domain({{-5, -5, -5}, {5, 5, 5}}, 0.2));
+    const double shared = lens(2.5, apart), one = volume_of(2.5);
+    for (const LevelSet& second : {b, other}) {
+        CHECK(std::abs(a.united(second).measure().volume / (2 * one - shared) - 1) < 0.01);
+        CHECK(std::abs(a.intersected(second).measure().volume / shared - 1) < 0.02);
+        CHECK(std::abs(a.without(second).measure().volume / (one - shared) - 1) < 0.01);
+        CHECK(a.united(second).domain() == a.domain());
+    }
+    // Inside a union's waist its distance is that to the seam, not to a ball's surface within the other.
+    CHECK(a.united(b).sample({0, 1.5, 0}) == Approx(-0.5).margin(0.05));
+    CHECK_THROWS_AS(ball({-4, 0, 0}, 1).intersected(ball({4, 0, 0}, 1)), Error);
+}
+
+TEST_CASE("LevelSet: a grid that is none is refused") {
+    CHECK(message_of([] { LevelSet(nullptr); }) == "LevelSet: expected a grid, got none");
+    const FloatGridPtr fog = make_grid(kDomain, 0.0F, "fog");
+    CHECK(message_of([&] { LevelSet{fog}; }).find("expected a grid of class level set") != std::string::npos);
+    fog->setGridClass(openvdb::GRID_LEVEL_SET);
+    CHECK(message_of([&] { LevelSet{fog}; }).find("expected a background of 0.75, got 0") != std::string::npos);
+    CHECK_THROWS_AS(LevelSet::from(*fog), Error);
+}
