@@ -18,7 +18,7 @@ LAYERS = [
     {"image": ["image_files"], "io/write": ["image_stream"], "io/points": ["points", "points_text", "point_array"], "clip": ["clip"], "edge": ["edge"], "redistance": []},
     {"points": ["scan_noise", "cloud_cleanup"], "surface": ["surface", "mesh_stream"], "evolve": ["evolve", "checkpoints"], "tagging": ["band"]},
     {"contours": ["contours", "seeds"], "meshing": ["mesh_relax", "mesh_cleanup"], "holes": ["holes"], "cloud/orientation": ["orientation"]},
-    {"start": ["start"], "painted": ["painted"], "analysis": ["compare", "evidence", "structures", "phantom"], "render/draw": ["picture"]},
+    {"start": ["start", "level_set"], "painted": ["painted"], "analysis": ["compare", "evidence", "structures", "phantom"], "render/draw": ["picture"]},
     {"guess": ["guess", "guess_correction"], "guidance": ["guidance"], "cloud/surface": ["cloud_surface"], "report": ["report_page"], "render": ["render"]},
     {"segment": ["pipeline"], "segment/start": [], "segment/solve": [], "segment/result": []},
     {"bricks": ["bricks"]},

@@ -10,9 +10,9 @@
 
 namespace covol {
 
-/// A closed surface, kept as its signed distance: the grid is a level set of OpenVDB's, in world units, negative inside,
-/// with cubic voxels, and outside of a band of kHalfWidthVoxels voxels on both sides of the surface it is +-kHalfWidth
-/// voxels. A value: copies share the grid, and nothing writes to it.
+/// A closed surface, kept as its signed distance: the grid is a level set of OpenVDB's, in world units, negative
+/// inside, with cubic voxels, and outside of a band of kHalfWidthVoxels voxels on both sides of the surface it is
+/// +-kHalfWidth voxels. A value: copies share the grid, and nothing writes to it.
 class LevelSet {
 public:
     /// The zero level set of any grid that is negative inside; its distance is made exact.

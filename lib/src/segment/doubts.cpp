@@ -1,14 +1,13 @@
 #include "segment/doubts.h"
 
 #include <openvdb/openvdb.h>
-#include <openvdb/tools/Interpolation.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "covol/error.h"
 #include "covol/points.h"
+#include "grid/levels_at.h"
 #include "points/kd_tree.h"
 #include "segment/heuristics.h"
 
@@ -79,17 +78,6 @@ void require_outside(const Problem& problem, const FloatGrid& u, const std::vect
                     "body, or give places outside of it (`outside`)");
 }
 
-std::vector<double> levels_at(const FloatGrid& u, const std::vector<Vec3>& places) {
-    std::vector<double> levels(places.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, places.size(), 256), [&](const auto& range) {
-        const auto accessor = u.getConstAccessor();
-        for (std::size_t n = range.begin(); n != range.end(); ++n)
-            levels[n] = openvdb::tools::BoxSampler::sample(
-                accessor, u.worldToIndex(openvdb::Vec3d(places[n][0], places[n][1], places[n][2])));
-    });
-    return levels;
-}
-
 Remarks doubt_isolated_marks(const Problem& problem) {
     Remarks remarks;
     const std::vector<IsolatedPoint> isolated = find_isolated_points(problem.given);
@@ -119,7 +107,7 @@ double largest_error_of_marks(const Problem& problem, double h, double noise) {
 bool misses_marks(const Problem& problem, const StartFacts& start, const FloatGrid& u) {
     const double beyond = std::min(largest_error_of_marks(problem, start.domain.voxel_size, start.cloud.noise),
                                    0.9 * double(u.background()));
-    const std::vector<double> levels = levels_at(u, start.marks.trusted);
+    const std::vector<double> levels = detail::levels_at(u, start.marks.trusted);
     const auto far =
         std::count_if(levels.begin(), levels.end(), [&](double level) { return std::abs(level) > beyond; });
     return double(far) > kDoubts.missed_share * double(start.marks.trusted.size());

@@ -22,9 +22,6 @@ namespace covol::pipeline {
 /// @throws Error InvalidInput
 void require_outside(const Problem& problem, const FloatGrid& u, const std::vector<char>& in_start);
 
-/// Of a level set, trilinear. @param places  world units
-[[nodiscard]] std::vector<double> levels_at(const FloatGrid& u, const std::vector<Vec3>& places);
-
 /// How far a mark may lie from the surface that it marks, world units.
 /// @param noise  of a cloud, else 0
 [[nodiscard]] double largest_error_of_marks(const Problem& problem, double h, double noise);

@@ -2,10 +2,7 @@
 
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Composite.h>
-#include <openvdb/tools/Interpolation.h>
 #include <openvdb/tools/ValueTransformer.h>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <cmath>
 #include <string>
@@ -16,12 +13,11 @@
 #include "covol/mesh_stream.h"
 #include "covol/start.h"
 #include "covol/surface.h"
+#include "grid/levels_at.h"
 #include "redistance/redistance.h"
 
 namespace covol {
 namespace {
-
-openvdb::Vec3d to_vdb(const Vec3& p) { return {p[0], p[1], p[2]}; }
 
 /// The other on the lattice of the first; null where none of it lies in the domain of that.
 FloatGridPtr on_lattice_of(const LevelSet& first, const LevelSet& other, const RunContext& run) {
@@ -54,19 +50,9 @@ LevelSet::LevelSet(FloatGridPtr distance) : grid_(std::move(distance)) {
 
 Domain LevelSet::domain() const { return domain_of(*grid_); }
 
-std::vector<double> LevelSet::sample(std::span<const Vec3> places) const {
-    std::vector<double> levels(places.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, places.size(), 256), [&](const auto& range) {
-        const auto accessor = grid_->getConstAccessor();
-        for (std::size_t n = range.begin(); n != range.end(); ++n)
-            levels[n] = openvdb::tools::BoxSampler::sample(accessor, grid_->worldToIndex(to_vdb(places[n])));
-    });
-    return levels;
-}
+std::vector<double> LevelSet::sample(std::span<const Vec3> places) const { return detail::levels_at(*grid_, places); }
 
-double LevelSet::sample(const Vec3& place) const {
-    return openvdb::tools::BoxSampler::sample(grid_->getConstAccessor(), grid_->worldToIndex(to_vdb(place)));
-}
+double LevelSet::sample(const Vec3& place) const { return sample(std::span(&place, 1)).front(); }
 
 LevelSet LevelSet::offset(double distance, const RunContext& run) const {
     if (!std::isfinite(distance))
@@ -77,7 +63,8 @@ LevelSet LevelSet::offset(double distance, const RunContext& run) const {
         const double half_width = kHalfWidthVoxels + std::abs(distance) / own.voxel_size;
         moved = detail::redistance(*grid_, own, half_width, detail::DomainEnd::Closed, "offset", run);
         const auto shift = float(distance);
-        openvdb::tools::foreach(moved->beginValueAll(), [shift](const auto& value) { value.setValue(*value - shift); });
+        openvdb::tools::foreach (moved->beginValueAll(),
+                                 [shift](const auto& value) { value.setValue(*value - shift); });
         moved->tree().root().setBackground(moved->background() - shift, false);
     });
     return from(*moved, run);

@@ -78,8 +78,15 @@ TEST_CASE("segment: image and points agree on the ball") {
     CHECK(result.report.domain.voxel_size == 1.0);
     CHECK(result.report.surface.closed);
     CHECK(std::abs(mean_radius(result.mesh) - kRadius) < 0.25);
-    CHECK(result.edge != nullptr);
-    CHECK(result.report.resolved.edge.edge_k.value() > 0);
+    // A guess that the image corrects needs no edges: none are looked for.
+    CHECK(result.report.guidance.used);
+    CHECK(result.edge == nullptr);
+    CHECK_FALSE(result.report.resolved.edge.edge_k.has_value());
+    SegmentOptions tagged;
+    tagged.start.kind = Start::Kind::Tag;
+    const SegmentResult flowed = segment(image, sphere_points(800), tagged);
+    CHECK(flowed.edge != nullptr);
+    CHECK(flowed.report.resolved.edge.edge_k.value() > 0);
 }
 
 TEST_CASE("segment: a sphere as start follows the image edge, without points") {

@@ -37,7 +37,7 @@ TEST_CASE("LevelSet: samples are the distance, clamped at the band's half width"
     const std::vector<double> expected{0, 0.3, -0.3, -kHalfWidthVoxels * kH, kHalfWidthVoxels * kH},
         found = surface.sample(places);
     for (std::size_t n = 0; n < places.size(); ++n) {
-        CHECK(std::abs(found[n] - expected[n]) < 0.02 * kH);
+        CHECK(std::abs(found[n] - expected[n]) < 0.04 * kH);
         CHECK(surface.sample(places[n]) == found[n]);
     }
 }
@@ -46,8 +46,10 @@ TEST_CASE("LevelSet: an offset ball is the ball of the other radius, beyond the 
     const LevelSet surface = ball({0.1, 0, -0.2}, 3);
     for (const double distance : {-2.0, -0.4, 0.0, 0.4, 2.0}) {
         const LevelSet moved = surface.offset(distance);
-        CHECK(std::abs(moved.measure().volume / volume_of(3 + distance) - 1) < 0.01);
-        CHECK(std::abs(moved.sample({3.1 + distance, 0, -0.2})) < 0.03 * kH);
+        // A tenth of a voxel: distances far from the surface are those to its patches.
+        const double error = 0.1 * kH, radius = 3 + distance;
+        CHECK(std::abs(moved.measure().volume - volume_of(radius)) < volume_of(radius + error) - volume_of(radius));
+        CHECK(std::abs(moved.sample({0.1 + radius, 0, -0.2})) < error);
         CHECK(moved.domain() == surface.domain());
     }
     CHECK_THROWS_AS(surface.offset(-3.5), Error);
@@ -60,14 +62,16 @@ TEST_CASE("LevelSet: unions, intersections and differences have their volumes, a
     // On another lattice: what it is combined with is resampled.
     const LevelSet other = ball({1.5, 0, 0}, 2.5, make_domain({{-5, -5, -5}, {5, 5, 5}}, 0.2));
     const double shared = lens(2.5, apart), one = volume_of(2.5);
+    // Where the surfaces cross, triangles round the edge off by less than half a voxel each way, on a ring of radius 2.
+    const double ring = 2 * std::numbers::pi * 2, error = ring * 0.5 * kH * kH + 0.01 * one;
     for (const LevelSet& second : {b, other}) {
-        CHECK(std::abs(a.united(second).measure().volume / (2 * one - shared) - 1) < 0.01);
-        CHECK(std::abs(a.intersected(second).measure().volume / shared - 1) < 0.02);
-        CHECK(std::abs(a.without(second).measure().volume / (one - shared) - 1) < 0.01);
+        CHECK(std::abs(a.united(second).measure().volume - (2 * one - shared)) < 2 * error);
+        CHECK(std::abs(a.intersected(second).measure().volume - shared) < error);
+        CHECK(std::abs(a.without(second).measure().volume - (one - shared)) < error);
         CHECK(a.united(second).domain() == a.domain());
     }
     // Inside a union's waist its distance is that to the seam, not to a ball's surface within the other.
-    CHECK(a.united(b).sample({0, 1.5, 0}) == Approx(-0.5).margin(0.05));
+    CHECK(a.united(b).sample({0, 1.5, 0}) == Approx(-0.5).margin(0.4 * kH));
     CHECK_THROWS_AS(ball({-4, 0, 0}, 1).intersected(ball({4, 0, 0}, 1)), Error);
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "covol/compare.h"
+#include "grid/levels_at.h"
 #include "image/support.h"
 #include "meshing/mesh_distance.h"
 #include "points/kd_tree.h"
@@ -90,7 +91,7 @@ private:
     }
 
     void find_bias() {
-        const std::vector<double> levels = levels_at(*surface_.level_set, marks_);
+        const std::vector<double> levels = detail::levels_at(*surface_.level_set, marks_);
         double sum = 0, squares = 0;
         for (std::size_t n = 0; n < marks_.size(); ++n) {
             const double d = std::copysign(surface_.mark_distances[n], levels[n]);
@@ -157,7 +158,7 @@ private:
         for (std::size_t n = 0; n < marks_.size(); n += every)
             for (int a = 0; a < 3; ++a)
                 for (const double step : {-0.5, 0.5}) beside.emplace_back(marks_[n])[std::size_t(a)] += step * h_;
-        const std::vector<double> levels = levels_at(*surface_.level_set, beside);
+        const std::vector<double> levels = detail::levels_at(*surface_.level_set, beside);
         Normals found;
         for (std::size_t n = 0, first = 0; n < marks_.size(); n += every, first += 6) {
             Vec3 normal{};

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "covol/error.h"
-#include "segment/doubts.h"
+#include "grid/levels_at.h"
 #include "segment/heuristics.h"
 #include "segment/solve/vanished.h"
 
@@ -53,7 +53,7 @@ EvolveReport approach_and_evolve(const StartFacts& start, FloatGrid& u, const Ev
 /// Of places to the zero level set; in its band, so clamped.
 double mean_distance(const std::vector<Vec3>& places, const FloatGrid& u) {
     double sum = 0;
-    for (const double level : levels_at(u, places)) sum += std::abs(level);
+    for (const double level : detail::levels_at(u, places)) sum += std::abs(level);
     return sum / double(places.size());
 }
 
