@@ -45,8 +45,8 @@ struct BrickPlan {
     [[nodiscard]] COVOL_API std::int64_t active_voxels() const;
 };
 
-/// What solving a brick did.
-struct BrickReport {
+struct SolvedBrick {
+    FloatGridPtr state;  ///< no leaf where no surface passes it
     StopReason stop_reason = StopReason::NotRun;
     int steps = 0;
     std::int64_t active_voxels = 0;
@@ -73,10 +73,10 @@ public:
     /// Solves the whole coarsely and splits it. @throws Error as segment() and reconstruct(), InvalidOptions.
     [[nodiscard]] COVOL_API BrickPlan plan(const BrickOptions& options) const;
     /// One sweep of one brick, from its own and its neighbours' last states, or from the coarse solve where `states`
-    /// has none. @return its state: no leaf where no surface passes it @throws Error InvalidInput (a plan of a job with
+    /// has none. @throws Error InvalidInput (a plan of a job with
     /// another voxel size)
-    [[nodiscard]] COVOL_API FloatGridPtr solve(const BrickPlan& plan, std::size_t brick, const BrickStates& states,
-                                               BrickReport& report) const;
+    [[nodiscard]] COVOL_API SolvedBrick solve(const BrickPlan& plan, std::size_t brick,
+                                              const BrickStates& states) const;
     /// Joins the states of all bricks and finishes the surface as segment() does.
     /// @param without_mesh  as SegmentOptions::without_mesh, where that is not set already
     /// @throws Error InvalidInput (no surface is left)

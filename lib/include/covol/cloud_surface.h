@@ -29,6 +29,11 @@ struct CloudReport {
     HintsReport hints;               ///< CloudOrientation::hints
 };
 
+struct CloudSurface {
+    FloatGridPtr u;
+    CloudReport report;
+};
+
 /// The closed surface behind points without normals, as a start (negative inside).
 ///
 /// Near the points, oriented by the indicator function that they make themselves (orient_cloud()), the level set is the
@@ -38,7 +43,7 @@ struct CloudReport {
 /// that enclose nothing it is the screened indicator. Where the indicator has fewer pieces and handles its topology is
 /// held.
 /// @throws Error InvalidInput (no surface), Cancelled.
-[[nodiscard]] COVOL_API FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cloud,
-                                                        CloudReport& report, const RunContext& run = {});
+[[nodiscard]] COVOL_API CloudSurface surface_from_cloud(const Domain& domain, const CloudOrientation& cloud,
+                                                        const RunContext& run = {});
 
 }  // namespace covol

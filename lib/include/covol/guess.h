@@ -41,6 +41,7 @@ struct GuessReport {
 struct Guess {
     FloatGridPtr u;           ///< a start as those of band.h: u0 clamped to +-3h, active beside the surface
     std::vector<Vec3> marks;  ///< on the surface; the others lie in the cut
+    GuessReport report;
 };
 
 /// A guess of the surface from few marks: through them it bends least (variational implicit surface, see
@@ -48,7 +49,6 @@ struct Guess {
 /// @throws Error InvalidOptions; InvalidInput (fewer than four distinct marks, all in one plane, nothing inside the
 /// domain).
 [[nodiscard]] COVOL_API Guess guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks,
-                                               const GuessOptions& options, GuessReport& report,
-                                               const RunContext& run = {});
+                                               const GuessOptions& options, const RunContext& run = {});
 
 }  // namespace covol

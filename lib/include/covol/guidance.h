@@ -46,6 +46,11 @@ struct GuidanceReport {
     COVOL_API void add(const GuidanceReport& pass, bool moved);
 };
 
+struct Guided {
+    FloatGridPtr u;  ///< a level set as start_from_grid() gives, on the guess's domain
+    GuidanceReport report;
+};
+
 /// Moves a guess to where the image shows, between the marks, the border that it shows at the marks.
 ///
 /// How often each brightness occurs at each depth along the surface's normals is learnt at the marks, whatever it is: a
@@ -57,10 +62,9 @@ struct GuidanceReport {
 ///
 /// @param guess  level set, negative inside, on its domain's lattice
 /// @param marks  world positions; at least 8 near the guess, or the image is not used
-/// @return a level set as start_from_grid() gives, on the guess's domain. Does not depend on the number of threads.
+/// @return does not depend on the number of threads
 /// @throws Error InvalidOptions, InvalidInput (no surface in the domain), Cancelled.
-[[nodiscard]] COVOL_API FloatGridPtr guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const Image& image,
-                                           const GuidanceOptions& options, GuidanceReport& report,
-                                           const RunContext& run = {});
+[[nodiscard]] COVOL_API Guided guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const Image& image,
+                                     const GuidanceOptions& options = {}, const RunContext& run = {});
 
 }  // namespace covol

@@ -53,6 +53,11 @@ struct HolesReport {
 [[nodiscard]] COVOL_API double measure_share_beyond(const TriangleMesh& mesh, const std::vector<float>& distances,
                                                     double distance);
 
+struct TreatedHoles {
+    TriangleMesh mesh;
+    HolesReport report;
+};
+
 /// Takes away what lies farther than `distance` from all points, back to the last of them: all that is closer than that
 /// to such a place. So a ball of that radius rolls along the rim, which is as smooth as it. Triangles are cut along the
 /// line, vertices close to it moved onto it, and pieces smaller than the ball's disc left out.
@@ -61,15 +66,13 @@ struct HolesReport {
 /// @param slack      of the rim beyond the last points, world units, < distance
 /// @return 2-manifold with boundary, outward; the mesh itself where there is no hole
 /// @throws Error InvalidInput where nothing is left.
-[[nodiscard]] COVOL_API TriangleMesh trim_holes(const TriangleMesh& mesh, const std::vector<float>& to_points,
-                                                double distance, double slack, HolesReport& report,
-                                                const RunContext& run = {});
+[[nodiscard]] COVOL_API TreatedHoles trim_holes(const TriangleMesh& mesh, const std::vector<float>& to_points,
+                                                double distance, double slack, const RunContext& run = {});
 
 /// The same cut, with the surface of least area in each hole instead of what was there (Pinkall and Polthier, Computing
 /// discrete minimal surfaces and their conjugates, Experimental Mathematics 2, 1993). It may pass through itself: a
 /// level set made from it does not.
-[[nodiscard]] COVOL_API TriangleMesh flatten_holes(const TriangleMesh& mesh, const std::vector<float>& to_points,
-                                                   double distance, double slack, HolesReport& report,
-                                                   const RunContext& run = {});
+[[nodiscard]] COVOL_API TreatedHoles flatten_holes(const TriangleMesh& mesh, const std::vector<float>& to_points,
+                                                   double distance, double slack, const RunContext& run = {});
 
 }  // namespace covol

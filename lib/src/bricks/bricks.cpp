@@ -270,9 +270,7 @@ struct BrickJob::Parts {
         plan.domain = choose_cloud_domain(problem, h(), resolved.marks.attracting);
         Domain lattice = plan.domain;
         lattice.voxel_size *= coarse_factor();
-        CloudReport unused;
-        plan.coarse =
-            surface_from_cloud(covering(lattice, plan.domain.world_box()), *resolved.choices.cloud, unused, run);
+        plan.coarse = surface_from_cloud(covering(lattice, plan.domain.world_box()), *resolved.choices.cloud, run).u;
     }
 
     void plan_flow(BrickPlan& plan) const {
@@ -321,20 +319,20 @@ BrickPlan BrickJob::plan(const BrickOptions& options) const {
     return plan;
 }
 
-FloatGridPtr BrickJob::solve(const BrickPlan& plan, std::size_t brick, const BrickStates& states,
-                             BrickReport& report) const {
+SolvedBrick BrickJob::solve(const BrickPlan& plan, std::size_t brick, const BrickStates& states) const {
     const RunContext& run = parts_->run;
     const Resolved& resolved = parts_->resolved;
     parts_->require_plan_of_this_job(plan);
     const VoxelBox core = plan.bricks.at(brick).core;
     const Domain kept = bricks::around(plan.domain, core, kStateLayers);
-    FloatGridPtr state = make_grid(kept, float(kHalfWidthVoxels * plan.domain.voxel_size), "u");
+    SolvedBrick result;
+    FloatGridPtr& state = result.state = make_grid(kept, float(kHalfWidthVoxels * plan.domain.voxel_size), "u");
     with_threads(run, [&] {
-        const Timed timed(report.seconds);
-        report.stop_reason = StopReason::Steady;
+        const Timed timed(result.seconds);
+        result.stop_reason = StopReason::Steady;
         if (parts_->field) {
             state = parts_->field->on(bricks::around(plan.domain, core, 0), run);
-            report.active_voxels = std::int64_t(state->activeVoxelCount());
+            result.active_voxels = std::int64_t(state->activeVoxelCount());
             return;
         }
         const Domain part = bricks::around(plan.domain, core, plan.options.overlap);
@@ -347,15 +345,15 @@ FloatGridPtr BrickJob::solve(const BrickPlan& plan, std::size_t brick, const Bri
         start.obstacle = frame.obstacle;
         start.distance = find_distance_for_flow(start.facts, *start.u, start.facts.report, run);
         const Solution solution = flow(parts_->problem, std::move(start), plan.edge);
-        report.stop_reason = solution.solve.stop_reason;
-        report.steps = solution.solve.steps;
-        report.active_voxels = solution.solve.active_voxels;
+        result.stop_reason = solution.solve.stop_reason;
+        result.steps = solution.solve.steps;
+        result.active_voxels = solution.solve.active_voxels;
         if (solution.has_vanished()) return;
         solution.u->setName("u");
         state = bricks::leaves_within(*solution.u, {kept.min, kept.max});
         set_domain(*state, kept);
     });
-    return state;
+    return result;
 }
 
 SegmentResult BrickJob::join(const BrickPlan& plan, const BrickStates& states, bool without_mesh) const {

@@ -191,15 +191,16 @@ std::string GuessOptions::why_invalid() const {
 bool can_enclose(const std::vector<Vec3>& marks) { return guess::span_space(marks); }
 
 Guess guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks, const GuessOptions& options,
-                       GuessReport& report, const RunContext& run) {
-    return guess::guess_in_image(domain, marks, options, options.end ? make_clip(*options.end) : Clip{}, report, run);
+                       const RunContext& run) {
+    return guess::guess_in_image(domain, marks, options, options.end ? make_clip(*options.end) : Clip{}, run);
 }
 
 Guess guess::guess_in_image(const Domain& domain, const std::vector<Vec3>& marks, const GuessOptions& given,
-                            const Clip& image, GuessReport& report, const RunContext& run) {
+                            const Clip& image, const RunContext& run) {
     const InImage options(given, image);
     detail::require_valid(options, "guess");
     Guess result;
+    GuessReport& report = result.report;
     with_threads(run, [&] {
         result.marks = without_cut_marks(marks, options, run);
         guess::ImpreciseMarks known = imprecise(result.marks, options);

@@ -9,6 +9,6 @@ namespace covol::guess {
 /// guess_from_marks() in an image whose axes need not be the world's.
 /// @param image  where the body is cut off, instead of GuessOptions::end; empty: nowhere
 [[nodiscard]] Guess guess_in_image(const Domain& domain, const std::vector<Vec3>& marks, const GuessOptions& options,
-                                   const Clip& image, GuessReport& report, const RunContext& run);
+                                   const Clip& image, const RunContext& run);
 
 }  // namespace covol::guess

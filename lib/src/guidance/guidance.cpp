@@ -468,12 +468,12 @@ std::string GuidanceOptions::why_invalid() const {
     return checks.lines();
 }
 
-FloatGridPtr guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const Image& image,
-                   const GuidanceOptions& options, GuidanceReport& report, const RunContext& run) {
+Guided guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const Image& image, const GuidanceOptions& options,
+             const RunContext& run) {
     detail::require_valid(options, "guide");
-    report = {};
-    FloatGridPtr result;
-    with_threads(run, [&] {
+    Guided guided;
+    auto& [result, report] = guided;
+    with_threads(run, [&, &result = result, &report = report] {
         result = start_from_grid(domain_of(guess), guess, run);
         if (marks.empty() || !(options.weight > 0) || options.range == 0.0) {
             report.reason = marks.empty() ? "there are no marks to learn the border from" : "the image has no weight";
@@ -493,7 +493,7 @@ FloatGridPtr guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const
         if (report.used) result = start_from_grid(domain_of(guess), *result, run);
         run.report("image guidance", 1);
     });
-    return result;
+    return guided;
 }
 
 }  // namespace covol

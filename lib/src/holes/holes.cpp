@@ -238,18 +238,20 @@ std::vector<BoundaryLoop> find_boundary_loops(const TriangleMesh& mesh) {
     return loops;
 }
 
-TriangleMesh trim_holes(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack,
-                        HolesReport& report, const RunContext& run) {
+TreatedHoles trim_holes(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack,
+                        const RunContext& run) {
+    HolesReport report;
     const holes::CutMesh cut = cut_holes(mesh, to_points, distance, slack, report, run, "trim_holes");
     report.policy = Holes::Open;
-    return report.share > 0 ? holes::kept_part(cut) : mesh;
+    return {report.share > 0 ? holes::kept_part(cut) : mesh, std::move(report)};
 }
 
-TriangleMesh flatten_holes(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack,
-                           HolesReport& report, const RunContext& run) {
+TreatedHoles flatten_holes(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack,
+                           const RunContext& run) {
+    TreatedHoles treated;
+    auto& [result, report] = treated;
     holes::CutMesh cut = cut_holes(mesh, to_points, distance, slack, report, run, "flatten_holes");
-    TriangleMesh result;
-    with_threads(run, [&] {
+    with_threads(run, [&, &result = result] {
         std::vector<char> fixed(cut.mesh.vertices.size(), 0), spans(cut.mesh.vertices.size(), 0);
         for (std::size_t t = 0; t < cut.kept.size(); ++t)
             if (cut.kept[t])
@@ -266,7 +268,7 @@ TriangleMesh flatten_holes(const TriangleMesh& mesh, const std::vector<float>& t
         remove_small_components(result, 0);  // vertices that nothing refers to
     });
     report.policy = Holes::Flat;
-    return result;
+    return treated;
 }
 
 }  // namespace covol

@@ -45,8 +45,7 @@ int solve_all(const BrickJob& job, const BrickPlan& plan, std::vector<FloatGridP
         bool moved = false;
         for (std::size_t n = 0; n < states.size(); ++n) {
             if (sweep > 1 && (!plan.has_sweeps || measure_seams(plan, n, known) < plan.options.tolerance)) continue;
-            BrickReport report;
-            states[n] = job.solve(plan, n, known, report);
+            states[n] = job.solve(plan, n, known).state;
             moved = true;
         }
         if (!moved) return sweep - 1;
@@ -183,12 +182,10 @@ TEST_CASE("a brick is held at its neighbours' states, and moved by no others") {
     bricks.most_voxels = 30000;
     const BrickPlan plan = job.plan(bricks);
     const BrickStates none = [](std::size_t) { return FloatGridPtr(); };
-    BrickReport report;
-    const FloatGridPtr once = job.solve(plan, 1, none, report);
-    CHECK(report.stop_reason == StopReason::Steady);
-    CHECK(report.steps > 0);
-    const FloatGridPtr again = job.solve(plan, 1, none, report);
-    CHECK(apart(*once, *again).most == 0);
+    const SolvedBrick once = job.solve(plan, 1, none), again = job.solve(plan, 1, none);
+    CHECK(once.stop_reason == StopReason::Steady);
+    CHECK(once.steps > 0);
+    CHECK(apart(*once.state, *again.state).most == 0);
     CHECK(measure_seams(plan, 1, none) > 1);  // nothing is known yet
     CHECK_THROWS_AS(job.join(plan, none), Error);
 }

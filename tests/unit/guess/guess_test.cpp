@@ -82,8 +82,7 @@ struct Bias {
 
 Bias bias_of(const Shape& shape, const std::vector<Vec3>& marks, const GuessOptions& options) {
     const Domain domain = cube_domain(80, 1.0);
-    GuessReport report;
-    const FloatGridPtr guess = guess_from_marks(domain, marks, options, report).u;
+    const FloatGridPtr guess = guess_from_marks(domain, marks, options).u;
     const TriangleMesh mesh = extract_mesh(*extract_surface(*guess), {});
     double sum = 0;
     for (const auto& v : mesh.vertices) sum += shape.distance({v[0], v[1], v[2]});
@@ -121,11 +120,10 @@ TEST_CASE("rough marks in thick slices enclose a body") {
                 const double times = knob(random);
                 for (int a = 0; a < 3; ++a) mark[a] = times * mark[a] + off(random) * spacing[a];
             }
-            GuessReport report;
-            const FloatGridPtr guess = guess_from_marks(cube_domain(120, 1.0), marks, precision(spacing), report).u;
-            const double volume = measure(extract_mesh(*extract_surface(*guess), {})).volume / shape.volume;
-            held += report.held_around;
-            INFO(count << " marks, seed " << seed << ": volume " << volume << ", held " << report.held_around);
+            const Guess guess = guess_from_marks(cube_domain(120, 1.0), marks, precision(spacing));
+            const double volume = measure(extract_mesh(*extract_surface(*guess.u), {})).volume / shape.volume;
+            held += guess.report.held_around;
+            INFO(count << " marks, seed " << seed << ": volume " << volume << ", held " << guess.report.held_around);
             CHECK(volume > 0.5);
             CHECK(volume < 2);
         }
@@ -134,9 +132,8 @@ TEST_CASE("rough marks in thick slices enclose a body") {
 
 TEST_CASE("what encloses nothing is refused with a reason") {
     const Domain domain = cube_domain(40, 1.0);
-    GuessReport report;
     const auto guess = [&](const std::vector<Vec3>& marks) {
-        return guess_from_marks(domain, marks, precision({1, 1, 1}), report).u;
+        return guess_from_marks(domain, marks, precision({1, 1, 1})).u;
     };
     CHECK_THROWS_WITH(guess({{0, 0, 0}, {5, 0, 0}, {0, 5, 0}}), Catch::Contains("at least 4 marks"));
     std::vector<Vec3> ring;
@@ -148,14 +145,13 @@ TEST_CASE("a guess does not depend on the number of threads, nor on where the wo
     const Shape shape = ellipsoid("ellipsoid", {18, 12, 10});
     const Domain domain = cube_domain(56, 1.0);
     const std::vector<Vec3> marks = draw(shape, 500, 5);  // parts, too
-    GuessReport report;
     RunContext one, four;
     one.threads = 1;
     four.threads = 4;
-    const FloatGridPtr a = guess_from_marks(domain, marks, precision({1, 1, 1}), report, one).u;
-    const FloatGridPtr b = guess_from_marks(domain, marks, precision({1, 1, 1}), report, four).u;
-    CHECK(report.patches > 0);
-    CHECK(identical(*a, *b));
+    const Guess a = guess_from_marks(domain, marks, precision({1, 1, 1}), one);
+    const Guess b = guess_from_marks(domain, marks, precision({1, 1, 1}), four);
+    CHECK(a.report.patches > 0);
+    CHECK(identical(*a.u, *b.u));
 }
 
 TEST_CASE("marks in the cut are told from marks on the surface") {
@@ -177,8 +173,7 @@ TEST_CASE("marks in the cut are told from marks on the surface") {
         const Vec3 p{along(random), along(random), top - 0.5};
         if (std::hypot(p[0], p[1]) < 0.8 * rim) marks.push_back(p);
     }
-    GuessReport report;
-    const FloatGridPtr guess = guess_from_marks(domain, marks, options, report).u;
+    const auto [guess, kept, report] = guess_from_marks(domain, marks, options);
     CHECK(report.cut_marks == 60);
     double sum = 0;
     int count = 0;
@@ -196,8 +191,7 @@ TEST_CASE("a seed in a cavity makes it one, and one in a dent keeps it open") {
     GuessOptions options = precision({1, 1, 1});
     options.outside = {{0, 0, 0}};
     options.inside = {{16, 0, 0}, {0, -16, 0}};
-    GuessReport report;
-    const FloatGridPtr guess = guess_from_marks(domain, marks, options, report).u;
+    const auto [guess, kept, report] = guess_from_marks(domain, marks, options);
     CHECK(report.wrong_seeds == 0);
     CHECK(value_at(*guess, {0, 0, 0}) > 0);
     CHECK(value_at(*guess, {0, 16, 0}) < 0);

@@ -77,18 +77,11 @@ std::vector<Vec3> sphere_points(int count, unsigned seed, Keep keep) {
     return points;
 }
 
-struct Trial {
-    TriangleMesh mesh;
-    HolesReport report;
-};
 template <typename Function>
-Trial treat(Function function, const TriangleMesh& mesh, const std::vector<Vec3>& points,
-            double slack_share = 1.0 / 6) {
-    Trial result;
+TreatedHoles treat(Function function, const TriangleMesh& mesh, const std::vector<Vec3>& points,
+                   double slack_share = 1.0 / 6) {
     const double distance = choose_hole_distance(points, 0.01);
-    result.mesh =
-        function(mesh, measure_distances(mesh, points), distance, slack_share * distance, result.report, RunContext{});
-    return result;
+    return function(mesh, measure_distances(mesh, points), distance, slack_share * distance, RunContext{});
 }
 
 }  // namespace
@@ -188,7 +181,7 @@ TEST_CASE("a sphere with holes is cut at the last points, whatever the draw") {
             // Points below the level: a hole of radius sqrt(1 - level^2) above it.
             const std::vector<Vec3> points = sphere_points(8000, seed, [&](const Vec3& p) { return p[2] < level; });
             const double spacing = std::sqrt(4 * kPi / 8000), rim = 2 * kPi * std::sqrt(1 - level * level);
-            const Trial open = treat(trim_holes, sphere, points);
+            const TreatedHoles open = treat(trim_holes, sphere, points);
             INFO("seed " << seed << ", hole above z = " << level);
             REQUIRE(open.report.loops.size() == 1);
             CHECK(open.report.loops[0].length == Approx(rim).epsilon(0.06));
@@ -214,7 +207,7 @@ TEST_CASE("a sphere with holes is cut at the last points, whatever the draw") {
             }
             CHECK(inward == 0);
 
-            const Trial flat = treat(flatten_holes, sphere, points);
+            const TreatedHoles flat = treat(flatten_holes, sphere, points);
             const double cap = kPi * (1 - level * level), below = kPi * (2.0 / 3 + level - level * level * level / 3);
             CHECK(measure(flat.mesh).closed);
             CHECK(measure(flat.mesh).area == Approx(2 * kPi * (1 + level) + cap).margin(rim * spacing));
@@ -226,31 +219,30 @@ TEST_CASE("a sphere with holes is cut at the last points, whatever the draw") {
 TEST_CASE("two holes, no hole, and nothing but holes") {
     const TriangleMesh sphere = sphere_mesh(5);
     const std::vector<Vec3> belt = sphere_points(8000, 3, [](const Vec3& p) { return std::abs(p[2]) < 0.6; });
-    const Trial open = treat(trim_holes, sphere, belt);
+    const TreatedHoles open = treat(trim_holes, sphere, belt);
     REQUIRE(open.report.loops.size() == 2);
     for (const BoundaryLoop& loop : open.report.loops) CHECK(loop.length == Approx(2 * kPi * 0.8).epsilon(0.06));
     CHECK(measure(treat(flatten_holes, sphere, belt).mesh).volume == Approx(2 * kPi * (0.6 - 0.072)).epsilon(0.05));
 
     const std::vector<Vec3> all = sphere_points(8000, 4, [](const Vec3&) { return true; });
-    const Trial whole = treat(trim_holes, sphere, all);
+    const TreatedHoles whole = treat(trim_holes, sphere, all);
     CHECK(whole.report.loops.empty());
     CHECK(whole.report.share == 0);
     CHECK(whole.mesh.triangles == sphere.triangles);
     CHECK(measure_share_beyond(sphere, measure_distances(sphere, all), whole.report.distance) == 0);
 
-    HolesReport report;
     const std::vector<Vec3> far{{5, 0, 0}};
-    CHECK_THROWS_AS(trim_holes(sphere, measure_distances(sphere, far), 0.1, 0.01, report), Error);
-    CHECK_THROWS_AS(flatten_holes(sphere, measure_distances(sphere, far), 0.1, 0.01, report), Error);
-    CHECK_THROWS_AS(trim_holes(sphere, {}, 0.1, 0.01, report), Error);
-    CHECK_THROWS_AS(trim_holes(sphere, measure_distances(sphere, all), 0.1, 0.1, report), Error);
+    CHECK_THROWS_AS(trim_holes(sphere, measure_distances(sphere, far), 0.1, 0.01), Error);
+    CHECK_THROWS_AS(flatten_holes(sphere, measure_distances(sphere, far), 0.1, 0.01), Error);
+    CHECK_THROWS_AS(trim_holes(sphere, {}, 0.1, 0.01), Error);
+    CHECK_THROWS_AS(trim_holes(sphere, measure_distances(sphere, all), 0.1, 0.1), Error);
 }
 
 TEST_CASE("a few points by themselves in a hole are no piece of the surface") {
     const TriangleMesh sphere = sphere_mesh(5);
     std::vector<Vec3> points = sphere_points(8000, 5, [](const Vec3& p) { return p[2] < 0; });
     points.push_back({0, 0, 1});
-    const Trial open = treat(trim_holes, sphere, points);
+    const TreatedHoles open = treat(trim_holes, sphere, points);
     CHECK(open.report.dropped_pieces <= 1);
     CHECK(open.report.loops.size() == 1);
     CHECK(measure(open.mesh).components == 1);

@@ -77,15 +77,14 @@ private:
                 return false;
             }
         }
-        BrickReport report;
-        const FloatGridPtr state = job_.solve(plan_, brick, states, report);
+        const SolvedBrick solved = job_.solve(plan_, brick, states);
         run_.check();  // what was cancelled is no state
-        facts.update({{"steps", report.steps},
-                      {"stop_reason", to_string(report.stop_reason)},
-                      {"active_voxels", report.active_voxels},
-                      {"seconds", report.seconds},
+        facts.update({{"steps", solved.steps},
+                      {"stop_reason", to_string(solved.stop_reason)},
+                      {"active_voxels", solved.active_voxels},
+                      {"seconds", solved.seconds},
                       {"peak_rss_bytes", peak_rss()}});
-        folder_.write_state(sweep, brick, state, facts);
+        folder_.write_state(sweep, brick, solved.state, facts);
         return true;
     }
 

@@ -36,7 +36,6 @@ void settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport& report
 
 /// The settled field over a domain. Its zero level set is the surface; it is no distance, nor are its active voxels a
 /// band, for which there is start_from_grid() or extract_surface().
-[[nodiscard]] FloatGridPtr settled_field(const Domain& domain, const CloudOrientation& cloud, CloudReport& report,
-                                         const RunContext& run);
+[[nodiscard]] CloudSurface settled_field(const Domain& domain, const CloudOrientation& cloud, const RunContext& run);
 
 }  // namespace covol::cloud

@@ -112,18 +112,19 @@ void cloud::settle(FloatGrid& field, const CloudOrientation& cloud, CloudReport&
     if (topology.own.pieces > 1) join();
 }
 
-FloatGridPtr cloud::settled_field(const Domain& domain, const CloudOrientation& cloud, CloudReport& report,
-                                  const RunContext& run) {
-    FloatGridPtr field = cloud::CloudField(cloud, domain.voxel_size, report, run).on(domain, run);
-    settle(*field, cloud, report, run);
-    return field;
+CloudSurface cloud::settled_field(const Domain& domain, const CloudOrientation& cloud, const RunContext& run) {
+    CloudSurface result;
+    result.u = cloud::CloudField(cloud, domain.voxel_size, result.report, run).on(domain, run);
+    settle(*result.u, cloud, result.report, run);
+    return result;
 }
 
-FloatGridPtr surface_from_cloud(const Domain& domain, const CloudOrientation& cloud, CloudReport& report,
-                                const RunContext& run) {
-    FloatGridPtr result;
-    with_threads(run,
-                 [&] { result = start_from_grid(domain, *cloud::settled_field(domain, cloud, report, run), run); });
+CloudSurface surface_from_cloud(const Domain& domain, const CloudOrientation& cloud, const RunContext& run) {
+    CloudSurface result;
+    with_threads(run, [&] {
+        result = cloud::settled_field(domain, cloud, run);
+        result.u = start_from_grid(domain, *result.u, run);
+    });
     return result;
 }
 

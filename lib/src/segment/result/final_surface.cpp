@@ -90,17 +90,18 @@ struct Maker {
         holes.policy = asked.policy;
         holes.distance = distance;
         if (asked.policy == Holes::Close) return;
+        const auto treat = asked.policy == Holes::Open ? trim_holes : flatten_holes;
+        TreatedHoles treated = treat(made.mesh, made.distance_to_points, distance, slack, run());
+        holes = std::move(treated.report);
         if (asked.policy == Holes::Open) {
             const double volume = measure(made.mesh).volume;
-            made.mesh = trim_holes(made.mesh, made.distance_to_points, distance, slack, holes, run());
+            made.mesh = std::move(treated.mesh);
             if (holes.share > 0) {
                 holes.closed_volume = volume;
                 relax();
             }
-        }
-        if (asked.policy == Holes::Flat) {
-            const TriangleMesh flat = flatten_holes(made.mesh, made.distance_to_points, distance, slack, holes, run());
-            if (holes.share > 0) replace_by(flat);
+        } else if (holes.share > 0) {
+            replace_by(treated.mesh);
         }
         if (holes.share > 0) made.distance_to_points = measure_distances(made.mesh, points, run());
         tell_of_holes();

@@ -87,10 +87,10 @@ FloatGridPtr ask_image(const Problem& problem, const StartFacts& start, const Fl
     if (start.origin == StartOrigin::Contours && problem.options.contours->slice_distance > 0)
         options.range = kFlow.contour_range * problem.options.contours->slice_distance;
     solution.was_asked = true;
-    GuidanceReport& report = solution.guidance;
-    const FloatGridPtr guided = guide(*u, marks, *problem.image, options, report, problem.run);
+    Guided guided = guide(*u, marks, *problem.image, options, problem.run);
+    const GuidanceReport& report = solution.guidance = std::move(guided.report);
     solution.report.remarks.choose("image", report.used ? "used" : "not used", report.reason, problem.run);
-    return guided;
+    return guided.u;
 }
 
 void evolve_to_rest(const Problem& problem, StartSurface start, const EdgeOptions& edge, Solution& solution,

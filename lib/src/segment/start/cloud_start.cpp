@@ -72,21 +72,19 @@ Domain choose_cloud_domain(const Problem& problem, double h, const std::vector<V
 
 StartSurface start_from_cloud(const Problem& problem, const Choices& choices, MarkSets marks) {
     const RunContext& run = problem.run;
-    StartSurface start;
+    StartSurface start = follow(StartOrigin::Cloud, choices, std::move(marks));
     StartFacts& facts = start.facts;
     Remarks& remarks = facts.report.remarks;
-    facts.origin = StartOrigin::Cloud;
-    facts.marks = std::move(marks);
-    facts.flow = choices.evolve;
-    facts.flow.follow = true;
     facts.domain = choose_cloud_domain(problem, choices.h, facts.marks.attracting);
     const bool at_rest = rests(problem, facts, EdgeFeature::Slope);
-    CloudReport& report = facts.cloud;
     {
         const Timed timed(facts.report.seconds.tag);
-        start.u = cloud::settled_field(facts.domain, *choices.cloud, report, run);
+        CloudSurface field = cloud::settled_field(facts.domain, *choices.cloud, run);
+        start.u = std::move(field.u);
+        facts.cloud = std::move(field.report);
         if (!at_rest) start.u = start_from_grid(facts.domain, *start.u, run);
     }
+    const CloudReport& report = facts.cloud;
     if (!at_rest && uses_points(facts.flow)) {
         if (!problem.options.evolve.attraction_range) {
             const double range = kStarts.reach_spacings * std::max(report.spacing, choices.h);

@@ -62,14 +62,10 @@ StartSurface start_from_contours_or_tags(const Problem& problem, const Choices& 
         throw Error(Errc::InvalidInput,
                     "segment: all contours lie on one slice, which tells nothing of how thick the body is; mark a "
                     "second slice, or give its `thickness`");
-    StartSurface start;
+    StartSurface start = follow(StartOrigin::Contours, choices, std::move(marks));
     StartFacts& facts = start.facts;
     facts.report.remarks.choose("start", "contours",
                                 "the body between the contours; what inner contours enclose is outside", run);
-    facts.origin = StartOrigin::Contours;
-    facts.marks = std::move(marks);
-    facts.flow = choices.evolve;
-    facts.flow.follow = true;
     facts.domain = problem.domain(choices.h, facts.marks.attracting, 2 * kJob.margin_voxels * choices.h);
     if (!problem.options.roi) facts.domain = carried_beyond_image(facts.domain, body->box());
     {

@@ -54,12 +54,8 @@ double largest_area(const WorldBox& box) {
 StartSurface start_from_guess(const Problem& problem, const Choices& choices, MarkSets marks) {
     const RunContext& run = problem.run;
     const double h = choices.h;
-    StartSurface start;
+    StartSurface start = follow(StartOrigin::Guess, choices, std::move(marks));
     StartFacts& facts = start.facts;
-    facts.origin = StartOrigin::Guess;
-    facts.marks = std::move(marks);
-    facts.flow = choices.evolve;
-    facts.flow.follow = true;
     const std::vector<Vec3>& points = facts.marks.attracting;
     const WorldBox box = bounding_box(points);
     facts.domain = problem.domain(h, points, kStarts.guess_margin * longest_side(box) + kJob.margin_voxels * h);
@@ -70,8 +66,9 @@ StartSurface start_from_guess(const Problem& problem, const Choices& choices, Ma
     detail::require_band_memory(largest_area(box), h, "segment", run);
     {
         const Timed timed(facts.report.seconds.tag);
-        Guess guess = guess::guess_in_image(facts.domain, points, guess_options(problem, h, points), problem.clip(),
-                                            facts.guess, run);
+        Guess guess =
+            guess::guess_in_image(facts.domain, points, guess_options(problem, h, points), problem.clip(), run);
+        facts.guess = std::move(guess.report);
         start.u = std::move(guess.u);
         facts.on_surface = std::move(guess.marks);
     }

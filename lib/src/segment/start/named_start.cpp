@@ -51,12 +51,8 @@ FloatGridPtr start_grid(const Start& start, const Domain& domain, const RunConte
 StartSurface start_as_named(const Problem& problem, const Choices& choices, MarkSets marks) {
     const RunContext& run = problem.run;
     const Start& named = problem.options.start;
-    StartSurface start;
+    StartSurface start = follow(StartOrigin::Given, choices, std::move(marks));
     StartFacts& facts = start.facts;
-    facts.origin = StartOrigin::Given;
-    facts.marks = std::move(marks);
-    facts.flow = choices.evolve;
-    facts.flow.follow = true;
     facts.domain = choose_domain_of_flow(problem, choices.h, facts.marks.attracting);
     detail::require_band_memory(known_area(named), choices.h, "segment", run);
     {

@@ -9,12 +9,8 @@ namespace covol::pipeline {
 
 StartSurface start_from_seeds(const Problem& problem, const Choices& choices, MarkSets marks) {
     const SegmentOptions& options = problem.options;
-    StartSurface start;
+    StartSurface start = follow(StartOrigin::Given, choices, std::move(marks));
     StartFacts& facts = start.facts;
-    facts.origin = StartOrigin::Given;
-    facts.marks = std::move(marks);
-    facts.flow = choices.evolve;
-    facts.flow.follow = true;
     facts.domain = choose_domain_of_flow(problem, choices.h, facts.marks.attracting);
     {
         const Timed timed(facts.report.seconds.tag);

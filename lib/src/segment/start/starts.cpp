@@ -7,6 +7,15 @@
 
 namespace covol::pipeline {
 
+StartSurface follow(StartOrigin origin, const Choices& choices, MarkSets marks) {
+    StartSurface start;
+    start.facts.origin = origin;
+    start.facts.marks = std::move(marks);
+    start.facts.flow = choices.evolve;
+    start.facts.flow.follow = true;
+    return start;
+}
+
 Domain choose_domain_of_flow(const Problem& problem, double h, const std::vector<Vec3>& points) {
     const Domain domain = problem.domain(h, points, 2 * kJob.margin_voxels * h);
     return problem.is_turned() && !problem.options.roi ? widened(domain, int(kJob.margin_voxels)) : domain;

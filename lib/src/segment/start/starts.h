@@ -4,6 +4,9 @@
 
 namespace covol::pipeline {
 
+/// What all starts have in common whose band follows the surface; domain and u are still to be made.
+[[nodiscard]] StartSurface follow(StartOrigin origin, const Choices& choices, MarkSets marks);
+
 /// One of those below, as was chosen.
 [[nodiscard]] StartSurface make_start(const Problem& problem, const Choices& choices, MarkSets marks);
 

@@ -50,9 +50,8 @@ double off_torus(const Vec3& p) { return std::abs(std::hypot(std::hypot(p[0], p[
 TEST_CASE("a bowl becomes a solid with a lid, not a skin") {
     for (unsigned seed = 1; seed <= 3; ++seed) {
         const CloudOrientation cloud = orient_cloud(bowl(4000, seed));
-        CloudReport report;
         const TriangleMesh mesh =
-            extract_mesh(*surface_from_cloud(make_domain({{-1.5, -1.5, -1.5}, {1.5, 1.5, 1.5}}, 0.05), cloud, report));
+            extract_mesh(*surface_from_cloud(make_domain({{-1.5, -1.5, -1.5}, {1.5, 1.5, 1.5}}, 0.05), cloud).u);
         const MeshMeasures m = measure(mesh);
         CHECK(m.closed);
         CHECK(m.components == 1);

@@ -23,11 +23,9 @@ struct Result {
 };
 
 Result surface_of(const std::vector<Vec3>& points, double h, const RunContext& run = {}) {
-    Result result;
     const CloudOrientation cloud = orient_cloud(points, run);
-    result.grid = surface_from_cloud(make_domain(bounding_box(points, 8 * h), h), cloud, result.report, run);
-    result.mesh = extract_mesh(*result.grid);
-    return result;
+    const CloudSurface made = surface_from_cloud(make_domain(bounding_box(points, 8 * h), h), cloud, run);
+    return {made.u, made.report, extract_mesh(*made.u)};
 }
 
 /// Root mean square distance of the mesh's vertices to the shape.
@@ -121,12 +119,11 @@ TEST_CASE("surface_from_cloud: the same bits for any number of threads") {
 
 TEST_CASE("surface_from_cloud: no surface in the domain is an error, a stop is heeded") {
     const CloudOrientation cloud = orient_cloud(test::ball(1).sample(1000, 8).points);
-    CloudReport report;
-    CHECK_NOTHROW(surface_from_cloud(kDomain, cloud, report));
+    CHECK_NOTHROW(surface_from_cloud(kDomain, cloud));
     Domain elsewhere = kDomain;
     elsewhere.origin[0] += 100;
     try {
-        static_cast<void>(surface_from_cloud(elsewhere, cloud, report));
+        static_cast<void>(surface_from_cloud(elsewhere, cloud));
         FAIL("expected an error");
     } catch (const Error& error) {
         CHECK(error.code() == Errc::InvalidInput);
@@ -135,7 +132,7 @@ TEST_CASE("surface_from_cloud: no surface in the domain is an error, a stop is h
     RunContext run;
     run.cancel = &stop;
     try {
-        static_cast<void>(surface_from_cloud(kDomain, cloud, report, run));
+        static_cast<void>(surface_from_cloud(kDomain, cloud, run));
         FAIL("expected an error");
     } catch (const Error& error) {
         CHECK(error.code() == Errc::Cancelled);
