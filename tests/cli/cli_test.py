@@ -557,6 +557,19 @@ class Tools(Case):
         self.assertAlmostEqual(self.report("info", "t.ply")["mesh"]["volume"], 8 / 6, places=5)
         self.run_covol("convert", self.points, "p.vdb", code=3)
 
+    def test_options_that_would_do_nothing(self):
+        """What is about a file that the run neither reads nor writes is refused."""
+        self.run_covol("convert", self.image, "i.vdb")
+        for options in (("--unit-scale", 2), ("--up", "y"), ("--simplify", 1), ("--remove-outliers",)):
+            with self.subTest(options=options):
+                self.assertIn(options[0], self.run_covol("convert", "i.vdb", "j.vdb", *options, code=2).stderr)
+        self.assertIn("--half", self.run_covol("convert", "i.vdb", "j.nrrd", "--half", code=2).stderr)
+        for options in (("--up", "y"), ("--unit-scale", 2)):
+            with self.subTest(options=options):
+                done = self.run_covol("segment", self.image, "--points", self.points, "-o", "s.vdb", *options, code=2)
+                self.assertIn(options[0] + ": it is about a mesh", done.stderr)
+        self.assertEqual(self.files(), ["i.vdb"])
+
     def test_render(self):
         self.segment()
         self.run_covol("render", "s.vdb", "-o", "s.png", "--image", self.image, "--points", self.points, "--size", "320x200")

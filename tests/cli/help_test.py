@@ -100,10 +100,10 @@ class OptionFiles(Case):
     def test_saved_options_are_one_list(self):
         # Of five groups, and in another order than they are bound.
         self.run_covol("segment", self.image, "--up", "y", "--sigma", "1vx", "--points", self.points, "--delta", "2vx", "-o", "s.vdb",
-                       "--epsilon", "0.02", "--save-config", "c.toml")
+                       "--mesh", "m.ply", "--epsilon", "0.02", "--save-config", "c.toml")
         self.assertNotRegex((self.out / "c.toml").read_text(), r"(?m)^# [\w ]+ Options$")
         self.assertEqual([line.split("=")[0] for line in self.lines("c.toml")],
-                         ["image", "points", "output", "delta", "epsilon", "sigma", "up"])
+                         ["image", "points", "output", "mesh", "delta", "epsilon", "sigma", "up"])
 
     def test_a_file_of_an_earlier_version(self):
         # Its comments hold descriptions that are different today.

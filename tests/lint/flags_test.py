@@ -1,6 +1,8 @@
-"""The library speaks of fields, the command line of flags: no file of lib/ names a flag, and tools/ has one for each field.
+"""The library speaks of options, the command line of flags: no file of lib/ names a flag, and what lib/ names is an option. An option
+has one row in one table, and its name stands nowhere else unless somebody uses it.
 
-    python3 tests/lint/flags_test.py SOURCE_DIR
+    python3 tests/lint/flags_test.py SOURCE_DIR           says what is wrong
+    python3 tests/lint/flags_test.py SOURCE_DIR NAME...   lists the places where an option's name stands
 """
 import pathlib
 import re
@@ -9,8 +11,13 @@ import sys
 TOKEN = re.compile(r'"(?:[^"\\\n]|\\.)*"|\'(?:[^\'\\\n]|\\.)+\'|//[^\n]*|/\*.*?\*/', re.S)
 FLAG = re.compile(r"(?<![-!<])--[a-z]|(?:^| )--$")  # "--" alone is put before a name
 FIELD = re.compile(r"`([a-z_]+)(?=`| = )|(?:^|, )([a-z_]{2,}) = ")
-PUT_TOGETHER = {"channel", "frame"}  # by image/image.cpp, so that no string has them as a whole
-TABLE = re.compile(r'\{"([a-z_]+)", "(--[a-z-]+)"\}')
+ROW = re.compile(r'Option\{\s*"([a-z_]+)",\s*&')
+# Flags that belong to no struct of options.
+BY_HAND = {"checkpoint", "checkpoint_every", "contours", "inside", "outside", "resume"}
+# Options of every kind that nothing names but their row: the rest is made from it. Others are named where one depends on another, where a
+# report has a result of the same name, and in messages about what would help.
+PLAIN = ("guess_weight", "epsilon", "edge_epsilon", "solver_tolerance", "coarse_levels", "guess_radius", "hole_distance", "contour_curve",
+         "points_scale", "points_channels", "painted_as", "painted_outside", "correct_level_shift", "zoom", "seed")
 
 
 def tokens(text):
@@ -21,27 +28,47 @@ def tokens(text):
             yield text.count("\n", 0, match.start()) + 1, token[1:-1] if token[0] == '"' else token, token[0] == '"'
 
 
+def sources(root, *folders):
+    return sorted(path for folder in folders for end in ("*.h", "*.cpp") for path in (root / folder).rglob(end))
+
+
+def options(root):
+    return {name for path in sources(root, "lib/include", "tools") for name in ROW.findall(path.read_text())}
+
+
+def places(root, names):
+    """Where a string in the sources is an option's name, or has its flag: (name, file:line)."""
+    flags = {name: re.compile(rf"--{name.replace('_', '-')}(?![a-z-])") for name in names}
+    for path in sources(root, "lib", "tools"):
+        text = path.read_text()
+        for line, token, is_string in tokens(text):
+            for name in names if is_string else []:
+                if token == name or flags[name].search(token):
+                    yield name, f"{path.relative_to(root)}:{line}"
+
+
 def findings(root):
-    sources = sorted((root / "lib").rglob("*.h")) + sorted((root / "lib").rglob("*.cpp"))
-    if len(sources) < 100:
+    known = options(root)
+    if len(sources(root, "lib")) < 100 or len(known) < 50:
         yield f"{root}: expected the sources of covol"
-    table = dict(TABLE.findall((root / "tools/covol/cli/option_names.cpp").read_text()))
-    named = set(PUT_TOGETHER)
-    for path in sources:
+    for path in sources(root, "lib"):
         for line, token, is_string in tokens(path.read_text()):
             where = f"{path.relative_to(root)}:{line}"
             if any(FLAG.search(part) for part in token.splitlines()):
-                yield f"{where}: names a flag; name the field, as covol/option_names.h tells: {token}"
+                yield f"{where}: names a flag; name the option, as covol/option_names.h tells: {token}"
             for field in (match[1] or match[2] for match in FIELD.finditer(token) if is_string):
-                named.add(field)
-                if field not in table:
-                    yield f"{where}: no flag for the field {field} in tools/covol/cli/option_names.cpp"
-    tools = "".join(path.read_text() for path in (root / "tools/covol").rglob("*.cpp") if path.stem != "option_names")
-    for field, flag in table.items():
-        if f'"{flag}' not in tools:
-            yield f"tools/covol/cli/option_names.cpp: no command has {flag}"
-        if field not in named:
-            yield f"tools/covol/cli/option_names.cpp: the library never names {field}"
+                if field not in known and field not in BY_HAND:
+                    yield f"{where}: {field} is in no table of options"
+    tools = "".join(path.read_text() for path in sources(root, "tools/covol"))
+    for name in sorted(BY_HAND):
+        if f'"--{name.replace("_", "-")}"' not in tools:
+            yield f"tests/lint/flags_test.py: no command has the flag of {name}"
+    stands = {name: [] for name in PLAIN}
+    for name, where in places(root, stands):
+        stands[name].append(where)
+    for name, where in stands.items():
+        if len(where) != 1 or "/include/covol/" not in where[0]:
+            yield f"{name}: expected its row alone, but it stands in {', '.join(where)}"
 
 
 def self_test():
@@ -58,6 +85,10 @@ def self_test():
 
 if __name__ == "__main__":
     self_test()
-    found = list(findings(pathlib.Path(sys.argv[1])))
+    root, names = pathlib.Path(sys.argv[1]), sys.argv[2:]
+    if names:
+        print("\n".join(f"{name}: {where}" for name, where in places(root, names)))
+        sys.exit(0)
+    found = list(findings(root))
     print("\n".join(found) if found else "no finding")
     sys.exit(1 if found else 0)

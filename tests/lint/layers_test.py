@@ -9,7 +9,7 @@ import sys
 # Folders of lib/src from the bottom up, with the public headers that they implement; a file may include headers of its own
 # level and of those below.
 LAYERS = [
-    {"base": ["api", "version", "fwd", "error", "option_names", "run", "domain", "safe_text"], "scheme": []},
+    {"base": ["api", "version", "fwd", "error", "option_names", "options_table", "run", "domain", "safe_text"], "scheme": []},
     {"files": ["file_set"], "limits": []},
     {"grid": [], "mesh": ["mesh"], "io": ["vdb_io"], "io/pixels": ["image"]},
     {"io/chunked": [], "io/modules": []},

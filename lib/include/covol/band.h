@@ -4,6 +4,7 @@
 
 #include "covol/api.h"
 #include "covol/domain.h"
+#include "covol/options_table.h"
 #include "covol/run.h"
 
 namespace covol {
@@ -11,8 +12,14 @@ namespace covol {
 struct BandOptions {
     double tag_distance = 0.0;         ///< D, world units; > 0.
     std::vector<Vec3> exterior_seeds;  ///< world positions that are outside, in cavities say
-    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
+
+template <>
+inline constexpr auto kOptions<BandOptions> =
+    std::tuple{Option{"tag_distance", &BandOptions::tag_distance, kPositiveLength, Group::Start,
+                      "D: closes gaps between points up to 2D", "from the points"},
+               Option{"exterior_seed", &BandOptions::exterior_seeds, Group::Start,
+                      "a position outside the structure, also in a cavity; repeatable"}};
 
 struct BandReport {
     double tag_distance = 0;      ///< D

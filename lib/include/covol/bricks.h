@@ -9,6 +9,7 @@
 #include "covol/edge.h"
 #include "covol/evolve.h"
 #include "covol/image.h"
+#include "covol/options_table.h"
 #include "covol/pipeline.h"
 
 // A job in parts: the surface is found brick by brick, each on its own machine or one after the other, and joined.
@@ -25,8 +26,17 @@ struct BrickOptions {
     int overlap = 16;                      ///< voxels, a multiple of 8, 8 to 2^23: layers of its neighbours
     double tolerance = 0.05;               ///< voxels, > 0: neighbours agree when their surfaces lie closer
     int most_sweeps = 4;                   ///< >= 1
-    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
+
+template <>
+inline constexpr auto kOptions<BrickOptions> = std::tuple{
+    Option{"brick_voxels", &BrickOptions::most_voxels, kPositive},
+    Option{"brick_overlap", &BrickOptions::overlap, counted_in(Unit::Voxels, between(8, 1 << 23)), Group::Numerics,
+           "layers of its neighbours around a brick, a multiple of 8"},
+    Option{"seam_tolerance", &BrickOptions::tolerance, counted_in(Unit::Voxels, kPositive), Group::Numerics,
+           "sweeps over the bricks end when neighbours' surfaces lie closer than this, voxels"},
+    Option{"most_sweeps", &BrickOptions::most_sweeps, at_least(1)},
+    Rule<BrickOptions>{"brick_overlap", "a multiple of 8", [](const BrickOptions& o) { return o.overlap % 8 == 0; }}};
 
 struct Brick {
     VoxelBox core;  ///< the voxels of the lattice that belong to it: whole leaves, cut at the domain's end

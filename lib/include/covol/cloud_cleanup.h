@@ -6,6 +6,7 @@
 
 #include "covol/api.h"
 #include "covol/fwd.h"
+#include "covol/options_table.h"
 #include "covol/run.h"
 
 namespace covol {
@@ -16,6 +17,8 @@ enum class CloudSmoothing {
     Wlop   ///< weighted locally optimal projection (Huang et al. 2009): evens out the density too, outliers matter
            ///< little
 };
+template <>
+inline constexpr auto kWords<CloudSmoothing> = std::array{"none", "jets", "wlop"};
 
 /// What clean_cloud() does, in this order; every step is off unless asked for.
 struct CloudCleanupOptions {
@@ -32,9 +35,24 @@ struct CloudCleanupOptions {
 
     /// Whether anything but duplicates is asked for.
     [[nodiscard]] bool any() const { return outlier_factor > 0 || simplify > 0 || smooth != CloudSmoothing::None; }
-    /// Empty when usable, else one line for each bad field.
-    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
+
+template <>
+inline constexpr auto kOptions<CloudCleanupOptions> = std::tuple{
+    Option{"duplicates", &CloudCleanupOptions::duplicates},
+    Option{"remove_outliers", &CloudCleanupOptions::outlier_factor, kNotNegative, Group::Clouds,
+           "drop marks that lie apart from all others, and points whose distance to their 24 neighbours is more than 3 "
+           "(or FACTOR) times the cloud's mean"},
+    Option{"simplify", &CloudCleanupOptions::simplify, kLength, Group::Clouds,
+           "keep one point in each cell of this edge, 1vx for example"},
+    Option{"smooth", &CloudCleanupOptions::smooth, Group::Clouds,
+           "move the points to fitted quadrics (jets), or make 0.25 times as many by projection, evenly spread (wlop)"},
+    Option{"wlop_share", &CloudCleanupOptions::wlop_share, Range{0, 1, true}},
+    Option{"wlop_radius", &CloudCleanupOptions::wlop_radius, kPositive},
+    Option{"neighbours", &CloudCleanupOptions::neighbours, at_least(6)},
+    Rule<CloudCleanupOptions>{"remove_outliers", "0 or >= 1", [](const CloudCleanupOptions& o) {
+                                  return o.outlier_factor <= 0 || o.outlier_factor >= 1;
+                              }}};
 
 struct CloudCleanupReport {
     std::size_t given = 0;

@@ -7,6 +7,7 @@
 #include "covol/api.h"
 #include "covol/domain.h"
 #include "covol/image.h"
+#include "covol/options_table.h"
 #include "covol/points.h"
 #include "covol/run.h"
 
@@ -16,13 +17,21 @@ enum class ContourCurve {
     Lines,  ///< neighbouring marks are joined by straight lines
     Spline  ///< by a centripetal Catmull-Rom curve through them (Yuksel, Schaefer, Keyser 2011)
 };
+template <>
+inline constexpr auto kWords<ContourCurve> = std::array{"lines", "spline"};
 
 struct ContourOptions {
     double step = 0.0;  ///< largest distance between neighbouring points, world units, > 0; the voxel size h
     ContourCurve curve = ContourCurve::Spline;
     double thickness = 0.0;  ///< of a body that is marked on a single slice, world units; 0: not known
-    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
+
+template <>
+inline constexpr auto kOptions<ContourOptions> = std::tuple{
+    Option{"step", &ContourOptions::step, kPositive},
+    Option{"contour_curve", &ContourOptions::curve, Group::ReadingMarks, "how neighbouring marks are joined"},
+    Option{"contour_thickness", &ContourOptions::thickness, kLength, Group::ReadingMarks,
+           "thickness of a body whose contours all lie on one slice"}};
 
 /// The body that closed contours on parallel slices enclose: shape-based interpolation.
 ///

@@ -3,14 +3,18 @@
 
 #include "covol/api.h"
 #include "covol/domain.h"
+#include "covol/options_table.h"
 #include "covol/run.h"
 
 namespace covol {
 
 struct DistanceOptions {
     double max_distance = 0.0;  ///< Radius of the tube, world units, > 0.
-    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
+
+template <>
+inline constexpr auto kOptions<DistanceOptions> = std::tuple{Option{
+    "max_distance", &DistanceOptions::max_distance, kPositiveLength, Group::Domain, "radius of the tube", "10vx"}};
 
 struct DistanceReport {
     std::int64_t active_voxels = 0;

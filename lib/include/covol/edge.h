@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -7,6 +8,7 @@
 #include "covol/api.h"
 #include "covol/domain.h"
 #include "covol/image.h"
+#include "covol/options_table.h"
 #include "covol/run.h"
 
 namespace covol {
@@ -19,9 +21,8 @@ enum class EdgeFeature {
                  ///< two
     DarkLine  ///< s = 1 - G_σ * I
 };
-
-/// "auto", "slope", "bright-line", "dark-line"
-[[nodiscard]] COVOL_API const char* to_string(EdgeFeature feature);
+template <>
+inline constexpr auto kWords<EdgeFeature> = std::array{"auto", "slope", "bright-line", "dark-line"};
 [[nodiscard]] inline bool is_line(EdgeFeature feature) {
     return feature == EdgeFeature::BrightLine || feature == EdgeFeature::DarkLine;
 }
@@ -35,10 +36,29 @@ struct EdgeOptions {
     /// that percentile, in (0,1); automatic: 0.9 for slopes, and for lines a third of the median: g then goes by
     /// relative brightness, as contrast that varies needs
     std::optional<double> contrast_percentile;
-    double low = 0.0,
-           high = 0.0;  ///< intensities mapped to 0 and 1; equal: 0.5 % and 99.5 % percentiles near the band.
-    [[nodiscard]] COVOL_API std::string why_invalid() const;
+    /// mapped to 0 and 1, ascending; automatic: 0.5 % and 99.5 % percentiles near the band
+    std::optional<std::array<double, 2>> intensities;
 };
+
+template <>
+inline constexpr auto kOptions<EdgeOptions> = std::tuple{
+    Option{"sigma", &EdgeOptions::sigma, kLength, with_image(Group::Edges), "presmoothing of the image",
+           "2vx after tagging, else 1vx", "1vx"},
+    Option{"edge_feature", &EdgeOptions::feature, with_image(Group::Edges),
+           "what edges are: borders between darker and brighter, or bright or dark sheets such as membranes",
+           "what the marks of contours lie on, else slope", "slope"},
+    Option{"edge_k", &EdgeOptions::edge_k, kPositive, with_image(Group::Edges), "K in g = 1/(1 + K s^2)",
+           "see `edge_contrast`"},
+    Option{"edge_contrast", &EdgeOptions::edge_contrast, kPositive, with_image(Group::Edges),
+           "gradient, per world unit, or brightness of lines at which g = 1/2, of the image scaled to "
+           "[0,1]; not with `edge_k`",
+           "90 % percentile in the band, for lines a third of the median"},
+    Option{"contrast_percentile", &EdgeOptions::contrast_percentile, kBetween0And1},
+    Option{"intensities", &EdgeOptions::intensities},
+    Rule<EdgeOptions>{"intensities", "the darker one first",
+                      [](const EdgeOptions& o) { return !o.intensities || (*o.intensities)[0] < (*o.intensities)[1]; }},
+    Rule<EdgeOptions>{"edge_contrast", "one of it and edge_k",
+                      [](const EdgeOptions& o) { return !o.edge_k || !o.edge_contrast; }}};
 
 struct EdgeReport {
     double sigma = 0;          ///< world units

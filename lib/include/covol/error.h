@@ -1,6 +1,8 @@
 #pragma once
+#include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "covol/api.h"
 
@@ -23,13 +25,15 @@ enum class Errc {
 /// option_names.h tells.
 class COVOL_API Error : public std::runtime_error {
 public:
-    Error(Errc code, const std::string& message) : std::runtime_error(message), code_(code) {}
+    Error(Errc code, const std::string& message, std::string option = {})
+        : std::runtime_error(message), code_(code), option_(std::make_shared<const std::string>(std::move(option))) {}
     [[nodiscard]] Errc code() const noexcept { return code_; }
-    /// The first field of options that the message names, `tag_distance` say; empty where it names none.
-    [[nodiscard]] std::string option() const;
+    /// The field of options that is wrong, or that would help, `tag_distance` say; empty where there is none.
+    [[nodiscard]] const std::string& option() const noexcept { return *option_; }
 
 private:
     Errc code_;
+    std::shared_ptr<const std::string> option_;  // exceptions must not throw where they are copied
 };
 
 }  // namespace covol

@@ -6,6 +6,7 @@
 #include "covol/fwd.h"
 #include "covol/image.h"
 #include "covol/mesh.h"
+#include "covol/options_table.h"
 #include "covol/run.h"
 
 namespace covol {
@@ -16,8 +17,13 @@ struct EvidenceOptions {
     /// in (0,1): where the edge strength 1 − g is below this the image does not hold the surface
     double weak_edge = 0.25;
     int suggestions = 0;  ///< how many slices to name, >= 0
-    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
+
+template <>
+inline constexpr auto kOptions<EvidenceOptions> =
+    std::tuple{Option{"reach", &EvidenceOptions::reach, kPositive},
+               Option{"weak_edge", &EvidenceOptions::weak_edge, kBetween0And1},
+               Option{"suggestions", &EvidenceOptions::suggestions, kNotNegative}};
 
 /// The surface and the marks in one slice of the image (along its third axis, half a slice to either side).
 struct SliceEvidence {

@@ -7,6 +7,7 @@
 
 #include "covol/api.h"
 #include "covol/fwd.h"
+#include "covol/options_table.h"
 #include "covol/run.h"
 
 namespace covol {
@@ -38,8 +39,34 @@ struct EvolveOptions {
     std::optional<double> solver_tolerance;
     [[nodiscard]] double solved_to() const { return solver_tolerance.value_or(tau ? 1e-3 : 1e-2); }
     int max_sweeps = 200;  ///< upper bound on a step's sweeps
-    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
+
+template <>
+inline constexpr auto kOptions<EvolveOptions> =
+    std::tuple{Option{"theta", &EvolveOptions::theta, kFraction, Group::Flow, "weight of the points, 0 to 1"},
+               Option{"rho", &EvolveOptions::rho, kFraction, with_image(Group::Flow), "weight of the image, 0 to 1"},
+               Option{"delta", &EvolveOptions::delta, kLength, Group::Flow, "weight of curvature",
+                      "0.5vx after tagging, else 1vx", "1vx"},
+               Option{"tau", &EvolveOptions::tau, kPositiveLength, Group::Flow,
+                      "time step; the flow's speed is 1 world unit per unit of time", "1vx and more"},
+               Option{"epsilon", &EvolveOptions::epsilon, kPositive, Group::Numerics, "regularises the norm of grad u"},
+               Option{"attraction_range", &EvolveOptions::attraction_range, kLength, Group::Flow,
+                      "points pull fully up to half of it, not at all beyond; 0: unlimited",
+                      "after tagging 8vx, and 0 where the image has no weight; else 5vx", "0"},
+               Option{"edge_epsilon", &EvolveOptions::edge_epsilon, kPositive, with_image(Group::Numerics),
+                      "regularises the norm of grad g"},
+               Option{"image_yields", &EvolveOptions::image_yields, kFraction, with_image(Group::Flow),
+                      "fraction of rho that fades close to points, on the attraction range's taper, 0 to 1",
+                      "1 after tagging, else 0", "0"},
+               Option{"guess_weight", &EvolveOptions::guess_weight, kFraction, with_image(Group::Flow),
+                      "fraction of theta that is left to what lies between marked slices, far from every mark, 0 to 1"},
+               Option{"follow", &EvolveOptions::follow, single_step(Group::Flow), "the band follows the surface"},
+               Option{"max_steps", &EvolveOptions::max_steps, kNotNegative, Group::Flow, "upper bound on time steps"},
+               Option{"tolerance", &EvolveOptions::tolerance, kNotNegative, Group::Flow,
+                      "steady below this mean change, in voxels a step of 1vx"},
+               Option{"solver_tolerance", &EvolveOptions::solver_tolerance, kBetween0And1, Group::Numerics,
+                      "a step's solve ends at this relative residual", "0.001 with `tau`, else 0.01"},
+               Option{"max_sweeps", &EvolveOptions::max_sweeps, at_least(1)}};
 
 /// Why evolve() returned. In every case u holds the last whole step.
 enum class StopReason { NotRun, Steady, MaxSteps, Cancelled, Vanished };

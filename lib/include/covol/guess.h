@@ -7,6 +7,7 @@
 
 #include "covol/api.h"
 #include "covol/domain.h"
+#include "covol/options_table.h"
 #include "covol/run.h"
 
 namespace covol {
@@ -23,8 +24,13 @@ struct GuessOptions {
     std::vector<Vec3> inside, outside;  ///< places whose side is known
     /// The world's end: where the body is cut off. Marks in the cut are told from marks on the surface.
     std::optional<WorldBox> end;
-    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
+
+template <>
+inline constexpr auto kOptions<GuessOptions> = std::tuple{
+    Option{"deviation", &GuessOptions::deviation},
+    Option{"most_deviation", &GuessOptions::most_deviation, kNotNegative}, Option{"inside", &GuessOptions::inside},
+    Option{"outside", &GuessOptions::outside}, Option{"end", &GuessOptions::end}};
 
 struct GuessReport {
     std::size_t marks = 0;        ///< that hold the surface

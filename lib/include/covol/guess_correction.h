@@ -9,6 +9,7 @@
 #include "covol/api.h"
 #include "covol/fwd.h"
 #include "covol/image.h"
+#include "covol/options_table.h"
 #include "covol/run.h"
 
 namespace covol {
@@ -21,8 +22,15 @@ struct CorrectionOptions {
     std::optional<double> precision;     ///< of the marks, world units, > 0; automatic: half a voxel
     std::optional<double> least_radius;  ///< within which a mark acts on the guess, however little it moves it, world
                                          ///< units, > 0; automatic: kCorrectionVoxels
-    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
+
+template <>
+inline constexpr auto kOptions<CorrectionOptions> = std::tuple{
+    Option{"precision", &CorrectionOptions::precision, kPositive},
+    Option{"guess_radius", &CorrectionOptions::least_radius, kPositiveLength, with_image(Group::ReadingMarks),
+           "a mark acts on the guess at least so far around it",
+           "12vx, or two of the image's widest spacing; 3 times its distance to the guess if it lies inside, 2.2 times "
+           "outside, where that is more"}};
 
 struct CorrectionReport {
     std::size_t marks = 0, seeds = 0;             ///< that act: seeds only where the guess had them on the wrong side

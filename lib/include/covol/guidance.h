@@ -7,21 +7,25 @@
 #include "covol/edge.h"
 #include "covol/fwd.h"
 #include "covol/image.h"
+#include "covol/options_table.h"
 #include "covol/run.h"
 
 namespace covol {
 
 /// What changes the result of guide(); lengths in world units.
 struct GuidanceOptions {
-    /// a mark lies within half of this of the border it means, along each axis, >= 0; automatic: one voxel of the image
+    /// standard deviation of a mark's place along each axis, >= 0; automatic: kUniformDeviation of a voxel of the image
     std::optional<double> mark_precision;
     /// how far from the guess the border is looked for, >= 0, and so twice the deviation that it may have; automatic:
     /// by the distance to the marks, and as far as the image says
     std::optional<double> range;
     double weight = 1;  ///< in [0,1]: share of what the image says that counts; 0 leaves the guess as it is
-    /// Empty when usable, else one line for each bad field: "weight: expected 0 to 1, got 2".
-    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
+
+template <>
+inline constexpr auto kOptions<GuidanceOptions> = std::tuple{
+    Option{"mark_precision", &GuidanceOptions::mark_precision, kNotNegative},
+    Option{"range", &GuidanceOptions::range, kNotNegative}, Option{"weight", &GuidanceOptions::weight, kFraction}};
 
 /// What guide() saw and did. The defaults say that nothing ran.
 struct GuidanceReport {

@@ -5,6 +5,7 @@
 #include "covol/api.h"
 #include "covol/domain.h"
 #include "covol/mesh.h"
+#include "covol/options_table.h"
 #include "covol/run.h"
 
 namespace covol {
@@ -15,13 +16,23 @@ enum class Holes {
     Open,   ///< the mesh ends there; the level set stays closed
     Flat    ///< it is spanned by the flattest patch, in mesh and level set
 };
-[[nodiscard]] COVOL_API const char* to_string(Holes holes);
+template <>
+inline constexpr auto kWords<Holes> = std::array{"close", "open", "flat"};
 
 struct HolesOptions {
     Holes policy = Holes::Close;
     /// world units, > 0: a hole is what lies farther from all points; automatic: choose_hole_distance()
     std::optional<double> distance;
 };
+
+template <>
+inline constexpr auto kOptions<HolesOptions> = std::tuple{
+    Option{"holes", &HolesOptions::policy, points_alone(Group::Clouds),
+           "where no points are, the surface goes on smoothly, or the mesh ends (the level set stays closed), or the "
+           "flattest patch spans it, in both"},
+    Option{"hole_distance", &HolesOptions::distance, kPositiveLength, points_alone(Group::Clouds),
+           "a hole is where the surface lies farther from all points",
+           "3 spacings where they are sparse, at least 3vx"}};
 
 /// A closed line on which a mesh ends.
 struct BoundaryLoop {

@@ -10,6 +10,7 @@
 #include "covol/api.h"
 #include "covol/domain.h"
 #include "covol/fwd.h"
+#include "covol/options_table.h"
 #include "covol/run.h"
 
 namespace covol {
@@ -54,15 +55,27 @@ struct VoxelBox {
 };
 
 struct ReadImageOptions {
-    Vec3 spacing{0, 0, 0};  ///< Replaces the file's spacing where > 0.
-    int channel = -1;       ///< Which channel of a hyperstack, from 0; -1: there must be only one.
-    int frame = -1;         ///< Which time point of a series, from 0; -1: there must be only one.
+    std::optional<Vec3> spacing;  ///< world units, > 0; automatic: the file's
+    std::optional<int> channel;   ///< of a hyperstack, from 0; automatic: there must be only one
+    std::optional<int> frame;     ///< time point of a series, from 0; automatic: there must be only one
     /// Read only what samples within this box need: the voxels in it and one more on every side.
     std::optional<WorldBox> roi = {};
     /// A coarse level of a pyramid that states no translation is moved by half the difference between its spacing and
     /// the finest level's: where voxels are means of finer ones, that is where they lie.
     bool correct_level_shift = false;
 };
+
+template <>
+inline constexpr auto kOptions<ReadImageOptions> =
+    std::tuple{Option{"spacing", &ReadImageOptions::spacing, kPositiveLength, Group::Input,
+                      "voxel spacing, instead of the file's"},
+               Option{"channel", &ReadImageOptions::channel, kNotNegative, Group::Input,
+                      "channel of an image that has several, from 0"},
+               Option{"frame", &ReadImageOptions::frame, kNotNegative, Group::Input,
+                      "time point of an image that has several, from 0"},
+               Option{"roi", &ReadImageOptions::roi, Group::Input, "take this box of the world only"},
+               Option{"correct_level_shift", &ReadImageOptions::correct_level_shift, Group::Input,
+                      "move a coarse level of an OME-Zarr image that states no translation onto the finest one"}};
 
 /// The chunks of an image whose file keeps it in boxes that are packed each on its own.
 struct ChunkCount {

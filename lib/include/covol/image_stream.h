@@ -8,6 +8,7 @@
 
 #include "covol/api.h"
 #include "covol/image.h"
+#include "covol/options_table.h"
 #include "covol/run.h"
 
 namespace covol {
@@ -62,6 +63,9 @@ struct WriteImageOptions {
     /// they mean that lattice.
     std::string like = {};
 };
+
+template <>
+inline constexpr auto kOptions<WriteImageOptions> = std::tuple{Option{"pack", &WriteImageOptions::pack}};
 
 /// Writes an image as the other write_image() do, but in boxes of a few MB that are filled and packed in parallel: the
 /// memory does not grow with the image. The file does not depend on the number of threads.

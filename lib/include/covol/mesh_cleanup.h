@@ -4,6 +4,7 @@
 
 #include "covol/api.h"
 #include "covol/mesh.h"
+#include "covol/options_table.h"
 #include "covol/run.h"
 
 namespace covol {
@@ -15,8 +16,18 @@ struct CleanupOptions {
     double adaptive = 0.0;
     int smooth_iterations = 0;  ///< tangential + normal (Taubin-like, volume keeping) smoothing steps
     bool repair = true;         ///< resolve self-intersections and non-manifold spots, fill holes
-    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
+
+template <>
+inline constexpr auto kOptions<CleanupOptions> =
+    std::tuple{Option{"target_edge", &CleanupOptions::target_edge, kLength, Group::MeshFiles,
+                      "decimate to about this edge length"},
+               Option{"adaptive", &CleanupOptions::adaptive, kLength, Group::MeshFiles,
+                      "decimate as far as no triangle comes farther from the level set: large triangles where it is "
+                      "flat; at most 2vx"},
+               Option{"smooth", &CleanupOptions::smooth_iterations, kNotNegative, Group::MeshFiles,
+                      "steps of volume-keeping smoothing"},
+               Option{"repair", &CleanupOptions::repair, Group::MeshFiles, "resolve self-intersections, fill holes"}};
 /// What a step has made of a mesh.
 struct CleanupStep {
     std::int64_t triangles = 0;

@@ -8,6 +8,7 @@
 
 #include "covol/api.h"
 #include "covol/mesh.h"
+#include "covol/options_table.h"
 
 namespace covol {
 
@@ -25,6 +26,12 @@ struct WriteMeshOptions {
     std::vector<VertexAttribute> attributes;
     std::function<void(const std::string& line)> warn;  ///< hears of what the format cannot hold
 };
+
+template <>
+inline constexpr auto kOptions<WriteMeshOptions> =
+    std::tuple{Option{"binary", &WriteMeshOptions::binary}, Option{"up", &WriteMeshOptions::y_up},
+               Option{"unit_scale", &WriteMeshOptions::unit_scale, kPositive, Group::MeshFiles,
+                      "multiplies the mesh's coordinates, 0.001 for mm to m"}};
 
 /// PLY, OBJ, STL, OFF or binary glTF (.glb), by the name's end; with normals where the format has them. Of a mesh with
 /// an origin of its own PLY has doubles, .glb a translation; binary STL is relative to it, which `warn` hears.

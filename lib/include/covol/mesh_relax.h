@@ -4,6 +4,7 @@
 
 #include "covol/api.h"
 #include "covol/mesh.h"
+#include "covol/options_table.h"
 #include "covol/run.h"
 
 namespace covol {
@@ -12,8 +13,12 @@ struct RelaxOptions {
     double isovalue = 0.0;   ///< world units; that of extract_mesh()
     int rounds = 3;          ///< >= 0: turns of edge flips and moves; 0 leaves the mesh as it is
     double tolerance = 0.0;  ///< voxels; > 0: no change moves a triangle farther from the level set than that
-    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
+
+template <>
+inline constexpr auto kOptions<RelaxOptions> =
+    std::tuple{Option{"isovalue", &RelaxOptions::isovalue}, Option{"rounds", &RelaxOptions::rounds, kNotNegative},
+               Option{"tolerance", &RelaxOptions::tolerance, kNotNegative}};
 
 struct RelaxReport {
     std::int64_t triangles = 0;  ///< afterwards

@@ -6,6 +6,7 @@
 #include "covol/api.h"
 #include "covol/contours.h"
 #include "covol/image.h"
+#include "covol/options_table.h"
 #include "covol/run.h"
 
 namespace covol {
@@ -16,11 +17,21 @@ enum class PaintedAs {
     Slices,     ///< slices that hold paint show the whole cross-section
     Scribbles   ///< paint only says what is inside
 };
+template <>
+inline constexpr auto kWords<PaintedAs> = std::array{"auto", "slices", "scribbles"};
 
 struct PaintedOptions {
     PaintedAs as = PaintedAs::Automatic;
     int outside_label = 0;  ///< a label painted on what belongs to no structure; 0: none (0 itself is unpainted)
 };
+
+template <>
+inline constexpr auto kOptions<PaintedOptions> = std::tuple{
+    Option{"painted_as", &PaintedOptions::as, Group::ReadingMarks,
+           "slices: those that hold paint show the whole cross-section; scribbles: paint says what is inside",
+           "by the paint itself"},
+    Option{"painted_outside", &PaintedOptions::outside_label, kNotNegative, Group::ReadingMarks,
+           "a label that was painted on what belongs to no structure", "none"}};
 
 /// A label of a painted image.
 struct LabelName {

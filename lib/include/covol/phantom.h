@@ -1,9 +1,11 @@
 #pragma once
+#include <algorithm>
 #include <string>
 #include <vector>
 
 #include "covol/api.h"
 #include "covol/image.h"
+#include "covol/options_table.h"
 
 namespace covol {
 
@@ -14,7 +16,6 @@ struct PhantomOptions {
     int point_count = 3000;       ///< points on the true surface (in the holes, for the spheres with holes)
     double noise = 0.0;           ///< standard deviation of additive Gaussian noise, in units of the contrast
     std::uint64_t seed = 1;
-    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
 struct Phantom {
     Image image;  ///< uint8, contrast 0..255
@@ -23,5 +24,14 @@ struct Phantom {
 };
 [[nodiscard]] COVOL_API Phantom make_phantom(const PhantomOptions& options);
 [[nodiscard]] COVOL_API std::vector<std::string> list_phantom_kinds();
+
+template <>
+inline constexpr auto kOptions<PhantomOptions> = std::tuple{
+    Option{"size", &PhantomOptions::size, between(16, 2048), Group::Input, "voxels along each axis"},
+    Option{"count", &PhantomOptions::point_count, kNotNegative, Group::Input, "number of points"},
+    Option{"noise", &PhantomOptions::noise, kNotNegative, Group::Input, "standard deviation, in units of the contrast"},
+    Option{"seed", &PhantomOptions::seed, Range{}, Group::Input, "of the random numbers"},
+    Rule<PhantomOptions>{"kind", "one that list_phantom_kinds() has",
+                         [](const PhantomOptions& o) { return std::ranges::count(list_phantom_kinds(), o.kind) > 0; }}};
 
 }  // namespace covol

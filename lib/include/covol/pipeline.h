@@ -20,6 +20,7 @@
 #include "covol/image.h"
 #include "covol/mesh.h"
 #include "covol/mesh_relax.h"
+#include "covol/options_table.h"
 #include "covol/points.h"
 #include "covol/seeds.h"
 #include "covol/surface.h"
@@ -45,7 +46,8 @@ enum class Model {
              ///< it where it shows the border that it has at the marks
     Paper    ///< curvature alone, Eq. (1) as it is printed
 };
-[[nodiscard]] COVOL_API const char* to_string(Model model);
+template <>
+inline constexpr auto kWords<Model> = std::array{"guided", "paper"};
 
 struct SegmentOptions {
     Model model = Model::Guided;
@@ -85,11 +87,46 @@ struct SegmentOptions {
     bool without_fields = false;  ///< SegmentResult::u, distance and edge are given up as soon as nothing needs them
     /// levels of voxel size 2h, 4h, ... that the flow passes first, >= 0; automatic: 1 for a sphere or a box, else 0
     std::optional<int> coarse_levels;
-    [[nodiscard]] COVOL_API std::string why_invalid() const;
     /// Whether points alone are tagged, or belong to contours or another start, and are neither guessed from nor a
     /// cloud: choose_voxel_size().
     [[nodiscard]] COVOL_API bool tags_points() const;
 };
+
+template <>
+inline constexpr auto kOptions<SegmentOptions> = std::tuple{
+    Option{
+        "model", &SegmentOptions::model, Group::Start,
+        "what holds the surface where neither marks nor edges speak: a guess made from the marks, or curvature alone"},
+    Option{"mark_precision", &SegmentOptions::mark_precision, kLength, Group::ReadingMarks,
+           "standard deviation of a mark's place", "0.3 of the image's spacing along each axis"},
+    Option{"voxel_size", &SegmentOptions::voxel_size, kPositiveLength, Group::Domain, "edge of the voxels",
+           "the image's smallest spacing; without an image from the points"},
+    Option{"roi", &SegmentOptions::roi, Group::Domain, "work in this box of the world only"},
+    Option{"lattice_origin", &SegmentOptions::lattice_origin, Group::Domain,
+           "centre of voxel (0,0,0): runs with the same voxel size and origin share their lattice",
+           "the image's; without an image 0,0,0"},
+    Option{"margin", &SegmentOptions::margin, kLength, points_alone(Group::Domain),
+           "between the points and the domain's boundary", "D + 6vx"},
+    Option{"init", &SegmentOptions::start},
+    Option{"tag_distance", &SegmentOptions::tag_distance, kPositiveLength, Group::Start,
+           "D: closes gaps between points up to 2D", "from the points"},
+    Option{"exterior_seed", &SegmentOptions::exterior_seeds, Group::Start,
+           "a position outside the structure, also in a cavity; repeatable"},
+    Part{&SegmentOptions::evolve},
+    Part{&SegmentOptions::edge},
+    Option{"coarse_levels", &SegmentOptions::coarse_levels, between(0, 4), Group::Numerics,
+           "levels of twice the voxel size, and so on, that the flow passes first", "1 for a sphere or a box, else 0"},
+    Part{&SegmentOptions::correction},
+    Part{&SegmentOptions::holes},
+    Part{&SegmentOptions::extract},
+    Rule<SegmentOptions>{
+        "init", "a radius > 0",
+        [](const SegmentOptions& o) { return o.start.kind != Start::Kind::Sphere || o.start.radius > 0; }},
+    Rule<SegmentOptions>{"without_mesh", "false where holes are treated, pieces dropped or another level is wanted",
+                         [](const SegmentOptions& o) {
+                             return !o.without_mesh || (o.holes.policy == Holes::Close &&
+                                                        o.extract.min_component_volume == 0 && o.extract.isovalue == 0);
+                         }}};
 
 struct SegmentReport {
     struct Seconds {

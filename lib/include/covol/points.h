@@ -8,6 +8,7 @@
 #include "covol/api.h"
 #include "covol/fwd.h"
 #include "covol/image.h"
+#include "covol/options_table.h"
 #include "covol/run.h"
 
 namespace covol {
@@ -21,7 +22,12 @@ enum class PointSpace {
     Local,     ///< lengths along the image's axes from the centre of voxel 0: the origin is left out, as Fiji does
     Slices     ///< x and y as in Local, z a slice from 0 (Fiji's Results)
 };
+template <>
+inline constexpr auto kWords<PointSpace> = std::array{
+    static_cast<const char*>(nullptr), "world", "index", "ras", "index1", "local", static_cast<const char*>(nullptr)};
 enum class PointOrder { Unstated, XYZ, ZYX };
+template <>
+inline constexpr auto kWords<PointOrder> = std::array{static_cast<const char*>(nullptr), "xyz", "zyx"};
 
 struct ReadPointsOptions {
     PointSpace space = PointSpace::Unstated;  ///< Unstated: what the format says, else World.
@@ -30,6 +36,20 @@ struct ReadPointsOptions {
     int channels = 1;                         ///< z / channels is the slice: Fiji counts a multi-point's positions
                                               ///< through a hyperstack's channels too. Points in voxels alone.
 };
+
+template <>
+inline constexpr auto kOptions<ReadPointsOptions> = std::tuple{
+    Option{
+        "points_space", &ReadPointsOptions::space, Group::ReadingMarks,
+        "coordinates are world units (LPS), the same in RAS, voxels from 0, voxels from 1, or lengths from the first "
+        "voxel",
+        "what the format says, else world"},
+    Option{"points_order", &ReadPointsOptions::order, Group::ReadingMarks, "order of the coordinates",
+           "what the format says, else xyz"},
+    Option{"points_scale", &ReadPointsOptions::scale, kPositive, Group::ReadingMarks,
+           "multiplies the points' lengths, 0.001 for micrometres to mm"},
+    Option{"points_channels", &ReadPointsOptions::channels, between(1, 1000), Group::ReadingMarks,
+           "channels of the hyperstack that a Fiji multi-point was clicked in"}};
 
 /// An ordered line of marks: the points [begin, end) of a cloud, as a person clicked them along a border.
 struct MarkLine {

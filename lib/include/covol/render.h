@@ -7,6 +7,7 @@
 
 #include "covol/api.h"
 #include "covol/image.h"
+#include "covol/options_table.h"
 #include "covol/picture.h"
 #include "covol/run.h"
 
@@ -39,6 +40,8 @@ enum class FigureKind {
     Surface,   ///< the view alone
     Slices     ///< the slices alone
 };
+template <>
+inline constexpr auto kWords<FigureKind> = std::array{"composed", "surface", "slices"};
 
 /// Where a parallel view looks from, in degrees. Azimuth 0 looks along +y and 90 along -x; elevation 90 along -z, down
 /// the world's third axis.
@@ -63,8 +66,24 @@ struct RenderOptions {
     std::optional<Vec3> at;         ///< world; where the three planes meet; automatic: the structures' middle
     bool volume = false;            ///< the image, volume rendered, behind the surfaces
     bool white_background = true;   ///< else black
-    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
+
+template <>
+inline constexpr auto kOptions<RenderOptions> = std::tuple{
+    Option{"width", &RenderOptions::width, between(64, 16384)},
+    Option{"height", &RenderOptions::height, between(64, 16384)},
+    Option{"zoom", &RenderOptions::zoom, between(0.05, 100), Group::Picture, "enlarges the view of the surfaces"},
+    Option{"volume", &RenderOptions::volume, Group::Picture, "show the image, volume rendered, behind the surfaces"},
+    Option{"slices", &RenderOptions::slices, between(0, 64), Group::Picture,
+           "so many slices along one axis, marked ones first; 0 for none", "three planes through the middle"},
+    Option{"slice_axis", &RenderOptions::slice_axis, between(0, 2)},
+    Option{"at", &RenderOptions::at, Group::Picture, "place in the world where the three planes meet",
+           "the structures' middle"},
+    Rule<RenderOptions>{"size", "width * height <= 50 million",
+                        [](const RenderOptions& o) { return double(o.width) * o.height <= 5e7; }},
+    Rule<RenderOptions>{"view", "a finite azimuth, and an elevation of -90 to 90", [](const RenderOptions& o) {
+                            return Range{}.holds(o.view.azimuth) && between(-90, 90).holds(o.view.elevation);
+                        }}};
 
 /// A figure: surfaces shaded by the gradient of smoothed level sets, with marks, axes and a scale bar; slices of the
 /// image in true proportions, with each structure's outline, the marks within half a slice, and a scale bar; a legend.

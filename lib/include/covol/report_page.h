@@ -8,6 +8,7 @@
 #include "covol/evidence.h"
 #include "covol/image.h"
 #include "covol/mesh.h"
+#include "covol/options_table.h"
 #include "covol/run.h"
 
 namespace covol {
@@ -39,8 +40,14 @@ struct ReportPageOptions {
     std::int64_t most_voxels = 16'000'000;
     std::int64_t most_marks = 20'000;  ///< of each structure; of more, every n-th
     int jpeg_quality = 80;             ///< 1 to 100
-    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
+
+template <>
+inline constexpr auto kOptions<ReportPageOptions> =
+    std::tuple{Option{"most_triangles", &ReportPageOptions::most_triangles, at_least(100)},
+               Option{"most_voxels", &ReportPageOptions::most_voxels, at_least(1000)},
+               Option{"most_marks", &ReportPageOptions::most_marks, at_least(1)},
+               Option{"jpeg_quality", &ReportPageOptions::jpeg_quality, between(1, 100)}};
 
 /// What a page holds.
 struct ReportPageSummary {

@@ -11,6 +11,7 @@
 #include "covol/fwd.h"
 #include "covol/image.h"
 #include "covol/image_stream.h"
+#include "covol/options_table.h"
 #include "covol/run.h"
 
 namespace covol {
@@ -24,8 +25,12 @@ struct Structure {
 struct SeparateOptions {
     std::optional<double> gap;  ///< gaps narrower than this close, world units; 0: none; automatic: 1 voxel
     double nested_share = 0.9;  ///< in (0.5,1]: a solid that lies in a larger one with this share is carved out of it
-    [[nodiscard]] COVOL_API std::string why_invalid() const;
 };
+
+template <>
+inline constexpr auto kOptions<SeparateOptions> =
+    std::tuple{Option{"gap", &SeparateOptions::gap, kNotNegative},
+               Option{"nested_share", &SeparateOptions::nested_share, Range{0.5, 1, true}}};
 
 /// Two structures that overlapped.
 struct StructureOverlap {

@@ -5,6 +5,7 @@
 #include "covol/api.h"
 #include "covol/image.h"
 #include "covol/mesh.h"
+#include "covol/options_table.h"
 #include "covol/run.h"
 
 namespace covol {
@@ -20,6 +21,13 @@ struct ExtractOptions {
     double isovalue = 0.0;              ///< world units
     double min_component_volume = 0.0;  ///< world units^3; smaller pieces are dropped; 0 keeps all
 };
+
+template <>
+inline constexpr auto kOptions<ExtractOptions> =
+    std::tuple{Option{"isovalue", &ExtractOptions::isovalue, kAnyLength, single_step(Group::MeshFiles),
+                      "extract this level outside the surface", "0"},
+               Option{"min_component", &ExtractOptions::min_component_volume, kVolume, Group::MeshFiles,
+                      "drop pieces of the mesh that are smaller than a cube of this edge"}};
 
 /// Closed, manifold, outward triangles of the zero level set, in world units.
 [[nodiscard]] COVOL_API TriangleMesh extract_mesh(const FloatGrid& surface, const ExtractOptions& options = {},

@@ -5,6 +5,7 @@
 
 #include "covol/api.h"
 #include "covol/fwd.h"
+#include "covol/options_table.h"
 #include "covol/run.h"
 
 namespace covol {
@@ -13,12 +14,22 @@ namespace covol {
 /// was built without it fails on such a file, or crashes. Zip is for grids that are neither level sets nor fog volumes:
 /// those OpenVDB then leaves as they are.
 enum class VdbCompression { None, Zip, Blosc };
+template <>
+inline constexpr auto kWords<VdbCompression> = std::array{"none", "zip", "blosc"};
 
 struct WriteVdbOptions {
     bool half = false;                            ///< values as 16-bit floats
     std::map<std::string, std::string> metadata;  ///< provenance, stored in the file and on every grid
     VdbCompression compression = VdbCompression::Blosc;
 };
+
+template <>
+inline constexpr auto kOptions<WriteVdbOptions> = std::tuple{
+    Option{"half", &WriteVdbOptions::half, Group::Output, "store values in .vdb files as 16-bit floats"},
+    Option{
+        "compression", &WriteVdbOptions::compression, Group::Output,
+        "of .vdb files: zip and none open where a program has no Blosc, or another one; under zip OpenVDB leaves level "
+        "sets and fog volumes as they are"}};
 
 /// Writes the grids in order, with statistics metadata and creator "covol VERSION".
 /// Whole or not at all. @throws Error Io, InvalidInput (names empty or not unique).

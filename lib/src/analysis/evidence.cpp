@@ -11,7 +11,6 @@
 #include <cmath>
 #include <map>
 
-#include "base/valid.h"
 #include "covol/distance.h"
 #include "covol/error.h"
 #include "covol/points.h"
@@ -285,19 +284,11 @@ private:
 
 }  // namespace
 
-std::string EvidenceOptions::why_invalid() const {
-    detail::FieldChecks checks;
-    checks.expect_positive("reach", reach);
-    checks.expect(weak_edge > 0 && weak_edge < 1, "weak_edge", "> 0 and < 1", weak_edge);
-    checks.expect_not_negative("suggestions", suggestions);
-    return checks.lines();
-}
-
 namespace {
 
 Evidence assess(const TriangleMesh& mesh, const std::vector<Vec3>& marks, const FloatGrid* edge,
                 const ImageGeometry& geometry, const EvidenceOptions& options, const RunContext& run) {
-    detail::require_valid(options, "assess_evidence");
+    require_valid(options, "assess_evidence");
     if (mesh.empty()) throw Error(Errc::InvalidInput, "assess_evidence: expected a surface, got an empty mesh");
     Evidence result;
     with_threads(run, [&] { result = Judge(mesh, marks, geometry, options, run).go(edge); });

@@ -8,8 +8,6 @@
 #include <numbers>
 #include <random>
 
-#include "base/valid.h"
-
 namespace covol {
 namespace {
 
@@ -152,24 +150,7 @@ std::vector<Shape> shapes() {
     };
 }
 
-std::string joined_kinds() {
-    std::string text;
-    for (const std::string& kind : list_phantom_kinds()) text += (text.empty() ? "" : ", ") + kind;
-    return text;
-}
-
 }  // namespace
-
-std::string PhantomOptions::why_invalid() const {
-    detail::FieldChecks checks;
-    const std::vector<std::string> kinds = list_phantom_kinds();
-    checks.expect(std::find(kinds.begin(), kinds.end(), kind) != kinds.end(), "kind", "one of " + joined_kinds(),
-                  "'" + kind + "'");
-    checks.expect(size >= 16 && size <= 2048, "size", "16 to 2048", size);
-    checks.expect_not_negative("point_count", point_count);
-    checks.expect_not_negative("noise", noise);
-    return checks.lines();
-}
 
 std::vector<std::string> list_phantom_kinds() {
     std::vector<std::string> names;
@@ -178,9 +159,16 @@ std::vector<std::string> list_phantom_kinds() {
 }
 
 Phantom make_phantom(const PhantomOptions& options) {
-    detail::require_valid(options, "make_phantom");
     const std::vector<Shape> all = shapes();
-    const Shape& shape = *std::find_if(all.begin(), all.end(), [&](const Shape& s) { return s.name == options.kind; });
+    const auto found = std::find_if(all.begin(), all.end(), [&](const Shape& s) { return s.name == options.kind; });
+    if (found == all.end()) {
+        std::string kinds;
+        for (const Shape& s : all) kinds += (kinds.empty() ? "" : ", ") + std::string(s.name);
+        throw Error(Errc::InvalidOptions,
+                    "make_phantom: kind: expected one of " + kinds + ", got '" + options.kind + "'", "kind");
+    }
+    require_valid(options, "make_phantom");
+    const Shape& shape = *found;
 
     const int n = options.size;
     const double h = 2 * kHalfSide / n;

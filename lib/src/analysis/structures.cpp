@@ -13,7 +13,6 @@
 #include <set>
 #include <sstream>
 
-#include "base/valid.h"
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "covol/surface.h"
@@ -59,7 +58,7 @@ public:
 
 private:
     void check_input() const {
-        detail::require_valid(options_, "separate");
+        require_valid(options_, "separate");
         if (structures_.empty()) throw Error(Errc::InvalidInput, "separate: expected a structure, got none");
         std::set<std::string> names;
         for (const Structure& s : structures_) {
@@ -243,13 +242,6 @@ private:
 };
 
 }  // namespace
-
-std::string SeparateOptions::why_invalid() const {
-    detail::FieldChecks checks;
-    checks.expect_not_negative("gap", gap);
-    checks.expect(nested_share > 0.5 && nested_share <= 1, "nested_share", "> 0.5 and <= 1", nested_share);
-    return checks.lines();
-}
 
 SeparateResult separate(const std::vector<Structure>& structures, const SeparateOptions& options,
                         const RunContext& run) {

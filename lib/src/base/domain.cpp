@@ -39,9 +39,9 @@ void require_voxel_size(const char* where, double voxel_size) {
     std::ostringstream text;
     text << where << ": `voxel_size`: expected >= " << kLeast << ", got " << voxel_size;
     if (voxel_size > 0 && voxel_size < kLeast)
-        text
-            << ", less than OpenVDB holds; state lengths in a smaller unit (`spacing` of the image, `scale` of points)";
-    throw Error(Errc::InvalidOptions, text.str());
+        text << ", less than OpenVDB holds; state lengths in a smaller unit (`spacing` of the image, `points_scale` of "
+                "points)";
+    throw Error(Errc::InvalidOptions, text.str(), "voxel_size");
 }
 
 }  // namespace
@@ -108,7 +108,8 @@ Domain covering(const Domain& lattice, const WorldBox& box) {
             throw Error(Errc::InvalidInput,
                         "covering: " + to_text(box) + " reaches more than 2^23 voxels of size " +
                             std::to_string(lattice.voxel_size) +
-                            " from the lattice's origin; choose a nearer `lattice_origin`, or a larger `voxel_size`");
+                            " from the lattice's origin; choose a nearer `lattice_origin`, or a larger `voxel_size`",
+                        "lattice_origin");
         domain.min[a] = static_cast<std::int32_t>(first);
         domain.max[a] = static_cast<std::int32_t>(std::max(first, last));
     }

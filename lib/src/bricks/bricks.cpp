@@ -8,7 +8,6 @@
 #include <optional>
 
 #include "base/no_surface.h"
-#include "base/valid.h"
 #include "bricks/split.h"
 #include "bricks/states.h"
 #include "cloud/surface/cloud_field.h"
@@ -34,15 +33,17 @@ constexpr std::size_t kEdgeSamples = 64;  // coarse leaves at which the image is
 
 void require_bricks_can(const Problem& problem, const Resolved& resolved) {
     const auto refuse = [](const std::string& what) {
-        throw Error(Errc::Unsupported, "bricks: " + what +
-                                           ": such a surface rests on all of them at once; solve it in one piece, "
-                                           "with a larger `voxel_size` where memory does not do");
+        throw Error(Errc::Unsupported,
+                    "bricks: " + what +
+                        ": such a surface rests on all of them at once; solve it in one piece, "
+                        "with a larger `voxel_size` where memory does not do",
+                    "voxel_size");
     };
     if (problem.options.contours) refuse("contours, got some");
     if (problem.options.guess) refuse("expected no guess to correct, got one");
     if (resolved.choices.start == StartMethod::Guess)
         refuse(std::to_string(resolved.marks.attracting.size()) +
-               " marks are a guess; `model = Paper`, or more marks, flow");
+               " marks are a guess; `model = paper`, or more marks, flow");
 }
 
 /// The voxels of one lattice that a coarse solve's domain covers.
@@ -150,17 +151,6 @@ std::vector<std::size_t> all_of(const BrickPlan& plan) {
 }
 
 }  // namespace
-
-std::string BrickOptions::why_invalid() const {
-    detail::FieldChecks checks;
-    checks.expect(most_voxels > 0, "most_voxels", "> 0", double(most_voxels));
-    constexpr int kFarthestVoxel = 1 << 23;  // of a lattice
-    checks.expect(overlap > 0 && overlap % 8 == 0 && overlap <= kFarthestVoxel, "overlap", "a multiple of 8, 8 to 2^23",
-                  overlap);
-    checks.expect_positive("tolerance", tolerance);
-    checks.expect(most_sweeps >= 1, "most_sweeps", ">= 1", most_sweeps);
-    return checks.lines();
-}
 
 std::int64_t BrickPlan::active_voxels() const {
     std::int64_t all = 0;
@@ -308,7 +298,7 @@ BrickJob::BrickJob(const std::vector<Vec3>& points, const SegmentOptions& option
 BrickJob::~BrickJob() = default;
 
 BrickPlan BrickJob::plan(const BrickOptions& options) const {
-    detail::require_valid(options, "bricks");
+    require_valid(options, "bricks");
     BrickPlan plan;
     plan.options = options;
     with_threads(parts_->run, [&] {

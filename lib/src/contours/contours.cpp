@@ -7,7 +7,6 @@
 #include <sstream>
 
 #include "base/number.h"
-#include "base/valid.h"
 #include "contours/contour_curve.h"
 #include "contours/contour_solid.h"
 #include "contours/heuristics.h"
@@ -130,8 +129,8 @@ void Densifier::check_inside(const Line& line) const {
     text << "densify: " << line.name << ": " << outside << " of " << line.index.size()
          << " marks lie outside the image, the first at voxel (" << (*first)[0] << ", " << (*first)[1] << ", "
          << (*first)[2] << ") of " << geometry_.size[0] << " x " << geometry_.size[1] << " x " << geometry_.size[2]
-         << "; check `space`, `order` and `spacing`";
-    throw Error(Errc::InvalidInput, text.str());
+         << "; check `points_space`, `points_order` and `spacing`";
+    throw Error(Errc::InvalidInput, text.str(), "points_space");
 }
 
 void Densifier::find_planes(Line& line) const {
@@ -381,18 +380,11 @@ void Densifier::summarise() {
 
 }  // namespace
 
-std::string ContourOptions::why_invalid() const {
-    detail::FieldChecks checks;
-    checks.expect_positive("step", step);
-    checks.expect_not_negative("thickness", thickness);
-    return checks.lines();
-}
-
 namespace {
 
 Contours densify_in(const ImageGeometry* geometry, const std::vector<PointCloud>& clouds, const ContourOptions& options,
                     const RunContext& run) {
-    detail::require_valid(options, "densify");
+    require_valid(options, "densify");
     Contours result;
     with_threads(run, [&] { result = Densifier(geometry, options, run).go(clouds); });
     return result;

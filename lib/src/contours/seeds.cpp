@@ -77,8 +77,10 @@ void check_sides(const std::vector<Vec3>& inside, const std::vector<Vec3>& outsi
     const detail::KdTree tree(inside);
     for (const Vec3& seed : outside)
         if (tree.nearest(seed) <= same * same)
-            throw Error(Errc::InvalidInput, "check_sides: expected each position on one side, got " + to_text(seed) +
-                                                " inside and outside; take it out of one of `inside` and `outside`");
+            throw Error(Errc::InvalidInput,
+                        "check_sides: expected each position on one side, got " + to_text(seed) +
+                            " inside and outside; take it out of one of `inside` and `outside`",
+                        "outside");
 }
 
 }  // namespace covol

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <memory>
 
-#include "base/valid.h"
 #include "covol/error.h"
 #include "distance/memory_need.h"
 #include "distance/nearest.h"
@@ -52,15 +51,9 @@ std::unique_ptr<Leaf> make_leaf(const detail::NearestField& field, const detail:
 
 }  // namespace
 
-std::string DistanceOptions::why_invalid() const {
-    detail::FieldChecks checks;
-    checks.expect_positive("max_distance", max_distance);
-    return checks.lines();
-}
-
 DistanceResult compute_distance(const std::vector<Vec3>& points, const Domain& domain, const DistanceOptions& options,
                                 const RunContext& run) {
-    detail::require_valid(options, "compute_distance");
+    require_valid(options, "compute_distance");
     if (domain.voxel_count() == 0) throw Error(Errc::InvalidInput, "compute_distance: the domain is empty");
     const std::vector<Vec3> positions = to_index_space(points, domain);
     detail::require_tube_memory(points, domain, {options.max_distance, 0, false}, "compute_distance", run);

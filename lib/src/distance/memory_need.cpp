@@ -80,7 +80,7 @@ void require(const BytesAt& bytes_at, double voxel_size, const char* where, cons
     text << where << ": a voxel size of " << voxel_size << " needs about " << gigabytes(needed) << " GiB of memory, "
          << gigabytes(budget) << " GiB may be used; use a larger one, such as " << fits
          << " (`voxel_size`), or a smaller domain (`roi`)";
-    throw Error(Errc::InvalidOptions, text.str());
+    throw Error(Errc::InvalidOptions, text.str(), "voxel_size");
 }
 
 }  // namespace

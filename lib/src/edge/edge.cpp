@@ -9,7 +9,6 @@
 #include <cmath>
 #include <iterator>
 
-#include "base/valid.h"
 #include "covol/error.h"
 #include "edge/heuristics.h"
 #include "edge/nth_value.h"
@@ -240,49 +239,26 @@ double automatic_contrast(FloatGrid& s, const EdgeOptions& options, bool is_line
 
 }  // namespace
 
-const char* to_string(EdgeFeature feature) {
-    switch (feature) {
-        case EdgeFeature::Automatic: return "auto";
-        case EdgeFeature::Slope: return "slope";
-        case EdgeFeature::BrightLine: return "bright-line";
-        case EdgeFeature::DarkLine: break;
-    }
-    return "dark-line";
-}
-
-std::string EdgeOptions::why_invalid() const {
-    detail::FieldChecks checks;
-    checks.expect_not_negative("sigma", sigma);
-    checks.expect_positive("edge_k", edge_k);
-    checks.expect_positive("edge_contrast", edge_contrast);
-    if (const auto p = contrast_percentile)
-        checks.expect(*p > 0 && *p < 1, "contrast_percentile", "between 0 and 1", *p);
-    checks.expect(std::isfinite(low) && std::isfinite(high) && low <= high, "low", "<= high", low);
-    return checks.lines();
-}
-
 EdgeResult detect_edges(const Image& image, const FloatGrid& topology, const EdgeOptions& options,
                         const RunContext& run) {
-    detail::require_valid(options, "detect_edges");
+    require_valid(options, "detect_edges");
     if (topology.activeVoxelCount() == 0)
         throw Error(Errc::InvalidInput, "detect_edges: expected active voxels in the band, got none");
     const Domain domain = domain_of(topology);
     EdgeResult result;
     EdgeReport& report = result.report;
     report.sigma = options.sigma.value_or(domain.voxel_size);
-    report.low = options.low, report.high = options.high;
     with_threads(run, [&] {
         Window window = sample_window(image, topology, domain, report.sigma, run);
-        if (!(report.low < report.high)) {
-            const auto range = brightness_range(window);
-            report.low = range[0], report.high = range[1];
-        }
+        const auto range = options.intensities ? *options.intensities : brightness_range(window);
+        report.low = range[0], report.high = range[1];
         if (!(report.low < report.high))
-            throw Error(Errc::InvalidInput, "detect_edges: " + image.path() +
-                                                ": every voxel near the band has the value " +
-                                                std::to_string(report.low) +
-                                                ", there is no edge to find; check that the points lie on the image's "
-                                                "structure, or segment with the points alone (`rho = 0`)");
+            throw Error(Errc::InvalidInput,
+                        "detect_edges: " + image.path() + ": every voxel near the band has the value " +
+                            std::to_string(report.low) +
+                            ", there is no edge to find; check that the points lie on the image's "
+                            "structure, or segment with the points alone (`rho = 0`)",
+                        "rho");
         normalise(window, report);
         smooth(window, domain, report.sigma, run);
 

@@ -57,11 +57,12 @@ struct Checkpoints::State {
 Checkpoints::Checkpoints(const std::string& folder, double every, const std::string& job, bool resume)
     : state_(new State{folder, every}) {
     if (!(every >= 0) || !std::isfinite(every))
-        throw Error(Errc::InvalidOptions, "`checkpoint_every`: expected >= 0 seconds, got " + detail::number(every));
+        throw Error(Errc::InvalidOptions, "`checkpoint_every`: expected >= 0 seconds, got " + detail::number(every),
+                    "checkpoint_every");
     std::error_code status;
     fs::create_directories(folder, status);
     if (!fs::is_directory(folder, status))
-        throw Error(Errc::Io, "`checkpoint`: " + folder + ": cannot be made, or is no folder");
+        throw Error(Errc::Io, "`checkpoint`: " + folder + ": cannot be made, or is no folder", "checkpoint");
     { const ScratchFolder finishes_what_was_begun(folder); }
     const fs::path job_file = fs::path(folder) / kJobFile;
     state_->had_states = fs::exists(job_file, status);
@@ -71,13 +72,15 @@ Checkpoints::Checkpoints(const std::string& folder, double every, const std::str
             std::ofstream file(temporary, std::ios::binary);
             file << job;
             file.close();
-            if (!file) throw Error(Errc::Io, "`checkpoint`: " + job_file.string() + ": cannot be written");
+            if (!file)
+                throw Error(Errc::Io, "`checkpoint`: " + job_file.string() + ": cannot be written", "checkpoint");
         });
         return;
     }
     if (!resume)
         throw Error(Errc::InvalidInput,
-                    "`checkpoint`: " + folder + ": it holds states of a run; `resume` goes on with it, or remove it");
+                    "`checkpoint`: " + folder + ": it holds states of a run; `resume` goes on with it, or remove it",
+                    "checkpoint");
     if (!holds(job_file, job))
         throw Error(Errc::InvalidInput, "`resume`: " + folder +
                                             ": its states are of a run with other options, inputs, version or "

@@ -14,7 +14,6 @@
 #include <utility>
 
 #include "base/number.h"
-#include "base/valid.h"
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "evolve/band_solver.h"
@@ -149,7 +148,8 @@ private:
                     std::string("evolve: ") + (options_.tau ? "`tau`" : "`delta`") +
                         ": expected a step (tau in voxels, times the largest of theta, rho, and delta in voxels) of " +
                         detail::number(kSmallestStep) + " to " + detail::number(kLargestStep) + ", got " +
-                        detail::number(step) + ": beyond it the coefficients of the scheme, of 16 bits, do not hold");
+                        detail::number(step) + ": beyond it the coefficients of the scheme, of 16 bits, do not hold",
+                    options_.tau ? "tau" : "delta");
     }
 
     // A state is that between two steps: u as the band was made of it, and what the steps since have changed.
@@ -313,26 +313,6 @@ private:
 
 }  // namespace
 
-std::string EvolveOptions::why_invalid() const {
-    detail::FieldChecks checks;
-    checks.expect_share("theta", theta);
-    checks.expect_share("rho", rho);
-    checks.expect_not_negative("delta", delta);
-    checks.expect_positive("tau", tau);
-    checks.expect_positive("epsilon", epsilon);
-    checks.expect_positive("edge_epsilon", edge_epsilon);
-    checks.expect_not_negative("attraction_range", attraction_range);
-    checks.expect_share("image_yields", image_yields);
-    checks.expect_share("guess_weight", guess_weight);
-    checks.expect_not_negative("max_steps", max_steps);
-    checks.expect_not_negative("tolerance", tolerance);
-    if (solver_tolerance)
-        checks.expect(*solver_tolerance > 0 && *solver_tolerance < 1, "solver_tolerance", "between 0 and 1",
-                      *solver_tolerance);
-    checks.expect(max_sweeps >= 1, "max_sweeps", ">= 1", max_sweeps);
-    return checks.lines();
-}
-
 const char* instruction_set() { return detail::kernels().name; }
 
 const char* to_string(StopReason reason) {
@@ -347,7 +327,7 @@ const char* to_string(StopReason reason) {
 }
 
 EvolveReport evolve(FloatGrid& u, const EvolveFields& fields, const EvolveOptions& options, const RunContext& run) {
-    detail::require_valid(options, "evolve");
+    require_valid(options, "evolve");
     EvolveReport report;
     with_threads(run, [&] {
         detail::require_memory_of_tiles(u, "evolve", run);

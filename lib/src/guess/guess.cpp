@@ -9,7 +9,6 @@
 #include <set>
 #include <utility>
 
-#include "base/valid.h"
 #include "base/vector.h"
 #include "clip/clipped.h"
 #include "clip/half_spaces.h"
@@ -181,13 +180,6 @@ std::vector<Vec3> without_cut_marks(const std::vector<Vec3>& marks, const InImag
 
 }  // namespace
 
-std::string GuessOptions::why_invalid() const {
-    for (const Vec3& axis : deviation)
-        for (const double x : axis)
-            if (!std::isfinite(x)) return "deviation: expected finite numbers";
-    return {};
-}
-
 bool can_enclose(const std::vector<Vec3>& marks) { return guess::span_space(marks); }
 
 Guess guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks, const GuessOptions& options,
@@ -198,7 +190,7 @@ Guess guess_from_marks(const Domain& domain, const std::vector<Vec3>& marks, con
 Guess guess::guess_in_image(const Domain& domain, const std::vector<Vec3>& marks, const GuessOptions& given,
                             const Clip& image, const RunContext& run) {
     const InImage options(given, image);
-    detail::require_valid(options, "guess");
+    require_valid<GuessOptions>(options, "guess");
     Guess result;
     GuessReport& report = result.report;
     with_threads(run, [&] {

@@ -11,7 +11,6 @@
 #include <memory>
 #include <numeric>
 
-#include "base/valid.h"
 #include "clip/clipped.h"
 #include "clip/half_spaces.h"
 #include "covol/error.h"
@@ -357,17 +356,10 @@ FloatGridPtr GuessCorrection::start(const RunContext& run) const {
     return start_from_grid(domain, *field, run);
 }
 
-std::string CorrectionOptions::why_invalid() const {
-    detail::FieldChecks checks;
-    checks.expect_positive("precision", precision);
-    checks.expect_positive("least_radius", least_radius);
-    return checks.lines();
-}
-
 GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>& marks,
                               const std::vector<Vec3>& inside, const std::vector<Vec3>& outside,
                               const CorrectionOptions& options, const RunContext& run) {
-    detail::require_valid(options, "correct_guess");
+    require_valid(options, "correct_guess");
     const std::vector<Vec3> surface = find_crossings(*guess);
     auto data = std::make_shared<GuessCorrection::Data>(guess, surface);
     with_threads(run, [&] {

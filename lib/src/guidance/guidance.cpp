@@ -12,7 +12,6 @@
 #include <numeric>
 #include <optional>
 
-#include "base/valid.h"
 #include "covol/domain.h"
 #include "covol/start.h"
 #include "covol/surface.h"
@@ -178,8 +177,8 @@ bool Guide::place_marks(bool first) {
             mark.residual += share * residual[m];
             for (int a = 0; a < 3; ++a) mark.at[a] += share * marks_[m][a];
         }
-        const double precision = options_.mark_precision.value_or(patches_.voxel[i]);
-        mark.deviation = precision * std::sqrt(share / 12);  // of a uniform error
+        const double width = options_.mark_precision ? *options_.mark_precision / kUniformDeviation : patches_.voxel[i];
+        mark.deviation = width * std::sqrt(share / 12);  // of a uniform error
         on_.push_back(mark);
     }
     if (on_.size() < kGuide.fewest_marks) {
@@ -460,17 +459,9 @@ void GuidanceReport::add(const GuidanceReport& pass, bool moved) {
     if (used) reason.clear();
 }
 
-std::string GuidanceOptions::why_invalid() const {
-    detail::FieldChecks checks;
-    checks.expect_not_negative("mark_precision", mark_precision);
-    checks.expect_not_negative("range", range);
-    checks.expect_share("weight", weight);
-    return checks.lines();
-}
-
 Guided guide(const FloatGrid& guess, const std::vector<Vec3>& marks, const Image& image, const GuidanceOptions& options,
              const RunContext& run) {
-    detail::require_valid(options, "guide");
+    require_valid(options, "guide");
     Guided guided;
     auto& [result, report] = guided;
     with_threads(run, [&, &result = result, &report = report] {

@@ -182,8 +182,6 @@ holes::CutMesh cut_holes(const TriangleMesh& mesh, const std::vector<float>& to_
 
 }  // namespace
 
-const char* to_string(Holes holes) { return holes == Holes::Close ? "close" : holes == Holes::Open ? "open" : "flat"; }
-
 double choose_hole_distance(const std::vector<Vec3>& points, double voxel_size) {
     return kHoles.far * std::max(voxel_size, measure_spacing(points).p95 / kP95OfSpacing);
 }

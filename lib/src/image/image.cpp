@@ -53,9 +53,10 @@ void check_direction(const std::string& where, const ImageGeometry& g) {
 /// @throws Error InvalidInput, Unsupported unless numbers hold the lattice well.
 void check_geometry(const std::string& where, const ImageGeometry& g) {
     const auto refuse = [&](const char* what, const std::string& expected, double got, int axis, const char* advice) {
-        throw Error(Errc::InvalidInput, where + ": " + what + ": expected " + expected + ", got " +
-                                            detail::number(got) + " along axis " + std::to_string(axis) + "; " +
-                                            advice);
+        throw Error(Errc::InvalidInput,
+                    where + ": " + what + ": expected " + expected + ", got " + detail::number(got) + " along axis " +
+                        std::to_string(axis) + "; " + advice,
+                    what);
     };
     double finest = detail::kLargestLength;
     for (int a = 0; a < 3; ++a) {
@@ -138,14 +139,12 @@ void warn_of_spacing(const std::string& path, const ImageInfo& info, const RunCo
 ImageInfo corrected_info(const std::string& path, const ImageFile& file, const ReadImageOptions& options,
                          const RunContext& run) {
     ImageInfo info = file.info();
-    for (int a = 0; a < 3; ++a) {
-        if (options.spacing[a] > 0) {
-            info.geometry.spacing[a] = options.spacing[a];
-            info.spacing_known[a] = true;
-        } else if (!info.spacing_known[a]) {
-            info.geometry.spacing[a] = 1;
-        }
+    if (options.spacing) {
+        info.geometry.spacing = *options.spacing;
+        info.spacing_known = {true, true, true};
     }
+    for (int a = 0; a < 3; ++a)
+        if (!info.spacing_known[a]) info.geometry.spacing[a] = 1;
     info.geometry.spacing_known = info.spacing_known[0] && info.spacing_known[1] && info.spacing_known[2];
     check_geometry("read_image: " + path, info.geometry);
     warn_of_spacing(path, info, run);
@@ -153,10 +152,10 @@ ImageInfo corrected_info(const std::string& path, const ImageFile& file, const R
 }
 
 /// The index along channels or frames that the caller chose, or the only one there is.
-std::uint64_t choose(const std::string& path, const std::string& what, int wanted, int count,
+std::uint64_t choose(const std::string& path, const std::string& what, const std::optional<int>& wanted, int count,
                      const std::vector<std::string>& names) {
-    if (wanted < 0 && count == 1) return 0;
-    if (wanted >= 0 && wanted < count) return std::uint64_t(wanted);
+    if (!wanted && count == 1) return 0;
+    if (wanted && *wanted < count) return std::uint64_t(*wanted);
     std::string list = "0 to " + std::to_string(count - 1);
     if (!names.empty()) {
         list.clear();
@@ -164,9 +163,11 @@ std::uint64_t choose(const std::string& path, const std::string& what, int wante
             list += (n == 0 ? "" : ", ") + std::to_string(n) + (names[n].empty() ? "" : " (" + names[n] + ")");
     }
     const std::string choice = "; choose " + list + " with `" + what + "`";
-    if (wanted < 0)
-        throw read_error(Errc::Unsupported, path, "expected one " + what + ", got " + std::to_string(count) + choice);
-    throw read_error(Errc::InvalidOptions, path, what + " " + std::to_string(wanted) + " does not exist" + choice);
+    if (!wanted)
+        throw read_error(Errc::Unsupported, path, "expected one " + what + ", got " + std::to_string(count) + choice,
+                         what);
+    throw read_error(Errc::InvalidOptions, path, what + " " + std::to_string(*wanted) + " does not exist" + choice,
+                     what);
 }
 
 PixelRequest choose_pixels(const std::string& path, const ImageInfo& info, const ReadImageOptions& options) {
@@ -370,6 +371,7 @@ std::optional<VoxelView> Image::view() const {
 // ---------------------------------------------------------------------------------------------- reading
 
 Image read_image(const std::string& path, const ReadImageOptions& options, const RunContext& run) {
+    require_valid(options, "read_image");
     Image image;
     with_threads(run, [&] {
         const std::unique_ptr<ImageFile> file = open_image(path, options, run);
@@ -398,11 +400,12 @@ ImageGeometry read_image_geometry(const std::string& path, const ReadImageOption
 }
 
 ImageInfo read_image_info(const std::string& path, const ReadImageOptions& options, const RunContext& run) {
+    require_valid(options, "read_image_info");
     const std::unique_ptr<ImageFile> file = open_image(path, options, run);
     ImageInfo info = corrected_info(path, *file, options, run);
     ReadImageOptions first = options;
-    if (info.channels > 1 && first.channel < 0) first.channel = 0;
-    if (info.frames > 1 && first.frame < 0) first.frame = 0;
+    first.channel = options.channel.value_or(0);
+    first.frame = options.frame.value_or(0);
     info.bytes_to_hold = file->bytes_to_hold(choose_pixels(path, info, first));
     return info;
 }

@@ -178,7 +178,8 @@ void Image::sample(const Domain& frame, const Index3& min, const Index3& max, fl
         if (!held_.contains(needed.min) || !held_.contains(needed.max))
             throw Error(
                 Errc::InvalidInput,
-                "sample: " + path_ + ": voxels outside the part that was read are needed; choose a larger `roi`");
+                "sample: " + path_ + ": voxels outside the part that was read are needed; choose a larger `roi`",
+                "roi");
         if (chunks_) box = needed;
     }
     detail::with_pixel_type(type_, [&](auto pixel) {

@@ -325,6 +325,7 @@ void check_place(const std::string& path, const FloatGrid& grid) {
 }  // namespace
 
 void write_vdb(const std::string& path, const std::vector<FloatGridPtr>& grids, const WriteVdbOptions& options) {
+    require_valid(options, "write_vdb");
     check_grids("write_vdb", path, grids);
     vdb::initialize();
     const auto add_provenance = [&](vdb::MetaMap& metadata) {

@@ -18,7 +18,6 @@
 #include <functional>
 #include <vector>
 
-#include "base/valid.h"
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "covol/mesh_relax.h"
@@ -249,14 +248,6 @@ void check_indices(const TriangleMesh& mesh, const char* where) {
 
 }  // namespace
 
-std::string CleanupOptions::why_invalid() const {
-    detail::FieldChecks checks;
-    checks.expect_not_negative("target_edge", target_edge);
-    checks.expect_not_negative("adaptive", adaptive);
-    checks.expect_not_negative("smooth_iterations", smooth_iterations);
-    return checks.lines();
-}
-
 int count_self_intersections(const TriangleMesh& mesh) {
     const Crossings crossings = count_crossings(mesh);
     return crossings.within + crossings.between;
@@ -295,7 +286,7 @@ CleanupReport clean(const Work& work) {
     const FloatGrid* const level_set = work.level_set;
     const CleanupOptions& options = work.options;
     const RunContext& run = work.run;
-    detail::require_valid(options, "clean_mesh");
+    require_valid(options, "clean_mesh");
     if (options.adaptive > 0 && (level_set == nullptr || options.adaptive > 2 * work.voxel_size()))
         throw Error(Errc::InvalidOptions,
                     level_set == nullptr

@@ -9,7 +9,6 @@
 #include <numeric>
 #include <optional>
 
-#include "base/valid.h"
 #include "covol/mesh_relax.h"
 #include "mesh/corner_table.h"
 #include "meshing/contacts.h"
@@ -364,17 +363,9 @@ private:
 }  // namespace
 }  // namespace meshing
 
-std::string RelaxOptions::why_invalid() const {
-    detail::FieldChecks checks;
-    checks.expect_finite("isovalue", isovalue);
-    checks.expect_not_negative("rounds", rounds);
-    checks.expect(tolerance >= 0, "tolerance", ">= 0", tolerance);
-    return checks.lines();
-}
-
 RelaxReport relax_mesh(TriangleMesh& mesh, const FloatGrid& level_set, const RelaxOptions& options,
                        const RunContext& run) {
-    detail::require_valid(options, "relax_mesh");
+    require_valid(options, "relax_mesh");
     RelaxReport report;
     if (mesh.empty()) return report;
     with_threads(run, [&] {

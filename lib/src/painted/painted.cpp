@@ -211,6 +211,7 @@ std::vector<LabelName> find_painted_labels(const Image& labels) {
 
 Painted understand_painted(const Image& labels, const std::vector<LabelName>& names, const PaintedOptions& options,
                            const RunContext& run) {
+    require_valid(options, "understand_painted");
     Painted result;
     result.geometry = labels.geometry();
     with_threads(run, [&] {
@@ -291,7 +292,8 @@ Image placed_on(const Image& labels, const ImageGeometry& image, bool force) {
                 "placed_on: " + labels.path() + ": " + std::to_string(outside) + " of " + std::to_string(painted) +
                     " painted voxels lie outside the image, the first at " + to_text(first) +
                     "; the labels reach from " + box_text(own.world_box()) + ", the image from " +
-                    box_text(image.world_box()) + "; check `spacing`, or save the labels with the image's geometry");
+                    box_text(image.world_box()) + "; check `spacing`, or save the labels with the image's geometry",
+                "spacing");
 }
 
 }  // namespace covol

@@ -13,7 +13,6 @@
 #include <set>
 #include <utility>
 
-#include "base/valid.h"
 #include "covol/error.h"
 #include "covol/points.h"
 #include "points/heuristics.h"
@@ -158,20 +157,9 @@ std::vector<Vec3> clean(const std::vector<Vec3>& points, const CloudCleanupOptio
 
 }  // namespace
 
-std::string CloudCleanupOptions::why_invalid() const {
-    detail::FieldChecks checks;
-    checks.expect(outlier_factor == 0 || (outlier_factor >= 1 && std::isfinite(outlier_factor)), "outlier_factor",
-                  "0 or >= 1", outlier_factor);
-    checks.expect_not_negative("simplify", simplify);
-    checks.expect(wlop_share > 0 && wlop_share <= 1, "wlop_share", "in (0,1]", wlop_share);
-    checks.expect_positive("wlop_radius", wlop_radius);
-    checks.expect(neighbours >= 6, "neighbours", ">= 6", neighbours);
-    return checks.lines();
-}
-
 std::vector<Vec3> clean_cloud(const std::vector<Vec3>& points, const CloudCleanupOptions& options,
                               const RunContext& run, CloudCleanupReport* report) {
-    detail::require_valid(options, "clean_cloud");
+    require_valid(options, "clean_cloud");
     for (const Vec3& p : points)
         if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2]))
             throw Error(Errc::InvalidInput, "clean_cloud: expected finite points");

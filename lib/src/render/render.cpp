@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "base/text.h"
-#include "base/valid.h"
 #include "base/vector.h"
 #include "covol/error.h"
 #include "limits/memory_budget.h"
@@ -379,24 +378,7 @@ private:
 }  // namespace
 }  // namespace figure
 
-namespace {
-constexpr double kMostPixels = 5e7;
-}
-
-std::string RenderOptions::why_invalid() const {
-    detail::FieldChecks checks;
-    checks.expect(width >= 64 && width <= 16384, "width", "64 to 16384", width);
-    checks.expect(height >= 64 && height <= 16384, "height", "64 to 16384", height);
-    checks.expect(double(width) * height <= kMostPixels, "width * height", "<= 50 million", double(width) * height);
-    checks.expect(zoom >= 0.05 && zoom <= 100, "zoom", "0.05 to 100", zoom);
-    checks.expect_finite("azimuth", view.azimuth);
-    checks.expect(view.elevation >= -90 && view.elevation <= 90, "elevation", "-90 to 90", view.elevation);
-    if (slices) checks.expect(*slices >= 0 && *slices <= 64, "slices", "0 to 64", *slices);
-    if (slice_axis) checks.expect(*slice_axis >= 0 && *slice_axis <= 2, "slice_axis", "0 to 2", *slice_axis);
-    if (at)
-        for (const double x : *at) checks.expect_finite("at", x);
-    return checks.lines();
-}
+namespace {}
 
 ViewDirection parse_view(const std::string& text, bool is_anatomical) {
     const double left = is_anatomical ? 90 : -90;
@@ -426,7 +408,7 @@ ViewDirection parse_view(const std::string& text, bool is_anatomical) {
 }
 
 Picture render(const RenderScene& scene, const RenderOptions& options, const RunContext& run) {
-    detail::require_valid(options, "render");
+    require_valid(options, "render");
     for (const RenderStructure& structure : scene.structures)
         if (structure.opacity && !(*structure.opacity >= 0 && *structure.opacity <= 1))
             throw Error(Errc::InvalidOptions,

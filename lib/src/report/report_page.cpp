@@ -5,7 +5,6 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "base/valid.h"
 #include "base/vector.h"
 #include "covol/error.h"
 #include "covol/safe_text.h"
@@ -131,7 +130,7 @@ Json to_json(const Image& image, const detail::SlicePlan& plan, const Vec3& orig
 }
 
 void check(const ReportPage& page, const ReportPageOptions& options) {
-    detail::require_valid(options, "write_report_page");
+    require_valid(options, "write_report_page");
     if (page.structures.empty()) throw Error(Errc::InvalidInput, "write_report_page: expected a structure, got none");
     for (const PageStructure& structure : page.structures)
         if (structure.mesh == nullptr || structure.mesh->empty())
@@ -170,15 +169,6 @@ Json data_of(const ReportPage& page, const ReportPageOptions& options, ReportPag
 }
 
 }  // namespace
-
-std::string ReportPageOptions::why_invalid() const {
-    detail::FieldChecks checks;
-    checks.expect(most_triangles >= 100, "most_triangles", ">= 100", double(most_triangles));
-    checks.expect(most_voxels >= 1000, "most_voxels", ">= 1000", double(most_voxels));
-    checks.expect(most_marks >= 1, "most_marks", ">= 1", double(most_marks));
-    checks.expect(jpeg_quality >= 1 && jpeg_quality <= 100, "jpeg_quality", "1 to 100", jpeg_quality);
-    return checks.lines();
-}
 
 ReportPageSummary write_report_page(const std::string& path, const ReportPage& page, const ReportPageOptions& options,
                                     const RunContext& run) {

@@ -91,7 +91,7 @@ Remarks doubt_isolated_marks(const Problem& problem) {
     remarks.warn(std::to_string(isolated.size()) + " of " + std::to_string(problem.given.size()) +
                      " marks lie apart from all others (" + places +
                      "): the surface goes there, too; look whether they are mistakes" +
-                     (problem.options.contours ? "" : ", which `outlier_factor` leaves out") +
+                     (problem.options.contours ? "" : ", which `remove_outliers` leaves out") +
                      ", or mark more beside them",
                  problem.run);
     return remarks;

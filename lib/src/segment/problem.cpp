@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/valid.h"
-
 namespace covol::pipeline {
 
 Problem::Problem(const Image* image_or_null, const std::vector<Vec3>& points, const SegmentOptions& segment_options,
                  const RunContext& context)
     : image(image_or_null), options(segment_options), run(context), given(points), points_(points) {
-    detail::require_valid(options, "segment");
+    require_valid(options, "segment");
     if (options.contours) {
         const std::vector<Vec3>& marked = options.contours->marks;
         given.insert(given.end(), marked.begin(), marked.end());

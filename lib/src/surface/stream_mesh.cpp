@@ -180,9 +180,7 @@ bool can_stream_mesh(const std::string& path) {
 
 StreamedMesh stream_mesh(const std::string& path, const FloatGrid& surface, double isovalue,
                          const WriteMeshOptions& options, const RunContext& run) {
-    if (!(options.unit_scale > 0) || !std::isfinite(options.unit_scale))
-        throw Error(Errc::InvalidOptions,
-                    "stream_mesh: expected unit_scale > 0, got " + std::to_string(options.unit_scale));
+    require_valid(options, "stream_mesh");
     if (!options.binary || !options.attributes.empty())
         throw Error(Errc::Unsupported, "stream_mesh: expected a binary file without attributes");
     StreamedMesh made;

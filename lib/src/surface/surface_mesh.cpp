@@ -12,11 +12,8 @@
 namespace covol {
 
 TriangleMesh extract_mesh(const FloatGrid& surface, const ExtractOptions& options, const RunContext& run) {
-    if (!std::isfinite(options.isovalue) || !(options.min_component_volume >= 0))
-        throw Error(Errc::InvalidOptions,
-                    "extract_mesh: expected a finite isovalue and min_component_volume >= 0, got " +
-                        std::to_string(options.isovalue) + " and " + std::to_string(options.min_component_volume));
     TriangleMesh mesh;
+    require_valid(options, "extract_mesh");
     with_threads(run, [&] {
         std::optional<detail::Uncut> whole;
         if (options.isovalue == 0) whole = detail::uncut(surface, detail::FaceLayer::OnFace);
@@ -28,10 +25,10 @@ TriangleMesh extract_mesh(const FloatGrid& surface, const ExtractOptions& option
         remove_small_components(mesh, options.min_component_volume);
         if (mesh.empty()) {
             std::ostringstream text;
-            text << "extract_mesh: every piece of the surface is smaller than min_component_volume, "
-                 << options.min_component_volume << "; all of it has " << whole << ", as a cube of edge "
-                 << std::cbrt(whole) << "; use a smaller `min_component_volume`";
-            throw Error(Errc::InvalidInput, text.str());
+            text << "extract_mesh: every piece of the surface is smaller than " << options.min_component_volume
+                 << "; all of it has " << whole << ", as a cube of edge " << std::cbrt(whole)
+                 << "; use a smaller `min_component`";
+            throw Error(Errc::InvalidInput, text.str(), "min_component");
         }
     }
     return mesh;

@@ -9,7 +9,6 @@
 #include <sstream>
 
 #include "base/number.h"
-#include "base/valid.h"
 #include "covol/error.h"
 #include "redistance/signed_distance.h"
 #include "tagging/tagging.h"
@@ -127,12 +126,6 @@ BandResult make(const FloatGrid& distance, const BandOptions& options, const Run
 
 }  // namespace
 
-std::string BandOptions::why_invalid() const {
-    detail::FieldChecks checks;
-    checks.expect_positive("tag_distance", tag_distance);
-    return checks.lines();
-}
-
 std::string BandReport::leak() const {
     return "the points leave gaps wider than the tag distance " + detail::number(tag_distance) +
            (holding_distance > 0 ? "; it would hold at " + detail::number(holding_distance)
@@ -140,7 +133,7 @@ std::string BandReport::leak() const {
 }
 
 BandResult tag_interior(const FloatGrid& distance, const BandOptions& options, const RunContext& run) {
-    detail::require_valid(options, "tag_interior");
+    require_valid(options, "tag_interior");
     if (distance.tree().leafCount() == 0)
         throw Error(
             Errc::InvalidInput,

@@ -156,9 +156,10 @@ TEST_CASE("the seed decides the points and the noise") {
 
 TEST_CASE("unusable phantom options are named") {
     PhantomOptions options;
-    CHECK(options.why_invalid().empty());
+    CHECK(why_invalid(options).empty());
     options.kind = "cube";
-    CHECK(options.why_invalid().find("kind: expected one of sphere, torus") != std::string::npos);
+    CHECK(why_invalid(options).find("kind: expected one that") != std::string::npos);
+    CHECK_THROWS_WITH(make_phantom(options), Catch::Contains("kind: expected one of sphere, torus"));
     CHECK_THROWS_AS(make_phantom(options), Error);
     options = {};
     options.size = 15;

@@ -45,8 +45,7 @@ EdgeOptions options(double sigma, double k) {
     EdgeOptions o;
     o.sigma = sigma;
     if (k > 0) o.edge_k = k;
-    o.low = 0;
-    o.high = 1;
+    o.intensities = {0, 1};
     return o;
 }
 
@@ -75,13 +74,13 @@ Errc edge_code(const std::function<void()>& call) { return code_of(call, "detect
 }  // namespace
 
 TEST_CASE("every edge option says when it is out of range") {
-    CHECK(EdgeOptions{}.why_invalid().empty());
+    CHECK(why_invalid(EdgeOptions{}).empty());
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
     const auto rejects = [](const char* field, auto EdgeOptions::*member, double value) {
         EdgeOptions o;
         o.*member = value;
-        INFO(field << " = " << value << ": " << o.why_invalid());
-        CHECK(o.why_invalid().rfind(std::string(field) + ": expected ", 0) == 0);
+        INFO(field << " = " << value << ": " << why_invalid(o));
+        CHECK(why_invalid(o).rfind(std::string(field) + ": expected ", 0) == 0);
     };
     for (const double bad : {-1.0, nan}) rejects("sigma", &EdgeOptions::sigma, bad);
     for (const double bad : {-1.0, 0.0, nan}) {
@@ -101,8 +100,7 @@ TEST_CASE("on a ramp g is 1/(1 + K s^2), with s per world unit of the normalised
     EdgeOptions o;
     o.sigma = kH;
     o.edge_k = 400;
-    o.low = 100;
-    o.high = 500;
+    o.intensities = {100, 500};
     const EdgeResult result =
         detect_edges(image, *topology_where(domain, [](const Vec3& x) { return std::abs(x[1]) < 2; }), o);
     REQUIRE(result.grid->activeVoxelCount() > 1000);
@@ -271,7 +269,8 @@ TEST_CASE("lines take their contrast from a third of the median") {
     const Domain domain = cube_domain(40, kH);
     const FloatGridPtr where = topology_where(domain, [](const Vec3& x) { return length(x) < 5; });
     EdgeOptions o;
-    o.low = 0, o.high = 1, o.sigma = 0.5;
+    o.intensities = {0, 1};
+    o.sigma = 0.5;
     o.feature = EdgeFeature::BrightLine;
     // Oblique to the voxels, of which whole layers would have the median else.
     const Image oblique = image_on(domain, [](const Vec3& x) {

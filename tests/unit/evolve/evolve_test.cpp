@@ -57,11 +57,11 @@ bool same_bits(const FloatGrid& a, const FloatGrid& b) {
 }  // namespace
 
 TEST_CASE("every option says when it is out of range") {
-    CHECK(EvolveOptions{}.why_invalid().empty());
+    CHECK(why_invalid(EvolveOptions{}).empty());
     const auto rejects = [](const char* field, auto EvolveOptions::*member, auto value) {
         EvolveOptions o;
         o.*member = value;
-        const std::string why = o.why_invalid();
+        const std::string why = why_invalid(o);
         INFO(field << " = " << value << ": " << why);
         CHECK(why.rfind(std::string(field) + ": expected ", 0) == 0);
         CHECK(why.find('\n') == std::string::npos);
@@ -94,7 +94,7 @@ TEST_CASE("every option says when it is out of range") {
     EvolveOptions two;
     two.theta = 2;
     two.max_steps = -3;
-    CHECK(two.why_invalid() == "theta: expected 0 to 1, got 2\nmax_steps: expected >= 0, got -3");
+    CHECK(why_invalid(two) == "theta: expected 0 to 1, got 2\nmax_steps: expected >= 0, got -3");
 }
 
 TEST_CASE("unusable options and grids are refused, and u stays as it was") {

@@ -205,10 +205,10 @@ TEST_CASE("without marks a guess stays", "[guess]") {
 
 TEST_CASE("options of a correction", "[guess]") {
     CorrectionOptions options;
-    CHECK(options.why_invalid().empty());
+    CHECK(why_invalid(options).empty());
     options.precision = -1;
     options.least_radius = -2;
-    CHECK(options.why_invalid() == "precision: expected > 0, got -1\nleast_radius: expected > 0, got -2");
+    CHECK(why_invalid(options) == "precision: expected > 0, got -1\nguess_radius: expected > 0, got -2");
     CHECK(code_of([&] { (void)correct_guess(start_from_sphere(cube(), kMiddle, kRadius), {}, {}, {}, options); }) ==
           Errc::InvalidOptions);
 }

@@ -10,6 +10,7 @@
 
 #include "covol/domain.h"
 #include "covol/error.h"
+#include "covol/guess.h"
 #include "covol/start.h"
 #include "covol/surface.h"
 #include "support/shapes.h"
@@ -238,10 +239,28 @@ TEST_CASE("Guidance gives the same bits for any number of threads") {
     }
 }
 
+TEST_CASE("the precision of marks is their standard deviation, as segment() means it") {
+    const ImageGeometry g = lattice();
+    const Image image = picture(
+        g, [](const Vec3& x) { return 100 - 60 * step_at(length(x) - kRadius); }, 20);
+    const std::vector<Vec3> marks = marks_on_sphere(60, kRadius);
+    const FloatGridPtr guess = wavy_sphere(domain_of_image(g), marks, 1.5);
+    GuidanceReport automatic, stated, coarse;
+    GuidanceOptions options;
+    REQUIRE(guide(*guess, marks, image, options, automatic));
+    options.mark_precision = kUniformDeviation * g.spacing[0];  // of what is uniform over a voxel
+    REQUIRE(guide(*guess, marks, image, options, stated));
+    CHECK(stated.gain == Approx(automatic.gain));
+    CHECK(stated.image_error == Approx(automatic.image_error));
+    options.mark_precision = 5 * g.spacing[0];
+    REQUIRE(guide(*guess, marks, image, options, coarse));
+    CHECK(coarse.image_error != Approx(automatic.image_error));
+}
+
 TEST_CASE("Guidance says what is wrong with its options") {
     GuidanceOptions options;
     options.weight = 2;
-    CHECK(options.why_invalid().find("weight: expected 0 to 1, got 2") == 0);
+    CHECK(why_invalid(options).find("weight: expected 0 to 1, got 2") == 0);
     const ImageGeometry g = lattice();
     const Image image = picture(
         g, [](const Vec3& x) { return length(x); }, 0);

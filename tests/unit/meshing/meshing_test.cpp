@@ -200,6 +200,6 @@ TEST_CASE("options of the relaxation are checked, none round leaves the mesh") {
     CHECK(mesh.vertices == before.vertices);
     options.rounds = -1;
     options.tolerance = -1;
-    CHECK_THAT(options.why_invalid(), Catch::Contains("rounds") && Catch::Contains("tolerance"));
+    CHECK_THAT(why_invalid(options), Catch::Contains("rounds") && Catch::Contains("tolerance"));
     CHECK_THROWS_AS(relax_mesh(mesh, *solid.level_set, options), Error);
 }

@@ -148,7 +148,7 @@ TEST_CASE("bad options and values are refused, a cancelled run ends") {
     CHECK_THROWS_AS(clean_cloud(points, options), Error);
     options.simplify = 0;
     options.neighbours = 2;
-    CHECK(options.why_invalid() == "neighbours: expected >= 6, got 2");
+    CHECK(why_invalid(options) == "neighbours: expected >= 6, got 2");
     CHECK_THROWS_AS(clean_cloud({{0, 0, std::nan("")}}, with_outliers(3)), Error);
     const std::atomic<bool> cancel = true;
     RunContext run;

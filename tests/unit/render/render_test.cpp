@@ -423,10 +423,10 @@ TEST_CASE("pictures are written whole, and what cannot be drawn is refused") {
     RenderOptions options;
     options.width = 1;
     options.zoom = 0;
-    CHECK(options.why_invalid().find("width") != std::string::npos);
-    CHECK(options.why_invalid().find("zoom") != std::string::npos);
+    CHECK(why_invalid(options).find("width") != std::string::npos);
+    CHECK(why_invalid(options).find("zoom") != std::string::npos);
     options = sized(16384, 16384, FigureKind::Surface);
-    CHECK(options.why_invalid().find("50 million") != std::string::npos);
+    CHECK(why_invalid(options).find("50 million") != std::string::npos);
     CHECK_THROWS_AS(render(RenderScene{}), Error);
     const FloatGridPtr ball = make_ball({0, 0, 0}, 1, 0.2);
     RenderScene scene;

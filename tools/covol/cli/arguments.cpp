@@ -12,7 +12,7 @@ namespace covol::tool {
 namespace {
 
 [[noreturn]] void bad_text(const std::string& flag, const std::string& expected, const std::string& text) {
-    throw UsageError(flag + ": expected " + expected + ", got '" + text + "'");
+    throw UsageError(flag + ": expected " + expected + ", got '" + text + "'", flag);
 }
 
 /// The number that `text` starts with; `rest` is what follows it.
@@ -23,7 +23,7 @@ double leading_number(const std::string& flag, const std::string& expected, cons
     const auto [stop, error] = std::from_chars(text.data() + (text.starts_with('+') ? 1 : 0), end, value);
     if (error != std::errc()) bad_text(flag, expected, text);
     if (!std::isfinite(value))
-        throw Error(Errc::InvalidOptions, flag + ": expected a finite number, got '" + text + "'");
+        throw Error(Errc::InvalidOptions, flag + ": expected a finite number, got '" + text + "'", flag);
     rest.assign(stop, end);
     return value;
 }
@@ -49,7 +49,7 @@ WorldBox to_box(const std::string& flag, const std::vector<double>& v) {
     WorldBox box{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
     for (int a = 0; a < 3; ++a)
         if (!(box.max[a] > box.min[a]))
-            throw Error(Errc::InvalidOptions, flag + ": expected x0,y0,z0 below x1,y1,z1 along each axis");
+            throw Error(Errc::InvalidOptions, flag + ": expected x0,y0,z0 below x1,y1,z1 along each axis", flag);
     return box;
 }
 
@@ -60,7 +60,7 @@ Length parse_length(const std::string& flag, const std::string& text) {
     std::string rest;
     Length length{leading_number(flag, expected, text, rest), rest == "vx", true};
     if (!rest.empty() && rest != "vx") bad_text(flag, expected, text);
-    if (length.value < 0) throw Error(Errc::InvalidOptions, flag + ": expected a length >= 0, got " + text);
+    if (length.value < 0) throw Error(Errc::InvalidOptions, flag + ": expected a length >= 0, got " + text, flag);
     return length;
 }
 
@@ -99,7 +99,8 @@ Start parse_start(const std::string& flag, const std::string& text) {
         start.center = {v[0], v[1], v[2]};
         start.radius = v[3];
         if (!(start.radius > 0))
-            throw Error(Errc::InvalidOptions, flag + ": expected a radius > 0, got " + std::to_string(start.radius));
+            throw Error(Errc::InvalidOptions, flag + ": expected a radius > 0, got " + std::to_string(start.radius),
+                        flag);
         return start;
     }
     if (kind == "box") {

@@ -4,6 +4,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "covol/domain.h"
 #include "covol/pipeline.h"
@@ -12,7 +13,9 @@ namespace covol::tool {
 
 /// The command line cannot be understood: exit code 2.
 struct UsageError : std::runtime_error {
-    using std::runtime_error::runtime_error;
+    explicit UsageError(const std::string& message, std::string option_ = {})
+        : std::runtime_error(message), option(std::move(option_)) {}
+    std::string option;  ///< that is wrong, as the caller named it; or empty
 };
 
 /// A length as people write it: world units, or voxels ("3vx") that become a length once h is known.

@@ -5,25 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "covol/options_table.h"
+
 // Help of the commands: options in groups, either those that people need first or all of them.
 namespace covol::tool {
-
-/// Groups of options, in the order in which help shows them.
-enum class Group {
-    Input,
-    Marks,
-    ReadingMarks,
-    Clouds,
-    Output,
-    MeshFiles,
-    Picture,
-    Start,
-    Domain,
-    Edges,
-    Flow,
-    Numerics,
-    Help
-};
 
 /// Options that are added to `command` from here on stand in this group.
 void in_group(CLI::App& command, Group group);

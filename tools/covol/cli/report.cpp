@@ -84,31 +84,30 @@ Json to_json(const CompareReport& r) {
             {"hausdorff", r.hausdorff}, {"hausdorff95", r.hd95}, {"mean_distance", r.assd}};
 }
 
+namespace {
+
+/// What was not needed, or was left to the step that uses it, is null.
+template <typename T>
+Json to_json_value(const T& value) {
+    if constexpr (requires { *value, value.has_value(); })
+        return value ? to_json_value(*value) : Json(nullptr);
+    else if constexpr (HasWords<T>)
+        return to_string(value) == std::string_view("auto") ? Json(nullptr) : Json(to_string(value));
+    else if constexpr (requires { to_json(value); })
+        return to_json(value);
+    else
+        return value;
+}
+
+}  // namespace
+
 Json to_json(const SegmentOptions& o) {
-    // What was not needed was not chosen: null.
-    const auto chosen = [](const auto& value) { return value ? Json(*value) : Json(nullptr); };
-    const EvolveOptions& e = o.evolve;
-    const bool feature = o.edge.feature != EdgeFeature::Automatic;
-    return {{"model", to_string(o.model)},
-            {"voxel_size", chosen(o.voxel_size)},
-            {"tag_distance", chosen(o.tag_distance)},
-            {"theta", e.theta},
-            {"rho", e.rho},
-            {"delta", chosen(e.delta)},
-            {"tau", chosen(e.tau)},
-            {"sigma", chosen(o.edge.sigma)},
-            {"edge_feature", feature ? Json(to_string(o.edge.feature)) : Json(nullptr)},
-            {"edge_k", chosen(o.edge.edge_k)},
-            {"intensities", {o.edge.low, o.edge.high}},
-            {"epsilon", e.epsilon},
-            {"edge_epsilon", e.edge_epsilon},
-            {"attraction_range", chosen(e.attraction_range)},
-            {"image_yields", chosen(e.image_yields)},
-            {"guess_weight", e.guess_weight},
-            {"follow", e.follow},
-            {"max_steps", e.max_steps},
-            {"tolerance", e.tolerance},
-            {"solver_tolerance", chosen(e.solver_tolerance)}};
+    Json json;
+    for_each_option(o, [&](const OptionInfo& option, const auto& value) {
+        const std::string name = option.name + std::string(option.range.unit == Unit::Volume ? "_volume" : "");
+        if constexpr (!std::is_same_v<std::remove_cvref_t<decltype(value)>, Start>) json[name] = to_json_value(value);
+    });
+    return json;
 }
 
 Json to_json(const SegmentReport& r) {

@@ -12,15 +12,15 @@ namespace {
 struct BandJob {
     std::string distance_path, output;
     PointFlags points;
-    TagFlags tag;
+    Given<BandOptions> tag;
     VdbFlags vdb;
 
     double choose_distance(const Domain& domain, Session& session) const {
-        if (tag.tag_distance.given) return tag.tag_distance.resolve(domain.voxel_size, 0);
+        if (tag.has("tag_distance")) return tag.resolve(domain.voxel_size).tag_distance;
         if (points.paths.empty()) throw UsageError("expected --tag-distance, or --points to choose it from");
         const std::vector<Vec3> cloud = read_world_points(points, nullptr, session.run()).points;
         const TagDistanceChoice choice =
-            choose_tag_distance(merge_close_points(cloud, 0), domain, tag.exterior_seeds, session.run());
+            choose_tag_distance(merge_close_points(cloud, 0), domain, tag.options.exterior_seeds, session.run());
         const std::string line = std::to_string(choice.tag_distance) + " (" + choice.reason + ")";
         session.note("tag_distance: " + line);
         session.report()["automatic"]["tag_distance"] = line;
@@ -33,7 +33,7 @@ struct BandJob {
         session.set_world(*d);
         const double D = choose_distance(domain_of(*d), session);
         const Stopwatch watch;
-        const BandResult result = tag_interior(*d, {D, tag.exterior_seeds}, session.run());
+        const BandResult result = tag_interior(*d, {D, tag.options.exterior_seeds}, session.run());
         session.add_seconds("tag", watch.seconds());
         session.report()["band"] = to_json(result.report);
         session.note(std::to_string(result.report.active_voxels) + " active voxels, encloses " +
@@ -54,7 +54,7 @@ void add_band(Session& session) {
         ->type_name("DISTANCE.vdb");
     in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "the grid 'band', .vdb")->required()->type_name("OUT.vdb");
-    job->tag.bind(*command);
+    bind_options(*command, job->tag, Offered::SingleStep);
     job->points.bind(*command, "--points");
     job->vdb.bind(*command);
     session.help().show_first(*command, {"--points", "--tag-distance", "--exterior-seed"});

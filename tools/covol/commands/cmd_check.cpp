@@ -261,13 +261,10 @@ void add_check(Session& session) {
     command->add_option("file", *path, ".vdb, image, mesh or points; exit code 3 when there is a problem")
         ->required()
         ->type_name("FILE");
-    add_choice(*command, "--for", *program,
-               {{"blender", Program::Blender},
-                {"houdini", Program::Houdini},
-                {"slicer", Program::Slicer},
-                {"fiji", Program::Fiji},
-                {"print", Program::Print}},
-               "what goes wrong in this program or in 3D printing, and what mends it [no program in particular]");
+    add_words(*command, {"for", {}, {}, "what goes wrong in this program or in 3D printing, and what mends it"},
+              {"", "blender", "houdini", "slicer", "fiji", "print"},
+              [program](std::size_t n) { *program = Program(n); })
+        ->default_str("no program in particular");
     command->add_option("--image", *image, "points: the image that they belong to")->type_name("IMAGE");
     flags->bind(*command);
 }

@@ -87,7 +87,7 @@ struct ConvertJob {
         session.note(input + ": " + std::to_string(world.size()) + " points, " + cloud.rule);
         Json& report = session.report()["points"];
         report = {{"count", world.size()}, {"rule", cloud.rule}};
-        if (cloud_flags.simplify.given && cloud_flags.simplify.in_voxels && !geometry)
+        if (cloud_flags.length("simplify").in_voxels && !geometry)
             throw UsageError("--simplify: a length in voxels needs --like IMAGE");
         const double h = geometry ? *std::min_element(geometry->spacing.begin(), geometry->spacing.end()) : 1;
         world = cloud_flags.clean(world, h, session.run(), report);
@@ -99,7 +99,7 @@ struct ConvertJob {
     void convert_mesh(Session& session) const {
         const auto triangles = std::make_shared<TriangleMesh>(read_mesh(input));
         session.report()["mesh"] = to_json(measure(*triangles));
-        session.outputs().add(output, [triangles, write = mesh.options(session)](const std::string& path) {
+        session.outputs().add(output, [triangles, write = mesh.write_options(session)](const std::string& path) {
             write_mesh(path, *triangles, write);
         });
     }
@@ -108,7 +108,9 @@ struct ConvertJob {
         const FileKind from = kind_of_file(input);
         const FileKind to = kind_of_output(output, from);
         session.outputs().check("OUT", output, is_nanovdb_name(output) ? OutputKind::NanoVdb : output_kind(to));
-        mesh.check();
+        mesh.check_used(from == FileKind::Mesh);
+        vdb.check_used(to == FileKind::Vdb);
+        cloud_flags.check_used(from == FileKind::Points);
         cloud_flags.check();
         if (from == FileKind::Image && to == FileKind::Vdb) return image_to_vdb(session);
         if (from == FileKind::Vdb && to == FileKind::Image) return vdb_to_image(session);
@@ -136,7 +138,9 @@ void add_convert(Session& session) {
         ->type_name("IMAGE");
     command->add_option("--grid", job->grid_name, "grid to take from a .vdb file [the first]")->type_name("NAME");
     in_group(*command, Group::Output);
-    add_length(*command, "--voxel-size", job->voxel_size, "", "edge of the voxels of a .vdb file [smallest spacing]");
+    add_length(*command, {"voxel_size", kPositiveLength, {}, "edge of the voxels of a .vdb file"},
+               [job = job](const Length& length) { job->voxel_size = length; })
+        ->default_str("smallest spacing");
     job->points.bind_options(*command);
     job->cloud_flags.bind(*command, false);
     job->mesh.bind(*command);

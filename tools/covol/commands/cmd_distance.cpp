@@ -12,26 +12,27 @@ constexpr int kTubeVoxels = 10;  // radius where none is given
 
 struct DistanceJob {
     PointFlags points;
-    DomainFlags domain;
+    Given<SegmentOptions> domain;
+    Given<DistanceOptions> tube;
     ImageFlags image;
-    Length max_distance;
     std::string like, output;
     VdbFlags vdb;
 
     Domain choose_domain(const ImageGeometry* geometry, const std::vector<Vec3>& cloud, double h, double radius) const {
         std::optional<WorldBox> whole;
         if (geometry != nullptr) whole = geometry->world_box();
-        const WorldBox box = domain.roi ? *domain.roi
-                             : whole    ? *whole
-                                        : bounding_box(cloud, domain.margin.resolve(h, radius + h));
-        return covol::choose_domain(box, h, whole, domain.lattice_origin);
+        const WorldBox box = domain.options.roi ? *domain.options.roi
+                             : whole            ? *whole
+                                                : bounding_box(cloud, domain.length("margin").resolve(h, radius + h));
+        return covol::choose_domain(box, h, whole, domain.options.lattice_origin);
     }
 
     double voxel_size(const ImageGeometry* geometry, const std::vector<Vec3>& cloud, Session& session) const {
-        if (geometry == nullptr || (domain.voxel_size.given && !domain.voxel_size.in_voxels))
-            return domain.resolve_voxel_size(nullptr, cloud, true, session);
+        const Length asked = domain.length("voxel_size");
+        if (geometry == nullptr || (asked.given && !asked.in_voxels))
+            return resolve_voxel_size(asked, nullptr, cloud, true, session);
         const double finest = *std::min_element(geometry->spacing.begin(), geometry->spacing.end());
-        return domain.voxel_size.resolve(finest, finest);
+        return asked.resolve(finest, finest);
     }
 
     void run(Session& session) const {
@@ -42,7 +43,7 @@ struct DistanceJob {
         geometry ? session.set_world(*geometry) : session.set_world_of_points();
         const std::vector<Vec3> cloud = read_world_points(points, pointer, session.run()).points;
         const double h = voxel_size(pointer, cloud, session);
-        const double radius = max_distance.resolve(h, kTubeVoxels * h);
+        const double radius = tube.length("max_distance").resolve(h, kTubeVoxels * h);
         const Domain box = choose_domain(pointer, cloud, h, radius);
         const Stopwatch watch;
         const DistanceResult result = compute_distance(cloud, box, {radius}, session.run());
@@ -64,11 +65,10 @@ void add_distance(Session& session) {
     job->points.bind(*command, "points")->required();
     in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "the grid 'distance', .vdb")->required()->type_name("OUT.vdb");
-    in_group(*command, Group::Domain);
-    add_length(*command, "--max-distance", job->max_distance, std::to_string(kTubeVoxels) + "vx", "radius of the tube");
+    bind_options(*command, job->tube, Offered::SingleStep);
     command->add_option("--like", job->like, "image whose box is the domain [the points' box]")->type_name("IMAGE");
-    job->domain.bind(*command, true);
-    job->image.bind(*command, false);
+    bind_options(*command, job->domain, Offered::SingleStep, {}, Group::Domain);
+    job->image.bind(*command, {"roi"});
     job->vdb.bind(*command);
     session.help().show_first(*command, {"--max-distance", "--like", "--voxel-size", "--roi"});
 }

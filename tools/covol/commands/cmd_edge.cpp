@@ -11,7 +11,7 @@ namespace {
 struct EdgeJob {
     std::string image_path, band_path, output;
     ImageFlags image;
-    EdgeFlags edge_flags;
+    Given<EdgeOptions> edge;
     VdbFlags vdb;
 
     void run(Session& session) const {
@@ -24,7 +24,7 @@ struct EdgeJob {
         const Image pixels = read_image(image_path, reading, session.run());
         session.set_world(pixels.geometry());
         const Stopwatch watch;
-        const EdgeResult result = detect_edges(pixels, *topology, edge_flags.resolve(h), session.run());
+        const EdgeResult result = detect_edges(pixels, *topology, edge.resolve(h), session.run());
         session.add_seconds("edge", watch.seconds());
         session.report()["input"]["image"] = to_json(pixels.geometry());
         session.report()["edge"] = to_json(result.report);
@@ -45,8 +45,8 @@ void add_edge(Session& session) {
         ->type_name("BAND.vdb");
     in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "the grid 'edge', .vdb")->required()->type_name("OUT.vdb");
-    job->edge_flags.bind(*command, true);
-    job->image.bind(*command, false);
+    bind_options(*command, job->edge, Offered::SingleStep);
+    job->image.bind(*command, {"roi"});
     job->vdb.bind(*command);
 }
 

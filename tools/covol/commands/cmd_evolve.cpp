@@ -14,13 +14,13 @@ namespace {
 
 struct EvolveJob {
     std::string band_path, distance_path, edge_path, output;
-    EvolveFlags flags;
+    Given<EvolveOptions> given;
     CheckpointFlags checkpoint;
     VdbFlags vdb;
 
     /// A field that is not given has no weight.
     EvolveOptions resolve(double h, Session& session) const {
-        EvolveOptions options = flags.resolve(h);
+        EvolveOptions options = given.resolve(h);
         if (distance_path.empty() && options.theta > 0) {
             options.theta = 0;
             session.note("theta: 0 (there is no --distance)");
@@ -76,8 +76,7 @@ void add_evolve(Session& session) {
     in_group(*command, Group::Input);
     command->add_option("--distance", job->distance_path, "what `covol distance` wrote")->type_name("DISTANCE.vdb");
     command->add_option("--edge", job->edge_path, "what `covol edge` wrote")->type_name("EDGE.vdb");
-    job->flags.bind(*command, true, true);
-    command->add_flag("--follow", job->flags.options.follow, "the band follows the surface");
+    bind_options(*command, job->given, Offered::SingleStep);
     job->checkpoint.bind(*command);
     job->vdb.bind(*command);
     session.help().show_first(*command, {"--distance", "--edge", "--theta", "--rho", "--delta", "--tau",

@@ -63,7 +63,8 @@ bool is_range_of_slices(const ImageInfo& info) { return info.bytes_to_hold == 0 
 /// Smallest and largest value of one channel, of a large file an estimate.
 Json range_of(const std::string& path, ReadImageOptions options, int channel, const ImageInfo& info, Session& session) {
     options.channel = channel;
-    if (info.frames > 1) options.frame = std::max(options.frame, 0);
+    const int frame = options.frame.value_or(0);
+    if (info.frames > 1) options.frame = frame;
     const Image image = read_image(path, options, session.run());
     const auto range = image.range();
     const std::optional<ChunkCount> chunks = image.chunks();
@@ -72,7 +73,7 @@ Json range_of(const std::string& path, ReadImageOptions options, int channel, co
     text << (info.channels > 1 ? "channel " + std::to_string(channel) +
                                      (named ? " " + safe_text(info.channel_names[channel]) : "") + ": "
                                : "values: ")
-         << range[0] << " to " << range[1] << (info.frames > 1 ? ", frame " + std::to_string(options.frame) : "");
+         << range[0] << " to " << range[1] << (info.frames > 1 ? ", frame " + std::to_string(frame) : "");
     const bool of_chunks = chunks && chunks->read < chunks->total, of_slices = is_range_of_slices(info);
     if (of_chunks) text << ", of " << chunks->read << " of " << chunks->total << " chunks";
     if (of_slices) text << ", of slices spread over the file";
@@ -110,8 +111,8 @@ void describe_image(const std::string& path, const ImageFlags& flags, Session& s
     if (!info.levels.empty()) report["levels"] = info.levels;
     report["spacing_known"] = {info.spacing_known[0], info.spacing_known[1], info.spacing_known[2]};
     for (const auto& [field, value] : info.fields) report["fields"][field] = value;
-    const int first = std::max(flags.options.channel, 0);
-    const int last = flags.options.channel >= 0 ? first : std::min(info.channels, kMostChannels) - 1;
+    const int first = flags.options.channel.value_or(0);
+    const int last = flags.options.channel ? first : std::min(info.channels, kMostChannels) - 1;
     for (int channel = first; channel <= last; ++channel) {
         const Json range = range_of(path, flags.options, channel, info, session);
         if (channel == first) report["range"] = range;

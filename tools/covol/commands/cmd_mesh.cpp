@@ -12,25 +12,15 @@ namespace {
 
 struct MeshJob {
     std::string input, output;
-    Length isovalue, min_component, target_edge, adaptive;
-    int smooth = 0;
-    bool repair = false;
+    Given<ExtractOptions> extract;
+    Given<CleanupOptions> cleanup;
     MeshFlags flags;
 
-    [[nodiscard]] ExtractOptions extract_options(double h) const {
-        const double edge = min_component.resolve(h, 0);
-        return {isovalue.resolve(h, 0), edge * edge * edge};
-    }
-
     void clean(TriangleMesh& mesh, const FloatGrid& level_set, double h, Session& session) const {
-        if (!repair && smooth == 0 && !target_edge.given && !adaptive.given) return;
-        CleanupOptions options;
-        options.target_edge = target_edge.resolve(h, 0);
-        options.adaptive = adaptive.resolve(h, 0);
-        options.smooth_iterations = smooth;
-        options.repair = repair;
+        if (cleanup.names.empty()) return;
         const Stopwatch watch;
-        const CleanupReport done = clean_mesh(mesh, level_set, isovalue.resolve(h, 0), options, session.run());
+        const CleanupReport done =
+            clean_mesh(mesh, level_set, extract.resolve(h).isovalue, cleanup.resolve(h), session.run());
         session.add_seconds("clean", watch.seconds());
         session.report()["cleanup"] = {{"self_intersections", done.self_intersections},
                                        {"holes_filled", done.holes_filled},
@@ -53,7 +43,7 @@ struct MeshJob {
     void stream(const FloatGridPtr& level_set, double h, Session& session) const {
         session.outputs().add(output, [this, level_set, h, &session](const std::string& path) {
             const StreamedMesh made =
-                stream_mesh(path, *level_set, isovalue.resolve(h, 0), flags.options(session), session.run());
+                stream_mesh(path, *level_set, extract.resolve(h).isovalue, flags.write_options(session), session.run());
             session.report()["mesh"] = {{"vertices", made.vertices}, {"triangles", made.triangles}};
             session.report()["surface"] = to_json(made.measures);
             session.note("mesh: " + plain_mesh_line(made.triangles));
@@ -63,7 +53,7 @@ struct MeshJob {
 
     void check_plain() const {
         if (!flags.plain) return;
-        if (repair || smooth != 0 || target_edge.given || adaptive.given || min_component.given)
+        if (!cleanup.names.empty() || extract.has("min_component"))
             throw UsageError(
                 "--plain: excludes --repair, --smooth, --target-edge, --adaptive and --min-component, which need the "
                 "whole mesh");
@@ -72,20 +62,19 @@ struct MeshJob {
 
     void run(Session& session) const {
         session.outputs().check("-o", output, OutputKind::Mesh);
-        flags.check();
         check_plain();
         const FloatGridPtr level_set = read_vdb_level_set(input, session.run());
         session.set_world(*level_set);
         const double h = domain_of(*level_set).voxel_size;
         if (flags.plain) return stream(level_set, h, session);
         const Stopwatch watch;
-        TriangleMesh mesh = extract_mesh(*level_set, extract_options(h), session.run());
+        TriangleMesh mesh = extract_mesh(*level_set, extract.resolve(h), session.run());
         session.add_seconds("surface", watch.seconds());
         if (mesh.triangles.empty())
             throw Error(Errc::InvalidInput,
                         input + ": nothing to mesh: no surface at this level, or all of it dropped");
         const Stopwatch relaxing;
-        const RelaxReport relaxed = relax_mesh(mesh, *level_set, {extract_options(h).isovalue}, session.run());
+        const RelaxReport relaxed = relax_mesh(mesh, *level_set, {extract.resolve(h).isovalue}, session.run());
         session.add_seconds("relax", relaxing.seconds());
         session.report()["mesh"] = to_json(relaxed);
         session.note("mesh: " + mesh_line(relaxed.triangles, relaxed.smallest_angle, relaxed.deviation));
@@ -94,8 +83,8 @@ struct MeshJob {
         session.report()["surface"] = to_json(measures);
         session.note("surface: " + one_line(measures));
         session.outputs().add(
-            output, [mesh = std::make_shared<TriangleMesh>(std::move(mesh)),
-                     write = flags.options(session)](const std::string& path) { write_mesh(path, *mesh, write); });
+            output, [mesh = std::make_shared<TriangleMesh>(std::move(mesh)), write = flags.write_options(session)](
+                        const std::string& path) { write_mesh(path, *mesh, write); });
     }
 };
 
@@ -111,15 +100,9 @@ void add_mesh(Session& session) {
     command->add_option("-o,--output", job->output, "closed, manifold, outward triangles")
         ->required()
         ->type_name("OUT.ply|.obj|.stl|.off|.glb");
-    in_group(*command, Group::MeshFiles);
-    add_length(*command, "--isovalue", job->isovalue, "0", "extract this level outside the surface");
-    add_length(*command, "--min-component", job->min_component, "", "drop pieces smaller than a cube of this edge");
-    add_length(*command, "--target-edge", job->target_edge, "", "decimate to about this edge length");
-    add_length(*command, "--adaptive", job->adaptive, "",
-               "decimate as far as no triangle comes farther from the level set: large triangles where it is flat; at "
-               "most 2vx");
-    command->add_option("--smooth", job->smooth, "steps of volume-keeping smoothing")->capture_default_str();
-    command->add_flag("--repair", job->repair, "resolve self-intersections, fill holes");
+    job->cleanup.options.repair = false;
+    bind_options(*command, job->extract, Offered::SingleStep);
+    bind_options(*command, job->cleanup, Offered::SingleStep);
     job->flags.bind_plain(*command);
     job->flags.bind(*command);
 }

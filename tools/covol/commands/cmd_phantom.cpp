@@ -19,16 +19,14 @@ std::vector<std::uint8_t> bytes_of(const Image& image) {
 }
 
 struct PhantomJob {
-    PhantomOptions options;
+    Given<PhantomOptions> given;
     std::string output, points_path, labels_path;
 
     void run(Session& session) const {
         session.outputs().check("-o", output, OutputKind::Image);
         session.outputs().check("--points", points_path, OutputKind::Points);
         session.outputs().check("--labels", labels_path, OutputKind::Image);
-        if (const std::string why = options.why_invalid(); !why.empty())
-            throw Error(Errc::InvalidOptions, "phantom: " + why);
-        const auto made = std::make_shared<Phantom>(make_phantom(options));
+        const auto made = std::make_shared<Phantom>(make_phantom(given.options));
         session.report()["image"] = to_json(made->image.geometry());
         session.report()["points"] = {{"count", made->points.size()}};
         session.outputs().add(output, [made](const std::string& path) {
@@ -50,19 +48,14 @@ void add_phantom(Session& session) {
     std::string kinds;
     for (const std::string& kind : list_phantom_kinds()) kinds += (kinds.empty() ? "" : ", ") + kind;
     in_group(*command, Group::Input);
-    command->add_option("kind", job->options.kind, kinds)->required()->type_name("KIND");
+    command->add_option("kind", job->given.options.kind, kinds)->required()->type_name("KIND");
     in_group(*command, Group::Output);
     command->add_option("-o,--output", job->output, "the image")
         ->required()
         ->type_name("OUT.nrrd|.nii.gz|.tif|.mha|.zarr");
     command->add_option("--points", job->points_path, "points on the true surface")->type_name("OUT.xyz|.csv|.ply");
     command->add_option("--labels", job->labels_path, "the true solid as a label image")->type_name("OUT");
-    in_group(*command, Group::Input);
-    command->add_option("--size", job->options.size, "voxels along each axis")->capture_default_str();
-    command->add_option("--count", job->options.point_count, "number of points")->capture_default_str();
-    command->add_option("--noise", job->options.noise, "standard deviation, in units of the contrast")
-        ->capture_default_str();
-    command->add_option("--seed", job->options.seed, "of the random numbers")->capture_default_str();
+    bind_options(*command, job->given, Offered::Always);
 }
 
 }  // namespace covol::tool

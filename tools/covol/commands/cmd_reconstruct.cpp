@@ -6,7 +6,7 @@ namespace covol::tool {
 void add_reconstruct(Session& session) {
     const auto [job, command] =
         session.add_job<SegmentJob>("reconstruct", "Points alone: the surface behind a point cloud");
-    job->evolve.options.rho = 0;
+    job->given.options.evolve.rho = 0;
     job->points.bind(*command, "points");
     job->bind(*command, false);
     session.help().show_first(*command, {"points", "--mesh", "--inside", "--remove-outliers", "--most-points",

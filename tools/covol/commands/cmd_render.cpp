@@ -19,10 +19,9 @@ struct RenderJob {
     PointFlags points;
     ImageFlags image;
     std::vector<std::string> opacities;
-    std::vector<Vec3> at;
     std::optional<FigureKind> figure;
     int turntable = 0;
-    RenderOptions options;
+    Given<RenderOptions> given;
 
     void run(Session& session) const {
         if (turntable < 0 || turntable > kMostFrames)
@@ -30,8 +29,7 @@ struct RenderJob {
                                                   std::to_string(turntable));
         for (int n = 0; n < std::max(1, turntable); ++n)
             session.outputs().check("-o", frame_path(n), OutputKind::Picture);
-        if (const std::string why = options.why_invalid(); !why.empty())
-            throw Error(Errc::InvalidOptions, "render: " + why);
+        require_valid(given.options, "render");
         static_cast<void>(parse_view(view, false));
         const std::vector<NamedLevelSet> level_sets = read_level_sets(input, session.run());
         std::optional<Image> pixels;
@@ -51,10 +49,9 @@ struct RenderJob {
             scene.is_anatomical = is_anatomical(image_path, image.options, session.run());
         }
         scene.unit = pixels && !pixels->geometry().unit.empty() ? pixels->geometry().unit : stated_unit();
-        RenderOptions chosen = options;
+        RenderOptions chosen = given.options;
         chosen.view = parse_view(view, scene.is_anatomical);
         chosen.figure = figure.value_or(turntable > 0 ? FigureKind::Surface : FigureKind::Composed);
-        if (!at.empty()) chosen.at = at.back();
         const Stopwatch watch;
         if (turntable == 0) {
             const auto picture = std::make_shared<Picture>(render(scene, chosen, session.run()));
@@ -136,21 +133,15 @@ void add_picture_options(CLI::App& command, RenderJob& job) {
             "--size",
             [&job](const std::string& text) {
                 const auto size = parse_size("--size", text);
-                job.options.width = size[0];
-                job.options.height = size[1];
+                job.given.options.width = size[0];
+                job.given.options.height = size[1];
             },
             "of the picture, in pixels")
         ->type_name("WIDTHxHEIGHT")
-        ->default_str(std::to_string(job.options.width) + "x" + std::to_string(job.options.height));
-    const std::map<std::string, FigureKind> figures{
-        {"composed", FigureKind::Composed}, {"surface", FigureKind::Surface}, {"slices", FigureKind::Slices}};
-    command
-        .add_option_function<std::string>(
-            "--figure",
-            [&job, figures](const std::string& word) { job.figure = figures.at(CLI::detail::to_lower(word)); },
-            "the surfaces beside slices of the image, or either alone [composed; surface for a turntable]")
-        ->check(CLI::IsMember(figures, CLI::ignore_case).description(""))
-        ->type_name("composed|surface|slices");
+        ->default_str(to_text(job.given.options.width) + "x" + to_text(job.given.options.height));
+    add_words(command, {"figure", {}, {}, "the surfaces beside slices of the image, or either alone"},
+              {"composed", "surface", "slices"}, [&job](std::size_t n) { job.figure = FigureKind(n); })
+        ->default_str("composed; surface for a turntable");
     command
         .add_option(
             "--view", job.view,
@@ -158,30 +149,18 @@ void add_picture_options(CLI::App& command, RenderJob& job) {
             "+x) and elevation in degrees")
         ->type_name("NAME|AZ,EL")
         ->capture_default_str();
-    command.add_option("--zoom", job.options.zoom, "enlarges the view of the surfaces")
-        ->type_name("FACTOR")
-        ->capture_default_str();
     command
         .add_option("--opacity", job.opacities,
                     "of the surfaces, 0 to 1, all of them or one by its name [1; 0.35 around other structures; 0.16 "
                     "with --volume]")
         ->type_name("[NAME=]SHARE...");
-    command.add_flag("--volume", job.options.volume, "show the image, volume rendered, behind the surfaces");
-    command
-        .add_option_function<int>(
-            "--slices", [&job](int count) { job.options.slices = count; },
-            "so many slices along one axis, marked ones first; 0 for none [three planes through the middle]")
-        ->type_name("N");
-    const std::map<std::string, int> axes{{"x", 0}, {"y", 1}, {"z", 2}};
-    command
-        .add_option_function<std::string>(
-            "--slice-axis", [&job, axes](const std::string& word) { job.options.slice_axis = axes.at(word); },
-            "the image's axis that slices are taken along [the one across marked slices, else z]")
-        ->check(CLI::IsMember(axes).description(""))
-        ->type_name("x|y|z");
-    add_vec3(command, "--at", job.at, "place in the world where the three planes meet [the structures' middle]");
-    add_choice(command, "--background", job.options.white_background, {{"black", false}, {"white", true}},
-               "around the pictures");
+    bind_options(command, job.given, Offered::Always);
+    add_words(command, {"slice_axis", {}, {}, "the image's axis that slices are taken along"}, {"x", "y", "z"},
+              [&job](std::size_t n) { job.given.options.slice_axis = int(n); })
+        ->default_str("the one across marked slices, else z");
+    add_words(command, {"background", {}, {}, "around the pictures"}, {"black", "white"}, [&job](std::size_t n) {
+        job.given.options.white_background = n == 1;
+    })->default_str("white");
     command
         .add_option("--turntable", job.turntable,
                     "N frames of a whole turn about the vertical axis: OUT_0001.png, OUT_0002.png, ... [0]")

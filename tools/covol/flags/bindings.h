@@ -1,53 +1,113 @@
 #pragma once
-#include <map>
+#include <algorithm>
+#include <functional>
+#include <initializer_list>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include "cli/arguments.h"
 #include "cli/help.h"
+#include "cli/option_names.h"
 #include "cli/session.h"
 #include "covol/mesh_io.h"
 #include "covol/pipeline.h"
 #include "covol/points.h"
 #include "covol/vdb_io.h"
+#include "flags/given.h"
 #include "flags/world_points.h"
 
-// Groups of flags that several subcommands share. Each binds to its own struct; lengths in voxels are resolved
-// once h is known.
+// Options of the library's structs, by their tables, and groups of flags that several subcommands share.
 namespace covol::tool {
 
 /// A number as help and messages show it.
-[[nodiscard]] std::string to_text(double value);
+template <typename Number>
+[[nodiscard]] std::string to_text(Number value) {
+    std::ostringstream text;
+    text << value;
+    return text.str();
+}
 
-/// An option that is a length.
-CLI::Option* add_length(CLI::App& command, const std::string& flag, Length& target, const std::string& shown_default,
-                        const std::string& description);
+/// Whether a job has the option; SingleStep has all of its struct.
+[[nodiscard]] bool is_offered(const OptionInfo& option, Offered job);
 
-/// An option that is one of several words, which configuration files keep as such. Where the description names no
-/// automatic choice, in brackets at its end, help shows the value that `target` has now.
-template <typename T>
-CLI::Option* add_choice(CLI::App& command, const std::string& flag, T& target, const std::map<std::string, T>& choices,
-                        const std::string& description) {
-    std::string names, text = description;
-    for (const auto& [name, value] : choices) {
-        names += (names.empty() ? "" : "|") + name;
-        if (value == target && !description.ends_with(']')) text += " [" + name + "]";
-    }
+// An option of each kind. What is out of the option's range is an Error where it is read.
+CLI::Option* add_length(CLI::App& command, const OptionInfo& option, const std::function<void(const Length&)>& take);
+CLI::Option* add_vec3(CLI::App& command, const OptionInfo& option, const std::function<void(const Vec3&)>& take);
+CLI::Option* add_box(CLI::App& command, const OptionInfo& option, const std::function<void(const WorldBox&)>& take);
+CLI::Option* add_words(CLI::App& command, const OptionInfo& option, const std::vector<std::string>& words,
+                       const std::function<void(std::size_t)>& take);
+template <typename Number>
+CLI::Option* add_number(CLI::App& command, const OptionInfo& option, const std::function<void(Number)>& take) {
+    const std::string flag = flag_of(option.name);
     return command
-        .add_option_function<std::string>(
-            flag, [&target, choices](const std::string& word) { target = choices.at(CLI::detail::to_lower(word)); },
-            text)
-        ->check(CLI::IsMember(choices, CLI::ignore_case).description(""))
-        ->type_name(names);
+        .add_option_function<Number>(
+            flag,
+            [take, flag, range = option.range](const Number& value) {
+                range.require(flag, double(value));
+                take(value);
+            },
+            option.text)
+        ->type_name(option.range.unit == Unit::Voxels ? "VOXELS"
+                    : std::is_integral_v<Number>      ? "N"
+                                                      : "NUMBER");
+}
+
+/// One for a field, of the field's type; null for a type that has none. A length goes into `given` until h is known.
+template <typename Options, typename Value>
+CLI::Option* add_option(CLI::App& command, const OptionInfo& option, Value& target, Given<Options>& given) {
+    using T = PlainOf<Value>;
+    [[maybe_unused]] const auto set = [&target](const T& value) { target = value; };
+    if constexpr (std::is_same_v<Value, bool>) {
+        return command.add_flag(flag_of(option.name), target, option.text);
+    } else if constexpr (HasWords<T>) {
+        std::vector<std::string> words;
+        for (const char* word : kWords<T>) words.emplace_back(word != nullptr ? word : "");
+        CLI::Option* made = add_words(command, option, words, [set](std::size_t n) { set(T(n)); });
+        if constexpr (std::is_same_v<T, Value>) made->default_str(words[std::size_t(target)]);
+        return made;
+    } else if constexpr (kIsNumber<T>) {
+        if (option.range.unit == Unit::Length || option.range.unit == Unit::Volume)
+            return add_length(command, option,
+                              [&given, option](const Length& length) { given.lengths[option.name] = length; });
+        CLI::Option* made = add_number<T>(command, option, set);
+        if constexpr (std::is_same_v<T, Value>) made->default_str(to_text(target));
+        return made;
+    } else if constexpr (std::is_same_v<T, Vec3>) {
+        return add_vec3(command, option, set);
+    } else if constexpr (std::is_same_v<T, std::vector<Vec3>>) {
+        return add_vec3(command, option, [&target](const Vec3& v) { target.push_back(v); });
+    } else if constexpr (std::is_same_v<T, WorldBox>) {
+        return add_box(command, option, set);
+    } else {
+        return nullptr;
+    }
+}
+
+/// An option for each row of the table that `job` has, in a group if one is named, but for those that are bound by
+/// hand. `given` has to stay where it is until the command line is read.
+template <typename Options>
+void bind_options(CLI::App& command, Given<Options>& given, Offered job,
+                  std::initializer_list<std::string_view> by_hand = {}, Group only = Group::None) {
+    for_each_option(given.options, [&](OptionInfo option, auto& value) {
+        const bool skipped = std::find(by_hand.begin(), by_hand.end(), option.name) != by_hand.end();
+        if (skipped || !is_offered(option, job) || (only != Group::None && option.place.group != only)) return;
+        if (job == Offered::SingleStep && *option.automatic_alone != 0) option.automatic = option.automatic_alone;
+        in_group(command, option.place.group);
+        CLI::Option* made = add_option(command, option, value, given);
+        made->description(with_flags(option.text));
+        if (*option.automatic != 0) made->default_str(with_flags(option.automatic));
+        made->each([&given, name = std::string(option.name)](const std::string&) { given.names.insert(name); });
+    });
 }
 
 /// The image's own facts that the user corrects.
-struct ImageFlags {
-    ReadImageOptions options;
-    /// @param with_roi    --roi crops the image; commands with a domain have their own
-    /// @param with_frame  --frame takes one time point; commands that take several have their own
-    void bind(CLI::App& command, bool with_roi = true, bool with_frame = true);
+struct ImageFlags : Given<ReadImageOptions> {
+    /// @param by_hand  "roi" crops the image, "frame" takes one time point: commands may have their own
+    void bind(CLI::App& command, std::initializer_list<std::string_view> by_hand = {}) {
+        bind_options(command, *this, Offered::SingleStep, by_hand);
+    }
     /// The image, or the part of it that --roi names.
     [[nodiscard]] Image read(const std::string& path, const RunContext& run) const;
     /// The lattice of read()'s image.
@@ -57,72 +117,33 @@ struct ImageFlags {
 /// `box` and what voxels of edge h around it may sample: leaves reach beyond a domain.
 [[nodiscard]] WorldBox sampled_box(const WorldBox& box, double h);
 
-struct PointFlags {
+struct PointFlags : Given<ReadPointsOptions> {
     std::vector<std::string> paths;
-    ReadPointsOptions options;
     /// `flag` is "--points", or a positional's name.
     CLI::Option* bind(CLI::App& command, const std::string& flag);
     /// How files are understood, without the files.
-    void bind_options(CLI::App& command);
+    void bind_options(CLI::App& command) { tool::bind_options(command, *this, Offered::SingleStep); }
 };
 
 [[nodiscard]] WorldPoints read_world_points(const PointFlags& flags, const ImageGeometry* geometry,
                                             const RunContext& run);
 
-/// Where the domain lies and how fine it is.
-struct DomainFlags {
-    Length voxel_size, margin;
-    std::optional<WorldBox> roi;
-    std::optional<Vec3> lattice_origin;
-    void bind(CLI::App& command, bool with_margin);
-    /// h, where --voxel-size may be relative ("2vx") to the automatic one. Says which in `session`.
-    /// @param tagged  of choose_voxel_size()
-    [[nodiscard]] double resolve_voxel_size(const Image* image, const std::vector<Vec3>& points, bool tagged,
-                                            Session& session) const;
-};
+/// h, where --voxel-size may be relative ("2vx") to the automatic one. Says which in `session`.
+/// @param tagged  of choose_voxel_size()
+[[nodiscard]] double resolve_voxel_size(const Length& asked, const Image* image, const std::vector<Vec3>& points,
+                                        bool tagged, Session& session);
 
-struct TagFlags {
-    Length tag_distance;
-    std::vector<Vec3> exterior_seeds;
-    std::vector<std::pair<std::string, Vec3>> named_seeds;  ///< of one structure among several
-    /// With `names`, seeds may be written name:x,y,z.
-    void bind(CLI::App& command, bool names = false);
-};
-
-struct EdgeFlags {
-    Length sigma;
-    EdgeOptions options;
-    /// @param alone  the single step, which knows of no marks
-    void bind(CLI::App& command, bool alone = false);
-    [[nodiscard]] EdgeOptions resolve(double h) const;
-};
-
-struct EvolveFlags {
-    Length delta, tau, attraction_range;
-    std::optional<double> guess_weight;
-    EvolveOptions options;
-    /// @param with_image  without one there is no rho
-    /// @param alone       the single step: what is automatic elsewhere is as in EvolveOptions
-    void bind(CLI::App& command, bool with_image, bool alone = false);
-    [[nodiscard]] EvolveOptions resolve(double h) const;
-};
-
-struct MeshFlags {
-    std::optional<bool> y_up;
-    double unit_scale = 1.0;
+struct MeshFlags : Given<WriteMeshOptions> {
     bool plain = false;  ///< stream_mesh()
     void bind(CLI::App& command);
     void bind_plain(CLI::App& command);
     /// @param path  of the mesh, or empty. @throws UsageError where its format can't be streamed.
     void check_plain(const std::string& path) const;
-    /// Checks before the long work. @throws Error InvalidOptions.
-    void check() const;
-    [[nodiscard]] WriteMeshOptions options(const Session& session) const;
+    /// @throws UsageError where an option of meshes is given, and `writes` none.
+    void check_used(bool writes) const;
+    [[nodiscard]] WriteMeshOptions write_options(const Session& session) const;
 };
 
 [[nodiscard]] bool is_float_grid(const VdbGridInfo& grid);
-
-/// A flag that is "x,y,z", once or many times.
-void add_vec3(CLI::App& command, const std::string& flag, std::vector<Vec3>& target, const std::string& description);
 
 }  // namespace covol::tool

@@ -29,12 +29,7 @@ void BrickFlags::bind(CLI::App& command) {
                     "allows]")
         ->check(CLI::Range(std::int64_t(1000), std::int64_t(1) << 40).description(""))
         ->type_name("N");
-    command.add_option("--brick-overlap", options.overlap, "layers of its neighbours around a brick, a multiple of 8")
-        ->type_name("VOXELS");
-    command
-        .add_option("--seam-tolerance", options.tolerance,
-                    "sweeps over the bricks end when neighbours' surfaces lie closer than this, voxels")
-        ->type_name("VOXELS");
+    bind_options(command, *this, Offered::Always);
 }
 
 BrickOptions BrickFlags::resolve(std::optional<std::uint64_t> memory) const {

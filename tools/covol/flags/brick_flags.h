@@ -8,8 +8,7 @@
 namespace covol::tool {
 
 /// How a job is split, by `covol brick` and where --memory-limit asks for it.
-struct BrickFlags {
-    BrickOptions options;
+struct BrickFlags : Given<BrickOptions> {
     std::optional<std::int64_t> most_voxels;
 
     void bind(CLI::App& command);

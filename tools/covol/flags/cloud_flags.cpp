@@ -37,29 +37,17 @@ std::string one_line(const CloudCleanupReport& r, const CloudCleanupOptions& opt
 
 void CloudFlags::bind(CLI::App& command, bool with_most) {
     in_group(command, Group::Clouds);
-    const CloudCleanupOptions lib;
-    const std::string factor = "3";
-    command
-        .add_flag("--remove-outliers{" + factor + "}", outlier_factor,
-                  "drop marks that lie apart from all others, and points whose distance to their " +
-                      std::to_string(lib.neighbours) + " neighbours is more than " + factor +
-                      " (or FACTOR) times the cloud's mean")
-        ->option_text("[=FACTOR]");
-    if (with_most)
-        command
-            .add_option("--most-points", most_points,
-                        "of larger clouds so many points are used, evenly spread over the surface; 0: all")
-            ->type_name("N")
-            ->default_str(std::to_string(most_points));
-    add_length(command, "--simplify", simplify, "", "keep one point in each cell of this edge, 1vx for example");
-    add_choice(command, "--smooth", smooth,
-               {{"none", CloudSmoothing::None}, {"jets", CloudSmoothing::Jets}, {"wlop", CloudSmoothing::Wlop}},
-               "move the points to fitted quadrics (jets), or make " + to_text(lib.wlop_share) +
-                   " times as many by projection, evenly spread (wlop)");
+    for_each_option(options, [&](const OptionInfo& option, auto&) {
+        if (option.name == std::string_view("remove_outliers"))
+            command.add_flag(flag_of(option.name) + "{3}", outlier_factor, option.text)->option_text("[=FACTOR]");
+    });
+    if (with_most) bind_options(command, inputs, Offered::PointsAlone);
+    bind_options(command, *this, Offered::Always, {"remove_outliers"});
 }
 
 std::vector<std::uint32_t> CloudFlags::used(const std::vector<Vec3>& points, const RunContext& run,
                                             Json& report) const {
+    const std::size_t most_points = inputs.options.most_points;
     std::vector<std::uint32_t> order =
         order_spatially(points, most_points > 0 ? most_points : std::numeric_limits<std::size_t>::max());
     if (order.size() < points.size()) {
@@ -70,29 +58,29 @@ std::vector<std::uint32_t> CloudFlags::used(const std::vector<Vec3>& points, con
     return order;
 }
 
-CloudCleanupOptions CloudFlags::resolve(double h) const {
-    CloudCleanupOptions options;
-    if (!outlier_factor.empty()) options.outlier_factor = parse_number("--remove-outliers", outlier_factor);
-    options.simplify = simplify.resolve(h, 0);
-    options.smooth = smooth;
-    return options;
+CloudCleanupOptions CloudFlags::cleanup(double h) const {
+    CloudCleanupOptions resolved = resolve(h);
+    if (!outlier_factor.empty()) resolved.outlier_factor = parse_number("--remove-outliers", outlier_factor);
+    return resolved;
 }
 
-void CloudFlags::check() const {
-    const std::string why = resolve(1).why_invalid();
-    if (!why.empty()) throw Error(Errc::InvalidOptions, why);
+void CloudFlags::check() const { require_valid(cleanup(1), "clean_cloud"); }
+
+void CloudFlags::check_used(bool has_cloud) const {
+    if (!has_cloud && cleanup(1).any())
+        throw UsageError("--remove-outliers, --simplify, --smooth: they are about points, and this run reads none");
 }
 
 std::vector<Vec3> CloudFlags::clean(const std::vector<Vec3>& points, double h, const RunContext& run,
                                     Json& report) const {
-    const CloudCleanupOptions options = resolve(h);
-    if (!options.any()) return points;
+    const CloudCleanupOptions asked = cleanup(h);
+    if (!asked.any()) return points;
     CloudCleanupReport done;
-    std::vector<Vec3> cleaned = clean_cloud(points, options, run, &done);
+    std::vector<Vec3> cleaned = clean_cloud(points, asked, run, &done);
     if (cleaned.empty() && !points.empty())
         throw Error(Errc::InvalidInput, "clean_cloud: no point is left of " + std::to_string(points.size()));
     report["cleanup"] = to_json(done);
-    run.info(one_line(done, options));
+    run.info(one_line(done, asked));
     return cleaned;
 }
 

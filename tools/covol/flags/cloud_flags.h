@@ -5,20 +5,22 @@
 #include "cli/arguments.h"
 #include "cli/session.h"
 #include "covol/cloud_cleanup.h"
+#include "flags/given.h"
+#include "flags/input_options.h"
 
 namespace covol::tool {
 
 /// What is done to a cloud before it is used.
-struct CloudFlags {
+struct CloudFlags : Given<CloudCleanupOptions> {
     std::string outlier_factor;  ///< a number; empty: outliers stay
-    Length simplify;
-    CloudSmoothing smooth = CloudSmoothing::None;
-    std::size_t most_points = 2500000;  ///< of a cloud without an image; 0: all
+    Given<InputOptions> inputs;
 
     /// @param with_most  --most-points, too
     void bind(CLI::App& command, bool with_most);
     /// @throws Error InvalidOptions for what is wrong whatever h is.
     void check() const;
+    /// @throws UsageError where an option is given, and there is no cloud.
+    void check_used(bool has_cloud) const;
     /// Which points of a cloud without an image are used, sorted in space; says so where these are not all of them, and
     /// puts it into `report` as "thinned_to".
     [[nodiscard]] std::vector<std::uint32_t> used(const std::vector<Vec3>& points, const RunContext& run,
@@ -28,7 +30,7 @@ struct CloudFlags {
                                           Json& report) const;
 
 private:
-    [[nodiscard]] CloudCleanupOptions resolve(double h) const;
+    [[nodiscard]] CloudCleanupOptions cleanup(double h) const;
 };
 
 }  // namespace covol::tool

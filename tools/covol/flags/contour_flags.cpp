@@ -10,11 +10,7 @@ void ContourFlags::bind(CLI::App& command, bool names) {
             std::string("ordered marks on slices: CSV (slice,contour,x_px,y_px), napari shapes, Fiji selections") +
                 (names ? "; NAME= as for points" : ""))
         ->type_name(names ? "[NAME=]FILE..." : "FILE...");
-    in_group(command, Group::ReadingMarks);
-    add_choice(command, "--contour-curve", curve, {{"lines", ContourCurve::Lines}, {"spline", ContourCurve::Spline}},
-               "how neighbouring marks are joined");
-    add_length(command, "--contour-thickness", thickness, "",
-               "thickness of a body whose contours all lie on one slice");
+    bind_options(command, *this, Offered::Always);
 }
 
 std::vector<PointCloud> ContourFlags::read(const ReadPointsOptions& reading, const ImageGeometry* geometry,
@@ -31,9 +27,10 @@ std::vector<PointCloud> ContourFlags::read(const ReadPointsOptions& reading, con
 std::shared_ptr<const Contours> ContourFlags::densify(const std::vector<PointCloud>& clouds,
                                                       const ImageGeometry* geometry, double h, const RunContext& run,
                                                       Json& report) const {
-    const ContourOptions options{h, curve, thickness.resolve(h, 0)};
-    const auto contours = std::make_shared<Contours>(
-        geometry != nullptr ? covol::densify(clouds, *geometry, options, run) : covol::densify(clouds, options, run));
+    ContourOptions dense = resolve(h);
+    dense.step = h;
+    const auto contours = std::make_shared<Contours>(geometry != nullptr ? covol::densify(clouds, *geometry, dense, run)
+                                                                         : covol::densify(clouds, dense, run));
     run.info("contours: " + contours->summary);
     Json rules = Json::array();
     for (const PointCloud& cloud : clouds) rules.push_back(cloud.rule);

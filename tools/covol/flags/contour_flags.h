@@ -10,10 +10,8 @@
 namespace covol::tool {
 
 /// Ordered marks on slices.
-struct ContourFlags {
+struct ContourFlags : Given<ContourOptions> {
     std::vector<std::string> paths;
-    ContourCurve curve = ContourCurve::Spline;
-    Length thickness;
 
     /// @param names  files may be NAME=FILE: of one structure among several
     void bind(CLI::App& command, bool names);

@@ -26,14 +26,7 @@ void GuessFlags::bind(CLI::App& command) {
                     "farther away stays as it is")
         ->type_name("[NAME=]FILE")
         ->allow_extra_args(false);
-    in_group(command, Group::ReadingMarks);
-    command.add_option("--guess-label", label, "of a mask with several labels the one to correct; the others stay")
-        ->check(CLI::PositiveNumber.description(""))
-        ->type_name("LABEL");
-    add_length(command, "--guess-radius", radius, "",
-               "a mark acts on the guess at least so far around it [" + to_text(kCorrectionVoxels) +
-                   "vx, or two of the image's widest spacing; 3 times its distance to the guess if it lies inside, 2.2 "
-                   "times outside, where that is more]");
+    bind_options(command, inputs, Offered::WithImage);
 }
 
 Guess read_guess(const std::string& path, int label, const ImageGeometry& image, bool force, const RunContext& run) {

@@ -6,14 +6,14 @@
 
 #include "covol/guess_correction.h"
 #include "flags/bindings.h"
+#include "flags/input_options.h"
 
 namespace covol::tool {
 
 /// Another tool's result that marks correct: --guess and what belongs to it.
 struct GuessFlags {
     std::vector<std::string> paths;  ///< with NAME= of one structure
-    int label = 0;                   ///< of several in a mask; 0: there is only one
-    Length radius;
+    Given<InputOptions> inputs;
 
     void bind(CLI::App& command);
 };

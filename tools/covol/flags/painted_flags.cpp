@@ -10,16 +10,7 @@ void PaintedFlags::bind(CLI::App& command) {
         .add_option("--painted", paths,
                     "label images painted on some slices or in some places; each label is a structure")
         ->type_name("[NAME=]FILE...");
-    in_group(command, Group::ReadingMarks);
-    command
-        .add_option("--painted-outside", options.outside_label,
-                    "a label that was painted on what belongs to no structure")
-        ->check(CLI::PositiveNumber.description(""))
-        ->type_name("LABEL");
-    add_choice(command, "--painted-as", options.as,
-               {{"auto", PaintedAs::Automatic}, {"slices", PaintedAs::Slices}, {"scribbles", PaintedAs::Scribbles}},
-               "slices: those that hold paint show the whole cross-section; scribbles: paint says what is inside [by "
-               "the paint itself]");
+    bind_options(command, *this, Offered::Always);
 }
 
 std::vector<std::shared_ptr<const PaintedFile>> PaintedFlags::read(const RunContext& run) const {

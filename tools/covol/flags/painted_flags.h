@@ -16,9 +16,8 @@ struct PaintedFile {
 };
 
 /// --painted and what belongs to it.
-struct PaintedFlags {
+struct PaintedFlags : Given<PaintedOptions> {
     std::vector<std::string> paths;
-    PaintedOptions options;
 
     void bind(CLI::App& command);
     /// @throws UsageError for NAME=FILE with several labels; Error

@@ -1,9 +1,9 @@
 #pragma once
-#include <CLI/CLI.hpp>
 #include <map>
 #include <string>
 
 #include "covol/vdb_io.h"
+#include "flags/bindings.h"
 
 namespace covol::tool {
 
@@ -12,9 +12,13 @@ inline constexpr const char* kDensityHelp =
     "the solid as a fog volume, 0 to 1; with the name that -o has, both grids are in that file";
 
 /// How .vdb files are written.
-struct VdbFlags {
-    WriteVdbOptions options;
-    void bind(CLI::App& command);
+struct VdbFlags : Given<WriteVdbOptions> {
+    void bind(CLI::App& command) { bind_options(command, *this, Offered::Always); }
+    /// @throws UsageError where an option of .vdb files is given, and `writes` none.
+    void check_used(bool writes) const {
+        if (!writes && !names.empty())
+            throw UsageError(flag_of(*names.begin()) + ": it is about .vdb files, and this run writes none");
+    }
     [[nodiscard]] WriteVdbOptions with(const std::map<std::string, std::string>& metadata) const {
         return {options.half, metadata, options.compression};
     }

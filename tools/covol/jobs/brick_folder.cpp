@@ -63,7 +63,8 @@ Vec3 place_of(const Json& json, const char* name) {
 }
 
 Json to_json(const EdgeOptions& edge) {
-    Json json{{"feature", int(edge.feature)}, {"low", edge.low}, {"high", edge.high}};
+    Json json{{"feature", int(edge.feature)}};
+    if (edge.intensities) json["intensities"] = *edge.intensities;
     if (edge.sigma) json["sigma"] = *edge.sigma;
     if (edge.edge_k) json["edge_k"] = *edge.edge_k;
     if (edge.contrast_percentile) json["contrast_percentile"] = *edge.contrast_percentile;
@@ -73,8 +74,7 @@ Json to_json(const EdgeOptions& edge) {
 EdgeOptions edge_of(const Json& json) {
     EdgeOptions edge;
     edge.feature = EdgeFeature(whole(json, "feature", 0, int(EdgeFeature::DarkLine)));
-    edge.low = real(json, "low");
-    edge.high = real(json, "high");
+    if (json.contains("intensities")) edge.intensities = json.at("intensities").get<std::array<double, 2>>();
     const auto optional = [&](const char* name) {
         return json.contains(name) ? std::optional(real(json, name)) : std::nullopt;
     };
@@ -223,14 +223,14 @@ BrickPlan BrickFolder::read_plan() const {
         const Json& bricks = json.at("bricks");
         if (!bricks.is_array() || bricks.empty()) throw std::out_of_range("bricks: expected a list of them, got none");
         for (const Json& brick : bricks) plan.bricks.push_back(brick_of(brick, plan.domain, bricks.size()));
-        if (const std::string why = plan.edge.why_invalid(); !why.empty()) throw std::out_of_range(why);
+        if (const std::string why = why_invalid(plan.edge); !why.empty()) throw std::out_of_range(why);
     } catch (const Error& error) {
         if (error.code() == Errc::Io) throw;
         throw Error(Errc::InvalidInput, file + ": expected a plan of covol brick plan: " + error.what());
     } catch (const std::exception& error) {
         throw Error(Errc::InvalidInput, file + ": expected a plan of covol brick plan: " + error.what());
     }
-    if (const std::string why = plan.options.why_invalid(); !why.empty())
+    if (const std::string why = why_invalid(plan.options); !why.empty())
         throw Error(Errc::InvalidInput, file + ": " + why);
     plan.coarse = read_vdb(path_ + "/coarse.vdb", "coarse");
     return plan;

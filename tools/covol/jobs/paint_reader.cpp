@@ -10,7 +10,7 @@ namespace covol::tool {
 const Painted& PaintReader::of(const StructureInput::Paint& paint, const RunContext& run) {
     const auto known = files_.find(paint.file.get());
     if (known != files_.end()) return known->second;
-    const bool force = job_.image.options.spacing[0] > 0;
+    const bool force = job_.image.has("spacing");
     return files_.emplace(paint.file.get(), job_.painted.understand(*paint.file, image_, force, run)).first->second;
 }
 

@@ -230,11 +230,11 @@ void run_plan(const SegmentJob& job, Session& session) {
     double given_h = 0, image_bytes = 0, pixel_bytes = 0;
     if (!job.images.empty()) {
         ReadImageOptions reading = job.image.options;
-        reading.roi = job.domain.roi;
+        reading.roi = job.given.options.roi;
         image = read_image_info(job.images.front(), reading, session.run());
         const Vec3& spacing = image->geometry.spacing;
         const double finest = *std::min_element(spacing.begin(), spacing.end());
-        given_h = job.domain.voxel_size.resolve(finest, finest);
+        given_h = job.given.length("voxel_size").resolve(finest, finest);
         const Index3& n = image->geometry.size;
         pixel_bytes = double(bytes_of(image->type));
         image_bytes = double(n[0]) * n[1] * n[2] * pixel_bytes;

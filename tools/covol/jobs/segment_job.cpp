@@ -16,34 +16,14 @@ namespace covol::tool {
 
 double SegmentJob::resolve_voxel_size(const Image* input_image, const Marks& marks, Session& session) const {
     const bool tagged = !marks.drawn.empty() || resolve(1).tags_points();
-    return domain.resolve_voxel_size(input_image, marks.given, tagged, session);
+    return tool::resolve_voxel_size(given.length("voxel_size"), input_image, marks.given, tagged, session);
 }
 
 SegmentOptions SegmentJob::resolve(double h) const {
-    SegmentOptions options;
+    SegmentOptions options = given.resolve(h);
     options.voxel_size = h;
-    options.voxel_size_may_grow = !domain.voxel_size.given;
-    options.roi = domain.roi;
-    options.lattice_origin = domain.lattice_origin;
-    options.margin = domain.margin.resolve_above_0(h);
+    options.voxel_size_may_grow = !given.has("voxel_size");
     options.keep_failed = !failed_path.empty();
-    options.start = start;
-    options.model = model;
-    options.mark_precision = mark_precision.resolve(h);
-    options.tag_distance = tag.tag_distance.resolve_above_0(h);
-    if (tag.tag_distance.given && !options.tag_distance)
-        throw Error(Errc::InvalidOptions, "--tag-distance: expected > 0, got 0");
-    options.exterior_seeds = tag.exterior_seeds;
-    options.edge = edge.resolve(h);
-    options.evolve = evolve.resolve(h);
-    if (coarse_levels >= 0) options.coarse_levels = coarse_levels;
-    options.holes.policy = holes.policy;
-    options.holes.distance = hole_distance.resolve_above_0(h);
-    if (hole_distance.given && !options.holes.distance)
-        throw Error(Errc::InvalidOptions, "--hole-distance: expected > 0, got 0");
-    options.correction.least_radius = guess.radius.resolve_above_0(h);
-    const double side = min_component.resolve(h, 0);
-    options.extract.min_component_volume = side * side * side;
     options.without_mesh = mesh.plain || !needs_mesh();
     options.without_fields = fields_path.empty() && !evidence.wanted();
     return options;
@@ -51,13 +31,13 @@ SegmentOptions SegmentJob::resolve(double h) const {
 
 bool SegmentJob::needs_mesh() const {
     return !mesh_path.empty() || !page_path.empty() || !scene_path.empty() || evidence.wanted() ||
-           holes.policy != Holes::Close || min_component.given;
+           given.options.holes.policy != Holes::Close || given.has("min_component");
 }
 
 void SegmentJob::check_options() const {
-    const std::string why = resolve(1.0).why_invalid();
-    if (!why.empty()) throw Error(Errc::InvalidOptions, why);
+    require_valid(resolve(1.0), "segment");
     cloud.check();
+    mesh.check_used(!mesh_path.empty());
     mesh.check_plain(mesh_path);
     if (mesh.plain && evidence.wanted())
         throw UsageError("--plain: excludes --evidence, --suggest and --report, which need the whole mesh");
@@ -66,13 +46,8 @@ void SegmentJob::check_options() const {
 std::string SegmentJob::unused(const SegmentReport& report) const {
     if (report.solve.steps > 0 || report.solve.stop_reason != StopReason::Steady) return {};
     std::string flags;
-    const auto name = [&](bool given, const char* flag) {
-        if (given) flags += (flags.empty() ? "" : ", ") + std::string(flag);
-    };
-    name(evolve.delta.given, "--delta");
-    name(evolve.tau.given, "--tau");
-    name(evolve.attraction_range.given, "--attraction-range");
-    name(evolve.options.image_yields.has_value(), "--image-yields");
+    for (const char* name : {"delta", "tau", "attraction_range", "image_yields"})
+        if (given.has(name)) flags += (flags.empty() ? "" : ", ") + flag_of(name);
     if (flags.empty()) return {};
     return flags +
            " did nothing: the surface is a guess that marks and image hold, and nothing flowed; --model paper flows";
@@ -93,6 +68,28 @@ std::string SegmentJob::any_output() const {
     for (const std::string* path : {&output, &mesh_path, &mask_path})
         if (!path->empty()) return *path;
     return {};
+}
+
+void SegmentJob::bind_named_seeds(CLI::App& command) {
+    for_each_option(given.options, [&](const OptionInfo& option, auto& value) {
+        if constexpr (std::is_same_v<std::remove_reference_t<decltype(value)>, std::vector<Vec3>>)
+            command
+                .add_option_function<std::vector<std::string>>(
+                    flag_of(option.name),
+                    [this, &value, flag = flag_of(option.name)](const std::vector<std::string>& texts) {
+                        for (const std::string& text : texts) {
+                            const std::size_t colon = text.find(':');
+                            if (colon == std::string::npos)
+                                value.push_back(parse_vec3(flag, text));
+                            else
+                                named_seeds.emplace_back(text.substr(0, colon),
+                                                         parse_vec3(flag, text.substr(colon + 1)));
+                        }
+                    },
+                    option.text + std::string("; with NAME: of that structure alone"))
+                ->type_name("[NAME:]X,Y,Z")
+                ->allow_extra_args(false);
+    });
 }
 
 void SegmentJob::bind(CLI::App& command, bool with_image) {
@@ -141,62 +138,37 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
     seeds.bind(command, with_image);
     if (with_image) guess.bind(command);
     cloud.bind(command, !with_image);
-    evolve.bind(command, with_image);
-    if (with_image) edge.bind(command);
-    tag.bind(command, with_image);
+    const Offered offered = with_image ? Offered::WithImage : Offered::PointsAlone;
+    if (with_image)
+        bind_options(command, given, offered, {"exterior_seed"});
+    else
+        bind_options(command, given, offered);
+    in_group(command, Group::Start);
+    if (with_image) bind_named_seeds(command);
     command
         .add_option_function<std::string>(
-            "--init", [this](const std::string& text) { start = parse_start("--init", text); },
+            "--init", [this](const std::string& text) { given.options.start = parse_start("--init", text); },
             "how the level set starts: auto, guess (through the marks with the least bending), cloud (many points "
             "without an image: their own surface), tag, sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1 (inside an object and "
             "without marks these grow to its edges), mesh:F, mask:F or vdb:F (near its marks such a start is a guess "
             "that they correct)")
         ->type_name("START")
         ->default_str("auto");
-    in_group(command, Group::Start);
-    add_choice(
-        command, "--model", model, {{"guided", Model::Guided}, {"paper", Model::Paper}},
-        "what holds the surface where neither marks nor edges speak: a guess made from the marks, or curvature alone");
-    in_group(command, Group::ReadingMarks);
-    add_length(command, "--mark-precision", mark_precision, "",
-               "standard deviation of a mark's place [0.3 of the image's spacing along each axis]");
-    domain.bind(command, !with_image);
-    in_group(command, Group::Numerics);
-    command
-        .add_option("--coarse-levels", coarse_levels,
-                    "levels of twice the voxel size, and so on, that the flow passes first; auto: 1 for a sphere or a "
-                    "box, else 0")
-        ->check(CLI::Range(0, 4).description(""))
-        ->type_name("N")
-        ->default_str("auto");
     bricks.bind(command);
     checkpoint.bind(command);
-    if (!with_image) {
-        in_group(command, Group::Clouds);
-        add_choice(command, "--holes", holes.policy,
-                   {{"close", Holes::Close}, {"open", Holes::Open}, {"flat", Holes::Flat}},
-                   "where no points are, the surface goes on smoothly, or the mesh ends (the level set stays closed), "
-                   "or the flattest patch spans it, in both");
-        add_length(command, "--hole-distance", hole_distance, "",
-                   "a hole is where the surface lies farther from all points [3 spacings where they are sparse, at "
-                   "least 3vx]");
-    }
-    in_group(command, Group::MeshFiles);
-    add_length(command, "--min-component", min_component, "",
-               "drop pieces of the mesh that are smaller than a cube of this edge");
     vdb.bind(command);
     mesh.bind(command);
     mesh.bind_plain(command);
-    if (with_image) image.bind(command, false, false);
+    if (with_image) image.bind(command, {"roi", "frame"});
 }
 
 Image SegmentJob::read(const std::string& path, const ReadImageOptions& options, Session& session) const {
     const Stopwatch reading;
     ReadImageOptions needed = options;
-    if (domain.roi) {
+    if (given.options.roi) {
         const Vec3 spacing = read_image_geometry(path, options, session.run()).spacing;
         const double finest = *std::min_element(spacing.begin(), spacing.end());
-        needed.roi = sampled_box(*domain.roi, domain.voxel_size.resolve(finest, finest));
+        needed.roi = sampled_box(*given.options.roi, given.length("voxel_size").resolve(finest, finest));
     }
     session.require_memory(double(read_image_info(path, needed, session.run()).bytes_to_hold), "the image");
     Image pixels = read_image(path, needed, session.run());

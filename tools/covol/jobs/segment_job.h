@@ -27,18 +27,9 @@ struct SegmentJob {
     SeedFlags seeds;
     GuessFlags guess;
     CloudFlags cloud;
-    DomainFlags domain;
-    TagFlags tag;
-    EdgeFlags edge;
-    EvolveFlags evolve;
+    Given<SegmentOptions> given;
+    std::vector<std::pair<std::string, Vec3>> named_seeds;  ///< outside one structure among several
     MeshFlags mesh;
-    Start start;
-    Model model = Model::Guided;
-    Length mark_precision;
-    int coarse_levels = -1;  ///< < 0: automatic
-    HolesOptions holes;
-    Length hole_distance;
-    Length min_component;  ///< edge of a cube of the smallest volume that is kept
     EvidenceFlags evidence;
     BrickFlags bricks;
     CheckpointFlags checkpoint;
@@ -52,11 +43,13 @@ struct SegmentJob {
     void run(Session& session) const;
 
     // For those.
+    /// --exterior-seed, whose places may belong to one structure.
+    void bind_named_seeds(CLI::App& command);
     /// A mesh or a label image that stands at -o goes where --mesh and --mask would have it.
     void sort_output(bool with_image);
     [[nodiscard]] std::string any_output() const;
     [[nodiscard]] SegmentOptions resolve(double h) const;
-    /// DomainFlags::resolve_voxel_size() for a structure with these marks.
+    /// resolve_voxel_size() for a structure with these marks.
     [[nodiscard]] double resolve_voxel_size(const Image* input_image, const Marks& marks, Session& session) const;
     /// Whether an output, or what is done to the surface, needs its relaxed mesh.
     [[nodiscard]] bool needs_mesh() const;

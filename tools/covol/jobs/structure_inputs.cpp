@@ -113,8 +113,8 @@ std::vector<StructureInput> structures_of(const SegmentJob& job,
     share_seeds(inputs, "--inside", job.seeds.inside, &SeedFlags::inside);
     share_seeds(inputs, "--outside", job.seeds.outside, &SeedFlags::outside);
     number_labels(inputs);
-    for (StructureInput& input : inputs) input.exterior_seeds = job.tag.exterior_seeds;
-    for (const auto& [name, seed] : job.tag.named_seeds)
+    for (StructureInput& input : inputs) input.exterior_seeds = job.given.options.exterior_seeds;
+    for (const auto& [name, seed] : job.named_seeds)
         owner_of(inputs, "--exterior-seed", name).exterior_seeds.push_back(seed);
     return inputs;
 }
@@ -127,13 +127,14 @@ std::vector<std::string> names_of(const std::vector<StructureInput>& inputs) {
 }
 
 std::vector<StructureStart> starts_of(const SegmentJob& job, const std::vector<StructureInput>& inputs) {
-    std::vector<StructureStart> starts(inputs.size(), {job.start});
-    if (inputs.size() == 1 || job.start.kind <= Start::Kind::Tag) return starts;
-    if (job.start.kind != Start::Kind::Vdb)
+    std::vector<StructureStart> starts(inputs.size(), {job.given.options.start});
+    if (inputs.size() == 1 || job.given.options.start.kind <= Start::Kind::Tag) return starts;
+    if (job.given.options.start.kind != Start::Kind::Vdb)
         throw UsageError(
             "--init: several structures cannot start from one shape; expected tag, or vdb:FILE with a grid for each");
     const std::vector<std::string> grids = make_grid_names(names_of(inputs));
-    for (std::size_t n = 0; n < starts.size(); ++n) starts[n].start.level_set = read_vdb(job.start.path, grids[n]);
+    for (std::size_t n = 0; n < starts.size(); ++n)
+        starts[n].start.level_set = read_vdb(job.given.options.start.path, grids[n]);
     return starts;
 }
 

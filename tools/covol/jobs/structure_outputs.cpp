@@ -60,7 +60,7 @@ std::map<std::string, std::string> metadata_of(const StructuresOutput& output, c
 void hand_over_meshes(const SegmentJob& job, const std::shared_ptr<const StructuresOutput>& output,
                       const std::string& path, const Session& session, const Sink& sink) {
     if (path.empty()) return;
-    const WriteMeshOptions options = job.mesh.options(session);
+    const WriteMeshOptions options = job.mesh.write_options(session);
     if (output->structures.size() > 1 && holds_several_meshes(path)) {
         sink(path, [output, options](const std::string& file) {
             std::vector<NamedMesh> meshes;
@@ -232,7 +232,6 @@ void check_outputs(const SegmentJob& job, const std::vector<StructureInput>& inp
     outputs.check("--report", tagged(job.page_path), OutputKind::Page);
     outputs.check("--keep-failed", tagged(job.failed_path), OutputKind::Vdb);
     job.evidence.check(outputs, tagged(job.evidence.path));
-    job.mesh.check();
     const std::string mesh = tagged(job.mesh_path);
     if (inputs.size() == 1 || mesh.empty() || holds_several_meshes(mesh))
         return outputs.check("--mesh", mesh, OutputKind::Mesh);

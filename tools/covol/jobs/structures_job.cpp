@@ -177,7 +177,8 @@ PreparedStructure StructurePreparer::prepare(std::size_t n, const RunContext& ru
 void StructurePreparer::add_guess(std::size_t n, PreparedStructure& prepared, const RunContext& run) const {
     const StructureInput& input = inputs_[n];
     if (input.guess.empty()) return;
-    prepared.guess = read_guess(input.guess, job_.guess.label, geometry_, job_.image.options.spacing[0] > 0, run);
+    prepared.guess =
+        read_guess(input.guess, job_.guess.inputs.options.guess_label, geometry_, job_.image.has("spacing"), run);
     prepared.options.guess = prepared.guess->start;
     prepared.output.input["guess"] = {{"path", input.guess}, {"label", prepared.guess->label}};
 }

@@ -74,8 +74,7 @@ def to_affine(img):
 
 def read_image(path, *, spacing=None, channel=None, frame=None, roi=None, correct_level_shift=False, progress=None,
                threads=0, memory_limit=0):
-    number = lambda n: -1 if n is None else int(n)
-    return _covol.read_image(os.fspath(path), spacing, number(channel), number(frame), roi, correct_level_shift,
+    return _covol.read_image(os.fspath(path), spacing, channel, frame, roi, correct_level_shift,
                              call(progress, threads, memory_limit))
 
 

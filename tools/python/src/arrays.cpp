@@ -12,7 +12,7 @@ namespace {
 std::string text_of(const py::handle& value) { return py::cast<std::string>(py::str(value)); }
 
 [[noreturn]] void bad(const std::string& name, const std::string& expected, const std::string& got) {
-    throw Error(Errc::InvalidInput, name + ": expected " + expected + ", got " + got);
+    throw Error(Errc::InvalidInput, name + ": expected " + expected + ", got " + got, name);
 }
 
 /// Doubles in rows, whatever they were.
@@ -52,7 +52,7 @@ py::array known_numbers(py::array array) {
     }
     if (kind != 'i' && kind != 'u' && kind != 'f')
         throw Error(Errc::Unsupported,
-                    "image: expected an array of integers, floats or bools, got " + text_of(array.dtype()));
+                    "image: expected an array of integers, floats or bools, got " + text_of(array.dtype()), "image");
     if (!py::cast<bool>(array.attr("dtype").attr("isnative")))
         return array.attr("astype")(array.attr("dtype").attr("newbyteorder")("="));
     return array;

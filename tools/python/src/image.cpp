@@ -6,6 +6,7 @@
 #include "covol/error.h"
 #include "covol/phantom.h"
 #include "covol/point_array.h"
+#include "options.h"
 
 namespace covol::python {
 namespace {
@@ -20,8 +21,8 @@ ImageGeometry make_geometry(const py::handle& spacing, const py::handle& origin,
     return geometry;
 }
 
-Image read(const std::string& path, const py::object& spacing, int channel, int frame, const py::object& roi,
-           bool correct_level_shift, const Call& call) {
+Image read(const std::string& path, const py::object& spacing, const std::optional<int>& channel,
+           const std::optional<int>& frame, const py::object& roi, bool correct_level_shift, const Call& call) {
     ReadImageOptions options;
     if (!spacing.is_none()) options.spacing = to_vec3("spacing", spacing);
     options.channel = channel;
@@ -29,7 +30,7 @@ Image read(const std::string& path, const py::object& spacing, int channel, int 
     options.correct_level_shift = correct_level_shift;
     if (!roi.is_none()) {
         const std::vector<Vec3> corners = to_positions("roi", roi);
-        if (corners.size() != 2) throw Error(Errc::InvalidOptions, "roi: expected two corners");
+        if (corners.size() != 2) reject("roi", "two corners", roi);
         options.roi = WorldBox{corners[0], corners[1]};
     }
     std::optional<Image> image;
@@ -40,50 +41,30 @@ Image read(const std::string& path, const py::object& spacing, int channel, int 
     return *image;
 }
 
-ReadPointsOptions make_reading(const std::optional<std::string>& space, const std::optional<std::string>& order,
-                               double scale, int channels) {
+ReadPointsOptions make_reading(const py::object& space, const py::object& order, double scale, int channels) {
     ReadPointsOptions reading;
-    const auto choose = [](const char* name, const std::optional<std::string>& word, auto& target, const auto& words) {
-        if (!word) return;
-        std::string list;
-        for (const auto& [text, value] : words) {
-            if (*word == text) {
-                target = value;
-                return;
-            }
-            list += (list.empty() ? "" : ", ") + std::string(text);
-        }
-        throw Error(Errc::InvalidOptions, std::string(name) + ": expected one of " + list + ", got '" + *word + "'");
-    };
-    choose("points_space", space, reading.space,
-           std::vector<std::pair<const char*, PointSpace>>{{"world", PointSpace::World},
-                                                           {"ras", PointSpace::Ras},
-                                                           {"index", PointSpace::Index},
-                                                           {"index1", PointSpace::IndexOne},
-                                                           {"local", PointSpace::Local}});
-    choose("points_order", order, reading.order,
-           std::vector<std::pair<const char*, PointOrder>>{{"xyz", PointOrder::XYZ}, {"zyx", PointOrder::ZYX}});
-    if (!(scale > 0)) throw Error(Errc::InvalidOptions, "points_scale: expected > 0, got " + std::to_string(scale));
-    if (channels < 1)
-        throw Error(Errc::InvalidOptions, "points_channels: expected >= 1, got " + std::to_string(channels));
+    if (!space.is_none()) reading.space = to_choice<PointSpace>("points_space", space);
+    if (!order.is_none()) reading.order = to_choice<PointOrder>("points_order", order);
     reading.scale = scale;
     reading.channels = channels;
+    require_valid(reading, "read_points");
     return reading;
 }
 
 /// Positions in one array, or of several lines one after the other.
 PointCloud make_points(const std::string& name, const py::object& positions, const std::optional<py::list>& lines,
-                       const std::optional<std::string>& space, const std::optional<std::string>& order, double scale,
-                       bool closed, const py::object& normals) {
+                       const py::object& space, const py::object& order, double scale, bool closed,
+                       const py::object& normals) {
     const ReadPointsOptions reading = make_reading(space, order, scale, 1);
     if (!lines) {
         PointCloud cloud = make_cloud(to_positions(name.c_str(), positions), reading, name);
         if (normals.is_none()) return cloud;
         cloud.normals = make_cloud(to_positions("normals", normals), {cloud.reading.space, cloud.reading.order}).points;
         if (cloud.normals.size() != cloud.points.size() || cloud.space != PointSpace::World)
-            throw Error(Errc::InvalidInput, "normals: expected one for each point, both in world units, got " +
-                                                std::to_string(cloud.normals.size()) + " for " +
-                                                std::to_string(cloud.points.size()));
+            throw Error(Errc::InvalidInput,
+                        "normals: expected one for each point, both in world units, got " +
+                            std::to_string(cloud.normals.size()) + " for " + std::to_string(cloud.points.size()),
+                        "normals");
         return cloud;
     }
     std::vector<Vec3> all;
@@ -96,15 +77,6 @@ PointCloud make_points(const std::string& name, const py::object& positions, con
     PointCloud cloud = make_cloud(all, reading, name);
     cloud.lines = std::move(marked);
     return cloud;
-}
-
-const char* word_of(PointSpace space) {
-    switch (space) {
-        case PointSpace::Index: return "index";
-        case PointSpace::Local: return "local";
-        case PointSpace::Slices: return "slices";
-        default: return "world";
-    }
 }
 
 py::tuple make_test_shape(const std::string& kind, int size, int points, double noise, std::uint64_t seed) {
@@ -217,7 +189,10 @@ void add_points(py::module_& module) {
             },
             "Of contours: a list of arrays (n, 3).")
         .def_property_readonly(
-            "space", [](const PointCloud& cloud) { return word_of(cloud.space); },
+            "space",
+            [](const PointCloud& cloud) {
+                return cloud.space == PointSpace::Slices ? "slices" : to_string(cloud.space);
+            },
             "'world', 'index', 'local' or 'slices'.")
         .def_readonly("rule", &PointCloud::rule, "How the coordinates were understood.")
         .def_readonly("source", &PointCloud::source, "The file.")
@@ -227,8 +202,8 @@ void add_points(py::module_& module) {
                 return from_positions(image != nullptr ? to_world(cloud, image->geometry()) : to_world(cloud));
             },
             py::arg("image") = nullptr, "(n, 3), x, y, z in the world; those in voxels need the image. Raises Error.");
-    module.def("read_points", [](const std::string& path, const std::optional<std::string>& space,
-                                 const std::optional<std::string>& order, double scale, int channels) {
+    module.def("read_points", [](const std::string& path, const py::object& space, const py::object& order,
+                                 double scale, int channels) {
         const ReadPointsOptions reading = make_reading(space, order, scale, channels);
         const py::gil_scoped_release released;
         return read_points(path, reading);

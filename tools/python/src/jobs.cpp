@@ -16,8 +16,7 @@ Shape to_shape(const char* name, const py::object& given) {
     if (py::isinstance<py::str>(given)) return py::cast<std::string>(given);
     if (py::isinstance<LevelSet>(given)) return py::cast<LevelSet>(given);
     if (py::isinstance<Image>(given)) return py::cast<Image>(given);
-    throw Error(Errc::InvalidOptions, std::string(name) + ": expected a text, a mask or a LevelSet, got " +
-                                          py::cast<std::string>(py::str(py::type::of(given))));
+    reject(name, "a text, a mask or a LevelSet", py::type::of(given));
 }
 
 std::shared_ptr<Result> run_job(const char* function, const std::optional<Image>& image, const py::dict& inputs,
@@ -78,7 +77,7 @@ Mesh mesh_of(const std::shared_ptr<Result>& r) {
 
 /// (slice, (z, y, x), (x, y, z), area) for each slice where marks would help.
 py::list suggest(const Result& r, int count, const Call& call) {
-    if (count < 0) throw Error(Errc::InvalidOptions, "count: expected >= 0, got " + std::to_string(count));
+    kNotNegative.require("count", count);
     const Image& image = image_of(r);
     Evidence evidence;
     call.run([&](const RunContext& run) { evidence = tool::judge(r.result, r.marks, image, count, run); });
@@ -96,8 +95,7 @@ py::object grid_of(const FloatGridPtr& grid) { return grid ? py::cast(LevelSet{g
 void add_jobs(py::module_& module) {
     py::class_<Call>(module, "Call")
         .def(py::init([](py::object progress, py::object log, int threads, std::uint64_t memory_limit) {
-            if (threads < 0)
-                throw Error(Errc::InvalidOptions, "threads: expected >= 0, got " + std::to_string(threads));
+            kNotNegative.require("threads", threads);
             return Call{std::move(progress), std::move(log), threads, memory_limit};
         }));
     py::class_<Result, std::shared_ptr<Result>>(module, "Result", "What segment() and reconstruct() return.",

@@ -1,10 +1,7 @@
 #include "options.h"
 
-#include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
-#include <type_traits>
+#include <limits>
 
 #include "arrays.h"
 #include "covol/error.h"
@@ -12,50 +9,53 @@
 namespace covol::python {
 namespace {
 
-template <typename T>
-using Words = std::vector<std::pair<const char*, T>>;
-
-[[noreturn]] void bad(const std::string& name, const std::string& expected, py::handle got) {
-    throw Error(Errc::InvalidOptions,
-                name + ": expected " + expected + ", got " + py::cast<std::string>(py::repr(got)));
-}
+using tool::PlainOf;
 
 double to_number(const std::string& name, py::handle value) {
     const double number = PyBool_Check(value.ptr()) ? -1.0 : PyFloat_AsDouble(value.ptr());
     if (PyErr_Occurred() != nullptr || PyBool_Check(value.ptr())) {
         PyErr_Clear();
-        bad(name, "a number", value);
+        reject(name, "a number", value);
     }
     return number;
 }
 
 // ---- what a value of each type is in Python ------------------------------------------------------------------------
 
-std::string type_of(double) { return "float"; }
-std::string type_of(int) { return "int"; }
-std::string type_of(std::size_t) { return "int"; }
-std::string type_of(const Vec3&) { return "_Vector"; }
-std::string type_of(const WorldBox&) { return "_Box"; }
-std::string type_of(const std::vector<Vec3>&) { return "ArrayLike"; }
+/// A type without a case here has no keyword.
 template <typename T>
-std::string type_of(const std::optional<T>&) {
-    return type_of(T{}) + " | None";
+constexpr bool kHasKeyword = HasWords<T> || kIsNumber<T> || std::is_same_v<T, Vec3> || std::is_same_v<T, WorldBox> ||
+                             std::is_same_v<T, std::vector<Vec3>>;
+
+template <typename T>
+std::string type_of(bool is_length) {
+    if constexpr (HasWords<T>) {
+        std::string words;
+        for (const char* word : kWords<T>)
+            if (word != nullptr) words += (words.empty() ? "\"" : ", \"") + std::string(word) + "\"";
+        return "Literal[" + words + "]";
+    }
+    if (std::is_integral_v<T>) return "int";
+    if (std::is_same_v<T, double>) return is_length ? "_Length" : "float";
+    return std::is_same_v<T, Vec3> ? "_Vector" : std::is_same_v<T, WorldBox> ? "_Box" : "ArrayLike";
 }
 
 template <typename T>
-T from_python(const std::string& name, py::handle value) {
-    if constexpr (std::is_same_v<T, double>) {
-        return to_number(name, value);
-    } else if constexpr (std::is_integral_v<T>) {
+T from_python(const OptionInfo& option, py::handle value) {
+    const std::string name = option.name;
+    if constexpr (HasWords<T>) {
+        return to_choice<T>(name, value);
+    } else if constexpr (kIsNumber<T>) {
         const double number = to_number(name, value);
         const bool whole = number == std::floor(number) && std::abs(number) < 1e9;
-        if (!whole || (std::is_unsigned_v<T> && number < 0)) bad(name, "a whole number", value);
+        if (std::is_integral_v<T> && !whole) reject(name, "a whole number", value);
+        option.range.require(name, number);
         return static_cast<T>(number);
     } else if constexpr (std::is_same_v<T, Vec3>) {
         return to_vec3(name.c_str(), value);
     } else if constexpr (std::is_same_v<T, WorldBox>) {
         const std::vector<Vec3> corners = to_positions(name.c_str(), value);
-        if (corners.size() != 2) bad(name, "two corners, ((x0, y0, z0), (x1, y1, z1))", value);
+        if (corners.size() != 2) reject(name, "two corners, ((x0, y0, z0), (x1, y1, z1))", value);
         return {corners[0], corners[1]};
     } else {
         return to_positions(name.c_str(), value);
@@ -72,142 +72,31 @@ py::object to_python(const std::vector<Vec3>& v) {
     for (std::size_t n = 0; n < v.size(); ++n) all[n] = from_vec3(v[n]);
     return all;
 }
+template <HasWords Enum>
+py::object to_python(Enum v) {
+    return py::str(to_string(v));
+}
 template <typename T>
 py::object to_python(const std::optional<T>& v) {
     return v ? to_python(*v) : py::none();
 }
 
-template <typename T>
-struct ValueOf {
-    using type = T;
-};
-template <typename T>
-struct ValueOf<std::optional<T>> {
-    using type = T;
-};
-
-// ---- the table -----------------------------------------------------------------------------------------------------
-
-/// `at(settings)` is the field.
-template <typename At>
-Option value(const char* name, const char* field, At at) {
-    using Field = std::remove_cvref_t<decltype(at(std::declval<Settings&>()))>;
-    using T = typename ValueOf<Field>::type;
-    Option option{name, field, type_of(Field{}), false, {}, {}, {}};
-    option.get = [at](const Settings& s) { return to_python(at(const_cast<Settings&>(s))); };
-    option.parse = [at, name = std::string(name)](py::handle given) -> std::function<void(Settings&)> {
-        if constexpr (!std::is_same_v<T, Field>)
-            if (given.is_none()) return [at](Settings& s) { at(s).reset(); };
-        return [at, v = from_python<T>(name, given)](Settings& s) { at(s) = v; };
-    };
-    return option;
-}
-
-template <typename At>
-Option length(const char* name, const char* field, At at) {
-    Option option = value(name, field, at);
-    option.is_length = true;
-    option.type = std::is_same_v<std::remove_cvref_t<decltype(at(std::declval<Settings&>()))>, double>
-                      ? "_Length"
-                      : "_Length | None";
-    option.set_number = [at](Settings& s, double v) { at(s) = v; };
-    return option;
-}
-
-template <typename T, typename At>
-Option word(const char* name, const char* field, At at, const Words<T>& words) {
-    Option option{name, field, "", false, {}, {}, {}};
-    std::string list;
-    for (const auto& [text, known] : words) {
-        option.type += (option.type.empty() ? "Literal[\"" : ", \"") + std::string(text) + "\"";
-        list += (list.empty() ? "" : ", ") + std::string(text);
-    }
-    option.type += "]";
-    option.get = [at, words](const Settings& s) -> py::object {
-        for (const auto& [text, known] : words)
-            if (known == at(const_cast<Settings&>(s))) return py::str(text);
-        return py::none();
-    };
-    option.parse = [at, words, list, name = std::string(name)](py::handle given) -> std::function<void(Settings&)> {
-        for (const auto& [text, known] : words)
-            if (py::isinstance<py::str>(given) && py::cast<std::string>(given) == text)
-                return [at, v = known](Settings& s) { at(s) = v; };
-        bad(name, "one of " + list, given);
-    };
-    return option;
-}
-
-#define COVOL_AT(expression) \
-    [](Settings & s) -> auto& { return (s.expression); }
-
-std::vector<Option> make_table() {
-    return {
-        word<Model>("model", "model", COVOL_AT(options.model), {{"guided", Model::Guided}, {"paper", Model::Paper}}),
-        length("mark_precision", "mark_precision", COVOL_AT(options.mark_precision)),
-        value("lattice_origin", "lattice_origin", COVOL_AT(options.lattice_origin)),
-        value("roi", "roi", COVOL_AT(options.roi)),
-        length("margin", "margin", COVOL_AT(options.margin)),
-        length("tag_distance", "tag_distance", COVOL_AT(options.tag_distance)),
-        value("exterior_seed", "exterior_seeds", COVOL_AT(options.exterior_seeds)),
-        length("sigma", "sigma", COVOL_AT(options.edge.sigma)),
-        word<EdgeFeature>("edge_feature", "feature", COVOL_AT(options.edge.feature),
-                          {{"auto", EdgeFeature::Automatic},
-                           {"slope", EdgeFeature::Slope},
-                           {"bright-line", EdgeFeature::BrightLine},
-                           {"dark-line", EdgeFeature::DarkLine}}),
-        value("edge_k", "edge_k", COVOL_AT(options.edge.edge_k)),
-        value("edge_contrast", "edge_contrast", COVOL_AT(options.edge.edge_contrast)),
-        value("theta", "theta", COVOL_AT(options.evolve.theta)),
-        value("rho", "rho", COVOL_AT(options.evolve.rho)),
-        length("delta", "delta", COVOL_AT(options.evolve.delta)),
-        length("tau", "tau", COVOL_AT(options.evolve.tau)),
-        value("epsilon", "epsilon", COVOL_AT(options.evolve.epsilon)),
-        length("attraction_range", "attraction_range", COVOL_AT(options.evolve.attraction_range)),
-        value("edge_epsilon", "edge_epsilon", COVOL_AT(options.evolve.edge_epsilon)),
-        value("image_yields", "image_yields", COVOL_AT(options.evolve.image_yields)),
-        value("guess_weight", "guess_weight", COVOL_AT(options.evolve.guess_weight)),
-        value("max_steps", "max_steps", COVOL_AT(options.evolve.max_steps)),
-        value("tolerance", "tolerance", COVOL_AT(options.evolve.tolerance)),
-        value("solver_tolerance", "solver_tolerance", COVOL_AT(options.evolve.solver_tolerance)),
-        value("coarse_levels", "coarse_levels", COVOL_AT(options.coarse_levels)),
-        length("min_component", "min_component_volume", COVOL_AT(min_component)),
-        word<ContourCurve>("contour_curve", "curve", COVOL_AT(contours.curve),
-                           {{"spline", ContourCurve::Spline}, {"lines", ContourCurve::Lines}}),
-        length("contour_thickness", "thickness", COVOL_AT(contours.thickness)),
-        value("guess_label", "guess_label", COVOL_AT(guess_label)),
-        length("guess_radius", "least_radius", COVOL_AT(options.correction.least_radius)),
-        word<Holes>("holes", "holes.policy", COVOL_AT(options.holes.policy),
-                    {{"close", Holes::Close}, {"open", Holes::Open}, {"flat", Holes::Flat}}),
-        length("hole_distance", "holes.distance", COVOL_AT(options.holes.distance)),
-        value("most_points", "most_points", COVOL_AT(most_points)),
-        value("remove_outliers", "outlier_factor", COVOL_AT(cloud.outlier_factor)),
-        length("simplify", "simplify", COVOL_AT(cloud.simplify)),
-        word<CloudSmoothing>(
-            "smooth", "smooth", COVOL_AT(cloud.smooth),
-            {{"none", CloudSmoothing::None}, {"jets", CloudSmoothing::Jets}, {"wlop", CloudSmoothing::Wlop}}),
-    };
-}
-
-#undef COVOL_AT
-
-const Option* find(const std::string& name) {
-    const std::vector<Option>& all = option_table();
-    const auto at = std::find_if(all.begin(), all.end(), [&](const Option& o) { return o.name == name; });
-    return at != all.end() ? &*at : nullptr;
+/// Calls visit(option, field, plain type) for each option that is a keyword.
+template <typename Of, typename Visit>
+void for_each_keyword(Of& settings, const Visit& visit) {
+    for_each_option(settings, [&](const OptionInfo& option, auto& field) {
+        using T = PlainOf<std::remove_cvref_t<decltype(field)>>;
+        if constexpr (kHasKeyword<T>)
+            if (option.place.group != Group::None && option.place.offered != Offered::SingleStep)
+                visit(option, field, std::type_identity<T>());
+    });
 }
 
 }  // namespace
 
-const std::vector<Option>& option_table() {
-    static const auto* const table = new std::vector<Option>(make_table());  // its functions outlive the interpreter
-    return *table;
-}
-
-std::string name_of_field(const std::string& field) {
-    for (const Option& option : option_table())
-        if (option.field == field) return option.name;
-    if (field == "start" || field.starts_with("start.")) return "init";
-    return {};
+void reject(const std::string& name, const std::string& expected, py::handle got) {
+    throw Error(Errc::InvalidOptions, name + ": expected " + expected + ", got " + py::cast<std::string>(py::repr(got)),
+                name);
 }
 
 Length to_length(const std::string& name, py::handle given) {
@@ -216,40 +105,51 @@ Length to_length(const std::string& name, py::handle given) {
 }
 
 GivenOptions::GivenOptions(const char* function, const py::dict& keywords) {
-    for (const auto& [key, given] : keywords) {
+    for (const auto& [key, value] : keywords) {
         const auto name = py::cast<std::string>(key);
-        if (name == "voxel_size") {
-            if (given.is_none()) continue;
-            voxel_size_ = to_length(name, given);
-            if (!(voxel_size_.value > 0) || !std::isfinite(voxel_size_.value)) bad(name, "> 0", given);
-            continue;
-        }
-        const Option* const option = find(name);
-        if (option == nullptr) {
-            py::list known;
-            for (const Option& o : option_table()) known.append(o.name);
-            known.append("voxel_size");
-            const py::list near = py::module_::import("difflib").attr("get_close_matches")(name, known, 1);
-            throw py::type_error(std::string(function) + "() got an unexpected option '" + name + "'" +
-                                 (near.empty() ? "" : "; did you mean '" + py::cast<std::string>(near[0]) + "'?"));
-        }
-        if (!option->is_length || given.is_none())
-            others_.push_back(option->parse(given));
-        else
-            lengths_.emplace_back(option, to_length(name, given));
+        bool is_known = false;
+        for_each_keyword(given_.options,
+                         [&, given = value]<typename T>(const OptionInfo& option, auto& field, std::type_identity<T>) {
+                             if (name != option.name) return;
+                             is_known = true;
+                             given_.names.insert(name);
+                             if constexpr (!std::is_same_v<T, std::remove_reference_t<decltype(field)>>)
+                                 if (given.is_none()) return field.reset();
+                             if (option.range.unit == Unit::Length || option.range.unit == Unit::Volume) {
+                                 const Length length = to_length(name, given);
+                                 option.range.require(name, length.value);
+                                 given_.lengths[name] = length;
+                             } else {
+                                 field = from_python<T>(option, given);
+                             }
+                         });
+        if (is_known) continue;
+        py::list known;
+        for_each_keyword(given_.options, [&](const OptionInfo& option, auto&, auto) { known.append(option.name); });
+        const py::list near = py::module_::import("difflib").attr("get_close_matches")(name, known, 1);
+        throw py::type_error(std::string(function) + "() got an unexpected option '" + name + "'" +
+                             (near.empty() ? "" : "; did you mean '" + py::cast<std::string>(near[0]) + "'?"));
     }
 }
 
 Settings GivenOptions::resolve(double h, bool with_image) const {
-    Settings settings;
-    if (!with_image) settings.options.evolve.rho = 0;
-    settings.options.voxel_size = h;
-    settings.options.voxel_size_may_grow = !voxel_size_.given;
-    for (const auto& set : others_) set(settings);
-    for (const auto& [option, length] : lengths_) option->set_number(settings, length.resolve(h, 0));
+    Settings settings = given_.resolve(h);
+    if (!with_image && !given_.has("rho")) settings.segment.evolve.rho = 0;
+    settings.segment.voxel_size = h;
+    settings.segment.voxel_size_may_grow = !voxel_size().given;
     settings.contours.step = h;
-    settings.options.extract.min_component_volume = std::pow(settings.min_component, 3);
     return settings;
+}
+
+py::list list_options() {
+    py::list all;
+    const Settings defaults;
+    for_each_keyword(defaults, [&]<typename T>(const OptionInfo& option, const auto& field, std::type_identity<T>) {
+        const bool is_length = option.range.unit == Unit::Length || option.range.unit == Unit::Volume;
+        const bool is_plain = std::is_same_v<T, std::remove_cvref_t<decltype(field)>>;
+        all.append(py::make_tuple(option.name, type_of<T>(is_length) + (is_plain ? "" : " | None"), to_python(field)));
+    });
+    return all;
 }
 
 }  // namespace covol::python

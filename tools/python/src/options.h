@@ -1,13 +1,12 @@
 #pragma once
 #include <pybind11/pybind11.h>
 
-#include <functional>
 #include <string>
-#include <vector>
 
-#include "cli/arguments.h"
 #include "covol/cloud_cleanup.h"
 #include "covol/pipeline.h"
+#include "flags/given.h"
+#include "flags/input_options.h"
 
 namespace covol::python {
 
@@ -16,29 +15,11 @@ using tool::Length;
 
 /// All that options of segment() and reconstruct() set.
 struct Settings {
-    SegmentOptions options;
+    SegmentOptions segment;
     ContourOptions contours;
     CloudCleanupOptions cloud;
-    std::size_t most_points = 2500000;  ///< of a cloud without an image; 0: all
-    double min_component = 0;           ///< edge of a cube of the smallest piece that is kept, world units
-    int guess_label = 0;                ///< 0: the only one
+    tool::InputOptions inputs;
 };
-
-/// An option as a keyword of Python.
-struct Option {
-    std::string name;   ///< the program's flag, with _ for -
-    std::string field;  ///< as the library's messages name it
-    std::string type;   ///< for stubs and messages
-    bool is_length = false;
-    std::function<void(Settings&, double)> set_number;                ///< of a length, in world units
-    std::function<std::function<void(Settings&)>(py::handle)> parse;  ///< of all others; needs the GIL, its result not
-    std::function<py::object(const Settings&)> get;
-};
-
-/// The one list of them.
-[[nodiscard]] const std::vector<Option>& option_table();
-/// The keyword that sets a field of the library; empty where none does.
-[[nodiscard]] std::string name_of_field(const std::string& field);
 
 /// Keywords, read while the GIL is held.
 class GivenOptions {
@@ -46,16 +27,38 @@ public:
     /// @throws Error InvalidOptions, py::type_error for a name that is none.
     GivenOptions(const char* function, const py::dict& keywords);
     /// "voxel_size", which may be relative to the automatic one.
-    [[nodiscard]] const Length& voxel_size() const { return voxel_size_; }
+    [[nodiscard]] Length voxel_size() const { return given_.length("voxel_size"); }
     /// The settings for voxels of edge h, which stays one that may grow where it was not given.
     [[nodiscard]] Settings resolve(double h, bool with_image) const;
 
 private:
-    Length voxel_size_;
-    std::vector<std::pair<const Option*, Length>> lengths_;
-    std::vector<std::function<void(Settings&)>> others_;
+    tool::Given<Settings> given_;
 };
 
-[[nodiscard]] Length to_length(const std::string& name, py::handle value);
+/// (name, type, default) of each option: what __init__.pyi is made of.
+[[nodiscard]] py::list list_options();
+
+/// The value of a word. @throws Error InvalidOptions, "name: expected one of ..."
+template <HasWords Enum>
+[[nodiscard]] Enum to_choice(const std::string& name, py::handle given);
+[[nodiscard]] Length to_length(const std::string& name, py::handle given);
+/// @throws Error InvalidOptions "name: expected ..., got ..."
+[[noreturn]] void reject(const std::string& name, const std::string& expected, py::handle got);
+
+template <HasWords Enum>
+Enum to_choice(const std::string& name, py::handle given) {
+    std::string list;
+    for (std::size_t n = 0; n < kWords<Enum>.size(); ++n)
+        if (const char* word = kWords<Enum>[n]; word != nullptr) {
+            if (py::isinstance<py::str>(given) && py::cast<std::string>(given) == word) return Enum(n);
+            list += (list.empty() ? "" : ", ") + std::string(word);
+        }
+    reject(name, "one of " + list, given);
+}
 
 }  // namespace covol::python
+
+template <>
+inline constexpr auto covol::kOptions<covol::python::Settings> =
+    std::tuple{Part{&python::Settings::segment}, Part{&python::Settings::contours}, Part{&python::Settings::cloud},
+               Part{&python::Settings::inputs}};

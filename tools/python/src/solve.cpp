@@ -37,8 +37,10 @@ LabelName choose_label(const char* option, const Image& labels, int wanted) {
         if (label.label == wanted || (wanted == 0 && all.size() == 1)) return label;
         list += (list.empty() ? "" : ", ") + std::to_string(label.label);
     }
-    throw Error(Errc::InvalidInput, std::string(option) + ": expected one label" +
-                                        (wanted > 0 ? ", " + std::to_string(wanted) : "") + ", got " + list);
+    throw Error(Errc::InvalidInput,
+                std::string(option) + ": expected one label" + (wanted > 0 ? ", " + std::to_string(wanted) : "") +
+                    ", got " + list,
+                option);
 }
 
 class Solver {
@@ -53,15 +55,14 @@ public:
 
     std::shared_ptr<Result> solve() {
         for (const PointCloud& cloud : marks_.points) tool::add_cloud(cloud, geometry_, world_, run_);
-        if (!image_) thin(world_, given_.resolve(1, false).most_points);
+        if (!image_) thin(world_, given_.resolve(1, false).inputs.most_points);
         drawn_ = marks_.contours;
         for (const PointCloud& lines : drawn_)
             if (geometry_ != nullptr) check_inside(lines, *geometry_, run_);
         const double h = voxel_size();
         settings_ = given_.resolve(h, image_.has_value());
-        if (const std::string why = settings_.options.why_invalid() + settings_.cloud.why_invalid(); !why.empty())
-            throw Error(Errc::InvalidOptions, why);
-        SegmentOptions& options = settings_.options;
+        require_valid(settings_, image_ ? "segment" : "reconstruct");
+        SegmentOptions& options = settings_.segment;
         read_paint(h);
         clean();
         densify_contours();
@@ -77,14 +78,14 @@ public:
 
 private:
     [[nodiscard]] double voxel_size() const {
-        const Length& wanted = given_.voxel_size();
+        const Length wanted = given_.voxel_size();
         if (wanted.given && !wanted.in_voxels) return wanted.value;
         std::vector<Vec3> all = world_.points;
         for (const PointCloud& lines : drawn_) {
             const std::vector<Vec3> world = to_world_of(lines);
             all.insert(all.end(), world.begin(), world.end());
         }
-        SegmentOptions asked = given_.resolve(1, image_.has_value()).options;
+        SegmentOptions asked = given_.resolve(1, image_.has_value()).segment;
         if (const auto start = start_of(marks_.init, "init")) asked.start = *start;
         const VoxelSizeChoice choice =
             image_ ? choose_voxel_size(*image_) : choose_voxel_size(all, !drawn_.empty() || asked.tags_points());
@@ -134,8 +135,8 @@ private:
             contours_ =
                 std::make_shared<Contours>(geometry_ != nullptr ? densify(drawn_, *geometry_, settings_.contours, run_)
                                                                 : densify(drawn_, settings_.contours, run_));
-        settings_.options.inside = painted_inside_;
-        settings_.options.contours = contours_;
+        settings_.segment.inside = painted_inside_;
+        settings_.segment.contours = contours_;
         if (!contours_) return;
         run_.info("contours: " + contours_->summary);
         out_->marks.insert(out_->marks.end(), contours_->marks.begin(), contours_->marks.end());
@@ -167,13 +168,13 @@ private:
     }
 
     void read_guess() {
-        settings_.options.guess = start_of(marks_.guess, "guess");
+        settings_.segment.guess = start_of(marks_.guess, "guess");
         const auto* mask = std::get_if<Image>(&marks_.guess);
         if (mask == nullptr) return;
         const Image labels = geometry_ != nullptr ? placed_on(*mask, *geometry_) : *mask;
-        out_->label = choose_label("guess", labels, settings_.guess_label).label;
+        out_->label = choose_label("guess", labels, settings_.inputs.guess_label).label;
         out_->guess_mask = labels;
-        settings_.options.guess->mask = std::make_shared<const Image>(tool::only(labels, out_->label));
+        settings_.segment.guess->mask = std::make_shared<const Image>(tool::only(labels, out_->label));
     }
 
     const std::optional<Image>& image_;

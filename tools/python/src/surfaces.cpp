@@ -78,7 +78,7 @@ Mesh make_mesh(const LevelSet& surface, const py::object& isovalue, const py::ob
     cleanup.adaptive = length("adaptive", adaptive);
     cleanup.smooth_iterations = smooth;
     cleanup.repair = repair;
-    if (const std::string why = cleanup.why_invalid(); !why.empty()) throw Error(Errc::InvalidOptions, why);
+    require_valid(cleanup, "mesh");
     const auto mesh = std::make_shared<TriangleMesh>();
     call.run([&](const RunContext& run) {
         *mesh = extract_mesh(*surface.grid, extract, run);
@@ -92,8 +92,7 @@ Mesh make_mesh(const LevelSet& surface, const py::object& isovalue, const py::ob
 }
 
 py::array make_mask(const LevelSet& surface, const Image& like, int label, const Call& call) {
-    if (label < 1 || label > 255)
-        throw Error(Errc::InvalidOptions, "label: expected 1 to 255, got " + std::to_string(label));
+    between(1, 255).require("label", label);
     std::vector<std::uint8_t> voxels;
     call.run([&](const RunContext& run) {
         voxels = rasterize(*surface.grid, like.geometry(), static_cast<std::uint8_t>(label), run);
@@ -147,7 +146,7 @@ py::object compare_solids(const py::object& a, const py::object& b, int label, i
 /// Of points from a surface.
 py::object measure_points(const py::object& points, const Mesh& mesh, const Call& call) {
     const std::vector<Vec3> places = to_positions("points", points);
-    if (places.empty()) throw Error(Errc::InvalidInput, "points: expected positions, got none");
+    if (places.empty()) throw Error(Errc::InvalidInput, "points: expected positions, got none", "points");
     FitStatistics fit;
     call.run([&](const RunContext& run) { fit = measure_fit(places, *mesh.triangles, run); });
     return from_json(tool::to_json(fit).dump());

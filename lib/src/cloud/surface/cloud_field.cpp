@@ -151,7 +151,8 @@ std::vector<Coord> leaves_of(const CloudField::Pieces& pieces, const Indicator& 
             throw Error(Errc::InvalidInput,
                         "reconstruct: the points are small parts, far apart: the finest cells that see the whole are " +
                             std::to_string(std::int64_t(across)) +
-                            " voxels wide; take the parts one by one, or a larger `voxel_size`");
+                            " voxels wide; take the parts one by one, or a larger `voxel_size`",
+                        "voxel_size");
         list.add(domain.world_to_index(box.min), domain.world_to_index(box.max));
     });
     parts[kParts] = list.take();

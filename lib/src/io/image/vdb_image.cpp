@@ -47,7 +47,8 @@ public:
         if (voxel_count(n) / kSparsest > grid_->activeVoxelCount())
             throw read_error(Errc::Unsupported, path_,
                              "the box of the grid's active voxels is " + size_text(n) +
-                                 ", nearly all of it empty; choose a part with `roi`");
+                                 ", nearly all of it empty; choose a part with `roi`",
+                             "roi");
         const std::shared_ptr<void> data = allocate_pixels(path_, voxel_count(n), PixelType::Float, 0);
         const openvdb::Coord first = first_.offsetBy(request.box.min[0], request.box.min[1], request.box.min[2]);
         tbb::parallel_for(0, n[2], [&](int k) {

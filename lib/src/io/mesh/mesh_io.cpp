@@ -54,9 +54,7 @@ void check_attribute(const VertexAttribute& attribute, const TriangleMesh& mesh)
 }
 
 Prepared prepare(const std::string& extension, const TriangleMesh& mesh, const WriteMeshOptions& options) {
-    if (!(options.unit_scale > 0) || !std::isfinite(options.unit_scale))
-        throw Error(Errc::InvalidOptions,
-                    "write_mesh: unit_scale: expected > 0, got " + std::to_string(options.unit_scale));
+    require_valid(options, "write_mesh");
     check_references(mesh);
     for (const VertexAttribute& attribute : options.attributes) check_attribute(attribute, mesh);
     WriteMeshOptions placing = options;

@@ -293,8 +293,8 @@ std::array<std::int64_t, 3> dense_strides(const Index3& size) {
     return {1, size[0], std::int64_t(size[0]) * std::int64_t(size[1])};
 }
 
-Error read_error(Errc code, const std::string& path, const std::string& what) {
-    return {code, "read_image: " + path + ": " + what};
+Error read_error(Errc code, const std::string& path, const std::string& what, const std::string& option) {
+    return {code, "read_image: " + path + ": " + what, option};
 }
 
 Error not_finite(const std::string& path, const Index3& voxel) {
@@ -327,7 +327,8 @@ std::shared_ptr<void> allocate_pixels(const std::string& path, std::uint64_t pix
     const auto refuse = [&] {
         return read_error(Errc::Unsupported, path,
                           "the image needs " + std::to_string(bytes >> 20) + " MiB, this machine has " +
-                              std::to_string(memory >> 20) + " MiB; choose a part with `roi`, or downsample it");
+                              std::to_string(memory >> 20) + " MiB; choose a part with `roi`, or downsample it",
+                          "roi");
     };
     if (bytes > memory) throw refuse();
     // malloc leaves the pages untouched until the reader fills them.

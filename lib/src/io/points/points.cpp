@@ -59,14 +59,6 @@ std::string to_ply(const std::vector<Vec3>& points, const std::string& comment) 
     return text;
 }
 
-void check_options(const ReadPointsOptions& options) {
-    if (!(options.scale > 0) || !std::isfinite(options.scale))
-        throw Error(Errc::InvalidOptions, "read_points: scale: expected > 0, got " + std::to_string(options.scale));
-    if (options.channels < 1)
-        throw Error(Errc::InvalidOptions,
-                    "read_points: channels: expected >= 1, got " + std::to_string(options.channels));
-}
-
 PointCloud to_cloud(const std::string& path, detail::PointTable table, const ReadPointsOptions& options) {
     if (table.points.empty())
         throw Error(Errc::InvalidInput, "read_points: " + path + ": expected at least one point, got none");
@@ -94,21 +86,23 @@ PointCloud to_cloud(const std::string& path, detail::PointTable table, const Rea
 }  // namespace
 
 PointCloud read_points(const std::string& path, const ReadPointsOptions& options) {
-    check_options(options);
+    require_valid(options, "read_points");
     return to_cloud(path, detail::read_point_table(path), options);
 }
 
 PointCloud parse_points(const std::string& text, const std::string& source, const ReadPointsOptions& options) {
-    check_options(options);
+    require_valid(options, "read_points");
     if (text.empty()) throw Error(Errc::InvalidInput, "read_points: " + source + ": expected points, got nothing");
     return to_cloud(source, detail::parse_columns(source, text, true), options);
 }
 
 std::vector<Vec3> to_world(const PointCloud& cloud) {
     if (cloud.space != PointSpace::World)
-        throw Error(Errc::InvalidInput, "to_world: " + cloud.source +
-                                            ": the points are in an image's own frame, and there is no image; give "
-                                            "one, or `space = World` for points in lengths");
+        throw Error(Errc::InvalidInput,
+                    "to_world: " + cloud.source +
+                        ": the points are in an image's own frame, and there is no image; give "
+                        "one, or `points_space = world` for points in lengths",
+                    "points_space");
     return cloud.points;
 }
 

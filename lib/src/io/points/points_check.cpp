@@ -20,11 +20,11 @@ struct Reading {
 
 const char* advice_of(PointSpace space) {
     switch (space) {
-        case PointSpace::Index: return "space = Index";
-        case PointSpace::IndexOne: return "space = IndexOne";
-        case PointSpace::Ras: return "space = Ras";
-        case PointSpace::Local: return "space = Local";
-        default: return "space = World";
+        case PointSpace::Index: return "points_space = index";
+        case PointSpace::IndexOne: return "points_space = index1";
+        case PointSpace::Ras: return "points_space = ras";
+        case PointSpace::Local: return "points_space = local";
+        default: return "points_space = world";
     }
 }
 
@@ -212,11 +212,12 @@ private:
             reading.advice += (reading.advice.empty() ? "" : ", ") + advice;
         };
         if (options.space != now_.space) change(advice_of(options.space));
-        if (options.order != now_.order) change(options.order == PointOrder::ZYX ? "order = ZYX" : "order = XYZ");
-        if (options.channels != now_.channels) change("channels = " + std::to_string(options.channels));
+        if (options.order != now_.order)
+            change(options.order == PointOrder::ZYX ? "points_order = zyx" : "points_order = xyz");
+        if (options.channels != now_.channels) change("points_channels = " + std::to_string(options.channels));
         if (options.scale != now_.scale && !in_voxels(options)) {
             std::ostringstream scale;
-            scale << "scale = " << options.scale;
+            scale << "points_scale = " << options.scale;
             change(scale.str());
         }
         if (reading.changes > 0 && reading.changes <= kMostChanges) list.push_back(reading);
@@ -250,15 +251,19 @@ std::string advice_of(const Checker& checker, const std::vector<Reading>& remedi
 void check_inside(const PointCloud& cloud, const ImageGeometry& geometry, const RunContext& run) {
     const Checker checker(cloud, geometry);
     const std::size_t outside = checker.count_outside();
-    if (outside > 0)
-        throw Error(Errc::InvalidInput, "check_inside: " + cloud.source + ": " + std::to_string(outside) + " of " +
-                                            std::to_string(cloud.points.size()) +
-                                            " points lie outside the image: " + checker.boxes() +
-                                            advice_of(checker, checker.remedies(), geometry.spacing_known));
+    if (outside > 0) {
+        const std::vector<Reading> remedies = checker.remedies();
+        const std::string first = !remedies.empty() ? remedies.front().advice : geometry.spacing_known ? "" : "spacing";
+        throw Error(Errc::InvalidInput,
+                    "check_inside: " + cloud.source + ": " + std::to_string(outside) + " of " +
+                        std::to_string(cloud.points.size()) + " points lie outside the image: " + checker.boxes() +
+                        advice_of(checker, remedies, geometry.spacing_known),
+                    first.substr(0, first.find(' ')));
+    }
     if (!geometry.spacing_known && cloud.space != PointSpace::Index)
         run.warn(cloud.source +
                  ": the points are in world units, and the image states no spacing, so that a voxel counts as 1: "
-                 "`spacing = sx,sy,sz` gives it, or `space = Index` if the points are voxels");
+                 "`spacing = sx,sy,sz` gives it, or `points_space = index` if the points are voxels");
     for (const Reading& reading : checker.more_plausible())
         run.warn(cloud.source + ": the points lie inside the image, but `" + reading.advice +
                  "` would put them on voxel centres: is it that " + checker.name(reading) + "?");

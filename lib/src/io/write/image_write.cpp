@@ -83,6 +83,7 @@ bool is_zarr_store(const std::string& folder) { return detail::is_zarr(folder); 
 
 void write_image(const std::string& given, const PixelSource& source, const WriteImageOptions& options,
                  const RunContext& run) {
+    require_valid(options, "write_image");
     const std::string path = detail::without_end_slash(given);
     check_image_extension(path);
     const ImageGeometry& geometry = source.geometry();

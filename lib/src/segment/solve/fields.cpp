@@ -165,14 +165,13 @@ Edges find_edges(const Problem& problem, const StartFacts& start, const FloatGri
                        std::string("g = 1/2 at a ") + (is_line(options.feature) ? "brightness" : "gradient") + " of " +
                            number(e.edge_contrast),
                        problem.run);
-    if (options.low == options.high)
+    if (!options.intensities)
         remarks.choose("intensities", number(e.low) + " to " + number(e.high), "mapped to 0 and 1, percentiles",
                        problem.run);
     // Fixed from here on: a band that moves must not change the meaning of g.
     edges.options.edge_k = e.edge_k;
     edges.options.edge_contrast.reset();
-    edges.options.low = e.low;
-    edges.options.high = e.high;
+    edges.options.intensities = {e.low, e.high};
     return edges;
 }
 

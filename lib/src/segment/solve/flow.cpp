@@ -71,9 +71,9 @@ std::string why_vanished(const Problem& problem, const Choices& choices, const S
         if (!start.encloses)
             return "the points enclose nothing and nothing held it; where the structure is cut off by the image's end "
                    "mark the cut too, or give a `tag_distance` beyond its radius; or draw `contours`, or choose "
-                   "another start (`start`)";
+                   "another start (`init`)";
     }
-    return "nothing held it; lower `delta`, or start closer to the edges (`start`)";
+    return "nothing held it; lower `delta`, or start closer to the edges (`init`)";
 }
 
 /// A surface through the marks, moved to where the image shows, between them, what it shows at them.
@@ -81,7 +81,7 @@ FloatGridPtr ask_image(const Problem& problem, const StartFacts& start, const Fl
     if (!uses_image(start.flow) || start.origin == StartOrigin::Corrected) return u;
     const std::vector<Vec3>& marks = start.origin == StartOrigin::Guess ? start.on_surface : start.marks.trusted;
     GuidanceOptions options;
-    if (problem.options.mark_precision) options.mark_precision = *problem.options.mark_precision / kUniformDeviation;
+    options.mark_precision = problem.options.mark_precision;
     options.weight = start.flow.rho;
     // The image may not say how wrong the body between contours is: where it shows another border, it says very.
     if (start.origin == StartOrigin::Contours && problem.options.contours->slice_distance > 0)
@@ -162,8 +162,10 @@ bool has_lost(const Solution& solution, const FloatGrid& start) {
 void check_flow(const Problem& problem, const Choices& choices, Solution& solution) {
     const EvolveReport& solved = solution.solve;
     if (solution.has_vanished())
-        throw Error(Errc::InvalidInput, "segment: the surface vanished after " + std::to_string(solved.steps) +
-                                            " steps: " + why_vanished(problem, choices, solution.start));
+        throw Error(Errc::InvalidInput,
+                    "segment: the surface vanished after " + std::to_string(solved.steps) +
+                        " steps: " + why_vanished(problem, choices, solution.start),
+                    "delta");
     if (solved.stop_reason == StopReason::MaxSteps)
         solution.report.remarks.warn("not steady after " + std::to_string(solved.steps) +
                                          " steps: the last change was " + number(solved.last_change) + " voxels",

@@ -48,7 +48,7 @@ std::string why_nothing_held(const std::vector<Vec3>& points, double tag_distanc
              : is_flat ? "the points lie in a plane"
                        : "the points enclose nothing")
          << " and nothing held it; add points on the sides that are missing";
-    if (!is_flat) text << ", or try `start = Cloud`";
+    if (!is_flat) text << ", or try `init = cloud`";
     const double hull = kVanished.hull * *std::max_element(side.begin(), side.end());
     if (!is_flat && tag_distance < hull)
         text << "; if they surround a body on all sides, try `tag_distance = " << hull << "`";

@@ -70,29 +70,30 @@ TEST_CASE("each usual mistake is named with the option that mends it") {
     const auto advice = [&](const std::vector<Vec3>& points, PointSpace space = PointSpace::World) {
         return verdict(cloud_of(points, space), geometry);
     };
-    says(advice({{15, 4, 3}}), "`order = ZYX` would bring them inside (the order of the axes is reversed)");
-    says(advice({{90, 70, 15}}), "; `space = Index` would bring them inside (they are voxels, not world units)");
-    says(advice({{15, 70, 90}}), "; `space = Index, order = ZYX` would");
-    says(advice({{-5, -3, 15}}), "; `space = Ras` would bring them inside (they are in RAS, the image is in LPS)");
+    says(advice({{15, 4, 3}}), "`points_order = zyx` would bring them inside (the order of the axes is reversed)");
+    says(advice({{90, 70, 15}}), "; `points_space = index` would bring them inside (they are voxels, not world units)");
+    says(advice({{15, 70, 90}}), "; `points_space = index, points_order = zyx` would");
+    says(advice({{-5, -3, 15}}),
+         "; `points_space = ras` would bring them inside (they are in RAS, the image is in LPS)");
     says(advice({{5000, 3000, 15000}, {2000, 1000, 3000}}), "; `scale = 0.001` would bring them inside (their unit");
-    says(advice({{-5000, -3000, 15000}, {-2000, -1000, 3000}}), "; `space = Ras, scale = 0.001` would");
-    says(advice({{100, 80, 20}}), "; `space = IndexOne` would bring them inside (they are voxels counted from 1)");
-    says(advice({{3, 70, 90}}, PointSpace::Index), "; `order = ZYX` would bring");
-    says(advice({{100, 80, 20}}, PointSpace::Index), "; `space = IndexOne` would bring");
+    says(advice({{-5000, -3000, 15000}, {-2000, -1000, 3000}}), "; `points_space = ras, points_scale = 0.001` would");
+    says(advice({{100, 80, 20}}), "; `points_space = index1` would bring them inside (they are voxels counted from 1)");
+    says(advice({{3, 70, 90}}, PointSpace::Index), "; `points_order = zyx` would bring");
+    says(advice({{100, 80, 20}}, PointSpace::Index), "; `points_space = index1` would bring");
     // the positions of a multi-point in a hyperstack of two channels
     says(advice({{15, 70, 39}}, PointSpace::Index),
-         "`channels = 2` would bring them inside (their slices count the channels");
+         "`points_channels = 2` would bring them inside (their slices count the channels");
     geometry.origin = {500, 600, 700};
     says(advice({{5, 4, 10}, {1, 1, 1}}),
-         "`space = Local` would bring them inside (they leave out the image's origin)");
+         "`points_space = local` would bring them inside (they leave out the image's origin)");
 }
 
 TEST_CASE("readings that fit equally well are all told") {
     const ImageGeometry geometry = small_image();
     // as voxels, or in world units with the axes reversed
     const std::string message = verdict(cloud_of({{15, 4, 3}, {12, 3, 2}}), geometry);
-    says(message, "; `order = ZYX` would");
-    says(message, "or `space = Index` would");
+    says(message, "; `points_order = zyx` would");
+    says(message, "or `points_space = index` would");
     says(message, "more than one reading fits");
 }
 
@@ -117,8 +118,8 @@ TEST_CASE("points that lie inside by accident are told by their slices") {
         world.push_back(geometry.index_to_world(p));
         reversed.push_back({world.back()[2], world.back()[1], world.back()[0]});
     }
-    says(verdict(cloud_of(voxels), geometry), "`space = Index` would put them on voxel centres");
-    says(verdict(cloud_of(reversed), geometry), "`order = ZYX` would put them on voxel centres");
+    says(verdict(cloud_of(voxels), geometry), "`points_space = index` would put them on voxel centres");
+    says(verdict(cloud_of(reversed), geometry), "`points_order = zyx` would put them on voxel centres");
     CHECK(verdict(cloud_of(world), geometry).empty());
     // who says it is not asked again
     PointCloud stated = cloud_of(voxels);
@@ -148,18 +149,18 @@ TEST_CASE("what the advice asks for, reads the file rightly") {
         for (std::size_t n = 0; n < world.size(); ++n)
             for (int a = 0; a < 3; ++a) REQUIRE(back[n][a] == Approx(world[n][a]));
     };
-    check({PointSpace::Unstated, PointOrder::ZYX}, "`order = ZYX`", [](const Vec3& p) {
+    check({PointSpace::Unstated, PointOrder::ZYX}, "`points_order = zyx`", [](const Vec3& p) {
         return Vec3{p[2], p[1], p[0]};
     });
-    check({PointSpace::Index}, "`space = Index`", [&](const Vec3& p) { return geometry.world_to_index(p); });
-    check({PointSpace::Ras}, "`space = Ras`", [](const Vec3& p) { return Vec3{-p[0], -p[1], p[2]}; });
-    check({PointSpace::Local}, "`space = Local`", [&](const Vec3& p) {
+    check({PointSpace::Index}, "`points_space = index`", [&](const Vec3& p) { return geometry.world_to_index(p); });
+    check({PointSpace::Ras}, "`points_space = ras`", [](const Vec3& p) { return Vec3{-p[0], -p[1], p[2]}; });
+    check({PointSpace::Local}, "`points_space = local`", [&](const Vec3& p) {
         return Vec3{p[0] - geometry.origin[0], p[1] - geometry.origin[1], p[2] - geometry.origin[2]};
     });
     check({PointSpace::Unstated, PointOrder::Unstated, 1e-3}, "`scale = 0.001`", [](const Vec3& p) {
         return Vec3{1e3 * p[0], 1e3 * p[1], 1e3 * p[2]};
     });
-    check({PointSpace::Index, PointOrder::ZYX}, "`space = Index, order = ZYX`", [&](const Vec3& p) {
+    check({PointSpace::Index, PointOrder::ZYX}, "`points_space = index, points_order = zyx`", [&](const Vec3& p) {
         const Vec3 i = geometry.world_to_index(p);
         return Vec3{i[2], i[1], i[0]};
     });
