@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <string>
 
 #include "support/both_solvers.h"
 #include "support/shapes.h"
@@ -93,26 +94,15 @@ double tracked_error(int n, double share) {
 }
 
 // Values frozen on the band's border hold the surface back when sqrt(δτ) comes near the band's width, hence τ ~ h².
-TEST_CASE("evolve() with a tracked band, tau = h^2: a shrinking sphere, first order in h") {
-    double first = 0, previous = 0;
-    for (const int n : {20, 40, 80}) {
-        const double h = 2.8 / n, error = tracked_error(n, 1.0);
-        print_order("evolve, tracked band, tau = h^2", h, error, previous);
-        CHECK(error < 0.075 * h);
-        if (previous == 0) first = error;
-        previous = error;
-    }
-    CHECK(std::log2(first / previous) / 2 > 0.9);  // of both halvings: the errors are some hundredths of h
-}
-
-// Each redistancing moves the surface inwards by about h²/10 of its curvature; the shorter the steps the more of them,
-// and with tau = h²/4 the error is that of their number: it does not fall with h.
-TEST_CASE("evolve() with a tracked band, tau = h^2/4: within a quarter of a voxel") {
+TEST_CASE("evolve() with a tracked band: a shrinking sphere, first order in h or better") {
+    const double share = GENERATE(1.0, 0.25);
     double previous = 0;
     for (const int n : {20, 40, 80}) {
-        const double h = 2.8 / n, error = tracked_error(n, 0.25);
-        print_order("evolve, tracked band, tau = h^2/4", h, error, previous);
-        CHECK(error < 0.25 * h);
+        const double h = 2.8 / n, error = tracked_error(n, share);
+        const std::string what = "evolve, tracked band, tau = " + std::to_string(share) + " h^2";
+        const double order = print_order(what.c_str(), h, error, previous);
+        CHECK(error < 0.08 * h);
+        if (previous > 0) CHECK(order >= 1);
         previous = error;
     }
 }

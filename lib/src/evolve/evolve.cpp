@@ -65,10 +65,10 @@ public:
             go_on();
             return;
         }
-        if (options.follow && (options.theta > 0 || options.rho > 0))
+        if (options.follow && is_held())
             detail::track_surface(u_, domain_, tracking_clamp(options_));
         else if (options.follow)
-            detail::track_surface_exactly(u_, domain_, tracking_clamp(options_), run_);
+            detail::track_free_surface(u_, domain_, run_);
         make_solver();
     }
 
@@ -214,42 +214,52 @@ private:
         return std::min(motion, net_motion_.per_step(solver_->u(), solver_->band().size()));
     }
 
+    // Points and edges hold the surface: where it comes to rest counts, not its way there.
+    [[nodiscard]] bool is_held() const { return options_.theta > 0 || options_.rho > 0; }
+
     // Narrow-band tracking. Advection turns the profile of u into a step, which creeps over the lattice, so every few
-    // steps u is made a distance again. The front's displacement is measured just before that, at the same phase of
-    // each cycle.
+    // steps u is looked at, and made a distance again where |grad u| on the front says that it no longer is one, or
+    // where the band has to move. Each time moves the front a little: where it need not be done, it is not. The
+    // front's displacement is measured just before that, at the same phase of each cycle.
     double track(double motion) {
         if (report_.steps % kEvolve.cycle != 0) return motion;
         std::vector<float> largest;
-        const double moved = measure_displacement(largest);
+        const Front front = measure_front(largest);
         const std::vector<std::size_t> left = front_displacement_.leaves_left(solver_->u());
-        if (left.empty())
-            solver_->redistance(tracking_clamp(options_));
-        else
+        if (!left.empty() || (!is_held() && !front.is_distance))
             remake_band(left, largest);
+        else if (!front.is_distance)
+            solver_->redistance(tracking_clamp(options_));
         // Only now, so that a leaf becomes inactive in the phase in which the others are at the end.
         if (solver_) solver_->update_active_leaves(largest, kEvolve.cycle * inactive_below());
-        return std::min(motion, moved / kEvolve.cycle);
+        return std::min(motion, front.moved / kEvolve.cycle);
     }
 
+    struct Front {
+        double moved;      // its mean displacement since the last call, voxels
+        bool is_distance;  // |grad u| on it, in no leaf too flat or too steep
+    };
     // @param largest  out: of each leaf, the displacement of the crossing that moved most since the last call, voxels
-    // @return the front's mean displacement since then
-    double measure_displacement(std::vector<float>& largest) {
+    Front measure_front(std::vector<float>& largest) {
         const std::size_t leaves = solver_->band().size();
-        std::vector<float> mean(leaves, 0.0F);
+        std::vector<float> mean(leaves, 0.0F), slope(leaves, 1.0F);
         largest.assign(leaves, 0.0F);
         tbb::parallel_for(std::size_t(0), leaves, [&](std::size_t leaf) {
             if (!solver_->is_leaf_active(leaf)) return;
             const detail::CrossingMarks::Displacement moved = marks_.renew(leaf, solver_->u().leaf(leaf));
             largest[leaf] = static_cast<float>(moved.largest);
             mean[leaf] = static_cast<float>(moved.mean);
+            slope[leaf] = static_cast<float>(moved.slope);
         });
+        const auto [flattest, steepest] = std::minmax_element(slope.begin(), slope.end());
         double sum = 0.0, crossings = 0.0;
         for (std::size_t leaf = 0; leaf < leaves; ++leaf) {
             const auto count = static_cast<double>(marks_.count(leaf));
             if (count > 0) sum += mean[leaf] * count;
             crossings += count;
         }
-        return crossings > 0 ? sum / crossings : 0.0;
+        return {crossings > 0 ? sum / crossings : 0.0,
+                *flattest >= detail::kFlattest && *steepest <= detail::kSteepest};
     }
 
     // Leaves no solver where no surface is left. @param largest  in: of each leaf before; out: of each leaf now
@@ -259,19 +269,23 @@ private:
         solver_->store(u_);
         const detail::BandSolver::LeafStates states = solver_->take_leaf_states();
         solver_.reset();  // its memory first
-        const std::vector<detail::Coord> changed =
-            detail::track_surface_near(stale, u_, domain_, tracking_clamp(options_));
+        std::vector<detail::Coord> changed;
+        if (is_held())
+            changed = detail::track_surface_near(stale, u_, domain_, tracking_clamp(options_));
+        else
+            detail::track_free_surface(u_, domain_, run_);
         if (!has_active(u_)) return;
         if (fields_.extend) fields_.extend(u_, fields_);
         solver_ = std::make_unique<detail::BandSolver>(u_, fields_, options_, domain_);
         is_band_new_ = true;
-        solver_->keep_inactive(states, changed);
+        if (is_held()) solver_->keep_inactive(states, changed);
         const detail::LeafBand& band = solver_->band();
         std::vector<std::int32_t> place(band.size()), same(band.size());
         for (std::size_t leaf = 0; leaf < band.size(); ++leaf) {
             const std::int32_t at = states.band.find(band.origin(leaf));
             place[leaf] = at == states.band.none() ? -1 : at;
-            same[leaf] = std::binary_search(changed.begin(), changed.end(), band.origin(leaf)) ? -1 : place[leaf];
+            const bool is_new = !is_held() || std::binary_search(changed.begin(), changed.end(), band.origin(leaf));
+            same[leaf] = is_new ? -1 : place[leaf];
         }
         std::vector<float> moved(band.size(), std::numeric_limits<float>::infinity());
         for (std::size_t leaf = 0; leaf < band.size(); ++leaf)
@@ -279,7 +293,7 @@ private:
         largest = std::move(moved);
         front_displacement_.remake(same, solver_->u());
         marks_.remake(place);
-        solver_->redistance(tracking_clamp(options_));
+        if (is_held()) solver_->redistance(tracking_clamp(options_));
     }
 
     void adapt_tau(double motion) {

@@ -16,6 +16,8 @@
 namespace covol::detail {
 namespace {
 
+constexpr std::size_t kFewJumps = 8;
+
 double crossing(float a, float b) { return double(a) / (double(a) - b); }
 
 int crossed_edges(const LeafMask& negative) {
@@ -111,16 +113,22 @@ void NetMotion::exchange(StateFile& file) {
 
 CrossingMarks::Displacement CrossingMarks::renew(std::size_t leaf, const float* u) {
     std::vector<Crossing> now;
+    double jumps = 0.0, squared_counts = 0.0;
     const LeafMask negative = negative_mask(u);
     for (int axis = 0; axis < 3; ++axis) {
         const LeafMask changes = sign_changes(negative, axis);
         const int step = 64 >> (3 * axis);
+        const auto first = double(now.size());
         for (int word = 0; word < 8; ++word)
             for (std::uint64_t bits = changes[word]; bits != 0; bits &= bits - 1) {
                 const int n = word << 6 | __builtin_ctzll(bits);
                 now.push_back({std::uint16_t(axis * kLeafSize + n), float(crossing(u[n], u[n + step]))});
+                jumps += std::abs(double(u[n]) - u[n + step]);
             }
+        squared_counts += (double(now.size()) - first) * (double(now.size()) - first);
     }
+    // A plane's crossings are as many along an axis as its normal's component there, and so large are their jumps.
+    const double slope = now.size() >= kFewJumps ? jumps / std::sqrt(squared_counts) : 1.0;
     Leaf& mark = leaves_[leaf];
     double sum = 0.0, largest = 0.0;
     int edges = 0;
@@ -141,7 +149,8 @@ CrossingMarks::Displacement CrossingMarks::renew(std::size_t leaf, const float* 
     const bool is_first = !mark.is_marked;
     mark = {std::move(now), true};
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
-    return is_first ? Displacement{kInfinity, kInfinity} : Displacement{edges > 0 ? sum / edges : 0.0, largest};
+    if (is_first) return {kInfinity, kInfinity, slope};
+    return {edges > 0 ? sum / edges : 0.0, largest, slope};
 }
 
 void CrossingMarks::remake(const std::vector<std::int32_t>& old_leaf) {

@@ -61,8 +61,9 @@ class CrossingMarks {
 public:
     struct Displacement {
         double mean = 0.0, largest = 0.0;  ///< of the crossings of one leaf, voxels
+        double slope = 1.0;                ///< |grad u| on the front, the leaf's mean; 1 of a few crossings
     };
-    /// Keeps the crossings of now. @return their distance from those kept before; infinity the first time
+    /// Keeps the crossings of now. @return their displacement since those kept before; infinity the first time
     Displacement renew(std::size_t leaf, const float* u);
     void resize(std::size_t leaves) { leaves_.resize(leaves); }
     /// The band was made again. @param old_leaf  for each new leaf the old one at the same place, or -1

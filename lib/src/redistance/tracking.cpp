@@ -4,6 +4,8 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "base/large_allocator.h"
 #include "base/no_surface.h"
@@ -13,6 +15,7 @@
 #include "grid/sign_masks.h"
 #include "redistance/local_distance.h"
 #include "redistance/redistance.h"
+#include "scheme/scheme.h"
 
 namespace covol::detail {
 
@@ -111,6 +114,26 @@ bool remake(const LeafBand& region, const std::vector<unsigned char>& zone, Floa
     return true;
 }
 
+constexpr float kNear = 1.5F;  // voxels
+
+/// |u| / |grad u| next to the front: its distance to second order, from voxel `u` of a padded buffer, voxels; infinity
+/// where u is no distance, or has a kink: there the slope towards the front is not that of central differences.
+float near_distance(const float* u) {
+    constexpr float kKink = 0.25F, kNone = std::numeric_limits<float>::infinity();
+    if (!(std::abs(*u) < kNear * float(kSteepest))) return kNone;
+    float central = 0, upwind = 0;
+    for (const int stride : {10 * kRow, kRow, 1}) {
+        const float low = u[-stride], high = u[stride];
+        const float down = std::max({0.0F, *u < 0 ? low - *u : *u - low, *u < 0 ? high - *u : *u - high});
+        upwind += down * down;
+        central += 0.25F * (high - low) * (high - low);
+    }
+    central = std::sqrt(central);
+    const bool is_distance = central > float(kFlattest) && central < float(kSteepest) &&
+                             std::abs(std::sqrt(upwind) - central) < kKink * central;
+    return is_distance ? std::abs(*u) / central : kNone;
+}
+
 }  // namespace
 
 std::vector<Coord> track_surface_near(const std::vector<Coord>& stale, FloatGrid& u, const Domain& domain,
@@ -139,17 +162,30 @@ void track_surface(FloatGrid& u, const Domain& domain, double clamp) {
     clamp_values(u.tree(), LeafBand(u), static_cast<float>(clamp * domain.voxel_size));
 }
 
-void track_surface_exactly(FloatGrid& u, const Domain& domain, double clamp, const RunContext& run) {
-    const FloatGridPtr next = redistance(u, domain, kTrackingWidth, DomainEnd::Open, u.getName().c_str(), run);
+void track_free_surface(FloatGrid& u, const Domain& domain, const RunContext& run) {
+    // The stencil reaches beyond the band, and there the distance has to go on: a plateau spreads by a voxel a step.
+    constexpr double kReach = kFreeWidth + 0.9;
+    static_assert(kReach < kLeafDim);
+    const FloatGridPtr next = redistance(u, domain, kReach, DomainEnd::Open, u.getName().c_str(), run);
     const LeafBand band(*next);
-    tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
-        const LeafBounds bounds(domain, band.origin(leaf));
-        if (!bounds.cuts()) return;
-        auto* node = next->tree().probeLeaf(band.origin(leaf));
-        for (int n = 0; n < kLeafSize; ++n)
-            if (!bounds.contains(n >> 6, n >> 3 & 7, n & 7)) node->setValueOff(n);
+    const auto h = static_cast<float>(domain.voxel_size);
+    const HaloField before = gather(band, u, false, [h](const LeafNode* leaf, float tile, float* block) {
+        for (int n = 0; n < kLeafSize; ++n) block[n] = (leaf != nullptr ? leaf->getValue(n) : tile) / h;
     });
-    clamp_values(next->tree(), band, static_cast<float>(clamp * domain.voxel_size));
+    tbb::parallel_for(std::size_t(0), band.size(), [&](std::size_t leaf) {
+        alignas(64) float values[kPaddedSize];
+        load_star(before, leaf, values);
+        const LeafBounds bounds(domain, band.origin(leaf));
+        if (bounds.cuts()) mirror_outside(values, bounds.lo, bounds.hi);
+        auto* node = next->tree().probeLeaf(band.origin(leaf));
+        for (int n = 0; n < kLeafSize; ++n) {
+            const float* at = values + padded(n >> 6, n >> 3 & 7, n & 7);
+            if (const float d = near_distance(at); d < kNear)
+                node->setValueOnly(n, std::copysign(h * d, *at));
+            else if (!bounds.contains(n >> 6, n >> 3 & 7, n & 7) || std::abs(node->getValue(n)) >= kFreeWidth * h)
+                node->setValueOff(n);
+        }
+    });
     u.setTree(next->treePtr());
 }
 

@@ -8,6 +8,7 @@
 
 #include "covol/error.h"
 #include "covol/start.h"
+#include "redistance/redistance.h"
 #include "support/clouds.h"
 
 using namespace covol;
@@ -37,12 +38,15 @@ FloatGridPtr two_balls(double reach, float scale) {
     return u;
 }
 
+double clamped(double value) { return std::clamp(value, -kClamp * kH, kClamp * kH); }
+
 struct Difference {
     double largest = 0, crossing = 0;
     int signs = 0, apart = 0;
 };
 
-/// Of two bands: their values in voxels, where their surfaces cut voxel edges, signs, and voxels that one alone has.
+/// Of two bands: their values up to the clamp in voxels, where their surfaces cut voxel edges, signs, and voxels that
+/// one alone has.
 Difference difference(const FloatGrid& one, const FloatGrid& other) {
     Difference result;
     const openvdb::CoordBBox box({kDomain.min[0], kDomain.min[1], kDomain.min[2]},
@@ -52,7 +56,7 @@ Difference difference(const FloatGrid& one, const FloatGrid& other) {
         const float u = a.getValue(*voxel), v = b.getValue(*voxel);
         result.signs += (u < 0) != (v < 0);
         result.apart += a.isValueOn(*voxel) != b.isValueOn(*voxel);
-        result.largest = std::max(result.largest, std::abs(double(u) - v) / kH);
+        result.largest = std::max(result.largest, std::abs(clamped(u) - clamped(v)) / kH);
         for (int axis = 0; axis < 3; ++axis) {
             openvdb::Coord next = *voxel;
             ++next[axis];
@@ -71,25 +75,58 @@ TEST_CASE("a band is tracked to first order as by exact distances, from whatever
     const double reach = GENERATE(3.0, 14.0);
     const float scale = GENERATE(1.0F, 0.07F);
     INFO(reach << " voxels, scaled by " << scale);
-    FloatGridPtr fast = two_balls(reach, scale), exact = two_balls(reach, scale);
+    const FloatGridPtr before = two_balls(reach, scale), fast = two_balls(reach, scale);
+    const FloatGridPtr exact =
+        detail::redistance(*before, kDomain, detail::kTrackingWidth, detail::DomainEnd::Open, "u", {});
     detail::track_surface(*fast, kDomain, kClamp);
-    detail::track_surface_exactly(*exact, kDomain, kClamp, {});
     const Difference apart = difference(*fast, *exact);
     CHECK(apart.signs == 0);
     // Neither may move the surface; it is in the groove between the balls that they do.
-    const FloatGridPtr before = two_balls(reach, scale);
     CHECK(difference(*fast, *before).crossing <= difference(*exact, *before).crossing);
     CHECK(difference(*exact, *before).crossing < 0.03);
     CHECK(apart.largest < 0.25);
     const auto active = double(exact->activeVoxelCount());
     CHECK(apart.apart < 0.1 * active);
-    CHECK(fast->background() == exact->background());
+    CHECK(fast->background() == float(kClamp * kH));
     CHECK(double(fast->tree().leafCount()) <= 1.1 * double(exact->tree().leafCount()));
     for (auto value = fast->cbeginValueOn(); value; ++value)
         for (int a = 0; a < 3; ++a) {
             REQUIRE(value.getCoord()[a] >= kDomain.min[a]);
             REQUIRE(value.getCoord()[a] <= kDomain.max[a]);
         }
+}
+
+TEST_CASE("a free surface stays where it is, and its band holds the distance") {
+    const float scale = GENERATE(0.07F, 0.7F, 1.0F, 1.6F, 8.0F);
+    const bool is_distance = scale > detail::kFlattest && scale < detail::kSteepest;
+    INFO("scaled by " << scale);
+    constexpr double kRadius = 16;  // voxels
+    const auto level = [](const Vec3& x) { return std::hypot(x[0] + 0.1, x[1] - 0.2, x[2]) - kRadius * kH; };
+    const auto made = [&] {
+        FloatGridPtr u = make_grid(kDomain, float(scale * 4 * kH), "u");
+        const openvdb::CoordBBox box({kDomain.min[0], kDomain.min[1], kDomain.min[2]},
+                                     {kDomain.max[0], kDomain.max[1], kDomain.max[2]});
+        for (auto voxel = box.begin(); voxel; ++voxel) {
+            const double d = std::clamp(level(world_of(kDomain, *voxel)), -4 * kH, 4 * kH);
+            u->tree().setValue(*voxel, scale * float(d));
+        }
+        return u;
+    };
+    const FloatGridPtr u = made();
+    detail::track_free_surface(*u, kDomain, {});
+    const Difference moved = difference(*u, *made());
+    CHECK(moved.signs == 0);
+    CHECK(moved.crossing < (is_distance ? 0.002 : 0.05));
+    double most = 0;
+    for (auto value = u->cbeginValueOn(); value; ++value)
+        most = std::max(most, std::abs(double(*value) - level(world_of(kDomain, value.getCoord()))) / kH);
+    CHECK(most < 1.0 / kRadius);
+    // Beyond the band, where its stencil still reaches, too.
+    const auto values = u->getConstAccessor();
+    const Vec3 beyond = kDomain.world_to_index({-0.1, 0.2, (kRadius + detail::kFreeWidth + 0.6) * kH});
+    const openvdb::Coord corner(int(std::lround(beyond[0])), int(std::lround(beyond[1])), int(std::lround(beyond[2])));
+    CHECK_FALSE(values.isValueOn(corner));
+    CHECK(std::abs(values.getValue(corner) - level(world_of(kDomain, corner))) < kH / kRadius);
 }
 
 TEST_CASE("a level set without a surface is refused, and stays as it was") {
