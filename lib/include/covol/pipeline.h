@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "covol/api.h"
@@ -27,18 +28,40 @@
 
 namespace covol {
 
-/// How the level set starts.
-struct Start {
-    /// Auto: a guess from the marks where there are few of them (see SegmentOptions::model); more, without an image,
-    /// are a Cloud (surface_from_cloud()), with one they are tagged.
-    enum class Kind { Auto, Guess, Cloud, Tag, Sphere, Box, Mesh, Mask, Vdb } kind = Kind::Auto;
-    Vec3 center{0, 0, 0};               ///< Sphere
-    double radius = 0;                  ///< Sphere
-    WorldBox box;                       ///< Box
-    std::string path;                   ///< Mesh, Mask, Vdb
-    FloatGridPtr level_set;             ///< Vdb: one in memory, instead of the file
-    std::shared_ptr<const Image> mask;  ///< Mask: likewise
+/// A guess from the marks where there are few of them (see SegmentOptions::model); more are a cloud without an image,
+/// with one they are tagged.
+struct AutoStart {};
+struct GuessStart {};  ///< the surface through the marks that bends least
+struct CloudStart {};  ///< surface_from_cloud(), of points without an image
+struct TagStart {};    ///< the points, tagged, or the body between contours
+struct SphereStart {
+    Vec3 center{0, 0, 0};
+    double radius = 0;  ///< world units, > 0
 };
+struct BoxStart {
+    WorldBox box;
+};
+struct MeshStart {
+    std::shared_ptr<const TriangleMesh> mesh;  ///< closed
+};
+struct MaskStart {
+    std::shared_ptr<const Image> mask;  ///< voxels above 0 are inside
+};
+struct LevelSetStart {
+    FloatGridPtr level_set;  ///< negative inside
+};
+/// How the level set starts: made from the marks, or named by the caller. covol/mesh_io.h, image_files.h and vdb_io.h
+/// read the files of one; read_start() all of them.
+using Start = std::variant<AutoStart, GuessStart, CloudStart, TagStart, SphereStart, BoxStart, MeshStart, MaskStart,
+                           LevelSetStart>;
+template <typename... Kinds>
+[[nodiscard]] bool is_any(const Start& start) {
+    return (std::holds_alternative<Kinds>(start) || ...);
+}
+/// The caller names a shape.
+[[nodiscard]] inline bool is_named(const Start& start) {
+    return !is_any<AutoStart, GuessStart, CloudStart, TagStart>(start);
+}
 
 /// What holds the surface where neither marks nor edges speak.
 enum class Model {
@@ -62,12 +85,12 @@ struct SegmentOptions {
     std::optional<double> margin;  ///< points alone, >= 0: between points and domain boundary; automatic: D + 6 voxels
     bool keep_failed = false;      ///< errors come as SegmentFailed, at the cost of a copy of the start
     Start start;
-    /// Another tool's result (Mesh, Mask or Vdb): corrected by the marks and seeds near them, and no flow. `start` is
-    /// then not used.
+    /// Another tool's result (a mesh, mask or level set): corrected by the marks and seeds near them, and no flow.
+    /// `start` is then not used.
     std::optional<Start> guess;
     CorrectionOptions correction;
     /// Marks on slices, densified with step h: their points join the others, those between the slices as guesses. With
-    /// closed contours the start `Tag` is the body that they enclose, unless other points lie far from it or an
+    /// closed contours TagStart is the body that they enclose, unless other points lie far from it or an
     /// exterior seed lies inside it: then all points are tagged, and each hole that inner contours leave is an exterior
     /// seed.
     std::shared_ptr<const Contours> contours;
@@ -119,9 +142,11 @@ inline constexpr auto kOptions<SegmentOptions> = std::tuple{
     Part{&SegmentOptions::correction},
     Part{&SegmentOptions::holes},
     Part{&SegmentOptions::extract},
-    Rule<SegmentOptions>{
-        "init", "a radius > 0",
-        [](const SegmentOptions& o) { return o.start.kind != Start::Kind::Sphere || o.start.radius > 0; }},
+    Rule<SegmentOptions>{"init", "a radius > 0",
+                         [](const SegmentOptions& o) {
+                             const auto* sphere = std::get_if<SphereStart>(&o.start);
+                             return sphere == nullptr || sphere->radius > 0;
+                         }},
     Rule<SegmentOptions>{"without_mesh", "false where holes are treated, pieces dropped or another level is wanted",
                          [](const SegmentOptions& o) {
                              return !o.without_mesh || (o.holes.policy == Holes::Close &&

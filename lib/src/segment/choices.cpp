@@ -15,11 +15,6 @@ namespace {
 
 constexpr double kMostReach = 1 << 22;  // voxels from a lattice's origin, with room around
 
-bool is_named(Start::Kind kind) {
-    return kind == Start::Kind::Sphere || kind == Start::Kind::Box || kind == Start::Kind::Mesh ||
-           kind == Start::Kind::Mask || kind == Start::Kind::Vdb;
-}
-
 /// What there is decides which terms of Eq. (3) can act.
 EvolveOptions with_terms_that_act(const Problem& problem, bool has_points, Remarks& remarks) {
     EvolveOptions evolve = problem.options.evolve;
@@ -58,12 +53,12 @@ void check_extent(const std::vector<Vec3>& points, double h) {
 // Points without an image that enclose something tell inside from outside themselves.
 bool is_cloud(const Problem& problem, const EvolveOptions& evolve, const std::vector<Vec3>& points) {
     const SegmentOptions& o = problem.options;
-    if (o.start.kind == Start::Kind::Cloud) {
+    if (is_any<CloudStart>(o.start)) {
         if (problem.image == nullptr) return true;
         throw Error(Errc::InvalidOptions, "segment: the start 'cloud' is for points without an image");
     }
     const bool has_seeds = !o.exterior_seeds.empty() || !o.inside.empty() || !o.outside.empty();
-    return o.start.kind == Start::Kind::Auto && problem.is_guided() && !o.contours && !o.tag_distance && !has_seeds &&
+    return is_any<AutoStart>(o.start) && problem.is_guided() && !o.contours && !o.tag_distance && !has_seeds &&
            problem.image == nullptr && uses_points(evolve) && points.size() > kAutomatic.most_guess_marks &&
            can_enclose(points);
 }
@@ -71,8 +66,8 @@ bool is_cloud(const Problem& problem, const EvolveOptions& evolve, const std::ve
 // Tagging needs marks that lie closer together than the body is thick anywhere, by far; the guess does not.
 StartMethod guess_or_tag(const Problem& problem, const std::vector<Vec3>& points, Remarks& remarks) {
     const SegmentOptions& o = problem.options;
-    if (o.start.kind == Start::Kind::Guess) return StartMethod::Guess;
-    if (o.start.kind == Start::Kind::Tag || !problem.is_guided() || o.contours || o.tag_distance ||
+    if (is_any<GuessStart>(o.start)) return StartMethod::Guess;
+    if (is_any<TagStart>(o.start) || !problem.is_guided() || o.contours || o.tag_distance ||
         points.size() > kAutomatic.most_guess_marks)
         return StartMethod::Tagged;
     // A layer: tagging tells what it needs.
@@ -154,7 +149,7 @@ Resolved resolve(const Problem& problem) {
     Remarks& remarks = c.report.remarks;
     MarkSets marks = problem.marks();
     std::vector<Vec3>& points = marks.attracting;
-    const bool has_points = !points.empty(), has_start = is_named(options.start.kind) || options.guess;
+    const bool has_points = !points.empty(), has_start = is_named(options.start) || options.guess;
     if (!has_points && !has_start && options.inside.empty())
         throw Error(Errc::InvalidInput,
                     "segment: the start 'tag' expects points, got none; give points, contours or seeds inside, or "

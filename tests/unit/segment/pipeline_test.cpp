@@ -83,7 +83,7 @@ TEST_CASE("segment: image and points agree on the ball") {
     CHECK(result.edge == nullptr);
     CHECK_FALSE(result.report.resolved.edge.edge_k.has_value());
     SegmentOptions tagged;
-    tagged.start.kind = Start::Kind::Tag;
+    tagged.start = TagStart{};
     const SegmentResult flowed = segment(image, sphere_points(800), tagged);
     CHECK(flowed.edge != nullptr);
     CHECK(flowed.report.resolved.edge.edge_k.value() > 0);
@@ -92,8 +92,7 @@ TEST_CASE("segment: image and points agree on the ball") {
 TEST_CASE("segment: a sphere as start follows the image edge, without points") {
     const Image image = ball_image(1.0);
     SegmentOptions options;
-    options.start.kind = Start::Kind::Sphere;
-    options.start.radius = kRadius + 2;
+    options.start = SphereStart{{0, 0, 0}, kRadius + 2};
     options.evolve.delta = 0.2;
     const SegmentResult result = segment(image, options);
     CHECK(result.report.resolved.evolve.follow);
@@ -106,8 +105,7 @@ TEST_CASE("segment: an unlimited attraction reaches from a far start to the poin
     constexpr double h = 0.8;
     SegmentOptions options;
     options.voxel_size = h;
-    options.start.kind = Start::Kind::Sphere;
-    options.start.radius = kRadius + 4;
+    options.start = SphereStart{{0, 0, 0}, kRadius + 4};
     options.margin = 8;
     options.evolve.attraction_range = 0;
     // the points are a voxel apart: more and curvature wins between them
@@ -142,8 +140,7 @@ Image ellipsoid_image(const Vec3& semi_axes) {
 
 SegmentResult from_sphere(const Image& image, double radius, std::optional<int> coarse_levels) {
     SegmentOptions options;
-    options.start.kind = Start::Kind::Sphere;
-    options.start.radius = radius;
+    options.start = SphereStart{{0, 0, 0}, radius};
     options.evolve.delta = 0.2;
     options.coarse_levels = coarse_levels;
     return segment(image, options);
@@ -168,8 +165,7 @@ TEST_CASE("segment: a coarse level first gives the same surface in fewer steps")
 TEST_CASE("segment: without mesh and fields the surface is the same") {
     const Image image = ellipsoid_image({26, 18, 22});
     SegmentOptions options;
-    options.start.kind = Start::Kind::Sphere;
-    options.start.radius = 32;
+    options.start = SphereStart{{0, 0, 0}, 32};
     const SegmentResult whole = segment(image, options);
     options.without_mesh = options.without_fields = true;
     const SegmentResult lean = segment(image, options);
@@ -201,7 +197,7 @@ TEST_CASE("segment: what is missing is an error that says so") {
     options.evolve.theta = 2;
     CHECK(code_of([&] { (void)reconstruct(sphere_points(100), options); }) == Errc::InvalidOptions);
     options = {};
-    options.start.kind = Start::Kind::Sphere;  // radius 0
+    options.start = SphereStart{};  // radius 0
     CHECK(code_of([&] { (void)segment(image, options); }) == Errc::InvalidOptions);
     options = {};
     for (const double bad : {0.0, -1.0}) {
@@ -243,7 +239,7 @@ TEST_CASE("segment: a set cancel flag ends it with Cancelled") {
 TEST_CASE("points are tagged, or guessed from") {
     SegmentOptions options;
     CHECK_FALSE(options.tags_points());
-    options.start.kind = Start::Kind::Guess;
+    options.start = GuessStart{};
     CHECK_FALSE(options.tags_points());
     options.tag_distance = 3;
     CHECK(options.tags_points());
@@ -251,7 +247,7 @@ TEST_CASE("points are tagged, or guessed from") {
     options.model = Model::Paper;
     CHECK(options.tags_points());
     options = {};
-    options.start.kind = Start::Kind::Sphere;
+    options.start = SphereStart{};
     CHECK(options.tags_points());
 }
 

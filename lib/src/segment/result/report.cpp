@@ -241,11 +241,11 @@ private:
     Remarks& remarks_;
 };
 
-Start::Kind kind_of(StartMethod method, Start::Kind asked) {
+Start resolved_start(StartMethod method, const Start& asked) {
     switch (method) {
-        case StartMethod::Guess: return Start::Kind::Guess;
-        case StartMethod::Cloud: return Start::Kind::Cloud;
-        case StartMethod::Tagged: return Start::Kind::Tag;
+        case StartMethod::Guess: return GuessStart{};
+        case StartMethod::Cloud: return CloudStart{};
+        case StartMethod::Tagged: return TagStart{};
         case StartMethod::Corrected:
         case StartMethod::Seeds:
         case StartMethod::Named: break;
@@ -258,7 +258,7 @@ Start::Kind kind_of(StartMethod method, Start::Kind asked) {
 SegmentOptions resolved_options(const Problem& problem, const Choices& choices, const Solution& solution) {
     SegmentOptions used = problem.options;
     used.voxel_size = choices.h;
-    used.start.kind = kind_of(choices.start, used.start.kind);
+    used.start = resolved_start(choices.start, used.start);
     used.evolve = solution.start.flow;
     used.edge = solution.edges.options;
     used.tag_distance = solution.start.tag_distance ? solution.start.tag_distance : used.tag_distance;

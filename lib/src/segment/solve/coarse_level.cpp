@@ -21,7 +21,7 @@ bool is_large(const Domain& d) {
 /// Automatic where the way to the surface may be long: tagging and a result of another run end beside it.
 int levels_of(const SegmentOptions& options, const StartFacts& start) {
     if (options.coarse_levels) return *options.coarse_levels;
-    const bool is_rough = options.start.kind == Start::Kind::Sphere || options.start.kind == Start::Kind::Box;
+    const bool is_rough = is_any<SphereStart, BoxStart>(options.start);
     return is_rough && start.origin != StartOrigin::Grown && is_large(start.domain) ? 1 : 0;
 }
 

@@ -2,9 +2,7 @@
 #include <numbers>
 #include <utility>
 
-#include "covol/compare.h"
 #include "covol/error.h"
-#include "covol/mesh_io.h"
 #include "covol/start.h"
 #include "distance/memory_need.h"
 #include "segment/doubts.h"
@@ -15,37 +13,45 @@
 namespace covol::pipeline {
 namespace {
 
-FloatGridPtr read_level_set(const std::string& path) {
-    FloatGridPtr grid = read_solid(path).level_set;
-    if (!grid) throw Error(Errc::InvalidInput, "segment: " + path + ": expected a .vdb file with a level set");
-    return grid;
-}
-
 /// Of the start, where it is known before it is made; else 0.
 double known_area(const Start& start) {
+    if (const auto* sphere = std::get_if<SphereStart>(&start))
+        return 4 * std::numbers::pi * sphere->radius * sphere->radius;
+    const auto* given = std::get_if<BoxStart>(&start);
+    if (given == nullptr) return 0;
     Vec3 side;
-    for (int a = 0; a < 3; ++a) side[a] = start.box.max[a] - start.box.min[a];
-    if (start.kind == Start::Kind::Sphere) return 4 * std::numbers::pi * start.radius * start.radius;
-    return start.kind == Start::Kind::Box ? 2 * (side[0] * side[1] + side[1] * side[2] + side[2] * side[0]) : 0.0;
+    for (int a = 0; a < 3; ++a) side[a] = given->box.max[a] - given->box.min[a];
+    return 2 * (side[0] * side[1] + side[1] * side[2] + side[2] * side[0]);
 }
+
+struct GridOf {
+    const Domain& domain;
+    const RunContext& run;
+
+    template <typename T>
+    static const T& required(const std::shared_ptr<T>& value, const char* what) {
+        if (value) return *value;
+        throw Error(Errc::InvalidOptions, std::string("segment: expected a start with a ") + what + ", got none",
+                    "init");
+    }
+
+    FloatGridPtr operator()(const SphereStart& s) const { return start_from_sphere(domain, s.center, s.radius); }
+    FloatGridPtr operator()(const BoxStart& s) const { return start_from_box(domain, s.box); }
+    FloatGridPtr operator()(const MeshStart& s) const { return start_from_mesh(domain, required(s.mesh, "mesh"), run); }
+    FloatGridPtr operator()(const MaskStart& s) const { return start_from_mask(domain, required(s.mask, "mask"), run); }
+    FloatGridPtr operator()(const LevelSetStart& s) const {
+        return start_from_grid(domain, required(s.level_set, "level set"), run);
+    }
+    template <typename Marked>
+    FloatGridPtr operator()(const Marked&) const {
+        throw Error(Errc::InvalidOptions, "segment: this start makes no grid of its own", "init");
+    }
+};
 
 }  // namespace
 
 FloatGridPtr start_grid(const Start& start, const Domain& domain, const RunContext& run) {
-    switch (start.kind) {
-        case Start::Kind::Sphere: return start_from_sphere(domain, start.center, start.radius);
-        case Start::Kind::Box: return start_from_box(domain, start.box);
-        case Start::Kind::Mesh: return start_from_mesh(domain, read_mesh(start.path), run);
-        case Start::Kind::Mask:
-            return start_from_mask(domain, start.mask ? *start.mask : read_image(start.path, {}, run), run);
-        case Start::Kind::Vdb:
-            return start_from_grid(domain, start.level_set ? *start.level_set : *read_level_set(start.path), run);
-        case Start::Kind::Auto:
-        case Start::Kind::Guess:
-        case Start::Kind::Cloud:
-        case Start::Kind::Tag: break;
-    }
-    throw Error(Errc::InvalidOptions, "segment: this start makes no grid of its own");
+    return std::visit(GridOf{domain, run}, start);
 }
 
 StartSurface start_as_named(const Problem& problem, const Choices& choices, MarkSets marks) {
@@ -60,7 +66,7 @@ StartSurface start_as_named(const Problem& problem, const Choices& choices, Mark
         start.u = start_grid(named, facts.domain, run);
     }
     facts.border_inside = inside_on_border(problem, *start.u);
-    const bool is_rough = named.kind == Start::Kind::Sphere || named.kind == Start::Kind::Box;
+    const bool is_rough = is_any<SphereStart, BoxStart>(named);
     if (is_rough) grow_to_edges(problem, choices, start);
     if (uses_points(facts.flow) && problem.is_guided() && !is_rough &&
         facts.marks.trusted.size() <= kAutomatic.most_guess_marks && !misses_marks(problem, facts, *start.u)) {
