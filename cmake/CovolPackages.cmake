@@ -25,6 +25,14 @@ foreach(component ${COVOL_DEB_COMPONENTS})
   set(CPACK_DEBIAN_${upper}_FILE_NAME DEB-DEFAULT)
 endforeach()
 
+# What is packed is built first: a build of the program alone lacks manual pages and the module.
+add_custom_target(covol_packed)
+add_dependencies(covol_packed covol covol_tool covol_made)
+if(COVOL_PYTHON)
+  add_dependencies(covol_packed covol_python)
+endif()
+set(CPACK_INSTALL_COMMANDS "${CMAKE_COMMAND} --build ${PROJECT_BINARY_DIR} --target covol_packed")
+
 set(CPACK_GENERATOR DEB)
 set(CPACK_COMPONENTS_ALL ${COVOL_DEB_COMPONENTS})
 set(CPACK_DEB_COMPONENT_INSTALL ON)

@@ -15,7 +15,7 @@ LAYERS = [
     {"io/chunked": [], "io/modules": []},
     {"io/hdf5": []},
     {"io/image": [], "io/mesh": ["mesh_io"], "distance": ["distance"]},
-    {"image": ["image_files"], "io/write": ["image_stream"], "io/points": ["points", "points_text", "point_array"], "clip": ["clip"], "edge": ["edge"], "redistance": []},
+    {"image": ["image_files"], "io/reader": [], "io/write": ["image_stream"], "io/points": ["points", "points_text", "point_array"], "clip": ["clip"], "edge": ["edge"], "redistance": []},
     {"points": ["scan_noise", "cloud_cleanup"], "surface": ["surface", "mesh_stream"], "evolve": ["evolve", "checkpoints"], "tagging": ["band"]},
     {"contours": ["contours", "seeds"], "meshing": ["mesh_relax", "mesh_cleanup"], "holes": ["holes"], "cloud/orientation": ["orientation"]},
     {"start": ["start", "level_set"], "painted": ["painted"], "analysis": ["compare", "evidence", "structures", "phantom"], "render/draw": ["picture"]},

@@ -1,8 +1,8 @@
-/// Preloaded into a program: its FAIL_FROM-th call (from 1) that makes a thread or a copy of the process fails, and all
+/// Preloaded into a program: its FAIL_FROM-th call (from 1) that makes a thread or starts a process fails, and all
 /// after it, as where a limit of processes is reached. 0 or unset: none.
 #include <dlfcn.h>
 #include <pthread.h>
-#include <unistd.h>
+#include <spawn.h>
 
 #include <atomic>
 #include <cerrno>
@@ -28,9 +28,10 @@ int pthread_create(pthread_t* thread, const pthread_attr_t* attributes, void* (*
                    void* argument) noexcept {
     return fails() ? EAGAIN : own<decltype(pthread_create)>("pthread_create")(thread, attributes, start, argument);
 }
-pid_t fork() noexcept {
-    if (!fails()) return own<decltype(fork)>("fork")();
-    errno = EAGAIN;
-    return -1;
+int posix_spawn(pid_t* process, const char* path, const posix_spawn_file_actions_t* files,
+                const posix_spawnattr_t* attributes, char* const* arguments, char* const* environment) noexcept {
+    return fails()
+               ? EAGAIN
+               : own<decltype(posix_spawn)>("posix_spawn")(process, path, files, attributes, arguments, environment);
 }
 }

@@ -1,7 +1,7 @@
 # What is installed below /usr needs no path to its libraries, and Debian allows none.
 file(GLOB_RECURSE files ${CPACK_TEMPORARY_DIRECTORY}/*)
 foreach(file ${files})
-  if(IS_SYMLINK ${file} OR NOT file MATCHES "/(covol|[^/]*\\.so[^/]*)$")
+  if(IS_SYMLINK ${file} OR NOT file MATCHES "/(covol|covol-reader|[^/]*\\.so[^/]*)$")
     continue()
   endif()
   file(READ ${file} magic LIMIT 4 HEX)

@@ -49,7 +49,7 @@ double gaussian(std::uint64_t seed, std::uint64_t index) {
 }
 
 /// What makes a kind of phantom.
-struct Shape {
+struct PhantomShape {
     const char* name;
     std::function<double(const Vec3&)> distance;             ///< to the true surface, negative inside
     std::function<double(const Vec3&, double h)> intensity;  ///< of the voxel there, in [0,1]
@@ -57,14 +57,15 @@ struct Shape {
 };
 
 /// A bright solid; the share of a voxel that lies inside is taken from the distance at its centre.
-Shape solid(const char* name, const std::function<double(const Vec3&)>& distance, std::function<Vec3(Random&)> point) {
+PhantomShape solid(const char* name, const std::function<double(const Vec3&)>& distance,
+                   std::function<Vec3(Random&)> point) {
     auto intensity = [distance](const Vec3& p, double h) { return std::clamp(0.5 - distance(p) / h, 0.0, 1.0); };
     return {name, distance, intensity, std::move(point)};
 }
 
 /// A thin bright shell around a sphere with holes where the axes meet it; the points lie in the holes.
 /// in_hole(a, b): for the hole on axis x, (a, b) = (y, z), and so on by cyclic permutation.
-Shape sphere_with_holes(const char* name, const std::function<bool(double, double)>& in_hole) {
+PhantomShape sphere_with_holes(const char* name, const std::function<bool(double, double)>& in_hole) {
     const auto is_open = [in_hole](const Vec3& p) {
         for (int axis = 0; axis < 3; ++axis) {
             const double a = p[(axis + 1) % 3], b = p[(axis + 2) % 3];
@@ -116,7 +117,7 @@ Vec3 point_on_torus(double major, double minor, Random& random) {
     return {r * std::cos(a), r * std::sin(a), minor * std::sin(b)};
 }
 
-std::vector<Shape> shapes() {
+std::vector<PhantomShape> shapes() {
     constexpr double kRadius = 0.8, kMajor = 0.75, kMinor = 0.3, kTwin = 0.45;
     constexpr Vec3 kBox = {0.9, 0.7, 0.5};
     constexpr Vec3 kTwinCenter = {0.55, 0.1, 0.05};
@@ -154,21 +155,21 @@ std::vector<Shape> shapes() {
 
 std::vector<std::string> list_phantom_kinds() {
     std::vector<std::string> names;
-    for (const Shape& shape : shapes()) names.emplace_back(shape.name);
+    for (const PhantomShape& shape : shapes()) names.emplace_back(shape.name);
     return names;
 }
 
 Phantom make_phantom(const PhantomOptions& options) {
-    const std::vector<Shape> all = shapes();
-    const auto found = std::find_if(all.begin(), all.end(), [&](const Shape& s) { return s.name == options.kind; });
+    const std::vector<PhantomShape> all = shapes();
+    const auto found = std::find_if(all.begin(), all.end(), [&](const PhantomShape& s) { return s.name == options.kind; });
     if (found == all.end()) {
         std::string kinds;
-        for (const Shape& s : all) kinds += (kinds.empty() ? "" : ", ") + std::string(s.name);
+        for (const PhantomShape& s : all) kinds += (kinds.empty() ? "" : ", ") + std::string(s.name);
         throw Error(Errc::InvalidOptions,
                     "make_phantom: kind: expected one of " + kinds + ", got '" + options.kind + "'", "kind");
     }
     require_valid(options, "make_phantom");
-    const Shape& shape = *found;
+    const PhantomShape& shape = *found;
 
     const int n = options.size;
     const double h = 2 * kHalfSide / n;

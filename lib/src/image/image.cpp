@@ -15,6 +15,7 @@
 #include "io/hdf5/hdf5_image.h"
 #include "io/image/image_formats.h"
 #include "io/image/tiff.h"
+#include "io/modules/reader.h"
 #include "io/pixels/chunks.h"
 #include "limits/memory_budget.h"
 #include "limits/world_limits.h"
@@ -75,24 +76,11 @@ void check_geometry(const std::string& where, const ImageGeometry& g) {
     check_direction(where, g);
 }
 
-std::unique_ptr<ImageFile> open_either_hdf5(const detail::Hdf5Name& name) {
-    return detail::is_itk_hdf5(name) ? detail::open_itk(name.path) : detail::open_hdf5(name);
-}
-
+/// The HDF5 library reads and writes outside its buffers where a file is damaged: what would be read of it is read by
+/// the reading program first. It keeps objects of damaged headers, too, which this process then has not seen.
 std::unique_ptr<ImageFile> open_tried_hdf5(const detail::Hdf5Name& name) {
-    detail::try_hdf5(name.path, [&] {
-        RunContext alone;
-        alone.threads = 1;
-        with_threads(alone, [&] {
-            const std::unique_ptr<ImageFile> file = open_either_hdf5(name);
-            try {
-                (void)file->read({{{0, 0, 0}, {0, 0, 0}}}, alone);
-            } catch (const Error&) {
-                // Others may be asked for.
-            }
-        });
-    });
-    return open_either_hdf5(name);
+    detail::try_hdf5(name.path, name.inside);
+    return detail::open_either_hdf5(name);
 }
 
 std::unique_ptr<ImageFile> open_image(const std::string& given, const ReadImageOptions& options,

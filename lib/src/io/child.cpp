@@ -2,19 +2,23 @@
 
 #include <fcntl.h>
 #include <poll.h>
+#include <spawn.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <new>
@@ -23,22 +27,79 @@
 namespace covol::detail {
 namespace {
 
-enum State : std::uint32_t { kWaiting, kBegun, kDone, kRefused, kOther, kCrashed };
+/// Where the program finds what it shares with this process, and what hangs up when it ends.
+constexpr int kOrders = 3, kResults = 4, kAlive = 5, kFirstOther = 6;
+constexpr std::array kStopSignals{SIGINT, SIGTERM, SIGHUP};  // the terminal's: not a crash
 
-/// What copy and parent know of a piece of work; zeros are one that waits.
+enum State : std::uint32_t { kWaiting, kBegun, kDone, kRefused, kNoMemory, kCrashed };
+
+/// What both know of a piece; zeros are one that waits.
 struct Slot {
     std::uint32_t state;
     std::int32_t code;
     char text[4096];
+    char answer[kAnswerBytes];
 
     [[nodiscard]] State now() { return State(std::atomic_ref(state).load(std::memory_order_acquire)); }
     void set(State next) { std::atomic_ref(state).store(next, std::memory_order_release); }
     [[nodiscard]] bool ended() { return now() > kBegun; }
+    void refuse(Errc why, const char* what) {
+        code = static_cast<std::int32_t>(why);
+        std::strncpy(text, what, sizeof text - 1);
+        set(kRefused);
+    }
+    /// The program may have been taken over: any number may stand here.
+    [[nodiscard]] Error refusal() const {
+        const bool known = code >= 0 && code <= static_cast<std::int32_t>(Errc::Cancelled);
+        return {known ? static_cast<Errc>(code) : Errc::InvalidInput, std::string(text, strnlen(text, sizeof text))};
+    }
+};
+
+/// What the program is asked: this, a Place for each piece, a Slot for each, and the pieces' texts.
+struct Head {
+    std::uint64_t count;
+    std::uint32_t task;
+    std::int32_t parent;
+};
+struct Place {
+    std::uint64_t path, path_end, detail_end;  ///< in the texts
+    std::uint64_t begin, bytes;                ///< in the results
+};
+
+class Orders {
+public:
+    Orders(std::uint32_t task, const std::vector<Piece>& pieces) : memory_(bytes_for(pieces)) {
+        new (memory_.data()) Head{pieces.size(), task, getpid()};
+        std::uint64_t at = 0;
+        for (std::size_t n = 0; n < pieces.size(); ++n) {
+            const Piece& piece = pieces[n];
+            const std::uint64_t path_end = at + piece.path.size(), detail_end = path_end + piece.detail.size();
+            places()[n] = {at, path_end, detail_end, piece.begin, piece.bytes};
+            piece.path.copy(texts() + at, piece.path.size());
+            piece.detail.copy(texts() + path_end, piece.detail.size());
+            at = detail_end;
+        }
+    }
+    explicit Orders(SharedMemory memory) : memory_(std::move(memory)) {}
+
+    [[nodiscard]] const SharedMemory& memory() const { return memory_; }
+    [[nodiscard]] const Head& head() const { return *reinterpret_cast<const Head*>(memory_.data()); }
+    [[nodiscard]] Place* places() const { return reinterpret_cast<Place*>(memory_.data() + sizeof(Head)); }
+    [[nodiscard]] Slot* slots() const { return reinterpret_cast<Slot*>(places() + head().count); }
+    [[nodiscard]] char* texts() const { return reinterpret_cast<char*>(slots() + head().count); }
+
+private:
+    static std::uint64_t bytes_for(const std::vector<Piece>& pieces) {
+        std::uint64_t bytes = sizeof(Head) + pieces.size() * (sizeof(Place) + sizeof(Slot));
+        for (const Piece& piece : pieces) bytes += piece.path.size() + piece.detail.size();
+        return bytes;
+    }
+
+    SharedMemory memory_;
 };
 
 /// Pieces [begin, end) of the work.
 struct Batch {
-    const std::function<void(std::size_t)>& work;
     Slot* slots;
     std::size_t begin, end;
 
@@ -49,30 +110,85 @@ struct Batch {
     }
 };
 
-[[noreturn]] void be_child(const Batch& batch) {
-    for (const int crash : {SIGABRT, SIGBUS, SIGFPE, SIGILL, SIGSEGV}) std::signal(crash, SIG_DFL);
-    for (const int stop : {SIGINT, SIGTERM, SIGHUP}) std::signal(stop, SIG_IGN);  // the parent's: not a crash
-    prctl(PR_SET_PDEATHSIG, SIGKILL);
-    const rlimit none{0, 0};
-    setrlimit(RLIMIT_CORE, &none);
-    if (const int null = open("/dev/null", O_RDWR); null >= 0)
-        for (int standard = 0; standard < 3; ++standard) dup2(null, standard);
-    for (std::size_t n = batch.begin; n < batch.end; ++n) {
-        Slot& slot = batch.slots[n];
-        slot.set(kBegun);
-        try {
-            batch.work(n);
-            slot.set(kDone);
-        } catch (const Error& error) {
-            slot.code = static_cast<std::int32_t>(error.code());
-            std::strncpy(slot.text, error.what(), sizeof slot.text - 1);
-            slot.set(kRefused);
-        } catch (...) {
-            slot.set(kOther);
-        }
-    }
-    _exit(0);  // no destructor, no flush: all of that is the parent's
+/// The same descriptor with a number that the program is not given.
+int moved_up(int descriptor) {
+    const int other = descriptor < 0 ? -1 : fcntl(descriptor, F_DUPFD_CLOEXEC, kFirstOther);
+    if (descriptor >= 0) close(descriptor);
+    return other;
 }
+
+/// One that hangs up when all that hold its end for writing have ended.
+struct Pipe {
+    Pipe() {
+        int ends[2];
+        if (pipe2(ends, O_CLOEXEC) != 0)
+            throw Error(Errc::Io, std::string("read_image: expected a pipe, got: ") + std::strerror(errno));
+        from = ends[0];
+        to = moved_up(ends[1]);
+    }
+    Pipe(const Pipe&) = delete;
+    Pipe& operator=(const Pipe&) = delete;
+    ~Pipe() {
+        close(from);
+        close_end();
+    }
+    void close_end() {
+        if (to >= 0) close(std::exchange(to, -1));
+    }
+
+    int from, to;
+};
+
+/// What posix_spawn() is told of descriptors and signals.
+class SpawnPlan {
+public:
+    SpawnPlan(int orders, int results, int alive) {
+        posix_spawn_file_actions_init(&files_);
+        posix_spawnattr_init(&attributes_);
+        for (int standard = 0; standard < 3; ++standard)
+            posix_spawn_file_actions_addopen(&files_, standard, "/dev/null", O_RDWR, 0);
+        for (const auto& [from, to] : {std::pair(orders, kOrders), {results, kResults}, {alive, kAlive}})
+            posix_spawn_file_actions_adddup2(&files_, from, to);
+        posix_spawn_file_actions_addclosefrom_np(&files_, kFirstOther);
+        sigset_t all, stops;
+        sigfillset(&all);
+        sigemptyset(&stops);
+        for (const int stop : kStopSignals) sigaddset(&stops, stop);
+        posix_spawnattr_setsigdefault(&attributes_, &all);
+        posix_spawnattr_setsigmask(&attributes_, &stops);
+        posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSIGMASK);
+    }
+    SpawnPlan(const SpawnPlan&) = delete;
+    SpawnPlan& operator=(const SpawnPlan&) = delete;
+    ~SpawnPlan() {
+        posix_spawn_file_actions_destroy(&files_);
+        posix_spawnattr_destroy(&attributes_);
+    }
+
+    /// @returns its process; throws Error Io.
+    [[nodiscard]] pid_t start(const std::string& program, const Batch& batch) const {
+        std::string name = program, begin = std::to_string(batch.begin), end = std::to_string(batch.end);
+        std::string locale = "LC_ALL=C", libraries = "LD_LIBRARY_PATH=";
+        const char* const folders = std::getenv("LD_LIBRARY_PATH");
+        if (folders != nullptr) libraries += folders;
+        char* const arguments[] = {name.data(), begin.data(), end.data(), nullptr};
+        char* const environment[] = {locale.data(), folders != nullptr ? libraries.data() : nullptr, nullptr};
+        pid_t process = 0;
+        const int why = posix_spawn(&process, program.c_str(), &files_, &attributes_, arguments, environment);
+        if (why != 0)
+            throw Error(
+                Errc::Io,
+                "read_image: " + program +
+                    ": expected to start covol's program that reads files apart from this one, got: " +
+                    std::strerror(why) +
+                    (why == ENOENT ? "; install covol again" : "; allow more processes and threads, or memory"));
+        return process;
+    }
+
+private:
+    posix_spawn_file_actions_t files_{};
+    posix_spawnattr_t attributes_{};
+};
 
 /// Seconds that the process has computed; 0 where the system does not say.
 double computed_by(pid_t process) {
@@ -82,12 +198,12 @@ double computed_by(pid_t process) {
     return double(time.tv_sec) + 1e-9 * double(time.tv_nsec);
 }
 
-/// Until the copy ends; one that takes too long for a piece, or whose run is cancelled, is killed.
+/// Until the program ends; one that takes too long for a piece, or whose run is cancelled, is killed.
 /// @param pipe  hung up when it ends
 void wait_for(pid_t child, int pipe, const Batch& batch, double seconds, const RunContext& run) {
     using Clock = std::chrono::steady_clock;
-    constexpr int kLongestPause = 20;   // milliseconds: an end of the pipe may be in another copy, too
-    constexpr double kMostPauses = 10;  // of a copy that computes nothing: a slow disk, or a lock for ever
+    constexpr int kLongestPause = 20;   // milliseconds
+    constexpr double kMostPauses = 10;  // of a program that computes nothing: a slow disk
     std::size_t piece = batch.begin;
     Clock::time_point since = Clock::now();
     double computed_before = 0;
@@ -109,69 +225,120 @@ void wait_for(pid_t child, int pipe, const Batch& batch, double seconds, const R
     waitpid(child, nullptr, 0);
 }
 
-/// Does the batch in a copy. @returns the first piece whose end is not known when that has ended
-std::size_t run_copy(const Batch& batch, double seconds, const RunContext& run) {
-    int ends[2];
-    const pid_t child = pipe2(ends, O_CLOEXEC) == 0 ? fork() : -2;
-    if (child == 0) be_child(batch);
-    if (child != -2) close(ends[1]);
-    if (child > 0) wait_for(child, ends[0], batch, seconds, run);
-    if (child != -2) close(ends[0]);
-    if (child < 0) {
-        for (std::size_t n = batch.begin; n < batch.end; ++n) batch.slots[n].set(kOther);
-    } else if (const std::size_t n = batch.first_not_ended(); n < batch.end && !run.cancelled()) {
-        batch.slots[n].set(kCrashed);
+/// Does the batch in the program. @returns the first piece whose end is not known when that has ended
+std::size_t run_program(const std::string& program, const Orders& orders, const SharedMemory& results,
+                        const Batch& batch, double seconds, const RunContext& run) {
+    Pipe alive;
+    const SpawnPlan plan(orders.memory().descriptor(), results.descriptor(), alive.to);
+    const pid_t child = plan.start(program, batch);
+    alive.close_end();
+    wait_for(child, alive.from, batch, seconds, run);
+    const std::size_t n = batch.first_not_ended();
+    if (n == batch.end || run.cancelled()) return n;
+    batch.slots[n].set(kCrashed);
+    return n + 1;
+}
+
+void do_piece(const std::function<void(const PieceAtWork&)>& work, const Orders& orders, const SharedMemory& results,
+              std::size_t n) {
+    Slot& slot = orders.slots()[n];
+    const Place& place = orders.places()[n];
+    const std::string path(orders.texts() + place.path, orders.texts() + place.path_end);
+    const std::string detail(orders.texts() + place.path_end, orders.texts() + place.detail_end);
+    slot.set(kBegun);
+    try {
+        work({orders.head().task, path, detail, {results.data() + place.begin, place.bytes}, slot.answer});
+        slot.set(kDone);
+    } catch (const Error& error) {
+        slot.refuse(error.code(), error.what());
+    } catch (const std::bad_alloc&) {
+        slot.set(kNoMemory);
+    } catch (const std::exception& error) {
+        slot.refuse(Errc::InvalidInput, ("read_image: " + path + ": " + error.what()).c_str());
     }
-    return batch.first_not_ended();
 }
 
 }  // namespace
 
-SharedMemory::SharedMemory(std::uint64_t bytes) : bytes_(std::max<std::uint64_t>(bytes, 1)) {
-    void* const place = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-    if (place == MAP_FAILED) throw std::bad_alloc();
-    data_ = static_cast<char*>(place);
+SharedMemory::SharedMemory(std::uint64_t bytes)
+    : SharedMemory(moved_up(memfd_create("covol", MFD_CLOEXEC | MFD_ALLOW_SEALING)),
+                   std::max<std::uint64_t>(bytes, 1)) {}
+
+SharedMemory::SharedMemory(int descriptor, std::uint64_t bytes) : descriptor_(descriptor), bytes_(bytes) {
+    // nobody may take away what the other has mapped
+    const bool made = ftruncate(descriptor, off_t(bytes)) == 0 &&
+                      fcntl(descriptor, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL) == 0;
+    data_ = made ? mapped() : nullptr;
+    if (data_ != nullptr) return;
+    if (descriptor >= 0) close(descriptor);
+    throw std::bad_alloc();
+}
+
+SharedMemory::SharedMemory(Given given) : descriptor_(given.descriptor) {
+    struct stat status {};
+    bytes_ = fstat(descriptor_, &status) == 0 ? std::uint64_t(status.st_size) : 0;
+    data_ = bytes_ > 0 ? mapped() : nullptr;
+    if (data_ == nullptr) throw std::bad_alloc();
+}
+
+char* SharedMemory::mapped() const {
+    void* const place = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_SHARED, descriptor_, 0);
+    return place == MAP_FAILED ? nullptr : static_cast<char*>(place);
 }
 
 SharedMemory::SharedMemory(SharedMemory&& other) noexcept
-    : data_(std::exchange(other.data_, nullptr)), bytes_(other.bytes_) {}
+    : descriptor_(std::exchange(other.descriptor_, -1)),
+      bytes_(other.bytes_),
+      data_(std::exchange(other.data_, nullptr)) {}
 
 SharedMemory::~SharedMemory() {
     if (data_ != nullptr) munmap(data_, bytes_);
+    if (descriptor_ >= 0) close(descriptor_);
 }
 
-std::vector<Trial> try_in_children(std::size_t count, const std::function<void(std::size_t)>& work, double seconds,
-                                   const RunContext& run) {
-    const SharedMemory memory(count * sizeof(Slot));
-    auto* const slots = reinterpret_cast<Slot*>(memory.data());
-    const auto do_pieces = [&](std::size_t begin, std::size_t end) {
-        for (Batch batch{work, slots, begin, end}; batch.begin < batch.end && !run.cancelled();)
-            batch.begin = run_copy(batch, seconds, run);
+std::vector<Trial> try_pieces(const std::string& program, std::uint32_t task, const std::vector<Piece>& pieces,
+                              const SharedMemory& results, double seconds, const RunContext& run) {
+    const Orders orders(task, pieces);
+    const std::size_t count = pieces.size();
+    const auto do_batch = [&](std::size_t begin, std::size_t end) {
+        for (Batch batch{orders.slots(), begin, end}; batch.begin < batch.end && !run.cancelled();)
+            batch.begin = run_program(program, orders, results, batch, seconds, run);
     };
-    // A copy costs milliseconds; a few batches for each thread keep all busy.
-    constexpr std::size_t kMostOfCopy = 16, kBatchesOfThread = 4;
+    // To start it and load its libraries takes tens of milliseconds.
+    constexpr std::size_t kLeastOfBatch = 8, kMostOfBatch = 64, kBatchesOfThread = 2;
     const auto threads = std::size_t(tbb::this_task_arena::max_concurrency());
-    const std::size_t pieces = std::clamp<std::size_t>(count / (kBatchesOfThread * threads), 1, kMostOfCopy);
-    if (count == 1)
-        do_pieces(0, 1);  // by this thread: it may hold locks
-    else
-        tbb::parallel_for(std::size_t(0), (count + pieces - 1) / pieces,
-                          [&](std::size_t b) { do_pieces(b * pieces, std::min((b + 1) * pieces, count)); });
+    const std::size_t size = std::clamp(count / (kBatchesOfThread * threads), kLeastOfBatch, kMostOfBatch);
+    tbb::parallel_for(std::size_t(0), (count + size - 1) / size,
+                      [&](std::size_t b) { do_batch(b * size, std::min((b + 1) * size, count)); });
     run.check();
     std::vector<Trial> trials(count);
     for (std::size_t n = 0; n < count; ++n) {
-        const State state = slots[n].now();
-        trials[n].crashed = state == kCrashed;
-        if (state == kRefused) trials[n].refused = Error(static_cast<Errc>(slots[n].code), slots[n].text);
-        if (state == kOther) work(n);
+        Slot& slot = orders.slots()[n];
+        const State state = slot.now();
+        if (state == kNoMemory) throw std::bad_alloc();
+        if (state == kRefused)
+            trials[n].refused = slot.refusal();
+        else if (state == kDone)
+            trials[n].answer.assign(slot.answer, slot.answer + sizeof slot.answer);
+        else
+            trials[n].crashed = true;
     }
     return trials;
 }
 
-Trial try_in_child(const std::function<void()>& work, double seconds) {
-    return try_in_children(
-               1, [&](std::size_t) { work(); }, seconds, RunContext())
-        .front();
+int serve_pieces(int count, char** arguments, const std::function<void(const PieceAtWork&)>& work) {
+    struct stat status {};
+    if (count != 3 || fstat(kAlive, &status) != 0 || !S_ISFIFO(status.st_mode)) return 2;
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    for (const int stop : kStopSignals) std::signal(stop, SIG_IGN);
+    const rlimit none{0, 0};
+    setrlimit(RLIMIT_CORE, &none);
+    const Orders orders(SharedMemory(SharedMemory::Given{kOrders}));
+    const SharedMemory results(SharedMemory::Given{kResults});
+    if (getppid() != orders.head().parent) return 2;  // it ended before the line above could see to it
+    const std::size_t end = std::strtoull(arguments[2], nullptr, 10);
+    for (std::size_t n = std::strtoull(arguments[1], nullptr, 10); n < end; ++n) do_piece(work, orders, results, n);
+    _exit(0);  // no destructors: those of libraries may crash, too
 }
 
 double most_seconds_for_pixels(std::uint64_t bytes) {
@@ -182,10 +349,6 @@ double most_seconds_for_pixels(std::uint64_t bytes) {
 std::optional<Error> reading_error(const Trial& trial, const std::string& path, const char* library) {
     if (!trial.crashed) return trial.refused;
     return Error(Errc::InvalidInput, "read_image: " + path + ": damaged: the " + library + " library cannot read it");
-}
-
-void try_reading(const std::string& path, const char* library, const std::function<void()>& read) {
-    if (const auto error = reading_error(try_in_child(read, kMostSecondsForHeader), path, library)) throw Error(*error);
 }
 
 }  // namespace covol::detail

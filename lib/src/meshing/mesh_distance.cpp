@@ -23,11 +23,11 @@ namespace covol {
 namespace detail {
 namespace {
 
-using Kernel = CGAL::Simple_cartesian<double>;
-using Triangles = std::vector<Kernel::Triangle_3>;
-using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
+using Cartesian = CGAL::Simple_cartesian<double>;
+using Triangles = std::vector<Cartesian::Triangle_3>;
+using Primitive = CGAL::AABB_triangle_primitive<Cartesian, Triangles::const_iterator>;
 
-Kernel::Point_3 to_cgal(const Vec3& p) { return {p[0], p[1], p[2]}; }
+Cartesian::Point_3 to_cgal(const Vec3& p) { return {p[0], p[1], p[2]}; }
 
 /// Some of a mesh's triangles.
 class TriangleTree {
@@ -45,12 +45,13 @@ public:
         tree_.build();  // now, for queries from many threads must find it finished
     }
     /// The closest of `guess` and the points of the triangles.
-    [[nodiscard]] Kernel::Point_3 closest_point(const Kernel::Point_3& query, const Kernel::Point_3& guess) const {
+    [[nodiscard]] Cartesian::Point_3 closest_point(const Cartesian::Point_3& query,
+                                                   const Cartesian::Point_3& guess) const {
         return tree_.closest_point(query, guess);
     }
     /// How far along a ray the first of the triangles lies; infinite where it meets none.
     /// @param own  a triangle of the mesh that does not count
-    [[nodiscard]] double first_hit(const Kernel::Ray_3& ray, std::size_t own) const {
+    [[nodiscard]] double first_hit(const Cartesian::Ray_3& ray, std::size_t own) const {
         const auto is_own = [&](Triangles::const_iterator t) {
             return begin_ + std::size_t(t - triangles_.begin()) == own;
         };
@@ -58,15 +59,15 @@ public:
         if (triangles_.size() == 1 && is_own(triangles_.begin())) return std::numeric_limits<double>::infinity();
         const auto hit = tree_.first_intersection(ray, is_own);
         if (!hit) return std::numeric_limits<double>::infinity();
-        if (const auto* point = boost::get<Kernel::Point_3>(&hit->first))
+        if (const auto* point = boost::get<Cartesian::Point_3>(&hit->first))
             return std::sqrt(CGAL::squared_distance(ray.source(), *point));
-        return std::sqrt(CGAL::squared_distance(ray.source(), boost::get<Kernel::Segment_3>(hit->first)));
+        return std::sqrt(CGAL::squared_distance(ray.source(), boost::get<Cartesian::Segment_3>(hit->first)));
     }
 
 private:
     std::size_t begin_;
     Triangles triangles_;
-    CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>> tree_;
+    CGAL::AABB_tree<CGAL::AABB_traits<Cartesian, Primitive>> tree_;
 };
 
 /// Several trees of triangles that follow each other, and so mostly lie close: CGAL builds a tree on one thread, and
@@ -89,9 +90,9 @@ std::vector<double> distances_to(const TriangleMesh& mesh, const std::vector<Vec
     const std::vector<std::uint32_t> order = order_spatially(points, points.size());
     std::vector<double> distances(points.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, order.size(), 256), [&](const auto& range) {
-        Kernel::Point_3 closest = to_cgal(mesh.place(mesh.triangles.front()[0]));
+        Cartesian::Point_3 closest = to_cgal(mesh.place(mesh.triangles.front()[0]));
         for (std::size_t n = range.begin(); n != range.end(); ++n) {
-            const Kernel::Point_3 query = to_cgal(points[order[n]]);
+            const Cartesian::Point_3 query = to_cgal(points[order[n]]);
             for (const auto& tree : trees) closest = tree->closest_point(query, closest);
             distances[order[n]] = std::sqrt(CGAL::squared_distance(query, closest));
         }
@@ -129,12 +130,12 @@ double measure_wall(const TriangleMesh& mesh, const RunContext& run) {
         tbb::parallel_for(std::size_t(0), rays, [&](std::size_t ray) {
             const std::size_t own = ray * count / rays;
             const auto& t = mesh.triangles[own];
-            const detail::Kernel::Triangle_3 triangle(detail::to_cgal(mesh.place(t[0])),
-                                                      detail::to_cgal(mesh.place(t[1])),
-                                                      detail::to_cgal(mesh.place(t[2])));
+            const detail::Cartesian::Triangle_3 triangle(detail::to_cgal(mesh.place(t[0])),
+                                                         detail::to_cgal(mesh.place(t[1])),
+                                                         detail::to_cgal(mesh.place(t[2])));
             if (triangle.is_degenerate()) return;
-            const detail::Kernel::Ray_3 inward(CGAL::centroid(triangle),
-                                               -triangle.supporting_plane().orthogonal_vector());
+            const detail::Cartesian::Ray_3 inward(CGAL::centroid(triangle),
+                                                  -triangle.supporting_plane().orthogonal_vector());
             for (const auto& tree : trees) walls[ray] = std::min(walls[ray], tree->first_hit(inward, own));
         });
     });

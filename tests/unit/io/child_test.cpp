@@ -6,62 +6,79 @@
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <chrono>
-#include <csignal>
 #include <cstdlib>
-#include <stdexcept>
+#include <cstring>
+#include <filesystem>
+#include <new>
 #include <thread>
 #include <vector>
 
 using namespace covol;
 using namespace covol::detail;
 
-TEST_CASE("Work in a copy of the process leaves this one alone") {
-    int here = 1;
-    CHECK_FALSE(try_in_child([&] { here = 2; }, 10).crashed);
-    CHECK(here == 1);
+namespace {
+
+constexpr std::uint32_t kTask = 7;
+
+Trial try_one(const Piece& piece, double seconds = 10, const SharedMemory& results = SharedMemory(0)) {
+    return try_pieces(COVOL_ODD_READER, kTask, {piece}, results, seconds, RunContext()).front();
 }
 
-TEST_CASE("What throws no covol::Error in a copy of the process is done in this one") {
-    int here = 1;
-    const auto work = [&] {
-        here = 2;
-        throw std::runtime_error("no crash");
-    };
-    CHECK_THROWS_AS(try_in_child(work, 10), std::runtime_error);
-    CHECK(here == 2);
+std::size_t open_descriptors() {
+    std::size_t count = 0;
+    for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd"))
+        count += entry.path().empty() ? 0 : 1;
+    return count;
 }
 
-TEST_CASE("Many pieces of work in copies of the process: each is done, and those that fail are told of") {
-    constexpr std::size_t kCount = 200;
-    const SharedMemory memory(kCount * sizeof(int));
-    auto* const values = reinterpret_cast<int*>(memory.data());
-    const auto work = [&](std::size_t n) {
-        if (n % 50 == 7) std::abort();
-        if (n % 50 == 9) throw Error(Errc::Unsupported, "piece " + std::to_string(n));
-        values[n] = int(n) + 1;
-    };
-    for (const int threads : {1, 2, 8}) {
-        std::fill_n(values, kCount, 0);
+}  // namespace
+
+TEST_CASE("A program's result comes back, and nothing of it stays open") {
+    const std::size_t before = open_descriptors();
+    {
+        const SharedMemory results(16);
+        const Trial trial = try_one({"write", "", 8, 4}, 10, results);
+        CHECK_FALSE(trial.crashed);
+        CHECK_FALSE(trial.refused);
+        std::uint32_t written = 0, beside = 0;
+        std::memcpy(&written, results.data() + 8, sizeof written);
+        std::memcpy(&beside, results.data() + 4, sizeof beside);
+        CHECK(written == kTask);
+        CHECK(beside == 0);
+        CHECK(ftruncate(results.descriptor(), 1) != 0);  // nor may the program take it away
+    }
+    CHECK(open_descriptors() == before);
+}
+
+TEST_CASE("Many pieces of work: each is done, and those that fail are told of") {
+    constexpr std::size_t kCount = 100;
+    std::vector<Piece> pieces;
+    for (std::size_t n = 0; n < kCount; ++n)
+        pieces.push_back({n % 50 == 7   ? "abort"
+                          : n % 50 == 9 ? "refuse"
+                                        : "write",
+                          "piece " + std::to_string(n), 4 * n, 4});
+    for (const int threads : {1, 8}) {
+        const SharedMemory results(4 * kCount);
+        const auto* const values = reinterpret_cast<const std::uint32_t*>(results.data());
         std::vector<Trial> trials;
         RunContext run;
         run.threads = threads;
-        with_threads(run, [&] { trials = try_in_children(kCount, work, 10, run); });
+        with_threads(run, [&] { trials = try_pieces(COVOL_ODD_READER, kTask, pieces, results, 10, run); });
         REQUIRE(trials.size() == kCount);
         for (std::size_t n = 0; n < kCount; ++n) {
             CHECK(trials[n].crashed == (n % 50 == 7));
             CHECK(trials[n].refused.has_value() == (n % 50 == 9));
             if (trials[n].refused) CHECK(trials[n].refused->what() == "piece " + std::to_string(n));
-            CHECK(values[n] == (n % 50 == 7 || n % 50 == 9 ? 0 : int(n) + 1));
+            CHECK(values[n] == (n % 50 == 7 || n % 50 == 9 ? 0 : kTask));
         }
     }
-    CHECK(try_in_children(0, work, 10, RunContext()).empty());
+    CHECK(try_pieces(COVOL_ODD_READER, kTask, {}, SharedMemory(0), 10, RunContext()).empty());
 }
 
 TEST_CASE("A piece that hangs costs its own time alone, and a run that is cancelled does not wait for it") {
-    const auto work = [](std::size_t n) {
-        if (n == 1) pause();
-    };
-    const std::vector<Trial> trials = try_in_children(3, work, 0.05, RunContext());
+    const std::vector<Piece> pieces{{"write"}, {"hang"}, {"write"}};
+    const std::vector<Trial> trials = try_pieces(COVOL_ODD_READER, kTask, pieces, SharedMemory(0), 0.2, RunContext());
     CHECK_FALSE(trials[0].crashed);
     CHECK(trials[1].crashed);
     CHECK_FALSE(trials[2].crashed);
@@ -74,7 +91,7 @@ TEST_CASE("A piece that hangs costs its own time alone, and a run that is cancel
         cancel = true;
     });
     try {
-        try_in_children(3, work, 1000, run);
+        try_pieces(COVOL_ODD_READER, kTask, pieces, SharedMemory(0), 1000, run);
         FAIL("not cancelled");
     } catch (const Error& error) {
         CHECK(error.code() == Errc::Cancelled);
@@ -82,40 +99,55 @@ TEST_CASE("A piece that hangs costs its own time alone, and a run that is cancel
     later.join();
 }
 
-TEST_CASE("An error in a copy of the process is told of") {
-    const Trial trial = try_in_child([] { throw Error(Errc::Unsupported, "read_image: a.h5: sheared"); }, 10);
+TEST_CASE("An error in the program is told of") {
+    const Trial trial = try_one({"refuse", "read_image: a.h5: sheared"});
     CHECK_FALSE(trial.crashed);
     REQUIRE(trial.refused);
     CHECK(trial.refused->code() == Errc::Unsupported);
     CHECK(std::string(trial.refused->what()) == "read_image: a.h5: sheared");
 
-    // Longer than a pipe holds, it neither waits nor is lost.
-    const Trial cut = try_in_child([] { throw Error(Errc::Io, std::string(1 << 20, 'x')); }, 10);
-    CHECK_FALSE(cut.crashed);
+    const Trial cut = try_one({"refuse", std::string(1 << 20, 'x')});
     REQUIRE(cut.refused);
     CHECK(std::string(cut.refused->what()) == std::string(4095, 'x'));
+
+    const Trial other = try_one({"fail"});
+    REQUIRE(other.refused);
+    CHECK(std::string(other.refused->what()) == "read_image: fail: a failure");
+    CHECK_THROWS_AS(try_one({"no memory"}), std::bad_alloc);
 }
 
-TEST_CASE("Work that crashes, leaves or hangs in a copy of the process is told of") {
-    CHECK(try_in_child([] { raise(SIGSEGV); }, 10).crashed);
-    CHECK(try_in_child([] { _exit(3); }, 10).crashed);
-    CHECK(try_in_child([] { pause(); }, 0.05).crashed);
-    volatile bool for_ever = true;
-    CHECK(try_in_child(
-              [&] {
-                  while (for_ever) continue;
-              },
-              0.05)
-              .crashed);
+TEST_CASE("Work that crashes, leaves or hangs is told of") {
+    CHECK(try_one({"segv"}).crashed);
+    CHECK(try_one({"leave"}).crashed);
+    CHECK(try_one({"hang"}, 0.2).crashed);
+    CHECK(try_one({"compute"}, 0.2).crashed);
+}
+
+TEST_CASE("The program gets no variable and no open file of this process") {
+    setenv("COVOL_TEST_VARIABLE", "1", 1);
+    CHECK(std::string(try_one({"variable", "COVOL_TEST_VARIABLE"}).answer.data()).empty());
+    CHECK(std::string(try_one({"variable", "LC_ALL"}).answer.data()) == "set");
+    const int open = dup(1);
+    REQUIRE(open >= 0);
+    CHECK(std::string(try_one({"open", "1"}).answer.data()) == "open");
+    CHECK(std::string(try_one({"open", std::to_string(std::max(open, 6))}).answer.data()).empty());
+    close(open);
+}
+
+TEST_CASE("A program that is not there is an error that says so") {
+    try {
+        try_pieces("/none/covol-reader", kTask, {{"write"}}, SharedMemory(0), 10, RunContext());
+        FAIL("started");
+    } catch (const Error& error) {
+        CHECK(error.code() == Errc::Io);
+        CHECK(std::string(error.what()).find("/none/covol-reader") != std::string::npos);
+    }
 }
 
 TEST_CASE("A file that crashes its library is damaged") {
-    CHECK_NOTHROW(try_reading("a.dcm", "GDCM", [] {}));
-    try {
-        try_reading("a.dcm", "GDCM", [] { std::abort(); });
-        FAIL("not refused");
-    } catch (const Error& error) {
-        CHECK(error.code() == Errc::InvalidInput);
-        CHECK(std::string(error.what()) == "read_image: a.dcm: damaged: the GDCM library cannot read it");
-    }
+    CHECK_FALSE(reading_error(try_one({"write"}), "a.dcm", "GDCM"));
+    const auto error = reading_error(try_one({"abort"}), "a.dcm", "GDCM");
+    REQUIRE(error);
+    CHECK(error->code() == Errc::InvalidInput);
+    CHECK(std::string(error->what()) == "read_image: a.dcm: damaged: the GDCM library cannot read it");
 }

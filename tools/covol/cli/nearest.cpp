@@ -34,7 +34,7 @@ bool is_number(const std::string& word) {
 }
 
 /// Long names with their dashes, short ones with theirs.
-std::vector<std::string> options_of(const CLI::App& app) {
+std::vector<std::string> names_of_options(const CLI::App& app) {
     std::vector<std::string> names;
     for (const CLI::Option* option : app.get_options()) {
         for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
@@ -76,10 +76,10 @@ std::string unknown_name(const CLI::App& program, const std::vector<std::string>
     const auto chosen = std::find_if(words.begin(), words.end(), is_command);
     if (chosen == words.end() && !words.empty() && !words[0].starts_with('-'))
         return with_hint("'" + words[0] + "' is no command of covol", nearest(words[0], commands), "covol --help");
-    std::vector<std::string> names = options_of(program);
+    std::vector<std::string> names = names_of_options(program);
     std::string help = "covol --help";
     if (chosen != words.end()) {
-        const std::vector<std::string> own = options_of(*program.get_subcommand(*chosen));
+        const std::vector<std::string> own = names_of_options(*program.get_subcommand(*chosen));
         names.insert(names.begin(), own.begin(), own.end());
         help = "covol " + *chosen + " --help-all";
     }

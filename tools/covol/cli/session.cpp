@@ -73,7 +73,7 @@ Json to_value(const std::string& text) {
 }
 
 /// The options as the user gave them, else their defaults; names as on the command line.
-Json options_of(const CLI::App& command) {
+Json values_of_options(const CLI::App& command) {
     Json options = Json::object();
     for (const CLI::Option* option : command.get_options()) {
         std::string name = option->get_single_name();
@@ -300,7 +300,7 @@ void Session::start_report() {
     report_["covol"] = version();
     report_["instruction_set"] = instruction_set();
     report_["command"] = command_->get_name();
-    report_["options"] = options_of(*command_);
+    report_["options"] = values_of_options(*command_);
     report_["seconds"] = Json::object();
 }
 

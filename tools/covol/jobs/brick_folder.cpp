@@ -62,7 +62,7 @@ Vec3 place_of(const Json& json, const char* name) {
     return place;
 }
 
-Json to_json(const EdgeOptions& edge) {
+Json as_json(const EdgeOptions& edge) {
     Json json{{"feature", int(edge.feature)}};
     if (edge.intensities) json["intensities"] = *edge.intensities;
     if (edge.sigma) json["sigma"] = *edge.sigma;
@@ -84,7 +84,7 @@ EdgeOptions edge_of(const Json& json) {
     return edge;
 }
 
-Json to_json(const Brick& brick) {
+Json as_json(const Brick& brick) {
     return {{"min", brick.core.min},
             {"max", brick.core.max},
             {"active_voxels", brick.active_voxels},
@@ -199,10 +199,10 @@ void BrickFolder::write_plan(const BrickPlan& plan, const JobOptions& job, const
               {"origin", plan.domain.origin},
               {"min", plan.domain.min},
               {"max", plan.domain.max},
-              {"edge", to_json(plan.edge)},
+              {"edge", as_json(plan.edge)},
               {"bricks", Json::array()}};
     for (const std::string& input : inputs) json["inputs"].push_back(input_of(input));
-    for (const Brick& brick : plan.bricks) json["bricks"].push_back(to_json(brick));
+    for (const Brick& brick : plan.bricks) json["bricks"].push_back(as_json(brick));
     write_text_file(file, json.dump(1) + "\n");
 }
 

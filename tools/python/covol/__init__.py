@@ -19,7 +19,14 @@ import os
 
 import numpy as np
 
-from . import _covol, _html, _inputs
+try:
+    from . import _covol
+except ImportError as error:
+    if error.name != __name__:
+        raise
+    raise ImportError(f"covol: {os.path.dirname(__file__)} has no _covol, the compiled part of the module: "
+                      "`cmake --build build --target covol_python` builds it", name="covol._covol") from None
+from . import _html, _inputs
 from ._covol import Image, LevelSet, Mesh, Points, Result, __version__
 from ._errors import Error
 from ._inputs import from_affine, read_image, read_points, to_affine

@@ -34,7 +34,7 @@ struct Spline {
     std::array<Float4, 3> w, d;
 };
 
-Float4 load(const float* p) {
+Float4 load4(const float* p) {
     Float4 v;
     std::memcpy(&v, p, sizeof v);
     return v;
@@ -174,7 +174,7 @@ public:
                     for (std::size_t i = 0; i < 4; ++i)
                         for (std::size_t j = 0; j < 4; ++j) {
                             float* p = nodes.data() + b.first + i * s.i + j * s.j;
-                            const Float4 sum = load(p) + row(b, n, i, j);
+                            const Float4 sum = load4(p) + row(b, n, i, j);
                             std::memcpy(p, &sum, sizeof sum);
                         }
                 }
@@ -210,8 +210,8 @@ double LatticeField::value_at(const Vec3& world) const {
     Float4 sum{};
     for (std::size_t i = 0; i < 4; ++i) {
         const float* row = values.data() + b.first + i * s.i;
-        sum += b.w[0][i] * (b.w[1][0] * load(row) + b.w[1][1] * load(row + s.j) + b.w[1][2] * load(row + 2 * s.j) +
-                            b.w[1][3] * load(row + 3 * s.j));
+        sum += b.w[0][i] * (b.w[1][0] * load4(row) + b.w[1][1] * load4(row + s.j) + b.w[1][2] * load4(row + 2 * s.j) +
+                            b.w[1][3] * load4(row + 3 * s.j));
     }
     return sum_of(sum * b.w[2]);
 }
@@ -224,7 +224,7 @@ LatticeField::Sample LatticeField::at(const Vec3& world) const {
         const float* row = values.data() + b.first + i * s.i;
         Float4 here{}, slope{};
         for (std::size_t j = 0; j < 4; ++j) {
-            const Float4 v = load(row + j * s.j);
+            const Float4 v = load4(row + j * s.j);
             here += b.w[1][j] * v;
             slope += b.d[1][j] * v;
         }

@@ -41,9 +41,9 @@ std::optional<Attributes> read_attributes(const std::string& folder) {
 }
 
 /// One list of multiscales while it is read.
-class Reader {
+class MultiscaleReader {
 public:
-    Reader(OmeImage& image, const Json& multiscale) : image_(image), json_(multiscale) {}
+    MultiscaleReader(OmeImage& image, const Json& multiscale) : image_(image), json_(multiscale) {}
 
     void read() {
         read_axes();
@@ -136,7 +136,7 @@ std::optional<OmeImage> read_ome_image(const std::string& folder) {
     image.images = static_cast<int>(multiscales.size());
     const Json& first = multiscales.front();
     image.version = attributes->version.empty() ? text_of(member(first, "version")) : attributes->version;
-    Reader(image, first).read();
+    MultiscaleReader(image, first).read();
     const Json& channels = member(member(attributes->json, "omero"), "channels");
     if (channels.is_array() && channels.size() <= kMostChannels)
         for (const Json& channel : channels) image.channels.push_back(text_of(member(channel, "label")));

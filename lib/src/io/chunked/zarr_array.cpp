@@ -20,9 +20,9 @@ constexpr std::size_t kMostDimensions = 16;
 constexpr std::uint64_t kMostIndexed = std::uint64_t(1) << 22;  ///< chunks of a shard: an index of 64 MiB
 
 /// The metadata of one array while it is read.
-class Reader {
+class ArrayReader {
 public:
-    Reader(ZarrArray& array, const Json& json) : array_(array), json_(json) {}
+    ArrayReader(ZarrArray& array, const Json& json) : array_(array), json_(json) {}
 
     void read_2();
     void read_3();
@@ -52,7 +52,7 @@ private:
     const Json& json_;
 };
 
-std::vector<std::uint64_t> Reader::sizes(const Json& value, const std::string& what) const {
+std::vector<std::uint64_t> ArrayReader::sizes(const Json& value, const std::string& what) const {
     std::vector<std::uint64_t> list;
     if (!value.is_array() || value.empty() || value.size() > kMostDimensions)
         throw wrong("expected a list of 1 to " + std::to_string(kMostDimensions) + " numbers as its " + what);
@@ -64,14 +64,14 @@ std::vector<std::uint64_t> Reader::sizes(const Json& value, const std::string& w
     return list;
 }
 
-char Reader::separator(const Json& value, char usual) const {
+char ArrayReader::separator(const Json& value, char usual) const {
     if (value.is_null()) return usual;
     const std::string text = text_of(value);
     if (text != "." && text != "/") throw wrong("expected the separator of its chunks' names to be . or /");
     return text[0];
 }
 
-void Reader::set_type(char kind, char width, const std::string& name) {
+void ArrayReader::set_type(char kind, char width, const std::string& name) {
     switch (kind) {
         case 'b':
         case 'u':
@@ -94,7 +94,7 @@ void Reader::set_type(char kind, char width, const std::string& name) {
     throw unsupported("expected integers of 8, 16 or 32 bits or floats, got elements of type " + quote(name));
 }
 
-void Reader::set_strides(const std::vector<std::size_t>& slowest_first) {
+void ArrayReader::set_strides(const std::vector<std::size_t>& slowest_first) {
     array_.strides.assign(array_.shape.size(), 1);
     std::uint64_t stride = 1;
     for (std::size_t n = slowest_first.size(); n-- > 0; stride *= array_.chunk[slowest_first[n]])
@@ -102,7 +102,7 @@ void Reader::set_strides(const std::vector<std::size_t>& slowest_first) {
 }
 
 /// Zarr 3 may state a float's bits.
-double Reader::bits_as_number(const std::string& text) const {
+double ArrayReader::bits_as_number(const std::string& text) const {
     std::uint64_t bits = 0;
     const std::string digits = text.substr(2);
     const auto [end, status] = std::from_chars(digits.data(), digits.data() + digits.size(), bits, 16);
@@ -117,7 +117,7 @@ double Reader::bits_as_number(const std::string& text) const {
                                            : std::bit_cast<double>(bits);
 }
 
-void Reader::set_fill(const Json& value) {
+void ArrayReader::set_fill(const Json& value) {
     const std::string text = text_of(value);
     const bool is_float = array_.type == PixelType::Float || array_.type == PixelType::Double;
     if (value.is_null())
@@ -143,7 +143,7 @@ void Reader::set_fill(const Json& value) {
 }
 
 /// All of a chunk is unpacked at once, its channels and frames too.
-void Reader::check_chunk() const {
+void ArrayReader::check_chunk() const {
     std::uint64_t bytes = array_.stored_bytes();
     for (const std::uint64_t n : array_.chunk) {
         if (n == 0) throw wrong("expected chunks of elements, got one with a side of 0");
@@ -155,7 +155,7 @@ void Reader::check_chunk() const {
 
 // ---- Zarr 2 -------------------------------------------------------------------------------------------------------
 
-void Reader::read_2() {
+void ArrayReader::read_2() {
     if (const Json& format = member(json_, "zarr_format"); format != 2)
         throw wrong("expected zarr_format 2, got " + quote(format.dump()));
     array_.shape = sizes(member(json_, "shape"), "shape");
@@ -191,11 +191,11 @@ void Reader::read_2() {
 // ---- Zarr 3 -------------------------------------------------------------------------------------------------------
 
 /// A codec, a grid or a way to name files: an object with a name, or the name alone.
-std::string Reader::codec_name(const Json& codec) const {
+std::string ArrayReader::codec_name(const Json& codec) const {
     return codec.is_string() ? text_of(codec) : text_of(member(codec, "name"));
 }
 
-void Reader::read_3() {
+void ArrayReader::read_3() {
     if (const Json& format = member(json_, "zarr_format"); format != 3)
         throw wrong("expected zarr_format 3, got " + quote(format.dump()));
     array_.shape = sizes(member(json_, "shape"), "shape");
@@ -225,7 +225,7 @@ void Reader::read_3() {
         for (const Json& name : names) array_.dimension_names.push_back(text_of(name));
 }
 
-void Reader::read_keys() {
+void ArrayReader::read_keys() {
     const Json& encoding = member(json_, "chunk_key_encoding");
     const std::string name = codec_name(encoding);
     if (name != "default" && name != "v2")
@@ -235,7 +235,7 @@ void Reader::read_keys() {
 }
 
 /// The dimensions of a chunk as it is stored, slowest first.
-std::vector<std::size_t> Reader::transposed(const Json& codec) const {
+std::vector<std::size_t> ArrayReader::transposed(const Json& codec) const {
     const Json& order = member(member(codec, "configuration"), "order");
     const std::size_t count = array_.shape.size();
     std::vector<std::size_t> dimensions;
@@ -251,7 +251,7 @@ std::vector<std::size_t> Reader::transposed(const Json& codec) const {
     return dimensions;
 }
 
-void Reader::set_byte_order(const Json& codec, bool& big) const {
+void ArrayReader::set_byte_order(const Json& codec, bool& big) const {
     const Json& endian = member(member(codec, "configuration"), "endian");
     const std::string text = text_of(endian);
     if (!endian.is_null() && text != "little" && text != "big")
@@ -259,7 +259,7 @@ void Reader::set_byte_order(const Json& codec, bool& big) const {
     big = text == "big";
 }
 
-void Reader::read_codecs(const Json& codecs) {
+void ArrayReader::read_codecs(const Json& codecs) {
     if (!codecs.is_array() || codecs.empty() || codecs.size() > kMostDimensions)
         throw wrong("expected a list of codecs");
     std::vector<std::size_t> slowest_first(array_.shape.size());
@@ -294,7 +294,7 @@ void Reader::read_codecs(const Json& codecs) {
     set_strides(slowest_first);
 }
 
-void Reader::read_shards(const Json& sharding) {
+void ArrayReader::read_shards(const Json& sharding) {
     const std::vector<std::uint64_t> outer = array_.chunk;
     array_.chunk = sizes(member(sharding, "chunk_shape"), "sharding's chunk_shape");
     if (array_.chunk.size() != outer.size()) throw wrong("its chunks have not as many dimensions as its shards");
@@ -358,7 +358,7 @@ ZarrArray read_zarr_array(const std::string& folder) {
         json = read_json(array.metadata);
     }
     if (!json) throw read_error(Errc::Io, folder, "expected an array, which .zarray or zarr.json describes");
-    Reader reader(array, *json);
+    ArrayReader reader(array, *json);
     array.version == 3 ? reader.read_3() : reader.read_2();
     return array;
 }

@@ -13,7 +13,7 @@
 namespace covol::detail {
 namespace {
 
-constexpr std::size_t kMostLevels = 64;
+constexpr std::size_t kMostBdvLevels = 64;
 
 /// A <ViewSetup> of the XML.
 struct Setup {
@@ -21,7 +21,7 @@ struct Setup {
     std::optional<Vec3> voxel;
 };
 
-struct Choice {
+struct BdvChoice {
     std::string time, setup;  ///< empty: not chosen
     int level = 0;
 };
@@ -39,9 +39,9 @@ std::vector<std::string> named(std::vector<std::string> names, char letter) {
 }
 
 /// @returns nothing where the path does not lead to an image's data.
-std::optional<Choice> parse(const std::string& inside) {
+std::optional<BdvChoice> parse_bdv(const std::string& inside) {
     const std::vector<std::string> parts = parts_of(inside);
-    Choice choice;
+    BdvChoice choice;
     if (parts.size() > 4 || (parts.size() == 4 && parts[3] != "cells")) return std::nullopt;
     if (!parts.empty()) choice.time = parts[0];
     if (parts.size() > 1) choice.setup = parts[1];
@@ -106,7 +106,7 @@ std::map<int, Setup> read_setups(const std::string& path) {
 
 class Reader {
 public:
-    Reader(const Hdf5File& file, Choice choice) : file_(file), choice_(std::move(choice)) {}
+    Reader(const Hdf5File& file, BdvChoice choice) : file_(file), choice_(std::move(choice)) {}
 
     /// @returns false where the file is of another kind.
     bool find() {
@@ -167,7 +167,7 @@ private:
     [[nodiscard]] std::vector<Vec3> factors() const {
         const std::vector<double> numbers = file_.table("/" + setups_.front() + "/resolutions");
         std::vector<Vec3> factors;
-        for (std::size_t n = 0; n + 3 <= numbers.size() && factors.size() < kMostLevels; n += 3) {
+        for (std::size_t n = 0; n + 3 <= numbers.size() && factors.size() < kMostBdvLevels; n += 3) {
             factors.push_back({numbers[n], numbers[n + 1], numbers[n + 2]});
             for (const double f : factors.back())
                 if (!std::isfinite(f) || !(f > 0))
@@ -222,7 +222,7 @@ private:
     }
 
     const Hdf5File& file_;
-    Choice choice_;
+    BdvChoice choice_;
     bool chosen_time_ = true;
     std::vector<std::string> times_, setups_;
 };
@@ -230,7 +230,7 @@ private:
 }  // namespace
 
 std::optional<Hdf5Layout> big_data_viewer_layout(const Hdf5File& file, const std::string& inside) {
-    std::optional<Choice> choice = parse(inside);
+    std::optional<BdvChoice> choice = parse_bdv(inside);
     if (!choice) return std::nullopt;
     Reader reader(file, std::move(*choice));
     return reader.find() ? std::optional(reader.describe()) : std::nullopt;

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "base/text.h"
-#include "io/child.h"
 #include "io/hdf5/hdf5_dataset.h"
 #include "io/hdf5/hdf5_layouts.h"
 #include "io/pixels/chunks.h"
@@ -150,11 +149,6 @@ std::optional<Hdf5Name> split_hdf5_name(const std::string& text) {
             return Hdf5Name{text.substr(0, begin), text.substr(begin + 1)};
     }
     return std::nullopt;
-}
-
-void try_hdf5(const std::string& path, const std::function<void()>& read) {
-    const Hdf5Lock lock;  // no other thread's, in the copy
-    try_reading(path, "HDF5", read);
 }
 
 bool is_itk_hdf5(const Hdf5Name& name) { return name.inside.empty() && Hdf5File(name.path).has("/ITKImage"); }

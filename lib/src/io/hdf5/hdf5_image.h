@@ -1,5 +1,4 @@
 #pragma once
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,11 +13,6 @@ struct Hdf5Name {
 };
 /// @returns an empty `inside` where `text` names a file alone; nothing where its name is not one of HDF5.
 std::optional<Hdf5Name> split_hdf5_name(const std::string& text);
-
-/// The HDF5 library reads and writes outside its buffers where a file is damaged: what would be read of it is read in a
-/// copy of this process first, which may crash. @throws Error InvalidInput (it did, or took a minute), and what `read`
-/// threw: the library keeps objects of damaged headers, which this process then has not seen.
-void try_hdf5(const std::string& path, const std::function<void()>& read);
 
 /// Whether the file as a whole is an image in ITK's layout, which ITK reads. @throws Error InvalidInput.
 bool is_itk_hdf5(const Hdf5Name& name);

@@ -11,18 +11,18 @@ namespace covol::detail {
 namespace {
 
 constexpr const char *kLevel = "ResolutionLevel ", *kTime = "TimePoint ", *kChannel = "Channel ";
-constexpr int kMostLevels = 32;
+constexpr int kMostImarisLevels = 32;
 
 /// What a path chose.
-struct Choice {
+struct ImarisChoice {
     int level = 0;
     std::optional<int> time, channel;
 };
 
 /// @returns nothing where the path does not lead to an image's data.
-std::optional<Choice> parse(const std::string& inside) {
+std::optional<ImarisChoice> parse_imaris(const std::string& inside) {
     const std::vector<std::string> parts = parts_of(inside);
-    Choice choice;
+    ImarisChoice choice;
     for (std::size_t n = 0; n < parts.size(); ++n) {
         std::optional<int> number = 0;
         if (n == 0 && parts[n] != "DataSet") return std::nullopt;
@@ -105,9 +105,9 @@ int count_of(const Hdf5File& file, const std::string& group, const char* word) {
 
 Vec3 times(const Vec3& a, const Vec3& b) { return {a[0] * b[0], a[1] * b[1], a[2] * b[2]}; }
 
-void describe_levels(const Hdf5File& file, const Extent& extent, const Index3& fine, const Choice& choice,
+void describe_levels(const Hdf5File& file, const Extent& extent, const Index3& fine, const ImarisChoice& choice,
                      ImageInfo& info) {
-    const int count = std::min(count_of(file, "/DataSet", kLevel), kMostLevels);
+    const int count = std::min(count_of(file, "/DataSet", kLevel), kMostImarisLevels);
     for (int level = 0; level < count; ++level) {
         const std::string name = level_name(level);
         try {
@@ -122,7 +122,7 @@ void describe_levels(const Hdf5File& file, const Extent& extent, const Index3& f
 }  // namespace
 
 std::optional<Hdf5Layout> imaris_layout(const Hdf5File& file, const std::string& inside) {
-    const std::optional<Choice> choice = parse(inside);
+    const std::optional<ImarisChoice> choice = parse_imaris(inside);
     if (!choice || !file.has(level_name(0)) || !file.has("/DataSetInfo/Image")) return std::nullopt;
     const int time = choice->time.value_or(0), channel = choice->channel.value_or(0);
     Hdf5Layout layout;

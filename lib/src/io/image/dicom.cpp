@@ -1,6 +1,6 @@
 // DICOM slice by slice: plain pixels are read here, compressed ones and files of several frames through ITK's GDCM
-// reader (gdcm_images.h). Series are put together here too: ITK's own helper neither says what lies in a folder nor
-// finds a missing slice.
+// reader, in another program (reader.h). Series are put together here too: ITK's own helper neither says what lies in a
+// folder nor finds a missing slice.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -12,8 +12,8 @@
 #include <variant>
 
 #include "io/image/dicom_header.h"
-#include "io/image/gdcm_images.h"
 #include "io/image/image_formats.h"
+#include "io/modules/reader.h"
 
 namespace covol::detail {
 namespace {
@@ -22,9 +22,8 @@ namespace fs = std::filesystem;
 
 constexpr std::uint32_t kModality = 0x00080060, kSeriesDescription = 0x0008103E, kThickness = 0x00180050;
 constexpr std::uint32_t kImagerSpacing = 0x00181164, kSeriesUid = 0x0020000E, kPosition = 0x00200032;
-constexpr std::uint32_t kOrientation = 0x00200037, kSamples = 0x00280002, kPlanar = 0x00280006, kFrames = 0x00280008;
-constexpr std::uint32_t kRows = 0x00280010, kColumns = 0x00280011, kPixelSpacing = 0x00280030, kAllocated = 0x00280100;
-constexpr std::uint32_t kStored = 0x00280101, kSigned = 0x00280103, kIntercept = 0x00281052, kSlope = 0x00281053;
+constexpr std::uint32_t kOrientation = 0x00200037, kPlanar = 0x00280006, kFrames = 0x00280008;
+constexpr std::uint32_t kPixelSpacing = 0x00280030, kIntercept = 0x00281052, kSlope = 0x00281053;
 
 struct Slice {
     std::string path, series, description;
@@ -51,9 +50,9 @@ PixelType rescaled_type(const PixelPlace& place, int stored_bits) {
 
 /// A file with plain pixels and one frame. Without orientation and position it lies at 0.
 void fill_plain(const DicomHeader& header, const std::string& unusable, Slice& slice) {
-    const int allocated = int(header.integer(kAllocated).value_or(0)),
-              stored = int(header.integer(kStored).value_or(0));
-    const bool is_signed = header.integer(kSigned).value_or(0) == 1;
+    const int allocated = int(header.integer(kBitsAllocated).value_or(0)),
+              stored = int(header.integer(kBitsStored).value_or(0));
+    const bool is_signed = header.integer(kRepresentation).value_or(0) == 1;
     slice.plain = true;
     slice.components = header.integer(kSamples).value_or(1);
     slice.size = {std::int32_t(header.integer(kColumns).value_or(0)), std::int32_t(header.integer(kRows).value_or(0)),
@@ -106,7 +105,7 @@ void fill_from_gdcm(const DicomHeader& header, const ItkHeader& image, const std
             slice.direction[b][a] = there && b < image.axes[a].size() ? image.axes[a][b] : (a == b ? 1 : 0);
     }
     // Packed pixels may be many; others are all there.
-    const std::uint64_t bytes = header.integer(kAllocated).value_or(8) / 8;
+    const std::uint64_t bytes = header.integer(kBitsAllocated).value_or(8) / 8;
     if (!header.encapsulated && voxel_count(slice.size) * slice.components * bytes > header.pixel_bytes)
         throw Error(Errc::InvalidInput, unusable);
 }
@@ -116,7 +115,7 @@ using SliceOrError = std::variant<Slice, Error>;
 /// The headers of some files.
 std::vector<SliceOrError> read_headers(const std::vector<std::string>& paths, const RunContext& run) {
     std::vector<SliceOrError> slices;
-    std::vector<GdcmFile> for_gdcm;
+    std::vector<Piece> for_gdcm;
     std::vector<std::pair<std::size_t, DicomHeader>> waiting;  // their places among the slices
     for (const std::string& path : paths) {
         run.check();
@@ -141,12 +140,13 @@ std::vector<SliceOrError> read_headers(const std::vector<std::string>& paths, co
         }
     }
     if (waiting.empty()) return slices;
-    const std::vector<std::variant<ItkHeader, Error>> images = gdcm_headers(for_gdcm, run);
+    const std::vector<std::variant<ItkHeader, Error>> images =
+        detail::read_headers(ReaderTask::GdcmHeader, for_gdcm, run);
     for (std::size_t n = 0; n < images.size(); ++n) {
         SliceOrError& slice = slices[waiting[n].first];
         try {
             if (const Error* error = std::get_if<Error>(&images[n])) throw Error(*error);
-            fill_from_gdcm(waiting[n].second, std::get<ItkHeader>(images[n]), for_gdcm[n].unusable,
+            fill_from_gdcm(waiting[n].second, std::get<ItkHeader>(images[n]), for_gdcm[n].detail,
                            std::get<Slice>(slice));
         } catch (const Error& error) {
             slice = error;
@@ -311,7 +311,7 @@ private:
         for (std::size_t first = begin; first < end;) {
             run.report("image", double(first - begin) / double(end - begin));
             const std::size_t last = first + std::clamp<std::size_t>(most, 1, end - first);
-            const GdcmPixels packed(packed_of(first, last), run);
+            const DecodedPixels packed(ReaderTask::GdcmPixels, packed_of(first, last), run);
             for (std::size_t next = 0; first < last; ++first) {
                 run.check();
                 const Slice& slice = slices_[first];
@@ -334,11 +334,11 @@ private:
     }
 
     /// Those that GDCM decodes.
-    [[nodiscard]] std::vector<GdcmFile> packed_of(std::size_t begin, std::size_t end) const {
-        std::vector<GdcmFile> files;
+    [[nodiscard]] std::vector<Piece> packed_of(std::size_t begin, std::size_t end) const {
+        std::vector<Piece> files;
         for (std::size_t n = begin; n < end; ++n)
             if (const Slice& slice = slices_[n]; !slice.plain)
-                files.push_back({slice.path, unusable(slice), bytes_of(slice)});
+                files.push_back({slice.path, unusable(slice), 0, bytes_of(slice)});
         return files;
     }
 

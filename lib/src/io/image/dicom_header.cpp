@@ -15,8 +15,6 @@ namespace {
 
 constexpr std::uint32_t kUndefined = 0xFFFFFFFF;
 constexpr std::uint32_t kItem = 0xFFFEE000, kItemEnd = 0xFFFEE00D, kSequenceEnd = 0xFFFEE0DD;
-constexpr std::uint32_t kSamples = 0x00280002, kRows = 0x00280010, kColumns = 0x00280011, kBitsAllocated = 0x00280100;
-constexpr std::uint32_t kBitsStored = 0x00280101, kHighBit = 0x00280102, kRepresentation = 0x00280103;
 constexpr std::uint32_t kTransferSyntax = 0x00020010, kPixelData = 0x7FE00010;
 constexpr int kDeepest = 16;
 

@@ -7,6 +7,11 @@
 
 namespace covol::detail {
 
+/// Tags of the image pixel module, PS3.3 C.7.6.3.
+inline constexpr std::uint32_t kSamples = 0x00280002, kRows = 0x00280010, kColumns = 0x00280011;
+inline constexpr std::uint32_t kBitsAllocated = 0x00280100, kBitsStored = 0x00280101, kHighBit = 0x00280102;
+inline constexpr std::uint32_t kRepresentation = 0x00280103;
+
 /// The elements of a DICOM file outside its sequences, and where its pixels lie.
 struct DicomHeader {
     std::map<std::uint32_t, std::string> values;  ///< tag (group << 16 | element) to bytes; long ones are left out

@@ -2,6 +2,8 @@
 #include <memory>
 #include <string>
 
+#include "io/hdf5/hdf5_image.h"
+#include "io/modules/modules.h"
 #include "io/pixels/raw_image.h"
 
 // One function for each family of image files; read_image() picks by the name's end.
@@ -9,6 +11,12 @@ namespace covol::detail {
 
 /// NRRD (.nrrd, .nhdr), NIfTI (.nii, .nii.gz), MetaImage (.mha, .mhd), ITK's HDF5 (.h5, .hdf5): ITK reads the header.
 std::unique_ptr<ImageFile> open_itk(const std::string& path);
+
+/// ITK's reader for files of this ending.
+OpenWithItk* itk_reader_of(const std::string& path);
+
+/// Of ITK's layout or another.
+std::unique_ptr<ImageFile> open_either_hdf5(const Hdf5Name& name);
 
 /// MRC2014 and CCP4 maps: modes 0, 1, 2, 6 and 12, either byte order.
 std::unique_ptr<ImageFile> open_mrc(const std::string& path);

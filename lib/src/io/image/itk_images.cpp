@@ -14,25 +14,16 @@
 
 #include "base/file.h"
 #include "base/text.h"
-#include "io/child.h"
 #include "io/hdf5/hdf5_file.h"
 #include "io/image/image_formats.h"
 #include "io/image/text_header.h"
-#include "io/modules/modules.h"
+#include "io/modules/reader.h"
 #include "io/pixels/nifti_space.h"
 
 namespace covol::detail {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// ITK's reader for files of this ending.
-OpenWithItk* reader_of(const std::string& extension) {
-    if (extension == ".nrrd" || extension == ".nhdr") return itk_module().open_nrrd;
-    if (extension == ".nii" || extension == ".nii.gz") return itk_module().open_nifti;
-    if (extension == ".h5" || extension == ".hdf5") return hdf5_module().open_itk;
-    return itk_module().open_meta;
-}
 
 /// Unit, whether there is a spacing at all, and the fields that were used.
 void read_text_header(const TextHeader& header, ImageInfo& info) {
@@ -229,32 +220,32 @@ void require_meta_header(const TextHeader& header, const std::string& unusable) 
         throw Error(Errc::InvalidInput, unusable + " (expected 1 to 10 as NDims, got " + dimensions + ")");
 }
 
-/// What only ITK reads: all at once, in a copy of the process, for its readers of text and of lists crash at damaged
-/// files; but HDF5 in boxes.
+/// What only ITK reads: all at once, in the reading program, for its readers of text and of lists crash at damaged
+/// files; but HDF5 in boxes, by `reader`.
 class ItkFile : public ImageFile {
 public:
-    ItkFile(std::string path, std::string unusable, ImageInfo info, std::unique_ptr<ItkReader> reader, bool in_boxes,
-            std::uint64_t file_bytes)
+    ItkFile(std::string path, std::string unusable, ImageInfo info, std::vector<std::uint64_t> size,
+            std::unique_ptr<ItkReader> reader, std::uint64_t file_bytes)
         : path_(std::move(path)),
           unusable_(std::move(unusable)),
+          size_(std::move(size)),
           reader_(std::move(reader)),
-          in_boxes_(in_boxes),
           file_bytes_(file_bytes) {
         info_ = std::move(info);
     }
 
     ~ItkFile() override {
         std::optional<Hdf5Lock> lock;
-        if (in_boxes_) lock.emplace();
+        if (reader_) lock.emplace();
         reader_ = nullptr;  // closes the file
     }
     ItkFile(const ItkFile&) = delete;
     ItkFile& operator=(const ItkFile&) = delete;
 
-    Pixels read(const PixelRequest& request, const RunContext&) override {
-        std::vector<std::uint64_t> size = reader_->header().size, begin(size.size(), 0);
+    Pixels read(const PixelRequest& request, const RunContext& run) override {
+        std::vector<std::uint64_t> size = size_, begin(size.size(), 0);
         VoxelBox box = whole_box(info_.geometry.size);
-        if (in_boxes_ && size.size() == 3) {
+        if (reader_ && size.size() == 3) {
             box = request.box;
             for (std::size_t a = 0; a < 3; ++a) {
                 begin[a] = std::uint64_t(box.min[a]);
@@ -267,11 +258,13 @@ public:
         std::shared_ptr<void> data = allocate_pixels(path_, pixels_of_all, info_.type, file_bytes_);
         const auto count = std::accumulate(size.begin(), size.end(), std::uint64_t(1), std::multiplies<>());
         if (count != voxel_count(box.size()) * std::uint64_t(info_.frames)) throw Error(Errc::InvalidInput, unusable_);
-        if (in_boxes_) {
+        if (reader_) {
             const Hdf5Lock lock;
             reader_->read(begin, size, data.get());
         } else {
-            data = read_in_child(begin, size, pixels_of_all * pixel_bytes(info_.type));
+            const std::vector<Piece> all{{path_, unusable_, 0, pixels_of_all * pixel_bytes(info_.type)}};
+            const auto decoded = std::make_shared<DecodedPixels>(ReaderTask::ItkPixels, all, run);
+            data = {decoded, decoded->of(0)};
         }
         Pixels pixels;
         pixels.stride = dense_strides(box.size());
@@ -285,18 +278,9 @@ public:
     }
 
 private:
-    [[nodiscard]] std::shared_ptr<void> read_in_child(const std::vector<std::uint64_t>& begin,
-                                                      const std::vector<std::uint64_t>& size, std::uint64_t bytes) {
-        const auto memory = std::make_shared<SharedMemory>(bytes);
-        const Trial trial =
-            try_in_child([&] { reader_->read(begin, size, memory->data()); }, most_seconds_for_pixels(bytes));
-        if (const auto error = reading_error(trial, path_, "ITK")) throw Error(*error);
-        return {memory, memory->data()};
-    }
-
     std::string path_, unusable_;
+    std::vector<std::uint64_t> size_;  // of all dimensions
     std::unique_ptr<ItkReader> reader_;
-    bool in_boxes_;
     std::uint64_t file_bytes_;
 };
 
@@ -315,7 +299,25 @@ ImageGeometry itk_geometry(const std::string& path, const ItkHeader& header) {
     return geometry;
 }
 
+ItkHeader header_by_itk(const std::string& path, const std::string& unusable) {
+    const auto found = read_headers(ReaderTask::ItkHeader, {{path, unusable}}, RunContext()).front();
+    if (const Error* error = std::get_if<Error>(&found)) throw Error(*error);
+    return std::get<ItkHeader>(found);
+}
+
 }  // namespace
+
+OpenWithItk* itk_reader_of(const std::string& path) {
+    const std::string end = extension(path);
+    if (end == ".nrrd" || end == ".nhdr") return itk_module().open_nrrd;
+    if (end == ".nii" || end == ".nii.gz") return itk_module().open_nifti;
+    if (end == ".h5" || end == ".hdf5") return hdf5_module().open_itk;
+    return itk_module().open_meta;
+}
+
+std::unique_ptr<ImageFile> open_either_hdf5(const Hdf5Name& name) {
+    return is_itk_hdf5(name) ? open_itk(name.path) : open_hdf5(name);
+}
 
 std::unique_ptr<ImageFile> open_itk(const std::string& path) {
     const std::string end = extension(path);
@@ -337,11 +339,9 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path) {
     if (is_nifti) nifti.emplace(begin, unusable);
     std::optional<Hdf5Lock> lock;
     if (is_hdf5) lock.emplace();
-    OpenWithItk* const open = reader_of(end);
     // Its readers abort, or do not end, where headers contradict themselves; HDF5's was tried before.
-    if (!is_hdf5) try_reading(path, "ITK", [&] { (void)open(path, unusable); });
-    std::unique_ptr<ItkReader> reader = open(path, unusable);
-    const ItkHeader& image = reader->header();
+    std::unique_ptr<ItkReader> reader = is_hdf5 ? itk_reader_of(path)(path, unusable) : nullptr;
+    const ItkHeader image = reader ? reader->header() : header_by_itk(path, unusable);
 
     ImageInfo info;
     info.type = image.type;
@@ -388,8 +388,8 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path) {
                              std::to_string(info.channels) + " channels and " + std::to_string(info.frames) +
                              " frames");
     const bool detached = header && !header->data_file().empty();
-    auto file =
-        std::make_unique<ItkFile>(path, unusable, info, std::move(reader), is_hdf5, detached ? 0 : fs::file_size(path));
+    auto file = std::make_unique<ItkFile>(path, unusable, info, image.size, std::move(reader),
+                                          detached ? 0 : fs::file_size(path));
     file->refer_to(files);
     return file;
 }

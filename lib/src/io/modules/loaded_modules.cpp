@@ -5,7 +5,7 @@
 
 #include "covol/error.h"
 #include "covol/version.h"
-#include "io/modules/modules.h"
+#include "io/modules/reader.h"
 
 namespace covol::detail {
 namespace {
@@ -37,6 +37,8 @@ const Module& load(const std::string& name, const char* formats) {
 }
 
 }  // namespace
+
+std::string reader_program() { return folder_of_modules() / "covol-reader"; }
 
 const ItkModule& itk_module() {
     static const auto& module = load<ItkModule>("itk", "NRRD, NIfTI and MetaImage");

@@ -1,0 +1,19 @@
+// Where the library is static: covol-reader in a folder beside the program's, as the library's would be.
+#include <filesystem>
+
+#include "covol/version.h"
+#include "io/modules/reader.h"
+
+namespace covol::detail {
+
+std::string reader_program() {
+    namespace fs = std::filesystem;
+    std::error_code status;
+    const fs::path installed = fs::path(COVOL_READER_FOLDER) / "covol-reader";
+    const fs::path program = fs::read_symlink("/proc/self/exe", status);
+    const fs::path beside =
+        program.parent_path().parent_path() / "lib" / "covol-" COVOL_VERSION_STRING / installed.filename();
+    return fs::exists(beside, status) ? beside : installed;
+}
+
+}  // namespace covol::detail

@@ -1,0 +1,9 @@
+#pragma once
+#include "covol/api.h"
+
+namespace covol {
+
+/// The main function of covol-reader. @returns 2 where the library did not start it.
+COVOL_API int serve_reader(int count, char** arguments);
+
+}  // namespace covol
