@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "base/no_surface.h"
+#include "base/number.h"
 #include "bricks/split.h"
 #include "bricks/states.h"
 #include "cloud/surface/cloud_field.h"
@@ -364,7 +365,8 @@ SegmentResult BrickJob::join(const BrickPlan& plan, const BrickStates& states, b
         if (solution.solve.leaf_count == 0)
             throw Error(Errc::InvalidInput,
                         "bricks: the surface vanished in all of them; lower `delta`, or start closer to the edges "
-                        "(`start`)");
+                        "(`init`)",
+                        "delta");
         solution.report.remarks.choose("bricks", std::to_string(plan.bricks.size()), "solved apart and joined", run);
         Surface made = make_surface(problem, choices, solution, surface);
         result.report = measure(problem, choices, before, solution, made);

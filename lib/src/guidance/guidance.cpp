@@ -13,6 +13,7 @@
 #include <optional>
 
 #include "covol/domain.h"
+#include "covol/guess.h"
 #include "covol/start.h"
 #include "covol/surface.h"
 #include "guidance/grid_sampler.h"

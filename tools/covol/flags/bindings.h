@@ -96,6 +96,7 @@ void bind_options(CLI::App& command, Given<Options>& given, Offered job,
         if (job == Offered::SingleStep && *option.automatic_alone != 0) option.automatic = option.automatic_alone;
         in_group(command, option.place.group);
         CLI::Option* made = add_option(command, option, value, given);
+        if (made == nullptr) return;
         made->description(with_flags(option.text));
         if (*option.automatic != 0) made->default_str(with_flags(option.automatic));
         made->each([&given, name = std::string(option.name)](const std::string&) { given.names.insert(name); });
