@@ -49,10 +49,18 @@ struct MarkFiles {
     std::string guess;  ///< another tool's mask, mesh or level set; empty: none
 };
 
+/// Which structure marks belong to, and where they come from.
+struct MarksOrigin {
+    std::string name;                    ///< empty: it is the only structure
+    int label = 0;                       ///< in a mask of all structures; 0: see number_labels()
+    MarkFiles files;                     ///< empty: from memory
+    std::vector<std::string> rules;      ///< how the coordinates of each cloud of points were understood
+    std::size_t count = 0;               ///< marks that were given
+    std::optional<std::size_t> thinned;  ///< the points, to so many
+};
+
 /// The marks of one structure, world units.
-struct Marks {
-    std::string name;  ///< empty: it is the only one
-    int label = 0;     ///< in a mask of all structures; 0: see number_labels()
+struct Marks : MarksOrigin {
     std::vector<Vec3> points;
     PointHints hints;                         ///< of the points
     std::vector<PointCloud> contours;         ///< lines on slices
@@ -67,11 +75,6 @@ struct Marks {
         guess;                    ///< called when it is needed: it may be a whole image; none: empty
     std::optional<Start> start;   ///< instead of SegmentOptions::start
     std::optional<double> delta;  ///< where EvolveOptions has none, world units
-
-    MarkFiles files;                     ///< where they come from; empty: from memory
-    std::vector<std::string> rules;      ///< how the coordinates of each cloud of points were understood
-    std::size_t point_count = 0;         ///< that were added
-    std::optional<std::size_t> thinned;  ///< to so many
 };
 
 /// Adds a cloud to the points. @param image  none: there is no image
@@ -105,15 +108,10 @@ struct MarksOptions {
 };
 
 /// What is known of one structure beside its result.
-struct StructureFacts {
-    std::string name;
-    std::string grid;         ///< make_grid_names()
-    int label = 0;            ///< in masks
-    std::vector<Vec3> marks;  ///< points, cleaned, and those of contours, as they were clicked; world units
-    MarkFiles files;
-    std::vector<std::string> rules, contour_rules;            ///< how each cloud's coordinates were understood
-    std::size_t count = 0;                                    ///< marks, before they were thinned and cleaned
-    std::optional<std::size_t> thinned;                       ///< to so many
+struct StructureFacts : MarksOrigin {
+    std::string grid;                                         ///< make_grid_names()
+    std::vector<Vec3> marks;                                  ///< points, cleaned, and those of contours, as they were clicked
+    std::vector<std::string> contour_rules;                   ///< how each cloud of contours was understood
     std::optional<CloudCleanupReport> cleanup;                ///< where something was to be done
     std::vector<std::pair<std::string, PaintedLabel>> paint;  ///< paths, and what the paint says
     double contour_seconds = 0;                               ///< that densify() took

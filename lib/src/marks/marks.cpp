@@ -87,11 +87,12 @@ void add_points(Marks& marks, const PointCloud& cloud, const std::optional<Image
     marks.points.insert(marks.points.end(), world.begin(), world.end());
     add_hints(cloud, world, marks);
     marks.rules.push_back(cloud.rule);
-    marks.point_count += world.size();
+    marks.count += world.size();
 }
 
 void add_contours(Marks& marks, PointCloud cloud, const std::optional<ImageGeometry>& image, const RunContext& run) {
     if (image) check_inside(cloud, *image, run);
+    marks.count += cloud.points.size();
     marks.contours.push_back(std::move(cloud));
 }
 

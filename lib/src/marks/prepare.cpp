@@ -9,6 +9,7 @@
 #include "covol/marks.h"
 #include "covol/seeds.h"
 #include "covol/structures.h"
+#include "marks/with_name.h"
 
 namespace covol {
 namespace {
@@ -71,15 +72,9 @@ public:
     StructureInput prepare(std::size_t n, const std::string& grid, const RunContext& run) {
         Marks& marks = structures_[n];
         StructureInput input;
-        input.name = marks.name;
+        static_cast<MarksOrigin&>(input) = marks;
         input.grid = grid;
-        input.label = marks.label;
         input.options = options_;
-        input.files = std::move(marks.files);
-        input.rules = std::move(marks.rules);
-        input.count = marks.point_count;
-        for (const PointCloud& lines : marks.contours) input.count += lines.points.size();
-        input.thinned = marks.thinned;
         const std::shared_ptr<const Contours> painted = own_contours(marks, run);
         if (!painted) add_outlines(marks, run);
         clean(marks, input, run);
@@ -202,7 +197,9 @@ std::vector<StructureInput> prepare_marks(std::vector<Marks> structures, const s
     Preparer preparer(std::move(structures), image, options, marks_options);
     std::vector<StructureInput> prepared;
     for (std::size_t n = 0; n < names.size(); ++n)
-        prepared.push_back(preparer.prepare(n, grids[n], speaking_for(names[n], names.size(), run)));
+        prepared.push_back(detail::with_name(names[n], [&] {
+            return preparer.prepare(n, grids[n], speaking_for(names[n], names.size(), run));
+        }));
     return prepared;
 }
 

@@ -11,6 +11,7 @@
 #include "covol/mesh_stream.h"
 #include "covol/seeds.h"
 #include "covol/surface.h"
+#include "marks/with_name.h"
 #include "meshing/level_set_distance.h"
 #include "meshing/mesh_distance.h"
 #include "segment/result/mark_fit.h"
@@ -114,16 +115,13 @@ StructuresResult segment_structures(const std::optional<Image>& image, std::vect
     for (StructureInput& input : inputs) {
         const RunContext own = speaking_for(input.name, inputs.size(), run);
         StructureResult made{std::move(static_cast<StructureFacts&>(input)), {}, {}};
-        try {
+        made.result = detail::with_name(made.name, [&] {
             if (input.guess) {
                 made.guess = input.guess(own);
                 input.options.guess = made.guess->start;
             }
-            made.result = solve(image, input, own);
-        } catch (const Error& error) {
-            if (made.name.empty()) throw;
-            throw Error(error.code(), made.name + ": " + error.what());
-        }
+            return solve(image, input, own);
+        });
         if (inputs.size() > 1 && made.guess) made.guess->mask.reset();
         input = {};
         all.structures.push_back(std::move(made));

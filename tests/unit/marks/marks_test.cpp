@@ -76,7 +76,7 @@ TEST_CASE("Clouds with and without normals and sensors become one list with a hi
     REQUIRE(marks.hints.to_sensor.size() == 4);
     CHECK(marks.hints.to_sensor[0] == Vec3{0, 0, 0});
     CHECK(marks.hints.to_sensor[1] == Vec3{0, 0, 1});
-    CHECK(marks.point_count == 4);
+    CHECK(marks.count == 4);
     CHECK_THROWS_AS(add_points(marks, cloud({{100, 0, 0}}), lattice()), Error);
 }
 
@@ -91,7 +91,7 @@ TEST_CASE("Points are thinned together with their hints") {
     thin_points(marks, 10);
     REQUIRE(marks.points.size() == 10);
     CHECK(marks.thinned == 10u);
-    CHECK(marks.point_count == 100);
+    CHECK(marks.count == 100);
     for (std::size_t n = 0; n < 10; ++n) CHECK(marks.hints.normals[n][1] == marks.points[n][0]);
     thin_points(marks, 0);
     CHECK(marks.points.size() == 10);
