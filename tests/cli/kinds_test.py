@@ -143,6 +143,15 @@ class Painted(KindsCase):
         self.assertEqual(report["seeds"]["outside"], 3 * 38)
         self.assertEqual(report["seeds"]["wrong"], 0)
 
+    def test_paint_is_not_called_seeds(self):
+        # A cone whose tip is painted by specks on slices side by side: they are no slices of a body, and lie beyond it.
+        x, y, z = lattice()
+        cone = (np.hypot(x, y) < 0.35 * (8 - z)) & (abs(z) < 9)
+        cone[[k for k in range(SIZE) if k % 5 not in (1, 2)]] = False
+        result = self.run_covol("segment", self.image, "--painted", self.labels("cone.nrrd", cone), "--rho", 0, "-o", "s.vdb")
+        self.assertRegex(result.stderr, r"warning: paint: (\d+) of \1 painted voxels lie on the wrong side")
+        self.assertNotIn("seeds", result.stderr)
+
     def test_mistakes(self):
         empty = self.labels("empty.nrrd", np.zeros((SIZE,) * 3))
         paint = self.labels("paint.nrrd", on_slices(ball(), 4, 2))

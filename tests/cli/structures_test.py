@@ -103,6 +103,10 @@ class Structures(Case):
             self.assertLess(abs(s["surface"]["volume"] / self.expected_volume() - 1), 0.045)
             for field in ("resolved", "automatic", "grid", "fit", "guess"):
                 self.assertIn(field, s)
+            # Of the caps of height 1.5 that went to the other structure, a sixth of each ball, marks lie outside.
+            self.assertGreater(s["fit"]["points_to_surface"]["bias"], 0.08)
+            self.assertGreater(s["fit"]["marks_off"]["count"], 20)
+            self.assertAlmostEqual(s["fit"]["marks_off"]["farthest"]["distance"], 1.5, delta=0.2)
         overlap, = report["overlaps"]
         self.assertEqual(overlap["structures"], ["left", "right"])
         self.assertNotIn("inner", overlap)

@@ -21,7 +21,8 @@ LAYERS = [
     {"start": ["start", "level_set"], "painted": ["painted"], "analysis": ["compare", "evidence", "structures", "phantom"], "render/draw": ["picture"]},
     {"guess": ["guess", "guess_correction"], "guidance": ["guidance"], "cloud/surface": ["cloud_surface"], "report": ["report_page"], "render": ["render"]},
     {"segment": ["pipeline"], "segment/start": [], "segment/solve": [], "segment/result": []},
-    {"bricks": ["bricks"]},
+    {"bricks": ["bricks"], "marks": ["marks"]},
+    {"io/inputs": ["file_kind", "read_marks"], "structures": ["segment_structures"]},
 ]
 LEVEL = {folder: level for level, folders in enumerate(LAYERS) for folder in folders}
 FOLDER = {header: folder for folders in LAYERS for folder, headers in folders.items() for header in headers}
@@ -36,7 +37,7 @@ PIPELINE = [
     ["flow"],
     ["coarse_level"],
     ["solve"],
-    ["final_surface"],
+    ["final_surface", "mark_fit"],
     ["report"],
 ]
 PIPELINE_LEVEL = {name: level for level, names in enumerate(PIPELINE) for name in names}

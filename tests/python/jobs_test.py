@@ -109,12 +109,12 @@ def test_every_flag_is_an_option(program):
                             flags[flag[2:].replace("-", "_")] = option
     ours = covol.options()
     assert set(ours) <= set(flags)
-    words = {"points_space", "points_order", "points_scale", "points", "contours", "painted", "inside", "outside", "guess", "init",
+    words = {"points_space", "points_order", "points_scale", "points", "contours", "painted", "painted_as", "painted_outside", "inside", "outside", "guess", "init",
              "spacing"}
     files = {"output", "mask", "mesh", "density", "fields", "table", "evidence", "suggest", "half", "up", "unit_scale",
              "channel", "frame", "correct_level_shift", "points_channels", "plain",
              "report", "keep_failed", "usda", "compression"}  # of reading and writing, which are functions of their own
-    later = {"painted_as", "painted_outside", "brick_voxels", "brick_overlap", "seam_tolerance", "checkpoint", "checkpoint_every", "resume"}
+    later = {"brick_voxels", "brick_overlap", "seam_tolerance", "checkpoint", "checkpoint_every", "resume"}
     unknown = set(flags) - set(ours) - words - files - later
     assert not unknown, f"flags without a keyword: {sorted(unknown)}"
     for name, default in ours.items():  # where help shows a number, it is the default here
@@ -175,6 +175,112 @@ def test_contours_paint_and_guesses(sphere):
     around = 1.1 * np.concatenate([np.eye(3), -np.eye(3)])
     seeds = covol.segment(image, points, inside=[[0, 0, 0]], outside=around)
     assert seeds.report["seeds"] == {"inside": 1, "outside": 6, "wrong": 0, "wrong_inside": 0, "wrong_outside": 0}
+
+
+def test_paint_on_the_outside_and_in_places(sphere):
+    image, points, labels = sphere
+    painted = np.zeros_like(labels)
+    painted[17:22, 18:22, 18:22], painted[2:4, 2:6, 2:6] = 4, 9
+    result = covol.segment(image, points, painted=painted, painted_outside=9, painted_as="scribbles")
+    seeds = result.report["seeds"]
+    assert seeds["outside"] == 32 and seeds["inside"] > 50 and seeds["wrong"] == 0
+    with pytest.raises(covol.Error, match="expected the outside label 3 among its labels, got 4, 9"):
+        covol.segment(image, points, painted=painted, painted_outside=3)
+    with pytest.raises(covol.Error, match="structures") as error:
+        covol.segment(image, points, painted=painted)
+    assert error.value.field == "painted"
+    with pytest.raises(covol.Error, match="painted_as: expected one of auto, slices, scribbles"):
+        covol.segment(image, points, painted=painted, painted_as="strokes")
+
+
+def test_a_tag_distance_that_nothing_encloses(sphere):
+    image, points, _ = sphere
+    with pytest.raises(covol.Error, match="is more than the points' whole box measures") as error:
+        covol.segment(image, points, init="tag", tag_distance=3.0)
+    assert (error.value.code, error.value.field) == ("invalid_options", "tag_distance")
+
+
+def two_balls():
+    """(Image, points by name, {name: expected voxels}) of balls that overlap."""
+    n, h = 40, 0.5
+    axis = h * (np.arange(n) - (n - 1) / 2)
+    z, y, x = np.meshgrid(axis, axis, axis, indexing="ij")
+    centers, radius = {"left": np.array((-2.5, 0, 0)), "right": np.array((2.5, 0.3, 0))}, 4.0
+    away = {name: np.sqrt((x - c[0]) ** 2 + (y - c[1]) ** 2 + (z - c[2]) ** 2) for name, c in centers.items()}
+    pixels = 200 * np.clip((radius - np.minimum(*away.values())) / h + 0.5, 0, 1)
+    up = 1 - (2 * np.arange(1000) + 1) / 1000
+    turn = np.pi * (3 - 5 ** 0.5) * np.arange(1000)
+    normals = np.stack([np.sqrt(1 - up ** 2) * np.cos(turn), np.sqrt(1 - up ** 2) * np.sin(turn), up], axis=1)
+    image = covol.Image(pixels.astype(np.float32), spacing=(h,) * 3, origin=(axis[0],) * 3)
+    expected = {name: (away[name] < radius) & (away[name] <= np.minimum(*away.values())) for name in centers}
+    return image, {name: c + radius * normals for name, c in centers.items()}, expected
+
+
+def test_several_structures(tmp_path, program):
+    image, points, expected = two_balls()
+    found = covol.structures(image, points, rho=0)
+    assert list(found) == ["left", "right"] and [r.label for r in found.values()] == [1, 2]
+    for n, (name, result) in enumerate(found.items(), 1):
+        assert np.array_equal(found.mask == n, result.mask > 0) and dice(result.mask, expected[name]) > 0.97
+        assert result.report["fit"]["points_to_surface"]["bias"] > 0.05 and result.report["fit"]["marks_off"]["count"] > 0
+    (overlap,) = found.overlaps
+    assert overlap["structures"] == ("left", "right") and overlap["volume"] > 10
+    # the program, with the same files
+    covol.save_mask(tmp_path / "i.nrrd", np.asarray(image.array, np.uint8), image)
+    for name, marks in points.items():
+        np.savetxt(tmp_path / f"{name}.xyz", marks, "%.17g")
+    run(program, "segment", tmp_path / "i.nrrd", "--points", *(f"{name}={tmp_path / name}.xyz" for name in points), "--rho", 0,
+        "-o", tmp_path / "s.vdb", "--mask", tmp_path / "m.nrrd", "--json", tmp_path / "r.json")
+    assert np.array_equal(covol.read_image(tmp_path / "m.nrrd").array, found.mask)
+    told = json.loads((tmp_path / "r.json").read_text())["structures"]
+    assert [s["fit"] for s in told] == [r.report["fit"] for r in found.values()]
+
+
+def test_structures_from_paint_seeds_and_names():
+    image, points, expected = two_balls()
+    painted = np.zeros(image.shape, np.uint8)
+    painted[::4][expected["left"][::4]], painted[::4][expected["right"][::4]] = 7, 3
+    found = covol.structures(image, painted=painted, rho=0)
+    assert {name: r.label for name, r in found.items()} == {"label3": 3, "label7": 7}
+    assert set(np.unique(found.mask)) == {0, 3, 7} and dice(found.mask == 7, expected["left"]) > 0.95
+    found = covol.structures(image, {"left": {"points": points["left"], "outside": [(2.5, 0.3, 0)]}, "right": {"init": found["label3"]}},
+                             rho=0)
+    assert found["left"].report["seeds"]["outside"] == 1 and dice(found["right"].mask, expected["right"]) > 0.9
+    with pytest.raises(covol.Error, match="'ponts'") as error:
+        covol.structures(image, {"left": {"ponts": points["left"]}})
+    assert error.value.field == "marks"
+    with pytest.raises(covol.Error, match="^far: "):
+        covol.structures(image, {"left": points["left"], "far": {"inside": [(100, 0, 0)]}})
+    with pytest.raises(covol.Error, match="structure"):
+        covol.structures(image)
+
+
+def test_timelapse():
+    image, points, _ = two_balls()
+    frames = [np.roll(image.array, n, axis=0) for n in range(3)]  # by a voxel along z
+    geometry = {"spacing": image.spacing, "origin": image.origin}
+    first = {"left": points["left"]}
+    asked = []
+
+    def read():
+        for frame in (frames[0], np.zeros((0, 3, 3)), *frames[1:]):
+            asked.append(len(asked))
+            yield frame
+
+    found = covol.timelapse(read(), {**first, "right": points["right"]}, **geometry)
+    next(found)
+    assert asked == [0]
+    failed, second, third = found
+    assert isinstance(failed, covol.Error) and list(third) == ["left", "right"]
+    heights = [r["left"].mesh.vertices[:, 2].mean() for r in (second, third)]
+    assert heights[1] - heights[0] == pytest.approx(0.5, abs=0.2)
+    assert second["left"].report["input"]["points"]["count"] == 0
+    # of one structure, with marks of a later frame
+    alone = list(covol.timelapse([frames[0], (frames[1], points["left"] + (0, 0, 0.5))], points["left"], rho=0, **geometry))
+    assert [r.report["input"]["points"]["count"] for r in alone] == [1000, 1000]
+    assert alone[1].mesh.vertices[:, 2].mean() == pytest.approx(0.5, abs=0.1)
+    with pytest.raises(TypeError, match="detla"):
+        next(covol.timelapse(frames, points["left"], detla=1))
 
 
 def test_shown_in_notebooks(solved, sphere):

@@ -67,9 +67,10 @@ struct CloudCleanupReport {
 };
 
 /// Cleans a cloud with CGAL's point-set processing. The order of the points that stay is kept, up to WLOP, which makes
-/// new ones. The same bits for any number of threads.
+/// new ones. The same bits for any number of threads. One line of the log says what was done.
 /// @param report  may be null
-/// @throws Error InvalidOptions, InvalidInput (a value that is not finite), Numerical (CGAL refuses), Cancelled.
+/// @throws Error InvalidOptions, InvalidInput (a value that is not finite; no point is left), Numerical (CGAL refuses),
+/// Cancelled.
 [[nodiscard]] COVOL_API std::vector<Vec3> clean_cloud(const std::vector<Vec3>& points,
                                                       const CloudCleanupOptions& options, const RunContext& run = {},
                                                       CloudCleanupReport* report = nullptr);

@@ -96,6 +96,7 @@ struct SegmentOptions {
     std::shared_ptr<const Contours> contours;
     PointHints hints;                    ///< of the points as they are given; for a cloud
     std::vector<Vec3> inside, outside;   ///< seeds: positions whose side is known, world units
+    std::size_t painted_seeds = 0;       ///< so many of them are voxels of paint; for messages
     std::optional<double> tag_distance;  ///< D, world units, > 0; automatic: choose_tag_distance()
     std::vector<Vec3> exterior_seeds;
     EdgeOptions edge;

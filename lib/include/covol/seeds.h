@@ -21,7 +21,8 @@ namespace covol {
 /// Seeds against a surface.
 struct SeedCheck {
     std::size_t inside = 0, outside = 0;              ///< seeds that were checked
-    std::size_t wrong_inside = 0, wrong_outside = 0;  ///< those of them on the wrong side
+    std::size_t painted = 0;                          ///< those of them that are voxels of paint; for warning()
+    std::size_t wrong_inside = 0, wrong_outside = 0;  ///< those of all on the wrong side
     Vec3 first{0, 0, 0};                              ///< the first of the wrong ones, world units
     double farthest = 0;                              ///< of them from the surface; no more than the level set knows
 

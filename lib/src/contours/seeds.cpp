@@ -44,10 +44,14 @@ std::vector<Vec3> collect_seeds(const PointCloud& cloud, double step) {
 
 std::string SeedCheck::warning() const {
     if (wrong() == 0) return {};
+    const char* const all = painted == 0                 ? "seeds"
+                            : painted < inside + outside ? "seeds and painted voxels"
+                                                         : "painted voxels";
+    const char* const ones = painted == 0 ? "seeds" : "ones";
     std::ostringstream text;
-    text << wrong() << " of " << inside + outside << " seeds lie on the wrong side of the surface (" << wrong_inside
-         << " inside seeds outside, " << wrong_outside << " outside seeds inside), the first at " << to_text(first)
-         << "; marks on the border beside them would move it";
+    text << wrong() << " of " << inside + outside << " " << all << " lie on the wrong side of the surface ("
+         << wrong_inside << " inside " << ones << " outside, " << wrong_outside << " outside " << ones
+         << " inside), the first at " << to_text(first) << "; marks on the border beside them would move it";
     return text.str();
 }
 

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <sstream>
 #include <utility>
 
 #include "covol/error.h"
@@ -155,6 +156,17 @@ std::vector<Vec3> clean(const std::vector<Vec3>& points, const CloudCleanupOptio
     return cleaner.points();
 }
 
+std::string one_line(const CloudCleanupReport& r, const CloudCleanupOptions& options) {
+    std::ostringstream text;
+    text << "cloud: " << r.kept << " of " << r.given << " points kept; " << r.duplicates << " duplicates";
+    if (options.outlier_factor > 0) text << ", " << r.outliers << " outliers in " << r.outlier_passes << " passes";
+    if (options.simplify > 0) text << ", " << r.simplified << " by cells of " << options.simplify;
+    if (options.smooth == CloudSmoothing::Jets)
+        text << "; jets moved " << r.smoothed << " by " << r.mean_shift << " on average, " << r.max_shift << " at most";
+    if (options.smooth == CloudSmoothing::Wlop) text << "; WLOP made " << r.smoothed;
+    return text.str();
+}
+
 }  // namespace
 
 std::vector<Vec3> clean_cloud(const std::vector<Vec3>& points, const CloudCleanupOptions& options,
@@ -172,7 +184,10 @@ std::vector<Vec3> clean_cloud(const std::vector<Vec3>& points, const CloudCleanu
         throw Error(Errc::Numerical, std::string("clean_cloud: CGAL: ") + e.what());
     }
     own.kept = result.size();
+    if (result.empty() && !points.empty())
+        throw Error(Errc::InvalidInput, "clean_cloud: no point is left of " + std::to_string(points.size()));
     if (report != nullptr) *report = own;
+    run.info(one_line(own, options));
     return result;
 }
 

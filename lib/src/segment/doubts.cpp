@@ -43,9 +43,9 @@ std::vector<char> are_inside(const FloatGrid& u, const std::vector<Vec3>& places
 
 }  // namespace
 
-std::string place_of(const Problem& problem, const Vec3& mark) {
-    if (problem.image == nullptr) return "at " + detail::to_text(mark);
-    const Vec3 index = problem.image->geometry().world_to_index(mark);
+std::string place_of(const Image* image, const Vec3& mark) {
+    if (image == nullptr) return "at " + detail::to_text(mark);
+    const Vec3 index = image->geometry().world_to_index(mark);
     return "on slice " + std::to_string(std::lround(index[2])) + ", at voxel " + detail::to_text(index);
 }
 
@@ -85,7 +85,7 @@ Remarks doubt_isolated_marks(const Problem& problem) {
     constexpr std::size_t kTold = 3;
     std::string places;
     for (std::size_t n = 0; n < std::min(isolated.size(), kTold); ++n)
-        places += (n == 0 ? "" : "; ") + place_of(problem, problem.given[isolated[n].index]) + ", " +
+        places += (n == 0 ? "" : "; ") + place_of(problem.image, problem.given[isolated[n].index]) + ", " +
                   number(isolated[n].distance) + " away";
     if (isolated.size() > kTold) places += "; ...";
     remarks.warn(std::to_string(isolated.size()) + " of " + std::to_string(problem.given.size()) +

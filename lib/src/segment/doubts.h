@@ -7,8 +7,8 @@
 
 namespace covol::pipeline {
 
-/// Where a mark lies, in words: on a slice, at a voxel of the image, or in the world.
-[[nodiscard]] std::string place_of(const Problem& problem, const Vec3& mark);
+/// Where a mark lies, in words: on a slice, at a voxel of the image, or in the world. @param image  null: there is none
+[[nodiscard]] std::string place_of(const Image* image, const Vec3& mark);
 
 /// Warns of marks that lie where no others are, before anything is made of them.
 [[nodiscard]] Remarks doubt_isolated_marks(const Problem& problem);

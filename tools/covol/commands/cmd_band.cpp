@@ -18,7 +18,7 @@ struct BandJob {
     double choose_distance(const Domain& domain, Session& session) const {
         if (tag.has("tag_distance")) return tag.resolve(domain.voxel_size).tag_distance;
         if (points.paths.empty()) throw UsageError("expected --tag-distance, or --points to choose it from");
-        const std::vector<Vec3> cloud = read_world_points(points, nullptr, session.run()).points;
+        const std::vector<Vec3> cloud = read_world_points(points, {}, session.run());
         const TagDistanceChoice choice =
             choose_tag_distance(merge_close_points(cloud, 0), domain, tag.options.exterior_seeds, session.run());
         const std::string line = std::to_string(choice.tag_distance) + " (" + choice.reason + ")";

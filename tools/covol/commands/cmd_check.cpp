@@ -2,11 +2,11 @@
 #include <cmath>
 #include <set>
 
-#include "cli/file_kind.h"
 #include "cli/option_names.h"
 #include "cli/report.h"
 #include "commands/commands.h"
 #include "covol/error.h"
+#include "covol/file_kind.h"
 #include "covol/mesh_cleanup.h"
 #include "covol/safe_text.h"
 #include "covol/surface.h"

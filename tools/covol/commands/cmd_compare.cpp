@@ -1,11 +1,11 @@
 #include <iomanip>
 #include <sstream>
 
-#include "cli/file_kind.h"
 #include "cli/report.h"
 #include "commands/commands.h"
 #include "covol/compare.h"
 #include "covol/error.h"
+#include "covol/file_kind.h"
 #include "covol/mesh_relax.h"
 #include "covol/surface.h"
 #include "flags/bindings.h"

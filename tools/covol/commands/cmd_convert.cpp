@@ -1,9 +1,9 @@
 #include <algorithm>
 
-#include "cli/file_kind.h"
 #include "cli/report.h"
 #include "commands/commands.h"
 #include "covol/error.h"
+#include "covol/file_kind.h"
 #include "covol/vdb_io.h"
 #include "flags/bindings.h"
 #include "flags/cloud_flags.h"
@@ -90,7 +90,11 @@ struct ConvertJob {
         if (cloud_flags.length("simplify").in_voxels && !geometry)
             throw UsageError("--simplify: a length in voxels needs --like IMAGE");
         const double h = geometry ? *std::min_element(geometry->spacing.begin(), geometry->spacing.end()) : 1;
-        world = cloud_flags.clean(world, h, session.run(), report);
+        if (const CloudCleanupOptions cleanup = cloud_flags.resolve(h); cleanup.any()) {
+            CloudCleanupReport done;
+            world = clean_cloud(world, cleanup, session.run(), &done);
+            report["cleanup"] = to_json(done);
+        }
         session.outputs().add(output, [world, comment = session.comment()](const std::string& path) {
             write_points(path, world, comment);
         });

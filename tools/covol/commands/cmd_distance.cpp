@@ -41,7 +41,7 @@ struct DistanceJob {
         if (!like.empty()) geometry = read_image_geometry(like, image.options, session.run());
         const ImageGeometry* pointer = geometry ? &*geometry : nullptr;
         geometry ? session.set_world(*geometry) : session.set_world_of_points();
-        const std::vector<Vec3> cloud = read_world_points(points, pointer, session.run()).points;
+        const std::vector<Vec3> cloud = read_world_points(points, geometry, session.run());
         const double h = voxel_size(pointer, cloud, session);
         const double radius = tube.length("max_distance").resolve(h, kTubeVoxels * h);
         const Domain box = choose_domain(pointer, cloud, h, radius);

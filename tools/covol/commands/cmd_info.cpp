@@ -3,9 +3,9 @@
 #include <iomanip>
 #include <sstream>
 
-#include "cli/file_kind.h"
 #include "cli/report.h"
 #include "commands/commands.h"
+#include "covol/file_kind.h"
 #include "covol/safe_text.h"
 #include "covol/vdb_io.h"
 #include "flags/bindings.h"

@@ -1,9 +1,9 @@
 #include <memory>
 
-#include "cli/file_kind.h"
 #include "cli/report.h"
 #include "commands/commands.h"
 #include "covol/error.h"
+#include "covol/file_kind.h"
 #include "covol/structures.h"
 #include "flags/bindings.h"
 

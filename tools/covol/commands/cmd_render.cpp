@@ -43,7 +43,7 @@ struct RenderJob {
             scene.structures.push_back(structure);
         }
         add_opacities(scene);
-        add_marks(scene, pixels ? &pixels->geometry() : nullptr, session.run());
+        add_marks(scene, pixels ? std::optional(pixels->geometry()) : std::nullopt, session.run());
         if (pixels) {
             scene.image = &*pixels;
             scene.is_anatomical = is_anatomical(image_path, image.options, session.run());
@@ -112,12 +112,12 @@ private:
         return value;
     }
 
-    void add_marks(RenderScene& scene, const ImageGeometry* geometry, const RunContext& run) const {
+    void add_marks(RenderScene& scene, const std::optional<ImageGeometry>& geometry, const RunContext& run) const {
         for (const std::string& text : points.paths) {
             const Named file = split_name(text);
             PointFlags own = points;
             own.paths = {file.value};
-            const std::vector<Vec3> marks = read_world_points(own, geometry, run).points;
+            const std::vector<Vec3> marks = read_world_points(own, geometry, run);
             const bool loose = file.name.empty() && scene.structures.size() > 1;
             std::vector<Vec3>& to =
                 loose ? scene.marks : scene.structures[owner_of(names_of(scene), "--points", file, "FILE")].marks;

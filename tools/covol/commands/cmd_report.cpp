@@ -9,8 +9,8 @@
 #include "covol/mesh_relax.h"
 #include "covol/structures.h"
 #include "covol/surface.h"
+#include "flags/contour_flags.h"
 #include "jobs/level_sets.h"
-#include "jobs/marks.h"
 #include "jobs/page.h"
 
 namespace covol::tool {
@@ -43,7 +43,7 @@ struct ReportPageJob {
         std::vector<Shown> all = read_surfaces(session.run());
         std::optional<Image> pixels;
         if (!image_path.empty()) pixels = image.read(image_path, session.run());
-        add_marks(all, pixels ? &pixels->geometry() : nullptr, session.run());
+        add_marks(all, pixels ? std::optional(pixels->geometry()) : std::nullopt, session.run());
         if (pixels) {
             facts["input"]["image"] = to_json(pixels->geometry());
             facts["input"]["image"]["path"] = image_path;
@@ -117,19 +117,17 @@ private:
         return all;
     }
 
-    void add_marks(std::vector<Shown>& all, const ImageGeometry* geometry, const RunContext& run) const {
+    void add_marks(std::vector<Shown>& all, const std::optional<ImageGeometry>& geometry, const RunContext& run) const {
         std::vector<std::string> names;
         for (const Shown& shown : all) names.push_back(shown.grid);
         const auto add = [&](const char* flag, const std::string& text, bool are_contours) {
             const Named file = split_name(text);
             Shown& shown = all[owner_of(names, flag, file, "FILE")];
-            PointFlags own_points = points;
-            ContourFlags own_contours = contours;
-            own_points.paths.clear();
-            own_contours.paths.clear();
-            (are_contours ? own_contours.paths : own_points.paths).push_back(file.value);
-            const Marks marks = read_marks(own_points, own_contours, {}, geometry, run);
-            shown.marks.insert(shown.marks.end(), marks.given.begin(), marks.given.end());
+            Marks marks;
+            (are_contours ? marks.files.contours : marks.files.points).push_back(file.value);
+            read_marks(marks, geometry, reading_of(points, run), run);
+            const std::vector<Vec3> given = positions_of(marks, geometry);
+            shown.marks.insert(shown.marks.end(), given.begin(), given.end());
             shown.facts["input"][are_contours ? "contours" : "points"]["paths"].push_back(file.value);
         };
         for (const std::string& text : points.paths) add("--points", text, false);

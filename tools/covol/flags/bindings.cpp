@@ -9,7 +9,6 @@
 
 #include "covol/error.h"
 #include "covol/mesh_stream.h"
-#include "covol/points_text.h"
 
 namespace covol::tool {
 
@@ -135,20 +134,19 @@ const std::string& standard_input(const RunContext& run) {
 
 }  // namespace
 
-WorldPoints read_world_points(const PointFlags& flags, const ImageGeometry* geometry, const RunContext& run) {
-    WorldPoints all;
-    for (const std::string& path : flags.paths) {
-        run.check();
-        const PointCloud cloud = path == "-" ? parse_points(standard_input(run), "standard input", flags.options)
-                                             : read_points(path, flags.options);
-        if (!cloud.lines.empty())
-            run.warn(path + ": its marks form " + std::to_string(cloud.lines.size()) +
-                     " lines, and are taken as loose points here; --contours joins them along the lines");
-        add_cloud(cloud, geometry, all, run);
-        run.info(path + ": " + std::to_string(cloud.points.size()) + " points" +
-                 (cloud.rule.empty() ? "" : ", " + cloud.rule));
-    }
-    return all;
+ReadMarksOptions reading_of(const PointFlags& flags, const RunContext& run) {
+    ReadMarksOptions reading;
+    reading.points = flags.options;
+    reading.standard_input = [run]() -> const std::string& { return standard_input(run); };
+    return reading;
+}
+
+std::vector<Vec3> read_world_points(const PointFlags& flags, const std::optional<ImageGeometry>& geometry,
+                                    const RunContext& run) {
+    Marks marks;
+    marks.files.points = flags.paths;
+    read_marks(marks, geometry, reading_of(flags, run), run);
+    return marks.points;
 }
 
 // ---- model ---------------------------------------------------------------------------------------------------------

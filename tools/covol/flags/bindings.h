@@ -14,9 +14,9 @@
 #include "covol/mesh_io.h"
 #include "covol/pipeline.h"
 #include "covol/points.h"
+#include "covol/read_marks.h"
 #include "covol/vdb_io.h"
 #include "flags/given.h"
-#include "flags/world_points.h"
 
 // Options of the library's structs, by their tables, and groups of flags that several subcommands share.
 namespace covol::tool {
@@ -126,8 +126,11 @@ struct PointFlags : Given<ReadPointsOptions> {
     void bind_options(CLI::App& command) { tool::bind_options(command, *this, Offered::SingleStep); }
 };
 
-[[nodiscard]] WorldPoints read_world_points(const PointFlags& flags, const ImageGeometry* geometry,
-                                            const RunContext& run);
+/// How files of marks are read; "-" is standard input.
+[[nodiscard]] ReadMarksOptions reading_of(const PointFlags& flags, const RunContext& run);
+/// World units.
+[[nodiscard]] std::vector<Vec3> read_world_points(const PointFlags& flags, const std::optional<ImageGeometry>& geometry,
+                                                  const RunContext& run);
 
 /// h, where --voxel-size may be relative ("2vx") to the automatic one. Says which in `session`.
 /// @param tagged  of choose_voxel_size()

@@ -21,16 +21,9 @@ struct CloudFlags : Given<CloudCleanupOptions> {
     void check() const;
     /// @throws UsageError where an option is given, and there is no cloud.
     void check_used(bool has_cloud) const;
-    /// Which points of a cloud without an image are used, sorted in space; says so where these are not all of them, and
-    /// puts it into `report` as "thinned_to".
-    [[nodiscard]] std::vector<std::uint32_t> used(const std::vector<Vec3>& points, const RunContext& run,
-                                                  Json& report) const;
-    /// The cloud as asked for; says what was done, and puts it into `report` as "cleanup".
-    [[nodiscard]] std::vector<Vec3> clean(const std::vector<Vec3>& points, double h, const RunContext& run,
-                                          Json& report) const;
-
-private:
     [[nodiscard]] CloudCleanupOptions cleanup(double h) const;
 };
+
+[[nodiscard]] Json to_json(const CloudCleanupReport& report);
 
 }  // namespace covol::tool

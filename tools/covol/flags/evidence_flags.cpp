@@ -6,7 +6,7 @@
 #include "cli/report.h"
 #include "cli/table.h"
 #include "covol/error.h"
-#include "flags/judge.h"
+#include "covol/segment_structures.h"
 
 namespace covol::tool {
 namespace {
@@ -39,7 +39,7 @@ void EvidenceFlags::check(Outputs& outputs, const std::string& path_of_this_run)
 
 Evidence EvidenceFlags::judge(const SegmentResult& result, const std::vector<Vec3>& marks, const Image& image,
                               const RunContext& run) const {
-    return tool::judge(result, marks, image, suggestions.value_or(for_page ? kPageSuggestions : 0), run);
+    return assess_evidence(result, marks, image, suggestions.value_or(for_page ? kPageSuggestions : 0), run);
 }
 
 Json to_json(const Evidence& e) {

@@ -22,7 +22,7 @@ struct EvidenceFlags {
     void bind(CLI::App& command);
     void check(Outputs& outputs, const std::string& path_of_this_run) const;
     [[nodiscard]] bool wanted() const { return !path.empty() || suggestions.value_or(0) > 0 || for_page; }
-    /// See flags/judge.h.
+    /// assess_evidence(), of as many suggestions as were asked for.
     [[nodiscard]] Evidence judge(const SegmentResult& result, const std::vector<Vec3>& marks, const Image& image,
                                  const RunContext& run) const;
 };

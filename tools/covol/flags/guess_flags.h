@@ -1,6 +1,4 @@
 #pragma once
-#include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,16 +15,6 @@ struct GuessFlags {
 
     void bind(CLI::App& command);
 };
-
-/// It as segment() takes it, and the mask that is written back.
-struct Guess {
-    Start start;
-    std::optional<Image> mask;  ///< as the file holds it
-    int label = 1;              ///< what is inside
-};
-/// @throws Error InvalidInput (several labels and none chosen: lists them; outside of the image).
-[[nodiscard]] Guess read_guess(const std::string& path, int label, const ImageGeometry& image, bool force,
-                               const RunContext& run);
 
 [[nodiscard]] Json to_json(const CorrectionReport& report);
 

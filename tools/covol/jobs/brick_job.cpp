@@ -18,8 +18,9 @@ namespace {
 
 constexpr double kSmallJob = 64;  // voxels across: never worth a look
 
-std::unique_ptr<BrickJob> make_job(const Image* image, const PreparedStructure& structure, const RunContext& run) {
-    if (image != nullptr) return std::make_unique<BrickJob>(*image, structure.points, structure.options, run);
+std::unique_ptr<BrickJob> make_job(const std::optional<Image>& image, const StructureInput& structure,
+                                   const RunContext& run) {
+    if (image) return std::make_unique<BrickJob>(*image, structure.points, structure.options, run);
     return std::make_unique<BrickJob>(structure.points, structure.options, run);
 }
 
@@ -201,26 +202,24 @@ std::string outputs_of_join(const Session& session) {
 
 void run_bricks(const SegmentJob& job, Session& session) {
     const BrickCall& call = *session.brick();
-    const std::vector<StructureInput> inputs = structures_of(job, job.painted.read(session.run()));
-    if (is_timelapse(job) || inputs.size() != 1)
+    const std::vector<Marks> structures = structures_of(job, job.painted.read(session.run()));
+    if (is_timelapse(job) || structures.size() != 1)
         throw UsageError("brick: expected one structure in one image; plan each by itself");
     const BrickFolder folder(call.folder);
     if (call.step == BrickCall::Step::Join)
-        return run_structures(job, session,
-                              [&](const Image* image, const PreparedStructure& structure, const RunContext& run) {
-                                  const BrickPlan plan = folder.read_plan();
-                                  return join(job, *make_job(image, structure, run), plan, folder, session);
-                              });
+        return run_structures(
+            job, session,
+            [&](const std::optional<Image>& image, const StructureInput& structure, const RunContext& run) {
+                const BrickPlan plan = folder.read_plan();
+                return join(job, *make_job(image, structure, run), plan, folder, session);
+            });
     job.check_options();
-    const std::vector<StructureStart> starts = starts_of(job, inputs);
     std::optional<Image> image;
     if (!job.images.empty()) image = job.read(job.images.front(), job.image.options, session);
-    const Image* const pixels = image ? &*image : nullptr;
     if (call.step == BrickCall::Step::Plan) {
-        const PreparedStructure structure =
-            StructurePreparer(job, inputs, pixels, starts, session).prepare(0, session.run());
+        const StructureInput structure = prepare_structure(job, structures, image, session, session.run());
         const BrickPlan plan =
-            make_job(pixels, structure, session.run())->plan(job.bricks.resolve(session.memory_limit()));
+            make_job(image, structure, session.run())->plan(job.bricks.resolve(session.memory_limit()));
         folder.write_plan(plan, session.job(), session.inputs(), {});
         if (const std::string outputs = outputs_of_join(session); !outputs.empty())
             session.note("the plan keeps settings and inputs alone; name what is to be written behind brick join: " +
@@ -233,8 +232,8 @@ void run_bricks(const SegmentJob& job, Session& session) {
         if (brick >= plan.bricks.size())
             throw UsageError("brick run: expected bricks 0 to " + std::to_string(plan.bricks.size() - 1) + ", got " +
                              std::to_string(brick));
-    const PreparedStructure structure = StructurePreparer(job, inputs, pixels, starts, session).prepare(0, inner);
-    const std::unique_ptr<BrickJob> solver = make_job(pixels, structure, inner);
+    const StructureInput structure = prepare_structure(job, structures, image, session, inner);
+    const std::unique_ptr<BrickJob> solver = make_job(image, structure, inner);
     const BrickRunner runner(*solver, plan, folder, session.run());
     std::vector<std::size_t> bricks = call.bricks;
     if (bricks.empty()) {
@@ -245,12 +244,12 @@ void run_bricks(const SegmentJob& job, Session& session) {
     static_cast<void>(runner.run_sweep(std::max(1, call.sweep), bricks));
 }
 
-SegmentResult solve_within_limit(const SegmentJob& job, const Image* image, const PreparedStructure& structure,
-                                 Session& session, const RunContext& run) {
-    const auto in_one = [&] { return solve_in_one_piece(image, structure, run); };
+SegmentResult solve_within_limit(const SegmentJob& job, const std::optional<Image>& image,
+                                 const StructureInput& structure, Session& session, const RunContext& run) {
+    const auto in_one = [&] { return solve_structure(image, structure, run); };
     const std::optional<std::uint64_t> limit = session.memory_limit();
     if (!limit) return in_one();
-    const WorldBox box = structure.points.empty() ? (image != nullptr ? image->geometry().world_box() : WorldBox{})
+    const WorldBox box = structure.points.empty() ? (image ? image->geometry().world_box() : WorldBox{})
                                                   : bounding_box(structure.points);
     if (longest_side(box) < kSmallJob * structure.options.voxel_size.value_or(1)) return in_one();
     RunContext inner = quiet(run);

@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "cli/arguments.h"
-#include "cli/file_kind.h"
+#include "covol/file_kind.h"
 
 namespace covol::tool {
 namespace {

@@ -12,7 +12,6 @@
 
 #include "cli/report.h"
 #include "covol/error.h"
-#include "jobs/marks.h"
 #include "jobs/structure_inputs.h"
 #include "jobs/timelapse_job.h"
 
@@ -48,29 +47,22 @@ struct StructurePlan {
     std::set<std::uint64_t> blocks;  ///< that are read
 };
 
-Pilot run_pilot(const SegmentJob& job, const StructureInput& input, const ImageGeometry* geometry, double h,
-                Session& session, const RunContext& quiet) {
-    Marks marks = read_marks(input.points, input.contours, job.cloud, geometry, quiet);
-    prepare_marks(marks, job.cloud, input.contours, geometry, h, session, quiet);
-    SegmentOptions options = job.resolve(h);
-    options.contours = marks.contours;
-    options.hints = marks.hints;
-    options.exterior_seeds = input.exterior_seeds;
-    Seeds seeds = read_seeds(input.seeds, input.points.options, geometry, h, quiet);
-    options.inside = std::move(seeds.inside);
-    options.outside = std::move(seeds.outside);
+Pilot run_pilot(const SegmentJob& job, const Marks& marks, const std::optional<ImageGeometry>& geometry, double h,
+                const RunContext& quiet) {
+    const StructureInput input = prepare_marks({marks}, geometry, job.resolve(h), job.marks_options(h), quiet).front();
+    SegmentOptions options = input.options;
     options.evolve.rho = 0;
     options.without_mesh = true;
     options.holes = {};
     options.extract = {};
     options.without_fields = false;
     Stopwatch watch;
-    SegmentResult result = reconstruct(marks.points, options, quiet);
+    SegmentResult result = reconstruct(input.points, options, quiet);
     Start::Kind start = result.report.resolved.start.kind;
-    if (geometry != nullptr && start == Start::Kind::Cloud) {  // which points have without an image alone
+    if (geometry && start == Start::Kind::Cloud) {  // which points have without an image alone
         options.start.kind = start = Start::Kind::Tag;
         watch = {};
-        result = reconstruct(marks.points, options, quiet);
+        result = reconstruct(input.points, options, quiet);
     }
     Pilot pilot{result.report.resolved.voxel_size.value_or(h),
                 double(result.report.active_voxels),
@@ -170,32 +162,34 @@ void plan_smoothing(const FloatGrid& surface, const ImageInfo& image, double rea
     plan.blocks = std::move(blocks.found);
 }
 
-StructurePlan plan_structure(const SegmentJob& job, const StructureInput& input, const ImageInfo* image, double given_h,
+StructurePlan plan_structure(const SegmentJob& job, Marks marks, const ImageInfo* image, double given_h,
                              Session& session, const RunContext& quiet) {
-    const ImageGeometry* geometry = image != nullptr ? &image->geometry : nullptr;
-    const Marks marks = read_marks(input.points, input.contours, job.cloud, geometry, quiet);
-    if (marks.given.empty())
+    std::optional<ImageGeometry> geometry;
+    if (image != nullptr) geometry = image->geometry;
+    read_marks(marks, geometry, job.reading(quiet), quiet);
+    if (!geometry) thin_points(marks, job.cloud.most_points, quiet);
+    const std::vector<Vec3> given = positions_of(marks, geometry);
+    if (given.empty())
         throw Error(Errc::InvalidInput,
                     "plan: expected points or contours, got none: how far a surface moves that starts without marks "
                     "is not known before");
-    const double h = given_h > 0 ? given_h : job.resolve_voxel_size(nullptr, marks, session);
-    const double coarse = std::max(h, longest_side(bounding_box(marks.given)) / kPilotVoxels);
-    const Pilot coarser = run_pilot(job, input, geometry, 2 * coarse, session, quiet);
-    const Pilot pilot = run_pilot(job, input, geometry, coarse, session, quiet);
+    const double h = given_h > 0 ? given_h : job.resolve_voxel_size(nullptr, marks, geometry, session);
+    const double coarse = std::max(h, longest_side(bounding_box(given)) / kPilotVoxels);
+    const Pilot coarser = run_pilot(job, marks, geometry, 2 * coarse, quiet);
+    const Pilot pilot = run_pilot(job, marks, geometry, coarse, quiet);
     // seconds = fixed + growing / h^2
     const double c = pilot.voxel_size, d = std::max(coarser.voxel_size, 1.01 * c);
     const double growing = std::max(0.0, (pilot.seconds - coarser.seconds) / (1 / (c * c) - 1 / (d * d)));
     const double fixed = std::max(0.0, pilot.seconds - growing / (c * c));
     StructurePlan plan;
-    plan.name = input.name;
+    plan.name = marks.name;
     const double finer = std::max(1.0, c / h);
     plan.active_voxels = pilot.active_voxels * finer * finer;
     plan.tube_voxels = pilot.tube_voxels * finer * finer * finer;
     plan.seconds = fixed + growing / (c * c) * finer * finer;
     if (image != nullptr) plan.seconds *= pilot.is_guess ? kGuessTime : kFlowTime;
     plan.bytes_while_solved = kTubeBytes * plan.tube_voxels - kBandBytes * plan.active_voxels;
-    if (pilot.is_cloud)
-        plan.bytes_while_solved = std::min(kCloudPointBytes * double(marks.given.size()), kMostCloudBytes);
+    if (pilot.is_cloud) plan.bytes_while_solved = std::min(kCloudPointBytes * double(given.size()), kMostCloudBytes);
     if (image == nullptr) return plan;
     if (pilot.is_guess) {
         plan_smoothing(*pilot.surface, *image, kGuessVoxels * h, plan);
@@ -248,8 +242,8 @@ void run_plan(const SegmentJob& job, Session& session) {
     }
     double voxels = 0, while_solved = 0, seconds = 0;
     std::set<std::uint64_t> blocks;
-    for (const StructureInput& input : structures_of(job, job.painted.read(session.run()))) {
-        const StructurePlan one = plan_structure(job, input, image ? &*image : nullptr, given_h, session, quiet);
+    for (const Marks& marks : structures_of(job, job.painted.read(session.run()))) {
+        const StructurePlan one = plan_structure(job, marks, image ? &*image : nullptr, given_h, session, quiet);
         voxels += one.active_voxels;
         while_solved = std::max(while_solved, one.bytes_while_solved);
         seconds += one.seconds;

@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/file_kind.h"
+#include "covol/file_kind.h"
 
 // What goes wrong with a file in one program, and the option that mends it: the rules of covol check --for.
 namespace covol::tool {

@@ -3,20 +3,33 @@
 #include <algorithm>
 #include <utility>
 
-#include "cli/file_kind.h"
 #include "cli/report.h"
 #include "covol/error.h"
+#include "covol/file_kind.h"
 #include "jobs/brick_job.h"
-#include "jobs/marks.h"
 #include "jobs/plan_job.h"
 #include "jobs/structures_job.h"
 #include "jobs/timelapse_job.h"
 
 namespace covol::tool {
 
-double SegmentJob::resolve_voxel_size(const Image* input_image, const Marks& marks, Session& session) const {
-    const bool tagged = !marks.drawn.empty() || resolve(1).tags_points();
-    return tool::resolve_voxel_size(given.length("voxel_size"), input_image, marks.given, tagged, session);
+double SegmentJob::resolve_voxel_size(const Image* input_image, const Marks& marks,
+                                      const std::optional<ImageGeometry>& geometry, Session& session) const {
+    const bool tagged = !marks.contours.empty() || resolve(1).tags_points();
+    return tool::resolve_voxel_size(given.length("voxel_size"), input_image,
+                                    input_image != nullptr ? std::vector<Vec3>{} : positions_of(marks, geometry),
+                                    tagged, session);
+}
+
+MarksOptions SegmentJob::marks_options(double h) const {
+    return {contours.resolve(h), cloud.cleanup(h), image.has("spacing")};
+}
+
+ReadMarksOptions SegmentJob::reading(const RunContext& run) const {
+    ReadMarksOptions options = reading_of(points, run);
+    options.guess_label = guess.inputs.options.guess_label;
+    options.force_geometry = image.has("spacing");
+    return options;
 }
 
 SegmentOptions SegmentJob::resolve(double h) const {
@@ -204,9 +217,10 @@ void SegmentJob::run(Session& session) const {
     if (session.brick()) return run_bricks(*this, session);
     if (is_timelapse(*this)) return run_timelapse(*this, session);
     checkpoint.begin(session);
-    run_structures(*this, session, [&](const Image* image, const PreparedStructure& structure, const RunContext& run) {
-        return solve_within_limit(*this, image, structure, session, run);
-    });
+    run_structures(*this, session,
+                   [&](const std::optional<Image>& pixels, const StructureInput& structure, const RunContext& run) {
+                       return solve_within_limit(*this, pixels, structure, session, run);
+                   });
 }
 
 }  // namespace covol::tool

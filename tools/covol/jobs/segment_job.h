@@ -15,8 +15,6 @@
 
 namespace covol::tool {
 
-struct Marks;
-
 /// What `segment` and `reconstruct` share: they differ in the image alone.
 struct SegmentJob {
     std::vector<std::string> images;  ///< none: points alone; several: the frames of a time-lapse
@@ -49,8 +47,12 @@ struct SegmentJob {
     void sort_output(bool with_image);
     [[nodiscard]] std::string any_output() const;
     [[nodiscard]] SegmentOptions resolve(double h) const;
+    [[nodiscard]] MarksOptions marks_options(double h) const;
+    [[nodiscard]] ReadMarksOptions reading(const RunContext& run) const;
     /// resolve_voxel_size() for a structure with these marks.
-    [[nodiscard]] double resolve_voxel_size(const Image* input_image, const Marks& marks, Session& session) const;
+    /// @param geometry  that the marks belong to
+    [[nodiscard]] double resolve_voxel_size(const Image* input_image, const Marks& marks,
+                                            const std::optional<ImageGeometry>& geometry, Session& session) const;
     /// Whether an output, or what is done to the surface, needs its relaxed mesh.
     [[nodiscard]] bool needs_mesh() const;
     /// Options that are wrong whatever h is are found before anything is read.

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "cli/file_kind.h"
 #include "cli/report.h"
+#include "covol/file_kind.h"
 #include "covol/mesh_stream.h"
 #include "covol/surface.h"
 #include "covol/vdb_io.h"
@@ -184,8 +184,30 @@ std::string title_of(const SegmentJob& job) {
     return (path.has_filename() ? path : path.parent_path()).filename().string();
 }
 
+Json input_of(const StructureOutput& s) {
+    Json json;
+    json["points"] = {{"densified", s.result.report.densified}, {"paths", s.files.points}, {"rules", s.rules}};
+    if (s.thinned) json["points"]["thinned_to"] = *s.thinned;
+    json["points"]["count"] = s.count;
+    if (s.cleanup) json["points"]["cleanup"] = to_json(*s.cleanup);
+    if (!s.contour_rules.empty()) {
+        const Contours& contours = *s.result.report.resolved.contours;
+        json["contours"] = {{"paths", s.files.contours},      {"rules", s.contour_rules},
+                            {"closed", contours.closed},      {"open", contours.open},
+                            {"slices", contours.slices},      {"slice_distance", contours.slice_distance},
+                            {"along", contours.along.size()}, {"between", contours.between.size()}};
+    }
+    for (const auto& [path, paint] : s.paint) {
+        Json entry = to_json(paint);
+        entry["path"] = path;
+        json["painted"].push_back(entry);
+    }
+    if (s.guess) json["guess"] = {{"path", s.files.guess}, {"label", s.guess->label}};
+    return json;
+}
+
 Json report_of(const StructureOutput& s) {
-    Json json{{"input", s.input}};
+    Json json{{"input", input_of(s)}};
     json.update(to_json(s.result.report));
     if (s.result.correction) json["correction"] = to_json(s.result.report.correction);
     if (s.corrected)
@@ -221,11 +243,11 @@ std::string density_name(const StructuresOutput& output, const StructureOutput& 
     return output.structures.size() > 1 ? "density_" + structure.grid : "density";
 }
 
-void check_outputs(const SegmentJob& job, const std::vector<StructureInput>& inputs, const NameTag& tagged,
+void check_outputs(const SegmentJob& job, const std::vector<Marks>& structures, const NameTag& tagged,
                    Outputs& outputs) {
     outputs.check("-o", tagged(job.output), OutputKind::Vdb);
     outputs.check("--mask", tagged(job.mask_path), OutputKind::Image);
-    if (!job.mask_path.empty() && !inputs.front().name.empty() && !keeps_names(job.mask_path))
+    if (!job.mask_path.empty() && !structures.front().name.empty() && !keeps_names(job.mask_path))
         outputs.check("--mask", labels_path(tagged(job.mask_path)), OutputKind::Text);
     if (!is_density_in_output(job)) outputs.check("--density", tagged(job.density_path), OutputKind::Vdb);
     outputs.check("--fields", tagged(job.fields_path), OutputKind::Vdb);
@@ -233,9 +255,9 @@ void check_outputs(const SegmentJob& job, const std::vector<StructureInput>& inp
     outputs.check("--keep-failed", tagged(job.failed_path), OutputKind::Vdb);
     job.evidence.check(outputs, tagged(job.evidence.path));
     const std::string mesh = tagged(job.mesh_path);
-    if (inputs.size() == 1 || mesh.empty() || holds_several_meshes(mesh))
+    if (structures.size() == 1 || mesh.empty() || holds_several_meshes(mesh))
         return outputs.check("--mesh", mesh, OutputKind::Mesh);
-    for (const std::string& grid : make_grid_names(names_of(inputs)))
+    for (const std::string& grid : make_grid_names(names_of(structures)))
         outputs.check("--mesh", with_suffix(mesh, "_" + grid), OutputKind::Mesh);
 }
 
@@ -282,7 +304,14 @@ Json to_json(const StructuresOutput& output) {
         entry.update(report_of(s));
         list.push_back(entry);
     }
-    return {{"structures", list}, {"overlaps", output.overlaps}};
+    Json overlaps = Json::array();
+    for (const StructureOverlap& overlap : output.overlaps) {
+        Json entry{{"structures", {output.structures[overlap.a].name, output.structures[overlap.b].name}},
+                   {"volume", overlap.volume}};
+        if (overlap.inner) entry["inner"] = output.structures[*overlap.inner].name;
+        overlaps.push_back(entry);
+    }
+    return {{"structures", list}, {"overlaps", overlaps}};
 }
 
 std::vector<std::string> result_columns() {

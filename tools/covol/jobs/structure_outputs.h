@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "cli/table.h"
-#include "covol/structures.h"
+#include "covol/segment_structures.h"
 #include "flags/evidence_flags.h"
 #include "jobs/name_tag.h"
 #include "jobs/segment_job.h"
@@ -16,15 +16,10 @@
 namespace covol::tool {
 
 /// What came out for one.
-struct StructureOutput {
-    std::string name, grid;
-    [[nodiscard]] const std::string& shown_name() const { return name.empty() ? grid : name; }
-    std::vector<Vec3> marks;  ///< as they were clicked
-    Json input;               ///< of the report
-    SegmentResult result;
+struct StructureOutput : StructureResult {
     std::optional<Evidence> evidence;
-    int label = 0;                           ///< in the mask
     std::optional<CorrectedMask> corrected;  ///< of a guess that is a mask in the image's geometry
+    [[nodiscard]] const std::string& shown_name() const { return name.empty() ? grid : name; }
 };
 
 /// All structures of one image, disjoint.
@@ -33,7 +28,7 @@ struct StructuresOutput {
     std::optional<Image> image;  ///< where a report page shows it
     bool is_anatomical = false;  ///< of that image
     std::vector<StructureOutput> structures;
-    Json overlaps = Json::array();
+    std::vector<StructureOverlap> overlaps;
     [[nodiscard]] std::vector<std::string> names() const;
     [[nodiscard]] std::vector<int> labels() const;
 };
@@ -50,7 +45,7 @@ using Sink = std::function<void(const std::string& path, std::function<void(cons
 void hand_over(const SegmentJob& job, const std::shared_ptr<const StructuresOutput>& output, const NameTag& tagged,
                Session& session, const Sink& sink);
 /// Checks those names. @throws Error as Outputs::check().
-void check_outputs(const SegmentJob& job, const std::vector<StructureInput>& inputs, const NameTag& tagged,
+void check_outputs(const SegmentJob& job, const std::vector<Marks>& structures, const NameTag& tagged,
                    Outputs& outputs);
 
 /// {"structures": [...], "overlaps": [...]}, or the fields of the only one that has no name.

@@ -10,40 +10,14 @@
 
 #include "cli/report.h"
 #include "covol/error.h"
-#include "covol/mesh_stream.h"
-#include "covol/surface.h"
 #include "covol/vdb_io.h"
-#include "jobs/marks.h"
 #include "jobs/page.h"
-#include "jobs/paint_reader.h"
 #include "jobs/usd_scene.h"
 
 namespace covol::tool {
 namespace {
 
-constexpr std::size_t kMostInLines = 4;  // structures; of more there is a table, and no line for each step
-
-/// A context whose lines begin with the structure's name. @param brief  warnings alone
-RunContext speaking_for(const std::string& name, bool brief, const RunContext& run) {
-    RunContext named = run;
-    if (!name.empty() && run.log)
-        named.log = [log = run.log, name, brief](LogLevel level, const std::string& line) {
-            if (!brief || level == LogLevel::Warning) log(level, name + ": " + line);
-        };
-    return named;
-}
-
-/// A core that the points enclose is farther than D from all of them, and lies in their box.
-void check_tag_distance(double tag_distance, const std::vector<Vec3>& points) {
-    if (points.empty()) return;
-    const WorldBox box = bounding_box(points);
-    const double diagonal = std::hypot(box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]);
-    if (tag_distance <= diagonal) return;
-    std::ostringstream text;
-    text << "--tag-distance: " << tag_distance << " is more than the points' whole box measures, " << diagonal
-         << ": nothing that they enclose is that far from them";
-    throw Error(Errc::InvalidOptions, text.str());
-}
+constexpr std::size_t kMostInLines = 4;  // structures; of more there is a table
 
 /// Up to rounding in files.
 bool is_same_lattice(const ImageGeometry& a, const ImageGeometry& b) {
@@ -57,42 +31,6 @@ bool is_same_lattice(const ImageGeometry& a, const ImageGeometry& b) {
     return true;
 }
 
-void measure_again(StructureOutput& s, const ExtractOptions& extract, const RunContext& run) {
-    SegmentReport& report = s.result.report;
-    const FloatGrid& surface = *s.result.surface;
-    if (report.resolved.without_mesh) {
-        const StreamedMesh made = measure_surface(surface, 0, run);
-        report.mesh.triangles = std::int64_t(made.triangles);
-        report.surface = made.measures;
-        if (!s.marks.empty()) report.fit = measure_fit(s.marks, surface, run);
-        return;
-    }
-    TriangleMesh& mesh = s.result.mesh;
-    mesh = extract_mesh(surface, extract, run);
-    report.mesh = relax_mesh(mesh, surface, {extract.isovalue}, run);
-    report.surface = measure(mesh);
-    if (!s.marks.empty()) report.fit = measure_fit(s.marks, mesh, run);
-}
-
-/// What changed by the separation is measured again.
-void separate_all(StructuresOutput& output, const SegmentOptions& options, const RunContext& run) {
-    const SeparateResult separated = separate(solids(output), {}, run);
-    for (const StructureOverlap& overlap : separated.report.overlaps) {
-        Json entry{{"structures", {output.structures[overlap.a].name, output.structures[overlap.b].name}},
-                   {"volume", overlap.volume}};
-        if (overlap.inner) entry["inner"] = output.structures[*overlap.inner].name;
-        output.overlaps.push_back(entry);
-    }
-    for (std::size_t n = 0; n < output.structures.size(); ++n) {
-        if (!separated.report.changed[n]) continue;
-        StructureOutput& s = output.structures[n];
-        s.result.surface = separated.surfaces[n];
-        measure_again(s, options.extract, run);
-        SegmentReport& report = s.result.report;
-        report.seeds = check_seeds(*s.result.surface, report.resolved.inside, report.resolved.outside);
-    }
-}
-
 void add_seconds(Session& session, const SegmentReport::Seconds& seconds) {
     session.add_seconds("distance", seconds.distance);
     session.add_seconds("tag", seconds.tag);
@@ -103,7 +41,7 @@ void add_seconds(Session& session, const SegmentReport::Seconds& seconds) {
 }
 
 /// What a failed run had goes to --keep-failed at once, and stays.
-void keep_failed(const SegmentJob& job, const StructureOutput& s, const SegmentFailed& failed, Session& session) {
+void keep_failed(const SegmentJob& job, const StructureFacts& s, const SegmentFailed& failed, Session& session) {
     const std::string path = s.name.empty() ? job.failed_path : with_suffix(job.failed_path, "_" + s.grid);
     std::vector<FloatGridPtr> grids;
     const auto add = [&](const FloatGridPtr& grid, const char* name) {
@@ -157,148 +95,60 @@ void summarise(const StructuresOutput& output, const SegmentJob& job, Session& s
 
 }  // namespace
 
-StructurePreparer::StructurePreparer(const SegmentJob& job, const std::vector<StructureInput>& inputs,
-                                     const Image* image, const std::vector<StructureStart>& starts, Session& session)
-    : job_(job),
-      inputs_(inputs),
-      image_(image),
-      starts_(starts),
-      session_(session),
-      geometry_(image != nullptr ? image->geometry() : ImageGeometry{}),
-      grids_(make_grid_names(names_of(inputs))),
-      paint_(job, geometry_) {}
-
-PreparedStructure StructurePreparer::prepare(std::size_t n, const RunContext& run) {
-    PreparedStructure prepared = read_marks_of(n, run);
-    add_guess(n, prepared, run);
-    return prepared;
-}
-
-void StructurePreparer::add_guess(std::size_t n, PreparedStructure& prepared, const RunContext& run) const {
-    const StructureInput& input = inputs_[n];
-    if (input.guess.empty()) return;
-    prepared.guess =
-        read_guess(input.guess, job_.guess.inputs.options.guess_label, geometry_, job_.image.has("spacing"), run);
-    prepared.options.guess = prepared.guess->start;
-    prepared.output.input["guess"] = {{"path", input.guess}, {"label", prepared.guess->label}};
-}
-
-PreparedStructure StructurePreparer::read_marks_of(std::size_t n, const RunContext& run) {
-    const ImageGeometry* const geometry = image_ != nullptr ? &geometry_ : nullptr;
-    const StructureInput& input = inputs_[n];
-    PreparedStructure prepared;
-    StructureOutput& s = prepared.output;
-    s.name = input.name;
-    s.grid = grids_[n];
-    s.label = input.label;
-    const Stopwatch reading;
-    Marks marks = read_marks(input.points, input.contours, job_.cloud, geometry, run);
-    session_.add_seconds("read", reading.seconds());
-    if (image_ == nullptr && marks.given.empty()) throw UsageError("expected an image, points or contours, got none");
-    if (!voxel_size_) voxel_size_ = job_.resolve_voxel_size(image_, marks, session_);
-    const double h = *voxel_size_;
-    const std::shared_ptr<const Contours> painted = paint_.own_contours(input, marks, h, run);
-    if (!painted) paint_.add_outlines(input, marks, run);
-    prepare_marks(marks, job_.cloud, input.contours, geometry, h, session_, run);
-    if (painted) {
-        marks.contours = painted;
-        marks.given.insert(marks.given.end(), painted->marks.begin(), painted->marks.end());
-        marks.report["points"]["count"] = marks.given.size();
-    }
-    s.marks = marks.given;
-    s.input = marks.report;
-    if (!input.paint.empty()) s.input["painted"] = paint_.report(input, run);
-    SegmentOptions& options = prepared.options = job_.resolve(h);
-    check_tag_distance(options.tag_distance.value_or(0), marks.given);
-    options.contours = marks.contours;
-    options.hints = marks.hints;
-    Seeds seeds = read_seeds(input.seeds, input.points.options, geometry, h, run);
-    options.inside = std::move(seeds.inside);
-    options.outside = std::move(seeds.outside);
-    paint_.add_seeds(inputs_, n, options, run);
-    options.exterior_seeds = input.exterior_seeds;
-    options.start = starts_[n].start;
-    if (!options.evolve.delta) options.evolve.delta = starts_[n].delta;
-    prepared.points = std::move(marks.points);
-    return prepared;
-}
-
-SegmentResult solve_in_one_piece(const Image* image, const PreparedStructure& structure, const RunContext& run) {
-    return image != nullptr ? segment(*image, structure.points, structure.options, run)
-                            : reconstruct(structure.points, structure.options, run);
-}
-
-StructuresOutput segment_structures(const SegmentJob& job, const std::vector<StructureInput>& inputs,
-                                    const Image* image, const std::vector<StructureStart>& starts, Session& session,
-                                    const RunContext& run, const Solver& solve) {
+StructuresOutput finish(const SegmentJob& job, StructuresResult result, const std::optional<Image>& image,
+                        Session& session, const RunContext& run) {
     StructuresOutput output;
-    if (image != nullptr) output.geometry = image->geometry();
-    if (image != nullptr && !job.page_path.empty()) {
+    if (image) output.geometry = image->geometry();
+    if (image && !job.page_path.empty()) {
         output.image = *image;
         output.is_anatomical = is_anatomical(image->path(), job.image.options, run);
     }
-    StructurePreparer preparer(job, inputs, image, starts, session);
-    const auto speaking = [&](std::size_t n) {
-        return speaking_for(inputs[n].name, inputs.size() > kMostInLines, run);
-    };
-    // All marks before the first is solved: what is wrong with the last file is told at once.
-    std::vector<PreparedStructure> structures;
-    for (std::size_t n = 0; n < inputs.size(); ++n) structures.push_back(preparer.read_marks_of(n, speaking(n)));
-    for (std::size_t n = 0; n < inputs.size(); ++n) {
-        const RunContext own = speaking(n);
-        PreparedStructure prepared = std::move(structures[n]);
-        preparer.add_guess(n, prepared, own);
-        StructureOutput& s = prepared.output;
-        try {
-            s.result = solve(image, prepared, own);
-        } catch (const SegmentFailed& failed) {
-            keep_failed(job, s, failed, session);
-            throw Error(failed.code(), (s.name.empty() ? "" : s.name + ": ") + failed.what());
-        } catch (const Error& error) {
-            if (s.name.empty()) throw;
-            throw Error(error.code(), s.name + ": " + error.what());
-        }
-        s.input["points"]["densified"] = s.result.report.densified;
-        const std::optional<Guess>& guess = prepared.guess;
-        if (guess && guess->mask && inputs.size() == 1) {
-            s.label = guess->label;
-            if (!job.mask_path.empty() && is_same_lattice(guess->mask->geometry(), output.geometry))
-                s.corrected = s.result.correction->apply(*guess->mask, guess->label, own);
+    output.overlaps = std::move(result.overlaps);
+    for (StructureResult& structure : result.structures) {
+        StructureOutput& s = output.structures.emplace_back(StructureOutput{std::move(structure), {}, {}});
+        if (s.guess && s.guess->mask) {
+            s.label = s.guess->label;
+            if (!job.mask_path.empty() && is_same_lattice(s.guess->mask->geometry(), output.geometry))
+                s.corrected = s.result.correction->apply(*s.guess->mask, s.label, run);
             else if (!job.mask_path.empty())
-                own.warn("--guess: " + inputs[n].guess +
+                run.warn("--guess: " + s.files.guess +
                          " does not lie on the image's voxels; the mask is made from the corrected surface");
         }
+        session.add_seconds("contours", s.contour_seconds);
         add_seconds(session, s.result.report.seconds);
-        output.structures.push_back(std::move(s));
+        if (image && job.evidence.wanted()) s.evidence = job.evidence.judge(s.result, s.marks, *image, run);
     }
-    if (inputs.size() > 1) {
-        const Stopwatch separating;
-        separate_all(output, job.resolve(preparer.voxel_size()), run);
-        session.add_seconds("separate", separating.seconds());
-    }
-    for (StructureOutput& s : output.structures) {
-        s.result.surface->setName(s.grid);
-        if (image != nullptr && job.evidence.wanted()) s.evidence = job.evidence.judge(s.result, s.marks, *image, run);
-    }
+    if (output.structures.size() > 1) session.add_seconds("separate", result.separate_seconds);
     summarise(output, job, session);
     return output;
 }
 
-void run_structures(const SegmentJob& job, Session& session, const Solver& solve) {
+void run_structures(const SegmentJob& job, Session& session, const StructureSolver& solve) {
     Outputs& outputs = session.outputs();
-    const std::vector<StructureInput> inputs = structures_of(job, job.painted.read(session.run()));
-    check_outputs(job, inputs, {}, outputs);
+    std::vector<Marks> structures = structures_of(job, job.painted.read(session.run()));
+    check_outputs(job, structures, {}, outputs);
     check_scene(job, outputs);
     outputs.check("--table", job.table_path, OutputKind::Table);
     job.check_options();
 
-    const std::vector<StructureStart> starts = starts_of(job, inputs);
+    add_starts(job, structures);
     ReadImageOptions reading = job.image.options;
     if (job.frames.given) reading.frame = job.frames.first;
     std::optional<Image> image;
     if (!job.images.empty()) image = job.read(job.images.front(), reading, session);
+    const StructuresOptions options = read_structures(job, structures, image, session, session.run());
+    const auto solve_or_keep = [&](const std::optional<Image>& pixels, const StructureInput& structure,
+                                   const RunContext& run) {
+        try {
+            return solve(pixels, structure, run);
+        } catch (const SegmentFailed& failed) {
+            keep_failed(job, structure, failed, session);
+            throw;
+        }
+    };
     const auto output = std::make_shared<StructuresOutput>(
-        segment_structures(job, inputs, image ? &*image : nullptr, starts, session, session.run(), solve));
+        finish(job, segment_structures(image, std::move(structures), options, session.run(), solve_or_keep), image,
+               session, session.run()));
     session.report().update(to_json(*output), true);
     if (image) SegmentJob::tell_chunks(*image, session);
     hand_over(job, output, {}, session,

@@ -42,17 +42,17 @@ std::vector<Frame> frames_of(const SegmentJob& job) {
 }
 
 /// The series as it goes on.
-class TimeLapse {
+class FrameRunner {
 public:
-    TimeLapse(const SegmentJob& job, Session& session)
-        : job_(job), session_(session), inputs_(structures_of(job)), table_(columns()) {}
+    FrameRunner(const SegmentJob& job, Session& session)
+        : job_(job), session_(session), structures_(structures_of(job)), table_(columns()) {}
 
     void run() {
         if (!job_.painted.paths.empty() || !job_.guess.paths.empty())
             throw UsageError("--painted, --guess: expected one image, got a time-lapse");
         frames_ = frames_of(job_);
         check();
-        starts_ = starts_of(job_, inputs_);
+        add_starts(job_, structures_);
         for (const Frame& frame : frames_) {
             session_.run().check();
             go(frame);
@@ -86,12 +86,12 @@ private:
     void check() {
         for (const Frame& frame : frames_) {
             std::vector<std::string> read{frame.path};
-            for (const StructureInput& input : inputs_)
-                for (const auto* paths : {&input.points.paths, &input.contours.paths})
+            for (const Marks& marks : structures_)
+                for (const auto* paths : {&marks.files.points, &marks.files.contours})
                     for (const std::string& path : *paths) read.push_back(with_frame(path, frame.number));
             session_.outputs().protect(read);
         }
-        for (const Frame& frame : frames_) check_outputs(job_, inputs_, tag(frame), session_.outputs());
+        for (const Frame& frame : frames_) check_outputs(job_, structures_, tag(frame), session_.outputs());
         session_.outputs().check("--table", job_.table_path, OutputKind::Table);
         check_scene(job_, session_.outputs());
         job_.check_options();
@@ -99,13 +99,13 @@ private:
 
     /// The structures with this frame's marks: a file of its own where the name has {frame}, else the first frame's
     /// alone.
-    [[nodiscard]] std::vector<StructureInput> inputs_at(const Frame& frame) const {
-        std::vector<StructureInput> inputs = inputs_;
-        for (StructureInput& input : inputs) {
-            input.points.paths = paths_at(frame, input.points.paths);
-            input.contours.paths = paths_at(frame, input.contours.paths);
+    [[nodiscard]] std::vector<Marks> marks_at(const Frame& frame) const {
+        std::vector<Marks> structures = structures_;
+        for (Marks& marks : structures) {
+            marks.files.points = paths_at(frame, marks.files.points);
+            marks.files.contours = paths_at(frame, marks.files.contours);
         }
-        return inputs;
+        return structures;
     }
 
     [[nodiscard]] std::vector<std::string> paths_at(const Frame& frame,
@@ -113,12 +113,12 @@ private:
         std::vector<std::string> paths;
         for (const std::string& path : patterns) {
             if (!has_frame_pattern(path)) {
-                if (!started_) paths.push_back(path);
+                if (!lapse_.started()) paths.push_back(path);
                 continue;
             }
             const std::string own = with_frame(path, frame.number);
             // Marks may be missing once there is a surface to start from.
-            if (!started_ || std::filesystem::exists(own)) paths.push_back(own);
+            if (!lapse_.started() || std::filesystem::exists(own)) paths.push_back(own);
         }
         return paths;
     }
@@ -139,12 +139,7 @@ private:
                 const StructureOutput& s = output->structures[n];
                 add_result(table_.row() << frame.number, s.name.empty() ? s.grid : s.name, s.label, s.result.report);
                 table_ << "ok";
-                starts_[n].start = Start{};
-                starts_[n].start.kind = Start::Kind::Vdb;
-                starts_[n].start.level_set = s.result.surface;
-                starts_[n].delta = s.result.report.resolved.evolve.delta;
             }
-            started_ = true;
         } catch (const Error& error) {
             if (error.code() == Errc::Cancelled) throw;
             fail(who, error);
@@ -165,7 +160,10 @@ private:
         run.log = [this, who](LogLevel level, const std::string& line) {
             level == LogLevel::Warning ? session_.warn(who + ": " + line) : session_.note(who + ": " + line);
         };
-        StructuresOutput output = segment_structures(job_, inputs_at(frame), &image, starts_, session_, run);
+        std::vector<Marks> marks = marks_at(frame);
+        const StructuresOptions options = read_structures(job_, marks, image, session_, run);
+        StructuresOutput output =
+            finish(job_, lapse_.segment(image, std::move(marks), options, run), image, session_, run);
         SegmentJob::tell_chunks(image, session_);
         return output;
     }
@@ -180,10 +178,9 @@ private:
 
     const SegmentJob& job_;
     Session& session_;
-    std::vector<StructureInput> inputs_;
+    std::vector<Marks> structures_;
     std::vector<Frame> frames_;
-    std::vector<StructureStart> starts_;
-    bool started_ = false;  ///< a frame has succeeded
+    TimeLapse lapse_;
     Json reports_ = Json::array();
     UsdScene scene_;
     Table table_;
@@ -196,6 +193,6 @@ private:
 
 bool is_timelapse(const SegmentJob& job) { return job.images.size() > 1 || (job.frames.given && !job.frames.is_one()); }
 
-void run_timelapse(const SegmentJob& job, Session& session) { TimeLapse(job, session).run(); }
+void run_timelapse(const SegmentJob& job, Session& session) { FrameRunner(job, session).run(); }
 
 }  // namespace covol::tool

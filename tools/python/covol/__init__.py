@@ -31,14 +31,14 @@ from ._covol import Image, LevelSet, Mesh, Points, Result, __version__
 from ._errors import Error
 from ._inputs import from_affine, read_image, read_points, to_affine
 
-__all__ = ["Error", "Image", "LevelSet", "Mesh", "Points", "Result", "Suggestion", "compare", "distances", "from_affine", "mask",
+__all__ = ["Error", "Image", "LevelSet", "Mesh", "Points", "Result", "Structures", "Suggestion", "compare", "distances", "from_affine", "mask",
            "mesh", "options", "phantom", "read_image", "read_level_set", "read_mesh", "read_points", "reconstruct", "save_mask",
-           "segment", "suggest", "to_affine"]
+           "segment", "structures", "suggest", "timelapse", "to_affine"]
 
 
-def segment(image, points=None, *, contours=None, painted=None, inside=None, outside=None, guess=None, init=None, spacing=None,
-            origin=None, direction=None, affine=None, points_space=None, points_order=None, points_scale=1.0, progress=None,
-            threads=0, memory_limit=0, **options):
+def segment(image, points=None, *, contours=None, painted=None, painted_outside=0, painted_as="auto", inside=None, outside=None,
+            guess=None, init=None, spacing=None, origin=None, direction=None, affine=None, points_space=None, points_order=None,
+            points_scale=1.0, progress=None, threads=0, memory_limit=0, **options):
     """The surface of a structure in a 3D image, found with the help of marks.
 
     Args:
@@ -47,6 +47,8 @@ def segment(image, points=None, *, contours=None, painted=None, inside=None, out
         points: marks on the surface, shape (n, 3); or Points, or a file.
         contours: closed lines of marks on slices: a list of arrays of shape (n, 3), Points, or a file.
         painted: label image of the image's shape with one label, painted on some slices or in some places.
+        painted_outside: a label in it that was painted on what is outside; 0: none.
+        painted_as: "auto", "slices" (which show whole cross-sections) or "scribbles" (which are inside).
         inside, outside: positions whose side is known, shape (n, 3); or Points, or a file.
         guess: another program's result that the marks correct: a mask of the image's shape, a LevelSet or a file.
         init: how the level set starts, as the flag --init: "tag", "sphere:x,y,z,r", ...; or a mask or a LevelSet.
@@ -68,24 +70,68 @@ def segment(image, points=None, *, contours=None, painted=None, inside=None, out
         Error: "invalid_options" and "invalid_input" with the keyword in `field`; "io", "unsupported", "numerical".
         KeyboardInterrupt: after Ctrl-C.
     """
-    geometry = {"spacing": spacing, "origin": origin, "direction": direction, "affine": affine}
-    volume = _inputs.image(image, **geometry)
-    reading = {"points_space": points_space, "points_order": points_order, "points_scale": points_scale}
-    own = {"spacing": volume.spacing, "origin": volume.origin, "direction": volume.direction}
+    marks = {"points": points, "contours": contours, "inside": inside, "outside": outside, "guess": guess}
+    (result,), _ = _run("segment", image, {"": marks}, (painted, painted_outside, painted_as), init,
+                        {"spacing": spacing, "origin": origin, "direction": direction, "affine": affine},
+                        (points_space, points_order, points_scale), _inputs.call(progress, threads, memory_limit), options)
+    return result
 
-    def like(value):
-        is_array = not (value is None or _inputs.is_path(value) or isinstance(value, (Image, LevelSet, Result)))
-        return _inputs.shape(value, **(own if is_array and not hasattr(value, "affine") else {}))
 
-    if painted is not None:
-        painted = _inputs.image(painted) if _inputs.is_path(painted) else like(painted)
-    if _inputs.is_path(guess):
-        guess = _guess_from(guess)
-    inputs = {"points": _inputs.points("points", points, reading),
-              "contours": _inputs.points("contours", contours, reading, lines=True),
-              "inside": _inputs.points("inside", inside, reading), "outside": _inputs.points("outside", outside, reading),
-              "painted": painted, "init": like(init), "guess": like(guess)}
-    return _covol.run("segment", volume, inputs, options, _inputs.call(progress, threads, memory_limit))
+def structures(image, marks=None, *, painted=None, painted_outside=0, painted_as="auto", init=None, spacing=None, origin=None,
+               direction=None, affine=None, points_space=None, points_order=None, points_scale=1.0, progress=None, threads=0,
+               memory_limit=0, **options):
+    """The surfaces of several structures in one image. They are made disjoint, and measured as they then are.
+
+    Args:
+        marks: dict of the structures' names; each has its points, or a dict of what segment() takes: points, contours, inside,
+            outside, guess, init, exterior_seed.
+        painted: label image of the image's shape. Each label belongs to the structure of its name, or is one more: "label3", or
+            what a .seg.nrrd calls it. Paint of one structure is outside of the others.
+        image, painted_outside, painted_as, init, spacing, origin, direction, affine, points_space, points_order, points_scale,
+            progress, threads, memory_limit, **options: see segment().
+
+    Returns:
+        Structures.
+
+    Raises:
+        Error, KeyboardInterrupt: as segment(); of one structure the message begins with its name.
+    """
+    return Structures(*_run("structures", image, marks or {}, (painted, painted_outside, painted_as), init,
+                            {"spacing": spacing, "origin": origin, "direction": direction, "affine": affine},
+                            (points_space, points_order, points_scale), _inputs.call(progress, threads, memory_limit), options))
+
+
+def timelapse(frames, marks=None, **keywords):
+    """Segments the frames of a time-lapse one after the other: each starts from the surfaces in the last one that succeeded.
+
+    Args:
+        frames: images as segment() takes them, in their order, or pairs (image, marks) where a later frame has marks, too. They
+            are asked for one by one.
+        marks: of the first frame: points, a dict of what segment() takes (points, contours, inside, outside, exterior_seed), or
+            for several structures a dict of these by name, as structures() takes it.
+        **keywords: spacing and the like, and options, as of segment().
+
+    Yields:
+        Result of each frame, or Structures; the Error in place of a frame that failed.
+
+    Raises:
+        KeyboardInterrupt: after Ctrl-C.
+    """
+    lapse = _covol.TimeLapse()
+    several = isinstance(marks, dict) and any(key not in ("points", "contours", "inside", "outside", "exterior_seed") for key in marks)
+    geometry = {key: keywords.pop(key, None) for key in ("spacing", "origin", "direction", "affine")}
+    reading = keywords.pop("points_space", None), keywords.pop("points_order", None), keywords.pop("points_scale", 1.0)
+    init = keywords.pop("init", None)
+    call = _inputs.call(**{key: keywords.pop(key) for key in ("progress", "threads", "memory_limit") if key in keywords})
+    for frame in frames:
+        image, own = frame if isinstance(frame, tuple) else (frame, None if lapse.started else marks)
+        own = {name: (own or {}).get(name) for name in marks} if several else {"": own}
+        try:
+            found = _run("timelapse", image, own, (None, 0, "auto"), init, geometry, reading, call, keywords, lapse)
+        except Error as error:
+            yield error
+            continue
+        yield Structures(*found) if several else found[0][0]
 
 
 def reconstruct(points=None, *, contours=None, inside=None, outside=None, init=None, normals=None, points_space=None,
@@ -103,21 +149,47 @@ def reconstruct(points=None, *, contours=None, inside=None, outside=None, init=N
     Raises:
         Error, KeyboardInterrupt: as segment().
     """
-    reading = {"points_space": points_space, "points_order": points_order, "points_scale": points_scale}
-    inputs = {"points": _inputs.points("points", points, reading, normals=normals),
-              "contours": _inputs.points("contours", contours, reading, lines=True),
-              "inside": _inputs.points("inside", inside, reading), "outside": _inputs.points("outside", outside, reading),
-              "painted": None, "init": _inputs.shape(init), "guess": None}
-    return _covol.run("reconstruct", None, inputs, options, _inputs.call(progress, threads, memory_limit))
+    marks = {"points": points, "contours": contours, "inside": inside, "outside": outside, "normals": normals}
+    (result,), _ = _run("reconstruct", None, {"": marks}, (None, 0, "auto"), init, {}, (points_space, points_order, points_scale),
+                        _inputs.call(progress, threads, memory_limit), options)
+    return result
 
 
-def _guess_from(path):
-    """A mask is read, a level set too; meshes are named by their kind."""
-    path = os.fspath(path)
-    ending = os.path.splitext(path.lower())[1]
-    if ending in (".ply", ".obj", ".stl", ".off", ".glb"):
-        return "mesh:" + path
-    return "vdb:" + path if ".vdb" in path.lower() else read_image(path)
+def _run(function, image, marks, painted, init, geometry, reading, call, options, lapse=None):
+    """The results of all structures, and the overlaps that were resolved."""
+    volume = None if function == "reconstruct" else _inputs.image(image, **geometry)
+    reading = dict(zip(("points_space", "points_order", "points_scale"), reading))
+
+    def like(value):
+        """A mask or the like; arrays lie where the image does."""
+        is_array = not (value is None or _inputs.is_path(value) or isinstance(value, (Image, LevelSet, Result)))
+        own = volume is not None and is_array and not hasattr(value, "affine")
+        return _inputs.shape(value, **({key: getattr(volume, key) for key in ("spacing", "origin", "direction")} if own else {}))
+
+    paint = _inputs.image(painted[0]) if _inputs.is_path(painted[0]) else like(painted[0])
+    return _covol.run(function, volume, {str(name): _inputs.marks(own, reading, like) for name, own in marks.items()},
+                      (paint, *painted[1:]), like(init), options, call, lapse)
+
+
+class Structures(dict):
+    """What structures() returns: a dict of Results by name.
+
+    Attributes:
+        overlaps: dicts of what two structures claimed and was divided: "structures" (two names), "volume" (world units^3) and,
+            where one was carved out of the other, "inner".
+    """
+
+    def __init__(self, results, overlaps):
+        super().__init__((result.name, result) for result in results)
+        names = list(self)
+        self.overlaps = [{"structures": (names[a], names[b]), "volume": volume, **({} if inner is None else {"inner": names[inner]})}
+                         for a, b, volume, inner in overlaps]
+
+    @property
+    def mask(self):
+        """Labels of the image's shape: Result.label where a voxel's centre is inside, else 0."""
+        values = np.array([0, *(result.label for result in self.values())])
+        return values.astype(np.min_scalar_type(values.max()))[_covol.label_image(list(self.values()), _inputs.call())]
 
 
 def mesh(surface, *, isovalue=0.0, min_component=0.0, target_edge=0.0, adaptive=0.0, smooth=0, repair=False, progress=None,
@@ -309,6 +381,6 @@ Args:
 Returns:
     Points: array of shape (n, 3) in its `space`, lines, normals; to_world(image) gives world positions. Raises Error.
 """
-for _type in (Error, Image, LevelSet, Mesh, Points, Result, Suggestion, read_image, read_points, from_affine, to_affine):
+for _type in (Error, Image, LevelSet, Mesh, Points, Result, Structures, Suggestion, read_image, read_points, from_affine, to_affine):
     _type.__module__ = "covol"
 del _type

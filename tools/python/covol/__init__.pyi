@@ -1,7 +1,7 @@
 # Types of the module covol; what things mean stands in the docstrings of covol/__init__.py. The options between the marks
 # are written by tools/python/write_stub.py.
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, Tuple, Union
 
 import numpy as np
@@ -123,9 +123,18 @@ class Result:
     def warnings(self) -> list[str]: ...
     @property
     def log(self) -> list[str]: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def label(self) -> int: ...
     def suggest(self, count: int = ..., *, progress: _Progress | None = ..., threads: int = ...) -> list[Suggestion]: ...
     def save(self, path: _Path) -> None: ...
     def _repr_html_(self) -> str: ...
+
+class Structures(dict[str, Result]):
+    overlaps: list[dict[str, Any]]
+    @property
+    def mask(self) -> NDArray[Any]: ...
 
 _ImageLike = Union[Image, ArrayLike, _Path, Any]  # Any: what nibabel reads
 _PointsLike = Union[Points, ArrayLike, _Path]
@@ -138,6 +147,8 @@ def segment(
     *,
     contours: _LinesLike | None = ...,
     painted: _ImageLike | None = ...,
+    painted_outside: int = ...,
+    painted_as: Literal["auto", "slices", "scribbles"] = ...,
     inside: _PointsLike | None = ...,
     outside: _PointsLike | None = ...,
     guess: _ImageLike | LevelSet | Result | None = ...,
@@ -191,6 +202,31 @@ def segment(
     voxel_size: _Length | None = None,
     # end of options
 ) -> Result: ...
+def structures(
+    image: _ImageLike,
+    marks: Mapping[str, _PointsLike | Mapping[str, Any]] | None = ...,
+    *,
+    painted: _ImageLike | None = ...,
+    painted_outside: int = ...,
+    painted_as: Literal["auto", "slices", "scribbles"] = ...,
+    init: _ImageLike | LevelSet | Result | None = ...,
+    spacing: _Vector | None = ...,
+    origin: _Vector | None = ...,
+    direction: ArrayLike | None = ...,
+    affine: ArrayLike | None = ...,
+    points_space: _Space | None = ...,
+    points_order: _Order | None = ...,
+    points_scale: float = ...,
+    progress: _Progress | None = ...,
+    threads: int = ...,
+    memory_limit: int = ...,
+    **options: Any,  # as of segment()
+) -> Structures: ...
+def timelapse(
+    frames: Iterable[_ImageLike | Tuple[_ImageLike, Any]],
+    marks: _PointsLike | Mapping[str, Any] | None = ...,
+    **keywords: Any,  # as of segment()
+) -> Iterator[Result | Structures | Error]: ...
 def reconstruct(
     points: _PointsLike | None = ...,
     *,

@@ -100,6 +100,21 @@ def points(name, value, reading, lines=False, normals=None):
     return [_covol.Points(name, value, None, *keywords, True, normals)]
 
 
+def marks(given, reading, like):
+    """Of one structure: what segment() takes beside the image, from a dict of its keywords, or from its points."""
+    given = given if isinstance(given, collections.abc.Mapping) else {"points": given}
+    known = ("points", "contours", "inside", "outside", "guess", "init", "exterior_seed", "normals")
+    for key in given:
+        if key not in known:
+            raise Error(f"marks: expected {', '.join(known[:-1])}, got {key!r}", "invalid_options", "marks")
+    values = {key: given.get(key) for key in known}
+    normals = values.pop("normals")
+    return {"points": points("points", values["points"], reading, normals=normals),
+            "contours": points("contours", values["contours"], reading, lines=True),
+            "inside": points("inside", values["inside"], reading), "outside": points("outside", values["outside"], reading),
+            "guess": like(values["guess"]), "init": like(values["init"]), "exterior_seed": values["exterior_seed"]}
+
+
 def shape(value, **geometry):
     """A start or a guess: a text or a file's path, a LevelSet, a mask."""
     if value is None or isinstance(value, (_covol.LevelSet, _covol.Image, str)):

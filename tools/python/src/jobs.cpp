@@ -6,7 +6,6 @@
 #include "cli/report.h"
 #include "covol/error.h"
 #include "covol/surface.h"
-#include "flags/judge.h"
 
 namespace covol::python {
 namespace {
@@ -19,19 +18,42 @@ Shape to_shape(const char* name, const py::object& given) {
     reject(name, "a text, a mask or a LevelSet", py::type::of(given));
 }
 
-std::shared_ptr<Result> run_job(const char* function, const std::optional<Image>& image, const py::dict& inputs,
-                                const py::dict& keywords, const Call& call) {
+GivenMarks to_marks(const py::handle& name, const py::handle& inputs) {
+    const auto clouds = [&](const char* kind) { return py::cast<std::vector<PointCloud>>(inputs[kind]); };
+    GivenMarks marks{py::cast<std::string>(name),
+                     clouds("points"),
+                     clouds("contours"),
+                     clouds("inside"),
+                     clouds("outside"),
+                     {},
+                     to_shape("init", inputs["init"]),
+                     to_shape("guess", inputs["guess"])};
+    if (const py::object seeds = inputs["exterior_seed"]; !seeds.is_none())
+        marks.exterior_seeds = to_positions("exterior_seed", seeds);
+    return marks;
+}
+
+/// @param marks    inputs of each structure, by name
+/// @param painted  the image, the label outside, how it is to be understood
+/// @return the results, and (a, b, volume, inner) of each overlap
+py::tuple run_job(const char* function, const std::optional<Image>& image, const py::dict& marks,
+                  const py::tuple& painted, const py::object& init, const py::dict& keywords, const Call& call,
+                  TimeLapse* lapse) {
     const GivenOptions given(function, keywords);
-    Marks marks;
-    const auto clouds = [&](const char* name) { return py::cast<std::vector<PointCloud>>(inputs[name]); };
-    marks.points = clouds("points");
-    marks.contours = clouds("contours");
-    marks.inside = clouds("inside");
-    marks.outside = clouds("outside");
-    if (const py::object painted = inputs["painted"]; !painted.is_none()) marks.painted = py::cast<Image>(painted);
-    marks.init = to_shape("init", inputs["init"]);
-    marks.guess = to_shape("guess", inputs["guess"]);
-    return solve(image, marks, given, call);
+    Problem problem{image, {}, std::nullopt, {}, to_shape("init", init)};
+    for (const auto& [name, inputs] : marks) problem.structures.push_back(to_marks(name, inputs));
+    if (!painted[0].is_none()) problem.painted = py::cast<Image>(painted[0]);
+    problem.painting.outside_label = py::cast<int>(painted[1]);
+    const auto word = py::cast<std::string>(painted[2]);
+    if (word != "auto" && word != "slices" && word != "scribbles")
+        throw Error(Errc::InvalidOptions, "painted_as: expected one of auto, slices, scribbles, got '" + word + "'");
+    problem.painting.as = word == "auto"     ? PaintedAs::Automatic
+                          : word == "slices" ? PaintedAs::Slices
+                                             : PaintedAs::Scribbles;
+    const Solution made = solve(problem, given, call, lapse);
+    py::list overlaps;
+    for (const StructureOverlap& o : made.overlaps) overlaps.append(py::make_tuple(o.a, o.b, o.volume, o.inner));
+    return py::make_tuple(made.structures, overlaps);
 }
 
 /// As the program writes it, without the paths.
@@ -55,17 +77,26 @@ const Image& image_of(const Result& r) {
 /// Of a mask that marks corrected its own values; else 1 where a voxel's centre is inside.
 py::array mask_of(const Result& r, const Call& call) {
     const Image& image = image_of(r);
+    const Image* const guess = r.guess && r.guess->mask ? &*r.guess->mask : nullptr;
     std::vector<std::uint8_t> voxels;
     std::vector<std::int32_t> labels;
     call.run([&](const RunContext& run) {
-        if (r.guess_mask && r.result.correction)
-            labels = r.result.correction->apply(*r.guess_mask, r.label, run).values;
-        else
-            voxels = rasterize(*r.result.surface, image.geometry(), 1, run);
+        if (guess != nullptr) labels = r.result.correction->apply(*guess, r.guess->label, run).values;
+        if (guess == nullptr) voxels = rasterize(*r.result.surface, image.geometry(), 1, run);
     });
-    const Index3 n = r.guess_mask ? r.guess_mask->geometry().size : image.geometry().size;
+    const Index3 n = (guess != nullptr ? *guess : image).geometry().size;
     const std::vector<py::ssize_t> shape{n[2], n[1], n[0]};
     return labels.empty() ? give(std::move(voxels), shape) : give(std::move(labels), shape);
+}
+
+/// The structures' numbers from 1 on where a voxel's centre is inside; 0 outside of all.
+py::array label_image(const std::vector<std::shared_ptr<Result>>& results, const Call& call) {
+    const ImageGeometry geometry = image_of(*results.at(0)).geometry();
+    std::vector<Structure> solids;
+    for (const auto& r : results) solids.push_back({r->name.empty() ? r->grid : r->name, r->result.surface});
+    std::vector<std::uint8_t> voxels;
+    call.run([&](const RunContext& run) { voxels = make_label_image(solids, geometry, run); });
+    return give(std::move(voxels), {geometry.size[2], geometry.size[1], geometry.size[0]});
 }
 
 Mesh mesh_of(const std::shared_ptr<Result>& r) {
@@ -80,7 +111,7 @@ py::list suggest(const Result& r, int count, const Call& call) {
     kNotNegative.require("count", count);
     const Image& image = image_of(r);
     Evidence evidence;
-    call.run([&](const RunContext& run) { evidence = tool::judge(r.result, r.marks, image, count, run); });
+    call.run([&](const RunContext& run) { evidence = assess_evidence(r.result, r.marks, image, count, run); });
     py::list all;
     for (const Suggestion& s : evidence.suggestions)
         all.append(
@@ -110,6 +141,10 @@ void add_jobs(py::module_& module) {
             "marks", [](const Result& r) { return from_positions(r.marks); }, "(n, 3), as they were used, world units.")
         .def_property_readonly(
             "log", [](const Result& r) { return r.log; }, "Choices and warnings, in their order.")
+        .def_property_readonly(
+            "name", [](const Result& r) { return r.name; }, "Of the structure; empty where it is the only one.")
+        .def_property_readonly(
+            "label", [](const Result& r) { return r.label; }, "Of the structure in Structures.mask.")
         .def("_fields",
              [](const Result& r) {
                  return py::make_tuple(grid_of(r.result.u), grid_of(r.result.distance), grid_of(r.result.edge));
@@ -117,7 +152,9 @@ void add_jobs(py::module_& module) {
         .def("_report", report_of)
         .def("_mask", mask_of)
         .def("_suggest", suggest);
+    py::class_<TimeLapse>(module, "TimeLapse").def(py::init()).def_property_readonly("started", &TimeLapse::started);
     module.def("run", run_job);
+    module.def("label_image", label_image);
 }
 
 }  // namespace covol::python

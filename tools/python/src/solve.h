@@ -6,8 +6,7 @@
 #include <vector>
 
 #include "call.h"
-#include "covol/pipeline.h"
-#include "covol/points.h"
+#include "covol/segment_structures.h"
 #include "options.h"
 
 namespace covol::python {
@@ -17,28 +16,39 @@ struct LevelSet {
     FloatGridPtr grid;
 };
 
-/// Where a level set starts, or a guess that marks correct: a text as on the command line, a level set or a mask.
+/// Where a level set starts, or a guess that marks correct: a text as on the command line or a file, a level set or a
+/// mask.
 using Shape = std::variant<std::monostate, std::string, LevelSet, Image>;
 
-/// What says where the surface is.
-struct Marks {
+/// What says where one structure is.
+struct GivenMarks {
+    std::string name;
     std::vector<PointCloud> points, contours, inside, outside;
-    std::optional<Image> painted;
+    std::vector<Vec3> exterior_seeds;
     Shape init, guess;
 };
 
-/// What came of one structure, and what it came from.
-struct Result {
-    SegmentResult result;
-    std::optional<Image> image;
-    std::vector<Vec3> marks;          ///< as they were given, world units
-    std::optional<Image> guess_mask;  ///< that was corrected
-    int label = 1;                    ///< in that mask
-    std::vector<std::string> log;     ///< choices and warnings, in their order
+/// All of a job but its options.
+struct Problem {
+    std::optional<Image> image;  ///< none: points alone
+    std::vector<GivenMarks> structures;
+    std::optional<Image> painted;
+    PaintedOptions painting;
+    Shape init;
 };
 
-/// The job of `covol segment` and `covol reconstruct` on what is in memory. @param image  none: points alone
-[[nodiscard]] std::shared_ptr<Result> solve(const std::optional<Image>& image, const Marks& marks,
-                                            const GivenOptions& given, const Call& call);
+/// What came of one structure, and what it came from.
+struct Result : StructureResult {
+    std::optional<Image> image;
+    std::vector<std::string> log;  ///< choices and warnings, in their order
+};
+
+struct Solution {
+    std::vector<std::shared_ptr<Result>> structures;
+    std::vector<StructureOverlap> overlaps;
+};
+
+/// The job of `covol segment` and `covol reconstruct` on what is in memory. @param lapse  null: no time-lapse
+[[nodiscard]] Solution solve(const Problem& problem, const GivenOptions& given, const Call& call, TimeLapse* lapse);
 
 }  // namespace covol::python

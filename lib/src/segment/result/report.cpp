@@ -14,6 +14,7 @@
 #include "points/kd_tree.h"
 #include "segment/doubts.h"
 #include "segment/heuristics.h"
+#include "segment/result/mark_fit.h"
 
 namespace covol::pipeline {
 namespace {
@@ -52,8 +53,10 @@ public:
           remarks_(remarks) {}
 
     void of_marks() {
-        find_marks_off();
-        find_bias();
+        report_.marks_off.beyond = largest_error_of_marks(problem_, h_, solution_.start.cloud.noise);
+        for (const std::string& line : compare_with_marks(report_, *surface_.level_set, problem_.image, marks_,
+                                                          surface_.mark_distances))
+            warn(line);
         if (solution_.start.origin == StartOrigin::Guess) find_surface_beyond();
         if (solution_.start.origin == StartOrigin::Cloud) find_folds();
         if (problem_.image == nullptr || !uses_image(solution_.start.flow)) return;
@@ -70,43 +73,6 @@ public:
 
 private:
     void warn(const std::string& line) { remarks_.warn(line, problem_.run); }
-
-    void find_marks_off() {
-        const std::vector<double>& distances = surface_.mark_distances;
-        SegmentReport::MarksOff& found = report_.marks_off;
-        found.beyond = largest_error_of_marks(problem_, h_, solution_.start.cloud.noise);
-        for (std::size_t n = 0; n < marks_.size(); ++n) {
-            found.count += distances[n] > found.beyond;
-            if (distances[n] <= found.farthest) continue;
-            found.farthest = distances[n];
-            found.farthest_world = found.farthest_index = marks_[n];
-        }
-        if (problem_.image != nullptr)
-            found.farthest_index = problem_.image->geometry().world_to_index(found.farthest_world);
-        if (found.count == 0) return;
-        warn(std::to_string(found.count) + " of " + std::to_string(marks_.size()) + " marks lie more than " +
-             number(found.beyond) + " off the surface, the farthest " + number(found.farthest) + " " +
-             place_of(problem_, found.farthest_world) +
-             ": look there whether the mark is wrong, or mark more beside it");
-    }
-
-    void find_bias() {
-        const std::vector<double> levels = detail::levels_at(*surface_.level_set, marks_);
-        double sum = 0, squares = 0;
-        for (std::size_t n = 0; n < marks_.size(); ++n) {
-            const double d = std::copysign(surface_.mark_distances[n], levels[n]);
-            sum += d;
-            squares += d * d;
-        }
-        const auto count = double(marks_.size());
-        const double bias = sum / count, error = std::sqrt(std::max(0.0, squares / count - bias * bias) / count);
-        report_.fit.bias = bias;
-        if (std::abs(bias) < kDoubts.bias_voxels * std::max(h_, solution_.start.cloud.noise) ||
-            std::abs(bias) < kDoubts.bias_errors * error)
-            return;
-        warn("the marks lie " + number(std::abs(bias) / h_) + " voxels " + (bias > 0 ? "outside" : "inside") +
-             " the surface on the mean: it is too " + (bias > 0 ? "small" : "large"));
-    }
 
     /// A surface through marks may bend least where it goes on for ever.
     void find_surface_beyond() {
@@ -219,7 +185,9 @@ private:
 
     void find_seeds() {
         report_.seeds = check_seeds(*surface_.level_set, problem_.options.inside, problem_.options.outside);
-        if (const std::string warning = report_.seeds.warning(); !warning.empty()) warn("seeds: " + warning);
+        report_.seeds.painted = problem_.options.painted_seeds;
+        if (const std::string warning = report_.seeds.warning(); !warning.empty())
+            warn((report_.seeds.painted > 0 ? "paint: " : "seeds: ") + warning);
     }
 
     void find_holes() {

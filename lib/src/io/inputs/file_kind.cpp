@@ -1,4 +1,4 @@
-#include "cli/file_kind.h"
+#include "covol/file_kind.h"
 
 #include <algorithm>
 #include <array>
@@ -11,7 +11,7 @@
 #include "covol/points.h"
 #include "covol/vdb_io.h"
 
-namespace covol::tool {
+namespace covol {
 namespace {
 
 std::string ending_of(const std::string& path) {
@@ -101,4 +101,4 @@ const char* to_string(FileKind kind) {
     return "points";
 }
 
-}  // namespace covol::tool
+}  // namespace covol

@@ -1,0 +1,53 @@
+#include "covol/read_marks.h"
+
+#include "covol/error.h"
+#include "covol/file_kind.h"
+#include "covol/points_text.h"
+
+namespace covol {
+
+void read_marks(Marks& marks, const std::optional<ImageGeometry>& image, const ReadMarksOptions& options,
+                const RunContext& run) {
+    const auto read = [&](const std::string& path) {
+        run.check();
+        return path == "-" && options.standard_input
+                   ? parse_points(options.standard_input(), "standard input", options.points)
+                   : read_points(path, options.points);
+    };
+    for (const std::string& path : marks.files.points) {
+        const PointCloud cloud = read(path);
+        if (!cloud.lines.empty())
+            run.warn(path + ": its marks form " + std::to_string(cloud.lines.size()) +
+                     " lines, and are taken as loose points here; `contours` joins them along the lines");
+        add_points(marks, cloud, image, run);
+        run.info(path + ": " + std::to_string(cloud.points.size()) + " points" +
+                 (cloud.rule.empty() ? "" : ", " + cloud.rule));
+    }
+    for (const std::string& path : marks.files.contours) add_contours(marks, read(path), image, run);
+    for (const std::string& path : marks.files.inside) marks.inside.push_back(read(path));
+    for (const std::string& path : marks.files.outside) marks.outside.push_back(read(path));
+    if (!marks.files.guess.empty())
+        marks.guess = [path = marks.files.guess, image, options](const RunContext& own) {
+            return read_guess(path, image, options, own);
+        };
+}
+
+GivenGuess read_guess(const std::string& path, const std::optional<ImageGeometry>& image,
+                      const ReadMarksOptions& options, const RunContext& run) {
+    const FileKind kind = kind_of_file(path);
+    if (kind == FileKind::Points)
+        throw Error(Errc::InvalidInput, "`guess`: " + path + ": expected a mask, mesh or level set, got points");
+    if (kind != FileKind::Image) {
+        GivenGuess guess;
+        guess.start.kind = kind == FileKind::Vdb ? Start::Kind::Vdb : Start::Kind::Mesh;
+        guess.start.path = path;
+        return guess;
+    }
+    RunContext silent = run;
+    silent.log = {};
+    GivenGuess guess = make_guess(read_image(path, {}, silent), options.guess_label, image, options.force_geometry);
+    run.info("`guess` " + path + ": label " + std::to_string(guess.label));
+    return guess;
+}
+
+}  // namespace covol

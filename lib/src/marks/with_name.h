@@ -1,0 +1,19 @@
+#pragma once
+#include <string>
+
+#include "covol/error.h"
+
+namespace covol::detail {
+
+/// What `work` returns; its errors begin with the structure's name.
+template <typename Work>
+auto with_name(const std::string& name, const Work& work) {
+    try {
+        return work();
+    } catch (const Error& error) {
+        if (name.empty()) throw;
+        throw Error(error.code(), name + ": " + error.what());
+    }
+}
+
+}  // namespace covol::detail

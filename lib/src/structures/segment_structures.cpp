@@ -1,0 +1,166 @@
+#include "covol/segment_structures.h"
+
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/Morphology.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "covol/error.h"
+#include "covol/mesh_relax.h"
+#include "covol/mesh_stream.h"
+#include "covol/seeds.h"
+#include "covol/surface.h"
+#include "marks/with_name.h"
+#include "meshing/level_set_distance.h"
+#include "meshing/mesh_distance.h"
+#include "segment/result/mark_fit.h"
+
+namespace covol {
+namespace {
+
+constexpr double kReachVoxels = 5.0;  // of marks whose attraction is unlimited
+constexpr double kWeakLine = 0.93;    // 1 - g where the image is 1.2 times as bright as the band's median
+constexpr int kBesideBand = 5;        // voxels beside the surface's band that tell how steep slopes are here
+
+/// Where edges are looked up for a surface that was found without them.
+FloatGridPtr around(const FloatGrid& surface) {
+    FloatGridPtr topology = surface.deepCopy();
+    openvdb::tools::dilateActiveValues(topology->tree(), kBesideBand, openvdb::tools::NN_FACE,
+                                       openvdb::tools::EXPAND_TILES);
+    const Domain domain = domain_of(surface);
+    topology->clip({openvdb::Coord(domain.min.data()), openvdb::Coord(domain.max.data())});
+    return topology;
+}
+
+/// What belongs to the surface: as segment() measures it.
+void measure_again(StructureResult& structure, const std::optional<Image>& image, const RunContext& run) {
+    SegmentReport& report = structure.result.report;
+    const SegmentOptions& options = report.resolved;
+    const FloatGrid& surface = *structure.result.surface;
+    TriangleMesh& mesh = structure.result.mesh;
+    if (options.without_mesh) {
+        const StreamedMesh made = measure_surface(surface, 0, run);
+        report.mesh.triangles = std::int64_t(made.triangles);
+        report.surface = made.measures;
+    } else {
+        mesh = extract_mesh(surface, options.extract, run);
+        report.mesh = relax_mesh(mesh, surface, {options.extract.isovalue}, run);
+        report.surface = measure(mesh);
+    }
+    report.seeds = check_seeds(surface, options.inside, options.outside);
+    report.seeds.painted = options.painted_seeds;
+    if (structure.marks.empty()) return;
+    std::vector<double> distances;
+    with_threads(run, [&] {
+        distances = options.without_mesh ? detail::distances_to(surface, structure.marks)
+                                         : detail::distances_to(mesh, structure.marks);
+    });
+    report.fit = detail::statistics_of(distances);
+    for (const std::string& line :
+         pipeline::compare_with_marks(report, surface, image ? &*image : nullptr, structure.marks, distances)) {
+        const std::string warning = "beside the other structures " + line;
+        report.warnings.push_back(warning);
+        run.warn(warning);
+    }
+}
+
+/// Makes the surfaces disjoint.
+void separate_all(StructuresResult& all, const std::optional<Image>& image, const RunContext& run) {
+    const auto begin = std::chrono::steady_clock::now();
+    std::vector<Structure> solids;
+    for (const StructureResult& structure : all.structures)
+        solids.push_back({structure.name, structure.result.surface});
+    SeparateResult separated = separate(solids, {}, run);
+    for (std::size_t n = 0; n < all.structures.size(); ++n) {
+        if (!separated.report.changed[n]) continue;
+        StructureResult& structure = all.structures[n];
+        structure.result.surface = separated.surfaces[n];
+        measure_again(structure, image, speaking_for(structure.name, all.structures.size(), run));
+    }
+    all.overlaps = std::move(separated.report.overlaps);
+    all.separate_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+}  // namespace
+
+VoxelSizeChoice choose_voxel_size(const std::optional<Image>& image, const Marks& marks,
+                                  const SegmentOptions& options) {
+    if (image) return choose_voxel_size(*image);
+    return choose_voxel_size(positions_of(marks, {}), !marks.contours.empty() || options.tags_points());
+}
+
+SegmentResult solve_structure(const std::optional<Image>& image, const StructureInput& structure,
+                              const RunContext& run) {
+    return image ? segment(*image, structure.points, structure.options, run)
+                 : reconstruct(structure.points, structure.options, run);
+}
+
+StructuresResult segment_structures(const std::optional<Image>& image, std::vector<Marks> marks,
+                                    const StructuresOptions& options, const RunContext& run,
+                                    const StructureSolver& solve) {
+    if (!image && marks.size() > 1)
+        throw Error(Errc::InvalidInput, "segment_structures: several structures need an image");
+    SegmentOptions common = options.segment;
+    if (!common.voxel_size && !marks.empty()) {
+        const VoxelSizeChoice choice = choose_voxel_size(image, marks.front(), common);
+        common.voxel_size = choice.voxel_size;
+        common.voxel_size_may_grow = true;
+        run.info("voxel_size: " + choice.reason);
+    }
+    std::optional<ImageGeometry> geometry;
+    if (image) geometry = image->geometry();
+    std::vector<StructureInput> inputs = prepare_marks(std::move(marks), geometry, common, options.marks, run);
+    StructuresResult all;
+    for (StructureInput& input : inputs) {
+        const RunContext own = speaking_for(input.name, inputs.size(), run);
+        StructureResult made{std::move(static_cast<StructureFacts&>(input)), {}, {}};
+        made.result = detail::with_name(made.name, [&] {
+            if (input.guess) {
+                made.guess = input.guess(own);
+                input.options.guess = made.guess->start;
+            }
+            return solve(image, input, own);
+        });
+        if (inputs.size() > 1 && made.guess) made.guess->mask.reset();
+        input = {};
+        all.structures.push_back(std::move(made));
+    }
+    if (inputs.size() > 1) separate_all(all, image, run);
+    for (StructureResult& structure : all.structures) structure.result.surface->setName(structure.grid);
+    return all;
+}
+
+StructuresResult TimeLapse::segment(const Image& frame, std::vector<Marks> marks, const StructuresOptions& options,
+                                    const RunContext& run) {
+    for (std::size_t n = 0; n < last_.size(); ++n) {
+        if (n >= marks.size() || marks.size() != last_.size() || marks[n].name != last_[n].name)
+            throw Error(Errc::InvalidInput, "TimeLapse: expected the structures of the frame before, in their order");
+        marks[n].start.emplace();
+        marks[n].start->kind = Start::Kind::Vdb;
+        marks[n].start->level_set = last_[n].surface;
+        marks[n].delta = last_[n].delta;
+    }
+    StructuresResult all = segment_structures(frame, std::move(marks), options, run);
+    last_.clear();
+    for (const StructureResult& structure : all.structures)
+        last_.push_back({structure.name, structure.result.surface, structure.result.report.resolved.evolve.delta});
+    return all;
+}
+
+Evidence assess_evidence(const SegmentResult& result, const std::vector<Vec3>& marks, const Image& image,
+                         int suggestions, const RunContext& run) {
+    const SegmentOptions& used = result.report.resolved;
+    EvidenceOptions options;
+    const double range = used.evolve.attraction_range.value_or(0);
+    options.reach = range > 0 ? range : kReachVoxels * *used.voxel_size;
+    options.suggestions = suggestions;
+    // Brightness is nowhere 0 as slopes are, and g falls below 1/2 before there is a line.
+    if (is_line(used.edge.feature)) options.weak_edge = kWeakLine;
+    // Edges that moved nothing were not looked for.
+    const FloatGridPtr g =
+        result.edge ? result.edge : detect_edges(image, *around(*result.surface), used.edge, run).grid;
+    return assess_evidence(result.mesh, marks, *g, image.geometry(), options, run);
+}
+
+}  // namespace covol
