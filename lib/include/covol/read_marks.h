@@ -23,6 +23,8 @@ struct ReadMarksOptions {
 COVOL_API void read_marks(Marks& marks, const std::optional<ImageGeometry>& image, const ReadMarksOptions& options = {},
                           const RunContext& run = {});
 
+/// Reads the file of a start that has none yet: MeshStart, MaskStart or LevelSetStart. @throws Error as the readers.
+[[nodiscard]] COVOL_API Start read_start(const Start& kind, const std::string& path, const RunContext& run = {});
 /// By the file's kind: make_guess() of a mask.
 /// @throws Error as make_guess() and read_image(); InvalidInput (points).
 [[nodiscard]] COVOL_API GivenGuess read_guess(const std::string& path, const std::optional<ImageGeometry>& image,

@@ -53,7 +53,8 @@ void check_tag_distance(double tag_distance, const std::vector<Vec3>& points) {
         throw Error(Errc::InvalidOptions, "`tag_distance`: " + detail::number(tag_distance) +
                                               " is more than the points' whole box measures, " +
                                               detail::number(diagonal) +
-                                              ": nothing that they enclose is that far from them");
+                                              ": nothing that they enclose is that far from them",
+                    "tag_distance");
 }
 
 /// One structure after the other.

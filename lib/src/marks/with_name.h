@@ -12,7 +12,7 @@ auto with_name(const std::string& name, const Work& work) {
         return work();
     } catch (const Error& error) {
         if (name.empty()) throw;
-        throw Error(error.code(), name + ": " + error.what());
+        throw Error(error.code(), name + ": " + error.what(), error.option());
     }
 }
 

@@ -136,9 +136,7 @@ StructuresResult TimeLapse::segment(const Image& frame, std::vector<Marks> marks
     for (std::size_t n = 0; n < last_.size(); ++n) {
         if (n >= marks.size() || marks.size() != last_.size() || marks[n].name != last_[n].name)
             throw Error(Errc::InvalidInput, "TimeLapse: expected the structures of the frame before, in their order");
-        marks[n].start.emplace();
-        marks[n].start->kind = Start::Kind::Vdb;
-        marks[n].start->level_set = last_[n].surface;
+        marks[n].start = LevelSetStart{last_[n].surface};
         marks[n].delta = last_[n].delta;
     }
     StructuresResult all = segment_structures(frame, std::move(marks), options, run);

@@ -128,8 +128,8 @@ TEST_CASE("A guess is one label of a mask") {
     const Image two = labels([](int i, int j, int k) { return in_ball(i, j, k, 11.5, 8) ? (i < 12 ? 7 : 3) : 0; });
     const GivenGuess guess = make_guess(two, 3, lattice());
     CHECK(guess.label == 3);
-    CHECK(guess.start.mask->at(14, 11, 11) == 1);
-    CHECK(guess.start.mask->at(8, 11, 11) == 0);
+    CHECK(std::get<MaskStart>(guess.start).mask->at(14, 11, 11) == 1);
+    CHECK(std::get<MaskStart>(guess.start).mask->at(8, 11, 11) == 0);
     CHECK(guess.mask->at(8, 11, 11) == 7);
     CHECK_THROWS_WITH(make_guess(two, 0, {}), Catch::Contains("expected one label, got 3, 7"));
     CHECK_THROWS_WITH(make_guess(two, 4, {}), Catch::Contains("expected one of the labels") && Catch::Contains("got 4"));
@@ -155,7 +155,7 @@ TEST_CASE("Paint of one structure is outside of the others, and the outside labe
     const Image scribbles = labels([](int i, int j, int k) {
         return in_ball(i, j, k, 5, 3) ? 1 : in_ball(i, j, k, 18, 3) ? 2 : k == 22 && j < 4 && i < 4 ? 9 : 0;
     });
-    PaintedOptions options{PaintedAs::Scribbles, 9};
+    const PaintedOptions options{PaintedAs::Scribbles, 9};
     std::vector<Marks> structures;
     add_paint(structures, {painted(scribbles, options)});
     const std::vector<StructureInput> inputs = prepare_marks(structures, lattice(), with_voxels_of(1));

@@ -107,7 +107,7 @@ TEST_CASE("A frame of a time-lapse starts from the one before, and a failed one 
     const double delta = first.structures.at(0).result.report.resolved.evolve.delta.value();
     const StructuresResult second = lapse.segment(scene(1), {Marks{}}, options);
     const SegmentReport& report = second.structures.at(0).result.report;
-    CHECK(report.resolved.start.kind == Start::Kind::Vdb);
+    CHECK(is_any<LevelSetStart>(report.resolved.start));
     CHECK(report.resolved.evolve.delta == delta);
     Marks other;
     other.name = "other";

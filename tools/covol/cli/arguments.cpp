@@ -81,37 +81,27 @@ WorldBox parse_box(const std::string& flag, const std::string& text) {
     return to_box(flag, numbers(flag, "x0,y0,z0,x1,y1,z1", text, 6));
 }
 
-Start parse_start(const std::string& flag, const std::string& text) {
-    Start start;
+StartChoice parse_start(const std::string& flag, const std::string& text) {
     const std::size_t colon = text.find(':');
     const std::string kind = text.substr(0, colon);
     const std::string rest = colon == std::string::npos ? "" : text.substr(colon + 1);
-    if (colon == std::string::npos && (kind == "auto" || kind == "guess" || kind == "cloud" || kind == "tag")) {
-        start.kind = kind == "auto"    ? Start::Kind::Auto
-                     : kind == "guess" ? Start::Kind::Guess
-                     : kind == "cloud" ? Start::Kind::Cloud
-                                       : Start::Kind::Tag;
-        return start;
+    if (colon == std::string::npos) {
+        if (kind == "auto") return {AutoStart{}, ""};
+        if (kind == "guess") return {GuessStart{}, ""};
+        if (kind == "cloud") return {CloudStart{}, ""};
+        if (kind == "tag") return {TagStart{}, ""};
     }
     if (kind == "sphere") {
         const std::vector<double> v = numbers(flag, "sphere:x,y,z,r", rest, 4);
-        start.kind = Start::Kind::Sphere;
-        start.center = {v[0], v[1], v[2]};
-        start.radius = v[3];
-        if (!(start.radius > 0))
-            throw Error(Errc::InvalidOptions, flag + ": expected a radius > 0, got " + std::to_string(start.radius),
-                        flag);
-        return start;
+        if (!(v[3] > 0))
+            throw Error(Errc::InvalidOptions, flag + ": expected a radius > 0, got " + std::to_string(v[3]), flag);
+        return {SphereStart{{v[0], v[1], v[2]}, v[3]}, ""};
     }
-    if (kind == "box") {
-        start.kind = Start::Kind::Box;
-        start.box = to_box(flag, numbers(flag, "box:x0,y0,z0,x1,y1,z1", rest, 6));
-        return start;
-    }
-    if (!rest.empty() && (kind == "mesh" || kind == "mask" || kind == "vdb")) {
-        start.kind = kind == "mesh" ? Start::Kind::Mesh : kind == "mask" ? Start::Kind::Mask : Start::Kind::Vdb;
-        start.path = rest;
-        return start;
+    if (kind == "box") return {BoxStart{to_box(flag, numbers(flag, "box:x0,y0,z0,x1,y1,z1", rest, 6))}, ""};
+    if (!rest.empty()) {
+        if (kind == "mesh") return {MeshStart{}, rest};
+        if (kind == "mask") return {MaskStart{}, rest};
+        if (kind == "vdb") return {LevelSetStart{}, rest};
     }
     bad_text(flag, "auto, guess, tag, sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1, mesh:FILE, mask:FILE or vdb:FILE", text);
 }

@@ -46,7 +46,12 @@ struct Length {
 [[nodiscard]] Vec3 parse_vec3(const std::string& flag, const std::string& text);
 [[nodiscard]] WorldBox parse_box(const std::string& flag, const std::string& text);
 /// tag, sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1, mesh:FILE, mask:FILE, vdb:FILE
-[[nodiscard]] Start parse_start(const std::string& flag, const std::string& text);
+/// `--init`: a start, and the file that it is read from, or empty.
+struct StartChoice {
+    Start start;
+    std::string path;
+};
+[[nodiscard]] StartChoice parse_start(const std::string& flag, const std::string& text);
 /// `--frame`: one time point, several, or all.
 struct FrameChoice {
     bool given = false, all = false;

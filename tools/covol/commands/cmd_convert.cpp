@@ -90,7 +90,7 @@ struct ConvertJob {
         if (cloud_flags.length("simplify").in_voxels && !geometry)
             throw UsageError("--simplify: a length in voxels needs --like IMAGE");
         const double h = geometry ? *std::min_element(geometry->spacing.begin(), geometry->spacing.end()) : 1;
-        if (const CloudCleanupOptions cleanup = cloud_flags.resolve(h); cleanup.any()) {
+        if (const CloudCleanupOptions cleanup = cloud_flags.cleanup(h); cleanup.any()) {
             CloudCleanupReport done;
             world = clean_cloud(world, cleanup, session.run(), &done);
             report["cleanup"] = to_json(done);

@@ -131,8 +131,7 @@ private:
     /// A position, or a word or shape to start from.
     static bool names_no_file(const std::string& value) {
         try {
-            const Start start = parse_start("", value);
-            return start.path.empty();
+            return parse_start("", value).path.empty();
         } catch (const std::exception&) {
         }
         try {

@@ -202,7 +202,7 @@ std::string outputs_of_join(const Session& session) {
 
 void run_bricks(const SegmentJob& job, Session& session) {
     const BrickCall& call = *session.brick();
-    const std::vector<Marks> structures = structures_of(job, job.painted.read(session.run()));
+    std::vector<Marks> structures = structures_of(job, job.painted.read(session.run()));
     if (is_timelapse(job) || structures.size() != 1)
         throw UsageError("brick: expected one structure in one image; plan each by itself");
     const BrickFolder folder(call.folder);
@@ -214,6 +214,7 @@ void run_bricks(const SegmentJob& job, Session& session) {
                 return join(job, *make_job(image, structure, run), plan, folder, session);
             });
     job.check_options();
+    add_starts(job, structures, session.run());
     std::optional<Image> image;
     if (!job.images.empty()) image = job.read(job.images.front(), job.image.options, session);
     if (call.step == BrickCall::Step::Plan) {

@@ -58,9 +58,9 @@ Pilot run_pilot(const SegmentJob& job, const Marks& marks, const std::optional<I
     options.without_fields = false;
     Stopwatch watch;
     SegmentResult result = reconstruct(input.points, options, quiet);
-    Start::Kind start = result.report.resolved.start.kind;
-    if (geometry && start == Start::Kind::Cloud) {  // which points have without an image alone
-        options.start.kind = start = Start::Kind::Tag;
+    Start start = result.report.resolved.start;
+    if (geometry && is_any<CloudStart>(start)) {  // which points have without an image alone
+        options.start = start = TagStart{};
         watch = {};
         result = reconstruct(input.points, options, quiet);
     }
@@ -68,8 +68,8 @@ Pilot run_pilot(const SegmentJob& job, const Marks& marks, const std::optional<I
                 double(result.report.active_voxels),
                 0,
                 watch.seconds(),
-                start == Start::Kind::Guess,
-                start == Start::Kind::Cloud,
+                is_any<GuessStart>(start),
+                is_any<CloudStart>(start),
                 result.surface};
     if (result.distance) pilot.tube_voxels = double(result.distance->activeVoxelCount());
     return pilot;
@@ -167,7 +167,7 @@ StructurePlan plan_structure(const SegmentJob& job, Marks marks, const ImageInfo
     std::optional<ImageGeometry> geometry;
     if (image != nullptr) geometry = image->geometry;
     read_marks(marks, geometry, job.reading(quiet), quiet);
-    if (!geometry) thin_points(marks, job.cloud.most_points, quiet);
+    if (!geometry) thin_points(marks, job.cloud.inputs.options.most_points, quiet);
     const std::vector<Vec3> given = positions_of(marks, geometry);
     if (given.empty())
         throw Error(Errc::InvalidInput,
@@ -242,7 +242,9 @@ void run_plan(const SegmentJob& job, Session& session) {
     }
     double voxels = 0, while_solved = 0, seconds = 0;
     std::set<std::uint64_t> blocks;
-    for (const Marks& marks : structures_of(job, job.painted.read(session.run()))) {
+    std::vector<Marks> structures = structures_of(job, job.painted.read(session.run()));
+    add_starts(job, structures, session.run());
+    for (const Marks& marks : structures) {
         const StructurePlan one = plan_structure(job, marks, image ? &*image : nullptr, given_h, session, quiet);
         voxels += one.active_voxels;
         while_solved = std::max(while_solved, one.bytes_while_solved);

@@ -160,7 +160,12 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
     if (with_image) bind_named_seeds(command);
     command
         .add_option_function<std::string>(
-            "--init", [this](const std::string& text) { given.options.start = parse_start("--init", text); },
+            "--init",
+            [this](const std::string& text) {
+                const StartChoice choice = parse_start("--init", text);
+                given.options.start = choice.start;
+                start_path = choice.path;
+            },
             "how the level set starts: auto, guess (through the marks with the least bending), cloud (many points "
             "without an image: their own surface), tag, sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1 (inside an object and "
             "without marks these grow to its edges), mesh:F, mask:F or vdb:F (near its marks such a start is a guess "

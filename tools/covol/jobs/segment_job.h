@@ -26,6 +26,7 @@ struct SegmentJob {
     GuessFlags guess;
     CloudFlags cloud;
     Given<SegmentOptions> given;
+    std::string start_path;  ///< of the file that the start is read from; empty: it needs none
     std::vector<std::pair<std::string, Vec3>> named_seeds;  ///< outside one structure among several
     MeshFlags mesh;
     EvidenceFlags evidence;

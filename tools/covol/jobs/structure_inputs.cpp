@@ -62,7 +62,7 @@ std::vector<Marks> structures_of(const SegmentJob& job,
         }
     share_seeds(structures, "--inside", job.seeds.inside, &MarkFiles::inside, &Marks::inside);
     share_seeds(structures, "--outside", job.seeds.outside, &MarkFiles::outside, &Marks::outside);
-    for (const auto& [name, seed] : job.tag.named_seeds)
+    for (const auto& [name, seed] : job.named_seeds)
         owner_of(structures, "--exterior-seed", name).exterior_seeds.push_back(seed);
     return structures;
 }
@@ -74,14 +74,19 @@ std::vector<std::string> names_of(const std::vector<Marks>& structures) {
     return names;
 }
 
-void add_starts(const SegmentJob& job, std::vector<Marks>& structures) {
-    if (structures.size() == 1 || job.start.kind <= Start::Kind::Tag) return;
-    if (job.start.kind != Start::Kind::Vdb)
+void add_starts(const SegmentJob& job, std::vector<Marks>& structures, const RunContext& run) {
+    const Start& start = job.given.options.start;
+    if (!is_named(start)) return;
+    if (structures.size() == 1) {
+        structures.front().start = read_start(start, job.start_path, run);
+        return;
+    }
+    if (!is_any<LevelSetStart>(start))
         throw UsageError(
             "--init: several structures cannot start from one shape; expected tag, or vdb:FILE with a grid for each");
     const std::vector<std::string> grids = make_grid_names(names_of(structures));
     for (std::size_t n = 0; n < structures.size(); ++n)
-        structures[n].start.emplace(job.start).level_set = read_vdb(job.start.path, grids[n]);
+        structures[n].start = LevelSetStart{read_vdb(job.start_path, grids[n])};
 }
 
 StructuresOptions read_structures(const SegmentJob& job, std::vector<Marks>& structures,
@@ -94,7 +99,7 @@ StructuresOptions read_structures(const SegmentJob& job, std::vector<Marks>& str
         const RunContext own = speaking_for(marks.name, structures.size(), run);
         const Stopwatch watch;
         read_marks(marks, geometry, reading, own);
-        if (!image) thin_points(marks, job.cloud.most_points, own);
+        if (!image) thin_points(marks, job.cloud.inputs.options.most_points, own);
         session.add_seconds("read", watch.seconds());
         if (!image && marks.points.empty() && marks.contours.empty())
             throw UsageError("expected an image, points or contours, got none");

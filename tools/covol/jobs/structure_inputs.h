@@ -19,8 +19,9 @@ namespace covol::tool {
 
 [[nodiscard]] std::vector<std::string> names_of(const std::vector<Marks>& structures);
 
-/// Gives each of several structures its own grid of --init vdb:FILE. @throws UsageError for other shapes; Error.
-void add_starts(const SegmentJob& job, std::vector<Marks>& structures);
+/// Reads the file of --init; of several structures each gets its own grid of a .vdb.
+/// @throws UsageError where several structures have one shape; Error.
+void add_starts(const SegmentJob& job, std::vector<Marks>& structures, const RunContext& run);
 
 /// Reads the structures' files, and chooses the voxel size that they share.
 /// @throws UsageError where there are neither an image nor marks; Error.

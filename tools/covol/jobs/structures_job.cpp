@@ -131,7 +131,7 @@ void run_structures(const SegmentJob& job, Session& session, const StructureSolv
     outputs.check("--table", job.table_path, OutputKind::Table);
     job.check_options();
 
-    add_starts(job, structures);
+    add_starts(job, structures, session.run());
     ReadImageOptions reading = job.image.options;
     if (job.frames.given) reading.frame = job.frames.first;
     std::optional<Image> image;

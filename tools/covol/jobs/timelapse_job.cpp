@@ -52,7 +52,7 @@ public:
             throw UsageError("--painted, --guess: expected one image, got a time-lapse");
         frames_ = frames_of(job_);
         check();
-        add_starts(job_, structures_);
+        add_starts(job_, structures_, session_.run());
         for (const Frame& frame : frames_) {
             session_.run().check();
             go(frame);

@@ -44,12 +44,7 @@ py::tuple run_job(const char* function, const std::optional<Image>& image, const
     for (const auto& [name, inputs] : marks) problem.structures.push_back(to_marks(name, inputs));
     if (!painted[0].is_none()) problem.painted = py::cast<Image>(painted[0]);
     problem.painting.outside_label = py::cast<int>(painted[1]);
-    const auto word = py::cast<std::string>(painted[2]);
-    if (word != "auto" && word != "slices" && word != "scribbles")
-        throw Error(Errc::InvalidOptions, "painted_as: expected one of auto, slices, scribbles, got '" + word + "'");
-    problem.painting.as = word == "auto"     ? PaintedAs::Automatic
-                          : word == "slices" ? PaintedAs::Slices
-                                             : PaintedAs::Scribbles;
+    problem.painting.as = to_choice<PaintedAs>("painted_as", painted[2]);
     const Solution made = solve(problem, given, call, lapse);
     py::list overlaps;
     for (const StructureOverlap& o : made.overlaps) overlaps.append(py::make_tuple(o.a, o.b, o.volume, o.inner));

@@ -7,19 +7,14 @@
 namespace covol::python {
 namespace {
 
-std::optional<Start> start_of(const Shape& shape) {
-    if (const auto* text = std::get_if<std::string>(&shape)) return tool::parse_start("init", *text);
-    Start start;
-    if (const auto* level_set = std::get_if<LevelSet>(&shape)) {
-        start.kind = Start::Kind::Vdb;
-        start.level_set = level_set->grid;
-    } else if (const auto* mask = std::get_if<Image>(&shape)) {
-        start.kind = Start::Kind::Mask;
-        start.mask = std::make_shared<const Image>(*mask);
-    } else {
-        return std::nullopt;
+std::optional<Start> start_of(const Shape& shape, const RunContext& run) {
+    if (const auto* text = std::get_if<std::string>(&shape)) {
+        const tool::StartChoice choice = tool::parse_start("init", *text);
+        return read_start(choice.start, choice.path, run);
     }
-    return start;
+    if (const auto* level_set = std::get_if<LevelSet>(&shape)) return LevelSetStart{level_set->grid};
+    if (const auto* mask = std::get_if<Image>(&shape)) return MaskStart{std::make_shared<const Image>(*mask)};
+    return std::nullopt;
 }
 
 class Solver {
@@ -39,16 +34,16 @@ public:
                       {std::make_shared<const PaintedImage>(make_painted(*problem_.painted, problem_.painting))});
             if (one && structures.size() > 1)
                 throw Error(Errc::InvalidInput,
-                            "painted: expected one label, got several; structures() takes each for a structure");
+                            "painted: expected one label, got several; structures() takes each for a structure",
+                            "painted");
         }
-        if (structures.empty()) throw Error(Errc::InvalidInput, "marks: expected a structure, got none");
-        SegmentOptions asked = defaults.options;
-        if (const auto start = start_of(problem_.init)) asked.start = *start;
+        if (structures.empty()) throw Error(Errc::InvalidInput, "marks: expected a structure, got none", "marks");
+        SegmentOptions asked = defaults.segment;
+        if (const auto start = start_of(problem_.init, run_)) asked.start = *start;
         const Settings settings = given_.resolve(voxel_size(structures.front(), asked), geometry_.has_value());
-        StructuresOptions options{settings.options, {settings.contours, settings.cloud, false}};
+        StructuresOptions options{settings.segment, {settings.contours, settings.cloud, false}};
         options.segment.start = asked.start;
-        if (const std::string why = options.segment.why_invalid() + settings.cloud.why_invalid(); !why.empty())
-            throw Error(Errc::InvalidOptions, why);
+        require_valid(settings, geometry_ ? "segment" : "reconstruct");
         return lapse != nullptr ? lapse->segment(*problem_.image, std::move(structures), options, run_)
                                 : segment_structures(problem_.image, std::move(structures), options, run_);
     }
@@ -58,25 +53,25 @@ private:
         Marks marks;
         marks.name = safe_text(given.name);
         for (const PointCloud& cloud : given.points) add_points(marks, cloud, geometry_, run_);
-        if (!geometry_) thin_points(marks, settings.most_points, run_);
+        if (!geometry_) thin_points(marks, settings.inputs.most_points, run_);
         for (const PointCloud& lines : given.contours) add_contours(marks, lines, geometry_, run_);
         marks.inside = given.inside;
         marks.outside = given.outside;
         marks.exterior_seeds = given.exterior_seeds;
-        marks.start = start_of(given.init);
+        marks.start = start_of(given.init, run_);
         if (const auto* path = std::get_if<std::string>(&given.guess)) marks.files.guess = *path;
         if (given.guess.index() != 0)
-            marks.guess = [this, &shape = given.guess, label = settings.guess_label](const RunContext& run) {
+            marks.guess = [this, &shape = given.guess, label = settings.inputs.guess_label](const RunContext& run) {
                 if (const auto* path = std::get_if<std::string>(&shape))
                     return read_guess(*path, geometry_, {{}, label, false, {}}, run);
                 if (const auto* mask = std::get_if<Image>(&shape)) return make_guess(*mask, label, geometry_);
-                return GivenGuess{*start_of(shape), std::nullopt};
+                return GivenGuess{*start_of(shape, run), std::nullopt};
             };
         return marks;
     }
 
     [[nodiscard]] double voxel_size(const Marks& marks, const SegmentOptions& asked) const {
-        const Length& wanted = given_.voxel_size();
+        const Length wanted = given_.voxel_size();
         if (wanted.given && !wanted.in_voxels) return wanted.value;
         const VoxelSizeChoice choice = choose_voxel_size(problem_.image, marks, asked);
         run_.info("voxel_size: " + choice.reason);

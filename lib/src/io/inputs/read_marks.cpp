@@ -2,7 +2,9 @@
 
 #include "covol/error.h"
 #include "covol/file_kind.h"
+#include "covol/mesh_io.h"
 #include "covol/points_text.h"
+#include "covol/vdb_io.h"
 
 namespace covol {
 
@@ -32,15 +34,20 @@ void read_marks(Marks& marks, const std::optional<ImageGeometry>& image, const R
         };
 }
 
+Start read_start(const Start& kind, const std::string& path, const RunContext& run) {
+    if (is_any<MeshStart>(kind)) return MeshStart{std::make_shared<const TriangleMesh>(read_mesh(path))};
+    if (is_any<MaskStart>(kind)) return MaskStart{std::make_shared<const Image>(read_image(path, {}, run))};
+    return is_any<LevelSetStart>(kind) ? LevelSetStart{read_vdb_level_set(path, run)} : kind;
+}
+
 GivenGuess read_guess(const std::string& path, const std::optional<ImageGeometry>& image,
                       const ReadMarksOptions& options, const RunContext& run) {
     const FileKind kind = kind_of_file(path);
     if (kind == FileKind::Points)
-        throw Error(Errc::InvalidInput, "`guess`: " + path + ": expected a mask, mesh or level set, got points");
+        throw Error(Errc::InvalidInput, "`guess`: " + path + ": expected a mask, mesh or level set, got points", "guess");
     if (kind != FileKind::Image) {
         GivenGuess guess;
-        guess.start.kind = kind == FileKind::Vdb ? Start::Kind::Vdb : Start::Kind::Mesh;
-        guess.start.path = path;
+        guess.start = read_start(kind == FileKind::Vdb ? Start(LevelSetStart{}) : Start(MeshStart{}), path, run);
         return guess;
     }
     RunContext silent = run;
