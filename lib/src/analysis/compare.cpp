@@ -9,12 +9,9 @@
 #include <limits>
 #include <numeric>
 
-#include "base/file.h"
 #include "covol/domain.h"
 #include "covol/error.h"
-#include "covol/mesh_io.h"
 #include "covol/surface.h"
-#include "covol/vdb_io.h"
 #include "mesh/triangle.h"
 #include "meshing/mesh_distance.h"
 
@@ -469,19 +466,6 @@ void compare_surfaces(const TriangleMesh& a, const TriangleMesh& b, double spaci
 }
 
 }  // namespace
-
-Solid read_solid(const std::string& path, int label, const RunContext& run) {
-    Solid solid;
-    solid.label = label;
-    if (detail::extension(split_grid_name(path).path) == ".vdb") {
-        solid.level_set = read_vdb_level_set(path, run);
-    } else if (is_mesh_name(path)) {
-        solid.mesh = read_mesh(path);
-    } else {
-        solid.mask = read_image(path, {}, run);
-    }
-    return solid;
-}
 
 CompareReport compare(const Solid& a, const Solid& b, const RunContext& run) {
     CompareReport report;

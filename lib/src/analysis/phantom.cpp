@@ -161,7 +161,8 @@ std::vector<std::string> list_phantom_kinds() {
 
 Phantom make_phantom(const PhantomOptions& options) {
     const std::vector<PhantomShape> all = shapes();
-    const auto found = std::find_if(all.begin(), all.end(), [&](const PhantomShape& s) { return s.name == options.kind; });
+    const auto found =
+        std::find_if(all.begin(), all.end(), [&](const PhantomShape& s) { return s.name == options.kind; });
     if (found == all.end()) {
         std::string kinds;
         for (const PhantomShape& s : all) kinds += (kinds.empty() ? "" : ", ") + std::string(s.name);

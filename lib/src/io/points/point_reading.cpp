@@ -43,16 +43,6 @@ Vec3 undo(const ReadPointsOptions& reading, Vec3 p) {
     return p;
 }
 
-Vec3 to_world(PointSpace space, const Vec3& p, const ImageGeometry& geometry) {
-    const Vec3& h = geometry.spacing;
-    switch (space) {
-        case PointSpace::Index: return geometry.index_to_world(p);
-        case PointSpace::Local: return geometry.index_to_world({p[0] / h[0], p[1] / h[1], p[2] / h[2]});
-        case PointSpace::Slices: return geometry.index_to_world({p[0] / h[0], p[1] / h[1], p[2]});
-        default: return p;
-    }
-}
-
 std::string describe(const ReadPointsOptions& reading) {
     std::ostringstream text;
     text << (reading.order == PointOrder::ZYX ? "z, y, x" : "x, y, z") << " in ";

@@ -14,7 +14,6 @@ namespace covol::detail {
 [[nodiscard]] Vec3 direction_as(const ReadPointsOptions& reading, Vec3 v);
 /// What the file says of a position; @pre reading.channels == 1.
 [[nodiscard]] Vec3 undo(const ReadPointsOptions& reading, Vec3 p);
-[[nodiscard]] Vec3 to_world(PointSpace space, const Vec3& p, const ImageGeometry& geometry);
 /// "z, y, x in voxels"
 [[nodiscard]] std::string describe(const ReadPointsOptions& reading);
 

@@ -96,24 +96,6 @@ PointCloud parse_points(const std::string& text, const std::string& source, cons
     return to_cloud(source, detail::parse_columns(source, text, true), options);
 }
 
-std::vector<Vec3> to_world(const PointCloud& cloud) {
-    if (cloud.space != PointSpace::World)
-        throw Error(Errc::InvalidInput,
-                    "to_world: " + cloud.source +
-                        ": the points are in an image's own frame, and there is no image; give "
-                        "one, or `points_space = world` for points in lengths",
-                    "points_space");
-    return cloud.points;
-}
-
-std::vector<Vec3> to_world(const PointCloud& cloud, const ImageGeometry& geometry) {
-    if (cloud.space == PointSpace::World) return cloud.points;
-    std::vector<Vec3> world;
-    world.reserve(cloud.points.size());
-    for (const Vec3& p : cloud.points) world.push_back(detail::to_world(cloud.space, p, geometry));
-    return world;
-}
-
 void write_points(const std::string& path, const std::vector<Vec3>& points, const std::string& comment) {
     const std::string extension = detail::extension(path);
     std::string text;

@@ -6,6 +6,7 @@
 
 #include "covol/error.h"
 #include "covol/points.h"
+#include "image/to_world.h"
 #include "io/points/point_reading.h"
 
 namespace covol {

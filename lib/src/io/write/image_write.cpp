@@ -72,13 +72,6 @@ void warn_of_losses(const std::string& path, const ImageGeometry& geometry, cons
 
 }  // namespace
 
-PixelSource::~PixelSource() = default;
-std::optional<double> PixelSource::uniform(const VoxelBox&) const { return std::nullopt; }
-std::optional<std::array<double, 2>> PixelSource::range() const { return std::nullopt; }
-void PixelSource::wrote(const VoxelBox&, const void*, double) const {}
-Metadata PixelSource::metadata() const { return {}; }
-std::vector<NamedLabel> PixelSource::label_names() const { return {}; }
-
 bool is_zarr_store(const std::string& folder) { return detail::is_zarr(folder); }
 
 void write_image(const std::string& given, const PixelSource& source, const WriteImageOptions& options,
