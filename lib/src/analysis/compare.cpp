@@ -42,7 +42,7 @@ public:
         const Vec3 &s = geometry.spacing,
                    origin = choose_mesh_origin(geometry.world_box(), std::min({s[0], s[1], s[2]}));
         for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
-            mesh.vertices[v] = meshing::to_position(meshing::minus(geometry.index_to_world(mesh.place(v)), origin));
+            mesh.vertices[v] = meshing::to_position(minus(geometry.index_to_world(mesh.place(v)), origin));
         mesh.origin = origin;
         if (determinant(geometry.direction) < 0)
             for (auto& t : mesh.triangles) std::swap(t[0], t[1]);
@@ -412,10 +412,7 @@ Samples sample_surface(const TriangleMesh& mesh, double spacing) {
     }
     for (const auto& t : mesh.triangles) {
         const Vec3 a{samples.points[t[0]]}, b{samples.points[t[1]]}, c{samples.points[t[2]]};
-        const auto length = [](const Vec3& p, const Vec3& q) {
-            return std::hypot(q[0] - p[0], q[1] - p[1], q[2] - p[2]);
-        };
-        const double ab = length(a, b), bc = length(b, c), ca = length(c, a);
+        const double ab = length(minus(b, a)), bc = length(minus(c, b)), ca = length(minus(a, c));
         const double half = (ab + bc + ca) / 2;
         const double area = std::sqrt(std::max(0.0, half * (half - ab) * (half - bc) * (half - ca)));
         // n^2 congruent pieces, one sample in the middle of each.

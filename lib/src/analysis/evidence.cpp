@@ -14,18 +14,12 @@
 #include "covol/distance.h"
 #include "covol/error.h"
 #include "covol/points.h"
+#include "mesh/triangle.h"
 #include "meshing/mesh_distance.h"
 #include "points/kd_tree.h"
 
 namespace covol {
 namespace {
-
-Vec3 minus(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-
-double triangle_area(const Vec3& a, const Vec3& b, const Vec3& c) {
-    const Vec3 u = minus(b, a), v = minus(c, a);
-    return 0.5 * std::hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]);
-}
 
 std::vector<float> distances_to(const TriangleMesh& mesh, const std::vector<Vec3>& marks) {
     if (marks.empty()) return {};
@@ -126,7 +120,7 @@ private:
         };
         Piece p{{},
                 {levels_[t[0]], levels_[t[1]], levels_[t[2]]},
-                triangle_area(a, b, c),
+                meshing::area(a, b, c),
                 mean(result_.distance_to_marks),
                 mean(result_.edge_strength),
                 false};

@@ -8,6 +8,8 @@
 #include <numbers>
 #include <random>
 
+#include "base/geometry.h"
+
 namespace covol {
 namespace {
 
@@ -16,8 +18,6 @@ constexpr double kPi = std::numbers::pi;
 const double kShellRadius = std::sqrt(3.0) / 2.0;  // the paper's spheres, section 5
 constexpr double kShellThickness = 0.04;
 constexpr double kContrast = 255.0;
-
-double length(const Vec3& p) { return std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]); }
 
 // The distributions of <random> differ between standard libraries; these do not.
 class Random {

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <vector>
 
+#include "base/geometry.h"
 #include "clip/half_spaces.h"
 #include "grid/leaf_band.h"
 
@@ -164,7 +165,7 @@ private:
             } else if (depth < width_) {
                 const Vec3 nearest = projected(clip_, x);
                 const double wall = sample(nearest);
-                const double away = std::hypot(x[0] - nearest[0], x[1] - nearest[1], x[2] - nearest[2]);
+                const double away = length(minus(x, nearest));
                 value = wall < 0 ? away : std::hypot(wall, away);
             }
             block.values[p] = float(std::clamp(value, -width_, width_));

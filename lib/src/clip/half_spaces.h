@@ -3,18 +3,16 @@
 #include <array>
 #include <cmath>
 
-#include "base/vector.h"
+#include "base/geometry.h"
 #include "covol/clip.h"
 
 namespace covol::detail {
 
 /// n·x - offset: how far beyond the plane a position lies, negative within.
-[[nodiscard]] inline double along(const HalfSpace& plane, const Vec3& x) {
-    return cloud::dot(plane.normal, x) - plane.offset;
-}
+[[nodiscard]] inline double along(const HalfSpace& plane, const Vec3& x) { return dot(plane.normal, x) - plane.offset; }
 
 [[nodiscard]] inline Vec3 moved(const Vec3& x, const Vec3& direction, double by) {
-    return cloud::plus(x, cloud::times(by, direction));
+    return plus(x, times(by, direction));
 }
 
 /// The nearest position in the clip, found by projecting onto its planes in turn; of a box it is exact.
@@ -45,8 +43,8 @@ namespace covol::detail {
         Vec3 direction{0, 0, 0};
         direction[a] = 1;
         direction = moved(direction, n, -n[a]);
-        if (i == 1) direction = moved(direction, found[0], -cloud::dot(direction, found[0]));
-        found[i++] = cloud::unit(direction);
+        if (i == 1) direction = moved(direction, found[0], -dot(direction, found[0]));
+        found[i++] = unit(direction);
     }
     return found;
 }

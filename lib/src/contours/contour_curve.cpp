@@ -1,5 +1,7 @@
 #include "contours/contour_curve.h"
 
+#include "base/geometry.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,8 +10,6 @@ namespace covol::detail {
 namespace {
 
 constexpr double kLongestPiece = 1e6;  // points on one piece: a step that is far too small must not take all memory
-
-double distance(const Vec3& a, const Vec3& b) { return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }
 
 Vec3 mix(const Vec3& a, const Vec3& b, double t) {
     return {a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])};
@@ -20,7 +20,7 @@ int pieces(double length, double step) { return std::max(1, int(std::ceil(std::m
 /// Barry and Goldman's pyramid: the curve through p[1] and p[2] at the fraction s between them.
 Vec3 catmull_rom(const std::array<Vec3, 4>& p, double s) {
     std::array<double, 4> t{0, 0, 0, 0};
-    for (int n = 1; n < 4; ++n) t[n] = t[n - 1] + std::sqrt(distance(p[n - 1], p[n]));
+    for (int n = 1; n < 4; ++n) t[n] = t[n - 1] + std::sqrt(length(minus(p[n - 1], p[n])));
     const double at = t[1] + s * (t[2] - t[1]);
     std::array<Vec3, 4> level = p;
     for (int width = 1; width < 4; ++width)
@@ -41,7 +41,7 @@ std::vector<Vec3> subdivide(const std::vector<Vec3>& marks, bool closed, double 
         points.push_back(marks[n]);
         if (n + 1 == count && !closed) break;
         const Vec3& next = marks[(n + 1) % count];
-        const int parts = pieces(distance(marks[n], next), step);
+        const int parts = pieces(length(minus(marks[n], next)), step);
         for (int part = 1; part < parts; ++part) points.push_back(mix(marks[n], next, double(part) / parts));
     }
     return points;
@@ -60,7 +60,7 @@ std::vector<Vec3> centripetal_curve(const std::vector<Vec3>& marks, bool closed,
     std::vector<Vec3> curve;
     for (std::ptrdiff_t n = 0; n + 1 < count + (closed ? 1 : 0); ++n) {
         const std::array<Vec3, 4> p{at(n - 1), at(n), at(n + 1), at(n + 2)};
-        const int parts = pieces(distance(p[1], p[2]), step);
+        const int parts = pieces(length(minus(p[1], p[2])), step);
         for (int part = 0; part < parts; ++part)
             curve.push_back(part == 0 ? p[1] : catmull_rom(p, double(part) / parts));
     }

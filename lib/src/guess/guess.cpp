@@ -9,7 +9,7 @@
 #include <set>
 #include <utility>
 
-#include "base/vector.h"
+#include "base/geometry.h"
 #include "clip/clipped.h"
 #include "clip/half_spaces.h"
 #include "covol/start.h"
@@ -29,14 +29,14 @@ struct InImage : GuessOptions {
 
 double longest(const std::array<Vec3, 3>& axes) {
     double most = 0;
-    for (const Vec3& a : axes) most = std::max(most, std::hypot(a[0], a[1], a[2]));
+    for (const Vec3& a : axes) most = std::max(most, length(a));
     return most;
 }
 
 /// The standard deviation of a mark's place along a direction.
 double deviation_along(const InImage& options, const Vec3& direction) {
     double sd = 0;
-    for (const Vec3& a : options.deviation) sd = std::hypot(sd, cloud::dot(a, direction));
+    for (const Vec3& a : options.deviation) sd = std::hypot(sd, dot(a, direction));
     return sd;
 }
 
@@ -118,8 +118,8 @@ bool is_surrounded(const Vec3& mark, const std::vector<Vec3>& others, const Half
     const auto [u, v] = detail::directions_in(face);
     std::vector<std::array<double, 2>> around;  // squared distance, direction
     for (const Vec3& other : others) {
-        const Vec3 to = cloud::minus(other, mark);
-        const double x = cloud::dot(to, u), y = cloud::dot(to, v);
+        const Vec3 to = minus(other, mark);
+        const double x = dot(to, u), y = dot(to, v);
         if (x != 0 || y != 0) around.push_back({x * x + y * y, std::atan2(y, x)});
     }
     const std::size_t count = std::min(kGuess.around, around.size());

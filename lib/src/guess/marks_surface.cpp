@@ -8,6 +8,7 @@
 #include <limits>
 #include <numeric>
 
+#include "base/geometry.h"
 #include "guess/heuristics.h"
 #include "guess/wendland.h"
 #include "points/kd_tree.h"
@@ -15,11 +16,9 @@
 namespace covol::guess {
 namespace {
 
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-Vec3 unit(const Vec3& v) {
-    const double length = std::sqrt(dot(v, v));
-    return length > 0 ? Vec3{v[0] / length, v[1] / length, v[2] / length} : Vec3{1, 0, 0};
+Vec3 unit_or_x(const Vec3& v) {
+    const double size = length(v);
+    return size > 0 ? Vec3{v[0] / size, v[1] / size, v[2] / size} : Vec3{1, 0, 0};
 }
 
 /// `count` of the points, each as far from those before it as can be.
@@ -59,7 +58,7 @@ std::vector<Vec3> at(const std::vector<Vec3>& all, const std::vector<std::size_t
 std::vector<Vec3> normals_of(const VariationalSurface& surface, const std::vector<Vec3>& marks) {
     std::vector<Vec3> normals(marks.size());
     tbb::parallel_for(std::size_t(0), marks.size(),
-                      [&](std::size_t n) { normals[n] = unit(surface.gradient(marks[n])); });
+                      [&](std::size_t n) { normals[n] = unit_or_x(surface.gradient(marks[n])); });
     return normals;
 }
 

@@ -76,7 +76,7 @@ SurfaceVertices vertices_of(const TriangleMesh& mesh, int smooth) {
     surface.area.assign(count, 0);
     for (const auto& t : mesh.triangles) {
         const double area =
-            meshing::length(meshing::area_normal(surface.places[t[0]], surface.places[t[1]], surface.places[t[2]]));
+            length(meshing::area_normal(surface.places[t[0]], surface.places[t[1]], surface.places[t[2]]));
         for (int c = 0; c < 3; ++c) {
             // In a closed surface every edge leaves each of its ends in exactly one triangle.
             surface.neighbours[fill[t[c]]++] = t[(c + 1) % 3];

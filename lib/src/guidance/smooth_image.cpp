@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/geometry.h"
 #include "base/matrix.h"
-#include "base/vector.h"
 #include "guidance/profile_kernel.h"
 #include "limits/memory_budget.h"
 
@@ -22,7 +22,7 @@ SmoothImage::SmoothImage(const Image& image, const WorldBox& box, double sigma, 
     : box_(box), sigma_(sigma) {
     const ImageGeometry& g = image.geometry();
     Vec3 lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
-    for (const Vec3& corner : cloud::corners(box)) {
+    for (const Vec3& corner : corners(box)) {
         const Vec3 at = g.world_to_index(corner);
         for (int a = 0; a < 3; ++a) {
             lo[a] = std::min(lo[a], at[a]);

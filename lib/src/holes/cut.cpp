@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "holes/heuristics.h"
+#include "mesh/triangle.h"
 
 namespace covol::holes {
 namespace {
@@ -25,19 +26,7 @@ double squared_length(const Point& a, const Point& b) {
     return sum;
 }
 
-std::array<double, 3> area_vector(const std::vector<Point>& vertices, const Triangle& t) {
-    std::array<double, 3> u, v;
-    for (int c = 0; c < 3; ++c) {
-        u[c] = double(vertices[t[1]][c]) - vertices[t[0]][c];
-        v[c] = double(vertices[t[2]][c]) - vertices[t[0]][c];
-    }
-    return {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
-}
-
-bool turns(const std::array<double, 3>& a, const std::array<double, 3>& b) {
-    const auto dot = [](const auto& x, const auto& y) { return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]; };
-    return dot(a, b) < kCut.least_cosine * std::sqrt(dot(a, a) * dot(b, b));
-}
+bool turns(const Vec3& a, const Vec3& b) { return dot(a, b) < kCut.least_cosine * std::sqrt(dot(a, a) * dot(b, b)); }
 
 /// Moves vertices close to the line onto it; their value becomes 0 in any case.
 void snap(const TriangleMesh& mesh, std::vector<Point>& vertices, std::vector<float>& values) {
@@ -65,7 +54,7 @@ void snap(const TriangleMesh& mesh, std::vector<Point>& vertices, std::vector<fl
         undone = false;
         for (const Triangle& t : mesh.triangles) {
             if (!moves[t[0]] && !moves[t[1]] && !moves[t[2]]) continue;
-            if (!turns(area_vector(vertices, t), area_vector(tried, t))) continue;
+            if (!turns(meshing::area_normal(vertices, t), meshing::area_normal(tried, t))) continue;
             for (const std::uint32_t v : t) {
                 undone = undone || moves[v];
                 moves[v] = 0;

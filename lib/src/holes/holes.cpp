@@ -5,13 +5,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
+#include "base/disjoint_sets.h"
 #include "covol/error.h"
 #include "covol/points.h"
 #include "holes/cut.h"
 #include "holes/heuristics.h"
 #include "holes/membrane.h"
+#include "mesh/triangle.h"
 #include "points/kd_tree.h"
 
 namespace covol {
@@ -23,9 +24,7 @@ constexpr double kP95OfSpacing = 0.976;
 using Triangle = std::array<std::uint32_t, 3>;
 
 double area_of(const TriangleMesh& mesh, const Triangle& t) {
-    const Vec3 a = mesh.place(t[0]), b = mesh.place(t[1]), c = mesh.place(t[2]);
-    const Vec3 u{b[0] - a[0], b[1] - a[1], b[2] - a[2]}, v{c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-    return 0.5 * std::hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]);
+    return meshing::area(mesh.place(t[0]), mesh.place(t[1]), mesh.place(t[2]));
 }
 
 /// Diffusion over the mesh: a Gaussian of standard deviation `width`, nearly, where triangles are even.
@@ -51,24 +50,15 @@ void smooth(const TriangleMesh& mesh, double width, std::vector<float>& values) 
 }
 
 /// Vertices that triangles of one kind join.
-class Parts {
-public:
-    Parts(const holes::CutMesh& cut, bool kept) : parent_(cut.mesh.vertices.size()) {
-        std::iota(parent_.begin(), parent_.end(), 0U);
-        for (std::size_t t = 0; t < cut.kept.size(); ++t) {
-            if ((cut.kept[t] != 0) != kept) continue;
-            const Triangle& c = cut.mesh.triangles[t];
-            for (const std::uint32_t v : {c[1], c[2]}) parent_[root(v)] = root(c[0]);
-        }
+detail::DisjointSets parts_of(const holes::CutMesh& cut, bool kept) {
+    detail::DisjointSets parts(cut.mesh.vertices.size());
+    for (std::size_t t = 0; t < cut.kept.size(); ++t) {
+        if ((cut.kept[t] != 0) != kept) continue;
+        const Triangle& c = cut.mesh.triangles[t];
+        for (const std::uint32_t v : {c[1], c[2]}) parts.unite(v, c[0]);
     }
-    std::uint32_t root(std::uint32_t v) {
-        while (parent_[v] != v) v = parent_[v] = parent_[parent_[v]];
-        return v;
-    }
-
-private:
-    std::vector<std::uint32_t> parent_;
-};
+    return parts;
+}
 
 /// The triangles that go, and those that stay: what a ball of the distance's radius does not reach whose middle is
 /// where points are missing.
@@ -129,7 +119,7 @@ private:
 
     /// Of those that end at a hole. @return how many
     std::size_t drop_small(holes::CutMesh& cut) const {
-        Parts parts(cut, true);
+        detail::DisjointSets parts = parts_of(cut, true);
         std::vector<char> ends(cut.mesh.vertices.size(), 0);
         for (std::size_t t = 0; t < cut.kept.size(); ++t)
             if (!cut.kept[t])
@@ -255,7 +245,7 @@ TreatedHoles flatten_holes(const TriangleMesh& mesh, const std::vector<float>& t
             if (cut.kept[t])
                 for (const std::uint32_t v : cut.mesh.triangles[t]) fixed[v] = 1;
         // A piece without any points hangs at nothing: it goes.
-        Parts patches(cut, false);
+        detail::DisjointSets patches = parts_of(cut, false);
         for (std::uint32_t v = 0; v < fixed.size(); ++v)
             if (fixed[v]) spans[patches.root(v)] = 1;
         std::erase_if(cut.mesh.triangles,

@@ -32,7 +32,7 @@ BeyondPoints measure_beyond(const FloatGrid& surface, const std::vector<Vec3>& p
         });
         for (const auto& t : piece.triangles) {
             const auto at = [&](int k) { return meshing::to_vec3(piece.positions[t[k] - first]); };
-            const double own = meshing::length(meshing::area_normal(at(0), at(1), at(2))) / 2;
+            const double own = length(meshing::area_normal(at(0), at(1), at(2))) / 2;
             area += own;
             if (distances[t[0] - first] + distances[t[1] - first] + distances[t[2] - first] > 3 * distance)
                 beyond += own;

@@ -8,19 +8,15 @@
 #include <numbers>
 #include <numeric>
 
+#include "base/disjoint_sets.h"
 #include "covol/domain.h"
 #include "mesh/corner_table.h"
-#include "mesh/disjoint_sets.h"
 #include "mesh/vertex_normals.h"
 
 namespace covol {
 namespace {
 
-using meshing::cross;
-using meshing::DisjointSets;
-using meshing::dot;
-using meshing::length;
-using meshing::minus;
+using detail::DisjointSets;
 
 Vec3 point(const TriangleMesh& mesh, std::uint32_t v) { return meshing::to_vec3(mesh.vertices[v]); }
 
@@ -193,7 +189,7 @@ Vec3 choose_mesh_origin(const WorldBox& box, double finest) {
 void move_mesh_origin(TriangleMesh& mesh, const Vec3& origin) {
     if (origin == mesh.origin) return;
     for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
-        mesh.vertices[v] = meshing::to_position(meshing::minus(mesh.place(v), origin));
+        mesh.vertices[v] = meshing::to_position(minus(mesh.place(v), origin));
     mesh.origin = origin;
 }
 

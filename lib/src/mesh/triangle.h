@@ -2,11 +2,11 @@
 // Triangles by their corners' positions.
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
 
+#include "base/geometry.h"
 #include "covol/error.h"
 #include "covol/fwd.h"
 
@@ -16,13 +16,6 @@ using Position = std::array<float, 3>;
 using Positions = std::vector<Position>;
 using Triangle = std::array<std::uint32_t, 3>;
 
-inline Vec3 minus(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-inline Vec3 plus(const Vec3& a, double s, const Vec3& b) { return {a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]}; }
-inline double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-inline Vec3 cross(const Vec3& a, const Vec3& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-inline double length(const Vec3& a) { return std::sqrt(dot(a, a)); }
 inline Vec3 to_vec3(const Position& p) { return {p[0], p[1], p[2]}; }
 inline Position to_position(const Vec3& p) { return {float(p[0]), float(p[1]), float(p[2])}; }
 
@@ -45,6 +38,8 @@ inline Vec3 area_normal(const Vec3& a, const Vec3& b, const Vec3& c) { return cr
 inline Vec3 area_normal(const Positions& p, const Triangle& t) {
     return area_normal(to_vec3(p[t[0]]), to_vec3(p[t[1]]), to_vec3(p[t[2]]));
 }
+
+inline double area(const Vec3& a, const Vec3& b, const Vec3& c) { return length(area_normal(a, b, c)) / 2; }
 
 /// The cosine of the smallest of a triangle's angles, 1 for a degenerate one: smaller is better.
 inline double worst_cosine(const Vec3& a, const Vec3& b, const Vec3& c) {

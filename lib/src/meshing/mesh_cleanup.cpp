@@ -18,10 +18,10 @@
 #include <functional>
 #include <vector>
 
+#include "base/disjoint_sets.h"
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "covol/mesh_relax.h"
-#include "mesh/disjoint_sets.h"
 #include "meshing/decimate.h"
 #include "meshing/mesh_distance.h"
 #include "meshing/safe_moves.h"
@@ -149,7 +149,7 @@ MeshDeviation change_of(const TriangleMesh& before, const TriangleMesh& after) {
         for (std::size_t v = 0; v < mesh.vertices.size(); ++v) points.push_back(mesh.place(v));
         for (const auto& t : mesh.triangles) {
             Vec3 middle{};
-            for (const std::uint32_t v : t) middle = meshing::plus(middle, 1.0 / 3, mesh.place(v));
+            for (const std::uint32_t v : t) middle = plus(middle, 1.0 / 3, mesh.place(v));
             points.push_back(middle);
         }
         return points;
@@ -255,7 +255,7 @@ int count_self_intersections(const TriangleMesh& mesh) {
 
 Crossings count_crossings(const TriangleMesh& mesh) {
     check_indices(mesh, "count_self_intersections");
-    meshing::DisjointSets pieces(mesh.vertices.size());
+    detail::DisjointSets pieces(mesh.vertices.size());
     for (const auto& t : mesh.triangles) {
         pieces.unite(t[0], t[1]);
         pieces.unite(t[1], t[2]);

@@ -4,8 +4,8 @@
 #include <limits>
 #include <numeric>
 
+#include "base/disjoint_sets.h"
 #include "covol/points.h"
-#include "mesh/disjoint_sets.h"
 #include "points/heuristics.h"
 #include "points/kd_tree.h"
 
@@ -72,7 +72,7 @@ public:
 private:
     [[nodiscard]] int is_large(std::uint32_t group) const { return size_[group] > kIsolated.most_together; }
 
-    meshing::DisjointSets sets_;
+    detail::DisjointSets sets_;
     std::vector<std::size_t> size_;  ///< places of each group
     std::size_t places_;
     std::uint32_t largest_ = 0;

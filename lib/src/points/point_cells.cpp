@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/vector.h"
+#include "base/geometry.h"
 
 namespace covol::cloud {
 namespace {

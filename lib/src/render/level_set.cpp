@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "base/vector.h"
+#include "base/geometry.h"
 #include "covol/error.h"
 
 namespace covol::figure {
@@ -105,14 +105,14 @@ WorldBox surface_box(const FloatGrid& grid) {
 
 Extent surface_extent(const FloatGrid& grid, const Basis& basis) {
     return extent_of(grid, [&](const Vec3& at, Extent& extent) {
-        extent.add(cloud::dot(at, basis.right), cloud::dot(at, basis.up), cloud::dot(at, basis.to_eye));
+        extent.add(dot(at, basis.right), dot(at, basis.up), dot(at, basis.to_eye));
     });
 }
 
 Extent turning_extent(const FloatGrid& grid, const Vec3& center, double elevation) {
     const Basis level = look(0, elevation);
     return extent_of(grid, [&](const Vec3& at, Extent& extent) {
-        const Vec3 away = cloud::minus(at, center);
+        const Vec3 away = minus(at, center);
         const double r = std::hypot(away[0], away[1]);
         const double up = std::abs(away[2] * level.up[2]) + r * std::abs(level.up[1]);
         const double deep = std::abs(away[2] * level.to_eye[2]) + r * std::abs(level.to_eye[1]);

@@ -5,7 +5,7 @@
 #include <limits>
 #include <set>
 
-#include "base/vector.h"
+#include "base/geometry.h"
 #include "render/draw/decorations.h"
 #include "render/slices.h"
 
@@ -36,7 +36,7 @@ Directions directions_of(const ImageGeometry& geometry) {
 /// Indices along an axis between which a box of the world lies.
 std::array<double, 2> range_of(const WorldBox& box, int axis, const ImageGeometry& geometry) {
     double low = std::numeric_limits<double>::max(), high = std::numeric_limits<double>::lowest();
-    for (const Vec3& corner : cloud::corners(box)) {
+    for (const Vec3& corner : corners(box)) {
         const double at = geometry.world_to_index(corner)[axis];
         low = std::min(low, at);
         high = std::max(high, at);

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/geometry.h"
 #include "base/number.h"
 #include "base/text.h"
-#include "base/vector.h"
 #include "covol/error.h"
 #include "limits/memory_budget.h"
 #include "render/draw/decorations.h"
@@ -203,8 +203,7 @@ private:
             Vec3 center;
             for (int a = 0; a < 3; ++a) center[a] = 0.5 * (box.min[a] + box.max[a]);
             for (const Body& body : bodies_) all.add(turning_extent(*body.surface, center, options_.view.elevation));
-            const double at[3] = {cloud::dot(center, basis.right), cloud::dot(center, basis.up),
-                                  cloud::dot(center, basis.to_eye)};
+            const double at[3] = {dot(center, basis.right), dot(center, basis.up), dot(center, basis.to_eye)};
             for (int a = 0; a < 3; ++a) {
                 all.min[a] += at[a];
                 all.max[a] += at[a];

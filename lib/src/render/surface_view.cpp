@@ -18,9 +18,6 @@
 namespace covol::figure {
 namespace {
 
-using cloud::dot;
-using cloud::plus;
-using cloud::times;
 using Intersector = openvdb::tools::LevelSetRayIntersector<FloatGrid>;
 
 constexpr int kMostHits = 12;                            // of one ray with one translucent body
@@ -141,7 +138,7 @@ private:
             }
             if (!meets) return {};
         }
-        Vec3 normal = cloud::unit(sample.gradient);
+        Vec3 normal = unit(sample.gradient);
         const bool enters = dot(normal, along) <= 0;
         if (!enters) normal = times(-1, normal);
         return {reach_ - t, normal, n, enters};

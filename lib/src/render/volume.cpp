@@ -5,14 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/vector.h"
+#include "base/geometry.h"
 
 namespace covol::figure {
 namespace {
-
-using cloud::minus;
-using cloud::plus;
-using cloud::times;
 
 constexpr double kMostVoxels = 3.2e7;
 constexpr double kMostRays = 1.2e6;

@@ -1,5 +1,7 @@
 #include "report/cluster.h"
 
+#include "mesh/triangle.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -29,14 +31,7 @@ Box box_of(const TriangleMesh& mesh) {
 
 double area_of(const TriangleMesh& mesh) {
     double area = 0;
-    for (const auto& t : mesh.triangles) {
-        std::array<double, 3> u{}, v{};
-        for (int a = 0; a < 3; ++a) {
-            u[a] = double(mesh.vertices[t[1]][a]) - mesh.vertices[t[0]][a];
-            v[a] = double(mesh.vertices[t[2]][a]) - mesh.vertices[t[0]][a];
-        }
-        area += 0.5 * std::hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]);
-    }
+    for (const auto& t : mesh.triangles) area += length(meshing::area_normal(mesh.vertices, t)) / 2;
     return area;
 }
 

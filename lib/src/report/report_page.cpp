@@ -5,7 +5,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "base/vector.h"
+#include "base/geometry.h"
 #include "covol/error.h"
 #include "covol/safe_text.h"
 #include "covol/version.h"
@@ -43,7 +43,7 @@ Json to_json(const Evidence& evidence, const Vec3& origin) {
         suggestions.push_back({{"slice", s.slice},
                                {"area", s.area},
                                {"index", to_json(s.index)},
-                               {"world", to_json(cloud::minus(s.world, origin))}});
+                               {"world", to_json(minus(s.world, origin))}});
     return {{"reach", evidence.reach},
             {"weak_edge", evidence.weak_edge},
             {"area", evidence.area},
@@ -107,7 +107,7 @@ std::vector<Vec3> places_of(const ReportPage& page) {
         for (std::size_t v = 0; v < structure.mesh->vertices.size(); ++v) add(structure.mesh->place(v));
         for (const Vec3& mark : structure.marks) add(mark);
     }
-    const std::array<Vec3, 8> corners = cloud::corners(box);
+    const std::array<Vec3, 8> corners = covol::corners(box);
     return {corners.begin(), corners.end()};
 }
 
@@ -117,13 +117,13 @@ Json to_json(const Image& image, const detail::SlicePlan& plan, const Vec3& orig
     const ImageGeometry &g = coded.geometry, &whole = image.geometry();
     return {{"size", g.size},
             {"spacing", to_json(g.spacing)},
-            {"origin", to_json(cloud::minus(g.origin, origin))},
+            {"origin", to_json(minus(g.origin, origin))},
             {"direction", {to_json(g.direction[0]), to_json(g.direction[1]), to_json(g.direction[2])}},
             {"first", plan.region.min},
             {"step", plan.step},
             {"of_size", whole.size},
             {"of_spacing", to_json(whole.spacing)},
-            {"of_origin", to_json(cloud::minus(whole.origin, origin))},
+            {"of_origin", to_json(minus(whole.origin, origin))},
             {"black", coded.black},
             {"white", coded.white},
             {"slices", coded.jpegs}};

@@ -8,6 +8,7 @@
 #include <queue>
 #include <vector>
 
+#include "base/median.h"
 #include "base/number.h"
 #include "covol/start.h"
 #include "start/heuristics.h"
@@ -19,21 +20,15 @@ using openvdb::Coord;
 
 constexpr std::size_t kMostVoxels = 24u << 20;
 
-double median_of(std::vector<float>& values) {
-    const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
-
 struct Spread {
     double middle = 0, width = 0;  // median, and the standard deviation that the median deviation tells of
 };
 
 Spread spread_of(std::vector<float> values) {
     Spread spread;
-    spread.middle = median_of(values);
+    spread.middle = cloud::median(values);
     for (float& v : values) v = std::abs(v - float(spread.middle));
-    spread.width = 1.4826 * median_of(values);
+    spread.width = 1.4826 * cloud::median(values);
     return spread;
 }
 

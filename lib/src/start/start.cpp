@@ -10,6 +10,7 @@
 #include <limits>
 #include <vector>
 
+#include "base/geometry.h"
 #include "base/number.h"
 #include "clip/clipped.h"
 #include "clip/half_spaces.h"
@@ -120,8 +121,6 @@ FloatGridPtr start_from_field(const Domain& domain, const std::vector<Coord>& cr
 
 using detail::to_text;
 
-double length(const Vec3& v) { return std::hypot(v[0], v[1], v[2]); }
-
 /// 1 where the mask is above 0: labels must not be interpolated.
 Image binarised(const Image& mask) {
     const Index3 n = mask.geometry().size;
@@ -152,11 +151,7 @@ FloatGridPtr start_from_sphere(const Domain& domain, const Vec3& center, double 
     const WorldBox box{{center[0] - reach, center[1] - reach, center[2] - reach},
                        {center[0] + reach, center[1] + reach, center[2] + reach}};
     return start_from_distance(
-        domain, box,
-        [&](const Vec3& x) {
-            return length({x[0] - center[0], x[1] - center[1], x[2] - center[2]}) - radius;
-        },
-        "start_from_sphere");
+        domain, box, [&](const Vec3& x) { return length(minus(x, center)) - radius; }, "start_from_sphere");
 }
 
 FloatGridPtr start_from_box(const Domain& domain, const WorldBox& box) {

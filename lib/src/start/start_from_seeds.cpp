@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/median.h"
 #include "covol/error.h"
 #include "covol/start.h"
 #include "points/kd_tree.h"
@@ -47,9 +48,7 @@ double usual_half_gap(const std::vector<Vec3>& outside, const detail::KdTree& in
     if (outside.empty()) return otherwise;
     std::vector<double> gaps;
     for (const Vec3& seed : outside) gaps.push_back(inside.nearest(seed));
-    const auto middle = gaps.begin() + std::ptrdiff_t(gaps.size() / 2);
-    std::nth_element(gaps.begin(), middle, gaps.end());
-    return std::sqrt(*middle) / 2;
+    return std::sqrt(cloud::median(std::move(gaps))) / 2;
 }
 
 }  // namespace

@@ -11,15 +11,15 @@
 #include <map>
 #include <unordered_map>
 
+#include "base/disjoint_sets.h"
 #include "grid/leaf_columns.h"
 #include "grid/sign_masks.h"
-#include "mesh/disjoint_sets.h"
 #include "surface/heuristics.h"
 
 namespace covol::detail {
 namespace {
 
-using meshing::DisjointSets;
+using detail::DisjointSets;
 
 using Leaf = FloatGrid::TreeType::LeafNodeType;
 

@@ -3,10 +3,10 @@
 
 #include <cmath>
 #include <functional>
-#include <numeric>
 #include <optional>
 #include <vector>
 
+#include "base/disjoint_sets.h"
 #include "base/file.h"
 #include "base/no_surface.h"
 #include "covol/error.h"
@@ -14,7 +14,6 @@
 #include "files/atomic.h"
 #include "io/mesh/mesh_formats.h"
 #include "io/mesh/mesh_stream.h"
-#include "mesh/disjoint_sets.h"
 #include "mesh/vertex_normals.h"
 #include "surface/marching_cubes.h"
 #include "surface/mesh_pieces.h"
@@ -67,7 +66,7 @@ private:
         std::array<Vec3, 3> p{};
         for (std::size_t k = 0; k < 3; ++k) p[k] = meshing::to_vec3(piece.positions[t[k] - piece.first]);
         part.volume = meshing::six_volumes(p, origin_) / 6;
-        part.area = meshing::length(meshing::area_normal(p[0], p[1], p[2])) / 2;
+        part.area = length(meshing::area_normal(p[0], p[1], p[2])) / 2;
         for (int k = 0; k < 3; ++k) {
             const std::uint32_t a = t[k], b = t[(k + 1) % 3];
             part.edges += a < b ? mixed(a, b) : -mixed(b, a);
@@ -90,7 +89,7 @@ private:
     Vec3 origin_{};
     Part sum_;
     std::vector<Part> parts_;  // of the triangles of a piece
-    meshing::DisjointSets pieces_;
+    detail::DisjointSets pieces_;
 };
 
 /// Takes pieces of the mesh, writes their triangles and those of their vertices that are done.

@@ -11,15 +11,15 @@
 #include <numeric>
 #include <tuple>
 
+#include "base/disjoint_sets.h"
 #include "grid/halo.h"
 #include "grid/leaf_columns.h"
-#include "mesh/disjoint_sets.h"
 #include "tagging/heuristics.h"
 
 namespace covol::detail {
 namespace {
 
-using meshing::DisjointSets;
+using detail::DisjointSets;
 
 constexpr float kBeyond = std::numeric_limits<float>::infinity();  ///< d of what lies beyond the tube
 constexpr float kNowhere = -kBeyond;                               ///< d of what lies outside the domain

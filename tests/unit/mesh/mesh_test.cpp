@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "mesh/disjoint_sets.h"
+#include "base/disjoint_sets.h"
 #include "support/meshes.h"
 
 using namespace covol;
@@ -139,7 +139,7 @@ TEST_CASE("sets united by many threads are those united one by one, known by the
             work.insert(work.end(), beside[at].begin(), beside[at].end());
         }
     for (int repeat = 0; repeat < 5; ++repeat) {
-        meshing::DisjointSets sets(kCount);
+        detail::DisjointSets sets(kCount);
         tbb::parallel_for(std::size_t(0), pairs.size(),
                           [&](std::size_t n) { sets.unite(pairs[n].first, pairs[n].second); });
         bool same = true;

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-#include "base/vector.h"
+#include "base/geometry.h"
 #include "cloud/orientation/areas.h"
 #include "cloud/orientation/heuristics.h"
 #include "cloud/orientation/indicator.h"

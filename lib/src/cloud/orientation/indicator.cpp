@@ -6,8 +6,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/geometry.h"
 #include "base/median.h"
-#include "base/vector.h"
 #include "cloud/orientation/heuristics.h"
 #include "covol/points.h"
 #include "points/point_cells.h"

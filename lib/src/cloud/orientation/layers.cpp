@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/vector.h"
+#include "base/geometry.h"
 #include "cloud/orientation/heuristics.h"
 #include "cloud/orientation/indicator.h"
 #include "points/point_cells.h"

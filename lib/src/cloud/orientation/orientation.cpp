@@ -7,7 +7,7 @@
 #include <numeric>
 #include <optional>
 
-#include "base/vector.h"
+#include "base/geometry.h"
 #include "cloud/orientation/areas.h"
 #include "cloud/orientation/given_sides.h"
 #include "cloud/orientation/heuristics.h"
@@ -22,11 +22,9 @@
 namespace covol {
 namespace {
 
-using cloud::dot;
 using cloud::Lattice;
 using cloud::LatticeField;
 using cloud::PointCells;
-using cloud::unit;
 using cloud::WindingField;
 
 /// What is tried until few normals turn.

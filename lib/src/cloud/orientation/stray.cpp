@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/geometry.h"
 #include "base/median.h"
-#include "base/vector.h"
 #include "cloud/orientation/heuristics.h"
 #include "points/heuristics.h"
 #include "points/neighbours.h"

@@ -5,9 +5,9 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <numeric>
 
-#include "base/vector.h"
+#include "base/disjoint_sets.h"
+#include "base/geometry.h"
 #include "cloud/orientation/heuristics.h"
 #include "points/heuristics.h"
 #include "points/neighbours.h"
@@ -85,34 +85,9 @@ std::size_t set_upright(const Sheets& sheets, std::vector<Vec3>& normals) {
     return all - lying.size();
 }
 
-/// Parts of sheets whose normals go on from one point to the next.
-class Parts {
-public:
-    explicit Parts(std::size_t count) : parent_(count), size_(count, 1) {
-        std::iota(parent_.begin(), parent_.end(), 0U);
-    }
-    [[nodiscard]] std::uint32_t of(std::uint32_t n) {
-        while (parent_[n] != n) n = parent_[n] = parent_[parent_[n]];
-        return n;
-    }
-    [[nodiscard]] std::size_t size(std::uint32_t part) const { return size_[part]; }
-    void join(std::uint32_t a, std::uint32_t b) {
-        a = of(a);
-        b = of(b);
-        if (a == b) return;
-        if (size_[a] < size_[b]) std::swap(a, b);
-        parent_[b] = a;
-        size_[a] += size_[b];
-    }
-
-private:
-    std::vector<std::uint32_t> parent_;
-    std::vector<std::size_t> size_;
-};
-
 /// @return how many
 std::size_t turn_smaller(const Sheets& sheets, std::vector<Vec3>& normals) {
-    Parts parts(sheets.size());
+    detail::DisjointSets parts(sheets.size());  // of sheets whose normals go on from one point to the next
     // By the sheets' normals: from tilted one to tilted one a seam could be crossed.
     const auto side = [&](std::uint32_t n) { return dot(sheets.axis(n), normals[n]); };
     const auto meets = [&](std::uint32_t n, std::uint32_t other) {
@@ -120,26 +95,28 @@ std::size_t turn_smaller(const Sheets& sheets, std::vector<Vec3>& normals) {
     };
     for (std::uint32_t n = 0; n < sheets.size(); ++n)
         sheets.for_beside(n, [&](std::uint32_t other) {
-            if (meets(n, other) > 0) parts.join(n, other);
+            if (meets(n, other) > 0) parts.unite(n, other);
         });
+    std::vector<std::size_t> size(sheets.size(), 0);
+    for (std::uint32_t n = 0; n < sheets.size(); ++n) ++size[parts.root(n)];
     // How often two parts meet back to front.
     std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> seams;
     for (std::uint32_t n = 0; n < sheets.size(); ++n)
         sheets.for_beside(n, [&](std::uint32_t other) {
-            if (const auto a = parts.of(n), b = parts.of(other); a != b && meets(n, other) < 0) ++seams[{a, b}];
+            if (const auto a = parts.root(n), b = parts.root(other); a != b && meets(n, other) < 0) ++seams[{a, b}];
         });
     // Each to the larger one that it meets most often.
     std::map<std::uint32_t, std::pair<std::size_t, std::uint32_t>> turned;
     for (const auto& [pair, count] : seams) {
         const auto [a, b] = pair;
-        if (parts.size(a) < parts.size(b) && count > turned[a].first) turned[a] = {count, b};
+        if (size[a] < size[b] && count > turned[a].first) turned[a] = {count, b};
     }
     std::erase_if(turned, [](const auto& t) { return t.second.first == 0; });
     std::size_t count = 0;
     for (std::uint32_t n = 0; n < sheets.size(); ++n) {
         // A part within one that is turned itself goes over twice.
         int times_turned = 0;
-        for (auto at = turned.find(parts.of(n)); at != turned.end(); at = turned.find(at->second.second))
+        for (auto at = turned.find(parts.root(n)); at != turned.end(); at = turned.find(at->second.second))
             ++times_turned;
         if (times_turned % 2 == 0) continue;
         normals[n] = times(-1, normals[n]);

@@ -6,7 +6,7 @@
 #include <array>
 #include <cstdint>
 
-#include "base/vector.h"
+#include "base/geometry.h"
 #include "cloud/orientation/areas.h"
 #include "cloud/orientation/heuristics.h"
 #include "cloud/orientation/indicator.h"

@@ -8,8 +8,8 @@
 #include <cmath>
 #include <limits>
 
+#include "base/geometry.h"
 #include "base/median.h"
-#include "base/vector.h"
 #include "cloud/surface/blend_kernel.h"
 #include "cloud/surface/heuristics.h"
 #include "cloud/surface/local_fit.h"

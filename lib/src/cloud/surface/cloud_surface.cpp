@@ -73,9 +73,9 @@ bool is_open(const FloatGrid& level_set, const CloudOrientation& points, const R
             Vec3 middle = mesh.origin;
             for (std::size_t k = 0; k < 3; ++k) {
                 corners[k] = meshing::to_vec3(piece.positions[piece.triangles[n * step][k] - piece.first]);
-                middle = meshing::plus(middle, 1.0 / 3, corners[k]);
+                middle = plus(middle, 1.0 / 3, corners[k]);
             }
-            area[n] = meshing::length(meshing::area_normal(corners[0], corners[1], corners[2]));
+            area[n] = length(meshing::area_normal(corners[0], corners[1], corners[2]));
             is_bare[n] = !cells.any_within(middle, reach);
         });
         for (std::size_t n = 0; n < area.size(); ++n) {

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
 
+#include "base/disjoint_sets.h"
+#include "base/geometry.h"
 #include "base/median.h"
-#include "base/vector.h"
 #include "cloud/surface/heuristics.h"
 #include "covol/mesh.h"
 #include "covol/surface.h"
@@ -39,18 +39,13 @@ struct Piece {
 
 /// The largest first; without cavities.
 std::vector<Piece> pieces_of(const TriangleMesh& mesh) {
-    std::vector<std::uint32_t> parent(mesh.vertices.size());
-    std::iota(parent.begin(), parent.end(), 0U);
-    const auto root = [&](std::uint32_t v) {
-        while (parent[v] != v) v = parent[v] = parent[parent[v]];
-        return v;
-    };
+    detail::DisjointSets joined(mesh.vertices.size());
     for (const auto& t : mesh.triangles)
-        for (const std::uint32_t v : {t[1], t[2]}) parent[root(v)] = root(t[0]);
+        for (const std::uint32_t v : {t[1], t[2]}) joined.unite(v, t[0]);
     std::map<std::uint32_t, Piece> pieces;
-    for (std::uint32_t v = 0; v < parent.size(); ++v) pieces[root(v)].surface.push_back(mesh.place(v));
+    for (std::uint32_t v = 0; v < joined.size(); ++v) pieces[joined.root(v)].surface.push_back(mesh.place(v));
     for (const auto& t : mesh.triangles) {
-        Piece& piece = pieces[root(t[0])];
+        Piece& piece = pieces[joined.root(t[0])];
         const auto corner = [&](std::size_t n) { return minus(mesh.place(t[n]), piece.surface.front()); };
         piece.volume += dot(corner(0), cross(corner(1), corner(2))) / 6;
     }

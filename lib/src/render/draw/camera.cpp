@@ -4,21 +4,16 @@
 #include <cmath>
 #include <numbers>
 
-#include "base/vector.h"
+#include "base/geometry.h"
 
 namespace covol::figure {
-
-using cloud::dot;
-using cloud::minus;
-using cloud::plus;
-using cloud::times;
 
 Basis look(double azimuth, double elevation) {
     const double a = azimuth * std::numbers::pi / 180, e = elevation * std::numbers::pi / 180;
     Basis basis;
     basis.to_eye = {std::sin(a) * std::cos(e), -std::cos(a) * std::cos(e), std::sin(e)};
     basis.right = {std::cos(a), std::sin(a), 0};
-    basis.up = cloud::cross(basis.to_eye, basis.right);
+    basis.up = cross(basis.to_eye, basis.right);
     return basis;
 }
 

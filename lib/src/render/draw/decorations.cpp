@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "base/vector.h"
+#include "base/geometry.h"
 
 namespace covol::figure {
 namespace {

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-namespace covol::meshing {
+namespace covol::detail {
 
 /// Sets under union, by any number of threads at once; each is known by its least member. Anderson and Woll, Wait-free
 /// parallel algorithms for the union-find problem, STOC 1991.
@@ -42,4 +42,4 @@ private:
     std::vector<std::uint32_t> parent_;
 };
 
-}  // namespace covol::meshing
+}  // namespace covol::detail
