@@ -109,10 +109,10 @@ struct MarksOptions {
 
 /// What is known of one structure beside its result.
 struct StructureFacts : MarksOrigin {
-    std::string grid;                                         ///< make_grid_names()
-    std::vector<Vec3> marks;                                  ///< points, cleaned, and those of contours, as they were clicked
-    std::vector<std::string> contour_rules;                   ///< how each cloud of contours was understood
-    std::optional<CloudCleanupReport> cleanup;                ///< where something was to be done
+    std::string grid;                           ///< make_grid_names()
+    std::vector<Vec3> marks;                    ///< points, cleaned, and those of contours, as they were clicked
+    std::vector<std::string> contour_rules;     ///< how each cloud of contours was understood
+    std::optional<CloudCleanupReport> cleanup;  ///< where something was to be done
     std::vector<std::pair<std::string, PaintedLabel>> paint;  ///< paths, and what the paint says
     double contour_seconds = 0;                               ///< that densify() took
 };

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <optional>
 
-#include "base/no_surface.h"
 #include "base/number.h"
 #include "bricks/split.h"
 #include "bricks/states.h"
@@ -16,6 +15,7 @@
 #include "covol/start.h"
 #include "covol/surface.h"
 #include "grid/flood_tiles.h"
+#include "redistance/no_surface.h"
 #include "segment/doubts.h"
 #include "segment/heuristics.h"
 #include "segment/result/report.h"

@@ -69,12 +69,14 @@ GivenGuess make_guess(const Image& mask, int label, const std::optional<ImageGeo
     std::string list;
     for (const LabelName& l : labels) list += (list.empty() ? "" : ", ") + std::to_string(l.label);
     if (label == 0 && labels.size() > 1)
-        throw Error(Errc::InvalidInput, who + ": expected one label, got " + list + "; choose one by `guess_label`", "guess");
+        throw Error(Errc::InvalidInput, who + ": expected one label, got " + list + "; choose one by `guess_label`",
+                    "guess");
     guess.label = label != 0 ? label : labels.front().label;
     if (std::none_of(labels.begin(), labels.end(), [&](const LabelName& l) { return l.label == guess.label; }))
-        throw Error(Errc::InvalidInput, "`guess_label`: expected one of the labels of the guess, " + list + ", got " +
-                                            std::to_string(guess.label),
-                    "guess_label");
+        throw Error(
+            Errc::InvalidInput,
+            "`guess_label`: expected one of the labels of the guess, " + list + ", got " + std::to_string(guess.label),
+            "guess_label");
     guess.start = MaskStart{std::make_shared<const Image>(only(*guess.mask, guess.label))};
     return guess;
 }

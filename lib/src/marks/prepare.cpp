@@ -50,10 +50,10 @@ void check_tag_distance(double tag_distance, const std::vector<Vec3>& points) {
     const WorldBox box = bounding_box(points);
     const double diagonal = std::hypot(box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]);
     if (tag_distance > diagonal)
-        throw Error(Errc::InvalidOptions, "`tag_distance`: " + detail::number(tag_distance) +
-                                              " is more than the points' whole box measures, " +
-                                              detail::number(diagonal) +
-                                              ": nothing that they enclose is that far from them",
+        throw Error(Errc::InvalidOptions,
+                    "`tag_distance`: " + detail::number(tag_distance) +
+                        " is more than the points' whole box measures, " + detail::number(diagonal) +
+                        ": nothing that they enclose is that far from them",
                     "tag_distance");
 }
 
@@ -198,9 +198,8 @@ std::vector<StructureInput> prepare_marks(std::vector<Marks> structures, const s
     Preparer preparer(std::move(structures), image, options, marks_options);
     std::vector<StructureInput> prepared;
     for (std::size_t n = 0; n < names.size(); ++n)
-        prepared.push_back(detail::with_name(names[n], [&] {
-            return preparer.prepare(n, grids[n], speaking_for(names[n], names.size(), run));
-        }));
+        prepared.push_back(detail::with_name(
+            names[n], [&] { return preparer.prepare(n, grids[n], speaking_for(names[n], names.size(), run)); }));
     return prepared;
 }
 

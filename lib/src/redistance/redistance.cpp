@@ -10,13 +10,13 @@
 #include <cmath>
 #include <string>
 
-#include "base/no_surface.h"
 #include "covol/error.h"
 #include "grid/flood_tiles.h"
 #include "grid/leaf_band.h"
 #include "grid/leaf_propagation.h"
 #include "grid/sign_masks.h"
 #include "redistance/interface_patches.h"
+#include "redistance/no_surface.h"
 
 namespace covol::detail {
 namespace {

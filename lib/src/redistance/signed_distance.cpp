@@ -9,10 +9,10 @@
 #include <optional>
 #include <string>
 
-#include "base/no_surface.h"
 #include "covol/error.h"
 #include "distance/nearest.h"
 #include "grid/leaf_propagation.h"
+#include "redistance/no_surface.h"
 
 namespace covol::detail {
 namespace {

@@ -8,12 +8,12 @@
 #include <limits>
 
 #include "base/large_allocator.h"
-#include "base/no_surface.h"
 #include "covol/error.h"
 #include "grid/halo.h"
 #include "grid/leaf_propagation.h"
 #include "grid/sign_masks.h"
 #include "redistance/local_distance.h"
+#include "redistance/no_surface.h"
 #include "redistance/redistance.h"
 #include "scheme/scheme.h"
 

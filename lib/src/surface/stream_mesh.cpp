@@ -8,13 +8,13 @@
 
 #include "base/disjoint_sets.h"
 #include "base/file.h"
-#include "base/no_surface.h"
 #include "covol/error.h"
 #include "covol/mesh_stream.h"
 #include "files/atomic.h"
 #include "io/mesh/mesh_formats.h"
 #include "io/mesh/mesh_stream.h"
 #include "mesh/vertex_normals.h"
+#include "redistance/no_surface.h"
 #include "surface/marching_cubes.h"
 #include "surface/mesh_pieces.h"
 

@@ -132,7 +132,8 @@ TEST_CASE("A guess is one label of a mask") {
     CHECK(std::get<MaskStart>(guess.start).mask->at(8, 11, 11) == 0);
     CHECK(guess.mask->at(8, 11, 11) == 7);
     CHECK_THROWS_WITH(make_guess(two, 0, {}), Catch::Contains("expected one label, got 3, 7"));
-    CHECK_THROWS_WITH(make_guess(two, 4, {}), Catch::Contains("expected one of the labels") && Catch::Contains("got 4"));
+    CHECK_THROWS_WITH(make_guess(two, 4, {}),
+                      Catch::Contains("expected one of the labels") && Catch::Contains("got 4"));
     CHECK(make_guess(labels(discs), 0, {}).label == 1);
 }
 

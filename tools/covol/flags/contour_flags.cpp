@@ -13,5 +13,4 @@ void ContourFlags::bind(CLI::App& command, bool names) {
     bind_options(command, *this, Offered::Always);
 }
 
-
 }  // namespace covol::tool

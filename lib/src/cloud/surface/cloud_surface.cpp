@@ -7,7 +7,6 @@
 #include <array>
 #include <cmath>
 
-#include "base/no_surface.h"
 #include "cloud/orientation/indicator.h"
 #include "cloud/surface/cloud_field.h"
 #include "cloud/surface/heuristics.h"
@@ -18,6 +17,7 @@
 #include "covol/start.h"
 #include "mesh/triangle.h"
 #include "points/point_cells.h"
+#include "redistance/no_surface.h"
 #include "surface/marching_cubes.h"
 #include "surface/mesh_pieces.h"
 #include "surface/pieces.h"

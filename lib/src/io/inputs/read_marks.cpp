@@ -44,7 +44,8 @@ GivenGuess read_guess(const std::string& path, const std::optional<ImageGeometry
                       const ReadMarksOptions& options, const RunContext& run) {
     const FileKind kind = kind_of_file(path);
     if (kind == FileKind::Points)
-        throw Error(Errc::InvalidInput, "`guess`: " + path + ": expected a mask, mesh or level set, got points", "guess");
+        throw Error(Errc::InvalidInput, "`guess`: " + path + ": expected a mask, mesh or level set, got points",
+                    "guess");
     if (kind != FileKind::Image) {
         GivenGuess guess;
         guess.start = read_start(kind == FileKind::Vdb ? Start(LevelSetStart{}) : Start(MeshStart{}), path, run);

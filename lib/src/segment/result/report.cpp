@@ -54,8 +54,8 @@ public:
 
     void of_marks() {
         report_.marks_off.beyond = largest_error_of_marks(problem_, h_, solution_.start.cloud.noise);
-        for (const std::string& line : compare_with_marks(report_, *surface_.level_set, problem_.image, marks_,
-                                                          surface_.mark_distances))
+        for (const std::string& line :
+             compare_with_marks(report_, *surface_.level_set, problem_.image, marks_, surface_.mark_distances))
             warn(line);
         if (solution_.start.origin == StartOrigin::Guess) find_surface_beyond();
         if (solution_.start.origin == StartOrigin::Cloud) find_folds();

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "base/no_surface.h"
 #include "covol/start.h"
+#include "redistance/no_surface.h"
 #include "segment/heuristics.h"
 
 namespace covol::pipeline {
