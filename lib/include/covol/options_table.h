@@ -154,10 +154,12 @@ constexpr void for_each_option(Options& options, const Visit& visit) {
 template <typename T>
 inline constexpr bool kIsNumber = std::is_arithmetic_v<T> && !std::is_same_v<T, bool>;
 
-namespace detail {
-
+/// For why_invalid(): a line of its own, "name: complaint", where there is one.
 COVOL_API void add_complaint(std::string& lines, const char* name, const std::string& complaint);
+/// The same of a number outside of the option's range.
 COVOL_API void complain(std::string& lines, const OptionInfo& option, double value);
+
+namespace detail {
 
 template <typename Value>
 void complain(std::string& lines, const OptionInfo& option, const Value& value) {
@@ -167,7 +169,7 @@ void complain(std::string& lines, const OptionInfo& option, const Value& value) 
         if (std::size_t(value) >= kWords<Value>.size())
             add_complaint(lines, option.name, "expected one of the values that the type has");
     } else if constexpr (kIsNumber<Value>) {
-        complain(lines, option, double(value));
+        covol::complain(lines, option, double(value));
     } else if constexpr (requires { value[0] < value[0], value.size(); } && !std::is_same_v<Value, std::string>) {
         for (const auto& one : value) complain(lines, option, one);
     } else if constexpr (requires { value.min[0], value.max[0]; }) {  // a box

@@ -25,16 +25,13 @@ void Range::require(const std::string& name, double value) const {
         throw Error(Errc::InvalidOptions, name + ": expected " + text() + ", got " + detail::number(value), name);
 }
 
-namespace detail {
-
 void add_complaint(std::string& lines, const char* name, const std::string& complaint) {
     if (!complaint.empty()) lines += (lines.empty() ? "" : "\n") + std::string(name) + ": " + complaint;
 }
 
 void complain(std::string& lines, const OptionInfo& option, double value) {
     if (!option.range.holds(value))
-        add_complaint(lines, option.name, "expected " + option.range.text() + ", got " + number(value));
+        add_complaint(lines, option.name, "expected " + option.range.text() + ", got " + detail::number(value));
 }
 
-}  // namespace detail
 }  // namespace covol

@@ -83,7 +83,7 @@ TEST_CASE("ranges say what they hold") {
     CHECK(Range{0.5, 1, true}.text() == "> 0.5 and <= 1");
     CHECK(Range{}.text() == "a finite number");
     CHECK((kFraction.holds(0) && kFraction.holds(1) && !kBetween0And1.holds(0) && !kBetween0And1.holds(1)));
-    for (const double bad : {std::nan(""), INFINITY, -INFINITY}) CHECK_FALSE(Range{}.holds(bad));
+    for (const double bad : {std::nan(""), double(INFINITY), -double(INFINITY)}) CHECK_FALSE(Range{}.holds(bad));
 }
 
 TEMPLATE_TEST_CASE("each struct of options can say what is wrong with it, and starts without fault", "", ExtractOptions,
