@@ -5,7 +5,7 @@ cd "$(dirname "$0")/.."
 
 build=${1:-build-core}
 absent=(-DCMAKE_DISABLE_FIND_PACKAGE_TIFF=ON -DCMAKE_DISABLE_FIND_PACKAGE_ITK=ON -DCMAKE_DISABLE_FIND_PACKAGE_HDF5=ON)
-cmake --preset default -B "$build" -DCOVOL_IO=OFF "${absent[@]}" >/dev/null
+cmake --preset ci -B "$build" -DCOVOL_IO=OFF "${absent[@]}" >/dev/null
 cmake --build "$build" --parallel "${COVOL_JOBS:-$(nproc)}"
 if ldd "$build/lib/libcovol.so" | grep -iE 'tiff|itk|gdcm|hdf5'; then
   echo "covol: the core links what it should not" >&2
