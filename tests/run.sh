@@ -14,5 +14,4 @@ else
   echo "covol: COVOL_DATA is not set: tests on larger data are SKIPPED"
 fi
 ctest --test-dir build-ci --output-on-failure -j2
-bash tests/core_alone.sh
 echo "covol: all tests passed"
