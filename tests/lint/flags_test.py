@@ -17,7 +17,7 @@ BY_HAND = {"checkpoint", "checkpoint_every", "contours", "guess", "inside", "out
 # Options of every kind that nothing names but their row: the rest is made from it. Others are named where one depends on another, where a
 # report has a result of the same name, and in messages about what would help.
 PLAIN = ("guess_weight", "epsilon", "edge_epsilon", "solver_tolerance", "coarse_levels", "guess_radius", "hole_distance", "contour_curve",
-         "points_scale", "points_channels", "painted_as", "painted_outside", "correct_level_shift", "zoom", "seed")
+         "points_scale", "points_channels", "painted_outside", "correct_level_shift", "zoom", "seed")
 
 
 def tokens(text):
