@@ -84,11 +84,9 @@ Json to_json(const CompareReport& r) {
             {"hausdorff", r.hausdorff}, {"hausdorff95", r.hd95}, {"mean_distance", r.assd}};
 }
 
-namespace {
-
 /// What was not needed, or was left to the step that uses it, is null.
 template <typename T>
-Json to_json_value(const T& value) {
+static Json to_json_value(const T& value) {
     if constexpr (requires { *value, value.has_value(); })
         return value ? to_json_value(*value) : Json(nullptr);
     else if constexpr (HasWords<T>)
@@ -98,8 +96,6 @@ Json to_json_value(const T& value) {
     else
         return value;
 }
-
-}  // namespace
 
 Json to_json(const SegmentOptions& o) {
     Json json;
