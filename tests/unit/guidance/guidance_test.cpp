@@ -245,15 +245,15 @@ TEST_CASE("the precision of marks is their standard deviation, as segment() mean
         g, [](const Vec3& x) { return 100 - 60 * step_at(length(x) - kRadius); }, 20);
     const std::vector<Vec3> marks = marks_on_sphere(60, kRadius);
     const FloatGridPtr guess = wavy_sphere(domain_of_image(g), marks, 1.5);
-    GuidanceReport automatic, stated, coarse;
     GuidanceOptions options;
-    REQUIRE(guide(*guess, marks, image, options, automatic));
+    const GuidanceReport automatic = guide(*guess, marks, image, options).report;
+    REQUIRE(automatic.used);
     options.mark_precision = kUniformDeviation * g.spacing[0];  // of what is uniform over a voxel
-    REQUIRE(guide(*guess, marks, image, options, stated));
+    const GuidanceReport stated = guide(*guess, marks, image, options).report;
     CHECK(stated.gain == Approx(automatic.gain));
     CHECK(stated.image_error == Approx(automatic.image_error));
     options.mark_precision = 5 * g.spacing[0];
-    REQUIRE(guide(*guess, marks, image, options, coarse));
+    const GuidanceReport coarse = guide(*guess, marks, image, options).report;
     CHECK(coarse.image_error != Approx(automatic.image_error));
 }
 

@@ -73,8 +73,6 @@ Image make_image(const ImageGeometry& geometry, const std::function<float(const 
     return Image::from_values(geometry, values.data());
 }
 
-double length(const Vec3& v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
-
 RenderOptions sized(int width, int height, FigureKind kind) {
     RenderOptions options;
     options.width = width;

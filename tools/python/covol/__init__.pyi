@@ -166,7 +166,7 @@ def segment(
     # options, from covol.options()
     attraction_range: _Length | None = None,
     coarse_levels: int | None = None,
-    contour_curve: Literal["spline", "lines"] = "spline",
+    contour_curve: Literal["lines", "spline"] = "spline",
     contour_thickness: _Length = 0.0,
     delta: _Length | None = None,
     edge_contrast: float | None = None,
@@ -244,7 +244,7 @@ def reconstruct(
     # options, from covol.options()
     attraction_range: _Length | None = None,
     coarse_levels: int | None = None,
-    contour_curve: Literal["spline", "lines"] = "spline",
+    contour_curve: Literal["lines", "spline"] = "spline",
     contour_thickness: _Length = 0.0,
     delta: _Length | None = None,
     edge_contrast: float | None = None,
