@@ -174,7 +174,8 @@ void complain(std::string& lines, const OptionInfo& option, const Value& value) 
         for (const auto& one : value) complain(lines, option, one);
     } else if constexpr (requires { value.min[0], value.max[0]; }) {  // a box
         for (std::size_t a = 0; a < value.min.size(); ++a)
-            if (!(value.max[a] > value.min[a])) add_complaint(lines, option.name, "expected min < max along each axis");
+            if (!(value.max[a] >= value.min[a]))
+                add_complaint(lines, option.name, "expected min <= max along each axis");
     }
 }
 

@@ -148,6 +148,12 @@ inline constexpr auto kOptions<SegmentOptions> = std::tuple{
                              const auto* sphere = std::get_if<SphereStart>(&o.start);
                              return sphere == nullptr || sphere->radius > 0;
                          }},
+    Rule<SegmentOptions>{"roi", "min < max along each axis",
+                         [](const SegmentOptions& o) {
+                             for (std::size_t n = 0; n < 3; ++n)
+                                 if (o.roi && o.roi->min[n] == o.roi->max[n]) return false;
+                             return true;
+                         }},
     Rule<SegmentOptions>{"without_mesh", "false where holes are treated, pieces dropped or another level is wanted",
                          [](const SegmentOptions& o) {
                              return !o.without_mesh || (o.holes.policy == Holes::Close &&

@@ -99,9 +99,9 @@ TEST_CASE("options without a check of their own so far are refused") {
     ReadImageOptions image;
     image.spacing = {1, 0, 1};
     image.channel = -1;
-    image.roi = WorldBox{{0, 0, 0}, {1, 0, 1}};
+    image.roi = WorldBox{{0, 0, 0}, {1, -1, 1}};
     CHECK(why_invalid(image) ==
-          "spacing: expected > 0, got 0\nchannel: expected >= 0, got -1\nroi: expected min < max along each axis");
+          "spacing: expected > 0, got 0\nchannel: expected >= 0, got -1\nroi: expected min <= max along each axis");
     ReadPointsOptions points;
     points.channels = 0;
     CHECK(why_invalid(points) == "points_channels: expected 1 to 1000, got 0");
@@ -121,5 +121,5 @@ TEST_CASE("options without a check of their own so far are refused") {
     edge.intensities = {2, 2};
     edge.edge_k = edge.edge_contrast = 1;
     CHECK(why_invalid(edge) ==
-          "intensities: expected the darker one first\nedge_contrast: expected one of it and edge_k");
+          "intensities: expected the darker one first\nedge_contrast: expected no `edge_k` beside it");
 }

@@ -143,7 +143,7 @@ TEST_CASE("Painted slices become contours, other paint seeds that are counted as
     add_paint(structures, {painted(labels(discs))});
     const StructureInput input = prepare_marks(structures, lattice(), with_voxels_of(1)).at(0);
     REQUIRE(input.options.contours);
-    CHECK(input.options.contours->slices == 5);
+    CHECK(input.options.contours->slices == 4);
     CHECK(input.marks == input.options.contours->marks);
     CHECK(input.count == input.marks.size());
     CHECK(input.options.inside.size() == 9);

@@ -79,8 +79,9 @@ TEST_CASE("Structures are measured as they are once they are separated") {
         // The band holds distances up to 3 voxels, and these are smaller: the mean of the signed distances.
         CHECK(report.fit.bias == Approx(sign / double(s.marks.size())).margin(0.05));
         CHECK(report.fit.bias == Approx(sum / double(s.marks.size())).margin(0.15));
-        CHECK(std::any_of(report.warnings.begin(), report.warnings.end(),
-                          [](const std::string& line) { return line.starts_with("beside the other structures "); }));
+        // Marks that both claim are off one of the two, as they have to be.
+        CHECK(std::none_of(report.warnings.begin(), report.warnings.end(),
+                           [](const std::string& line) { return line.find("off the surface") != std::string::npos; }));
     }
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 #include <string>
 
+#include "covol/options_table.h"
+
 namespace covol::tool {
 
 /// "--tag-distance" of the option "tag_distance".
@@ -8,5 +10,14 @@ namespace covol::tool {
 
 /// A message of the library, which names options, with their flags: "`tag_distance = 3`" becomes "--tag-distance 3".
 [[nodiscard]] std::string with_flags(const std::string& message);
+
+/// As require_valid(), with the flag of the first bad option in front: "--edge-contrast: expected ...".
+/// @throws Error InvalidOptions.
+template <typename Options>
+void require_valid_flags(const Options& options) {
+    const std::string why = why_invalid(options), name = why.substr(0, why.find(':'));
+    if (!why.empty())
+        throw Error(Errc::InvalidOptions, flag_of(name) + why.substr(name.size(), why.find('\n') - name.size()), name);
+}
 
 }  // namespace covol::tool

@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "cli/option_names.h"
 #include "commands/commands.h"
 #include "covol/error.h"
 #include "covol/render.h"
@@ -29,7 +30,7 @@ struct RenderJob {
                                                   std::to_string(turntable));
         for (int n = 0; n < std::max(1, turntable); ++n)
             session.outputs().check("-o", frame_path(n), OutputKind::Picture);
-        require_valid(given.options, "render");
+        require_valid_flags(given.options);
         static_cast<void>(parse_view(view, false));
         const std::vector<NamedLevelSet> level_sets = read_level_sets(input, session.run());
         std::optional<Image> pixels;

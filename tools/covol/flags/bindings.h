@@ -97,8 +97,11 @@ void bind_options(CLI::App& command, Given<Options>& given, Offered job,
         in_group(command, option.place.group);
         CLI::Option* made = add_option(command, option, value, given);
         if (made == nullptr) return;
-        made->description(with_flags(option.text));
-        if (*option.automatic != 0) made->default_str(with_flags(option.automatic));
+        // Help shows what stands in brackets as the default; in reports automatic choices are no values of options.
+        const bool is_automatic = *option.automatic != 0;
+        made->description(with_flags(option.text) +
+                          (is_automatic ? " [" + with_flags(option.automatic) + "]" : std::string()));
+        if (is_automatic) made->default_str("");
         made->each([&given, name = std::string(option.name)](const std::string&) { given.names.insert(name); });
     });
 }

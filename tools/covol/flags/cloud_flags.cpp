@@ -1,5 +1,6 @@
 #include "flags/cloud_flags.h"
 
+#include "cli/option_names.h"
 #include "covol/error.h"
 #include "flags/bindings.h"
 
@@ -21,7 +22,7 @@ CloudCleanupOptions CloudFlags::cleanup(double h) const {
     return resolved;
 }
 
-void CloudFlags::check() const { require_valid(cleanup(1), "clean_cloud"); }
+void CloudFlags::check() const { require_valid_flags(cleanup(1)); }
 
 void CloudFlags::check_used(bool has_cloud) const {
     if (!has_cloud && cleanup(1).any())

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "cli/option_names.h"
 #include "cli/report.h"
 #include "covol/error.h"
 #include "covol/file_kind.h"
@@ -48,7 +49,7 @@ bool SegmentJob::needs_mesh() const {
 }
 
 void SegmentJob::check_options() const {
-    require_valid(resolve(1.0), "segment");
+    require_valid_flags(resolve(1.0));
     cloud.check();
     mesh.check_used(!mesh_path.empty());
     mesh.check_plain(mesh_path);

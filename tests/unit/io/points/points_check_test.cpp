@@ -75,7 +75,8 @@ TEST_CASE("each usual mistake is named with the option that mends it") {
     says(advice({{15, 70, 90}}), "; `points_space = index, points_order = zyx` would");
     says(advice({{-5, -3, 15}}),
          "; `points_space = ras` would bring them inside (they are in RAS, the image is in LPS)");
-    says(advice({{5000, 3000, 15000}, {2000, 1000, 3000}}), "; `scale = 0.001` would bring them inside (their unit");
+    says(advice({{5000, 3000, 15000}, {2000, 1000, 3000}}),
+         "; `points_scale = 0.001` would bring them inside (their unit");
     says(advice({{-5000, -3000, 15000}, {-2000, -1000, 3000}}), "; `points_space = ras, points_scale = 0.001` would");
     says(advice({{100, 80, 20}}), "; `points_space = index1` would bring them inside (they are voxels counted from 1)");
     says(advice({{3, 70, 90}}, PointSpace::Index), "; `points_order = zyx` would bring");
@@ -157,7 +158,7 @@ TEST_CASE("what the advice asks for, reads the file rightly") {
     check({PointSpace::Local}, "`points_space = local`", [&](const Vec3& p) {
         return Vec3{p[0] - geometry.origin[0], p[1] - geometry.origin[1], p[2] - geometry.origin[2]};
     });
-    check({PointSpace::Unstated, PointOrder::Unstated, 1e-3}, "`scale = 0.001`", [](const Vec3& p) {
+    check({PointSpace::Unstated, PointOrder::Unstated, 1e-3}, "`points_scale = 0.001`", [](const Vec3& p) {
         return Vec3{1e3 * p[0], 1e3 * p[1], 1e3 * p[2]};
     });
     check({PointSpace::Index, PointOrder::ZYX}, "`points_space = index, points_order = zyx`", [&](const Vec3& p) {
