@@ -235,6 +235,10 @@ std::size_t run_program(const std::string& program, const Orders& orders, const 
     wait_for(child, alive.from, batch, seconds, run);
     const std::size_t n = batch.first_not_ended();
     if (n == batch.end || run.cancelled()) return n;
+    if (batch.slots[n].now() != kBegun)  // that says nothing of the file: libraries make threads where they are loaded
+        throw Error(Errc::Io, "read_image: " + program +
+                                  ": expected it to read files apart from this program, but it ended before it began; "
+                                  "allow more processes and threads, or memory");
     batch.slots[n].set(kCrashed);
     return n + 1;
 }
@@ -268,10 +272,14 @@ SharedMemory::SharedMemory(int descriptor, std::uint64_t bytes) : descriptor_(de
     // nobody may take away what the other has mapped
     const bool made = ftruncate(descriptor, off_t(bytes)) == 0 &&
                       fcntl(descriptor, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL) == 0;
+    const int why = made ? 0 : errno;
     data_ = made ? mapped() : nullptr;
     if (data_ != nullptr) return;
     if (descriptor >= 0) close(descriptor);
-    throw std::bad_alloc();
+    if (why != EFBIG) throw std::bad_alloc();
+    throw Error(Errc::Io, "read_image: expected " + std::to_string(bytes) +
+                              " bytes of memory that two programs share, got: " + std::strerror(why) +
+                              "; allow larger files (ulimit -f), which that counts as");
 }
 
 SharedMemory::SharedMemory(Given given) : descriptor_(given.descriptor) {

@@ -63,8 +63,8 @@ Vec3 place_of(const Json& json, const char* name) {
 }
 
 Json as_json(const EdgeOptions& edge) {
-    Json json{{"feature", int(edge.feature)}};
-    if (edge.intensities) json["intensities"] = *edge.intensities;
+    const auto [low, high] = edge.intensities.value_or(std::array{0.0, 0.0});
+    Json json{{"feature", int(edge.feature)}, {"low", low}, {"high", high}};
     if (edge.sigma) json["sigma"] = *edge.sigma;
     if (edge.edge_k) json["edge_k"] = *edge.edge_k;
     if (edge.contrast_percentile) json["contrast_percentile"] = *edge.contrast_percentile;
@@ -74,7 +74,7 @@ Json as_json(const EdgeOptions& edge) {
 EdgeOptions edge_of(const Json& json) {
     EdgeOptions edge;
     edge.feature = EdgeFeature(whole(json, "feature", 0, int(EdgeFeature::DarkLine)));
-    if (json.contains("intensities")) edge.intensities = json.at("intensities").get<std::array<double, 2>>();
+    if (const double low = real(json, "low"), high = real(json, "high"); low != high) edge.intensities = {low, high};
     const auto optional = [&](const char* name) {
         return json.contains(name) ? std::optional(real(json, name)) : std::nullopt;
     };
