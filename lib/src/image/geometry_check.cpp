@@ -21,7 +21,8 @@ void check_direction(const std::string& where, const ImageGeometry& g) {
                 throw Error(Errc::Unsupported,
                             where +
                                 ": direction: expected perpendicular axes of length 1, got sheared or degenerate "
-                                "ones; resample the image");
+                                "ones; resample the image",
+                            "direction");
         }
 }
 
