@@ -231,7 +231,7 @@ class Cleaning(PointsCase):
         self.assertAlmostEqual(report["surface"]["volume"] / clean["surface"]["volume"], 1, delta=0.01)
 
     def test_bad_values(self):
-        self.refuse("convert", self.dirty, "o.xyz", "--remove-outliers=0.5", code=3, says="remove_outliers: expected 0 or >= 1")
+        self.refuse("convert", self.dirty, "o.xyz", "--remove-outliers=0.5", code=3, says="--remove-outliers: expected 0 or >= 1")
         self.refuse("convert", self.dirty, "o.xyz", "--remove-outliers=many", code=2, says="--remove-outliers")
         self.refuse("convert", self.dirty, "o.xyz", "--smooth", "butter", code=2, says="--smooth")
         self.refuse("convert", self.dirty, "o.xyz", "--simplify", "1vx", code=2, says="--like IMAGE")
