@@ -101,7 +101,7 @@ TEST_CASE("evolve() with a tracked band: a shrinking sphere, first order in h or
         const double h = 2.8 / n, error = tracked_error(n, share);
         const std::string what = "evolve, tracked band, tau = " + std::to_string(share) + " h^2";
         const double order = print_order(what.c_str(), h, error, previous);
-        CHECK(error < 0.08 * h);
+        CHECK(error < 0.075 * h);
         if (previous > 0) CHECK(order >= 1);
         previous = error;
     }
