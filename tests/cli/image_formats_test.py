@@ -463,13 +463,24 @@ class Options(Case):
             slice_.save_as(path)
         self.run_covol("info", series)
         (self.folder / "any.h5").write_bytes(b"\x89HDF\r\n\x1a\n")
-        for image in (self.write_nrrd(), self.folder / "any.h5", series):
-            with self.subTest(image):
-                done = subprocess.run([COVOL, "info", image], capture_output=True, text=True, timeout=300,
-                                      env={**os.environ, "LD_LIBRARY_PATH": str(alone)})
-                self.assertEqual(done.returncode, 4, done.stdout + done.stderr)
-                self.assertRegex(done.stderr, r"alone/covol-[0-9.]+/covol-reader: expected to start covol's program that reads files ")
-                self.assertIn("install covol again", done.stderr)
+        images = ((self.write_nrrd(), "itk.so", "NRRD, NIfTI and MetaImage"), (self.folder / "any.h5", "hdf5.so", "HDF5"),
+                  (series, "gdcm.so", "compressed DICOM"))
+
+        def expect(message):
+            for image, module, formats in images:
+                with self.subTest(module):
+                    done = subprocess.run([COVOL, "info", image], capture_output=True, text=True, timeout=300,
+                                          env={**os.environ, "LD_LIBRARY_PATH": str(alone)})
+                    self.assertEqual(done.returncode, 4, done.stdout + done.stderr)
+                    self.assertRegex(done.stderr, message.format(module=module, formats=formats))
+                    self.assertIn("install covol again", done.stderr)
+
+        expect("alone/covol-[0-9.]+/covol-reader: expected to start covol's program that reads files ")
+        # the program that reads files, and no module
+        (folder,) = pathlib.Path(library.group(2)).resolve().parent.glob("covol-*")
+        (alone / folder.name).mkdir()
+        shutil.copy(folder / "covol-reader", alone / folder.name)
+        expect("alone/covol-[0-9.]+/{module}: expected covol's module for {formats} ")
 
     def test_a_huge_image_takes_little_memory(self):
         """2048^3 bytes on disk (a sparse file), a small ball in it; whole and with --roi."""

@@ -63,9 +63,10 @@ std::vector<std::variant<ItkHeader, Error>> read_headers(ReaderTask task, const 
     for (std::size_t n = 0; n < files.size(); ++n) {
         FlatHeader flat;
         if (!trials[n].answer.empty()) std::memcpy(&flat, trials[n].answer.data(), sizeof flat);
-        if (const auto error = reading_error(trials[n], files[n].path, library_of(task)))
+        if (const auto error = reading_error(trials[n], files[n].path, library_of(task))) {
+            if (error->code() == Errc::Io) throw Error(*error);  // a module is missing: no fault of the file
             headers.emplace_back(*error);
-        else if (const auto header = flat.header())
+        } else if (const auto header = flat.header())
             headers.emplace_back(*header);
         else
             headers.emplace_back(Error(Errc::InvalidInput, files[n].detail));
