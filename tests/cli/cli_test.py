@@ -538,7 +538,7 @@ class Tools(Case):
         self.run_covol("reconstruct", self.points, "-o", "s.vdb")
         for size in ("1e308", "100"):
             self.run_covol("mesh", "s.vdb", "-o", "m.ply", "--min-component", size, code=3)
-        done = self.run_covol("reconstruct", self.points, "-o", "t.vdb", "--min-component", "1e100", code=3)
+        done = self.run_covol("reconstruct", self.points, "-o", "t.vdb", "--min-component", "1e308", code=3)
         self.assertIn("use a smaller --min-component", done.stderr)
         self.assertEqual(self.files(), ["s.vdb"])
 

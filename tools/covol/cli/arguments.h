@@ -33,10 +33,6 @@ struct Length {
     [[nodiscard]] std::optional<double> resolve(double voxel_size) const {
         return given ? std::optional(resolve(voxel_size, 0)) : std::nullopt;
     }
-    /// The same; none where it was given as 0.
-    [[nodiscard]] std::optional<double> resolve_above_0(double voxel_size) const {
-        return resolve(voxel_size, 0) > 0 ? resolve(voxel_size) : std::nullopt;
-    }
 };
 
 // Each takes the option's name for its messages.

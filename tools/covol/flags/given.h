@@ -1,5 +1,7 @@
 #pragma once
+#include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <optional>
 #include <set>
@@ -42,7 +44,9 @@ struct Given {
             if constexpr (std::is_same_v<PlainOf<std::remove_cvref_t<decltype(value)>>, double>)
                 if (const Length found = length(option.name); found.given) {
                     const double a = found.resolve(h, 0);
-                    value = option.range.unit == Unit::Volume ? a * a * a : a;
+                    // Of a cube that no number holds none is large enough, which its user says.
+                    value =
+                        option.range.unit == Unit::Volume ? std::min(a * a * a, std::numeric_limits<double>::max()) : a;
                 }
         });
         return resolved;
