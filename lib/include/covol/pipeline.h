@@ -19,6 +19,7 @@
 #include "covol/guidance.h"
 #include "covol/holes.h"
 #include "covol/image.h"
+#include "covol/inference.h"
 #include "covol/mesh.h"
 #include "covol/mesh_relax.h"
 #include "covol/options_table.h"
@@ -177,6 +178,7 @@ struct SegmentReport {
     std::size_t densified = 0;    ///< points made from contours
     GuessReport guess;            ///< where the start was one
     CloudReport cloud;            ///< likewise
+    InferenceReport inference;    ///< of a guess and the image, before its guidance
     GuidanceReport guidance;      ///< what the image said to a guess
     TagDistanceChoice tag;
     BandReport band;

@@ -182,6 +182,18 @@ Gradients descend(const Matrix& H, const Vector& c, const Vector& first) {
     return found;
 }
 
+/// Less where the gradients lie along the axes.
+Matrix with_axes(const Matrix& energy, const std::vector<Vec3>& axes) {
+    Matrix result = energy;
+    const double mean = energy.trace() / double(energy.rows());
+    for (Index n = 0; n < Index(axes.size()); ++n) {
+        const Vec3& axis = axes[std::size_t(n)];
+        const Point a(axis[0], axis[1], axis[2]);
+        result.block<3, 3>(3 * n, 3 * n) -= mean * a * a.transpose();
+    }
+    return result;
+}
+
 /// Approximate eigenvectors of the least eigenvalues: inverse iteration on a subspace.
 Matrix flattest_modes(const Matrix& H, const Vector& outward) {
     const Index size = H.rows(), count = std::min<Index>(kVariational.subspace, size);
@@ -272,11 +284,11 @@ Vector away_from_neighbours(const std::vector<Point>& nodes, Index marks, double
 
 /// Of first guesses, `known` ones among them unless there are none, the one that ends at the least energy. A body ends:
 /// where some ends have one sign all around, far from the marks, the others are no bodies.
-Gradients least_energy(const HermiteSystem& system, const Vector& values, const Vector& c,
-                       const std::vector<Point>& nodes, Index marks, const Vector& outward, const Vector& known,
-                       const Inside& in_world) {
+Gradients least_energy(const HermiteSystem& system, const Matrix& energy, const Vector& values, const Vector& c,
+                       const std::vector<Point>& nodes, Index marks, const Vector& outward,
+                       const std::vector<Vector>& known, const Inside& in_world) {
     std::vector<Vector> guesses{outward};
-    if (known.size() > 0) guesses.push_back(known);
+    guesses.insert(guesses.end(), known.begin(), known.end());
     for (const double share : kLocalShares)
         if (share * double(marks) >= kVariational.least_local)
             guesses.push_back(away_from_neighbours(nodes, marks, share));
@@ -284,7 +296,7 @@ Gradients least_energy(const HermiteSystem& system, const Vector& values, const 
     for (Index k = 0; k < std::min<Index>(kVariational.modes, modes.cols()); ++k) guesses.push_back(modes.col(k));
     std::vector<Gradients> ends(guesses.size());
     tbb::parallel_for(std::size_t(0), guesses.size(), [&](std::size_t n) {
-        Gradients& end = ends[n] = descend(system.energy(), c, guesses[n]);
+        Gradients& end = ends[n] = descend(energy, c, guesses[n]);
         end.closed = has_one_sign_around(nodes, marks, expansion(system, values, end.unit, nodes), in_world);
     });
     Gradients best;
@@ -374,8 +386,12 @@ VariationalSurface::VariationalSurface(const Constraints& given, const Normals& 
     };
     Vector outward(3 * marks);
     for (Index n = 0; n < marks; ++n) outward.segment<3>(3 * n) = nodes[std::size_t(n)];
-    Vector known(3 * Index(normals.size()));
-    for (std::size_t n = 0; n < normals.size(); ++n) known.segment<3>(3 * Index(n)) = to_point(normals[n]);
+    std::vector<Vector> known;
+    for (const std::vector<Vec3>* directions : {&normals, &given.axes}) {
+        if (directions->empty()) continue;
+        known.emplace_back(3 * marks);
+        for (Index n = 0; n < marks; ++n) known.back().segment<3>(3 * n) = to_point((*directions)[std::size_t(n)]);
+    }
 
     double unit_amplitude = amplitude > 0 ? amplitude * radius_ : 1.0;
     Gradients found;
@@ -385,11 +401,14 @@ VariationalSurface::VariationalSurface(const Constraints& given, const Normals& 
         const HermiteSystem system(nodes, marks, lambda);
         double constant = 0;
         const Vector c = system.linear(values, constant) - system.energy() * before;
+        const Matrix energy = with_axes(system.energy(), given.axes);
         if (round > 0)
-            found = descend(system.energy(), c, found.unit);
+            found = descend(energy, c, found.unit);
         else
-            found = search == Search::Wide ? least_energy(system, values, c, nodes, marks, outward, known, in_world)
-                                           : descend(system.energy(), c, known);
+            found = search == Search::Wide
+                        ? least_energy(system, energy, values, c, nodes, marks, outward, known, in_world)
+                        : descend(energy, c, known.front());
+        if (!given.axes.empty()) found.energy = found.unit.dot(system.energy() * found.unit) + 2 * c.dot(found.unit);
         if (round + 1 == rounds) f_ = expansion(system, values, found.unit - before, nodes);
         if (amplitude > 0) continue;
         unit_amplitude = std::max((found.energy + constant) / system.freedom(), 1e-12);

@@ -24,6 +24,9 @@ struct Constraints {
     /// and value() leaves it out. Empty: nothing.
     std::vector<double> known_value;
     std::vector<Vec3> known_gradient;
+    /// Of each mark a line along which its normal likely lies, either way; the square of its length says how much that
+    /// counts, in mean eigenvalues of the energy. Empty: nothing is known.
+    std::vector<Vec3> axes;
 };
 
 /// f of VariationalSurface, as arrays: node, weight of its value and of its gradient (0 for seeds).

@@ -5,11 +5,9 @@
 A mask is the truth without a quarter of it on one side of a plane, or without a fifth of it in a ball around a place of its
 surface; marks lie on the part of the true surface that the mask misses. correction_draws.csv has each run.
 """
-import pathlib
 import os
 import sys
 
-import nibabel
 import numpy as np
 import tifffile
 from scipy import ndimage
@@ -19,20 +17,7 @@ import truth
 from common import Bench, markdown, version_of
 
 COUNTS = (5, 10, 30)
-MORE = (("hippocampus", "hippocampus_001", 0), ("left atrium", "la_8M99", 0), ("ventricle", "mri_freesurfer", 4),
-        ("caudate", "mri_freesurfer", 11), ("putamen", "mri_freesurfer", 12), ("hippocampus 2", "mri_freesurfer", 17),
-        ("brain stem", "mri_freesurfer", 16))
-
-
-def more_structures(data):
-    """Thin and curved ones beside those of truth.structures(). A label of 0: whatever is not 0."""
-    images = pathlib.Path(data) / "images"
-    for name, image, label in MORE:
-        labels = truth.read_array(images / f"{image}_gt.nii.gz")
-        parts, _ = ndimage.label(labels == label if label else labels > 0)
-        body = parts == 1 + np.argmax(np.bincount(parts.ravel())[1:])
-        spacing = np.array(nibabel.load(images / f"{image}.nii.gz").header.get_zooms()[:3], float)
-        yield truth.Structure(name, images / f"{image}.nii.gz", body, spacing)
+MORE = ("hippocampus", "left atrium", "ventricle, left", "caudate", "putamen", "hippocampus 2", "brain stem")
 
 
 # ---- mistakes: (structure, rng) -> mask -------------------------------------------------------------------------------
@@ -106,7 +91,8 @@ def main():
     bench = Bench("correction", __doc__, 5, arguments=lambda parser: parser.add_argument(
         "--check", action="store_true", help="exit code 1 when a mask becomes worse in silence"))
     words = [w for w in bench.options.only.split(",") if w]
-    bench.structures += [s for s in more_structures(os.environ["COVOL_DATA"]) if not words or any(w in s.name for w in words)]
+    bench.structures += [s for s in truth.more_structures(os.environ["COVOL_DATA"])
+                         if s.name in MORE and (not words or any(w in s.name for w in words))]
     rows = measure(bench)
     bench.write("correction_draws", rows)
     silent = [row for row in rows if row["dice"] < row["given"] and not row["warned"]]

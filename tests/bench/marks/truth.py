@@ -7,6 +7,7 @@ import dataclasses
 import functools
 import math
 import pathlib
+import zlib
 
 import nibabel
 import numpy as np
@@ -69,7 +70,18 @@ def read_array(path):
     """z y x"""
     if path.name.endswith((".nii", ".nii.gz")):
         return np.asarray(nibabel.load(path).dataobj).transpose(2, 1, 0)
+    if path.suffix == ".nrrd":
+        return read_nrrd(path)
     return tifffile.imread(path)
+
+
+def read_nrrd(path):
+    """z y x, of a little-endian file with an attached header and gzip encoding."""
+    head, _, packed = path.read_bytes().partition(b"\n\n")
+    fields = dict(line.split(": ", 1) for line in head.decode().splitlines() if ": " in line)
+    types = {"uint8": "u1", "unsigned char": "u1", "uint16": "<u2", "int16": "<i2", "short": "<i2", "float": "<f4"}
+    sizes = [int(n) for n in fields["sizes"].split()]
+    return np.frombuffer(zlib.decompress(packed, 31), types[fields["type"]]).reshape(sizes[::-1])
 
 
 def tiff_spacing(path):
@@ -101,6 +113,59 @@ def structures(data):
         file = nibabel.load(images / f"{image}.nii.gz")
         yield Structure(name, images / f"{image}.nii.gz", read_array(images / f"{truth}.nii.gz") > 0,
                         np.array(file.header.get_zooms()[:3], float), (), axis, large)
+
+
+# Name, image, file with labels, labels (none: all), of several parts the largest alone.
+MORE = (("hippocampus", "hippocampus_001.nii.gz", "hippocampus_001_gt.nii.gz", ()),
+        ("hippocampus, anterior", "hippocampus_001.nii.gz", "hippocampus_001_gt.nii.gz", (1,)),
+        ("hippocampus, posterior", "hippocampus_001.nii.gz", "hippocampus_001_gt.nii.gz", (2,)),
+        ("left atrium", "la_8M99.nii.gz", "la_8M99_gt.nii.gz", ()),
+        ("ventricle", "mri_freesurfer.nii.gz", "mri_freesurfer_gt.nii.gz", (43,)),
+        ("ventricle, left", "mri_freesurfer.nii.gz", "mri_freesurfer_gt.nii.gz", (4,)),
+        ("caudate", "mri_freesurfer.nii.gz", "mri_freesurfer_gt.nii.gz", (11,)),
+        ("caudate, right", "mri_freesurfer.nii.gz", "mri_freesurfer_gt.nii.gz", (50,)),
+        ("putamen", "mri_freesurfer.nii.gz", "mri_freesurfer_gt.nii.gz", (12,)),
+        ("hippocampus 2", "mri_freesurfer.nii.gz", "mri_freesurfer_gt.nii.gz", (17,)),
+        ("brain stem", "mri_freesurfer.nii.gz", "mri_freesurfer_gt.nii.gz", (16,)),
+        ("thalamus", "mri_freesurfer.nii.gz", "mri_freesurfer_gt.nii.gz", (10,)),
+        ("corpus callosum", "mri_freesurfer.nii.gz", "mri_freesurfer_gt.nii.gz", (251, 252, 253, 254, 255)),
+        ("cerebellum", "mri_freesurfer.nii.gz", "mri_freesurfer_gt.nii.gz", (7, 8)),
+        ("cerebellar white matter", "mri_freesurfer.nii.gz", "mri_freesurfer_gt.nii.gz", (7,)),
+        ("cortex", "mri_freesurfer.nii.gz", "mri_freesurfer_gt.nii.gz", (42,)),
+        ("iliac arteries", "vmtk_aorta.nrrd", "vmtk_aorta_levelset_mask.nrrd", ()),
+        ("kidney, cut", "ts_example_ct_sm.nii.gz", "ts_example_seg.nii.gz", (2,)),
+        ("liver", "ts_example_ct_sm.nii.gz", "ts_example_seg.nii.gz", (5,)),
+        ("vertebra", "ts_example_ct_sm.nii.gz", "ts_example_seg.nii.gz", (31,)),
+        ("colon", "ts_example_ct_sm.nii.gz", "ts_example_seg.nii.gz", (20,)),
+        ("aorta", "ts_example_ct_sm.nii.gz", "ts_example_seg.nii.gz", (52,)),
+        ("mouse nucleus 156", "mouse_nuclei_75.tif", "mouse_nuclei_75_labels.tif", (156,)),
+        ("mouse nucleus 395", "mouse_nuclei_75.tif", "mouse_nuclei_75_labels.tif", (395,)),
+        ("worm nucleus 59", "stardist_img3d.tif", "stardist_mask3d.tif", (59,)),
+        ("worm nucleus 81", "stardist_img3d.tif", "stardist_mask3d.tif", (81,)))
+
+
+def more_structures(data):
+    """Others beside those of structures(): thin, curved and branched ones, and nuclei that touch."""
+    images = pathlib.Path(data) / "images"
+    for name, image, truth_file, labels in MORE:
+        values = read_array(images / truth_file)
+        parts, _ = ndimage.label(np.isin(values, labels) if labels else values > 0, np.ones((3, 3, 3)))
+        body = parts == 1 + np.argmax(np.bincount(parts.ravel())[1:])
+        yield Structure(name, images / image, body, spacing_of(images / image), large=body.sum() > 200_000)
+
+
+def spacing_of(path):
+    """x y z; of a file that stores none, 1."""
+    if path.name.endswith(".nii.gz"):
+        return np.array(nibabel.load(path).header.get_zooms()[:3], float)
+    if path.suffix == ".nrrd":
+        head = path.read_bytes().partition(b"\n\n")[0].decode()
+        vectors = head.split("space directions: ")[1].splitlines()[0].split()
+        return np.array([np.linalg.norm([float(x) for x in v.strip("()").split(",")]) for v in vectors])
+    try:
+        return tiff_spacing(path)
+    except (KeyError, TypeError):
+        return np.ones(3)
 
 
 # ---- outlines ---------------------------------------------------------------------------------------------------------

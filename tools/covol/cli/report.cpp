@@ -133,6 +133,19 @@ Json to_json(const SegmentReport& r) {
                                      {{"distance", r.marks_off.farthest},
                                       {"world", to_json(r.marks_off.farthest_world)},
                                       {"index", to_json(r.marks_off.farthest_index)}}}};
+    if (!r.inference.reason.empty()) {
+        const InferenceReport& i = r.inference;
+        json["inference"] = {{"used", i.used},
+                             {"reason", i.reason},
+                             {"bits", i.bits},
+                             {"body_error", i.body_error},
+                             {"guess_error", i.guess_error},
+                             {"guess_weight", i.guess_weight},
+                             {"agreement", i.agreement},
+                             {"held_out", i.held_out}};
+        if (i.expected)
+            json["expected_dice"] = {{"value", i.expected->value}, {"low", i.expected->low}, {"high", i.expected->high}};
+    }
     if (r.guidance.used || !r.guidance.reason.empty())
         json["guidance"] = {{"used", r.guidance.used},
                             {"reason", r.guidance.reason},

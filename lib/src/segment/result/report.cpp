@@ -250,6 +250,7 @@ SegmentReport measure(const Problem& problem, const Choices& choices, const Step
         report.densified = contours->along.size() + contours->between.size();
     report.guess = start.guess;
     report.cloud = start.cloud;
+    report.inference = start.inference;
     report.guidance = solution.guidance;
     report.tag = start.tag;
     report.band = start.band;

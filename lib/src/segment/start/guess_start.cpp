@@ -1,6 +1,7 @@
 // The start from few marks: the surface through them that bends least.
 #include <utility>
 
+#include "covol/inference.h"
 #include "covol/orientation.h"
 #include "distance/memory_need.h"
 #include "guess/guess_in_image.h"
@@ -49,6 +50,18 @@ double largest_area(const WorldBox& box) {
     return area;
 }
 
+/// What marks and image show together, where the marks alone are not as good.
+void infer_start(const Problem& problem, StartSurface& start) {
+    StartFacts& facts = start.facts;
+    const Timed timed(facts.report.seconds.tag);
+    KnownSides sides{problem.options.inside, problem.options.outside};
+    sides.outside.insert(sides.outside.end(), problem.options.exterior_seeds.begin(),
+                         problem.options.exterior_seeds.end());
+    Inferred inferred = infer(*start.u, facts.on_surface, *problem.image, sides, problem.run);
+    facts.inference = std::move(inferred.report);
+    start.u = std::move(inferred.u);
+}
+
 }  // namespace
 
 StartSurface start_from_guess(const Problem& problem, const Choices& choices, MarkSets marks) {
@@ -72,6 +85,7 @@ StartSurface start_from_guess(const Problem& problem, const Choices& choices, Ma
         start.u = std::move(guess.u);
         facts.on_surface = std::move(guess.marks);
     }
+    if (problem.image != nullptr && uses_image(facts.flow)) infer_start(problem, start);
     if (!rests(problem, facts, EdgeFeature::Slope))
         start.distance = find_distance_for_flow(facts, *start.u, facts.report, run);
     facts.report.remarks.choose("guess", facts.guess.summary, "", run);

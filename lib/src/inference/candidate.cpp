@@ -1,0 +1,405 @@
+#include "inference/candidate.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "base/geometry.h"
+#include "base/median.h"
+#include "covol/error.h"
+#include "inference/heuristics.h"
+#include "inference/minimal_surface.h"
+#include "points/kd_tree.h"
+
+namespace covol::inference {
+namespace {
+
+using guess::Constraints;
+using guess::Normals;
+using guess::Search;
+using guess::VariationalSurface;
+
+constexpr double kOffsets[] = {1.5, 2.5, 3.5};  // cells beside a mark
+constexpr int kAllFolds = -1;                   // of a sample that is never left out
+constexpr std::size_t kElsewhere = 300;         // samples that no mark gives
+constexpr std::size_t kFewestSamples = 40;
+constexpr double kOnMarkCells = 1.5;
+
+template <typename Visit>
+void for_each_row(const Lattice& lattice, const Visit& visit) {
+    tbb::parallel_for(0, lattice.size[2], [&](int k) {
+        for (int j = 0; j < lattice.size[1]; ++j) visit(j, k);
+    });
+}
+
+std::vector<Vec3> at(const std::vector<Vec3>& all, const std::vector<std::size_t>& chosen) {
+    std::vector<Vec3> some;
+    for (const std::size_t n : chosen) some.push_back(all[n]);
+    return some;
+}
+
+Constraints constraints_of(const Marks& marks, const std::vector<std::size_t>& chosen, const Proposal& proposal) {
+    Constraints c;
+    c.marks = at(marks.places, chosen);
+    c.variance.assign(chosen.size(), marks.variance);
+    if (proposal.strength > 0)
+        for (const std::size_t n : chosen) c.axes.push_back(times(std::sqrt(proposal.strength), proposal.axes[n]));
+    return c;
+}
+
+/// The surface through marks, and which side of it is outside: the one that goes on for ever.
+class Guess {
+public:
+    Guess(const Marks& marks, const std::vector<std::size_t>& chosen, const Proposal& proposal)
+        : surface_(constraints_of(marks, chosen, proposal),
+                   proposal.search == Search::Near ? at(proposal.axes, chosen) : Normals{}, proposal.search) {
+        Vec3 middle{0, 0, 0};
+        for (const Vec3& m : marks.places) middle = plus(middle, 1.0 / double(marks.places.size()), m);
+        double reach = 0, far = 0;
+        for (const Vec3& m : marks.places) reach = std::max(reach, length(minus(m, middle)));
+        for (int corner = 0; corner < 8; ++corner)
+            far += surface_.value({middle[0] + ((corner & 4) != 0 ? 3 : -3) * reach,
+                                   middle[1] + ((corner & 2) != 0 ? 3 : -3) * reach,
+                                   middle[2] + ((corner & 1) != 0 ? 3 : -3) * reach});
+        side_ = far < 0 ? -1 : 1;
+    }
+    /// Of some of the marks of another one, near its normals.
+    Guess(const Marks& marks, const std::vector<std::size_t>& chosen, const Proposal& proposal, const Guess& whole,
+          const std::vector<Vec3>& normals)
+        : surface_(constraints_of(marks, chosen, proposal), at(normals, chosen), Search::Near,
+                   whole.surface_.amplitude()) {}
+
+    [[nodiscard]] double value(const Vec3& place) const { return side_ * surface_.value(place); }
+    [[nodiscard]] Vec3 normal(const Vec3& place) const { return times(side_, unit(surface_.gradient(place))); }
+    void row(const Vec3& from, const Vec3& step, std::vector<double>& values) const {
+        surface_.row(from, step, int(values.size()), values.data());
+        for (double& v : values) v *= side_;
+    }
+
+private:
+    VariationalSurface surface_;
+    double side_ = 1;
+};
+
+/// The guess as two witnesses: as it is, and less so the farther from the marks that it was made of.
+void add_guess(double value, double to_mark, double cell, Features& features) {
+    constexpr double kFarCells = 8, kFading = 0.3;
+    const double cells = value / cell;
+    features[kOfImage] = float(std::clamp(cells, -kFarCells, kFarCells));
+    features[kOfImage + 1] = float(std::clamp(cells / (1 + kFading * to_mark / cell), -kFarCells, kFarCells));
+}
+
+/// What teaches inside and outside.
+class Samples {
+public:
+    Samples(const Scene& scene, const Guess& whole) : scene_(scene), whole_(whole), cell_(scene.lattice.finest()) {}
+
+    /// Along the normals of the marks, each with a guess that was made without it.
+    void add_marks(const Proposal& proposal) {
+        const Marks& marks = scene_.marks;
+        std::vector<Vec3> normals(marks.places.size());
+        tbb::parallel_for(std::size_t(0), normals.size(),
+                          [&](std::size_t n) { normals[n] = whole_.normal(marks.places[n]); });
+        std::vector<std::optional<Held>> held(kFolds);
+        tbb::parallel_for(0, kFolds, [&](int fold) {
+            std::vector<std::size_t> rest;
+            for (std::size_t n = 0; n < marks.spread.size(); ++n)
+                if (int(n % kFolds) != fold) rest.push_back(marks.spread[n]);
+            try {
+                held[std::size_t(fold)].emplace(Guess(marks, rest, proposal, whole_, normals),
+                                                detail::KdTree(at(marks.places, rest)));
+            } catch (const Error&) {  // the rest has no surface: its fold teaches nothing
+            }
+        });
+        const detail::KdTree tree(at(marks.places, marks.spread));
+        std::size_t rank = 0;
+        for (std::size_t n = 0; n < marks.places.size(); ++n) {
+            const bool is_spread = rank < marks.spread.size() && marks.spread[rank] == n;
+            const std::optional<Held>* one = is_spread ? &held[rank++ % kFolds] : nullptr;
+            if (one != nullptr && !*one) continue;
+            const double step = scene_.lattice.cell_along(normals[n]);
+            for (const double offset : kOffsets)
+                for (const double direction : {-1.0, 1.0}) {
+                    const Vec3 place = plus(marks.places[n], direction * offset * step, normals[n]);
+                    const double guess = whole_.value(place);
+                    if (guess * direction < 0) continue;  // beyond the other wall of a thin body
+                    Sample s = sample(place);
+                    if (one != nullptr)
+                        add_guess((*one)->guess.value(place), std::sqrt((*one)->tree.nearest(place)), cell_, s.at);
+                    else
+                        add_guess(guess, std::sqrt(tree.nearest(place)), cell_, s.at);
+                    s.inside = direction < 0;
+                    s.fold = int(n % kFolds);
+                    all_.push_back(s);
+                }
+        }
+        of_marks_ = all_.size();
+    }
+
+    /// Nodes of which the side is known; together they count half as much as the marks.
+    void add_nodes(const std::vector<std::size_t>& nodes, bool inside) {
+        const std::size_t count = std::min(kElsewhere, nodes.size());
+        for (std::size_t m = 0; m < count; ++m) {
+            const std::size_t n = nodes[(2 * m + 1) * nodes.size() / (2 * count)];
+            const Vec3 place = scene_.lattice.place_of(n);
+            Sample s = sample(place);
+            add_guess(whole_.value(place), double(scene_.to_mark[n]), cell_, s.at);
+            s.inside = inside;
+            s.fold = kAllFolds;
+            s.weight = float(0.5 * double(of_marks_) / double(count));
+            all_.push_back(s);
+        }
+    }
+
+    [[nodiscard]] std::size_t of_marks() const { return of_marks_; }
+    [[nodiscard]] const std::vector<Sample>& all() const { return all_; }
+
+private:
+    struct Held {
+        Guess guess;
+        detail::KdTree tree;
+    };
+    [[nodiscard]] Sample sample(const Vec3& place) const {
+        Sample s;
+        for (int f = 0; f < kOfImage; ++f)
+            s.at[std::size_t(f)] = float(scene_.lattice.value((*scene_.image)[f], place));
+        return s;
+    }
+
+    const Scene& scene_;
+    const Guess& whole_;
+    double cell_;
+    std::vector<Sample> all_;
+    std::size_t of_marks_ = 0;
+};
+
+std::vector<std::size_t> surely_outside(const Scene& scene) {
+    const double above = kInference.surely_outside * scene.marks.spacing + scene.lattice.finest();
+    std::vector<std::size_t> nodes;
+    for (std::size_t n = 0; n < scene.above_hull.size(); ++n)
+        if (double(scene.above_hull[n]) > above) nodes.push_back(n);
+    return nodes;
+}
+
+/// Log odds of inside at all nodes.
+Field odds_of(const Scene& scene, const Guess& guess, const Appearance& appearance, const Solid* refine) {
+    const Lattice& lattice = scene.lattice;
+    const double most = kInference.most_odds, cell = lattice.finest();
+    Field coarse;
+    if (refine != nullptr) coarse = signed_distance(refine->lattice, refine->inside);
+    Field odds(lattice.count());
+    for_each_row(lattice, [&](int j, int k) {
+        std::vector<double> row(std::size_t(lattice.size[0]));
+        guess.row(lattice.place(0, j, k), {lattice.spacing[0], 0, 0}, row);
+        for (int i = 0; i < lattice.size[0]; ++i) {
+            const std::size_t n = lattice.node(i, j, k);
+            Features at;
+            for (int f = 0; f < kOfImage; ++f) at[std::size_t(f)] = (*scene.image)[f][n];
+            add_guess(row[std::size_t(i)], double(scene.to_mark[n]), cell, at);
+            const double above = std::max(0.0, double(scene.above_hull[n]) / scene.marks.spacing - kInference.hull_slack);
+            double value = std::clamp(appearance.log_odds(at), -most, most);
+            value = std::max(value - kInference.hull_odds * above, -most);
+            if (refine != nullptr) {
+                const double off = refine->lattice.value(coarse, lattice.place(i, j, k)) / refine->lattice.finest();
+                if (std::abs(off) > kInference.fine_band) value = off < 0 ? most : -most;
+            }
+            odds[n] = float(value);
+        }
+    });
+    constexpr float kKnown = 4;  // times the most that the image says
+    for (const std::size_t n : scene.known_inside) odds[n] = kKnown * float(most);
+    for (const std::size_t n : scene.known_outside) odds[n] = -kKnown * float(most);
+    return odds;
+}
+
+Solid least_body(const Scene& scene, const Field& odds, const RunContext& run) {
+    const Lattice& lattice = scene.lattice;
+    const double reach = std::hypot(scene.marks.spacing, lattice.finest());
+    Field cost(odds.size()), weight(odds.size()), u(odds.size());
+    for (std::size_t n = 0; n < odds.size(); ++n) {
+        cost[n] = float(-kInference.odds_weight) * odds[n];
+        weight[n] = scene.edge[n] * float(kInference.surface_at_marks +
+                                          std::min(double(scene.to_mark[n]) / reach, kInference.surface_far));
+        u[n] = cost[n] < 0 ? 1.0F : 0.0F;
+    }
+    minimize_surface(lattice, weight, cost, kInference.iterations, u, run);
+    Solid solid{lattice, std::vector<char>(u.size())};
+    for (std::size_t n = 0; n < u.size(); ++n) solid.inside[n] = u[n] > 0.5F ? 1 : 0;
+    return solid;
+}
+
+/// Drops parts that hardly any mark belongs to; empty where nothing is left, or all is inside.
+void keep_marked_parts(const Scene& scene, Solid& solid) {
+    const Parts parts = label_parts(solid.lattice, solid.inside);
+    std::vector<double> marked(std::size_t(parts.count) + 1, 0.0);
+    double all = 0;
+    for (std::size_t n = 0; n < solid.inside.size(); ++n) {
+        if (parts.number[n] == 0 || double(scene.to_mark[n]) >= kOnMarkCells * solid.lattice.finest()) continue;
+        ++marked[std::size_t(parts.number[n])];
+        ++all;
+    }
+    std::size_t inside = 0;
+    for (std::size_t n = 0; n < solid.inside.size(); ++n) {
+        if (marked[std::size_t(parts.number[n])] < kInference.least_part * std::max(all, 1.0)) solid.inside[n] = 0;
+        inside += std::size_t(solid.inside[n] != 0);
+    }
+    if (inside == 0 || inside == solid.inside.size()) solid.inside.clear();
+}
+
+/// Marks lie on the surface, anywhere on it with the same probability: their likelihood falls with its area, and where
+/// much of it is far from any. What the image tells of the sides of marks that were left out counts, too.
+double score_of(const Scene& scene, const Solid& solid, double bits) {
+    const Lattice& lattice = scene.lattice;
+    const double cell = lattice.finest(), marks = double(scene.marks.places.size());
+    const Field distance = signed_distance(lattice, solid.inside);
+    double on = 0;
+    for (const Vec3& mark : scene.marks.places) on += std::abs(lattice.value(distance, mark)) < kOnMarkCells * cell;
+    std::vector<std::pair<double, double>> faces;  // distance to a mark, area
+    double area = 0;
+    const std::size_t steps[3] = {1, std::size_t(lattice.size[0]),
+                                  std::size_t(lattice.size[0]) * std::size_t(lattice.size[1])};
+    for (int k = 0; k < lattice.size[2]; ++k)
+        for (int j = 0; j < lattice.size[1]; ++j)
+            for (int i = 0; i < lattice.size[0]; ++i) {
+                const std::size_t n = lattice.node(i, j, k);
+                if (solid.inside[n] == 0) continue;
+                const int here[3] = {i, j, k};
+                double of_node = 0;
+                for (int a = 0; a < 3; ++a) {
+                    const double face = lattice.spacing[(a + 1) % 3] * lattice.spacing[(a + 2) % 3];
+                    if (here[a] > 0 && solid.inside[n - steps[a]] == 0) of_node += face;
+                    if (here[a] + 1 < lattice.size[a] && solid.inside[n + steps[a]] == 0) of_node += face;
+                }
+                constexpr double kStairs = 1.5;  // faces of cells over a smooth surface, in the mean
+                if (of_node == 0) continue;
+                faces.emplace_back(double(scene.to_mark[n]), of_node / kStairs);
+                area += faces.back().second;
+            }
+    const double reach = 2 * std::sqrt(area / (marks * std::numbers::pi)) + cell;
+    double near = 0;
+    for (const auto& [away, of_node] : faces) near += away < reach ? of_node : 0.0;
+    constexpr double kWeight = 0.5;  // marks are no independent draws, nor are their sides
+    return std::log(std::max(on / marks, 1e-9)) + std::log(std::max(near / area, 1e-9)) + kWeight * bits -
+           kWeight * std::log(area);
+}
+
+}  // namespace
+
+Scene::Scene(const Image& source, const Lattice& given, const Marks& known, const RunContext& run)
+    : marks(known),
+      lattice(given),
+      image(std::make_shared<ImageFeatures>(lattice, sample(source, lattice, run))) {
+    measure();
+}
+
+Scene::Scene(const Scene& other, const Marks& known) : marks(known), lattice(other.lattice), image(other.image) {
+    measure();
+}
+
+void Scene::measure() {
+    to_mark.resize(lattice.count());
+    edge.resize(lattice.count());
+    above_hull.resize(lattice.count());
+    const detail::KdTree tree(marks.places);
+    std::vector<double> slopes;
+    for (const Vec3& mark : marks.places) slopes.push_back(lattice.value(image->slope(), mark));
+    const double usual = std::max(cloud::median(slopes), 1e-6);
+    // A place that is known tells as far as halfway to the nearest mark.
+    std::vector<std::pair<Vec3, double>> balls;
+    for (const std::vector<Vec3>* places : {&marks.inside, &marks.outside})
+        for (const Vec3& place : *places)
+            balls.emplace_back(place, std::max(0.5 * std::sqrt(tree.nearest(place)), lattice.finest()));
+    for_each_row(lattice, [&](int j, int k) {
+        for (int i = 0; i < lattice.size[0]; ++i) {
+            const std::size_t n = lattice.node(i, j, k);
+            const Vec3 place = lattice.place(i, j, k);
+            to_mark[n] = float(std::sqrt(tree.nearest(place)));
+            const double slope = double(image->slope()[n]) / usual;
+            edge[n] = float(1 / (1 + slope * slope));
+            above_hull[n] = float(std::max(marks.above_hull(place), -1e30));
+        }
+    });
+    if (balls.empty()) return;
+    for (std::size_t n = 0; n < lattice.count(); ++n)
+        for (std::size_t b = 0; b < balls.size(); ++b)
+            if (length(minus(lattice.place_of(n), balls[b].first)) <= balls[b].second)
+                (b < marks.inside.size() ? known_inside : known_outside).push_back(n);
+}
+
+Field Solid::level() const {
+    constexpr double kCells = 0.7;  // enough to even out the stairs
+    return smooth(lattice, signed_distance(lattice, inside), kCells * lattice.finest());
+}
+
+Candidate propose(const Scene& scene, const Proposal& proposal, const RunContext& run) {
+    Candidate candidate;
+    candidate.solid.lattice = scene.lattice;
+    std::optional<Guess> guess;
+    try {
+        guess.emplace(scene.marks, scene.marks.spread, proposal);
+    } catch (const Error& error) {
+        if (error.code() == Errc::Cancelled) throw;
+        return candidate;  // these normals have no surface
+    }
+    Samples samples(scene, *guess);
+    samples.add_marks(proposal);
+    if (samples.of_marks() < kFewestSamples) return candidate;
+    samples.add_nodes(surely_outside(scene), false);
+    samples.add_nodes(scene.known_outside, false);
+    samples.add_nodes(scene.known_inside, true);
+    candidate.bits = held_out_bits(samples.all(), kInference.ridge, kFolds);
+    const Appearance appearance(samples.all(), kInference.ridge);
+    run.check();
+    Solid solid = least_body(scene, odds_of(scene, *guess, appearance, proposal.refine), run);
+    keep_marked_parts(scene, solid);
+    if (!solid.empty()) candidate.score = score_of(scene, solid, candidate.bits);
+    candidate.solid = std::move(solid);
+    return candidate;
+}
+
+std::vector<Vec3> image_axes(const Scene& scene, double sigma_cells, bool fading) {
+    const Lattice& lattice = scene.lattice;
+    const Field smoothed = smooth(lattice, scene.image->image(), sigma_cells * lattice.finest());
+    std::array<Field, 3> slope;
+    for (int a = 0; a < 3; ++a) slope[std::size_t(a)] = derivative(lattice, smoothed, a);
+    std::vector<double> sizes(lattice.count());
+    for (std::size_t n = 0; n < sizes.size(); ++n)
+        sizes[n] = double(std::hypot(slope[0][n], slope[1][n], slope[2][n]));
+    constexpr double kClear = 4;  // of the median slope
+    const double clear = std::max(kClear * cloud::median(sizes), 1e-9);
+    std::vector<Vec3> axes;
+    for (const Vec3& mark : scene.marks.places) {
+        Vec3 g;
+        for (int a = 0; a < 3; ++a) g[a] = lattice.value(slope[std::size_t(a)], mark);
+        const double size = length(g);
+        axes.push_back(size > 0 ? times(fading ? std::sqrt(std::min(size / clear, 1.0)) : 1.0, unit(g))
+                                : Vec3{1e-3, 0, 0});
+    }
+    return axes;
+}
+
+std::vector<Vec3> normals_of(const Solid& solid, const std::vector<Vec3>& places) {
+    const Lattice& lattice = solid.lattice;
+    Field body(solid.inside.size());
+    for (std::size_t n = 0; n < body.size(); ++n) body[n] = solid.inside[n] != 0 ? -1.0F : 0.0F;
+    body = smooth(lattice, body, lattice.finest());
+    std::array<Field, 3> slope;
+    for (int a = 0; a < 3; ++a) slope[std::size_t(a)] = derivative(lattice, body, a);
+    std::vector<Vec3> normals;
+    for (const Vec3& place : places) {
+        Vec3 g;
+        for (int a = 0; a < 3; ++a) g[a] = lattice.value(slope[std::size_t(a)], place);
+        normals.push_back(length(g) > 1e-9 ? unit(g) : Vec3{1, 0, 0});
+    }
+    return normals;
+}
+
+VariationalSurface surface_near(const Marks& marks, const std::vector<Vec3>& normals) {
+    return {constraints_of(marks, marks.spread, {}), at(normals, marks.spread), Search::Near};
+}
+
+}  // namespace covol::inference

@@ -1,0 +1,56 @@
+#pragma once
+// The heuristic constants of this folder: docs/heuristics.md shows what half and twice of each does.
+#include <cstddef>
+
+#include "base/heuristic.h"
+
+namespace covol {
+
+/// The body that marks and image show: candidate.cpp and infer.cpp. Cells are the finest edges of a lattice's cells.
+struct InferenceHeuristics {
+    /// [nodes] Of the lattice on which candidates are compared.
+    double coarse_nodes = heuristic("inference.coarse_nodes", 60000);
+    /// [nodes] Of the lattice of the result, at most.
+    double fine_nodes = heuristic("inference.fine_nodes", 400000);
+    /// [voxels] Of a box around the marks: a larger one takes long to read.
+    double most_voxels = heuristic("inference.most_voxels", 6.4e7);
+    /// [marks] That guesses are made of; the others are predicted.
+    std::size_t guess_marks = heuristic("inference.guess_marks", 100);
+    /// [marks] Fewer teach nothing.
+    std::size_t fewest_marks = heuristic("inference.fewest_marks", 12);
+    /// [voxels] Around the marks' box, and at least their spacing.
+    double around_voxels = heuristic("inference.around_voxels", 8);
+    /// [spacings] Above the marks' convex hull, from which surface is improbable.
+    double hull_slack = heuristic("inference.hull_slack", 0.2);
+    /// [log odds a spacing] Beyond that.
+    double hull_odds = heuristic("inference.hull_odds", 7);
+    /// [spacings] Above the hull, beyond which the image shows what is outside.
+    double surely_outside = heuristic("inference.surely_outside", 0.5);
+    /// [log odds] That one place may say.
+    double most_odds = heuristic("inference.most_odds", 4);
+    /// [cells of surface] That a cell of one nat is worth.
+    double odds_weight = heuristic("inference.odds_weight", 0.3);
+    /// [of a cell of surface] What it costs at a mark, where the image is even.
+    double surface_at_marks = heuristic("inference.surface_at_marks", 0.1);
+    /// [of a cell of surface] What it costs far from all marks.
+    double surface_far = heuristic("inference.surface_far", 4);
+    /// Of the regression, in the standardised terms' prior precision.
+    double ridge = heuristic("inference.ridge", 3);
+    /// [iterations] Of the primal-dual algorithm.
+    int iterations = heuristic("inference.iterations", 150);
+    /// [mean eigenvalues of the energy] Of the image's gradients as axes of the normals.
+    double axes_strength = heuristic("inference.axes_strength", 1);
+    /// The same of normals that a body gave.
+    double normals_strength = heuristic("inference.normals_strength", 3);
+    /// [rounds] In which a body's normals give the next one.
+    int rounds = heuristic("inference.rounds", 2);
+    /// [of the marks that the body reaches] A part with fewer is none of it.
+    double least_part = heuristic("inference.least_part", 0.05);
+    /// [cells] From the coarse body's surface, beyond which the fine lattice follows it.
+    double fine_band = heuristic("inference.fine_band", 2.5);
+    /// [Dice] Of guess and body, above which they are one.
+    double agreement = heuristic("inference.agreement", 0.9);
+};
+COVOL_HEURISTICS InferenceHeuristics kInference{};
+
+}  // namespace covol

@@ -1,0 +1,301 @@
+#include "covol/inference.h"
+
+#include <openvdb/openvdb.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "base/geometry.h"
+#include "base/median.h"
+#include "covol/domain.h"
+#include "covol/error.h"
+#include "covol/start.h"
+#include "grid/levels_at.h"
+#include "inference/candidate.h"
+#include "inference/heuristics.h"
+#include "points/kd_tree.h"
+
+namespace covol {
+namespace {
+
+using namespace inference;
+using guess::Search;
+
+constexpr std::array kSigmas{1.0, 2.0};  // cells, of the gradients that are axes
+
+/// Of marks that were left out: how far off they lie, negative inside.
+struct HeldOut {
+    std::vector<double> of_body, of_guess;
+    std::vector<double> away;  ///< to the nearest mark that was not left out
+};
+
+class Inference {
+public:
+    Inference(const Image& image, Marks marks, const RunContext& run)
+        : image_(image), marks_(std::move(marks)), run_(run) {
+        const ImageGeometry& g = image.geometry();
+        low_ = high_ = marks_.places.front();
+        for (const Vec3& m : marks_.places)
+            for (int a = 0; a < 3; ++a) {
+                low_[a] = std::min(low_[a], m[a]);
+                high_[a] = std::max(high_[a], m[a]);
+            }
+        const double voxel = *std::min_element(g.spacing.begin(), g.spacing.end());
+        const double around = std::max(kInference.around_voxels * voxel, marks_.spacing);
+        for (int a = 0; a < 3; ++a) {
+            low_[a] -= around;
+            high_[a] += around;
+        }
+    }
+
+    /// Of the image, in the box around the marks.
+    [[nodiscard]] double voxels() const {
+        double count = 1;
+        for (int a = 0; a < 3; ++a) count *= (high_[a] - low_[a]) / image_.geometry().spacing[a] + 1;
+        return count;
+    }
+
+    /// Empty where no candidate has a body.
+    [[nodiscard]] Solid find(InferenceReport& report);
+    [[nodiscard]] HeldOut hold_out() const;
+    /// The body, with the surface through the marks in its place as far as that is worth.
+    [[nodiscard]] Field pooled(const Solid& body, double guess_weight) const;
+    [[nodiscard]] double coarse_cell() const { return coarse_->lattice.finest(); }
+    [[nodiscard]] const Marks& marks() const { return marks_; }
+
+private:
+    [[nodiscard]] Candidate best_candidate() const;
+
+    const Image& image_;
+    Marks marks_;
+    const RunContext& run_;
+    Vec3 low_{}, high_{};
+    std::optional<Scene> coarse_;
+    Solid coarse_body_;
+};
+
+Candidate Inference::best_candidate() const {
+    std::vector<Proposal> proposals{{}};
+    for (const double sigma : kSigmas) {
+        proposals.push_back({image_axes(*coarse_, sigma, true), kInference.axes_strength, Search::Wide});
+        // Where the body is darker all around, or brighter, the gradients themselves are the normals.
+        proposals.push_back({image_axes(*coarse_, sigma, false), kInference.normals_strength, Search::Near});
+    }
+    std::vector<Candidate> found(proposals.size());
+    tbb::parallel_for(std::size_t(0), proposals.size(),
+                      [&](std::size_t n) { found[n] = propose(*coarse_, proposals[n], run_); });
+    const auto best = [&](bool to_continue) {
+        Candidate* result = nullptr;
+        for (Candidate& c : found)
+            if (!c.solid.empty() && !(to_continue && c.was_continued) && (result == nullptr || c.score > result->score))
+                result = &c;
+        return result;
+    };
+    for (int round = 0; round < kInference.rounds; ++round) {
+        Candidate* from = best(true);
+        if (from == nullptr) break;
+        from->was_continued = true;
+        Candidate next = propose(*coarse_, {normals_of(from->solid, marks_.places), kInference.normals_strength, Search::Near}, run_);
+        found.push_back(std::move(next));
+    }
+    Candidate* chosen = best(false);
+    return chosen != nullptr ? std::move(*chosen) : Candidate{};
+}
+
+Solid Inference::find(InferenceReport& report) {
+    const ImageGeometry& g = image_.geometry();
+    coarse_.emplace(image_, cover(g, low_, high_, kInference.coarse_nodes), marks_, run_);
+    Candidate chosen = best_candidate();
+    report.bits = chosen.bits;
+    coarse_body_ = std::move(chosen.solid);
+    if (coarse_body_.empty()) return {};
+    const Lattice fine = cover(g, low_, high_, kInference.fine_nodes);
+    if (fine.count() <= coarse_->lattice.count()) return coarse_body_;
+    const Scene scene(image_, fine, marks_, run_);
+    const Candidate refined = propose(
+        scene, {normals_of(coarse_body_, marks_.places), kInference.normals_strength, Search::Near, &coarse_body_},
+        run_);
+    return refined.solid.empty() ? coarse_body_ : refined.solid;
+}
+
+HeldOut Inference::hold_out() const {
+    const std::vector<Vec3> normals = normals_of(coarse_body_, marks_.places);
+    std::array<HeldOut, kFolds> by_fold;
+    tbb::parallel_for(0, kFolds, [&](int fold) {
+        std::vector<std::size_t> rest, out;
+        const Marks part = marks_.without(fold, image_.geometry(), rest, out);
+        std::vector<Vec3> of_rest;
+        for (const std::size_t n : rest) of_rest.push_back(normals[n]);
+        const Candidate again = propose(Scene(*coarse_, part), {of_rest, kInference.normals_strength, Search::Near}, run_);
+        if (again.solid.empty()) return;
+        const Field level = again.solid.level();
+        const guess::VariationalSurface surface = surface_near(part, of_rest);
+        const detail::KdTree tree(part.places);
+        HeldOut& held = by_fold[std::size_t(fold)];
+        for (const std::size_t n : out) {
+            const Vec3& mark = marks_.places[n];
+            held.of_body.push_back(again.solid.lattice.value(level, mark));
+            held.of_guess.push_back(surface.value(mark));
+            held.away.push_back(std::sqrt(tree.nearest(mark)));
+        }
+    });
+    HeldOut all;
+    for (const HeldOut& held : by_fold) {
+        all.of_body.insert(all.of_body.end(), held.of_body.begin(), held.of_body.end());
+        all.of_guess.insert(all.of_guess.end(), held.of_guess.begin(), held.of_guess.end());
+        all.away.insert(all.away.end(), held.away.begin(), held.away.end());
+    }
+    return all;
+}
+
+Field Inference::pooled(const Solid& body, double guess_weight) const {
+    constexpr double kBandCells = 4;
+    const Lattice& lattice = body.lattice;
+    Field level = body.level();
+    const guess::VariationalSurface surface = surface_near(marks_, normals_of(body, marks_.places));
+    const detail::KdTree tree(marks_.places);
+    const double cell = lattice.finest(), band = kBandCells * cell;
+    tbb::parallel_for(0, lattice.size[2], [&](int k) {
+        for (int j = 0; j < lattice.size[1]; ++j)
+            for (int i = 0; i < lattice.size[0]; ++i) {
+                float& value = level[lattice.node(i, j, k)];
+                if (std::abs(double(value)) > band) continue;
+                const Vec3 place = lattice.place(i, j, k);
+                // At a mark the surface through it is right, as far as a cell.
+                const double away2 = tree.nearest(place), weight = 1 - (1 - guess_weight) * away2 / (away2 + cell * cell);
+                const double off = std::clamp(surface.value(place), -band, band) - double(value);
+                value += float(weight * std::clamp(off, -0.5 * band, 0.5 * band));
+            }
+    });
+    return level;
+}
+
+/// The weight of the guess, in [0,1], with which the mean of both predicts marks best (stacking: Wolpert, Neural
+/// Networks 5(2), 1992).
+/// @param shrink  of the body's errors on a finer lattice
+double weight_of_guess(const HeldOut& held, double cell, double shrink) {
+    constexpr double kMostCells = 4;  // a miss is a miss
+    double with = 0, square = 0;
+    for (std::size_t n = 0; n < held.of_body.size(); ++n) {
+        const double most = kMostCells * cell, body = std::clamp(shrink * held.of_body[n], -most, most),
+                     guess = std::clamp(held.of_guess[n], -most, most);
+        with += body * (body - guess);
+        square += (body - guess) * (body - guess);
+    }
+    return square > 0 ? std::clamp(with / square, 0.0, 1.0) : 0.0;
+}
+
+double median_size(const std::vector<double>& values) {
+    std::vector<double> sizes;
+    for (const double v : values) sizes.push_back(std::abs(v));
+    return sizes.empty() ? 0.0 : cloud::median(sizes);
+}
+
+/// A solid as a level anywhere in the world.
+class Level {
+public:
+    Level(const ImageGeometry& geometry, const Lattice& lattice, const Field& field)
+        : geometry_(geometry), lattice_(lattice), field_(field) {}
+
+    /// Beyond the lattice there is nothing of the body, but where the image ends it goes on as it came.
+    [[nodiscard]] double operator()(const Vec3& world) const {
+        const Vec3 place = to_frame(geometry_, world);
+        double beyond = 0;
+        for (int a = 0; a < 3; ++a) {
+            const double low = lattice_.origin[a], cell = lattice_.spacing[a], high = low + (lattice_.size[a] - 1) * cell;
+            if (low > 0.5 * cell) beyond = std::max(beyond, low - place[a]);
+            if (high < (geometry_.size[a] - 1) * geometry_.spacing[a] - 0.5 * cell)
+                beyond = std::max(beyond, place[a] - high);
+        }
+        const double inner = lattice_.value(field_, place);
+        return beyond > 0 ? std::max(inner, beyond) : inner;
+    }
+
+private:
+    const ImageGeometry& geometry_;
+    const Lattice& lattice_;
+    const Field& field_;
+};
+
+/// Dice of two levels at the lattice's nodes, and the size of the second one.
+struct Overlap {
+    double dice = 0, volume = 0, area = 0;
+};
+Overlap compare(const FloatGrid& guess, const ImageGeometry& geometry, const Lattice& lattice, const Field& level) {
+    std::vector<Vec3> world;
+    for (std::size_t n = 0; n < level.size(); ++n) {
+        const Vec3 place = lattice.place_of(n);
+        world.push_back(geometry.index_to_world(
+            {place[0] / geometry.spacing[0], place[1] / geometry.spacing[1], place[2] / geometry.spacing[2]}));
+    }
+    const std::vector<double> of_guess = detail::levels_at(guess, world);
+    double both = 0, sum = 0, inside = 0, rim = 0;
+    const double cell = lattice.finest();
+    for (std::size_t n = 0; n < level.size(); ++n) {
+        const bool one = of_guess[n] < 0, other = level[n] < 0;
+        both += one && other;
+        sum += double(one) + double(other);
+        inside += other;
+        rim += std::abs(double(level[n])) < cell;
+    }
+    const double volume = lattice.spacing[0] * lattice.spacing[1] * lattice.spacing[2];
+    return {sum > 0 ? 2 * both / sum : 0, inside * volume, rim * volume / (2 * cell)};
+}
+
+}  // namespace
+
+Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Image& image, const KnownSides& sides,
+               const RunContext& run) {
+    Inferred result;
+    InferenceReport& report = result.report;
+    const auto keep_guess = [&](std::string reason) {
+        report.reason = std::move(reason);
+        result.u = guess.deepCopy();
+        return result;
+    };
+    const ImageGeometry& geometry = image.geometry();
+    Marks marks(geometry, world);
+    if (marks.places.size() < kInference.fewest_marks)
+        return keep_guess(std::to_string(marks.places.size()) + " marks do not teach inside and outside, " +
+                          std::to_string(kInference.fewest_marks) + " would");
+    for (const Vec3& place : sides.inside) marks.inside.push_back(to_frame(geometry, place));
+    for (const Vec3& place : sides.outside) marks.outside.push_back(to_frame(geometry, place));
+    Inference inference(image, std::move(marks), run);
+    if (inference.voxels() > kInference.most_voxels) return keep_guess("the box around the marks is too large");
+    with_threads(run, [&] {
+        const Solid body = inference.find(report);
+        if (body.empty()) {
+            keep_guess("no body is likely by the image");
+            return;
+        }
+        const HeldOut held = inference.hold_out();
+        const double cell = body.lattice.finest();
+        report.held_out = held.of_body.size();
+        report.body_error = median_size(held.of_body);
+        report.guess_error = median_size(held.of_guess);
+        report.guess_weight = weight_of_guess(held, cell, cell / inference.coarse_cell());
+        const Field level = inference.pooled(body, report.guess_weight);
+        const Overlap overlap = compare(guess, geometry, body.lattice, level);
+        report.agreement = overlap.dice;
+        if (report.guess_weight >= 0.5 && overlap.dice > kInference.agreement) {
+            keep_guess("the surface of least bending agrees with the image, and predicts marks better");
+            return;
+        }
+        const Level at(geometry, body.lattice, level);
+        result.u = start_from_level(
+            domain_of(guess), world,
+            [&](const Vec3& from, const Vec3& step, int count, double* values) {
+                for (int n = 0; n < count; ++n) values[n] = at(plus(from, n, step));
+            },
+            run);
+        report.used = true;
+        report.reason = "marks and image show it together";
+    });
+    return result;
+}
+
+}  // namespace covol

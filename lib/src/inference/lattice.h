@@ -1,0 +1,63 @@
+#pragma once
+#include <cstddef>
+#include <vector>
+
+#include "covol/image.h"
+#include "covol/run.h"
+
+namespace covol::inference {
+
+/// Places of the image's own frame: index times spacing, an isometry of the world in which the image's axes are those
+/// of the coordinates.
+[[nodiscard]] Vec3 to_frame(const ImageGeometry& geometry, const Vec3& world);
+
+using Field = std::vector<float>;  ///< a value for each node of a lattice, x fastest
+
+/// A box of nodes along the image's axes; lengths and places are of the image's frame.
+struct Lattice {
+    Index3 size{0, 0, 0};
+    Vec3 origin{0, 0, 0};   ///< of node (0, 0, 0)
+    Vec3 spacing{1, 1, 1};  ///< at least the image's
+
+    [[nodiscard]] std::size_t count() const { return std::size_t(size[0]) * std::size_t(size[1]) * std::size_t(size[2]); }
+    [[nodiscard]] std::size_t node(int i, int j, int k) const {
+        return (std::size_t(k) * std::size_t(size[1]) + std::size_t(j)) * std::size_t(size[0]) + std::size_t(i);
+    }
+    [[nodiscard]] Vec3 place(int i, int j, int k) const {
+        return {origin[0] + i * spacing[0], origin[1] + j * spacing[1], origin[2] + k * spacing[2]};
+    }
+    [[nodiscard]] Vec3 place_of(std::size_t node) const {
+        const std::size_t x = std::size_t(size[0]), y = std::size_t(size[1]);
+        return place(int(node % x), int(node / x % y), int(node / (x * y)));
+    }
+    [[nodiscard]] double finest() const;
+    /// The length of a cell along a direction.
+    [[nodiscard]] double cell_along(const Vec3& unit) const;
+    /// Trilinear; beyond the lattice the value at its end.
+    [[nodiscard]] double value(const Field& field, const Vec3& place) const;
+};
+
+/// Covers a box of the frame, within the image, with at most `most` nodes. Nodes are voxels where that is enough, and
+/// lie symmetrically about the middle of the box otherwise, so that a mirror image has the same.
+[[nodiscard]] Lattice cover(const ImageGeometry& geometry, const Vec3& low, const Vec3& high, double most);
+
+/// The image at the nodes: its voxels, or their mean with weights that fall to 0 at the next nodes.
+[[nodiscard]] Field sample(const Image& image, const Lattice& lattice, const RunContext& run);
+
+/// Convolved with a Gaussian; @param sigma  a length of the frame. Beyond the end the last value goes on.
+[[nodiscard]] Field smooth(const Lattice& lattice, const Field& field, double sigma);
+
+/// Central differences, one-sided at the end, along an axis.
+[[nodiscard]] Field derivative(const Lattice& lattice, const Field& field, int axis);
+
+/// Signed distance to the border of a body of nodes, negative inside, up to half a cell; far where there is none.
+[[nodiscard]] Field signed_distance(const Lattice& lattice, const std::vector<char>& inside);
+
+/// Numbers of the connected parts (by faces) of a body from 1, 0 outside, and how many there are.
+struct Parts {
+    std::vector<int> number;
+    int count = 0;
+};
+[[nodiscard]] Parts label_parts(const Lattice& lattice, const std::vector<char>& inside);
+
+}  // namespace covol::inference

@@ -1,0 +1,37 @@
+#pragma once
+#include <utility>
+#include <vector>
+
+#include "covol/image.h"
+#include "inference/lattice.h"
+
+namespace covol::inference {
+
+/// How many parts the marks are divided into, each of which is left out once.
+inline constexpr int kFolds = 5;
+
+/// Marks in the image's frame. Their order, and so their folds, is by the distance from their middle: it does not
+/// depend on the order in which they were given, nor on a mirror image.
+struct Marks {
+    std::vector<Vec3> places;
+    std::vector<std::size_t> spread;  ///< of them, as far apart as can be, ascending: guesses are made of these
+    double spacing = 0;               ///< median distance to the nearest other mark
+    double variance = 0;              ///< of a place along an axis
+    /// Half-spaces around all marks, n.x <= offset. Where marks come near the image's end the body may go on to it.
+    std::vector<std::pair<Vec3, double>> hull;
+    std::vector<Vec3> inside, outside;  ///< places known to be so
+
+    Marks(const ImageGeometry& geometry, const std::vector<Vec3>& world);
+    /// Without every kFolds-th mark. @param left_out  their places
+    [[nodiscard]] Marks without(int fold, const ImageGeometry& geometry, std::vector<std::size_t>& rest,
+                                std::vector<std::size_t>& left_out) const;
+    /// Height above the hull, negative inside of it.
+    [[nodiscard]] double above_hull(const Vec3& place) const;
+
+private:
+    Marks() = default;
+    void choose_spread();
+    void make_hull(const ImageGeometry& geometry);
+};
+
+}  // namespace covol::inference

@@ -1,0 +1,97 @@
+#include "inference/minimal_surface.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace covol::inference {
+namespace {
+
+/// Values of a row and of what lies beside it.
+struct Row {
+    std::size_t begin;
+    int count;
+    bool has_y, has_z;            // a next row along that axis
+    bool after_y, after_z;        // a row before
+    std::size_t step_y, step_z;
+};
+
+struct State {
+    Field bar, px, py, pz;
+    float scale[3];  // tau / h along each axis
+    float tau;
+};
+
+void ascend(const Row& row, const Field& weight, State& s) {
+    const float* __restrict bar = s.bar.data() + row.begin;
+    const float* __restrict w = weight.data() + row.begin;
+    float* __restrict px = s.px.data() + row.begin;
+    float* __restrict py = s.py.data() + row.begin;
+    float* __restrict pz = s.pz.data() + row.begin;
+    const float* __restrict next_y = bar + (row.has_y ? row.step_y : 0);
+    const float* __restrict next_z = bar + (row.has_z ? row.step_z : 0);
+    for (int i = 0; i < row.count; ++i) {
+        const float gx = i + 1 < row.count ? bar[i + 1] - bar[i] : 0.0F;
+        const float x = px[i] + s.scale[0] * gx, y = py[i] + s.scale[1] * (next_y[i] - bar[i]),
+                    z = pz[i] + s.scale[2] * (next_z[i] - bar[i]);
+        const float size = std::sqrt(x * x + y * y + z * z);
+        const float shrink = size > w[i] ? w[i] / size : 1.0F;
+        px[i] = x * shrink;
+        py[i] = y * shrink;
+        pz[i] = z * shrink;
+    }
+}
+
+void descend(const Row& row, const Field& cost, State& s, Field& u) {
+    const float* __restrict px = s.px.data() + row.begin;
+    const float* __restrict py = s.py.data() + row.begin;
+    const float* __restrict pz = s.pz.data() + row.begin;
+    const float* __restrict c = cost.data() + row.begin;
+    float* __restrict bar = s.bar.data() + row.begin;
+    float* __restrict value = u.data() + row.begin;
+    const float *before_y = py - (row.after_y ? row.step_y : 0), *before_z = pz - (row.after_z ? row.step_z : 0);
+    const float with_y = row.after_y ? s.scale[1] : 0.0F, with_z = row.after_z ? s.scale[2] : 0.0F;
+    for (int i = 0; i < row.count; ++i) {
+        const float before_x = i > 0 ? px[i - 1] : 0.0F;
+        // At the end of the lattice p is 0 by the gradient that was taken there.
+        const float div = s.scale[0] * (px[i] - before_x) + s.scale[1] * py[i] - with_y * before_y[i] +
+                          s.scale[2] * pz[i] - with_z * before_z[i];
+        const float next = std::clamp(value[i] + div - s.tau * c[i], 0.0F, 1.0F);
+        bar[i] = 2 * next - value[i];
+        value[i] = next;
+    }
+}
+
+}  // namespace
+
+void minimize_surface(const Lattice& lattice, const Field& weight, const Field& cost, int iterations, Field& u,
+                      const RunContext& run) {
+    const std::size_t count = lattice.count();
+    State s{u, Field(count, 0.0F), Field(count, 0.0F), Field(count, 0.0F), {}, 0};
+    double squares = 0;
+    for (int a = 0; a < 3; ++a) {
+        const double h = lattice.spacing[a] / lattice.finest();
+        squares += 4 / (h * h);
+        s.scale[a] = float(1 / h);
+    }
+    s.tau = float(0.95 / std::sqrt(squares));
+    for (float& x : s.scale) x *= s.tau;
+    const auto row_of = [&](int j, int k) {
+        return Row{lattice.node(0, j, k), lattice.size[0],          j + 1 < lattice.size[1],
+                   k + 1 < lattice.size[2], j > 0,                    k > 0,
+                   std::size_t(lattice.size[0]), std::size_t(lattice.size[0]) * std::size_t(lattice.size[1])};
+    };
+    const auto for_each_row = [&](const auto& visit) {
+        tbb::parallel_for(0, lattice.size[2], [&](int k) {
+            for (int j = 0; j < lattice.size[1]; ++j) visit(row_of(j, k));
+        });
+    };
+    for (int n = 0; n < iterations; ++n) {
+        if (n % 16 == 0) run.check();
+        for_each_row([&](const Row& row) { ascend(row, weight, s); });
+        for_each_row([&](const Row& row) { descend(row, cost, s, u); });
+    }
+}
+
+}  // namespace covol::inference
