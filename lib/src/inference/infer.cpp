@@ -30,7 +30,6 @@ constexpr std::array kSigmas{1.0, 2.0};  // cells, of the gradients that are axe
 /// Of marks that were left out: how far off they lie, negative inside.
 struct HeldOut {
     std::vector<double> of_body, of_guess;
-    std::vector<double> away;  ///< to the nearest mark that was not left out
 };
 
 class Inference {
@@ -134,20 +133,17 @@ HeldOut Inference::hold_out() const {
         if (again.solid.empty()) return;
         const Field level = again.solid.level();
         const guess::VariationalSurface surface = surface_near(part, of_rest);
-        const detail::KdTree tree(part.places);
         HeldOut& held = by_fold[std::size_t(fold)];
         for (const std::size_t n : out) {
             const Vec3& mark = marks_.places[n];
             held.of_body.push_back(again.solid.lattice.value(level, mark));
             held.of_guess.push_back(surface.value(mark));
-            held.away.push_back(std::sqrt(tree.nearest(mark)));
         }
     });
     HeldOut all;
     for (const HeldOut& held : by_fold) {
         all.of_body.insert(all.of_body.end(), held.of_body.begin(), held.of_body.end());
         all.of_guess.insert(all.of_guess.end(), held.of_guess.begin(), held.of_guess.end());
-        all.away.insert(all.away.end(), held.away.begin(), held.away.end());
     }
     return all;
 }
@@ -246,6 +242,26 @@ Overlap compare(const FloatGrid& guess, const ImageGeometry& geometry, const Lat
     return {sum > 0 ? 2 * both / sum : 0, inside * volume, rim * volume / (2 * cell)};
 }
 
+/// What lies between a surface and the truth is, relative to the body, the surface's area times its mean error over the
+/// volume; marks that were left out lie on the truth, and tell the error of a result from fewer marks. How that error
+/// and the Dice coefficient go together was measured: kInference.expected_scale.
+std::optional<ExpectedDice> expected_dice(const HeldOut& held, double guess_weight, double cell,
+                                          const Overlap& body) {
+    if (held.of_body.size() < kInference.fewest_marks || !(body.volume > 0)) return {};
+    constexpr double kMostCells = 8, kLeastCells = 0.1;
+    const double most = kMostCells * cell;
+    double error = 0;
+    for (std::size_t n = 0; n < held.of_body.size(); ++n) {
+        const double off = guess_weight * held.of_guess[n] + (1 - guess_weight) * held.of_body[n];
+        error += std::min(std::abs(off), most) / double(held.of_body.size());
+    }
+    error = std::max(error, kLeastCells * cell);
+    const double lost =
+        kInference.expected_scale * std::pow(error * body.area / body.volume, kInference.expected_power);
+    const auto dice = [&](double factor) { return std::max(1 - lost * factor, 0.0); };
+    return ExpectedDice{dice(1), dice(kInference.expected_factor), dice(1 / kInference.expected_factor)};
+}
+
 }  // namespace
 
 Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Image& image, const KnownSides& sides,
@@ -281,6 +297,7 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
         const Field level = inference.pooled(body, report.guess_weight);
         const Overlap overlap = compare(guess, geometry, body.lattice, level);
         report.agreement = overlap.dice;
+        report.expected = expected_dice(held, report.guess_weight, cell, overlap);
         if (report.guess_weight >= 0.5 && overlap.dice > kInference.agreement) {
             keep_guess("the surface of least bending agrees with the image, and predicts marks better");
             return;

@@ -135,6 +135,8 @@ struct DoubtsHeuristics {
     double border_share = heuristic("doubts.border_share", 0.6);
     /// [standard errors] Between both, on the mean of the marks: the largest of twenty stays below in noise.
     double border_errors = heuristic("doubts.border_errors", 4.0);
+    /// [Dice] Expected of a result, below which it is doubted: of 26 results below 0.8 24 are, of 94 above 0.9 two.
+    double least_expected_dice = heuristic("doubts.least_expected_dice", 0.87);
     /// [nats] Of guidance: 0 to 0.06 with noise in place of the image, 0.08 to 1.2 with marks of its own, on the same.
     double least_gain = heuristic("doubts.least_gain", 0.05);
     /// [probability] The support above which a low gain alone says nothing: at most 0.62 where marks that were shifted,

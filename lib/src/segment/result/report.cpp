@@ -63,6 +63,7 @@ public:
         find_lost_precision();
         find_strange_image();
         find_silent_image();
+        find_doubtful_body();
     }
 
     void of_surface() {
@@ -165,8 +166,18 @@ private:
     }
 
     void find_silent_image() {
-        if (solution_.was_asked && !solution_.guidance.used)
+        if (solution_.was_asked && !solution_.guidance.used && !solution_.start.inference.used)
             warn("the image had no say between the marks: " + solution_.guidance.reason);
+    }
+
+    void find_doubtful_body() {
+        const auto& expected = solution_.start.inference.expected;
+        if (!expected || expected->value >= kDoubts.least_expected_dice) return;
+        const auto percent = [](double value) { return number(std::round(100 * value) / 100); };
+        warn("the body is likely not found well: by marks that were left out, its Dice coefficient with the truth is "
+             "about " +
+             percent(expected->value) + " (" + percent(expected->low) + " to " + percent(expected->high) +
+             " with a probability of 90 %); mark more, above all where it is thin or branches");
     }
 
     void find_pieces() {
