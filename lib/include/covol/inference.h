@@ -18,8 +18,8 @@ struct KnownSides {
 
 /// How good a result likely is: its Dice coefficient with the truth, in [0,1].
 struct ExpectedDice {
-    double value = 0;            ///< as likely too low as too high
-    double low = 0, high = 0;    ///< an interval that holds the truth in 90 % of results
+    double value = 0;          ///< as likely too low as too high
+    double low = 0, high = 0;  ///< an interval that holds the truth in 90 % of results
 };
 
 /// What infer() found. The defaults say that nothing ran.
@@ -29,11 +29,11 @@ struct InferenceReport {
     /// What the image and the guess tell of the two sides of marks that they were not learnt from, bits: 1 is
     /// everything, 0 nothing.
     double bits = 0;
-    double body_error = 0;    ///< median distance of the body to marks that it was not made from, world units
-    double guess_error = 0;   ///< the same of the guess with the body's normals
-    double guess_weight = 0;  ///< in [0,1]: of the guess in what best predicts such marks
-    double agreement = 0;     ///< Dice of guess and body
-    std::size_t held_out = 0;             ///< marks that this was measured at
+    double body_error = 0;     ///< median distance of the body to marks that it was not made from, world units
+    double guess_error = 0;    ///< the same of the guess with the body's normals
+    double guess_weight = 0;   ///< in [0,1]: of the guess in what best predicts such marks
+    double agreement = 0;      ///< Dice of guess and body
+    std::size_t held_out = 0;  ///< marks that this was measured at
     std::optional<ExpectedDice> expected;  ///< none where too few marks were held out
 };
 

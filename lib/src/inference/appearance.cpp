@@ -10,7 +10,9 @@
 namespace covol::inference {
 namespace {
 
-constexpr double kSigmas[kScales] = {0.6, 1.2, 2.4};  // finest cells
+constexpr double kFeatureSigmas[kScales] = {0.6, 1.2, 2.4};  // finest cells
+constexpr int kRounds = 20;
+constexpr double kEnough = 1e-2;  // of a standardised term's weight
 
 }  // namespace
 
@@ -24,7 +26,7 @@ ImageFeatures::ImageFeatures(const Lattice& lattice, Field image) : image_(std::
     const float low = percentile(0.01), high = percentile(0.99), range = std::max(high - low, 1e-20F);
     for (float& v : image_) v = std::clamp((v - low) / range, -0.5F, 1.5F);
     for (int s = 0; s < kScales; ++s) {
-        const double sigma = kSigmas[s] * lattice.finest();
+        const double sigma = kFeatureSigmas[s] * lattice.finest();
         Field smoothed = smooth(lattice, image_, sigma);
         Field slope(smoothed.size(), 0.0F), laplacian(smoothed.size(), 0.0F);
         for (int axis = 0; axis < 3; ++axis) {
@@ -45,8 +47,9 @@ ImageFeatures::ImageFeatures(const Lattice& lattice, Field image) : image_(std::
 void Appearance::expand(const Features& at, float* terms) const {
     Features z;
     for (int a = 0; a < kFeatures; ++a)
-        z[std::size_t(a)] = (std::clamp(at[std::size_t(a)], low_[std::size_t(a)], high_[std::size_t(a)]) - mean_[std::size_t(a)]) *
-                            scale_[std::size_t(a)];
+        z[std::size_t(a)] =
+            (std::clamp(at[std::size_t(a)], low_[std::size_t(a)], high_[std::size_t(a)]) - mean_[std::size_t(a)]) *
+            scale_[std::size_t(a)];
     int n = 0;
     terms[n++] = 1;
     for (const float v : z) terms[n++] = v;
@@ -93,7 +96,7 @@ Appearance::Appearance(const std::vector<Sample>& samples, double ridge, int wit
     }
     Vector w = Vector::Zero(kTerms), penalty = Vector::Constant(kTerms, ridge);
     penalty[0] = 1e-6;
-    for (int round = 0; round < 20; ++round) {
+    for (int round = 0; round < kRounds; ++round) {
         const Vector odds = (Z * w).cwiseMax(-30).cwiseMin(30);
         const Vector p = (1 / (1 + (-odds.array()).exp())).matrix();
         const Vector curvature = (weight.array() * p.array() * (1 - p.array())).matrix();
@@ -104,7 +107,7 @@ Appearance::Appearance(const std::vector<Sample>& samples, double ridge, int wit
         const Vector gradient = Z.transpose() * (weight.array() * (y - p).array()).matrix() - penalty.cwiseProduct(w);
         const Vector step = H.selfadjointView<Eigen::Lower>().llt().solve(gradient);
         w += step;
-        if (step.cwiseAbs().maxCoeff() < 1e-3) break;
+        if (step.cwiseAbs().maxCoeff() < kEnough) break;
     }
     for (int t = 0; t < kTerms; ++t) weights_[std::size_t(t)] = float(w[t]);
 }

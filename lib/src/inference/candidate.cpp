@@ -27,7 +27,6 @@ constexpr double kOffsets[] = {1.5, 2.5, 3.5};  // cells beside a mark
 constexpr int kAllFolds = -1;                   // of a sample that is never left out
 constexpr std::size_t kElsewhere = 300;         // samples that no mark gives
 constexpr std::size_t kFewestSamples = 40;
-constexpr double kOnMarkCells = 1.5;
 
 template <typename Visit>
 void for_each_row(const Lattice& lattice, const Visit& visit) {
@@ -56,7 +55,8 @@ class Guess {
 public:
     Guess(const Marks& marks, const std::vector<std::size_t>& chosen, const Proposal& proposal)
         : surface_(constraints_of(marks, chosen, proposal),
-                   proposal.search == Search::Near ? at(proposal.axes, chosen) : Normals{}, proposal.search) {
+                   proposal.search == Search::Near ? at(proposal.axes, chosen) : Normals{}, proposal.search,
+                   proposal.amplitude) {
         Vec3 middle{0, 0, 0};
         for (const Vec3& m : marks.places) middle = plus(middle, 1.0 / double(marks.places.size()), m);
         double reach = 0, far = 0;
@@ -73,6 +73,7 @@ public:
         : surface_(constraints_of(marks, chosen, proposal), at(normals, chosen), Search::Near,
                    whole.surface_.amplitude()) {}
 
+    [[nodiscard]] double amplitude() const { return surface_.amplitude(); }
     [[nodiscard]] double value(const Vec3& place) const { return side_ * surface_.value(place); }
     [[nodiscard]] Vec3 normal(const Vec3& place) const { return times(side_, unit(surface_.gradient(place))); }
     void row(const Vec3& from, const Vec3& step, std::vector<double>& values) const {
@@ -200,7 +201,8 @@ Field odds_of(const Scene& scene, const Guess& guess, const Appearance& appearan
             Features at;
             for (int f = 0; f < kOfImage; ++f) at[std::size_t(f)] = (*scene.image)[f][n];
             add_guess(row[std::size_t(i)], double(scene.to_mark[n]), cell, at);
-            const double above = std::max(0.0, double(scene.above_hull[n]) / scene.marks.spacing - kInference.hull_slack);
+            const double above =
+                std::max(0.0, double(scene.above_hull[n]) / scene.marks.spacing - kInference.hull_slack);
             double value = std::clamp(appearance.log_odds(at), -most, most);
             value = std::max(value - kInference.hull_odds * above, -most);
             if (refine != nullptr) {
@@ -238,7 +240,7 @@ void keep_marked_parts(const Scene& scene, Solid& solid) {
     std::vector<double> marked(std::size_t(parts.count) + 1, 0.0);
     double all = 0;
     for (std::size_t n = 0; n < solid.inside.size(); ++n) {
-        if (parts.number[n] == 0 || double(scene.to_mark[n]) >= kOnMarkCells * solid.lattice.finest()) continue;
+        if (parts.number[n] == 0 || double(scene.to_mark[n]) >= kInference.on_mark * solid.lattice.finest()) continue;
         ++marked[std::size_t(parts.number[n])];
         ++all;
     }
@@ -257,7 +259,8 @@ double score_of(const Scene& scene, const Solid& solid, double bits) {
     const double cell = lattice.finest(), marks = double(scene.marks.places.size());
     const Field distance = signed_distance(lattice, solid.inside);
     double on = 0;
-    for (const Vec3& mark : scene.marks.places) on += std::abs(lattice.value(distance, mark)) < kOnMarkCells * cell;
+    for (const Vec3& mark : scene.marks.places)
+        on += std::abs(lattice.value(distance, mark)) < kInference.on_mark * cell;
     std::vector<std::pair<double, double>> faces;  // distance to a mark, area
     double area = 0;
     const std::size_t steps[3] = {1, std::size_t(lattice.size[0]),
@@ -282,17 +285,15 @@ double score_of(const Scene& scene, const Solid& solid, double bits) {
     const double reach = 2 * std::sqrt(area / (marks * std::numbers::pi)) + cell;
     double near = 0;
     for (const auto& [away, of_node] : faces) near += away < reach ? of_node : 0.0;
-    constexpr double kWeight = 0.5;  // marks are no independent draws, nor are their sides
-    return std::log(std::max(on / marks, 1e-9)) + std::log(std::max(near / area, 1e-9)) + kWeight * bits -
-           kWeight * std::log(area);
+    const double weight = kInference.score_weight;
+    return std::log(std::max(on / marks, 1e-9)) + std::log(std::max(near / area, 1e-9)) + weight * bits -
+           weight * std::log(area);
 }
 
 }  // namespace
 
 Scene::Scene(const Image& source, const Lattice& given, const Marks& known, const RunContext& run)
-    : marks(known),
-      lattice(given),
-      image(std::make_shared<ImageFeatures>(lattice, sample(source, lattice, run))) {
+    : marks(known), lattice(given), image(std::make_shared<ImageFeatures>(lattice, sample(source, lattice, run))) {
     measure();
 }
 
@@ -345,18 +346,19 @@ Candidate propose(const Scene& scene, const Proposal& proposal, const RunContext
         if (error.code() == Errc::Cancelled) throw;
         return candidate;  // these normals have no surface
     }
+    candidate.amplitude = guess->amplitude();
     Samples samples(scene, *guess);
     samples.add_marks(proposal);
     if (samples.of_marks() < kFewestSamples) return candidate;
     samples.add_nodes(surely_outside(scene), false);
     samples.add_nodes(scene.known_outside, false);
     samples.add_nodes(scene.known_inside, true);
-    candidate.bits = held_out_bits(samples.all(), kInference.ridge, kFolds);
+    if (proposal.is_compared) candidate.bits = held_out_bits(samples.all(), kInference.ridge, kFolds);
     const Appearance appearance(samples.all(), kInference.ridge);
     run.check();
     Solid solid = least_body(scene, odds_of(scene, *guess, appearance, proposal.refine), run);
     keep_marked_parts(scene, solid);
-    if (!solid.empty()) candidate.score = score_of(scene, solid, candidate.bits);
+    if (!solid.empty() && proposal.is_compared) candidate.score = score_of(scene, solid, candidate.bits);
     candidate.solid = std::move(solid);
     return candidate;
 }
@@ -367,10 +369,8 @@ std::vector<Vec3> image_axes(const Scene& scene, double sigma_cells, bool fading
     std::array<Field, 3> slope;
     for (int a = 0; a < 3; ++a) slope[std::size_t(a)] = derivative(lattice, smoothed, a);
     std::vector<double> sizes(lattice.count());
-    for (std::size_t n = 0; n < sizes.size(); ++n)
-        sizes[n] = double(std::hypot(slope[0][n], slope[1][n], slope[2][n]));
-    constexpr double kClear = 4;  // of the median slope
-    const double clear = std::max(kClear * cloud::median(sizes), 1e-9);
+    for (std::size_t n = 0; n < sizes.size(); ++n) sizes[n] = double(std::hypot(slope[0][n], slope[1][n], slope[2][n]));
+    const double clear = std::max(kInference.clear_slope * cloud::median(sizes), 1e-9);
     std::vector<Vec3> axes;
     for (const Vec3& mark : scene.marks.places) {
         Vec3 g;
@@ -398,8 +398,8 @@ std::vector<Vec3> normals_of(const Solid& solid, const std::vector<Vec3>& places
     return normals;
 }
 
-VariationalSurface surface_near(const Marks& marks, const std::vector<Vec3>& normals) {
-    return {constraints_of(marks, marks.spread, {}), at(normals, marks.spread), Search::Near};
+VariationalSurface surface_near(const Marks& marks, const std::vector<Vec3>& normals, double amplitude) {
+    return {constraints_of(marks, marks.spread, {}), at(normals, marks.spread), Search::Near, amplitude};
 }
 
 }  // namespace covol::inference

@@ -21,9 +21,9 @@ struct Scene {
     const Marks& marks;
     Lattice lattice;
     std::shared_ptr<const ImageFeatures> image;
-    Field to_mark;     ///< distance to the nearest mark
-    Field edge;        ///< in (0,1]: what surface costs by the image's slope alone
-    Field above_hull;  ///< height above the marks' convex hull
+    Field to_mark;                                         ///< distance to the nearest mark
+    Field edge;                                            ///< in (0,1]: what surface costs by the image's slope alone
+    Field above_hull;                                      ///< height above the marks' convex hull
     std::vector<std::size_t> known_inside, known_outside;  ///< nodes beside places that are known to be so
 
     Scene(const Image& image, const Lattice& lattice, const Marks& marks, const RunContext& run);
@@ -49,13 +49,16 @@ struct Proposal {
     std::vector<Vec3> axes;  ///< of each mark; empty: the marks alone
     double strength = 0;     ///< of them, in mean eigenvalues of the bending energy
     guess::Search search = guess::Search::Wide;
+    double amplitude = 0;           ///< of VariationalSurface; 0: from the marks, which takes thrice as long
     const Solid* refine = nullptr;  ///< only beside the surface of this one
+    bool is_compared = true;        ///< false: bits and score are not needed
 };
 
 struct Candidate {
     Solid solid;
     double bits = 0;   ///< of appearance.h's held_out_bits()
     double score = 0;  ///< log likelihood of a mark, but for a constant: higher is better
+    double amplitude = 0;
     bool was_continued = false;
 };
 
@@ -68,6 +71,7 @@ struct Candidate {
 [[nodiscard]] std::vector<Vec3> normals_of(const Solid& solid, const std::vector<Vec3>& places);
 
 /// The surface of least energy through the spread marks, near these normals (of all marks).
-[[nodiscard]] guess::VariationalSurface surface_near(const Marks& marks, const std::vector<Vec3>& normals);
+[[nodiscard]] guess::VariationalSurface surface_near(const Marks& marks, const std::vector<Vec3>& normals,
+                                                     double amplitude);
 
 }  // namespace covol::inference

@@ -14,6 +14,8 @@ struct InferenceHeuristics {
     double fine_nodes = heuristic("inference.fine_nodes", 400000);
     /// [voxels] Of a box around the marks: a larger one takes long to read.
     double most_voxels = heuristic("inference.most_voxels", 6.4e7);
+    /// [of the memory limit] That this box may take as single precision.
+    double most_of_memory = heuristic("inference.most_of_memory", 0.25);
     /// [marks] That guesses are made of; the others are predicted.
     std::size_t guess_marks = heuristic("inference.guess_marks", 100);
     /// [marks] Fewer teach nothing.
@@ -34,14 +36,20 @@ struct InferenceHeuristics {
     double surface_at_marks = heuristic("inference.surface_at_marks", 0.1);
     /// [of a cell of surface] What it costs far from all marks.
     double surface_far = heuristic("inference.surface_far", 4);
-    /// Of the regression, in the standardised terms' prior precision.
+    /// [prior precision] Of the regression's standardised terms.
     double ridge = heuristic("inference.ridge", 3);
     /// [iterations] Of the primal-dual algorithm.
     int iterations = heuristic("inference.iterations", 150);
     /// [mean eigenvalues of the energy] Of the image's gradients as axes of the normals.
     double axes_strength = heuristic("inference.axes_strength", 1);
-    /// The same of normals that a body gave.
+    /// [mean eigenvalues of the energy] Of normals that a body gave.
     double normals_strength = heuristic("inference.normals_strength", 3);
+    /// [median slopes] Of the image, at which a gradient counts fully as an axis.
+    double clear_slope = heuristic("inference.clear_slope", 4);
+    /// [cells] From a mark to a surface that passes it.
+    double on_mark = heuristic("inference.on_mark", 1.5);
+    /// [of one] Weight of area and bits in a candidate's score: marks are no independent draws, nor are their sides.
+    double score_weight = heuristic("inference.score_weight", 0.5);
     /// [rounds] In which a body's normals give the next one.
     int rounds = heuristic("inference.rounds", 2);
     /// [of the marks that the body reaches] A part with fewer is none of it.
@@ -50,8 +58,8 @@ struct InferenceHeuristics {
     double fine_band = heuristic("inference.fine_band", 2.5);
     /// [Dice] Of guess and body, above which they are one.
     double agreement = heuristic("inference.agreement", 0.9);
-    /// [1 - Dice] Of a result whose error times its area is its volume: by 120 runs of 19 structures with 20, 60 and 300
-    /// marks; 66 runs of 11 others, which were not looked at, lie in the interval in 89 %.
+    /// [1 - Dice] Of a result whose error times its area is its volume: by 120 runs of 19 structures with 20, 60 and
+    /// 300 marks; 66 runs of 11 others, which were not looked at, lie in the interval in 89 %.
     double expected_scale = heuristic("inference.expected_scale", 0.41);
     /// [power] With which 1 - Dice grows with that error.
     double expected_power = heuristic("inference.expected_power", 1.15);

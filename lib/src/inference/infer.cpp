@@ -68,6 +68,9 @@ public:
 
 private:
     [[nodiscard]] Candidate best_candidate() const;
+    [[nodiscard]] Proposal near_normals_of(const Solid& body, double amplitude) const {
+        return {normals_of(body, marks_.places), kInference.normals_strength, Search::Near, amplitude};
+    }
 
     const Image& image_;
     Marks marks_;
@@ -75,18 +78,21 @@ private:
     Vec3 low_{}, high_{};
     std::optional<Scene> coarse_;
     Solid coarse_body_;
+    double amplitude_ = 0;  // of its guess
 };
 
 Candidate Inference::best_candidate() const {
-    std::vector<Proposal> proposals{{}};
+    std::vector<Candidate> found{propose(*coarse_, {}, run_)};  // by the marks alone
+    const double amplitude = found.front().amplitude;
+    std::vector<Proposal> proposals;
     for (const double sigma : kSigmas) {
-        proposals.push_back({image_axes(*coarse_, sigma, true), kInference.axes_strength, Search::Wide});
+        proposals.push_back({image_axes(*coarse_, sigma, true), kInference.axes_strength, Search::Wide, amplitude});
         // Where the body is darker all around, or brighter, the gradients themselves are the normals.
-        proposals.push_back({image_axes(*coarse_, sigma, false), kInference.normals_strength, Search::Near});
+        proposals.push_back({image_axes(*coarse_, sigma, false), kInference.normals_strength, Search::Near, amplitude});
     }
-    std::vector<Candidate> found(proposals.size());
+    found.resize(1 + proposals.size());
     tbb::parallel_for(std::size_t(0), proposals.size(),
-                      [&](std::size_t n) { found[n] = propose(*coarse_, proposals[n], run_); });
+                      [&](std::size_t n) { found[1 + n] = propose(*coarse_, proposals[n], run_); });
     const auto best = [&](bool to_continue) {
         Candidate* result = nullptr;
         for (Candidate& c : found)
@@ -98,7 +104,7 @@ Candidate Inference::best_candidate() const {
         Candidate* from = best(true);
         if (from == nullptr) break;
         from->was_continued = true;
-        Candidate next = propose(*coarse_, {normals_of(from->solid, marks_.places), kInference.normals_strength, Search::Near}, run_);
+        Candidate next = propose(*coarse_, near_normals_of(from->solid, amplitude), run_);
         found.push_back(std::move(next));
     }
     Candidate* chosen = best(false);
@@ -110,14 +116,16 @@ Solid Inference::find(InferenceReport& report) {
     coarse_.emplace(image_, cover(g, low_, high_, kInference.coarse_nodes), marks_, run_);
     Candidate chosen = best_candidate();
     report.bits = chosen.bits;
+    amplitude_ = chosen.amplitude;
     coarse_body_ = std::move(chosen.solid);
     if (coarse_body_.empty()) return {};
     const Lattice fine = cover(g, low_, high_, kInference.fine_nodes);
     if (fine.count() <= coarse_->lattice.count()) return coarse_body_;
     const Scene scene(image_, fine, marks_, run_);
-    const Candidate refined = propose(
-        scene, {normals_of(coarse_body_, marks_.places), kInference.normals_strength, Search::Near, &coarse_body_},
-        run_);
+    Proposal refining = near_normals_of(coarse_body_, amplitude_);
+    refining.refine = &coarse_body_;
+    refining.is_compared = false;
+    const Candidate refined = propose(scene, refining, run_);
     return refined.solid.empty() ? coarse_body_ : refined.solid;
 }
 
@@ -129,10 +137,12 @@ HeldOut Inference::hold_out() const {
         const Marks part = marks_.without(fold, image_.geometry(), rest, out);
         std::vector<Vec3> of_rest;
         for (const std::size_t n : rest) of_rest.push_back(normals[n]);
-        const Candidate again = propose(Scene(*coarse_, part), {of_rest, kInference.normals_strength, Search::Near}, run_);
+        const Candidate again =
+            propose(Scene(*coarse_, part),
+                    {of_rest, kInference.normals_strength, Search::Near, amplitude_, nullptr, false}, run_);
         if (again.solid.empty()) return;
         const Field level = again.solid.level();
-        const guess::VariationalSurface surface = surface_near(part, of_rest);
+        const guess::VariationalSurface surface = surface_near(part, of_rest, amplitude_);
         HeldOut& held = by_fold[std::size_t(fold)];
         for (const std::size_t n : out) {
             const Vec3& mark = marks_.places[n];
@@ -152,7 +162,7 @@ Field Inference::pooled(const Solid& body, double guess_weight) const {
     constexpr double kBandCells = 4;
     const Lattice& lattice = body.lattice;
     Field level = body.level();
-    const guess::VariationalSurface surface = surface_near(marks_, normals_of(body, marks_.places));
+    const guess::VariationalSurface surface = surface_near(marks_, normals_of(body, marks_.places), amplitude_);
     const detail::KdTree tree(marks_.places);
     const double cell = lattice.finest(), band = kBandCells * cell;
     tbb::parallel_for(0, lattice.size[2], [&](int k) {
@@ -162,7 +172,8 @@ Field Inference::pooled(const Solid& body, double guess_weight) const {
                 if (std::abs(double(value)) > band) continue;
                 const Vec3 place = lattice.place(i, j, k);
                 // At a mark the surface through it is right, as far as a cell.
-                const double away2 = tree.nearest(place), weight = 1 - (1 - guess_weight) * away2 / (away2 + cell * cell);
+                const double away2 = tree.nearest(place),
+                             weight = 1 - (1 - guess_weight) * away2 / (away2 + cell * cell);
                 const double off = std::clamp(surface.value(place), -band, band) - double(value);
                 value += float(weight * std::clamp(off, -0.5 * band, 0.5 * band));
             }
@@ -202,7 +213,8 @@ public:
         const Vec3 place = to_frame(geometry_, world);
         double beyond = 0;
         for (int a = 0; a < 3; ++a) {
-            const double low = lattice_.origin[a], cell = lattice_.spacing[a], high = low + (lattice_.size[a] - 1) * cell;
+            const double low = lattice_.origin[a], cell = lattice_.spacing[a],
+                         high = low + (lattice_.size[a] - 1) * cell;
             if (low > 0.5 * cell) beyond = std::max(beyond, low - place[a]);
             if (high < (geometry_.size[a] - 1) * geometry_.spacing[a] - 0.5 * cell)
                 beyond = std::max(beyond, place[a] - high);
@@ -245,8 +257,7 @@ Overlap compare(const FloatGrid& guess, const ImageGeometry& geometry, const Lat
 /// What lies between a surface and the truth is, relative to the body, the surface's area times its mean error over the
 /// volume; marks that were left out lie on the truth, and tell the error of a result from fewer marks. How that error
 /// and the Dice coefficient go together was measured: kInference.expected_scale.
-std::optional<ExpectedDice> expected_dice(const HeldOut& held, double guess_weight, double cell,
-                                          const Overlap& body) {
+std::optional<ExpectedDice> expected_dice(const HeldOut& held, double guess_weight, double cell, const Overlap& body) {
     if (held.of_body.size() < kInference.fewest_marks || !(body.volume > 0)) return {};
     constexpr double kMostCells = 8, kLeastCells = 0.1;
     const double most = kMostCells * cell;
@@ -281,7 +292,11 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
     for (const Vec3& place : sides.inside) marks.inside.push_back(to_frame(geometry, place));
     for (const Vec3& place : sides.outside) marks.outside.push_back(to_frame(geometry, place));
     Inference inference(image, std::move(marks), run);
-    if (inference.voxels() > kInference.most_voxels) return keep_guess("the box around the marks is too large");
+    // A copy of the box is not held, but chunks of it are.
+    const double bytes = sizeof(float) * inference.voxels();
+    if (inference.voxels() > kInference.most_voxels ||
+        (run.memory_budget > 0 && bytes > kInference.most_of_memory * double(run.memory_budget)))
+        return keep_guess("the image's box around the marks is too large to be read as a whole");
     with_threads(run, [&] {
         const Solid body = inference.find(report);
         if (body.empty()) {

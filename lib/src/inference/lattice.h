@@ -19,7 +19,9 @@ struct Lattice {
     Vec3 origin{0, 0, 0};   ///< of node (0, 0, 0)
     Vec3 spacing{1, 1, 1};  ///< at least the image's
 
-    [[nodiscard]] std::size_t count() const { return std::size_t(size[0]) * std::size_t(size[1]) * std::size_t(size[2]); }
+    [[nodiscard]] std::size_t count() const {
+        return std::size_t(size[0]) * std::size_t(size[1]) * std::size_t(size[2]);
+    }
     [[nodiscard]] std::size_t node(int i, int j, int k) const {
         return (std::size_t(k) * std::size_t(size[1]) + std::size_t(j)) * std::size_t(size[0]) + std::size_t(i);
     }

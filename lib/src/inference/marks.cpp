@@ -70,7 +70,7 @@ void Marks::choose_spread() {
 
 void Marks::make_hull(const ImageGeometry& geometry) {
     constexpr int kDirections = 200;
-    constexpr double kTowards = 0.3;  // cosine: a direction that leaves the image through a face
+    constexpr double kTowards = 0.3;         // cosine: a direction that leaves the image through a face
     for (int n = 0; n < kDirections; ++n) {  // a Fibonacci lattice
         const double z = 1 - (2 * n + 1) / double(kDirections), phi = n * 2.399963229728653, r = std::sqrt(1 - z * z);
         const Vec3 direction{r * std::cos(phi), r * std::sin(phi), z};
@@ -81,9 +81,8 @@ void Marks::make_hull(const ImageGeometry& geometry) {
     for (int a = 0; a < 3; ++a)
         for (const bool upper : {false, true}) {
             const double end = (upper ? geometry.size[a] - 0.5 : -0.5) * geometry.spacing[a];
-            const bool reaches_end = std::any_of(places.begin(), places.end(), [&](const Vec3& mark) {
-                return std::abs(end - mark[a]) <= spacing;
-            });
+            const bool reaches_end = std::any_of(places.begin(), places.end(),
+                                                 [&](const Vec3& mark) { return std::abs(end - mark[a]) <= spacing; });
             if (!reaches_end) continue;
             std::erase_if(hull, [&](const auto& face) { return (upper ? 1 : -1) * face.first[a] > kTowards; });
         }

@@ -12,8 +12,8 @@ namespace {
 struct Row {
     std::size_t begin;
     int count;
-    bool has_y, has_z;            // a next row along that axis
-    bool after_y, after_z;        // a row before
+    bool has_y, has_z;      // a next row along that axis
+    bool after_y, after_z;  // a row before
     std::size_t step_y, step_z;
 };
 
@@ -78,9 +78,14 @@ void minimize_surface(const Lattice& lattice, const Field& weight, const Field& 
     s.tau = float(0.95 / std::sqrt(squares));
     for (float& x : s.scale) x *= s.tau;
     const auto row_of = [&](int j, int k) {
-        return Row{lattice.node(0, j, k), lattice.size[0],          j + 1 < lattice.size[1],
-                   k + 1 < lattice.size[2], j > 0,                    k > 0,
-                   std::size_t(lattice.size[0]), std::size_t(lattice.size[0]) * std::size_t(lattice.size[1])};
+        return Row{lattice.node(0, j, k),
+                   lattice.size[0],
+                   j + 1 < lattice.size[1],
+                   k + 1 < lattice.size[2],
+                   j > 0,
+                   k > 0,
+                   std::size_t(lattice.size[0]),
+                   std::size_t(lattice.size[0]) * std::size_t(lattice.size[1])};
     };
     const auto for_each_row = [&](const auto& visit) {
         tbb::parallel_for(0, lattice.size[2], [&](int k) {

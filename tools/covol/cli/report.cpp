@@ -144,7 +144,8 @@ Json to_json(const SegmentReport& r) {
                              {"agreement", i.agreement},
                              {"held_out", i.held_out}};
         if (i.expected)
-            json["expected_dice"] = {{"value", i.expected->value}, {"low", i.expected->low}, {"high", i.expected->high}};
+            json["expected_dice"] = {
+                {"value", i.expected->value}, {"low", i.expected->low}, {"high", i.expected->high}};
     }
     if (r.guidance.used || !r.guidance.reason.empty())
         json["guidance"] = {{"used", r.guidance.used},

@@ -174,10 +174,11 @@ private:
         const auto& expected = solution_.start.inference.expected;
         if (!expected || expected->value >= kDoubts.least_expected_dice) return;
         const auto percent = [](double value) { return number(std::round(100 * value) / 100); };
-        warn("the body is likely not found well: by marks that were left out, its Dice coefficient with the truth is "
-             "about " +
-             percent(expected->value) + " (" + percent(expected->low) + " to " + percent(expected->high) +
-             " with a probability of 90 %); mark more, above all where it is thin or branches");
+        warn(
+            "the body is likely not found well: by marks that were left out, its Dice coefficient with the truth is "
+            "about " +
+            percent(expected->value) + " (" + percent(expected->low) + " to " + percent(expected->high) +
+            " with a probability of 90 %); mark more, above all where it is thin or branches");
     }
 
     void find_pieces() {

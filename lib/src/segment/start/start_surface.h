@@ -33,7 +33,7 @@ struct StartFacts {
     CorrectionOptions correction_options;  ///< as used
     std::shared_ptr<const GuessCorrection> correction;  ///< of another tool's result
     GuessReport guess;
-    InferenceReport inference;             ///< of a guess in an image
+    InferenceReport inference;  ///< of a guess in an image
     CloudReport cloud;
     CorrectionReport correction_report;
     TagDistanceChoice tag;
