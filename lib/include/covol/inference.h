@@ -29,11 +29,11 @@ struct InferenceReport {
     /// What the image and the guess tell of the two sides of marks that they were not learnt from, bits: 1 is
     /// everything, 0 nothing.
     double bits = 0;
-    double body_error = 0;     ///< median distance of the body to marks that it was not made from, world units
-    double guess_error = 0;    ///< the same of the guess with the body's normals
-    double guess_weight = 0;   ///< in [0,1]: of the guess in what best predicts such marks
-    double agreement = 0;      ///< Dice of guess and body
-    std::size_t held_out = 0;  ///< marks that this was measured at
+    double body_error = 0;       ///< median distance of the body to marks that it was not made from, world units
+    double guess_error = 0;      ///< the same of the guess with the body's normals
+    double weight_of_guess = 0;  ///< in [0,1]: of the guess in what best predicts such marks
+    double agreement = 0;        ///< Dice of guess and body
+    std::size_t held_out = 0;    ///< marks that this was measured at
     std::optional<ExpectedDice> expected;  ///< none where too few marks were held out
 };
 

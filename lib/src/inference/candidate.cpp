@@ -11,6 +11,7 @@
 #include "base/geometry.h"
 #include "base/median.h"
 #include "covol/error.h"
+#include "covol/guess.h"
 #include "inference/heuristics.h"
 #include "inference/minimal_surface.h"
 #include "points/kd_tree.h"
@@ -47,6 +48,10 @@ Constraints constraints_of(const Marks& marks, const std::vector<std::size_t>& c
     c.variance.assign(chosen.size(), marks.variance);
     if (proposal.strength > 0)
         for (const std::size_t n : chosen) c.axes.push_back(times(std::sqrt(proposal.strength), proposal.axes[n]));
+    const double voxel = std::sqrt(marks.variance) / kUniformDeviation;
+    c.seeds = marks.inside;
+    c.seeds.insert(c.seeds.end(), marks.outside.begin(), marks.outside.end());
+    for (std::size_t n = 0; n < c.seeds.size(); ++n) c.seed_value.push_back(n < marks.inside.size() ? -voxel : voxel);
     return c;
 }
 
@@ -65,7 +70,7 @@ public:
             far += surface_.value({middle[0] + ((corner & 4) != 0 ? 3 : -3) * reach,
                                    middle[1] + ((corner & 2) != 0 ? 3 : -3) * reach,
                                    middle[2] + ((corner & 1) != 0 ? 3 : -3) * reach});
-        side_ = far < 0 ? -1 : 1;
+        side_ = far < 0 && marks.inside.empty() && marks.outside.empty() ? -1 : 1;
     }
     /// Of some of the marks of another one, near its normals.
     Guess(const Marks& marks, const std::vector<std::size_t>& chosen, const Proposal& proposal, const Guess& whole,
@@ -228,6 +233,9 @@ Solid least_body(const Scene& scene, const Field& odds, const RunContext& run) {
                                           std::min(double(scene.to_mark[n]) / reach, kInference.surface_far));
         u[n] = cost[n] < 0 ? 1.0F : 0.0F;
     }
+    // What is known costs no surface: a small place is not smoothed away.
+    for (const std::vector<std::size_t>* nodes : {&scene.known_inside, &scene.known_outside})
+        for (const std::size_t n : *nodes) weight[n] = 0;
     minimize_surface(lattice, weight, cost, kInference.iterations, u, run);
     Solid solid{lattice, std::vector<char>(u.size())};
     for (std::size_t n = 0; n < u.size(); ++n) solid.inside[n] = u[n] > 0.5F ? 1 : 0;

@@ -254,6 +254,15 @@ Overlap compare(const FloatGrid& guess, const ImageGeometry& geometry, const Lat
     return {sum > 0 ? 2 * both / sum : 0, inside * volume, rim * volume / (2 * cell)};
 }
 
+template <typename LevelAt>
+std::size_t count_wrong(const KnownSides& sides, const LevelAt& level) {
+    const auto wrong = [&](const std::vector<Vec3>& places, double side) {
+        return std::size_t(
+            std::count_if(places.begin(), places.end(), [&](const Vec3& p) { return side * level(p) < 0; }));
+    };
+    return wrong(sides.inside, -1) + wrong(sides.outside, 1);
+}
+
 /// What lies between a surface and the truth is, relative to the body, the surface's area times its mean error over the
 /// volume; marks that were left out lie on the truth, and tell the error of a result from fewer marks. How that error
 /// and the Dice coefficient go together was measured: kInference.expected_scale.
@@ -308,16 +317,22 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
         report.held_out = held.of_body.size();
         report.body_error = median_size(held.of_body);
         report.guess_error = median_size(held.of_guess);
-        report.guess_weight = weight_of_guess(held, cell, cell / inference.coarse_cell());
-        const Field level = inference.pooled(body, report.guess_weight);
+        report.weight_of_guess = weight_of_guess(held, cell, cell / inference.coarse_cell());
+        const Field level = inference.pooled(body, report.weight_of_guess);
         const Overlap overlap = compare(guess, geometry, body.lattice, level);
         report.agreement = overlap.dice;
-        report.expected = expected_dice(held, report.guess_weight, cell, overlap);
-        if (report.guess_weight >= 0.5 && overlap.dice > kInference.agreement) {
+        report.expected = expected_dice(held, report.weight_of_guess, cell, overlap);
+        if (report.weight_of_guess >= 0.5 && overlap.dice > kInference.agreement) {
             keep_guess("the surface of least bending agrees with the image, and predicts marks better");
             return;
         }
         const Level at(geometry, body.lattice, level);
+        const auto at_guess = [&](const Vec3& place) { return detail::levels_at(guess, std::vector<Vec3>{place})[0]; };
+        if (count_wrong(sides, at) > count_wrong(sides, at_guess)) {
+            keep_guess(
+                "more of the places that are known to be inside or outside are so of the surface of least bending");
+            return;
+        }
         result.u = start_from_level(
             domain_of(guess), world,
             [&](const Vec3& from, const Vec3& step, int count, double* values) {

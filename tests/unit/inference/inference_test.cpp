@@ -164,7 +164,7 @@ TEST_CASE("A ball through which a surface of least bending passes well stays as 
     const Inferred inferred = infer(*guess, marks, Image::from_values(geometry(), picture(ball, 20, 40).data()));
     CHECK_FALSE(inferred.report.used);
     CHECK(same(*inferred.u, *guess));
-    CHECK(inferred.report.guess_weight >= 0.5);
+    CHECK(inferred.report.weight_of_guess >= 0.5);
     REQUIRE(inferred.report.expected);
     CHECK(inferred.report.expected->value > 0.9);
 }

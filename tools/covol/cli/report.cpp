@@ -140,7 +140,7 @@ Json to_json(const SegmentReport& r) {
                              {"bits", i.bits},
                              {"body_error", i.body_error},
                              {"guess_error", i.guess_error},
-                             {"guess_weight", i.guess_weight},
+                             {"weight_of_guess", i.weight_of_guess},
                              {"agreement", i.agreement},
                              {"held_out", i.held_out}};
         if (i.expected)
