@@ -21,21 +21,6 @@ Vec3 unit_or_x(const Vec3& v) {
     return size > 0 ? Vec3{v[0] / size, v[1] / size, v[2] / size} : Vec3{1, 0, 0};
 }
 
-/// `count` of the points, each as far from those before it as can be.
-std::vector<std::size_t> spread_out(const std::vector<Vec3>& points, std::size_t count) {
-    std::vector<std::size_t> chosen;
-    std::vector<double> away(points.size(), std::numeric_limits<double>::infinity());
-    std::size_t next = 0;
-    while (chosen.size() < std::min(count, points.size())) {
-        chosen.push_back(next);
-        for (std::size_t n = 0; n < points.size(); ++n)
-            away[n] = std::min(away[n], detail::squared_distance(points[n], points[next]));
-        next = std::size_t(std::max_element(away.begin(), away.end()) - away.begin());
-        if (!(away[next] > 0)) break;  // the rest are copies
-    }
-    return chosen;
-}
-
 /// The part of the marks with these numbers, with the variance along the normals where these are known.
 Constraints part_of(const ImpreciseMarks& all, const std::vector<std::size_t>& chosen, const Normals& normals) {
     Constraints part;
@@ -143,6 +128,20 @@ double likeliest_coarser_factor(const ImpreciseMarks& marks, const Normals& norm
 }
 
 }  // namespace
+
+std::vector<std::size_t> spread_out(const std::vector<Vec3>& points, std::size_t count, std::size_t first) {
+    std::vector<std::size_t> chosen;
+    std::vector<double> away(points.size(), std::numeric_limits<double>::infinity());
+    std::size_t next = first;
+    while (chosen.size() < std::min(count, points.size())) {
+        chosen.push_back(next);
+        for (std::size_t n = 0; n < points.size(); ++n)
+            away[n] = std::min(away[n], detail::squared_distance(points[n], points[next]));
+        next = std::size_t(std::max_element(away.begin(), away.end()) - away.begin());
+        if (!(away[next] > 0)) break;  // the rest are copies
+    }
+    return chosen;
+}
 
 double ImpreciseMarks::variance_along(const Vec3& n) const {
     double sum = 0;

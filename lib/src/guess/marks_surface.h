@@ -23,6 +23,11 @@ struct ImpreciseMarks {
     [[nodiscard]] double variance_along(const Vec3& unit) const;
 };
 
+/// Numbers of `count` of the points, each as far from those before it as can be; fewer where the rest are copies.
+/// @pre there are points
+[[nodiscard]] std::vector<std::size_t> spread_out(const std::vector<Vec3>& points, std::size_t count,
+                                                  std::size_t first = 0);
+
 /// The surface of least energy through any number of marks: one VariationalSurface through all of them where they are
 /// few; else one through a spread-out part of them, and around each place another one through its neighbours, blended
 /// by weights that add up to one (partition of unity). What the whole knows, the side, is passed on to the parts; where

@@ -11,7 +11,6 @@
 #include "base/geometry.h"
 #include "base/median.h"
 #include "covol/error.h"
-#include "covol/guess.h"
 #include "inference/heuristics.h"
 #include "inference/minimal_surface.h"
 #include "points/kd_tree.h"
@@ -48,10 +47,6 @@ Constraints constraints_of(const Marks& marks, const std::vector<std::size_t>& c
     c.variance.assign(chosen.size(), marks.variance);
     if (proposal.strength > 0)
         for (const std::size_t n : chosen) c.axes.push_back(times(std::sqrt(proposal.strength), proposal.axes[n]));
-    const double voxel = std::sqrt(marks.variance) / kUniformDeviation;
-    c.seeds = marks.inside;
-    c.seeds.insert(c.seeds.end(), marks.outside.begin(), marks.outside.end());
-    for (std::size_t n = 0; n < c.seeds.size(); ++n) c.seed_value.push_back(n < marks.inside.size() ? -voxel : voxel);
     return c;
 }
 
@@ -70,7 +65,7 @@ public:
             far += surface_.value({middle[0] + ((corner & 4) != 0 ? 3 : -3) * reach,
                                    middle[1] + ((corner & 2) != 0 ? 3 : -3) * reach,
                                    middle[2] + ((corner & 1) != 0 ? 3 : -3) * reach});
-        side_ = far < 0 && marks.inside.empty() && marks.outside.empty() ? -1 : 1;
+        side_ = far < 0 ? -1 : 1;
     }
     /// Of some of the marks of another one, near its normals.
     Guess(const Marks& marks, const std::vector<std::size_t>& chosen, const Proposal& proposal, const Guess& whole,
@@ -317,11 +312,6 @@ void Scene::measure() {
     std::vector<double> slopes;
     for (const Vec3& mark : marks.places) slopes.push_back(lattice.value(image->slope(), mark));
     const double usual = std::max(cloud::median(slopes), 1e-6);
-    // A place that is known tells as far as halfway to the nearest mark.
-    std::vector<std::pair<Vec3, double>> balls;
-    for (const std::vector<Vec3>* places : {&marks.inside, &marks.outside})
-        for (const Vec3& place : *places)
-            balls.emplace_back(place, std::max(0.5 * std::sqrt(tree.nearest(place)), lattice.finest()));
     for_each_row(lattice, [&](int j, int k) {
         for (int i = 0; i < lattice.size[0]; ++i) {
             const std::size_t n = lattice.node(i, j, k);
@@ -332,16 +322,26 @@ void Scene::measure() {
             above_hull[n] = float(std::max(marks.above_hull(place), -1e30));
         }
     });
+    const std::vector<KnownBall> balls = known_balls(marks, lattice.finest());
     if (balls.empty()) return;
     for (std::size_t n = 0; n < lattice.count(); ++n)
-        for (std::size_t b = 0; b < balls.size(); ++b)
-            if (length(minus(lattice.place_of(n), balls[b].first)) <= balls[b].second)
-                (b < marks.inside.size() ? known_inside : known_outside).push_back(n);
+        for (const KnownBall& ball : balls)
+            if (length(minus(lattice.place_of(n), ball.middle)) <= ball.radius)
+                (ball.inside ? known_inside : known_outside).push_back(n);
 }
 
 Field Solid::level() const {
     constexpr double kCells = 0.7;  // enough to even out the stairs
     return smooth(lattice, signed_distance(lattice, inside), kCells * lattice.finest());
+}
+
+std::vector<KnownBall> known_balls(const Marks& marks, double cell) {
+    const detail::KdTree tree(marks.places);
+    std::vector<KnownBall> balls;
+    for (const bool inside : {true, false})
+        for (const Vec3& place : inside ? marks.inside : marks.outside)
+            balls.push_back({place, std::max(0.5 * std::sqrt(tree.nearest(place)), cell), inside});
+    return balls;
 }
 
 Candidate propose(const Scene& scene, const Proposal& proposal, const RunContext& run) {

@@ -64,6 +64,14 @@ struct Candidate {
 
 [[nodiscard]] Candidate propose(const Scene& scene, const Proposal& proposal, const RunContext& run);
 
+/// A place that is known to be inside or outside tells as far as halfway to the nearest mark, and a cell at least.
+struct KnownBall {
+    Vec3 middle;
+    double radius;
+    bool inside;
+};
+[[nodiscard]] std::vector<KnownBall> known_balls(const Marks& marks, double cell);
+
 /// Unit gradients of the image at all marks. @param fading  shorter where they are no larger than usual
 [[nodiscard]] std::vector<Vec3> image_axes(const Scene& scene, double sigma_cells, bool fading);
 

@@ -56,6 +56,12 @@ struct InferenceHeuristics {
     double least_part = heuristic("inference.least_part", 0.05);
     /// [cells] From the coarse body's surface, beyond which the fine lattice follows it.
     double fine_band = heuristic("inference.fine_band", 2.5);
+    /// [places] Known to be inside, or outside, that are used: as far apart as can be.
+    std::size_t most_places = heuristic("inference.most_places", 200);
+    /// [cells] From the body's surface, beyond which it has left a mark.
+    double off_cells = heuristic("inference.off_cells", 2);
+    /// [of the marks] That a body may leave.
+    double most_off = heuristic("inference.most_off", 0.15);
     /// [Dice] Of guess and body, above which they are one.
     double agreement = heuristic("inference.agreement", 0.9);
     /// [1 - Dice] Of a result whose error times its area is its volume: by 120 runs of 19 structures with 20, 60 and

@@ -15,6 +15,7 @@
 #include "covol/error.h"
 #include "covol/start.h"
 #include "grid/levels_at.h"
+#include "guess/marks_surface.h"
 #include "inference/candidate.h"
 #include "inference/heuristics.h"
 #include "points/kd_tree.h"
@@ -64,7 +65,6 @@ public:
     /// The body, with the surface through the marks in its place as far as that is worth.
     [[nodiscard]] Field pooled(const Solid& body, double guess_weight) const;
     [[nodiscard]] double coarse_cell() const { return coarse_->lattice.finest(); }
-    [[nodiscard]] const Marks& marks() const { return marks_; }
 
 private:
     [[nodiscard]] Candidate best_candidate() const;
@@ -165,12 +165,19 @@ Field Inference::pooled(const Solid& body, double guess_weight) const {
     const guess::VariationalSurface surface = surface_near(marks_, normals_of(body, marks_.places), amplitude_);
     const detail::KdTree tree(marks_.places);
     const double cell = lattice.finest(), band = kBandCells * cell;
+    const std::vector<KnownBall> balls = known_balls(marks_, cell);
+    const auto is_known = [&](const Vec3& place) {  // there the guess, which knows nothing of it, has no say
+        return std::any_of(balls.begin(), balls.end(), [&](const KnownBall& ball) {
+            return length(minus(place, ball.middle)) <= ball.radius + cell;
+        });
+    };
     tbb::parallel_for(0, lattice.size[2], [&](int k) {
         for (int j = 0; j < lattice.size[1]; ++j)
             for (int i = 0; i < lattice.size[0]; ++i) {
                 float& value = level[lattice.node(i, j, k)];
                 if (std::abs(double(value)) > band) continue;
                 const Vec3 place = lattice.place(i, j, k);
+                if (is_known(place)) continue;
                 // At a mark the surface through it is right, as far as a cell.
                 const double away2 = tree.nearest(place),
                              weight = 1 - (1 - guess_weight) * away2 / (away2 + cell * cell);
@@ -254,6 +261,23 @@ Overlap compare(const FloatGrid& guess, const ImageGeometry& geometry, const Lat
     return {sum > 0 ? 2 * both / sum : 0, inside * volume, rim * volume / (2 * cell)};
 }
 
+/// In the image's frame; of very many some, spread out.
+void add_places(const ImageGeometry& geometry, const std::vector<Vec3>& world, std::vector<Vec3>& places) {
+    if (world.empty()) return;
+    for (const std::size_t n : guess::spread_out(world, kInference.most_places))
+        places.push_back(to_frame(geometry, world[n]));
+}
+
+/// Of the marks, that lie off a level's surface.
+double fraction_off(const ImageGeometry& geometry, const std::vector<Vec3>& world, const Lattice& lattice,
+                    const Field& level) {
+    const double beyond = kInference.off_cells * lattice.finest();
+    const auto off = std::count_if(world.begin(), world.end(), [&](const Vec3& mark) {
+        return std::abs(lattice.value(level, to_frame(geometry, mark))) > beyond;
+    });
+    return double(off) / double(world.size());
+}
+
 template <typename LevelAt>
 std::size_t count_wrong(const KnownSides& sides, const LevelAt& level) {
     const auto wrong = [&](const std::vector<Vec3>& places, double side) {
@@ -298,8 +322,8 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
     if (marks.places.size() < kInference.fewest_marks)
         return keep_guess(std::to_string(marks.places.size()) + " marks do not teach inside and outside, " +
                           std::to_string(kInference.fewest_marks) + " would");
-    for (const Vec3& place : sides.inside) marks.inside.push_back(to_frame(geometry, place));
-    for (const Vec3& place : sides.outside) marks.outside.push_back(to_frame(geometry, place));
+    add_places(geometry, sides.inside, marks.inside);
+    add_places(geometry, sides.outside, marks.outside);
     Inference inference(image, std::move(marks), run);
     // A copy of the box is not held, but chunks of it are.
     const double bytes = sizeof(float) * inference.voxels();
@@ -324,6 +348,11 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
         report.expected = expected_dice(held, report.weight_of_guess, cell, overlap);
         if (report.weight_of_guess >= 0.5 && overlap.dice > kInference.agreement) {
             keep_guess("the surface of least bending agrees with the image, and predicts marks better");
+            return;
+        }
+        if (fraction_off(geometry, world, body.lattice, level) > kInference.most_off) {
+            report.expected.reset();  // of a body that is not taken
+            keep_guess("the likeliest body by the image leaves many marks");
             return;
         }
         const Level at(geometry, body.lattice, level);

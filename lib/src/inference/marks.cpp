@@ -7,6 +7,7 @@
 #include "base/geometry.h"
 #include "base/median.h"
 #include "covol/guess.h"
+#include "guess/marks_surface.h"
 #include "inference/heuristics.h"
 #include "points/kd_tree.h"
 
@@ -57,14 +58,7 @@ double Marks::above_hull(const Vec3& place) const {
 }
 
 void Marks::choose_spread() {
-    std::vector<double> away(places.size(), std::numeric_limits<double>::infinity());
-    std::size_t next = places.size() - 1;
-    while (spread.size() < std::min(kInference.guess_marks, places.size())) {
-        spread.push_back(next);
-        for (std::size_t n = 0; n < places.size(); ++n)
-            away[n] = std::min(away[n], detail::squared_distance(places[n], places[next]));
-        next = std::size_t(std::max_element(away.begin(), away.end()) - away.begin());
-    }
+    spread = guess::spread_out(places, kInference.guess_marks, places.size() - 1);
     std::sort(spread.begin(), spread.end());
 }
 

@@ -36,7 +36,7 @@ ImageGeometry geometry() {
 
 using Body = double (*)(const Vec3&);
 
-/// Bright inside, with noise; a neighbour of the same brightness beside it.
+/// Brighter inside by `contrast`, with noise.
 std::vector<float> picture(Body body, double contrast, double noise) {
     std::mt19937 random(1);
     std::normal_distribution<double> normal(0, noise);
