@@ -288,7 +288,7 @@ int Session::execute() {
             return fail(kBadInput, memory_text());
         return fail(exit_code_of(error.code()), error.code() == Errc::Cancelled ? interrupted_text() : error.what());
     } catch (const std::bad_alloc&) {
-        return fail(kBadInput, "out of memory; use a larger --voxel-size or a --roi");
+        return fail(kBadInput, kOutOfMemory);
     } catch (const std::exception& error) {
         if (is_missing_thread(error)) return fail(kIo, kNoThread);
         return fail(kDefect, std::string("internal error: ") + error.what());

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <future>
+#include <new>
 #include <string>
 #include <system_error>
 #include <thread>
@@ -37,18 +38,22 @@ int count_possible(int wanted) {
 
 std::atomic<bool> may_have_files = false;
 
-/// For threads that cannot be made where no exception is caught: in TBB, and in libraries that make some as they are
-/// loaded.
+[[noreturn]] void end_at_once(const char* why, int code) {
+    for (const char* part : {"covol: error: ", why, "\n"})
+        static_cast<void>(!::write(STDERR_FILENO, part, std::strlen(part)));
+    if (may_have_files) ScratchFolder::remove_all();
+    ::_exit(code);
+}
+
+/// For threads and memory that are not there where no exception is caught: in TBB, and in libraries that make threads
+/// as they are loaded.
 [[noreturn]] void on_terminate() {
     try {
         if (const std::exception_ptr thrown = std::current_exception()) std::rethrow_exception(thrown);
+    } catch (const std::bad_alloc&) {
+        end_at_once(kOutOfMemory, kBadInput);
     } catch (const std::exception& error) {
-        if (is_missing_thread(error)) {
-            for (const char* part : {"covol: error: ", kNoThread, "\n"})
-                static_cast<void>(!::write(STDERR_FILENO, part, std::strlen(part)));
-            if (may_have_files) ScratchFolder::remove_all();
-            ::_exit(kIo);
-        }
+        if (is_missing_thread(error)) end_at_once(kNoThread, kIo);
         for (const char* part : {"covol: error: internal error: ", error.what(), "\n"})
             static_cast<void>(!::write(STDERR_FILENO, part, std::strlen(part)));
     } catch (...) {

@@ -13,7 +13,8 @@ struct ThreadCount {
 /// @param threads  that may be wanted; 0: one for each core
 [[nodiscard]] ThreadCount limit_threads(int threads);
 
-/// What to say where the system makes no thread.
+/// What to say if there is no memory, or the system makes no thread.
+constexpr const char* kOutOfMemory = "out of memory; use a larger --voxel-size or a --roi";
 constexpr const char* kNoThread =
     "the system makes no more threads or processes; see ulimit -u, and pids.max of the control group, or use fewer "
     "(--threads 1)";
