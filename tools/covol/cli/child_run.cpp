@@ -64,7 +64,14 @@ int run_this_program(const std::vector<std::string>& words, const RunContext& ru
     std::vector<char*> argv;
     for (std::string& word : all) argv.push_back(word.data());
     argv.push_back(nullptr);
+    // Until it is a program of its own the child has this one's handler, which would lose a signal.
+    sigset_t term, before;
+    sigemptyset(&term);
+    sigaddset(&term, SIGTERM);
+    ::pthread_sigmask(SIG_BLOCK, &term, &before);
     const pid_t parent = ::getpid(), child = ::fork();
+    if (child == 0) ::signal(SIGTERM, SIG_DFL);
+    ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
     if (child == 0) {
         ::prctl(PR_SET_PDEATHSIG, SIGKILL);
         if (::getppid() == parent) ::execv(self.c_str(), argv.data());
