@@ -47,7 +47,8 @@ struct Inferred {
 /// The image's gradients are axes of the normals at the marks; what lies on both sides of the marks teaches how inside
 /// and outside look; the body of least surface with these log odds, a convex problem, is global, and its normals start
 /// the next round (lib/src/inference/candidate.h). Marks that were left out tell how far body and guess are to be
-/// believed. Where the guess agrees with the body and predicts such marks at least as well, it is kept.
+/// believed. The guess is kept where it agrees with the body and predicts such marks at least as well, and where the
+/// body leaves many marks, or has more of the known places on the wrong side.
 ///
 /// @param guess  level set, negative inside, on its domain's lattice
 /// @param marks  world positions on the surface
