@@ -20,7 +20,7 @@ LAYERS = [
     {"contours": ["contours", "seeds"], "meshing": ["mesh_relax", "mesh_cleanup"], "holes": ["holes"], "cloud/orientation": ["orientation"]},
     {"start": ["start", "level_set"], "painted": ["painted"], "analysis": ["compare", "evidence", "structures", "phantom"], "render/draw": ["picture"]},
     {"io/read": ["image_files"], "guess": ["guess", "guess_correction"], "cloud/surface": ["cloud_surface"], "report": ["report_page"], "render": ["render"]},
-    {"guidance": ["guidance"], "inference": ["inference"]},
+    {"guidance": ["guidance", "motion"], "inference": ["inference"]},
     {"segment": ["pipeline"], "segment/start": [], "segment/solve": [], "segment/result": []},
     {"bricks": ["bricks"], "marks": ["marks"]},
     {"io/inputs": ["file_kind", "read_marks"], "structures": ["segment_structures"]},

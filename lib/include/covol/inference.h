@@ -34,11 +34,14 @@ struct InferenceReport {
     double weight_of_guess = 0;  ///< in [0,1]: of the guess in what best predicts such marks
     double agreement = 0;        ///< Dice of guess and body
     std::size_t held_out = 0;    ///< marks that this was measured at
+    /// Marks that are more likely wrong than right, as they were given; the body is made without them.
+    std::vector<Vec3> wrong_marks;
     std::optional<ExpectedDice> expected;  ///< none where too few marks were held out
 };
 
 struct Inferred {
     FloatGridPtr u;  ///< a level set as start_from_level() gives, on the guess's domain; the guess's where it was kept
+    std::vector<Vec3> marks;  ///< without the wrong ones
     InferenceReport report;
 };
 
@@ -47,8 +50,9 @@ struct Inferred {
 /// The image's gradients are axes of the normals at the marks; what lies on both sides of the marks teaches how inside
 /// and outside look; the body of least surface with these log odds, a convex problem, is global, and its normals start
 /// the next round (lib/src/inference/candidate.h). Marks that were left out tell how far body and guess are to be
-/// believed. The guess is kept where it agrees with the body and predicts such marks at least as well, and where the
-/// body leaves many marks, or has more of the known places on the wrong side.
+/// believed, and which marks are wrong: several that lie far from it whether or not they are left out. The guess is
+/// kept where it agrees with the body and predicts such marks at least as well, and where the body leaves many marks,
+/// or has more of the known places on the wrong side.
 ///
 /// @param guess  level set, negative inside, on its domain's lattice
 /// @param marks  world positions on the surface

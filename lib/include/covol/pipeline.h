@@ -49,7 +49,8 @@ struct MaskStart {
     std::shared_ptr<const Image> mask;  ///< voxels above 0 are inside
 };
 struct LevelSetStart {
-    FloatGridPtr level_set;  ///< negative inside
+    FloatGridPtr level_set;   ///< negative inside
+    bool is_settled = false;  ///< it is a result: marks and image correct it, and nothing flows
 };
 /// How the level set starts: made from the marks, or named by the caller. covol/mesh_io.h, image_files.h and vdb_io.h
 /// read the files of one; read_start() all of them.

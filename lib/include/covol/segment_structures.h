@@ -8,6 +8,7 @@
 #include "covol/evidence.h"
 #include "covol/image.h"
 #include "covol/marks.h"
+#include "covol/motion.h"
 #include "covol/pipeline.h"
 #include "covol/structures.h"
 
@@ -22,8 +23,9 @@ struct StructuresOptions {
 
 /// What came of one structure.
 struct StructureResult : StructureFacts {
-    SegmentResult result;             ///< its surface has the name `grid`
-    std::optional<GivenGuess> guess;  ///< that was corrected; its mask only if the structure is the only one
+    SegmentResult result;                ///< its surface has the name `grid`
+    std::optional<GivenGuess> guess;     ///< that was corrected; its mask only if the structure is the only one
+    std::optional<MotionReport> motion;  ///< from the frame before, of a surface that followed the image
 };
 
 struct StructuresResult {
@@ -51,9 +53,10 @@ using StructureSolver = std::function<SegmentResult(const std::optional<Image>& 
                                                             const RunContext& run = {},
                                                             const StructureSolver& solve = solve_structure);
 
-/// A time-lapse: the structures of one frame after the other. Each starts from its surface in the last frame that could
-/// be segmented, with the weight of curvature that was chosen there, where the options leave it open: a surface that
-/// changed its stiffness between frames would seem to move.
+/// A time-lapse: the structures of one frame after the other. A surface that marks and image gave follows the image
+/// (SurfaceTemplate), and is corrected by the frame's own marks; one that flowed, as the paper's model does, flows on
+/// from its surface in the last frame that could be segmented, with the weight of curvature that was chosen there,
+/// where the options leave it open: a surface that changed its stiffness between frames would seem to move.
 class TimeLapse {
 public:
     /// @param marks  of the same structures, in the same order, in all frames; once there is a frame they may be empty
@@ -66,8 +69,9 @@ public:
 private:
     struct Last {
         std::string name;
-        FloatGridPtr surface;
+        FloatGridPtr surface;  ///< not a distance, where it did not flow: making it one moves its edges a little
         std::optional<double> delta;
+        std::optional<SurfaceTemplate> look;  ///< of a surface that did not flow
     };
     std::vector<Last> last_;
 };

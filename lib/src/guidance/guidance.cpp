@@ -84,7 +84,6 @@ private:
     };
     [[nodiscard]] Word hear(const OffsetField& field, double prior) const;
     [[nodiscard]] std::vector<double> local_error2(const Word& word) const;
-    [[nodiscard]] std::vector<double> on_vertices(const std::vector<double>& offset) const;
     [[nodiscard]] double mean(const std::vector<double>& by_patch) const {
         double sum = 0;
         for (std::size_t i = 0; i < by_patch.size(); ++i) sum += patches_.area[i] * by_patch[i];
@@ -420,28 +419,9 @@ void Guide::weigh(bool first) {
     report_.mean_offset = mean(whole);
 }
 
-/// Offsets of patches as a smooth function on the vertices.
-std::vector<double> Guide::on_vertices(const std::vector<double>& offset) const {
-    std::vector<double> result(patches_.places.size());
-    tbb::parallel_for(std::size_t(0), result.size(), [&](std::size_t v) {
-        const std::uint32_t own = patches_.patch[v];
-        double sum = 0, total = 0;
-        const auto add = [&](std::uint32_t i) {
-            const double weight =
-                std::exp(-detail::squared_distance(patches_.places[v], patches_.centers[i]) / squared(width_)) + 1e-12;
-            sum += weight * offset[i];
-            total += weight;
-        };
-        add(own);
-        for (const std::uint32_t i : patches_.neighbours[own]) add(i);
-        result[v] = sum / total;
-    });
-    return result;
-}
-
 /// The distance to the surface less the offset of its nearest vertex.
 void Guide::move() {
-    const FloatGridPtr moved = distance_->less(on_vertices(offset_));
+    const FloatGridPtr moved = distance_->less(on_vertices(patches_, width_, offset_));
     detail::drop_unmarked_pieces(*moved, marks_);
     surface_ = detail::redistance(*moved, domain_, kHalfWidthVoxels, detail::DomainEnd::Closed, "guess", run_);
 }

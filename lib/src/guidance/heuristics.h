@@ -73,4 +73,35 @@ struct OffsetFieldHeuristics {
 };
 COVOL_HEURISTICS OffsetFieldHeuristics kOffsets{};
 
+/// From one image of a time-lapse to the next one: motion.cpp.
+struct MotionHeuristics {
+    /// [voxels] That a whole surface moves along an axis from one image to the next.
+    double farthest = heuristic("motion.farthest", 12.0);
+    /// [voxels] That a part of it moves beside that.
+    double range = heuristic("motion.range", 6.0);
+    /// [voxels] To both sides of the surface that it is recognised by.
+    double window = heuristic("motion.window", 4.0);
+    /// [voxels] To which a translation is found, and the least deviation of offsets.
+    double finest_step = heuristic("motion.finest_step", 0.03);
+    /// [of the mismatch] A translation leaves less.
+    double least_gain = heuristic("motion.least_gain", 0.9);
+    /// [of the samples] That are in the image after a translation.
+    double least_seen = heuristic("motion.least_seen", 0.8);
+    /// [patches] That a translation is found from.
+    std::size_t most_patches = heuristic("motion.most_patches", 2000);
+    /// [of the variance of brightness] That its noise has at least.
+    double least_noise = heuristic("motion.least_noise", 1e-6);
+    /// [square steps of a fourth of a voxel] Of one patch's offset, at least.
+    double variance = heuristic("motion.variance", 0.25);
+    /// [of the radius of the body] Over which offsets are alike.
+    double alike = heuristic("motion.alike", 0.5);
+    /// [passes] In which it is matched, each from where the last one found it.
+    int passes = heuristic("motion.passes", 2);
+    /// [rounds] In which the deviation of offsets is estimated.
+    int rounds = heuristic("motion.rounds", 4);
+    /// [voxels] Less is no offset.
+    double still = heuristic("motion.still", 0.02);
+};
+COVOL_HEURISTICS MotionHeuristics kMotion{};
+
 }  // namespace covol

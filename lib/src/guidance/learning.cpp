@@ -115,7 +115,8 @@ PatchProfile read_profile(const Scene& scene, std::size_t patch, int reach, cons
         const Vec3 &x = p.places[p.members[n]], &normal = p.normals[p.members[n]];
         Row row;
         row.values = values.data() + rows.size() * longest + reach;
-        const SmoothImage::Line line = image.along(x, {step * normal[0], step * normal[1], step * normal[2]});
+        const Vec3 first{x[0] + scene.shift[0], x[1] + scene.shift[1], x[2] + scene.shift[2]};
+        const SmoothImage::Line line = image.along(first, {step * normal[0], step * normal[1], step * normal[2]});
         if (!line.sample(0, row.values[0])) continue;
         for (const int side : {-1, 1}) {
             int checked = 0;  // the last step before the next look at the distance

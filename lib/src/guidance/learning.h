@@ -16,6 +16,7 @@ struct Scene {
     const FloatGrid& distance;  ///< to the surface, signed, in a wide band
     const Domain& domain;
     const std::vector<int>& ranges;  ///< by patch: how far the border is looked for, steps
+    Vec3 shift{0, 0, 0};             ///< of the image's places against the surface's
 };
 
 /// The marks in one patch.

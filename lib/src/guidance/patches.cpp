@@ -46,6 +46,24 @@ struct VertexKey {
 
 }  // namespace
 
+std::vector<double> on_vertices(const Patches& patches, double width, const std::vector<double>& by_patch) {
+    std::vector<double> result(patches.places.size());
+    tbb::parallel_for(std::size_t(0), result.size(), [&](std::size_t v) {
+        const std::uint32_t own = patches.patch[v];
+        double sum = 0, total = 0;
+        const auto add = [&](std::uint32_t i) {
+            const double away2 = detail::squared_distance(patches.places[v], patches.centers[i]),
+                         weight = std::exp(-away2 / (width * width)) + 1e-12;
+            sum += weight * by_patch[i];
+            total += weight;
+        };
+        add(own);
+        for (const std::uint32_t i : patches.neighbours[own]) add(i);
+        result[v] = sum / total;
+    });
+    return result;
+}
+
 double voxel_along(const ImageGeometry& g, const Vec3& d) {
     double sum = 0;
     for (int a = 0; a < 3; ++a) {

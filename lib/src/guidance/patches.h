@@ -45,6 +45,11 @@ struct Patches {
 /// Fills borders and neighbours, and what is by vertex, from the vertices that were cut.
 void find_borders(SurfaceVertices&& vertices, Patches& patches);
 
+/// Values of patches as a smooth function on the vertices.
+/// @param width  of the patches
+[[nodiscard]] std::vector<double> on_vertices(const Patches& patches, double width,
+                                              const std::vector<double>& by_patch);
+
 /// The edge of the image's voxels along a unit vector.
 [[nodiscard]] double voxel_along(const ImageGeometry& geometry, const Vec3& direction);
 

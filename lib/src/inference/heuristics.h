@@ -62,6 +62,14 @@ struct InferenceHeuristics {
     double off_cells = heuristic("inference.off_cells", 2);
     /// [of the marks] That a body may leave.
     double most_off = heuristic("inference.most_off", 0.15);
+    /// [marks] Of fewer none is called wrong: a body of so few lacks parts.
+    std::size_t wrong_from_marks = heuristic("inference.wrong_from_marks", 40);
+    /// [of the marks] That are thought to be wrong before anything is known.
+    double wrong_prior = heuristic("inference.wrong_prior", 0.05);
+    /// [cells] From right marks to the body, in the mean, at least.
+    double usual_off = heuristic("inference.usual_off", 0.3);
+    /// [rounds] In which wrong marks are left out.
+    int wrong_rounds = heuristic("inference.wrong_rounds", 4);
     /// [Dice] Of guess and body, above which they are one.
     double agreement = heuristic("inference.agreement", 0.9);
     /// [1 - Dice] Of a result whose error times its area is its volume: by 120 runs of 19 structures with 20, 60 and

@@ -18,6 +18,7 @@
 #include "guess/marks_surface.h"
 #include "inference/candidate.h"
 #include "inference/heuristics.h"
+#include "inference/wrong_marks.h"
 #include "points/kd_tree.h"
 
 namespace covol {
@@ -30,6 +31,7 @@ constexpr std::array kSigmas{1.0, 2.0};  // cells, of the gradients that are axe
 
 /// Of marks that were left out: how far off they lie, negative inside.
 struct HeldOut {
+    std::vector<std::size_t> marks;
     std::vector<double> of_body, of_guess;
 };
 
@@ -37,19 +39,7 @@ class Inference {
 public:
     Inference(const Image& image, Marks marks, const RunContext& run)
         : image_(image), marks_(std::move(marks)), run_(run) {
-        const ImageGeometry& g = image.geometry();
-        low_ = high_ = marks_.places.front();
-        for (const Vec3& m : marks_.places)
-            for (int a = 0; a < 3; ++a) {
-                low_[a] = std::min(low_[a], m[a]);
-                high_[a] = std::max(high_[a], m[a]);
-            }
-        const double voxel = *std::min_element(g.spacing.begin(), g.spacing.end());
-        const double around = std::max(kInference.around_voxels * voxel, marks_.spacing);
-        for (int a = 0; a < 3; ++a) {
-            low_[a] -= around;
-            high_[a] += around;
-        }
+        choose_box();
     }
 
     /// Of the image, in the box around the marks.
@@ -59,14 +49,22 @@ public:
         return count;
     }
 
-    /// Empty where no candidate has a body.
-    [[nodiscard]] Solid find(InferenceReport& report);
+    /// False where no candidate has a body.
+    [[nodiscard]] bool find(InferenceReport& report);
+    /// The body that was found, on a finer lattice.
+    [[nodiscard]] Solid refined() const;
+    /// Whether marks are likely wrong, which are left out from here on: the body is to be found again.
+    [[nodiscard]] bool leave_out_wrong(const HeldOut& held);
+    [[nodiscard]] bool leaves_out(const Vec3& mark) const {
+        return std::find(wrong_.begin(), wrong_.end(), mark) != wrong_.end();
+    }
     [[nodiscard]] HeldOut hold_out() const;
     /// The body, with the surface through the marks in its place as far as that is worth.
     [[nodiscard]] Field pooled(const Solid& body, double guess_weight) const;
     [[nodiscard]] double coarse_cell() const { return coarse_->lattice.finest(); }
 
 private:
+    void choose_box();
     [[nodiscard]] Candidate best_candidate() const;
     [[nodiscard]] Proposal near_normals_of(const Solid& body, double amplitude) const {
         return {normals_of(body, marks_.places), kInference.normals_strength, Search::Near, amplitude};
@@ -78,7 +76,8 @@ private:
     Vec3 low_{}, high_{};
     std::optional<Scene> coarse_;
     Solid coarse_body_;
-    double amplitude_ = 0;  // of its guess
+    std::vector<Vec3> wrong_;  // marks that are left out; places of the frame
+    double amplitude_ = 0;     // of its guess
 };
 
 Candidate Inference::best_candidate() const {
@@ -111,15 +110,33 @@ Candidate Inference::best_candidate() const {
     return chosen != nullptr ? std::move(*chosen) : Candidate{};
 }
 
-Solid Inference::find(InferenceReport& report) {
+void Inference::choose_box() {
     const ImageGeometry& g = image_.geometry();
-    coarse_.emplace(image_, cover(g, low_, high_, kInference.coarse_nodes), marks_, run_);
+    low_ = high_ = marks_.places.front();
+    for (const Vec3& m : marks_.places)
+        for (int a = 0; a < 3; ++a) {
+            low_[a] = std::min(low_[a], m[a]);
+            high_[a] = std::max(high_[a], m[a]);
+        }
+    const double voxel = *std::min_element(g.spacing.begin(), g.spacing.end());
+    const double around = std::max(kInference.around_voxels * voxel, marks_.spacing);
+    for (int a = 0; a < 3; ++a) {
+        low_[a] -= around;
+        high_[a] += around;
+    }
+}
+
+bool Inference::find(InferenceReport& report) {
+    coarse_.emplace(image_, cover(image_.geometry(), low_, high_, kInference.coarse_nodes), marks_, run_);
     Candidate chosen = best_candidate();
     report.bits = chosen.bits;
     amplitude_ = chosen.amplitude;
     coarse_body_ = std::move(chosen.solid);
-    if (coarse_body_.empty()) return {};
-    const Lattice fine = cover(g, low_, high_, kInference.fine_nodes);
+    return !coarse_body_.empty();
+}
+
+Solid Inference::refined() const {
+    const Lattice fine = cover(image_.geometry(), low_, high_, kInference.fine_nodes);
     if (fine.count() <= coarse_->lattice.count()) return coarse_body_;
     const Scene scene(image_, fine, marks_, run_);
     Proposal refining = near_normals_of(coarse_body_, amplitude_);
@@ -127,6 +144,26 @@ Solid Inference::find(InferenceReport& report) {
     refining.is_compared = false;
     const Candidate refined = propose(scene, refining, run_);
     return refined.solid.empty() ? coarse_body_ : refined.solid;
+}
+
+bool Inference::leave_out_wrong(const HeldOut& held) {
+    if (held.marks.size() < kInference.wrong_from_marks) return false;
+    const Field level = coarse_body_.level();
+    double anywhere = 0;
+    for (const float value : level) anywhere += std::abs(double(value)) / double(level.size());
+    std::vector<double> off;
+    for (std::size_t i = 0; i < held.marks.size(); ++i)  // a body passes marks that it was made from, wrong ones too
+        off.push_back(std::min(std::abs(coarse_body_.lattice.value(level, marks_.places[held.marks[i]])),
+                               std::abs(held.of_body[i])));
+    const std::vector<double> wrong = probability_wrong(off, anywhere, kInference.usual_off * coarse_cell());
+    std::vector<std::size_t> left_out;
+    for (std::size_t i = 0; i < held.marks.size(); ++i)
+        if (wrong[i] > 0.5) left_out.push_back(held.marks[i]);
+    if (left_out.empty()) return false;
+    for (const std::size_t n : left_out) wrong_.push_back(marks_.places[n]);
+    marks_ = marks_.without(left_out, image_.geometry());
+    choose_box();
+    return true;
 }
 
 HeldOut Inference::hold_out() const {
@@ -146,12 +183,14 @@ HeldOut Inference::hold_out() const {
         HeldOut& held = by_fold[std::size_t(fold)];
         for (const std::size_t n : out) {
             const Vec3& mark = marks_.places[n];
+            held.marks.push_back(n);
             held.of_body.push_back(again.solid.lattice.value(level, mark));
             held.of_guess.push_back(surface.value(mark));
         }
     });
     HeldOut all;
     for (const HeldOut& held : by_fold) {
+        all.marks.insert(all.marks.end(), held.marks.begin(), held.marks.end());
         all.of_body.insert(all.of_body.end(), held.of_body.begin(), held.of_body.end());
         all.of_guess.insert(all.of_guess.end(), held.of_guess.begin(), held.of_guess.end());
     }
@@ -188,6 +227,12 @@ Field Inference::pooled(const Solid& body, double guess_weight) const {
     return level;
 }
 
+double median_size(const std::vector<double>& values) {
+    std::vector<double> sizes;
+    for (const double v : values) sizes.push_back(std::abs(v));
+    return sizes.empty() ? 0.0 : cloud::median(sizes);
+}
+
 /// The weight of the guess, in [0,1], with which the mean of both predicts marks best (stacking: Wolpert, Neural
 /// Networks 5(2), 1992).
 /// @param shrink  of the body's errors on a finer lattice
@@ -201,12 +246,6 @@ double weight_of_guess(const HeldOut& held, double cell, double shrink) {
         square += (body - guess) * (body - guess);
     }
     return square > 0 ? std::clamp(with / square, 0.0, 1.0) : 0.0;
-}
-
-double median_size(const std::vector<double>& values) {
-    std::vector<double> sizes;
-    for (const double v : values) sizes.push_back(std::abs(v));
-    return sizes.empty() ? 0.0 : cloud::median(sizes);
 }
 
 /// A solid as a level anywhere in the world.
@@ -311,6 +350,7 @@ std::optional<ExpectedDice> expected_dice(const HeldOut& held, double guess_weig
 Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Image& image, const KnownSides& sides,
                const RunContext& run) {
     Inferred result;
+    result.marks = world;
     InferenceReport& report = result.report;
     const auto keep_guess = [&](std::string reason) {
         report.reason = std::move(reason);
@@ -331,18 +371,29 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
         (run.memory_budget > 0 && bytes > kInference.most_of_memory * double(run.memory_budget)))
         return keep_guess("the image's box around the marks is too large to be read as a whole");
     with_threads(run, [&] {
-        const Solid body = inference.find(report);
-        if (body.empty()) {
-            keep_guess("no body is likely by the image");
-            return;
+        HeldOut held;
+        for (int round = 0; round <= kInference.wrong_rounds; ++round) {
+            if (!inference.find(report)) {
+                keep_guess("no body is likely by the image");
+                return;
+            }
+            held = inference.hold_out();
+            if (round == kInference.wrong_rounds || !inference.leave_out_wrong(held)) break;
         }
-        const HeldOut held = inference.hold_out();
+        const Solid body = inference.refined();
         const double cell = body.lattice.finest();
         report.held_out = held.of_body.size();
         report.body_error = median_size(held.of_body);
         report.guess_error = median_size(held.of_guess);
         report.weight_of_guess = weight_of_guess(held, cell, cell / inference.coarse_cell());
         const Field level = inference.pooled(body, report.weight_of_guess);
+        std::erase_if(result.marks, [&](const Vec3& mark) {
+            const Vec3 place = to_frame(geometry, mark);
+            const bool is_wrong = inference.leaves_out(place) && std::abs(body.lattice.value(level, place)) >
+                                                                     kInference.on_mark * body.lattice.finest();
+            if (is_wrong) report.wrong_marks.push_back(mark);
+            return is_wrong;
+        });
         const Overlap overlap = compare(guess, geometry, body.lattice, level);
         report.agreement = overlap.dice;
         report.expected = expected_dice(held, report.weight_of_guess, cell, overlap);
@@ -350,7 +401,7 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
             keep_guess("the surface of least bending agrees with the image, and predicts marks better");
             return;
         }
-        if (fraction_off(geometry, world, body.lattice, level) > kInference.most_off) {
+        if (fraction_off(geometry, result.marks, body.lattice, level) > kInference.most_off) {
             report.expected.reset();  // of a body that is not taken
             keep_guess("the likeliest body by the image leaves many marks");
             return;
@@ -363,7 +414,7 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
             return;
         }
         result.u = start_from_level(
-            domain_of(guess), world,
+            domain_of(guess), result.marks,
             [&](const Vec3& from, const Vec3& step, int count, double* values) {
                 for (int n = 0; n < count; ++n) values[n] = at(plus(from, n, step));
             },

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "base/geometry.h"
 #include "base/median.h"
@@ -15,6 +16,16 @@ namespace covol::inference {
 
 Marks::Marks(const ImageGeometry& geometry, const std::vector<Vec3>& world) {
     for (const Vec3& mark : world) places.push_back(to_frame(geometry, mark));
+    arrange(geometry);
+}
+
+Marks::Marks(std::vector<Vec3> marks, std::vector<Vec3> known_inside, std::vector<Vec3> known_outside,
+             const ImageGeometry& geometry)
+    : places(std::move(marks)), inside(std::move(known_inside)), outside(std::move(known_outside)) {
+    arrange(geometry);
+}
+
+void Marks::arrange(const ImageGeometry& geometry) {
     std::sort(places.begin(), places.end());
     places.erase(std::unique(places.begin(), places.end()), places.end());
     Vec3 middle{0, 0, 0};
@@ -49,6 +60,13 @@ Marks Marks::without(int fold, const ImageGeometry& geometry, std::vector<std::s
     part.choose_spread();
     part.make_hull(geometry);
     return part;
+}
+
+Marks Marks::without(const std::vector<std::size_t>& left_out, const ImageGeometry& geometry) const {
+    std::vector<Vec3> rest;
+    for (std::size_t n = 0; n < places.size(); ++n)
+        if (std::find(left_out.begin(), left_out.end(), n) == left_out.end()) rest.push_back(places[n]);
+    return {std::move(rest), inside, outside, geometry};
 }
 
 double Marks::above_hull(const Vec3& place) const {

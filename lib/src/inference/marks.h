@@ -25,11 +25,17 @@ struct Marks {
     /// Without every kFolds-th mark. @param left_out  their places
     [[nodiscard]] Marks without(int fold, const ImageGeometry& geometry, std::vector<std::size_t>& rest,
                                 std::vector<std::size_t>& left_out) const;
+    /// Without some.
+    [[nodiscard]] Marks without(const std::vector<std::size_t>& left_out, const ImageGeometry& geometry) const;
     /// Height above the hull, negative inside of it.
     [[nodiscard]] double above_hull(const Vec3& place) const;
 
 private:
     Marks() = default;
+    Marks(std::vector<Vec3> marks, std::vector<Vec3> known_inside, std::vector<Vec3> known_outside,
+          const ImageGeometry& geometry);
+    /// Sorts the marks, and measures them.
+    void arrange(const ImageGeometry& geometry);
     void choose_spread();
     void make_hull(const ImageGeometry& geometry);
 };

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "covol/error.h"
 #include "covol/mesh_relax.h"
@@ -15,13 +16,15 @@
 #include "meshing/level_set_distance.h"
 #include "meshing/mesh_distance.h"
 #include "segment/result/mark_fit.h"
+#include "segment/step.h"
 
 namespace covol {
 namespace {
 
-constexpr double kReachVoxels = 5.0;  // of marks whose attraction is unlimited
-constexpr double kWeakLine = 0.93;    // 1 - g where the image is 1.2 times as bright as the band's median
-constexpr int kBesideBand = 5;        // voxels beside the surface's band that tell how steep slopes are here
+constexpr double kReachVoxels = 5.0;       // of marks whose attraction is unlimited
+constexpr double kWeakLine = 0.93;         // 1 - g where the image is 1.2 times as bright as the band's median
+constexpr double kLeastCorrelation = 0.5;  // of brightness along a surface, from frame to frame
+constexpr int kBesideBand = 5;             // voxels beside the surface's band that tell how steep slopes are here
 
 /// Where edges are looked up for a surface that was found without them.
 FloatGridPtr around(const FloatGrid& surface) {
@@ -112,7 +115,7 @@ StructuresResult segment_structures(const std::optional<Image>& image, std::vect
     StructuresResult all;
     for (StructureInput& input : inputs) {
         const RunContext own = speaking_for(input.name, inputs.size(), run);
-        StructureResult made{std::move(static_cast<StructureFacts&>(input)), {}, {}};
+        StructureResult made{std::move(static_cast<StructureFacts&>(input)), {}, {}, {}};
         made.result = detail::with_name(made.name, [&] {
             if (input.guess) {
                 made.guess = input.guess(own);
@@ -131,16 +134,41 @@ StructuresResult segment_structures(const std::optional<Image>& image, std::vect
 
 StructuresResult TimeLapse::segment(const Image& frame, std::vector<Marks> marks, const StructuresOptions& options,
                                     const RunContext& run) {
+    std::vector<std::optional<MotionReport>> motions(marks.size());
     for (std::size_t n = 0; n < last_.size(); ++n) {
-        if (n >= marks.size() || marks.size() != last_.size() || marks[n].name != last_[n].name)
+        Last& last = last_[n];
+        if (n >= marks.size() || marks.size() != last_.size() || marks[n].name != last.name)
             throw Error(Errc::InvalidInput, "TimeLapse: expected the structures of the frame before, in their order");
-        marks[n].start = LevelSetStart{last_[n].surface};
-        marks[n].delta = last_[n].delta;
+        if (last.look) {
+            const RunContext own = speaking_for(last.name, last_.size(), run);
+            Followed followed = last.look->follow(frame, own);
+            marks[n].start = LevelSetStart{std::move(followed.u), true};
+            motions[n] = followed.report;
+            if (followed.report.correlation < kLeastCorrelation)
+                own.warn("the image around the surface is not what it was in the frame before (correlation " +
+                         pipeline::number(std::round(100 * followed.report.correlation) / 100) +
+                         "): it may have lost the structure; mark this frame");
+        } else {
+            marks[n].start = LevelSetStart{last.surface};
+        }
+        marks[n].delta = last.delta;
     }
-    StructuresResult all = segment_structures(frame, std::move(marks), options, run);
+    StructuresOptions with_fields = options;
+    with_fields.segment.without_fields = false;
+    StructuresResult all = segment_structures(frame, std::move(marks), with_fields, run);
     last_.clear();
-    for (const StructureResult& structure : all.structures)
-        last_.push_back({structure.name, structure.result.surface, structure.result.report.resolved.evolve.delta});
+    for (std::size_t n = 0; n < all.structures.size(); ++n) {
+        StructureResult& structure = all.structures[n];
+        SegmentResult& result = structure.result;
+        structure.motion = motions[n];
+        Last last{structure.name, result.surface, result.report.resolved.evolve.delta, {}};
+        if (result.report.solve.steps == 0 && result.report.resolved.model == Model::Guided) {
+            last.surface = result.u;
+            last.look.emplace(last.surface, frame, run);
+        }
+        if (options.segment.without_fields) result.u = result.distance = result.edge = nullptr;
+        last_.push_back(std::move(last));
+    }
     return all;
 }
 

@@ -142,7 +142,8 @@ Json to_json(const SegmentReport& r) {
                              {"guess_error", i.guess_error},
                              {"weight_of_guess", i.weight_of_guess},
                              {"agreement", i.agreement},
-                             {"held_out", i.held_out}};
+                             {"held_out", i.held_out},
+                             {"wrong_marks", i.wrong_marks}};
         if (i.expected)
             json["expected_dice"] = {
                 {"value", i.expected->value}, {"low", i.expected->low}, {"high", i.expected->high}};

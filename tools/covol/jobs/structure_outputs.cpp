@@ -209,6 +209,11 @@ Json input_of(const StructureOutput& s) {
 Json report_of(const StructureOutput& s) {
     Json json{{"input", input_of(s)}};
     json.update(to_json(s.result.report));
+    if (s.motion)
+        json["motion"] = {{"translation", s.motion->translation},
+                          {"mean_offset", s.motion->mean_offset},
+                          {"max_offset", s.motion->max_offset},
+                          {"correlation", s.motion->correlation}};
     if (s.result.correction) json["correction"] = to_json(s.result.report.correction);
     if (s.corrected)
         json["correction"]["mask"] = {

@@ -135,7 +135,7 @@ struct Maker {
         }
         made.measures = mesh.measures;
         made.mesh_report.triangles = std::int64_t(mesh.triangles);
-        if (!points.empty()) made.mark_distances = detail::distances_to(*made.level_set, choices.measured_marks);
+        if (!points.empty()) made.mark_distances = detail::distances_to(*made.level_set, made.marks);
     }
 
     void make_and_measure_mesh() {
@@ -144,8 +144,7 @@ struct Maker {
         // Parts of each of these run on one thread.
         tbb::parallel_invoke([&] { made.measures = measure(made.mesh); },
                              [&] {
-                                 if (!points.empty())
-                                     made.mark_distances = detail::distances_to(made.mesh, choices.measured_marks);
+                                 if (!points.empty()) made.mark_distances = detail::distances_to(made.mesh, made.marks);
                              });
         if (made.holes.closed_volume > 0) made.measures.volume = made.holes.closed_volume;
     }
@@ -160,6 +159,10 @@ Surface make_surface(const Problem& problem, const Choices& choices, Solution& s
     Maker maker{problem, choices, solution.start.domain, points, {}};
     maker.made.active_voxels = solution.solve.active_voxels;
     maker.made.leaf_count = solution.solve.leaf_count;
+    maker.made.marks = choices.measured_marks;
+    const std::vector<Vec3>& wrong = solution.start.inference.wrong_marks;
+    std::erase_if(maker.made.marks,
+                  [&](const Vec3& mark) { return std::find(wrong.begin(), wrong.end(), mark) != wrong.end(); });
     double seconds = 0;
     {
         const Timed timed(seconds);

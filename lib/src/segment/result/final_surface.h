@@ -11,7 +11,8 @@ struct Surface {
     FloatGridPtr level_set;                 ///< the distance to it
     TriangleMesh mesh;                      ///< empty without a mesh
     std::vector<float> distance_to_points;  ///< at the mesh's vertices; of points without an image
-    std::vector<double> mark_distances;     ///< of Choices::measured_marks to it; empty where nothing attracts
+    std::vector<Vec3> marks;                ///< Choices::measured_marks without those that are likely wrong
+    std::vector<double> mark_distances;     ///< of these to it; empty where nothing attracts
     std::int64_t active_voxels = 0, leaf_count = 0;
     MeshMeasures measures;
     RelaxReport mesh_report;

@@ -45,7 +45,7 @@ public:
     Doubts(const Problem& problem, const Choices& choices, const Solution& solution, const Surface& surface,
            SegmentReport& report, Remarks& remarks)
         : problem_(problem),
-          marks_(choices.measured_marks),
+          marks_(surface.marks),
           h_(choices.h),
           solution_(solution),
           surface_(surface),
@@ -63,6 +63,7 @@ public:
         find_lost_precision();
         find_strange_image();
         find_silent_image();
+        find_wrong_marks();
         find_doubtful_body();
     }
 
@@ -168,6 +169,19 @@ private:
     void find_silent_image() {
         if (solution_.was_asked && !solution_.guidance.used && !solution_.start.inference.used)
             warn("the image had no say between the marks: " + solution_.guidance.reason);
+    }
+
+    void find_wrong_marks() {
+        constexpr std::size_t kNamed = 5;
+        const std::vector<Vec3>& wrong = solution_.start.inference.wrong_marks;
+        if (wrong.empty()) return;
+        std::string places;
+        for (std::size_t n = 0; n < std::min(wrong.size(), kNamed); ++n)
+            places += (n > 0 ? "; " : "") + place_of(problem_.image, wrong[n]);
+        if (wrong.size() > kNamed) places += "; and " + std::to_string(wrong.size() - kNamed) + " more";
+        warn(std::to_string(wrong.size()) + " of " + std::to_string(wrong.size() + marks_.size()) +
+             " marks are likely wrong and were left out (" + places +
+             "): correct or delete them, or mark more beside them if the body lacks a part there");
     }
 
     void find_doubtful_body() {

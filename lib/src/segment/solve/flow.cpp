@@ -78,7 +78,8 @@ std::string why_vanished(const Problem& problem, const Choices& choices, const S
 
 /// A surface through the marks, moved to where the image shows, between them, what it shows at them.
 FloatGridPtr ask_image(const Problem& problem, const StartFacts& start, const FloatGridPtr& u, Solution& solution) {
-    if (!uses_image(start.flow) || start.origin == StartOrigin::Corrected) return u;
+    if (!uses_image(start.flow) || start.origin == StartOrigin::Corrected || start.origin == StartOrigin::Settled)
+        return u;
     const std::vector<Vec3>& marks = start.origin == StartOrigin::Guess ? start.on_surface : start.marks.trusted;
     GuidanceOptions options;
     options.mark_precision = problem.options.mark_precision;

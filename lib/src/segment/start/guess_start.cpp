@@ -50,16 +50,29 @@ double largest_area(const WorldBox& box) {
     return area;
 }
 
-/// What marks and image show together, where the marks alone are not as good.
+void guess(const Problem& problem, const std::vector<Vec3>& marks, StartSurface& start) {
+    StartFacts& facts = start.facts;
+    Guess made = guess::guess_in_image(facts.domain, marks, guess_options(problem, start.h(), marks), problem.clip(),
+                                       problem.run);
+    facts.guess = std::move(made.report);
+    start.u = std::move(made.u);
+    facts.on_surface = std::move(made.marks);
+}
+
+/// What marks and image show together, if the marks alone are not as good.
 void infer_start(const Problem& problem, StartSurface& start) {
     StartFacts& facts = start.facts;
-    const Timed timed(facts.report.seconds.tag);
     KnownSides sides{problem.options.inside, problem.options.outside};
     sides.outside.insert(sides.outside.end(), problem.options.exterior_seeds.begin(),
                          problem.options.exterior_seeds.end());
     Inferred inferred = infer(*start.u, facts.on_surface, *problem.image, sides, problem.run);
     facts.inference = std::move(inferred.report);
-    start.u = std::move(inferred.u);
+    if (facts.inference.wrong_marks.empty() || facts.inference.used) {
+        start.u = std::move(inferred.u);
+        facts.on_surface = std::move(inferred.marks);
+    } else {
+        guess(problem, inferred.marks, start);
+    }
 }
 
 }  // namespace
@@ -79,13 +92,9 @@ StartSurface start_from_guess(const Problem& problem, const Choices& choices, Ma
     detail::require_band_memory(largest_area(box), h, "segment", run);
     {
         const Timed timed(facts.report.seconds.tag);
-        Guess guess =
-            guess::guess_in_image(facts.domain, points, guess_options(problem, h, points), problem.clip(), run);
-        facts.guess = std::move(guess.report);
-        start.u = std::move(guess.u);
-        facts.on_surface = std::move(guess.marks);
+        guess(problem, points, start);
+        if (problem.image != nullptr && uses_image(facts.flow)) infer_start(problem, start);
     }
-    if (problem.image != nullptr && uses_image(facts.flow)) infer_start(problem, start);
     if (!rests(problem, facts, EdgeFeature::Slope))
         start.distance = find_distance_for_flow(facts, *start.u, facts.report, run);
     facts.report.remarks.choose("guess", facts.guess.summary, "", run);

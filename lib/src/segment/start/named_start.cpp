@@ -1,4 +1,6 @@
 // The start that the caller names.
+#include <openvdb/openvdb.h>
+
 #include <numbers>
 #include <utility>
 
@@ -48,6 +50,12 @@ struct GridOf {
     }
 };
 
+/// Whether a grid's voxels are those of a domain's lattice, whatever part of it.
+bool is_on_lattice(const FloatGrid& grid, const Domain& domain) {
+    const Domain own = domain_of(grid);
+    return own.voxel_size == domain.voxel_size && own.origin == domain.origin;
+}
+
 }  // namespace
 
 FloatGridPtr start_grid(const Start& start, const Domain& domain, const RunContext& run) {
@@ -59,17 +67,29 @@ StartSurface start_as_named(const Problem& problem, const Choices& choices, Mark
     const Start& named = problem.options.start;
     StartSurface start = follow(StartOrigin::Given, choices, std::move(marks));
     StartFacts& facts = start.facts;
+    const auto* level_set = std::get_if<LevelSetStart>(&named);
+    const bool is_settled = level_set != nullptr && level_set->is_settled && problem.is_guided();
     facts.domain = choose_domain_of_flow(problem, choices.h, facts.marks.attracting);
     detail::require_band_memory(known_area(named), choices.h, "segment", run);
     {
         const Timed timed(facts.report.seconds.tag);
-        start.u = start_grid(named, facts.domain, run);
+        if (is_settled && level_set->level_set && is_on_lattice(*level_set->level_set, facts.domain)) {
+            facts.domain = domain_of(*level_set->level_set);  // it stays what it is, to the bit
+            start.u = level_set->level_set->deepCopy();
+        } else {
+            start.u = start_grid(named, facts.domain, run);
+        }
     }
     facts.border_inside = inside_on_border(problem, *start.u);
     const bool is_rough = is_any<SphereStart, BoxStart>(named);
     if (is_rough) grow_to_edges(problem, choices, start);
+    if (is_settled && facts.marks.trusted.empty()) {
+        facts.origin = StartOrigin::Settled;
+        return start;
+    }
     if (uses_points(facts.flow) && problem.is_guided() && !is_rough &&
-        facts.marks.trusted.size() <= kAutomatic.most_guess_marks && !misses_marks(problem, facts, *start.u)) {
+        facts.marks.trusted.size() <= kAutomatic.most_guess_marks &&
+        (is_settled || !misses_marks(problem, facts, *start.u))) {
         correct_start(problem, start);
         facts.on_surface = facts.marks.trusted;
         facts.origin = StartOrigin::Guess;

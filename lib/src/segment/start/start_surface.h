@@ -14,6 +14,7 @@ enum class StartOrigin {
     Grown,       ///< one of these that has grown to the image's edges
     Guess,       ///< the surface through few marks
     Corrected,   ///< another tool's result, corrected by marks
+    Settled,     ///< a result that no mark corrects
     Cloud,       ///< the surface behind a cloud: quadrics, and an indicator between them
     Tagged,      ///< the points, tagged (closed or as a solid, too)
     Contours,    ///< the body between contours
@@ -54,7 +55,7 @@ struct StartSurface {
 /// Stained sheets run on beside and across the border that contours mark, and guidance by the profile alone cannot
 /// tell them apart: there the edge detector of lines flows, with the body as a guess.
 [[nodiscard]] inline bool rests(const Problem& problem, const StartFacts& start, EdgeFeature feature) {
-    if (start.origin == StartOrigin::Corrected) return true;
+    if (start.origin == StartOrigin::Corrected || start.origin == StartOrigin::Settled) return true;
     if (!problem.is_guided() || !uses_points(start.flow)) return false;
     if (start.origin == StartOrigin::Contours) return !uses_image(start.flow) || !is_line(feature);
     return start.origin == StartOrigin::Guess || start.origin == StartOrigin::Cloud;

@@ -1,0 +1,465 @@
+// A surface from one image of a time-lapse to the next one.
+#include "covol/motion.h"
+
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/Interpolation.h>
+#include <openvdb/tree/LeafManager.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "base/median.h"
+#include "covol/domain.h"
+#include "covol/start.h"
+#include "covol/surface.h"
+#include "guidance/heuristics.h"
+#include "guidance/learning.h"
+#include "guidance/wide_distance.h"
+#include "redistance/redistance.h"
+
+namespace covol {
+namespace {
+
+using namespace guidance;
+
+constexpr int kStepsOfSample = kStepsPerVoxel / 2;
+
+/// Mean brightness of a patch by steps outward of it.
+class Template {
+public:
+    Template() = default;
+    explicit Template(const PatchProfile& profile) : lo_(profile.lo) {
+        if (profile.empty()) return;
+        values_.assign(std::size_t(profile.steps()), 0.0);
+        for (int row = 0; row < profile.rows; ++row)
+            for (std::size_t s = 0; s < values_.size(); ++s)
+                values_[s] += double(profile.values[std::size_t(row) * values_.size() + s]) / profile.rows;
+    }
+    [[nodiscard]] bool has(int step) const { return step >= lo_ && step < lo_ + int(values_.size()); }
+    [[nodiscard]] double at(int step) const { return values_[std::size_t(step - lo_)]; }
+    void scale(double gain, double base) {
+        for (double& v : values_) v = gain * v + base;
+    }
+
+private:
+    int lo_ = 0;
+    std::vector<double> values_;
+};
+
+/// Means, deviations and correlation of two variables.
+class Moments {
+public:
+    void add(double x, double y) {
+        ++count_;
+        const double dx = x - x_, dy = y - y_;
+        x_ += dx / count_;
+        y_ += dy / count_;
+        xx_ += dx * (x - x_);
+        yy_ += dy * (y - y_);
+        xy_ += dx * (y - y_);
+    }
+    void add(const Moments& other) {
+        if (other.count_ == 0) return;
+        const double all = count_ + other.count_, dx = other.x_ - x_, dy = other.y_ - y_;
+        const double cross = count_ * other.count_ / all;
+        xx_ += other.xx_ + dx * dx * cross;
+        yy_ += other.yy_ + dy * dy * cross;
+        xy_ += other.xy_ + dx * dy * cross;
+        x_ += dx * other.count_ / all;
+        y_ += dy * other.count_ / all;
+        count_ = all;
+    }
+    [[nodiscard]] double count() const { return count_; }
+    [[nodiscard]] double mean_x() const { return x_; }
+    [[nodiscard]] double mean_y() const { return y_; }
+    [[nodiscard]] double deviation_x() const { return count_ > 0 ? std::sqrt(xx_ / count_) : 0; }
+    [[nodiscard]] double deviation_y() const { return count_ > 0 ? std::sqrt(yy_ / count_) : 0; }
+    [[nodiscard]] double correlation() const { return xx_ > 0 && yy_ > 0 ? xy_ / std::sqrt(xx_ * yy_) : 0; }
+
+private:
+    double count_ = 0, x_ = 0, y_ = 0, xx_ = 0, yy_ = 0, xy_ = 0;
+};
+
+}  // namespace
+
+/// What is known of a surface.
+struct SurfaceTemplate::Data {
+    FloatGridPtr given;
+    double h = 1;
+    Domain domain;         ///< with room to move
+    FloatGridPtr surface;  ///< a start on it
+    Patches patches;
+    std::optional<WideDistance> distance;
+    std::vector<int> window, range;   ///< by patch, steps: what is compared, and how far it may have moved
+    std::vector<Template> templates;  ///< by patch, of both
+
+    Data(FloatGridPtr level_set, const Image& image, const RunContext& run);
+    [[nodiscard]] WorldBox box(double around) const;
+    /// @param shift  of the image's places against the surface's
+    [[nodiscard]] Template read(std::size_t i, const SmoothImage& image, const Vec3& shift) const {
+        return Template(
+            read_profile({patches, *distance->grid(), domain, range, shift}, i, window[i] + range[i], image));
+    }
+};
+
+SurfaceTemplate::Data::Data(FloatGridPtr level_set, const Image& image, const RunContext& run)
+    : given(std::move(level_set)),
+      h(given->voxelSize()[0]),
+      domain(widened(domain_of(*given), int(std::ceil(kMotion.farthest)))),
+      surface(start_from_grid(domain, *given, run)) {
+    SurfaceVertices vertices = vertices_of(extract_mesh(*surface, {}, run), kGuide.normal_rounds);
+    patches = cut_patches(vertices, image.geometry(), kGuide.patch_width * h);
+    find_borders(std::move(vertices), patches);
+    distance.emplace(*surface, patches.places, domain, kGuide.width, run);
+    for (const double voxel : patches.voxel) {
+        window.push_back(int(std::ceil(kMotion.window * h * kStepsPerVoxel / voxel)));
+        range.push_back(int(std::ceil(kMotion.range * h * kStepsPerVoxel / voxel)));
+    }
+    const SmoothImage smooth(image, box(kGuide.width * h), h, run);
+    templates.resize(patches.size());
+    tbb::parallel_for(std::size_t(0), patches.size(), [&](std::size_t i) { templates[i] = read(i, smooth, {}); });
+}
+
+WorldBox SurfaceTemplate::Data::box(double around) const {
+    WorldBox box{patches.places.front(), patches.places.front()};
+    for (const Vec3& x : patches.places)
+        for (int a = 0; a < 3; ++a) {
+            box.min[a] = std::min(box.min[a], x[a] - around);
+            box.max[a] = std::max(box.max[a], x[a] + around);
+        }
+    return box;
+}
+
+namespace {
+
+/// A level in a wide band, moved by a part of a voxel along each axis.
+FloatGridPtr moved_by(const FloatGrid& level, const Vec3& part) {
+    FloatGridPtr result = level.deepCopy();
+    if (part == Vec3{0, 0, 0}) return result;
+    const openvdb::Vec3d back(part[0], part[1], part[2]);
+    using Leaves = openvdb::tree::LeafManager<FloatGrid::TreeType>;
+    Leaves(result->tree()).foreach ([&](FloatGrid::TreeType::LeafNodeType& leaf, std::size_t) {
+        const auto values = level.getConstAccessor();
+        for (auto value = leaf.beginValueOn(); value; ++value)
+            value.setValue(openvdb::tools::QuadraticSampler::sample(values, value.getCoord().asVec3d() - back));
+    });
+    return result;
+}
+
+/// A surface on its way into another image.
+class Motion {
+public:
+    Motion(const SurfaceTemplate::Data& known, const Image& image, const RunContext& run)
+        : known_(known),
+          patches_(known.patches),
+          h_(known.h),
+          run_(run),
+          image_(image, known.box((kGuide.width + kMotion.farthest) * known.h), known.h, run) {}
+
+    Followed follow() {
+        translate();
+        match();
+        return moved();
+    }
+
+private:
+    /// Mean squared differences of a patch from what it may have become, by offset.
+    struct Mismatch {
+        int first = 0;  ///< offset, steps
+        std::vector<double> squares;
+        /// Calls visit(offset, square) at parts of a step: between steps goes a parabola.
+        template <typename Visit>
+        void for_each_offset(const Visit& visit) const {
+            constexpr int kParts = 8;
+            for (std::size_t n = 0; n < squares.size(); ++n) {
+                const bool is_end = n == 0 || n + 1 == squares.size();
+                const double below = squares[is_end ? n : n - 1], here = squares[n],
+                             above = squares[is_end ? n : n + 1];
+                for (int part = 1 - kParts / 2; part <= kParts / 2; ++part) {
+                    const double x = double(part) / kParts;
+                    visit(first + double(n) + x,
+                          std::max(here + 0.5 * x * (above - below) + 0.5 * x * x * (above + below - 2 * here), 0.0));
+                }
+            }
+        }
+        [[nodiscard]] double least() const {
+            double best = std::numeric_limits<double>::infinity();
+            for_each_offset([&](double, double square) { best = std::min(best, square); });
+            return best;
+        }
+    };
+
+    /// Of a patch's offset, by itself.
+    struct Estimate {
+        double offset = 0, variance = 0;  ///< 0: nothing is known
+    };
+
+    void translate();
+    [[nodiscard]] double mismatch(const Vec3& shift) const;
+    void match();
+    void fit(const OffsetField& field, const std::vector<double>& measured, const std::vector<double>& precision);
+    [[nodiscard]] std::vector<Template> read_now();
+    template <typename Pair>
+    bool for_each_pair(std::size_t i, const Template& later, int offset, const Pair& pair) const;
+    [[nodiscard]] std::vector<Mismatch> compare(const std::vector<Template>& later) const;
+    [[nodiscard]] std::vector<Estimate> estimates(const std::vector<Mismatch>& mismatches, double noise) const;
+    [[nodiscard]] double radius() const;
+    [[nodiscard]] Followed moved() const;
+
+    const SurfaceTemplate::Data& known_;
+    const Patches& patches_;
+    double h_;
+    const RunContext& run_;
+    SmoothImage image_;
+    Vec3 translation_{0, 0, 0};
+    std::vector<double> offset_;  // by patch
+    Moments both_;                // brightness before and now, all along the surface
+};
+
+/// 1 - correlation of the templates with the new image, shifted.
+double Motion::mismatch(const Vec3& shift) const {
+    const std::size_t every = patches_.size() / kMotion.most_patches + 1;
+    std::vector<Moments> of_patch(patches_.size() / every + 1);
+    std::vector<double> samples(of_patch.size(), 0.0);
+    tbb::parallel_for(std::size_t(0), of_patch.size(), [&](std::size_t n) {
+        const std::size_t i = n * every;
+        if (i >= patches_.size()) return;
+        const Template& known = known_.templates[i];
+        const double step = patches_.voxel[i] / kStepsPerVoxel;
+        const Vec3 &center = patches_.centers[i], &normal = patches_.directions[i];
+        const SmoothImage::Line line = image_.along({center[0] + shift[0], center[1] + shift[1], center[2] + shift[2]},
+                                                    {step * normal[0], step * normal[1], step * normal[2]});
+        for (int s = -known_.window[i]; s <= known_.window[i]; s += kStepsOfSample) {
+            if (!known.has(s)) continue;
+            ++samples[n];
+            float value = 0;
+            if (line.sample(s, value)) of_patch[n].add(known.at(s), double(value));
+        }
+    });
+    Moments all;
+    double expected = 0;
+    for (std::size_t n = 0; n < of_patch.size(); ++n) {
+        all.add(of_patch[n]);
+        expected += samples[n];
+    }
+    // A shift out of the image is none.
+    return all.count() < kMotion.least_seen * expected ? 2.0 : 1 - all.correlation();
+}
+
+/// Pattern search (Hooke and Jeeves, J. ACM 8(2), 1961), from steps as wide as a surface may move down to a fraction of
+/// a voxel.
+void Motion::translate() {
+    double best = mismatch(translation_);
+    const double standing = best;
+    const double most = kMotion.farthest * h_;
+    for (double step = 0.5 * most; step >= kMotion.finest_step * h_; step *= 0.5)
+        for (bool moved = true; moved;) {
+            moved = false;
+            Vec3 to = translation_;
+            for (int n = 0; n < 27; ++n) {
+                const Vec3 tried{translation_[0] + (n % 3 - 1) * step, translation_[1] + (n / 3 % 3 - 1) * step,
+                                 translation_[2] + (n / 9 - 1) * step};
+                if (*std::max_element(tried.begin(), tried.end()) > most ||
+                    *std::min_element(tried.begin(), tried.end()) < -most)
+                    continue;
+                const double now = mismatch(tried);
+                if (now >= best) continue;
+                best = now;
+                to = tried;
+                moved = true;
+            }
+            translation_ = to;
+            run_.check();
+        }
+    // What noise gives is no motion.
+    if (!(best < kMotion.least_gain * standing)) translation_ = {0, 0, 0};
+}
+
+/// Twice: an offset that is found is a few percent too short, for the places between the old surface and the new one
+/// look like neither.
+void Motion::match() {
+    offset_.assign(patches_.size(), 0.0);
+    const OffsetField field(patches_, std::max(kMotion.alike * radius(), 4 * h_));
+    const std::vector<Mismatch> of_itself = compare(known_.templates);
+    for (int pass = 0; pass < kMotion.passes; ++pass) {
+        const std::vector<Mismatch> now = compare(read_now());
+        std::vector<double> least;
+        for (const Mismatch& m : now)
+            if (!m.squares.empty()) least.push_back(m.least());
+        const double spread = both_.deviation_x();
+        if (least.empty() || !(spread > 0)) return;
+        const double noise = std::max(cloud::median(least), kMotion.least_noise * spread * spread);
+        const std::vector<Estimate> seen = estimates(now, noise);
+        // Where brightness changes on one side of a place only, the mean of where it may have gone lies on the other,
+        // even if it is still there: that is the offset of nothing.
+        const std::vector<Estimate> unmoved = estimates(of_itself, noise);
+        std::vector<double> measured(offset_), precision(offset_.size(), 0.0);
+        for (std::size_t i = 0; i < measured.size(); ++i) {
+            measured[i] += seen[i].offset - unmoved[i].offset;
+            precision[i] = seen[i].variance > 0 ? 1 / seen[i].variance : 0;
+        }
+        fit(field, measured, precision);
+    }
+}
+
+/// The offsets as a smooth field, and by expectation maximisation its deviation.
+void Motion::fit(const OffsetField& field, const std::vector<double>& measured, const std::vector<double>& precision) {
+    const std::size_t count = patches_.size();
+    const std::vector<OffsetEvidence> none(count);
+    const std::vector<double> zero(count, 0.0);
+    double deviation = 0.5 * kMotion.range * h_;
+    std::vector<double> believed = precision;
+    for (int round = 0; round < kMotion.rounds; ++round) {
+        run_.check();
+        offset_ = field.fit(zero, std::vector<double>(count, deviation), none, measured, believed, nullptr).offset;
+        double squares = 0, area = 0;
+        for (std::size_t i = 0; i < count; ++i) {
+            const double unknown = 1 / (1 / (deviation * deviation) + believed[i]), off = measured[i] - offset_[i];
+            squares += patches_.area[i] * (offset_[i] * offset_[i] + unknown);
+            area += patches_.area[i];
+            // Student's t with three degrees of freedom: some places have changed, and tell nothing.
+            believed[i] = precision[i] * 4 / (3 + off * off * precision[i]);
+        }
+        deviation = std::max(std::sqrt(squares / area), kMotion.finest_step * h_);
+    }
+}
+
+/// Calls pair(brightness before, brightness later) for all that a patch has of both, moved by `offset` steps.
+/// @return false where that is less than half of what it had before
+template <typename Pair>
+bool Motion::for_each_pair(std::size_t i, const Template& later, int offset, const Pair& pair) const {
+    const Template& was = known_.templates[i];
+    int all = 0, both = 0;
+    for (int s = -known_.window[i]; s <= known_.window[i]; ++s) {
+        if (!was.has(s)) continue;
+        ++all;
+        if (!later.has(s + offset)) continue;
+        ++both;
+        pair(was.at(s), later.at(s + offset));
+    }
+    return both > 0 && 2 * both >= all;
+}
+
+/// The image along the surface, moved, in the brightness of before.
+std::vector<Template> Motion::read_now() {
+    std::vector<Template> now(patches_.size());
+    std::vector<Moments> best(now.size());
+    tbb::parallel_for(std::size_t(0), now.size(), [&](std::size_t i) {
+        Vec3 to = translation_;
+        for (int a = 0; a < 3; ++a) to[a] += offset_[i] * patches_.directions[i][a];
+        now[i] = known_.read(i, image_, to);
+        for (int offset = -known_.range[i]; offset <= known_.range[i]; ++offset) {
+            Moments both;
+            if (!for_each_pair(i, now[i], offset, [&](double was, double is) { both.add(was, is); })) continue;
+            if (both.correlation() > best[i].correlation()) best[i] = both;
+        }
+    });
+    // A lamp fades, a stain bleaches: one gain and one offset of brightness, where each patch fits best.
+    both_ = {};
+    for (const Moments& of_patch : best) both_.add(of_patch);
+    const double gain = both_.deviation_y() > 0 ? both_.deviation_x() / both_.deviation_y() : 1.0;
+    for (Template& t : now) t.scale(gain, both_.mean_x() - gain * both_.mean_y());
+    return now;
+}
+
+std::vector<Motion::Mismatch> Motion::compare(const std::vector<Template>& later) const {
+    std::vector<Mismatch> result(later.size());
+    tbb::parallel_for(std::size_t(0), later.size(), [&](std::size_t i) {
+        for (int offset = -known_.range[i]; offset <= known_.range[i]; ++offset) {
+            double sum = 0;
+            int count = 0;
+            const bool enough = for_each_pair(i, later[i], offset, [&](double was, double is) {
+                sum += (is - was) * (is - was);
+                ++count;
+            });
+            if (!enough) continue;  // at the ends of the range
+            if (result[i].squares.empty()) result[i].first = offset;
+            result[i].squares.push_back(sum / count);
+        }
+    });
+    return result;
+}
+
+std::vector<Motion::Estimate> Motion::estimates(const std::vector<Mismatch>& mismatches, double noise) const {
+    std::vector<Estimate> result(mismatches.size());
+    tbb::parallel_for(std::size_t(0), result.size(), [&](std::size_t i) {
+        const Mismatch& m = mismatches[i];
+        if (m.squares.empty()) return;
+        int seen = 0;
+        for (int s = -known_.window[i]; s <= known_.window[i]; ++s) seen += known_.templates[i].has(s);
+        const double samples = double(seen) / kStepsPerVoxel;  // closer than a voxel they are one
+        const double best = m.least();
+        double mass = 0, first = 0, second = 0;
+        m.for_each_offset([&](double offset, double square) {
+            const double weight = std::exp(-0.5 * samples * (square - best) / noise);
+            mass += weight;
+            first += weight * offset;
+            second += weight * offset * offset;
+        });
+        const double step = patches_.voxel[i] / kStepsPerVoxel, mean = first / mass;
+        result[i].offset = mean * step;
+        result[i].variance = (std::max(second / mass - mean * mean, 0.0) + kMotion.variance) * step * step;
+    });
+    return result;
+}
+
+/// Of a ball of the surface's area and volume.
+double Motion::radius() const {
+    double area = 0, volume = 0;
+    const Vec3& origin = patches_.centers.front();
+    for (std::size_t i = 0; i < patches_.size(); ++i) {
+        area += patches_.area[i];
+        for (int a = 0; a < 3; ++a)
+            volume += patches_.area[i] * patches_.directions[i][a] * (patches_.centers[i][a] - origin[a]) / 3;
+    }
+    return 3 * std::abs(volume) / area;
+}
+
+Followed Motion::moved() const {
+    Followed result;
+    MotionReport& report = result.report;
+    report.translation = translation_;
+    report.correlation = both_.correlation();
+    double area = 0;
+    for (std::size_t i = 0; i < patches_.size(); ++i) {
+        report.mean_offset += patches_.area[i] * offset_[i];
+        area += patches_.area[i];
+        report.max_offset = std::max(report.max_offset, std::abs(offset_[i]));
+    }
+    report.mean_offset /= area;
+    result.u = known_.given;
+    const bool is_still = translation_ == Vec3{0, 0, 0} && !(report.max_offset > kMotion.still * h_);
+    if (is_still) return result;
+    const FloatGridPtr level = known_.distance->less(on_vertices(patches_, kGuide.patch_width * h_, offset_));
+    // Whole voxels are another place of the lattice, parts of one another value: linear interpolation would shrink what
+    // is convex, from frame to frame.
+    Vec3 whole, part;
+    for (int a = 0; a < 3; ++a) {
+        whole[a] = std::round(translation_[a] / h_);
+        part[a] = translation_[a] / h_ - whole[a];
+    }
+    result.u = detail::redistance(*moved_by(*level, part), known_.domain, kHalfWidthVoxels, detail::DomainEnd::Closed,
+                                  "motion", run_);
+    if (whole == Vec3{0, 0, 0}) return result;
+    result.u->transform().postTranslate(h_ * openvdb::Vec3d(whole[0], whole[1], whole[2]));
+    result.u = start_from_grid(known_.domain, *result.u, run_);
+    return result;
+}
+
+}  // namespace
+
+SurfaceTemplate::SurfaceTemplate(const FloatGridPtr& surface, const Image& image, const RunContext& run) {
+    with_threads(run, [&] { data_ = std::make_shared<const Data>(surface, image, run); });
+}
+
+Followed SurfaceTemplate::follow(const Image& image, const RunContext& run) const {
+    Followed result;
+    with_threads(run, [&] { result = Motion(*data_, image, run).follow(); });
+    return result;
+}
+
+}  // namespace covol
