@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "covol/api.h"
+#include "covol/domain.h"
 #include "covol/fwd.h"
 #include "covol/image.h"
 #include "covol/options_table.h"
@@ -77,13 +78,19 @@ private:
     std::shared_ptr<const Data> data_;
 };
 
+/// A guess that was redrawn before marks correct it: redraw().
+struct RedrawnGuess {
+    FloatGridPtr u;  ///< null: it was not
+    WorldBox box;    ///< beyond it is the guess
+};
+
 /// @param guess  a start (start_from_mask() and its kin): a signed distance clamped to kHalfWidthVoxels
 /// @param marks  on the surface, world units
 /// @param inside, outside  seeds; those that the guess has on the wrong side move it to half a voxel beyond them
 /// @throws Error InvalidOptions, InvalidInput (no surface in the guess)
 [[nodiscard]] COVOL_API GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>& marks,
                                                       const std::vector<Vec3>& inside, const std::vector<Vec3>& outside,
-                                                      const CorrectionOptions& options = {},
-                                                      const RunContext& run = {});
+                                                      const CorrectionOptions& options = {}, const RunContext& run = {},
+                                                      const RedrawnGuess& redrawn = {});
 
 }  // namespace covol

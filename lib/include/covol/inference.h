@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "covol/api.h"
+#include "covol/domain.h"
 #include "covol/fwd.h"
 #include "covol/image.h"
 #include "covol/run.h"
@@ -59,6 +60,24 @@ struct Inferred {
 /// @return does not depend on the number of threads, nor on the order of the marks
 /// @throws Error InvalidInput, Cancelled.
 [[nodiscard]] COVOL_API Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& marks, const Image& image,
+                                       const KnownSides& sides = {}, const RunContext& run = {});
+
+/// A guess that redraw() has changed, or has not.
+struct Redrawn {
+    FloatGridPtr u;   ///< a start, as start_from_grid() gives it
+    WorldBox box;     ///< beyond it nothing has changed
+    double bits = 0;  ///< what the image tells of the sides of the guess at places that it was not learnt from
+    bool used = false;
+    std::string reason;  ///< why, in plain words
+};
+
+/// Redraws a guess where marks say that it is wrong: how inside and outside look is learnt from the guess where no mark
+/// speaks against it, and around marks that it misses, as far as a few times what it misses them by, the body of least
+/// surface with these log odds takes its place. Nothing comes that hangs on nothing, and no void.
+/// @param guess  a start: a signed distance, clamped
+/// @param marks  world positions on the surface
+/// @throws Error Cancelled.
+[[nodiscard]] COVOL_API Redrawn redraw(const FloatGridPtr& guess, const std::vector<Vec3>& marks, const Image& image,
                                        const KnownSides& sides = {}, const RunContext& run = {});
 
 }  // namespace covol

@@ -155,6 +155,17 @@ bool comes_inside(double guess, double move, const Facets& hull, const Vec3& wor
                         [&](const HalfSpace& facet) { return level + detail::along(facet, world) >= 0; });
 }
 
+bool holds(const WorldBox& box, const Vec3& world) {
+    for (int a = 0; a < 3; ++a)
+        if (world[a] < box.min[a] || world[a] > box.max[a]) return false;
+    return true;
+}
+
+double nearest_level(const FloatGrid& grid, const Vec3& world) {
+    return double(openvdb::tools::BoxSampler::sample(
+        grid.getConstAccessor(), grid.transform().worldToIndex(openvdb::Vec3d(world[0], world[1], world[2]))));
+}
+
 double sum_of(const std::vector<Bump>& bumps, const Vec3& world) {
     double sum = 0;
     for (const Bump& b : bumps) {
@@ -279,7 +290,9 @@ struct GuessCorrection::Data {
     Data(const FloatGridPtr& start, const std::vector<Vec3>& surface) : grid(start), distance(start, surface) {}
     FloatGridPtr grid;
     FarDistance distance;
-    Facets hull;  ///< of the guess, the marks and the seeds that act; empty where none of them is far
+    FloatGridPtr given;  ///< before it was redrawn; null: it was not
+    WorldBox redrawn{};  ///< beyond it `given` and `grid` are the same
+    Facets hull;         ///< of the guess, the marks and the seeds that act; empty where none of them is far
     std::vector<Bump> bumps;
     CorrectionReport report;
 
@@ -358,10 +371,15 @@ FloatGridPtr GuessCorrection::start(const RunContext& run) const {
 
 GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>& marks,
                               const std::vector<Vec3>& inside, const std::vector<Vec3>& outside,
-                              const CorrectionOptions& options, const RunContext& run) {
+                              const CorrectionOptions& options, const RunContext& run, const RedrawnGuess& redrawn) {
     require_valid(options, "correct_guess");
-    const std::vector<Vec3> surface = find_crossings(*guess);
-    auto data = std::make_shared<GuessCorrection::Data>(guess, surface);
+    const FloatGridPtr& start = redrawn.u ? redrawn.u : guess;
+    const std::vector<Vec3> surface = find_crossings(*start);
+    auto data = std::make_shared<GuessCorrection::Data>(start, surface);
+    if (redrawn.u) {
+        data->given = guess;
+        data->redrawn = redrawn.box;
+    }
     with_threads(run, [&] {
         const double h = guess->voxelSize()[0];
         const double precision = options.precision.value_or(kCorrection.precision_voxels * h);
@@ -423,13 +441,15 @@ CorrectedMask GuessCorrection::apply(const Image& mask, int label, const RunCont
                     *value = broken ? 0 : std::int32_t(old);
                     const Vec3 world = geometry.index_to_world({double(i), double(j), double(k)});
                     const double move = sum_of(bumps, world);
-                    if (move == 0) continue;
+                    const bool is_redrawn = data_->given && holds(data_->redrawn, world);
+                    if (move == 0 && !is_redrawn) continue;
                     ++near;
-                    if (std::abs(move) < at_least) continue;
+                    if (std::abs(move) < at_least && !is_redrawn) continue;
                     const double before = data_->distance.at(world);
                     at_least = std::abs(before) - data_->distance.slack();
                     const bool in = comes_inside(before, move, data_->hull, world);
-                    if ((before < 0) == in) continue;
+                    const double given = is_redrawn ? nearest_level(*data_->given, world) : before;
+                    if ((given < 0) == in) continue;
                     if (in && *value == 0) {
                         *value = label;
                         ++came;

@@ -70,6 +70,14 @@ struct InferenceHeuristics {
     double usual_off = heuristic("inference.usual_off", 0.3);
     /// [rounds] In which wrong marks are left out.
     int wrong_rounds = heuristic("inference.wrong_rounds", 4);
+    /// [voxels] From a guess to a mark that it misses; at least half of the widest spacing.
+    double missed_voxels = heuristic("inference.missed_voxels", 1.5);
+    /// [of what it misses a mark by] Within which a guess is redrawn.
+    double redrawn = heuristic("inference.redrawn", 1.8);
+    /// [voxels] By which a guess misses a mark, at most.
+    double farthest_miss = heuristic("inference.farthest_miss", 30);
+    /// [bits] That an image which redraws a guess tells of its sides.
+    double redraw_bits = heuristic("inference.redraw_bits", 0.3);
     /// [Dice] Of guess and body, above which they are one.
     double agreement = heuristic("inference.agreement", 0.9);
     /// [1 - Dice] Of a result whose error times its area is its volume: by 120 runs of 19 structures with 20, 60 and

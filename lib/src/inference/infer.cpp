@@ -42,11 +42,9 @@ public:
         choose_box();
     }
 
-    /// Of the image, in the box around the marks.
-    [[nodiscard]] double voxels() const {
-        double count = 1;
-        for (int a = 0; a < 3; ++a) count *= (high_[a] - low_[a]) / image_.geometry().spacing[a] + 1;
-        return count;
+    /// That candidates are compared on.
+    [[nodiscard]] Lattice coarse_lattice() const {
+        return cover(image_.geometry(), low_, high_, kInference.coarse_nodes);
     }
 
     /// False where no candidate has a body.
@@ -127,7 +125,7 @@ void Inference::choose_box() {
 }
 
 bool Inference::find(InferenceReport& report) {
-    coarse_.emplace(image_, cover(image_.geometry(), low_, high_, kInference.coarse_nodes), marks_, run_);
+    coarse_.emplace(image_, coarse_lattice(), marks_, run_);
     Candidate chosen = best_candidate();
     report.bits = chosen.bits;
     amplitude_ = chosen.amplitude;
@@ -365,10 +363,7 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
     add_places(geometry, sides.inside, marks.inside);
     add_places(geometry, sides.outside, marks.outside);
     Inference inference(image, std::move(marks), run);
-    // A copy of the box is not held, but chunks of it are.
-    const double bytes = sizeof(float) * inference.voxels();
-    if (inference.voxels() > kInference.most_voxels ||
-        (run.memory_budget > 0 && bytes > kInference.most_of_memory * double(run.memory_budget)))
+    if (is_too_large(inference.coarse_lattice(), geometry, run))
         return keep_guess("the image's box around the marks is too large to be read as a whole");
     with_threads(run, [&] {
         HeldOut held;

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "inference/heuristics.h"
+
 namespace covol::inference {
 namespace {
 
@@ -105,6 +107,14 @@ Lattice cover(const ImageGeometry& geometry, const Vec3& low, const Vec3& high, 
     }
     with(coarse);
     return lattice;
+}
+
+bool is_too_large(const Lattice& lattice, const ImageGeometry& geometry, const RunContext& run) {
+    double voxels = 1;
+    for (int a = 0; a < 3; ++a) voxels *= (lattice.size[a] - 1) * lattice.spacing[a] / geometry.spacing[a] + 1;
+    // A copy of the box is not held, but chunks of it are.
+    return voxels > kInference.most_voxels ||
+           (run.memory_budget > 0 && sizeof(float) * voxels > kInference.most_of_memory * double(run.memory_budget));
 }
 
 Field sample(const Image& image, const Lattice& lattice, const RunContext& run) {

@@ -43,6 +43,9 @@ struct Lattice {
 /// lie symmetrically about the middle of the box otherwise, so that a mirror image has the same.
 [[nodiscard]] Lattice cover(const ImageGeometry& geometry, const Vec3& low, const Vec3& high, double most);
 
+/// Whether the image's box under a lattice is too large to be read as a whole.
+[[nodiscard]] bool is_too_large(const Lattice& lattice, const ImageGeometry& geometry, const RunContext& run);
+
 /// The image at the nodes: its voxels, or their mean with weights that fall to 0 at the next nodes.
 [[nodiscard]] Field sample(const Image& image, const Lattice& lattice, const RunContext& run);
 

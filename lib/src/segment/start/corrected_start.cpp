@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "covol/inference.h"
 #include "segment/doubts.h"
 #include "segment/heuristics.h"
 #include "segment/start/starts.h"
@@ -28,8 +29,15 @@ GuessCorrection correct(const Problem& problem, const std::vector<Vec3>& marks, 
     const RunContext& run = problem.run;
     const Timed timed(start.facts.report.seconds.tag);
     start.facts.correction_options = correction_options(problem, start.h());
+    RedrawnGuess redrawn;
+    if (problem.image != nullptr && uses_image(start.facts.flow)) {
+        Redrawn by_image =
+            redraw(start.u, marks, *problem.image, {problem.options.inside, problem.options.outside}, run);
+        start.facts.report.remarks.choose("image", by_image.used ? "used" : "not used", by_image.reason, run);
+        if (by_image.used) redrawn = {by_image.u, by_image.box};
+    }
     GuessCorrection made = correct_guess(start.u, marks, problem.options.inside, problem.options.outside,
-                                         start.facts.correction_options, run);
+                                         start.facts.correction_options, run, redrawn);
     const CorrectionReport& report = start.facts.correction_report = made.report();
     if (report.before_max > kDoubts.far_from_guess * report.depth)
         start.facts.report.remarks.warn(
