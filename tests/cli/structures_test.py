@@ -435,6 +435,20 @@ class Evidence(Case):
         return ("segment", self.scene, "--points", self.marks, "--init", "sphere:0,0,0,%g" % self.RADIUS, "--max-steps", 0,
                 "-o", "s.vdb", *more)
 
+    def test_what_rests_on_nothing_does_not_depend_on_the_voxel_size(self):
+        points = ball_points(self.CENTER, self.RADIUS, 300)
+        few = self.inputs / "few.xyz"
+        write_points(few, np.concatenate([points[points[:, 2] < 0][::3], points[points[:, 2] >= 0][::40]]))
+        found = []
+        for voxel in (1, 2):
+            report = self.report("segment", self.scene, "--points", few, "--voxel-size", f"{voxel * H}", "--suggest", 2, "-o", "s.vdb")
+            found.append(report["evidence"])
+            # As far as the surface through marks is right to a voxel of the image: 0.3 d^2 / (2 R) = H.
+            radius = 3 * report["surface"]["volume"] / report["surface"]["area"]
+            self.assertAlmostEqual(found[-1]["reach"], math.sqrt(2 * radius * H / 0.3), delta=0.01 * H)
+        one, other = (e["unsupported_area"] / e["area"] for e in found)
+        self.assertAlmostEqual(one, other, delta=0.03)
+
     def test_suggestions_lie_on_the_bare_half(self):
         done = self.run_covol(*self.judge("--suggest", 3, "--json", "r.json"))
         lines = [l for l in done.stdout.splitlines() if "marks would help in slice" in l]

@@ -21,8 +21,9 @@
 namespace covol {
 namespace {
 
-constexpr double kReachVoxels = 5.0;       // of marks whose attraction is unlimited
+constexpr double kSagitta = 0.3;           // of it, that a surface of least bending is off
 constexpr double kWeakLine = 0.93;         // 1 - g where the image is 1.2 times as bright as the band's median
+constexpr double kLargeOverlap = 0.02;     // of the smaller structure
 constexpr double kLeastCorrelation = 0.5;  // of brightness along a surface, from frame to frame
 constexpr int kBesideBand = 5;             // voxels beside the surface's band that tell how steep slopes are here
 
@@ -34,6 +35,19 @@ FloatGridPtr around(const FloatGrid& surface) {
     const Domain domain = domain_of(surface);
     topology->clip({openvdb::Coord(domain.min.data()), openvdb::Coord(domain.max.data())});
     return topology;
+}
+
+double smallest_spacing(const Image& image) {
+    const Vec3& spacing = image.geometry().spacing;
+    return *std::min_element(spacing.begin(), spacing.end());
+}
+
+/// How far from a mark the surface that bends least is right to a voxel of the image: at a distance d it is off by
+/// kSagitta d^2 / (2 R), R the radius of a ball with the body's volume by its area (guidance.cpp says so, too).
+double reach_of_marks(const SegmentResult& result, const Image& image) {
+    const MeshMeasures& body = result.report.surface;
+    const double radius = body.area > 0 ? 3 * std::abs(body.volume) / body.area : 0;
+    return std::max(std::sqrt(2 * radius * smallest_spacing(image) / kSagitta), smallest_spacing(image));
 }
 
 /// What belongs to the surface: as segment() measures it.
@@ -80,6 +94,15 @@ void separate_all(StructuresResult& all, const std::optional<Image>& image, cons
         measure_again(structure, image, speaking_for(structure.name, all.structures.size(), run));
     }
     all.overlaps = std::move(separated.report.overlaps);
+    for (const StructureOverlap& overlap : all.overlaps) {
+        if (overlap.inner) continue;  // one within the other: that is no mistake
+        const StructureResult &a = all.structures[overlap.a], &b = all.structures[overlap.b];
+        const double smaller = std::min(a.result.report.surface.volume, b.result.report.surface.volume);
+        if (overlap.volume < kLargeOverlap * smaller) continue;
+        run.warn("'" + a.name + "' and '" + b.name + "' both claimed " + pipeline::number(overlap.volume) + " (" +
+                 pipeline::number(std::round(100 * overlap.volume / smaller)) +
+                 " % of the smaller one); the surface was put halfway: mark more where they touch");
+    }
     all.separate_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
@@ -177,13 +200,16 @@ Evidence assess_evidence(const SegmentResult& result, const std::vector<Vec3>& m
     const SegmentOptions& used = result.report.resolved;
     EvidenceOptions options;
     const double range = used.evolve.attraction_range.value_or(0);
-    options.reach = range > 0 ? range : kReachVoxels * *used.voxel_size;
+    options.reach = range > 0 ? range : reach_of_marks(result, image);
     options.suggestions = suggestions;
     // Brightness is nowhere 0 as slopes are, and g falls below 1/2 before there is a line.
     if (is_line(used.edge.feature)) options.weak_edge = kWeakLine;
-    // Edges that moved nothing were not looked for.
-    const FloatGridPtr g =
-        result.edge ? result.edge : detect_edges(image, *around(*result.surface), used.edge, run).grid;
+    FloatGridPtr g = result.edge;
+    if (!g) {  // edges that moved nothing were not looked for
+        EdgeOptions edge = used.edge;
+        if (!edge.sigma) edge.sigma = smallest_spacing(image);
+        g = detect_edges(image, *around(*result.surface), edge, run).grid;
+    }
     return assess_evidence(result.mesh, marks, *g, image.geometry(), options, run);
 }
 

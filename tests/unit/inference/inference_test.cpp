@@ -200,3 +200,25 @@ TEST_CASE("Few marks, and boxes that are too large, leave the guess as it is, an
     CHECK_FALSE(inferred.report.expected);
     CHECK(same(*inferred.u, *guess));
 }
+
+TEST_CASE("Wrong marks among many right ones are named, and cost little") {
+    std::vector<Vec3> marks = marks_on(horn, 60);
+    const Image image = Image::from_values(geometry(), picture(horn, 60, 15).data());
+    const double right = dice(*infer(*guess_of(marks), marks, image).u, horn);
+    std::vector<Vec3> wrong;
+    std::mt19937 random(2);
+    std::uniform_real_distribution<double> wide(-24, 24);
+    while (wrong.size() < 6) {
+        const Vec3 p{wide(random), wide(random), wide(random) / 2};
+        if (std::abs(horn(p)) < 5) continue;
+        wrong.push_back(p);
+        marks[wrong.size()] = p;
+    }
+    const Inferred inferred = infer(*guess_of(marks), marks, image);
+    REQUIRE(inferred.report.used);
+    CHECK(dice(*inferred.u, horn) > right - 0.02);
+    const std::vector<Vec3>& named = inferred.report.wrong_marks;
+    for (const Vec3& p : named) CHECK(std::find(wrong.begin(), wrong.end(), p) != wrong.end());
+    CHECK(named.size() >= 5);
+    CHECK(inferred.marks.size() == marks.size() - named.size());
+}

@@ -55,8 +55,16 @@ StructuresOptions points_alone() {
 }  // namespace
 
 TEST_CASE("Structures are measured as they are once they are separated") {
+    RunContext run;
+    std::vector<std::string> warnings;
+    run.log = [&](LogLevel level, const std::string& line) {
+        if (level == LogLevel::Warning) warnings.push_back(line);
+    };
     const StructuresResult found =
-        segment_structures(scene(), {ball("left", kLeft), ball("right", kRight)}, points_alone());
+        segment_structures(scene(), {ball("left", kLeft), ball("right", kRight)}, points_alone(), run);
+    CHECK(std::any_of(warnings.begin(), warnings.end(), [](const std::string& line) {
+        return line.find("'left' and 'right' both claimed") != std::string::npos;
+    }));
     REQUIRE(found.structures.size() == 2);
     REQUIRE(found.overlaps.size() == 1);
     for (const StructureResult& s : found.structures) {
