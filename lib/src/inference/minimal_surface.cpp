@@ -31,8 +31,7 @@ void ascend(const Row& row, const Field& weight, State& s) {
     float* __restrict pz = s.pz.data() + row.begin;
     const float* __restrict next_y = bar + (row.has_y ? row.step_y : 0);
     const float* __restrict next_z = bar + (row.has_z ? row.step_z : 0);
-    for (int i = 0; i < row.count; ++i) {
-        const float gx = i + 1 < row.count ? bar[i + 1] - bar[i] : 0.0F;
+    const auto at = [&](int i, float gx) {
         const float x = px[i] + s.scale[0] * gx, y = py[i] + s.scale[1] * (next_y[i] - bar[i]),
                     z = pz[i] + s.scale[2] * (next_z[i] - bar[i]);
         const float size = std::sqrt(x * x + y * y + z * z);
@@ -40,7 +39,10 @@ void ascend(const Row& row, const Field& weight, State& s) {
         px[i] = x * shrink;
         py[i] = y * shrink;
         pz[i] = z * shrink;
-    }
+    };
+    const int last = row.count - 1;
+    for (int i = 0; i < last; ++i) at(i, bar[i + 1] - bar[i]);
+    at(last, 0.0F);
 }
 
 void descend(const Row& row, const Field& cost, State& s, Field& u) {
@@ -52,15 +54,30 @@ void descend(const Row& row, const Field& cost, State& s, Field& u) {
     float* __restrict value = u.data() + row.begin;
     const float *before_y = py - (row.after_y ? row.step_y : 0), *before_z = pz - (row.after_z ? row.step_z : 0);
     const float with_y = row.after_y ? s.scale[1] : 0.0F, with_z = row.after_z ? s.scale[2] : 0.0F;
-    for (int i = 0; i < row.count; ++i) {
-        const float before_x = i > 0 ? px[i - 1] : 0.0F;
+    const auto at = [&](int i, float before_x) {
         // At the end of the lattice p is 0 by the gradient that was taken there.
         const float div = s.scale[0] * (px[i] - before_x) + s.scale[1] * py[i] - with_y * before_y[i] +
                           s.scale[2] * pz[i] - with_z * before_z[i];
         const float next = std::clamp(value[i] + div - s.tau * c[i], 0.0F, 1.0F);
         bar[i] = 2 * next - value[i];
         value[i] = next;
+    };
+    at(0, 0.0F);
+    for (int i = 1; i < row.count; ++i) at(i, px[i - 1]);
+}
+
+constexpr int kCheckEvery = 25;
+constexpr std::size_t kSteady = 20000;
+
+/// On which side of 1/2 each node is. @return how many have changed
+std::size_t update_sides(const Field& u, std::vector<char>& side) {
+    std::size_t changed = 0;
+    for (std::size_t n = 0; n < u.size(); ++n) {
+        const char now = u[n] > 0.5F ? 1 : 0;
+        changed += std::size_t(now != side[n]);
+        side[n] = now;
     }
+    return changed;
 }
 
 }  // namespace
@@ -92,8 +109,13 @@ void minimize_surface(const Lattice& lattice, const Field& weight, const Field& 
             for (int j = 0; j < lattice.size[1]; ++j) visit(row_of(j, k));
         });
     };
+    std::vector<char> side(count, 0);
     for (int n = 0; n < iterations; ++n) {
-        if (n % 16 == 0) run.check();
+        if (n % kCheckEvery == 0) {
+            run.check();
+            const std::size_t changed = update_sides(u, side);
+            if (n > 0 && changed * kSteady < count) break;
+        }
         for_each_row([&](const Row& row) { ascend(row, weight, s); });
         for_each_row([&](const Row& row) { descend(row, cost, s, u); });
     }
