@@ -18,7 +18,7 @@ namespace covol::inference {
 
 /// What is known of a lattice's nodes before there is a candidate.
 struct Scene {
-    const Marks& marks;
+    Marks marks;
     Lattice lattice;
     std::shared_ptr<const ImageFeatures> image;
     Field to_mark;                                         ///< distance to the nearest mark

@@ -68,6 +68,10 @@ struct InferenceHeuristics {
     double wrong_prior = heuristic("inference.wrong_prior", 0.05);
     /// [cells] From right marks to the body, in the mean, at least.
     double usual_off = heuristic("inference.usual_off", 0.3);
+    /// [of the marks] That may be wrong: where more seem to be it is the body that is.
+    double most_wrong = heuristic("inference.most_wrong", 0.2);
+    /// [spacings] Within which two other suspects say that a mark is right, and the body lacks a part.
+    double beside_spacings = heuristic("inference.beside_spacings", 3);
     /// [rounds] In which wrong marks are left out.
     int wrong_rounds = heuristic("inference.wrong_rounds", 4);
     /// [voxels] From a guess to a mark that it misses; at least half of the widest spacing.

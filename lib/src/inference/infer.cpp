@@ -31,9 +31,24 @@ constexpr std::array kSigmas{1.0, 2.0};  // cells, of the gradients that are axe
 
 /// Of marks that were left out: how far off they lie, negative inside.
 struct HeldOut {
-    std::vector<std::size_t> marks;
+    std::vector<Vec3> marks;
     std::vector<double> of_body, of_guess;
 };
+
+/// The weight of the guess, in [0,1], with which the mean of both predicts marks best (stacking: Wolpert, Neural
+/// Networks 5(2), 1992).
+/// @param shrink  of the body's errors on a finer lattice
+double weight_of_guess(const HeldOut& held, double cell, double shrink) {
+    constexpr double kMostCells = 4;  // a miss is a miss
+    double with = 0, square = 0;
+    for (std::size_t n = 0; n < held.of_body.size(); ++n) {
+        const double most = kMostCells * cell, body = std::clamp(shrink * held.of_body[n], -most, most),
+                     guess = std::clamp(held.of_guess[n], -most, most);
+        with += body * (body - guess);
+        square += (body - guess) * (body - guess);
+    }
+    return square > 0 ? std::clamp(with / square, 0.0, 1.0) : 0.0;
+}
 
 class Inference {
 public:
@@ -151,15 +166,24 @@ bool Inference::leave_out_wrong(const HeldOut& held) {
     for (const float value : level) anywhere += std::abs(double(value)) / double(level.size());
     std::vector<double> off;
     for (std::size_t i = 0; i < held.marks.size(); ++i)  // a body passes marks that it was made from, wrong ones too
-        off.push_back(std::min(std::abs(coarse_body_.lattice.value(level, marks_.places[held.marks[i]])),
-                               std::abs(held.of_body[i])));
+        off.push_back(std::min(std::abs(coarse_body_.lattice.value(level, held.marks[i])), std::abs(held.of_body[i])));
     const std::vector<double> wrong = probability_wrong(off, anywhere, kInference.usual_off * coarse_cell());
-    std::vector<std::size_t> left_out;
+    std::vector<Vec3> suspects;
     for (std::size_t i = 0; i < held.marks.size(); ++i)
-        if (wrong[i] > 0.5) left_out.push_back(held.marks[i]);
-    if (left_out.empty()) return false;
-    for (const std::size_t n : left_out) wrong_.push_back(marks_.places[n]);
-    marks_ = marks_.without(left_out, image_.geometry());
+        if (wrong[i] > 0.5) suspects.push_back(held.marks[i]);
+    // Several beside each other lie on a part that the body lacks.
+    const double beside = kInference.beside_spacings * marks_.spacing;
+    std::vector<Vec3> all = wrong_;
+    for (const Vec3& suspect : suspects) {
+        const auto company = std::count_if(suspects.begin(), suspects.end(), [&](const Vec3& other) {
+            return other != suspect && length(minus(other, suspect)) < beside;
+        });
+        if (company < 2) all.push_back(suspect);
+    }
+    const double given = double(marks_.places.size() + wrong_.size());
+    if (all.size() == wrong_.size() || double(all.size()) > kInference.most_wrong * given) return false;
+    wrong_ = std::move(all);
+    marks_ = marks_.without(wrong_, image_.geometry());
     choose_box();
     return true;
 }
@@ -181,7 +205,7 @@ HeldOut Inference::hold_out() const {
         HeldOut& held = by_fold[std::size_t(fold)];
         for (const std::size_t n : out) {
             const Vec3& mark = marks_.places[n];
-            held.marks.push_back(n);
+            held.marks.push_back(mark);
             held.of_body.push_back(again.solid.lattice.value(level, mark));
             held.of_guess.push_back(surface.value(mark));
         }
@@ -229,21 +253,6 @@ double median_size(const std::vector<double>& values) {
     std::vector<double> sizes;
     for (const double v : values) sizes.push_back(std::abs(v));
     return sizes.empty() ? 0.0 : cloud::median(sizes);
-}
-
-/// The weight of the guess, in [0,1], with which the mean of both predicts marks best (stacking: Wolpert, Neural
-/// Networks 5(2), 1992).
-/// @param shrink  of the body's errors on a finer lattice
-double weight_of_guess(const HeldOut& held, double cell, double shrink) {
-    constexpr double kMostCells = 4;  // a miss is a miss
-    double with = 0, square = 0;
-    for (std::size_t n = 0; n < held.of_body.size(); ++n) {
-        const double most = kMostCells * cell, body = std::clamp(shrink * held.of_body[n], -most, most),
-                     guess = std::clamp(held.of_guess[n], -most, most);
-        with += body * (body - guess);
-        square += (body - guess) * (body - guess);
-    }
-    return square > 0 ? std::clamp(with / square, 0.0, 1.0) : 0.0;
 }
 
 /// A solid as a level anywhere in the world.
@@ -367,7 +376,7 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
         return keep_guess("the image's box around the marks is too large to be read as a whole");
     with_threads(run, [&] {
         HeldOut held;
-        for (int round = 0; round <= kInference.wrong_rounds; ++round) {
+        for (int round = 0;; ++round) {
             if (!inference.find(report)) {
                 keep_guess("no body is likely by the image");
                 return;
@@ -389,6 +398,11 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
             if (is_wrong) report.wrong_marks.push_back(mark);
             return is_wrong;
         });
+        const auto reject_body = [&](const char* reason) {  // nor what it says of the marks
+            report.wrong_marks.clear();
+            result.marks = world;
+            keep_guess(reason);
+        };
         const Overlap overlap = compare(guess, geometry, body.lattice, level);
         report.agreement = overlap.dice;
         report.expected = expected_dice(held, report.weight_of_guess, cell, overlap);
@@ -397,14 +411,14 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
             return;
         }
         if (fraction_off(geometry, result.marks, body.lattice, level) > kInference.most_off) {
-            report.expected.reset();  // of a body that is not taken
-            keep_guess("the likeliest body by the image leaves many marks");
+            report.expected.reset();
+            reject_body("the likeliest body by the image leaves many marks");
             return;
         }
         const Level at(geometry, body.lattice, level);
         const auto at_guess = [&](const Vec3& place) { return detail::levels_at(guess, std::vector<Vec3>{place})[0]; };
         if (count_wrong(sides, at) > count_wrong(sides, at_guess)) {
-            keep_guess(
+            reject_body(
                 "more of the places that are known to be inside or outside are so of the surface of least bending");
             return;
         }

@@ -62,10 +62,10 @@ Marks Marks::without(int fold, const ImageGeometry& geometry, std::vector<std::s
     return part;
 }
 
-Marks Marks::without(const std::vector<std::size_t>& left_out, const ImageGeometry& geometry) const {
+Marks Marks::without(const std::vector<Vec3>& left_out, const ImageGeometry& geometry) const {
     std::vector<Vec3> rest;
-    for (std::size_t n = 0; n < places.size(); ++n)
-        if (std::find(left_out.begin(), left_out.end(), n) == left_out.end()) rest.push_back(places[n]);
+    for (const Vec3& mark : places)
+        if (std::find(left_out.begin(), left_out.end(), mark) == left_out.end()) rest.push_back(mark);
     return {std::move(rest), inside, outside, geometry};
 }
 

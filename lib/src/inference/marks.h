@@ -26,7 +26,7 @@ struct Marks {
     [[nodiscard]] Marks without(int fold, const ImageGeometry& geometry, std::vector<std::size_t>& rest,
                                 std::vector<std::size_t>& left_out) const;
     /// Without some.
-    [[nodiscard]] Marks without(const std::vector<std::size_t>& left_out, const ImageGeometry& geometry) const;
+    [[nodiscard]] Marks without(const std::vector<Vec3>& left_out, const ImageGeometry& geometry) const;
     /// Height above the hull, negative inside of it.
     [[nodiscard]] double above_hull(const Vec3& place) const;
 

@@ -99,7 +99,7 @@ void separate_all(StructuresResult& all, const std::optional<Image>& image, cons
         const StructureResult &a = all.structures[overlap.a], &b = all.structures[overlap.b];
         const double smaller = std::min(a.result.report.surface.volume, b.result.report.surface.volume);
         if (overlap.volume < kLargeOverlap * smaller) continue;
-        run.warn("'" + a.name + "' and '" + b.name + "' both claimed " + pipeline::number(overlap.volume) + " (" +
+        run.info("'" + a.name + "' and '" + b.name + "' both claimed " + pipeline::number(overlap.volume) + " (" +
                  pipeline::number(std::round(100 * overlap.volume / smaller)) +
                  " % of the smaller one); the surface was put halfway: mark more where they touch");
     }

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # Builds covol and measures how good few marks are; writes tables (.csv, .md) and curve.png into tests/bench/marks/results.
 #
-#   COVOL_DATA=FOLDER bash tests/bench/marks/run.sh [PART...] [--quick] [OPTION...]      (PART: table contours curve bias cut silence correction inference)
+#   COVOL_DATA=FOLDER bash tests/bench/marks/run.sh [PART...] [--quick] [OPTION...]      (PART: table contours curve bias cut silence correction inference wrong)
 #
 # Options are those of the scripts (table.py --help). What was measured with the same binary and the same scripts is not measured
-# again (build/marks). Table, contours, curve, silence, correction and inference need the images of COVOL_DATA and are skipped without them.
+# again (build/marks). Table, contours, curve, silence, correction, inference and wrong need the images of COVOL_DATA and are skipped without them.
 set -euo pipefail
 cd "$(dirname "$0")/../../.."
 
@@ -13,7 +13,7 @@ while (( $# > 0 )) && [[ $1 != -* ]]; do
   parts+=("$1")
   shift
 done
-(( ${#parts[@]} > 0 )) || parts=(table contours curve bias cut silence correction inference)
+(( ${#parts[@]} > 0 )) || parts=(table contours curve bias cut silence correction inference wrong)
 
 bash tests/install_packages.sh python3-scipy python3-skimage python3-matplotlib
 cmake --preset default --log-level=WARNING
