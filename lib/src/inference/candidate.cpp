@@ -51,9 +51,9 @@ Constraints constraints_of(const Marks& marks, const std::vector<std::size_t>& c
 }
 
 /// The surface through marks, and which side of it is outside: the one that goes on for ever.
-class Guess {
+class GuessedSurface {
 public:
-    Guess(const Marks& marks, const std::vector<std::size_t>& chosen, const Proposal& proposal)
+    GuessedSurface(const Marks& marks, const std::vector<std::size_t>& chosen, const Proposal& proposal)
         : surface_(constraints_of(marks, chosen, proposal),
                    proposal.search == Search::Near ? at(proposal.axes, chosen) : Normals{}, proposal.search,
                    proposal.amplitude) {
@@ -68,8 +68,8 @@ public:
         side_ = far < 0 ? -1 : 1;
     }
     /// Of some of the marks of another one, near its normals.
-    Guess(const Marks& marks, const std::vector<std::size_t>& chosen, const Proposal& proposal, const Guess& whole,
-          const std::vector<Vec3>& normals)
+    GuessedSurface(const Marks& marks, const std::vector<std::size_t>& chosen, const Proposal& proposal,
+                   const GuessedSurface& whole, const std::vector<Vec3>& normals)
         : surface_(constraints_of(marks, chosen, proposal), at(normals, chosen), Search::Near,
                    whole.surface_.amplitude()) {}
 
@@ -97,7 +97,8 @@ void add_guess(double value, double to_mark, double cell, Features& features) {
 /// What teaches inside and outside.
 class Samples {
 public:
-    Samples(const Scene& scene, const Guess& whole) : scene_(scene), whole_(whole), cell_(scene.lattice.finest()) {}
+    Samples(const Scene& scene, const GuessedSurface& whole)
+        : scene_(scene), whole_(whole), cell_(scene.lattice.finest()) {}
 
     /// Along the normals of the marks, each with a guess that was made without it.
     void add_marks(const Proposal& proposal) {
@@ -111,7 +112,7 @@ public:
             for (std::size_t n = 0; n < marks.spread.size(); ++n)
                 if (int(n % kFolds) != fold) rest.push_back(marks.spread[n]);
             try {
-                held[std::size_t(fold)].emplace(Guess(marks, rest, proposal, whole_, normals),
+                held[std::size_t(fold)].emplace(GuessedSurface(marks, rest, proposal, whole_, normals),
                                                 detail::KdTree(at(marks.places, rest)));
             } catch (const Error&) {  // the rest has no surface: its fold teaches nothing
             }
@@ -161,7 +162,7 @@ public:
 
 private:
     struct Held {
-        Guess guess;
+        GuessedSurface guess;
         detail::KdTree tree;
     };
     [[nodiscard]] Sample sample(const Vec3& place) const {
@@ -172,7 +173,7 @@ private:
     }
 
     const Scene& scene_;
-    const Guess& whole_;
+    const GuessedSurface& whole_;
     double cell_;
     std::vector<Sample> all_;
     std::size_t of_marks_ = 0;
@@ -187,7 +188,7 @@ std::vector<std::size_t> surely_outside(const Scene& scene) {
 }
 
 /// Log odds of inside at all nodes.
-Field odds_of(const Scene& scene, const Guess& guess, const Appearance& appearance, const Solid* refine) {
+Field odds_of(const Scene& scene, const GuessedSurface& guess, const Appearance& appearance, const Solid* refine) {
     const Lattice& lattice = scene.lattice;
     const double most = kInference.most_odds, cell = lattice.finest();
     Field coarse;
@@ -347,7 +348,7 @@ std::vector<KnownBall> known_balls(const Marks& marks, double cell) {
 Candidate propose(const Scene& scene, const Proposal& proposal, const RunContext& run) {
     Candidate candidate;
     candidate.solid.lattice = scene.lattice;
-    std::optional<Guess> guess;
+    std::optional<GuessedSurface> guess;
     try {
         guess.emplace(scene.marks, scene.marks.spread, proposal);
     } catch (const Error& error) {
