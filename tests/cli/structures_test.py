@@ -445,7 +445,7 @@ class Evidence(Case):
             found.append(report["evidence"])
             # As far as the surface through marks is right to a voxel of the image: 0.3 d^2 / (2 R) = H.
             radius = 3 * report["surface"]["volume"] / report["surface"]["area"]
-            self.assertAlmostEqual(found[-1]["reach"], math.sqrt(2 * radius * H / 0.3), delta=0.01 * H)
+            self.assertAlmostEqual(found[-1]["reach"], math.sqrt(radius * H / 0.6), delta=0.01 * H)
         one, other = (e["unsupported_area"] / e["area"] for e in found)
         self.assertAlmostEqual(one, other, delta=0.03)
 

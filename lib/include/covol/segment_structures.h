@@ -77,7 +77,8 @@ private:
 };
 
 /// Judges a result by its marks and the image's edges. The marks reach as far as the points' attraction does, or, where
-/// nothing flowed, as far as the surface through them is right to a voxel of the image: whatever the voxel size is.
+/// nothing flowed, as far as the surface through them is right to a fourth of a voxel of the image: whatever the voxel
+/// size is.
 /// @param suggestions  how many slices to name
 [[nodiscard]] COVOL_API Evidence assess_evidence(const SegmentResult& result, const std::vector<Vec3>& marks,
                                                  const Image& image, int suggestions, const RunContext& run = {});

@@ -128,8 +128,9 @@ private:
         for (int a = 0; a < 3; ++a) {
             const double at = (place[a] - lattice_.origin[a]) / lattice_.spacing[a],
                          reach = lattice_.finest() / lattice_.spacing[a];
-            low[a] = std::max(int(std::ceil(at - reach)), 0);
-            high[a] = std::min(int(std::floor(at + reach)), lattice_.size[a] - 1);
+            const double last = lattice_.size[a] - 1;  // the place may lie anywhere
+            low[a] = int(std::clamp(std::ceil(at - reach), 0.0, last + 1));
+            high[a] = int(std::clamp(std::floor(at + reach), -1.0, last));
         }
         for (int k = low[2]; k <= high[2]; ++k)
             for (int j = low[1]; j <= high[1]; ++j)

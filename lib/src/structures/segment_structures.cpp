@@ -21,6 +21,7 @@
 namespace covol {
 namespace {
 
+constexpr double kRightTo = 0.25;          // voxels of the image
 constexpr double kSagitta = 0.3;           // of it, that a surface of least bending is off
 constexpr double kWeakLine = 0.93;         // 1 - g where the image is 1.2 times as bright as the band's median
 constexpr double kLargeOverlap = 0.02;     // of the smaller structure
@@ -42,12 +43,12 @@ double smallest_spacing(const Image& image) {
     return *std::min_element(spacing.begin(), spacing.end());
 }
 
-/// How far from a mark the surface that bends least is right to a voxel of the image: at a distance d it is off by
-/// kSagitta d^2 / (2 R), R the radius of a ball with the body's volume by its area (guidance.cpp says so, too).
+/// How far from a mark the surface that bends least is right to a fourth of a voxel of the image: at a distance d it is
+/// off by kSagitta d^2 / (2 R), R the radius of a ball with the body's volume by its area (guidance.cpp says so, too).
 double reach_of_marks(const SegmentResult& result, const Image& image) {
     const MeshMeasures& body = result.report.surface;
     const double radius = body.area > 0 ? 3 * std::abs(body.volume) / body.area : 0;
-    return std::max(std::sqrt(2 * radius * smallest_spacing(image) / kSagitta), smallest_spacing(image));
+    return std::max(std::sqrt(2 * radius * kRightTo * smallest_spacing(image) / kSagitta), smallest_spacing(image));
 }
 
 /// What belongs to the surface: as segment() measures it.
