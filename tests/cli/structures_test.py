@@ -443,7 +443,7 @@ class Evidence(Case):
         for voxel in (1, 2):
             report = self.report("segment", self.scene, "--points", few, "--voxel-size", f"{voxel * H}", "--suggest", 2, "-o", "s.vdb")
             found.append(report["evidence"])
-            # As far as the surface through marks is right to a voxel of the image: 0.3 d^2 / (2 R) = H.
+            # As far as the surface through marks is right to a fourth of a voxel of the image: 0.3 d^2 / (2 R) = H / 4.
             radius = 3 * report["surface"]["volume"] / report["surface"]["area"]
             self.assertAlmostEqual(found[-1]["reach"], math.sqrt(radius * H / 0.6), delta=0.01 * H)
         one, other = (e["unsupported_area"] / e["area"] for e in found)

@@ -80,7 +80,7 @@ private:
 
 /// A guess that was redrawn before marks correct it: redraw().
 struct RedrawnGuess {
-    FloatGridPtr u;  ///< null: it was not
+    FloatGridPtr u;  ///< a start, as start_from_grid() gives it; null, or the guess itself: it was not
     WorldBox box;    ///< beyond it is the guess
 };
 

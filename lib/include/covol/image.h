@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <memory>
@@ -35,6 +36,7 @@ struct ImageGeometry {
     [[nodiscard]] COVOL_API WorldBox world_box() const;
     /// Direction is the identity up to 1e-6.
     [[nodiscard]] COVOL_API bool is_axis_aligned() const;
+    [[nodiscard]] double smallest_spacing() const { return std::min({spacing[0], spacing[1], spacing[2]}); }
 };
 
 enum class PixelType { UInt8, Int8, UInt16, Int16, UInt32, Int32, Float, Double };

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "covol/api.h"
-#include "covol/domain.h"
 #include "covol/fwd.h"
+#include "covol/guess_correction.h"
 #include "covol/image.h"
 #include "covol/run.h"
 
@@ -63,9 +63,7 @@ struct Inferred {
                                        const KnownSides& sides = {}, const RunContext& run = {});
 
 /// A guess that redraw() has changed, or has not.
-struct Redrawn {
-    FloatGridPtr u;   ///< a start, as start_from_grid() gives it
-    WorldBox box;     ///< beyond it nothing has changed
+struct Redrawn : RedrawnGuess {
     double bits = 0;  ///< what the image tells of the sides of the guess at places that it was not learnt from
     bool used = false;
     std::string reason;  ///< why, in plain words

@@ -24,7 +24,6 @@ constexpr double kMaxLatticeVoxels = 1e12;
 constexpr double kMaxSamples = 4e6;  // on a surface
 
 double voxel_volume(const ImageGeometry& g) { return g.spacing[0] * g.spacing[1] * g.spacing[2]; }
-double smallest_spacing(const ImageGeometry& g) { return std::min({g.spacing[0], g.spacing[1], g.spacing[2]}); }
 
 bool is_label(double value, int label) { return label == 0 ? value != 0 : value == label; }
 
@@ -473,7 +472,7 @@ CompareReport compare(const Solid& a, const Solid& b, const RunContext& run) {
         report.volume_a = first.volume();
         report.volume_b = second.volume();
         compare_overlap(first, second, lattice, run, report);
-        compare_surfaces(first.surface(), second.surface(), 2 * smallest_spacing(lattice), run, report);
+        compare_surfaces(first.surface(), second.surface(), 2 * lattice.smallest_spacing(), run, report);
     });
     return report;
 }

@@ -34,6 +34,12 @@ struct Bump {
     double radius, height;
 };
 
+/// Trilinear between voxels.
+double level_at(const FloatGrid& grid, const Vec3& world) {
+    return double(openvdb::tools::BoxSampler::sample(
+        grid.getConstAccessor(), grid.transform().worldToIndex(openvdb::Vec3d(world[0], world[1], world[2]))));
+}
+
 /// The signed distance to the guess, however far.
 class FarDistance {
 public:
@@ -41,9 +47,7 @@ public:
         : guess_(guess), exact_(kCorrection.exact_voxels * guess->voxelSize()[0]), surface_(crossings) {}
 
     [[nodiscard]] double at(const Vec3& world) const {
-        const double near = double(openvdb::tools::BoxSampler::sample(
-            guess_->getConstAccessor(),
-            guess_->transform().worldToIndex(openvdb::Vec3d(world[0], world[1], world[2]))));
+        const double near = level_at(*guess_, world);
         if (std::abs(near) < exact_) return near;
         return std::copysign(std::max(exact_, std::sqrt(surface_.nearest(world))), near);
     }
@@ -159,11 +163,6 @@ bool holds(const WorldBox& box, const Vec3& world) {
     for (int a = 0; a < 3; ++a)
         if (world[a] < box.min[a] || world[a] > box.max[a]) return false;
     return true;
-}
-
-double nearest_level(const FloatGrid& grid, const Vec3& world) {
-    return double(openvdb::tools::BoxSampler::sample(
-        grid.getConstAccessor(), grid.transform().worldToIndex(openvdb::Vec3d(world[0], world[1], world[2]))));
 }
 
 double sum_of(const std::vector<Bump>& bumps, const Vec3& world) {
@@ -376,7 +375,7 @@ GuessCorrection correct_guess(const FloatGridPtr& guess, const std::vector<Vec3>
     const FloatGridPtr& start = redrawn.u ? redrawn.u : guess;
     const std::vector<Vec3> surface = find_crossings(*start);
     auto data = std::make_shared<GuessCorrection::Data>(start, surface);
-    if (redrawn.u) {
+    if (start != guess) {
         data->given = guess;
         data->redrawn = redrawn.box;
     }
@@ -442,14 +441,21 @@ CorrectedMask GuessCorrection::apply(const Image& mask, int label, const RunCont
                     const Vec3 world = geometry.index_to_world({double(i), double(j), double(k)});
                     const double move = sum_of(bumps, world);
                     const bool is_redrawn = data_->given && holds(data_->redrawn, world);
-                    if (move == 0 && !is_redrawn) continue;
-                    ++near;
-                    if (std::abs(move) < at_least && !is_redrawn) continue;
-                    const double before = data_->distance.at(world);
-                    at_least = std::abs(before) - data_->distance.slack();
-                    const bool in = comes_inside(before, move, data_->hull, world);
-                    const double given = is_redrawn ? nearest_level(*data_->given, world) : before;
-                    if ((given < 0) == in) continue;
+                    const bool is_still = move == 0 || std::abs(move) < at_least;  // the bumps change no side here
+                    near += move != 0;
+                    if (is_still && !is_redrawn) continue;
+                    bool was = false, in = false;
+                    if (is_still) {
+                        in = level_at(*data_->grid, world) < 0;
+                    } else {
+                        const double before = data_->distance.at(world);
+                        at_least = std::abs(before) - data_->distance.slack();
+                        was = before < 0;
+                        in = comes_inside(before, move, data_->hull, world);
+                    }
+                    if (is_redrawn) was = level_at(*data_->given, world) < 0;
+                    if (was == in) continue;
+                    near += move == 0;
                     if (in && *value == 0) {
                         *value = label;
                         ++came;

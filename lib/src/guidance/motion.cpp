@@ -98,7 +98,7 @@ struct SurfaceTemplate::Data {
     std::vector<Template> templates;  ///< by patch, of both
 
     Data(FloatGridPtr level_set, const Image& image, const RunContext& run);
-    [[nodiscard]] WorldBox box(double around) const;
+    [[nodiscard]] WorldBox box(double around) const { return bounding_box(patches.places, around); }
     /// @param shift  of the image's places against the surface's
     [[nodiscard]] Template read(std::size_t i, const SmoothImage& image, const Vec3& shift) const {
         return Template(
@@ -122,16 +122,6 @@ SurfaceTemplate::Data::Data(FloatGridPtr level_set, const Image& image, const Ru
     const SmoothImage smooth(image, box(kGuide.width * h), h, run);
     templates.resize(patches.size());
     tbb::parallel_for(std::size_t(0), patches.size(), [&](std::size_t i) { templates[i] = read(i, smooth, {}); });
-}
-
-WorldBox SurfaceTemplate::Data::box(double around) const {
-    WorldBox box{patches.places.front(), patches.places.front()};
-    for (const Vec3& x : patches.places)
-        for (int a = 0; a < 3; ++a) {
-            box.min[a] = std::min(box.min[a], x[a] - around);
-            box.max[a] = std::max(box.max[a], x[a] + around);
-        }
-    return box;
 }
 
 namespace {
@@ -171,6 +161,7 @@ private:
     struct Mismatch {
         int first = 0;  ///< offset, steps
         std::vector<double> squares;
+        double least = std::numeric_limits<double>::infinity();  ///< of for_each_offset()
         /// Calls visit(offset, square) at parts of a step: between steps goes a parabola.
         template <typename Visit>
         void for_each_offset(const Visit& visit) const {
@@ -185,11 +176,6 @@ private:
                           std::max(here + 0.5 * x * (above - below) + 0.5 * x * x * (above + below - 2 * here), 0.0));
                 }
             }
-        }
-        [[nodiscard]] double least() const {
-            double best = std::numeric_limits<double>::infinity();
-            for_each_offset([&](double, double square) { best = std::min(best, square); });
-            return best;
         }
     };
 
@@ -289,7 +275,7 @@ void Motion::match() {
         const std::vector<Mismatch> now = compare(read_now());
         std::vector<double> least;
         for (const Mismatch& m : now)
-            if (!m.squares.empty()) least.push_back(m.least());
+            if (!m.squares.empty()) least.push_back(m.least);
         const double spread = both_.deviation_x();
         if (least.empty() || !(spread > 0)) return;
         const double noise = std::max(cloud::median(least), kMotion.least_noise * spread * spread);
@@ -380,6 +366,7 @@ std::vector<Motion::Mismatch> Motion::compare(const std::vector<Template>& later
             if (result[i].squares.empty()) result[i].first = offset;
             result[i].squares.push_back(sum / count);
         }
+        result[i].for_each_offset([&](double, double square) { result[i].least = std::min(result[i].least, square); });
     });
     return result;
 }
@@ -392,10 +379,9 @@ std::vector<Motion::Estimate> Motion::estimates(const std::vector<Mismatch>& mis
         int seen = 0;
         for (int s = -known_.window[i]; s <= known_.window[i]; ++s) seen += known_.templates[i].has(s);
         const double samples = double(seen) / kStepsPerVoxel;  // closer than a voxel they are one
-        const double best = m.least();
         double mass = 0, first = 0, second = 0;
         m.for_each_offset([&](double offset, double square) {
-            const double weight = std::exp(-0.5 * samples * (square - best) / noise);
+            const double weight = std::exp(-0.5 * samples * (square - m.least) / noise);
             mass += weight;
             first += weight * offset;
             second += weight * offset * offset;

@@ -7,6 +7,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include "base/median.h"
+
 namespace covol::inference {
 namespace {
 
@@ -42,6 +44,25 @@ ImageFeatures::ImageFeatures(const Lattice& lattice, Field image) : image_(std::
         fields_[std::size_t(3 * s + 1)] = std::move(slope);
         fields_[std::size_t(3 * s + 2)] = std::move(laplacian);
     }
+}
+
+Field ImageFeatures::edge(const Lattice& lattice, const std::vector<Vec3>& places) const {
+    std::vector<double> slopes;
+    for (const Vec3& place : places) slopes.push_back(lattice.value(slope(), place));
+    const double usual = std::max(cloud::median(slopes), 1e-6);
+    Field result(lattice.count());
+    tbb::parallel_for(std::size_t(0), result.size(), [&](std::size_t n) {
+        const double steep = double(slope()[n]) / usual;
+        result[n] = float(1 / (1 + steep * steep));
+    });
+    return result;
+}
+
+std::vector<std::size_t> some_of(const std::vector<std::size_t>& nodes, std::size_t most) {
+    std::vector<std::size_t> some;
+    const std::size_t count = std::min(most, nodes.size());
+    for (std::size_t m = 0; m < count; ++m) some.push_back(nodes[(2 * m + 1) * nodes.size() / (2 * count)]);
+    return some;
 }
 
 void Appearance::expand(const Features& at, float* terms) const {

@@ -1,5 +1,6 @@
 #pragma once
 #include <array>
+#include <cstddef>
 #include <vector>
 
 #include "inference/lattice.h"
@@ -15,6 +16,15 @@ class ImageFeatures {
 public:
     ImageFeatures(const Lattice& lattice, Field image);
     [[nodiscard]] const Field& operator[](int n) const { return fields_[std::size_t(n)]; }
+    /// At a node; without those of a guess.
+    [[nodiscard]] Features at(std::size_t node) const {
+        Features all{};
+        for (int f = 0; f < kOfImage; ++f) all[std::size_t(f)] = (*this)[f][node];
+        return all;
+    }
+    /// What surface costs at each node by the slope there, in (0,1]: half where it is as steep as at the median of the
+    /// places, which lie on the surface.
+    [[nodiscard]] Field edge(const Lattice& lattice, const std::vector<Vec3>& places) const;
     /// The slope at the scale that edges are weighed by.
     [[nodiscard]] const Field& slope() const { return fields_[4]; }
     [[nodiscard]] const Field& image() const { return image_; }
@@ -23,6 +33,9 @@ private:
     Field image_;
     std::array<Field, kOfImage> fields_;
 };
+
+/// `most` of the nodes at most, evenly.
+[[nodiscard]] std::vector<std::size_t> some_of(const std::vector<std::size_t>& nodes, std::size_t most);
 
 struct Sample {
     Features at{};

@@ -144,15 +144,14 @@ public:
 
     /// Nodes of which the side is known; together they count half as much as the marks.
     void add_nodes(const std::vector<std::size_t>& nodes, bool inside) {
-        const std::size_t count = std::min(kElsewhere, nodes.size());
-        for (std::size_t m = 0; m < count; ++m) {
-            const std::size_t n = nodes[(2 * m + 1) * nodes.size() / (2 * count)];
+        const std::vector<std::size_t> some = some_of(nodes, kElsewhere);
+        for (const std::size_t n : some) {
             const Vec3 place = scene_.lattice.place_of(n);
             Sample s = sample(place);
             add_guess(whole_.value(place), double(scene_.to_mark[n]), cell_, s.at);
             s.inside = inside;
             s.fold = kAllFolds;
-            s.weight = float(0.5 * double(of_marks_) / double(count));
+            s.weight = float(0.5 * double(of_marks_) / double(some.size()));
             all_.push_back(s);
         }
     }
@@ -199,8 +198,7 @@ Field odds_of(const Scene& scene, const GuessedSurface& guess, const Appearance&
         guess.row(lattice.place(0, j, k), {lattice.spacing[0], 0, 0}, row);
         for (int i = 0; i < lattice.size[0]; ++i) {
             const std::size_t n = lattice.node(i, j, k);
-            Features at;
-            for (int f = 0; f < kOfImage; ++f) at[std::size_t(f)] = (*scene.image)[f][n];
+            Features at = scene.image->at(n);
             add_guess(row[std::size_t(i)], double(scene.to_mark[n]), cell, at);
             const double above =
                 std::max(0.0, double(scene.above_hull[n]) / scene.marks.spacing - kInference.hull_slack);
@@ -213,9 +211,8 @@ Field odds_of(const Scene& scene, const GuessedSurface& guess, const Appearance&
             odds[n] = float(value);
         }
     });
-    constexpr float kKnown = 4;  // times the most that the image says
-    for (const std::size_t n : scene.known_inside) odds[n] = kKnown * float(most);
-    for (const std::size_t n : scene.known_outside) odds[n] = -kKnown * float(most);
+    for (const std::size_t n : scene.known_inside) odds[n] = float(kKnown * most);
+    for (const std::size_t n : scene.known_outside) odds[n] = float(-kKnown * most);
     return odds;
 }
 
@@ -232,10 +229,7 @@ Solid least_body(const Scene& scene, const Field& odds, const RunContext& run) {
     // What is known costs no surface: a small place is not smoothed away.
     for (const std::vector<std::size_t>* nodes : {&scene.known_inside, &scene.known_outside})
         for (const std::size_t n : *nodes) weight[n] = 0;
-    minimize_surface(lattice, weight, cost, kInference.iterations, u, run);
-    Solid solid{lattice, std::vector<char>(u.size())};
-    for (std::size_t n = 0; n < u.size(); ++n) solid.inside[n] = u[n] > 0.5F ? 1 : 0;
-    return solid;
+    return solve_body(lattice, weight, cost, std::move(u), run);
 }
 
 /// Drops parts that hardly any mark belongs to; empty where nothing is left, or all is inside.
@@ -307,19 +301,14 @@ Scene::Scene(const Scene& other, const Marks& known) : marks(known), lattice(oth
 
 void Scene::measure() {
     to_mark.resize(lattice.count());
-    edge.resize(lattice.count());
+    edge = image->edge(lattice, marks.places);
     above_hull.resize(lattice.count());
     const detail::KdTree tree(marks.places);
-    std::vector<double> slopes;
-    for (const Vec3& mark : marks.places) slopes.push_back(lattice.value(image->slope(), mark));
-    const double usual = std::max(cloud::median(slopes), 1e-6);
     for_each_row(lattice, [&](int j, int k) {
         for (int i = 0; i < lattice.size[0]; ++i) {
             const std::size_t n = lattice.node(i, j, k);
             const Vec3 place = lattice.place(i, j, k);
             to_mark[n] = float(std::sqrt(tree.nearest(place)));
-            const double slope = double(image->slope()[n]) / usual;
-            edge[n] = float(1 / (1 + slope * slope));
             above_hull[n] = float(std::max(marks.above_hull(place), -1e30));
         }
     });
@@ -329,6 +318,13 @@ void Scene::measure() {
         for (const KnownBall& ball : balls)
             if (length(minus(lattice.place_of(n), ball.middle)) <= ball.radius)
                 (ball.inside ? known_inside : known_outside).push_back(n);
+}
+
+Solid solve_body(const Lattice& lattice, const Field& weight, const Field& cost, Field u, const RunContext& run) {
+    minimize_surface(lattice, weight, cost, kInference.iterations, u, run);
+    Solid solid{lattice, std::vector<char>(u.size())};
+    for (std::size_t n = 0; n < u.size(); ++n) solid.inside[n] = u[n] > 0.5F ? 1 : 0;
+    return solid;
 }
 
 Field Solid::level() const {

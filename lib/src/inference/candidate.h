@@ -18,7 +18,7 @@ namespace covol::inference {
 
 /// What is known of a lattice's nodes before there is a candidate.
 struct Scene {
-    Marks marks;
+    const Marks& marks;
     Lattice lattice;
     std::shared_ptr<const ImageFeatures> image;
     Field to_mark;                                         ///< distance to the nearest mark
@@ -43,6 +43,13 @@ struct Solid {
     /// About the signed distance to its surface, smoothed by less than a cell.
     [[nodiscard]] Field level() const;
 };
+
+/// The body whose surface and cost are least: minimize_surface(). @param u  the first guess
+[[nodiscard]] Solid solve_body(const Lattice& lattice, const Field& weight, const Field& cost, Field u,
+                               const RunContext& run);
+
+/// Log odds of what is known, in the most that the image may say.
+inline constexpr double kKnown = 4;
 
 /// Where a candidate's normals come from.
 struct Proposal {

@@ -35,21 +35,6 @@ struct HeldOut {
     std::vector<double> of_body, of_guess;
 };
 
-/// The weight of the guess, in [0,1], with which the mean of both predicts marks best (stacking: Wolpert, Neural
-/// Networks 5(2), 1992).
-/// @param shrink  of the body's errors on a finer lattice
-double weight_of_guess(const HeldOut& held, double cell, double shrink) {
-    constexpr double kMostCells = 4;  // a miss is a miss
-    double with = 0, square = 0;
-    for (std::size_t n = 0; n < held.of_body.size(); ++n) {
-        const double most = kMostCells * cell, body = std::clamp(shrink * held.of_body[n], -most, most),
-                     guess = std::clamp(held.of_guess[n], -most, most);
-        with += body * (body - guess);
-        square += (body - guess) * (body - guess);
-    }
-    return square > 0 ? std::clamp(with / square, 0.0, 1.0) : 0.0;
-}
-
 class Inference {
 public:
     Inference(const Image& image, Marks marks, const RunContext& run)
@@ -59,7 +44,7 @@ public:
 
     /// That candidates are compared on.
     [[nodiscard]] Lattice coarse_lattice() const {
-        return cover(image_.geometry(), low_, high_, kInference.coarse_nodes);
+        return cover(image_.geometry(), box_.min, box_.max, kInference.coarse_nodes);
     }
 
     /// False where no candidate has a body.
@@ -86,7 +71,7 @@ private:
     const Image& image_;
     Marks marks_;
     const RunContext& run_;
-    Vec3 low_{}, high_{};
+    WorldBox box_;  // around the marks, of the frame
     std::optional<Scene> coarse_;
     Solid coarse_body_;
     std::vector<Vec3> wrong_;  // marks that are left out; places of the frame
@@ -124,19 +109,8 @@ Candidate Inference::best_candidate() const {
 }
 
 void Inference::choose_box() {
-    const ImageGeometry& g = image_.geometry();
-    low_ = high_ = marks_.places.front();
-    for (const Vec3& m : marks_.places)
-        for (int a = 0; a < 3; ++a) {
-            low_[a] = std::min(low_[a], m[a]);
-            high_[a] = std::max(high_[a], m[a]);
-        }
-    const double voxel = *std::min_element(g.spacing.begin(), g.spacing.end());
-    const double around = std::max(kInference.around_voxels * voxel, marks_.spacing);
-    for (int a = 0; a < 3; ++a) {
-        low_[a] -= around;
-        high_[a] += around;
-    }
+    const double voxel = image_.geometry().smallest_spacing();
+    box_ = bounding_box(marks_.places, std::max(kInference.around_voxels * voxel, marks_.spacing));
 }
 
 bool Inference::find(InferenceReport& report) {
@@ -149,7 +123,7 @@ bool Inference::find(InferenceReport& report) {
 }
 
 Solid Inference::refined() const {
-    const Lattice fine = cover(image_.geometry(), low_, high_, kInference.fine_nodes);
+    const Lattice fine = cover(image_.geometry(), box_.min, box_.max, kInference.fine_nodes);
     if (fine.count() <= coarse_->lattice.count()) return coarse_body_;
     const Scene scene(image_, fine, marks_, run_);
     Proposal refining = near_normals_of(coarse_body_, amplitude_);
@@ -181,7 +155,9 @@ bool Inference::leave_out_wrong(const HeldOut& held) {
         if (company < 2) all.push_back(suspect);
     }
     const double given = double(marks_.places.size() + wrong_.size());
-    if (all.size() == wrong_.size() || double(all.size()) > kInference.most_wrong * given) return false;
+    // Of a single one nobody knows whether it is wrong, or the body lacks a part.
+    if (all.size() == wrong_.size() || all.size() < 2 || double(all.size()) > kInference.most_wrong * given)
+        return false;
     wrong_ = std::move(all);
     marks_ = marks_.without(wrong_, image_.geometry());
     choose_box();
@@ -249,6 +225,21 @@ Field Inference::pooled(const Solid& body, double guess_weight) const {
     return level;
 }
 
+/// The weight of the guess, in [0,1], with which the mean of both predicts marks best (stacking: Wolpert, Neural
+/// Networks 5(2), 1992).
+/// @param shrink  of the body's errors on a finer lattice
+double weight_of_guess(const HeldOut& held, double cell, double shrink) {
+    constexpr double kMostCells = 4;  // a miss is a miss
+    double with = 0, square = 0;
+    for (std::size_t n = 0; n < held.of_body.size(); ++n) {
+        const double most = kMostCells * cell, body = std::clamp(shrink * held.of_body[n], -most, most),
+                     guess = std::clamp(held.of_guess[n], -most, most);
+        with += body * (body - guess);
+        square += (body - guess) * (body - guess);
+    }
+    return square > 0 ? std::clamp(with / square, 0.0, 1.0) : 0.0;
+}
+
 double median_size(const std::vector<double>& values) {
     std::vector<double> sizes;
     for (const double v : values) sizes.push_back(std::abs(v));
@@ -287,13 +278,7 @@ struct Overlap {
     double dice = 0, volume = 0, area = 0;
 };
 Overlap compare(const FloatGrid& guess, const ImageGeometry& geometry, const Lattice& lattice, const Field& level) {
-    std::vector<Vec3> world;
-    for (std::size_t n = 0; n < level.size(); ++n) {
-        const Vec3 place = lattice.place_of(n);
-        world.push_back(geometry.index_to_world(
-            {place[0] / geometry.spacing[0], place[1] / geometry.spacing[1], place[2] / geometry.spacing[2]}));
-    }
-    const std::vector<double> of_guess = detail::levels_at(guess, world);
+    const std::vector<double> of_guess = levels_on(lattice, geometry, guess);
     double both = 0, sum = 0, inside = 0, rim = 0;
     const double cell = lattice.finest();
     for (std::size_t n = 0; n < level.size(); ++n) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "grid/levels_at.h"
 #include "inference/heuristics.h"
 
 namespace covol::inference {
@@ -45,6 +46,11 @@ public:
 Vec3 to_frame(const ImageGeometry& geometry, const Vec3& world) {
     const Vec3 index = geometry.world_to_index(world);
     return {index[0] * geometry.spacing[0], index[1] * geometry.spacing[1], index[2] * geometry.spacing[2]};
+}
+
+Vec3 to_world(const ImageGeometry& geometry, const Vec3& place) {
+    return geometry.index_to_world(
+        {place[0] / geometry.spacing[0], place[1] / geometry.spacing[1], place[2] / geometry.spacing[2]});
 }
 
 double Lattice::finest() const { return std::min({spacing[0], spacing[1], spacing[2]}); }
@@ -99,7 +105,7 @@ Lattice cover(const ImageGeometry& geometry, const Vec3& low, const Vec3& high, 
     };
     double cell = 0;
     if (with(cell) <= most) return lattice;
-    double fine = *std::min_element(geometry.spacing.begin(), geometry.spacing.end()), coarse = fine;
+    double fine = geometry.smallest_spacing(), coarse = fine;
     while (with(coarse) > most) coarse *= 2;
     for (int round = 0; round < 30; ++round) {
         cell = 0.5 * (fine + coarse);
@@ -107,6 +113,13 @@ Lattice cover(const ImageGeometry& geometry, const Vec3& low, const Vec3& high, 
     }
     with(coarse);
     return lattice;
+}
+
+std::vector<double> levels_on(const Lattice& lattice, const ImageGeometry& geometry, const FloatGrid& u) {
+    std::vector<Vec3> places;
+    places.reserve(lattice.count());
+    for (std::size_t n = 0; n < lattice.count(); ++n) places.push_back(to_world(geometry, lattice.place_of(n)));
+    return detail::levels_at(u, places);
 }
 
 bool is_too_large(const Lattice& lattice, const ImageGeometry& geometry, const RunContext& run) {

@@ -10,6 +10,7 @@ namespace covol::inference {
 /// Places of the image's own frame: index times spacing, an isometry of the world in which the image's axes are those
 /// of the coordinates.
 [[nodiscard]] Vec3 to_frame(const ImageGeometry& geometry, const Vec3& world);
+[[nodiscard]] Vec3 to_world(const ImageGeometry& geometry, const Vec3& place);
 
 using Field = std::vector<float>;  ///< a value for each node of a lattice, x fastest
 
@@ -42,6 +43,9 @@ struct Lattice {
 /// Covers a box of the frame, within the image, with at most `most` nodes. Nodes are voxels where that is enough, and
 /// lie symmetrically about the middle of the box otherwise, so that a mirror image has the same.
 [[nodiscard]] Lattice cover(const ImageGeometry& geometry, const Vec3& low, const Vec3& high, double most);
+
+/// A level set at all nodes.
+[[nodiscard]] std::vector<double> levels_on(const Lattice& lattice, const ImageGeometry& geometry, const FloatGrid& u);
 
 /// Whether the image's box under a lattice is too large to be read as a whole.
 [[nodiscard]] bool is_too_large(const Lattice& lattice, const ImageGeometry& geometry, const RunContext& run);

@@ -9,15 +9,12 @@
 #include <utility>
 
 #include "base/geometry.h"
-#include "base/median.h"
 #include "covol/domain.h"
 #include "covol/inference.h"
 #include "covol/start.h"
 #include "grid/levels_at.h"
-#include "inference/appearance.h"
+#include "inference/candidate.h"
 #include "inference/heuristics.h"
-#include "inference/lattice.h"
-#include "inference/minimal_surface.h"
 
 namespace covol {
 namespace {
@@ -31,42 +28,33 @@ struct Miss {
     bool outside = false;
 };
 
-Vec3 to_world(const ImageGeometry& g, const Vec3& place) {
-    return g.index_to_world({place[0] / g.spacing[0], place[1] / g.spacing[1], place[2] / g.spacing[2]});
+std::vector<Vec3> places_of(const std::vector<Miss>& misses) {
+    std::vector<Vec3> places;
+    for (const Miss& miss : misses) places.push_back(miss.place);
+    return places;
 }
 
-std::vector<char> inside_of(const FloatGrid& guess, const ImageGeometry& geometry, const Lattice& lattice) {
-    std::vector<Vec3> places;
-    places.reserve(lattice.count());
-    for (std::size_t n = 0; n < lattice.count(); ++n) places.push_back(to_world(geometry, lattice.place_of(n)));
-    std::vector<char> inside;
-    for (const double level : detail::levels_at(guess, places)) inside.push_back(level < 0 ? 1 : 0);
-    return inside;
+Solid solid_of(const FloatGrid& guess, const ImageGeometry& geometry, const Lattice& lattice) {
+    Solid solid{lattice, {}};
+    for (const double level : levels_on(lattice, geometry, guess)) solid.inside.push_back(level < 0 ? 1 : 0);
+    return solid;
 }
 
 Lattice around(const ImageGeometry& geometry, const std::vector<Miss>& misses, double reach) {
-    Vec3 low = misses.front().place, high = low;
-    for (const Miss& miss : misses)
-        for (int a = 0; a < 3; ++a) {
-            low[a] = std::min(low[a], miss.place[a]);
-            high[a] = std::max(high[a], miss.place[a]);
-        }
-    for (int a = 0; a < 3; ++a) {
-        low[a] -= reach;
-        high[a] += reach;
-    }
-    return cover(geometry, low, high, kInference.fine_nodes);
+    const WorldBox box = bounding_box(places_of(misses), reach);
+    return cover(geometry, box.min, box.max, kInference.fine_nodes);
 }
 
 class Redrawing {
 public:
-    Redrawing(const FloatGrid& guess, const Image& image, std::vector<Miss> misses, const RunContext& run)
+    Redrawing(const FloatGrid& guess, const Image& image, std::vector<Miss> misses, const Lattice& lattice,
+              const RunContext& run)
         : run_(run),
           geometry_(image.geometry()),
           misses_(std::move(misses)),
-          lattice_(around(geometry_, misses_, reach(geometry_, misses_))),
-          inside_(inside_of(guess, geometry_, lattice_)),
-          distance_(signed_distance(lattice_, inside_)),
+          lattice_(lattice),
+          guess_(solid_of(guess, geometry_, lattice_)),
+          distance_(signed_distance(lattice_, guess_.inside)),
           image_(lattice_, sample(image, lattice_, run)),
           freedom_(lattice_.count()),
           nearest_(lattice_.count()) {
@@ -77,24 +65,16 @@ public:
         });
     }
 
-    /// Of the box around the misses.
-    [[nodiscard]] static double reach(const ImageGeometry& geometry, const std::vector<Miss>& misses) {
-        double most = 0;
-        for (const Miss& miss : misses) most = std::max(most, miss.off);
-        return (kInference.redrawn + 1) * most +
-               kInference.around_voxels * *std::min_element(geometry.spacing.begin(), geometry.spacing.end());
-    }
-
     /// Bits that the image tells of the guess's sides where no mark speaks against it.
     double learn();
     void draw(const std::vector<Vec3>& inside, const std::vector<Vec3>& outside);
     /// In a guess's lattice, what was redrawn.
     [[nodiscard]] FloatGridPtr on(const FloatGrid& guess) const;
     [[nodiscard]] WorldBox box() const;
+    /// Mean distance of what was drawn to the marks that the guess misses.
     [[nodiscard]] double distance_to_marks() const {
-        const Field level = smoothed_level();
         double sum = 0;
-        for (const Miss& miss : misses_) sum += std::abs(lattice_.value(level, miss.place)) / double(misses_.size());
+        for (const Miss& miss : misses_) sum += std::abs(lattice_.value(level_, miss.place)) / double(misses_.size());
         return sum;
     }
 
@@ -112,14 +92,9 @@ private:
     /// much, and those inside that it is too large.
     [[nodiscard]] double known(std::size_t n) const {
         const Miss& miss = *nearest_[n];
-        if (miss.outside == (inside_[n] != 0)) return 1;
+        if (miss.outside == is_inside(n)) return 1;
         const double deep = std::abs(double(distance_[n])) / miss.off;
         return std::clamp(std::max((double(freedom_[n]) - 1) / (kInference.redrawn - 1), 2 * (deep - 1)), 0.0, 1.0);
-    }
-    [[nodiscard]] Features features(std::size_t n) const {
-        Features at{};
-        for (int f = 0; f < kOfImage; ++f) at[std::size_t(f)] = image_[f][n];
-        return at;
     }
     /// Within a cell.
     [[nodiscard]] std::vector<std::size_t> nodes_beside(const Vec3& place) const {
@@ -139,41 +114,38 @@ private:
                         nodes.push_back(lattice_.node(i, j, k));
         return nodes;
     }
-    void keep_parts(std::vector<char>& body, bool of_inside) const;
-    [[nodiscard]] Field smoothed_level() const {
-        return smooth(lattice_, signed_distance(lattice_, body_), 0.7 * lattice_.finest());
-    }
+    [[nodiscard]] bool is_inside(std::size_t n) const { return guess_.inside[n] != 0; }
+    [[nodiscard]] bool is_free(std::size_t n) const { return double(freedom_[n]) <= kInference.redrawn; }
+    void drop_loose_parts(std::vector<char>& body, bool of_inside) const;
 
     const RunContext& run_;
     const ImageGeometry& geometry_;
     std::vector<Miss> misses_;
     Lattice lattice_;
-    std::vector<char> inside_;
-    Field distance_;
+    Solid guess_;
+    Field distance_;  // to it
     ImageFeatures image_;
     Field freedom_;                     // distance to the nearest miss, in what it is missed by
     std::vector<const Miss*> nearest_;  // that one
     std::vector<Sample> samples_;
-    std::vector<char> body_;
+    Field level_;  // of what was drawn
 };
 
 double Redrawing::learn() {
     constexpr std::size_t kOfEach = 600, kFewest = 100;
-    constexpr int kFolds = 5;
     const double cell = lattice_.finest();
     for (const bool inside : {true, false}) {
         std::vector<std::size_t> nodes;
         for (std::size_t n = 0; n < lattice_.count(); ++n) {
             const double deep = std::abs(double(distance_[n])) / cell;
-            if ((inside_[n] != 0) == inside && deep > 1 && deep < 8 && double(freedom_[n]) > kInference.redrawn)
-                nodes.push_back(n);
+            if (is_inside(n) == inside && deep > 1 && deep < 8 && !is_free(n)) nodes.push_back(n);
         }
-        const std::size_t count = std::min(kOfEach, nodes.size());
-        for (std::size_t m = 0; m < count; ++m) {
+        int fold = 0;
+        for (const std::size_t n : some_of(nodes, kOfEach)) {
             Sample s;
-            s.at = features(nodes[(2 * m + 1) * nodes.size() / (2 * count)]);
+            s.at = image_.at(n);
             s.inside = inside;
-            s.fold = int(m % kFolds);
+            s.fold = fold++ % kFolds;
             samples_.push_back(s);
         }
     }
@@ -182,13 +154,13 @@ double Redrawing::learn() {
 }
 
 /// Parts that hang on nothing that is known: pieces without the guess's own inside, voids without its outside.
-void Redrawing::keep_parts(std::vector<char>& body, bool of_inside) const {
+void Redrawing::drop_loose_parts(std::vector<char>& body, bool of_inside) const {
     std::vector<char> side(body.size());
     for (std::size_t n = 0; n < body.size(); ++n) side[n] = (body[n] != 0) == of_inside ? 1 : 0;
     const Parts parts = label_parts(lattice_, side);
     std::vector<char> hangs(std::size_t(parts.count) + 1, 0);
     for (std::size_t n = 0; n < body.size(); ++n)
-        if (double(freedom_[n]) > kInference.redrawn) hangs[std::size_t(parts.number[n])] = 1;
+        if (!is_free(n)) hangs[std::size_t(parts.number[n])] = 1;
     for (std::size_t n = 0; n < body.size(); ++n)
         if (side[n] != 0 && hangs[std::size_t(parts.number[n])] == 0) body[n] = of_inside ? 0 : 1;
 }
@@ -196,19 +168,12 @@ void Redrawing::keep_parts(std::vector<char>& body, bool of_inside) const {
 void Redrawing::draw(const std::vector<Vec3>& inside, const std::vector<Vec3>& outside) {
     const Appearance appearance(samples_, kInference.ridge);
     const double most = kInference.most_odds, cell = lattice_.finest();
-    std::vector<double> slopes;
-    for (const Miss& miss : misses_) slopes.push_back(lattice_.value(image_.slope(), miss.place));
-    const double usual = std::max(cloud::median(slopes), 1e-6);
-    Field cost(lattice_.count()), weight(lattice_.count()), u(lattice_.count());
+    Field cost(lattice_.count()), weight = image_.edge(lattice_, places_of(misses_)), u(lattice_.count());
     tbb::parallel_for(std::size_t(0), lattice_.count(), [&](std::size_t n) {
-        const double sure = known(n);
-        double odds = (inside_[n] != 0 ? 4 : -4) * most;
-        if (sure < 1)
-            odds = (1 - sure) * std::clamp(appearance.log_odds(features(n)), -most, most) +
-                   sure * (inside_[n] != 0 ? most : -most);
-        const double slope = double(image_.slope()[n]) / usual;
+        const double sure = known(n), side = is_inside(n) ? most : -most;
+        double odds = kKnown * side;
+        if (sure < 1) odds = (1 - sure) * std::clamp(appearance.log_odds(image_.at(n)), -most, most) + sure * side;
         cost[n] = float(-kInference.odds_weight * odds);
-        weight[n] = float(1 / (1 + slope * slope));
         u[n] = odds > 0 ? 1.0F : 0.0F;
     });
     const auto hold = [&](const Vec3& place, double odds) {
@@ -227,33 +192,22 @@ void Redrawing::draw(const std::vector<Vec3>& inside, const std::vector<Vec3>& o
         for (double way = 1.5 * cell; way < miss.off; way += 0.5 * cell)
             hold(plus(miss.place, way, unit(to_guess)), miss.outside ? most : -most);
     }
-    for (const Vec3& world : inside) hold(to_frame(geometry_, world), 4 * most);
-    for (const Vec3& world : outside) hold(to_frame(geometry_, world), -4 * most);
-    minimize_surface(lattice_, weight, cost, kInference.iterations, u, run_);
-    body_.resize(u.size());
-    for (std::size_t n = 0; n < u.size(); ++n) body_[n] = u[n] > 0.5F ? 1 : 0;
-    keep_parts(body_, true);
-    keep_parts(body_, false);
+    for (const Vec3& world : inside) hold(to_frame(geometry_, world), kKnown * most);
+    for (const Vec3& world : outside) hold(to_frame(geometry_, world), -kKnown * most);
+    Solid body = solve_body(lattice_, weight, cost, std::move(u), run_);
+    for (const bool of_inside : {true, false}) drop_loose_parts(body.inside, of_inside);
+    level_ = body.level();
 }
 
 WorldBox Redrawing::box() const {
-    WorldBox box;
-    bool first = true;
-    for (int corner = 0; corner < 8; ++corner) {
-        const Vec3 world = to_world(geometry_, lattice_.place((corner & 1) != 0 ? lattice_.size[0] - 1 : 0,
-                                                              (corner & 2) != 0 ? lattice_.size[1] - 1 : 0,
-                                                              (corner & 4) != 0 ? lattice_.size[2] - 1 : 0));
-        for (int a = 0; a < 3; ++a) {
-            box.min[a] = first ? world[a] : std::min(box.min[a], world[a]);
-            box.max[a] = first ? world[a] : std::max(box.max[a], world[a]);
-        }
-        first = false;
-    }
-    return box;
+    const Index3& n = lattice_.size;
+    std::vector<Vec3> world;
+    for (const Vec3& corner : corners({lattice_.origin, lattice_.place(n[0] - 1, n[1] - 1, n[2] - 1)}))
+        world.push_back(to_world(geometry_, corner));
+    return bounding_box(world);
 }
 
 FloatGridPtr Redrawing::on(const FloatGrid& guess) const {
-    const Field level = smoothed_level();
     const Domain domain = domain_of(guess);
     const double clamp = kHalfWidthVoxels * domain.voxel_size;
     FloatGridPtr result = guess.deepCopy();
@@ -267,7 +221,7 @@ FloatGridPtr Redrawing::on(const FloatGrid& guess) const {
             for (int k = first(2); k <= last(2); ++k) {
                 const Vec3 place = to_frame(geometry_, domain.index_to_world({double(i), double(j), double(k)}));
                 if (nearest_miss(place).first > kInference.redrawn) continue;
-                accessor.setValueOn({i, j, k}, float(std::clamp(lattice_.value(level, place), -clamp, clamp)));
+                accessor.setValueOn({i, j, k}, float(std::clamp(lattice_.value(level_, place), -clamp, clamp)));
             }
     return start_from_grid(domain, *result, run_);
 }
@@ -276,45 +230,46 @@ FloatGridPtr Redrawing::on(const FloatGrid& guess) const {
 
 Redrawn redraw(const FloatGridPtr& guess, const std::vector<Vec3>& marks, const Image& image, const KnownSides& sides,
                const RunContext& run) {
-    Redrawn result{guess, {}, 0, false, ""};
+    Redrawn result;
+    result.u = guess;
+    result.reason = "the guess passes the marks";
     const ImageGeometry& geometry = image.geometry();
-    const double voxel = *std::min_element(geometry.spacing.begin(), geometry.spacing.end()),
-                 widest = *std::max_element(geometry.spacing.begin(), geometry.spacing.end());
-    const double missed = kInference.missed_voxels * std::max(voxel, 0.5 * widest),
+    const double voxel = geometry.smallest_spacing(),
+                 widest = *std::max_element(geometry.spacing.begin(), geometry.spacing.end()),
+                 missed = kInference.missed_voxels * std::max(voxel, 0.5 * widest),
                  clamp = kHalfWidthVoxels * guess->voxelSize()[0];
     std::vector<Miss> misses;
     const std::vector<double> levels = detail::levels_at(*guess, marks);
     for (std::size_t n = 0; n < marks.size(); ++n)
         if (std::abs(levels[n]) > std::min(missed, 0.9 * clamp))
             misses.push_back({to_frame(geometry, marks[n]), std::abs(levels[n]), levels[n] > 0});
-    if (misses.empty()) {
-        result.reason = "the guess passes the marks";
-        return result;
-    }
+    if (misses.empty()) return result;
     with_threads(run, [&] {
         // A start is clamped: how far off a mark is, is measured anew.
-        const Lattice wide = around(geometry, misses, kInference.farthest_miss * voxel);
-        const Field distance = signed_distance(wide, inside_of(*guess, geometry, wide));
-        for (Miss& miss : misses) miss.off = std::max(std::abs(wide.value(distance, miss.place)), miss.off);
+        const Solid wide = solid_of(*guess, geometry, around(geometry, misses, kInference.farthest_miss * voxel));
+        const Field distance = signed_distance(wide.lattice, wide.inside);
+        for (Miss& miss : misses) miss.off = std::max(std::abs(wide.lattice.value(distance, miss.place)), miss.off);
         std::erase_if(misses, [&](const Miss& miss) { return miss.off <= missed; });
-        if (misses.empty()) {
-            result.reason = "the guess passes the marks";
-            return;
+        if (misses.empty()) return;
+        double sum = 0, most = 0;
+        for (const Miss& miss : misses) {
+            sum += miss.off / double(misses.size());
+            most = std::max(most, miss.off);
         }
-        if (is_too_large(around(geometry, misses, Redrawing::reach(geometry, misses)), geometry, run)) {
+        const Lattice lattice =
+            around(geometry, misses, (kInference.redrawn + 1) * most + kInference.around_voxels * voxel);
+        if (is_too_large(lattice, geometry, run)) {
             result.reason = "the image's box around the marks that the guess misses is too large to be read as a whole";
             return;
         }
-        Redrawing redrawing(*guess, image, misses, run);
+        Redrawing redrawing(*guess, image, misses, lattice, run);
         result.bits = redrawing.learn();
         if (result.bits < kInference.redraw_bits) {
             result.reason = "the image does not tell the sides of the guess";
             return;
         }
         redrawing.draw(sides.inside, sides.outside);
-        double before = 0;
-        for (const Miss& miss : misses) before += miss.off / double(misses.size());
-        if (!(redrawing.distance_to_marks() < before)) {
+        if (!(redrawing.distance_to_marks() < sum)) {
             result.reason = "what the image shows does not pass the marks";
             return;
         }

@@ -194,8 +194,7 @@ Resolved resolve(const Problem& problem) {
 }  // namespace pipeline
 
 VoxelSizeChoice choose_voxel_size(const Image& image) {
-    const Vec3& spacing = image.geometry().spacing;
-    return {*std::min_element(spacing.begin(), spacing.end()), "the image's smallest spacing"};
+    return {image.geometry().smallest_spacing(), "the image's smallest spacing"};
 }
 
 VoxelSizeChoice choose_voxel_size(const std::vector<Vec3>& world_points, bool tagged) {

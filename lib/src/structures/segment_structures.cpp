@@ -12,6 +12,7 @@
 #include "covol/mesh_stream.h"
 #include "covol/seeds.h"
 #include "covol/surface.h"
+#include "guidance/heuristics.h"
 #include "marks/with_name.h"
 #include "meshing/level_set_distance.h"
 #include "meshing/mesh_distance.h"
@@ -22,7 +23,6 @@ namespace covol {
 namespace {
 
 constexpr double kRightTo = 0.25;          // voxels of the image
-constexpr double kSagitta = 0.3;           // of it, that a surface of least bending is off
 constexpr double kWeakLine = 0.93;         // 1 - g where the image is 1.2 times as bright as the band's median
 constexpr double kLargeOverlap = 0.02;     // of the smaller structure
 constexpr double kLeastCorrelation = 0.5;  // of brightness along a surface, from frame to frame
@@ -38,17 +38,13 @@ FloatGridPtr around(const FloatGrid& surface) {
     return topology;
 }
 
-double smallest_spacing(const Image& image) {
-    const Vec3& spacing = image.geometry().spacing;
-    return *std::min_element(spacing.begin(), spacing.end());
-}
-
 /// How far from a mark the surface that bends least is right to a fourth of a voxel of the image: at a distance d it is
-/// off by kSagitta d^2 / (2 R), R the radius of a ball with the body's volume by its area (guidance.cpp says so, too).
+/// off by kGuide.share_of_sagitta d^2 / (2 R), R the radius of a ball with the body's volume by its area.
 double reach_of_marks(const SegmentResult& result, const Image& image) {
     const MeshMeasures& body = result.report.surface;
     const double radius = body.area > 0 ? 3 * std::abs(body.volume) / body.area : 0;
-    return std::max(std::sqrt(2 * radius * kRightTo * smallest_spacing(image) / kSagitta), smallest_spacing(image));
+    const double voxel = image.geometry().smallest_spacing();
+    return std::max(std::sqrt(2 * radius * kRightTo * voxel / kGuide.share_of_sagitta), voxel);
 }
 
 /// What belongs to the surface: as segment() measures it.
@@ -177,9 +173,16 @@ StructuresResult TimeLapse::segment(const Image& frame, std::vector<Marks> marks
         }
         marks[n].delta = last.delta;
     }
-    StructuresOptions with_fields = options;
-    with_fields.segment.without_fields = false;
-    StructuresResult all = segment_structures(frame, std::move(marks), with_fields, run);
+    StructuresOptions with_u = options;
+    with_u.segment.without_fields = false;
+    const bool without_fields = options.segment.without_fields;
+    StructuresResult all =
+        segment_structures(frame, std::move(marks), with_u, run,
+                           [&](const std::optional<Image>& image, const StructureInput& input, const RunContext& own) {
+                               SegmentResult result = solve_structure(image, input, own);
+                               if (without_fields) result.distance = result.edge = nullptr;
+                               return result;
+                           });
     last_.clear();
     for (std::size_t n = 0; n < all.structures.size(); ++n) {
         StructureResult& structure = all.structures[n];
@@ -190,7 +193,7 @@ StructuresResult TimeLapse::segment(const Image& frame, std::vector<Marks> marks
             last.surface = result.u;
             last.look.emplace(last.surface, frame, run);
         }
-        if (options.segment.without_fields) result.u = result.distance = result.edge = nullptr;
+        if (without_fields) result.u = nullptr;
         last_.push_back(std::move(last));
     }
     return all;
@@ -208,7 +211,7 @@ Evidence assess_evidence(const SegmentResult& result, const std::vector<Vec3>& m
     FloatGridPtr g = result.edge;
     if (!g) {  // edges that moved nothing were not looked for
         EdgeOptions edge = used.edge;
-        if (!edge.sigma) edge.sigma = smallest_spacing(image);
+        if (!edge.sigma) edge.sigma = image.geometry().smallest_spacing();
         g = detect_edges(image, *around(*result.surface), edge, run).grid;
     }
     return assess_evidence(result.mesh, marks, *g, image.geometry(), options, run);

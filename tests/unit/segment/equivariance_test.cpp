@@ -9,7 +9,6 @@
 #include <random>
 
 #include "covol/pipeline.h"
-#include "support/shapes.h"
 
 using namespace covol;
 

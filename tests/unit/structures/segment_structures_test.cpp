@@ -111,11 +111,11 @@ TEST_CASE("A frame of a time-lapse starts from the one before, and a failed one 
     StructuresOptions options;
     const StructuresResult first = lapse.segment(scene(), {ball("", kLeft)}, options);
     REQUIRE(lapse.started());
-    CHECK(first.structures.at(0).result.report.resolved.evolve.delta.has_value());
+    const double delta = first.structures.at(0).result.report.resolved.evolve.delta.value();
     const StructuresResult second = lapse.segment(scene(1), {Marks{}}, options);
     const SegmentReport& report = second.structures.at(0).result.report;
     CHECK(is_any<LevelSetStart>(report.resolved.start));
-    CHECK(report.resolved.evolve.delta == first.structures.at(0).result.report.resolved.evolve.delta);
+    CHECK(report.resolved.evolve.delta == delta);
     Marks other;
     other.name = "other";
     CHECK_THROWS_AS(lapse.segment(scene(2), {other}, options), Error);

@@ -31,10 +31,10 @@ GuessCorrection correct(const Problem& problem, const std::vector<Vec3>& marks, 
     start.facts.correction_options = correction_options(problem, start.h());
     RedrawnGuess redrawn;
     if (problem.image != nullptr && uses_image(start.facts.flow)) {
-        Redrawn by_image =
+        const Redrawn by_image =
             redraw(start.u, marks, *problem.image, {problem.options.inside, problem.options.outside}, run);
-        start.facts.report.remarks.choose("image", by_image.used ? "used" : "not used", by_image.reason, run);
-        if (by_image.used) redrawn = {by_image.u, by_image.box};
+        start.facts.report.remarks.choose("redrawn", by_image.used ? "by the image" : "no", by_image.reason, run);
+        redrawn = by_image;
     }
     GuessCorrection made = correct_guess(start.u, marks, problem.options.inside, problem.options.outside,
                                          start.facts.correction_options, run, redrawn);
