@@ -262,16 +262,15 @@ public:
         }
         return weight;
     }
-    /// Whether the guess is as good by the mean square, within its standard error: of two models that are not told
-    /// apart the simpler one (the one-standard-error rule: Breiman et al., Classification and Regression Trees, 1984).
-    [[nodiscard]] bool is_guess_as_good() const {
+    /// How much worse the guess is than the body by the mean square, in standard errors.
+    [[nodiscard]] double guess_worse() const {
         double sum = 0, squares = 0;
         for (const auto& [body, guess] : off_) {
             const double more = guess * guess - body * body;
             sum += more;
             squares += more * more;
         }
-        return sum <= std::sqrt(squares);
+        return squares > 0 ? sum / std::sqrt(squares) : 0;
     }
 
 private:
@@ -434,8 +433,13 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
         const Overlap overlap = compare(guess, geometry, body.lattice, level);
         report.agreement = overlap.dice;
         report.expected = expected_dice(held, report.weight_of_guess, cell, overlap);
-        if (predictions.is_guess_as_good() && overlap.dice > kInference.agreement) {
-            keep_guess("the surface of least bending agrees with the image, and predicts marks better");
+        // Of two that agree the simpler one, if they are not told apart (the one-standard-error rule: Breiman et al.,
+        // Classification and Regression Trees, 1984); of two that do not, the one that is better for sure.
+        const double worse = predictions.guess_worse();
+        if (overlap.dice > kInference.agreement ? worse <= 1 : worse < -2) {
+            keep_guess(overlap.dice > kInference.agreement
+                           ? "the surface of least bending agrees with the image, and predicts marks as well"
+                           : "the surface of least bending predicts marks better");
             return;
         }
         if (fraction_off(geometry, result.marks, body.lattice, level) > kInference.most_off) {
