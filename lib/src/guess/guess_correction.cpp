@@ -1,7 +1,6 @@
 #include "covol/guess_correction.h"
 
 #include <openvdb/openvdb.h>
-#include <openvdb/tools/Interpolation.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -15,6 +14,7 @@
 #include "clip/half_spaces.h"
 #include "covol/error.h"
 #include "covol/start.h"
+#include "grid/levels_at.h"
 #include "guess/heuristics.h"
 #include "guess/wendland.h"
 #include "points/convex_hull.h"
@@ -34,12 +34,6 @@ struct Bump {
     double radius, height;
 };
 
-/// Trilinear between voxels.
-double level_at(const FloatGrid& grid, const Vec3& world) {
-    return double(openvdb::tools::BoxSampler::sample(
-        grid.getConstAccessor(), grid.transform().worldToIndex(openvdb::Vec3d(world[0], world[1], world[2]))));
-}
-
 /// The signed distance to the guess, however far.
 class FarDistance {
 public:
@@ -47,7 +41,7 @@ public:
         : guess_(guess), exact_(kCorrection.exact_voxels * guess->voxelSize()[0]), surface_(crossings) {}
 
     [[nodiscard]] double at(const Vec3& world) const {
-        const double near = level_at(*guess_, world);
+        const double near = detail::level_at(*guess_, world);
         if (std::abs(near) < exact_) return near;
         return std::copysign(std::max(exact_, std::sqrt(surface_.nearest(world))), near);
     }
@@ -446,14 +440,14 @@ CorrectedMask GuessCorrection::apply(const Image& mask, int label, const RunCont
                     if (is_still && !is_redrawn) continue;
                     bool was = false, in = false;
                     if (is_still) {
-                        in = level_at(*data_->grid, world) < 0;
+                        in = detail::level_at(*data_->grid, world) < 0;
                     } else {
                         const double before = data_->distance.at(world);
                         at_least = std::abs(before) - data_->distance.slack();
                         was = before < 0;
                         in = comes_inside(before, move, data_->hull, world);
                     }
-                    if (is_redrawn) was = level_at(*data_->given, world) < 0;
+                    if (is_redrawn) was = detail::level_at(*data_->given, world) < 0;
                     if (was == in) continue;
                     near += move == 0;
                     if (in && *value == 0) {

@@ -401,7 +401,7 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
             return;
         }
         const Level at(geometry, body.lattice, level);
-        const auto at_guess = [&](const Vec3& place) { return detail::levels_at(guess, std::vector<Vec3>{place})[0]; };
+        const auto at_guess = [&](const Vec3& place) { return detail::level_at(guess, place); };
         if (count_wrong(sides, at) > count_wrong(sides, at_guess)) {
             reject_body(
                 "more of the places that are known to be inside or outside are so of the surface of least bending");

@@ -92,7 +92,7 @@ double Volume::at(const Vec3& index) const {
 
 Layer cast_volume(const Volume& volume, const Camera& camera, double density, bool on_white, const RunContext& run) {
     const ImageGeometry& g = volume.geometry();
-    const double finest = std::min({g.spacing[0], g.spacing[1], g.spacing[2]});
+    const double finest = g.smallest_spacing();
     const Rect& at = camera.at;
     // Rays need not be finer than voxels; between them colours are interpolated.
     const double coarse =

@@ -1,4 +1,3 @@
-#include <algorithm>
 
 #include "cli/report.h"
 #include "commands/commands.h"
@@ -89,7 +88,7 @@ struct ConvertJob {
         report = {{"count", world.size()}, {"rule", cloud.rule}};
         if (cloud_flags.length("simplify").in_voxels && !geometry)
             throw UsageError("--simplify: a length in voxels needs --like IMAGE");
-        const double h = geometry ? *std::min_element(geometry->spacing.begin(), geometry->spacing.end()) : 1;
+        const double h = geometry ? geometry->smallest_spacing() : 1;
         if (const CloudCleanupOptions cleanup = cloud_flags.cleanup(h); cleanup.any()) {
             CloudCleanupReport done;
             world = clean_cloud(world, cleanup, session.run(), &done);

@@ -31,7 +31,7 @@ struct DistanceJob {
         const Length asked = domain.length("voxel_size");
         if (geometry == nullptr || (asked.given && !asked.in_voxels))
             return resolve_voxel_size(asked, nullptr, cloud, true, session);
-        const double finest = *std::min_element(geometry->spacing.begin(), geometry->spacing.end());
+        const double finest = geometry->smallest_spacing();
         return asked.resolve(finest, finest);
     }
 

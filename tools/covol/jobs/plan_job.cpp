@@ -226,8 +226,7 @@ void run_plan(const SegmentJob& job, Session& session) {
         ReadImageOptions reading = job.image.options;
         reading.roi = job.given.options.roi;
         image = read_image_info(job.images.front(), reading, session.run());
-        const Vec3& spacing = image->geometry.spacing;
-        const double finest = *std::min_element(spacing.begin(), spacing.end());
+        const double finest = image->geometry.smallest_spacing();
         given_h = job.given.length("voxel_size").resolve(finest, finest);
         const Index3& n = image->geometry.size;
         pixel_bytes = double(bytes_of(image->type));

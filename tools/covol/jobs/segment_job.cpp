@@ -185,8 +185,7 @@ Image SegmentJob::read(const std::string& path, const ReadImageOptions& options,
     const Stopwatch reading;
     ReadImageOptions needed = options;
     if (given.options.roi) {
-        const Vec3 spacing = read_image_geometry(path, options, session.run()).spacing;
-        const double finest = *std::min_element(spacing.begin(), spacing.end());
+        const double finest = read_image_geometry(path, options, session.run()).smallest_spacing();
         needed.roi = sampled_box(*given.options.roi, given.length("voxel_size").resolve(finest, finest));
     }
     session.require_memory(double(read_image_info(path, needed, session.run()).bytes_to_hold), "the image");

@@ -2,7 +2,6 @@
 
 #include <openvdb/openvdb.h>
 
-#include <algorithm>
 #include <cmath>
 #include <iomanip>
 #include <optional>
@@ -22,7 +21,7 @@ constexpr std::size_t kMostInLines = 4;  // structures; of more there is a table
 /// Up to rounding in files.
 bool is_same_lattice(const ImageGeometry& a, const ImageGeometry& b) {
     if (a.size != b.size) return false;
-    const double slack = 1e-3 * *std::min_element(b.spacing.begin(), b.spacing.end());
+    const double slack = 1e-3 * b.smallest_spacing();
     for (const Vec3& corner :
          {Vec3{0, 0, 0}, Vec3{double(a.size[0]), 0, 0}, Vec3{0, double(a.size[1]), 0}, Vec3{0, 0, double(a.size[2])}}) {
         const Vec3 p = a.index_to_world(corner), q = b.index_to_world(corner);

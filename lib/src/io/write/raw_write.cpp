@@ -198,7 +198,7 @@ std::string nifti_header(const std::string& path, const PixelSource& source, con
     put(kCodes, std::int16_t(1));
     put(kCodes + 2, std::int16_t(1));
     const std::optional<NiftiSpace> stated = read_nifti_space(like);
-    if (stated && still_holds(*stated, header, *std::min_element(g.spacing.begin(), g.spacing.end()))) {
+    if (stated && still_holds(*stated, header, g.smallest_spacing())) {
         put(kPixdim, stated->qfac);
         put(kCodes, stated->codes);
         put(kQuatern, stated->qform);
