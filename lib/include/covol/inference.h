@@ -52,8 +52,9 @@ struct Inferred {
 /// and outside look; the body of least surface with these log odds, a convex problem, is global, and its normals start
 /// the next round (lib/src/inference/candidate.h). Marks that were left out tell how far body and guess are to be
 /// believed, and which marks are wrong: several that lie far from it whether or not they are left out. The guess is
-/// kept where it agrees with the body and predicts such marks at least as well, and where the body leaves many marks,
-/// or has more of the known places on the wrong side.
+/// kept where it agrees with the body and predicts such marks as well, within the standard error, where it does not and
+/// predicts them better by two, and where the body
+/// leaves many marks, or has more of the known places on the wrong side.
 ///
 /// @param guess  level set, negative inside, on its domain's lattice
 /// @param marks  world positions on the surface

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -23,9 +22,9 @@ using guess::Normals;
 using guess::Search;
 using guess::VariationalSurface;
 
-constexpr double kOffsets[] = {1.5, 2.5, 3.5};  // cells beside a mark
-constexpr int kAllFolds = -1;                   // of a sample that is never left out
-constexpr std::size_t kElsewhere = 300;         // samples that no mark gives
+constexpr double kOffsets[] = {0.75, 1.5, 2.5, 3.5};  // cells beside a mark
+constexpr int kAllFolds = -1;                         // of a sample that is never left out
+constexpr std::size_t kElsewhere = 300;               // samples that no mark gives
 constexpr std::size_t kFewestSamples = 40;
 
 template <typename Visit>
@@ -222,8 +221,7 @@ Solid least_body(const Scene& scene, const Field& odds, const RunContext& run) {
     Field cost(odds.size()), weight(odds.size()), u(odds.size());
     for (std::size_t n = 0; n < odds.size(); ++n) {
         cost[n] = float(-kInference.odds_weight) * odds[n];
-        weight[n] = scene.edge[n] * float(kInference.surface_at_marks +
-                                          std::min(double(scene.to_mark[n]) / reach, kInference.surface_far));
+        weight[n] = scene.edge[n] * float(kInference.surface_at_marks + double(scene.to_mark[n]) / reach);
         u[n] = cost[n] < 0 ? 1.0F : 0.0F;
     }
     // What is known costs no surface: a small place is not smoothed away.
@@ -250,42 +248,38 @@ void keep_marked_parts(const Scene& scene, Solid& solid) {
     if (inside == 0 || inside == solid.inside.size()) solid.inside.clear();
 }
 
-/// Marks lie on the surface, anywhere on it with the same probability: their likelihood falls with its area, and where
-/// much of it is far from any. What the image tells of the sides of marks that were left out counts, too.
-double score_of(const Scene& scene, const Solid& solid, double bits) {
-    const Lattice& lattice = scene.lattice;
-    const double cell = lattice.finest(), marks = double(scene.marks.places.size());
-    const Field distance = signed_distance(lattice, solid.inside);
-    double on = 0;
-    for (const Vec3& mark : scene.marks.places)
-        on += std::abs(lattice.value(distance, mark)) < kInference.on_mark * cell;
-    std::vector<std::pair<double, double>> faces;  // distance to a mark, area
-    double area = 0;
+/// Of the faces between inside and outside, over the smooth surface.
+double area_of(const Solid& solid) {
+    constexpr double kStairs = 1.5;  // faces of cells over a smooth surface, in the mean
+    const Lattice& lattice = solid.lattice;
     const std::size_t steps[3] = {1, std::size_t(lattice.size[0]),
                                   std::size_t(lattice.size[0]) * std::size_t(lattice.size[1])};
+    double area = 0;
     for (int k = 0; k < lattice.size[2]; ++k)
         for (int j = 0; j < lattice.size[1]; ++j)
             for (int i = 0; i < lattice.size[0]; ++i) {
                 const std::size_t n = lattice.node(i, j, k);
                 if (solid.inside[n] == 0) continue;
                 const int here[3] = {i, j, k};
-                double of_node = 0;
                 for (int a = 0; a < 3; ++a) {
                     const double face = lattice.spacing[(a + 1) % 3] * lattice.spacing[(a + 2) % 3];
-                    if (here[a] > 0 && solid.inside[n - steps[a]] == 0) of_node += face;
-                    if (here[a] + 1 < lattice.size[a] && solid.inside[n + steps[a]] == 0) of_node += face;
+                    if (here[a] > 0 && solid.inside[n - steps[a]] == 0) area += face;
+                    if (here[a] + 1 < lattice.size[a] && solid.inside[n + steps[a]] == 0) area += face;
                 }
-                constexpr double kStairs = 1.5;  // faces of cells over a smooth surface, in the mean
-                if (of_node == 0) continue;
-                faces.emplace_back(double(scene.to_mark[n]), of_node / kStairs);
-                area += faces.back().second;
             }
-    const double reach = 2 * std::sqrt(area / (marks * std::numbers::pi)) + cell;
-    double near = 0;
-    for (const auto& [away, of_node] : faces) near += away < reach ? of_node : 0.0;
-    const double weight = kInference.score_weight;
-    return std::log(std::max(on / marks, 1e-9)) + std::log(std::max(near / area, 1e-9)) + weight * bits -
-           weight * std::log(area);
+    return area / kStairs;
+}
+
+/// Marks lie on the surface, anywhere on it with the same probability, so that they are the less likely the larger it
+/// is, and the farther they lie off it. What the image tells of the sides of marks that were left out counts, too.
+double score_of(const Scene& scene, const Solid& solid, double bits) {
+    constexpr double kMostCells = 4;  // a miss is a miss
+    const double cell = solid.lattice.finest();
+    const Field distance = signed_distance(solid.lattice, solid.inside);
+    double off = 0;
+    for (const Vec3& mark : scene.marks.places)
+        off += std::min(std::abs(solid.lattice.value(distance, mark)) / cell, kMostCells);
+    return bits - std::log(area_of(solid)) - off / (kInference.usual_off * double(scene.marks.places.size()));
 }
 
 }  // namespace

@@ -81,15 +81,19 @@ private:
 Candidate Inference::best_candidate() const {
     std::vector<Candidate> found{propose(*coarse_, {}, run_)};  // by the marks alone
     const double amplitude = found.front().amplitude;
+    const auto propose_all = [&](const std::vector<Proposal>& proposals) {
+        const std::size_t before = found.size();
+        found.resize(before + proposals.size());
+        tbb::parallel_for(std::size_t(0), proposals.size(),
+                          [&](std::size_t n) { found[before + n] = propose(*coarse_, proposals[n], run_); });
+    };
     std::vector<Proposal> proposals;
     for (const double sigma : kSigmas) {
         proposals.push_back({image_axes(*coarse_, sigma, true), kInference.axes_strength, Search::Wide, amplitude});
         // Where the body is darker all around, or brighter, the gradients themselves are the normals.
         proposals.push_back({image_axes(*coarse_, sigma, false), kInference.normals_strength, Search::Near, amplitude});
     }
-    found.resize(1 + proposals.size());
-    tbb::parallel_for(std::size_t(0), proposals.size(),
-                      [&](std::size_t n) { found[1 + n] = propose(*coarse_, proposals[n], run_); });
+    propose_all(proposals);
     const auto best = [&](bool to_continue) {
         Candidate* result = nullptr;
         for (Candidate& c : found)
@@ -98,11 +102,14 @@ Candidate Inference::best_candidate() const {
         return result;
     };
     for (int round = 0; round < kInference.rounds; ++round) {
-        Candidate* from = best(true);
-        if (from == nullptr) break;
-        from->was_continued = true;
-        Candidate next = propose(*coarse_, near_normals_of(from->solid, amplitude), run_);
-        found.push_back(std::move(next));
+        std::vector<Proposal> next;
+        for (int n = 0; n < kInference.continued; ++n) {
+            Candidate* from = best(true);
+            if (from == nullptr) break;
+            from->was_continued = true;
+            next.push_back(near_normals_of(from->solid, amplitude));
+        }
+        propose_all(next);
     }
     Candidate* chosen = best(false);
     return chosen != nullptr ? std::move(*chosen) : Candidate{};
@@ -225,20 +232,54 @@ Field Inference::pooled(const Solid& body, double guess_weight) const {
     return level;
 }
 
-/// The weight of the guess, in [0,1], with which the mean of both predicts marks best (stacking: Wolpert, Neural
-/// Networks 5(2), 1992).
-/// @param shrink  of the body's errors on a finer lattice
-double weight_of_guess(const HeldOut& held, double cell, double shrink) {
-    constexpr double kMostCells = 4;  // a miss is a miss
-    double with = 0, square = 0;
-    for (std::size_t n = 0; n < held.of_body.size(); ++n) {
-        const double most = kMostCells * cell, body = std::clamp(shrink * held.of_body[n], -most, most),
-                     guess = std::clamp(held.of_guess[n], -most, most);
-        with += body * (body - guess);
-        square += (body - guess) * (body - guess);
+/// How body and guess predict marks that they were not made from.
+class Predictions {
+public:
+    /// @param shrink  of the body's errors on a finer lattice
+    Predictions(const HeldOut& held, double cell, double shrink) : small_(kInference.usual_off * cell) {
+        constexpr double kMostCells = 4;  // a miss is a miss
+        const double most = kMostCells * cell;
+        for (std::size_t n = 0; n < held.of_body.size(); ++n)
+            off_.push_back(
+                {std::clamp(shrink * held.of_body[n], -most, most), std::clamp(held.of_guess[n], -most, most)});
     }
-    return square > 0 ? std::clamp(with / square, 0.0, 1.0) : 0.0;
-}
+
+    /// The weight of the guess, in [0,1], with which the mean of both predicts marks best (stacking: Wolpert, Neural
+    /// Networks 5(2), 1992), by the mean size of the error, smooth about 0: reweighted least squares.
+    [[nodiscard]] double weight_of_guess() const {
+        constexpr int kRounds = 30;
+        double weight = 0.5;
+        for (int round = 0; round < kRounds; ++round) {
+            double with = 0, square = 0;
+            for (const auto& [body, guess] : off_) {
+                const double off = weight * guess + (1 - weight) * body, apart = body - guess,
+                             counts = 1 / std::hypot(off, small_);
+                with += counts * body * apart;
+                square += counts * apart * apart;
+            }
+            if (!(square > 0)) return 0;
+            weight = std::clamp(with / square, 0.0, 1.0);
+        }
+        return weight;
+    }
+    /// How much worse the guess is than the body by the mean square, in standard errors.
+    [[nodiscard]] double guess_worse() const {
+        double sum = 0, squares = 0;
+        for (const auto& [body, guess] : off_) {
+            const double more = guess * guess - body * body;
+            sum += more;
+            squares += more * more;
+        }
+        return squares > 0 ? sum / std::sqrt(squares) : 0;
+    }
+
+private:
+    struct Off {
+        double body, guess;
+    };
+    std::vector<Off> off_;
+    double small_;
+};
 
 double median_size(const std::vector<double>& values) {
     std::vector<double> sizes;
@@ -374,7 +415,8 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
         report.held_out = held.of_body.size();
         report.body_error = median_size(held.of_body);
         report.guess_error = median_size(held.of_guess);
-        report.weight_of_guess = weight_of_guess(held, cell, cell / inference.coarse_cell());
+        const Predictions predictions(held, cell, cell / inference.coarse_cell());
+        report.weight_of_guess = predictions.weight_of_guess();
         const Field level = inference.pooled(body, report.weight_of_guess);
         std::erase_if(result.marks, [&](const Vec3& mark) {
             const Vec3 place = to_frame(geometry, mark);
@@ -391,8 +433,13 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
         const Overlap overlap = compare(guess, geometry, body.lattice, level);
         report.agreement = overlap.dice;
         report.expected = expected_dice(held, report.weight_of_guess, cell, overlap);
-        if (report.weight_of_guess >= 0.5 && overlap.dice > kInference.agreement) {
-            keep_guess("the surface of least bending agrees with the image, and predicts marks better");
+        // Of two that agree the simpler one, if they are not told apart (the one-standard-error rule: Breiman et al.,
+        // Classification and Regression Trees, 1984); of two that do not, the one that is better for sure.
+        const double worse = predictions.guess_worse();
+        if (overlap.dice > kInference.agreement ? worse <= 1 : worse < -2) {
+            keep_guess(overlap.dice > kInference.agreement
+                           ? "the surface of least bending agrees with the image, and predicts marks as well"
+                           : "the surface of least bending predicts marks better");
             return;
         }
         if (fraction_off(geometry, result.marks, body.lattice, level) > kInference.most_off) {

@@ -187,9 +187,9 @@ TEST_CASE("Marks are ordered by their place, and their hull leaves the image's e
     std::vector<Vec3> world;
     std::mt19937 random(2);
     std::uniform_real_distribution<double> uniform(10, 40);
-    for (int n = 0; n < 150; ++n) world.push_back({uniform(random), uniform(random), uniform(random)});
+    for (int n = 0; n < 200; ++n) world.push_back({uniform(random), uniform(random), uniform(random)});
     const Marks marks(g, world);
-    CHECK(marks.spread.size() == 100);
+    CHECK(marks.spread.size() == 150);
     std::vector<Vec3> turned(world.rbegin(), world.rend());
     turned.push_back(world.front());  // a copy counts once
     CHECK(Marks(g, turned).places == marks.places);
