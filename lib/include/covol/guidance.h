@@ -19,13 +19,18 @@ struct GuidanceOptions {
     /// how far from the guess the border is looked for, >= 0, and so twice the deviation that it may have; automatic:
     /// by the distance to the marks, and as far as the image says
     std::optional<double> range;
+    /// how far off the guess may lie (rms), per distance from the nearest mark, >= 0, if that was measured: an image
+    /// that shows another border says that the guess is worse; automatic: what the image says
+    std::optional<double> error_slope;
     double weight = 1;  ///< in [0,1]: share of what the image says that counts; 0 leaves the guess as it is
 };
 
 template <>
-inline constexpr auto kOptions<GuidanceOptions> = std::tuple{
-    Option{"mark_precision", &GuidanceOptions::mark_precision, kNotNegative},
-    Option{"range", &GuidanceOptions::range, kNotNegative}, Option{"weight", &GuidanceOptions::weight, kFraction}};
+inline constexpr auto kOptions<GuidanceOptions> =
+    std::tuple{Option{"mark_precision", &GuidanceOptions::mark_precision, kNotNegative},
+               Option{"range", &GuidanceOptions::range, kNotNegative},
+               Option{"error_slope", &GuidanceOptions::error_slope, kNotNegative},
+               Option{"weight", &GuidanceOptions::weight, kFraction}};
 
 /// What guide() saw and did. The defaults say that nothing ran.
 struct GuidanceReport {

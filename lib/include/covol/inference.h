@@ -34,7 +34,10 @@ struct InferenceReport {
     double guess_error = 0;      ///< the same of the guess with the body's normals
     double weight_of_guess = 0;  ///< in [0,1]: of the guess in what best predicts such marks
     double agreement = 0;        ///< Dice of guess and body
-    std::size_t held_out = 0;    ///< marks that this was measured at
+    /// How far off the result lies (rms), per distance from the nearest mark, by marks that it was not made from; none
+    /// if none were held out.
+    std::optional<double> error_slope;
+    std::size_t held_out = 0;  ///< marks that this was measured at
     /// Marks that are more likely wrong than right, as they were given; the body is made without them.
     std::vector<Vec3> wrong_marks;
     std::optional<ExpectedDice> expected;  ///< none where too few marks were held out

@@ -369,6 +369,7 @@ void Guide::weigh(bool first) {
     }
     double slope2 = 0;
     for (const Word& w : words) slope2 = std::max(slope2, w.slope2);
+    if (options_.error_slope) slope2 = std::min(slope2, squared(*options_.error_slope));
     double needed2 = guess2_ + std::max(slope2 * mean(distance2), mean(least2));
     if (options_.range) needed2 = std::min(needed2, guess2_ + mean(most2));
     Word chosen = words.front();

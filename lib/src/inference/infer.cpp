@@ -33,6 +33,7 @@ constexpr std::array kSigmas{1.0, 2.0};  // cells, of the gradients that are axe
 struct HeldOut {
     std::vector<Vec3> marks;
     std::vector<double> of_body, of_guess;
+    std::vector<double> to_rest2;  // square distance to the nearest mark that they were made from
 };
 
 class Inference {
@@ -185,10 +186,12 @@ HeldOut Inference::hold_out() const {
         if (again.solid.empty()) return;
         const Field level = again.solid.level();
         const guess::VariationalSurface surface = surface_near(part, of_rest, amplitude_);
+        const detail::KdTree tree(part.places);
         HeldOut& held = by_fold[std::size_t(fold)];
         for (const std::size_t n : out) {
             const Vec3& mark = marks_.places[n];
             held.marks.push_back(mark);
+            held.to_rest2.push_back(tree.nearest(mark));
             held.of_body.push_back(again.solid.lattice.value(level, mark));
             held.of_guess.push_back(surface.value(mark));
         }
@@ -198,6 +201,7 @@ HeldOut Inference::hold_out() const {
         all.marks.insert(all.marks.end(), held.marks.begin(), held.marks.end());
         all.of_body.insert(all.of_body.end(), held.of_body.begin(), held.of_body.end());
         all.of_guess.insert(all.of_guess.end(), held.of_guess.begin(), held.of_guess.end());
+        all.to_rest2.insert(all.to_rest2.end(), held.to_rest2.begin(), held.to_rest2.end());
     }
     return all;
 }
@@ -359,6 +363,17 @@ std::size_t count_wrong(const KnownSides& sides, const LevelAt& level) {
     return wrong(sides.inside, -1) + wrong(sides.outside, 1);
 }
 
+/// How an error grows with the distance from the marks: the slope of the line through 0 that fits its squares best.
+double error_slope(const HeldOut& held, double guess_weight, double shrink) {
+    double errors = 0, distances = 0;
+    for (std::size_t n = 0; n < held.of_body.size(); ++n) {
+        const double off = guess_weight * held.of_guess[n] + (1 - guess_weight) * shrink * held.of_body[n];
+        errors += off * off * held.to_rest2[n];
+        distances += held.to_rest2[n] * held.to_rest2[n];
+    }
+    return distances > 0 ? std::sqrt(errors / distances) : 0;
+}
+
 /// What lies between a surface and the truth is, relative to the body, the surface's area times its mean error over the
 /// volume; marks that were left out lie on the truth, and tell the error of a result from fewer marks. How that error
 /// and the Dice coefficient go together was measured: kInference.expected_scale.
@@ -415,8 +430,10 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
         report.held_out = held.of_body.size();
         report.body_error = median_size(held.of_body);
         report.guess_error = median_size(held.of_guess);
-        const Predictions predictions(held, cell, cell / inference.coarse_cell());
+        const double shrink = cell / inference.coarse_cell();
+        const Predictions predictions(held, cell, shrink);
         report.weight_of_guess = predictions.weight_of_guess();
+        report.error_slope = error_slope(held, 1, shrink);  // of the guess
         const Field level = inference.pooled(body, report.weight_of_guess);
         std::erase_if(result.marks, [&](const Vec3& mark) {
             const Vec3 place = to_frame(geometry, mark);
@@ -460,6 +477,7 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
                 for (int n = 0; n < count; ++n) values[n] = at(plus(from, n, step));
             },
             run);
+        report.error_slope = error_slope(held, report.weight_of_guess, shrink);
         report.used = true;
         report.reason = "marks and image show it together";
     });

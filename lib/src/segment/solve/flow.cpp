@@ -87,6 +87,7 @@ FloatGridPtr ask_image(const Problem& problem, const StartFacts& start, const Fl
     // The image may not say how wrong the body between contours is: where it shows another border, it says very.
     if (start.origin == StartOrigin::Contours && problem.options.contours->slice_distance > 0)
         options.range = kFlow.contour_range * problem.options.contours->slice_distance;
+    options.error_slope = start.inference.error_slope;
     if (start.inference.used) options.range = kFlow.inferred_range * start.domain.voxel_size;
     solution.was_asked = true;
     Guided guided = guide(*u, marks, *problem.image, options, problem.run);
