@@ -24,6 +24,7 @@ LAYERS = [
     {"segment": ["pipeline"], "segment/start": [], "segment/solve": [], "segment/result": []},
     {"bricks": ["bricks"], "marks": ["marks"]},
     {"io/inputs": ["file_kind", "read_marks"], "structures": ["segment_structures"]},
+    {"study": ["study", "study_solver"]},
 ]
 LEVEL = {folder: level for level, folders in enumerate(LAYERS) for folder in folders}
 FOLDER = {header: folder for folders in LAYERS for folder, headers in folders.items() for header in headers}

@@ -1,0 +1,61 @@
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "covol/api.h"
+#include "covol/pipeline.h"
+#include "covol/study.h"
+
+namespace covol {
+
+/// What is known of a structure's surface.
+struct StudyResult {
+    enum class Stage {
+        Empty,    ///< there is no surface yet: `message` says what is missing
+        Working,  ///< `progress` of the next one
+        First,    ///< the last surface, moved to the marks; without one, the surface through the marks alone
+        Refined,  ///< as `covol segment` gives it
+        Failed    ///< `message` says why; the last surface stays as it is
+    };
+    StudyId structure = 0;
+    Stage stage = Stage::Empty;
+    std::uint64_t version = 0;   ///< of the surface, grows; 0: there is none
+    std::uint64_t sequence = 0;  ///< what the caller gave with the marks
+    double progress = 0;         ///< in [0,1]
+    std::string message;
+    std::shared_ptr<const SegmentResult> surface;  ///< of First and Refined
+    double seconds = 0;                            ///< that it took
+};
+
+/// Finds the surfaces of structures whose marks change, one at a time, on a thread of its own: the structure that
+/// changed last comes first, and what its change made obsolete is cancelled.
+///
+/// Each structure is solved for itself, as segment_structures() solves a single one; where structures overlap is
+/// decided by who asks for all of them together.
+class COVOL_API StudySolver {
+public:
+    /// @param told  called from the solver's thread, one result at a time; it must not call the solver
+    StudySolver(Image image, SegmentOptions options, std::function<void(const StudyResult&)> told,
+                const RunContext& run = {});
+    /// Cancels what runs.
+    ~StudySolver();
+    StudySolver(const StudySolver&) = delete;
+    StudySolver& operator=(const StudySolver&) = delete;
+
+    /// The structure's marks are these now.
+    void solve(std::shared_ptr<const StudyStructure> structure, std::uint64_t sequence);
+    /// It is gone.
+    void forget(StudyId structure);
+    /// The newest surface; null: there is none.
+    [[nodiscard]] std::shared_ptr<const SegmentResult> surface(StudyId structure) const;
+    /// Until nothing is left to do.
+    void wait() const;
+
+private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace covol

@@ -1,0 +1,292 @@
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+
+#include "covol/error.h"
+#include "covol/study.h"
+#include "study/study_json.h"
+
+namespace covol {
+namespace {
+
+using nlohmann::json;
+namespace act = study_action;
+
+constexpr std::size_t kMostKeyBytes = 100;
+
+[[noreturn]] void refuse(const std::string& why) { throw Error(Errc::InvalidInput, "study: " + why); }
+
+/// Fields of one object; says which one is wrong.
+class Fields {
+public:
+    explicit Fields(const json& object) : object_(object) {
+        if (!object.is_object()) refuse("expected an object");
+    }
+    [[nodiscard]] bool has(const char* name) const { return object_.contains(name); }
+    [[nodiscard]] const json& at(const char* name) const {
+        const auto found = object_.find(name);
+        if (found == object_.end()) refuse(std::string("expected a field '") + name + "'");
+        return *found;
+    }
+    [[nodiscard]] StudyId id(const char* name) const {
+        const json& value = at(name);
+        if (!value.is_number_unsigned() || value.get<std::uint64_t>() > kMostId)
+            refuse(std::string("'") + name + "': expected a number from 1");
+        return value.get<StudyId>();
+    }
+    [[nodiscard]] std::string text(const char* name) const {
+        const json& value = at(name);
+        if (!value.is_string()) refuse(std::string("'") + name + "': expected a text");
+        return value.get<std::string>();
+    }
+    [[nodiscard]] bool flag(const char* name) const {
+        const json& value = at(name);
+        if (!value.is_boolean()) refuse(std::string("'") + name + "': expected true or false");
+        return value.get<bool>();
+    }
+    [[nodiscard]] double number(const char* name) const { return number_of(at(name), name); }
+    [[nodiscard]] Vec3 place(const char* name) const { return place_of(at(name), name); }
+    [[nodiscard]] std::vector<Vec3> places(const char* name) const {
+        const json& value = at(name);
+        if (!value.is_array()) refuse(std::string("'") + name + "': expected a list of places");
+        std::vector<Vec3> result;
+        for (const json& place : value) result.push_back(place_of(place, name));
+        return result;
+    }
+    [[nodiscard]] std::array<std::uint8_t, 3> color(const char* name) const {
+        const json& value = at(name);
+        std::array<std::uint8_t, 3> result{};
+        const auto is_byte = [](const json& c) { return c.is_number_unsigned() && c.get<std::uint64_t>() <= 255; };
+        if (!value.is_array() || value.size() != 3 || !std::all_of(value.begin(), value.end(), is_byte))
+            refuse(std::string("'") + name + "': expected [red, green, blue] from 0 to 255");
+        for (std::size_t c = 0; c < 3; ++c) result[c] = value[c].get<std::uint8_t>();
+        return result;
+    }
+
+private:
+    static constexpr std::uint64_t kMostId = std::uint64_t(1) << 53;  // what a browser counts exactly
+
+    static double number_of(const json& value, const char* name) {
+        if (!value.is_number() || !std::isfinite(value.get<double>()))
+            refuse(std::string("'") + name + "': expected a number");
+        return value.get<double>();
+    }
+    static Vec3 place_of(const json& value, const char* name) {
+        if (!value.is_array() || value.size() != 3) refuse(std::string("'") + name + "': expected [x, y, z]");
+        return {number_of(value[0], name), number_of(value[1], name), number_of(value[2], name)};
+    }
+
+    const json& object_;
+};
+
+MarkKind kind_of(const std::string& word) {
+    for (std::size_t n = 0; n < kWords<MarkKind>.size(); ++n)
+        if (word == kWords<MarkKind>[n]) return MarkKind(n);
+    refuse("'kind': expected surface, inside or outside, got '" + word.substr(0, kMostKeyBytes) + "'");
+}
+
+/// An action's word, how it is read, and how it is written; one for each alternative of StudyAction, in its order.
+template <typename Action>
+struct Form;
+
+template <>
+struct Form<act::AddStructure> {
+    static constexpr const char* word = "add_structure";
+    static act::AddStructure read(const Fields& f) {
+        act::AddStructure a{f.text("name"), {}};
+        if (f.has("color")) a.color = f.color("color");
+        return a;
+    }
+    static void write(const act::AddStructure& a, json& j) {
+        j["name"] = a.name;
+        if (a.color) j["color"] = *a.color;
+    }
+};
+template <>
+struct Form<act::RemoveStructure> {
+    static constexpr const char* word = "remove_structure";
+    static act::RemoveStructure read(const Fields& f) { return {f.id("structure")}; }
+    static void write(const act::RemoveStructure& a, json& j) { j["structure"] = a.structure; }
+};
+template <>
+struct Form<act::Rename> {
+    static constexpr const char* word = "rename";
+    static act::Rename read(const Fields& f) { return {f.id("structure"), f.text("name")}; }
+    static void write(const act::Rename& a, json& j) {
+        j["structure"] = a.structure;
+        j["name"] = a.name;
+    }
+};
+template <>
+struct Form<act::Recolor> {
+    static constexpr const char* word = "recolor";
+    static act::Recolor read(const Fields& f) { return {f.id("structure"), f.color("color")}; }
+    static void write(const act::Recolor& a, json& j) {
+        j["structure"] = a.structure;
+        j["color"] = a.color;
+    }
+};
+template <>
+struct Form<act::Lock> {
+    static constexpr const char* word = "lock";
+    static act::Lock read(const Fields& f) { return {f.id("structure"), f.flag("locked")}; }
+    static void write(const act::Lock& a, json& j) {
+        j["structure"] = a.structure;
+        j["locked"] = a.locked;
+    }
+};
+template <>
+struct Form<act::Show> {
+    static constexpr const char* word = "show";
+    static act::Show read(const Fields& f) { return {f.id("structure"), f.flag("visible")}; }
+    static void write(const act::Show& a, json& j) {
+        j["structure"] = a.structure;
+        j["visible"] = a.visible;
+    }
+};
+template <>
+struct Form<act::Duplicate> {
+    static constexpr const char* word = "duplicate";
+    static act::Duplicate read(const Fields& f) { return {f.id("structure")}; }
+    static void write(const act::Duplicate& a, json& j) { j["structure"] = a.structure; }
+};
+template <>
+struct Form<act::AddMark> {
+    static constexpr const char* word = "add_mark";
+    static act::AddMark read(const Fields& f) { return {f.id("structure"), kind_of(f.text("kind")), f.place("world")}; }
+    static void write(const act::AddMark& a, json& j) {
+        j["structure"] = a.structure;
+        j["kind"] = kWords<MarkKind>[std::size_t(a.kind)];
+        j["world"] = a.world;
+    }
+};
+template <>
+struct Form<act::MoveMark> {
+    static constexpr const char* word = "move_mark";
+    static act::MoveMark read(const Fields& f) { return {f.id("structure"), f.id("mark"), f.place("world")}; }
+    static void write(const act::MoveMark& a, json& j) {
+        j["structure"] = a.structure;
+        j["mark"] = a.mark;
+        j["world"] = a.world;
+    }
+};
+template <>
+struct Form<act::RemoveMark> {
+    static constexpr const char* word = "remove_mark";
+    static act::RemoveMark read(const Fields& f) { return {f.id("structure"), f.id("mark")}; }
+    static void write(const act::RemoveMark& a, json& j) {
+        j["structure"] = a.structure;
+        j["mark"] = a.mark;
+    }
+};
+template <>
+struct Form<act::GiveMark> {
+    static constexpr const char* word = "give_mark";
+    static act::GiveMark read(const Fields& f) { return {f.id("structure"), f.id("mark"), f.id("to")}; }
+    static void write(const act::GiveMark& a, json& j) {
+        j["structure"] = a.structure;
+        j["mark"] = a.mark;
+        j["to"] = a.to;
+    }
+};
+template <>
+struct Form<act::AddOutline> {
+    static constexpr const char* word = "add_outline";
+    static act::AddOutline read(const Fields& f) {
+        StudyOutline outline;
+        outline.axis = int(std::min<StudyId>(f.at("axis") == 0 ? 0 : f.id("axis"), 3));
+        outline.at = f.number("at");
+        outline.closed = f.flag("closed");
+        outline.world = f.places("world");
+        return {f.id("structure"), std::move(outline)};
+    }
+    static void write(const act::AddOutline& a, json& j) {
+        j["structure"] = a.structure;
+        j["axis"] = a.outline.axis;
+        j["at"] = a.outline.at;
+        j["closed"] = a.outline.closed;
+        j["world"] = a.outline.world;
+    }
+};
+template <>
+struct Form<act::RemoveOutline> {
+    static constexpr const char* word = "remove_outline";
+    static act::RemoveOutline read(const Fields& f) { return {f.id("structure"), f.id("mark")}; }
+    static void write(const act::RemoveOutline& a, json& j) {
+        j["structure"] = a.structure;
+        j["mark"] = a.mark;
+    }
+};
+template <>
+struct Form<act::Undo> {
+    static constexpr const char* word = "undo";
+    static act::Undo read(const Fields& /*unused*/) { return {}; }
+    static void write(const act::Undo& /*unused*/, json& /*unused*/) {}
+};
+template <>
+struct Form<act::Redo> {
+    static constexpr const char* word = "redo";
+    static act::Redo read(const Fields& /*unused*/) { return {}; }
+    static void write(const act::Redo& /*unused*/, json& /*unused*/) {}
+};
+
+template <typename... Actions>
+StudyAction read_action(const std::string& word, const Fields& fields, const std::variant<Actions...>* /*types*/) {
+    std::optional<StudyAction> found;
+    ((word == Form<Actions>::word ? (found.emplace(Form<Actions>::read(fields)), true) : false) || ...);
+    if (!found) refuse("'do': no action is called '" + word.substr(0, kMostKeyBytes) + "'");
+    return *std::move(found);
+}
+
+bool is_key(const std::string& key) {
+    return key.size() <= kMostKeyBytes &&
+           std::all_of(key.begin(), key.end(), [](char c) { return c >= ' ' && c <= '~'; });
+}
+
+}  // namespace
+
+namespace detail {
+
+json parse_object(std::string_view text) {
+    // Deep nesting would use up the stack of whoever destroys it.
+    constexpr int kDeepest = 8;
+    bool is_deep = false;
+    json object = json::parse(
+        text,
+        [&](int depth, json::parse_event_t, json&) {
+            is_deep = is_deep || depth > kDeepest;
+            return !is_deep;
+        },
+        false);
+    if (object.is_discarded() || !object.is_object() || is_deep) refuse("expected one JSON object");
+    return object;
+}
+
+}  // namespace detail
+
+KeyedAction parse_study_action(std::string_view text) {
+    const json object = detail::parse_object(text);
+    const Fields fields(object);
+    KeyedAction result;
+    if (fields.has("key")) result.key = fields.text("key");
+    if (!is_key(result.key)) refuse("'key': expected at most 100 printable ASCII characters");
+    result.action = read_action(fields.text("do"), fields, static_cast<const StudyAction*>(nullptr));
+    return result;
+}
+
+std::string to_json(const KeyedAction& keyed) {
+    json object;
+    if (!keyed.key.empty()) object["key"] = keyed.key;
+    std::visit(
+        [&](const auto& action) {
+            using Action = std::decay_t<decltype(action)>;
+            object["do"] = Form<Action>::word;
+            Form<Action>::write(action, object);
+        },
+        keyed.action);
+    return object.dump();
+}
+
+}  // namespace covol

@@ -1,0 +1,214 @@
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "covol/error.h"
+#include "covol/structures.h"
+#include "covol/study.h"
+
+namespace covol {
+namespace {
+
+constexpr std::size_t kMostStructures = 10'000, kMostMarks = 1'000'000, kMostCorners = 100'000, kMostNameBytes = 200;
+
+[[noreturn]] void refuse(const std::string& why) { throw Error(Errc::InvalidInput, "study: " + why); }
+
+void require_name(const std::string& name) {
+    if (name.empty()) refuse("a structure needs a name");
+    if (name.size() > kMostNameBytes) refuse("expected a name of at most " + std::to_string(kMostNameBytes) + " bytes");
+    const auto is_control = [](char c) { return (c >= 0 && c < ' ') || c == 127; };
+    if (std::any_of(name.begin(), name.end(), is_control)) refuse("a name holds no control characters");
+}
+
+}  // namespace
+
+StudyHistory::StudyHistory(const ImageGeometry& image) : image_(image) {}
+
+std::shared_ptr<const StudyStructure> StudyHistory::find(StudyId structure) const {
+    const auto found = std::find_if(state_.begin(), state_.end(), [&](const auto& s) { return s->id == structure; });
+    return found != state_.end() ? *found : nullptr;
+}
+
+/// Makes the changes of an action; checks all before anything changes.
+struct StudyHistory::Planning {
+    const StudyHistory& history;
+    StudyId next;  ///< the number that the next new thing gets
+
+    [[nodiscard]] std::size_t place_of(StudyId structure) const {
+        const StudyState& all = history.state_;
+        const auto found = std::find_if(all.begin(), all.end(), [&](const auto& s) { return s->id == structure; });
+        if (found == all.end()) refuse("there is no structure " + std::to_string(structure));
+        return std::size_t(found - all.begin());
+    }
+    void require_free(const std::string& name, StudyId own = 0) const {
+        for (const auto& s : history.state_)
+            if (s->name == name && s->id != own) refuse("a structure is called '" + name + "' already");
+    }
+    void require_inside(const Vec3& world) const {
+        const Vec3 index = history.image_.world_to_index(world);
+        for (std::size_t a = 0; a < 3; ++a)
+            if (!(index[a] >= -0.5 && index[a] <= history.image_.size[a] - 0.5))
+                refuse("a mark lies outside of the image");
+    }
+    /// `edit` is given a copy.
+    template <typename Edit>
+    [[nodiscard]] Change edited(StudyId structure, bool may_be_locked, const Edit& edit) const {
+        const std::size_t place = place_of(structure);
+        const auto& before = history.state_[place];
+        if (before->locked && !may_be_locked) refuse("'" + before->name + "' is locked");
+        auto after = std::make_shared<StudyStructure>(*before);
+        edit(*after);
+        return {before, after, place};
+    }
+    [[nodiscard]] Change added(std::shared_ptr<StudyStructure> structure) {
+        if (history.state_.size() >= kMostStructures) refuse("too many structures");
+        structure->id = next++;
+        return {nullptr, std::move(structure), history.state_.size()};
+    }
+    static std::vector<StudyMark>::iterator mark_in(StudyStructure& structure, StudyId mark) {
+        const auto found = std::find_if(structure.marks.begin(), structure.marks.end(),
+                                        [&](const StudyMark& m) { return m.id == mark; });
+        if (found == structure.marks.end()) refuse("'" + structure.name + "' has no mark " + std::to_string(mark));
+        return found;
+    }
+
+    Changes operator()(const study_action::AddStructure& a) {
+        require_name(a.name);
+        require_free(a.name);
+        auto structure = std::make_shared<StudyStructure>();
+        structure->name = a.name;
+        structure->color = a.color.value_or(structure_color(history.state_.size()));
+        return {added(std::move(structure))};
+    }
+    Changes operator()(const study_action::RemoveStructure& a) {
+        const std::size_t place = place_of(a.structure);
+        if (history.state_[place]->locked) refuse("'" + history.state_[place]->name + "' is locked");
+        return {{history.state_[place], nullptr, place}};
+    }
+    Changes operator()(const study_action::Rename& a) {
+        require_name(a.name);
+        require_free(a.name, a.structure);
+        return {edited(a.structure, true, [&](StudyStructure& s) { s.name = a.name; })};
+    }
+    Changes operator()(const study_action::Recolor& a) {
+        return {edited(a.structure, true, [&](StudyStructure& s) { s.color = a.color; })};
+    }
+    Changes operator()(const study_action::Lock& a) {
+        return {edited(a.structure, true, [&](StudyStructure& s) { s.locked = a.locked; })};
+    }
+    Changes operator()(const study_action::Show& a) {
+        return {edited(a.structure, true, [&](StudyStructure& s) { s.visible = a.visible; })};
+    }
+    Changes operator()(const study_action::Duplicate& a) {
+        auto copy = std::make_shared<StudyStructure>(*history.state_[place_of(a.structure)]);
+        const std::string name = copy->name;
+        const auto is_used = [&](const std::string& other) {
+            return std::any_of(history.state_.begin(), history.state_.end(),
+                               [&](const auto& s) { return s->name == other; });
+        };
+        for (int n = 2; is_used(copy->name); ++n) copy->name = name + " " + std::to_string(n);
+        require_name(copy->name);
+        copy->color = structure_color(history.state_.size());
+        copy->locked = false;
+        Change change = added(copy);
+        for (StudyMark& m : copy->marks) m.id = next++;
+        for (StudyOutline& o : copy->outlines) o.id = next++;
+        return {std::move(change)};
+    }
+    Changes operator()(const study_action::AddMark& a) {
+        require_inside(a.world);
+        return {edited(a.structure, false, [&](StudyStructure& s) {
+            if (s.marks.size() >= kMostMarks) refuse("'" + s.name + "' has too many marks");
+            s.marks.push_back({next++, a.kind, a.world});
+        })};
+    }
+    Changes operator()(const study_action::MoveMark& a) {
+        require_inside(a.world);
+        return {edited(a.structure, false, [&](StudyStructure& s) { mark_in(s, a.mark)->world = a.world; })};
+    }
+    Changes operator()(const study_action::RemoveMark& a) {
+        return {edited(a.structure, false, [&](StudyStructure& s) { s.marks.erase(mark_in(s, a.mark)); })};
+    }
+    Changes operator()(const study_action::GiveMark& a) {
+        if (a.structure == a.to) refuse("the mark belongs to that structure already");
+        StudyMark mark;
+        Change from = edited(a.structure, false, [&](StudyStructure& s) {
+            const auto found = mark_in(s, a.mark);
+            mark = *found;
+            s.marks.erase(found);
+        });
+        Change to = edited(a.to, false, [&](StudyStructure& s) { s.marks.push_back(mark); });
+        return {std::move(from), std::move(to)};
+    }
+    Changes operator()(const study_action::AddOutline& a) {
+        const StudyOutline& outline = a.outline;
+        const std::size_t fewest = outline.closed ? 3 : 2;
+        if (outline.world.size() < fewest)
+            refuse("an outline needs " + std::to_string(fewest) + " corners, got " +
+                   std::to_string(outline.world.size()));
+        if (outline.world.size() > kMostCorners) refuse("an outline has too many corners");
+        if (outline.axis < 0 || outline.axis > 2 || !std::isfinite(outline.at)) refuse("an outline lies on no slice");
+        for (const Vec3& corner : outline.world) require_inside(corner);
+        return {edited(a.structure, false, [&](StudyStructure& s) {
+            if (s.outlines.size() >= kMostMarks) refuse("'" + s.name + "' has too many outlines");
+            s.outlines.push_back(outline);
+            s.outlines.back().id = next++;
+        })};
+    }
+    Changes operator()(const study_action::RemoveOutline& a) {
+        return {edited(a.structure, false, [&](StudyStructure& s) {
+            if (std::erase_if(s.outlines, [&](const StudyOutline& o) { return o.id == a.mark; }) == 0)
+                refuse("'" + s.name + "' has no outline " + std::to_string(a.mark));
+        })};
+    }
+    Changes operator()(const study_action::Undo& /*unused*/) { return {}; }
+    Changes operator()(const study_action::Redo& /*unused*/) { return {}; }
+};
+
+void StudyHistory::put(const Changes& changes, bool forward) {
+    const auto put_one = [&](const Change& change) {
+        const auto& before = forward ? change.before : change.after;
+        const auto& after = forward ? change.after : change.before;
+        const auto at = state_.begin() + std::ptrdiff_t(change.place);
+        if (!before)
+            state_.insert(at, after);
+        else if (!after)
+            state_.erase(at);
+        else
+            *at = after;
+    };
+    if (forward)
+        std::for_each(changes.begin(), changes.end(), put_one);
+    else
+        std::for_each(changes.rbegin(), changes.rend(), put_one);
+}
+
+StudyHistory::Step StudyHistory::plan(const StudyAction& action) const {
+    if (std::holds_alternative<study_action::Undo>(action)) return {Step::Kind::Undo, {}, last_id_};
+    if (std::holds_alternative<study_action::Redo>(action)) return {Step::Kind::Redo, {}, last_id_};
+    Planning planning{*this, last_id_ + 1};
+    Changes changes = std::visit(planning, action);
+    return {Step::Kind::Do, std::move(changes), planning.next - 1};
+}
+
+StudyHistory::Changed StudyHistory::carry_out(Step step) {
+    const bool forward = step.kind != Step::Kind::Undo;
+    std::vector<Changes>& to = forward ? done_ : undone_;
+    if (step.kind == Step::Kind::Do) {
+        last_id_ = step.last_id;
+        done_.push_back(std::move(step.changes));
+        undone_.clear();
+    } else {
+        std::vector<Changes>& from = forward ? undone_ : done_;
+        if (from.empty()) return {};
+        to.push_back(std::move(from.back()));
+        from.pop_back();
+    }
+    put(to.back(), forward);
+    Changed changed;
+    for (const Change& c : to.back()) changed.push_back((c.before ? c.before : c.after)->id);
+    return changed;
+}
+
+}  // namespace covol

@@ -1,0 +1,202 @@
+#include "covol/study_solver.h"
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <unordered_map>
+#include <utility>
+
+#include "covol/error.h"
+#include "covol/segment_structures.h"
+
+namespace covol {
+namespace {
+
+constexpr std::size_t kFewestMarks = 4;  // a surface through fewer is any surface
+
+double seconds_since(std::chrono::steady_clock::time_point begin) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+/// What is missing before there can be a surface, in words; empty: nothing.
+std::string missing(const StudyStructure& structure) {
+    if (!structure.outlines.empty()) return {};
+    const std::size_t marks =
+        std::size_t(std::count_if(structure.marks.begin(), structure.marks.end(),
+                                  [](const StudyMark& mark) { return mark.kind == MarkKind::Surface; }));
+    if (marks >= kFewestMarks) return {};
+    const std::size_t more = kFewestMarks - marks;
+    return std::to_string(more) +
+           (more == 1 ? " mark more and there is a surface" : " marks more and there is a surface");
+}
+
+}  // namespace
+
+struct StudySolver::State {
+    struct Job {
+        std::shared_ptr<const StudyStructure> structure;
+        std::uint64_t sequence = 0;
+    };
+
+    State(Image i, SegmentOptions o, std::function<void(const StudyResult&)> t, const RunContext& r)
+        : image(std::move(i)), options(std::move(o)), told(std::move(t)), run(r) {
+        run.cancel = &cancel;
+        if (!options.voxel_size) options.voxel_size = choose_voxel_size(image).voxel_size;
+    }
+
+    void work() {
+        std::unique_lock lock(mutex);
+        for (;;) {
+            changed.wait(lock, [&] { return is_stopping || !waiting.empty(); });
+            if (is_stopping) return;
+            const Job job = waiting.front();
+            waiting.pop_front();
+            running = job.structure->id;
+            is_obsolete = false;
+            cancel = false;
+            lock.unlock();
+            const bool is_done = solve(job);
+            lock.lock();
+            running = 0;
+            if (!is_done && !is_obsolete && !is_stopping) waiting.push_back(job);  // it made way for another one
+            changed.notify_all();
+        }
+    }
+
+    /// False: cancelled.
+    bool solve(const Job& job) {
+        StudyResult result;
+        result.structure = job.structure->id;
+        result.sequence = job.sequence;
+        const auto tell = [&](StudyResult::Stage stage) {
+            result.stage = stage;
+            told(result);
+        };
+        result.message = missing(*job.structure);
+        if (!result.message.empty()) {
+            keep(result.structure, nullptr);
+            tell(StudyResult::Stage::Empty);
+            return true;
+        }
+        const auto begin = std::chrono::steady_clock::now();
+        tell(StudyResult::Stage::Working);
+        const auto find = [&](const SegmentOptions& how, StudyResult::Stage stage) {
+            RunContext own = run;
+            own.progress = [&, last = begin](const std::string&, double fraction) mutable {
+                const auto now = std::chrono::steady_clock::now();
+                if (now - last < std::chrono::milliseconds(200)) return;
+                last = now;
+                result.progress = fraction;
+                tell(StudyResult::Stage::Working);
+            };
+            StructuresResult all = segment_structures(image, {marks_of(*job.structure)}, {how, {}}, own);
+            result.surface = std::make_shared<const SegmentResult>(std::move(all.structures.front().result));
+            result.version = ++versions;
+            result.seconds = seconds_since(begin);
+            keep(result.structure, result.surface);
+            tell(stage);
+            result.surface.reset();
+        };
+        try {
+            SegmentOptions first = options;
+            first.evolve.rho = 0;
+            if (const auto before = newest(result.structure)) first.guess = LevelSetStart{before->surface};
+            try {
+                find(first, StudyResult::Stage::First);
+            } catch (const Error& error) {
+                if (error.code() == Errc::Cancelled) throw;  // else the image may know better
+            }
+            find(options, StudyResult::Stage::Refined);
+        } catch (const Error& error) {
+            if (error.code() == Errc::Cancelled) return false;
+            result.message = error.what();
+            tell(StudyResult::Stage::Failed);
+        } catch (const std::exception& error) {
+            result.message = error.what();
+            tell(StudyResult::Stage::Failed);
+        }
+        return true;
+    }
+
+    void keep(StudyId structure, std::shared_ptr<const SegmentResult> surface) {
+        const std::lock_guard lock(mutex);
+        if (is_obsolete) return;
+        if (surface)
+            surfaces[structure] = std::move(surface);
+        else
+            surfaces.erase(structure);
+    }
+    [[nodiscard]] std::shared_ptr<const SegmentResult> newest(StudyId structure) const {
+        const std::lock_guard lock(mutex);
+        const auto found = surfaces.find(structure);
+        return found != surfaces.end() ? found->second : nullptr;
+    }
+    /// @pre locked
+    void drop(StudyId structure) {
+        std::erase_if(waiting, [&](const Job& job) { return job.structure->id == structure; });
+        if (running == structure) is_obsolete = true;
+    }
+
+    const Image image;
+    SegmentOptions options;
+    const std::function<void(const StudyResult&)> told;
+    RunContext run;
+    std::atomic<bool> cancel{false};
+    mutable std::mutex mutex;
+    mutable std::condition_variable changed;
+    std::deque<Job> waiting;
+    StudyId running = 0;
+    bool is_obsolete = false, is_stopping = false;
+    std::unordered_map<StudyId, std::shared_ptr<const SegmentResult>> surfaces;
+    std::uint64_t versions = 0;
+    std::thread worker;
+};
+
+StudySolver::StudySolver(Image image, SegmentOptions options, std::function<void(const StudyResult&)> told,
+                         const RunContext& run)
+    : state_(std::make_unique<State>(std::move(image), std::move(options), std::move(told), run)) {
+    state_->worker = std::thread([state = state_.get()] { state->work(); });
+}
+
+StudySolver::~StudySolver() {
+    {
+        const std::lock_guard lock(state_->mutex);
+        state_->is_stopping = true;
+        state_->cancel = true;
+    }
+    state_->changed.notify_all();
+    state_->worker.join();
+}
+
+void StudySolver::solve(std::shared_ptr<const StudyStructure> structure, std::uint64_t sequence) {
+    {
+        const std::lock_guard lock(state_->mutex);
+        state_->drop(structure->id);
+        state_->waiting.push_front({std::move(structure), sequence});
+        state_->cancel = true;
+    }
+    state_->changed.notify_all();
+}
+
+void StudySolver::forget(StudyId structure) {
+    {
+        const std::lock_guard lock(state_->mutex);
+        state_->drop(structure);
+        if (state_->running == structure) state_->cancel = true;
+        state_->surfaces.erase(structure);
+    }
+    state_->changed.notify_all();
+}
+
+std::shared_ptr<const SegmentResult> StudySolver::surface(StudyId structure) const { return state_->newest(structure); }
+
+void StudySolver::wait() const {
+    std::unique_lock lock(state_->mutex);
+    state_->changed.wait(lock, [&] { return state_->waiting.empty() && state_->running == 0; });
+}
+
+}  // namespace covol

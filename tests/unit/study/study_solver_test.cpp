@@ -1,0 +1,140 @@
+#include "covol/study_solver.h"
+
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <map>
+#include <mutex>
+#include <vector>
+
+#include "covol/segment_structures.h"
+
+using namespace covol;
+
+namespace {
+
+using Stage = StudyResult::Stage;
+constexpr int kSize = 40;
+constexpr double kRadius = 9;
+const Vec3 kCenter{20, 19, 21};
+
+Image scene() {
+    ImageGeometry geometry;
+    geometry.size = {kSize, kSize, kSize};
+    std::vector<float> values;
+    for (int k = 0; k < kSize; ++k)
+        for (int j = 0; j < kSize; ++j)
+            for (int i = 0; i < kSize; ++i) {
+                const double d = std::hypot(i - kCenter[0], j - kCenter[1], k - kCenter[2]) - kRadius;
+                values.push_back(float(100 * std::clamp(0.5 - d, 0.0, 1.0)));
+            }
+    return Image::from_values(geometry, values.data());
+}
+
+std::shared_ptr<const StudyStructure> ball(StudyId id, int count) {
+    auto structure = std::make_shared<StudyStructure>();
+    structure->id = id;
+    structure->name = "ball " + std::to_string(id);
+    for (int n = 0; n < count; ++n) {
+        const double z = 1 - (2 * n + 1.0) / count, r = std::sqrt(1 - z * z), turn = 2.399963 * n;
+        structure->marks.push_back({n + 1,
+                                    MarkKind::Surface,
+                                    {kCenter[0] + kRadius * r * std::cos(turn),
+                                     kCenter[1] + kRadius * r * std::sin(turn), kCenter[2] + kRadius * z}});
+    }
+    return structure;
+}
+
+/// What a solver said.
+struct Listener {
+    std::mutex mutex;
+    std::vector<StudyResult> results;
+    std::function<void(const StudyResult&)> told() {
+        return [this](const StudyResult& result) {
+            const std::lock_guard lock(mutex);
+            results.push_back(result);
+        };
+    }
+    [[nodiscard]] std::vector<StudyResult> of(StudyId structure, Stage stage) {
+        const std::lock_guard lock(mutex);
+        std::vector<StudyResult> found;
+        std::copy_if(results.begin(), results.end(), std::back_inserter(found),
+                     [&](const StudyResult& r) { return r.structure == structure && r.stage == stage; });
+        return found;
+    }
+};
+
+}  // namespace
+
+TEST_CASE("A structure gets a first surface, and then the one that segment gives") {
+    Listener listener;
+    StudySolver solver(scene(), {}, listener.told());
+    solver.solve(ball(3, 25), 11);
+    solver.wait();
+    const auto first = listener.of(3, Stage::First), refined = listener.of(3, Stage::Refined);
+    REQUIRE(first.size() == 1);
+    REQUIRE(refined.size() == 1);
+    CHECK(first[0].version < refined[0].version);
+    CHECK(refined[0].sequence == 11);
+    REQUIRE(refined[0].surface);
+    CHECK(solver.surface(3) == refined[0].surface);
+    const StructuresResult plain = segment_structures(scene(), {marks_of(*ball(3, 25))});
+    CHECK(refined[0].surface->mesh.vertices == plain.structures.front().result.mesh.vertices);
+    CHECK(refined[0].surface->report.surface.volume == Approx(4.0 / 3 * M_PI * std::pow(kRadius, 3)).epsilon(0.05));
+}
+
+TEST_CASE("Too few marks are told, and no surface is left") {
+    Listener listener;
+    StudySolver solver(scene(), {}, listener.told());
+    solver.solve(ball(1, 20), 1);
+    solver.wait();
+    CHECK(solver.surface(1) != nullptr);
+    solver.solve(ball(1, 3), 2);
+    solver.wait();
+    const auto empty = listener.of(1, Stage::Empty);
+    REQUIRE(empty.size() == 1);
+    CHECK(empty[0].message == "1 mark more and there is a surface");
+    CHECK(solver.surface(1) == nullptr);
+}
+
+TEST_CASE("The first surface after a change is the last one moved to the marks") {
+    Listener listener;
+    StudySolver solver(scene(), {}, listener.told());
+    solver.solve(ball(1, 25), 1);
+    solver.wait();
+    auto moved = std::make_shared<StudyStructure>(*ball(1, 25));
+    moved->marks.push_back({99, MarkKind::Surface, {kCenter[0] + kRadius + 2, kCenter[1], kCenter[2]}});
+    solver.solve(moved, 2);
+    solver.wait();
+    const auto first = listener.of(1, Stage::First);
+    REQUIRE(first.size() == 2);
+    CHECK(first[1].surface->correction != nullptr);
+}
+
+TEST_CASE("Every structure is solved in the end, the newest marks last, whatever was cancelled on the way") {
+    Listener listener;
+    StudySolver solver(scene(), {}, listener.told());
+    for (std::uint64_t n = 1; n <= 12; ++n)
+        for (const StudyId id : {1, 2, 3}) solver.solve(ball(id, 15 + int(n)), n);
+    solver.forget(2);
+    solver.wait();
+    CHECK(solver.surface(2) == nullptr);
+    for (const StudyId id : {1, 3}) {
+        const auto refined = listener.of(id, Stage::Refined);
+        REQUIRE_FALSE(refined.empty());
+        CHECK(refined.back().sequence == 12);
+        CHECK(refined.back().surface == solver.surface(id));
+        CHECK(listener.of(id, Stage::Failed).empty());
+    }
+}
+
+TEST_CASE("A solver that is gone stops at once") {
+    Listener listener;
+    {
+        StudySolver solver(scene(), {}, listener.told());
+        for (const StudyId id : {1, 2, 3, 4, 5}) solver.solve(ball(id, 30), 1);
+    }
+    CHECK(listener.of(1, Stage::Refined).empty());
+}

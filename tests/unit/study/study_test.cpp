@@ -1,0 +1,258 @@
+#include "covol/study.h"
+
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "covol/error.h"
+
+using namespace covol;
+namespace act = study_action;
+namespace fs = std::filesystem;
+
+namespace {
+
+ImageGeometry image_of(int size = 20) {
+    ImageGeometry geometry;
+    geometry.size = {size, size, size};
+    return geometry;
+}
+
+/// A folder that is gone with this object.
+struct Folder {
+    fs::path path = fs::temp_directory_path() / ("covol_study_" + std::to_string(::getpid()));
+    Folder() { fs::remove_all(path); }
+    ~Folder() { fs::remove_all(path); }
+    [[nodiscard]] std::string text() const { return path.string(); }
+    [[nodiscard]] fs::path journal() const { return path / "journal.jsonl"; }
+};
+
+std::string read(const fs::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void write(const fs::path& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
+
+bool is_same(const StudyState& a, const StudyState& b) {
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const auto& x, const auto& y) { return *x == *y; });
+}
+
+/// What a person may do next, sensible or not.
+StudyAction any_action(const StudyHistory& history, std::mt19937& rng) {
+    const auto below = [&](std::size_t n) { return std::size_t(rng() % n); };
+    const auto place = [&] { return Vec3{double(below(20)), double(below(20)), double(below(22))}; };  // some outside
+    StudyId structure = 1 + StudyId(below(5)), to = structure, mark = 1;
+    if (!history.state().empty() && below(10) > 0) {
+        const StudyStructure& s = *history.state()[below(history.state().size())];
+        structure = s.id;
+        to = history.state()[below(history.state().size())]->id;
+        if (!s.marks.empty()) mark = s.marks[below(s.marks.size())].id;
+        if (s.marks.empty() && !s.outlines.empty()) mark = s.outlines[below(s.outlines.size())].id;
+    }
+    switch (below(24)) {
+        case 0: return act::AddStructure{"s" + std::to_string(below(30)), {}};
+        case 1: return act::RemoveStructure{structure};
+        case 2: return act::Rename{structure, "t" + std::to_string(below(30))};
+        case 3: return act::Recolor{structure, {std::uint8_t(below(256)), 2, 3}};
+        case 4: return act::Lock{structure, below(4) == 0};
+        case 5: return act::Show{structure, below(2) == 0};
+        case 6: return act::Duplicate{structure};
+        case 7: return act::MoveMark{structure, mark, place()};
+        case 8: return act::RemoveMark{structure, mark};
+        case 9: return act::GiveMark{structure, mark, to};
+        case 10:
+            return act::AddOutline{structure, {0, int(below(3)), double(below(20)), true, {place(), place(), place()}}};
+        case 11: return act::RemoveOutline{structure, mark};
+        case 12:
+        case 13:
+        case 14:
+        case 15: return act::Undo{};
+        case 16:
+        case 17: return act::Redo{};
+        default: return act::AddMark{structure, MarkKind(below(3)), place()};
+    }
+}
+
+}  // namespace
+
+TEST_CASE("Undo and redo give back every state, and a plain replay of what was done gives the same one") {
+    const unsigned seed = GENERATE(1U, 2U, 3U);
+    std::mt19937 rng(seed);
+    StudyHistory history(image_of());
+    std::vector<StudyAction> carried_out;
+    std::vector<StudyState> states{history.state()};  // behind each other, as undo goes back through them
+    std::size_t at = 0;
+    int refused = 0;
+    for (int n = 0; n < 5000; ++n) {
+        const StudyAction action = any_action(history, rng);
+        const StudyState before = history.state();
+        try {
+            (void)history.apply(action);
+        } catch (const Error&) {
+            REQUIRE(is_same(history.state(), before));
+            ++refused;
+            continue;
+        }
+        carried_out.push_back(action);
+        if (std::holds_alternative<act::Undo>(action)) {
+            if (at > 0) --at;
+        } else if (std::holds_alternative<act::Redo>(action)) {
+            if (at + 1 < states.size()) ++at;
+        } else {
+            states.resize(++at);
+            states.push_back(history.state());
+        }
+        REQUIRE(is_same(history.state(), states[at]));
+        REQUIRE(history.can_undo() == (at > 0));
+        REQUIRE(history.can_redo() == (at + 1 < states.size()));
+    }
+    CHECK(refused > 100);
+    CHECK(states.size() > 100);
+    StudyHistory again(image_of());
+    for (const StudyAction& action : carried_out)
+        again.apply(parse_study_action(to_json({"", action})).action);  // by way of the journal's text
+    CHECK(is_same(again.state(), history.state()));
+}
+
+TEST_CASE("A study that is opened again is what it was") {
+    const Folder folder;
+    std::mt19937 rng(7);
+    StudyState state;
+    std::uint64_t sequence = 0;
+    for (int session = 0; session < 4; ++session) {
+        Study study(folder.text(), "stack.tif", image_of());
+        CHECK(study.repaired().empty());
+        CHECK(study.sequence() == sequence);
+        CHECK(is_same(study.state(), state));
+        for (int n = 0; n < 200; ++n) try {
+                (void)study.apply(
+                    {std::to_string(session) + "-" + std::to_string(n), any_action(study.history(), rng)});
+            } catch (const Error&) {
+            }
+        state = study.state();
+        sequence = study.sequence();
+        CHECK(is_same(read_study(folder.text()), state));  // while it is open
+        CHECK_THROWS_WITH(Study(folder.text(), "stack.tif", image_of()),
+                          Catch::Matchers::Contains("another program has this study open"));
+    }
+    CHECK(sequence > 200);
+    CHECK_THROWS_WITH(Study(folder.text(), "stack.tif", image_of(21)),
+                      Catch::Matchers::Contains("image of another size"));
+}
+
+TEST_CASE("An action that is sent twice is applied once, also after the study was opened again") {
+    const Folder folder;
+    const KeyedAction add{"page-1", act::AddStructure{"nucleus", {}}};
+    {
+        Study study(folder.text(), "stack.tif", image_of());
+        CHECK(study.apply(add).is_new);
+        CHECK_FALSE(study.apply(add).is_new);
+        CHECK(study.state().size() == 1);
+    }
+    Study study(folder.text(), "stack.tif", image_of());
+    CHECK_FALSE(study.apply(add).is_new);
+    CHECK(study.state().size() == 1);
+    CHECK(study.sequence() == 1);
+}
+
+TEST_CASE("Wherever the journal is cut off, all whole lines are there, and the study goes on") {
+    const Folder folder;
+    {
+        Study study(folder.text(), "stack.tif", image_of());
+        (void)study.apply({"a", act::AddStructure{"one", {}}});
+        for (int n = 0; n < 5; ++n)
+            (void)study.apply({"m" + std::to_string(n), act::AddMark{1, MarkKind::Surface, {double(n), 1, 1}}});
+    }
+    const std::string whole = read(folder.journal());
+    const std::size_t header = whole.find('\n') + 1;
+    for (std::size_t bytes = header; bytes < whole.size(); ++bytes) {
+        write(folder.journal(), whole.substr(0, bytes));
+        const auto lines = std::uint64_t(std::count(whole.begin(), whole.begin() + std::ptrdiff_t(bytes), '\n')) - 1;
+        Study study(folder.text(), "stack.tif", image_of());
+        REQUIRE(study.sequence() == lines);
+        REQUIRE(study.repaired().empty() == (whole[bytes - 1] == '\n'));
+        (void)study.apply({"z", act::AddStructure{"two", {}}});
+        REQUIRE(read_study(folder.text()).back()->name == "two");
+    }
+}
+
+TEST_CASE("Damage before the last line is an error that names the line") {
+    const Folder folder;
+    {
+        Study study(folder.text(), "stack.tif", image_of());
+        (void)study.apply({"a", act::AddStructure{"one", {}}});
+        (void)study.apply({"b", act::AddStructure{"two", {}}});
+    }
+    std::string text = read(folder.journal());
+    text.replace(text.find("add_structure"), 3, "\x01zz");
+    write(folder.journal(), text);
+    CHECK_THROWS_WITH(Study(folder.text(), "stack.tif", image_of()), Catch::Matchers::Contains("line 2 is damaged"));
+    CHECK_THROWS_WITH(read_study(folder.text()), Catch::Matchers::Contains("line 2 is damaged"));
+    CHECK(read(folder.journal()) == text);
+    write(folder.journal(), "this is no journal\n");
+    CHECK_THROWS_WITH(Study(folder.text(), "stack.tif", image_of()),
+                      Catch::Matchers::Contains("its first line is none"));
+    CHECK_THROWS_WITH(read_study_image(folder.text() + "/none"), Catch::Matchers::Contains("there is no study there"));
+}
+
+TEST_CASE("A study says where its image is from its own folder") {
+    const Folder folder;
+    { const Study study(folder.text(), (folder.path.parent_path() / "scans/stack.tif").string(), image_of()); }
+    CHECK(read_study_image(folder.text()).path == "../scans/stack.tif");
+    CHECK(read_study_image(folder.text()).geometry.size == Index3{20, 20, 20});
+}
+
+TEST_CASE("Texts that are no action are refused") {
+    for (const std::string text :
+         {"", "{", "[]", "3", "{}", R"({"do":"sing"})", R"({"do":3})", R"({"do":"lock","structure":1,"locked":1})",
+          R"({"do":"lock","structure":-1,"locked":true})", R"({"do":"lock","structure":1e300,"locked":true})",
+          R"({"do":"add_mark","structure":1,"kind":"surface","world":[1,2]})",
+          R"({"do":"add_mark","structure":1,"kind":"surface","world":[1,2,1e999]})",
+          R"({"do":"add_mark","structure":1,"kind":"skin","world":[1,2,3]})",
+          R"({"do":"recolor","structure":1,"color":[1,2,256]})", R"({"do":"undo","key":7})",
+          "{\"do\":\"undo\",\"key\":\"a\\u0007\"}", R"({"do":"add_structure","name":"\ud800"})"})
+        CHECK_THROWS_AS(parse_study_action(text), Error);
+    CHECK_THROWS_AS(parse_study_action(std::string(1'000'000, '[')), Error);
+    CHECK_THROWS_AS(parse_study_action("{\"do\":\"undo\",\"a\":" + std::string(1'000'000, '[')), Error);
+    StudyHistory history(image_of());
+    CHECK_THROWS_AS(history.apply(act::AddStructure{"", {}}), Error);
+    CHECK_THROWS_AS(history.apply(act::AddStructure{"a\nb", {}}), Error);
+    CHECK_THROWS_AS(history.apply(act::AddStructure{std::string(1000, 'a'), {}}), Error);
+    (void)history.apply(act::AddStructure{"one", {}});
+    CHECK_THROWS_AS(history.apply(act::AddMark{1, MarkKind::Surface, {1, 1, 25}}), Error);
+    CHECK_THROWS_AS(history.apply(act::AddMark{1, MarkKind::Surface, {1, 1, std::numeric_limits<double>::quiet_NaN()}}),
+                    Error);
+    CHECK_THROWS_AS(history.apply(act::AddOutline{1, {0, 2, 1, true, {{1, 1, 1}, {2, 1, 1}}}}), Error);
+    CHECK_THROWS_AS(history.apply(act::AddOutline{1, {0, 3, 1, true, {{1, 1, 1}, {2, 1, 1}, {2, 2, 1}}}}), Error);
+    CHECK(history.state().front()->marks.empty());
+}
+
+TEST_CASE("A structure becomes the marks that segment takes") {
+    StudyHistory history(image_of());
+    (void)history.apply(act::AddStructure{"one", {}});
+    (void)history.apply(act::AddStructure{"empty", {}});
+    (void)history.apply(act::AddMark{1, MarkKind::Surface, {1, 2, 3}});
+    (void)history.apply(act::AddMark{1, MarkKind::Inside, {4, 5, 6}});
+    (void)history.apply(act::AddMark{1, MarkKind::Outside, {7, 8, 9}});
+    (void)history.apply(act::AddOutline{1, {0, 2, 4, true, {{1, 1, 4}, {5, 1, 4}, {5, 5, 4}}}});
+    const std::vector<Marks> marks = marks_of(history.state());
+    REQUIRE(marks.size() == 1);
+    CHECK(marks[0].name == "one");
+    CHECK(marks[0].points == std::vector<Vec3>{{1, 2, 3}});
+    REQUIRE(marks[0].inside.size() == 1);
+    CHECK(marks[0].inside[0].points == std::vector<Vec3>{{4, 5, 6}});
+    REQUIRE(marks[0].outside.size() == 1);
+    REQUIRE(marks[0].contours.size() == 1);
+    REQUIRE(marks[0].contours[0].lines.size() == 1);
+    CHECK(marks[0].contours[0].lines[0].closed);
+    CHECK(marks[0].contours[0].points.size() == 3);
+    CHECK(marks[0].count == 4);
+}
