@@ -19,7 +19,7 @@ LAYERS = [
     {"points": ["scan_noise", "cloud_cleanup"], "surface": ["surface", "mesh_stream"], "evolve": ["evolve", "checkpoints"], "tagging": ["band"]},
     {"contours": ["contours", "seeds"], "meshing": ["mesh_relax", "mesh_cleanup"], "holes": ["holes"], "cloud/orientation": ["orientation"]},
     {"start": ["start", "level_set"], "painted": ["painted"], "analysis": ["compare", "evidence", "structures", "phantom"], "render/draw": ["picture"]},
-    {"io/read": ["image_files"], "guess": ["guess", "guess_correction"], "cloud/surface": ["cloud_surface"], "report": ["report_page"], "render": ["render"]},
+    {"io/read": ["image_files"], "guess": ["guess", "guess_correction"], "cloud/surface": ["cloud_surface"], "report": ["report_page", "page_data"], "render": ["render"]},
     {"guidance": ["guidance", "motion"], "inference": ["inference"]},
     {"segment": ["pipeline"], "segment/start": [], "segment/solve": [], "segment/result": []},
     {"bricks": ["bricks"], "marks": ["marks"]},

@@ -10,6 +10,7 @@ namespace {
 int run(int argc, char** argv) {
     expect_temporary_files();
     Session session;
+    add_mark(session);
     add_segment(session);
     add_reconstruct(session);
     add_distance(session);

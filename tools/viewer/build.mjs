@@ -1,30 +1,46 @@
-// Makes lib/src/report/viewer.html of page.html, style.css and src. With --check it only says whether that file is what
-// would be made.
+// Makes two pages, each one file: viewer.html (what covol report writes) of page.html, and mark.html (what covol mark
+// serves) of mark_page.html. --out FOLDER puts them elsewhere; --check only says whether they are what would be made.
 import * as esbuild from 'esbuild';
 import {createHash} from 'node:crypto';
-import {readFileSync, writeFileSync} from 'node:fs';
+import {mkdirSync, readFileSync, writeFileSync} from 'node:fs';
+import {basename, join} from 'node:path';
+import {fileURLToPath} from 'node:url';
 
 const here = new URL('.', import.meta.url);
-const target = new URL('../../lib/src/report/viewer.html', here);
+const PAGES = [
+  {page: 'page.html', entry: 'src/main.js', styles: ['base.css', 'style.css'], target: '../../lib/src/report/viewer.html'},
+  {page: 'mark_page.html', entry: 'src/mark/main.js', styles: ['base.css', 'mark.css'], target: '../covol/mark/mark.html'},
+];
 const read = (name) => readFileSync(new URL(name, here), 'utf8');
 const hash = (text) => createHash('sha256').update(text, 'utf8').digest('base64');
+const isCheck = process.argv.includes('--check'), out = process.argv.includes('--out') ? process.argv[process.argv.indexOf('--out') + 1] : null;
 
-const options = {minify: true, write: false, charset: 'ascii', legalComments: 'none'};
-const bundled = await esbuild.build({
-  ...options, entryPoints: [new URL('src/main.js', here).pathname], bundle: true, format: 'iife', target: 'es2020',
-});
-const notice = `/*!\nThis page holds three.js:\n${read('node_modules/three/LICENSE').trim().replace(/\*\//g, '')}\n*/\n`;
-const script = notice + bundled.outputFiles[0].text.trim();
-const style = (await esbuild.transform(read('style.css'), {minify: true, loader: 'css'})).code.trim();
-for (const text of [script, style])
-  if (/<\/(script|style)|<!--|\{\{(title|data)\}\}/i.test(text)) throw new Error('what is built would end its element');
-
-const parts = {script, style, script_hash: hash(script), style_hash: hash(style)};
-const page = read('page.html').replace(/\{\{(script|style|script_hash|style_hash)\}\}/g, (_, name) => parts[name]);
-if (process.argv.includes('--check')) {
-  const same = readFileSync(target, 'utf8') === page;
-  console.log(same ? 'viewer.html is up to date' : 'viewer.html differs from what src makes: npm run build');
-  process.exit(same ? 0 : 1);
+async function build({page, entry, styles}) {
+  const options = {minify: true, write: false, charset: 'ascii', legalComments: 'none'};
+  const bundled = await esbuild.build({
+    ...options, entryPoints: [fileURLToPath(new URL(entry, here))], bundle: true, format: 'iife', target: 'es2020',
+  });
+  const notice = `/*!\nThis page holds three.js:\n${read('node_modules/three/LICENSE').trim().replace(/\*\//g, '')}\n*/\n`;
+  const script = notice + bundled.outputFiles[0].text.trim();
+  const style = (await esbuild.transform(styles.map(read).join('\n'), {minify: true, loader: 'css'})).code.trim();
+  for (const text of [script, style])
+    if (/<\/(script|style)|<!--|\{\{(title|data)\}\}/i.test(text)) throw new Error('what is built would end its element');
+  const parts = {script, style, script_hash: hash(script), style_hash: hash(style)};
+  return read(page).replace(/\{\{(script|style|script_hash|style_hash)\}\}/g, (_, name) => parts[name]);
 }
-writeFileSync(target, page);
-console.log(`viewer.html: ${Math.round(page.length / 1024)} KiB`);
+
+let isSame = true;
+for (const page of PAGES) {
+  const text = await build(page), name = basename(page.target);
+  const target = out ? join(out, name) : fileURLToPath(new URL(page.target, here));
+  if (isCheck) {
+    const same = readFileSync(target, 'utf8') === text;
+    console.log(same ? `${name} is up to date` : `${name} differs from what src makes: npm run build`);
+    isSame &&= same;
+  } else {
+    if (out) mkdirSync(out, {recursive: true});
+    writeFileSync(target, text);
+    console.log(`${name}: ${Math.round(text.length / 1024)} KiB`);
+  }
+}
+process.exit(isSame ? 0 : 1);

@@ -140,8 +140,11 @@ public:
     [[nodiscard]] bool can_undo() const noexcept { return !done_.empty(); }
     [[nodiscard]] bool can_redo() const noexcept { return !undone_.empty(); }
 
-    /// The structures that changed, came or went; empty: it was no change (an undo of nothing).
-    using Changed = std::vector<StudyId>;
+    /// What an action did.
+    struct Changed {
+        std::vector<StudyId> structures;  ///< that changed, came or went; none: an undo of nothing
+        StudyId made = 0;                 ///< the number of the structure, mark or outline that is new; 0: none is
+    };
     /// The same actions in the same order give the same state, numbers included.
     /// @throws Error InvalidInput: it cannot be done (no such structure, a name that is in use, a place outside of the
     ///         image, a locked structure), and nothing changed.
@@ -156,7 +159,7 @@ public:
     struct Step {
         enum class Kind { Do, Undo, Redo } kind = Kind::Do;
         std::vector<Change> changes;  ///< of Do
-        StudyId last_id = 0;
+        StudyId last_id = 0;          ///< after it
     };
     /// @throws Error as apply().
     [[nodiscard]] Step plan(const StudyAction& action) const;
@@ -205,7 +208,7 @@ public:
 
     struct Applied {
         StudyHistory::Changed changed;
-        bool is_new = true;  ///< false: an action with this key had been applied before
+        bool is_new = true;  ///< false: an action with this key had been applied before; `made` is what it made then
     };
     /// On the disk when this returns. @throws Error InvalidInput (as StudyHistory::apply()), Io: nothing changed.
     Applied apply(const KeyedAction& action);
@@ -217,7 +220,7 @@ private:
     std::string folder_;
     StudyHistory history_;
     std::unique_ptr<Journal> journal_;
-    std::unordered_map<std::string, std::uint64_t> keys_;
+    std::unordered_map<std::string, StudyId> made_;  // by the key of each action
     std::uint64_t sequence_ = 0;
     std::string repaired_;
 };

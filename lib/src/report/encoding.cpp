@@ -22,12 +22,19 @@ std::string to_base64(const std::uint8_t* data, std::size_t count) {
     return text;
 }
 
+std::string deflated(const std::vector<std::uint8_t>& bytes, int level) {
+    uLongf size = compressBound(bytes.size());
+    std::string packed(size, '\0');
+    if (compress2(reinterpret_cast<Bytef*>(packed.data()), &size, bytes.data(), bytes.size(), level) != Z_OK)
+        throw std::bad_alloc();
+    packed.resize(size);
+    return packed;
+}
+
 std::string pack(const std::vector<std::uint8_t>& bytes) {
     constexpr int kLevel = 6;
-    uLongf size = compressBound(bytes.size());
-    std::vector<std::uint8_t> packed(size);
-    if (compress2(packed.data(), &size, bytes.data(), bytes.size(), kLevel) != Z_OK) throw std::bad_alloc();
-    return to_base64(packed.data(), size);
+    const std::string packed = deflated(bytes, kLevel);
+    return to_base64(reinterpret_cast<const std::uint8_t*>(packed.data()), packed.size());
 }
 
 std::string safe_in_script(std::string_view json) {

@@ -10,7 +10,9 @@ namespace covol::detail {
 
 /// RFC 4648, with padding.
 [[nodiscard]] std::string to_base64(const std::uint8_t* data, std::size_t count);
-/// A zlib stream (RFC 1950) as base64.
+/// A zlib stream (RFC 1950). @param level  1: fast, to 9: small
+[[nodiscard]] std::string deflated(const std::vector<std::uint8_t>& bytes, int level);
+/// The same as base64.
 [[nodiscard]] std::string pack(const std::vector<std::uint8_t>& bytes);
 
 /// JSON text that may stand in a script element: no character in it ends one or begins a comment.

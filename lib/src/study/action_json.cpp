@@ -4,8 +4,8 @@
 #include <string>
 #include <utility>
 
-#include "covol/error.h"
 #include "covol/study.h"
+#include "study/refuse.h"
 #include "study/study_json.h"
 
 namespace covol {
@@ -16,7 +16,7 @@ namespace act = study_action;
 
 constexpr std::size_t kMostKeyBytes = 100;
 
-[[noreturn]] void refuse(const std::string& why) { throw Error(Errc::InvalidInput, "study: " + why); }
+using detail::refuse;
 
 /// Fields of one object; says which one is wrong.
 class Fields {

@@ -3,16 +3,16 @@
 #include <string>
 #include <utility>
 
-#include "covol/error.h"
 #include "covol/structures.h"
 #include "covol/study.h"
+#include "study/refuse.h"
 
 namespace covol {
 namespace {
 
 constexpr std::size_t kMostStructures = 10'000, kMostMarks = 1'000'000, kMostCorners = 100'000, kMostNameBytes = 200;
 
-[[noreturn]] void refuse(const std::string& why) { throw Error(Errc::InvalidInput, "study: " + why); }
+using detail::refuse;
 
 void require_name(const std::string& name) {
     if (name.empty()) refuse("a structure needs a name");
@@ -195,19 +195,20 @@ StudyHistory::Step StudyHistory::plan(const StudyAction& action) const {
 StudyHistory::Changed StudyHistory::carry_out(Step step) {
     const bool forward = step.kind != Step::Kind::Undo;
     std::vector<Changes>& to = forward ? done_ : undone_;
+    Changed changed;
     if (step.kind == Step::Kind::Do) {
+        if (step.last_id > last_id_) changed.made = last_id_ + 1;
         last_id_ = step.last_id;
         done_.push_back(std::move(step.changes));
         undone_.clear();
     } else {
         std::vector<Changes>& from = forward ? undone_ : done_;
-        if (from.empty()) return {};
+        if (from.empty()) return changed;
         to.push_back(std::move(from.back()));
         from.pop_back();
     }
     put(to.back(), forward);
-    Changed changed;
-    for (const Change& c : to.back()) changed.push_back((c.before ? c.before : c.after)->id);
+    for (const Change& c : to.back()) changed.structures.push_back((c.before ? c.before : c.after)->id);
     return changed;
 }
 

@@ -179,9 +179,9 @@ Study::Study(std::string folder, const std::string& image_path, const ImageGeome
             Errc::InvalidInput, path,
             "this study belongs to an image of another size, spacing or place; open that image, or name another study");
     each_action(lines, path, [&](const KeyedAction& action) {
-        history_.apply(action.action);
+        const StudyId made = history_.apply(action.action).made;
         ++sequence_;
-        if (!action.key.empty()) keys_.emplace(action.key, sequence_);
+        if (!action.key.empty()) made_.emplace(action.key, made);
     });
     const std::size_t whole = std::size_t(lines.back().data() + lines.back().size() + 1 - text.data());
     if (whole < text.size()) {
@@ -196,12 +196,13 @@ Study::~Study() = default;
 Study::Study(Study&&) noexcept = default;
 
 Study::Applied Study::apply(const KeyedAction& action) {
-    if (!action.key.empty() && keys_.count(action.key) > 0) return {{}, false};
+    if (const auto before = made_.find(action.key); before != made_.end()) return {{{}, before->second}, false};
     StudyHistory::Step step = history_.plan(action.action);
     journal_->append(to_json(action));
     ++sequence_;
-    if (!action.key.empty()) keys_.emplace(action.key, sequence_);
-    return {history_.carry_out(std::move(step)), true};
+    Applied applied{history_.carry_out(std::move(step)), true};
+    if (!action.key.empty()) made_.emplace(action.key, applied.changed.made);
+    return applied;
 }
 
 StudyImage read_study_image(const std::string& folder) {
@@ -218,7 +219,7 @@ StudyState read_study(const std::string& folder) {
     const std::vector<std::string_view> lines = whole_lines(text);
     if (lines.empty()) fail(Errc::InvalidInput, path, "expected the journal of a study; it is empty");
     StudyHistory history(parse_header(lines.front(), path).geometry);
-    each_action(lines, path, [&](const KeyedAction& action) { history.apply(action.action); });
+    each_action(lines, path, [&](const KeyedAction& action) { (void)history.apply(action.action); });
     return history.state();
 }
 

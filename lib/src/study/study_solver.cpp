@@ -1,5 +1,6 @@
 #include "covol/study_solver.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
@@ -12,6 +13,7 @@
 
 #include "covol/error.h"
 #include "covol/segment_structures.h"
+#include "covol/surface.h"
 
 namespace covol {
 namespace {
@@ -22,14 +24,28 @@ double seconds_since(std::chrono::steady_clock::time_point begin) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
+/// Whether places lie in one plane, up to a thousandth of their extent: as clicks on one slice do.
+bool are_flat(const std::vector<Vec3>& places) {
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (const Vec3& p : places) mean += Eigen::Vector3d(p[0], p[1], p[2]) / double(places.size());
+    Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+    for (const Vec3& p : places) {
+        const Eigen::Vector3d off = Eigen::Vector3d(p[0], p[1], p[2]) - mean;
+        spread += off * off.transpose();
+    }
+    const Eigen::Vector3d squares = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues();
+    return squares[0] <= 1e-6 * squares[2];
+}
+
 /// What is missing before there can be a surface, in words; empty: nothing.
 std::string missing(const StudyStructure& structure) {
     if (!structure.outlines.empty()) return {};
-    const std::size_t marks =
-        std::size_t(std::count_if(structure.marks.begin(), structure.marks.end(),
-                                  [](const StudyMark& mark) { return mark.kind == MarkKind::Surface; }));
-    if (marks >= kFewestMarks) return {};
-    const std::size_t more = kFewestMarks - marks;
+    std::vector<Vec3> places;
+    for (const StudyMark& mark : structure.marks)
+        if (mark.kind == MarkKind::Surface) places.push_back(mark.world);
+    if (places.size() >= kFewestMarks)
+        return are_flat(places) ? "all marks lie in one plane: set some on other slices, or in another view" : "";
+    const std::size_t more = kFewestMarks - places.size();
     return std::to_string(more) +
            (more == 1 ? " mark more and there is a surface" : " marks more and there is a surface");
 }
@@ -94,7 +110,9 @@ struct StudySolver::State {
                 tell(StudyResult::Stage::Working);
             };
             StructuresResult all = segment_structures(image, {marks_of(*job.structure)}, {how, {}}, own);
-            result.surface = std::make_shared<const SegmentResult>(std::move(all.structures.front().result));
+            SegmentResult found = std::move(all.structures.front().result);
+            if (found.mesh.empty()) found.mesh = extract_mesh(*found.surface, {}, own);
+            result.surface = std::make_shared<const SegmentResult>(std::move(found));
             result.version = ++versions;
             result.seconds = seconds_since(begin);
             keep(result.structure, result.surface);
@@ -104,6 +122,7 @@ struct StudySolver::State {
         try {
             SegmentOptions first = options;
             first.evolve.rho = 0;
+            first.without_mesh = first.without_fields = true;  // good triangles take as long as the surface itself
             if (const auto before = newest(result.structure)) first.guess = LevelSetStart{before->surface};
             try {
                 find(first, StudyResult::Stage::First);

@@ -54,7 +54,7 @@ void add_file(const fs::path& path, Digest& hash) {
 }
 
 void add_metadata(const fs::path& folder, Digest& hash) {
-    const std::set<std::string> names{".zarray", ".zattrs", ".zgroup", "zarr.json"};
+    const std::set<std::string> names{".zarray", ".zattrs", ".zgroup", "zarr.json", "journal.jsonl"};  // or of a study
     std::set<fs::path> found;
     // Chunks lie deeper, or beside these, in any number.
     std::vector<fs::path> level{folder};

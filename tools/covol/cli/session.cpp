@@ -295,6 +295,10 @@ int Session::execute() {
     }
 }
 
+void Session::take_interrupt() {
+    if (interrupted) cancel_requested = false;
+}
+
 void Session::start_report() {
     report_["schema"] = kReportSchema;
     report_["covol"] = version();

@@ -123,6 +123,8 @@ public:
     [[nodiscard]] std::optional<std::uint64_t> memory_limit() const;
     /// The files that the command line names to be read.
     [[nodiscard]] const std::vector<std::string>& inputs() const noexcept { return inputs_; }
+    /// Ctrl-C was how the person ends this command: it is no interruption.
+    static void take_interrupt();
     /// The run went well, but ends with this exit code.
     void set_exit_code(int code) { exit_code_ = code; }
 

@@ -10,14 +10,15 @@ void add_segment(Session& session) {
     command
         ->add_option(
             "image", job->images,
-            "3D image: TIFF, OME-Zarr, NRRD, NIfTI, MetaImage, DICOM, MRC, HDF5, .vdb; several are a time-lapse")
-        ->required()
+            "3D image: TIFF, OME-Zarr, NRRD, NIfTI, MetaImage, DICOM, MRC, HDF5, .vdb; several are a time-lapse [the "
+            "study's]")
         ->type_name("IMAGE...");
     job->points.bind(*command, "--points")
         ->description(
             "marks on the surface: tables, marks of Fiji, napari, 3D Slicer and ITK-SNAP, clouds; with names, ve=FILE "
             "exe=FILE, several structures")
         ->type_name("[NAME=]FILE...");
+    command->add_option("--study", job->study, "structures and marks of covol mark")->type_name("STUDY");
     job->bind(*command, true);
     session.help().show_first(*command, {"--points", "--contours", "--painted", "--inside", "--outside", "--guess",
                                          "--mask", "--mesh", "--suggest", "--frame", "--rho", "--voxel-size"});

@@ -11,6 +11,7 @@ void add_band(Session& session);
 void add_edge(Session& session);
 void add_evolve(Session& session);
 void add_surface(Session& session);
+void add_mark(Session& session);
 void add_mesh(Session& session);
 void add_mask(Session& session);
 void add_compare(Session& session);

@@ -1,12 +1,14 @@
 #include "jobs/segment_job.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <utility>
 
 #include "cli/option_names.h"
 #include "cli/report.h"
 #include "covol/error.h"
 #include "covol/file_kind.h"
+#include "covol/study.h"
 #include "jobs/brick_job.h"
 #include "jobs/plan_job.h"
 #include "jobs/structures_job.h"
@@ -78,6 +80,12 @@ void SegmentJob::sort_output(bool with_image) {
     alone = std::exchange(output, "");
 }
 
+void SegmentJob::find_image() {
+    if (!images.empty()) return;
+    if (study.empty()) throw UsageError("expected an image");
+    images.push_back((std::filesystem::path(study) / read_study_image(study).path).lexically_normal().string());
+}
+
 std::string SegmentJob::any_output() const {
     for (const std::string* path : {&output, &mesh_path, &mask_path})
         if (!path->empty()) return *path;
@@ -114,7 +122,10 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
                         (with_image ? "a mesh or a label image" : "a mesh") + " alone, by the name's end")
         ->required()
         ->type_name("OUT.vdb|...");
-    command.final_callback([this, with_image] { sort_output(with_image); });
+    command.final_callback([this, with_image] {
+        if (with_image) find_image();
+        sort_output(with_image);
+    });
     if (with_image) {
         command.add_option("--mask", mask_path, "label image in the image's own geometry; .seg.nrrd for 3D Slicer")
             ->type_name("OUT.nrrd|.nii.gz|.tif|.mha|.zarr");
@@ -214,6 +225,7 @@ void SegmentJob::run(Session& session) const {
     if (names && images.empty())
         throw UsageError("expected files without names: several structures need an image, see covol segment");
     if (images.empty()) session.set_world_of_points();
+    session.outputs().protect(images);  // one may be the study's, which the command line does not name
     if (session.is_planning()) return run_plan(*this, session);
     if (checkpoint.given() && (session.brick() || is_timelapse(*this)))
         throw UsageError(

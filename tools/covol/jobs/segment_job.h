@@ -33,6 +33,7 @@ struct SegmentJob {
     BrickFlags bricks;
     CheckpointFlags checkpoint;
     FrameChoice frames;
+    std::string study;  ///< folder of a study, whose structures join those of the files; empty: none
     std::string output, mask_path, mesh_path, density_path, fields_path, table_path, failed_path, page_path, scene_path;
     VdbFlags vdb;
 
@@ -44,6 +45,8 @@ struct SegmentJob {
     // For those.
     /// --exterior-seed, whose places may belong to one structure.
     void bind_named_seeds(CLI::App& command);
+    /// Without an image it is the study's. @throws UsageError: there is none
+    void find_image();
     /// A mesh or a label image that stands at -o goes where --mesh and --mask would have it.
     void sort_output(bool with_image);
     [[nodiscard]] std::string any_output() const;

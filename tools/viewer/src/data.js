@@ -12,7 +12,7 @@ async function unpack(base64) {
 }
 
 /** lib/src/report/mesh_codec.h says how vertices are coded. */
-function decodePositions(mesh, bytes) {
+export function decodePositions(mesh, bytes) {
   const count = mesh.vertices, positions = new Float32Array(3 * count);
   for (let a = 0; a < 3; ++a) {
     const low = 2 * a * count, high = low + count, scale = (mesh.max[a] - mesh.min[a]) / 65535;
@@ -24,7 +24,7 @@ function decodePositions(mesh, bytes) {
   return positions;
 }
 
-function decodeCorners(mesh, bytes) {
+export function decodeCorners(mesh, bytes) {
   const corners = new Uint32Array(3 * mesh.triangles);
   for (let n = 0, at = 0, fresh = 0; n < corners.length; ++n) {
     let behind = 0;

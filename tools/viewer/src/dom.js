@@ -62,3 +62,10 @@ export function unitText(unit) {
 }
 
 export function colorOf(rgb) { return `rgb(${rgb[0]}, ${rgb[1]}, ${rgb[2]})`; }
+
+/** A round patch of a colour. */
+export function dot(color) {
+  const element = el('span', {class: 'dot'});
+  element.style.background = colorOf(color);
+  return element;
+}

@@ -1,5 +1,5 @@
 // What the run was and how good its result is: tables, bars, the command.
-import {colorOf, el, number, svg} from './dom.js';
+import {dot, el, number, svg} from './dom.js';
 
 function section(title, note, ...content) {
   return el('section', {class: 'card'}, el('h2', {}, title), note ? el('p', {class: 'note'}, note) : null, ...content);
@@ -45,12 +45,6 @@ function quality({structure, facts}, data) {
   add('triangles shown', number(structure.mesh.triangles), structure.mesh.triangles < structure.mesh.of_triangles ? `of ${number(structure.mesh.of_triangles)}` : null);
   const title = data.structures.length > 1 ? el('h3', {}, dot(structure.color), structure.name) : null;
   return el('div', {class: 'structure-quality'}, title, el('dl', {class: 'figures'}, figures));
-}
-
-export function dot(color) {
-  const element = el('span', {class: 'dot'});
-  element.style.background = colorOf(color);
-  return element;
 }
 
 function text(value) {

@@ -1,12 +1,14 @@
 // The page: views, switches, facts.
 import {contrast, greyTable, structureList, suggestions, toolbar} from './controls.js';
 import {readData} from './data.js';
-import {el, svg, unitText} from './dom.js';
+import {el, unitText} from './dom.js';
 import {factsOf, warningsOf} from './facts.js';
 import {indexCoordinates} from './outline.js';
-import {AXIS_COLORS, View3D} from './scene.js';
+import {View3D} from './scene.js';
 import {SlicePanel} from './slices.js';
+import {axisTriad, stageIn} from './stage3d.js';
 import {State} from './state.js';
+import {themeButton} from './theme.js';
 import {Volume} from './volume.js';
 
 const MOST_MARKS = 10000;  // more hide what they lie on, at first
@@ -20,35 +22,6 @@ function middleOf(structures, volume) {
     }
   const index = volume.toIndex(low.map((x, a) => (x + high[a]) / 2));
   return index.map((at, a) => Math.min(volume.size[a] - 1, Math.max(0, Math.round(at))));
-}
-
-/** The world's axes as the eye sees them. */
-function axisTriad(data) {
-  const names = data.anatomical ? ['L', 'P', 'S'] : ['x', 'y', 'z'], drawing = svg('svg', {viewBox: '-32 -32 64 64', class: 'triad', 'aria-hidden': 'true'});
-  const lines = AXIS_COLORS.map((color) => svg('line', {x1: 0, y1: 0, stroke: color, 'stroke-width': 2.5, 'stroke-linecap': 'round'}));
-  const labels = names.map((name, a) => svg('text', {'text-anchor': 'middle', 'dominant-baseline': 'central', fill: AXIS_COLORS[a]}, document.createTextNode(name)));
-  drawing.append(...lines, ...labels);
-  const turn = (camera) => {
-    const e = camera.matrixWorldInverse.elements;
-    for (let a = 0; a < 3; ++a) {
-      const x = e[4 * a], y = -e[4 * a + 1];
-      lines[a].setAttribute('x2', 18 * x);
-      lines[a].setAttribute('y2', 18 * y);
-      labels[a].setAttribute('x', 26 * x);
-      labels[a].setAttribute('y', 26 * y);
-    }
-  };
-  return {drawing, turn};
-}
-
-function themeButton(state) {
-  const system = matchMedia('(prefers-color-scheme: dark)');
-  const apply = (theme) => { document.documentElement.dataset.theme = theme; state.set({theme}); };
-  const button = el('button', {type: 'button', class: 'icon', title: 'dark or light (t)', 'aria-label': 'dark or light',
-    onclick: () => apply(state.get('theme') === 'dark' ? 'light' : 'dark')}, '\u25d0');
-  apply(system.matches ? 'dark' : 'light');
-  system.addEventListener('change', () => apply(system.matches ? 'dark' : 'light'));
-  return button;
 }
 
 function keyboard(state, panels, view, theme) {
@@ -65,28 +38,6 @@ function keyboard(state, panels, view, theme) {
   });
 }
 
-function make3D(data, state, volume, holder) {
-  const canvas = el('canvas', {tabindex: 0, role: 'img', 'aria-label': 'the surfaces in 3D; drag or arrow keys turn them'}), triad = axisTriad(data);
-  holder.append(canvas, triad.drawing);
-  try {
-    const view = new View3D(canvas, data, state, volume);
-    view.onTurn = triad.turn;
-    view.renderNow();
-    canvas.addEventListener('keydown', (event) => {
-      const [x, y] = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]}[event.key] ?? [0, 0];
-      if (!x && !y) return;
-      event.preventDefault();
-      view.rotate(x * 0.12, y * 0.12);
-    });
-    canvas.addEventListener('webglcontextlost', () => holder.append(el('p', {class: 'notice over'}, 'The graphics device was lost; reload the page.')));
-    return view;
-  } catch (error) {
-    holder.replaceChildren(el('p', {class: 'notice over'}, el('strong', {}, 'No 3D view: '),
-      `this browser has no WebGL, or it is switched off (${error.message}). ${volume ? 'The slices beside it work.' : 'The figures below work.'}`));
-    return null;
-  }
-}
-
 async function start() {
   const page = document.getElementById('page');
   const data = await readData();
@@ -100,7 +51,7 @@ async function start() {
   const slices = volume ? middleOf(data.structures, volume) : [0, 0, 0];
   const state = new State({slices, visible: data.structures.map(() => true), marks: !data.structures.some((s) => s.markCount > MOST_MARKS), planes: [false, false, Boolean(volume)], cut: -1, flip: false,
     cutShare: 0.5, opacity: 1, coloring: 'structure', grey: greyTable({black: 0, white: 255}), focus: null, large: -1, decoded: 0, theme: 'light'});
-  const theme = themeButton(state);
+  const theme = themeButton(state, '\u25d0');
   if (volume) await volume.decodeSlice(slices[2]);
 
   let view = null;
@@ -125,7 +76,8 @@ async function start() {
     stage.dataset.large = state.get('large');
     for (const panel of panels) panel.later();
   });
-  view = make3D(data, state, volume, holder);
+  view = stageIn(holder, {label: 'the surfaces in 3D; drag or arrow keys turn them', triad: axisTriad(data.anatomical),
+    otherwise: volume ? 'The slices beside it work.' : 'The figures below work.'}, (canvas) => new View3D(canvas, data, state, volume));
   for (const panel of panels) panel.draw();
   keyboard(state, panels, () => view, theme);
   window.covolReport = {data, state, volume, view, panels, ready: performance.now(), done: !volume};

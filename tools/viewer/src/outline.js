@@ -12,13 +12,17 @@ export function indexCoordinates(positions, volume) {
   return result;
 }
 
-/** The segments x0, y0, x1, y1, ... in which triangles cross coordinates[axis] = at, in the two other axes. */
-function cross(coordinates, corners, axis, at, [right, down]) {
-  const along = coordinates[axis], xs = coordinates[right], ys = coordinates[down], segments = [];
+/**
+ * The segments x0, y0, x1, y1, ... in which triangles cross coordinates[axis] = at, in the two other axes. `edges` is
+ * given a number for the mesh's edge on which each end lies.
+ */
+function cross(coordinates, corners, axis, at, [right, down], edges = null) {
+  const along = coordinates[axis], xs = coordinates[right], ys = coordinates[down], segments = [], count = along.length;
   // A vertex on the plane counts as above it: no segment is found twice or lost.
   const edge = (a, b) => {
     const share = (at - along[a]) / (along[b] - along[a]);
     segments.push(xs[a] + share * (xs[b] - xs[a]), ys[a] + share * (ys[b] - ys[a]));
+    edges?.push(Math.min(a, b) * count + Math.max(a, b));
   };
   for (let n = 0; n < corners.length; n += 3) {
     const a = corners[n], b = corners[n + 1], c = corners[n + 2];
@@ -40,4 +44,42 @@ export function outlineAt(structure, axis, at, axes) {
   const segments = cross(structure.index, structure.corners, axis, at + 1e-4, axes);
   structure.outlines[axis] = {at, segments};
   return segments;
+}
+
+/** Lines {places: [x0, y0, x1, y1, ...], closed} of segments whose ends are on the same edges. */
+function chain(segments, edges) {
+  const ends = new Map(), used = new Uint8Array(edges.length / 2), lines = [];
+  edges.forEach((edge, n) => { ends.has(edge) ? ends.get(edge).push(n) : ends.set(edge, [n]); });
+  const place = (end) => [segments[2 * end], segments[2 * end + 1]];
+  /** From an end on to the next ones, until there are none. */
+  const follow = (end, places) => {
+    for (let next = ends.get(edges[end]).find((other) => !used[other >> 1]); next !== undefined;) {
+      used[next >> 1] = 1;
+      const far = next ^ 1;
+      places.push(place(far));
+      next = ends.get(edges[far]).find((other) => !used[other >> 1]);
+      end = far;
+    }
+    return end;
+  };
+  for (let n = 0; n < used.length; ++n) {
+    if (used[n]) continue;
+    used[n] = 1;
+    const forward = [place(2 * n + 1)], last = follow(2 * n + 1, forward), closed = edges[last] === edges[2 * n];
+    const backward = [place(2 * n)];
+    if (!closed) follow(2 * n, backward);
+    lines.push({places: [...backward.reverse(), ...forward].flat(), closed});
+  }
+  return lines;
+}
+
+/** A structure's outline on a slice as lines; the last one of each axis is kept. */
+export function linesAt(structure, axis, at, axes) {
+  structure.lines ??= [];
+  const known = structure.lines[axis];
+  if (known?.at === at) return known.lines;
+  const edges = [], segments = cross(structure.index, structure.corners, axis, at + 1e-4, axes, edges);
+  const lines = chain(segments, edges);
+  structure.lines[axis] = {at, lines};
+  return lines;
 }

@@ -1,72 +1,44 @@
 // The 3D view: surfaces, marks, three textured slice planes.
 import {
-  AmbientLight, Box3, BufferAttribute, BufferGeometry, Color, DataTexture, DirectionalLight, DoubleSide, Group, IcosahedronGeometry,
-  InstancedMesh, LineBasicMaterial, LineLoop, LineSegments, LinearFilter, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial,
-  MeshStandardMaterial, PerspectiveCamera, Plane, Points, PointsMaterial, Scene, Sphere, SRGBColorSpace, Vector3, WebGLRenderer,
+  Box3, BufferAttribute, BufferGeometry, Color, DataTexture, DoubleSide, Group, IcosahedronGeometry, InstancedMesh, LineBasicMaterial,
+  LineLoop, LineSegments, LinearFilter, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, MeshStandardMaterial, Points,
+  PointsMaterial, SRGBColorSpace, Vector3,
 } from 'three';
-import {OrbitControls} from 'three/examples/jsm/controls/OrbitControls.js';
 import {rangeOf, vertexColors} from './colors.js';
 import {outlineAt} from './outline.js';
+import {AXIS_COLORS} from './space.js';
+import {rgbColor, Stage3D} from './stage3d.js';
 
 const MOST_BALLS = 4000;  // marks as balls; more are points
-const AXIS_COLORS = ['#d9574a', '#4f9e57', '#4a7fd1'];
-const EYE = new Vector3(0.45, -0.8, 0.4);
 
-function rgbColor(rgb) { return new Color().setRGB(rgb[0] / 255, rgb[1] / 255, rgb[2] / 255, SRGBColorSpace); }
-
-export class View3D {
+export class View3D extends Stage3D {
   /** @throws where there is no WebGL */
   constructor(canvas, data, state, volume) {
-    Object.assign(this, {canvas, data, state, volume});
-    this.renderer = new WebGLRenderer({canvas, antialias: true, alpha: true, preserveDrawingBuffer: false});
-    this.renderer.localClippingEnabled = true;
-    this.scene = new Scene();
-    this.camera = new PerspectiveCamera(28, 1, 0.01, 1000);
-    this.camera.up.set(0, 0, 1);
-    this.scene.add(this.camera);
-    this.addLights();
-    this.clip = new Plane();
+    super(canvas, state, volume);
+    Object.assign(this, {data, volume});
     this.addSurfaces();
     this.addMarks();
     if (volume) this.addPlanes();
     this.addFocus();
-    this.controls = new OrbitControls(this.camera, canvas);
-    this.controls.enableDamping = false;
-    this.controls.addEventListener('change', () => this.draw());
-    this.look(EYE, true);
-    new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
-    this.resize();
+    this.begin();
     this.listen();
   }
 
-  addLights() {
-    const key = new DirectionalLight(0xffffff, 2.7), fill = new DirectionalLight(0xdfe8ff, 0.9), rim = new DirectionalLight(0xffffff, 0.7);
-    key.position.set(-0.7, 0.9, 1.1);
-    fill.position.set(1.2, -0.1, 0.7);
-    rim.position.set(0.2, 0.8, -1.2);
-    for (const light of [key, fill, rim]) {
-      this.camera.add(light, light.target);  // they turn with the eye
-      light.target.position.set(0, 0, 0);
-    }
-    this.scene.add(new AmbientLight(0xffffff, 0.4));
-  }
-
   addSurfaces() {
-    this.box = new Box3();
+    const box = new Box3();
     this.surfaces = this.data.structures.map((structure) => {
       const geometry = new BufferGeometry();
       geometry.setAttribute('position', new BufferAttribute(structure.positions, 3));
       geometry.setIndex(new BufferAttribute(structure.corners, 1));
       geometry.computeVertexNormals();
       geometry.computeBoundingBox();
-      this.box.union(geometry.boundingBox);
+      box.union(geometry.boundingBox);
       const material = new MeshStandardMaterial({color: rgbColor(structure.color), roughness: 0.58, metalness: 0, side: DoubleSide});
       const mesh = new Mesh(geometry, material);
       this.scene.add(mesh);
       return mesh;
     });
-    this.sphere = this.box.getBoundingSphere(new Sphere());
-    if (!(this.sphere.radius > 0)) this.sphere.radius = 1;
+    this.setBox(box);
   }
 
   addMarks() {
@@ -123,13 +95,7 @@ export class View3D {
     const {group, mesh} = this.planes[axis], volume = this.volume, at = this.state.get('slices')[axis];
     group.visible = this.state.get('planes')[axis];
     const [right, down] = volume.planeAxes(axis), position = mesh.geometry.getAttribute('position');
-    [[0, 0], [1, 0], [1, 1], [0, 1]].forEach(([x, y], n) => {
-      const index = [0, 0, 0];
-      index[axis] = at;
-      index[right] = x ? volume.size[right] - 0.5 : -0.5;
-      index[down] = y ? volume.size[down] - 0.5 : -0.5;
-      position.setXYZ(n, ...volume.toWorld(index));
-    });
+    this.cornersOf(axis, at).forEach((place, n) => position.setXYZ(n, ...place));
     position.needsUpdate = true;
     if (!group.visible) return;
     this.paintPlane(axis);
@@ -200,37 +166,10 @@ export class View3D {
     });
   }
 
-  /** The half that is cut away is the one in front. */
-  turnCut() {
-    const axis = this.state.get('cut');
-    if (axis < 0) return;
-    const {normal, place} = this.cutAt(axis);
-    this.cutSign = Math.sign(normal.dot(this.camera.position.clone().sub(place))) || 1;
-  }
-
-  /** One half beside the slice of an axis is cut away. */
-  updateClip() {
-    const axis = this.state.get('cut');
-    let planes = null;
-    if (axis >= 0) {
-      const sign = (this.state.get('flip') ? -1 : 1) * (this.cutSign ?? 1);
-      const {normal, place} = this.cutAt(axis);
-      this.clip.setFromNormalAndCoplanarPoint(normal.multiplyScalar(-sign), place);
-      planes = [this.clip];
-    }
-    const materials = [...this.surfaces, ...this.marks.flatMap((group) => group.children)].map((object) => object.material);
-    for (const material of materials) {
-      if (Boolean(material.clippingPlanes) !== Boolean(planes)) material.needsUpdate = true;
-      material.clippingPlanes = planes;
-    }
-  }
+  updateClip() { this.clipMaterials([...this.surfaces, ...this.marks.flatMap((group) => group.children)].map((object) => object.material)); }
 
   cutAt(axis) {
-    if (this.volume) {
-      const index = [0, 0, 0];
-      index[axis] = this.state.get('slices')[axis];
-      return {normal: new Vector3(...this.volume.axes[axis]), place: new Vector3(...this.volume.toWorld(index))};
-    }
+    if (this.volume) return super.cutAt(axis);
     const normal = new Vector3().setComponent(axis, 1), place = this.box.min.clone();
     place.lerp(this.box.max, this.state.get('cutShare'));
     return {normal, place};
@@ -258,71 +197,4 @@ export class View3D {
     if (flat.lengthSq() > 0.01) this.look(flat.x === 0 && flat.y === 0 ? flat.setY(-0.6) : flat);
     else this.draw();
   }
-
-  /** Turns to a direction; at once, or in a third of a second. */
-  look(direction, atOnce = false) {
-    // The narrower side of the view has to hold the ball around all surfaces.
-    const half = Math.atan(Math.tan(this.camera.fov * Math.PI / 360) * Math.min(1, this.camera.aspect));
-    const distance = 0.93 * this.sphere.radius / Math.sin(half), from = this.camera.position.clone().sub(this.sphere.center);
-    const begin = from.clone().normalize(), end = direction.clone().normalize(), size = from.length() || distance;
-    const place = (share) => {
-      const now = begin.clone().lerp(end, share);
-      if (now.lengthSq() < 1e-4) now.copy(end);
-      this.camera.position.copy(this.sphere.center).addScaledVector(now.normalize(), size + share * (distance - size));
-      this.controls.target.copy(this.sphere.center);
-      this.camera.near = distance / 100;
-      this.camera.far = distance * 20;
-      this.camera.updateProjectionMatrix();
-      this.controls.update();
-      this.draw();
-    };
-    if (atOnce || matchMedia('(prefers-reduced-motion: reduce)').matches) return place(1);
-    const start = performance.now(), turn = ++this.turn || (this.turn = 1);
-    const step = (now) => {
-      if (turn !== this.turn) return;
-      const share = Math.min(1, Math.max(0, (now - start) / 350));
-      place(share * share * (3 - 2 * share));
-      if (share < 1) requestAnimationFrame(step);
-    };
-    requestAnimationFrame(step);
-  }
-
-  reset() { this.look(EYE); }
-
-  rotate(horizontal, vertical) {
-    const from = this.camera.position.clone().sub(this.controls.target);
-    from.applyAxisAngle(this.camera.up, horizontal);
-    const side = from.clone().cross(this.camera.up).normalize();
-    const tilted = from.clone().applyAxisAngle(side, vertical);
-    if (tilted.angleTo(this.camera.up) > 0.05 && tilted.angleTo(this.camera.up) < Math.PI - 0.05) from.copy(tilted);
-    this.camera.position.copy(this.controls.target).add(from);
-    this.controls.update();
-    this.draw();
-  }
-
-  resize() {
-    const {clientWidth: width, clientHeight: height} = this.canvas.parentElement;
-    if (width === 0 || height === 0) return;
-    const before = this.camera.aspect;
-    this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
-    this.renderer.setSize(width, height, false);
-    this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
-    if (before !== this.camera.aspect && !this.sized) this.look(EYE, true);
-    this.sized = true;
-    this.renderNow();
-  }
-
-  draw() {
-    this.pending ??= requestAnimationFrame(() => this.renderNow());
-  }
-
-  renderNow() {
-    if (this.pending) cancelAnimationFrame(this.pending);
-    this.pending = null;
-    this.renderer.render(this.scene, this.camera);
-    this.onTurn?.(this.camera);
-  }
 }
-
-export {AXIS_COLORS};

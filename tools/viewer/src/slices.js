@@ -1,34 +1,16 @@
 // The slice viewer: three planes of the image with the surfaces' outlines and the marks.
 import {colorOf, el, number} from './dom.js';
 import {outlineAt} from './outline.js';
-import {AXIS_COLORS} from './scene.js';
+import {Plane} from './plane.js';
+import {AXIS_COLORS, dominant, planeName} from './space.js';
 
-const LETTERS = [['R', 'L'], ['A', 'P'], ['I', 'S']];  // towards - and + of the world's axes, LPS
 const MANY_MARKS = 100;
-const PLANES = ['sagittal', 'coronal', 'axial'];
-
-/** The world axis that an image axis runs along most. */
-function dominant(axis) {
-  const sizes = axis.map(Math.abs), w = sizes.indexOf(Math.max(...sizes));
-  return {w, sign: Math.sign(axis[w]) || 1};
-}
-
-export function planeName(volume, axis, anatomical) {
-  return anatomical ? PLANES[dominant(volume.axes[axis]).w] : ['yz', 'xz', 'xy'][axis];
-}
 
 export class SlicePanel {
   constructor(axis, data, state, volume) {
     Object.assign(this, {axis, data, state, volume});
-    [this.right, this.down] = volume.planeAxes(axis);
-    this.flipX = this.flipY = false;
-    if (data.anatomical) {  // as a radiologist hangs it: the patient's left at the right, anterior and superior up
-      const x = dominant(volume.axes[this.right]), y = dominant(volume.axes[this.down]);
-      this.flipX = x.sign < 0;
-      this.flipY = y.w === 2 ? y.sign > 0 : y.sign < 0;
-    } else {
-      this.flipY = this.down === 2;  // z up, as in 3D
-    }
+    this.plane = new Plane(volume, axis, data.anatomical);
+    ({right: this.right, down: this.down} = this.plane);
     this.canvas = el('canvas', {tabindex: 0, role: 'img', 'aria-label': `slice ${planeName(volume, axis, data.anatomical)}; arrow keys change it`});
     this.label = el('span', {class: 'where'});
     this.slider = el('input', {type: 'range', min: 0, max: volume.size[axis] - 1, step: 1, 'data-axis': axis,
@@ -72,12 +54,11 @@ export class SlicePanel {
 
   /** The slices of the two other planes through a place in this one. */
   pick(event) {
-    const box = this.canvas.getBoundingClientRect(), {left, top, scaleX, scaleY} = this.layout;
+    const box = this.canvas.getBoundingClientRect(), slices = [...this.state.get('slices')];
+    const [x, y] = this.plane.unplace(event.clientX - box.left, event.clientY - box.top);
     const clampTo = (axis, at) => Math.min(this.volume.size[axis] - 1, Math.max(0, Math.round(at)));
-    const slices = [...this.state.get('slices')];
-    const x = (event.clientX - box.left - left) / scaleX - 0.5, y = (event.clientY - box.top - top) / scaleY - 0.5;
-    slices[this.right] = clampTo(this.right, this.flipX ? this.volume.size[this.right] - 1 - x : x);
-    slices[this.down] = clampTo(this.down, this.flipY ? this.volume.size[this.down] - 1 - y : y);
+    slices[this.right] = clampTo(this.right, x);
+    slices[this.down] = clampTo(this.down, y);
     this.state.set({slices});
   }
 
@@ -85,27 +66,24 @@ export class SlicePanel {
 
   draw() {
     this.pending = null;
-    const {volume, axis, right, down, canvas} = this, box = canvas.parentElement, ratio = Math.min(2, devicePixelRatio);
+    const {plane, canvas} = this, box = canvas.parentElement, ratio = Math.min(2, devicePixelRatio);
     const width = box.clientWidth, height = box.clientHeight;
     this.slider.value = this.at;
     this.tell();
     if (width === 0 || height === 0) return;
     canvas.width = Math.round(width * ratio);
     canvas.height = Math.round(height * ratio);
-    const sizeX = volume.size[right] * volume.spacing[right], sizeY = volume.size[down] * volume.spacing[down];
-    const scale = Math.min(width / sizeX, height / sizeY);  // CSS pixels per world unit
-    this.layout = {left: (width - scale * sizeX) / 2, top: (height - scale * sizeY) / 2, scale,
-      scaleX: scale * volume.spacing[right], scaleY: scale * volume.spacing[down]};
+    plane.lay(width, height);
     const context = canvas.getContext('2d');
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, width, height);
-    this.drawImage(context, scale * sizeX, scale * sizeY);
-    this.drawCrosshair(context, scale * sizeX, scale * sizeY);
+    this.drawImage(context);
+    this.drawCrosshair(context);
     this.drawOutlines(context);
     if (this.state.get('marks')) this.drawMarks(context);
     this.drawFocus(context);
-    this.drawScale(context, width, height);
-    if (this.data.anatomical) this.drawLetters(context, width, height);
+    plane.drawScale(context, this.data.unitText);
+    plane.drawLetters(context);
   }
 
   tell() {
@@ -116,13 +94,9 @@ export class SlicePanel {
     this.label.textContent = `${number(Math.round(file))} of 0\u2013${volume.ofSize[axis] - 1}  \u00b7  ${'xyz'[d.w]} ${number(world)}${this.data.unitText ? ` ${this.data.unitText}` : ''}`;
   }
 
-  /** From voxels to CSS pixels; voxel centres are at integers. */
-  place(x, y) {
-    const {left, top, scaleX, scaleY} = this.layout, nx = this.volume.size[this.right], ny = this.volume.size[this.down];
-    return [left + ((this.flipX ? nx - 1 - x : x) + 0.5) * scaleX, top + ((this.flipY ? ny - 1 - y : y) + 0.5) * scaleY];
-  }
+  place(x, y) { return this.plane.place(x, y); }
 
-  drawImage(context, width, height) {
+  drawImage(context) {
     const {values, width: nx, height: ny} = this.volume.slice(this.axis, this.at), grey = this.state.get('grey');
     const key = `${this.at} ${this.state.get('decoded')} ${grey.key}`;
     if (this.key !== key) {
@@ -132,16 +106,11 @@ export class SlicePanel {
       own.putImageData(image, 0, 0);
       this.key = key;
     }
-    context.save();
-    context.translate(this.layout.left + (this.flipX ? width : 0), this.layout.top + (this.flipY ? height : 0));
-    context.scale(this.flipX ? -1 : 1, this.flipY ? -1 : 1);
-    context.imageSmoothingQuality = 'high';
-    context.drawImage(this.picture, 0, 0, width, height);
-    context.restore();
+    this.plane.drawPicture(context, this.picture);
   }
 
-  drawCrosshair(context, width, height) {
-    const slices = this.state.get('slices'), [x, y] = this.place(slices[this.right], slices[this.down]), {left, top} = this.layout;
+  drawCrosshair(context) {
+    const slices = this.state.get('slices'), [x, y] = this.place(slices[this.right], slices[this.down]), {left, top, width, height} = this.plane;
     context.lineWidth = 1;
     context.globalAlpha = 0.55;
     for (const [axis, from, to] of [[this.right, [x, top], [x, top + height]], [this.down, [left, y], [left + width, y]]]) {
@@ -207,51 +176,5 @@ export class SlicePanel {
       context.arc(x, y, 11, 0, 2 * Math.PI);
       context.stroke();
     }
-  }
-
-  /** A bar of a round length, at most a quarter of the picture. */
-  drawScale(context, width, height) {
-    const most = Math.min(120, width / 4) / this.layout.scale, tens = 10 ** Math.floor(Math.log10(most));
-    const length = [5, 2, 1].map((n) => n * tens).find((n) => n <= most), pixels = length * this.layout.scale;
-    // On the picture itself, where there is room.
-    const {left, top} = this.layout, x = width - Math.max(12, left + 10) - pixels, y = height - Math.max(12, top + 10);
-    const text = `${number(length)}${this.data.unitText ? ` ${this.data.unitText}` : ''}`;
-    context.font = '11px system-ui, sans-serif';
-    context.textAlign = 'center';
-    for (const [color, line] of [['rgba(0, 0, 0, 0.7)', 4], ['#fff', 2]]) {
-      context.strokeStyle = color;
-      context.lineWidth = line;
-      context.lineCap = 'butt';
-      context.beginPath();
-      context.moveTo(x, y);
-      context.lineTo(x + pixels, y);
-      context.stroke();
-    }
-    this.write(context, text, x + pixels / 2, y - 6);
-  }
-
-  write(context, text, x, y) {
-    context.lineJoin = 'round';
-    context.strokeStyle = 'rgba(0, 0, 0, 0.7)';
-    context.lineWidth = 3;
-    context.strokeText(text, x, y);
-    context.fillStyle = '#fff';
-    context.fillText(text, x, y);
-  }
-
-  drawLetters(context, width, height) {
-    const ends = (axis, flip) => {
-      const {w, sign} = dominant(this.volume.axes[axis]), forward = (sign > 0) !== flip;
-      return forward ? LETTERS[w] : [...LETTERS[w]].reverse();
-    };
-    const [left, right] = ends(this.right, this.flipX), [top, bottom] = ends(this.down, this.flipY);
-    context.font = '600 12px system-ui, sans-serif';
-    context.textAlign = 'center';
-    context.textBaseline = 'middle';
-    this.write(context, left, 10, height / 2);
-    this.write(context, right, width - 10, height / 2);
-    this.write(context, top, width / 2, 11);
-    this.write(context, bottom, width / 2, height - 11);
-    context.textBaseline = 'alphabetic';
   }
 }

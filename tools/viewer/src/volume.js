@@ -1,24 +1,13 @@
 // The image: slices are decoded into one array of bytes, and cut along any axis.
 
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+import {ImageSpace} from './space.js';
 
-export class Volume {
+export class Volume extends ImageSpace {
   constructor(image) {
-    Object.assign(this, {size: image.size, spacing: image.spacing, origin: image.origin, first: image.first, step: image.step,
-      ofSize: image.of_size, black: image.black, white: image.white, jpegs: image.slices});
-    // Columns of the direction are the axes i, j, k.
-    this.axes = [0, 1, 2].map((a) => [0, 1, 2].map((row) => image.direction[row][a]));
+    super(image);
+    Object.assign(this, {first: image.first, step: image.step, ofSize: image.of_size, black: image.black, white: image.white, jpegs: image.slices});
     this.data = new Uint8Array(this.size[0] * this.size[1] * this.size[2]);
     this.decoded = new Uint8Array(this.size[2]);
-  }
-
-  toWorld(index) {
-    return [0, 1, 2].map((w) => this.origin[w] + this.axes.reduce((sum, axis, a) => sum + axis[w] * index[a] * this.spacing[a], 0));
-  }
-
-  toIndex(world) {
-    const from = world.map((x, w) => x - this.origin[w]);
-    return this.axes.map((axis, a) => dot(axis, from) / this.spacing[a]);
   }
 
   /** From the voxels of the file to those that are shown. */
@@ -58,9 +47,6 @@ export class Volume {
     }
     tell();
   }
-
-  /** The axes that a slice along `axis` shows: to the right, and along the other one. */
-  planeAxes(axis) { return [[1, 2], [0, 2], [0, 1]][axis]; }
 
   /** The grey values of a slice as bytes, row by row. */
   slice(axis, at) {

@@ -1,0 +1,378 @@
+// WebSockets of the running server.
+#include <catch2/catch.hpp>
+#include <future>
+#include <thread>
+
+#include "unit/serve/serve_client.h"
+
+namespace {
+
+using namespace serve_test;
+using covol::serve::Client;
+using covol::serve::Handlers;
+using covol::serve::Options;
+using covol::serve::Request;
+using covol::serve::Response;
+using Clock = std::chrono::steady_clock;
+
+/// A server that greets clients, and sends back what they send.
+class Echo {
+public:
+    explicit Echo(Options options = {}, const Handlers& other = {}) : site_(handlers(other), std::move(options)) {}
+    Site& site() { return site_; }
+    Log& log() { return log_; }
+    [[nodiscard]] Client last() const { return {last_}; }
+
+private:
+    Handlers handlers(const Handlers& other) {
+        Handlers made = other;
+        made.opened = [this](Client client) {
+            last_ = client.number;
+            log_.add("opened " + std::to_string(client.number));
+            site_.server.send(client, "hello");
+        };
+        made.closed = [this](Client client) { log_.add("closed " + std::to_string(client.number)); };
+        made.on_error = [this](const std::string& text) { log_.add("error " + text); };
+        if (!made.message) {
+            made.message = [this](Client client, std::string_view text) {
+                site_.server.send(client, std::string(text));
+            };
+        }
+        return made;
+    }
+
+    Log log_;
+    std::atomic<std::uint64_t> last_{0};
+    Site site_;
+};
+
+}  // namespace
+
+TEST_CASE("a client is greeted, and gets back what it sends") {
+    Echo echo;
+    {
+        Live live(echo.site());
+        CHECK(live.answer["X-Content-Type-Options"] == "nosniff");
+        CHECK(live.answer["Cache-Control"] == "no-store");
+        CHECK(live.receive() == "hello");
+        for (const std::string& text :
+             {std::string(), std::string("{\"do\":1}"), std::string("K\u00f6rper"), std::string(1'000'000, 'x')}) {
+            live.send(text);
+            CHECK(live.receive() == text);
+        }
+        CHECK(echo.log().lines() == std::vector<std::string>{"opened 1"});
+        live.close();
+    }
+    CHECK(soon([&] { return echo.log().count("closed 1") == 1; }));
+    CHECK_FALSE(echo.site().server.send(Client{1}, "late"));
+    CHECK_FALSE(echo.site().server.send(Client{77}, "nobody"));
+    Live second(echo.site());
+    CHECK(second.receive() == "hello");
+    CHECK(echo.last() == Client{2});
+}
+
+TEST_CASE("texts to a client keep their order, and those of a client theirs") {
+    Log log;
+    Handlers handlers;
+    handlers.message = [&](Client, std::string_view text) { log.add(std::string(text)); };
+    Echo echo({}, handlers);
+    Live live(echo.site());
+    CHECK(live.receive() == "hello");
+    for (int n = 0; n < 2000; ++n) CHECK(echo.site().server.send(echo.last(), std::to_string(n)));
+    for (int n = 0; n < 2000; ++n) CHECK(live.receive() == std::to_string(n));
+    for (int n = 0; n < 300; ++n) live.send(std::to_string(n));
+    REQUIRE(soon([&] { return log.lines().size() == 300; }));
+    for (std::size_t n = 0; n < 300; ++n) CHECK(log.lines()[n] == std::to_string(n));
+}
+
+TEST_CASE("broadcasts reach all clients in one order") {
+    Echo echo;
+    Live one(echo.site()), two(echo.site());
+    CHECK(one.receive() == "hello");
+    CHECK(two.receive() == "hello");
+    std::vector<std::thread> threads;
+    for (int k = 0; k < 4; ++k) {
+        threads.emplace_back([&, k] {
+            for (int n = 0; n < 100; ++n) echo.site().server.broadcast(std::to_string(k) + "/" + std::to_string(n));
+        });
+    }
+    for (auto& thread : threads) thread.join();
+    for (int n = 0; n < 400; ++n) CHECK(one.receive() == two.receive());
+}
+
+TEST_CASE("what opened sends comes before any broadcast") {
+    std::promise<void> go;
+    std::shared_future<void> gone = go.get_future().share();
+    std::atomic<bool> is_inside{false};
+    Site* site = nullptr;
+    Handlers handlers;
+    handlers.opened = [&](Client client) {
+        is_inside = true;
+        gone.wait();
+        site->server.send(client, "state");
+        site->server.broadcast("after");
+    };
+    Site made(handlers);
+    site = &made;
+    Live live(made);
+    REQUIRE(soon([&] { return is_inside.load(); }));
+    made.server.broadcast("before");
+    go.set_value();
+    CHECK(live.receive() == "state");
+    CHECK(live.receive() == "after");
+}
+
+TEST_CASE("messages that are too large, too many or no text end a client") {
+    Options options;
+    options.most_message_bytes = 1000;
+    options.messages_per_second = 10;
+    options.message_burst = 50;
+    Echo echo(options);
+    {
+        Live live(echo.site());
+        live.send(std::string(1000, 'x'));
+        live.send(std::string(1001, 'x'));
+        CHECK(live.closed_with() == 1009);
+    }
+    {
+        Live live(echo.site());
+        live.socket().binary(true);
+        live.send("x");
+        CHECK(live.closed_with() == 1003);
+    }
+    {
+        Live live(echo.site());
+        live.send("\xff\xfe");
+        CHECK(live.closed_with() == 1007);
+    }
+    {
+        Live live(echo.site());
+        for (int n = 0; n < 60; ++n) live.send("x");
+        CHECK(live.closed_with() == 1008);
+    }
+    {
+        Live live(echo.site());
+        for (int n = 0; n < 60; ++n) live.socket().ping({});
+        CHECK(live.closed_with() == 1008);
+    }
+    CHECK(soon([&] { return echo.log().count("closed ") == 5; }));
+    CHECK(echo.log().count("error") == 0);
+}
+
+TEST_CASE("a client that is sent texts all the while is told, too, why it is closed") {
+    Options options;
+    options.most_message_bytes = 1000;
+    Echo echo(options);
+    Live live(echo.site());
+    CHECK(live.receive() == "hello");
+    std::jthread talker([&] {
+        for (int n = 0; n < 50; ++n) {  // before and after the server has said why
+            std::this_thread::sleep_for(std::chrono::milliseconds(2));
+            (void)echo.site().server.send(echo.last(), "x");
+        }
+    });
+    live.send(std::string(20'000'000, 'x'));
+    CHECK(live.closed_with() == 1009);
+    talker.join();
+    CHECK(soon([&] { return echo.log().count("closed 1") == 1; }));
+}
+
+TEST_CASE("a client that closes while it is sent texts gets an answer") {
+    Echo echo;
+    for (int n = 0; n < 20; ++n) {
+        Live live(echo.site());
+        CHECK(live.receive() == "hello");
+        std::jthread talker([&] {
+            for (int k = 0; k < 2000; ++k) (void)echo.site().server.send(echo.last(), "x");
+        });
+        CHECK(live.receive() == "x");
+        CHECK_NOTHROW(live.close());
+        talker.join();
+    }
+}
+
+TEST_CASE("a flood that does not stop is cut off") {
+    Options options;
+    options.message_burst = 50;
+    Echo echo(options);
+    Live live(echo.site());
+    beast::error_code status;
+    const auto start = Clock::now();
+    while (!status && Clock::now() - start < std::chrono::seconds(8)) {
+        live.socket().write(asio::buffer("x", 1), status);
+    }
+    CHECK(status);
+    CHECK(soon([&] { return echo.log().count("closed 1") == 1; }));
+}
+
+TEST_CASE("an allowed burst is answered") {
+    Echo echo;
+    Live live(echo.site());
+    CHECK(live.receive() == "hello");
+    for (int n = 0; n < 390; ++n) live.send(std::to_string(n));
+    for (int n = 0; n < 390; ++n) CHECK(live.receive() == std::to_string(n));
+}
+
+TEST_CASE("a handler that throws ends its client, and is told to the log") {
+    Handlers handlers;
+    handlers.message = [](Client, std::string_view) { throw std::runtime_error("detail"); };
+    Echo echo({}, handlers);
+    Live live(echo.site());
+    live.send("x");
+    CHECK(live.closed_with() == 1011);
+    CHECK(soon([&] { return echo.log().count("closed 1") == 1; }));
+    CHECK(echo.log().count("error message: detail") == 1);
+}
+
+TEST_CASE("no more clients than are allowed") {
+    Options options;
+    options.most_clients = 2;
+    Echo echo(options);
+    Live one(echo.site());
+    auto two = std::make_unique<Live>(echo.site());
+    CHECK(echo.site().get("/live", echo.site().upgrade()).result_int() == 503);
+    two.reset();
+    CHECK(soon([&] { return echo.log().count("closed 2") == 1; }));
+    Live three(echo.site());
+    CHECK(three.receive() == "hello");
+}
+
+TEST_CASE("handshakes that are no good") {
+    Echo echo;
+    Fields fields = echo.site().upgrade();
+    fields[4] = {"Sec-WebSocket-Key", "-"};
+    CHECK(echo.site().get("/live", fields).result_int() == 400);
+    fields = echo.site().upgrade();
+    fields[3].second = "12";
+    CHECK(echo.site().get("/live", fields).result_int() == 426);
+    Wire early(echo.site().port);
+    early.send(echo.site().head("/live", echo.site().upgrade()) + "early");
+    CHECK(early.receive().result_int() == 400);
+    CHECK(echo.log().lines().empty());
+}
+
+TEST_CASE("a client that does not read is closed, and the others are not") {
+    Options options;
+    options.most_waiting_bytes = std::size_t(8) << 20;
+    Echo echo(options);
+    Live slow(echo.site());
+    CHECK(slow.receive() == "hello");
+    const Client first = echo.last();
+    Live good(echo.site());
+    CHECK(good.receive() == "hello");
+    const std::string text(1 << 20, 'x');
+    int sent = 0;
+    while (echo.site().server.send(first, text)) REQUIRE(++sent < 100);
+    CHECK(sent >= 8);
+    CHECK(soon([&] { return echo.log().count("closed 1") == 1; }));
+    CHECK_FALSE(echo.site().server.send(first, "x"));
+    good.send("still here");
+    CHECK(good.receive() == "still here");
+    CHECK(slow.closed_with() == 0);
+}
+
+TEST_CASE("a client that does not answer is closed after a while") {
+    Options options;
+    options.live_idle = std::chrono::milliseconds(400);
+    Echo echo(options);
+    Live silent(echo.site());  // it would answer pings while it reads
+    CHECK(soon([&] { return echo.log().count("closed 1") == 1; }));
+    Live there(echo.site());
+    CHECK(there.receive() == "hello");
+    std::thread sender([&] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(1200));
+        echo.site().server.broadcast("after a while");
+    });
+    CHECK(there.receive() == "after a while");
+    sender.join();
+}
+
+TEST_CASE("slow pictures do not delay messages") {
+    std::promise<void> go;
+    std::shared_future<void> gone = go.get_future().share();
+    std::atomic<int> waiting{0};
+    Handlers handlers;
+    handlers.get = [&](const Request&) {
+        ++waiting;
+        gone.wait();
+        return Response();
+    };
+    Echo echo({}, handlers);
+    std::vector<std::unique_ptr<Wire>> wires;
+    for (int n = 0; n < 6; ++n) {
+        wires.push_back(std::make_unique<Wire>(echo.site().port));
+        wires.back()->send(echo.site().head("/slice"));
+    }
+    REQUIRE(soon([&] { return waiting == 4; }));
+    Live live(echo.site());
+    CHECK(live.receive() == "hello");
+    live.send("now");
+    CHECK(live.receive() == "now");
+    go.set_value();
+    for (auto& wire : wires) CHECK(wire->receive().result_int() == 200);
+}
+
+TEST_CASE("a handler that is slow gets all messages, and little is kept for it") {
+    std::atomic<int> handled{0};
+    Handlers handlers;
+    handlers.message = [&](Client, std::string_view) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+        ++handled;
+    };
+    Options options;
+    options.messages_per_second = options.message_burst = 1e6;
+    Echo echo(options, handlers);
+    Live live(echo.site());
+    for (int n = 0; n < 500; ++n) live.send(std::string(1000, 'x'));
+    CHECK(soon([&] { return handled == 500; }));
+}
+
+TEST_CASE("the end is told to clients, and takes less than a second") {
+    Log log;
+    Handlers handlers;
+    handlers.opened = [&](Client client) { log.add("opened " + std::to_string(client.number)); };
+    handlers.closed = [&](Client client) { log.add("closed " + std::to_string(client.number)); };
+    auto site = std::make_unique<Site>(handlers);
+    Live reading(*site), silent(*site);
+    REQUIRE(soon([&] { return log.count("opened") == 2; }));
+    auto code = std::async(std::launch::async, [&] { return reading.closed_with(); });
+    const auto start = Clock::now();
+    site->server.stop();
+    CHECK(Clock::now() - start < std::chrono::seconds(1));
+    CHECK(code.get() == 1001);
+    CHECK(log.count("closed") == 2);
+    CHECK_FALSE(site->server.send(Client{1}, "x"));
+    site->server.broadcast("x");
+    site.reset();
+}
+
+TEST_CASE("clients come and go while all talk") {
+    Echo echo;
+    std::atomic<bool> is_over{false};
+    std::vector<std::thread> threads;
+    for (int k = 0; k < 2; ++k) {
+        threads.emplace_back([&] {
+            while (!is_over) {
+                echo.site().server.broadcast(std::string(3000, 'b'));
+                std::this_thread::sleep_for(std::chrono::milliseconds(1));
+            }
+        });
+    }
+    for (int k = 0; k < 4; ++k) {
+        threads.emplace_back([&, k] {
+            for (int n = 0; n < 10; ++n) {
+                Live live(echo.site());
+                live.send("x");
+                while (live.receive() != "x") {
+                }
+                if ((n + k) % 2 == 0) live.close();
+                (void)echo.site().get("/image");
+            }
+        });
+    }
+    for (std::size_t k = 2; k < threads.size(); ++k) threads[k].join();
+    is_over = true;
+    threads[0].join();
+    threads[1].join();
+    CHECK(soon([&] { return echo.log().count("closed") == 40; }));
+}

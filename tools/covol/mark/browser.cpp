@@ -1,0 +1,53 @@
+#include "mark/browser.h"
+
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <fstream>
+#include <system_error>
+
+#include "covol/error.h"
+
+extern char** environ;
+
+namespace covol::tool {
+
+BrowserLink::BrowserLink(const std::string& url) {
+    std::string name = (std::filesystem::temp_directory_path() / "covol-open-XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr) throw Error(Errc::Io, "mark: no folder can be made in " + name);
+    folder_ = name;
+    std::ofstream page(folder_ / "open.html");
+    page << "<!doctype html><meta charset=\"utf-8\"><meta name=\"referrer\" content=\"no-referrer\"><title>covol "
+            "mark</title>"
+         << "<meta http-equiv=\"refresh\" content=\"0;url=" << url << "\">\n";
+    if (!page.flush()) throw Error(Errc::Io, "mark: " + folder_.string() + " cannot be written");
+}
+
+BrowserLink::~BrowserLink() {
+    std::error_code ignored;
+    std::filesystem::remove_all(folder_, ignored);
+}
+
+bool BrowserLink::open() const {
+    const std::string file = (folder_ / "open.html").string();
+    for (const char* program : {"xdg-open", "open"}) {
+        posix_spawn_file_actions_t actions;
+        posix_spawn_file_actions_init(&actions);
+        for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+            posix_spawn_file_actions_addopen(&actions, stream, "/dev/null", O_RDWR, 0);
+        const std::array<const char*, 3> words{program, file.c_str(), nullptr};
+        pid_t child = 0;
+        const int failed =
+            ::posix_spawnp(&child, program, &actions, nullptr, const_cast<char* const*>(words.data()), environ);
+        posix_spawn_file_actions_destroy(&actions);
+        if (failed != 0) continue;
+        int status = 0;
+        return ::waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0;
+    }
+    return false;
+}
+
+}  // namespace covol::tool

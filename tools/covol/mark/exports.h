@@ -1,0 +1,25 @@
+#pragma once
+#include <functional>
+#include <string>
+
+#include "covol/image.h"
+#include "covol/segment_structures.h"
+#include "covol/study.h"
+
+namespace covol::tool {
+
+/// A file to be saved.
+struct Export {
+    std::string name, bytes;
+};
+
+/// @param format  mask.nii.gz, mask.nrrd, mask.tif, mesh.ply, mesh.stl, surface.vdb, marks.csv, table.csv
+/// @param wanted  the structures that it is about; of a mesh one, or one file cannot hold them
+/// @param results  of all structures of the study: masks do not overlap, and labels do not depend on what is wanted
+/// @param scratch  a folder that files are made in
+/// @throws Error InvalidInput (no such format); what making it throws.
+[[nodiscard]] Export make_export(const std::string& format, const StudyState& wanted,
+                                 const std::function<StructuresResult()>& results, const Image& image,
+                                 const std::string& scratch, const RunContext& run);
+
+}  // namespace covol::tool

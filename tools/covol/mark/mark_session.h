@@ -1,0 +1,78 @@
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+
+#include "cli/json.h"
+#include "covol/image.h"
+#include "covol/segment_structures.h"
+#include "covol/study.h"
+#include "covol/study_solver.h"
+#include "serve/web_server.h"
+
+namespace covol::tool {
+
+/// What a study is shown with.
+struct MarkView {
+    std::string page;   ///< HTML
+    std::string title;  ///< the image's name
+    bool is_anatomical = false;
+    SegmentOptions options;  ///< of every structure
+};
+
+/// One study on the page of `covol mark`: answers what the page asks for, and tells it what changes.
+/// docs/mark_protocol.md has the messages.
+class MarkSession {
+public:
+    using Send = std::function<void(serve::Client, std::string)>;
+    using Broadcast = std::function<void(std::string)>;
+
+    MarkSession(Study study, Image image, MarkView view, const RunContext& run);
+
+    /// From here on all changes are told; the structures that the study has are solved. Called once.
+    void start(Send send, Broadcast broadcast);
+
+    [[nodiscard]] serve::Response get(const serve::Request& request);
+    void opened(serve::Client client);
+    void message(serve::Client client, std::string_view text);
+
+    /// The surfaces of all structures that have marks, as `covol segment --study` gives them.
+    [[nodiscard]] StructuresResult results();
+
+private:
+    struct Solved {
+        std::shared_ptr<const StudyStructure> from;  ///< with these marks
+        StudyResult told;                            ///< the last message
+        std::uint64_t version = 0;
+        std::shared_ptr<const SegmentResult> surface;  ///< of that version; null: none
+        bool is_refined = false;
+    };
+
+    void hear(const StudyResult& result);
+    void act(serve::Client client, std::string_view text);
+    void suggest(serve::Client client, StudyId structure);
+    void follow(const std::vector<StudyId>& structures);
+    [[nodiscard]] Json to_json(const StudyStructure& structure) const;
+    [[nodiscard]] Json standing() const;
+    [[nodiscard]] serve::Response image_facts() const;
+    [[nodiscard]] serve::Response slice(const serve::Request& request) const;
+    [[nodiscard]] serve::Response mesh(const serve::Request& request) const;
+    [[nodiscard]] serve::Response download(const serve::Request& request);
+
+    const Image image_;
+    const MarkView view_;
+    const RunContext run_;
+    std::array<double, 2> range_{0, 1}, window_{0, 1};  // of brightness: coded; shown at first
+    mutable std::mutex mutex_;
+    Study study_;
+    std::map<StudyId, Solved> solved_;
+    Send send_;
+    Broadcast broadcast_;
+    std::unique_ptr<StudySolver> solver_;  // last: its thread ends before what it tells is gone
+};
+
+}  // namespace covol::tool

@@ -1,0 +1,153 @@
+#include "serve/http_connection.h"
+
+#include <boost/asio/post.hpp>
+#include <boost/beast/http/read.hpp>
+#include <boost/beast/http/write.hpp>
+#include <boost/beast/websocket/rfc6455.hpp>
+
+#include "serve/answers.h"
+#include "serve/live_connection.h"
+
+namespace covol::serve {
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+namespace {
+
+constexpr std::uint32_t kMostHeaderBytes = 16 * 1024;
+
+std::string_view view_of(beast::string_view text) { return {text.data(), text.size()}; }
+
+RequestHead head_of(const http::request<http::empty_body>& request) {
+    RequestHead head;
+    head.method = view_of(request.method_string());
+    head.target = view_of(request.target());
+    for (const auto& field : request) head.fields.emplace_back(view_of(field.name_string()), view_of(field.value()));
+    head.is_upgrade = beast::websocket::is_upgrade(request);
+    return head;
+}
+
+}  // namespace
+
+HttpConnection::HttpConnection(Hub& hub, asio::ip::tcp::socket socket)
+    : hub_(hub), stream_(std::move(socket)), buffer_(4 * kMostHeaderBytes) {}
+
+void HttpConnection::read() {
+    is_head_ = false;
+    response_.reset();
+    serializer_.reset();
+    parser_.emplace();
+    parser_->header_limit(kMostHeaderBytes);
+    waits_since_ = std::chrono::steady_clock::now();
+    stream_.expires_after(hub_.options.idle);
+    http::async_read_header(stream_, buffer_, *parser_,
+                            [self = self()](beast::error_code status, std::size_t) { self->on_read(status); });
+}
+
+void HttpConnection::on_read(beast::error_code status) {
+    waits_since_.reset();
+    if (!stream_.socket().is_open() || hub_.is_stopping) return finish();
+    if (status == http::error::header_limit || status == http::error::buffer_overflow) {
+        return refuse(431, "The head of a request has at most " + std::to_string(kMostHeaderBytes) + " bytes.");
+    }
+    if (status == http::error::body_limit) return refuse(413, "Requests have no body here.");
+    const bool is_malformed = status.category() == make_error_code(http::error::bad_method).category() &&
+                              status != http::error::end_of_stream && status != http::error::partial_message;
+    if (status && is_malformed) return refuse(400, "This is no request that is understood.");
+    if (status) return finish();  // the end, or nothing came for too long
+
+    Judgement judgement = judge(head_of(parser_->get()), hub_.rules);
+    is_head_ = parser_->get().method() == http::verb::head;
+    switch (judgement.kind) {
+        case Judgement::Kind::Refuse: return refuse(judgement.status, judgement.why);
+        case Judgement::Kind::SetCookie:
+            return answer(cookie_answer(hub_.rules.cookie_name, hub_.rules.cookie, judgement.is_link), wants_to_stay());
+        case Judgement::Kind::Get: return call_handler(std::move(judgement.request));
+        case Judgement::Kind::Live: return open_live();
+    }
+}
+
+void HttpConnection::call_handler(Request request) {
+    stream_.expires_never();
+    asio::post(hub_.get_pool, [self = self(), request = std::move(request)]() mutable {
+        Hub& hub = self->hub_;
+        Response response;
+        try {
+            if (!hub.is_stopping)
+                response = hub.handlers.get ? hub.handlers.get(request) : refusal(404, "There is nothing here.");
+            if (const std::string why = why_unsendable(response); !why.empty()) {
+                hub.report(request.path + ": " + why);
+                response = refusal(500, "This could not be answered.");
+            }
+        } catch (...) {
+            hub.report(request.path + ": " + what_was_thrown());
+            response = refusal(500, "This could not be answered.");
+        }
+        // Moved: the socket is to be destroyed on its own thread.
+        asio::post(hub.io, [self = std::move(self), response = std::move(response)]() mutable {
+            self->answer(std::move(response), self->wants_to_stay());
+        });
+    });
+}
+
+bool HttpConnection::wants_to_stay() const { return parser_->get().version() == 11 && parser_->get().keep_alive(); }
+
+void HttpConnection::open_live() {
+    if (buffer_.size() != 0) return refuse(400, "A WebSocket begins with the answer to its request.");
+    if (!hub_.has_room_for_client()) return refuse(503, "Too many windows are open.");
+    const auto live = std::make_shared<LiveConnection>(hub_, std::move(stream_), hub_.next_client());
+    hub_.leave(shared_from_this(), false);
+    hub_.enter(live, true);
+    live->accept(parser_->release());
+}
+
+void HttpConnection::refuse(int status, const std::string& why) { answer(refusal(status, why), false); }
+
+void HttpConnection::answer(Response response, bool keep) {
+    if (!stream_.socket().is_open()) return;
+    keeps_ = keep;
+    response_.emplace();
+    response_->version(11);
+    response_->result(unsigned(response.status));
+    for (const auto& [name, value] : headers_of(response, hub_.options.page_policy)) response_->insert(name, value);
+    response_->keep_alive(keep);
+    const bool has_no_body = response.status == 204 || response.status == 304;
+    if (!has_no_body) response_->content_length(response.body.size());
+    if (!has_no_body && !is_head_) response_->body() = std::move(response.body);
+    serializer_.emplace(*response_);
+    write();
+}
+
+// Piece by piece: the limit of time is for each, so that a large file may take long on a slow line.
+void HttpConnection::write() {
+    stream_.expires_after(hub_.options.idle);
+    http::async_write_some(stream_, *serializer_, [self = self()](beast::error_code status, std::size_t) {
+        if (status) return self->finish();
+        if (!self->serializer_->is_done()) return self->write();
+        if (self->keeps_) return self->read();
+        beast::error_code ignored;
+        self->stream_.socket().shutdown(asio::ip::tcp::socket::shutdown_send, ignored);
+        self->stream_.expires_after(std::chrono::seconds(1));
+        self->waits_since_ = std::chrono::steady_clock::now();
+        self->drain();
+    });
+}
+
+// Where a socket is closed before all is read that came, the client may lose the answer.
+void HttpConnection::drain() {
+    constexpr std::size_t kMost = 1 << 20, kPiece = 4096;
+    buffer_.consume(buffer_.size());
+    stream_.async_read_some(buffer_.prepare(kPiece), [self = self()](beast::error_code status, std::size_t count) {
+        self->drained_ += count;
+        if (status || self->drained_ > kMost) return self->finish();
+        self->drain();
+    });
+}
+
+void HttpConnection::finish() {
+    waits_since_.reset();
+    stream_.close();
+    hub_.leave(shared_from_this(), false);
+}
+
+}  // namespace covol::serve

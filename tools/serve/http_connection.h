@@ -1,0 +1,56 @@
+#pragma once
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/message.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/serializer.hpp>
+#include <boost/beast/http/string_body.hpp>
+#include <optional>
+
+#include "serve/hub.h"
+
+namespace covol::serve {
+
+/// A socket that speaks HTTP, one request after another, until it becomes a WebSocket or is closed.
+class HttpConnection final : public Connection {
+public:
+    HttpConnection(Hub& hub, boost::asio::ip::tcp::socket socket);
+
+    /// Waits for a request. @pre it is in a shared pointer
+    void read();
+    /// Answers with a text for people, and closes.
+    void refuse(int status, const std::string& why);
+
+    void stop() override { finish(); }
+    void finish() override;
+    [[nodiscard]] std::optional<MessageRate::Time> waits_since() const override { return waits_since_; }
+
+private:
+    using Stream = boost::beast::tcp_stream;
+    using StringResponse = boost::beast::http::response<boost::beast::http::string_body>;
+
+    [[nodiscard]] std::shared_ptr<HttpConnection> self() {
+        return std::static_pointer_cast<HttpConnection>(shared_from_this());
+    }
+    void on_read(boost::beast::error_code status);
+    void call_handler(Request request);
+    void open_live();
+    [[nodiscard]] bool wants_to_stay() const;
+    /// @param keep  whether the connection stays open
+    void answer(Response response, bool keep);
+    void write();
+    void drain();
+
+    Hub& hub_;
+    Stream stream_;
+    boost::beast::flat_buffer buffer_;
+    std::optional<boost::beast::http::request_parser<boost::beast::http::empty_body>> parser_;
+    std::optional<StringResponse> response_;
+    std::optional<boost::beast::http::response_serializer<boost::beast::http::string_body>> serializer_;
+    bool is_head_ = false, keeps_ = false;
+    std::size_t drained_ = 0;
+    std::optional<MessageRate::Time> waits_since_;
+};
+
+}  // namespace covol::serve

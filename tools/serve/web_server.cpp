@@ -1,0 +1,206 @@
+#include "serve/web_server.h"
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <cerrno>
+#include <cstring>
+#include <thread>
+
+#include "covol/error.h"
+#include "serve/answers.h"
+#include "serve/hub.h"
+#include "serve/request_rules.h"
+#include "serve/secret.h"
+
+namespace covol::serve {
+namespace asio = boost::asio;
+using asio::ip::tcp;
+namespace {
+
+[[noreturn]] void fail_to_listen(std::uint16_t port, int number) {
+    const std::string what = "web_server: port " + std::to_string(port) + " of 127.0.0.1: ";
+    if (number == EADDRINUSE) {
+        throw Error(Errc::Io, what + "another program listens there: choose another port, or 0 for one that is free",
+                    "port");
+    }
+    if (number == EACCES) {
+        throw Error(Errc::Io, what + "only administrators may listen there: choose one from 1024 on", "port");
+    }
+    throw Error(Errc::Io, what + std::strerror(number));
+}
+
+// Made without Asio: its sockets would be inherited by programs that are started, a browser say, and stay open with
+// them.
+int listen_on(std::uint16_t port) {
+    const int socket = ::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    if (socket < 0) fail_to_listen(port, errno);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(port);
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    const int yes = 1;  // connections of an earlier run that are still ending do not hold the port
+    constexpr int kBacklog = 64;
+    if (::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes) != 0 ||
+        ::bind(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
+        ::listen(socket, kBacklog) != 0) {
+        const int number = errno;
+        ::close(socket);
+        fail_to_listen(port, number);
+    }
+    return socket;
+}
+
+Options checked(Options options) {
+    if (const std::string why = options.why_invalid(); !why.empty()) {
+        throw Error(Errc::InvalidOptions, "web_server: " + why);
+    }
+    return options;
+}
+
+}  // namespace
+
+std::string Options::why_invalid() const {
+    for (const std::string& one : authorities) {
+        if (!is_authority(one)) return "authorities: expected name:port, got \"" + one + "\"";
+    }
+    if (page_policy.empty() || !is_header_value(page_policy)) return "page_policy: expected one line";
+    if (live_path.size() < 2 || live_path[0] != '/') return "live_path: expected /name, got \"" + live_path + "\"";
+    if (most_message_bytes < 1) return "most_message_bytes: expected >= 1, got 0";
+    if (most_connections < 1) return "most_connections: expected >= 1, got 0";
+    if (!(messages_per_second > 0)) {
+        return "messages_per_second: expected > 0, got " + std::to_string(messages_per_second);
+    }
+    if (!(message_burst >= 1)) return "message_burst: expected >= 1, got " + std::to_string(message_burst);
+    if (idle.count() < 1) return "idle: expected >= 1 ms, got " + std::to_string(idle.count());
+    if (live_idle.count() < 2) return "live_idle: expected >= 2 ms, got " + std::to_string(live_idle.count());
+    if (get_threads < 1) return "get_threads: expected >= 1, got " + std::to_string(get_threads);
+    return {};
+}
+
+class WebServer::Impl {
+public:
+    Impl(Options options, Handlers handlers)
+        : hub_(checked(std::move(options)), std::move(handlers)), acceptor_(hub_.io), pause_(hub_.io) {
+        acceptor_.assign(tcp::v4(), listen_on(hub_.options.port));
+        port_ = acceptor_.local_endpoint().port();
+        hub_.rules.authorities = allowed_authorities(port_, hub_.options.authorities);
+        hub_.rules.token = random_secret();
+        hub_.rules.cookie = random_secret();  // another one: links are kept in histories and lists of processes
+        hub_.rules.cookie_name = "covol_mark_" + std::to_string(port_);
+        hub_.rules.live_path = hub_.options.live_path;
+        wait();
+        thread_ = std::thread([this] { serve(); });
+    }
+
+    ~Impl() { stop(); }
+    Impl(const Impl&) = delete;
+    Impl& operator=(const Impl&) = delete;
+
+    void stop() {
+        std::call_once(stopped_, [this] {
+            hub_.is_stopping = true;
+            asio::post(hub_.io, [this] {
+                boost::system::error_code ignored;
+                acceptor_.close(ignored);
+                pause_.cancel();
+                hub_.stop_all();
+            });
+            thread_.join();  // ends when the last socket is closed
+            hub_.get_pool.join();
+            hub_.live_pool.join();
+        });
+    }
+
+    [[nodiscard]] Hub& hub() { return hub_; }
+    [[nodiscard]] std::uint16_t port() const { return port_; }
+
+private:
+    void serve() {
+        while (true) {
+            try {
+                hub_.io.run();
+                return;
+            } catch (...) {  // no memory, say: it concerns one connection
+                hub_.report(what_was_thrown());
+            }
+        }
+    }
+
+    void wait() {
+        acceptor_.async_wait(tcp::acceptor::wait_read, [this](boost::system::error_code status) {
+            if (hub_.is_stopping || !acceptor_.is_open()) return;
+            if (status || accept_all()) return wait();
+            // No more files may be open: try again when some are closed.
+            pause_.expires_after(std::chrono::milliseconds(100));
+            pause_.async_wait([this](boost::system::error_code) {
+                if (!hub_.is_stopping) wait();
+            });
+        });
+    }
+
+    // Takes the connections that wait. @return false where none can be had for now
+    bool accept_all() {
+        constexpr int kMost = 64;  // then it is the turn of others
+        for (int n = 0; n < kMost; ++n) {
+            const int accepted = ::accept4(acceptor_.native_handle(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+            if (accepted < 0) {
+                const bool is_short = errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM;
+                if (is_short && !was_short_) hub_.report(std::string("accept: ") + std::strerror(errno));
+                was_short_ = is_short;
+                return !is_short;
+            }
+            was_short_ = false;
+            boost::system::error_code status;
+            tcp::socket socket(hub_.io);
+            socket.assign(tcp::v4(), accepted, status);
+            if (status) {
+                ::close(accepted);
+                continue;
+            }
+            socket.set_option(tcp::no_delay(true), status);
+            hub_.welcome(std::move(socket));
+        }
+        return true;
+    }
+
+    Hub hub_;
+    tcp::acceptor acceptor_;
+    asio::steady_timer pause_;
+    std::uint16_t port_ = 0;
+    bool was_short_ = false;
+    std::once_flag stopped_;
+    std::thread thread_;
+};
+
+WebServer::WebServer(Options options, Handlers handlers) {
+    try {
+        impl_ = std::make_unique<Impl>(std::move(options), std::move(handlers));
+    } catch (const Error&) {
+        throw;
+    } catch (const std::exception& error) {  // of sockets and threads
+        throw Error(Errc::Io, std::string("web_server: ") + error.what());
+    }
+}
+
+WebServer::~WebServer() = default;
+
+std::uint16_t WebServer::port() const { return impl_->port(); }
+
+std::string WebServer::url() const {
+    return "http://127.0.0.1:" + std::to_string(impl_->port()) + "/?token=" + impl_->hub().rules.token;
+}
+
+bool WebServer::send(Client client, std::string text) { return impl_->hub().send(client, std::move(text)); }
+
+void WebServer::broadcast(std::string text) { impl_->hub().broadcast(std::move(text)); }
+
+void WebServer::stop() { impl_->stop(); }
+
+}  // namespace covol::serve

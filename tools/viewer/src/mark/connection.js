@@ -1,0 +1,105 @@
+// The WebSocket: what waits is sent in order; where the connection is lost, it is opened again.
+import {Store} from './store.js';
+
+const MOST_ON_THE_WAY = 64;
+const PATIENCE = 15000;  // ms without an answer: the other end is gone, though nobody said so
+const WAITS = [200, 400, 800, 1500, 2500, 4000];
+
+export class Connection {
+  /** `state` gets "link": connecting, open, lost, refused or other, and "waiting", the number of actions. */
+  constructor(study, queue, state) {
+    Object.assign(this, {study, queue, state, number: 0, tries: 0, isOpen: false});
+    study.on('action', () => { this.flush(); this.count(); });
+    study.on('gap', () => this.socket?.close());
+    addEventListener('online', () => this.hurry());
+    document.addEventListener('visibilitychange', () => { if (!document.hidden) this.hurry(); });
+    setInterval(() => this.checkPatience(), 2000);
+  }
+
+  open() {
+    clearTimeout(this.timer);
+    this.timer = null;
+    const socket = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/live`);
+    this.socket = socket;
+    ++this.number;
+    socket.addEventListener('message', (event) => { if (socket === this.socket) this.receive(JSON.parse(event.data)); });
+    socket.addEventListener('close', () => { if (socket === this.socket) this.closed(); });
+  }
+
+  receive(message) {
+    if (message.state && !this.welcome(message.state)) return;
+    this.study.receive(message);
+    if (!message.state) return;
+    this.isOpen = true;
+    this.tries = 0;
+    this.state.set({link: 'open'});
+    this.flush();
+    this.count();
+  }
+
+  /** Whether this is the study that the page shows. */
+  welcome(state) {
+    if (this.study.name === null) {
+      this.study.name = state.study;
+      this.queue.open(new Store(`covol-mark/actions/${state.study}`));
+    } else if (this.study.name !== state.study) {
+      this.state.set({link: 'other'});
+      const socket = this.socket;
+      this.socket = null;
+      this.isOpen = false;
+      socket.close();
+      return false;
+    }
+    return true;
+  }
+
+  async closed() {
+    this.isOpen = false;
+    this.socket = null;
+    this.state.set({link: this.study.name === null ? 'connecting' : 'lost'});
+    this.count();
+    this.timer = setTimeout(() => this.open(), WAITS[Math.min(this.tries++, WAITS.length - 1)]);
+    if (this.tries < 2) return;
+    try {  // a server that was started anew knows neither the cookie nor the page
+      const answer = await fetch('/image', {method: 'HEAD'});
+      if (answer.status === 403 && !this.isOpen) this.state.set({link: 'refused'});
+    } catch { /* there is no server at all */ }
+  }
+
+  hurry() {
+    if (!this.timer) return;
+    this.tries = 0;
+    this.open();
+  }
+
+  checkPatience() {
+    const oldest = this.queue.items.find((item) => item.seq === null && item.sentOn === this.number);
+    if (this.isOpen && oldest && performance.now() - oldest.sentAt > PATIENCE) this.socket.close();
+  }
+
+  count() { this.state.set({waiting: this.queue.waiting}); }
+
+  flush() {
+    if (!this.isOpen) return;
+    let onTheWay = 0;
+    for (const item of this.queue.items) {
+      if (item.seq !== null) continue;
+      if (item.sentOn !== this.number) {
+        // What follows must not overtake one that waits for an ID.
+        if (onTheWay >= MOST_ON_THE_WAY || !this.queue.isReady(item)) return;
+        item.sentOn = this.number;
+        item.sentAt = performance.now();
+        this.socket.send(JSON.stringify(item.action));
+      }
+      ++onTheWay;
+    }
+  }
+
+  /** A question; it is not kept. False where nobody hears it. */
+  ask(what, structure) {
+    if (!this.isOpen || typeof structure === 'string') return false;
+    this.socket.send(JSON.stringify({key: this.queue.nextKey(), ask: what, structure}));
+    return true;
+  }
+}
+

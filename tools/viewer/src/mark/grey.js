@@ -1,0 +1,36 @@
+// Which values of the image are black and which are white.
+
+/** A pixel for each of the 65536 codes of a slice. */
+export function greyTable({low, high}, {black, white}) {
+  const table = new Uint32Array(65536), scale = (high - low) / 65535, range = white - black || 1e-9;
+  for (let n = 0; n < 65536; ++n) {
+    const grey = Math.min(255, Math.max(0, Math.round(255 * (low + n * scale - black) / range)));
+    table[n] = 0xff000000 | grey * 0x010101;
+  }
+  table.key = `${black} ${white}`;
+  return table;
+}
+
+/** The range between the darkest and the brightest hundredth of a slice. */
+function rangeOfSlice({values}, {low, high}) {
+  const counts = new Uint32Array(1024);
+  for (let n = 0; n < values.length; ++n) ++counts[values[n] >> 6];
+  const at = (share) => {
+    let sum = 0, n = 0;
+    while (n < 1023 && (sum += counts[n]) < share * values.length) ++n;
+    return n;
+  };
+  const value = (n) => low + n / 1023 * (high - low);
+  return {black: value(at(0.01)), white: value(at(0.99))};
+}
+
+/** [name, window] of what there is to choose from; `slice` is the one that is looked at. */
+export function presets(image, slice) {
+  const list = [['automatic', {black: image.black, white: image.white}], ['whole range', {black: image.low, white: image.high}]];
+  if (slice) list.push(['this slice', rangeOfSlice(slice, image)]);
+  if (image.anatomical && image.low <= -500 && image.high >= 300)  // Hounsfield units
+    list.push(['soft tissue', {black: -160, white: 240}], ['brain', {black: 0, white: 80}], ['bone', {black: -450, white: 1050}], ['lung', {black: -1350, white: 150}]);
+  return list;
+}
+
+export const isSame = (a, b) => Math.abs(a.black - b.black) + Math.abs(a.white - b.white) <= 1e-6 * (Math.abs(a.white) + Math.abs(a.black) + 1e-12);

@@ -1,0 +1,63 @@
+// The surfaces of the newest results, fetched and decoded.
+import {decodeCorners, decodePositions} from '../data.js';
+import {indexCoordinates} from '../outline.js';
+
+const HEAD = 40;  // bytes before the positions
+export const GOODBYE = 1000;  // ms for which the surface before is still outlined
+
+function decode(buffer, space) {
+  const view = new DataView(buffer), float3 = (at) => [0, 4, 8].map((n) => view.getFloat32(at + n, true));
+  const mesh = {vertices: view.getUint32(0, true), triangles: view.getUint32(4, true), min: float3(8), max: float3(20)};
+  const size = view.getUint32(32, true), bytes = new Uint8Array(buffer, HEAD);
+  const positions = decodePositions(mesh, bytes.subarray(0, size)), corners = decodeCorners(mesh, bytes.subarray(size));
+  return {...mesh, positions, corners, index: indexCoordinates(positions, space)};
+}
+
+/** After a new connection the same surface may come again. */
+const isSame = (a, b) => a.vertices === b.vertices && a.triangles === b.triangles && a.min.every((x, n) => x === b.min[n]) && a.max.every((x, n) => x === b.max[n]);
+
+export class Meshes {
+  /** `changed(id, mesh or null)` is called for each that comes or goes. */
+  constructor(space, changed) {
+    Object.assign(this, {space, changed, items: new Map(), wanted: new Map()});
+  }
+
+  get(id) { return this.items.get(id) ?? null; }
+
+  /** A result came; `isNew`: of a server that may count from the beginning again. */
+  async take({structure: id, version, stage}, isNew) {
+    if (stage === 'empty') return this.drop(id);
+    const wanted = this.wanted.get(id);
+    if (!isNew && wanted >= version) return;
+    // One that is worked on has a surface only where there was one before.
+    if (!(version > 0) || (!['first', 'refined'].includes(stage) && !isNew && wanted)) return;
+    this.wanted.set(id, version);
+    let mesh = null;
+    try {
+      const answer = await fetch(`/mesh?structure=${id}&version=${version}`);
+      if (answer.ok) mesh = decode(await answer.arrayBuffer(), this.space);
+    } catch { /* the connection is lost: the next state brings it */ }
+    if (this.wanted.get(id) !== version) return;
+    if (!mesh) this.wanted.delete(id);
+    else this.put(id, {...mesh, id, version, arrived: performance.now(), isShown: false});
+  }
+
+  put(id, mesh) {
+    const before = this.items.get(id);
+    mesh.before = before && !isSame(before, mesh) ? {...before, before: null} : null;
+    this.items.set(id, mesh);
+    this.changed(id, mesh);
+    setTimeout(() => {
+      mesh.before = null;
+      if (this.items.get(id) === mesh) this.changed(id, mesh, true);
+    }, GOODBYE);
+  }
+
+  drop(id) {
+    this.wanted.delete(id);
+    if (this.items.delete(id)) this.changed(id, null);
+  }
+
+  /** What no structure has any more goes. */
+  keepOnly(ids) { for (const id of this.items.keys()) if (!ids.includes(id)) this.drop(id); }
+}

@@ -1,0 +1,198 @@
+// One plane on the page: its slice, what is drawn upon it, zoom and place.
+import {el, number} from '../dom.js';
+import {Plane, write} from '../plane.js';
+import {AXIS_COLORS, dominant, planeName} from '../space.js';
+import {icon} from './icons.js';
+import {drawOverlay} from './overlay.js';
+import {PointerInput} from './pointer.js';
+
+const LARGEST_VOXEL = 90;  // CSS pixels, when zoomed in
+const REDRAWN_ON = ['slices', 'views', 'grey', 'study', 'meshes', 'hover', 'selected', 'ring', 'ruler', 'draft', 'drag', 'active', 'loaded', 'theme', 'large', 'tool', 'planes'];
+
+export class PlanePanel {
+  /** `app` has image, space, unitText, state, study, meshes, slices and tools. */
+  constructor(axis, app) {
+    Object.assign(this, {axis, ...app, shownAt: -1, travel: 0, picture: null, pictureStep: 1});
+    const {state, space, image} = this, name = planeName(space, axis, image.anatomical);
+    this.name = name;
+    this.plane = new Plane(space, axis, image.anatomical);
+    ({right: this.right, down: this.down} = this.plane);
+    this.canvas = el('canvas', {tabindex: 0, role: 'application', 'aria-roledescription': 'image plane'});
+    this.slider = el('input', {type: 'range', min: 0, max: space.size[axis] - 1, step: 1, 'data-axis': axis, 'aria-label': `slice, ${name}`,
+      oninput: () => this.go(Number(this.slider.value))});
+    this.chip = el('span', {class: 'chip'}, name);
+    this.chip.style.setProperty('--chip', AXIS_COLORS[axis]);
+    this.where = el('span', {class: 'where'});
+    this.fit = el('button', {type: 'button', class: 'icon fit', title: 'whole slice (r)', 'aria-label': `whole slice, ${name}`, onclick: () => this.setView(null)});
+    this.large = el('button', {type: 'button', class: 'icon', title: 'this plane alone, and back (f)', 'aria-label': `${name} alone, and back`, onclick: () => this.toggleLarge()});
+    const head = el('div', {class: 'panel-head', ondblclick: (event) => { if (!event.target.closest('button, input')) this.toggleLarge(); }},
+      this.chip, this.slider, this.where, this.fit, this.large);
+    this.element = el('section', {class: `panel slice axis-${axis}`, 'aria-label': name}, head, el('div', {class: 'picture'}, this.canvas));
+    new ResizeObserver(() => this.draw()).observe(this.canvas.parentElement);
+    state.on(REDRAWN_ON, () => this.later());
+    this.input = new PointerInput(this);
+  }
+
+  get at() { return this.state.get('slices')[this.axis]; }
+
+  get view() { return this.state.get('views')[this.axis]; }
+
+  go(at) {
+    const slices = [...this.state.get('slices')], next = Math.min(this.space.size[this.axis] - 1, Math.max(0, Math.round(at)));
+    this.travel = Math.sign(next - this.at) || this.travel;
+    slices[this.axis] = next;
+    this.state.set({slices});
+  }
+
+  toggleLarge() { this.state.set({large: this.state.get('large') === this.axis ? -1 : this.axis}); }
+
+  setView(view) {
+    const views = [...this.state.get('views')];
+    views[this.axis] = view && {zoom: view.zoom, x: Math.min(this.space.size[this.right] - 0.5, Math.max(-0.5, view.x)), y: Math.min(this.space.size[this.down] - 0.5, Math.max(-0.5, view.y))};
+    this.state.set({views});
+  }
+
+  /** The view that shows a voxel at a place of the canvas. */
+  viewWith(zoom, [x, y], [px, py]) {
+    const {plane} = this, grow = zoom / (this.view?.zoom ?? 1), [sx, sy] = plane.shown(x, y);
+    const [cx, cy] = plane.shown(sx - (px - plane.viewWidth / 2) / (plane.scaleX * grow), sy - (py - plane.viewHeight / 2) / (plane.scaleY * grow));
+    return {zoom, x: cx, y: cy};
+  }
+
+  zoomAt(factor, px = this.plane.viewWidth / 2, py = this.plane.viewHeight / 2) {
+    const {plane} = this, before = this.view?.zoom ?? 1, fit = Math.min(plane.scaleX, plane.scaleY) / before;
+    const zoom = Math.min(LARGEST_VOXEL / fit, before * factor);
+    this.setView(zoom <= 1.001 ? null : this.viewWith(zoom, plane.unplace(px, py), [px, py]));
+    this.draw();  // the next event counts from here
+  }
+
+  /** Brings a place into sight where zoom has put it out of it. */
+  reveal(index) {
+    if (!this.view || !this.plane.viewWidth) return;
+    const [px, py] = this.plane.place(index[this.right], index[this.down]), {viewWidth, viewHeight} = this.plane, rim = 24;
+    if (px < rim || py < rim || px > viewWidth - rim || py > viewHeight - rim) this.setView({...this.view, x: index[this.right], y: index[this.down]});
+  }
+
+  /** A place of the canvas in voxels of the image, on the slice that is seen. */
+  indexAt(px, py) {
+    const index = [0, 0, 0], [x, y] = this.plane.unplace(px, py);
+    [index[this.axis], index[this.right], index[this.down]] = [this.shownAt, x, y];
+    return index;
+  }
+
+  /** Whether a place may be marked: it is in the image, and that is seen. */
+  isSeen(index) {
+    if (!this.isInside(index)) return false;
+    if (!this.hasPicture) this.toast('This slice could not be loaded: it is not marked blindly.');
+    return this.hasPicture;
+  }
+
+  isInside(index) { return [this.right, this.down].every((a) => index[a] >= -0.5 && index[a] <= this.space.size[a] - 0.5); }
+
+  /** A place of the world in CSS pixels of the canvas, and of the window. */
+  spotOf(world) {
+    const index = this.space.toIndex(world);
+    return this.plane.place(index[this.right], index[this.down]);
+  }
+
+  pixelOf(world) {
+    const box = this.canvas.getBoundingClientRect(), [x, y] = this.spotOf(world);
+    return [box.left + x, box.top + y];
+  }
+
+  later() { this.pending ??= requestAnimationFrame(() => this.draw()); }
+
+  draw() {
+    if (this.pending) cancelAnimationFrame(this.pending);
+    this.pending = null;
+    const {canvas, plane} = this, box = canvas.parentElement, ratio = Math.min(3, devicePixelRatio), width = box.clientWidth, height = box.clientHeight;
+    this.tell();
+    if (width === 0 || height === 0) return this.drawHidden(ratio);
+    const size = [Math.round(width * ratio), Math.round(height * ratio)];
+    if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
+    plane.lay(width, height, this.view);
+    this.takeSlice(ratio);
+    const context = canvas.getContext('2d');
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.clearRect(0, 0, width, height);
+    if (this.hasPicture) plane.drawPicture(context, this.picture, this.pictureStep);
+    else this.drawNoPicture(context, width, height);
+    drawOverlay(this, context);
+    if (this.input.spot && !this.input.gesture) this.tellCursor?.(this, this.input.spot);
+    plane.drawScale(context, this.unitText);
+    plane.drawLetters(context);
+    return undefined;
+  }
+
+  /** A plane that another one hides may still be seen in 3D. */
+  drawHidden(ratio) {
+    if (!this.state.get('planes')[this.axis]) return;
+    if (!this.plane.scaleX) this.plane.lay(512, 512);
+    this.takeSlice(ratio);
+  }
+
+  /** As many voxels for a value as there are in a pixel of the screen. */
+  stepFor(ratio) {
+    const voxels = 1 / (Math.max(this.plane.scaleX, this.plane.scaleY) * ratio);
+    return Math.min(64, 2 ** Math.max(0, Math.floor(Math.log2(voxels) + 1e-6)));
+  }
+
+  takeSlice(ratio) {
+    const {axis, at, slices} = this, step = this.stepFor(ratio), wanted = `${at} ${step}`, failed = slices.hasFailed(axis, at, step);
+    if (this.wanted !== wanted || (this.hadFailed && !failed)) slices.want(axis, at, step, this.travel);
+    this.wanted = wanted;
+    this.hadFailed = failed;
+    const slice = slices.best(axis, at, step);
+    if (slice) this.paint(slice);
+    if (slice || failed) [this.shownAt, this.hasPicture] = [at, Boolean(slice)];
+    // Until it is here the slice before stays, with all that belongs to it.
+  }
+
+  paint(slice) {
+    const grey = this.state.get('grey'), key = `${slice.at} ${slice.step} ${grey.key}`;
+    if (key === this.key) return;
+    this.picture ??= document.createElement('canvas');
+    const {picture} = this, {width, height, values} = slice;
+    if (picture.width !== width || picture.height !== height) Object.assign(picture, {width, height});
+    const context = picture.getContext('2d');
+    if (this.pixels?.width !== width || this.pixels?.height !== height) this.pixels = context.createImageData(width, height);
+    const pixels = new Uint32Array(this.pixels.data.buffer);
+    for (let n = 0; n < pixels.length; ++n) pixels[n] = grey[values[n]];
+    context.putImageData(this.pixels, 0, 0);
+    this.key = key;
+    this.slice = slice;
+    this.pictureStep = slice.step;
+    this.onPicture?.(this.axis);
+  }
+
+  drawNoPicture(context, width, height) {
+    if (this.shownAt < 0) return;
+    const {left, top, width: w, height: h} = this.plane;
+    context.fillStyle = '#16171a';
+    context.fillRect(left, top, w, h);
+    context.font = '12px system-ui, sans-serif';
+    context.textAlign = 'center';
+    write(context, 'this slice could not be loaded', width / 2, height / 2);
+  }
+
+  tell() {
+    const {space, axis, at, image} = this, index = [0, 0, 0];
+    index[axis] = at;
+    const {w} = dominant(space.axes[axis]), world = space.toWorld(index)[w], first = image.first_slice ?? 0;
+    const text = `${at + first} of ${first}\u2013${space.size[axis] - 1 + first}`, isZoomed = Boolean(this.view);
+    const place = `${'xyz'[w]} ${number(world).replace('-', '\u2212')}${this.unitText ? `\u2009${this.unitText}` : ''}`;
+    if (this.where.dataset.text !== text + place) {
+      this.where.dataset.text = text + place;
+      this.where.replaceChildren(el('b', {}, String(at + first)), ` of ${first}\u2013${space.size[axis] - 1 + first}`, el('span', {class: 'world'}, ` \u00b7 ${place}`));
+      this.slider.value = at;
+      this.slider.setAttribute('aria-valuetext', `${text}, ${place}`);
+      this.canvas.setAttribute('aria-label', `${this.name}, slice ${text}. Arrows move the crosshair, a sets a mark there, [ and ] change the slice`);
+    }
+    const zoom = isZoomed ? `${number(this.view.zoom, 2)}\u00d7` : '';
+    if (this.fit.textContent !== zoom) this.fit.textContent = zoom;
+    this.fit.hidden = !isZoomed;
+    const isLarge = this.state.get('large') === axis;
+    if (this.isLarge !== isLarge) this.large.replaceChildren(icon(isLarge ? 'small' : 'large'));
+    this.isLarge = isLarge;
+  }
+}

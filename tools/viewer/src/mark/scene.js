@@ -1,0 +1,257 @@
+// The 3D view of the page: surfaces that come and go, marks, slices where they are asked for.
+import {
+  Box3, BufferAttribute, BufferGeometry, CanvasTexture, DoubleSide, Group, InstancedMesh, IcosahedronGeometry, LineBasicMaterial,
+  LineLoop, LineSegments, LinearFilter, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, MeshStandardMaterial, Raycaster,
+  SRGBColorSpace, Vector2, Vector3,
+} from 'three';
+import {AXIS_COLORS} from '../space.js';
+import {EYE, rgbColor, Stage3D} from '../stage3d.js';
+
+const CLICK = 4;  // CSS pixels
+const KINDS = ['surface', 'inside', 'outside'];
+const shared = new IcosahedronGeometry(1, 2);
+
+/** A mark is told from the surface that it lies on, and from those of the other kinds. */
+function markColor(color, kind) {
+  const own = rgbColor(color);
+  return kind === 'surface' ? own.multiplyScalar(0.3) : kind === 'inside' ? own.lerp(rgbColor([255, 255, 255]), 0.6) : rgbColor([20, 20, 22]);
+}
+
+export class MarkScene extends Stage3D {
+  /** `app` has space, state, study, meshes, tools, panels and goTo(world). @throws where there is no WebGL */
+  constructor(canvas, app) {
+    super(canvas, app.state, app.space);
+    Object.assign(this, {app, surfaces: new Map(), balls: new Map(), isTouched: false});
+    const {size} = this.space, corners = [[-0.5, -0.5, -0.5], size.map((n) => n - 0.5)], box = new Box3();
+    for (let n = 0; n < 8; ++n) box.expandByPoint(new Vector3(...this.space.toWorld([0, 1, 2].map((a) => corners[n >> a & 1][a]))));
+    this.imageBox = box;
+    this.setBox(box);
+    this.sphere.radius *= 1.15;  // its corners lie on the ball around it
+    this.addImageBox(corners);
+    this.addPlanes();
+    this.addRing();
+    this.begin();
+    this.controls.addEventListener('start', () => { this.isTouched = true; });
+    this.controls.addEventListener('end', () => this.keepCamera());
+    this.listen();
+    this.update();
+  }
+
+  addImageBox(corners) {
+    const places = [];
+    for (let n = 0; n < 8; ++n)
+      for (let a = 0; a < 3; ++a)
+        if (!(n >> a & 1)) for (const end of [n, n | 1 << a]) places.push(...this.space.toWorld([0, 1, 2].map((b) => corners[end >> b & 1][b])));
+    const geometry = new BufferGeometry().setAttribute('position', new BufferAttribute(new Float32Array(places), 3));
+    this.frame = new LineSegments(geometry, new LineBasicMaterial({transparent: true, opacity: 0.35}));
+    this.scene.add(this.frame);
+  }
+
+  addPlanes() {
+    this.planes = [0, 1, 2].map((axis) => {
+      const geometry = new BufferGeometry();
+      geometry.setAttribute('position', new BufferAttribute(new Float32Array(12), 3));
+      geometry.setAttribute('uv', new BufferAttribute(new Float32Array(8), 2));
+      geometry.setIndex([0, 1, 2, 0, 2, 3]);
+      const mesh = new Mesh(geometry, new MeshBasicMaterial({side: DoubleSide}));
+      const border = new LineLoop(new BufferGeometry().setAttribute('position', geometry.getAttribute('position')), new LineBasicMaterial({color: AXIS_COLORS[axis]}));
+      mesh.frustumCulled = border.frustumCulled = false;
+      const group = new Group().add(mesh, border);
+      this.scene.add(group);
+      return {group, mesh};
+    });
+  }
+
+  addRing() {
+    this.ring = new Mesh(shared, new MeshBasicMaterial({color: '#ffc414', depthTest: false, transparent: true, opacity: 0.9}));
+    this.ring.renderOrder = 1;
+    this.scene.add(this.ring);
+  }
+
+  listen() {
+    const {state} = this;
+    state.on(['study', 'meshes', 'drag', 'active'], () => this.update());
+    state.on(['slices', 'planes'], () => { for (const axis of [0, 1, 2]) this.movePlane(axis); this.updateClip(); });
+    state.on(['cut'], () => { this.turnCut(); this.updateClip(); });
+    state.on(['flip'], () => this.updateClip());
+    state.on(['ring', 'theme'], () => this.updateSigns());
+    let from = null;
+    this.canvas.addEventListener('pointerdown', (event) => { from = event.button === 0 ? [event.clientX, event.clientY] : null; });
+    this.canvas.addEventListener('pointerup', (event) => {
+      if (from && event.button === 0 && Math.hypot(event.clientX - from[0], event.clientY - from[1]) <= CLICK) this.pick(event);
+      from = null;
+    });
+    for (const axis of [0, 1, 2]) this.movePlane(axis);
+    this.turnCut();
+    this.updateSigns();
+  }
+
+  /** Surfaces and marks as they are now. The camera stays, but while nobody has touched it all of the body is shown. */
+  update() {
+    const {study, meshes} = this.app, seen = new Set();
+    for (const structure of study.structures) {
+      seen.add(structure.id);
+      this.updateSurface(structure, meshes.get(structure.id));
+      this.updateMarks(structure);
+    }
+    for (const [id, surface] of this.surfaces) if (!seen.has(id)) this.dropSurface(id, surface);
+    for (const [id, own] of this.balls) if (!seen.has(id)) this.scene.remove(own.group), this.balls.delete(id);
+    const box = new Box3();
+    for (const [id, {mesh}] of this.surfaces) if (study.structure(id)?.visible) box.union(mesh.geometry.boundingBox);
+    this.setBox(box.isEmpty() ? this.imageBox : box);
+    if (!box.isEmpty() && !this.isTouched && !this.isWellSeen()) this.look(this.camera.position.clone().sub(this.controls.target), true);
+    this.updateClip();
+  }
+
+  /** Whether the body is in sight, and not too small. */
+  isWellSeen() {
+    const half = Math.atan(Math.tan(this.camera.fov * Math.PI / 360) * Math.min(1, this.camera.aspect));
+    const fit = this.sphere.radius / Math.sin(half), distance = this.camera.position.distanceTo(this.sphere.center);
+    return distance > 0.85 * fit && distance < 1.5 * fit && this.controls.target.distanceTo(this.sphere.center) < 0.4 * this.sphere.radius;
+  }
+
+  dropSurface(id, {mesh}) {
+    this.scene.remove(mesh);
+    mesh.geometry.dispose();
+    mesh.material.dispose();
+    this.surfaces.delete(id);
+  }
+
+  updateSurface(structure, data) {
+    let own = this.surfaces.get(structure.id);
+    if (own && own.data !== data) this.dropSurface(structure.id, own), own = null;
+    if (!data) return;
+    if (!own) {
+      const geometry = new BufferGeometry();
+      geometry.setAttribute('position', new BufferAttribute(data.positions, 3));
+      geometry.setIndex(new BufferAttribute(data.corners, 1));
+      geometry.computeVertexNormals();
+      geometry.computeBoundingBox();
+      own = {data, mesh: new Mesh(geometry, new MeshStandardMaterial({roughness: 0.58, metalness: 0, side: DoubleSide}))};
+      own.mesh.userData.structure = structure.id;
+      this.scene.add(own.mesh);
+      this.surfaces.set(structure.id, own);
+    }
+    own.mesh.material.color = rgbColor(structure.color);
+    own.mesh.visible = structure.visible;
+  }
+
+  updateMarks(structure) {
+    let own = this.balls.get(structure.id);
+    const drag = this.state.get('drag'), moved = drag?.structure === structure.id ? drag : null;
+    const key = [structure.marks, structure.color, structure.visible, moved, this.sphere.radius];
+    if (own && key.every((part, n) => part === own.key[n])) return;
+    if (own) {
+      this.scene.remove(own.group);
+      for (const ball of own.group.children) ball.dispose();
+    }
+    own = {key, group: new Group()};
+    // On the screen about as large beside a small body as beside a large one.
+    const radius = 0.016 * this.sphere.radius;
+    for (const kind of KINDS) {
+      const marks = structure.marks.filter((m) => m.kind === kind);
+      if (marks.length === 0) continue;
+      const balls = new InstancedMesh(shared, new MeshLambertMaterial({color: markColor(structure.color, kind)}), marks.length);
+      marks.forEach((m, n) => balls.setMatrixAt(n, new Matrix4().makeScale(radius, radius, radius).setPosition(...(moved?.mark === m.id ? moved.world : m.world))));
+      balls.frustumCulled = false;
+      own.group.add(balls);
+    }
+    own.group.visible = structure.visible;
+    this.scene.add(own.group);
+    this.balls.set(structure.id, own);
+  }
+
+  updateClip() {
+    this.clipMaterials([...this.surfaces.values()].map(({mesh}) => mesh.material).concat([...this.balls.values()].flatMap(({group}) => group.children.map((ball) => ball.material))));
+    this.draw();
+  }
+
+  updateSigns() {
+    const ring = this.state.get('ring');
+    this.ring.visible = Boolean(ring);
+    if (ring) this.ring.position.set(...ring.world);
+    this.ring.scale.setScalar(0.03 * this.sphere.radius);
+    this.frame.material.color.set(this.state.get('theme') === 'dark' ? '#8b919c' : '#6d727b');
+    this.draw();
+  }
+
+  movePlane(axis) {
+    const {group, mesh} = this.planes[axis], panel = this.app.panels[axis];
+    group.visible = this.state.get('planes')[axis];
+    if (!group.visible) return;
+    const position = mesh.geometry.getAttribute('position'), uv = mesh.geometry.getAttribute('uv'), {picture, pictureStep, right, down} = panel;
+    this.cornersOf(axis, this.state.get('slices')[axis]).forEach((place, n) => position.setXYZ(n, ...place));
+    position.needsUpdate = true;
+    if (!picture) return;
+    // The last pixels of a coarse picture reach beyond the image.
+    const x = this.space.size[right] / pictureStep / picture.width, y = this.space.size[down] / pictureStep / picture.height;
+    [[0, 0], [x, 0], [x, y], [0, y]].forEach(([u, v], n) => uv.setXY(n, u, v));
+    uv.needsUpdate = true;
+    this.paintPlane(mesh.material, picture);
+  }
+
+  paintPlane(material, picture) {
+    const {map} = material;
+    if (map?.image === picture && map.userData.width === picture.width && map.userData.height === picture.height) {
+      map.needsUpdate = true;
+    } else {
+      map?.dispose();
+      material.map = Object.assign(new CanvasTexture(picture), {colorSpace: SRGBColorSpace, flipY: false, generateMipmaps: false, minFilter: LinearFilter, magFilter: LinearFilter});
+      material.map.userData = {width: picture.width, height: picture.height};
+      material.needsUpdate = true;
+    }
+    this.draw();
+  }
+
+  /** What is under the pointer: the slices go there, or a mark is set there. */
+  pick(event) {
+    const box = this.canvas.getBoundingClientRect(), ray = new Raycaster();
+    ray.setFromCamera(new Vector2(2 * (event.clientX - box.left) / box.width - 1, 1 - 2 * (event.clientY - box.top) / box.height), this.camera);
+    const surfaces = [...this.surfaces.values()].map(({mesh}) => mesh).filter((mesh) => mesh.visible);
+    const planes = this.planes.filter(({group}) => group.visible).map(({mesh}) => mesh);
+    const isThere = ({object, point}) => !(object.material.clippingPlanes ?? []).some((plane) => plane.distanceToPoint(point) < 0);
+    const hit = ray.intersectObjects([...surfaces, ...planes], false).find(isThere);
+    if (!hit) return;
+    const world = hit.point.toArray(), {structure} = hit.object.userData;
+    this.app.goTo(world);
+    if (!event.shiftKey || !structure) return;
+    this.state.set({active: structure});
+    this.app.tools.addMark('surface', world);
+  }
+
+  reset() {
+    this.updateSigns();
+    this.look(EYE);
+    this.isTouched = false;
+    this.app.keep('camera', null);
+  }
+
+  /** A thin body in a large image must not be cut off when the eye moves away from it. */
+  setDepth(distance) {
+    const size = this.imageBox.max.distanceTo(this.imageBox.min);
+    this.camera.near = Math.min(distance, size) / 100;
+    this.camera.far = 20 * Math.max(distance, size);
+    this.camera.updateProjectionMatrix();
+  }
+
+  rotate(horizontal, vertical) {
+    super.rotate(horizontal, vertical);
+    this.isTouched = true;
+    this.keepCamera();
+  }
+
+  keepCamera() {
+    this.app.keep('camera', {position: this.camera.position.toArray(), target: this.controls.target.toArray()});
+  }
+
+  /** The camera as it was before a reload. */
+  takeCamera({position, target}) {
+    this.isTouched = true;
+    this.sized = true;
+    this.camera.position.set(...position);
+    this.controls.target.set(...target);
+    this.setDepth(this.camera.position.distanceTo(this.controls.target));
+    this.controls.update();
+    this.draw();
+  }
+}

@@ -1,0 +1,108 @@
+// One plane of an image on a canvas: where voxels are drawn, with letters of orientation and a scale bar.
+import {number} from './dom.js';
+import {dominant} from './space.js';
+
+const LETTERS = [['R', 'L'], ['A', 'P'], ['I', 'S']];  // towards - and + of the world's axes, LPS
+
+/** Text that is readable on any grey. */
+export function write(context, text, x, y, color = '#fff') {
+  context.lineJoin = 'round';
+  context.strokeStyle = 'rgba(0, 0, 0, 0.7)';
+  context.lineWidth = 3;
+  context.strokeText(text, x, y);
+  context.fillStyle = color;
+  context.fillText(text, x, y);
+}
+
+export class Plane {
+  constructor(space, axis, anatomical) {
+    Object.assign(this, {space, axis, anatomical});
+    [this.right, this.down] = space.planeAxes(axis);
+    this.flipX = this.flipY = false;
+    if (anatomical) {  // as a radiologist hangs it: the patient's left at the right, anterior and superior up
+      const x = dominant(space.axes[this.right]), y = dominant(space.axes[this.down]);
+      this.flipX = x.sign < 0;
+      this.flipY = y.w === 2 ? y.sign > 0 : y.sign < 0;
+    } else {
+      this.flipY = this.down === 2;  // z up, as in 3D
+    }
+  }
+
+  /** Fits the plane into so many CSS pixels; `view` has a zoom, and the voxel x, y that is in the middle. */
+  lay(width, height, view = null) {
+    const {size, spacing} = this.space, sizeX = size[this.right] * spacing[this.right], sizeY = size[this.down] * spacing[this.down];
+    const scale = Math.min(width / sizeX, height / sizeY) * (view?.zoom ?? 1);  // CSS pixels per world unit
+    const scaleX = scale * spacing[this.right], scaleY = scale * spacing[this.down];
+    const [x, y] = view ? this.shown(view.x, view.y) : [(size[this.right] - 1) / 2, (size[this.down] - 1) / 2];
+    Object.assign(this, {scale, scaleX, scaleY, viewWidth: width, viewHeight: height, width: scale * sizeX, height: scale * sizeY,
+      left: width / 2 - (x + 0.5) * scaleX, top: height / 2 - (y + 0.5) * scaleY});
+  }
+
+  /** Voxels as they are counted from the left and from the top; its own inverse. */
+  shown(x, y) {
+    const {size} = this.space;
+    return [this.flipX ? size[this.right] - 1 - x : x, this.flipY ? size[this.down] - 1 - y : y];
+  }
+
+  /** From voxels to CSS pixels; voxel centres are at integers. */
+  place(x, y) {
+    const [sx, sy] = this.shown(x, y);
+    return [this.left + (sx + 0.5) * this.scaleX, this.top + (sy + 0.5) * this.scaleY];
+  }
+
+  /** From CSS pixels to voxels. */
+  unplace(px, py) { return this.shown((px - this.left) / this.scaleX - 0.5, (py - this.top) / this.scaleY - 0.5); }
+
+  /** A picture of the plane, of which a pixel is `step` x `step` voxels; the last ones may reach beyond the image. */
+  drawPicture(context, picture, step = 1) {
+    const {left, top, width, height} = this;
+    context.save();
+    context.beginPath();
+    context.rect(left, top, width, height);
+    context.clip();
+    context.translate(left + (this.flipX ? width : 0), top + (this.flipY ? height : 0));
+    context.scale(this.flipX ? -1 : 1, this.flipY ? -1 : 1);
+    context.imageSmoothingQuality = 'high';
+    context.drawImage(picture, 0, 0, picture.width * step * this.scaleX, picture.height * step * this.scaleY);
+    context.restore();
+  }
+
+  /** A bar of a round length, at most a quarter of the view. */
+  drawScale(context, unitText) {
+    const {viewWidth: width, viewHeight: height} = this;
+    const most = Math.min(120, width / 4) / this.scale, tens = 10 ** Math.floor(Math.log10(most));
+    const length = [5, 2, 1].map((n) => n * tens).find((n) => n <= most), pixels = length * this.scale;
+    // On the picture itself, where there is room.
+    const x = width - Math.max(12, this.left + 10) - pixels, y = height - Math.max(12, this.top + 10);
+    context.font = '11px system-ui, sans-serif';
+    context.textAlign = 'center';
+    for (const [color, line] of [['rgba(0, 0, 0, 0.7)', 4], ['#fff', 2]]) {
+      context.strokeStyle = color;
+      context.lineWidth = line;
+      context.lineCap = 'butt';
+      context.beginPath();
+      context.moveTo(x, y);
+      context.lineTo(x + pixels, y);
+      context.stroke();
+    }
+    write(context, `${number(length)}${unitText ? ` ${unitText}` : ''}`, x + pixels / 2, y - 6);
+  }
+
+  drawLetters(context) {
+    if (!this.anatomical) return;
+    const {viewWidth: width, viewHeight: height} = this;
+    const ends = (axis, flip) => {
+      const {w, sign} = dominant(this.space.axes[axis]), forward = (sign > 0) !== flip;
+      return forward ? LETTERS[w] : [...LETTERS[w]].reverse();
+    };
+    const [left, right] = ends(this.right, this.flipX), [top, bottom] = ends(this.down, this.flipY);
+    context.font = '600 12px system-ui, sans-serif';
+    context.textAlign = 'center';
+    context.textBaseline = 'middle';
+    write(context, left, 10, height / 2);
+    write(context, right, width - 10, height / 2);
+    write(context, top, width / 2, 11);
+    write(context, bottom, width / 2, height - 11);
+    context.textBaseline = 'alphabetic';
+  }
+}
