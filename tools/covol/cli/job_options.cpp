@@ -20,7 +20,7 @@ constexpr std::array<std::string_view, 19> kSettings{
 constexpr std::array<std::string_view, 21> kInputs{
     "IMAGE",        "IMAGE...", "FILE",     "FILE...",     "[NAME=]FILE", "[NAME=]FILE...", "[NAME=]FILE|X,Y,Z",
     "FILE|X,Y,Z",   "START",    "IN",       "A",           "B",           "IN.vdb[:NAME]",  "U.vdb",
-    "DISTANCE.vdb", "BAND.vdb", "EDGE.vdb", "REPORT.json", "FILE.vdb",    "FOLDER...", "STUDY"};
+    "DISTANCE.vdb", "BAND.vdb", "EDGE.vdb", "REPORT.json", "FILE.vdb",    "FOLDER...",      "STUDY"};
 
 template <typename List>
 bool contains(const List& list, std::string_view type) {

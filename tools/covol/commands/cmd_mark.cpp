@@ -66,6 +66,8 @@ struct MarkJob {
     void run(Session& session) const {
         if (port < 0 || port > 65535)
             throw Error(Errc::InvalidOptions, "--port: expected 0 to 65535, got " + std::to_string(port));
+        session.require_memory(double(read_image_info(image_path, image.options, session.run()).bytes_to_hold),
+                               "the image");
         const Image pixels = image.read(image_path, session.run());
         const std::filesystem::path path = without_slash(image_path);
         Study opened(study.empty() ? path.string() + ".covol" : study, image_path, pixels.geometry());

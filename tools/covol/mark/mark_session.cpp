@@ -8,6 +8,7 @@
 
 #include "covol/error.h"
 #include "covol/page_data.h"
+#include "covol/safe_text.h"
 #include "covol/segment_structures.h"
 #include "mark/exports.h"
 
@@ -75,7 +76,7 @@ RunContext quiet(RunContext run) {
     return run;
 }
 
-Json to_json(const StudyResult& result, std::uint64_t version) {
+Json result_json(const StudyResult& result, std::uint64_t version) {
     Json json{{"structure", result.structure},  {"version", version},          {"seq", result.sequence},
               {"stage", word_of(result.stage)}, {"progress", result.progress}, {"message", result.message},
               {"seconds", result.seconds}};
@@ -165,8 +166,9 @@ void MarkSession::hear(const StudyResult& result) {
             solved.version = result.version;
             solved.is_refined = result.stage == StudyResult::Stage::Refined;
         }
-        if (result.surface || result.stage != StudyResult::Stage::Working) solved.told = result;
-        text = text_of({{"result", tool::to_json(result, solved.version)}});
+        Json told = result_json(result, solved.version);
+        text = text_of({{"result", told}});
+        if (result.stage != StudyResult::Stage::Working) solved.told = std::move(told);
     }
     broadcast_(std::move(text));
 }
@@ -185,9 +187,7 @@ Json MarkSession::to_json(const StudyStructure& structure) const {
               {"marks", std::move(marks)},
               {"outlines", std::move(outlines)},
               {"result", nullptr}};
-    const auto solved = solved_.find(structure.id);
-    if (solved != solved_.end() && solved->second.told.structure != 0)
-        json["result"] = tool::to_json(solved->second.told, solved->second.version);
+    if (const auto solved = solved_.find(structure.id); solved != solved_.end()) json["result"] = solved->second.told;
     return json;
 }
 
@@ -349,7 +349,7 @@ StructuresResult MarkSession::results() {
         state = study_.state();
         for (const auto& structure : state)
             if (const auto found = solved_.find(structure->id); found != solved_.end() && found->second.is_refined)
-                known[marks_of(*structure).name] = found->second.surface;
+                known[safe_text(structure->name)] = found->second.surface;
     }
     std::vector<Marks> marks = marks_of(state);
     if (marks.empty()) throw Error(Errc::InvalidInput, "no structure has marks yet");

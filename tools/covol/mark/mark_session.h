@@ -46,7 +46,7 @@ public:
 private:
     struct Solved {
         std::shared_ptr<const StudyStructure> from;  ///< with these marks
-        StudyResult told;                            ///< the last message
+        Json told;                                   ///< the last result, as the page has it; null: none
         std::uint64_t version = 0;
         std::shared_ptr<const SegmentResult> surface;  ///< of that version; null: none
         bool is_refined = false;
