@@ -1,4 +1,5 @@
 """How calls run: progress, Ctrl-C, other threads, errors."""
+import json
 import logging
 import os
 import pickle
@@ -153,3 +154,22 @@ def test_choices_are_logged(sphere, caplog):
         result = covol.segment(image, points)
     assert [record.message for record in caplog.records if record.name == "covol"] == result.log
     assert any("voxel_size" in line for line in result.log)
+
+
+def test_a_study_gives_the_same_as_its_marks(sphere, tmp_path):
+    image, points, _ = sphere
+    some = points[::len(points) // 40]
+    size = image.array.shape[::-1]
+    lines = [{"covol_study": 1, "image": {"path": "x.tif", "size": size, "spacing": list(image.spacing), "origin": list(image.origin),
+                                          "direction": np.asarray(image.direction).tolist()}},
+             {"do": "add_structure", "name": "ball"}, {"do": "add_structure", "name": "nothing yet"}]
+    lines += [{"do": "add_mark", "structure": 1, "kind": "surface", "world": mark.tolist()} for mark in some]
+    lines += [{"do": "add_mark", "structure": 1, "kind": "outside", "world": some[0].tolist()}, {"do": "undo"}]
+    (tmp_path / "journal.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
+    study = covol.read_study(tmp_path)
+    assert list(study) == ["ball"] and list(study["ball"]) == ["points"]
+    ours, theirs = covol.structures(image, study), covol.structures(image, {"ball": {"points": some}})
+    assert np.array_equal(ours["ball"].mesh.vertices, theirs["ball"].mesh.vertices)
+    with pytest.raises(covol.Error) as error:
+        covol.read_study(tmp_path / "nowhere")
+    assert error.value.code == "io"

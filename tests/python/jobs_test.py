@@ -113,7 +113,7 @@ def test_every_flag_is_an_option(program):
              "spacing"}
     files = {"output", "mask", "mesh", "density", "fields", "table", "evidence", "suggest", "half", "up", "unit_scale",
              "channel", "frame", "correct_level_shift", "points_channels", "plain",
-             "report", "keep_failed", "usda", "compression"}  # of reading and writing, which are functions of their own
+             "report", "keep_failed", "usda", "compression", "study"}  # of reading and writing, which are functions of their own
     later = {"brick_voxels", "brick_overlap", "seam_tolerance", "checkpoint", "checkpoint_every", "resume"}
     unknown = set(flags) - set(ours) - words - files - later
     assert not unknown, f"flags without a keyword: {sorted(unknown)}"

@@ -29,10 +29,10 @@ except ImportError as error:
 from . import _html, _inputs
 from ._covol import Image, LevelSet, Mesh, Points, Result, __version__
 from ._errors import Error
-from ._inputs import from_affine, read_image, read_points, to_affine
+from ._inputs import from_affine, read_image, read_points, read_study, to_affine
 
 __all__ = ["Error", "Image", "LevelSet", "Mesh", "Points", "Result", "Structures", "Suggestion", "compare", "distances", "from_affine", "mask",
-           "mesh", "options", "phantom", "read_image", "read_level_set", "read_mesh", "read_points", "reconstruct", "save_mask",
+           "mesh", "options", "phantom", "read_image", "read_level_set", "read_mesh", "read_points", "read_study", "reconstruct", "save_mask",
            "segment", "structures", "suggest", "timelapse", "to_affine"]
 
 
@@ -381,6 +381,16 @@ Args:
 Returns:
     Points: array of shape (n, 3) in its `space`, lines, normals; to_world(image) gives world positions. Raises Error.
 """
-for _type in (Error, Image, LevelSet, Mesh, Points, Result, Structures, Suggestion, read_image, read_points, from_affine, to_affine):
+read_study.__doc__ = """The structures and marks of a study of `covol mark`; structures(image, read_study(folder)) gives their surfaces.
+
+Args:
+    folder: of the study, "stack.tif.covol" say.
+
+Returns:
+    dict of each structure's marks by its name: a dict of Points with the keys "points", "contours", "inside" and "outside",
+    without those that there are none of. World positions. Raises Error.
+"""
+for _type in (Error, Image, LevelSet, Mesh, Points, Result, Structures, Suggestion, read_image, read_points, read_study, from_affine,
+              to_affine):
     _type.__module__ = "covol"
 del _type

@@ -82,6 +82,10 @@ def read_points(path, *, points_space=None, points_order=None, points_scale=1.0,
     return _covol.read_points(os.fspath(path), points_space, points_order, points_scale, points_channels)
 
 
+def read_study(folder):
+    return _covol.read_study(os.fspath(folder))
+
+
 def points(name, value, reading, lines=False, normals=None):
     """A list of Points from None, a file, Points, several of these, positions or, with `lines`, closed lines of positions."""
     if value is None:

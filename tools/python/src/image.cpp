@@ -6,6 +6,7 @@
 #include "covol/error.h"
 #include "covol/phantom.h"
 #include "covol/point_array.h"
+#include "covol/study.h"
 #include "options.h"
 
 namespace covol::python {
@@ -77,6 +78,23 @@ PointCloud make_points(const std::string& name, const py::object& positions, con
     PointCloud cloud = make_cloud(all, reading, name);
     cloud.lines = std::move(marked);
     return cloud;
+}
+
+/// Each structure's marks as structures() takes them.
+py::dict marks_of_study(const std::string& folder) {
+    py::dict structures;
+    for (const Marks& marks : marks_of(read_study(folder))) {
+        py::dict kinds;
+        if (!marks.points.empty()) kinds["points"] = make_cloud(marks.points, {PointSpace::World, PointOrder::XYZ});
+        const auto add = [&](const char* kind, const std::vector<PointCloud>& clouds) {
+            if (!clouds.empty()) kinds[kind] = clouds.front();
+        };
+        add("contours", marks.contours);
+        add("inside", marks.inside);
+        add("outside", marks.outside);
+        structures[marks.name.c_str()] = kinds;
+    }
+    return structures;
 }
 
 py::tuple make_test_shape(const std::string& kind, int size, int points, double noise, std::uint64_t seed) {
@@ -208,6 +226,7 @@ void add_points(py::module_& module) {
         const py::gil_scoped_release released;
         return read_points(path, reading);
     });
+    module.def("read_study", marks_of_study);
 }
 
 }  // namespace covol::python

@@ -68,7 +68,7 @@ export function toolbar(app, {theme, help, suggestions}) {
     suggest.lastChild.textContent = state.get('isAsking') ? 'Asking\u2026' : state.get('suggested') > 0 ? `Next (${state.get('suggested')})` : 'Suggest';
   });
   theme.className = 'tool';
-  return el('header', {class: 'bar', role: 'toolbar', 'aria-label': 'tools'},
+  return el('header', {class: 'bar'},
     el('div', {class: 'title'}, el('span', {class: 'brand'}, 'covol'), el('h1', {title: image.name}, image.name)),
     toolChoice(state), history(app), el('div', {class: 'tools'}, windowMenu(app), suggest, accept),
     el('div', {class: 'tools end'}, exportMenu(app), theme, button('help', 'keys (?)', () => help.showModal())));
