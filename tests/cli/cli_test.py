@@ -15,8 +15,8 @@ import tempfile
 import unittest
 
 COVOL = os.environ.get("COVOL", "build/bin/covol")
-COMMANDS = ["segment", "reconstruct", "distance", "band", "edge", "evolve", "surface", "mesh", "mask", "compare",
-            "info", "check", "convert", "render", "report", "mark", "phantom", "plan", "brick", "rerun"]
+COMMANDS = ["mark", "segment", "reconstruct", "distance", "band", "edge", "evolve", "surface", "mesh", "mask", "compare",
+            "info", "check", "convert", "render", "report", "phantom", "plan", "brick", "rerun"]
 
 # The shape of all tests: a bright ball in a dark box.
 SIZE = 40          # voxels along each axis

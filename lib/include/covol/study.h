@@ -58,64 +58,64 @@ struct StudyStructure {
 using StudyState = std::vector<std::shared_ptr<const StudyStructure>>;
 
 /// What a person does. `structure` names the one that it is about; colours are chosen where none is given.
-namespace study_action {
-struct AddStructure {
-    std::string name;
-    std::optional<std::array<std::uint8_t, 3>> color;
+struct StudyActions {
+    struct AddStructure {
+        std::string name;
+        std::optional<std::array<std::uint8_t, 3>> color;
+    };
+    struct RemoveStructure {
+        StudyId structure = 0;
+    };
+    struct Rename {
+        StudyId structure = 0;
+        std::string name;
+    };
+    struct Recolor {
+        StudyId structure = 0;
+        std::array<std::uint8_t, 3> color{};
+    };
+    struct Lock {
+        StudyId structure = 0;
+        bool locked = true;
+    };
+    struct Show {
+        StudyId structure = 0;
+        bool visible = true;
+    };
+    struct Duplicate {
+        StudyId structure = 0;
+    };
+    struct AddMark {
+        StudyId structure = 0;
+        MarkKind kind = MarkKind::Surface;
+        Vec3 world{0, 0, 0};
+    };
+    struct MoveMark {
+        StudyId structure = 0, mark = 0;
+        Vec3 world{0, 0, 0};
+    };
+    struct RemoveMark {
+        StudyId structure = 0, mark = 0;
+    };
+    struct GiveMark {
+        StudyId structure = 0, mark = 0, to = 0;
+    };
+    struct AddOutline {
+        StudyId structure = 0;
+        StudyOutline outline;
+    };  ///< the outline's own number is not used
+    struct RemoveOutline {
+        StudyId structure = 0, mark = 0;
+    };
+    struct Undo {};
+    struct Redo {};
 };
-struct RemoveStructure {
-    StudyId structure = 0;
-};
-struct Rename {
-    StudyId structure = 0;
-    std::string name;
-};
-struct Recolor {
-    StudyId structure = 0;
-    std::array<std::uint8_t, 3> color{};
-};
-struct Lock {
-    StudyId structure = 0;
-    bool locked = true;
-};
-struct Show {
-    StudyId structure = 0;
-    bool visible = true;
-};
-struct Duplicate {
-    StudyId structure = 0;
-};
-struct AddMark {
-    StudyId structure = 0;
-    MarkKind kind = MarkKind::Surface;
-    Vec3 world{0, 0, 0};
-};
-struct MoveMark {
-    StudyId structure = 0, mark = 0;
-    Vec3 world{0, 0, 0};
-};
-struct RemoveMark {
-    StudyId structure = 0, mark = 0;
-};
-struct GiveMark {
-    StudyId structure = 0, mark = 0, to = 0;
-};
-struct AddOutline {
-    StudyId structure = 0;
-    StudyOutline outline;
-};  ///< the outline's own number is not used
-struct RemoveOutline {
-    StudyId structure = 0, mark = 0;
-};
-struct Undo {};
-struct Redo {};
-}  // namespace study_action
 
 using StudyAction =
-    std::variant<study_action::AddStructure, study_action::RemoveStructure, study_action::Rename, study_action::Recolor,
-                 study_action::Lock, study_action::Show, study_action::Duplicate, study_action::AddMark,
-                 study_action::MoveMark, study_action::RemoveMark, study_action::GiveMark, study_action::AddOutline,
-                 study_action::RemoveOutline, study_action::Undo, study_action::Redo>;
+    std::variant<StudyActions::AddStructure, StudyActions::RemoveStructure, StudyActions::Rename, StudyActions::Recolor,
+                 StudyActions::Lock, StudyActions::Show, StudyActions::Duplicate, StudyActions::AddMark,
+                 StudyActions::MoveMark, StudyActions::RemoveMark, StudyActions::GiveMark, StudyActions::AddOutline,
+                 StudyActions::RemoveOutline, StudyActions::Undo, StudyActions::Redo>;
 
 /// An action with the key that its sender made for it: one that comes twice is applied once.
 struct KeyedAction {

@@ -34,24 +34,24 @@ struct StudyResult {
 ///
 /// Each structure is solved for itself, as segment_structures() solves a single one; where structures overlap is
 /// decided by who asks for all of them together.
-class COVOL_API StudySolver {
+class StudySolver {
 public:
     /// @param told  called from the solver's thread, one result at a time; it must not call the solver
-    StudySolver(Image image, SegmentOptions options, std::function<void(const StudyResult&)> told,
-                const RunContext& run = {});
+    COVOL_API StudySolver(Image image, SegmentOptions options, std::function<void(const StudyResult&)> told,
+                          const RunContext& run = {});
     /// Cancels what runs.
-    ~StudySolver();
+    COVOL_API ~StudySolver();
     StudySolver(const StudySolver&) = delete;
     StudySolver& operator=(const StudySolver&) = delete;
 
     /// The structure's marks are these now.
-    void solve(std::shared_ptr<const StudyStructure> structure, std::uint64_t sequence);
+    COVOL_API void solve(std::shared_ptr<const StudyStructure> structure, std::uint64_t sequence);
     /// It is gone.
-    void forget(StudyId structure);
+    COVOL_API void forget(StudyId structure);
     /// The newest surface; null: there is none.
-    [[nodiscard]] std::shared_ptr<const SegmentResult> surface(StudyId structure) const;
+    [[nodiscard]] COVOL_API std::shared_ptr<const SegmentResult> surface(StudyId structure) const;
     /// Until nothing is left to do.
-    void wait() const;
+    COVOL_API void wait() const;
 
 private:
     struct State;

@@ -12,7 +12,7 @@ namespace covol {
 namespace {
 
 using nlohmann::json;
-namespace act = study_action;
+using act = StudyActions;
 
 constexpr std::size_t kMostKeyBytes = 100;
 

@@ -73,7 +73,7 @@ struct StudyHistory::Planning {
         return found;
     }
 
-    Changes operator()(const study_action::AddStructure& a) {
+    Changes operator()(const StudyActions::AddStructure& a) {
         require_name(a.name);
         require_free(a.name);
         auto structure = std::make_shared<StudyStructure>();
@@ -81,26 +81,26 @@ struct StudyHistory::Planning {
         structure->color = a.color.value_or(structure_color(history.state_.size()));
         return {added(std::move(structure))};
     }
-    Changes operator()(const study_action::RemoveStructure& a) {
+    Changes operator()(const StudyActions::RemoveStructure& a) {
         const std::size_t place = place_of(a.structure);
         if (history.state_[place]->locked) refuse("'" + history.state_[place]->name + "' is locked");
         return {{history.state_[place], nullptr, place}};
     }
-    Changes operator()(const study_action::Rename& a) {
+    Changes operator()(const StudyActions::Rename& a) {
         require_name(a.name);
         require_free(a.name, a.structure);
         return {edited(a.structure, true, [&](StudyStructure& s) { s.name = a.name; })};
     }
-    Changes operator()(const study_action::Recolor& a) {
+    Changes operator()(const StudyActions::Recolor& a) {
         return {edited(a.structure, true, [&](StudyStructure& s) { s.color = a.color; })};
     }
-    Changes operator()(const study_action::Lock& a) {
+    Changes operator()(const StudyActions::Lock& a) {
         return {edited(a.structure, true, [&](StudyStructure& s) { s.locked = a.locked; })};
     }
-    Changes operator()(const study_action::Show& a) {
+    Changes operator()(const StudyActions::Show& a) {
         return {edited(a.structure, true, [&](StudyStructure& s) { s.visible = a.visible; })};
     }
-    Changes operator()(const study_action::Duplicate& a) {
+    Changes operator()(const StudyActions::Duplicate& a) {
         auto copy = std::make_shared<StudyStructure>(*history.state_[place_of(a.structure)]);
         const std::string name = copy->name;
         const auto is_used = [&](const std::string& other) {
@@ -116,21 +116,21 @@ struct StudyHistory::Planning {
         for (StudyOutline& o : copy->outlines) o.id = next++;
         return {std::move(change)};
     }
-    Changes operator()(const study_action::AddMark& a) {
+    Changes operator()(const StudyActions::AddMark& a) {
         require_inside(a.world);
         return {edited(a.structure, false, [&](StudyStructure& s) {
             if (s.marks.size() >= kMostMarks) refuse("'" + s.name + "' has too many marks");
             s.marks.push_back({next++, a.kind, a.world});
         })};
     }
-    Changes operator()(const study_action::MoveMark& a) {
+    Changes operator()(const StudyActions::MoveMark& a) {
         require_inside(a.world);
         return {edited(a.structure, false, [&](StudyStructure& s) { mark_in(s, a.mark)->world = a.world; })};
     }
-    Changes operator()(const study_action::RemoveMark& a) {
+    Changes operator()(const StudyActions::RemoveMark& a) {
         return {edited(a.structure, false, [&](StudyStructure& s) { s.marks.erase(mark_in(s, a.mark)); })};
     }
-    Changes operator()(const study_action::GiveMark& a) {
+    Changes operator()(const StudyActions::GiveMark& a) {
         if (a.structure == a.to) refuse("the mark belongs to that structure already");
         StudyMark mark;
         Change from = edited(a.structure, false, [&](StudyStructure& s) {
@@ -141,7 +141,7 @@ struct StudyHistory::Planning {
         Change to = edited(a.to, false, [&](StudyStructure& s) { s.marks.push_back(mark); });
         return {std::move(from), std::move(to)};
     }
-    Changes operator()(const study_action::AddOutline& a) {
+    Changes operator()(const StudyActions::AddOutline& a) {
         const StudyOutline& outline = a.outline;
         const std::size_t fewest = outline.closed ? 3 : 2;
         if (outline.world.size() < fewest)
@@ -156,14 +156,14 @@ struct StudyHistory::Planning {
             s.outlines.back().id = next++;
         })};
     }
-    Changes operator()(const study_action::RemoveOutline& a) {
+    Changes operator()(const StudyActions::RemoveOutline& a) {
         return {edited(a.structure, false, [&](StudyStructure& s) {
             if (std::erase_if(s.outlines, [&](const StudyOutline& o) { return o.id == a.mark; }) == 0)
                 refuse("'" + s.name + "' has no outline " + std::to_string(a.mark));
         })};
     }
-    Changes operator()(const study_action::Undo& /*unused*/) { return {}; }
-    Changes operator()(const study_action::Redo& /*unused*/) { return {}; }
+    Changes operator()(const StudyActions::Undo& /*unused*/) { return {}; }
+    Changes operator()(const StudyActions::Redo& /*unused*/) { return {}; }
 };
 
 void StudyHistory::put(const Changes& changes, bool forward) {
@@ -185,8 +185,8 @@ void StudyHistory::put(const Changes& changes, bool forward) {
 }
 
 StudyHistory::Step StudyHistory::plan(const StudyAction& action) const {
-    if (std::holds_alternative<study_action::Undo>(action)) return {Step::Kind::Undo, {}, last_id_};
-    if (std::holds_alternative<study_action::Redo>(action)) return {Step::Kind::Redo, {}, last_id_};
+    if (std::holds_alternative<StudyActions::Undo>(action)) return {Step::Kind::Undo, {}, last_id_};
+    if (std::holds_alternative<StudyActions::Redo>(action)) return {Step::Kind::Redo, {}, last_id_};
     Planning planning{*this, last_id_ + 1};
     Changes changes = std::visit(planning, action);
     return {Step::Kind::Do, std::move(changes), planning.next - 1};

@@ -14,7 +14,7 @@
 #include "covol/error.h"
 
 using namespace covol;
-namespace act = study_action;
+using act = StudyActions;
 namespace fs = std::filesystem;
 
 namespace {
