@@ -81,6 +81,9 @@ struct MarkJob {
         options.port = std::uint16_t(port);
         options.authorities = authorities;
         options.page_policy = policy_of(view.page);
+        // A page that comes back sends all that was done meanwhile at once; an action takes about a millisecond.
+        options.messages_per_second = 2000;
+        options.message_burst = 10'000;
         MarkSession mark(std::move(opened), pixels, std::move(view), session.run());
         std::latch started(1);  // a browser may be there before the study is
         serve::Handlers handlers;
