@@ -102,8 +102,8 @@ struct StudyActions {
     };
     struct AddOutline {
         StudyId structure = 0;
-        StudyOutline outline;
-    };  ///< the outline's own number is not used
+        StudyOutline outline;  ///< its own number is not used
+    };
     struct RemoveOutline {
         StudyId structure = 0, mark = 0;
     };
@@ -215,7 +215,6 @@ public:
 
 private:
     struct Journal;
-    void replay(std::string_view text);
 
     std::string folder_;
     StudyHistory history_;

@@ -12,7 +12,6 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <utility>
 
 #include "covol/error.h"
@@ -167,6 +166,10 @@ Study::Study(std::string folder, const std::string& image_path, const ImageGeome
     const std::string text = read_text(path);
     const std::vector<std::string_view> lines = whole_lines(text);
     if (lines.empty()) {
+        // A first line that was cut off holds no action; another file of this name is not the study's to begin anew.
+        constexpr std::string_view kBegin = "{\"covol_study\":";
+        if (!kBegin.starts_with(std::string_view(text).substr(0, kBegin.size())))
+            fail(Errc::InvalidInput, path, "expected the journal of a study; its first line is none");
         const fs::path absolute = fs::absolute(image_path, failed), base = fs::absolute(folder_, failed);
         const fs::path relative = absolute.lexically_relative(base);
         journal_->cut(0);

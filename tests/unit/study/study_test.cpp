@@ -200,6 +200,13 @@ TEST_CASE("Damage before the last line is an error that names the line") {
     write(folder.journal(), "this is no journal\n");
     CHECK_THROWS_WITH(Study(folder.text(), "stack.tif", image_of()),
                       Catch::Matchers::Contains("its first line is none"));
+    // Without an end of a line, too, it is not taken for a line that was cut off, and stays.
+    write(folder.journal(), "somebody's notes");
+    CHECK_THROWS_WITH(Study(folder.text(), "stack.tif", image_of()),
+                      Catch::Matchers::Contains("its first line is none"));
+    CHECK(read(folder.journal()) == "somebody's notes");
+    write(folder.journal(), "{\"covol_study\":1,\"ima");
+    CHECK(Study(folder.text(), "stack.tif", image_of()).sequence() == 0);
     CHECK_THROWS_WITH(read_study_image(folder.text() + "/none"), Catch::Matchers::Contains("there is no study there"));
 }
 

@@ -81,7 +81,7 @@ struct MarkJob {
         options.port = std::uint16_t(port);
         options.authorities = authorities;
         options.page_policy = policy_of(view.page);
-        // A page that comes back sends all that was done meanwhile at once; an action takes about a millisecond.
+        // A page that comes back sends what was done meanwhile as fast as it is kept, a millisecond or less each.
         options.messages_per_second = 2000;
         options.message_burst = 10'000;
         MarkSession mark(std::move(opened), pixels, std::move(view), session.run());

@@ -75,11 +75,9 @@ Export make_export(const std::string& format, const StudyState& wanted,
     }
     return made_of_file(file_name(whole, ending), scratch, run, [&](const std::string& path) {
         if (format.starts_with("mesh")) {
-            std::vector<NamedMesh> meshes;
-            for (const StructureResult& s : all.structures)
-                meshes.push_back({s.name, s.result.mesh, structure_color(meshes.size())});
-            if (meshes.size() > 1) throw Error(Errc::InvalidInput, "choose one structure: a mesh file holds one");
-            return write_mesh(path, meshes.front().mesh);
+            if (all.structures.size() > 1)
+                throw Error(Errc::InvalidInput, "choose one structure: a mesh file holds one");
+            return write_mesh(path, all.structures.front().result.mesh);
         }
         if (format.starts_with("surface")) {
             std::vector<FloatGridPtr> grids;

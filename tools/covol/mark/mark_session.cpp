@@ -112,18 +112,14 @@ MarkSession::MarkSession(Study study, Image image, MarkView view, const RunConte
     window_ = image_.percentiles(kBlack, kWhite);
     if (!(window_[1] > window_[0])) window_ = range_;
     // Of an image in chunks only some were looked at.
-    for (std::size_t n = 0; n < 2; ++n)
-        range_[n] = n == 0 ? std::min(range_[0], window_[0]) : std::max(range_[1], window_[1]);
+    range_ = {std::min(range_[0], window_[0]), std::max(range_[1], window_[1])};
 }
 
 void MarkSession::start(Send send, Broadcast broadcast) {
     send_ = std::move(send);
     broadcast_ = std::move(broadcast);
-    RunContext quiet = run_;
-    quiet.log = nullptr;
-    quiet.progress = nullptr;
     solver_ = std::make_unique<StudySolver>(
-        image_, view_.options, [this](const StudyResult& r) { hear(r); }, quiet);
+        image_, view_.options, [this](const StudyResult& r) { hear(r); }, run_);
     const std::lock_guard lock(mutex_);
     std::vector<StudyId> all;
     for (const auto& structure : study_.state()) all.push_back(structure->id);
