@@ -431,8 +431,7 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
         report.body_error = median_size(held.of_body);
         report.guess_error = median_size(held.of_guess);
         const double shrink = cell / inference.coarse_cell();
-        const Predictions predictions(held, cell, shrink);
-        report.weight_of_guess = predictions.weight_of_guess();
+        report.weight_of_guess = Predictions(held, cell, shrink).weight_of_guess();
         report.error_slope = error_slope(held, 1, shrink);  // of the guess
         const Field level = inference.pooled(body, report.weight_of_guess);
         std::erase_if(result.marks, [&](const Vec3& mark) {
@@ -452,7 +451,8 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
         report.expected = expected_dice(held, report.weight_of_guess, cell, overlap);
         // Of two that agree the simpler one, if they are not told apart (the one-standard-error rule: Breiman et al.,
         // Classification and Regression Trees, 1984); of two that do not, the one that is better for sure.
-        const double worse = predictions.guess_worse();
+        // The errors that were measured decide, not those that a finer lattice is expected to have.
+        const double worse = Predictions(held, cell, 1).guess_worse();
         if (overlap.dice > kInference.agreement ? worse <= 1 : worse < -2) {
             keep_guess(overlap.dice > kInference.agreement
                            ? "the surface of least bending agrees with the image, and predicts marks as well"
