@@ -13,7 +13,7 @@ packages=(
   # images
   libinsighttoolkit5-dev libtiff-dev libpng-dev libturbojpeg0-dev libzstd-dev liblz4-dev libhdf5-dev
   # command line, reports, the Python module, packages
-  libcli11-dev nlohmann-json3-dev libxxhash-dev pybind11-dev python3-dev dpkg-dev file
+  libcli11-dev nlohmann-json3-dev libxxhash-dev pybind11-dev python3-dev dpkg-dev file patchelf
   # tests: other programs that read what covol writes
   catch2 libopenvdb-tools libnanovdb-tools python3-vtk9 python3-meshio python3 python3-openvdb python3-numpy python3-tifffile
   python3-nibabel python3-pydicom python3-zarr python3-numcodecs python3-h5py python3-pil

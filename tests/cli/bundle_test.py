@@ -1,0 +1,86 @@
+"""The bundle that tools/packaging/bundle.py makes: nothing of this machine is used but the C library, and every licence is there.
+
+    COVOL_BUILD=build python3 -m unittest tests/cli/bundle_test.py
+
+tests/bundle_in_clean_root.sh runs it in new Debians without a compiler, which takes minutes.
+"""
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import tarfile
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+BUILD = pathlib.Path(os.environ.get("COVOL_BUILD", "build")).resolve()
+C_LIBRARY = r"(linux-vdso|.*/ld-linux-[^/]*|libc|libm|libdl|librt|libpthread|libresolv)\.so\.\d+"
+
+
+def run(*words, **more):
+    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, **more)
+    if done.returncode != 0:
+        raise AssertionError(f"{words} ended with {done.returncode}:\n{done.stdout}{done.stderr}")
+    return done.stdout + done.stderr
+
+
+@unittest.skipUnless(shutil.which("patchelf") and shutil.which("dpkg"), "needs patchelf and dpkg")
+class Bundle(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.work = pathlib.Path(tempfile.mkdtemp(prefix="covol-bundle-"))
+        cls.addClassCleanup(shutil.rmtree, cls.work)
+        run("cmake", "--build", BUILD, "--target", "covol_packed")
+        cls.said = run("/usr/bin/python3", ROOT / "tools/packaging/bundle.py", BUILD, "--output", cls.work, "--level", "0")
+        [packed] = cls.work.glob("*.tar.xz")
+        with tarfile.open(packed) as tar:
+            cls.entries = tar.getmembers()
+        run("tar", "xf", packed, "-C", cls.work)
+        cls.root = cls.work / packed.name.removesuffix(".tar.xz")
+        cls.elf = [path for path in cls.root.rglob("*") if path.is_file() and path.read_bytes()[:4] == b"\x7fELF"]
+        # A library of another version in LD_LIBRARY_PATH, as ROS, conda or a cluster's module has it.
+        poison = cls.work / "poison"
+        poison.mkdir()
+        for path in (cls.root / "lib").glob("*.so*"):
+            if path.is_file():
+                (poison / path.name).write_text("not a library")
+        cls.environment = {"PATH": "/usr/bin:/bin", "LD_LIBRARY_PATH": str(poison), "HOME": str(cls.work)}
+
+    def test_only_the_c_library_is_the_machines_own(self):
+        self.assertGreater(len(self.elf), 50)
+        for path in self.elf:
+            for line in run("ldd", path, env={"PATH": "/usr/bin:/bin"}).splitlines():
+                name, _, place = line.strip().partition(" => ")
+                if not re.fullmatch(C_LIBRARY, name.split(" (")[0]):
+                    self.assertTrue(place.startswith(str(self.root)), f"{path}: {line}")
+
+    def test_a_job_runs(self):
+        def covol(*words):
+            return run(self.root / "bin/covol", *words, env=self.environment, cwd=self.work)
+        covol("phantom", "sphere", "--size", "32", "-o", "p.nii.gz", "--points", "p.csv")  # which ITK reads, in a module of its own
+        said = covol("segment", "p.nii.gz", "--points", "p.csv", "-o", "s.vdb", "--mesh", "s.ply", "--report", "s.html")
+        self.assertIn("closed, genus 0", said)
+        self.assertGreater((self.work / "s.html").stat().st_size, 100_000)
+
+    def test_every_file_has_its_package_and_licence(self):
+        rows = [line.split("\t") for line in (self.root / "share/doc/covol/FILES.txt").read_text().splitlines()[1:]]
+        listed = {row[0]: row for row in rows}
+        licences = self.root / "share/doc/covol/licences"
+        for path in self.elf:
+            name, package, licence = listed[str(path.relative_to(self.root))]
+            self.assertTrue(package and licence, name)
+            if package != "covol":
+                self.assertGreater((licences / package.split()[0]).stat().st_size, 100, name)
+        self.assertTrue(listed["lib/libtbb.so.12"][1].startswith("libtbb12 "))
+        self.assertIn("Apache-2.0", listed["lib/libtbb.so.12"][2])
+
+    def test_plain_entries(self):
+        for entry in self.entries:
+            self.assertTrue(entry.name.startswith(self.root.name) and ".." not in entry.name.split("/"), entry.name)
+            self.assertEqual((entry.uid, entry.gid, 0 if entry.issym() else entry.mode & 0o7022), (0, 0, 0), entry.name)
+        self.assertEqual(len({entry.mtime for entry in self.entries}), 1)
+
+
+if __name__ == "__main__":
+    unittest.main()
