@@ -17,8 +17,8 @@ export function planeName(space, axis, anatomical) {
 
 /** An image's lattice; voxel centres are at integers. */
 export class ImageSpace {
-  constructor({size, spacing, origin, direction}) {
-    Object.assign(this, {size, spacing, origin});
+  constructor({size, spacing, origin, direction}, base = [0, 0, 0]) {
+    Object.assign(this, {size, spacing, origin, base});
     // Columns of the direction are the axes i, j, k.
     this.axes = [0, 1, 2].map((a) => [0, 1, 2].map((row) => direction[row][a]));
   }
@@ -31,6 +31,14 @@ export class ImageSpace {
     const from = world.map((x, w) => x - this.origin[w]);
     return this.axes.map((axis, a) => dot(axis, from) / this.spacing[a]);
   }
+
+  /** The number of a slice as covol's files count it, from 0, and how many there are. */
+  fileNumber(axis, at) { return at; }
+
+  fileCount(axis) { return this.size[axis]; }
+
+  /** The place in the world that a file would name: pages of places far from 0 count from a place near them. */
+  fileWorld(index) { return this.toWorld(index).map((x, w) => x + this.base[w]); }
 
   /** The voxel at an index, or the nearest one of the image. */
   voxelAt(index) { return index.map((at, a) => Math.min(this.size[a] - 1, Math.max(0, Math.round(at)))); }

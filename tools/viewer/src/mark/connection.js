@@ -1,5 +1,5 @@
 // The WebSocket: what waits is sent in order; where the connection is lost, it is opened again.
-import {Store} from './store.js';
+import {Store} from '../store.js';
 
 const MOST_ON_THE_WAY = 64;
 const PATIENCE = 15000;  // ms without an answer: the other end is gone, though nobody said so

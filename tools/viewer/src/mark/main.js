@@ -1,40 +1,41 @@
 // The page of covol mark: an image in three planes, marks upon it, and the surfaces that they make.
+import {BodyScene} from '../body_scene.js';
 import {el, unitText} from '../dom.js';
+import {greyTable} from '../grey.js';
+import {icon} from '../icons.js';
+import {helpSheet, showFocus} from '../keyboard.js';
+import {remember, VIEW_NAMES, viewState} from '../kept_view.js';
+import {hintsOf} from '../mark_tools.js';
+import {PlanePanel} from '../plane_panel.js';
+import {sceneTools} from '../scene_tools.js';
 import {ImageSpace, planeName} from '../space.js';
 import {axisTriad, stageIn} from '../stage3d.js';
 import {State} from '../state.js';
+import {statusRow} from '../status.js';
+import {Store} from '../store.js';
+import {Suggestions} from '../suggest.js';
 import {themeButton} from '../theme.js';
+import {Toasts} from '../toast.js';
 import {Connection} from './connection.js';
-import {greyTable} from './grey.js';
-import {icon} from './icons.js';
-import {helpSheet, keyboard} from './keyboard.js';
+import {keyboard, SHEET} from './keyboard.js';
+import {linkBar} from './link_bar.js';
 import {Meshes} from './meshes.js';
-import {PlanePanel} from './panel.js';
+import {drawOverlay} from './overlay.js';
+import {PointerInput} from './pointer.js';
 import {isReference, Queue} from './queue.js';
-import {MarkScene} from './scene.js';
 import {sidebar as makeSidebar} from './sidebar.js';
 import {SliceStore} from './slice_store.js';
-import {linkBar, statusRow} from './status.js';
-import {Store} from './store.js';
 import {Study} from './study.js';
-import {Suggestions} from './suggest.js';
-import {Toasts} from './toast.js';
-import {sceneTools, toolbar} from './toolbar.js';
+import {toolbar} from './toolbar.js';
 import {Tools, TOOLS} from './tools.js';
 
-const KEPT = ['slices', 'views', 'window', 'active', 'tool', 'planes', 'cut', 'flip', 'large'];
+const KEPT = [...VIEW_NAMES, 'active', 'tool'];
 
-/** What is shown, as it was before a reload where that makes sense. */
 function firstState(image, space, kept) {
-  const isTriple = (list, test) => Array.isArray(list) && list.length === 3 && list.every(test);
-  const slices = isTriple(kept.slices, Number.isInteger) ? space.voxelAt(kept.slices) : image.size.map((n) => Math.floor((n - 1) / 2));
-  const views = isTriple(kept.views, (v) => v === null || [v.zoom, v.x, v.y].every(Number.isFinite)) ? kept.views : [null, null, null];
-  const window = Number.isFinite(kept.window?.black) && Number.isFinite(kept.window?.white) ? kept.window : {black: image.black, white: image.white};
-  return new State({slices, views, window, grey: greyTable(image, window), tool: TOOLS.some(([name]) => name === kept.tool) ? kept.tool : 'surface',
-    active: Number.isInteger(kept.active) ? kept.active : null, planes: isTriple(kept.planes, (on) => typeof on === 'boolean') ? kept.planes : [false, false, false],
-    cut: [0, 1, 2].includes(kept.cut) ? kept.cut : -1, flip: kept.flip === true, large: [0, 1, 2, 3].includes(kept.large) ? kept.large : -1,
-    selected: null, hover: null, drag: null, ring: null, suggested: 0, isAsking: false, ruler: null, draft: null, keyPanel: 2, link: 'connecting', waiting: 0,
-    study: 0, meshes: 0, loaded: 0, theme: 'light'});
+  const view = viewState(image, space, kept);
+  return new State({...view, grey: greyTable(image, view.window), tool: TOOLS.some(([name]) => name === kept.tool) ? kept.tool : 'surface',
+    active: Number.isInteger(kept.active) ? kept.active : null, selected: null, hover: null, drag: null, ring: null, suggested: 0, isAsking: false, ruler: null, draft: null,
+    keyPanel: 2, link: 'connecting', waiting: 0, study: 0, meshes: 0, loaded: 0, theme: 'light'});
 }
 
 /** What is chosen follows the structures: IDs come, and what is gone is not chosen any more. */
@@ -53,18 +54,6 @@ function follow(state, study) {
     const isKept = study.seq < 0 || study.structure(active);
     state.set({study: state.get('study') + 1, active: isKept ? active : first, selected: known(state.get('selected')), hover: known(state.get('hover')), drag: known(state.get('drag'))});
   });
-}
-
-/** Keeps what a reload brings back; the last change counts. */
-function remember(state, store) {
-  let timer = null;
-  const save = () => {
-    clearTimeout(timer);
-    timer = null;
-    for (const name of KEPT) if (name !== 'active' || !isReference(state.get(name))) store.set(name, state.get(name));
-  };
-  state.on(KEPT, () => { timer ??= setTimeout(save, 300); });
-  addEventListener('pagehide', () => { if (timer) save(); });
 }
 
 async function start() {
@@ -91,9 +80,9 @@ async function start() {
   state.on(['link'], () => { if (state.get('link') === 'open') slices.retry(); });
   follow(state, study);
 
-  const panels = app.panels = [0, 1, 2].map((axis) => new PlanePanel(axis, app));
-  const status = statusRow(app), names = [0, 1, 2].map((axis) => planeName(space, axis, image.anatomical));
-  const suggestions = new Suggestions({...app, connection}), help = helpSheet();
+  const panels = app.panels = [0, 1, 2].map((axis) => new PlanePanel(axis, app, {drawOverlay, Input: PointerInput, redrawnOn: ['draft']}));
+  const status = statusRow(app, hintsOf(TOOLS)), names = [0, 1, 2].map((axis) => planeName(space, axis, image.anatomical));
+  const suggestions = new Suggestions({...app, connection}), help = helpSheet(SHEET);
   const theme = themeButton(state, icon('theme'), {get: () => new Store('covol-mark').get('theme'), set: (value) => new Store('covol-mark').set('theme', value)});
   let view = null;
   const holder = el('div', {class: 'picture'}), three = el('section', {class: 'panel three', 'aria-label': '3D'}, sceneTools(app, () => view, names), holder);
@@ -103,20 +92,17 @@ async function start() {
   state.on(['large'], enlarge);
   enlarge();
   view = stageIn(holder, {label: 'the surfaces in 3D: drag or arrow keys turn them, a click brings the planes there, Shift+click sets a mark', triad: axisTriad(image.anatomical),
-    otherwise: 'The planes beside it work.'}, (canvas) => new MarkScene(canvas, app));
-  const camera = store.get('camera');
-  if (view && [camera?.position, camera?.target].every((place) => place?.length === 3 && place.every(Number.isFinite))) view.takeCamera(camera);
+    otherwise: 'The planes beside it work.'}, (canvas) => new BodyScene(canvas, app));
+  view?.takeCamera(store.get('camera'));
   for (const panel of panels) {
     panel.tellCursor = status.tell;
     panel.onPicture = (axis) => view?.movePlane(axis);
     panel.onShown = () => { told.lastShown = performance.now(); };
     panel.draw();
   }
-  // A frame shows what has the keys, once keys are used.
-  addEventListener('keydown', ({key}) => { if (/^(Tab|Arrow.*|Page.*|[[\]{}a])$/.test(key)) document.documentElement.dataset.keys = 'on'; });
-  addEventListener('pointerdown', () => { delete document.documentElement.dataset.keys; }, true);
+  showFocus();
   keyboard(app, {suggestions, sidebar, help, theme, view: () => view});
-  remember(state, store);
+  remember(state, store, KEPT, (name, value) => name !== 'active' || !isReference(value));
   // Where nothing can be kept, what was not sent would be lost.
   addEventListener('beforeunload', (event) => { if (queue.isLost && queue.waiting > 0) event.preventDefault(); });
   connection.open();

@@ -1,5 +1,5 @@
 // The surfaces of the newest results, fetched and decoded.
-import {decodeCorners, decodePositions} from '../data.js';
+import {decodeCorners, decodePositions} from '../mesh_codec.js';
 import {indexCoordinates} from '../outline.js';
 
 const HEAD = 40;  // bytes before the positions

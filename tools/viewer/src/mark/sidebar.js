@@ -1,6 +1,6 @@
 // The structures: what they are called, how good they are, what is to be said about them.
 import {colorOf, el, number} from '../dom.js';
-import {icon} from './icons.js';
+import {icon} from '../icons.js';
 
 const hex = (rgb) => `#${rgb.map((v) => v.toString(16).padStart(2, '0')).join('')}`;
 const rgb = (text) => [1, 3, 5].map((at) => parseInt(text.slice(at, at + 2), 16));

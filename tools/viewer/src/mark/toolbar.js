@@ -1,42 +1,13 @@
 // The row above the views: tools, undo, grey values, suggestions, files.
+import {barButton, historyButtons, suggestButtons, toolChoice, windowMenu} from '../bar.js';
 import {dot, el} from '../dom.js';
-import {isSame, presets} from './grey.js';
-import {icon} from './icons.js';
-import {menu, menuItem} from './menu.js';
+import {icon} from '../icons.js';
+import {menu} from '../menu.js';
 import {TOOLS} from './tools.js';
 
-function button(name, label, onclick, more = {}) {
-  return el('button', {type: 'button', class: 'tool', title: label, 'aria-label': label, 'data-do': name, onclick, ...more}, icon(name));
-}
-
-function toolChoice(state) {
-  const buttons = TOOLS.map(([name, label, key]) => button(name, `${label} (${key})`, () => state.set({tool: name}), {'data-tool': name}));
-  const update = () => buttons.forEach((one) => one.setAttribute('aria-pressed', String(one.dataset.tool === state.get('tool'))));
-  state.on(['tool'], update);
-  update();
-  return el('div', {class: 'tools', role: 'group', 'aria-label': 'tool'}, buttons);
-}
-
-function history(app) {
-  const {study, state} = app;
-  const undo = button('undo', 'undo (z)', () => study.act({do: 'undo'})), redo = button('redo', 'redo (Shift+z)', () => study.act({do: 'redo'}));
-  const update = () => {
-    const waiting = study.queue.items.filter(({action}) => action.do !== 'undo').length > 0;
-    undo.disabled = !study.canUndo && !waiting;
-    redo.disabled = !study.canRedo && !study.queue.items.some(({action}) => action.do === 'undo');
-  };
-  state.on(['study'], update);
-  update();
-  return el('div', {class: 'tools', role: 'group', 'aria-label': 'history'}, undo, redo);
-}
-
-function windowMenu({state, image, panels}) {
-  return menu('grey values (w)', [icon('window'), el('span', {class: 'caret'})], (close) => [
-    ...presets(image, panels[state.get('keyPanel')].slice).map(([name, window]) => menuItem(name, () => { state.set({window}); close(); },
-      {role: 'menuitemradio', 'aria-checked': String(isSame(window, state.get('window')))})),
-    menuItem('inverted', () => { const {black, white} = state.get('window'); state.set({window: {black: white, white: black}}); close(); }),
-    el('p', {class: 'hint'}, 'Right-drag in a plane: across for contrast, up and down for brightness.'),
-  ]);
+function canUndo(study) {
+  const waiting = study.queue.items.map(({action}) => action.do);
+  return [study.canUndo || waiting.some((what) => what !== 'undo'), study.canRedo || waiting.includes('undo')];
 }
 
 const FILES_OF_ALL = [['mask.nii.gz', 'labels, NIfTI'], ['mask.nrrd', 'labels, NRRD'], ['mask.tif', 'labels, TIFF'], ['table.csv', 'table']];
@@ -60,42 +31,10 @@ function exportMenu({study}) {
 
 export function toolbar(app, {theme, help, suggestions}) {
   const {state, image} = app;
-  const suggest = el('button', {type: 'button', class: 'tool wide', title: 'where a mark would help most (n)', 'data-do': 'suggest', onclick: () => suggestions.next()}, icon('suggest'), el('span', {}, 'Suggest'));
-  const accept = el('button', {type: 'button', class: 'tool wide accept', title: 'the border is at the ring (Enter)', 'data-do': 'accept', hidden: true, onclick: () => suggestions.accept()}, 'Border is here');
-  state.on(['ring', 'suggested', 'isAsking', 'link'], () => {
-    if (state.get('link') !== 'open') state.set({isAsking: false});
-    accept.hidden = !state.get('ring');
-    suggest.lastChild.textContent = state.get('isAsking') ? 'Asking\u2026' : state.get('suggested') > 0 ? `Next (${state.get('suggested')})` : 'Suggest';
-  });
+  state.on(['link'], () => { if (state.get('link') !== 'open') state.set({isAsking: false}); });
   theme.className = 'tool';
   return el('header', {class: 'bar'},
     el('div', {class: 'title'}, el('span', {class: 'brand'}, 'covol'), el('h1', {title: image.name}, image.name)),
-    toolChoice(state), history(app), el('div', {class: 'tools'}, windowMenu(app), suggest, accept),
-    el('div', {class: 'tools end'}, exportMenu(app), theme, button('help', 'keys (?)', () => help.showModal())));
-}
-
-/** What belongs to the 3D view, upon it. */
-export function sceneTools(app, view, names) {
-  const {state} = app;
-  const planes = [2, 1, 0].map((axis) => el('button', {type: 'button', class: 'small', 'data-plane': axis, 'aria-label': `slice ${names[axis]} in 3D`, onclick: () => {
-    const list = [...state.get('planes')];
-    list[axis] = !list[axis];
-    state.set({planes: list});
-  }}, names[axis]));
-  const cut = el('select', {class: 'small', 'aria-label': 'cut the surfaces at a slice', onchange: () => state.set({cut: Number(cut.value)})},
-    [[-1, 'no cut'], ...[2, 1, 0].map((axis) => [axis, `cut ${names[axis]}`])].map(([value, text]) => el('option', {value}, text)));
-  const flip = el('button', {type: 'button', class: 'small', title: 'the other half', 'aria-label': 'the other half', onclick: () => state.set({flip: !state.get('flip')})}, icon('flip'));
-  const home = el('button', {type: 'button', class: 'small', title: 'reset the camera (r)', 'aria-label': 'reset the camera', onclick: () => view()?.reset()}, icon('home'));
-  const large = el('button', {type: 'button', class: 'icon', title: '3D alone, and back (f)', 'aria-label': '3D alone, and back', onclick: () => state.set({large: state.get('large') === 3 ? -1 : 3})});
-  const update = () => {
-    planes.forEach((one) => one.setAttribute('aria-pressed', String(state.get('planes')[one.dataset.plane])));
-    cut.value = state.get('cut');
-    flip.hidden = state.get('cut') < 0;
-    flip.setAttribute('aria-pressed', String(state.get('flip')));
-    large.replaceChildren(icon(state.get('large') === 3 ? 'small' : 'large'));
-  };
-  state.on(['planes', 'cut', 'flip', 'large'], update);
-  update();
-  return el('div', {class: 'panel-head', ondblclick: (event) => { if (!event.target.closest('button, select')) large.click(); }},
-    el('span', {class: 'chip plain'}, '3D'), el('span', {class: 'scene-tools'}, planes, cut, flip, home), large);
+    toolChoice(state, TOOLS), historyButtons(app, () => canUndo(app.study)), el('div', {class: 'tools'}, windowMenu(app), suggestButtons(state, suggestions)),
+    el('div', {class: 'tools end'}, exportMenu(app), theme, barButton('help', 'keys (?)', () => help.showModal())));
 }

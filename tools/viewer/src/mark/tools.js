@@ -1,19 +1,10 @@
-// What a click, a drag or a key does with the active structure: marks, outlines, the ruler.
+// What a click, a drag or a key does with the active structure: outlines and structures as a whole, beside marks.
+import {MARK_TOOLS, MarkTools} from '../mark_tools.js';
 
-export const TOOLS = [
-  ['surface', 'surface mark', 's'], ['inside', 'inside mark', 'i'], ['outside', 'outside mark', 'o'], ['outline', 'outline', 'c'],
-  ['erase', 'move or erase', 'e'], ['crosshair', 'crosshair', 'p'], ['ruler', 'ruler', 'm'],
-];
-export const HINTS = {
-  surface: 'Click: mark on the surface \u00b7 Shift: inside \u00b7 Alt: outside \u00b7 drag moves a mark',
-  inside: 'Click: mark inside \u00b7 drag moves a mark', outside: 'Click: mark outside \u00b7 drag moves a mark',
-  outline: 'Click: corner, drag: freehand \u00b7 Enter closes, Shift+Enter leaves it open, Escape cancels',
-  erase: 'Click removes a mark or an outline \u00b7 drag moves a mark', crosshair: 'Click or drag: the other planes go there', ruler: 'Drag measures a distance \u00b7 Escape removes it',
-};
+const OUTLINE = ['outline', 'outline', 'c', 'Click: corner, drag: freehand \u00b7 Enter closes, Shift+Enter leaves it open, Escape cancels'];
+export const TOOLS = [...MARK_TOOLS.slice(0, 3), OUTLINE, ...MARK_TOOLS.slice(3)];
 const COLORS = [[68, 119, 170], [238, 102, 119], [34, 136, 51], [204, 187, 68], [102, 204, 238], [170, 51, 119], [238, 119, 51],
   [0, 153, 136], [136, 34, 85], [153, 153, 51], [51, 34, 136], [187, 187, 187]];
-
-export const isMarkTool = (tool) => ['surface', 'inside', 'outside'].includes(tool);
 
 /** Without the corners that lie within `most` of the line between their neighbours. */
 function thinned(places, most) {
@@ -28,26 +19,10 @@ function thinned(places, most) {
   return [...thinned(places.slice(0, at + 1), most).slice(0, -1), ...thinned(places.slice(at), most)];
 }
 
-export class Tools {
-  constructor({state, study, space, toast}) { Object.assign(this, {state, study, space, toast}); }
-
-  /** The kind of mark that a click makes. */
-  kindOf(event) {
-    const tool = this.state.get('tool');
-    return event.shiftKey ? 'inside' : event.altKey ? 'outside' : isMarkTool(tool) ? tool : 'surface';
-  }
-
-  active() { return this.study.structure(this.state.get('active')); }
-
-  /** The structure that is marked, made where there is none; null, and a word, where it is not to be changed. */
-  open() {
-    let own = this.active() ?? this.study.structures[0] ?? null;
-    if (!own) own = this.study.structure(this.addStructure());
-    else if (!this.active()) this.state.set({active: own.id});
-    if (own.locked) this.toast(`\u201c${own.name}\u201d is locked: l unlocks it.`);
-    else if (!own.visible) this.toast(`\u201c${own.name}\u201d is hidden: h shows it.`);
-    else return own;
-    return null;
+export class Tools extends MarkTools {
+  isReady() {
+    if (this.study.name === null) this.toast('Not connected yet.');
+    return this.study.name !== null;
   }
 
   addStructure() {
@@ -59,26 +34,6 @@ export class Tools {
     const reference = this.study.act({do: 'add_structure', name: `structure ${n}`, color});
     this.state.set({active: reference, selected: null});
     return reference;
-  }
-
-  addMark(kind, world) {
-    if (this.study.name === null) return this.toast('Not connected yet.');
-    const own = this.open();
-    if (own) this.study.act({do: 'add_mark', structure: own.id, kind, world});
-    return undefined;
-  }
-
-  moveMark({structure, mark}, world) { this.study.act({do: 'move_mark', structure, mark, world}); }
-
-  /** A mark or an outline: {structure, mark} or {structure, outline}. */
-  remove(target) {
-    const own = target && this.study.structure(target.structure);
-    if (!own) return false;
-    if (own.locked) this.toast(`\u201c${own.name}\u201d is locked: l unlocks it.`);
-    else if (target.outline) this.study.act({do: 'remove_outline', structure: own.id, mark: target.outline});
-    else this.study.act({do: 'remove_mark', structure: own.id, mark: target.mark});
-    this.state.set({selected: null, hover: null});
-    return true;
   }
 
   /** The outline that is being drawn gets a corner; `places` are voxels in the plane. */

@@ -4,8 +4,8 @@ import {
   LineLoop, LineSegments, LinearFilter, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, MeshStandardMaterial, Raycaster,
   SRGBColorSpace, Vector2, Vector3,
 } from 'three';
-import {AXIS_COLORS} from '../space.js';
-import {EYE, rgbColor, Stage3D} from '../stage3d.js';
+import {AXIS_COLORS} from './space.js';
+import {EYE, rgbColor, Stage3D} from './stage3d.js';
 
 const CLICK = 4;  // CSS pixels
 const KINDS = ['surface', 'inside', 'outside'];
@@ -17,7 +17,7 @@ function markColor(color, kind) {
   return kind === 'surface' ? own.multiplyScalar(0.3) : kind === 'inside' ? own.lerp(rgbColor([255, 255, 255]), 0.6) : rgbColor([20, 20, 22]);
 }
 
-export class MarkScene extends Stage3D {
+export class BodyScene extends Stage3D {
   /** `app` has space, state, study, meshes, tools, panels and goTo(world). @throws where there is no WebGL */
   constructor(canvas, app) {
     super(canvas, app.state, app.space);
@@ -244,8 +244,10 @@ export class MarkScene extends Stage3D {
     this.app.keep('camera', {position: this.camera.position.toArray(), target: this.controls.target.toArray()});
   }
 
-  /** The camera as it was before a reload. */
-  takeCamera({position, target}) {
+  /** The camera as it was before a reload, {position, target}; what makes no sense is not taken. */
+  takeCamera(kept) {
+    const {position, target} = kept ?? {};
+    if (![position, target].every((place) => place?.length === 3 && place.every(Number.isFinite))) return;
     this.isTouched = true;
     this.sized = true;
     this.camera.position.set(...position);

@@ -4,10 +4,10 @@ import {
   LineLoop, LineSegments, LinearFilter, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, MeshStandardMaterial, Points,
   PointsMaterial, SRGBColorSpace, Vector3,
 } from 'three';
-import {rangeOf, vertexColors} from './colors.js';
-import {outlineAt} from './outline.js';
-import {AXIS_COLORS} from './space.js';
-import {rgbColor, Stage3D} from './stage3d.js';
+import {rangeOf, vertexColors} from '../colors.js';
+import {outlineAt} from '../outline.js';
+import {AXIS_COLORS} from '../space.js';
+import {rgbColor, Stage3D} from '../stage3d.js';
 
 const MOST_BALLS = 4000;  // marks as balls; more are points
 

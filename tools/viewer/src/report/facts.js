@@ -1,5 +1,5 @@
 // What the run was and how good its result is: tables, bars, the command.
-import {dot, el, number, svg} from './dom.js';
+import {dot, el, number, svg} from '../dom.js';
 
 function section(title, note, ...content) {
   return el('section', {class: 'card'}, el('h2', {}, title), note ? el('p', {class: 'note'}, note) : null, ...content);

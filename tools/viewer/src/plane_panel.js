@@ -1,18 +1,19 @@
 // One plane on the page: its slice, what is drawn upon it, zoom and place.
-import {el, number} from '../dom.js';
-import {Plane, write} from '../plane.js';
-import {AXIS_COLORS, dominant, planeName} from '../space.js';
+import {el, number} from './dom.js';
+import {Plane, write} from './plane.js';
+import {AXIS_COLORS, dominant, planeName} from './space.js';
 import {icon} from './icons.js';
-import {drawOverlay} from './overlay.js';
-import {PointerInput} from './pointer.js';
 
 const LARGEST_VOXEL = 90;  // CSS pixels, when zoomed in
-const REDRAWN_ON = ['slices', 'views', 'grey', 'study', 'meshes', 'hover', 'selected', 'ring', 'ruler', 'draft', 'drag', 'active', 'loaded', 'theme', 'large', 'tool', 'planes'];
+const REDRAWN_ON = ['slices', 'views', 'grey', 'study', 'meshes', 'hover', 'selected', 'ring', 'ruler', 'drag', 'active', 'loaded', 'theme', 'large', 'tool', 'planes', 'countFrom'];
 
 export class PlanePanel {
-  /** `app` has image, space, unitText, state, study, meshes, slices and tools. */
-  constructor(axis, app) {
-    Object.assign(this, {axis, ...app, shownAt: -1, travel: 0, picture: null, pictureStep: 1});
+  /**
+   * `app` has image, space, unitText, state, slices, toast, and what the pointer and the overlay ask for.
+   * `drawOverlay(panel, context)` draws upon the slice, `Input` is a PlanePointer, `redrawnOn` are more names of the state.
+   */
+  constructor(axis, app, {drawOverlay, Input, redrawnOn = []}) {
+    Object.assign(this, {axis, ...app, drawOverlay, shownAt: -1, travel: 0, picture: null, pictureStep: 1});
     const {state, space, image} = this, name = planeName(space, axis, image.anatomical);
     this.name = name;
     this.plane = new Plane(space, axis, image.anatomical);
@@ -22,15 +23,15 @@ export class PlanePanel {
       oninput: () => this.go(Number(this.slider.value))});
     this.chip = el('span', {class: 'chip'}, name);
     this.chip.style.setProperty('--chip', AXIS_COLORS[axis]);
-    this.where = el('span', {class: 'where'});
+    this.where = el('button', {type: 'button', class: 'where', title: 'slices are counted from 0, as covol does, or from 1, as Fiji does (k)', onclick: () => state.set({countFrom: 1 - state.get('countFrom')})});
     this.fit = el('button', {type: 'button', class: 'icon fit', title: 'whole slice (r)', 'aria-label': `whole slice, ${name}`, onclick: () => this.setView(null)});
     this.large = el('button', {type: 'button', class: 'icon', title: 'this plane alone, and back (f)', 'aria-label': `${name} alone, and back`, onclick: () => this.toggleLarge()});
     const head = el('div', {class: 'panel-head', ondblclick: (event) => { if (!event.target.closest('button, input')) this.toggleLarge(); }},
       this.chip, this.slider, this.where, this.fit, this.large);
     this.element = el('section', {class: `panel slice axis-${axis}`, 'aria-label': name}, head, el('div', {class: 'picture'}, this.canvas));
     new ResizeObserver(() => this.draw()).observe(this.canvas.parentElement);
-    state.on(REDRAWN_ON, () => this.later());
-    this.input = new PointerInput(this);
+    state.on([...REDRAWN_ON, ...redrawnOn], () => this.later());
+    this.input = new Input(this);
   }
 
   get at() { return this.state.get('slices')[this.axis]; }
@@ -117,7 +118,7 @@ export class PlanePanel {
     context.clearRect(0, 0, width, height);
     if (this.hasPicture) plane.drawPicture(context, this.picture, this.pictureStep);
     else this.drawNoPicture(context, width, height);
-    drawOverlay(this, context);
+    this.drawOverlay(this, context);
     if (this.input.spot && !this.input.gesture) this.tellCursor?.(this, this.input.spot);
     plane.drawScale(context, this.unitText);
     plane.drawLetters(context);
@@ -176,14 +177,14 @@ export class PlanePanel {
   }
 
   tell() {
-    const {space, axis, at, image} = this, index = [0, 0, 0];
+    const {space, axis, at, state} = this, index = [0, 0, 0];
     index[axis] = at;
-    const {w} = dominant(space.axes[axis]), world = space.toWorld(index)[w], first = image.first_slice ?? 0;
-    const text = `${at + first} of ${first}\u2013${space.size[axis] - 1 + first}`, isZoomed = Boolean(this.view);
+    const {w} = dominant(space.axes[axis]), world = space.fileWorld(index)[w], first = state.get('countFrom');
+    const shown = space.fileNumber(axis, at) + first, range = `${first}\u2013${space.fileCount(axis) - 1 + first}`, text = `${shown} of ${range}`, isZoomed = Boolean(this.view);
     const place = `${'xyz'[w]} ${number(world).replace('-', '\u2212')}${this.unitText ? `\u2009${this.unitText}` : ''}`;
     if (this.where.dataset.text !== text + place) {
       this.where.dataset.text = text + place;
-      this.where.replaceChildren(el('b', {}, String(at + first)), ` of ${first}\u2013${space.size[axis] - 1 + first}`, el('span', {class: 'world'}, ` \u00b7 ${place}`));
+      this.where.replaceChildren(el('b', {}, String(shown)), ` of ${range}`, el('span', {class: 'world'}, ` \u00b7 ${place}`));
       this.slider.value = at;
       this.slider.setAttribute('aria-valuetext', `${text}, ${place}`);
       this.canvas.setAttribute('aria-label', `${this.name}, slice ${text}. Arrows move the crosshair, a sets a mark there, [ and ] change the slice`);

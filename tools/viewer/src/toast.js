@@ -1,5 +1,5 @@
 // Short texts that go away by themselves, or by a click.
-import {el} from '../dom.js';
+import {el} from './dom.js';
 
 const STAY = 6000;  // ms
 

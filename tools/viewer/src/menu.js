@@ -1,5 +1,5 @@
 // A button with a list below it.
-import {el} from '../dom.js';
+import {el} from './dom.js';
 
 /** `fill` gives the list's elements when it opens. */
 export function menu(label, face, fill) {

@@ -1,7 +1,7 @@
 // What is switched around the 3D view, and the list of suggested slices.
-import {colorings, rangeOf, SUPPORT, viridis} from './colors.js';
-import {choice, colorOf, dot, el, number, toggle} from './dom.js';
-import {planeName} from './space.js';
+import {colorings, rangeOf, SUPPORT, viridis} from '../colors.js';
+import {choice, colorOf, dot, el, number, toggle} from '../dom.js';
+import {planeName} from '../space.js';
 
 /** The structures: names, colours, on and off. */
 export function structureList(data, state) {

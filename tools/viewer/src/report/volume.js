@@ -1,6 +1,6 @@
 // The image: slices are decoded into one array of bytes, and cut along any axis.
 
-import {ImageSpace} from './space.js';
+import {ImageSpace} from '../space.js';
 
 export class Volume extends ImageSpace {
   constructor(image) {

@@ -1,14 +1,14 @@
 // The page: views, switches, facts.
 import {contrast, greyTable, structureList, suggestions, toolbar} from './controls.js';
 import {readData} from './data.js';
-import {el, unitText} from './dom.js';
+import {el, unitText} from '../dom.js';
 import {factsOf, warningsOf} from './facts.js';
-import {indexCoordinates} from './outline.js';
+import {indexCoordinates} from '../outline.js';
 import {View3D} from './scene.js';
 import {SlicePanel} from './slices.js';
-import {axisTriad, stageIn} from './stage3d.js';
-import {State} from './state.js';
-import {themeButton} from './theme.js';
+import {axisTriad, stageIn} from '../stage3d.js';
+import {State} from '../state.js';
+import {themeButton} from '../theme.js';
 import {Volume} from './volume.js';
 
 const MOST_MARKS = 10000;  // more hide what they lie on, at first

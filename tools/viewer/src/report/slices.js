@@ -1,8 +1,8 @@
 // The slice viewer: three planes of the image with the surfaces' outlines and the marks.
-import {colorOf, el, number} from './dom.js';
-import {outlineAt} from './outline.js';
-import {Plane} from './plane.js';
-import {AXIS_COLORS, dominant, planeName} from './space.js';
+import {colorOf, el, number} from '../dom.js';
+import {outlineAt} from '../outline.js';
+import {Plane} from '../plane.js';
+import {AXIS_COLORS, dominant, planeName} from '../space.js';
 
 const MANY_MARKS = 100;
 

@@ -1,5 +1,5 @@
 // Icons, drawn as lines on 18 x 18.
-import {svg} from '../dom.js';
+import {svg} from './dom.js';
 
 const PATHS = {
   surface: ['M1.8 13.2C4 5.5 14 5.5 16.2 13.2', ['circle', 9, 7.4, 2.4]],

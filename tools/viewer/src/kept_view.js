@@ -1,0 +1,28 @@
+// What is seen survives a reload: slices, zoom, grey values, planes in 3D.
+
+export const VIEW_NAMES = ['slices', 'views', 'window', 'planes', 'cut', 'flip', 'large', 'countFrom'];
+
+/** What is shown at first: as it was before a reload, as far as that makes sense. */
+export function viewState(image, space, kept, first = {}) {
+  const isTriple = (list, test) => Array.isArray(list) && list.length === 3 && list.every(test), isOneOf = (values, value, otherwise) => values.includes(value) ? value : otherwise;
+  const otherwise = {slices: space.size.map((n) => Math.floor((n - 1) / 2)), window: {black: image.black, white: image.white}, planes: [false, false, false], ...first};
+  return {
+    slices: isTriple(kept.slices, Number.isInteger) ? space.voxelAt(kept.slices) : otherwise.slices,
+    views: isTriple(kept.views, (v) => v === null || [v.zoom, v.x, v.y].every(Number.isFinite)) ? kept.views : [null, null, null],
+    window: Number.isFinite(kept.window?.black) && Number.isFinite(kept.window?.white) ? kept.window : otherwise.window,
+    planes: isTriple(kept.planes, (on) => typeof on === 'boolean') ? kept.planes : otherwise.planes,
+    cut: isOneOf([0, 1, 2], kept.cut, -1), flip: kept.flip === true, large: isOneOf([0, 1, 2, 3], kept.large, -1), countFrom: isOneOf([0, 1], kept.countFrom, 0),
+  };
+}
+
+/** Keeps these parts of the state; the last change counts. `isLasting(name, value)` says what may be kept. */
+export function remember(state, store, names, isLasting = () => true) {
+  let timer = null;
+  const save = () => {
+    clearTimeout(timer);
+    timer = null;
+    for (const name of names) if (isLasting(name, state.get(name))) store.set(name, state.get(name));
+  };
+  state.on(names, () => { timer ??= setTimeout(save, 300); });
+  addEventListener('pagehide', () => { if (timer) save(); });
+}

@@ -1,0 +1,25 @@
+// The row below the views: what is under the cursor, what a click does.
+import {el, number} from './dom.js';
+
+/** `hints` has a text for each tool. */
+export function statusRow({state, space, image, slices, unitText}, hints) {
+  const voxel = el('span', {}), world = el('span', {}), value = el('span', {}), hint = el('span', {class: 'hint'});
+  const element = el('footer', {class: 'status', 'aria-label': 'under the cursor'}, el('span', {class: 'cursor'}, voxel, world, value), hint);
+  const update = () => { hint.textContent = hints[state.get('tool')] ?? ''; };
+  state.on(['tool'], update);
+  update();
+  // A tenth of a voxel can be told.
+  const digits = Math.min(6, Math.max(0, Math.ceil(1 - Math.log10(Math.min(...space.spacing)))));
+  const signed = (v) => v.toFixed(digits).replace('-', '\u2212');
+  /** Tells of a place in a panel; null: the pointer has left. */
+  const tell = (panel, spot) => {
+    const index = spot && panel.indexAt(...spot);
+    if (!index || !panel.isInside(index)) return [voxel, world, value].forEach((part) => { part.textContent = ''; });
+    const at = space.voxelAt(index), known = slices.valueAt(at, image);
+    voxel.textContent = `voxel ${at.map((n, a) => space.fileNumber(a, n)).join(', ')}`;
+    world.textContent = `${space.fileWorld(index).map(signed).join(', ')}${unitText ? `\u2009${unitText}` : ''}`;
+    value.textContent = known ? `value ${known.isExact ? '' : '\u2248\u2009'}${number(known.value)}` : '';
+    return undefined;
+  };
+  return {element, tell};
+}
