@@ -8,8 +8,8 @@ import {fileURLToPath} from 'node:url';
 
 const here = new URL('.', import.meta.url);
 const PAGES = [
-  {page: 'page.html', entry: 'src/report/main.js', styles: ['base.css', 'style.css'], target: '../../lib/src/report/viewer.html'},
-  {page: 'mark_page.html', entry: 'src/mark/main.js', styles: ['base.css', 'mark.css'], target: '../covol/mark/mark.html'},
+  {page: 'page.html', entry: 'src/report/main.js', styles: ['base.css', 'viewer.css', 'report.css'], target: '../../lib/src/report/viewer.html'},
+  {page: 'mark_page.html', entry: 'src/mark/main.js', styles: ['base.css', 'viewer.css', 'mark.css'], target: '../covol/mark/mark.html'},
 ];
 const read = (name) => readFileSync(new URL(name, here), 'utf8');
 const hash = (text) => createHash('sha256').update(text, 'utf8').digest('base64');

@@ -143,9 +143,13 @@ Json data_of(const ReportPage& page, const ReportPageOptions& options, ReportPag
     Json facts = Json::parse(page.facts, nullptr, false);
     if (!facts.is_object())
         throw Error(Errc::InvalidInput, "write_report_page: facts: expected a JSON object, got something else");
-    Json data{{"covol", version()},           {"title", safe_text(page.title)},
-              {"unit", safe_text(page.unit)}, {"anatomical", page.is_anatomical},
-              {"facts", std::move(facts)},    {"structures", Json::array()}};
+    Json data{{"covol", version()},
+              {"title", safe_text(page.title)},
+              {"unit", safe_text(page.unit)},
+              {"anatomical", page.is_anatomical},
+              {"origin", to_json(origin_of(page))},
+              {"facts", std::move(facts)},
+              {"structures", Json::array()}};
     double all = 0;
     for (const PageStructure& structure : page.structures) all += double(structure.mesh->triangles.size());
     for (const PageStructure& structure : page.structures) {

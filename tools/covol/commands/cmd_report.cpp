@@ -94,7 +94,8 @@ private:
         if (!told.is_object() || !told.contains("covol"))
             throw Error(Errc::InvalidInput,
                         "--run-report: " + run_report + ": expected a report that covol wrote with --json");
-        for (const char* name : {"input", "resolved", "automatic", "grid", "solve", "surface", "fit", "seconds"})
+        for (const char* name :
+             {"input", "resolved", "automatic", "grid", "solve", "surface", "fit", "seconds", "expected_dice"})
             if (told.contains(name) && told[name].is_object()) facts[name] = told[name];
         if (told.contains("warnings") && told["warnings"].is_array()) facts["warnings"] = told["warnings"];
         if (told.contains("structures") && told["structures"].is_array())

@@ -1,15 +1,18 @@
 // The 3D view of the page: surfaces that come and go, marks, slices where they are asked for.
 import {
-  Box3, BufferAttribute, BufferGeometry, CanvasTexture, DoubleSide, Group, InstancedMesh, IcosahedronGeometry, LineBasicMaterial,
+  BackSide, Box3, BufferAttribute, BufferGeometry, CanvasTexture, DoubleSide, Group, InstancedMesh, IcosahedronGeometry, LineBasicMaterial,
   LineLoop, LineSegments, LinearFilter, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, MeshStandardMaterial, Raycaster,
   SRGBColorSpace, Vector2, Vector3,
 } from 'three';
+import {linesAt} from './outline.js';
 import {AXIS_COLORS} from './space.js';
 import {EYE, rgbColor, Stage3D} from './stage3d.js';
 
 const CLICK = 4;  // CSS pixels
 const KINDS = ['surface', 'inside', 'outside'];
-const shared = new IcosahedronGeometry(1, 2);
+const HALO = 1.3;  // radius of the rim around a mark, of its own: it is told from dark and light alike
+const shared = new IcosahedronGeometry(1, 2), coarse = new IcosahedronGeometry(1, 1), coarsest = new IcosahedronGeometry(1, 0);
+const ballOf = (count) => count > 4000 ? coarsest : count > 800 ? coarse : shared;
 
 /** A mark is told from the surface that it lies on, and from those of the other kinds. */
 function markColor(color, kind) {
@@ -56,9 +59,11 @@ export class BodyScene extends Stage3D {
       const mesh = new Mesh(geometry, new MeshBasicMaterial({side: DoubleSide}));
       const border = new LineLoop(new BufferGeometry().setAttribute('position', geometry.getAttribute('position')), new LineBasicMaterial({color: AXIS_COLORS[axis]}));
       mesh.frustumCulled = border.frustumCulled = false;
-      const group = new Group().add(mesh, border);
+      const outlines = new LineSegments(new BufferGeometry(), new LineBasicMaterial({vertexColors: true}));
+      outlines.frustumCulled = false;
+      const group = new Group().add(mesh, border, outlines);
       this.scene.add(group);
-      return {group, mesh};
+      return {group, mesh, outlines};
     });
   }
 
@@ -70,7 +75,7 @@ export class BodyScene extends Stage3D {
 
   listen() {
     const {state} = this;
-    state.on(['study', 'meshes', 'drag', 'active'], () => this.update());
+    state.on(['study', 'meshes', 'drag', 'active', 'marks'], () => this.update());
     state.on(['slices', 'planes'], () => { for (const axis of [0, 1, 2]) this.movePlane(axis); this.updateClip(); });
     state.on(['cut'], () => { this.turnCut(); this.updateClip(); });
     state.on(['flip'], () => this.updateClip());
@@ -92,14 +97,15 @@ export class BodyScene extends Stage3D {
     for (const structure of study.structures) {
       seen.add(structure.id);
       this.updateSurface(structure, meshes.get(structure.id));
-      this.updateMarks(structure);
     }
     for (const [id, surface] of this.surfaces) if (!seen.has(id)) this.dropSurface(id, surface);
     for (const [id, own] of this.balls) if (!seen.has(id)) this.scene.remove(own.group), this.balls.delete(id);
     const box = new Box3();
     for (const [id, {mesh}] of this.surfaces) if (study.structure(id)?.visible) box.union(mesh.geometry.boundingBox);
     this.setBox(box.isEmpty() ? this.imageBox : box);
+    for (const structure of study.structures) this.updateMarks(structure);
     if (!box.isEmpty() && !this.isTouched && !this.isWellSeen()) this.look(this.camera.position.clone().sub(this.controls.target), true);
+    for (const axis of [0, 1, 2]) if (this.planes[axis].group.visible && this.app.panels[axis]) this.drawOutlines(axis);
     this.updateClip();
   }
 
@@ -139,7 +145,7 @@ export class BodyScene extends Stage3D {
   updateMarks(structure) {
     let own = this.balls.get(structure.id);
     const drag = this.state.get('drag'), moved = drag?.structure === structure.id ? drag : null;
-    const key = [structure.marks, structure.color, structure.visible, moved, this.sphere.radius];
+    const isShown = structure.visible && this.state.get('marks'), key = [structure.marks, structure.color, isShown, moved, this.sphere.radius];
     if (own && key.every((part, n) => part === own.key[n])) return;
     if (own) {
       this.scene.remove(own.group);
@@ -147,16 +153,19 @@ export class BodyScene extends Stage3D {
     }
     own = {key, group: new Group()};
     // On the screen about as large beside a small body as beside a large one.
-    const radius = 0.016 * this.sphere.radius;
+    const radius = this.sphere.radius * Math.min(0.013, Math.max(0.005, 0.2 / Math.sqrt(structure.marks.length)));
     for (const kind of KINDS) {
       const marks = structure.marks.filter((m) => m.kind === kind);
       if (marks.length === 0) continue;
-      const balls = new InstancedMesh(shared, new MeshLambertMaterial({color: markColor(structure.color, kind)}), marks.length);
-      marks.forEach((m, n) => balls.setMatrixAt(n, new Matrix4().makeScale(radius, radius, radius).setPosition(...(moved?.mark === m.id ? moved.world : m.world))));
-      balls.frustumCulled = false;
-      own.group.add(balls);
+      const inner = new MeshLambertMaterial({color: markColor(structure.color, kind)}), rim = new MeshBasicMaterial({color: 0xffffff, side: BackSide});
+      for (const [material, size] of [[inner, radius], [rim, HALO * radius]]) {
+        const balls = new InstancedMesh(ballOf(marks.length), material, marks.length);
+        marks.forEach((m, n) => balls.setMatrixAt(n, new Matrix4().makeScale(size, size, size).setPosition(...(moved?.mark === m.id ? moved.world : m.world))));
+        balls.frustumCulled = false;
+        own.group.add(balls);
+      }
     }
-    own.group.visible = structure.visible;
+    own.group.visible = isShown;
     this.scene.add(own.group);
     this.balls.set(structure.id, own);
   }
@@ -179,6 +188,7 @@ export class BodyScene extends Stage3D {
     const {group, mesh} = this.planes[axis], panel = this.app.panels[axis];
     group.visible = this.state.get('planes')[axis];
     if (!group.visible) return;
+    if (!panel) return;
     const position = mesh.geometry.getAttribute('position'), uv = mesh.geometry.getAttribute('uv'), {picture, pictureStep, right, down} = panel;
     this.cornersOf(axis, this.state.get('slices')[axis]).forEach((place, n) => position.setXYZ(n, ...place));
     position.needsUpdate = true;
@@ -188,6 +198,28 @@ export class BodyScene extends Stage3D {
     [[0, 0], [x, 0], [x, y], [0, y]].forEach(([u, v], n) => uv.setXY(n, u, v));
     uv.needsUpdate = true;
     this.paintPlane(mesh.material, picture);
+    this.drawOutlines(axis);
+  }
+
+  /** The surfaces' outlines on a slice, seen from both of its sides. */
+  drawOutlines(axis) {
+    const {outlines} = this.planes[axis], {right, down} = this.app.panels[axis], at = this.state.get('slices')[axis];
+    const places = [], colors = [], lift = 0.002 * this.sphere.radius / this.space.spacing[axis], index = [0, 0, 0];
+    const add = (line, n, offset) => {
+      [index[axis], index[right], index[down]] = [at + offset, line[n], line[n + 1]];
+      places.push(...this.space.toWorld(index));
+    };
+    for (const structure of this.app.study.structures) {
+      const mesh = structure.visible && this.app.meshes.get(structure.id);
+      if (!mesh) continue;
+      const before = places.length, color = rgbColor(structure.color).toArray();
+      for (const {places: line, closed} of linesAt(mesh, axis, at, [right, down]))
+        for (let n = 0; n < line.length - (closed ? 0 : 2); n += 2)
+          for (const offset of [-lift, lift]) add(line, n, offset), add(line, (n + 2) % line.length, offset);
+      for (let n = before; n < places.length; n += 3) colors.push(...color);
+    }
+    outlines.geometry.dispose();
+    outlines.geometry = new BufferGeometry().setAttribute('position', new BufferAttribute(new Float32Array(places), 3)).setAttribute('color', new BufferAttribute(new Float32Array(colors), 3));
   }
 
   paintPlane(material, picture) {

@@ -26,7 +26,8 @@ function rangeOfSlice({values}, {low, high}) {
 
 /** [name, window] of what there is to choose from; `slice` is the one that is looked at. */
 export function presets(image, slice) {
-  const list = [['automatic', {black: image.black, white: image.white}], ['whole range', {black: image.low, white: image.high}]];
+  const automatic = {black: image.black, white: image.white}, whole = {black: image.low, white: image.high}, list = [['automatic', automatic]];
+  if (!isSame(automatic, whole)) list.push(['whole range', whole]);
   if (slice) list.push(['this slice', rangeOfSlice(slice, image)]);
   if (image.anatomical && image.low <= -500 && image.high >= 300)  // Hounsfield units
     list.push(['soft tissue', {black: -160, white: 240}], ['brain', {black: 0, white: 80}], ['bone', {black: -450, white: 1050}], ['lung', {black: -1350, white: 150}]);

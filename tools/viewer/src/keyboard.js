@@ -4,7 +4,7 @@ import {isSame, presets} from './grey.js';
 
 export const VIEW_ROWS = [['wheel, [ ]', 'slice; with Shift 10'], ['Ctrl+wheel, + \u2212', 'zoom'], ['middle, Space+drag', 'move the picture'], ['Ctrl+click, x', 'crosshair to the cursor'],
   ['arrows', 'move the crosshair, turn 3D'], ['right-drag', 'grey values'], ['w', 'next grey values'], ['f', 'this view alone'], ['r', 'reset views'], ['v', 'slices in 3D'],
-  ['k', 'count slices from 1, as Fiji does'], ['t', 'dark or light'], ['?', 'this sheet']];
+  ['q', 'marks: show or hide'], ['k', 'count slices from 1, as Fiji does'], ['t', 'dark or light'], ['?', 'this sheet']];
 
 /** [title, rows of [key, what it does]] for each part. */
 export function helpSheet(parts) {
@@ -42,6 +42,7 @@ export function viewKeys(app, {help, theme, view}) {
     f: () => state.set({large: state.get('large') >= 0 ? -1 : document.activeElement === view()?.canvas || !panel() ? 3 : state.get('keyPanel')}),
     r: () => { state.set({views: [null, null, null]}); view()?.reset(); },
     v: () => state.set({planes: state.get('planes').every(Boolean) ? [false, false, false] : [true, true, true]}),
+    q: () => state.set({marks: !state.get('marks')}),
     k: () => state.set({countFrom: 1 - state.get('countFrom')}),
   };
   return {keys, panel, moveCrosshair};

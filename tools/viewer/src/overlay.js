@@ -120,6 +120,7 @@ export function drawMark(context, [x, y], kind, color, {radius = 4, alpha = 1, i
 /** Marks as they are seen on a panel: [{structure, mark, spot, far}], those that a drag has moved with their new place. */
 export function marksOn(panel, most = FAINT_WITHIN) {
   const {study, space, state, axis, plane} = panel, drag = state.get('drag'), list = [];
+  if (!state.get('marks')) return list;
   for (const structure of study.structures) {
     if (!structure.visible) continue;
     for (const mark of structure.marks) {

@@ -14,6 +14,12 @@ export function write(context, text, x, y, color = '#fff') {
   context.fillText(text, x, y);
 }
 
+/** The largest of 1, 2, 5, 10, ... that is no more than this. */
+export function roundLength(most) {
+  const tens = 10 ** Math.floor(Math.log10(most));
+  return [5, 2, 1].map((n) => n * tens).find((n) => n <= most) ?? tens;
+}
+
 export class Plane {
   constructor(space, axis, anatomical) {
     Object.assign(this, {space, axis, anatomical});
@@ -70,8 +76,8 @@ export class Plane {
   /** A bar of a round length, at most a quarter of the view. */
   drawScale(context, unitText) {
     const {viewWidth: width, viewHeight: height} = this;
-    const most = Math.min(120, width / 4) / this.scale, tens = 10 ** Math.floor(Math.log10(most));
-    const length = [5, 2, 1].map((n) => n * tens).find((n) => n <= most), pixels = length * this.scale;
+    const most = Math.min(120, width / 4) / this.scale;
+    const length = roundLength(most), pixels = length * this.scale;
     // On the picture itself, where there is room.
     const x = width - Math.max(12, this.left + 10) - pixels, y = height - Math.max(12, this.top + 10);
     context.font = '11px system-ui, sans-serif';

@@ -5,7 +5,7 @@ import {AXIS_COLORS, dominant, planeName} from './space.js';
 import {icon} from './icons.js';
 
 const LARGEST_VOXEL = 90;  // CSS pixels, when zoomed in
-const REDRAWN_ON = ['slices', 'views', 'grey', 'study', 'meshes', 'hover', 'selected', 'ring', 'ruler', 'drag', 'active', 'loaded', 'theme', 'large', 'tool', 'planes', 'countFrom'];
+const REDRAWN_ON = ['slices', 'views', 'grey', 'study', 'meshes', 'hover', 'selected', 'ring', 'ruler', 'drag', 'active', 'loaded', 'theme', 'large', 'tool', 'planes', 'countFrom', 'marks'];
 
 export class PlanePanel {
   /**
@@ -165,6 +165,9 @@ export class PlanePanel {
     this.pictureStep = slice.step;
     this.onPicture?.(this.axis);
   }
+
+  /** The slice has changed, though its number has not. */
+  forgetPicture() { this.key = null; }
 
   drawNoPicture(context, width, height) {
     if (this.shownAt < 0) return;

@@ -3,7 +3,8 @@ import {
   AmbientLight, Box3, Color, DirectionalLight, PerspectiveCamera, Plane, Scene, Sphere, SRGBColorSpace, Vector3, WebGLRenderer,
 } from 'three';
 import {OrbitControls} from 'three/examples/jsm/controls/OrbitControls.js';
-import {el, svg} from './dom.js';
+import {el, number, svg} from './dom.js';
+import {roundLength} from './plane.js';
 import {AXIS_COLORS} from './space.js';
 
 export const EYE = new Vector3(0.45, -0.8, 0.4);
@@ -29,13 +30,26 @@ export function axisTriad(anatomical) {
   return {drawing, turn};
 }
 
+/** The length of a bar at the distance of what the camera turns about. */
+export function scaleBar(unit) {
+  const text = el('span', {}), bar = el('i', {}), drawing = el('div', {class: 'scale', 'aria-hidden': 'true'}, text, bar);
+  const update = ({camera, controls, canvas}) => {
+    const distance = camera.position.distanceTo(controls.target), pixel = 2 * distance * Math.tan(camera.fov * Math.PI / 360) / (canvas.clientHeight || 1);
+    const length = roundLength(Math.min(120, canvas.clientWidth / 4) * pixel), label = `${number(length)}${unit ? `\u2009${unit}` : ''}`;
+    drawing.hidden = !Number.isFinite(length);
+    bar.style.width = `${(length / pixel).toFixed(1)}px`;
+    if (text.textContent !== label) text.textContent = label;
+  };
+  return {drawing, update};
+}
+
 /** `make(canvas)` makes the view in a holder, or a word says why there is none. */
-export function stageIn(holder, {label, triad, otherwise}, make) {
+export function stageIn(holder, {label, triad, scale, otherwise}, make) {
   const canvas = el('canvas', {tabindex: 0, role: 'img', 'aria-label': label});
-  holder.append(canvas, triad.drawing);
+  holder.append(canvas, triad.drawing, scale.drawing);
   try {
     const view = make(canvas);
-    view.onTurn = triad.turn;
+    view.onTurn = (camera) => { triad.turn(camera); scale.update(view); };
     view.renderNow();
     canvas.addEventListener('keydown', (event) => {
       const [x, y] = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]}[event.key] ?? [0, 0];

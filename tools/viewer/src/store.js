@@ -1,11 +1,12 @@
-// What a reload must not lose. localStorage may be full or forbidden: then it is lost, and nothing else happens.
+// What a reload must not lose. The browser's storage may be full or forbidden: then it is lost, and nothing else happens.
 
 export class Store {
-  constructor(prefix) { this.prefix = `${prefix}/`; }
+  /** `place()` gives the storage: localStorage, or sessionStorage for what belongs to one tab. */
+  constructor(prefix, place = () => localStorage) { Object.assign(this, {prefix: `${prefix}/`, place}); }
 
   get(name, otherwise = null) {
     try {
-      const text = localStorage.getItem(this.prefix + name);
+      const text = this.place().getItem(this.prefix + name);
       return text === null ? otherwise : JSON.parse(text);
     } catch {
       return otherwise;
@@ -15,7 +16,7 @@ export class Store {
   /** Whether it is kept. */
   set(name, value) {
     try {
-      localStorage.setItem(this.prefix + name, JSON.stringify(value));
+      this.place().setItem(this.prefix + name, JSON.stringify(value));
       return true;
     } catch {
       return false;
@@ -24,13 +25,13 @@ export class Store {
 
   remove(name) {
     try {
-      localStorage.removeItem(this.prefix + name);
+      this.place().removeItem(this.prefix + name);
     } catch { /* nothing was kept */ }
   }
 
   names() {
     try {
-      return Object.keys(localStorage).filter((name) => name.startsWith(this.prefix)).map((name) => name.slice(this.prefix.length));
+      return Object.keys(this.place()).filter((name) => name.startsWith(this.prefix)).map((name) => name.slice(this.prefix.length));
     } catch {
       return [];
     }

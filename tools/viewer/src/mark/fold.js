@@ -1,4 +1,5 @@
 // What the structures will be once the actions that are under way have been applied.
+import {applyAction, isSameMark, isSameOutline} from '../changes.js';
 import {referenceOf} from './queue.js';
 
 /** Undo takes back the action before it that is still under way; what is older than that only the server knows. */
@@ -17,10 +18,6 @@ function withoutUndone(actions) {
   return done;
 }
 
-const isSamePlace = (a, b) => a.length === b.length && a.every((v, n) => v === b[n]);
-const isSameMark = (mark, action) => mark.kind === action.kind && isSamePlace(mark.world, action.world);
-const isSameOutline = (outline, a) => outline.axis === a.axis && outline.at === a.at && outline.world.length === a.world.length && outline.world.every((place, n) => isSamePlace(place, a.world[n]));
-
 /** The newest ID of what an action has made, for a server that does not tell it; `taken` are those of others. */
 export function madeBy(action, structures, taken) {
   const own = structures.find((s) => s.id === action.structure);
@@ -29,42 +26,10 @@ export function madeBy(action, structures, taken) {
   return (made ?? []).map(({id}) => id).filter((id) => !taken.has(id)).sort((a, b) => b - a)[0];
 }
 
-const CHANGES = {
-  rename: (own, a) => ({...own, name: a.name}),
-  recolor: (own, a) => ({...own, color: a.color}),
-  lock: (own, a) => ({...own, locked: a.locked}),
-  show: (own, a) => ({...own, visible: a.visible}),
-  // What the server has already told of is not shown twice until it is acknowledged.
-  add_mark: (own, a, id) => own.marks.some((m) => !m.isNew && isSameMark(m, a)) ? own : ({...own, marks: [...own.marks, {id, kind: a.kind, world: a.world, isNew: true}]}),
-  move_mark: (own, a) => ({...own, marks: own.marks.map((m) => m.id === a.mark ? {...m, world: a.world} : m)}),
-  remove_mark: (own, a) => ({...own, marks: own.marks.filter((m) => m.id !== a.mark)}),
-  add_outline: (own, a, id) => own.outlines.some((o) => !o.isNew && isSameOutline(o, a)) ? own : ({...own, outlines: [...own.outlines, {id, axis: a.axis, at: a.at, closed: a.closed, world: a.world, isNew: true}]}),
-  remove_outline: (own, a) => ({...own, outlines: own.outlines.filter((o) => o.id !== a.mark)}),
-};
-
-function apply(structures, action, id) {
-  switch (action.do) {
-    case 'add_structure':
-      if (structures.some((s) => !s.isNew && s.name === action.name)) return structures;
-      return [...structures, {id, name: action.name, color: action.color, locked: false, visible: true, marks: [], outlines: [], result: null, isNew: true}];
-    case 'remove_structure': return structures.filter((s) => s.id !== action.structure);
-    case 'give_mark': {
-      const mark = structures.find((s) => s.id === action.structure)?.marks.find((m) => m.id === action.mark);
-      if (!mark) return structures;
-      return structures.map((s) => s.id === action.structure ? CHANGES.remove_mark(s, action) : s.id === action.to ? {...s, marks: [...s.marks, mark]} : s);
-    }
-    case 'duplicate': return structures;  // its copy has a name and a colour that the server chooses
-    default: {
-      const change = CHANGES[action.do];
-      return change ? structures.map((s) => s.id === action.structure ? change(s, action, id) : s) : structures;
-    }
-  }
-}
-
 /** `resolve` gives the ID for a reference where it is known. */
 export function fold(structures, actions, resolve) {
   return withoutUndone(actions).reduce((list, a) => {
     const action = {...a, structure: resolve(a.structure), mark: resolve(a.mark), to: resolve(a.to)};
-    return apply(list, action, resolve(referenceOf(a.key)));
+    return applyAction(list, action, resolve(referenceOf(a.key)));
   }, structures);
 }

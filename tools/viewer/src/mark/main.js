@@ -9,7 +9,7 @@ import {hintsOf} from '../mark_tools.js';
 import {PlanePanel} from '../plane_panel.js';
 import {sceneTools} from '../scene_tools.js';
 import {ImageSpace, planeName} from '../space.js';
-import {axisTriad, stageIn} from '../stage3d.js';
+import {axisTriad, scaleBar, stageIn} from '../stage3d.js';
 import {State} from '../state.js';
 import {statusRow} from '../status.js';
 import {Store} from '../store.js';
@@ -91,7 +91,7 @@ async function start() {
   const enlarge = () => { stage.dataset.large = state.get('large'); };
   state.on(['large'], enlarge);
   enlarge();
-  view = stageIn(holder, {label: 'the surfaces in 3D: drag or arrow keys turn them, a click brings the planes there, Shift+click sets a mark', triad: axisTriad(image.anatomical),
+  view = stageIn(holder, {label: 'the surfaces in 3D: drag or arrow keys turn them, a click brings the planes there, Shift+click sets a mark', triad: axisTriad(image.anatomical), scale: scaleBar(units),
     otherwise: 'The planes beside it work.'}, (canvas) => new BodyScene(canvas, app));
   view?.takeCamera(store.get('camera'));
   for (const panel of panels) {

@@ -33,13 +33,19 @@ async function decodeStructure(structure) {
     markCount: structure.marks.count,
     marks: new Float32Array(marks.buffer, 0, marks.length >> 2),
     values,
-    visible: true,
   };
 }
 
-/** The page's data, meshes decoded, slices not yet. */
+/** A number that tells this page from others (FNV-1a over some of its text). */
+function digestOf(text) {
+  let hash = 2166136261;
+  for (let n = 0; n < text.length; n += 61) hash = Math.imul(hash ^ text.charCodeAt(n), 16777619);
+  return `${text.length}-${(hash >>> 0).toString(16)}`;
+}
+
+/** The page's data, meshes decoded, slices not yet, and a digest of it. */
 export async function readData() {
-  const data = JSON.parse(document.getElementById('data').textContent);
+  const text = document.getElementById('data').textContent, data = JSON.parse(text);
   data.structures = await Promise.all(data.structures.map(decodeStructure));
-  return data;
+  return {data, digest: digestOf(text)};
 }

@@ -1,6 +1,12 @@
 // What the run was and how good its result is: tables, bars, the command.
 import {dot, el, number, svg} from '../dom.js';
 
+/** What there is of each structure: of several, one is open at first. */
+function perStructure(parts) {
+  if (parts.length === 1) return parts[0][1];
+  return parts.map(([structure, content], n) => el('details', {class: 'one', open: n === 0}, el('summary', {}, dot(structure.color), el('span', {}, structure.name)), content));
+}
+
 function section(title, note, ...content) {
   return el('section', {class: 'card'}, el('h2', {}, title), note ? el('p', {class: 'note'}, note) : null, ...content);
 }
@@ -11,7 +17,13 @@ export function structureFacts(data) {
   return data.structures.map((structure, n) => ({structure, facts: list.find((f) => f.name === structure.name) ?? list[n] ?? data.facts}));
 }
 
-function warningsOf(data) {
+/** What was warned of one structure: lines that begin with its name, or all where there is no other one. */
+export function warningsAbout(data, structure) {
+  const warnings = (Array.isArray(data.facts.warnings) ? data.facts.warnings : []).map(String);
+  return data.structures.length === 1 ? warnings : warnings.filter((line) => line.startsWith(`${structure.name}: `));
+}
+
+export function warningsOf(data) {
   const warnings = Array.isArray(data.facts.warnings) ? data.facts.warnings : [];
   if (warnings.length === 0) return null;
   const label = warnings.length > 1 ? `${warnings.length} warnings` : '1 warning';
@@ -43,8 +55,7 @@ function quality({structure, facts}, data) {
   if (e && e.area > 0) add('rests on neither marks nor edges', `${number(100 * e.unsupported_area / e.area, 2)} %`, 'of the surface');
   if (structure.markCount > 0 && !fit) add('marks', number(structure.markCount));
   add('triangles shown', number(structure.mesh.triangles), structure.mesh.triangles < structure.mesh.of_triangles ? `of ${number(structure.mesh.of_triangles)}` : null);
-  const title = data.structures.length > 1 ? el('h3', {}, dot(structure.color), structure.name) : null;
-  return el('div', {class: 'structure-quality'}, title, el('dl', {class: 'figures'}, figures));
+  return el('dl', {class: 'figures'}, figures);
 }
 
 function text(value) {
@@ -83,7 +94,7 @@ function timeBars(seconds) {
   if (stages.length === 0) return null;
   const most = Math.max(...stages.map(([, time]) => time));
   return el('div', {class: 'bars', role: 'table', 'aria-label': 'seconds of each stage'}, stages.map(([name, time]) => {
-    const bar = el('span', {class: 'bar'});
+    const bar = el('span', {class: 'time'});
     bar.style.width = `${Math.max(0.5, 100 * time / most)}%`;
     return el('div', {class: 'bar-row', role: 'row'}, el('span', {role: 'rowheader'}, name), el('span', {class: 'track'}, bar),
       el('span', {class: 'value', role: 'cell'}, `${number(time, 3)}\u2009s`));
@@ -110,12 +121,8 @@ function convergence(changes, tolerance) {
 }
 
 function convergenceOf(all) {
-  return all.flatMap(({structure, facts}) => {
-    const changes = facts.solve?.changes;
-    if (!Array.isArray(changes) || changes.length < 2) return [];
-    const title = all.length > 1 ? [el('h3', {}, dot(structure.color), structure.name)] : [];
-    return [...title, convergence(changes, facts.resolved?.tolerance)];
-  });
+  const curves = all.filter(({facts}) => Array.isArray(facts.solve?.changes) && facts.solve.changes.length > 1);
+  return curves.map(({structure, facts}) => [structure, convergence(facts.solve.changes, facts.resolved?.tolerance)]);
 }
 
 function pairs(rows) {
@@ -166,12 +173,9 @@ export function factsOf(data) {
   const bars = timeBars(seconds), curves = convergenceOf(all);
   const tables = all.map(({structure, facts}) => [structure, optionsTable(facts, data)]).filter(([, table]) => table);
   return el('div', {class: 'facts'},
-    section('Quality', null, all.map((one) => quality(one, data))),
+    section('Quality', null, perStructure(all.map((one) => [one.structure, quality(one, data)]))),
     bars ? section('Time', seconds.total ? `${number(seconds.total, 3)}\u2009s in all` : null, bars) : null,
-    curves.length ? section('Convergence', 'Mean motion of the surface at each step, in voxels; dashed: the tolerance.', curves) : null,
-    tables.length ? section('Options', 'What was used, and what covol chose by itself.', tables.map(([structure, table]) =>
-      [tables.length > 1 ? el('h3', {}, dot(structure.color), structure.name) : null, table])) : null,
+    curves.length ? section('Convergence', 'Mean motion of the surface at each step, in voxels; dashed: the tolerance.', perStructure(curves)) : null,
+    tables.length ? section('Options', 'What was used, and what covol chose by itself.', perStructure(tables)) : null,
     section('Provenance', null, provenance(data)));
 }
-
-export {warningsOf};

@@ -1,91 +1,136 @@
-// The page: views, switches, facts.
-import {contrast, greyTable, structureList, suggestions, toolbar} from './controls.js';
-import {readData} from './data.js';
+// The page of covol report: the image in three planes, surfaces and marks, and the figures of the run. There is no server.
+import {barButton, historyButtons, suggestButtons, toolChoice, windowMenu} from '../bar.js';
+import {colorings} from '../colors.js';
 import {el, unitText} from '../dom.js';
-import {factsOf, warningsOf} from './facts.js';
+import {greyTable} from '../grey.js';
+import {icon} from '../icons.js';
+import {remember, VIEW_NAMES, viewState} from '../kept_view.js';
+import {helpSheet, showFocus} from '../keyboard.js';
+import {MarkPointer} from '../mark_pointer.js';
+import {hintsOf, MARK_TOOLS, MarkTools} from '../mark_tools.js';
 import {indexCoordinates} from '../outline.js';
-import {View3D} from './scene.js';
-import {SlicePanel} from './slices.js';
-import {axisTriad, stageIn} from '../stage3d.js';
+import {PlanePanel} from '../plane_panel.js';
+import {sceneTools} from '../scene_tools.js';
+import {planeName} from '../space.js';
+import {axisTriad, scaleBar, stageIn} from '../stage3d.js';
 import {State} from '../state.js';
+import {statusRow} from '../status.js';
+import {Store} from '../store.js';
+import {Suggestions} from '../suggest.js';
 import {themeButton} from '../theme.js';
-import {Volume} from './volume.js';
+import {Toasts} from '../toast.js';
+import {lookBox, marksButton, suggestedPlaces, suggestionList} from './controls.js';
+import {readData} from './data.js';
+import {exportMenu} from './export_menu.js';
+import {factsOf, warningsOf} from './facts.js';
+import {keyboard, SHEET} from './keyboard.js';
+import {LocalStudy} from './local_study.js';
+import {drawOverlay} from './overlay.js';
+import {ReportScene} from './scene.js';
+import {saveTable, structureTable} from './table.js';
+import {spaceAround, Volume, VolumeSlices} from './volume.js';
 
 const MOST_MARKS = 10000;  // more hide what they lie on, at first
+const KEPT = [...VIEW_NAMES, 'tool', 'active', 'coloring', 'opacity'];
 
-function middleOf(structures, volume) {
-  const low = [Infinity, Infinity, Infinity], high = low.map((x) => -x);
-  for (const {mesh} of structures)
-    for (let a = 0; a < 3; ++a) {
-      low[a] = Math.min(low[a], mesh.min[a]);
-      high[a] = Math.max(high[a], mesh.max[a]);
-    }
-  const index = volume.toIndex(low.map((x, a) => (x + high[a]) / 2));
-  return index.map((at, a) => Math.min(volume.size[a] - 1, Math.max(0, Math.round(at))));
+const middleOf = ({mesh: {min, max}}) => min.map((x, a) => (x + max[a]) / 2);
+
+function firstState(image, space, data, kept) {
+  const view = viewState(image, space, kept, {slices: space.voxelAt(space.toIndex(middleOf(data.structures[0]))), marks: !data.structures.some((s) => s.markCount > MOST_MARKS)});
+  return new State({...view, grey: greyTable(image, view.window), tool: MARK_TOOLS.some(([name]) => name === kept.tool) ? kept.tool : 'crosshair',
+    active: data.structures[kept.active - 1] ? kept.active : 1, coloring: colorings(data.structures).some(([name]) => name === kept.coloring) ? kept.coloring : 'structure',
+    opacity: typeof kept.opacity === 'number' && kept.opacity >= 0 && kept.opacity <= 1 ? kept.opacity : 1, selected: null, hover: null, drag: null, ring: null, suggested: 0, isAsking: false, ruler: null,
+    keyPanel: 2, study: 0, meshes: 0, loaded: 0, theme: 'light'});
 }
 
-function keyboard(state, panels, view, theme) {
-  document.addEventListener('keydown', (event) => {
-    if (event.target.matches?.('input, select, textarea') || event.ctrlKey || event.metaKey || event.altKey) return;
-    const click = (selector) => document.querySelector(selector)?.click();
-    const actions = {
-      m: () => click('[data-key=marks]'), t: () => theme.click(), r: () => view()?.reset(),
-      '[': () => panels[2]?.go(panels[2].at - 1), ']': () => panels[2]?.go(panels[2].at + 1),
-      1: () => click('[data-plane="2"]'), 2: () => click('[data-plane="1"]'), 3: () => click('[data-plane="0"]'),
-      Escape: () => state.set({large: -1, focus: null}),
-    };
-    actions[event.key]?.();
-  });
+/** What is chosen is gone when its mark is. */
+function follow(state, study) {
+  const known = (target) => target && study.structure(target.structure)?.marks.some((m) => m.id === target.mark) ? target : null;
+  study.on('change', () => state.set({study: state.get('study') + 1, selected: known(state.get('selected')), hover: known(state.get('hover')), drag: known(state.get('drag'))}));
+}
+
+/** Everything that the parts of the page share. */
+function appOf(data, digest) {
+  const base = data.origin ?? [0, 0, 0], volume = data.image ? new Volume(data.image, base) : null, space = volume ?? spaceAround(data.structures, base);
+  const {black, white} = data.image ?? {black: 0, white: 1}, image = {black, white, low: black, high: white, anatomical: data.anatomical};
+  for (const structure of data.structures) Object.assign(structure, {index: indexCoordinates(structure.positions, space), isShown: true});
+  const view = new Store(`covol-report/${digest}`, () => sessionStorage), kept = Object.fromEntries(KEPT.map((name) => [name, view.get(name)]));
+  const state = firstState(image, space, data, kept), study = new LocalStudy(data.structures, new Store(`covol-report/${digest}`)), toasts = new Toasts();
+  const app = {data, image, volume, space, unitText: data.unitText, state, study, toasts, kept: view, panels: [], slices: volume && new VolumeSlices(volume),
+    meshes: {get: (id) => data.structures[id - 1] ?? null}, toast: (text, kind) => toasts.show(text, kind), keep: (name, value) => view.set(name, value)};
+  app.tools = new MarkTools(app);
+  app.goTo = (world) => {
+    const index = space.toIndex(world);
+    state.set({slices: space.voxelAt(index)});
+    for (const panel of app.panels) panel.reveal(index);
+  };
+  app.choose = (id) => {
+    state.set({active: id, selected: null});
+    app.goTo(middleOf(data.structures[id - 1]));
+  };
+  const places = suggestedPlaces(data);
+  app.suggestions = new Suggestions({...app, connection: {ask: (_, id) => setTimeout(() => study.emit('suggestions', {structure: id, places: places.filter((place) => place.id === id)}))}});
+  state.on(['window'], () => state.set({grey: greyTable(image, state.get('window'))}));
+  follow(state, study);
+  return app;
+}
+
+function header(app, {theme, help, warnings}) {
+  const {state, study, volume, data} = app;
+  theme.className = 'tool';
+  return el('header', {class: 'bar'},
+    el('div', {class: 'title'}, el('span', {class: 'brand'}, 'covol'), el('h1', {title: data.title}, data.title), warnings && el('a', {class: 'badge', href: '#warnings'}, warnings.label)),
+    toolChoice(state, MARK_TOOLS), historyButtons(app, () => [study.canUndo, study.canRedo]),
+    el('div', {class: 'tools'}, volume ? windowMenu(app) : null, suggestedPlaces(data).length > 0 ? suggestButtons(state, app.suggestions) : null),
+    el('div', {class: 'tools end'}, exportMenu(app, () => saveTable(app)), theme, barButton('help', 'keys (?)', () => help.showModal())));
+}
+
+/** The 3D view and the planes. */
+function stageOf(app, view) {
+  const {state, volume, space, image, panels} = app, holder = el('div', {class: 'picture'}), names = [0, 1, 2].map((axis) => volume ? planeName(space, axis, image.anatomical) : 'xyz'[axis]);
+  const three = el('section', {class: 'panel three', 'aria-label': '3D'}, sceneTools(app, view, names, [marksButton(state)]), holder, lookBox(app));
+  const element = el('section', {class: `stage${volume ? '' : ' alone'}`, 'aria-label': 'views'}, three, panels.length > 0 ? [panels[2].element, panels[1].element, panels[0].element] : null);
+  const enlarge = () => { element.dataset.large = state.get('large'); };
+  state.on(['large'], enlarge);
+  enlarge();
+  return {element, holder};
 }
 
 async function start() {
-  const page = document.getElementById('page');
-  const data = await readData();
+  const {data, digest} = await readData();
   data.unitText = unitText(data.unit);
-  const volume = data.image ? new Volume(data.image) : null;
-  for (const structure of data.structures) {
-    if (!volume) continue;
-    structure.index = indexCoordinates(structure.positions, volume);
-    structure.markIndex = indexCoordinates(structure.marks, volume);
-  }
-  const slices = volume ? middleOf(data.structures, volume) : [0, 0, 0];
-  const state = new State({slices, visible: data.structures.map(() => true), marks: !data.structures.some((s) => s.markCount > MOST_MARKS), planes: [false, false, Boolean(volume)], cut: -1, flip: false,
-    cutShare: 0.5, opacity: 1, coloring: 'structure', grey: greyTable({black: 0, white: 255}), focus: null, large: -1, decoded: 0, theme: 'light'});
-  const theme = themeButton(state, '\u25d0');
-  if (volume) await volume.decodeSlice(slices[2]);
-
-  let view = null;
-  const holder = el('div', {class: 'picture'});
-  const three = el('section', {class: 'panel three'}, holder, structureList(data, state));
-  const panels = volume ? [0, 1, 2].map((axis) => new SlicePanel(axis, data, state, volume)) : [];
-  const left = el('div', {class: 'left'}, three, toolbar(data, state, volume, () => view));
-  const right = volume ? el('div', {class: 'right'}, panels[2].element, el('div', {class: 'pair'}, panels[1].element, panels[0].element), contrast(state)) : null;
-  const stage = el('div', {class: `stage${volume ? '' : ' alone'}`}, left, right);
-  const warnings = warningsOf(data);
-  let figures;
+  const app = appOf(data, digest), {state, volume, panels, slices} = app;
+  if (volume) await volume.decodeSlice(state.get('slices')[2]);
+  if (volume) for (const axis of [0, 1, 2]) panels.push(new PlanePanel(axis, app, {drawOverlay, Input: MarkPointer}));
+  let view = null, figures;
+  const own = new Store('covol-report'), theme = themeButton(state, icon('theme'), {get: () => own.get('theme'), set: (value) => own.set('theme', value)});
+  const help = helpSheet(SHEET), status = statusRow({...app, slices: slices ?? {valueAt: () => null}}, hintsOf(MARK_TOOLS)), warnings = warningsOf(data), stage = stageOf(app, () => view);
   try {
     figures = factsOf(data);
   } catch (error) {  // a report that another version wrote
     figures = el('p', {class: 'notice'}, `The figures of this run cannot be shown: ${error.message}.`);
   }
-  page.replaceChildren(
-    el('header', {}, el('span', {class: 'mark'}, 'covol'), el('h1', {}, data.title), warnings && el('a', {class: 'badge', href: '#warnings'}, warnings.label), theme),
-    el('main', {}, stage, suggestions(data, state, volume), warnings?.element, figures,
-      el('footer', {}, 'Keys: m marks, 1 2 3 slice planes, [ ] slice, r reset view, t dark or light; arrows on a focused view.')));
-  state.on(['large'], () => {
-    stage.dataset.large = state.get('large');
-    for (const panel of panels) panel.later();
-  });
-  view = stageIn(holder, {label: 'the surfaces in 3D; drag or arrow keys turn them', triad: axisTriad(data.anatomical),
-    otherwise: volume ? 'The slices beside it work.' : 'The figures below work.'}, (canvas) => new View3D(canvas, data, state, volume));
-  for (const panel of panels) panel.draw();
-  keyboard(state, panels, () => view, theme);
-  window.covolReport = {data, state, volume, view, panels, ready: performance.now(), done: !volume};
+  document.getElementById('page').replaceChildren(header(app, {theme, help, warnings}), el('main', {}, stage.element, status.element,
+    el('div', {class: 'below'}, suggestionList(app), warnings?.element, structureTable(app), figures)), app.toasts.element, help);
+  view = stageIn(stage.holder, {label: 'the surfaces in 3D: drag or arrow keys turn them, a click brings the planes there, Shift+click sets a mark', triad: axisTriad(data.anatomical), scale: scaleBar(data.unitText),
+    otherwise: volume ? 'The slices beside it work.' : 'The figures below work.'}, (canvas) => new ReportScene(canvas, app));
+  view?.takeCamera(app.kept.get('camera'));
+  for (const panel of panels) {
+    panel.tellCursor = status.tell;
+    panel.onPicture = (axis) => view?.movePlane(axis);
+    panel.draw();
+  }
+  showFocus();
+  keyboard(app, {suggestions: app.suggestions, help, theme, view: () => view});
+  remember(state, app.kept, KEPT);
+  window.covolReport = {...app, view, ready: performance.now(), done: !volume};
   if (!volume) return;
-  let count = 0;
-  await volume.decodeAll(slices[2], () => state.set({decoded: ++count}));
-  window.covolReport.done = true;
-  window.covolReport.decoded = performance.now();
+  await volume.decodeAll(() => state.get('slices')[2], () => {
+    slices.forget();
+    for (const panel of panels) panel.forgetPicture();
+    state.set({loaded: state.get('loaded') + 1});
+  });
+  Object.assign(window.covolReport, {done: true, decoded: performance.now()});
 }
 
 start().catch((error) => {

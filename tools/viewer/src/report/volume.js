@@ -1,23 +1,24 @@
-// The image: slices are decoded into one array of bytes, and cut along any axis.
-
+// The image of a page: slices are decoded into one array of bytes, and cut along any axis.
 import {ImageSpace} from '../space.js';
 
+const FULL = 257;  // from 8 to 16 bits
+
 export class Volume extends ImageSpace {
-  constructor(image) {
-    super(image);
-    Object.assign(this, {first: image.first, step: image.step, ofSize: image.of_size, black: image.black, white: image.white, jpegs: image.slices});
+  /** `image` is what the page holds, `base` the place in the world that it counts from. */
+  constructor(image, base) {
+    super(image, base);
+    Object.assign(this, {first: image.first, step: image.step, ofSize: image.of_size, jpegs: image.slices});
     this.data = new Uint8Array(this.size[0] * this.size[1] * this.size[2]);
     this.decoded = new Uint8Array(this.size[2]);
-  }
-
-  /** From the voxels of the file to those that are shown. */
-  fromFileIndex(index) {
-    return index.map((at, a) => (at - this.first[a] - this.offset(a)) / this.step[a]);
   }
 
   toFileIndex(axis, at) { return this.first[axis] + this.offset(axis) + at * this.step[axis]; }
 
   offset(axis) { return axis === 2 ? Math.floor(this.step[2] / 2) : 0.5 * (this.step[axis] - 1); }
+
+  fileNumber(axis, at) { return Math.round(this.toFileIndex(axis, at)); }
+
+  fileCount(axis) { return this.ofSize[axis]; }
 
   async decodeSlice(k) {
     if (this.decoded[k]) return;
@@ -34,12 +35,13 @@ export class Volume extends ImageSpace {
     this.jpegs[k] = null;
   }
 
-  /** All of them; `wanted` first, then from there outwards. `tell` hears of progress. */
+  /** All of them, from what `wanted()` says outwards. `tell` hears of progress. */
   async decodeAll(wanted, tell) {
-    const order = Array.from({length: this.size[2]}, (_, k) => k).sort((a, b) => Math.abs(a - wanted) - Math.abs(b - wanted));
+    const left = Array.from({length: this.size[2]}, (_, k) => k).filter((k) => !this.decoded[k]);
     let last = performance.now();
-    for (const k of order) {
-      await this.decodeSlice(k);
+    while (left.length > 0) {
+      const near = wanted(), nearest = left.reduce((best, k, n) => Math.abs(k - near) < Math.abs(left[best] - near) ? n : best, 0);
+      await this.decodeSlice(left.splice(nearest, 1)[0]);
       if (performance.now() - last < 120) continue;
       tell();
       await new Promise((next) => setTimeout(next));
@@ -48,14 +50,43 @@ export class Volume extends ImageSpace {
     tell();
   }
 
-  /** The grey values of a slice as bytes, row by row. */
+  /** The grey values of a slice, 0 to 65535, row by row. */
   slice(axis, at) {
-    const [right, down] = this.planeAxes(axis), [nx, ny] = this.size;
-    const strides = [1, nx, nx * ny], width = this.size[right], height = this.size[down];
-    const out = new Uint8Array(width * height), begin = Math.min(this.size[axis] - 1, Math.max(0, Math.round(at))) * strides[axis];
-    if (axis === 2) return out.set(this.data.subarray(begin, begin + width * height)), {width, height, values: out};
+    const [right, down] = this.planeAxes(axis), [nx, ny] = this.size, strides = [1, nx, nx * ny];
+    const width = this.size[right], height = this.size[down], values = new Uint16Array(width * height), begin = at * strides[axis];
     for (let y = 0, n = 0; y < height; ++y)
-      for (let x = 0, from = begin + y * strides[down]; x < width; ++x, from += strides[right]) out[n++] = this.data[from];
-    return {width, height, values: out};
+      for (let x = 0, from = begin + y * strides[down]; x < width; ++x, from += strides[right]) values[n++] = FULL * this.data[from];
+    return {axis, at, step: 1, width, height, values};
   }
+}
+
+/** What the planes ask for slices. */
+export class VolumeSlices {
+  constructor(volume) { Object.assign(this, {volume, kept: [null, null, null]}); }
+
+  want() {}
+
+  hasFailed() { return false; }
+
+  best(axis, at) {
+    if (axis === 2 && !this.volume.decoded[at]) return null;
+    if (this.kept[axis]?.at !== at) this.kept[axis] = this.volume.slice(axis, at);
+    return this.kept[axis];
+  }
+
+  /** More of the image is there. */
+  forget() { this.kept = [null, null, null]; }
+
+  /** JPEGs of 8 bits tell a value to some parts of a hundred. */
+  valueAt([i, j, k], {low, high}) {
+    const {volume} = this, [nx, ny] = volume.size;
+    return volume.decoded[k] ? {value: low + volume.data[(k * ny + j) * nx + i] / 255 * (high - low), isExact: false} : null;
+  }
+}
+
+/** For a page without an image: a lattice around the surfaces, on which they can be cut. */
+export function spaceAround(structures, base) {
+  const low = [0, 1, 2].map((a) => Math.min(...structures.map(({mesh}) => mesh.min[a]))), high = [0, 1, 2].map((a) => Math.max(...structures.map(({mesh}) => mesh.max[a])));
+  const size = [201, 201, 201], spacing = low.map((x, a) => (high[a] - x) / (size[a] - 1) || 1);
+  return new ImageSpace({size, spacing, origin: low, direction: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}, base);
 }
