@@ -3,7 +3,9 @@
     COVOL=build/bin/covol python3 -m unittest tests/cli/report_page_test.py
 """
 import base64
+import csv
 import json
+import math
 import os
 import pathlib
 import re
@@ -16,7 +18,9 @@ from cli_test import CENTER, H, ORIGIN, RADIUS, SIZE, Case, ball_bytes, sphere_p
 
 try:
     from selenium import webdriver
+    from selenium.webdriver.common.action_chains import ActionChains
     from selenium.webdriver.common.by import By
+    from selenium.webdriver.common.keys import Keys
     from selenium.webdriver.support.ui import WebDriverWait
 except ImportError:
     webdriver = None
@@ -175,9 +179,14 @@ class Browser(PageCase):
     def open(self, page):
         self.driver.get_log("browser")
         self.driver.get_log("performance")
-        self.driver.get(page.as_uri())
-        WebDriverWait(self.driver, 60).until(lambda d: d.execute_script("return Boolean(window.covolReport?.done)"))
+        self.load(page.as_uri())
         self.addCleanup(self.quiet)
+        # The next test begins anew.
+        self.addCleanup(self.js, "Storage.prototype.setItem = () => {}; localStorage.clear(); sessionStorage.clear()")
+
+    def load(self, address):
+        self.driver.get(address)
+        WebDriverWait(self.driver, 60).until(lambda d: d.execute_script("return Boolean(window.covolReport?.done)"))
 
     def quiet(self):
         """Nothing went wrong, and nobody was asked for anything."""
@@ -204,57 +213,267 @@ class Browser(PageCase):
     def slice_picture(self, axis):
         return self.js("report.panels[arguments[0]].draw(); return report.panels[arguments[0]].canvas.toDataURL()", axis)
 
+    def slices(self, *at):
+        if at:
+            self.js("report.state.set({slices: arguments[0]}); for (const panel of report.panels) panel.draw();", at)
+        return self.js("return report.state.get('slices')")
+
+    def marks(self, structure=0):
+        """Where they are, in voxels, with their kinds."""
+        return self.js("return report.study.structures[arguments[0]].marks.map((m) => [m.kind, ...report.space.toIndex(m.world)])", structure)
+
+    def new_marks(self, structure=0):
+        return self.marks(structure)[self.js("return report.study.given.get(arguments[0] + 1)", structure):]
+
+    def spot(self, axis, index):
+        return [round(v) for v in self.js("const p = report.panels[arguments[0]]; p.draw(); return p.pixelOf(report.space.toWorld(arguments[1]))", axis, index)]
+
+    def mouse(self, *steps, keys=()):
+        """True events: ("move", x, y), ("down", button), ("up", button), ("wheel", x, y, delta)."""
+        chain = ActionChains(self.driver, duration=0)
+        for key in keys:
+            chain.key_down(key)
+        for what, *rest in steps:
+            if what == "wheel":
+                chain.w3c_actions.wheel_action.pause()
+                chain.w3c_actions.wheel_action.scroll(rest[0], rest[1], 0, rest[2], 0, "viewport")
+                chain.w3c_actions.key_action.pause()
+                continue
+            pointer = chain.w3c_actions.pointer_action
+            pointer.move_to_location(*rest) if what == "move" else pointer.pointer_down(button=rest[0]) if what == "down" else pointer.pointer_up(button=rest[0])
+            chain.w3c_actions.key_action.pause()
+        for key in keys:
+            chain.key_up(key)
+        chain.perform()
+
+    def click(self, axis, index, *keys):
+        self.mouse(("move", *self.spot(axis, index)), ("down", 0), ("up", 0), keys=keys)
+
+    def keys(self, *keys):
+        chain = ActionChains(self.driver, duration=0)
+        for key in keys:
+            chain.send_keys(key)
+        chain.perform()
+
+    def near(self, index, wanted):
+        for one, other in zip(index, wanted):
+            self.assertLess(abs(one - other), 0.51, (index, wanted))
+
+    def test_the_first_view_shows_the_whole_body(self):
+        """No slice plane hides a half: what is drawn lies inside of the view, and every structure is there."""
+        self.open(self.two())
+        self.assertEqual(self.js("return report.state.get('planes')"), [False, False, False])
+        edges = self.js("""
+            const {camera} = report.view, out = [], {positions} = report.data.structures[0];
+            for (let n = 0; n < positions.length; n += 3) {
+                const p = camera.position.clone().set(positions[n], positions[n + 1], positions[n + 2]).project(camera);
+                out.push(Math.max(Math.abs(p.x), Math.abs(p.y)));
+            }
+            return Math.max(...out);""")
+        self.assertLess(edges, 1.0)
+        self.assertGreater(edges, 0.5)  # and it is not small
+
     def test_surface_planes_and_switches(self):
         self.open(self.two())
         drawn, all_on = self.picture()
         self.assertGreater(drawn, 0.1)
         boxes = self.driver.find_elements(By.CSS_SELECTOR, ".structures input")
-        self.assertEqual(len(boxes), 2)
-        labels = [label.text for label in self.driver.find_elements(By.CSS_SELECTOR, ".structures label")]
-        self.assertEqual(labels, ["first", f"second{EVIL}"])
+        names = [name.text for name in self.driver.find_elements(By.CSS_SELECTOR, ".structures .name")]
+        self.assertEqual(names, ["first", f"second{EVIL}"])
         boxes[0].click()
         one_off = self.picture()[1]
         self.assertNotEqual(one_off, all_on)
         boxes[0].click()
         self.assertEqual(self.picture()[1], all_on)
-        for selector in ("[data-key=marks]", '[data-plane="2"]', '[data-plane="0"]', '[aria-label^="cut"] [data-value="2"]'):
+        for selector in ("[data-key=marks]", '[data-plane="2"]', '[data-plane="0"]'):
             before = self.picture()[1]
             self.driver.find_element(By.CSS_SELECTOR, selector).click()
             self.assertNotEqual(self.picture()[1], before, selector)
-        before = self.picture()[1]
-        self.js("const s = document.querySelector('.toolbar select'); s.value = 'distance_to_marks'; s.dispatchEvent(new Event('change'))")
-        self.assertNotEqual(self.picture()[1], before)
+        for label, value in (("cut the surfaces at a slice", "2"), ("colour by", "distance_to_marks")):
+            before = self.picture()[1]
+            self.js("const s = document.querySelector(`select[aria-label='${arguments[0]}']`); s.value = arguments[1]; s.dispatchEvent(new Event('change'))", label, value)
+            self.assertNotEqual(self.picture()[1], before, label)
         self.assertEqual(len(self.driver.find_elements(By.CSS_SELECTOR, ".legend .ramp")), 1)
+        self.assertRegex(self.driver.find_element(By.CSS_SELECTOR, ".three .scale").text, r"^\d")
 
-    def test_slider_keys_and_click_change_the_slice(self):
+    def test_slider_wheel_keys_and_click_change_the_slice(self):
         self.open(self.two())
         slider = self.driver.find_element(By.CSS_SELECTOR, 'input[data-axis="2"]')
-        before, middle = self.slice_picture(2), self.js("return report.state.get('slices')[2]")
+        before, middle = self.slice_picture(2), self.slices()[2]
         self.js("arguments[0].value = 12; arguments[0].dispatchEvent(new Event('input'))", slider)
-        self.assertEqual(self.js("return report.state.get('slices')[2]"), 12)
+        self.assertEqual(self.slices()[2], 12)
         self.assertNotEqual(12, middle)
         self.assertNotEqual(self.slice_picture(2), before)
-        self.assertIn("12 of 0–39", self.driver.find_element(By.CSS_SELECTOR, ".axis-2 .where").text)
-        canvas = self.driver.find_element(By.CSS_SELECTOR, ".axis-2 canvas")
-        canvas.click()
-        canvas.send_keys("\ue013")  # arrow up
-        self.assertEqual(self.js("return report.state.get('slices')[2]"), 13)
-        side = self.slice_picture(0)
-        self.js("report.state.set({slices: [5, 20, 13]})")
-        self.assertNotEqual(self.slice_picture(0), side)
+        where = self.driver.find_element(By.CSS_SELECTOR, ".axis-2 .where")
+        self.assertIn("12 of 0\u201339", where.text)
+        where.click()  # as Fiji counts
+        WebDriverWait(self.driver, 10).until(lambda _: "13 of 1\u201340" in where.text)
+        spot = self.spot(2, [15, 25, 12])
+        self.mouse(("wheel", *spot, 100))
+        self.assertEqual(self.slices()[2], 13)
+        self.click(2, [15, 25, 13])  # the crosshair is the tool at first
+        self.assertEqual(self.slices(), [15, 25, 13])
+        self.keys("]", Keys.ARROW_LEFT)
+        self.assertEqual(self.slices(), [14, 25, 14])
+
+    def test_zoom_pan_window_and_value(self):
+        self.open(self.two())
+        self.slices(20, 20, 20)
+        spot = self.spot(2, [26, 18, 20])
+        place = self.js("const p = report.panels[2], box = p.canvas.getBoundingClientRect(); return p.plane.unplace(arguments[0] - box.left, arguments[1] - box.top)", *spot)
+        self.mouse(("wheel", *spot, -200), keys=[Keys.CONTROL])
+        zoom = self.js("return report.state.get('views')[2].zoom")
+        self.assertGreater(zoom, 1.2)
+        after = self.spot(2, [*place, 20])
+        self.assertLess(math.hypot(after[0] - spot[0], after[1] - spot[1]), 1.5)  # at the cursor
+        self.mouse(("move", *spot), ("down", 1), ("move", spot[0] + 40, spot[1] + 30), ("up", 1))
+        after = self.spot(2, [*place, 20])
+        self.assertLess(math.hypot(after[0] - spot[0] - 40, after[1] - spot[1] - 30), 1.5)
+        before, picture = self.js("return report.state.get('window')"), self.slice_picture(2)
+        self.mouse(("move", *spot), ("down", 2), ("move", spot[0] + 120, spot[1]), ("up", 2))
+        window = self.js("return report.state.get('window')")
+        self.assertGreater(window["white"] - window["black"], 1.5 * (before["white"] - before["black"]))
+        self.assertNotEqual(self.slice_picture(2), picture)
+        self.mouse(("move", *self.spot(2, [20, 20, 20])))
+        cursor = self.driver.find_element(By.CSS_SELECTOR, ".status .cursor").text
+        self.assertIn("voxel 20, 20, 20", cursor)
+        image = data_of(self.two())["image"]
+        value = float(re.search(r"value \u2248\u2009([\d.]+)", cursor)[1])
+        self.assertGreater(value, image["black"] + 0.8 * (image["white"] - image["black"]))  # the inside of the ball
+        self.load(self.driver.current_url)  # what was seen survives it
+        self.assertAlmostEqual(self.js("return report.state.get('views')[2].zoom"), zoom)
+        self.assertEqual(self.js("return report.state.get('window')"), window)
+        self.js("document.activeElement.blur()")
+        self.keys("r")
+        self.assertEqual(self.js("return report.state.get('views')"), [None] * 3)
+
+    def test_marks_are_set_undone_and_read_by_covol(self):
+        self.open(self.two())
+        self.slices(20, 20, 20)
+        given = len(self.marks())
+        self.keys("s")
+        self.click(2, [33, 20, 20])
+        self.click(2, [20, 33, 20])
+        self.click(2, [22, 21, 20], Keys.SHIFT)
+        self.assertEqual([kind for kind, *_ in self.new_marks()], ["surface", "surface", "inside"])
+        self.near(self.new_marks()[0][1:], [33, 20, 20])
+        start, end = self.spot(2, [33, 20, 20]), self.spot(2, [31, 18, 20])
+        self.mouse(("move", *start), ("down", 0), ("move", (start[0] + end[0]) // 2, (start[1] + end[1]) // 2), ("move", *end), ("up", 0))
+        self.near(self.new_marks()[0][1:], [31, 18, 20])
+        self.keys("z")
+        self.near(self.new_marks()[0][1:], [33, 20, 20])
+        self.keys("Z")
+        self.near(self.new_marks()[0][1:], [31, 18, 20])
+        self.mouse(("move", *self.spot(2, [20, 33, 20])))
+        self.keys(Keys.DELETE)
+        self.assertEqual(len(self.marks()), given + 2)
+        self.keys("z")
+        self.load(self.driver.current_url)
+        kept = self.marks()
+        self.assertEqual(len(kept), given + 3)  # a reload loses none
+        self.assertEqual(self.downloads(), {"first_marks.csv", "first_new_marks.csv", "first_inside.csv", "structures.csv", *self.second_files()})
+        for name, count in (("first_marks.csv", given + 2), ("first_inside.csv", 1)):
+            rows = self.rows(name)
+            self.assertEqual((len(rows), list(rows[0])), (count, ["x", "y", "z"]))
+        worlds = [[float(row[c]) for c in "xyz"] for row in self.rows("first_marks.csv")]
+        wanted = [[ORIGIN[a] + H * index[a] for a in range(3)] for kind, *index in kept if kind == "surface"]
+        for one, other in zip(worlds, wanted):
+            self.assertLess(math.dist(one, other), 1e-3)
+        run = self.report("segment", self.image, "--points", self.saved / "first_marks.csv", "--inside", self.saved / "first_inside.csv", *COARSE, "-o", "again.vdb")
+        self.assertEqual((run["input"]["points"]["count"], run["seeds"]["inside"]), (given + 2, 1))
+
+    def rows(self, name): return list(csv.DictReader((self.saved / name).read_text().splitlines()))
+
+    def second_files(self):
+        return {name for name in os.listdir(self.saved) if name.startswith("second")}
+
+    def downloads(self):
+        """Each file of the menu, saved."""
+        self.saved = pathlib.Path(tempfile.mkdtemp(prefix="saved-", dir=self.pages))
+        self.driver.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(self.saved)})
+        menu = self.driver.find_element(By.CSS_SELECTOR, '[aria-label="save marks and the table"][aria-haspopup]')
+        menu.click()
+        names = [item.get_attribute("data-file") for item in self.driver.find_elements(By.CSS_SELECTOR, "[data-file]")]
+        menu.click()
+        for name in names:
+            menu.click()
+            self.driver.find_element(By.CSS_SELECTOR, f'[data-file="{name}"]').click()
+            WebDriverWait(self.driver, 20, 0.05).until(lambda _: (self.saved / name).exists())
+        return set(os.listdir(self.saved))
+
+    def test_the_table_is_sorted_and_saved(self):
+        self.open(self.two())
+        rows = lambda: [row.text for row in self.driver.find_elements(By.CSS_SELECTOR, ".structures-table tbody .name")]
+        self.assertEqual(rows(), ["first", f"second{EVIL}"])
+        unit = data_of(self.two())["unit"] or "units"
+        volumes = [s["surface"]["volume"] for s in data_of(self.two())["facts"]["structures"]]
+        head = self.driver.find_elements(By.CSS_SELECTOR, ".structures-table thead button")[1]
+        self.js("arguments[0].scrollIntoView({block: 'center'})", head)
+        head.click()
+        self.assertEqual(rows()[0] == "first", volumes[0] > volumes[1])
+        head.click()
+        self.assertEqual(rows()[0] == "first", volumes[0] < volumes[1])
+        self.assertEqual(head.find_element(By.XPATH, "..").get_attribute("aria-sort"), "ascending")
+        self.downloads()
+        table = self.rows("structures.csv")
+        self.assertEqual([row["structure"] for row in table], ["first", f"second{EVIL}"])
+        self.assertEqual([float(row[f"volume_{unit}3"]) for row in table], volumes)
+        for row, own in zip(table, data_of(self.two())["structures"]):
+            self.assertAlmostEqual(float(row[f"extent_x_{unit}"]), own["mesh"]["max"][0] - own["mesh"]["min"][0], places=9)
+
+    def test_the_keyboard_alone(self):
+        """Tab reaches the plane; keys move, mark, measure nothing, enlarge and list themselves."""
+        self.open(self.two())
+        self.js("document.querySelector('.axis-2 .where').focus()")
+        for _ in range(4):
+            self.keys(Keys.TAB)
+            if self.js("return document.activeElement === report.panels[2].canvas"):
+                break
+        self.assertTrue(self.js("return document.activeElement === report.panels[2].canvas"))
+        at = self.slices()
+        self.keys(Keys.ARROW_RIGHT, "]", "i", "a")
+        at = [at[0] + 1, at[1], at[2] + 1]
+        self.assertEqual(self.slices(), at)
+        (kind, *index), = self.new_marks()
+        self.assertEqual(kind, "inside")
+        self.near(index, at)
+        self.keys("z", "f")
+        self.assertEqual((self.new_marks(), self.js("return report.state.get('large')")), ([], 2))
+        self.keys("f", "?")
+        self.assertTrue(self.js("return document.querySelector('dialog.help').open"))
+        self.keys(Keys.ESCAPE)
+        self.assertFalse(self.js("return document.querySelector('dialog.help').open"))
+
+    def test_every_control_has_a_name(self):
+        self.open(self.two())
+        nameless = self.js("""
+            return [...document.querySelectorAll('button, a, input, select, canvas, summary, [role=menu], [role=region]')].filter((e) =>
+                !(e.getAttribute('aria-label') || e.textContent.trim() || e.closest('label')?.textContent.trim())).map((e) => e.outerHTML)""")
+        self.assertEqual(nameless, [])
+        unreachable = self.js("return [...document.querySelectorAll('#page button, #page a[href], #page input, #page select, #page canvas')].filter((e) => e.tabIndex < 0 && e.getAttribute('role') !== 'menuitem').map((e) => e.outerHTML)")
+        self.assertEqual(unreachable, [])
 
     def test_outline_is_where_the_surface_is(self):
         """Through the middle of a ball it is a circle: its points are as far from the middle as the mesh says."""
         self.open(self.two())
         radii = self.js("""
-            const middle = (report.volume.size[0] - 1) / 2;
+            const middle = (report.space.size[0] - 1) / 2, panel = report.panels[2], drawn = [], context = panel.canvas.getContext('2d');
             report.state.set({slices: [20, 20, Math.round(middle)]});
-            const s = report.panels[2].outline(report.data.structures[1]), radii = [];
-            for (let n = 0; n < s.length; n += 2) radii.push(Math.hypot(s[n] - middle - arguments[0], s[n + 1] - middle));
-            return [Math.min(...radii), Math.max(...radii), s.length / 4];""", 0.5 / H)
-        self.assertGreater(radii[2], 50)
-        self.assertGreater(radii[0], RADIUS / H - 2.5)
-        self.assertLess(radii[1], RADIUS / H + 1.5)
+            panel.draw();
+            // What is drawn: the places that the outline's path goes through.
+            const lineTo = context.lineTo.bind(context), moveTo = context.moveTo.bind(context);
+            let own = [];
+            context.beginPath = () => { own = []; CanvasRenderingContext2D.prototype.beginPath.call(context); };
+            context.moveTo = (x, y) => { own.push([x, y]); moveTo(x, y); };
+            context.lineTo = (x, y) => { own.push([x, y]); lineTo(x, y); };
+            context.stroke = () => { if (own.length > 40) drawn.push(own); CanvasRenderingContext2D.prototype.stroke.call(context); };
+            panel.draw();
+            for (const name of ['beginPath', 'moveTo', 'lineTo', 'stroke']) delete context[name];
+            return drawn.map((line) => line.map(([x, y]) => panel.plane.unplace(x, y)).map(([x, y]) => Math.hypot(x - middle, y - middle)));""")
+        self.assertGreaterEqual(len(radii), 2)  # of both structures
+        for line in radii:
+            self.assertGreater(min(line), RADIUS / H - 2.5)
+            self.assertLess(max(line), RADIUS / H + 2)
 
     def test_a_suggestion_is_jumped_to(self):
         half = self.inputs / "half.xyz"  # no marks above
@@ -267,16 +486,22 @@ class Browser(PageCase):
         wanted = int(buttons[0].get_attribute("data-slice"))
         self.js("report.state.set({slices: [0, 0, 0]})")
         before = self.picture()[1]
+        self.js("arguments[0].scrollIntoView({block: 'center'})", buttons[0])
         buttons[0].click()
-        self.assertEqual(self.js("return report.state.get('slices')[2]"), wanted)
-        WebDriverWait(self.driver, 10).until(lambda _: self.picture()[1] != before)
+        self.assertEqual(self.slices()[2], wanted)
+        self.assertNotEqual(self.picture()[1], before)
         self.assertEqual(buttons[0].get_attribute("aria-current"), "true")
+        count = len(self.marks())
+        self.keys(Keys.ENTER)  # on the button: that one again
+        self.js("document.activeElement.blur()")
+        self.keys(Keys.ENTER)  # the border is at the ring
+        self.assertEqual(len(self.marks()), count + 1)
 
     def test_dark_light_and_a_phone(self):
         self.open(self.two())
         back = "return getComputedStyle(document.documentElement).backgroundColor"
         first = self.js(back)
-        self.driver.find_element(By.CSS_SELECTOR, "header .icon").click()
+        self.keys("t")
         self.assertNotEqual(self.js(back), first)
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {"width": 390, "height": 844, "deviceScaleFactor": 2, "mobile": True})
         self.addCleanup(self.driver.execute_cdp_cmd, "Emulation.clearDeviceMetricsOverride", {})

@@ -82,7 +82,7 @@ function optionRows(facts, data) {
 function optionsTable(facts, data) {
   const rows = optionRows(facts, data);
   if (rows.length === 0) return null;
-  return el('div', {class: 'scroll'}, el('table', {class: 'options'},
+  return el('div', {class: 'scroll', tabindex: 0, role: 'region', 'aria-label': 'options'}, el('table', {class: 'options'},
     el('thead', {}, el('tr', {}, ['option', 'used', 'chosen', 'why'].map((head) => el('th', {scope: 'col'}, head)))),
     el('tbody', {}, rows.map((row) => el('tr', {class: row.how},
       el('th', {scope: 'row'}, row.name), el('td', {class: 'value'}, row.value), el('td', {}, el('span', {class: `tag ${row.how}`}, row.how)),
