@@ -401,6 +401,29 @@ class Browser(PageCase):
             WebDriverWait(self.driver, 20, 0.05).until(lambda _: (self.saved / name).exists())
         return set(os.listdir(self.saved))
 
+    def test_an_oblique_plane_faces_the_eye_and_shows_the_image(self):
+        self.open(self.two())
+        self.slices(20, 20, 20)
+        before = self.picture()[1]
+        self.keys("d")
+        self.assertNotEqual(self.picture()[1], before)
+        normal, eye = self.js("const v = report.view, e = v.camera.position.clone().sub(v.controls.target).normalize(); return [report.state.get('oblique').normal, e.toArray()]")
+        self.assertLess(math.dist(normal, eye), 1e-6)
+        # In the middle of the ball it is as bright as the ball, at its rim as dark as what is around it.
+        values = self.js("""
+            const {pixels} = report.view.oblique, n = Math.sqrt(pixels.length / 4), at = (x, y) => pixels[4 * (Math.round(y * (n - 1)) * n + Math.round(x * (n - 1)))];
+            return [at(0.5, 0.5), at(0.5, 0.72), at(0.72, 0.5)];""")
+        self.assertGreater(values[0], 200)
+        self.assertLess(max(values[1:]), 60)
+        self.assertGreater(self.js("return report.view.oblique.lines.geometry.getAttribute('position').count"), 100)
+        whole = self.picture()[1]
+        self.js("report.state.set({cut: 3})")
+        self.assertNotEqual(self.picture()[1], whole)
+        self.js("report.view.canvas.focus()")
+        self.keys("]")
+        moved = self.js("const o = report.state.get('oblique'), c = report.space.toWorld([20, 20, 20]); return o.center.map((x, a) => x - c[a])")
+        self.assertAlmostEqual(math.hypot(*moved), H, places=6)
+
     def test_the_table_is_sorted_and_saved(self):
         self.open(self.two())
         rows = lambda: [row.text for row in self.driver.find_elements(By.CSS_SELECTOR, ".structures-table tbody .name")]

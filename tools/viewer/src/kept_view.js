@@ -11,7 +11,7 @@ export function viewState(image, space, kept, first = {}) {
     views: isTriple(kept.views, (v) => v === null || [v.zoom, v.x, v.y].every(Number.isFinite)) ? kept.views : [null, null, null],
     window: Number.isFinite(kept.window?.black) && Number.isFinite(kept.window?.white) ? kept.window : otherwise.window,
     planes: isTriple(kept.planes, (on) => typeof on === 'boolean') ? kept.planes : otherwise.planes,
-    cut: isOneOf([0, 1, 2], kept.cut, -1), flip: kept.flip === true, large: isOneOf([0, 1, 2, 3], kept.large, -1), countFrom: isOneOf([0, 1], kept.countFrom, 0),
+    cut: isOneOf(otherwise.cuts ?? [0, 1, 2], kept.cut, -1), flip: kept.flip === true, large: isOneOf([0, 1, 2, 3], kept.large, -1), countFrom: isOneOf([0, 1], kept.countFrom, 0),
     marks: isOneOf([true, false], kept.marks, otherwise.marks ?? true),
   };
 }

@@ -2,8 +2,8 @@
 import {el} from './dom.js';
 import {icon} from './icons.js';
 
-/** `names` are the planes'; `more` are controls of one page. */
-export function sceneTools(app, view, names, more = []) {
+/** `names` are the planes'; one page may have more controls, and more [value, text] to cut at. */
+export function sceneTools(app, view, names, {more = [], cuts = []} = {}) {
   const {state} = app;
   const planes = [2, 1, 0].map((axis) => el('button', {type: 'button', class: 'small', 'data-plane': axis, 'aria-label': `slice ${names[axis]} in 3D`, onclick: () => {
     const list = [...state.get('planes')];
@@ -11,7 +11,7 @@ export function sceneTools(app, view, names, more = []) {
     state.set({planes: list});
   }}, names[axis]));
   const cut = el('select', {class: 'small', 'aria-label': 'cut the surfaces at a slice', onchange: () => state.set({cut: Number(cut.value)})},
-    [[-1, 'no cut'], ...[2, 1, 0].map((axis) => [axis, `cut ${names[axis]}`])].map(([value, text]) => el('option', {value}, text)));
+    [[-1, 'no cut'], ...[2, 1, 0].map((axis) => [axis, `cut ${names[axis]}`]), ...cuts].map(([value, text]) => el('option', {value}, text)));
   const flip = el('button', {type: 'button', class: 'small', title: 'the other half', 'aria-label': 'the other half', onclick: () => state.set({flip: !state.get('flip')})}, icon('flip'));
   const home = el('button', {type: 'button', class: 'small', title: 'reset the camera (r)', 'aria-label': 'reset the camera', onclick: () => view()?.reset()}, icon('home'));
   const large = el('button', {type: 'button', class: 'icon', title: '3D alone, and back (f)', 'aria-label': '3D alone, and back', onclick: () => state.set({large: state.get('large') === 3 ? -1 : 3})});

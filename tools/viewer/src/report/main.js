@@ -19,27 +19,28 @@ import {Store} from '../store.js';
 import {Suggestions} from '../suggest.js';
 import {themeButton} from '../theme.js';
 import {Toasts} from '../toast.js';
-import {lookBox, marksButton, suggestedPlaces, suggestionList} from './controls.js';
+import {lookBox, marksButton, obliqueButton, suggestedPlaces, suggestionList} from './controls.js';
 import {readData} from './data.js';
 import {exportMenu} from './export_menu.js';
 import {factsOf, warningsOf} from './facts.js';
 import {keyboard, SHEET} from './keyboard.js';
 import {LocalStudy} from './local_study.js';
 import {drawOverlay} from './overlay.js';
-import {ReportScene} from './scene.js';
+import {OBLIQUE, ReportScene} from './scene.js';
 import {saveTable, structureTable} from './table.js';
 import {spaceAround, Volume, VolumeSlices} from './volume.js';
 
 const MOST_MARKS = 10000;  // more hide what they lie on, at first
-const KEPT = [...VIEW_NAMES, 'tool', 'active', 'coloring', 'opacity'];
+const KEPT = [...VIEW_NAMES, 'tool', 'active', 'coloring', 'opacity', 'oblique'];
 
 const middleOf = ({mesh: {min, max}}) => min.map((x, a) => (x + max[a]) / 2);
 
 function firstState(image, space, data, kept) {
-  const view = viewState(image, space, kept, {slices: space.voxelAt(space.toIndex(middleOf(data.structures[0]))), marks: !data.structures.some((s) => s.markCount > MOST_MARKS)});
+  const view = viewState(image, space, kept, {slices: space.voxelAt(space.toIndex(middleOf(data.structures[0]))), marks: !data.structures.some((s) => s.markCount > MOST_MARKS), cuts: data.image ? [0, 1, 2, OBLIQUE] : [0, 1, 2]});
+  const isPlace = (place) => Array.isArray(place) && place.length === 3 && place.every(Number.isFinite);
   return new State({...view, grey: greyTable(image, view.window), tool: MARK_TOOLS.some(([name]) => name === kept.tool) ? kept.tool : 'crosshair',
     active: data.structures[kept.active - 1] ? kept.active : 1, coloring: colorings(data.structures).some(([name]) => name === kept.coloring) ? kept.coloring : 'structure',
-    opacity: typeof kept.opacity === 'number' && kept.opacity >= 0 && kept.opacity <= 1 ? kept.opacity : 1, selected: null, hover: null, drag: null, ring: null, suggested: 0, isAsking: false, ruler: null,
+    oblique: isPlace(kept.oblique?.normal) && isPlace(kept.oblique?.center) ? kept.oblique : null, opacity: typeof kept.opacity === 'number' && kept.opacity >= 0 && kept.opacity <= 1 ? kept.opacity : 1, selected: null, hover: null, drag: null, ring: null, suggested: 0, isAsking: false, ruler: null,
     keyPanel: 2, study: 0, meshes: 0, loaded: 0, theme: 'light'});
 }
 
@@ -86,9 +87,9 @@ function header(app, {theme, help, warnings}) {
 }
 
 /** The 3D view and the planes. */
-function stageOf(app, view) {
+function stageOf(app, view, oblique) {
   const {state, volume, space, image, panels} = app, holder = el('div', {class: 'picture'}), names = [0, 1, 2].map((axis) => volume ? planeName(space, axis, image.anatomical) : 'xyz'[axis]);
-  const three = el('section', {class: 'panel three', 'aria-label': '3D'}, sceneTools(app, view, names, [marksButton(state)]), holder, lookBox(app));
+  const three = el('section', {class: 'panel three', 'aria-label': '3D'}, sceneTools(app, view, names, {more: [volume ? oblique : null, marksButton(state)], cuts: volume ? [[OBLIQUE, 'cut oblique']] : []}), holder, lookBox(app));
   const element = el('section', {class: `stage${volume ? '' : ' alone'}`, 'aria-label': 'views'}, three, panels.length > 0 ? [panels[2].element, panels[1].element, panels[0].element] : null);
   const enlarge = () => { element.dataset.large = state.get('large'); };
   state.on(['large'], enlarge);
@@ -104,7 +105,7 @@ async function start() {
   if (volume) for (const axis of [0, 1, 2]) panels.push(new PlanePanel(axis, app, {drawOverlay, Input: MarkPointer}));
   let view = null, figures;
   const own = new Store('covol-report'), theme = themeButton(state, icon('theme'), {get: () => own.get('theme'), set: (value) => own.set('theme', value)});
-  const help = helpSheet(SHEET), status = statusRow({...app, slices: slices ?? {valueAt: () => null}}, hintsOf(MARK_TOOLS)), warnings = warningsOf(data), stage = stageOf(app, () => view);
+  const help = helpSheet(SHEET), status = statusRow({...app, slices: slices ?? {valueAt: () => null}}, hintsOf(MARK_TOOLS)), warnings = warningsOf(data), oblique = obliqueButton(state, () => view), stage = stageOf(app, () => view, oblique);
   try {
     figures = factsOf(data);
   } catch (error) {  // a report that another version wrote
@@ -121,7 +122,7 @@ async function start() {
     panel.draw();
   }
   showFocus();
-  keyboard(app, {suggestions: app.suggestions, help, theme, view: () => view});
+  keyboard(app, {suggestions: app.suggestions, help, theme, view: () => view, oblique});
   remember(state, app.kept, KEPT);
   window.covolReport = {...app, view, ready: performance.now(), done: !volume};
   if (!volume) return;
