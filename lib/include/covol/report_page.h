@@ -57,8 +57,9 @@ struct ReportPageSummary {
     std::uint64_t bytes = 0;
 };
 
-/// Writes a page for a web browser, one file that asks no host for anything: the surfaces in 3D with their marks and
-/// three slice planes, slices with outlines, and the facts of the run. The same input gives the same bytes.
+/// Writes a page for a web browser, one file that asks no host for anything: the surfaces in 3D with their marks,
+/// three planes of the image with outlines, a table of the structures, and the facts of the run; marks can be set and
+/// saved. The same input gives the same bytes.
 /// Whole or not at all: to a temporary name beside the target, then renamed.
 /// @throws Error InvalidOptions; InvalidInput (no structure, an empty mesh, facts that are no JSON object); Io;
 ///               Cancelled; what reading the image throws.
