@@ -3,7 +3,9 @@
     COVOL=build/bin/covol python3 -m unittest tests/cli/mark_page_test.py
 """
 import math
+import unittest
 
+import axe
 from mark_page_case import BALL, RADII, By, Keys, PageCase
 
 
@@ -74,6 +76,17 @@ class Marks(PageCase):
         self.hover(1, [20, 20, 10])
         self.keys("x")
         self.assertEqual(self.slices(), [20, 20, 10])
+
+    @unittest.skipIf(axe.MISSING, axe.MISSING)
+    def test_axe_finds_no_serious_fault(self):
+        self.open()
+        self.mark_ball(6)
+        for width in (1400, 400):
+            self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width == 400})
+            for _ in range(2):
+                self.assertEqual(axe.serious_faults(self.driver), [])
+                self.keys("t")
+        self.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
     def test_undo_and_redo(self):
         self.open()

@@ -14,6 +14,7 @@ import tempfile
 import unittest
 import zlib
 
+import axe
 from cli_test import CENTER, H, ORIGIN, RADIUS, SIZE, Case, ball_bytes, sphere_points, write_nrrd, write_xyz
 
 try:
@@ -475,6 +476,16 @@ class Browser(PageCase):
         self.assertEqual(nameless, [])
         unreachable = self.js("return [...document.querySelectorAll('#page button, #page a[href], #page input, #page select, #page canvas')].filter((e) => e.tabIndex < 0 && e.getAttribute('role') !== 'menuitem').map((e) => e.outerHTML)")
         self.assertEqual(unreachable, [])
+
+    @unittest.skipIf(axe.MISSING, axe.MISSING)
+    def test_axe_finds_no_serious_fault(self):
+        self.open(self.two())
+        for width in (1200, 400):
+            self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {"width": width, "height": 800, "deviceScaleFactor": 1, "mobile": width == 400})
+            for _ in range(2):
+                self.assertEqual(axe.serious_faults(self.driver), [])
+                self.keys("t")
+        self.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
     def test_outline_is_where_the_surface_is(self):
         """Through the middle of a ball it is a circle: its points are as far from the middle as the mesh says."""

@@ -1,0 +1,13 @@
+"""axe-core on a page in a browser: `npm ci` in tools/viewer brings it; without it such tests are skipped."""
+import pathlib
+
+SCRIPT = pathlib.Path(__file__).resolve().parents[2] / "tools" / "viewer" / "node_modules" / "axe-core" / "axe.min.js"
+MISSING = None if SCRIPT.exists() else "SKIPPED: axe-core is not there: npm ci in tools/viewer"
+
+
+def serious_faults(driver):
+    """What axe-core calls serious or critical: its rule and the elements."""
+    driver.execute_script(SCRIPT.read_text())
+    return driver.execute_async_script("""
+        const done = arguments[arguments.length - 1];
+        axe.run().then(({violations}) => done(violations.filter(({impact}) => ['serious', 'critical'].includes(impact)).map(({id, nodes}) => [id, nodes.map((n) => n.html.slice(0, 120))])));""")
