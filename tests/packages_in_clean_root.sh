@@ -12,8 +12,8 @@ work=$(mktemp -d "${2:-/tmp}/covol-root-XXXXXX")
 root=$work/root
 mirror=${COVOL_MIRROR:-$(apt-get indextargets --format '$(SITE)' 'Created-By: Packages' | head -1)}
 finish() {
-  umount "$root/proc" 2>/dev/null || true
-  rm -rf "$work"
+  umount --lazy "$root/proc" 2>/dev/null || true
+  rm -rf --one-file-system "$work"
 }
 trap finish EXIT
 begun=$SECONDS
