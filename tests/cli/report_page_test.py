@@ -555,7 +555,19 @@ class Browser(PageCase):
     def test_points_alone_have_no_slices(self):
         self.open(self.page_of("cloud", "reconstruct", self.points, "-o", "s.vdb"))
         self.assertGreater(self.picture()[0], 0.1)
-        self.assertEqual(self.driver.find_elements(By.CSS_SELECTOR, ".slice"), [])
+        self.assertEqual(self.driver.find_elements(By.CSS_SELECTOR, ".slice, [data-plane]"), [])
+        whole = self.picture()[1]
+        self.js("report.state.set({cut: 2})")
+        half = self.picture()[1]
+        slider = self.driver.find_element(By.CSS_SELECTOR, '[aria-label="place of the cut"]')
+        self.js("arguments[0].value = 150; arguments[0].dispatchEvent(new Event('input'))", slider)
+        self.assertEqual(len({whole, half, self.picture()[1]}), 3)
+        box = self.driver.find_element(By.CSS_SELECTOR, ".three canvas").rect
+        self.mouse(("move", round(box["x"] + box["width"] / 2), round(box["y"] + box["height"] / 2)), ("down", 0), ("up", 0), keys=[Keys.SHIFT])
+        (kind, *index), = self.new_marks()
+        self.assertEqual(kind, "surface")
+        world = self.js("return report.space.toWorld(arguments[0])", index)
+        self.assertAlmostEqual(math.dist(world, CENTER), RADIUS, delta=H)
 
     @unittest.skipUnless(os.environ.get("COVOL_DATA"), "SKIPPED: COVOL_DATA is not set")
     def test_a_stack_of_15_million_voxels_stays_small_and_opens_soon(self):

@@ -25,5 +25,5 @@ export function sceneTools(app, view, names, {more = [], cuts = []} = {}) {
   state.on(['planes', 'cut', 'flip', 'large'], update);
   update();
   return el('div', {class: 'panel-head', ondblclick: (event) => { if (!event.target.closest('button, select')) large.click(); }},
-    el('span', {class: 'chip plain'}, '3D'), el('span', {class: 'scene-tools'}, planes, cut, flip, more, home), large);
+    el('span', {class: 'chip plain'}, '3D'), el('span', {class: 'scene-tools'}, app.panels.length > 0 ? planes : [], cut, flip, more, home), large);
 }

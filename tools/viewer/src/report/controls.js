@@ -30,6 +30,21 @@ function legend(data, name) {
   return [el('span', {}, number(low, 3)), bar, el('span', {}, `${number(high, 3)}${unit}`)];
 }
 
+/** Where the surfaces are cut, on a page that has no planes which show it. */
+function cutPlace({state, space}) {
+  const slider = el('input', {type: 'range', min: 0, step: 1, 'aria-label': 'place of the cut', oninput: () => state.set({slices: state.get('slices').map((at, axis) => axis === state.get('cut') ? Number(slider.value) : at)})});
+  const row = el('label', {}, el('span', {}, 'cut at'), slider), update = () => {
+    const axis = state.get('cut');
+    row.hidden = axis < 0;
+    if (axis < 0) return;
+    slider.max = space.size[axis] - 1;
+    slider.value = state.get('slices')[axis];
+  };
+  state.on(['cut', 'slices'], update);
+  update();
+  return row;
+}
+
 /** Upon the 3D view: structures, colours, opacity. */
 export function lookBox(app) {
   const {data, state} = app, colors = colorings(data.structures), key = el('div', {class: 'legend'}), parts = [structureList(app)];
@@ -46,6 +61,7 @@ export function lookBox(app) {
   }
   const slider = el('input', {type: 'range', min: 0, max: 1, step: 0.01, value: state.get('opacity'), 'aria-label': 'opacity of the surfaces', oninput: () => state.set({opacity: Number(slider.value)})});
   parts.push(el('label', {}, el('span', {}, 'opacity'), slider));
+  if (!app.volume) parts.push(cutPlace(app));
   return el('details', {class: 'look', open: !matchMedia('(max-width: 760px)').matches}, el('summary', {}, data.structures.length > 1 ? `${data.structures.length} structures` : 'Surface'), el('div', {}, parts));
 }
 

@@ -81,7 +81,7 @@ function header(app, {theme, help, warnings}) {
   theme.className = 'tool';
   return el('header', {class: 'bar'},
     el('div', {class: 'title'}, el('span', {class: 'brand'}, 'covol'), el('h1', {title: data.title}, data.title), warnings && el('a', {class: 'badge', href: '#warnings'}, warnings.label)),
-    toolChoice(state, MARK_TOOLS), historyButtons(app, () => [study.canUndo, study.canRedo]),
+    volume ? toolChoice(state, MARK_TOOLS) : null, historyButtons(app, () => [study.canUndo, study.canRedo]),
     el('div', {class: 'tools'}, volume ? windowMenu(app) : null, suggestedPlaces(data).length > 0 ? suggestButtons(state, app.suggestions) : null),
     el('div', {class: 'tools end'}, exportMenu(app, () => saveTable(app)), theme, barButton('help', 'keys (?)', () => help.showModal())));
 }
@@ -105,7 +105,7 @@ async function start() {
   if (volume) for (const axis of [0, 1, 2]) panels.push(new PlanePanel(axis, app, {drawOverlay, Input: MarkPointer}));
   let view = null, figures;
   const own = new Store('covol-report'), theme = themeButton(state, icon('theme'), {get: () => own.get('theme'), set: (value) => own.set('theme', value)});
-  const help = helpSheet(SHEET), status = statusRow({...app, slices: slices ?? {valueAt: () => null}}, hintsOf(MARK_TOOLS)), warnings = warningsOf(data), oblique = obliqueButton(state, () => view), stage = stageOf(app, () => view, oblique);
+  const help = helpSheet(SHEET), status = statusRow({...app, slices: slices ?? {valueAt: () => null}}, volume ? hintsOf(MARK_TOOLS) : Object.fromEntries(MARK_TOOLS.map(([tool]) => [tool, 'Shift and a click on the surface: a mark']))), warnings = warningsOf(data), oblique = obliqueButton(state, () => view), stage = stageOf(app, () => view, oblique);
   try {
     figures = factsOf(data);
   } catch (error) {  // a report that another version wrote
