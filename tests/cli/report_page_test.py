@@ -348,6 +348,25 @@ class Browser(PageCase):
         self.keys("r")
         self.assertEqual(self.js("return report.state.get('views')"), [None] * 3)
 
+    def test_two_fingers_zoom_and_move_the_picture(self):
+        self.open(self.two())
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {"width": 400, "height": 850, "deviceScaleFactor": 1, "mobile": True})
+        self.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": True})
+        self.addCleanup(self.driver.execute_cdp_cmd, "Emulation.clearDeviceMetricsOverride", {})
+        self.addCleanup(self.driver.execute_cdp_cmd, "Emulation.setTouchEmulationEnabled", {"enabled": False})
+        self.js("report.panels[2].canvas.scrollIntoView({block: 'center'})")
+        x, y = self.spot(2, [20, 20, self.slices()[2]])
+        touch = lambda kind, *places: self.driver.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": a, "y": b, "id": n} for n, (a, b) in enumerate(places)]})
+        touch("touchStart", (x - 30, y))
+        touch("touchStart", (x - 30, y), (x + 30, y))
+        for n in range(1, 7):
+            touch("touchMove", (x - 30 - 5 * n, y), (x + 30 + 5 * n, y))
+        touch("touchEnd")
+        self.assertAlmostEqual(self.js("return report.state.get('views')[2]?.zoom ?? 1"), 2, delta=0.15)
+        after = self.spot(2, [20, 20, self.slices()[2]])
+        self.assertLess(math.hypot(after[0] - x, after[1] - y), 4)
+        self.assertEqual(self.new_marks(), [])
+
     def test_marks_are_set_undone_and_read_by_covol(self):
         self.open(self.two())
         self.slices(20, 20, 20)
