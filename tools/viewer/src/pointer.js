@@ -22,6 +22,8 @@ export class PlanePointer {
     canvas.addEventListener('pointerleave', () => this.leave());
     canvas.addEventListener('contextmenu', (event) => event.preventDefault());
     canvas.addEventListener('wheel', (event) => this.turn(event), {passive: false});
+    // The space bar does not scroll the page while the pointer is on a plane.
+    addEventListener('keydown', (event) => { if (event.key === ' ' && this.spot && !event.target.matches?.('button, a, input, select, summary, textarea')) event.preventDefault(); });
     // One finger scrolls the page, unless it has something to do here.
     canvas.addEventListener('touchstart', (event) => {
       const box = canvas.getBoundingClientRect(), touch = event.touches[0];
