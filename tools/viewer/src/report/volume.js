@@ -60,13 +60,17 @@ export class Volume extends ImageSpace {
   }
 }
 
-/** What the planes ask for slices. */
+/** What the planes ask for slices: all that is decoded is here, whole and in full detail, and the rest comes by itself. */
 export class VolumeSlices {
   constructor(volume) { Object.assign(this, {volume, kept: [null, null, null]}); }
 
   want() {}
 
   hasFailed() { return false; }
+
+  partial() { return null; }
+
+  late() { return null; }
 
   best(axis, at) {
     if (axis === 2 && !this.volume.decoded[at]) return null;
