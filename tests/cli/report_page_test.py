@@ -116,7 +116,9 @@ class Page(PageCase):
     def test_frames_have_a_page_each(self):
         self.run_covol("segment", self.image, self.image, "--points", self.few, *COARSE, "-o", "s.vdb", "--report", "s.html")
         self.assertEqual([name for name in self.files() if name.endswith(".html")], ["s_t000.html", "s_t001.html"])
-        self.assertEqual(data_of(self.out / "s_t001.html")["title"], "ball.nrrd_t001")
+        second = data_of(self.out / "s_t001.html")
+        self.assertEqual(second["title"], "ball.nrrd_t001")
+        self.assertEqual(second["frames"], {"at": 1, "pages": ["s_t000.html", "s_t001.html"]})
 
     def test_letters_are_for_patients(self):
         import nibabel
@@ -443,6 +445,22 @@ class Browser(PageCase):
         self.keys("]")
         moved = self.js("const o = report.state.get('oblique'), c = report.space.toWorld([20, 20, 20]); return o.center.map((x, a) => x - c[a])")
         self.assertAlmostEqual(math.hypot(*moved), H, places=6)
+
+    def test_frames_are_gone_through_and_seen_in_the_same_way(self):
+        pages = [self.pages / f"frames_t00{n}.html" for n in range(2)]
+        self.run_covol("segment", self.image, self.image, "--points", self.few, *COARSE, "-o", "s.vdb", "--report", self.pages / "frames.html")
+        self.open(pages[0])
+        self.slices(9, 21, 14)
+        self.js("report.panels[2].zoomAt(3); report.view.rotate(1, 0)")
+        camera = self.js("return report.view.camera.position.toArray()")
+        self.keys(".")
+        WebDriverWait(self.driver, 60).until(lambda d: d.current_url == pages[1].as_uri() and d.execute_script("return Boolean(window.covolReport?.done)"))
+        self.assertEqual((self.slices(), self.js("return Math.round(report.state.get('views')[2].zoom)")), ([9, 21, 14], 3))
+        self.assertLess(math.dist(self.js("return report.view.camera.position.toArray()"), camera), 1e-4)
+        slider = self.driver.find_element(By.CSS_SELECTOR, ".frames input")
+        self.assertEqual(slider.get_attribute("value"), "1")
+        self.js("arguments[0].value = 0; arguments[0].dispatchEvent(new Event('change'))", slider)
+        WebDriverWait(self.driver, 60).until(lambda d: d.current_url == pages[0].as_uri() and d.execute_script("return Boolean(window.covolReport?.done)"))
 
     def test_the_table_is_sorted_and_saved(self):
         self.open(self.two())

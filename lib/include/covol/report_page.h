@@ -31,6 +31,9 @@ struct ReportPage {
     std::string unit;              ///< of lengths; empty: unknown
     /// World axes are anatomical (LPS): the page writes letters at the edges of its views.
     bool is_anatomical = false;
+    /// Of a time-lapse: the file names of all frames' pages, which lie in one folder, and which of them this one is.
+    std::vector<std::string> frames;
+    std::size_t frame = 0;
 };
 
 struct ReportPageOptions {

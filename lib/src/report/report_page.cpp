@@ -132,6 +132,10 @@ Json to_json(const Image& image, const detail::SlicePlan& plan, const Vec3& orig
 void check(const ReportPage& page, const ReportPageOptions& options) {
     require_valid(options, "write_report_page");
     if (page.structures.empty()) throw Error(Errc::InvalidInput, "write_report_page: expected a structure, got none");
+    if (!page.frames.empty() && page.frame >= page.frames.size())
+        throw Error(Errc::InvalidInput, "write_report_page: frame: expected less than " +
+                                            std::to_string(page.frames.size()) + ", the number of frames, got " +
+                                            std::to_string(page.frame));
     for (const PageStructure& structure : page.structures)
         if (structure.mesh == nullptr || structure.mesh->empty())
             throw Error(Errc::InvalidInput,
@@ -150,6 +154,11 @@ Json data_of(const ReportPage& page, const ReportPageOptions& options, ReportPag
               {"origin", to_json(origin_of(page))},
               {"facts", std::move(facts)},
               {"structures", Json::array()}};
+    if (page.frames.size() > 1) {
+        Json names = Json::array();
+        for (const std::string& name : page.frames) names.push_back(safe_text(name));
+        data["frames"] = {{"at", page.frame}, {"pages", std::move(names)}};
+    }
     double all = 0;
     for (const PageStructure& structure : page.structures) all += double(structure.mesh->triangles.size());
     for (const PageStructure& structure : page.structures) {

@@ -1,6 +1,7 @@
 #pragma once
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace covol::tool {
 
@@ -22,6 +23,7 @@ namespace covol::tool {
 struct NameTag {
     std::string suffix;
     std::optional<int> frame;
+    std::vector<NameTag> series = {};  ///< of a time-lapse those of all frames, in order
     /// Of an empty path an empty one.
     [[nodiscard]] std::string operator()(const std::string& path) const;
 };

@@ -47,9 +47,7 @@ void write_page(const std::string& path, const ReportPage& page, Session& sessio
     session.note(text.str());
 }
 
-void write_page(const std::string& path, const StructuresOutput& output, const std::string& title, Session& session) {
-    ReportPage page;
-    page.title = title;
+void write_page(const std::string& path, const StructuresOutput& output, ReportPage page, Session& session) {
     Json facts = page_facts(session);
     facts.update(to_json(output), true);
     std::vector<Evidence> distances(output.structures.size());  // of points without an image

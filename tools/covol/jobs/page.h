@@ -19,7 +19,7 @@ namespace covol::tool {
 /// Writes the page, and tells of it in the report and in a note.
 void write_page(const std::string& path, const ReportPage& page, Session& session);
 
-/// What came out of a run.
-void write_page(const std::string& path, const StructuresOutput& output, const std::string& title, Session& session);
+/// What came out of a run; `page` has a title, and of a time-lapse its frames.
+void write_page(const std::string& path, const StructuresOutput& output, ReportPage page, Session& session);
 
 }  // namespace covol::tool

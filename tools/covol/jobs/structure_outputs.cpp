@@ -294,9 +294,14 @@ void hand_over(const SegmentJob& job, const std::shared_ptr<const StructuresOutp
         write_text(file, evidence_csv(surfaces), session.run());
     });
     // The last one, so that it tells of as much as there is to tell.
-    sink(tagged(job.page_path), [output, &session, title = title_of(job) + tagged.suffix](const std::string& file) {
-        write_page(file, *output, title, session);
-    });
+    ReportPage page;
+    page.title = title_of(job) + tagged.suffix;
+    for (const NameTag& frame : tagged.series) {
+        if (frame.frame == tagged.frame) page.frame = page.frames.size();
+        page.frames.push_back(std::filesystem::path(frame(job.page_path)).filename().string());
+    }
+    sink(tagged(job.page_path),
+         [output, &session, page](const std::string& file) { write_page(file, *output, page, session); });
 }
 
 Json to_json(const StructuresOutput& output) {

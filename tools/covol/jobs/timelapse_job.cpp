@@ -83,6 +83,12 @@ private:
         return {"_t" + padded(frame.number, digits), frame.number};
     }
 
+    [[nodiscard]] NameTag tag_in_series(const Frame& frame) const {
+        NameTag own = tag(frame);
+        for (const Frame& other : frames_) own.series.push_back(tag(other));
+        return own;
+    }
+
     void check() {
         for (const Frame& frame : frames_) {
             std::vector<std::string> read{frame.path};
@@ -129,7 +135,7 @@ private:
         Json report{{"frame", frame.number}, {"image", frame.path}};
         try {
             const auto output = std::make_shared<StructuresOutput>(segment_frame(frame, who));
-            hand_over(job_, output, tag(frame), session_, [&](const std::string& path, auto write) {
+            hand_over(job_, output, tag_in_series(frame), session_, [&](const std::string& path, auto write) {
                 if (session_.outputs().write(path, write)) session_.note("wrote " + path);
             });
             add_to_scene(scene_, job_, *output, tag(frame));

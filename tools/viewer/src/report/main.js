@@ -23,6 +23,7 @@ import {lookBox, marksButton, obliqueButton, suggestedPlaces, suggestionList} fr
 import {readData} from './data.js';
 import {exportMenu} from './export_menu.js';
 import {factsOf, warningsOf} from './facts.js';
+import {frameBar} from './frames.js';
 import {keyboard, SHEET} from './keyboard.js';
 import {LocalStudy} from './local_study.js';
 import {drawOverlay} from './overlay.js';
@@ -55,7 +56,8 @@ function appOf(data, digest) {
   const base = data.origin ?? [0, 0, 0], volume = data.image ? new Volume(data.image, base) : null, space = volume ?? spaceAround(data.structures, base);
   const {black, white} = data.image ?? {black: 0, white: 1}, image = {black, white, low: black, high: white, anatomical: data.anatomical};
   for (const structure of data.structures) Object.assign(structure, {index: indexCoordinates(structure.positions, space), isShown: true});
-  const view = new Store(`covol-report/${digest}`, () => sessionStorage), kept = Object.fromEntries(KEPT.map((name) => [name, view.get(name)]));
+  // All frames of a time-lapse are looked at in the same way.
+  const view = new Store(`covol-report/${data.frames ? `${location.pathname.replace(/[^/]*$/, '')}${data.frames.pages[0]}` : digest}`, () => sessionStorage), kept = Object.fromEntries(KEPT.map((name) => [name, view.get(name)]));
   const state = firstState(image, space, data, kept), study = new LocalStudy(data.structures, new Store(`covol-report/${digest}`)), toasts = new Toasts();
   const app = {data, image, volume, space, unitText: data.unitText, state, study, toasts, kept: view, panels: [], slices: volume && new VolumeSlices(volume),
     meshes: {get: (id) => data.structures[id - 1] ?? null}, toast: (text, kind) => toasts.show(text, kind), keep: (name, value) => view.set(name, value)};
@@ -76,13 +78,14 @@ function appOf(data, digest) {
   return app;
 }
 
-function header(app, {theme, help, warnings}) {
+function header(app, {theme, help, warnings, frames}) {
   const {state, study, volume, data} = app;
   theme.className = 'tool';
   return el('header', {class: 'bar'},
     el('div', {class: 'title'}, el('span', {class: 'brand'}, 'covol'), el('h1', {title: data.title}, data.title), warnings && el('a', {class: 'badge', href: '#warnings'}, warnings.label)),
     volume ? toolChoice(state, MARK_TOOLS) : null, historyButtons(app, () => [study.canUndo, study.canRedo]),
     el('div', {class: 'tools'}, volume ? windowMenu(app) : null, suggestedPlaces(data).length > 0 ? suggestButtons(state, app.suggestions) : null),
+    frames?.element ?? null,
     el('div', {class: 'tools end'}, exportMenu(app, () => saveTable(app)), theme, barButton('help', 'keys (?)', () => help.showModal())));
 }
 
@@ -104,6 +107,7 @@ async function start() {
   if (volume) await volume.decodeSlice(state.get('slices')[2]);
   if (volume) for (const axis of [0, 1, 2]) panels.push(new PlanePanel(axis, app, {drawOverlay, Input: MarkPointer}));
   let view = null, figures;
+  const frames = frameBar(data.frames);
   const own = new Store('covol-report'), theme = themeButton(state, icon('theme'), {get: () => own.get('theme'), set: (value) => own.set('theme', value)});
   const help = helpSheet(SHEET), status = statusRow({...app, slices: slices ?? {valueAt: () => null}}, volume ? hintsOf(MARK_TOOLS) : Object.fromEntries(MARK_TOOLS.map(([tool]) => [tool, 'Shift and a click on the surface: a mark']))), warnings = warningsOf(data), oblique = obliqueButton(state, () => view), stage = stageOf(app, () => view, oblique);
   try {
@@ -111,7 +115,7 @@ async function start() {
   } catch (error) {  // a report that another version wrote
     figures = el('p', {class: 'notice'}, `The figures of this run cannot be shown: ${error.message}.`);
   }
-  document.getElementById('page').replaceChildren(header(app, {theme, help, warnings}), el('main', {}, stage.element, status.element,
+  document.getElementById('page').replaceChildren(header(app, {theme, help, warnings, frames}), el('main', {}, stage.element, status.element,
     el('div', {class: 'below'}, suggestionList(app), warnings?.element, structureTable(app), figures)), app.toasts.element, help);
   view = stageIn(stage.holder, {label: 'the surfaces in 3D: drag or arrow keys turn them, a click brings the planes there, Shift+click sets a mark', triad: axisTriad(data.anatomical), scale: scaleBar(data.unitText),
     otherwise: volume ? 'The slices beside it work.' : 'The figures below work.'}, (canvas) => new ReportScene(canvas, app));
@@ -122,7 +126,7 @@ async function start() {
     panel.draw();
   }
   showFocus();
-  keyboard(app, {suggestions: app.suggestions, help, theme, view: () => view, oblique});
+  keyboard(app, {suggestions: app.suggestions, help, theme, view: () => view, oblique, frames});
   remember(state, app.kept, KEPT);
   window.covolReport = {...app, view, ready: performance.now(), done: !volume};
   if (!volume) return;
