@@ -68,7 +68,7 @@ export class VolumeSlices {
 
   hasFailed() { return false; }
 
-  partial() { return null; }
+  partFor() { return null; }
 
   late() { return null; }
 
