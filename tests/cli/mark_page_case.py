@@ -26,7 +26,8 @@ CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 SIZE, SPACING, ORIGIN = (96, 80, 60), (0.8, 0.8, 1.4), (-31, 12, 5)
 BALL = (34, 42, 30)  # the middle of the bright body, and how far its surface is
 RADII = (20, 24, 13)
-FLAGS = ["--headless=new", "--no-sandbox", "--enable-unsafe-swiftshader", "--use-angle=swiftshader", "--no-first-run", "--disable-quic",
+# Pages are put together by the processor, as on a computer without a graphics card; SwiftShader is for WebGL alone.
+FLAGS = ["--headless=new", "--disable-gpu-compositing", "--no-sandbox", "--enable-unsafe-swiftshader", "--use-angle=swiftshader", "--no-first-run", "--disable-quic",
          "--disable-background-networking", "--disable-component-update", "--disable-sync", "--window-size=1400,900"]
 
 

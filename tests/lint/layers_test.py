@@ -12,7 +12,7 @@ LAYERS = [
     {"base": ["api", "version", "fwd", "error", "option_names", "options_table", "run", "domain", "safe_text"], "scheme": []},
     {"files": ["file_set"], "limits": []},
     {"grid": [], "mesh": ["mesh"], "io": ["vdb_io"], "io/pixels": ["image"]},
-    {"image": ["image_stream", "points"], "io/chunked": [], "io/modules": []},
+    {"image": ["image_stream", "image_levels", "points"], "io/chunked": [], "io/modules": []},
     {"io/hdf5": []},
     {"io/image": [], "io/mesh": ["mesh_io"], "distance": ["distance"]},
     {"io/reader": [], "io/write": [], "io/points": ["points_text", "point_array"], "clip": ["clip"], "edge": ["edge"], "redistance": []},

@@ -1,5 +1,7 @@
 #include "serve/http_connection.h"
 
+#include <sys/socket.h>
+
 #include <boost/asio/post.hpp>
 #include <boost/beast/http/read.hpp>
 #include <boost/beast/http/write.hpp>
@@ -69,11 +71,14 @@ void HttpConnection::on_read(beast::error_code status) {
 
 void HttpConnection::call_handler(Request request) {
     stream_.expires_never();
+    const auto gone = std::make_shared<std::atomic<bool>>(false);
+    request.gone = gone;
+    watch(gone);
     asio::post(hub_.get_pool, [self = self(), request = std::move(request)]() mutable {
         Hub& hub = self->hub_;
         Response response;
         try {
-            if (!hub.is_stopping)
+            if (!hub.is_stopping && !*request.gone)
                 response = hub.handlers.get ? hub.handlers.get(request) : refusal(404, "There is nothing here.");
             if (const std::string why = why_unsendable(response); !why.empty()) {
                 hub.report(request.path + ": " + why);
@@ -85,8 +90,21 @@ void HttpConnection::call_handler(Request request) {
         }
         // Moved: the socket is to be destroyed on its own thread.
         asio::post(hub.io, [self = std::move(self), response = std::move(response)]() mutable {
+            beast::error_code ignored;
+            self->stream_.socket().cancel(ignored);  // the watch: the next request is read at once when it comes
             self->answer(std::move(response), self->wants_to_stay());
         });
+    });
+}
+
+// A page that is turned to another slice closes the connection on which it waits for this one: its place is free then.
+void HttpConnection::watch(std::shared_ptr<std::atomic<bool>> gone) {
+    stream_.socket().async_wait(asio::ip::tcp::socket::wait_read, [self = self(), gone](beast::error_code status) {
+        char next = 0;
+        // Bytes that are there belong to the next request.
+        if (status || ::recv(self->stream_.socket().native_handle(), &next, 1, MSG_PEEK | MSG_DONTWAIT) != 0) return;
+        *gone = true;
+        self->finish();
     });
 }
 

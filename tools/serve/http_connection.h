@@ -35,6 +35,7 @@ private:
     }
     void on_read(boost::beast::error_code status);
     void call_handler(Request request);
+    void watch(std::shared_ptr<std::atomic<bool>> gone);
     void open_live();
     [[nodiscard]] bool wants_to_stay() const;
     /// @param keep  whether the connection stays open

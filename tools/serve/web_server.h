@@ -1,4 +1,5 @@
 #pragma once
+#include <atomic>
 #include <chrono>
 #include <compare>
 #include <cstddef>
@@ -19,6 +20,8 @@ namespace covol::serve {
 struct Request {
     std::string path;                          ///< decoded, begins with '/'
     std::map<std::string, std::string> query;  ///< decoded, UTF-8 without NUL
+    /// Becomes true if the client closes the connection before it has the answer: nobody waits for it any more.
+    std::shared_ptr<const std::atomic<bool>> gone{};
 };
 
 /// What a handler answers. The server adds the length and all headers that protect the page.

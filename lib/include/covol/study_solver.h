@@ -15,7 +15,8 @@ struct StudyResult {
     enum class Stage {
         Empty,    ///< there is no surface yet: `message` says what is missing
         Working,  ///< `progress` of the next one
-        First,    ///< the last surface, moved to the marks; without one, the surface through the marks alone
+        First,  ///< the last surface, moved to the marks; without one, the surface through the marks alone; of a large
+                ///< structure in voxels of twice the size
         Refined,  ///< as `covol segment` gives it
         Failed    ///< `message` says why; the last surface stays as it is
     };
@@ -36,9 +37,10 @@ struct StudyResult {
 /// decided by who asks for all of them together.
 class StudySolver {
 public:
+    /// @param image  gives the one that a surface is made from, on the solver's thread
     /// @param told  called from the solver's thread, one result at a time; it must not call the solver
-    COVOL_API StudySolver(Image image, SegmentOptions options, std::function<void(const StudyResult&)> told,
-                          const RunContext& run = {});
+    COVOL_API StudySolver(std::function<Image()> image, SegmentOptions options,
+                          std::function<void(const StudyResult&)> told, const RunContext& run = {});
     /// Cancels what runs.
     COVOL_API ~StudySolver();
     StudySolver(const StudySolver&) = delete;

@@ -26,42 +26,102 @@ void append(std::vector<std::uint8_t>& bytes, T value) {
     for (int n = 0; n < 4; ++n) bytes.push_back(std::uint8_t(bits >> (8 * n)));
 }
 
-}  // namespace
+/// Where the pixels of a slice lie in a level of the image.
+struct SlicePlan {
+    std::size_t level = 0, along = 2, right = 0, down = 1;
+    std::int32_t at = 0;                ///< the level's voxel
+    Index3 size{0, 0, 0};               ///< of the level
+    std::int32_t across = 1, rows = 1;  ///< the level's voxels of a pixel, right and down
+    SliceRequest::Part part;            ///< of the slice's pixels
+};
 
-PageSlice make_page_slice(const Image& image, int axis, int at, int step, const std::array<double, 2>& range,
-                          const RunContext& run) {
-    if (axis < 0 || axis > 2) throw Error(Errc::InvalidOptions, "slice: expected an axis 0, 1 or 2");
-    const VoxelBox& held = image.held();
-    const std::size_t along = std::size_t(axis), right = axis == 0 ? 1 : 0, down = axis == 2 ? 1 : 2;
-    if (at < held.min[along] || at > held.max[along] || step < 1 || step > (1 << 20))
+SlicePlan plan_slice(const ImageLevels& image, const SliceRequest& wanted) {
+    if (wanted.axis < 0 || wanted.axis > 2) throw Error(Errc::InvalidOptions, "slice: expected an axis 0, 1 or 2");
+    SlicePlan plan;
+    plan.along = std::size_t(wanted.axis);
+    plan.right = wanted.axis == 0 ? 1 : 0;
+    plan.down = wanted.axis == 2 ? 1 : 2;
+    const Index3& whole = image.levels().front().size;
+    if (wanted.at < 0 || wanted.at >= whole[plan.along] || wanted.step < 1 || wanted.step > (1 << 20))
         throw Error(Errc::InvalidOptions, "slice: it lies outside of the image");
-    VoxelBox slice = held;
-    slice.min[along] = slice.max[along] = at;
-    if (image.chunks()) image.load(slice, run);
-    const int across = slice.size()[right], rows = slice.size()[down];
-    PageSlice coded{(across + step - 1) / step, (rows + step - 1) / step, {}};
-    std::vector<std::uint8_t> bytes(2 * std::size_t(coded.width) * std::size_t(coded.height));
+    plan.level = image.level_for(wanted.step);
+    const ImageLevels::Level& level = image.levels()[plan.level];
+    plan.size = level.size;
+    plan.at = std::min(wanted.at / level.factor[plan.along], level.size[plan.along] - 1);
+    plan.across = wanted.step / level.factor[plan.right];
+    plan.rows = wanted.step / level.factor[plan.down];
+    const int width = (whole[plan.right] + wanted.step - 1) / wanted.step;
+    const int height = (whole[plan.down] + wanted.step - 1) / wanted.step;
+    plan.part = wanted.part.value_or(SliceRequest::Part{0, 0, width, height});
+    SliceRequest::Part& part = plan.part;
+    if (part.x < 0 || part.y < 0 || part.x >= width || part.y >= height || part.width < 1 || part.height < 1)
+        throw Error(Errc::InvalidOptions, "slice: its part lies outside of the image");
+    part.width = std::min(part.width, width - part.x);
+    part.height = std::min(part.height, height - part.y);
+    return plan;
+}
+
+/// The first and last voxel of a pixel. A coarse level may lack the image's last voxels: then its own last one counts.
+std::array<std::int32_t, 2> voxels_of(std::int32_t pixel, std::int32_t step, std::int32_t size) {
+    const std::int32_t first = std::int32_t(std::min(std::int64_t(pixel) * step, std::int64_t(size) - 1));
+    return {first, std::int32_t(std::min(std::int64_t(first) + step, std::int64_t(size)) - 1)};
+}
+
+/// Pixels of rows `first` to `last`, from as many of the level's voxels as that takes.
+void code_rows(const ImageLevels& image, const SlicePlan& plan, int first, int last, const std::array<double, 2>& range,
+               std::uint8_t* out, const RunContext& run) {
+    const SliceRequest::Part& part = plan.part;
+    VoxelBox box;
+    box.min[plan.along] = box.max[plan.along] = plan.at;
+    box.min[plan.right] = voxels_of(part.x, plan.across, plan.size[plan.right])[0];
+    box.max[plan.right] = voxels_of(part.x + part.width - 1, plan.across, plan.size[plan.right])[1];
+    box.min[plan.down] = voxels_of(part.y + first, plan.rows, plan.size[plan.down])[0];
+    box.max[plan.down] = voxels_of(part.y + last, plan.rows, plan.size[plan.down])[1];
+    const std::int64_t row = box.size()[plan.right];
+    std::vector<float> values(std::size_t(row) * std::size_t(box.size()[plan.down]));
+    image.copy(plan.level, box, values.data(), run);
     const double scale = range[1] > range[0] ? kMostCode / (range[1] - range[0]) : 0;
-    tbb::parallel_for(0, coded.height, [&](int y) {
-        VoxelBox box = slice;
-        box.min[down] = slice.min[down] + y * step;
-        box.max[down] = std::min(box.min[down] + step - 1, slice.max[down]);
-        const int lines = box.max[down] - box.min[down] + 1;
-        std::vector<float> values(std::size_t(across) * std::size_t(lines));
-        image.copy(box, values.data());
-        std::uint8_t* out = bytes.data() + 2 * std::size_t(y) * std::size_t(coded.width);
-        for (int x = 0; x < coded.width; ++x) {
-            const int first = x * step, last = std::min(first + step, across);
+    for (int y = first; y <= last; ++y) {
+        const auto [top, bottom] = voxels_of(part.y + y, plan.rows, plan.size[plan.down]);
+        for (int x = 0; x < part.width; ++x) {
+            const auto [left, right] = voxels_of(part.x + x, plan.across, plan.size[plan.right]);
             double sum = 0;
-            for (int line = 0; line < lines; ++line)
-                for (int n = first; n < last; ++n)
-                    sum += double(values[std::size_t(line) * std::size_t(across) + std::size_t(n)]);
-            const double mean = sum / (double(last - first) * lines);
+            for (std::int32_t j = top; j <= bottom; ++j) {
+                const float* from = values.data() + (j - box.min[plan.down]) * row;
+                for (std::int32_t i = left; i <= right; ++i) sum += double(from[i - box.min[plan.right]]);
+            }
+            const double mean = sum / (double(right - left + 1) * (bottom - top + 1));
             const auto code = std::uint16_t(std::lround(std::clamp((mean - range[0]) * scale, 0.0, kMostCode)));
             *out++ = std::uint8_t(code & 255U);
             *out++ = std::uint8_t(code >> 8U);
         }
+    }
+}
+
+}  // namespace
+
+PageSlice make_page_slice(const ImageLevels& image, const SliceRequest& wanted, const std::array<double, 2>& range,
+                          const RunContext& run) {
+    const SlicePlan plan = plan_slice(image, wanted);
+    const int width = plan.part.width, height = plan.part.height;
+    if (!image.is_in_chunks() && image.image().chunks()) {  // a packed stream: its layers are decoded once
+        VoxelBox slice = image.image().held();
+        slice.min[plan.along] = slice.max[plan.along] = plan.at;
+        image.image().load(slice, run);
+    }
+    const Index3& factor = image.levels()[plan.level].factor;
+    PageSlice coded{width, height, *std::max_element(factor.begin(), factor.end()), {}};
+    const std::size_t bytes_of_row = 2 * std::size_t(width);
+    std::vector<std::uint8_t> bytes(bytes_of_row * std::size_t(height));
+    // Of an image in chunks so many rows at once that each chunk is looked up once; more would take much memory.
+    const int chunk = image.is_in_chunks() ? std::max(1, image.chunk_size(plan.level)[plan.down] / plan.rows) : 1;
+    const int offset = plan.part.y % chunk;
+    tbb::parallel_for(0, (offset + height - 1) / chunk + 1, [&](int n) {
+        const int first = std::max(0, n * chunk - offset), last = std::min(height, (n + 1) * chunk - offset) - 1;
+        if (!run.cancelled())
+            code_rows(image, plan, first, last, range, bytes.data() + bytes_of_row * std::size_t(first), run);
     });
+    run.check();
     coded.bytes = detail::deflated(bytes, kFast);
     return coded;
 }

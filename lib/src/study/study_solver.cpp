@@ -19,6 +19,7 @@ namespace covol {
 namespace {
 
 constexpr std::size_t kFewestMarks = 4;  // a surface through fewer is any surface
+constexpr double kManyVoxels = 1e5;      // of a surface's band: more take longer than a person should wait
 
 double seconds_since(std::chrono::steady_clock::time_point begin) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -50,6 +51,25 @@ std::string missing(const StudyStructure& structure) {
            (more == 1 ? " mark more and there is a surface" : " marks more and there is a surface");
 }
 
+/// About how many voxels of edge h the surface takes: as many as the one before, else as a body that fills the box of
+/// the marks.
+double voxels_of_band(const StudyStructure& structure, const SegmentResult* before, double h) {
+    if (before != nullptr) {
+        const double own = before->report.domain.voxel_size;
+        return double(before->report.active_voxels) * own * own / (h * h);
+    }
+    std::vector<Vec3> places;
+    for (const StudyMark& mark : structure.marks)
+        if (mark.kind == MarkKind::Surface) places.push_back(mark.world);
+    for (const StudyOutline& outline : structure.outlines)
+        places.insert(places.end(), outline.world.begin(), outline.world.end());
+    const WorldBox box = bounding_box(places);
+    double area = 0;
+    for (std::size_t a = 0; a < 3; ++a)
+        area += 2 * (box.max[a] - box.min[a]) * (box.max[(a + 1) % 3] - box.min[(a + 1) % 3]);
+    return 2 * kHalfWidthVoxels * area / (h * h);
+}
+
 }  // namespace
 
 struct StudySolver::State {
@@ -58,10 +78,10 @@ struct StudySolver::State {
         std::uint64_t sequence = 0;
     };
 
-    State(Image i, SegmentOptions o, std::function<void(const StudyResult&)> t, const RunContext& r)
+    State(std::function<Image()> i, SegmentOptions o, std::function<void(const StudyResult&)> t, const RunContext& r)
         : image(std::move(i)), options(std::move(o)), told(std::move(t)), run(r) {
         run.cancel = &cancel;
-        if (!options.voxel_size) options.voxel_size = choose_voxel_size(image).voxel_size;
+        if (!options.voxel_size) options.voxel_size = choose_voxel_size(image()).voxel_size;
     }
 
     void work() {
@@ -100,6 +120,7 @@ struct StudySolver::State {
         }
         const auto begin = std::chrono::steady_clock::now();
         tell(StudyResult::Stage::Working);
+        Image pixels;
         const auto find = [&](const SegmentOptions& how, StudyResult::Stage stage) {
             RunContext own = run;
             own.progress = [&, last = begin](const std::string&, double fraction) mutable {
@@ -109,7 +130,7 @@ struct StudySolver::State {
                 result.progress = fraction;
                 tell(StudyResult::Stage::Working);
             };
-            StructuresResult all = segment_structures(image, {marks_of(*job.structure)}, {how, {}}, own);
+            StructuresResult all = segment_structures(pixels, {marks_of(*job.structure)}, {how, {}}, own);
             SegmentResult found = std::move(all.structures.front().result);
             if (found.mesh.empty()) found.mesh = extract_mesh(*found.surface, {}, own);
             result.surface = std::make_shared<const SegmentResult>(std::move(found));
@@ -120,10 +141,13 @@ struct StudySolver::State {
             result.surface.reset();
         };
         try {
+            pixels = image();
             SegmentOptions first = options;
             first.evolve.rho = 0;
             first.without_mesh = first.without_fields = true;  // good triangles take as long as the surface itself
-            if (const auto before = newest(result.structure)) first.guess = LevelSetStart{before->surface};
+            const auto before = newest(result.structure);
+            if (before) first.guess = LevelSetStart{before->surface};
+            if (voxels_of_band(*job.structure, before.get(), *first.voxel_size) > kManyVoxels) *first.voxel_size *= 2;
             try {
                 find(first, StudyResult::Stage::First);
             } catch (const Error& error) {
@@ -160,7 +184,7 @@ struct StudySolver::State {
         if (running == structure) is_obsolete = true;
     }
 
-    const Image image;
+    const std::function<Image()> image;
     SegmentOptions options;
     const std::function<void(const StudyResult&)> told;
     RunContext run;
@@ -175,8 +199,8 @@ struct StudySolver::State {
     std::thread worker;
 };
 
-StudySolver::StudySolver(Image image, SegmentOptions options, std::function<void(const StudyResult&)> told,
-                         const RunContext& run)
+StudySolver::StudySolver(std::function<Image()> image, SegmentOptions options,
+                         std::function<void(const StudyResult&)> told, const RunContext& run)
     : state_(std::make_unique<State>(std::move(image), std::move(options), std::move(told), run)) {
     state_->worker = std::thread([state = state_.get()] { state->work(); });
 }

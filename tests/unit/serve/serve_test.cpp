@@ -2,6 +2,7 @@
 #include <fcntl.h>
 #include <sys/stat.h>
 
+#include <atomic>
 #include <catch2/catch.hpp>
 #include <condition_variable>
 #include <thread>
@@ -292,6 +293,30 @@ TEST_CASE("connections without a request are closed after a while") {
     CHECK(silent.is_at_end());
     CHECK(half.is_at_end());
     CHECK(kept.is_at_end());
+}
+
+TEST_CASE("a handler learns that nobody waits for its answer any more") {
+    std::atomic<int> left{0}, stayed{0};
+    Gate gate;
+    Handlers handlers;
+    handlers.get = [&](const Request& request) {
+        gate.wait();
+        if (request.path == "/left") left = soon([&] { return request.gone->load(); }) ? 1 : -1;
+        if (request.path == "/stayed") stayed = *request.gone ? -1 : 1;
+        return page(request);
+    };
+    const Site site(handlers, {});
+    Wire patient(site.port);
+    patient.send(site.head("/stayed") + site.head("/stayed"));  // the second one waits for its turn
+    {
+        Wire hasty(site.port);
+        hasty.send(site.head("/left"));
+        REQUIRE(soon([&] { return gate.waiting() == 2; }));
+    }
+    gate.open();
+    for (int n = 0; n < 2; ++n) CHECK(patient.receive().body() == "/stayed");
+    CHECK(soon([&] { return left == 1; }));
+    CHECK(stayed == 1);
 }
 
 TEST_CASE("two servers do not know each other's browsers") {

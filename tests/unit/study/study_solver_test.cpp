@@ -70,7 +70,7 @@ struct Listener {
 
 TEST_CASE("A structure gets a first surface, and then the one that segment gives") {
     Listener listener;
-    StudySolver solver(scene(), {}, listener.told());
+    StudySolver solver(scene, {}, listener.told());
     solver.solve(ball(3, 25), 11);
     solver.wait();
     const auto first = listener.of(3, Stage::First), refined = listener.of(3, Stage::Refined);
@@ -87,7 +87,7 @@ TEST_CASE("A structure gets a first surface, and then the one that segment gives
 
 TEST_CASE("Too few marks are told, and no surface is left") {
     Listener listener;
-    StudySolver solver(scene(), {}, listener.told());
+    StudySolver solver(scene, {}, listener.told());
     solver.solve(ball(1, 20), 1);
     solver.wait();
     CHECK(solver.surface(1) != nullptr);
@@ -101,7 +101,7 @@ TEST_CASE("Too few marks are told, and no surface is left") {
 
 TEST_CASE("The first surface after a change is the last one moved to the marks") {
     Listener listener;
-    StudySolver solver(scene(), {}, listener.told());
+    StudySolver solver(scene, {}, listener.told());
     solver.solve(ball(1, 25), 1);
     solver.wait();
     auto moved = std::make_shared<StudyStructure>(*ball(1, 25));
@@ -115,7 +115,7 @@ TEST_CASE("The first surface after a change is the last one moved to the marks")
 
 TEST_CASE("Every structure is solved in the end, the newest marks last, whatever was cancelled on the way") {
     Listener listener;
-    StudySolver solver(scene(), {}, listener.told());
+    StudySolver solver(scene, {}, listener.told());
     for (std::uint64_t n = 1; n <= 12; ++n)
         for (const StudyId id : {1, 2, 3}) solver.solve(ball(id, 15 + int(n)), n);
     solver.forget(2);
@@ -133,7 +133,7 @@ TEST_CASE("Every structure is solved in the end, the newest marks last, whatever
 TEST_CASE("A solver that is gone stops at once") {
     Listener listener;
     {
-        StudySolver solver(scene(), {}, listener.told());
+        StudySolver solver(scene, {}, listener.told());
         for (const StudyId id : {1, 2, 3, 4, 5}) solver.solve(ball(id, 30), 1);
     }
     CHECK(listener.of(1, Stage::Refined).empty());

@@ -2,14 +2,17 @@
 #include <filesystem>
 #include <iostream>
 #include <latch>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <thread>
 
 #include "commands/commands.h"
 #include "covol/error.h"
+#include "covol/image_levels.h"
 #include "flags/bindings.h"
 #include "jobs/page.h"
+#include "mark/bounded_image.h"
 #include "mark/browser.h"
 #include "mark/mark_session.h"
 #include "mark/page.h"
@@ -25,6 +28,13 @@ std::string policy_of(const std::string& page) {
     const std::size_t begin = page.find(kPolicyBegins) + std::string_view(kPolicyBegins).size();
     return page.substr(begin, page.find('"', begin) - begin) + "; frame-ancestors 'none'";
 }
+
+/// Decoded chunks that are kept for slices: a slice through 2048 x 2048 x 2048 voxels of 8 bits in chunks of 128 takes
+/// 128 MiB where two voxels make a pixel.
+constexpr std::uint64_t kMostSliceBytes = std::uint64_t(512) << 20;
+
+/// Decoded chunks that surfaces were made from, before they are given up.
+constexpr std::uint64_t kMostJobBytes = std::uint64_t(768) << 20;
 
 /// "scan.nii.gz" of a path that may end in a slash.
 std::filesystem::path without_slash(const std::string& path) {
@@ -84,7 +94,14 @@ struct MarkJob {
         // A page that comes back sends what was done meanwhile as fast as it is kept, a millisecond or less each.
         options.messages_per_second = 2000;
         options.message_burst = 10'000;
-        MarkSession mark(std::move(opened), pixels, std::move(view), session.run());
+        const auto open = [&] { return image.read(image_path, quiet(session.run())); };
+        const ImageLevels levels = open_image_levels(pixels, image.options, kMostSliceBytes, session.run());
+        // A packed stream, which takes long to open, is opened once.
+        const bool is_bounded = levels.is_in_chunks();
+        BoundedImage for_jobs(is_bounded ? open() : pixels, open,
+                              is_bounded ? kMostJobBytes : std::numeric_limits<std::uint64_t>::max());
+        MarkSession mark(
+            std::move(opened), levels, [&] { return for_jobs.get(); }, std::move(view), session.run());
         std::latch started(1);  // a browser may be there before the study is
         serve::Handlers handlers;
         handlers.get = [&](const serve::Request& request) {

@@ -69,13 +69,6 @@ std::vector<Vec3> farthest_from(const std::vector<Vec3>& marks, const TriangleMe
     return found;
 }
 
-/// What is to be said of results stands on the page.
-RunContext quiet(RunContext run) {
-    run.log = nullptr;
-    run.progress = nullptr;
-    return run;
-}
-
 Json result_json(const StudyResult& result, std::uint64_t version) {
     Json json{{"structure", result.structure},  {"version", version},          {"seq", result.sequence},
               {"stage", word_of(result.stage)}, {"progress", result.progress}, {"message", result.message},
@@ -105,11 +98,23 @@ Json result_json(const StudyResult& result, std::uint64_t version) {
 
 }  // namespace
 
-MarkSession::MarkSession(Study study, Image image, MarkView view, const RunContext& run)
-    : image_(std::move(image)), view_(std::move(view)), run_(quiet(run)), study_(std::move(study)) {
-    range_ = image_.range();
+RunContext quiet(RunContext run) {
+    run.log = nullptr;
+    run.progress = nullptr;
+    return run;
+}
+
+MarkSession::MarkSession(Study study, ImageLevels levels, std::function<Image()> image, MarkView view,
+                         const RunContext& run)
+    : levels_(std::move(levels)),
+      image_(std::move(image)),
+      geometry_(levels_.image().geometry()),
+      view_(std::move(view)),
+      run_(quiet(run)),
+      study_(std::move(study)) {
+    range_ = levels_.range(run_);
     if (!(range_[1] > range_[0])) range_[1] = range_[0] + 1;
-    window_ = image_.percentiles(kBlack, kWhite);
+    window_ = levels_.percentiles(kBlack, kWhite, run_);
     if (!(window_[1] > window_[0])) window_ = range_;
     // Of an image in chunks only some were looked at.
     range_ = {std::min(range_[0], window_[0]), std::max(range_[1], window_[1])};
@@ -261,11 +266,11 @@ void MarkSession::suggest(serve::Client client, StudyId id) {
         for (const StudyMark& mark : structure->marks)
             if (mark.kind == MarkKind::Surface) marks.push_back(mark.world);
         std::vector<Vec3> suggested;
-        for (const Suggestion& s : assess_evidence(*surface, marks, image_, kSuggestions, run_).suggestions)
+        for (const Suggestion& s : assess_evidence(*surface, marks, image_(), kSuggestions, run_).suggestions)
             suggested.push_back(s.world);
         if (suggested.empty()) suggested = farthest_from(marks, surface->mesh, kSuggestions);
         for (const Vec3& place : suggested)
-            places.push_back({{"world", place}, {"index", image_.geometry().world_to_index(place)}});
+            places.push_back({{"world", place}, {"index", geometry_.world_to_index(place)}});
     }
     send_(client, text_of({{"suggestions", {{"structure", id}, {"places", std::move(places)}}}}));
 }
@@ -290,7 +295,9 @@ serve::Response MarkSession::get(const serve::Request& request) {
 }
 
 serve::Response MarkSession::image_facts() const {
-    const ImageGeometry& g = image_.geometry();
+    const ImageGeometry& g = geometry_;
+    Json levels = Json::array();
+    for (const ImageLevels::Level& level : levels_.levels()) levels.push_back(level.factor);
     serve::Response response;
     response.type = "application/json";
     response.body = text_of({{"name", view_.title},
@@ -300,6 +307,8 @@ serve::Response MarkSession::image_facts() const {
                              {"direction", g.direction},
                              {"unit", g.unit},
                              {"anatomical", view_.is_anatomical},
+                             {"levels", levels},
+                             {"in_chunks", levels_.is_in_chunks()},
                              {"low", range_[0]},
                              {"high", range_[1]},
                              {"black", window_[0]},
@@ -311,12 +320,19 @@ serve::Response MarkSession::image_facts() const {
 serve::Response MarkSession::slice(const serve::Request& request) const {
     constexpr std::int64_t kMost = std::int64_t(1) << 30;
     const auto small = [&](const char* name) { return int(std::min(number_of(request, name), kMost)); };
-    PageSlice coded = make_page_slice(image_, small("axis"), small("at"), small("step"), range_, run_);
+    SliceRequest wanted{small("axis"), small("at"), small("step"), {}};
+    if (request.query.contains("width"))
+        wanted.part = SliceRequest::Part{small("x"), small("y"), small("width"), small("height")};
+    RunContext run = run_;
+    run.cancel = request.gone.get();  // the page turned to another slice
+    PageSlice coded = make_page_slice(levels_, wanted, range_, run);
     serve::Response response;
     response.type = "application/octet-stream";
     response.body = std::move(coded.bytes);
     response.is_deflated = true;
-    response.headers = {{"X-Width", std::to_string(coded.width)}, {"X-Height", std::to_string(coded.height)}};
+    response.headers = {{"X-Width", std::to_string(coded.width)},
+                        {"X-Height", std::to_string(coded.height)},
+                        {"X-Factor", std::to_string(coded.factor)}};
     return response;
 }
 
@@ -354,7 +370,7 @@ StructuresResult MarkSession::results() {
         const auto found = known.find(structure.name);
         return found != known.end() ? *found->second : solve_structure(image, structure, run);
     };
-    return segment_structures(image_, std::move(marks), {view_.options, {}}, run_, solve);
+    return segment_structures(image_(), std::move(marks), {view_.options, {}}, run_, solve);
 }
 
 serve::Response MarkSession::download(const serve::Request& request) {
@@ -371,7 +387,7 @@ serve::Response MarkSession::download(const serve::Request& request) {
         if (state.empty()) throw Error(Errc::InvalidInput, "there is no structure " + std::to_string(id));
     }
     Export made = make_export(
-        format->second, state, [&] { return results(); }, image_, study_.folder(), run_);
+        format->second, state, [&] { return results(); }, levels_.image(), study_.folder(), run_);
     serve::Response response;
     response.type = "application/octet-stream";
     response.body = std::move(made.bytes);

@@ -9,12 +9,16 @@
 
 #include "cli/json.h"
 #include "covol/image.h"
+#include "covol/image_levels.h"
 #include "covol/segment_structures.h"
 #include "covol/study.h"
 #include "covol/study_solver.h"
 #include "serve/web_server.h"
 
 namespace covol::tool {
+
+/// Says nothing: what there is to say of results stands on the page, and of the image it was said when it was read.
+[[nodiscard]] RunContext quiet(RunContext run);
 
 /// What a study is shown with.
 struct MarkView {
@@ -31,7 +35,8 @@ public:
     using Send = std::function<void(serve::Client, std::string)>;
     using Broadcast = std::function<void(std::string)>;
 
-    MarkSession(Study study, Image image, MarkView view, const RunContext& run);
+    /// @param image  gives the one that a job is computed with, from any thread
+    MarkSession(Study study, ImageLevels levels, std::function<Image()> image, MarkView view, const RunContext& run);
 
     /// From here on all changes are told; the structures that the study has are solved. Called once.
     void start(Send send, Broadcast broadcast);
@@ -63,7 +68,9 @@ private:
     [[nodiscard]] serve::Response mesh(const serve::Request& request) const;
     [[nodiscard]] serve::Response download(const serve::Request& request);
 
-    const Image image_;
+    const ImageLevels levels_;            // for the eye
+    const std::function<Image()> image_;  // for the surfaces
+    const ImageGeometry geometry_;
     const MarkView view_;
     const RunContext run_;
     std::array<double, 2> range_{0, 1}, window_{0, 1};  // of brightness: coded; shown at first

@@ -76,7 +76,9 @@ export class BodyScene extends Stage3D {
   listen() {
     const {state} = this;
     state.on(['study', 'meshes', 'drag', 'active', 'marks'], () => this.update());
-    state.on(['slices', 'planes'], () => { for (const axis of [0, 1, 2]) this.movePlane(axis); this.updateClip(); });
+    state.on(['planes'], () => this.movePlanes());
+    // Most of the time nothing in 3D shows where the slices are.
+    state.on(['slices'], () => { if (state.get('planes').some(Boolean) || state.get('cut') >= 0) this.movePlanes(); });
     state.on(['cut'], () => { this.turnCut(); this.updateClip(); });
     state.on(['flip'], () => this.updateClip());
     state.on(['ring', 'theme'], () => this.updateSigns());
@@ -182,6 +184,11 @@ export class BodyScene extends Stage3D {
     this.ring.scale.setScalar(0.03 * this.sphere.radius);
     this.frame.material.color.set(this.state.get('theme') === 'dark' ? '#8b919c' : '#6d727b');
     this.draw();
+  }
+
+  movePlanes() {
+    for (const axis of [0, 1, 2]) this.movePlane(axis);
+    this.updateClip();
   }
 
   movePlane(axis) {

@@ -59,8 +59,8 @@ export class Plane {
   /** From CSS pixels to voxels. */
   unplace(px, py) { return this.shown((px - this.left) / this.scaleX - 0.5, (py - this.top) / this.scaleY - 0.5); }
 
-  /** A picture of the plane, of which a pixel is `step` x `step` voxels; the last ones may reach beyond the image. */
-  drawPicture(context, picture, step = 1) {
+  /** A picture of the plane, of which a pixel is `step` x `step` voxels; the last ones may reach beyond the image. A part of it begins at a pixel x, y. */
+  drawPicture(context, picture, step = 1, {x = 0, y = 0} = {}) {
     const {left, top, width, height} = this;
     context.save();
     context.beginPath();
@@ -69,7 +69,7 @@ export class Plane {
     context.translate(left + (this.flipX ? width : 0), top + (this.flipY ? height : 0));
     context.scale(this.flipX ? -1 : 1, this.flipY ? -1 : 1);
     context.imageSmoothingQuality = 'high';
-    context.drawImage(picture, 0, 0, picture.width * step * this.scaleX, picture.height * step * this.scaleY);
+    context.drawImage(picture, x * step * this.scaleX, y * step * this.scaleY, picture.width * step * this.scaleX, picture.height * step * this.scaleY);
     context.restore();
   }
 

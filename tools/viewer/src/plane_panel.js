@@ -3,9 +3,13 @@ import {el, number} from './dom.js';
 import {Plane, write} from './plane.js';
 import {AXIS_COLORS, dominant, planeName} from './space.js';
 import {icon} from './icons.js';
+import {PictureLayer} from './picture_layer.js';
 
-const LARGEST_VOXEL = 90;  // CSS pixels, when zoomed in
+const MOST_STEP = 1024, LARGEST_VOXEL = 90;  // CSS pixels, when zoomed in
 const REDRAWN_ON = ['slices', 'views', 'grey', 'study', 'meshes', 'hover', 'selected', 'ring', 'ruler', 'drag', 'active', 'loaded', 'theme', 'large', 'tool', 'planes', 'countFrom', 'marks'];
+
+/** As many voxels for a value as there are in a pixel of the screen. */
+const stepFor = (voxels) => Math.min(MOST_STEP, 2 ** Math.max(0, Math.floor(Math.log2(voxels) + 1e-6)));
 
 export class PlanePanel {
   /**
@@ -13,7 +17,7 @@ export class PlanePanel {
    * `drawOverlay(panel, context)` draws upon the slice, `Input` is a PlanePointer, `redrawnOn` are more names of the state.
    */
   constructor(axis, app, {drawOverlay, Input, redrawnOn = []}) {
-    Object.assign(this, {axis, ...app, drawOverlay, shownAt: -1, travel: 0, picture: null, pictureStep: 1});
+    Object.assign(this, {axis, ...app, drawOverlay, shownAt: -1, travel: 0, picture: null, pictureStep: 1, layer: new PictureLayer()});
     const {state, space, image} = this, name = planeName(space, axis, image.anatomical);
     this.name = name;
     this.plane = new Plane(space, axis, image.anatomical);
@@ -28,7 +32,7 @@ export class PlanePanel {
     this.large = el('button', {type: 'button', class: 'icon', title: 'this plane alone, and back (f)', 'aria-label': `${name} alone, and back`, onclick: () => this.toggleLarge()});
     const head = el('div', {class: 'panel-head', ondblclick: (event) => { if (!event.target.closest('button, input')) this.toggleLarge(); }},
       this.chip, this.slider, this.where, this.fit, this.large);
-    this.element = el('section', {class: `panel slice axis-${axis}`, 'aria-label': name}, head, el('div', {class: 'picture'}, this.canvas));
+    this.element = el('section', {class: `panel slice axis-${axis}`, 'aria-label': name}, head, el('div', {class: 'picture'}, this.canvas, this.layer.canvas));
     new ResizeObserver(() => this.draw()).observe(this.canvas.parentElement);
     state.on([...REDRAWN_ON, ...redrawnOn], () => this.later());
     this.input = new Input(this);
@@ -116,8 +120,8 @@ export class PlanePanel {
     const context = canvas.getContext('2d');
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, width, height);
-    if (this.hasPicture) plane.drawPicture(context, this.picture, this.pictureStep);
-    else this.drawNoPicture(context, width, height);
+    this.layer.draw(plane, width, height, ratio, this.hasPicture);
+    if (!this.hasPicture) this.drawNoPicture(context, width, height);
     this.drawOverlay(this, context);
     if (this.input.spot && !this.input.gesture) this.tellCursor?.(this, this.input.spot);
     plane.drawScale(context, this.unitText);
@@ -132,42 +136,28 @@ export class PlanePanel {
     this.takeSlice(ratio);
   }
 
-  /** As many voxels for a value as there are in a pixel of the screen. */
-  stepFor(ratio) {
-    const voxels = 1 / (Math.max(this.plane.scaleX, this.plane.scaleY) * ratio);
-    return Math.min(64, 2 ** Math.max(0, Math.floor(Math.log2(voxels) + 1e-6)));
+  /** As many voxels for a value as there are in a pixel of the screen, and the part of the slice that is seen. */
+  wish(ratio) {
+    const {plane, axis, slices} = this, step = stepFor(1 / (Math.max(plane.scaleX, plane.scaleY) * ratio));
+    return {step, part: slices.partFor(axis, step, plane.unplace(0, 0), plane.unplace(plane.viewWidth, plane.viewHeight))};
   }
 
   takeSlice(ratio) {
-    const {axis, at, slices} = this, step = this.stepFor(ratio), wanted = `${at} ${step}`, failed = slices.hasFailed(axis, at, step);
-    if (this.wanted !== wanted || (this.hadFailed && !failed)) slices.want(axis, at, step, this.travel);
+    const {axis, at, slices} = this, {step, part} = this.wish(ratio), wanted = `${at} ${step} ${JSON.stringify(part)}`, failed = slices.hasFailed(axis, at, step, part);
+    if (this.wanted !== wanted || (this.hadFailed && !failed)) slices.want(axis, at, step, this.travel, part);
     this.wanted = wanted;
     this.hadFailed = failed;
-    const slice = slices.best(axis, at, step);
-    if (slice) this.paint(slice);
-    if (slice || failed) [this.shownAt, this.hasPicture] = [at, Boolean(slice)];
-    // Until it is here the slice before stays, with all that belongs to it.
-  }
-
-  paint(slice) {
-    const grey = this.state.get('grey'), key = `${slice.at} ${slice.step} ${grey.key}`;
-    if (key === this.key) return;
-    this.picture ??= document.createElement('canvas');
-    const {picture} = this, {width, height, values} = slice;
-    if (picture.width !== width || picture.height !== height) Object.assign(picture, {width, height});
-    const context = picture.getContext('2d');
-    if (this.pixels?.width !== width || this.pixels?.height !== height) this.pixels = context.createImageData(width, height);
-    const pixels = new Uint32Array(this.pixels.data.buffer);
-    for (let n = 0; n < pixels.length; ++n) pixels[n] = grey[values[n]];
-    context.putImageData(this.pixels, 0, 0);
-    this.key = key;
-    this.slice = slice;
-    this.pictureStep = slice.step;
-    this.onPicture?.(this.axis);
+    // Until it is here one before it stays, with all that belongs to it.
+    const late = slices.best(axis, at, step) || part || this.shownAt < 0 ? null : slices.late(axis, at, step, this.shownAt), place = late ?? at;
+    const slice = slices.best(axis, place, step), detail = part && slices.partial(axis, place, step, part);
+    const isNew = slice && this.layer.take(slice, detail, this.state.get('grey'));
+    if (slice) [this.slice, this.picture, this.pictureStep] = [slice, this.layer.whole.canvas, slice.step];
+    if (slice || failed) [this.shownAt, this.hasPicture] = [place, Boolean(slice)];
+    if (isNew) this.onPicture?.(axis);
   }
 
   /** The slice has changed, though its number has not. */
-  forgetPicture() { this.key = null; }
+  forgetPicture() { this.layer.whole.slice = null; }
 
   drawNoPicture(context, width, height) {
     if (this.shownAt < 0) return;

@@ -107,6 +107,13 @@ public:
         describe_shift(correct_shift, run);
     }
 
+    [[nodiscard]] std::vector<std::string> coarser_levels() const override {
+        std::vector<std::string> paths;
+        for (std::size_t n = level_ + 1; ome_ && n < ome_->levels.size(); ++n)
+            paths.push_back(path_within(ome_->metadata, ome_->group, ome_->levels[n].path));
+        return paths;
+    }
+
 protected:
     [[nodiscard]] std::shared_ptr<const ChunkSource> chunks(const PixelRequest& request) const override {
         return zarr_chunks(array_, axes_, info_.geometry.size, request.channel, request.frame);

@@ -47,10 +47,18 @@ public:
             info.channels = info.frames = 1;
             return open_placed(dataset->path(), info, *place)->read({request.box, 0, 0}, run);
         }
-        const bool own = layout_.in_datasets;
-        return read_chunks(hdf5_chunks(std::move(dataset), axes_, info_.geometry.size, own ? 0 : request.channel,
-                                       own ? 0 : request.frame),
-                           request.box, run);
+        return read_chunks(chunks_of(std::move(dataset), request), request.box, run);
+    }
+
+    [[nodiscard]] std::shared_ptr<const ChunkSource> chunk_source(const PixelRequest& request) const override {
+        auto dataset = std::make_shared<Hdf5Dataset>(dataset_of(request));
+        return place_in(*dataset, request) ? nullptr : chunks_of(std::move(dataset), request);
+    }
+
+    [[nodiscard]] std::vector<std::string> coarser_levels() const override {
+        std::vector<std::string> names;
+        for (const std::string& inside : layout_.coarser) names.push_back(file_->path() + ":" + inside);
+        return names;
     }
 
     [[nodiscard]] std::uint64_t bytes_to_hold(const PixelRequest& request) const override {
@@ -59,6 +67,13 @@ public:
     }
 
 private:
+    [[nodiscard]] std::shared_ptr<const ChunkSource> chunks_of(std::shared_ptr<const Hdf5Dataset> dataset,
+                                                               const PixelRequest& request) const {
+        const bool own = layout_.in_datasets;
+        return hdf5_chunks(std::move(dataset), axes_, info_.geometry.size, own ? 0 : request.channel,
+                           own ? 0 : request.frame);
+    }
+
     [[nodiscard]] Hdf5Dataset dataset_of(const PixelRequest& request) const {
         Hdf5Dataset dataset(file_, layout_.dataset(request.channel, request.frame));
         if (layout_.is_unsigned) dataset.take_as_unsigned();

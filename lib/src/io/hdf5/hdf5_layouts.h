@@ -17,6 +17,7 @@ struct Hdf5Layout {
     std::string letters = "zyx";  ///< of a dataset's dimensions: x, y, z, c, t, or ? for one of a single element
     bool in_datasets = false;     ///< each channel and frame is one: then info has their numbers
     std::function<std::string(std::uint64_t channel, std::uint64_t frame)> dataset;  ///< its name
+    std::vector<std::string> coarser;  ///< names of a pyramid's coarser levels, the finest first
     std::optional<Index3> size;                                                      ///< where datasets are padded
     bool is_unsigned = false;  ///< integers of 16 bits have no sign, whatever the file says
 };

@@ -106,13 +106,15 @@ int count_of(const Hdf5File& file, const std::string& group, const char* word) {
 Vec3 times(const Vec3& a, const Vec3& b) { return {a[0] * b[0], a[1] * b[1], a[2] * b[2]}; }
 
 void describe_levels(const Hdf5File& file, const Extent& extent, const Index3& fine, const ImarisChoice& choice,
-                     ImageInfo& info) {
+                     Hdf5Layout& layout) {
+    ImageInfo& info = layout.info;
     const int count = std::min(count_of(file, "/DataSet", kLevel), kMostImarisLevels);
     for (int level = 0; level < count; ++level) {
         const std::string name = level_name(level);
         try {
             const Index3 size = size_of(file, level, choice.time.value_or(0), choice.channel.value_or(0));
             info.levels.push_back(level_text(name, size, times(extent.spacing(fine), factors(fine, size))));
+            if (level > choice.level) layout.coarser.push_back(name);
         } catch (const Error&) {  // it does not matter until it is read
             info.levels.push_back(name + ": cannot be read");
         }
@@ -153,7 +155,7 @@ std::optional<Hdf5Layout> imaris_layout(const Hdf5File& file, const std::string&
     for (const char* field : {"ExtMin0", "ExtMin1", "ExtMin2", "ExtMax0", "ExtMax1", "ExtMax2", "Unit"})
         if (const std::string value = file.text("/DataSetInfo/Image", field); !value.empty())
             info.fields.emplace_back(field, quote(value));
-    describe_levels(file, extent, fine, *choice, info);
+    describe_levels(file, extent, fine, *choice, layout);
     layout.dataset = [level = choice->level, time, channel](std::uint64_t c, std::uint64_t t) {
         return channel_name(level, time + int(t), channel + int(c)) + "/Data";
     };

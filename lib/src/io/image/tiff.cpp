@@ -77,10 +77,15 @@ public:
         return may_map(request) || is_worth_mapping(bytes) ? 0 : bytes;
     }
 
+    [[nodiscard]] std::shared_ptr<const ChunkSource> chunk_source(const PixelRequest& request) const override {
+        return chunks_of(request);
+    }
+
     Pixels read(const PixelRequest& request, const RunContext& run) override {
         if (may_map(request))
             if (std::optional<Pixels> mapped = map(request)) return *mapped;
-        if (is_worth_mapping(ImageFile::bytes_to_hold(request))) return read_in_chunks(request, run);
+        if (is_worth_mapping(ImageFile::bytes_to_hold(request)))
+            return read_chunks(chunks_of(request), request.box, run);
         const Index3 n = request.box.size();
         const std::uint64_t page_bytes = std::uint64_t(n[0]) * std::uint64_t(n[1]) * pixel_bytes(info_.type);
         std::uint64_t file_bytes = 0;
@@ -166,11 +171,11 @@ private:
         return plane;
     }
 
-    [[nodiscard]] Pixels read_in_chunks(const PixelRequest& request, const RunContext& run) const {
+    [[nodiscard]] std::shared_ptr<const ChunkSource> chunks_of(const PixelRequest& request) const {
         TiffFrame frame = frame_of_kind();
         frame.sample = kind_.samples > 1 ? request.channel : 0;
         for (std::int32_t k = 0; k < frame.size[2]; ++k) frame.slices.push_back(plane(request, k));
-        return read_chunks(tiff_chunks(frame, tiff_chunk_size(*tiff_, frame)), request.box, run);
+        return tiff_chunks(frame, tiff_chunk_size(*tiff_, frame));
     }
 
     [[nodiscard]] Error damaged(const TiffStack::Plane& plane) const {

@@ -15,17 +15,6 @@
 namespace covol::detail {
 namespace {
 
-/// The part of `box` that chunk c of this size holds.
-VoxelBox part_of(const VoxelBox& box, const Index3& chunk, const Index3& size) {
-    VoxelBox part;
-    for (int a = 0; a < 3; ++a) {
-        const std::int64_t first = std::int64_t(chunk[a]) * size[a];
-        part.min[a] = std::int32_t(std::max<std::int64_t>(box.min[a], first));
-        part.max[a] = std::int32_t(std::min<std::int64_t>(box.max[a], first + size[a] - 1));
-    }
-    return part;
-}
-
 /// Copies `part` from a chunk, dense, into `box`, dense.
 void copy_part(const VoxelBox& part, const void* chunk, const Index3& chunk_size, const VoxelBox& box, void* out,
                std::uint64_t width) {
@@ -42,7 +31,18 @@ void copy_part(const VoxelBox& part, const void* chunk, const Index3& chunk_size
         }
 }
 
-/// The first and the last chunk that the box touches.
+}  // namespace
+
+VoxelBox part_of(const VoxelBox& box, const Index3& chunk, const Index3& size) {
+    VoxelBox part;
+    for (int a = 0; a < 3; ++a) {
+        const std::int64_t first = std::int64_t(chunk[a]) * size[a];
+        part.min[a] = std::int32_t(std::max<std::int64_t>(box.min[a], first));
+        part.max[a] = std::int32_t(std::min<std::int64_t>(box.max[a], first + size[a] - 1));
+    }
+    return part;
+}
+
 VoxelBox chunks_around(const VoxelBox& box, const Index3& chunk_size) {
     VoxelBox chunks;
     for (int a = 0; a < 3; ++a) {
@@ -52,7 +52,6 @@ VoxelBox chunks_around(const VoxelBox& box, const Index3& chunk_size) {
     return chunks;
 }
 
-/// @throws Error InvalidInput at the first voxel of `box` that is NaN or infinite.
 void require_finite(const ChunkSource& source, const VoxelBox& box, const void* chunk) {
     with_pixel_type(source.type(), [&](auto pixel) {
         using T = decltype(pixel);
@@ -68,8 +67,6 @@ void require_finite(const ChunkSource& source, const VoxelBox& box, const void* 
         }
     });
 }
-
-}  // namespace
 
 ChunkSource::ChunkSource(std::string path, PixelType type, const Index3& size, const Index3& chunk_size)
     : path_(std::move(path)), type_(type), size_(size), chunk_size_(chunk_size) {

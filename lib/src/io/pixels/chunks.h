@@ -50,6 +50,13 @@ private:
     Index3 size_, chunk_size_;
 };
 
+/// The part of `box` that chunk c of this size holds.
+[[nodiscard]] VoxelBox part_of(const VoxelBox& box, const Index3& chunk, const Index3& size);
+/// The first and the last chunk that the box touches.
+[[nodiscard]] VoxelBox chunks_around(const VoxelBox& box, const Index3& chunk_size);
+/// @throws Error InvalidInput at the first voxel of `box` that is NaN or infinite; `chunk` is the one that holds it.
+void require_finite(const ChunkSource& source, const VoxelBox& box, const void* chunk);
+
 /// What one chunk may take when it is unpacked. Zarr's own codecs stop at 2 GiB; the usual size is below 16 MiB.
 constexpr std::uint64_t kMostChunkBytes = std::uint64_t(1) << 30;
 
@@ -109,6 +116,9 @@ public:
         return read_chunks(chunks(request), request.box, run);
     }
     [[nodiscard]] std::uint64_t bytes_to_hold(const PixelRequest& request) const final;
+    [[nodiscard]] std::shared_ptr<const ChunkSource> chunk_source(const PixelRequest& request) const final {
+        return chunks(request);
+    }
 
 protected:
     /// The request's channel and frame; its box does not matter.

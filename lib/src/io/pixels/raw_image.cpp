@@ -199,6 +199,8 @@ private:
 
 }  // namespace
 
+std::shared_ptr<const ChunkSource> ImageFile::chunk_source(const PixelRequest& /*request*/) const { return nullptr; }
+
 std::uint64_t ImageFile::bytes_to_hold(const PixelRequest& request) const {
     return voxel_count(request.box.size()) * pixel_bytes(info_.type);
 }

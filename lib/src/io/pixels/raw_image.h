@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <type_traits>
+#include <vector>
 
 #include "covol/error.h"
 #include "covol/image.h"
@@ -11,6 +12,7 @@
 namespace covol::detail {
 
 class ChunkedVoxels;
+class ChunkSource;
 
 /// Voxels of an open file: `data` points to the first voxel of the box that was asked for; or `chunks` has all voxels
 /// of the image.
@@ -42,6 +44,11 @@ public:
     [[nodiscard]] virtual Pixels read(const PixelRequest& request, const RunContext& run) = 0;
     /// Memory that read() takes: all of the box, unless a format knows better.
     [[nodiscard]] virtual std::uint64_t bytes_to_hold(const PixelRequest& request) const;
+
+    /// The chunks of a channel and frame, each of which can be decoded alone; null where a file has none.
+    [[nodiscard]] virtual std::shared_ptr<const ChunkSource> chunk_source(const PixelRequest& request) const;
+    /// The coarser levels of a pyramid, the finest first: names that are read as images.
+    [[nodiscard]] virtual std::vector<std::string> coarser_levels() const { return {}; }
 
     /// Files that are read beside the one that was given, or of the folder that was given.
     [[nodiscard]] const std::vector<std::string>& files() const noexcept { return files_; }

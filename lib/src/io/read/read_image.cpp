@@ -3,11 +3,13 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <utility>
 
 #include "base/file.h"
 #include "covol/error.h"
 #include "covol/image.h"
 #include "covol/image_files.h"
+#include "covol/image_levels.h"
 #include "covol/vdb_io.h"
 #include "image/geometry_check.h"
 #include "io/chunked/zarr.h"
@@ -124,6 +126,31 @@ PixelRequest choose_pixels(const std::string& path, const ImageInfo& info, const
 }
 
 }  // namespace
+
+ImageLevels open_image_levels(const Image& image, const ReadImageOptions& options, std::uint64_t most_bytes,
+                              const RunContext& run) {
+    ImageLevels whole(image);
+    if (image.view()) return whole;  // it is in memory, or mapped
+    RunContext quiet = run;          // what there is to say was said when the image was read
+    quiet.log = nullptr;
+    const auto chunks_of = [&](const std::string& path, ImageGeometry& geometry) {
+        const std::unique_ptr<ImageFile> file = open_image(path, options, quiet);
+        geometry = file->info().geometry;
+        return std::pair(file->chunk_source(choose_pixels(path, file->info(), options)), file->coarser_levels());
+    };
+    std::vector<ImageLevels::Source> sources;
+    ImageGeometry finest, geometry;
+    const auto [own, coarser] = chunks_of(image.path(), finest);
+    if (!own) return whole;
+    sources.push_back({finest, own});
+    for (const std::string& path : coarser) try {
+            if (auto chunks = chunks_of(path, geometry).first) sources.push_back({geometry, std::move(chunks)});
+        } catch (const Error& error) {
+            if (error.code() == Errc::Cancelled) throw;
+            run.warn(std::string(error.what()) + ": this level of the pyramid is not used");
+        }
+    return {image, std::move(sources), most_bytes};
+}
 
 Image read_image(const std::string& path, const ReadImageOptions& options, const RunContext& run) {
     require_valid(options, "read_image");

@@ -26,6 +26,7 @@ import {isReference, Queue} from './queue.js';
 import {sidebar as makeSidebar} from './sidebar.js';
 import {SliceStore} from './slice_store.js';
 import {Study} from './study.js';
+import {Timing} from './timing.js';
 import {toolbar} from './toolbar.js';
 import {Tools, TOOLS} from './tools.js';
 
@@ -63,8 +64,8 @@ async function start() {
   document.title = `${image.name} \u2013 covol mark`;
   const store = new Store(`covol-mark/view/${image.name}`), kept = Object.fromEntries(KEPT.map((name) => [name, store.get(name)]));
   const state = firstState(image, space, kept), queue = new Queue(), study = new Study(queue), connection = new Connection(study, queue, state), toasts = new Toasts();
-  const toast = (text, kind) => toasts.show(text, kind), told = {lastShown: 0};
-  const slices = new SliceStore(space, () => state.set({loaded: state.get('loaded') + 1}));
+  const toast = (text, kind) => toasts.show(text, kind), timing = new Timing();
+  const slices = new SliceStore(space, image, () => state.set({loaded: state.get('loaded') + 1}));
   const meshes = new Meshes(space, () => state.set({meshes: state.get('meshes') + 1}));
   const tools = new Tools({state, study, space, toast});
   const app = {image, space, unitText: units, state, study, meshes, slices, tools, toast, keep: (name, value) => store.set(name, value)};
@@ -97,7 +98,7 @@ async function start() {
   for (const panel of panels) {
     panel.tellCursor = status.tell;
     panel.onPicture = (axis) => view?.movePlane(axis);
-    panel.onShown = () => { told.lastShown = performance.now(); };
+    panel.onShown = (mesh) => timing.drawn(mesh);
     panel.draw();
   }
   showFocus();
@@ -106,8 +107,8 @@ async function start() {
   // Where nothing can be kept, what was not sent would be lost.
   addEventListener('beforeunload', (event) => { if (queue.isLost && queue.waiting > 0) event.preventDefault(); });
   connection.open();
-  window.covolMark = {state, study, connection, queue, panels, view, meshes, slices, image, space, suggestions,
-    get resultsSeen() { return study.resultsSeen; }, get lastShown() { return told.lastShown; }, get lastAction() { return study.lastAction; }};
+  window.covolMark = {state, study, connection, queue, panels, view, meshes, slices, image, space, suggestions, timing,
+    get resultsSeen() { return study.resultsSeen; }, get lastShown() { return timing.lastShown; }, get lastAction() { return study.lastAction; }};
 }
 
 start().catch((error) => {

@@ -25,7 +25,7 @@ export class Meshes {
   get(id) { return this.items.get(id) ?? null; }
 
   /** A result came; `isNew`: of a server that may count from the beginning again. */
-  async take({structure: id, version, stage}, isNew) {
+  async take({structure: id, version, stage, seq}, isNew) {
     if (stage === 'empty') return this.drop(id);
     const wanted = this.wanted.get(id);
     if (!isNew && wanted >= version) return;
@@ -39,7 +39,7 @@ export class Meshes {
     } catch { /* the connection is lost: the next state brings it */ }
     if (this.wanted.get(id) !== version) return;
     if (!mesh) this.wanted.delete(id);
-    else this.put(id, {...mesh, id, version, arrived: performance.now(), isShown: false});
+    else this.put(id, {...mesh, id, version, seq, stage, arrived: performance.now(), isShown: false});
   }
 
   put(id, mesh) {

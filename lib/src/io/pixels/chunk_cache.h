@@ -1,0 +1,62 @@
+#pragma once
+#include <cstdint>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <unordered_map>
+
+#include "io/pixels/chunks.h"
+
+namespace covol::detail {
+
+/// The chunks of one or several sources that were used last, up to a bound. Safe to use by several threads: a chunk
+/// that two of them ask for is decoded once.
+class ChunkCache {
+public:
+    /// Its voxels, as ChunkSource::read() gives them; they stay as long as somebody holds them.
+    using Chunk = std::shared_ptr<const char[]>;
+
+    /// @param most_bytes  of all chunks together; a larger chunk is kept until the next one comes
+    explicit ChunkCache(std::uint64_t most_bytes) : most_bytes_(most_bytes) {}
+
+    /// @param source  outlives the cache
+    /// @throws as ChunkSource::read(), and Error InvalidInput at a value that is NaN or infinite.
+    [[nodiscard]] Chunk get(const ChunkSource& source, const Index3& chunk);
+
+    [[nodiscard]] std::uint64_t bytes() const;  ///< that are kept
+    [[nodiscard]] std::uint64_t most_bytes() const noexcept { return most_bytes_; }
+    [[nodiscard]] std::uint64_t decoded() const;  ///< chunks so far; again those that were given up
+
+private:
+    struct Key {
+        const ChunkSource* source = nullptr;
+        Index3 chunk{0, 0, 0};
+        friend bool operator==(const Key&, const Key&) = default;
+    };
+    struct Hash {
+        [[nodiscard]] std::size_t operator()(const Key& key) const noexcept;
+    };
+    /// Locked while the chunk is decoded.
+    struct Slot {
+        std::mutex mutex;
+        Chunk voxels;
+    };
+    struct Entry {
+        std::shared_ptr<Slot> slot;
+        std::list<Key>::iterator place;
+        std::uint64_t bytes = 0;
+    };
+
+    [[nodiscard]] std::shared_ptr<Slot> slot_of(const Key& key);
+    [[nodiscard]] Chunk fill_of(const ChunkSource& source);
+    void count(const Key& key, std::uint64_t bytes);
+
+    const std::uint64_t most_bytes_;
+    mutable std::mutex mutex_;
+    std::list<Key> order_;  ///< what was used last stands first
+    std::unordered_map<Key, Entry, Hash> entries_;
+    std::unordered_map<const ChunkSource*, Chunk> fills_;  ///< one for all chunks that a file does not have
+    std::uint64_t bytes_ = 0, decoded_ = 0;
+};
+
+}  // namespace covol::detail

@@ -1,0 +1,73 @@
+"""The page of `covol mark` on one image: the first picture, scrolling by the wheel, and memory.
+
+    /usr/bin/python3 tests/bench/marks/large.py IMAGE [--covol BINARY] [--shot PNG]
+"""
+import argparse
+import time
+
+from browser import Browser, Program
+
+COUNT = """
+window.seen = []; const panel = window.covolMark.panels[arguments[0]], put = panel.onPicture;
+panel.onPicture = (axis) => { put?.(axis); requestAnimationFrame((now) => window.seen.push([now, panel.shownAt, panel.slice.step])); };
+"""
+
+
+def scroll(browser, axis, slices, pause=0.02):
+    """Different slices that were seen in a second while the wheel turns one slice every `pause` seconds."""
+    browser.driver.execute_script(COUNT, axis)
+    box = browser.js("const b = mark.panels[arguments[0]].canvas.getBoundingClientRect(); return [b.left + b.width / 2, b.top + b.height / 2]", axis)
+    chain = browser.actions()
+    chain.w3c_actions.pointer_action.move_to_location(*map(round, box))
+    chain.perform()
+    begin, first = browser.js("return performance.now()"), browser.js("return mark.panels[arguments[0]].at", axis)
+    for n in range(slices):
+        browser.driver.execute_cdp_cmd("Input.dispatchMouseEvent", {"type": "mouseWheel", "x": box[0], "y": box[1], "deltaX": 0, "deltaY": -120})
+        time.sleep(pause)
+    browser.wait("const p = mark.panels[arguments[0]]; return p.shownAt === p.at", axis)
+    end, last = browser.js("return performance.now()"), browser.js("return mark.panels[arguments[0]].at", axis)
+    seen = browser.js("return window.seen")
+    places = [place for n, (_, place, _) in enumerate(seen) if n == 0 or seen[n - 1][1] != place]
+    # Slices of a coarse level have the same picture.
+    thick = browser.js("const p = mark.panels[arguments[0]]; return mark.slices.thickness(arguments[0], p.slice.step)", axis)
+    seconds = (end - begin) / 1000
+    gaps = [b[0] - a[0] for a, b in zip(seen, seen[1:])]
+    return len(places) / seconds, abs(last // thick - first // thick) / seconds, max(gaps, default=0)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("image")
+    parser.add_argument("--covol", default="build/bin/covol")
+    parser.add_argument("--slices", type=int, default=100)
+    parser.add_argument("--shot")
+    options = parser.parse_args()
+    browser = Browser()
+    try:
+        program = Program(options.covol, options.image)
+        try:
+            ready = time.perf_counter() - program.began
+            browser.open(program.url)
+            print(f"first pictures {time.perf_counter() - program.began:.2f} s after the start, of which the program took {ready:.2f} s", flush=True)
+            for axis in (2, 1, 0):
+                browser.wait("return mark.slices.underWay.size === 0")
+                shown, asked, gap = scroll(browser, axis, options.slices)
+                print(f"plane {axis}: {shown:.1f} slices a second seen of {asked:.1f} asked for, the longest wait {gap:.0f} ms", flush=True)
+            browser.js("const p = mark.panels[2]; p.zoomAt(30)")
+            begin = time.perf_counter()
+            browser.wait("const p = mark.panels[2]; return p.layer.hasFine || p.slice.step === 1")
+            print(f"zoomed in: {time.perf_counter() - begin:.2f} s")
+            shown, asked, gap = scroll(browser, 2, options.slices)
+            print(f"plane 2, zoomed in: {shown:.1f} slices a second seen of {asked:.1f} asked for, the longest wait {gap:.0f} ms", flush=True)
+            if options.shot:
+                browser.driver.save_screenshot(options.shot)
+            own, whole = browser.memory()
+            print(f"memory: the program {program.peak():.0f} MB at most, the page's process {own:.0f} MB, the browser with all its processes {whole:.0f} MB")
+        finally:
+            program.close()
+    finally:
+        browser.close()
+
+
+if __name__ == "__main__":
+    main()

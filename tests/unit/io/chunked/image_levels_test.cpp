@@ -1,0 +1,195 @@
+#include "covol/image_levels.h"
+
+#include <tbb/parallel_for.h>
+#include <zlib.h>
+
+#include <atomic>
+#include <catch2/catch.hpp>
+#include <memory>
+#include <vector>
+
+#include "covol/error.h"
+#include "covol/page_data.h"
+#include "io/pixels/chunk_cache.h"
+
+using namespace covol;
+using detail::ChunkCache;
+using detail::ChunkSource;
+
+namespace {
+
+/// Voxel (i,j,k) is i + 3 j + 7 k, times `scale`; the chunk at the origin is missing if that is asked for.
+class Slope final : public ChunkSource {
+public:
+    Slope(const Index3& size, int chunk, int scale, bool lacks_first = false)
+        : ChunkSource("slope", PixelType::UInt16, size, {chunk, chunk, chunk}), scale_(scale), lacks_(lacks_first) {}
+    [[nodiscard]] bool read(const Index3& chunk, void* out) const override {
+        ++reads;
+        if (lacks_ && chunk == Index3{0, 0, 0}) return false;
+        auto* values = static_cast<std::uint16_t*>(out);
+        const Index3& n = chunk_size();
+        for (int k = 0; k < n[2]; ++k)
+            for (int j = 0; j < n[1]; ++j)
+                for (int i = 0; i < n[0]; ++i)
+                    *values++ = std::uint16_t(
+                        scale_ * (chunk[0] * n[0] + i + 3 * (chunk[1] * n[1] + j) + 7 * (chunk[2] * n[2] + k)));
+        return true;
+    }
+    mutable std::atomic<int> reads{0};
+
+private:
+    int scale_;
+    bool lacks_;
+};
+
+constexpr std::uint64_t kChunkBytes = 8 * 8 * 8 * 2;
+
+ImageGeometry geometry_of(const Index3& size, const Vec3& spacing) {
+    ImageGeometry geometry;
+    geometry.size = size;
+    geometry.spacing = spacing;
+    return geometry;
+}
+
+/// Levels of factors 1, 2 and 4, the last of half as many along k.
+struct Pyramid {
+    Index3 size{40, 24, 36};
+    std::shared_ptr<Slope> fine = std::make_shared<Slope>(size, 8, 1);
+    std::shared_ptr<Slope> half = std::make_shared<Slope>(Index3{20, 12, 18}, 8, 2);
+    std::shared_ptr<Slope> quarter = std::make_shared<Slope>(Index3{10, 6, 18}, 8, 4);
+    std::vector<ImageLevels::Source> sources{{geometry_of(size, {0.5, 0.5, 0.5}), fine},
+                                             {geometry_of({20, 12, 18}, {1, 1, 1}), half},
+                                             {geometry_of({10, 6, 18}, {2, 2, 1}), quarter}};
+
+    [[nodiscard]] ImageLevels open(std::uint64_t most_bytes = 1 << 20) const {
+        const std::vector<float> nothing(detail::voxel_count(size));
+        return {Image::from_values(sources.front().geometry, nothing.data()), sources, most_bytes};
+    }
+};
+
+std::vector<int> unpacked(const PageSlice& slice) {
+    std::vector<unsigned char> bytes(2 * std::size_t(slice.width) * std::size_t(slice.height));
+    uLongf count = bytes.size();
+    REQUIRE(uncompress(bytes.data(), &count, reinterpret_cast<const Bytef*>(slice.bytes.data()), slice.bytes.size()) ==
+            Z_OK);
+    REQUIRE(count == bytes.size());
+    std::vector<int> values;
+    for (std::size_t n = 0; n < bytes.size(); n += 2) values.push_back(bytes[n] + 256 * bytes[n + 1]);
+    return values;
+}
+
+}  // namespace
+
+TEST_CASE("A cache of chunks keeps what was used last, up to its bound") {
+    const Slope source({64, 8, 8}, 8, 1);
+    ChunkCache cache(3 * kChunkBytes);
+    for (int n = 0; n < 3; ++n) static_cast<void>(cache.get(source, {n, 0, 0}));
+    static_cast<void>(cache.get(source, {0, 0, 0}));  // chunk 1 is the oldest now
+    CHECK(source.reads == 3);
+    CHECK(cache.bytes() == 3 * kChunkBytes);
+    const ChunkCache::Chunk held = cache.get(source, {1, 0, 0});
+    static_cast<void>(cache.get(source, {3, 0, 0}));
+    static_cast<void>(cache.get(source, {4, 0, 0}));
+    static_cast<void>(cache.get(source, {5, 0, 0}));
+    CHECK(cache.bytes() == 3 * kChunkBytes);
+    CHECK(cache.decoded() == 6);
+    CHECK(reinterpret_cast<const std::uint16_t*>(held.get())[0] == 8);  // whoever holds it keeps it
+    static_cast<void>(cache.get(source, {5, 0, 0}));
+    CHECK(source.reads == 6);
+    static_cast<void>(cache.get(source, {1, 0, 0}));
+    CHECK(source.reads == 7);
+}
+
+TEST_CASE("Chunks that a file does not have share one") {
+    const Slope source({16, 8, 8}, 8, 1, true);
+    ChunkCache cache(kChunkBytes);
+    const ChunkCache::Chunk none = cache.get(source, {0, 0, 0});
+    CHECK(reinterpret_cast<const std::uint16_t*>(none.get())[5] == 0);
+    CHECK(cache.bytes() == 0);
+}
+
+TEST_CASE("A chunk that several threads ask for is decoded once") {
+    const Slope source({64, 64, 8}, 8, 1);
+    ChunkCache cache(64 * kChunkBytes);
+    tbb::parallel_for(0, 640, [&](int n) { static_cast<void>(cache.get(source, {n % 8, n / 8 % 8, 0})); });
+    CHECK(source.reads == 64);
+    CHECK(cache.bytes() == 64 * kChunkBytes);
+}
+
+TEST_CASE("A pixel is taken from the coarsest level that suffices") {
+    const ImageLevels levels = Pyramid().open();
+    REQUIRE(levels.levels().size() == 3);
+    CHECK(levels.levels()[1].factor == Index3{2, 2, 2});
+    CHECK(levels.levels()[2].factor == Index3{4, 4, 2});
+    CHECK(levels.level_for(1) == 0);
+    CHECK(levels.level_for(2) == 1);
+    CHECK(levels.level_for(3) == 0);
+    CHECK(levels.level_for(4) == 2);
+    CHECK(levels.level_for(6) == 1);
+    CHECK(levels.level_for(64) == 2);
+}
+
+TEST_CASE("A level whose voxels span no whole number of fine ones is left out") {
+    Pyramid pyramid;
+    pyramid.sources[1].geometry.spacing = {0.8, 0.8, 0.8};
+    const ImageLevels levels = pyramid.open();
+    REQUIRE(levels.levels().size() == 2);
+    CHECK(levels.levels()[1].factor == Index3{4, 4, 2});
+    pyramid.sources[2].geometry.size = {11, 6, 18};
+    CHECK(pyramid.open().levels().size() == 2);  // the last voxel lacks some
+    pyramid.sources[2].geometry.size = {17, 6, 18};
+    CHECK(pyramid.open().levels().size() == 1);
+}
+
+TEST_CASE("A slice for a page comes from its level alone, in whole and in part") {
+    const Pyramid pyramid;
+    const ImageLevels levels = pyramid.open();
+    const std::array<double, 2> range{0, 65535};
+    const PageSlice whole = make_page_slice(levels, {2, 21, 2, {}}, range);
+    CHECK(whole.width == 20);
+    CHECK(whole.height == 12);
+    CHECK(whole.factor == 2);
+    CHECK(pyramid.fine->reads == 0);
+    CHECK(pyramid.half->reads == 3 * 2);
+    const std::vector<int> values = unpacked(whole);
+    for (int y = 0; y < 12; ++y)
+        for (int x = 0; x < 20; ++x) CHECK(values[std::size_t(y * 20 + x)] == 2 * (x + 3 * y + 7 * 10));
+    const PageSlice part = make_page_slice(levels, {2, 21, 2, SliceRequest::Part{5, 7, 9, 100}}, range);
+    CHECK(part.width == 9);
+    CHECK(part.height == 5);
+    const std::vector<int> some = unpacked(part);
+    for (int y = 0; y < 5; ++y)
+        for (int x = 0; x < 9; ++x) CHECK(some[std::size_t(y * 9 + x)] == values[std::size_t((y + 7) * 20 + x + 5)]);
+    // Of the level that is finer than a pixel, means; along each axis.
+    const std::vector<int> means = unpacked(make_page_slice(levels, {0, 39, 6, {}}, range));
+    REQUIRE(means.size() == 4 * 6);
+    CHECK(means[1 * 4 + 2] == 2 * (19 + 3 * 7 + 7 * 4));
+    CHECK_THROWS_AS(make_page_slice(levels, {2, 36, 1, {}}, range), Error);
+    CHECK_THROWS_AS(make_page_slice(levels, {2, 0, 1, SliceRequest::Part{40, 0, 1, 1}}, range), Error);
+}
+
+TEST_CASE("Of an image in chunks no more is kept than is allowed") {
+    const Pyramid pyramid;
+    const ImageLevels levels = pyramid.open(20 * kChunkBytes);
+    for (int axis = 0; axis < 3; ++axis)
+        for (int at = 0; at < pyramid.size[std::size_t(axis)]; ++at)
+            static_cast<void>(make_page_slice(levels, {axis, at, 1, {}}, {0, 1000}));
+    CHECK(levels.cache().bytes <= 20 * kChunkBytes);
+    CHECK(levels.cache().decoded > 75);  // all of its chunks, some of them again
+    const auto [low, high] = levels.percentiles(0, 1);
+    CHECK(low == 0);
+    CHECK(high == 4 * (9 + 3 * 5 + 7 * 17));  // of the coarsest level
+    CHECK(levels.range() == std::array<double, 2>{0, 65535});
+}
+
+TEST_CASE("An image that is held is shown as it is") {
+    const ImageGeometry geometry = geometry_of({4, 3, 2}, {1, 1, 1});
+    std::vector<float> values(24);
+    for (std::size_t n = 0; n < values.size(); ++n) values[n] = float(n);
+    const ImageLevels levels(Image::from_values(geometry, values.data()));
+    CHECK_FALSE(levels.is_in_chunks());
+    CHECK(levels.cache().most_bytes == 0);
+    CHECK(levels.range() == std::array<double, 2>{0, 23});
+    const std::vector<int> coded = unpacked(make_page_slice(levels, {2, 1, 2, {}}, {0, 65535}));
+    CHECK(coded == std::vector<int>{15, 17, 21, 23});  // means of 2 x 2, and of what is left
+}

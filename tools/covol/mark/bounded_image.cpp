@@ -1,0 +1,24 @@
+#include "mark/bounded_image.h"
+
+#include <utility>
+
+namespace covol::tool {
+
+BoundedImage::BoundedImage(Image image, std::function<Image()> open, std::uint64_t most_bytes)
+    : open_(std::move(open)), most_bytes_(most_bytes), image_(std::move(image)) {}
+
+std::uint64_t BoundedImage::decoded_bytes() const {
+    if (image_.view()) return 0;  // it is held as a whole, or mapped
+    const ChunkCount chunks = image_.chunks().value_or(ChunkCount{});
+    std::uint64_t bytes = chunks.read * bytes_of(image_.pixel_type());
+    for (const std::int32_t n : chunks.size) bytes *= std::uint64_t(n);
+    return bytes;
+}
+
+Image BoundedImage::get() {
+    const std::lock_guard lock(mutex_);
+    if (decoded_bytes() > most_bytes_) image_ = open_();
+    return image_;
+}
+
+}  // namespace covol::tool

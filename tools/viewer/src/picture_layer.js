@@ -1,0 +1,52 @@
+// The image on a plane, on a canvas of its own below the marks: it is drawn anew only when it is another picture.
+import {el} from './dom.js';
+
+/** Pictures come from the processor: on a canvas of the graphics card each one would be sent there first. */
+const contextOf = (canvas) => canvas.getContext('2d', {willReadFrequently: true});
+
+/** A slice, or a part of it, as a picture. */
+class Picture {
+  /** Whether it is another one than before. */
+  paint(slice, grey) {
+    if (this.slice === slice && this.grey === grey.key) return false;
+    this.canvas ??= document.createElement('canvas');
+    const {canvas} = this, {width, height, values} = slice;
+    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, {width, height});
+    const context = contextOf(canvas);
+    if (this.pixels?.width !== width || this.pixels?.height !== height) this.pixels = context.createImageData(width, height);
+    const pixels = new Uint32Array(this.pixels.data.buffer);
+    for (let n = 0; n < pixels.length; ++n) pixels[n] = grey[values[n]];
+    context.putImageData(this.pixels, 0, 0);
+    Object.assign(this, {slice, grey: grey.key});
+    return true;
+  }
+}
+
+export class PictureLayer {
+  constructor() {
+    Object.assign(this, {canvas: el('canvas', {class: 'image', 'aria-hidden': 'true'}), whole: new Picture(), fine: new Picture(), hasFine: false, count: 0});
+  }
+
+  /** A whole slice, and a finer part of it or null. Whether the whole is another picture than before. */
+  take(slice, part, grey) {
+    const isNew = this.whole.paint(slice, grey), isFiner = part ? this.fine.paint(part, grey) : false;
+    if (isNew || isFiner || this.hasFine !== Boolean(part)) ++this.count;
+    this.hasFine = Boolean(part);
+    return isNew;
+  }
+
+  /** On so many CSS pixels; `plane` says where. Nothing where there is no picture. */
+  draw(plane, width, height, ratio, isThere) {
+    const {canvas} = this, key = [this.count, isThere, width, height, ratio, plane.left, plane.top, plane.scaleX, plane.scaleY].join(' ');
+    if (key === this.key) return;
+    this.key = key;
+    const size = [Math.round(width * ratio), Math.round(height * ratio)];
+    if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
+    const context = contextOf(canvas);
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.clearRect(0, 0, width, height);
+    if (!isThere) return;
+    plane.drawPicture(context, this.whole.canvas, this.whole.slice.step);
+    if (this.hasFine) plane.drawPicture(context, this.fine.canvas, this.fine.slice.step, this.fine.slice.part);
+  }
+}
