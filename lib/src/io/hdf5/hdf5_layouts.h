@@ -18,8 +18,8 @@ struct Hdf5Layout {
     bool in_datasets = false;     ///< each channel and frame is one: then info has their numbers
     std::function<std::string(std::uint64_t channel, std::uint64_t frame)> dataset;  ///< its name
     std::vector<std::string> coarser;  ///< names of a pyramid's coarser levels, the finest first
-    std::optional<Index3> size;                                                      ///< where datasets are padded
-    bool is_unsigned = false;  ///< integers of 16 bits have no sign, whatever the file says
+    std::optional<Index3> size;        ///< where datasets are padded
+    bool is_unsigned = false;          ///< integers of 16 bits have no sign, whatever the file says
 };
 
 /// A level of a pyramid: "/name: 512 x 512 x 100, spacing 0.4 x 0.4 x 1".
