@@ -97,7 +97,7 @@ class Large(Case):
             live.add_mark(one, place.tolist())
         refined = live.wait_for(one, "refined", 41)
         self.assertAlmostEqual(refined["volume"] / (4 / 3 * np.pi * (RADIUS * SPACING) ** 3), 1, delta=0.05)
-        self.run_covol("segment", "--study", self.out / "study", "--mesh", self.out / "ball.ply", "--json", self.out / "ball.json")
+        self.run_covol("segment", "--study", self.out / "study", "-o", self.out / "ball.vdb", "--mesh", self.out / "ball.ply", "--json", self.out / "ball.json")
         report = json.loads((self.out / "ball.json").read_text())
         self.assertEqual(report["structures"][0]["surface"]["volume"], refined["volume"])
         self.assertLess(report["input"]["image"]["chunks"]["read"], 60)  # of 1024

@@ -111,7 +111,7 @@ class BrowserCase(PageCase):
             return [drawn / (width * height), sum];""")
 
     def slice_picture(self, axis):
-        return self.js("report.panels[arguments[0]].draw(); return report.panels[arguments[0]].canvas.toDataURL()", axis)
+        return self.js("report.panels[arguments[0]].draw(); return report.panels[arguments[0]].layer.canvas.toDataURL()", axis)
 
     def slices(self, *at):
         if at:
