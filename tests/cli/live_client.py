@@ -32,6 +32,24 @@ class Page:
         connection.close()
         return answer.status, answer.headers, body
 
+    def post(self, path, body, **headers):
+        """Status and text; `headers` replace those of a page."""
+        connection = http.client.HTTPConnection(*self.address, timeout=60)
+        given = {"Cookie": self.cookie, "Origin": self.origin, "Content-Length": str(len(body))} | headers
+        connection.putrequest("POST", path)
+        for name, value in given.items():
+            if value is not None:
+                connection.putheader(name, value)
+        connection.endheaders()
+        try:
+            connection.send(body)
+        except OSError:
+            pass  # it was refused before it was read
+        answer = connection.getresponse()
+        text = answer.read().decode()
+        connection.close()
+        return answer.status, text
+
     def json(self, path):
         status, _, body = self.get(path)
         assert status == 200, (status, body)

@@ -56,14 +56,15 @@ def write_image(path, direction, unit):
 class Server:
     """The program. Killed and started again it has the same study, and another token."""
 
-    def __init__(self, is_turned=False, is_anatomical=False, name="ball"):
+    def __init__(self, is_turned=False, is_anatomical=False, name="ball", options=()):
+        self.options = options
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="covol-mark-"))
         self.image = self.folder / f"{name}.nrrd"
         write_image(self.image, turned() if is_turned else np.eye(3), "mm" if is_anatomical else "um")
         self.start()
 
     def start(self):
-        self.process = subprocess.Popen([COVOL, "mark", self.image, "--no-browser"], stdout=subprocess.PIPE,
+        self.process = subprocess.Popen([COVOL, "mark", self.image, "--no-browser", *self.options], stdout=subprocess.PIPE,
                                         stderr=subprocess.DEVNULL, text=True)
         self.url = self.process.stdout.readline().split()[1]
 

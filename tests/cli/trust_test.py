@@ -515,7 +515,7 @@ class Roles(Case):
                     name = option["names"].split(", ")[-1].lstrip("-") or f"<{option['value']}>"
                     roles.setdefault(option["role"], set()).add((command["name"], name))
         names = {role: {name for _, name in found} for role, found in roles.items()}
-        self.assertEqual(names["conduct"], {"checkpoint", "checkpoint-every", "resume", "help", "help-all", "also-at", "<plan|run|join ...>",
+        self.assertEqual(names["conduct"], {"checkpoint", "checkpoint-every", "resume", "help", "help-all", "also-at", "in-frame-of", "<plan|run|join ...>",
                                             "<COMMAND...>"})
         self.assertEqual(names["output"], {"output", "mask", "table", "evidence", "mesh", "density", "usda", "fields", "report", "keep-failed", "points", "labels",
                                            "<OUT>"})

@@ -53,6 +53,7 @@ const Rules& rules() {
         those.cookie = "fedcba9876543210";
         those.cookie_name = "covol_mark_8000";
         those.live_path = "/live";
+        those.most_body_bytes = 1000;
         return those;
     }();
     return made;
@@ -79,6 +80,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         case Judgement::Kind::SetCookie: require(parse_target(head.target)->query.at("token") == rules().token); break;
         case Judgement::Kind::Live:
             require(head.is_upgrade && text.find("http://") != std::string_view::npos);
+            [[fallthrough]];
+        case Judgement::Kind::Post:
+            require(judgement.kind != Judgement::Kind::Post ||
+                    (judgement.body_bytes >= 1 && judgement.body_bytes <= 1000 &&
+                     text.find("http://") != std::string_view::npos));
             [[fallthrough]];
         case Judgement::Kind::Get:
             require(text.find("covol_mark_8000=fedcba9876543210") != std::string_view::npos);

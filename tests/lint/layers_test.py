@@ -10,7 +10,7 @@ import sys
 # level and of those below.
 LAYERS = [
     {"base": ["api", "version", "fwd", "error", "option_names", "options_table", "run", "domain", "safe_text"], "scheme": []},
-    {"files": ["file_set"], "limits": []},
+    {"files": ["file_set", "digest"], "limits": []},
     {"grid": [], "mesh": ["mesh"], "io": ["vdb_io"], "io/pixels": ["image"]},
     {"image": ["image_stream", "image_levels", "points"], "io/chunked": [], "io/modules": []},
     {"io/hdf5": []},
@@ -18,13 +18,14 @@ LAYERS = [
     {"io/reader": [], "io/write": [], "io/points": ["points_text", "point_array"], "clip": ["clip"], "edge": ["edge"], "redistance": []},
     {"points": ["scan_noise", "cloud_cleanup"], "surface": ["surface", "mesh_stream"], "evolve": ["evolve", "checkpoints"], "tagging": ["band"]},
     {"contours": ["contours", "seeds"], "meshing": ["mesh_relax", "mesh_cleanup"], "holes": ["holes"], "cloud/orientation": ["orientation"]},
-    {"start": ["start", "level_set"], "painted": ["painted"], "analysis": ["compare", "evidence", "structures", "phantom"], "render/draw": ["picture"]},
+    {"start": ["start", "level_set"], "painted": ["painted"], "analysis": ["compare", "evidence", "structures", "phantom", "intensity"], "render/draw": ["picture"]},
     {"io/read": ["image_files"], "guess": ["guess", "guess_correction"], "cloud/surface": ["cloud_surface"], "report": ["report_page", "page_data"], "render": ["render"]},
     {"guidance": ["guidance", "motion"], "inference": ["inference"]},
     {"segment": ["pipeline"], "segment/start": [], "segment/solve": [], "segment/result": []},
     {"bricks": ["bricks"], "marks": ["marks"]},
     {"io/inputs": ["file_kind", "read_marks"], "structures": ["segment_structures"]},
     {"study": ["study", "study_solver"]},
+    {"io/study": ["study_files"]},
 ]
 LEVEL = {folder: level for level, folders in enumerate(LAYERS) for folder in folders}
 FOLDER = {header: folder for folders in LAYERS for folder, headers in folders.items() for header in headers}
@@ -49,7 +50,7 @@ LOUD = re.compile(r"\bstd::(cout|cerr|clog)\b|(?<![\w:])(printf|puts|putchar)\s*
                   r"|(?<![\w.])(std::|::)?(exit|_Exit|quick_exit|abort|terminate)\s*\(")
 GPL_FILES = {"cloud_cleanup.cpp", "convex_hull.cpp", "mesh_cleanup.cpp", "mesh_distance.cpp"}
 # Readers and writers, which the core does without: COVOL_IO.
-READERS = {"io/chunked", "io/hdf5", "io/image", "io/inputs", "io/modules", "io/points", "io/read", "io/reader", "io/write"}
+READERS = {"io/chunked", "io/hdf5", "io/image", "io/inputs", "io/modules", "io/points", "io/read", "io/reader", "io/study", "io/write"}
 INCLUDE = re.compile(r"#\s*include\s*\"([\w/]+)\.h\"")
 
 

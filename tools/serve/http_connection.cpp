@@ -6,6 +6,7 @@
 #include <boost/beast/http/read.hpp>
 #include <boost/beast/http/write.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
+#include <limits>
 
 #include "serve/answers.h"
 #include "serve/live_connection.h"
@@ -36,10 +37,13 @@ HttpConnection::HttpConnection(Hub& hub, asio::ip::tcp::socket socket)
 
 void HttpConnection::read() {
     is_head_ = false;
+    wants_to_stay_.reset();
     response_.reset();
     serializer_.reset();
     parser_.emplace();
     parser_->header_limit(kMostHeaderBytes);
+    // judge() looks at the length. Boost 1.74 takes "none" for 0 here.
+    if (hub_.rules.most_body_bytes > 0) parser_->body_limit(std::numeric_limits<std::uint64_t>::max());
     waits_since_ = std::chrono::steady_clock::now();
     stream_.expires_after(hub_.options.idle);
     http::async_read_header(stream_, buffer_, *parser_,
@@ -65,31 +69,30 @@ void HttpConnection::on_read(beast::error_code status) {
         case Judgement::Kind::SetCookie:
             return answer(cookie_answer(hub_.rules.cookie_name, hub_.rules.cookie, judgement.is_link), wants_to_stay());
         case Judgement::Kind::Get: return call_handler(std::move(judgement.request));
+        case Judgement::Kind::Post: return take_body(std::move(judgement.request));
         case Judgement::Kind::Live: return open_live();
     }
 }
 
-void HttpConnection::call_handler(Request request) {
+void HttpConnection::answer_with(const std::string& path, std::function<Response()> handler) {
     stream_.expires_never();
-    const auto gone = std::make_shared<std::atomic<bool>>(false);
-    request.gone = gone;
-    watch(gone);
-    asio::post(hub_.get_pool, [self = self(), request = std::move(request)]() mutable {
+    asio::post(hub_.get_pool, [self = self(), path, handler = std::move(handler)]() mutable {
         Hub& hub = self->hub_;
         Response response;
         try {
-            if (!hub.is_stopping && !*request.gone)
-                response = hub.handlers.get ? hub.handlers.get(request) : refusal(404, "There is nothing here.");
+            if (!hub.is_stopping) response = handler();
             if (const std::string why = why_unsendable(response); !why.empty()) {
-                hub.report(request.path + ": " + why);
+                hub.report(path + ": " + why);
                 response = refusal(500, "This could not be answered.");
             }
         } catch (...) {
-            hub.report(request.path + ": " + what_was_thrown());
+            hub.report(path + ": " + what_was_thrown());
             response = refusal(500, "This could not be answered.");
         }
+        handler = nullptr;  // with the body that it may hold
         // Moved: the socket is to be destroyed on its own thread.
         asio::post(hub.io, [self = std::move(self), response = std::move(response)]() mutable {
+            self->end_post();
             beast::error_code ignored;
             self->stream_.socket().cancel(ignored);  // the watch: the next request is read at once when it comes
             self->answer(std::move(response), self->wants_to_stay());
@@ -108,7 +111,51 @@ void HttpConnection::watch(std::shared_ptr<std::atomic<bool>> gone) {
     });
 }
 
-bool HttpConnection::wants_to_stay() const { return parser_->get().version() == 11 && parser_->get().keep_alive(); }
+void HttpConnection::call_handler(Request request) {
+    const auto gone = std::make_shared<std::atomic<bool>>(false);
+    request.gone = gone;
+    watch(gone);
+    const std::string path = request.path;
+    answer_with(path, [&hub = hub_, request = std::move(request)] {
+        if (*request.gone) return Response{};
+        return hub.handlers.get ? hub.handlers.get(request) : refusal(404, "There is nothing here.");
+    });
+}
+
+void HttpConnection::take_body(Request request) {
+    if (hub_.is_posting) return refuse(503, "Another file is being sent: try again when it is there.");
+    hub_.is_posting = is_posting_ = true;
+    wants_to_stay_ = parser_->get().version() == 11 && parser_->get().keep_alive();
+    auto parser = std::make_shared<BodyParser>(std::move(*parser_));
+    parser->body_limit(hub_.rules.most_body_bytes);
+    read_body(std::move(parser), std::move(request));
+}
+
+// Piece by piece, as write().
+void HttpConnection::read_body(std::shared_ptr<BodyParser> parser, Request request) {
+    stream_.expires_after(hub_.options.idle);
+    BodyParser& into = *parser;
+    http::async_read_some(stream_, buffer_, into,
+                          [self = self(), parser = std::move(parser), request = std::move(request)](
+                              beast::error_code status, std::size_t) mutable {
+                              if (status || self->hub_.is_stopping) return self->finish();
+                              if (!parser->is_done()) return self->read_body(std::move(parser), std::move(request));
+                              const std::string path = request.path;
+                              self->answer_with(
+                                  path, [&hub = self->hub_, parser = std::move(parser), request = std::move(request)] {
+                                      return hub.handlers.post(request, std::move(parser->get().body()));
+                                  });
+                          });
+}
+
+void HttpConnection::end_post() {
+    if (is_posting_) hub_.is_posting = false;
+    is_posting_ = false;
+}
+
+bool HttpConnection::wants_to_stay() const {
+    return wants_to_stay_.value_or(parser_->get().version() == 11 && parser_->get().keep_alive());
+}
 
 void HttpConnection::open_live() {
     if (buffer_.size() != 0) return refuse(400, "A WebSocket begins with the answer to its request.");
@@ -163,6 +210,7 @@ void HttpConnection::drain() {
 }
 
 void HttpConnection::finish() {
+    end_post();
     waits_since_.reset();
     stream_.close();
     hub_.leave(shared_from_this(), false);

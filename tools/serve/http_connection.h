@@ -6,7 +6,10 @@
 #include <boost/beast/http/parser.hpp>
 #include <boost/beast/http/serializer.hpp>
 #include <boost/beast/http/string_body.hpp>
+#include <functional>
+#include <memory>
 #include <optional>
+#include <string>
 
 #include "serve/hub.h"
 
@@ -28,6 +31,7 @@ public:
 
 private:
     using Stream = boost::beast::tcp_stream;
+    using BodyParser = boost::beast::http::request_parser<boost::beast::http::string_body>;
     using StringResponse = boost::beast::http::response<boost::beast::http::string_body>;
 
     [[nodiscard]] std::shared_ptr<HttpConnection> self() {
@@ -36,6 +40,11 @@ private:
     void on_read(boost::beast::error_code status);
     void call_handler(Request request);
     void watch(std::shared_ptr<std::atomic<bool>> gone);
+    void take_body(Request request);
+    void read_body(std::shared_ptr<BodyParser> parser, Request request);
+    /// Calls `handler` on a thread for handlers, and answers with what it returns.
+    void answer_with(const std::string& path, std::function<Response()> handler);
+    void end_post();
     void open_live();
     [[nodiscard]] bool wants_to_stay() const;
     /// @param keep  whether the connection stays open
@@ -49,7 +58,8 @@ private:
     std::optional<boost::beast::http::request_parser<boost::beast::http::empty_body>> parser_;
     std::optional<StringResponse> response_;
     std::optional<boost::beast::http::response_serializer<boost::beast::http::string_body>> serializer_;
-    bool is_head_ = false, keeps_ = false;
+    bool is_head_ = false, keeps_ = false, is_posting_ = false;
+    std::optional<bool> wants_to_stay_;  // of a POST, whose head is gone when it is answered
     std::size_t drained_ = 0;
     std::optional<MessageRate::Time> waits_since_;
 };

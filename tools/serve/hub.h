@@ -48,6 +48,7 @@ public:
     const Handlers handlers;
     Rules rules{};                         ///< complete before the first connection
     std::atomic<bool> is_stopping{false};  ///< any thread
+    bool is_posting = false;               ///< a body is being read or handled: it may be large
     /// Where handlers run. Two pools: however many pictures are being read, messages are answered.
     boost::asio::thread_pool get_pool, live_pool;
     boost::asio::io_context io{1};  // after the pools: what it holds to the end still names them

@@ -67,13 +67,33 @@ bool parse_query(std::string_view text, std::map<std::string, std::string>& quer
 
 Judgement refuse(int status, std::string why) { return {Judgement::Kind::Refuse, status, std::move(why)}; }
 
-// What is wrong with the request before anybody asks who sent it; Get where nothing is.
+// The length of a POST's body, in its own `body_bytes`.
+Judgement judge_body(const std::vector<std::string_view>& lengths, const Rules& rules) {
+    if (lengths.size() != 1) return refuse(411, "Content-Length: expected it once.");
+    std::size_t bytes = 0;
+    const char* const end = lengths[0].data() + lengths[0].size();
+    const auto [last, status] = std::from_chars(lengths[0].data(), end, bytes);
+    if (last != end || lengths[0].empty() || status == std::errc::invalid_argument)
+        return refuse(400, "Content-Length: expected one number.");
+    if (status != std::errc() || bytes > rules.most_body_bytes)
+        return refuse(413, "A file has at most " + std::to_string(rules.most_body_bytes) + " bytes here.");
+    if (bytes == 0) return refuse(400, "Content-Length: expected a file that is not empty.");
+    Judgement good;
+    good.kind = Judgement::Kind::Post;
+    good.body_bytes = bytes;
+    return good;
+}
+
+// What is wrong with the request before anybody asks who sent it; Get or Post where nothing is.
 Judgement judge_form(const RequestHead& head, const Rules& rules) {
-    if (head.method != "GET" && head.method != "HEAD") return refuse(405, "Only GET and HEAD are answered here.");
+    const bool is_post = head.method == "POST" && rules.most_body_bytes > 0;
+    if (head.method != "GET" && head.method != "HEAD" && !is_post)
+        return refuse(405, "Only GET and HEAD are answered here.");
     if (head.target.size() > rules.most_target_bytes) {
         return refuse(414, "An address has at most " + std::to_string(rules.most_target_bytes) + " bytes.");
     }
     if (!values_of(head, "Transfer-Encoding").empty()) return refuse(400, "Requests have no body here.");
+    if (is_post) return judge_body(values_of(head, "Content-Length"), rules);
     if (const auto lengths = values_of(head, "Content-Length"); !lengths.empty()) {
         const bool is_number =
             lengths.size() == 1 && !lengths[0].empty() && std::all_of(lengths[0].begin(), lengths[0].end(), is_digit);
@@ -92,23 +112,27 @@ bool has_value(const RequestHead& head, std::string_view name, std::string_view 
     return values.size() == 1 && values[0] == value;
 }
 
-// Whether a person followed a link of another page: the whole window goes here, and that page sees nothing of it.
-bool is_link(const RequestHead& head) {
+// Whether a person followed a link of another page: the whole window goes here, and that page sees nothing of it. Or a
+// frame of a page that may have one, which the page's policy decides; other hosts' frames would not be sent the cookie.
+bool is_link(const RequestHead& head, const Rules& rules) {
+    if (rules.may_be_framed && has_value(head, "Sec-Fetch-Site", "same-site") &&
+        has_value(head, "Sec-Fetch-Mode", "navigate") && has_value(head, "Sec-Fetch-Dest", "iframe"))
+        return true;
     return (has_value(head, "Sec-Fetch-Site", "cross-site") || has_value(head, "Sec-Fetch-Site", "same-site")) &&
            has_value(head, "Sec-Fetch-Mode", "navigate") && has_value(head, "Sec-Fetch-Dest", "document");
 }
 
 // Whether the request is for this server, and comes from one of its own pages or from none.
-Judgement judge_source(const RequestHead& head, const Rules& rules, bool may_be_link) {
+Judgement judge_source(const RequestHead& head, const Rules& rules, bool may_be_link, bool is_post) {
     const auto hosts = values_of(head, "Host");
     if (hosts.size() != 1) return refuse(400, "Host: expected it once.");
     if (std::find(rules.authorities.begin(), rules.authorities.end(), hosts[0]) == rules.authorities.end()) {
         return refuse(403, "This server is not reached by that name.");
     }
     const auto origins = values_of(head, "Origin");
-    // Browsers send it with each WebSocket, and the page's own origin is the one of its Host.
+    // Browsers send it with each WebSocket and each POST, and the page's own origin is the one of its Host.
     const bool is_own = origins.size() == 1 && origins[0] == "http://" + std::string(hosts[0]);
-    if (!is_own && (head.is_upgrade || !origins.empty())) {
+    if (!is_own && (head.is_upgrade || is_post || !origins.empty())) {
         return refuse(403, "Pages of other servers are not answered here.");
     }
     const auto sites = values_of(head, "Sec-Fetch-Site");
@@ -130,11 +154,14 @@ bool is_known(const RequestHead& head, const Rules& rules) {
 }  // namespace
 
 Judgement judge(const RequestHead& head, const Rules& rules) {
-    if (Judgement form = judge_form(head, rules); form.kind == Judgement::Kind::Refuse) return form;
+    const Judgement form = judge_form(head, rules);
+    if (form.kind == Judgement::Kind::Refuse) return form;
+    const bool is_post = form.kind == Judgement::Kind::Post;
     std::optional<Request> request = parse_target(head.target);
-    const bool has_token = request && request->path == "/" && request->query.contains("token") && !head.is_upgrade,
-               follows_link = has_token && is_link(head);
-    if (Judgement source = judge_source(head, rules, follows_link); source.kind == Judgement::Kind::Refuse)
+    const bool has_token =
+                   request && request->path == "/" && request->query.contains("token") && !head.is_upgrade && !is_post,
+               follows_link = has_token && is_link(head, rules);
+    if (Judgement source = judge_source(head, rules, follows_link, is_post); source.kind == Judgement::Kind::Refuse)
         return source;
     if (has_token) {
         if (!is_same_secret(rules.token, request->query["token"])) {
@@ -155,7 +182,8 @@ Judgement judge(const RequestHead& head, const Rules& rules) {
     if (head.is_upgrade && (!is_live || head.method != "GET")) return refuse(404, "No WebSocket is opened here.");
     if (!head.is_upgrade && is_live) return refuse(426, "This address is for WebSockets.");
     Judgement good;
-    good.kind = is_live ? Judgement::Kind::Live : Judgement::Kind::Get;
+    good.kind = is_live ? Judgement::Kind::Live : form.kind;
+    good.body_bytes = form.body_bytes;
     good.is_head = head.method == "HEAD";
     good.request = std::move(*request);
     return good;

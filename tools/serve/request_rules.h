@@ -26,6 +26,8 @@ struct Rules {
     std::string cookie_name, cookie;
     std::string live_path;
     std::size_t most_target_bytes = 4096;
+    bool may_be_framed = false;       ///< pages of the same host, on other ports, may show the link in a frame
+    std::size_t most_body_bytes = 0;  ///< of a POST; 0: none is answered
 };
 
 /// What to do with a request.
@@ -34,18 +36,21 @@ struct Judgement {
         Refuse,     ///< answer with `status` and `why`, and close the connection
         SetCookie,  ///< the right token: set the cookie, and lead to "/"
         Get,        ///< let a handler answer
+        Post,       ///< read `body_bytes`, and let a handler answer
         Live        ///< open a WebSocket
     };
     Kind kind = Kind::Refuse;
     int status = 400;
-    std::string why{};  ///< for people
-    Request request{};  ///< of Get
+    std::string why{};           ///< for people
+    Request request{};           ///< of Get and Post
+    std::size_t body_bytes = 0;  ///< of Post, from 1 to Rules::most_body_bytes
     bool is_head = false;
     bool is_link = false;  ///< of SetCookie: a person followed a link of another page, or of a file, to get here
 };
 
 /// Applies all rules to a request. No handler hears of one before Host, Origin, Sec-Fetch-Site and either the token or
-/// the cookie are right. Links of other pages lead to the token's address alone.
+/// the cookie are right. Links of other pages lead to the token's address alone. A POST also has to say that it comes
+/// from the server's own page, and how long its body is.
 [[nodiscard]] Judgement judge(const RequestHead& head, const Rules& rules);
 
 /// 127.0.0.1 and localhost with this port, and the further ones as browsers write them: in small letters, and without

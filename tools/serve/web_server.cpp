@@ -61,6 +61,10 @@ Options checked(Options options) {
     if (const std::string why = options.why_invalid(); !why.empty()) {
         throw Error(Errc::InvalidOptions, "web_server: " + why);
     }
+    // It is stronger than X-Frame-Options, which knows no origins.
+    options.page_policy += "; frame-ancestors";
+    for (const std::string& one : options.frame_origins) options.page_policy += " " + one;
+    if (options.frame_origins.empty()) options.page_policy += " 'none'";
     return options;
 }
 
@@ -69,6 +73,11 @@ Options checked(Options options) {
 std::string Options::why_invalid() const {
     for (const std::string& one : authorities) {
         if (!is_authority(one)) return "authorities: expected name:port, got \"" + one + "\"";
+    }
+    for (const std::string& one : frame_origins) {
+        constexpr std::string_view kScheme = "http://";
+        if (!one.starts_with(kScheme) || !is_authority(std::string_view(one).substr(kScheme.size())))
+            return "frame_origins: expected http://name:port, got \"" + one + "\"";
     }
     if (page_policy.empty() || !is_header_value(page_policy)) return "page_policy: expected one line";
     if (live_path.size() < 2 || live_path[0] != '/') return "live_path: expected /name, got \"" + live_path + "\"";
@@ -95,6 +104,8 @@ public:
         hub_.rules.cookie = random_secret();  // another one: links are kept in histories and lists of processes
         hub_.rules.cookie_name = "covol_mark_" + std::to_string(port_);
         hub_.rules.live_path = hub_.options.live_path;
+        hub_.rules.may_be_framed = !hub_.options.frame_origins.empty();
+        hub_.rules.most_body_bytes = hub_.handlers.post ? hub_.options.most_body_bytes : 0;
         wait();
         thread_ = std::thread([this] { serve(); });
     }

@@ -16,7 +16,7 @@
 // for messages in both directions. It knows who may ask; what is answered is up to its handlers.
 namespace covol::serve {
 
-/// A GET or HEAD that passed all checks.
+/// A GET, HEAD or POST that passed all checks.
 struct Request {
     std::string path;                          ///< decoded, begins with '/'
     std::map<std::string, std::string> query;  ///< decoded, UTF-8 without NUL
@@ -47,6 +47,8 @@ struct Client {
 struct Handlers {
     std::function<Response(const Request&)>
         get{};  ///< may be slow; what it throws becomes an answer 500 without details
+    /// A POST with its body, one at a time, where Options::most_body_bytes allows any; as `get`.
+    std::function<Response(const Request&, std::string body)> post{};
     std::function<void(Client)> opened{};
     std::function<void(Client, std::string_view)> message{};  ///< UTF-8; where it throws, the client is closed (1011)
     std::function<void(Client)> closed{};                     ///< exactly once for each client that was `opened`
@@ -59,9 +61,12 @@ struct Options {
     /// Further values of `Host`, `name:port`, that a page may be loaded from, such as the other end of a forwarded
     /// port.
     std::vector<std::string> authorities{};
-    std::string page_policy = "default-src 'none'";          ///< Content-Security-Policy of text/html
-    std::string live_path = "/live";                         ///< where WebSockets are opened
+    /// Origins, "http://localhost:8888", whose pages may show the page in a frame: notebooks on this machine.
+    std::vector<std::string> frame_origins{};
+    std::string page_policy = "default-src 'none'";  ///< Content-Security-Policy of text/html, without frame-ancestors
+    std::string live_path = "/live";                 ///< where WebSockets are opened
     std::size_t most_message_bytes = std::size_t(4) << 20;   ///< of a message that a client sends, >= 1
+    std::size_t most_body_bytes = 0;                         ///< of a POST; 0: none is answered
     std::size_t most_waiting_bytes = std::size_t(64) << 20;  ///< that a client has not read yet: with more it is closed
     /// Open at once, >= 1, WebSockets among them. One more closes the one that waits longest for a request; where none
     /// waits it is refused (503).

@@ -20,12 +20,13 @@
 // What says where structures are: marks of every kind, by structure, and what segment() takes of them.
 namespace covol {
 
-/// A label image that somebody painted. Structures share it: paint of one is outside of the others.
+/// A label image that somebody painted.
 struct PaintedImage {
     Image image;
     PaintedOptions options;
     std::vector<LabelName> labels;  ///< that belong to structures
     std::string name;               ///< of the structure that its only label belongs to; empty: the label's own
+    bool is_shared = true;          ///< paint of one structure is outside of the others, and labels keep their values
 };
 /// Finds the labels. @throws Error as find_painted_labels().
 [[nodiscard]] COVOL_API PaintedImage make_painted(const Image& image, const PaintedOptions& options = {});

@@ -2,6 +2,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,6 +16,7 @@
 #include "covol/image.h"
 #include "covol/marks.h"
 #include "covol/options_table.h"
+#include "covol/pipeline.h"
 
 // What a person marks on one image: structures with their marks, and everything that was done to them, in a journal.
 namespace covol {
@@ -43,6 +45,25 @@ struct StudyOutline {
     bool operator==(const StudyOutline&) const = default;
 };
 
+/// Another program's result that a structure's marks correct.
+struct StudyGuess {
+    std::string path;    ///< a mask, label image, mesh or level set; from the study's folder where it is relative
+    std::string digest;  ///< digest_of() it
+    int label = 0;       ///< of a mask; 0: its only one
+    bool operator==(const StudyGuess&) const = default;
+};
+
+/// A stroke of a brush or an eraser: the voxels whose centres lie within the radius of a line.
+struct StudyStroke {
+    StudyId id = 0;
+    bool erases = false;
+    double radius = 1;        ///< world units, > 0
+    std::optional<int> axis;  ///< of a disc, which stays on the slice `at` perpendicular to it; none: a ball
+    int at = 0;               ///< voxels along that axis
+    std::vector<Vec3> world;  ///< corners of the line; one is a dab
+    bool operator==(const StudyStroke&) const = default;
+};
+
 struct StudyStructure {
     StudyId id = 0;
     std::string name;                     ///< unique within the study
@@ -51,7 +72,29 @@ struct StudyStructure {
     bool visible = true;
     std::vector<StudyMark> marks;  ///< in the order in which they were set
     std::vector<StudyOutline> outlines;
+    std::vector<StudyStroke> strokes;  ///< in the order in which they were painted
+    std::optional<StudyGuess> guess;
     bool operator==(const StudyStructure&) const = default;
+
+    /// Whether there is anything that a surface can be made from.
+    [[nodiscard]] bool has_evidence() const {
+        return !marks.empty() || !outlines.empty() || !strokes.empty() || guess.has_value();
+    }
+    /// Whether both say the same of a surface.
+    [[nodiscard]] bool has_same_evidence(const StudyStructure& other) const {
+        return marks == other.marks && outlines == other.outlines && strokes == other.strokes && guess == other.guess;
+    }
+};
+
+/// How all structures of a study are segmented, instead of what SegmentOptions chooses; the program's flags come first.
+struct StudyOptions {
+    std::optional<double> voxel_size;      ///< world units, > 0
+    std::optional<double> rho;             ///< EvolveOptions::rho, in [0,1]
+    std::optional<double> mark_precision;  ///< SegmentOptions::mark_precision, world units, >= 0
+    std::optional<Model> model;
+    bool operator==(const StudyOptions&) const = default;
+
+    [[nodiscard]] COVOL_API SegmentOptions applied_to(SegmentOptions options) const;
 };
 
 /// Structures in their order. They are shared between states, and never change.
@@ -90,6 +133,12 @@ struct StudyActions {
         MarkKind kind = MarkKind::Surface;
         Vec3 world{0, 0, 0};
     };
+    /// One action for the marks of a file.
+    struct AddMarks {
+        StudyId structure = 0;
+        MarkKind kind = MarkKind::Surface;
+        std::vector<Vec3> world;
+    };
     struct MoveMark {
         StudyId structure = 0, mark = 0;
         Vec3 world{0, 0, 0};
@@ -107,6 +156,32 @@ struct StudyActions {
     struct RemoveOutline {
         StudyId structure = 0, mark = 0;
     };
+    struct AddStroke {
+        StudyId structure = 0;
+        StudyStroke stroke;  ///< its own number is not used
+    };
+    struct ClearPaint {
+        StudyId structure = 0;
+    };
+    struct SetGuess {
+        StudyId structure = 0;
+        StudyGuess guess;
+    };
+    struct RemoveGuess {
+        StudyId structure = 0;
+    };
+    /// A structure for each label of another program's label image, which is its guess.
+    struct AddLabels {
+        std::string path, digest;  ///< as of StudyGuess
+        struct Label {
+            int label = 0;
+            std::string name;
+        };
+        std::vector<Label> labels;
+    };
+    struct SetOptions {
+        StudyOptions options;
+    };
     struct Undo {};
     struct Redo {};
 };
@@ -114,8 +189,13 @@ struct StudyActions {
 using StudyAction =
     std::variant<StudyActions::AddStructure, StudyActions::RemoveStructure, StudyActions::Rename, StudyActions::Recolor,
                  StudyActions::Lock, StudyActions::Show, StudyActions::Duplicate, StudyActions::AddMark,
-                 StudyActions::MoveMark, StudyActions::RemoveMark, StudyActions::GiveMark, StudyActions::AddOutline,
-                 StudyActions::RemoveOutline, StudyActions::Undo, StudyActions::Redo>;
+                 StudyActions::AddMarks, StudyActions::MoveMark, StudyActions::RemoveMark, StudyActions::GiveMark,
+                 StudyActions::AddOutline, StudyActions::RemoveOutline, StudyActions::AddStroke,
+                 StudyActions::ClearPaint, StudyActions::SetGuess, StudyActions::RemoveGuess, StudyActions::AddLabels,
+                 StudyActions::SetOptions, StudyActions::Undo, StudyActions::Redo>;
+
+/// Whether the action names a file: what comes from a page may not.
+[[nodiscard]] COVOL_API bool names_file(const StudyAction& action);
 
 /// An action with the key that its sender made for it: one that comes twice is applied once.
 struct KeyedAction {
@@ -126,6 +206,7 @@ struct KeyedAction {
 /// {"key":"...","do":"add_mark","structure":1,"kind":"surface","world":[x,y,z]}: docs/study.md has all of them.
 /// @throws Error InvalidInput: the text is no such action. It may come from anywhere.
 [[nodiscard]] COVOL_API KeyedAction parse_study_action(std::string_view json);
+/// @throws Error InvalidInput: a key that is none, or a text that is no UTF-8
 [[nodiscard]] COVOL_API std::string to_json(const KeyedAction& action);
 
 /// Structures and what was done to them, without limit; nothing of files.
@@ -135,6 +216,7 @@ public:
     explicit StudyHistory(const ImageGeometry& image);
 
     [[nodiscard]] const StudyState& state() const noexcept { return state_; }
+    [[nodiscard]] const StudyOptions& options() const noexcept { return options_; }
     /// Null: there is none.
     [[nodiscard]] std::shared_ptr<const StudyStructure> find(StudyId structure) const;
     [[nodiscard]] bool can_undo() const noexcept { return !done_.empty(); }
@@ -143,17 +225,19 @@ public:
     /// What an action did.
     struct Changed {
         std::vector<StudyId> structures;  ///< that changed, came or went; none: an undo of nothing
-        StudyId made = 0;                 ///< the number of the structure, mark or outline that is new; 0: none is
+        StudyId made = 0;                 ///< the number of the first structure, mark or the like that is new; 0: none
+        bool options = false;             ///< whether the options changed
     };
     /// The same actions in the same order give the same state, numbers included.
     /// @throws Error InvalidInput: it cannot be done (no such structure, a name that is in use, a place outside of the
     ///         image, a locked structure), and nothing changed.
     Changed apply(const StudyAction& action) { return carry_out(plan(action)); }
 
-    /// Of one structure; one of both may be null.
+    /// Of one structure, where one of both may be null; or of the options.
     struct Change {
         std::shared_ptr<const StudyStructure> before, after;
-        std::size_t place = 0;  ///< in the order
+        std::size_t place = 0;                                    ///< in the order
+        std::optional<std::array<StudyOptions, 2>> options = {};  ///< before and after
     };
     /// An action that can be done: what is to be kept on the disk first is kept between plan() and carry_out().
     struct Step {
@@ -173,6 +257,7 @@ private:
 
     ImageGeometry image_;
     StudyState state_;
+    StudyOptions options_;
     std::vector<Changes> done_, undone_;
     StudyId last_id_ = 0;
 };
@@ -229,9 +314,21 @@ private:
 /// Its structures as they are now; another program may have it open. @throws Error Io, InvalidInput.
 [[nodiscard]] COVOL_API StudyState read_study(const std::string& folder);
 
+/// How all of its structures are segmented. @throws Error Io, InvalidInput.
+[[nodiscard]] COVOL_API StudyOptions read_study_options(const std::string& folder);
+
+/// What a study's structures need to become marks.
+struct StudySite {
+    ImageGeometry image;
+    /// Reads a guess, and checks its digest (StudyFiles); none: structures with a guess are an error.
+    std::function<GivenGuess(const StudyGuess&, const RunContext&)> read_guess;
+};
 /// What segment_structures() takes of a structure.
-[[nodiscard]] COVOL_API Marks marks_of(const StudyStructure& structure);
-/// Of all structures that have marks, in their order.
-[[nodiscard]] COVOL_API std::vector<Marks> marks_of(const StudyState& state);
+[[nodiscard]] COVOL_API Marks marks_of(const StudyStructure& structure, const StudySite& site);
+/// Of all structures that have evidence, in their order; guesses of label images keep their labels.
+[[nodiscard]] COVOL_API std::vector<Marks> marks_of(const StudyState& state, const StudySite& site);
+
+/// The paint of a structure as a label image of the box around it, 1 where it is painted; none: nothing is.
+[[nodiscard]] COVOL_API std::optional<Image> paint_of(const StudyStructure& structure, const ImageGeometry& image);
 
 }  // namespace covol

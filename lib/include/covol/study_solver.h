@@ -38,14 +38,18 @@ struct StudyResult {
 class StudySolver {
 public:
     /// @param image  gives the one that a surface is made from, on the solver's thread
+    /// @param read_guess  as of StudySite; none: structures with a guess fail
     /// @param told  called from the solver's thread, one result at a time; it must not call the solver
     COVOL_API StudySolver(std::function<Image()> image, SegmentOptions options,
-                          std::function<void(const StudyResult&)> told, const RunContext& run = {});
+                          std::function<void(const StudyResult&)> told, const RunContext& run = {},
+                          std::function<GivenGuess(const StudyGuess&, const RunContext&)> read_guess = {});
     /// Cancels what runs.
     COVOL_API ~StudySolver();
     StudySolver(const StudySolver&) = delete;
     StudySolver& operator=(const StudySolver&) = delete;
 
+    /// From the next solve() on. What runs is not affected: all structures are to be solved again.
+    COVOL_API void set_options(SegmentOptions options);
     /// The structure's marks are these now.
     COVOL_API void solve(std::shared_ptr<const StudyStructure> structure, std::uint64_t sequence);
     /// It is gone.

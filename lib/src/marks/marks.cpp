@@ -56,7 +56,7 @@ Image only(const Image& labels, int label) {
 }  // namespace
 
 PaintedImage make_painted(const Image& image, const PaintedOptions& options) {
-    PaintedImage painted{image, options, find_painted_labels(image), {}};
+    PaintedImage painted{image, options, find_painted_labels(image), {}, true};
     std::erase_if(painted.labels, [&](const LabelName& label) { return label.label == options.outside_label; });
     return painted;
 }
@@ -152,7 +152,8 @@ void number_labels(std::vector<Marks>& structures) {
     for (const Marks& marks : structures) taken.insert(marks.label);
     for (Marks& marks : structures)
         for (const Marks::Paint& paint : marks.paint)
-            if (marks.label == 0 && taken.insert(paint.label).second) marks.label = paint.label;
+            if (marks.label == 0 && paint.image->is_shared && taken.insert(paint.label).second)
+                marks.label = paint.label;
     int next = 1;
     for (Marks& marks : structures) {
         while (taken.contains(next)) ++next;

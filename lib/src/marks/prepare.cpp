@@ -163,6 +163,7 @@ private:
         std::set<const PaintedImage*> images;
         for (std::size_t n = 0; n < structures_.size(); ++n)
             for (const Marks::Paint& paint : structures_[n].paint) {
+                if (n != own && !paint.image->is_shared) continue;
                 const std::vector<Vec3>& seeds = paint_.label_of(paint, run).inside;
                 std::vector<Vec3>& side = n == own ? options.inside : options.outside;
                 side.insert(side.end(), seeds.begin(), seeds.end());

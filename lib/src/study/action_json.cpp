@@ -15,6 +15,7 @@ using nlohmann::json;
 using act = StudyActions;
 
 constexpr std::size_t kMostKeyBytes = 100;
+constexpr int kMostWhole = 1 << 30;
 
 using detail::refuse;
 
@@ -45,6 +46,13 @@ public:
         const json& value = at(name);
         if (!value.is_boolean()) refuse(std::string("'") + name + "': expected true or false");
         return value.get<bool>();
+    }
+    /// From 0 to `most`.
+    [[nodiscard]] int whole(const char* name, int most) const {
+        const json& value = at(name);
+        if (!value.is_number_unsigned() || value.get<std::uint64_t>() > std::uint64_t(most))
+            refuse(std::string("'") + name + "': expected a whole number from 0 to " + std::to_string(most));
+        return value.get<int>();
     }
     [[nodiscard]] double number(const char* name) const { return number_of(at(name), name); }
     [[nodiscard]] Vec3 place(const char* name) const { return place_of(at(name), name); }
@@ -81,11 +89,14 @@ private:
     const json& object_;
 };
 
-MarkKind kind_of(const std::string& word) {
-    for (std::size_t n = 0; n < kWords<MarkKind>.size(); ++n)
-        if (word == kWords<MarkKind>[n]) return MarkKind(n);
-    refuse("'kind': expected surface, inside or outside, got '" + word.substr(0, kMostKeyBytes) + "'");
+template <typename Enum>
+Enum word_of(const std::string& name, const std::string& word, const char* expected) {
+    for (std::size_t n = 0; n < kWords<Enum>.size(); ++n)
+        if (word == kWords<Enum>[n]) return Enum(n);
+    refuse("'" + name + "': expected " + expected + ", got '" + word.substr(0, kMostKeyBytes) + "'");
 }
+
+MarkKind kind_of(const std::string& word) { return word_of<MarkKind>("kind", word, "surface, inside or outside"); }
 
 /// An action's word, how it is read, and how it is written; one for each alternative of StudyAction, in its order.
 template <typename Action>
@@ -163,6 +174,18 @@ struct Form<act::AddMark> {
     }
 };
 template <>
+struct Form<act::AddMarks> {
+    static constexpr const char* word = "add_marks";
+    static act::AddMarks read(const Fields& f) {
+        return {f.id("structure"), kind_of(f.text("kind")), f.places("world")};
+    }
+    static void write(const act::AddMarks& a, json& j) {
+        j["structure"] = a.structure;
+        j["kind"] = kWords<MarkKind>[std::size_t(a.kind)];
+        j["world"] = a.world;
+    }
+};
+template <>
 struct Form<act::MoveMark> {
     static constexpr const char* word = "move_mark";
     static act::MoveMark read(const Fields& f) { return {f.id("structure"), f.id("mark"), f.place("world")}; }
@@ -220,6 +243,99 @@ struct Form<act::RemoveOutline> {
     }
 };
 template <>
+struct Form<act::AddStroke> {
+    static constexpr const char* word = "add_stroke";
+    static act::AddStroke read(const Fields& f) {
+        StudyStroke stroke;
+        stroke.erases = f.flag("erases");
+        stroke.radius = f.number("radius");
+        if (f.has("axis")) {
+            stroke.axis = f.whole("axis", 2);
+            stroke.at = f.whole("at", kMostWhole);
+        }
+        stroke.world = f.places("world");
+        return {f.id("structure"), std::move(stroke)};
+    }
+    static void write(const act::AddStroke& a, json& j) {
+        j["structure"] = a.structure;
+        j["erases"] = a.stroke.erases;
+        j["radius"] = a.stroke.radius;
+        if (a.stroke.axis) {
+            j["axis"] = *a.stroke.axis;
+            j["at"] = a.stroke.at;
+        }
+        j["world"] = a.stroke.world;
+    }
+};
+template <>
+struct Form<act::ClearPaint> {
+    static constexpr const char* word = "clear_paint";
+    static act::ClearPaint read(const Fields& f) { return {f.id("structure")}; }
+    static void write(const act::ClearPaint& a, json& j) { j["structure"] = a.structure; }
+};
+template <>
+struct Form<act::SetGuess> {
+    static constexpr const char* word = "set_guess";
+    static act::SetGuess read(const Fields& f) {
+        return {f.id("structure"), {f.text("path"), f.text("digest"), f.whole("label", kMostWhole)}};
+    }
+    static void write(const act::SetGuess& a, json& j) {
+        j["structure"] = a.structure;
+        j["path"] = a.guess.path;
+        j["digest"] = a.guess.digest;
+        j["label"] = a.guess.label;
+    }
+};
+template <>
+struct Form<act::RemoveGuess> {
+    static constexpr const char* word = "remove_guess";
+    static act::RemoveGuess read(const Fields& f) { return {f.id("structure")}; }
+    static void write(const act::RemoveGuess& a, json& j) { j["structure"] = a.structure; }
+};
+template <>
+struct Form<act::AddLabels> {
+    static constexpr const char* word = "add_labels";
+    static act::AddLabels read(const Fields& f) {
+        act::AddLabels a{f.text("path"), f.text("digest"), {}};
+        const json& labels = f.at("labels");
+        if (!labels.is_array()) refuse("'labels': expected a list of objects with 'label' and 'name'");
+        for (const json& one : labels) {
+            const Fields fields(one);
+            a.labels.push_back({fields.whole("label", kMostWhole), fields.text("name")});
+        }
+        return a;
+    }
+    static void write(const act::AddLabels& a, json& j) {
+        j["path"] = a.path;
+        j["digest"] = a.digest;
+        j["labels"] = json::array();
+        for (const auto& one : a.labels) j["labels"].push_back({{"label", one.label}, {"name", one.name}});
+    }
+};
+template <>
+struct Form<act::SetOptions> {
+    static constexpr const char* word = "set_options";
+    static act::SetOptions read(const Fields& f) {
+        const Fields given(f.at("options"));
+        act::SetOptions a;
+        const auto number = [&](const char* name, std::optional<double>& value) {
+            if (given.has(name)) value = given.number(name);
+        };
+        number("voxel_size", a.options.voxel_size);
+        number("rho", a.options.rho);
+        number("mark_precision", a.options.mark_precision);
+        if (given.has("model")) a.options.model = word_of<Model>("model", given.text("model"), "guided or paper");
+        return a;
+    }
+    static void write(const act::SetOptions& a, json& j) {
+        json& to = j["options"] = json::object();
+        if (a.options.voxel_size) to["voxel_size"] = *a.options.voxel_size;
+        if (a.options.rho) to["rho"] = *a.options.rho;
+        if (a.options.mark_precision) to["mark_precision"] = *a.options.mark_precision;
+        if (a.options.model) to["model"] = kWords<Model>[std::size_t(*a.options.model)];
+    }
+};
+template <>
 struct Form<act::Undo> {
     static constexpr const char* word = "undo";
     static act::Undo read(const Fields& /*unused*/) { return {}; }
@@ -240,9 +356,9 @@ StudyAction read_action(const std::string& word, const Fields& fields, const std
     return *std::move(found);
 }
 
-bool is_key(const std::string& key) {
-    return key.size() <= kMostKeyBytes &&
-           std::all_of(key.begin(), key.end(), [](char c) { return c >= ' ' && c <= '~'; });
+void require_key(const std::string& key) {
+    if (key.size() > kMostKeyBytes || !std::all_of(key.begin(), key.end(), [](char c) { return c >= ' ' && c <= '~'; }))
+        refuse("'key': expected at most 100 printable ASCII characters");
 }
 
 }  // namespace
@@ -266,17 +382,22 @@ json parse_object(std::string_view text) {
 
 }  // namespace detail
 
+bool names_file(const StudyAction& action) {
+    return std::holds_alternative<act::SetGuess>(action) || std::holds_alternative<act::AddLabels>(action);
+}
+
 KeyedAction parse_study_action(std::string_view text) {
     const json object = detail::parse_object(text);
     const Fields fields(object);
     KeyedAction result;
     if (fields.has("key")) result.key = fields.text("key");
-    if (!is_key(result.key)) refuse("'key': expected at most 100 printable ASCII characters");
+    require_key(result.key);
     result.action = read_action(fields.text("do"), fields, static_cast<const StudyAction*>(nullptr));
     return result;
 }
 
 std::string to_json(const KeyedAction& keyed) {
+    require_key(keyed.key);  // what is written has to be read again
     json object;
     if (!keyed.key.empty()) object["key"] = keyed.key;
     std::visit(
@@ -286,7 +407,11 @@ std::string to_json(const KeyedAction& keyed) {
             Form<Action>::write(action, object);
         },
         keyed.action);
-    return object.dump();
+    try {
+        return object.dump();
+    } catch (const json::exception&) {
+        refuse("expected names and paths in UTF-8");
+    }
 }
 
 }  // namespace covol

@@ -1,16 +1,20 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <set>
 #include <string>
 #include <utility>
 
 #include "covol/structures.h"
 #include "covol/study.h"
+#include "study/paint.h"
 #include "study/refuse.h"
 
 namespace covol {
 namespace {
 
-constexpr std::size_t kMostStructures = 10'000, kMostMarks = 1'000'000, kMostCorners = 100'000, kMostNameBytes = 200;
+constexpr std::size_t kMostStructures = 10'000, kMostMarks = 1'000'000, kMostCorners = 100'000, kMostNameBytes = 200,
+                      kMostStrokes = 100'000, kMostPathBytes = 4096;
 
 using detail::refuse;
 
@@ -50,6 +54,11 @@ struct StudyHistory::Planning {
         for (std::size_t a = 0; a < 3; ++a)
             if (!(index[a] >= -0.5 && index[a] <= history.image_.size[a] - 0.5))
                 refuse("a mark lies outside of the image");
+    }
+    static void require_file(const std::string& path, const std::string& digest) {
+        if (path.empty() || path.size() > kMostPathBytes || path.find('\0') != std::string::npos)
+            refuse("expected a path of 1 to " + std::to_string(kMostPathBytes) + " bytes");
+        if (digest.empty() || digest.size() > kMostNameBytes) refuse("expected a digest of the file");
     }
     /// `edit` is given a copy.
     template <typename Edit>
@@ -114,6 +123,7 @@ struct StudyHistory::Planning {
         Change change = added(copy);
         for (StudyMark& m : copy->marks) m.id = next++;
         for (StudyOutline& o : copy->outlines) o.id = next++;
+        for (StudyStroke& stroke : copy->strokes) stroke.id = next++;
         return {std::move(change)};
     }
     Changes operator()(const StudyActions::AddMark& a) {
@@ -121,6 +131,15 @@ struct StudyHistory::Planning {
         return {edited(a.structure, false, [&](StudyStructure& s) {
             if (s.marks.size() >= kMostMarks) refuse("'" + s.name + "' has too many marks");
             s.marks.push_back({next++, a.kind, a.world});
+        })};
+    }
+    Changes operator()(const StudyActions::AddMarks& a) {
+        if (a.world.empty()) refuse("expected marks, got none");
+        for (const Vec3& place : a.world) require_inside(place);
+        return {edited(a.structure, false, [&](StudyStructure& s) {
+            if (a.world.size() > kMostMarks - std::min(s.marks.size(), kMostMarks))
+                refuse("'" + s.name + "' has too many marks");
+            for (const Vec3& place : a.world) s.marks.push_back({next++, a.kind, place});
         })};
     }
     Changes operator()(const StudyActions::MoveMark& a) {
@@ -162,12 +181,75 @@ struct StudyHistory::Planning {
                 refuse("'" + s.name + "' has no outline " + std::to_string(a.mark));
         })};
     }
+    Changes operator()(const StudyActions::AddStroke& a) {
+        if (a.stroke.world.empty()) refuse("a stroke needs a place");
+        if (a.stroke.world.size() > kMostCorners) refuse("a stroke has too many corners");
+        for (const Vec3& corner : a.stroke.world) require_inside(corner);
+        return {edited(a.structure, false, [&](StudyStructure& s) {
+            if (s.strokes.size() >= kMostStrokes) refuse("'" + s.name + "' has too many strokes");
+            s.strokes.push_back(a.stroke);
+            s.strokes.back().id = next++;
+            detail::require_paintable(s, history.image_);
+        })};
+    }
+    Changes operator()(const StudyActions::ClearPaint& a) {
+        return {edited(a.structure, false, [&](StudyStructure& s) {
+            if (s.strokes.empty()) refuse("'" + s.name + "' has no paint");
+            s.strokes.clear();
+        })};
+    }
+    Changes operator()(const StudyActions::SetGuess& a) {
+        require_file(a.guess.path, a.guess.digest);
+        return {edited(a.structure, false, [&](StudyStructure& s) { s.guess = a.guess; })};
+    }
+    Changes operator()(const StudyActions::RemoveGuess& a) {
+        return {edited(a.structure, false, [&](StudyStructure& s) {
+            if (!s.guess) refuse("'" + s.name + "' has no guess");
+            s.guess.reset();
+        })};
+    }
+    Changes operator()(const StudyActions::AddLabels& a) {
+        require_file(a.path, a.digest);
+        if (a.labels.empty()) refuse("expected labels, got none");
+        if (a.labels.size() > kMostStructures - history.state_.size()) refuse("too many structures");
+        Changes changes;
+        std::set<std::string> names;
+        for (const auto& one : a.labels) {
+            require_name(one.name);
+            require_free(one.name);
+            if (!names.insert(one.name).second) refuse("two labels are called '" + one.name + "'");
+            auto structure = std::make_shared<StudyStructure>();
+            structure->name = one.name;
+            structure->guess = StudyGuess{a.path, a.digest, one.label};
+            structure->color = structure_color(history.state_.size() + changes.size());
+            Change change = added(std::move(structure));
+            change.place += changes.size();
+            changes.push_back(std::move(change));
+        }
+        return changes;
+    }
+    Changes operator()(const StudyActions::SetOptions& a) {
+        const auto is_number = [](const std::optional<double>& value, double least, double most) {
+            return !value || (*value >= least && *value <= most);
+        };
+        constexpr double kSmallest = std::numeric_limits<double>::min(), kLargest = std::numeric_limits<double>::max();
+        if (!is_number(a.options.voxel_size, kSmallest, kLargest)) refuse("'voxel_size': expected a number > 0");
+        if (!is_number(a.options.rho, 0, 1)) refuse("'rho': expected a number from 0 to 1");
+        if (!is_number(a.options.mark_precision, 0, kLargest)) refuse("'mark_precision': expected a number >= 0");
+        Change change;
+        change.options = {history.options_, a.options};
+        return {std::move(change)};
+    }
     Changes operator()(const StudyActions::Undo& /*unused*/) { return {}; }
     Changes operator()(const StudyActions::Redo& /*unused*/) { return {}; }
 };
 
 void StudyHistory::put(const Changes& changes, bool forward) {
     const auto put_one = [&](const Change& change) {
+        if (change.options) {
+            options_ = (*change.options)[forward ? 1 : 0];
+            return;
+        }
         const auto& before = forward ? change.before : change.after;
         const auto& after = forward ? change.after : change.before;
         const auto at = state_.begin() + std::ptrdiff_t(change.place);
@@ -208,7 +290,11 @@ StudyHistory::Changed StudyHistory::carry_out(Step step) {
         from.pop_back();
     }
     put(to.back(), forward);
-    for (const Change& c : to.back()) changed.structures.push_back((c.before ? c.before : c.after)->id);
+    for (const Change& c : to.back())
+        if (c.options)
+            changed.options = true;
+        else
+            changed.structures.push_back((c.before ? c.before : c.after)->id);
     return changed;
 }
 

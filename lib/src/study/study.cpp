@@ -16,7 +16,6 @@
 
 #include "covol/error.h"
 #include "covol/file_set.h"
-#include "covol/safe_text.h"
 #include "files/descriptor.h"
 #include "study/study_json.h"
 
@@ -216,49 +215,30 @@ StudyImage read_study_image(const std::string& folder) {
     return parse_header(lines.front(), path);
 }
 
-StudyState read_study(const std::string& folder) {
+namespace {
+
+StudyHistory read_history(const std::string& folder) {
     const fs::path path = fs::path(folder) / kJournal;
     const std::string text = read_text(path);
     const std::vector<std::string_view> lines = whole_lines(text);
     if (lines.empty()) fail(Errc::InvalidInput, path, "expected the journal of a study; it is empty");
     StudyHistory history(parse_header(lines.front(), path).geometry);
     each_action(lines, path, [&](const KeyedAction& action) { (void)history.apply(action.action); });
-    return history.state();
+    return history;
 }
 
-Marks marks_of(const StudyStructure& structure) {
-    const auto cloud = [](std::vector<Vec3> places) {
-        PointCloud points;
-        points.points = std::move(places);
-        points.stated = true;
-        return points;
-    };
-    Marks marks;
-    marks.name = safe_text(structure.name);
-    std::vector<Vec3> inside, outside;
-    for (const StudyMark& mark : structure.marks)
-        (mark.kind == MarkKind::Surface  ? marks.points
-         : mark.kind == MarkKind::Inside ? inside
-                                         : outside)
-            .push_back(mark.world);
-    marks.count = marks.points.size();
-    if (!inside.empty()) marks.inside.push_back(cloud(std::move(inside)));
-    if (!outside.empty()) marks.outside.push_back(cloud(std::move(outside)));
-    PointCloud lines = cloud({});
-    for (const StudyOutline& outline : structure.outlines) {
-        const std::size_t begin = lines.points.size();
-        lines.points.insert(lines.points.end(), outline.world.begin(), outline.world.end());
-        lines.lines.push_back({begin, lines.points.size(), outline.closed, {}});
-    }
-    if (!lines.lines.empty()) add_contours(marks, std::move(lines), {});
-    return marks;
-}
+}  // namespace
 
-std::vector<Marks> marks_of(const StudyState& state) {
-    std::vector<Marks> all;
-    for (const auto& structure : state)
-        if (!structure->marks.empty() || !structure->outlines.empty()) all.push_back(marks_of(*structure));
-    return all;
+StudyState read_study(const std::string& folder) { return read_history(folder).state(); }
+
+StudyOptions read_study_options(const std::string& folder) { return read_history(folder).options(); }
+
+SegmentOptions StudyOptions::applied_to(SegmentOptions options) const {
+    if (voxel_size) options.voxel_size = *voxel_size;
+    if (rho) options.evolve.rho = *rho;
+    if (mark_precision) options.mark_precision = *mark_precision;
+    if (model) options.model = *model;
+    return options;
 }
 
 }  // namespace covol

@@ -38,9 +38,25 @@ bool are_flat(const std::vector<Vec3>& places) {
     return squares[0] <= 1e-6 * squares[2];
 }
 
+/// Whether all paint is on one slice.
+bool is_on_one_slice(const std::vector<StudyStroke>& strokes) {
+    const StudyStroke* first = nullptr;
+    for (const StudyStroke& stroke : strokes) {
+        if (stroke.erases) continue;
+        if (!stroke.axis || (first != nullptr && (stroke.axis != first->axis || stroke.at != first->at))) return false;
+        first = &stroke;
+    }
+    return first != nullptr;
+}
+
 /// What is missing before there can be a surface, in words; empty: nothing.
 std::string missing(const StudyStructure& structure) {
-    if (!structure.outlines.empty()) return {};
+    // What a guess or paint alone gives, whoever segments it knows best.
+    if (!structure.outlines.empty() || structure.guess) return {};
+    if (!structure.strokes.empty())
+        return structure.marks.empty() && is_on_one_slice(structure.strokes)
+                   ? "paint a second slice, or set marks beside this one, and there is a surface"
+                   : "";
     std::vector<Vec3> places;
     for (const StudyMark& mark : structure.marks)
         if (mark.kind == MarkKind::Surface) places.push_back(mark.world);
@@ -63,6 +79,7 @@ double voxels_of_band(const StudyStructure& structure, const SegmentResult* befo
         if (mark.kind == MarkKind::Surface) places.push_back(mark.world);
     for (const StudyOutline& outline : structure.outlines)
         places.insert(places.end(), outline.world.begin(), outline.world.end());
+    if (places.empty()) return 0;  // a guess or paint alone
     const WorldBox box = bounding_box(places);
     double area = 0;
     for (std::size_t a = 0; a < 3; ++a)
@@ -78,10 +95,18 @@ struct StudySolver::State {
         std::uint64_t sequence = 0;
     };
 
-    State(std::function<Image()> i, SegmentOptions o, std::function<void(const StudyResult&)> t, const RunContext& r)
-        : image(std::move(i)), options(std::move(o)), told(std::move(t)), run(r) {
+    State(std::function<Image()> i, SegmentOptions o, std::function<void(const StudyResult&)> t, const RunContext& r,
+          std::function<GivenGuess(const StudyGuess&, const RunContext&)> read_guess)
+        : image(std::move(i)), site{image().geometry(), std::move(read_guess)}, told(std::move(t)), run(r) {
         run.cancel = &cancel;
-        if (!options.voxel_size) options.voxel_size = choose_voxel_size(image()).voxel_size;
+        set_options(std::move(o));
+    }
+    /// @pre locked, or nothing runs
+    void set_options(SegmentOptions o) {
+        options = std::move(o);
+        if (options.voxel_size) return;
+        if (!automatic_voxel_size) automatic_voxel_size = choose_voxel_size(image()).voxel_size;
+        options.voxel_size = automatic_voxel_size;
     }
 
     void work() {
@@ -94,8 +119,9 @@ struct StudySolver::State {
             running = job.structure->id;
             is_obsolete = false;
             cancel = false;
+            const SegmentOptions how = options;
             lock.unlock();
-            const bool is_done = solve(job);
+            const bool is_done = solve(job, how);
             lock.lock();
             running = 0;
             if (!is_done && !is_obsolete && !is_stopping) waiting.push_back(job);  // it made way for another one
@@ -104,7 +130,7 @@ struct StudySolver::State {
     }
 
     /// False: cancelled.
-    bool solve(const Job& job) {
+    bool solve(const Job& job, const SegmentOptions& refined) {
         StudyResult result;
         result.structure = job.structure->id;
         result.sequence = job.sequence;
@@ -121,7 +147,7 @@ struct StudySolver::State {
         const auto begin = std::chrono::steady_clock::now();
         tell(StudyResult::Stage::Working);
         Image pixels;
-        const auto find = [&](const SegmentOptions& how, StudyResult::Stage stage) {
+        const auto find = [&](const SegmentOptions& how, const Marks& marks, StudyResult::Stage stage) {
             RunContext own = run;
             own.progress = [&, last = begin](const std::string&, double fraction) mutable {
                 const auto now = std::chrono::steady_clock::now();
@@ -130,7 +156,7 @@ struct StudySolver::State {
                 result.progress = fraction;
                 tell(StudyResult::Stage::Working);
             };
-            StructuresResult all = segment_structures(pixels, {marks_of(*job.structure)}, {how, {}}, own);
+            StructuresResult all = segment_structures(pixels, {marks}, {how, {}}, own);
             SegmentResult found = std::move(all.structures.front().result);
             if (found.mesh.empty()) found.mesh = extract_mesh(*found.surface, {}, own);
             result.surface = std::make_shared<const SegmentResult>(std::move(found));
@@ -142,18 +168,23 @@ struct StudySolver::State {
         };
         try {
             pixels = image();
-            SegmentOptions first = options;
+            const Marks marks = marks_of(*job.structure, site);
+            SegmentOptions first = refined;
             first.evolve.rho = 0;
             first.without_mesh = first.without_fields = true;  // good triangles take as long as the surface itself
+            Marks moved = marks;
             const auto before = newest(result.structure);
-            if (before) first.guess = LevelSetStart{before->surface};
+            if (before) {
+                first.guess = LevelSetStart{before->surface};
+                moved.guess = nullptr;
+            }
             if (voxels_of_band(*job.structure, before.get(), *first.voxel_size) > kManyVoxels) *first.voxel_size *= 2;
             try {
-                find(first, StudyResult::Stage::First);
+                find(first, moved, StudyResult::Stage::First);
             } catch (const Error& error) {
                 if (error.code() == Errc::Cancelled) throw;  // else the image may know better
             }
-            find(options, StudyResult::Stage::Refined);
+            find(refined, marks, StudyResult::Stage::Refined);
         } catch (const Error& error) {
             if (error.code() == Errc::Cancelled) return false;
             result.message = error.what();
@@ -185,7 +216,9 @@ struct StudySolver::State {
     }
 
     const std::function<Image()> image;
+    const StudySite site;
     SegmentOptions options;
+    std::optional<double> automatic_voxel_size;
     const std::function<void(const StudyResult&)> told;
     RunContext run;
     std::atomic<bool> cancel{false};
@@ -200,8 +233,10 @@ struct StudySolver::State {
 };
 
 StudySolver::StudySolver(std::function<Image()> image, SegmentOptions options,
-                         std::function<void(const StudyResult&)> told, const RunContext& run)
-    : state_(std::make_unique<State>(std::move(image), std::move(options), std::move(told), run)) {
+                         std::function<void(const StudyResult&)> told, const RunContext& run,
+                         std::function<GivenGuess(const StudyGuess&, const RunContext&)> read_guess)
+    : state_(
+          std::make_unique<State>(std::move(image), std::move(options), std::move(told), run, std::move(read_guess))) {
     state_->worker = std::thread([state = state_.get()] { state->work(); });
 }
 
@@ -213,6 +248,11 @@ StudySolver::~StudySolver() {
     }
     state_->changed.notify_all();
     state_->worker.join();
+}
+
+void StudySolver::set_options(SegmentOptions options) {
+    const std::lock_guard lock(state_->mutex);
+    state_->set_options(std::move(options));
 }
 
 void StudySolver::solve(std::shared_ptr<const StudyStructure> structure, std::uint64_t sequence) {

@@ -179,6 +179,34 @@ TEST_CASE("pages of other sites do not lead here") {
     CHECK(status_of(link("/image", "navigate", "document")) == 403);
 }
 
+TEST_CASE("a frame of a page on the same host leads here where frames are allowed, and to the link alone") {
+    Rules own = rules();
+    const std::string target = "/?token=" + kToken;
+    const auto framed = [&](std::string_view to, std::string_view site, std::string_view dest = "iframe") {
+        const Judgement judgement =
+            judge(with(with(with(good_head(to), "Sec-Fetch-Site", site), "Sec-Fetch-Mode", "navigate"),
+                       "Sec-Fetch-Dest", dest),
+                  own);
+        return judgement.kind == Kind::Refuse ? judgement.status : 0;
+    };
+    CHECK(framed(target, "same-site") == 403);
+    own.may_be_framed = true;
+    CHECK(framed(target, "same-site") == 0);
+    CHECK(framed(target, "cross-site") == 403);
+    CHECK(framed(target, "same-site", "embed") == 403);
+    CHECK(framed("/", "same-site") == 403);
+    CHECK(framed("/image", "same-site") == 403);
+    Options options;
+    options.frame_origins = {"http://localhost:8888", "http://127.0.0.1:8888"};
+    CHECK(options.why_invalid().empty());
+    for (const std::string bad :
+         {"localhost:8888", "https://localhost:8888", "http://*", "http://a:1 b", "http://a/", ""}) {
+        options.frame_origins = {bad};
+        CAPTURE(bad);
+        CHECK(options.why_invalid().find("frame_origins") == 0);
+    }
+}
+
 TEST_CASE("only GET and HEAD, without a body, of an address that is not too long") {
     for (const std::string_view method : {"POST", "PUT", "DELETE", "OPTIONS", "TRACE", "CONNECT", "get", ""}) {
         RequestHead head = good_head();
@@ -198,6 +226,52 @@ TEST_CASE("only GET and HEAD, without a body, of an address that is not too long
     const std::string longest = "/" + std::string(4095, 'x');
     CHECK(status_of(good_head(longest)) == 0);
     CHECK(status_of(good_head(longest + "x")) == 414);
+}
+
+TEST_CASE("a POST is answered where files are taken, from the page itself, and with a length that is not too large") {
+    const auto judged = [](const RequestHead& head, std::size_t most = 1000) {
+        Rules own = rules();
+        own.most_body_bytes = most;
+        const Judgement judgement = judge(head, own);
+        return judgement.kind == Kind::Refuse ? judgement.status : judgement.kind == Kind::Post ? 0 : -1;
+    };
+    RequestHead good = with(with(good_head("/import"), "Origin", "http://127.0.0.1:8000"), "Content-Length", "1000");
+    good.method = "POST";
+    CHECK(judged(good) == 0);
+    CHECK(judged(good, 0) == 405);
+    CHECK(judged(good, 999) == 413);
+    CHECK(judged(with(good, "Content-Length", "99999999999999999999999")) == 413);
+    for (const std::string_view length : {"", "-1", "0x1", "1, 1", "1 ", "0"})
+        CHECK(judged(with(good, "Content-Length", length)) == 400);
+    CHECK(judged(without(good, "Content-Length")) == 411);
+    RequestHead two = good;
+    two.fields.emplace_back("content-length", "1000");
+    CHECK(judged(two) == 411);
+    CHECK(judged(with(good, "Transfer-Encoding", "chunked")) == 400);
+    // Forms and scripts of other pages, of which a browser tells where they are from.
+    CHECK(judged(without(good, "Origin")) == 403);
+    CHECK(judged(with(good, "Origin", "null")) == 403);
+    CHECK(judged(with(good, "Origin", "http://127.0.0.1:8001")) == 403);
+    CHECK(judged(with(good, "Sec-Fetch-Site", "same-site")) == 403);
+    CHECK(judged(without(good, "Cookie")) == 403);
+    CHECK(judged(with(good, "Host", "evil.example")) == 403);
+    RequestHead other = good;
+    for (const std::string_view target : {"/live", "/import#a"}) {
+        other.target = target;
+        CHECK(judged(other) >= 400);
+    }
+    const std::string link = "/?token=" + kToken;
+    other = without(good, "Cookie");
+    other.target = link;
+    CHECK(judged(other) == 403);
+    CHECK(judged(good_head()) == -1);
+    CHECK(judge(good,
+                [] {
+                    Rules own = rules();
+                    own.most_body_bytes = 1000;
+                    return own;
+                }())
+              .body_bytes == 1000);
 }
 
 TEST_CASE("addresses that are not understood") {

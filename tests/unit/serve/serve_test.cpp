@@ -89,7 +89,7 @@ TEST_CASE("the link sets the cookie and leads to the page") {
     const Answer second = site.get("/");
     CHECK(second.result_int() == 200);
     CHECK(second.body() == "/");
-    check_protection(second, options.page_policy);
+    check_protection(second, options.page_policy + "; frame-ancestors 'none'");
     check_protection(site.get("/image"));
     CHECK(site.get("/a?b=%20c&d=e").body() == "/a b= c d=e");
 }
@@ -225,6 +225,60 @@ TEST_CASE("bodies that are deflated, large or files") {
     wire.send(site.head("/none") + site.head("/deflated"));
     CHECK(wire.receive().result_int() == 204);
     CHECK(wire.receive().body().size() == 6);
+}
+
+TEST_CASE("the body of a POST comes whole, one at a time, and its connection goes on") {
+    Log log;
+    std::atomic<bool> may_answer{true};
+    Handlers handlers;
+    handlers.post = [&](const Request& request, std::string body) {
+        log.add(request.path + " " + std::to_string(body.size()));
+        while (!may_answer) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        Response response;
+        response.body = body.substr(body.size() - 3);
+        return response;
+    };
+    Options options;
+    options.most_body_bytes = 3'000'000;
+    Site site(handlers, options);
+    const auto head = [&](std::size_t bytes) {
+        return site.head("/import?as=points",
+                         {{"Origin", "http://" + site.host}, {"Content-Length", std::to_string(bytes)}}, "POST");
+    };
+    const std::string body = std::string(2'999'997, 'x') + "end";
+    {
+        Wire wire(site.port);
+        for (int n = 0; n < 2; ++n) {
+            wire.send(head(body.size()) + body);
+            const Answer answer = wire.receive();
+            CHECK(answer.result_int() == 200);
+            CHECK(answer.body() == "end");
+        }
+        wire.send(site.head("/image"));
+        CHECK(wire.receive().result_int() == 404);
+        wire.send(head(body.size() + 1));
+        CHECK(wire.receive().result_int() == 413);
+        CHECK(wire.is_at_end());
+    }
+    may_answer = false;
+    Wire first(site.port), second(site.port);
+    first.send(head(4) + "1234");
+    REQUIRE(soon([&] { return log.count("/import 4") == 1; }));
+    second.send(head(4) + "5678");
+    CHECK(second.receive().result_int() == 503);
+    may_answer = true;
+    CHECK(first.receive().body() == "234");
+    // One that stops in the middle makes room again.
+    {
+        Wire cut(site.port);
+        cut.send(head(1000) + "half");
+    }
+    CHECK(soon([&] {
+        Wire next(site.port);
+        next.send(head(4) + "9abc");
+        return next.receive().result_int() == 200;
+    }));
+    CHECK(log.count("/import") == 4);
 }
 
 TEST_CASE("what goes wrong in a handler is told to the log alone") {

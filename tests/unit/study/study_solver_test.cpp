@@ -80,7 +80,7 @@ TEST_CASE("A structure gets a first surface, and then the one that segment gives
     CHECK(refined[0].sequence == 11);
     REQUIRE(refined[0].surface);
     CHECK(solver.surface(3) == refined[0].surface);
-    const StructuresResult plain = segment_structures(scene(), {marks_of(*ball(3, 25))});
+    const StructuresResult plain = segment_structures(scene(), {marks_of(*ball(3, 25), {scene().geometry(), {}})});
     CHECK(refined[0].surface->mesh.vertices == plain.structures.front().result.mesh.vertices);
     CHECK(refined[0].surface->report.surface.volume == Approx(4.0 / 3 * M_PI * std::pow(kRadius, 3)).epsilon(0.05));
 }
@@ -128,6 +128,77 @@ TEST_CASE("Every structure is solved in the end, the newest marks last, whatever
         CHECK(refined.back().surface == solver.surface(id));
         CHECK(listener.of(id, Stage::Failed).empty());
     }
+}
+
+TEST_CASE("A guess gives a surface without marks, and marks correct it as in segment") {
+    Listener listener;
+    const ImageGeometry geometry = scene().geometry();
+    std::vector<std::uint8_t> values;
+    for (int k = 0; k < kSize; ++k)
+        for (int j = 0; j < kSize; ++j)
+            for (int i = 0; i < kSize; ++i)
+                values.push_back(std::hypot(i - kCenter[0], j - kCenter[1], k - kCenter[2]) < kRadius - 2 ? 1 : 0);
+    const Image mask = Image::from_values(geometry, values.data());
+    const auto reader = [&](const StudyGuess& guess, const RunContext& /*unused*/) {
+        CHECK(guess.path == "mask.nrrd");
+        return make_guess(mask, 0, geometry);
+    };
+    StudySolver solver(scene, {}, listener.told(), {}, reader);
+    auto structure = std::make_shared<StudyStructure>();
+    structure->id = 1;
+    structure->name = "mask";
+    structure->guess = StudyGuess{"mask.nrrd", "xxh128:0", 0};
+    solver.solve(structure, 1);
+    solver.wait();
+    REQUIRE(listener.of(1, Stage::Refined).size() == 1);
+    const double volume = listener.of(1, Stage::Refined)[0].surface->report.surface.volume;
+    CHECK(std::cbrt(volume * 3 / (4 * M_PI)) == Approx(kRadius - 2).margin(0.3));
+    auto corrected = std::make_shared<StudyStructure>(*structure);
+    corrected->marks.push_back({2, MarkKind::Surface, {kCenter[0] + kRadius, kCenter[1], kCenter[2]}});
+    solver.solve(corrected, 2);
+    solver.wait();
+    const StructuresResult plain = segment_structures(scene(), {marks_of(*corrected, {geometry, reader})});
+    CHECK(listener.of(1, Stage::Refined).back().surface->mesh.vertices ==
+          plain.structures.front().result.mesh.vertices);
+    CHECK(listener.of(1, Stage::Refined).back().surface->correction != nullptr);
+}
+
+TEST_CASE("Paint on one slice is asked for a second one") {
+    Listener listener;
+    StudySolver solver(scene, {}, listener.told());
+    auto structure = std::make_shared<StudyStructure>();
+    structure->id = 1;
+    structure->name = "painted";
+    const auto cut = [](int k) { return std::sqrt(kRadius * kRadius - (k - kCenter[2]) * (k - kCenter[2])); };
+    structure->strokes.push_back({2, false, cut(20), 2, 20, {{kCenter[0], kCenter[1], 20}}});
+    solver.solve(structure, 1);
+    solver.wait();
+    REQUIRE(listener.of(1, Stage::Empty).size() == 1);
+    CHECK(listener.of(1, Stage::Empty)[0].message.starts_with("paint a second slice"));
+    auto more = std::make_shared<StudyStructure>(*structure);
+    for (const int k : {15, 25})
+        more->strokes.push_back({k, false, cut(k), 2, k, {{kCenter[0], kCenter[1], double(k)}}});
+    solver.solve(more, 2);
+    solver.wait();
+    REQUIRE(listener.of(1, Stage::Refined).size() == 1);
+    CHECK(listener.of(1, Stage::Refined)[0].surface->report.surface.volume ==
+          Approx(4.0 / 3 * M_PI * std::pow(kRadius, 3)).epsilon(0.1));
+}
+
+TEST_CASE("Other options give another surface") {
+    Listener listener;
+    StudySolver solver(scene, {}, listener.told());
+    solver.solve(ball(1, 25), 1);
+    solver.wait();
+    SegmentOptions options;
+    options.voxel_size = 2;
+    solver.set_options(options);
+    solver.solve(ball(1, 25), 2);
+    solver.wait();
+    const auto refined = listener.of(1, Stage::Refined);
+    REQUIRE(refined.size() == 2);
+    CHECK(refined[0].surface->report.resolved.voxel_size == 1);
+    CHECK(refined[1].surface->report.resolved.voxel_size == 2);
 }
 
 TEST_CASE("A solver that is gone stops at once") {

@@ -57,7 +57,7 @@ StudyAction any_action(const StudyHistory& history, std::mt19937& rng) {
         if (!s.marks.empty()) mark = s.marks[below(s.marks.size())].id;
         if (s.marks.empty() && !s.outlines.empty()) mark = s.outlines[below(s.outlines.size())].id;
     }
-    switch (below(24)) {
+    switch (below(33)) {
         case 0: return act::AddStructure{"s" + std::to_string(below(30)), {}};
         case 1: return act::RemoveStructure{structure};
         case 2: return act::Rename{structure, "t" + std::to_string(below(30))};
@@ -71,6 +71,23 @@ StudyAction any_action(const StudyHistory& history, std::mt19937& rng) {
         case 10:
             return act::AddOutline{structure, {0, int(below(3)), double(below(20)), true, {place(), place(), place()}}};
         case 11: return act::RemoveOutline{structure, mark};
+        case 24: return act::AddMarks{structure, MarkKind(below(3)), {place(), place(), place()}};
+        case 25:
+        case 26: {
+            StudyStroke stroke{0, below(3) == 0, 0.5 + double(below(4)), {}, 0, {place(), place()}};
+            if (below(2) == 0) {
+                stroke.axis = int(below(3));
+                stroke.at = int(below(22));
+            }
+            return act::AddStroke{structure, stroke};
+        }
+        case 27: return act::ClearPaint{structure};
+        case 28: return act::SetGuess{structure, {"../mask.nrrd", "xxh128:" + std::to_string(below(9)), int(below(3))}};
+        case 29: return act::RemoveGuess{structure};
+        case 30:
+            return act::AddLabels{
+                "l.nrrd", "xxh128:0", {{1, "l" + std::to_string(below(20))}, {2, "m" + std::to_string(below(20))}}};
+        case 31: return act::SetOptions{{1.0 + double(below(3)), {}, {}, Model(below(2))}};
         case 12:
         case 13:
         case 14:
@@ -89,6 +106,7 @@ TEST_CASE("Undo and redo give back every state, and a plain replay of what was d
     StudyHistory history(image_of());
     std::vector<StudyAction> carried_out;
     std::vector<StudyState> states{history.state()};  // behind each other, as undo goes back through them
+    std::vector<StudyOptions> options{history.options()};
     std::size_t at = 0;
     int refused = 0;
     for (int n = 0; n < 5000; ++n) {
@@ -109,8 +127,11 @@ TEST_CASE("Undo and redo give back every state, and a plain replay of what was d
         } else {
             states.resize(++at);
             states.push_back(history.state());
+            options.resize(at);
+            options.push_back(history.options());
         }
         REQUIRE(is_same(history.state(), states[at]));
+        REQUIRE(history.options() == options[at]);
         REQUIRE(history.can_undo() == (at > 0));
         REQUIRE(history.can_redo() == (at + 1 < states.size()));
     }
@@ -120,6 +141,146 @@ TEST_CASE("Undo and redo give back every state, and a plain replay of what was d
     for (const StudyAction& action : carried_out)
         again.apply(parse_study_action(to_json({"", action})).action);  // by way of the journal's text
     CHECK(is_same(again.state(), history.state()));
+    CHECK(again.options() == history.options());
+}
+
+TEST_CASE("Options, guesses and labels are undone and done again") {
+    StudyHistory history(image_of());
+    CHECK(history.apply(act::SetOptions{{0.5, 0.25, {}, Model::Paper}}).options);
+    (void)history.apply(act::SetOptions{{}});
+    CHECK(history.options() == StudyOptions{});
+    CHECK(history.apply(act::Undo{}).options);
+    CHECK(history.options().voxel_size == 0.5);
+    SegmentOptions applied = history.options().applied_to({});
+    CHECK(applied.voxel_size == 0.5);
+    CHECK(applied.evolve.rho == 0.25);
+    CHECK(applied.model == Model::Paper);
+    (void)history.apply(act::Undo{});
+    CHECK(history.options() == StudyOptions{});
+
+    const auto made = history.apply(act::AddLabels{"../labels.nrrd", "xxh128:12", {{2, "two"}, {7, "seven"}}});
+    CHECK(made.structures == std::vector<StudyId>{1, 2});
+    REQUIRE(history.state().size() == 2);
+    CHECK(history.state()[1]->guess == StudyGuess{"../labels.nrrd", "xxh128:12", 7});
+    (void)history.apply(act::Undo{});
+    CHECK(history.state().empty());
+    (void)history.apply(act::Redo{});
+    CHECK(history.state()[0]->name == "two");
+    CHECK(history.state()[1]->name == "seven");
+    CHECK_THROWS_AS(history.apply(act::AddLabels{"l", "d", {{1, "two"}}}), Error);
+    CHECK_THROWS_AS(history.apply(act::AddLabels{"l", "d", {{1, "a"}, {2, "a"}}}), Error);
+    CHECK_THROWS_AS(history.apply(act::AddLabels{"", "d", {{1, "a"}}}), Error);
+    CHECK_THROWS_AS(history.apply(act::SetGuess{1, {"a", "", 0}}), Error);
+    CHECK_THROWS_AS(history.apply(act::SetOptions{{0.0, {}, {}, {}}}), Error);
+    CHECK_THROWS_AS(history.apply(act::SetOptions{{{}, 1.5, {}, {}}}), Error);
+    CHECK(history.state().size() == 2);
+    // A label keeps its value in masks.
+    const std::vector<Marks> marks =
+        marks_of(history.state(), {image_of(), [](const StudyGuess&, const RunContext&) { return GivenGuess{}; }});
+    REQUIRE(marks.size() == 2);
+    CHECK(marks[1].label == 7);
+    CHECK_THROWS_AS(marks_of(history.state(), {image_of(), {}}), Error);
+}
+
+namespace {
+
+/// How much of the image is painted.
+double painted_volume(const StudyStructure& structure, const ImageGeometry& image) {
+    const std::optional<Image> paint = paint_of(structure, image);
+    if (!paint) return 0;
+    double voxels = 0;
+    const Index3 size = paint->geometry().size;
+    for (int k = 0; k < size[2]; ++k)
+        for (int j = 0; j < size[1]; ++j)
+            for (int i = 0; i < size[0]; ++i) voxels += paint->at(i, j, k);
+    return voxels * image.spacing[0] * image.spacing[1] * image.spacing[2];
+}
+
+}  // namespace
+
+TEST_CASE("A brush paints balls, discs and what lies between two places, and an eraser takes it away") {
+    ImageGeometry image = image_of(60);
+    image.spacing = {0.5, 0.5, 0.8};
+    image.origin = {-4, 3, 1};
+    image.direction = {{{0, 1, 0}, {-1, 0, 0}, {0, 0, 1}}};
+    const auto at = [&](double i, double j, double k) { return image.index_to_world({i, j, k}); };
+    StudyStructure structure;
+    CHECK_FALSE(paint_of(structure, image));
+    structure.strokes.push_back({1, false, 5, {}, 0, {at(30, 30, 30)}});
+    const double ball = 4.0 / 3 * M_PI * 125;
+    CHECK(painted_volume(structure, image) == Approx(ball).epsilon(0.03));
+    // The same place once more adds nothing; a line adds a cylinder.
+    structure.strokes.push_back({2, false, 5, {}, 0, {at(30, 30, 30), at(38, 30, 30)}});
+    CHECK(painted_volume(structure, image) == Approx(ball + 25 * M_PI * 4).epsilon(0.03));
+    structure.strokes.push_back({3, true, 100, {}, 0, {at(30, 30, 30)}});
+    CHECK_FALSE(paint_of(structure, image));
+    structure.strokes.push_back({4, false, 5, 2, 12, {at(30, 30, 12.4)}});
+    CHECK(painted_volume(structure, image) == Approx(25 * M_PI * 0.8).epsilon(0.03));
+    CHECK(paint_of(structure, image)->geometry().index_to_world({0, 0, 0})[2] < at(0, 0, 12)[2]);
+    structure.strokes.push_back({5, true, 5, 0, 30, {at(30, 30, 12)}});
+    CHECK(painted_volume(structure, image) == Approx(25 * M_PI * 0.8 - 10 * 0.5 * 0.8).epsilon(0.05));
+}
+
+TEST_CASE("Strokes that would take too long or too much memory are refused, and nothing is painted") {
+    ImageGeometry image = image_of(2000);
+    StudyHistory history(image);
+    (void)history.apply(act::AddStructure{"one", {}});
+    const auto stroke = [](double radius, std::vector<Vec3> world) {
+        return act::AddStroke{1, {0, false, radius, {}, 0, std::move(world)}};
+    };
+    CHECK_THROWS_WITH(history.apply(stroke(1e4, {{5, 5, 5}})), Catch::Matchers::Contains("too many voxels"));
+    CHECK_THROWS_WITH(history.apply(stroke(1e-9, {{5, 5, 5}, {900, 5, 5}})),
+                      Catch::Matchers::Contains("so thin a brush"));
+    CHECK_THROWS_WITH(history.apply(stroke(0, {{5, 5, 5}})), Catch::Matchers::Contains("radius > 0"));
+    CHECK_THROWS_WITH(history.apply(stroke(1, {})), Catch::Matchers::Contains("needs a place"));
+    CHECK_THROWS_WITH(history.apply(stroke(1, {{5, 5, 5000}})), Catch::Matchers::Contains("outside of the image"));
+    CHECK_THROWS_WITH(history.apply(act::AddStroke{1, {0, false, 1, 2, 2000, {{5, 5, 5}}}}),
+                      Catch::Matchers::Contains("no slice"));
+    (void)history.apply(stroke(3, {{5, 5, 5}}));
+    CHECK_THROWS_WITH(history.apply(stroke(3, {{1900, 1900, 1900}})), Catch::Matchers::Contains("268 million voxels"));
+    CHECK(history.state().front()->strokes.size() == 1);
+    CHECK_THROWS_AS(history.apply(act::ClearPaint{2}), Error);
+    (void)history.apply(act::ClearPaint{1});
+    CHECK_THROWS_WITH(history.apply(act::ClearPaint{1}), Catch::Matchers::Contains("has no paint"));
+}
+
+TEST_CASE("Paint becomes evidence of its own structure alone") {
+    StudyHistory history(image_of(40));
+    (void)history.apply(act::AddStructure{"one", {}});
+    (void)history.apply(act::AddStructure{"two", {}});
+    (void)history.apply(act::AddStroke{1, {0, false, 2, {}, 0, {{10, 10, 10}, {20, 10, 10}}}});
+    (void)history.apply(act::AddMark{2, MarkKind::Surface, {30, 30, 30}});
+    const std::vector<Marks> marks = marks_of(history.state(), {image_of(40), {}});
+    REQUIRE(marks.size() == 2);
+    REQUIRE(marks[0].paint.size() == 1);
+    CHECK_FALSE(marks[0].paint[0].image->is_shared);
+    SegmentOptions options;
+    options.voxel_size = 1;
+    const auto inputs = prepare_marks(marks, image_of(40), options);
+    CHECK_FALSE(inputs[0].options.inside.empty());
+    CHECK(inputs[1].options.outside.empty());
+    CHECK(inputs[1].label == 2);
+}
+
+TEST_CASE("What could not be read again is not written") {
+    const Folder folder;
+    Study study(folder.text(), "stack.tif", image_of());
+    (void)study.apply({"a", act::AddStructure{"one", {}}});
+    CHECK_THROWS_WITH(study.apply({"a\nb", act::AddStructure{"two", {}}}), Catch::Matchers::Contains("'key'"));
+    CHECK_THROWS_WITH(study.apply({std::string(101, 'k'), act::AddStructure{"two", {}}}),
+                      Catch::Matchers::Contains("'key'"));
+    CHECK_THROWS_WITH(study.apply({"b", act::SetGuess{1, {"\xff.nrrd", "xxh128:0", 0}}}),
+                      Catch::Matchers::Contains("UTF-8"));
+    CHECK_THROWS_WITH(study.apply({"c", act::AddStructure{"\xc3", {}}}), Catch::Matchers::Contains("UTF-8"));
+    CHECK(study.state().size() == 1);
+    CHECK(is_same(read_study(folder.text()), study.state()));
+}
+
+TEST_CASE("Only some actions name files") {
+    CHECK(names_file(act::SetGuess{}));
+    CHECK(names_file(act::AddLabels{}));
+    CHECK_FALSE(names_file(act::AddMarks{}));
+    CHECK_FALSE(names_file(act::RemoveGuess{}));
 }
 
 TEST_CASE("A study that is opened again is what it was") {
@@ -219,13 +380,30 @@ TEST_CASE("A study says where its image is from its own folder") {
 
 TEST_CASE("Texts that are no action are refused") {
     for (const std::string text :
-         {"", "{", "[]", "3", "{}", R"({"do":"sing"})", R"({"do":3})", R"({"do":"lock","structure":1,"locked":1})",
-          R"({"do":"lock","structure":-1,"locked":true})", R"({"do":"lock","structure":1e300,"locked":true})",
+         {"",
+          "{",
+          "[]",
+          "3",
+          "{}",
+          R"({"do":"sing"})",
+          R"({"do":3})",
+          R"({"do":"lock","structure":1,"locked":1})",
+          R"({"do":"lock","structure":-1,"locked":true})",
+          R"({"do":"lock","structure":1e300,"locked":true})",
           R"({"do":"add_mark","structure":1,"kind":"surface","world":[1,2]})",
           R"({"do":"add_mark","structure":1,"kind":"surface","world":[1,2,1e999]})",
           R"({"do":"add_mark","structure":1,"kind":"skin","world":[1,2,3]})",
-          R"({"do":"recolor","structure":1,"color":[1,2,256]})", R"({"do":"undo","key":7})",
-          "{\"do\":\"undo\",\"key\":\"a\\u0007\"}", R"({"do":"add_structure","name":"\ud800"})"})
+          R"({"do":"recolor","structure":1,"color":[1,2,256]})",
+          R"({"do":"set_options","options":3})",
+          R"({"do":"set_options","options":{"rho":"a"}})",
+          R"({"do":"set_options","options":{"model":"magic"}})",
+          R"({"do":"add_stroke","structure":1,"erases":false,"radius":1,"axis":3,"at":1,"world":[[1,1,1]]})",
+          R"({"do":"add_stroke","structure":1,"erases":false,"radius":1,"axis":1,"at":1.5,"world":[[1,1,1]]})",
+          R"({"do":"add_labels","path":"a","digest":"b","labels":[1]})",
+          R"({"do":"set_guess","structure":1,"path":"a","digest":"b","label":-1})",
+          R"({"do":"undo","key":7})",
+          "{\"do\":\"undo\",\"key\":\"a\\u0007\"}",
+          R"({"do":"add_structure","name":"\ud800"})"})
         CHECK_THROWS_AS(parse_study_action(text), Error);
     CHECK_THROWS_AS(parse_study_action(std::string(1'000'000, '[')), Error);
     CHECK_THROWS_AS(parse_study_action("{\"do\":\"undo\",\"a\":" + std::string(1'000'000, '[')), Error);
@@ -250,7 +428,7 @@ TEST_CASE("A structure becomes the marks that segment takes") {
     (void)history.apply(act::AddMark{1, MarkKind::Inside, {4, 5, 6}});
     (void)history.apply(act::AddMark{1, MarkKind::Outside, {7, 8, 9}});
     (void)history.apply(act::AddOutline{1, {0, 2, 4, true, {{1, 1, 4}, {5, 1, 4}, {5, 5, 4}}}});
-    const std::vector<Marks> marks = marks_of(history.state());
+    const std::vector<Marks> marks = marks_of(history.state(), {image_of(), {}});
     REQUIRE(marks.size() == 1);
     CHECK(marks[0].name == "one");
     CHECK(marks[0].points == std::vector<Vec3>{{1, 2, 3}});

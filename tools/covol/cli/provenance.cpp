@@ -1,88 +1,10 @@
 #include "cli/provenance.h"
 
-#define XXH_INLINE_ALL
-#include <xxhash.h>
-
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
-#include <memory>
-#include <set>
-
-#include "covol/error.h"
-#include "covol/file_set.h"
 
 namespace covol::tool {
 namespace fs = std::filesystem;
-namespace {
-
-constexpr std::uint64_t kPiece = 1 << 20, kPieces = 64;
-
-class Digest {
-public:
-    Digest() { XXH3_128bits_reset(state_.get()); }
-    void add(const void* bytes, std::size_t count) { XXH3_128bits_update(state_.get(), bytes, count); }
-    /// As xxh128sum prints it.
-    [[nodiscard]] std::string hex() const {
-        XXH128_canonical_t digest;
-        XXH128_canonicalFromHash(&digest, XXH3_128bits_digest(state_.get()));
-        std::string text;
-        for (const unsigned char byte : digest.digest) {
-            text += "0123456789abcdef"[byte >> 4];
-            text += "0123456789abcdef"[byte & 15];
-        }
-        return text;
-    }
-
-private:
-    std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state_{XXH3_createState(), XXH3_freeState};
-};
-
-void add_file(const fs::path& path, Digest& hash) {
-    std::ifstream file = open_regular_file(path.string());
-    std::error_code status;
-    const std::uint64_t bytes = fs::file_size(path, status);
-    const bool whole = bytes <= kPieces * kPiece;
-    std::vector<char> piece(kPiece);
-    for (std::uint64_t n = 0; !status && file && (whole ? n * kPiece < bytes : n < kPieces); ++n) {
-        const std::uint64_t begin = whole ? n * kPiece : (bytes - kPiece) * n / (kPieces - 1);
-        file.seekg(std::streamoff(begin));
-        file.read(piece.data(), std::streamsize(std::min(kPiece, bytes - begin)));
-        hash.add(piece.data(), std::size_t(file.gcount()));
-    }
-    if (status || !file) throw Error(Errc::Io, path.string() + ": cannot read");
-}
-
-void add_metadata(const fs::path& folder, Digest& hash) {
-    const std::set<std::string> names{".zarray", ".zattrs", ".zgroup", "zarr.json", "journal.jsonl"};  // or of a study
-    std::set<fs::path> found;
-    // Chunks lie deeper, or beside these, in any number.
-    std::vector<fs::path> level{folder};
-    for (int depth = 0; depth < 3; ++depth) {
-        std::vector<fs::path> next;
-        for (const fs::path& at : level) {
-            bool is_array = false;
-            for (const std::string& name : names) {
-                std::error_code status;
-                if (!fs::is_regular_file(at / name, status)) continue;
-                found.insert(at / name);
-                is_array = is_array || name == ".zarray";
-            }
-            if (is_array) continue;
-            std::error_code status;
-            for (const fs::directory_entry& entry : fs::directory_iterator(at, status))
-                if (entry.is_directory(status) && entry.path().filename() != "c") next.push_back(entry.path());
-        }
-        level = std::move(next);
-    }
-    for (const fs::path& path : found) {
-        const std::string name = fs::relative(path, folder).string();
-        hash.add(name.c_str(), name.size() + 1);
-        add_file(path, hash);
-    }
-}
-
-}  // namespace
 
 std::pair<std::size_t, std::size_t> path_within(const std::string& text) {
     const std::size_t equals = text.find('=');
@@ -135,17 +57,6 @@ Json without_folders(const Json& options) {
         if (value.is_array() || value.is_object()) value = without_folders(value);
     }
     return result;
-}
-
-std::string digest_of(const std::string& path) {
-    Digest hash;
-    std::error_code status;
-    if (fs::is_directory(path, status)) {
-        add_metadata(path, hash);
-        return "xxh128-of-metadata:" + hash.hex();
-    }
-    add_file(path, hash);
-    return (fs::file_size(path, status) > kPieces * kPiece ? "xxh128-of-pieces:" : "xxh128:") + hash.hex();
 }
 
 Json describe_inputs(const std::vector<std::string>& paths) {

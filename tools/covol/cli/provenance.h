@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cli/json.h"
+#include "covol/digest.h"
 
 namespace covol::tool {
 
@@ -24,13 +25,6 @@ namespace covol::tool {
 /// File names in place of paths: files that are passed on need not tell whose folders they come from.
 [[nodiscard]] std::string without_folder(const std::string& text);
 [[nodiscard]] Json without_folders(const Json& options);
-
-/// What tells one input from another of the same name: "xxh128:HEX" of the file, as xxh128sum prints it; of one above
-/// 64 MiB "xxh128-of-pieces:HEX", of 64 pieces of 1 MiB that lie evenly from its first byte to its last; of a folder,
-/// such as a Zarr store, "xxh128-of-metadata:HEX", of the .zarray, .zattrs, .zgroup and zarr.json in it, by their
-/// paths.
-/// @throws Error Io.
-[[nodiscard]] std::string digest_of(const std::string& path);
 
 /// A list of {"name", "digest"} in the order of the paths.
 [[nodiscard]] Json describe_inputs(const std::vector<std::string>& paths);

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <iostream>
@@ -8,12 +9,15 @@
 #include <thread>
 
 #include "commands/commands.h"
+#include "covol/digest.h"
 #include "covol/error.h"
 #include "covol/image_levels.h"
+#include "covol/study_files.h"
 #include "flags/bindings.h"
 #include "jobs/page.h"
 #include "mark/bounded_image.h"
 #include "mark/browser.h"
+#include "mark/imports.h"
 #include "mark/mark_session.h"
 #include "mark/page.h"
 #include "serve/web_server.h"
@@ -26,7 +30,7 @@ constexpr const char* kPolicyBegins = "<meta http-equiv=\"Content-Security-Polic
 
 std::string policy_of(const std::string& page) {
     const std::size_t begin = page.find(kPolicyBegins) + std::string_view(kPolicyBegins).size();
-    return page.substr(begin, page.find('"', begin) - begin) + "; frame-ancestors 'none'";
+    return page.substr(begin, page.find('"', begin) - begin);
 }
 
 /// Decoded chunks that are kept for slices: a slice through 2048 x 2048 x 2048 voxels of 8 bits in chunks of 128 takes
@@ -70,8 +74,8 @@ struct MarkJob {
     std::string image_path, study;
     ImageFlags image;
     bool without_browser = false;
-    int port = 0;
-    std::vector<std::string> authorities;
+    int port = 0, guess_label = 0;
+    std::vector<std::string> authorities, frame_origins, points, guesses, labels;
 
     void run(Session& session) const {
         if (port < 0 || port > 65535)
@@ -84,14 +88,18 @@ struct MarkJob {
         if (!opened.repaired().empty()) session.warn(opened.folder() + ": " + opened.repaired());
         const std::string folder = opened.folder();
         MarkView view;
+        view.site = open_study_site(folder, pixels.geometry());
+        take_files(opened, view.site, session);
         view.page = detail::mark_page();
         view.title = path.filename().string();
         view.is_anatomical = is_anatomical(image_path, image.options, session.run());
         serve::Options options;
         options.port = std::uint16_t(port);
         options.authorities = authorities;
+        options.frame_origins = frame_origins;
         options.page_policy = policy_of(view.page);
         // A page that comes back sends what was done meanwhile as fast as it is kept, a millisecond or less each.
+        options.most_body_bytes = kMostFileBytes;
         options.messages_per_second = 2000;
         options.message_burst = 10'000;
         const auto open = [&] { return image.read(image_path, quiet(session.run())); };
@@ -107,6 +115,10 @@ struct MarkJob {
         handlers.get = [&](const serve::Request& request) {
             started.wait();
             return mark.get(request);
+        };
+        handlers.post = [&](const serve::Request& request, const std::string& body) {
+            started.wait();
+            return mark.post(request, body);
         };
         handlers.opened = [&](serve::Client client) {
             started.wait();
@@ -126,6 +138,55 @@ struct MarkJob {
         server->stop();
         session.take_interrupt();
     }
+
+private:
+    /// Adds the files of the command line to the study.
+    void take_files(Study& study, const StudySite& site, Session& session) const {
+        const std::string folder = study.folder();
+        for (const std::string& text : points) {
+            const Named file = split_name(text);
+            const StudyAction marks = import_points(file.value, 0, site.image, session.run());
+            const StudyId id = structure_of(study, "--points", file);
+            auto action = std::get<StudyActions::AddMarks>(marks);
+            action.structure = id;
+            // The same command line tomorrow does not add them twice.
+            const std::string key = "points-" + std::to_string(id) + "-" + digest_of(file.value);
+            if (!study.apply({key, action}).is_new)
+                session.note(file.value + ": its marks were added to this structure before, and are not added again");
+        }
+        for (const std::string& text : guesses) {
+            const Named file = split_name(text);
+            const StudyGuess guess = guess_of_file(folder, file.value, guess_label);
+            (void)site.read_guess(guess, session.run());
+            const StudyId id = structure_of(study, "--guess", file);
+            if (study.history().find(id)->guess != guess) (void)study.apply({"", StudyActions::SetGuess{id, guess}});
+        }
+        for (const std::string& file : labels) {
+            const StudyAction action = import_labels(file, folder, study.state(), site, session.run());
+            const auto& added = std::get<StudyActions::AddLabels>(action);
+            const bool is_there = std::any_of(study.state().begin(), study.state().end(), [&](const auto& structure) {
+                return structure->guess && structure->guess->path == added.path &&
+                       structure->guess->digest == added.digest && structure->guess->label > 0;
+            });
+            if (is_there)
+                session.note(file + ": its labels are structures of this study already");
+            else
+                (void)study.apply({"", action});
+        }
+    }
+
+    /// The structure of that name, made where there is none; without a name the only one.
+    static StudyId structure_of(Study& study, const std::string& flag, const Named& file) {
+        const StudyState& all = study.state();
+        if (file.name.empty() && all.size() > 1)
+            throw UsageError(flag + ": the study has several structures; say which one this is for, as in " +
+                             all.front()->name + "=" + file.value);
+        if (file.name.empty() && all.size() == 1) return all.front()->id;
+        const std::string name = file.name.empty() ? "structure 1" : file.name;
+        for (const auto& structure : all)
+            if (structure->name == name) return structure->id;
+        return study.apply({"", StudyActions::AddStructure{name, {}}}).changed.made;
+    }
 };
 
 }  // namespace
@@ -138,6 +199,23 @@ void add_mark(Session& session) {
     command->add_option("study", job->study, "folder of marks and structures, made if it is not there [IMAGE.covol]")
         ->type_name("STUDY");
     job->image.bind(*command, {"roi"});
+    in_group(*command, Group::Marks);
+    command
+        ->add_option("--points", job->points,
+                     "marks on the surface that are added to a structure, of any format that covol segment reads")
+        ->type_name("[NAME=]FILE")
+        ->allow_extra_args(false);
+    command
+        ->add_option("--guess", job->guesses,
+                     "another tool's result, a mask, mesh or level set, that the marks of a structure correct")
+        ->type_name("[NAME=]FILE")
+        ->allow_extra_args(false);
+    command->add_option("--guess-label", job->guess_label, "label of a guess that has several")->type_name("N");
+    command
+        ->add_option("--labels", job->labels,
+                     "another tool's label image: each label becomes a structure, with it as the guess")
+        ->type_name("FILE")
+        ->allow_extra_args(false);
     in_group(*command, Group::Output);
     command->add_flag("--no-browser", job->without_browser,
                       "print the address alone; from another machine: ssh -L PORT:127.0.0.1:PORT, with --port PORT");
@@ -147,6 +225,11 @@ void add_mark(Session& session) {
         ->add_option("--also-at", job->authorities,
                      "a further address that the page is loaded from, localhost:9000 where ssh -L 9000:127.0.0.1:PORT")
         ->type_name("HOST:PORT");
+    command
+        ->add_option("--in-frame-of", job->frame_origins,
+                     "a notebook on this machine that may show the page in a frame, http://localhost:8888")
+        ->type_name("ORIGIN")
+        ->allow_extra_args(false);
 }
 
 }  // namespace covol::tool

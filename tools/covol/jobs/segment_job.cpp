@@ -80,6 +80,26 @@ void SegmentJob::sort_output(bool with_image) {
     alone = std::exchange(output, "");
 }
 
+void SegmentJob::take_study_options() {
+    if (study.empty()) return;
+    const StudyOptions own = read_study_options(study);
+    const auto take_length = [&](const char* name, const std::optional<double>& value) {
+        if (!value || given.has(name)) return;
+        given.lengths[name] = {*value, false, true};
+        given.names.insert(name);
+    };
+    take_length("voxel_size", own.voxel_size);
+    take_length("mark_precision", own.mark_precision);
+    if (own.rho && !given.has("rho")) {
+        given.options.evolve.rho = *own.rho;
+        given.names.insert("rho");
+    }
+    if (own.model && !given.has("model")) {
+        given.options.model = *own.model;
+        given.names.insert("model");
+    }
+}
+
 void SegmentJob::find_image() {
     if (!images.empty()) return;
     if (study.empty()) throw UsageError("expected an image");
@@ -124,6 +144,7 @@ void SegmentJob::bind(CLI::App& command, bool with_image) {
         ->type_name("OUT.vdb|...");
     command.final_callback([this, with_image] {
         if (with_image) find_image();
+        if (with_image) take_study_options();
         sort_output(with_image);
     });
     if (with_image) {

@@ -47,6 +47,8 @@ struct SegmentJob {
     void bind_named_seeds(CLI::App& command);
     /// Without an image it is the study's. @throws UsageError: there is none
     void find_image();
+    /// The study's, where the command line has none.
+    void take_study_options();
     /// A mesh or a label image that stands at -o goes where --mesh and --mask would have it.
     void sort_output(bool with_image);
     [[nodiscard]] std::string any_output() const;

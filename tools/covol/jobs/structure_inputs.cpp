@@ -1,6 +1,7 @@
 #include "jobs/structure_inputs.h"
 
 #include "covol/study.h"
+#include "covol/study_files.h"
 #include "covol/vdb_io.h"
 
 namespace covol::tool {
@@ -38,7 +39,8 @@ void share_seeds(std::vector<Marks>& structures, const std::string& flag, const 
 std::vector<Marks> structures_of(const SegmentJob& job,
                                  const std::vector<std::shared_ptr<const PaintedImage>>& painted) {
     std::vector<Marks> structures;
-    if (!job.study.empty()) structures = marks_of(read_study(job.study));
+    if (!job.study.empty())
+        structures = marks_of(read_study(job.study), open_study_site(job.study, read_study_image(job.study).geometry));
     add_files(structures, job.points.paths, &MarkFiles::points);
     add_files(structures, job.contours.paths, &MarkFiles::contours);
     add_paint(structures, painted);

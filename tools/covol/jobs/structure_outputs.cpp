@@ -219,6 +219,10 @@ Json report_of(const StructureOutput& s) {
         json["correction"]["mask"] = {
             {"added", s.corrected->added}, {"removed", s.corrected->removed}, {"reached", s.corrected->reached}};
     if (s.evidence) json["evidence"] = to_json(*s.evidence);
+    if (s.intensity && s.intensity->voxels > 0)
+        json["intensity"] = {{"mean", s.intensity->mean},
+                             {"standard_deviation", s.intensity->standard_deviation},
+                             {"voxels", s.intensity->voxels}};
     return json;
 }
 
@@ -325,11 +329,18 @@ Json to_json(const StructuresOutput& output) {
 }
 
 std::vector<std::string> result_columns() {
-    return {"structure", "label",   "volume",  "area",  "components",  "genus",  "closed",
-            "fit_mean",  "fit_p95", "fit_max", "steps", "stop_reason", "seconds"};
+    return {"structure", "label",   "volume",         "area",         "components", "genus",       "closed", "fit_mean",
+            "fit_p95",   "fit_max", "intensity_mean", "intensity_sd", "steps",      "stop_reason", "seconds"};
 }
 
-void add_result(Table& table, const std::string& name, int label, const SegmentReport& r) {
+std::optional<IntensityStatistics> intensity_within(const Image& image, const FloatGrid& surface, double most_read,
+                                                    const RunContext& run) {
+    if (image.chunks() && count_voxels_around(image, surface) > most_read) return {};
+    return measure_intensity(image, surface, run);
+}
+
+void add_result(Table& table, const std::string& name, int label, const SegmentReport& r,
+                const std::optional<IntensityStatistics>& intensity) {
     table << name << label << r.surface.volume << r.surface.area << r.surface.components << r.surface.genus
           << (r.surface.closed ? "true" : "false");
     if (r.point_count > 0)
@@ -337,6 +348,11 @@ void add_result(Table& table, const std::string& name, int label, const SegmentR
     else
         table << ""
               << ""
+              << "";
+    if (intensity && intensity->voxels > 0)
+        table << intensity->mean << intensity->standard_deviation;
+    else
+        table << ""
               << "";
     table << r.solve.steps << to_string(r.solve.stop_reason) << r.seconds.total;
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cli/table.h"
+#include "covol/intensity.h"
 #include "covol/segment_structures.h"
 #include "flags/evidence_flags.h"
 #include "jobs/name_tag.h"
@@ -18,7 +19,8 @@ namespace covol::tool {
 /// What came out for one.
 struct StructureOutput : StructureResult {
     std::optional<Evidence> evidence;
-    std::optional<CorrectedMask> corrected;  ///< of a guess that is a mask in the image's geometry
+    std::optional<IntensityStatistics> intensity;  ///< inside the surface
+    std::optional<CorrectedMask> corrected;        ///< of a guess that is a mask in the image's geometry
     [[nodiscard]] const std::string& shown_name() const { return name.empty() ? grid : name; }
 };
 
@@ -53,6 +55,11 @@ void check_outputs(const SegmentJob& job, const std::vector<Marks>& structures, 
 
 /// The table's columns for a structure's result, and their values.
 [[nodiscard]] std::vector<std::string> result_columns();
-void add_result(Table& table, const std::string& name, int label, const SegmentReport& report);
+void add_result(Table& table, const std::string& name, int label, const SegmentReport& report,
+                const std::optional<IntensityStatistics>& intensity);
+
+/// Of an image in chunks none where more voxels than `most_read` would have to be read for it.
+[[nodiscard]] std::optional<IntensityStatistics> intensity_within(const Image& image, const FloatGrid& surface,
+                                                                  double most_read, const RunContext& run);
 
 }  // namespace covol::tool

@@ -104,7 +104,7 @@ StructuresOutput finish(const SegmentJob& job, StructuresResult result, const st
     }
     output.overlaps = std::move(result.overlaps);
     for (StructureResult& structure : result.structures) {
-        StructureOutput& s = output.structures.emplace_back(StructureOutput{std::move(structure), {}, {}});
+        StructureOutput& s = output.structures.emplace_back(StructureOutput{std::move(structure), {}, {}, {}});
         if (s.guess && s.guess->mask) {
             s.label = s.guess->label;
             if (!job.mask_path.empty() && is_same_lattice(s.guess->mask->geometry(), output.geometry))
@@ -115,6 +115,8 @@ StructuresOutput finish(const SegmentJob& job, StructuresResult result, const st
         }
         session.add_seconds("contours", s.contour_seconds);
         add_seconds(session, s.result.report.seconds);
+        // Of an image in chunks what marks and surface needed was read, and not all that lies inside.
+        if (image) s.intensity = intensity_within(*image, *s.result.surface, 0, run);
         if (image && job.evidence.wanted()) s.evidence = job.evidence.judge(s.result, s.marks, *image, run);
     }
     if (output.structures.size() > 1) session.add_seconds("separate", result.separate_seconds);
@@ -158,7 +160,7 @@ void run_structures(const SegmentJob& job, Session& session, const StructureSolv
     outputs.add(job.table_path, [output, &session](const std::string& file) {
         Table table(result_columns());
         for (const StructureOutput& s : output->structures)
-            add_result(table.row(), s.name.empty() ? s.grid : s.name, s.label, s.result.report);
+            add_result(table.row(), s.name.empty() ? s.grid : s.name, s.label, s.result.report, s.intensity);
         write_text(file, table.text(), session.run());
     });
 }

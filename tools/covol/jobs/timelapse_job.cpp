@@ -143,7 +143,8 @@ private:
             report.update(to_json(*output));
             for (std::size_t n = 0; n < output->structures.size(); ++n) {
                 const StructureOutput& s = output->structures[n];
-                add_result(table_.row() << frame.number, s.name.empty() ? s.grid : s.name, s.label, s.result.report);
+                add_result(table_.row() << frame.number, s.name.empty() ? s.grid : s.name, s.label, s.result.report,
+                           s.intensity);
                 table_ << "ok";
             }
         } catch (const Error& error) {

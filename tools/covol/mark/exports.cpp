@@ -52,8 +52,9 @@ std::string marks_table(const StudyState& wanted) {
 }  // namespace
 
 Export make_export(const std::string& format, const StudyState& wanted,
-                   const std::function<StructuresResult()>& results, const Image& image, const std::string& scratch,
-                   const RunContext& run) {
+                   const std::function<StructuresResult()>& results,
+                   const std::function<std::optional<IntensityStatistics>(const StructureResult&)>& intensity,
+                   const Image& image, const std::string& scratch, const RunContext& run) {
     const std::string whole = wanted.size() == 1 ? wanted.front()->name : "structures";
     if (format == "marks.csv") return {file_name(whole, "_marks.csv"), marks_table(wanted)};
     static constexpr std::array kFormats{"mask.nii.gz", "mask.nrrd",   "mask.tif", "mesh.ply",
@@ -70,7 +71,8 @@ Export make_export(const std::string& format, const StudyState& wanted,
     const std::string ending = format.substr(format.find('.'));
     if (format == "table.csv") {
         Table table(result_columns());
-        for (const StructureResult& s : all.structures) add_result(table.row(), s.name, s.label, s.result.report);
+        for (const StructureResult& s : all.structures)
+            add_result(table.row(), s.name, s.label, s.result.report, intensity(s));
         return {file_name(whole, ending), table.text()};
     }
     return made_of_file(file_name(whole, ending), scratch, run, [&](const std::string& path) {

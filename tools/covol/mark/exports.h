@@ -1,8 +1,10 @@
 #pragma once
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "covol/image.h"
+#include "covol/intensity.h"
 #include "covol/segment_structures.h"
 #include "covol/study.h"
 
@@ -16,10 +18,12 @@ struct Export {
 /// @param format  mask.nii.gz, mask.nrrd, mask.tif, mesh.ply, mesh.stl, surface.vdb, marks.csv, table.csv
 /// @param wanted  the structures that it is about; of a mesh one, or one file cannot hold them
 /// @param results  of all structures of the study: masks do not overlap, and labels do not depend on what is wanted
+/// @param intensity  of a structure's surface, for the table
 /// @param scratch  a folder that files are made in
 /// @throws Error InvalidInput (no such format); what making it throws.
-[[nodiscard]] Export make_export(const std::string& format, const StudyState& wanted,
-                                 const std::function<StructuresResult()>& results, const Image& image,
-                                 const std::string& scratch, const RunContext& run);
+[[nodiscard]] Export make_export(
+    const std::string& format, const StudyState& wanted, const std::function<StructuresResult()>& results,
+    const std::function<std::optional<IntensityStatistics>(const StructureResult&)>& intensity, const Image& image,
+    const std::string& scratch, const RunContext& run);
 
 }  // namespace covol::tool

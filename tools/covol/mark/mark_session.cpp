@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <utility>
 
@@ -10,13 +11,16 @@
 #include "covol/page_data.h"
 #include "covol/safe_text.h"
 #include "covol/segment_structures.h"
+#include "jobs/structure_outputs.h"
 #include "mark/exports.h"
+#include "mark/imports.h"
 
 namespace covol::tool {
 namespace {
 
 constexpr double kBlack = 0.002, kWhite = 0.998;  // fractions of the voxels below what is shown black and white
 constexpr int kSuggestions = 5;
+constexpr double kMostRead = double(1 << 27);  // voxels of an image in chunks, for a mean intensity
 
 const char* word_of(StudyResult::Stage stage) {
     switch (stage) {
@@ -69,7 +73,8 @@ std::vector<Vec3> farthest_from(const std::vector<Vec3>& marks, const TriangleMe
     return found;
 }
 
-Json result_json(const StudyResult& result, std::uint64_t version) {
+Json result_json(const StudyResult& result, std::uint64_t version,
+                 const std::optional<IntensityStatistics>& intensity) {
     Json json{{"structure", result.structure},  {"version", version},          {"seq", result.sequence},
               {"stage", word_of(result.stage)}, {"progress", result.progress}, {"message", result.message},
               {"seconds", result.seconds}};
@@ -88,12 +93,20 @@ Json result_json(const StudyResult& result, std::uint64_t version) {
     json["volume"] = report.surface.volume;
     json["area"] = report.surface.area;
     json["extent"] = {high[0] - low[0], high[1] - low[1], high[2] - low[2]};
-    json["mean"] = nullptr;
+    json["mean"] = json["sd"] = nullptr;
+    if (intensity && intensity->voxels > 0) {
+        json["mean"] = intensity->mean;
+        json["sd"] = intensity->standard_deviation;
+    }
     json["expected"] = nullptr;
     if (const auto& expected = report.inference.expected)
         json["expected"] = {{"value", expected->value}, {"low", expected->low}, {"high", expected->high}};
     json["warnings"] = report.warnings;
     return json;
+}
+
+Json options_json(const StudyOptions& options) {
+    return Json::parse(covol::to_json(KeyedAction{"", StudyActions::SetOptions{options}})).at("options");
 }
 
 }  // namespace
@@ -124,7 +137,7 @@ void MarkSession::start(Send send, Broadcast broadcast) {
     send_ = std::move(send);
     broadcast_ = std::move(broadcast);
     solver_ = std::make_unique<StudySolver>(
-        image_, view_.options, [this](const StudyResult& r) { hear(r); }, run_);
+        image_, options(), [this](const StudyResult& r) { hear(r); }, run_, view_.site.read_guess);
     const std::lock_guard lock(mutex_);
     std::vector<StudyId> all;
     for (const auto& structure : study_.state()) all.push_back(structure->id);
@@ -141,9 +154,7 @@ void MarkSession::follow(const std::vector<StudyId>& structures) {
             continue;
         }
         Solved& solved = solved_[id];
-        const bool is_same =
-            solved.from && solved.from->marks == structure->marks && solved.from->outlines == structure->outlines;
-        if (is_same || (!solved.from && structure->marks.empty() && structure->outlines.empty())) continue;
+        if (solved.from ? solved.from->has_same_evidence(*structure) : !structure->has_evidence()) continue;
         solved.from = structure;
         solved.is_refined = false;
         solver_->solve(structure, study_.sequence());
@@ -153,6 +164,9 @@ void MarkSession::follow(const std::vector<StudyId>& structures) {
 /// On the solver's thread.
 void MarkSession::hear(const StudyResult& result) {
     std::string text;
+    std::optional<IntensityStatistics> intensity;
+    if (result.stage == StudyResult::Stage::Refined)
+        intensity = intensity_within(image_(), *result.surface->surface, kMostRead, run_);
     {
         const std::lock_guard lock(mutex_);
         const auto found = solved_.find(result.structure);
@@ -167,7 +181,8 @@ void MarkSession::hear(const StudyResult& result) {
             solved.version = result.version;
             solved.is_refined = result.stage == StudyResult::Stage::Refined;
         }
-        Json told = result_json(result, solved.version);
+        solved.intensity = intensity;
+        Json told = result_json(result, solved.version, intensity);
         text = text_of({{"result", told}});
         if (result.stage != StudyResult::Stage::Working) solved.told = std::move(told);
     }
@@ -175,11 +190,16 @@ void MarkSession::hear(const StudyResult& result) {
 }
 
 Json MarkSession::to_json(const StudyStructure& structure) const {
-    Json marks = Json::array(), outlines = Json::array();
+    Json marks = Json::array(), outlines = Json::array(), strokes = Json::array();
     for (const StudyMark& m : structure.marks)
         marks.push_back({{"id", m.id}, {"kind", kWords<MarkKind>[std::size_t(m.kind)]}, {"world", m.world}});
     for (const StudyOutline& o : structure.outlines)
         outlines.push_back({{"id", o.id}, {"axis", o.axis}, {"at", o.at}, {"closed", o.closed}, {"world", o.world}});
+    for (const StudyStroke& s : structure.strokes) {
+        Json stroke{{"id", s.id}, {"erases", s.erases}, {"radius", s.radius}, {"world", s.world}};
+        if (s.axis) stroke.update({{"axis", *s.axis}, {"at", s.at}});
+        strokes.push_back(std::move(stroke));
+    }
     Json json{{"id", structure.id},
               {"name", structure.name},
               {"color", structure.color},
@@ -187,7 +207,12 @@ Json MarkSession::to_json(const StudyStructure& structure) const {
               {"visible", structure.visible},
               {"marks", std::move(marks)},
               {"outlines", std::move(outlines)},
+              {"strokes", std::move(strokes)},
+              {"guess", nullptr},
               {"result", nullptr}};
+    if (structure.guess)  // pages need not know where it lies
+        json["guess"] = {{"name", std::filesystem::path(structure.guess->path).filename().string()},
+                         {"label", structure.guess->label}};
     if (const auto solved = solved_.find(structure.id); solved != solved_.end()) json["result"] = solved->second.told;
     return json;
 }
@@ -195,7 +220,8 @@ Json MarkSession::to_json(const StudyStructure& structure) const {
 Json MarkSession::standing() const {
     return {{"seq", study_.sequence()},
             {"can_undo", study_.history().can_undo()},
-            {"can_redo", study_.history().can_redo()}};
+            {"can_redo", study_.history().can_redo()},
+            {"options", options_json(study_.history().options())}};
 }
 
 void MarkSession::opened(serve::Client client) {
@@ -230,26 +256,42 @@ void MarkSession::act(serve::Client client, std::string_view text) {
             return suggest(client, asked["structure"].get<StudyId>());
     }
     const KeyedAction action = parse_study_action(text);
+    if (names_file(action.action)) throw Error(Errc::InvalidInput, "study: a page names no files");
     const std::lock_guard lock(mutex_);
-    const Study::Applied applied = study_.apply(action);
-    const std::vector<StudyId>& changed = applied.changed.structures;
-    if (!changed.empty()) {
-        follow(changed);
-        Json patch = standing();
-        patch["structures"] = Json::array();
-        patch["removed"] = Json::array();
-        patch["order"] = Json::array();
-        for (const StudyId id : changed)
-            if (const auto structure = study_.history().find(id))
-                patch["structures"].push_back(to_json(*structure));
-            else
-                patch["removed"].push_back(id);
-        for (const auto& structure : study_.state()) patch["order"].push_back(structure->id);
-        broadcast_(text_of({{"patch", std::move(patch)}}));
-    }
+    const Study::Applied applied = apply(action);
     Json answer{{"done", action.key}, {"seq", study_.sequence()}};
     if (applied.changed.made != 0) answer["id"] = applied.changed.made;
     send_(client, text_of(answer));
+}
+
+Study::Applied MarkSession::apply(const KeyedAction& action) {
+    Study::Applied applied = study_.apply(action);
+    tell(applied.changed);
+    return applied;
+}
+
+void MarkSession::tell(const StudyHistory::Changed& changed) {
+    std::vector<StudyId> structures = changed.structures;
+    if (changed.options) {
+        solver_->set_options(options());
+        for (auto& [id, solved] : solved_) {
+            solved.from = nullptr;  // with other options it has another surface
+            structures.push_back(id);
+        }
+    }
+    if (structures.empty() && !changed.options) return;
+    follow(structures);
+    Json patch = standing();
+    patch["structures"] = Json::array();
+    patch["removed"] = Json::array();
+    patch["order"] = Json::array();
+    for (const StudyId id : structures)
+        if (const auto structure = study_.history().find(id))
+            patch["structures"].push_back(to_json(*structure));
+        else
+            patch["removed"].push_back(id);
+    for (const auto& structure : study_.state()) patch["order"].push_back(structure->id);
+    broadcast_(text_of({{"patch", std::move(patch)}}));
 }
 
 void MarkSession::suggest(serve::Client client, StudyId id) {
@@ -292,6 +334,42 @@ serve::Response MarkSession::get(const serve::Request& request) {
         return refused(is_theirs ? 400 : 500, error.what());
     }
     return refused(404, "there is nothing here");
+}
+
+serve::Response MarkSession::post(const serve::Request& request, const std::string& body) {
+    try {
+        if (request.path != "/import") return refused(404, "there is nothing here");
+        const auto text = [&](const char* name) {
+            const auto found = request.query.find(name);
+            if (found == request.query.end())
+                throw Error(Errc::InvalidInput, std::string("'") + name + "': expected one");
+            return found->second;
+        };
+        const std::string key = text("key");
+        const std::string as = text("as");
+        const StudyId structure = as == "labels" ? 0 : number_of(request, "structure");
+        const GivenFile file = keep_file(text("name"), body, as == "points", study_.folder(), run_);
+        StudyState state;
+        {
+            const std::lock_guard lock(mutex_);
+            state = study_.state();
+        }
+        const StudyAction action =
+            as == "points"   ? import_points(file.path(), structure, view_.site.image, run_)
+            : as == "guess"  ? import_guess(file.path(), structure, study_.folder(), view_.site, run_)
+            : as == "labels" ? import_labels(file.path(), study_.folder(), state, view_.site, run_)
+                             : throw Error(Errc::InvalidInput, "'as': expected points, guess or labels");
+        const std::lock_guard lock(mutex_);
+        const Study::Applied applied = apply({key, action});
+        if (as != "points") file.keep();
+        serve::Response response;
+        response.type = "application/json";
+        response.body = text_of({{"seq", study_.sequence()}, {"id", applied.changed.made}});
+        return response;
+    } catch (const Error& error) {
+        const bool is_theirs = error.code() != Errc::Io;
+        return refused(is_theirs ? 400 : 500, error.what());
+    }
 }
 
 serve::Response MarkSession::image_facts() const {
@@ -356,21 +434,23 @@ serve::Response MarkSession::mesh(const serve::Request& request) const {
 StructuresResult MarkSession::results() {
     StudyState state;
     std::map<std::string, std::shared_ptr<const SegmentResult>> known;
+    SegmentOptions how;
     {
         const std::lock_guard lock(mutex_);
         state = study_.state();
+        how = options();
         for (const auto& structure : state)
             if (const auto found = solved_.find(structure->id); found != solved_.end() && found->second.is_refined)
                 known[safe_text(structure->name)] = found->second.surface;
     }
-    std::vector<Marks> marks = marks_of(state);
+    std::vector<Marks> marks = marks_of(state, view_.site);
     if (marks.empty()) throw Error(Errc::InvalidInput, "no structure has marks yet");
     number_labels(marks);
     const auto solve = [&](const std::optional<Image>& image, const StructureInput& structure, const RunContext& run) {
         const auto found = known.find(structure.name);
         return found != known.end() ? *found->second : solve_structure(image, structure, run);
     };
-    return segment_structures(image_(), std::move(marks), {view_.options, {}}, run_, solve);
+    return segment_structures(image_(), std::move(marks), {how, {}}, run_, solve);
 }
 
 serve::Response MarkSession::download(const serve::Request& request) {
@@ -387,7 +467,9 @@ serve::Response MarkSession::download(const serve::Request& request) {
         if (state.empty()) throw Error(Errc::InvalidInput, "there is no structure " + std::to_string(id));
     }
     Export made = make_export(
-        format->second, state, [&] { return results(); }, levels_.image(), study_.folder(), run_);
+        format->second, state, [&] { return results(); },
+        [&](const StructureResult& s) { return intensity_within(image_(), *s.result.surface, kMostRead, run_); },
+        levels_.image(), study_.folder(), run_);
     serve::Response response;
     response.type = "application/octet-stream";
     response.body = std::move(made.bytes);

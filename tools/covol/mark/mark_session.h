@@ -10,6 +10,7 @@
 #include "cli/json.h"
 #include "covol/image.h"
 #include "covol/image_levels.h"
+#include "covol/intensity.h"
 #include "covol/segment_structures.h"
 #include "covol/study.h"
 #include "covol/study_solver.h"
@@ -25,7 +26,8 @@ struct MarkView {
     std::string page;   ///< HTML
     std::string title;  ///< the image's name
     bool is_anatomical = false;
-    SegmentOptions options;  ///< of every structure
+    SegmentOptions options;  ///< of every structure, where the study's own say nothing
+    StudySite site;
 };
 
 /// One study on the page of `covol mark`: answers what the page asks for, and tells it what changes.
@@ -42,6 +44,8 @@ public:
     void start(Send send, Broadcast broadcast);
 
     [[nodiscard]] serve::Response get(const serve::Request& request);
+    /// A file that a person chose on the page: marks, a guess, or a label image.
+    [[nodiscard]] serve::Response post(const serve::Request& request, const std::string& body);
     void opened(serve::Client client);
     void message(serve::Client client, std::string_view text);
 
@@ -55,12 +59,17 @@ private:
         std::uint64_t version = 0;
         std::shared_ptr<const SegmentResult> surface;  ///< of that version; null: none
         bool is_refined = false;
+        std::optional<IntensityStatistics> intensity;  ///< of the surface that was refined last
     };
 
     void hear(const StudyResult& result);
     void act(serve::Client client, std::string_view text);
     void suggest(serve::Client client, StudyId structure);
     void follow(const std::vector<StudyId>& structures);
+    /// Applies an action, and tells all pages. @pre locked
+    Study::Applied apply(const KeyedAction& action);
+    void tell(const StudyHistory::Changed& changed);
+    [[nodiscard]] SegmentOptions options() const { return study_.history().options().applied_to(view_.options); }
     [[nodiscard]] Json to_json(const StudyStructure& structure) const;
     [[nodiscard]] Json standing() const;
     [[nodiscard]] serve::Response image_facts() const;

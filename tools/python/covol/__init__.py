@@ -29,10 +29,11 @@ except ImportError as error:
 from . import _html, _inputs
 from ._covol import Image, LevelSet, Mesh, Points, Result, __version__
 from ._errors import Error
-from ._inputs import from_affine, read_image, read_points, read_study, to_affine
+from ._mark import Study, mark
+from ._inputs import from_affine, read_image, read_points, read_study, read_study_options, to_affine
 
-__all__ = ["Error", "Image", "LevelSet", "Mesh", "Points", "Result", "Structures", "Suggestion", "compare", "distances", "from_affine", "mask",
-           "mesh", "options", "phantom", "read_image", "read_level_set", "read_mesh", "read_points", "read_study", "reconstruct", "save_mask",
+__all__ = ["Error", "Image", "LevelSet", "Mesh", "Points", "Result", "Structures", "Study", "Suggestion", "compare", "distances", "from_affine", "mark", "mask",
+           "mesh", "options", "phantom", "read_image", "read_level_set", "read_mesh", "read_points", "read_study", "read_study_options", "reconstruct", "save_mask",
            "segment", "structures", "suggest", "timelapse", "to_affine"]
 
 
@@ -84,7 +85,7 @@ def structures(image, marks=None, *, painted=None, painted_outside=0, painted_as
 
     Args:
         marks: dict of the structures' names; each has its points, or a dict of what segment() takes: points, contours, inside,
-            outside, guess, init, exterior_seed.
+            outside, guess, init, exterior_seed, and `painted`, a label image with one label, which is paint of this structure alone.
         painted: label image of the image's shape. Each label belongs to the structure of its name, or is one more: "label3", or
             what a .seg.nrrd calls it. Paint of one structure is outside of the others.
         image, painted_outside, painted_as, init, spacing, origin, direction, affine, points_space, points_order, points_scale,
@@ -387,10 +388,19 @@ Args:
     folder: of the study, "stack.tif.covol" say.
 
 Returns:
-    dict of each structure's marks by its name: a dict of Points with the keys "points", "contours", "inside" and "outside",
-    without those that there are none of. World positions. Raises Error.
+    dict of each structure's marks by its name: a dict of Points with the keys "points", "contours", "inside" and "outside", of an
+    Image with the key "painted", and an Image, a LevelSet or the path of a mesh with the key "guess", without those that there are none of. World
+    positions. Raises Error.
 """
-for _type in (Error, Image, LevelSet, Mesh, Points, Result, Structures, Suggestion, read_image, read_points, read_study, from_affine,
+read_study_options.__doc__ = """The options of a study: structures(image, read_study(folder), **read_study_options(folder)).
+
+Args:
+    folder: of the study.
+
+Returns:
+    dict of keywords: voxel_size, rho, mark_precision and model, without those that the study leaves open. Raises Error.
+"""
+for _type in (Error, Study, mark, Image, LevelSet, Mesh, Points, Result, Structures, Suggestion, read_image, read_points, read_study, read_study_options, from_affine,
               to_affine):
     _type.__module__ = "covol"
 del _type

@@ -86,6 +86,10 @@ def read_study(folder):
     return _covol.read_study(os.fspath(folder))
 
 
+def read_study_options(folder):
+    return _covol.read_study_options(os.fspath(folder))
+
+
 def points(name, value, reading, lines=False, normals=None):
     """A list of Points from None, a file, Points, several of these, positions or, with `lines`, closed lines of positions."""
     if value is None:
@@ -107,7 +111,7 @@ def points(name, value, reading, lines=False, normals=None):
 def marks(given, reading, like):
     """Of one structure: what segment() takes beside the image, from a dict of its keywords, or from its points."""
     given = given if isinstance(given, collections.abc.Mapping) else {"points": given}
-    known = ("points", "contours", "inside", "outside", "guess", "init", "exterior_seed", "normals")
+    known = ("points", "contours", "inside", "outside", "guess", "init", "exterior_seed", "painted", "normals")
     for key in given:
         if key not in known:
             raise Error(f"marks: expected {', '.join(known[:-1])}, got {key!r}", "invalid_options", "marks")
@@ -116,7 +120,8 @@ def marks(given, reading, like):
     return {"points": points("points", values["points"], reading, normals=normals),
             "contours": points("contours", values["contours"], reading, lines=True),
             "inside": points("inside", values["inside"], reading), "outside": points("outside", values["outside"], reading),
-            "guess": like(values["guess"]), "init": like(values["init"]), "exterior_seed": values["exterior_seed"]}
+            "guess": like(values["guess"]), "init": like(values["init"]), "exterior_seed": values["exterior_seed"],
+            "painted": like(values["painted"])}
 
 
 def shape(value, **geometry):

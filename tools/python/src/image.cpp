@@ -1,13 +1,19 @@
 // Image and Points.
 #include <pybind11/stl.h>
 
+#include <filesystem>
+#include <map>
+
 #include "arrays.h"
 #include "classes.h"
 #include "covol/error.h"
 #include "covol/phantom.h"
 #include "covol/point_array.h"
+#include "covol/safe_text.h"
 #include "covol/study.h"
+#include "covol/study_files.h"
 #include "options.h"
+#include "solve.h"
 
 namespace covol::python {
 namespace {
@@ -80,10 +86,36 @@ PointCloud make_points(const std::string& name, const py::object& positions, con
     return cloud;
 }
 
+/// A mask, a level set, or the path of a mesh.
+py::object guess_of(const Marks& marks, const std::string& path) {
+    const Start start = marks.guess({}).start;
+    if (const auto* mask = std::get_if<MaskStart>(&start)) return py::cast(*mask->mask);
+    if (const auto* grid = std::get_if<LevelSetStart>(&start)) return py::cast(LevelSet{grid->level_set});
+    return py::str(path);
+}
+
+/// What structures() takes as keywords.
+py::dict options_of_study(const std::string& folder) {
+    const StudyOptions options = read_study_options(folder);
+    py::dict keywords;
+    if (options.voxel_size) keywords["voxel_size"] = *options.voxel_size;
+    if (options.rho) keywords["rho"] = *options.rho;
+    if (options.mark_precision) keywords["mark_precision"] = *options.mark_precision;
+    if (options.model) keywords["model"] = kWords<Model>[std::size_t(*options.model)];
+    return keywords;
+}
+
 /// Each structure's marks as structures() takes them.
 py::dict marks_of_study(const std::string& folder) {
     py::dict structures;
-    for (const Marks& marks : marks_of(read_study(folder))) {
+    const ImageGeometry image = read_study_image(folder).geometry;
+    const StudyState state = read_study(folder);
+    std::map<std::string, std::string> guesses;  // by name
+    for (const auto& structure : state)
+        if (structure->guess)
+            guesses[safe_text(structure->name)] =
+                (std::filesystem::path(folder) / structure->guess->path).lexically_normal().string();
+    for (const Marks& marks : marks_of(state, open_study_site(folder, image))) {
         py::dict kinds;
         if (!marks.points.empty()) kinds["points"] = make_cloud(marks.points, {PointSpace::World, PointOrder::XYZ});
         const auto add = [&](const char* kind, const std::vector<PointCloud>& clouds) {
@@ -92,6 +124,8 @@ py::dict marks_of_study(const std::string& folder) {
         add("contours", marks.contours);
         add("inside", marks.inside);
         add("outside", marks.outside);
+        if (!marks.paint.empty()) kinds["painted"] = marks.paint.front().image->image;
+        if (marks.guess) kinds["guess"] = guess_of(marks, guesses[marks.name]);
         structures[marks.name.c_str()] = kinds;
     }
     return structures;
@@ -227,6 +261,7 @@ void add_points(py::module_& module) {
         return read_points(path, reading);
     });
     module.def("read_study", marks_of_study);
+    module.def("read_study_options", options_of_study);
 }
 
 }  // namespace covol::python

@@ -30,6 +30,7 @@ GivenMarks to_marks(const py::handle& name, const py::handle& inputs) {
                      to_shape("guess", inputs["guess"])};
     if (const py::object seeds = inputs["exterior_seed"]; !seeds.is_none())
         marks.exterior_seeds = to_positions("exterior_seed", seeds);
+    if (const py::object painted = inputs["painted"]; !painted.is_none()) marks.painted = py::cast<Image>(painted);
     return marks;
 }
 

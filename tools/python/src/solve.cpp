@@ -59,6 +59,12 @@ private:
         marks.outside = given.outside;
         marks.exterior_seeds = given.exterior_seeds;
         marks.start = start_of(given.init, run_);
+        if (given.painted) {
+            PaintedImage painted = make_painted(*given.painted);
+            painted.is_shared = false;
+            const int label = painted.labels.front().label;
+            marks.paint.push_back({std::make_shared<const PaintedImage>(std::move(painted)), label});
+        }
         if (const auto* path = std::get_if<std::string>(&given.guess)) marks.files.guess = *path;
         if (given.guess.index() != 0)
             marks.guess = [this, &shape = given.guess, label = settings.inputs.guess_label](const RunContext& run) {

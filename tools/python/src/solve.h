@@ -26,6 +26,7 @@ struct GivenMarks {
     std::vector<PointCloud> points, contours, inside, outside;
     std::vector<Vec3> exterior_seeds;
     Shape init, guess;
+    std::optional<Image> painted = {};  ///< of this structure alone
 };
 
 /// All of a job but its options.

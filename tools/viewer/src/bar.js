@@ -1,4 +1,5 @@
 // Parts of the row above the views: tools, undo, grey values.
+import {COLOR_MAPS} from './color_maps.js';
 import {el} from './dom.js';
 import {isSame, presets} from './grey.js';
 import {icon} from './icons.js';
@@ -30,7 +31,8 @@ export function windowMenu({state, image, panels}) {
   return menu('grey values (w)', [icon('window'), el('span', {class: 'caret'})], (close) => [
     ...presets(image, panels[state.get('keyPanel')].slice).map(([name, window]) => menuItem(name, () => { state.set({window}); close(); },
       {role: 'menuitemradio', 'aria-checked': String(isSame(window, state.get('window')))})),
-    menuItem('inverted', () => { const {black, white} = state.get('window'); state.set({window: {black: white, white: black}}); close(); }),
+    el('h3', {}, 'Colours'),
+    ...COLOR_MAPS.map((colors) => menuItem(colors, () => { state.set({colors}); close(); }, {role: 'menuitemradio', 'aria-checked': String(state.get('colors') === colors)})),
     el('p', {class: 'hint'}, 'Right-drag in a plane: across for contrast, up and down for brightness.'),
   ]);
 }

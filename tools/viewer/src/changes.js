@@ -14,6 +14,10 @@ const CHANGES = {
   move_mark: (own, a) => ({...own, marks: own.marks.map((m) => m.id === a.mark ? {...m, world: a.world} : m)}),
   remove_mark: (own, a) => ({...own, marks: own.marks.filter((m) => m.id !== a.mark)}),
   add_outline: (own, a, id) => own.outlines.some((o) => !o.isNew && isSameOutline(o, a)) ? own : ({...own, outlines: [...own.outlines, {id, axis: a.axis, at: a.at, closed: a.closed, world: a.world, isNew: true}]}),
+  add_marks: (own, a) => ({...own, marks: [...own.marks, ...a.world.map((world, n) => ({id: `${a.key} ${n}`, kind: a.kind, world, isNew: true}))]}),
+  add_stroke: (own, a, id) => own.strokes.some((s) => s.id === id) ? own : ({...own, strokes: [...own.strokes, {id, erases: a.erases, radius: a.radius, axis: a.axis, at: a.at, world: a.world}]}),
+  clear_paint: (own) => ({...own, strokes: []}),
+  remove_guess: (own) => ({...own, guess: null}),
   remove_outline: (own, a) => ({...own, outlines: own.outlines.filter((o) => o.id !== a.mark)}),
 };
 
@@ -22,7 +26,7 @@ export function applyAction(structures, action, id) {
   switch (action.do) {
     case 'add_structure':
       if (structures.some((s) => !s.isNew && s.name === action.name)) return structures;
-      return [...structures, {id, name: action.name, color: action.color, locked: false, visible: true, marks: [], outlines: [], result: null, isNew: true}];
+      return [...structures, {id, name: action.name, color: action.color, locked: false, visible: true, marks: [], outlines: [], strokes: [], guess: null, result: null, isNew: true}];
     case 'remove_structure': return structures.filter((s) => s.id !== action.structure);
     case 'give_mark': {
       const mark = structures.find((s) => s.id === action.structure)?.marks.find((m) => m.id === action.mark);

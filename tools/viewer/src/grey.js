@@ -1,13 +1,13 @@
-// Which values of the image are black and which are white.
+// Which values of the image are black and which are white, and the colours between.
+import {colorTable} from './color_maps.js';
 
 /** A pixel for each of the 65536 codes of a slice. */
-export function greyTable({low, high}, {black, white}) {
-  const table = new Uint32Array(65536), scale = (high - low) / 65535, range = white - black || 1e-9;
+export function greyTable({low, high}, {black, white}, colors = 'grey') {
+  const shades = colorTable(colors), table = new Uint32Array(65536), scale = (high - low) / 65535, range = white - black || 1e-9;
   for (let n = 0; n < 65536; ++n) {
-    const grey = Math.min(255, Math.max(0, Math.round(255 * (low + n * scale - black) / range)));
-    table[n] = 0xff000000 | grey * 0x010101;
+    table[n] = shades[Math.min(255, Math.max(0, Math.round(255 * (low + n * scale - black) / range)))];
   }
-  table.key = `${black} ${white}`;
+  table.key = `${black} ${white} ${colors}`;
   return table;
 }
 
@@ -29,7 +29,9 @@ export function presets(image, slice) {
   const automatic = {black: image.black, white: image.white}, whole = {black: image.low, white: image.high}, list = [['automatic', automatic]];
   if (!isSame(automatic, whole)) list.push(['whole range', whole]);
   if (slice) list.push(['this slice', rangeOfSlice(slice, image)]);
-  if (image.anatomical && image.low <= -500 && image.high >= 300)  // Hounsfield units
+  // Hounsfield units: air is -1000, and no scanner tells less than -4096 or more than 32767.
+  const isAnatomicalCt = image.anatomical && image.low <= -500, looksLikeCt = image.low <= -900 && image.low >= -4096 && image.high <= 32767;
+  if ((isAnatomicalCt || looksLikeCt) && image.high >= 300)
     list.push(['soft tissue', {black: -160, white: 240}], ['brain', {black: 0, white: 80}], ['bone', {black: -450, white: 1050}], ['lung', {black: -1350, white: 150}]);
   return list;
 }

@@ -1,6 +1,7 @@
 // What is seen survives a reload: slices, zoom, grey values, planes in 3D.
+import {COLOR_MAPS} from './color_maps.js';
 
-export const VIEW_NAMES = ['slices', 'views', 'window', 'planes', 'cut', 'flip', 'large', 'countFrom', 'marks'];
+export const VIEW_NAMES = ['slices', 'views', 'window', 'planes', 'cut', 'flip', 'large', 'countFrom', 'marks', 'colors'];
 
 /** What is shown at first: as it was before a reload, as far as that makes sense. */
 export function viewState(image, space, kept, first = {}) {
@@ -12,7 +13,7 @@ export function viewState(image, space, kept, first = {}) {
     window: Number.isFinite(kept.window?.black) && Number.isFinite(kept.window?.white) ? kept.window : otherwise.window,
     planes: isTriple(kept.planes, (on) => typeof on === 'boolean') ? kept.planes : otherwise.planes,
     cut: isOneOf(otherwise.cuts ?? [0, 1, 2], kept.cut, -1), flip: kept.flip === true, large: isOneOf([0, 1, 2, 3], kept.large, -1), countFrom: isOneOf([0, 1], kept.countFrom, 0),
-    marks: isOneOf([true, false], kept.marks, otherwise.marks ?? true),
+    colors: isOneOf(COLOR_MAPS, kept.colors, 'grey'), marks: isOneOf([true, false], kept.marks, otherwise.marks ?? true),
   };
 }
 

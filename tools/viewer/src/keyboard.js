@@ -55,7 +55,7 @@ export function viewKeys(app, {help, theme, view}) {
 export function listenToKeys(keys, {help, view, moveCrosshair, enter, digit, taking = 'body, canvas'}) {
   document.addEventListener('keydown', (event) => {
     const {key, target} = event, isText = target.matches?.('input:not([type=range]):not([type=color]):not([type=checkbox]), select, textarea'), isOnControl = target.matches?.('button, a, input, select, summary');
-    if (help.open || isText) return;
+    if (help.open || document.querySelector('dialog[open]') || isText) return;
     const isTyped = event.getModifierState('AltGraph');  // [ and ] on many keyboards
     if (!isTyped && (event.ctrlKey || event.metaKey)) {
       const act = {z: event.shiftKey ? keys.Z : keys.z, Z: keys.Z, y: keys.Z}[key];

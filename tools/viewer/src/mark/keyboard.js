@@ -5,7 +5,7 @@ import {TOOLS} from './tools.js';
 export const SHEET = [
   ['Marks', [['Click', 'mark with the tool'], ['Shift+click', 'inside'], ['Alt+click', 'outside'], ['drag', 'move a mark'], ['Delete', 'remove the mark or the outline under the cursor'],
     ['a', 'mark or corner at the crosshair'], ['z', 'undo'], ['Shift+z', 'redo']]],
-  ['Tools', [...TOOLS.map(([, label, key]) => [key, label]), ['Enter', 'close the outline'], ['Shift+Enter', 'end it open'], ['Escape', 'cancel']]],
+  ['Tools', [...TOOLS.map(([, label, key]) => [key, label]), [', .', 'smaller, larger brush'], ['d', 'brush: disc or ball'], ['Enter', 'close the outline'], ['Shift+Enter', 'end it open'], ['Escape', 'cancel']]],
   ['Structures', [['1\u20269', 'choose'], ['Shift+n', 'new structure'], ['F2', 'rename'], ['h', 'hide or show'], ['l', 'lock']]],
   ['Suggestions', [['n', 'where a mark would help; the next one'], ['Enter', 'the border is at the ring'], ['click', 'the border is there']]],
   ['Views', VIEW_ROWS],
@@ -39,6 +39,7 @@ export function keyboard(app, {suggestions, sidebar, help, theme, view}) {
   const keys = {
     ...shared, z: () => study.act({do: 'undo'}), Z: () => study.act({do: 'redo'}),
     n: () => suggestions.next(), N: () => tools.addStructure(), F2: () => sidebar.rename(), a: atCrosshair, Escape: cancel,
+    ',': () => tools.resizeBrush(1 / 1.25), '.': () => tools.resizeBrush(1.25), d: () => tools.toggleBall(),
     h: () => own() && tools.change('show', own().id, !own().visible), l: () => own() && tools.change('lock', own().id, !own().locked),
     Delete: () => tools.remove(state.get('hover') ?? state.get('selected')),
     Backspace: () => tools.dropCorner() || tools.remove(state.get('hover') ?? state.get('selected')),

@@ -17,24 +17,29 @@ import {Suggestions} from '../suggest.js';
 import {themeButton} from '../theme.js';
 import {Toasts} from '../toast.js';
 import {Connection} from './connection.js';
+import {Files} from './files.js';
 import {keyboard, SHEET} from './keyboard.js';
 import {linkBar} from './link_bar.js';
 import {Meshes} from './meshes.js';
+import {optionsSheet} from './options.js';
 import {drawOverlay} from './overlay.js';
+import {PaintPictures} from './paint.js';
 import {PointerInput} from './pointer.js';
 import {isReference, Queue} from './queue.js';
 import {sidebar as makeSidebar} from './sidebar.js';
 import {SliceStore} from './slice_store.js';
 import {Study} from './study.js';
+import {tableSheet} from './table.js';
 import {Timing} from './timing.js';
 import {toolbar} from './toolbar.js';
 import {Tools, TOOLS} from './tools.js';
 
-const KEPT = [...VIEW_NAMES, 'active', 'tool'];
+const KEPT = [...VIEW_NAMES, 'active', 'tool', 'brush'];
 
 function firstState(image, space, kept) {
   const view = viewState(image, space, kept);
-  return new State({...view, grey: greyTable(image, view.window), tool: TOOLS.some(([name]) => name === kept.tool) ? kept.tool : 'surface',
+  const brush = kept.brush?.radius > 0 ? {radius: kept.brush.radius, isBall: kept.brush.isBall === true} : {radius: 5 * Math.min(...space.spacing), isBall: false};
+  return new State({...view, grey: greyTable(image, view.window, view.colors), brush, stroke: null, tool: TOOLS.some(([name]) => name === kept.tool) ? kept.tool : 'surface',
     active: Number.isInteger(kept.active) ? kept.active : null, selected: null, hover: null, drag: null, ring: null, suggested: 0, isAsking: false, ruler: null, draft: null,
     keyPanel: 2, link: 'connecting', waiting: 0, study: 0, meshes: 0, loaded: 0, theme: 'light'});
 }
@@ -67,28 +72,28 @@ async function start() {
   const toast = (text, kind) => toasts.show(text, kind), timing = new Timing();
   const slices = new SliceStore(space, image, () => state.set({loaded: state.get('loaded') + 1}));
   const meshes = new Meshes(space, () => state.set({meshes: state.get('meshes') + 1}));
-  const tools = new Tools({state, study, space, toast});
-  const app = {image, space, unitText: units, state, study, meshes, slices, tools, toast, keep: (name, value) => store.set(name, value)};
+  const tools = new Tools({state, study, space, toast}), painting = new PaintPictures(space), files = new Files({study, tools, toast, queue});
+  const app = {image, space, unitText: units, state, study, meshes, slices, tools, painting, files, toast, keep: (name, value) => store.set(name, value)};
   app.goTo = (world) => {
     const index = space.toIndex(world);
     state.set({slices: space.voxelAt(index)});
     for (const panel of app.panels) panel.reveal(index);
   };
-  state.on(['window'], () => state.set({grey: greyTable(image, state.get('window'))}));
+  state.on(['window', 'colors'], () => state.set({grey: greyTable(image, state.get('window'), state.get('colors'))}));
   study.on('failed', (why) => toast(why, 'failed'));
   study.on('result', (result, isNew) => meshes.take(result, isNew));
   study.on('change', () => meshes.keepOnly(study.confirmed.map((s) => s.id)));
   state.on(['link'], () => { if (state.get('link') === 'open') slices.retry(); });
   follow(state, study);
 
-  const panels = app.panels = [0, 1, 2].map((axis) => new PlanePanel(axis, app, {drawOverlay, Input: PointerInput, redrawnOn: ['draft']}));
+  const panels = app.panels = [0, 1, 2].map((axis) => new PlanePanel(axis, app, {drawOverlay, Input: PointerInput, redrawnOn: ['draft', 'stroke', 'brush']}));
   const status = statusRow(app, hintsOf(TOOLS)), names = [0, 1, 2].map((axis) => planeName(space, axis, image.anatomical));
-  const suggestions = new Suggestions({...app, connection}), help = helpSheet(SHEET);
+  const suggestions = new Suggestions({...app, connection}), help = helpSheet(SHEET), table = tableSheet(app), options = optionsSheet(app);
   const theme = themeButton(state, icon('theme'), {get: () => new Store('covol-mark').get('theme'), set: (value) => new Store('covol-mark').set('theme', value)});
   let view = null;
   const holder = el('div', {class: 'picture'}), three = el('section', {class: 'panel three', 'aria-label': '3D'}, sceneTools(app, () => view, names), holder);
   const sidebar = makeSidebar(app), stage = el('main', {class: 'stage'}, panels[2].element, three, panels[1].element, panels[0].element);
-  document.getElementById('page').replaceChildren(toolbar(app, {theme, help, suggestions}), linkBar(state), stage, sidebar.element, status.element, toasts.element, help);
+  document.getElementById('page').replaceChildren(toolbar(app, {theme, help, suggestions, table, options}), linkBar(state), stage, sidebar.element, status.element, toasts.element, files.input, help, table.dialog, options.dialog);
   const enlarge = () => { stage.dataset.large = state.get('large'); };
   state.on(['large'], enlarge);
   enlarge();
@@ -107,7 +112,7 @@ async function start() {
   // Where nothing can be kept, what was not sent would be lost.
   addEventListener('beforeunload', (event) => { if (queue.isLost && queue.waiting > 0) event.preventDefault(); });
   connection.open();
-  window.covolMark = {state, study, connection, queue, panels, view, meshes, slices, image, space, suggestions, timing,
+  window.covolMark = {state, study, connection, queue, panels, view, meshes, slices, image, space, suggestions, timing, tools, files,
     get resultsSeen() { return study.resultsSeen; }, get lastShown() { return timing.lastShown; }, get lastAction() { return study.lastAction; }};
 }
 

@@ -1,5 +1,6 @@
-// What the mark page draws upon a slice: outlines, finished and not, beside what every page draws.
+// What the mark page draws upon a slice: paint, outlines, finished and not, beside what every page draws.
 import {away, drawCrosshair, drawMark, drawMarks, drawRing, drawRuler, drawSurface, FAINT_WITHIN, inkOf, stroke} from '../overlay.js';
+import {isBrush} from './tools.js';
 
 function planePlaces(panel, worlds) {
   return worlds.flatMap((world) => {
@@ -46,7 +47,34 @@ function drawDraft(panel, context) {
   for (const spot of [panel.plane.place(...draft.places[0]), last]) drawMark(context, spot, 'surface', color, {radius: 3});
 }
 
+function drawPaint(panel, context) {
+  const {painting, axis, shownAt: at, study, state, tools} = panel, stroke = state.get('stroke');
+  if (at < 0) return;
+  const draw = (canvas, alpha) => {
+    if (!canvas) return;
+    context.globalAlpha = alpha;
+    panel.plane.drawPicture(context, canvas);
+    context.globalAlpha = 1;
+  };
+  for (const structure of study.structures) if (structure.visible) draw(painting.get(structure, axis, at), 0.38);
+  if (stroke) draw(painting.draft(stroke, axis, at, stroke.erases ? [255, 255, 255] : tools.active()?.color ?? [255, 210, 74]), stroke.erases ? 0.3 : 0.45);
+}
+
+/** How large the brush is, where the pointer is. */
+function drawBrush(panel, context) {
+  const {state, input, plane} = panel;
+  if (!isBrush(state.get('tool')) || !input.spot) return;
+  context.beginPath();
+  context.arc(...input.spot, Math.max(2, state.get('brush').radius * plane.scale), 0, 2 * Math.PI);
+  for (const [color, width] of [['rgba(0, 0, 0, 0.6)', 3], ['#fff', 1.2]]) {
+    context.strokeStyle = color;
+    context.lineWidth = width;
+    context.stroke();
+  }
+}
+
 export function drawOverlay(panel, context) {
+  drawPaint(panel, context);
   drawCrosshair(panel, context);
   const active = panel.tools.active();
   const ordered = [...panel.study.structures].sort((a, b) => (a === active) - (b === active));  // the active one lies on top
@@ -59,4 +87,5 @@ export function drawOverlay(panel, context) {
   drawDraft(panel, context);
   drawRuler(panel, context);
   drawRing(panel, context);
+  drawBrush(panel, context);
 }

@@ -1,6 +1,7 @@
-// Outlines by mouse, pen and fingers, beside what a plane and marks have.
+// Outlines and paint by mouse, pen and fingers, beside what a plane and marks have.
 import {MarkPointer} from '../mark_pointer.js';
 import {CLICK, TAP} from '../pointer.js';
+import {isBrush} from './tools.js';
 
 const HIT_LINE = 6;  // CSS pixels
 const FREEHAND = 3;  // between two corners
@@ -35,11 +36,17 @@ export class PointerInput extends MarkPointer {
 
   targetAt(spot, isTouch = false) { return super.targetAt(spot, isTouch) ?? this.outlineAt(spot); }
 
-  hoverTarget(spot) { return this.panel.state.get('draft') ? null : super.hoverTarget(spot); }
+  hoverTarget(spot) { return this.panel.state.get('draft') || isBrush(this.tool) ? null : super.hoverTarget(spot); }
 
-  takesTouch(spot) { return super.takesTouch(spot) || this.tool === 'outline'; }
+  takesTouch(spot) { return super.takesTouch(spot) || this.tool === 'outline' || isBrush(this.tool); }
+
+  interrupt() {
+    super.interrupt();
+    this.panel.state.set({stroke: null});
+  }
 
   press(event, spot) {
+    if (isBrush(this.tool)) return this.beginStroke(event, spot);
     if (this.tool !== 'outline') return super.press(event, spot);
     return this.begin('outline', spot, {hit: null, limit: event.pointerType === 'touch' ? TAP : CLICK});
   }
@@ -47,23 +54,25 @@ export class PointerInput extends MarkPointer {
   drag(gesture, spot, event) {
     if (gesture.what === 'outline') this.beginFreehand(gesture, spot);
     else if (gesture.what === 'freehand') this.freehand(gesture, event);
+    else if (gesture.what === 'stroke') this.goOnPainting(gesture, event);
     else super.drag(gesture, spot, event);
   }
 
   release(gesture, spot, event) {
     if (gesture.what === 'outline' && !gesture.moved) this.corner(spot);
     else if (gesture.what === 'freehand') this.endFreehand(spot);
+    else if (gesture.what === 'stroke') this.panel.tools.endStroke();
     else super.release(gesture, spot, event);
   }
 
   leave() {
     super.leave();
-    if (!this.gesture && this.panel.state.get('draft')) this.panel.later();
+    if (!this.gesture && (this.panel.state.get('draft') || isBrush(this.tool))) this.panel.later();
   }
 
   hover(spot) {
     super.hover(spot);
-    if (this.panel.state.get('draft')) this.panel.later();
+    if (this.panel.state.get('draft') || isBrush(this.tool)) this.panel.later();
   }
 
   corner(spot) {
@@ -79,6 +88,26 @@ export class PointerInput extends MarkPointer {
 
   doubleClick() {
     if (this.panel.state.get('tool') === 'outline' && this.panel.state.get('draft')) this.panel.tools.closeDraft(true);
+  }
+
+  beginStroke(event, spot) {
+    const {panel} = this, index = panel.indexAt(...spot);
+    if (!panel.isSeen(index)) return;
+    const erases = this.tool === 'rubber' || event.shiftKey;
+    if (panel.tools.stroke(panel, [index], erases)) this.begin('stroke', spot, {corner: spot, at: panel.shownAt});
+  }
+
+  /** Corners a third of the brush apart: between them it paints a straight line. */
+  goOnPainting(gesture, event) {
+    const {panel} = this, places = [], apart = Math.max(2, panel.state.get('brush').radius * panel.plane.scale / 3);
+    for (const one of event.getCoalescedEvents?.() ?? [event]) {
+      const spot = this.spotOf(one), index = panel.indexAt(...spot);
+      if (Math.hypot(spot[0] - gesture.corner[0], spot[1] - gesture.corner[1]) < apart || !panel.isInside(index)) continue;
+      gesture.corner = spot;
+      index[panel.axis] = gesture.at;
+      places.push(index);
+    }
+    if (places.length > 0) panel.tools.stroke(panel, places);
   }
 
   beginFreehand(gesture, spot) {

@@ -24,14 +24,20 @@ class Card {
     this.volume = el('span', {});
     this.dice = el('span', {});
     this.range = el('span', {class: 'range', 'aria-hidden': 'true'}, el('i', {}), el('b', {}));
-    this.figures.append(el('span', {class: 'label'}, 'volume'), this.volume, el('span', {class: 'label'}, 'expected Dice'), el('span', {class: 'dice'}, this.dice, this.range));
+    this.mean = el('span', {title: 'of the image inside, with its standard deviation'});
+    this.meanLabel = el('span', {class: 'label'}, 'mean value');
+    this.figures.append(el('span', {class: 'label'}, 'volume'), this.volume, this.meanLabel, this.mean, el('span', {class: 'label'}, 'expected Dice'), el('span', {class: 'dice'}, this.dice, this.range));
     this.message = el('p', {class: 'message'});
+    this.paint = el('span', {});
+    this.guess = el('span', {class: 'place'});
+    this.paintRow = el('div', {class: 'row from'}, this.paint, iconButton('remove', 'remove all paint', () => tools.change('clear_paint', this.id)));
+    this.guessRow = el('div', {class: 'row from'}, this.guess, iconButton('remove', 'remove the guess', () => tools.change('remove_guess', this.id)));
     this.warnings = el('ul', {class: 'warnings'});
     this.bar = el('div', {class: 'progress', role: 'progressbar', 'aria-label': 'surface', 'aria-valuemin': 0, 'aria-valuemax': 100}, el('i', {}));
     this.actions = el('div', {class: 'actions'}, iconButton('rename', 'rename (F2)', () => this.rename()),
       iconButton('duplicate', 'duplicate', () => tools.change('duplicate', this.id)), iconButton('remove', 'remove this structure', () => tools.change('remove', this.id)));
     this.element = el('li', {class: 'structure', 'data-structure': String(id)},
-      el('div', {class: 'row'}, this.swatch, this.name, this.count, this.lock, this.eye, this.digit), this.figures, this.message, this.warnings, this.actions, this.bar);
+      el('div', {class: 'row'}, this.swatch, this.name, this.count, this.lock, this.eye, this.digit), this.figures, this.guessRow, this.paintRow, this.message, this.warnings, this.actions, this.bar);
     this.element.addEventListener('click', (event) => { if (!event.target.closest('button, input')) state.set({active: this.id}); });
   }
 
@@ -59,8 +65,16 @@ class Card {
     if (hasSurface) {
       put(this.volume, `${number(result.volume)}${unit}`);
       this.updateDice(result.expected);
+      const isKnown = typeof result.mean === 'number';
+      this.mean.hidden = this.meanLabel.hidden = !isKnown;
+      if (isKnown) put(this.mean, `${number(result.mean)} \u00b1 ${number(result.sd, 3)}`);
     }
-    this.updateText(result, marks + outlines, isActive);
+    const strokes = structure.strokes?.length ?? 0;
+    this.paintRow.hidden = strokes === 0 || !isActive;
+    put(this.paint, `painted: ${strokes} stroke${strokes === 1 ? '' : 's'}`);
+    this.guessRow.hidden = !structure.guess || !isActive;
+    if (structure.guess) put(this.guess, `corrects ${structure.guess.name}${structure.guess.label ? `, label ${structure.guess.label}` : ''}`);
+    this.updateText(result, marks + outlines + strokes + (structure.guess ? 1 : 0), isActive);
     const isWorking = result?.stage === 'working', share = Math.round(100 * (result?.progress ?? 0));
     this.bar.hidden = !isWorking;
     this.bar.firstChild.style.width = `${Math.max(6, share)}%`;

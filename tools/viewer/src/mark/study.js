@@ -2,7 +2,7 @@
 import {fold, madeBy} from './fold.js';
 import {referenceOf} from './queue.js';
 
-const OF_A_SURFACE = ['triangles', 'volume', 'area', 'extent', 'mean', 'expected', 'warnings'];
+const OF_A_SURFACE = ['triangles', 'volume', 'area', 'extent', 'mean', 'sd', 'expected', 'warnings'];
 
 /** While a surface is worked on, and where that failed, the figures of the one that is there stay. */
 function merged(before, result) {
@@ -12,7 +12,7 @@ function merged(before, result) {
 
 export class Study {
   constructor(queue) {
-    Object.assign(this, {queue, name: null, seq: -1, canUndo: false, canRedo: false, confirmed: [], structures: [], resultsSeen: 0, lastAction: 0});
+    Object.assign(this, {queue, name: null, seq: -1, canUndo: false, canRedo: false, options: {}, confirmed: [], structures: [], resultsSeen: 0, lastAction: 0});
     this.ids = new Map();
     this.guesses = new Map();
     this.listeners = {change: [], result: [], failed: [], suggestions: [], action: [], gap: [], state: []};
@@ -48,7 +48,7 @@ export class Study {
   }
 
   takeState(state) {
-    Object.assign(this, {name: state.study, seq: state.seq, canUndo: state.can_undo, canRedo: state.can_redo});
+    Object.assign(this, {name: state.study, seq: state.seq, canUndo: state.can_undo, canRedo: state.can_redo, options: state.options ?? {}});
     const before = new Map(this.confirmed.map((s) => [s.id, s.result]));
     this.confirmed = state.structures.map((s) => ({...s, result: merged(before.get(s.id), s.result)}));
     this.emit('state', state);
@@ -60,7 +60,7 @@ export class Study {
   takePatch(patch) {
     if (patch.seq <= this.seq) return;
     if (patch.seq !== this.seq + 1) return this.emit('gap');  // one was lost: only a whole state helps
-    Object.assign(this, {seq: patch.seq, canUndo: patch.can_undo, canRedo: patch.can_redo});
+    Object.assign(this, {seq: patch.seq, canUndo: patch.can_undo, canRedo: patch.can_redo, options: patch.options ?? this.options});
     const known = new Map(this.confirmed.map((s) => [s.id, s]));
     for (const s of patch.structures) known.set(s.id, {...s, result: merged(known.get(s.id)?.result, s.result)});
     for (const id of patch.removed ?? []) known.delete(id);

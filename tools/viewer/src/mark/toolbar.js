@@ -2,7 +2,7 @@
 import {barButton, historyButtons, suggestButtons, toolChoice, windowMenu} from '../bar.js';
 import {dot, el} from '../dom.js';
 import {icon} from '../icons.js';
-import {menu} from '../menu.js';
+import {menu, menuItem} from '../menu.js';
 import {TOOLS} from './tools.js';
 
 function canUndo(study) {
@@ -12,6 +12,12 @@ function canUndo(study) {
 
 const FILES_OF_ALL = [['mask.nii.gz', 'labels, NIfTI'], ['mask.nrrd', 'labels, NRRD'], ['mask.tif', 'labels, TIFF'], ['table.csv', 'table']];
 const FILES_OF_ONE = [['mask.nii.gz', 'NIfTI'], ['mask.nrrd', 'NRRD'], ['mask.tif', 'TIFF'], ['mesh.ply', 'PLY'], ['mesh.stl', 'STL'], ['surface.vdb', 'VDB']];
+
+function importMenu({files}) {
+  const item = (as, text, close) => menuItem(text, () => { close(); files.choose(as); }, {'data-import': as});
+  return menu('add files', [icon('import'), el('span', {class: 'caret'})], (close) => [item('points', 'Marks for the active structure\u2026', close), item('guess', 'A guess to correct\u2026', close), item('labels', 'Labels as structures\u2026', close),
+    el('p', {class: 'hint'}, 'Or drop a file on the page: marks of napari, Fiji, 3D Slicer; a mask, a mesh or a level set of another tool.')]);
+}
 
 function exportMenu({study}) {
   const link = (id, format, text) => el('a', {role: 'menuitem', tabindex: -1, href: `/export?structure=${id}&format=${format}`, download: '', title: format}, text);
@@ -29,12 +35,12 @@ function exportMenu({study}) {
   });
 }
 
-export function toolbar(app, {theme, help, suggestions}) {
+export function toolbar(app, {theme, help, suggestions, table, options}) {
   const {state, image} = app;
   state.on(['link'], () => { if (state.get('link') !== 'open') state.set({isAsking: false}); });
   theme.className = 'tool';
   return el('header', {class: 'bar'},
     el('div', {class: 'title'}, el('span', {class: 'brand'}, 'covol'), el('h1', {title: image.name}, image.name)),
     toolChoice(state, TOOLS), historyButtons(app, () => canUndo(app.study)), el('div', {class: 'tools'}, windowMenu(app), suggestButtons(state, suggestions)),
-    el('div', {class: 'tools end'}, exportMenu(app), theme, barButton('help', 'keys (?)', () => help.showModal())));
+    el('div', {class: 'tools end'}, barButton('table', 'table of results', () => table.open()), barButton('options', 'options of the study', () => options.open()), importMenu(app), exportMenu(app), theme, barButton('help', 'keys (?)', () => help.showModal())));
 }

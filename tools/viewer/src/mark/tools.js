@@ -2,7 +2,10 @@
 import {MARK_TOOLS, MarkTools} from '../mark_tools.js';
 
 const OUTLINE = ['outline', 'outline', 'c', 'Click: corner, drag: freehand \u00b7 Enter closes, Shift+Enter leaves it open, Escape cancels'];
-export const TOOLS = [...MARK_TOOLS.slice(0, 3), OUTLINE, ...MARK_TOOLS.slice(3)];
+const BRUSH_KEYS = ', and . change the size \u00b7 d: disc or ball';
+const BRUSHES = [['brush', 'brush', 'b', `Drag paints what is inside \u00b7 Shift rubs out \u00b7 ${BRUSH_KEYS}`], ['rubber', 'rub out paint', 'g', `Drag rubs paint out \u00b7 ${BRUSH_KEYS}`]];
+export const isBrush = (tool) => ['brush', 'rubber'].includes(tool);
+export const TOOLS = [...MARK_TOOLS.slice(0, 3), OUTLINE, ...BRUSHES, ...MARK_TOOLS.slice(3)];
 const COLORS = [[68, 119, 170], [238, 102, 119], [34, 136, 51], [204, 187, 68], [102, 204, 238], [170, 51, 119], [238, 119, 51],
   [0, 153, 136], [136, 34, 85], [153, 153, 51], [51, 34, 136], [187, 187, 187]];
 
@@ -34,6 +37,32 @@ export class Tools extends MarkTools {
     const reference = this.study.act({do: 'add_structure', name: `structure ${n}`, color});
     this.state.set({active: reference, selected: null});
     return reference;
+  }
+
+  /** The stroke that is being painted goes on; false where nothing may be painted. */
+  stroke(panel, places, erases) {
+    const {axis, shownAt: at} = panel, {radius, isBall} = this.state.get('brush'), old = this.state.get('stroke');
+    if (!old && (!this.isReady() || !this.open())) return false;
+    const world = places.map((index) => this.space.toWorld(index));
+    this.state.set({stroke: old ? {...old, world: [...old.world, ...world]} : {erases, radius, ...(isBall ? {} : {axis, at}), world}});
+    return true;
+  }
+
+  endStroke() {
+    const stroke = this.state.get('stroke'), own = stroke && this.open();
+    if (own && !(stroke.erases && (own.strokes ?? []).length === 0)) this.study.act({do: 'add_stroke', structure: own.id, ...stroke});
+    this.state.set({stroke: null});
+  }
+
+  resizeBrush(factor) {
+    const {radius, isBall} = this.state.get('brush'), least = 0.5 * Math.min(...this.space.spacing), most = Math.max(...this.space.size.map((n, a) => n * this.space.spacing[a])) / 4;
+    this.state.set({brush: {radius: Math.min(most, Math.max(least, radius * factor)), isBall}});
+  }
+
+  toggleBall() {
+    const {radius, isBall} = this.state.get('brush');
+    this.state.set({brush: {radius, isBall: !isBall}});
+    this.toast(isBall ? 'The brush paints on one slice.' : 'The brush is a ball: it paints on the slices beside it as well.');
   }
 
   /** The outline that is being drawn gets a corner; `places` are voxels in the plane. */
@@ -83,6 +112,8 @@ export class Tools extends MarkTools {
     const changes = {
       rename: () => value && value !== own.name && act({do: 'rename', name: value}),
       recolor: () => act({do: 'recolor', color: value}),
+      clear_paint: () => act({do: 'clear_paint'}),
+      remove_guess: () => act({do: 'remove_guess'}),
       duplicate: () => act({do: 'duplicate'}),
       give: () => act({do: 'give_mark', mark: value.mark, to: value.to}),
       remove: () => {

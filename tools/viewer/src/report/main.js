@@ -39,7 +39,7 @@ const middleOf = ({mesh: {min, max}}) => min.map((x, a) => (x + max[a]) / 2);
 function firstState(image, space, data, kept) {
   const view = viewState(image, space, kept, {slices: space.voxelAt(space.toIndex(middleOf(data.structures[0]))), marks: !data.structures.some((s) => s.markCount > MOST_MARKS), cuts: data.image ? [0, 1, 2, OBLIQUE] : [0, 1, 2]});
   const isPlace = (place) => Array.isArray(place) && place.length === 3 && place.every(Number.isFinite);
-  return new State({...view, grey: greyTable(image, view.window), tool: MARK_TOOLS.some(([name]) => name === kept.tool) ? kept.tool : 'crosshair',
+  return new State({...view, grey: greyTable(image, view.window, view.colors), tool: MARK_TOOLS.some(([name]) => name === kept.tool) ? kept.tool : 'crosshair',
     active: data.structures[kept.active - 1] ? kept.active : 1, coloring: colorings(data.structures).some(([name]) => name === kept.coloring) ? kept.coloring : 'structure',
     oblique: isPlace(kept.oblique?.normal) && isPlace(kept.oblique?.center) ? kept.oblique : null, opacity: typeof kept.opacity === 'number' && kept.opacity >= 0 && kept.opacity <= 1 ? kept.opacity : 1, selected: null, hover: null, drag: null, ring: null, suggested: 0, isAsking: false, ruler: null,
     keyPanel: 2, study: 0, meshes: 0, loaded: 0, theme: 'light'});
@@ -73,7 +73,7 @@ function appOf(data, digest) {
   };
   const places = suggestedPlaces(data);
   app.suggestions = new Suggestions({...app, connection: {ask: (_, id) => setTimeout(() => study.emit('suggestions', {structure: id, places: places.filter((place) => place.id === id)}))}});
-  state.on(['window'], () => state.set({grey: greyTable(image, state.get('window'))}));
+  state.on(['window', 'colors'], () => state.set({grey: greyTable(image, state.get('window'), state.get('colors'))}));
   follow(state, study);
   return app;
 }

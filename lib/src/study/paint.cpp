@@ -1,0 +1,159 @@
+#include "study/paint.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "study/refuse.h"
+
+namespace covol {
+namespace {
+
+using detail::refuse;
+
+constexpr double kMostVoxels = double(1 << 28);  // of the box around a structure's paint
+constexpr double kMostVisits = double(1 << 30);  // of voxels by a stroke: some seconds
+constexpr int kMargin = 10;  // voxels around the paint: outlines are smoothed over 8, and there it has not ended
+
+/// A piece of a stroke's line.
+struct Piece {
+    Vec3 from, to;  // world
+};
+
+double distance(const Vec3& a, const Vec3& b) { return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }
+
+/// The voxels that a piece may reach, in the image; empty where max < min.
+VoxelBox box_around(const Piece& piece, const StudyStroke& stroke, const ImageGeometry& image) {
+    VoxelBox box;
+    const Vec3 a = image.world_to_index(piece.from), b = image.world_to_index(piece.to);
+    for (std::size_t n = 0; n < 3; ++n) {
+        const double reach = stroke.radius / image.spacing[n], last = image.size[n] - 1;
+        box.min[n] = int(std::clamp(std::ceil(std::min(a[n], b[n]) - reach), 0.0, last + 1));
+        box.max[n] = int(std::clamp(std::floor(std::max(a[n], b[n]) + reach), -1.0, last));
+        if (stroke.axis && std::size_t(*stroke.axis) == n) box.min[n] = box.max[n] = stroke.at;
+    }
+    return box;
+}
+
+double voxels_in(const VoxelBox& box) {
+    double count = 1;
+    for (const int side : box.size()) count *= std::max(0, side);
+    return count;
+}
+
+void grow(VoxelBox& all, const VoxelBox& box) {
+    for (std::size_t n = 0; n < 3; ++n) {
+        all.min[n] = std::min(all.min[n], box.min[n]);
+        all.max[n] = std::max(all.max[n], box.max[n]);
+    }
+}
+
+VoxelBox nowhere() {
+    constexpr int kFar = std::numeric_limits<int>::max() / 2;
+    return {{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}};
+}
+
+/// Pieces of at most twice the radius: the box around a long one is mostly empty.
+template <typename Take>
+void each_piece(const StudyStroke& stroke, const Take& take) {
+    if (stroke.world.size() == 1) take(Piece{stroke.world[0], stroke.world[0]});
+    for (std::size_t n = 1; n < stroke.world.size(); ++n) {
+        const Vec3 &a = stroke.world[n - 1], &b = stroke.world[n];
+        const double parts = std::max(1.0, std::ceil(distance(a, b) / (2 * stroke.radius)));
+        const auto at = [&](double part) {
+            Vec3 place{};
+            for (std::size_t c = 0; c < 3; ++c) place[c] = a[c] + part / parts * (b[c] - a[c]);
+            return place;
+        };
+        for (double part = 0; part < parts; ++part) take(Piece{at(part), at(part + 1)});
+    }
+}
+
+VoxelBox box_around(const StudyStructure& structure, const ImageGeometry& image) {
+    VoxelBox all = nowhere();
+    for (const StudyStroke& stroke : structure.strokes)
+        if (!stroke.erases)
+            each_piece(stroke, [&](const Piece& piece) {
+                const VoxelBox box = box_around(piece, stroke, image);
+                if (voxels_in(box) > 0) grow(all, box);
+            });
+    return all;
+}
+
+/// One that stays on a slice is measured along that slice.
+void draw(const StudyStroke& stroke, const ImageGeometry& image, const VoxelBox& box, std::vector<std::uint8_t>& out) {
+    const Index3 size = box.size();
+    each_piece(stroke, [&](const Piece& piece) {
+        VoxelBox reached = box_around(piece, stroke, image);
+        for (std::size_t n = 0; n < 3; ++n) {
+            reached.min[n] = std::max(reached.min[n], box.min[n]);
+            reached.max[n] = std::min(reached.max[n], box.max[n]);
+        }
+        // In lengths along the image's axes, which are perpendicular.
+        Vec3 a = image.world_to_index(piece.from), b = image.world_to_index(piece.to), along{};
+        for (std::size_t n = 0; n < 3; ++n) {
+            if (stroke.axis && std::size_t(*stroke.axis) == n) a[n] = b[n] = stroke.at;
+            a[n] *= image.spacing[n];
+            along[n] = b[n] * image.spacing[n] - a[n];
+        }
+        const double length2 = along[0] * along[0] + along[1] * along[1] + along[2] * along[2];
+        const double radius2 = stroke.radius * stroke.radius * (1 + 1e-9);
+        for (int k = reached.min[2]; k <= reached.max[2]; ++k)
+            for (int j = reached.min[1]; j <= reached.max[1]; ++j)
+                for (int i = reached.min[0]; i <= reached.max[0]; ++i) {
+                    const Vec3 d{i * image.spacing[0] - a[0], j * image.spacing[1] - a[1], k * image.spacing[2] - a[2]};
+                    const double dot = d[0] * along[0] + d[1] * along[1] + d[2] * along[2];
+                    const double part = length2 > 0 ? std::clamp(dot / length2, 0.0, 1.0) : 0;
+                    double away2 = 0;
+                    for (std::size_t n = 0; n < 3; ++n) {
+                        const double off = d[n] - part * along[n];
+                        away2 += off * off;
+                    }
+                    if (away2 > radius2) continue;
+                    const std::size_t row =
+                        std::size_t(k - box.min[2]) * std::size_t(size[1]) + std::size_t(j - box.min[1]);
+                    out[row * std::size_t(size[0]) + std::size_t(i - box.min[0])] = stroke.erases ? 0 : 1;
+                }
+    });
+}
+
+}  // namespace
+
+namespace detail {
+
+void require_paintable(const StudyStructure& structure, const ImageGeometry& image) {
+    const StudyStroke& stroke = structure.strokes.back();
+    if (!(stroke.radius > 0) || !std::isfinite(stroke.radius)) refuse("a brush needs a radius > 0");
+    if (stroke.axis &&
+        (*stroke.axis < 0 || *stroke.axis > 2 || stroke.at < 0 || stroke.at >= image.size[std::size_t(*stroke.axis)]))
+        refuse("a stroke lies on no slice of the image");
+    double length = 0;
+    for (std::size_t n = 1; n < stroke.world.size(); ++n) length += distance(stroke.world[n - 1], stroke.world[n]);
+    double visits = 0;
+    // Before its pieces are made: of a very thin brush there would be very many.
+    if (length / stroke.radius > kMostVisits / 16) refuse("a stroke is too long for so thin a brush");
+    each_piece(stroke, [&](const Piece& piece) { visits += 1 + voxels_in(box_around(piece, stroke, image)); });
+    if (visits > kMostVisits) refuse("a stroke covers too many voxels: take a smaller brush, or a shorter stroke");
+    if (const VoxelBox box = box_around(structure, image); box.max[0] >= box.min[0] && voxels_in(box) > kMostVoxels)
+        refuse("the paint of '" + structure.name +
+               "' would span more than 268 million voxels: paint what lies far apart as two structures");
+}
+
+}  // namespace detail
+
+std::optional<Image> paint_of(const StudyStructure& structure, const ImageGeometry& image) {
+    VoxelBox box = box_around(structure, image);
+    if (box.max[0] < box.min[0]) return {};
+    for (std::size_t n = 0; n < 3; ++n) {
+        box.min[n] = std::max(0, box.min[n] - kMargin);
+        box.max[n] = std::min(image.size[n] - 1, box.max[n] + kMargin);
+    }
+    std::vector<std::uint8_t> values(std::size_t(voxels_in(box)));
+    for (const StudyStroke& stroke : structure.strokes) draw(stroke, image, box, values);
+    if (std::find(values.begin(), values.end(), 1) == values.end()) return {};
+    return Image::from_values(cropped(image, box), values.data());
+}
+
+}  // namespace covol

@@ -1,0 +1,202 @@
+"""covol.mark(): the page of `covol mark` in a notebook, and what is marked on it as arrays."""
+import atexit
+import html
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import tempfile
+import weakref
+
+import numpy as np
+
+from . import _covol, _inputs
+from ._errors import Error
+
+_PATIENCE = 30  # seconds for the program to end
+_TYPES = {"uint8": "uint8", "int8": "int8", "uint16": "uint16", "int16": "int16", "uint32": "uint32", "int32": "int32",
+          "float32": "float", "float64": "double"}
+
+
+def _program(given):
+    found = given or os.environ.get("COVOL") or shutil.which("covol")
+    if not found:
+        raise Error("mark: the program covol was not found; install it, or name it with program=", "io", "program")
+    return os.path.abspath(os.fspath(found))
+
+
+def _write_nrrd(path, image):
+    """An image as a file that covol reads back to the same numbers."""
+    array = np.ascontiguousarray(image.array)
+    if array.dtype == bool:
+        array = array.astype(np.uint8)
+    if array.dtype.name not in _TYPES:
+        array = array.astype(np.float32)
+    axes = np.asarray(image.direction) * np.asarray(image.spacing)
+    vectors = " ".join("(" + ",".join(repr(float(x)) for x in axes[:, a]) + ")" for a in range(3))
+    head = ["NRRD0004", f"type: {_TYPES[array.dtype.name]}", "dimension: 3", "space dimension: 3",
+            "sizes: " + " ".join(map(str, array.shape[::-1])), f"space directions: {vectors}", "endian: little", "encoding: raw",
+            "space origin: (" + ",".join(repr(float(x)) for x in image.origin) + ")"]
+    if image.unit:
+        head.insert(4, "space units: " + " ".join([f'"{image.unit}"'] * 3))
+    with open(path, "wb") as file:
+        file.write(("\n".join(head) + "\n\n").encode())
+        file.write(array.astype(array.dtype.newbyteorder("<"), copy=False).tobytes())
+
+
+def _notebooks():
+    """Origins of the notebook servers of this user that run on this machine."""
+    try:
+        from jupyter_server.serverapp import list_running_servers
+        ports = {int(server["port"]) for server in list_running_servers()}
+    except Exception:  # noqa: BLE001 - another program's files, in whatever state
+        ports = set()
+    return [f"http://localhost:{port}" for port in sorted(ports or {8888})]
+
+
+def _end(process, folder):
+    if process.poll() is None:
+        process.send_signal(signal.SIGINT)
+        try:
+            process.wait(_PATIENCE)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+    process.stdout.close()
+    if folder is not None:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+class Study:
+    """A study that a person marks on a page, in a notebook's output or in a browser, and its state as it is now.
+
+    Attributes:
+        url: the page's address, with its secret: whoever has it may change the study, while this runs.
+        folder: of the study.
+        image: the Image.
+    """
+
+    def __init__(self, volume, marks, study, program, notebook, height, geometry):
+        self._own = tempfile.mkdtemp(prefix="covol-mark-")
+        try:
+            self.image = _inputs.image(volume, **geometry)
+            self.folder = os.path.abspath(os.fspath(study)) if study is not None else os.path.join(self._own, "study")
+            if _inputs.is_path(volume):
+                path = os.path.abspath(os.fspath(volume))
+            else:  # in the study, which can be opened again without the array
+                os.makedirs(self.folder, exist_ok=True)
+                path = os.path.join(self.folder, "volume.nrrd")
+                _write_nrrd(path, self.image)
+            self._height = int(height)
+            origins = [notebook] if isinstance(notebook, str) else _notebooks() if notebook is None else list(notebook)
+            command = [_program(program), "mark", path, self.folder, "--no-browser", "--quiet"]
+            for origin in origins:
+                command += ["--in-frame-of", origin.rstrip("/")]
+            if _inputs.is_path(volume) and geometry.get("spacing") is not None:
+                command += ["--spacing", ",".join(repr(float(x)) for x in np.broadcast_to(geometry["spacing"], 3))]
+            for name, places in _named(marks).items():
+                file = os.path.join(self._own, f"marks{len(command)}.csv")
+                np.savetxt(file, places, "%.17g", ",", header="x,y,z", comments="")
+                command += ["--points", f"{name}={file}"]
+            # A group of its own: Ctrl-C in a notebook stops the cell, not the page.
+            with open(os.path.join(self._own, "said.txt"), "w+") as said:
+                self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=said, text=True, start_new_session=True)
+                line = self._process.stdout.readline()
+                if not line.startswith("open "):
+                    _end(self._process, None)
+                    said.seek(0)
+                    raise Error(said.read().strip() or "mark: the program ended", "io")
+        except BaseException:
+            shutil.rmtree(self._own, ignore_errors=True)
+            raise
+        self.url = line.split()[1]
+        host = origins[0].split("://", 1)[-1].split(":")[0] if origins else "127.0.0.1"
+        self._framed = self.url.replace("127.0.0.1", "localhost", 1) if host == "localhost" else self.url
+        self._known = None
+        self._finalizer = weakref.finalize(self, _end, self._process, self._own)
+        atexit.register(self._finalizer)
+
+    @property
+    def is_open(self):
+        """Whether the page is served."""
+        return self._process.poll() is None
+
+    @property
+    def marks(self):
+        """The structures and their marks as they are now: read_study()."""
+        return _covol.read_study(self.folder)
+
+    @property
+    def options(self):
+        """The study's options as they are now: read_study_options()."""
+        return _covol.read_study_options(self.folder)
+
+    @property
+    def result(self):
+        """The surfaces of all structures that have marks, as they are now: Structures, with `mask`. Computed when the study has changed."""
+        journal = pathlib.Path(self.folder) / "journal.jsonl"
+        size = journal.stat().st_size  # it only grows
+        if self._known is None or self._known[0] != size:
+            from . import structures
+            self._known = size, structures(self.image, self.marks, **self.options)
+        return self._known[1]
+
+    def close(self):
+        """Ends the program. A study without a folder of the caller's is gone with it."""
+        self._finalizer()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    def __repr__(self):
+        return f"<covol.Study: {self.folder}, {'open' if self.is_open else 'closed'}>"
+
+    def _repr_html_(self):
+        if not self.is_open:
+            return "<p>This study is closed.</p>"
+        frame, page = html.escape(self._framed, quote=True), html.escape(self.url, quote=True)
+        return (f'<iframe src="{frame}" title="covol mark" style="width:100%;height:{self._height}px;border:0" '
+                f'allow="fullscreen"></iframe><p><a href="{page}" target="_blank" rel="noreferrer">in a window of its own</a></p>')
+
+
+def _named(marks):
+    """Points of each structure, (n, 3), by its name."""
+    if marks is None:
+        return {}
+    given = marks if isinstance(marks, dict) else {"structure 1": marks}
+    named = {}
+    for name, value in given.items():
+        value = value.get("points") if isinstance(value, dict) else value
+        places = np.asarray(value, float)
+        if places.ndim != 2 or places.shape[1] != 3:
+            raise Error(f"marks: expected shape (n, 3), got {places.shape}", "invalid_input", "marks")
+        named[str(name)] = places
+    return named
+
+
+def mark(volume, marks=None, *, study=None, spacing=None, origin=None, direction=None, affine=None, notebook=None, program=None,
+         height=760):
+    """Shows the page of `covol mark` in a notebook's output cell, and gives what is marked there as arrays.
+
+    Args:
+        volume: as the image of segment(); an array is written to a temporary file.
+        marks: points on the surface, shape (n, 3), world units; or a dict of these by the structures' names.
+        study: folder that the study is kept in; None: a temporary one, which close() removes.
+        spacing, origin, direction, affine: see segment().
+        notebook: origin of the notebook, "http://localhost:8888", or a list of such: pages of no other origin may show the page
+            in a frame. None: those of the notebook servers that run on this machine, else that one.
+        program: path of the program covol; None: the variable COVOL, else as the shell finds it.
+        height: of the output cell, pixels.
+
+    Returns:
+        Study, which a notebook shows. `study.marks` and `study.result.mask` are the state as it is then; `study.close()` ends it.
+
+    Raises:
+        Error: as read_image() and the program; "io" where there is no program.
+    """
+    return Study(volume, marks, study, program, notebook, height,
+                 {"spacing": spacing, "origin": origin, "direction": direction, "affine": affine})

@@ -1,0 +1,70 @@
+// Painted voxels on a slice: strokes as lib/src/study/paint.cpp draws them.
+
+const NOTHING = {};
+
+/** Pieces of at most twice the radius: the box around a long one is mostly empty. */
+function* pieces(corners, radius) {
+  if (corners.length === 1) yield [corners[0], corners[0]];
+  for (let n = 1; n < corners.length; ++n) {
+    const [a, b] = [corners[n - 1], corners[n]], parts = Math.max(1, Math.ceil(Math.hypot(...a.map((v, c) => b[c] - v)) / (2 * radius)));
+    const at = (part) => a.map((v, c) => v + part / parts * (b[c] - v));
+    for (let part = 0; part < parts; ++part) yield [at(part), at(part + 1)];
+  }
+}
+
+/** Draws a stroke into the values of a slice: `take` is called with columns and rows of it. Lengths are along the image's axes. */
+export function drawStroke(space, stroke, axis, at, take) {
+  const isDisc = stroke.axis !== undefined && stroke.axis !== null;
+  if (isDisc && stroke.axis === axis && stroke.at !== at) return;
+  const {size, spacing} = space, [right, down] = space.planeAxes(axis), {radius} = stroke, most = radius * radius * (1 + 1e-9);
+  const corners = stroke.world.map((world) => space.toIndex(world).map((v, c) => (isDisc && c === stroke.axis ? stroke.at : v) * spacing[c]));
+  for (const [a, b] of pieces(corners, radius)) {
+    const low = [0, 0, 0], high = [0, 0, 0];
+    for (let c = 0; c < 3; ++c) {
+      low[c] = Math.max(0, Math.ceil((Math.min(a[c], b[c]) - radius) / spacing[c]));
+      high[c] = Math.min(size[c] - 1, Math.floor((Math.max(a[c], b[c]) + radius) / spacing[c]));
+      if (isDisc && c === stroke.axis) low[c] = high[c] = stroke.at;
+    }
+    if (at < low[axis] || at > high[axis]) continue;
+    const along = a.map((v, c) => b[c] - v), length2 = along[0] ** 2 + along[1] ** 2 + along[2] ** 2, d = [0, 0, 0];
+    d[axis] = at * spacing[axis] - a[axis];
+    for (let y = low[down]; y <= high[down]; ++y) {
+      d[down] = y * spacing[down] - a[down];
+      for (let x = low[right]; x <= high[right]; ++x) {
+        d[right] = x * spacing[right] - a[right];
+        const part = length2 > 0 ? Math.min(1, Math.max(0, (d[0] * along[0] + d[1] * along[1] + d[2] * along[2]) / length2)) : 0;
+        if ((d[0] - part * along[0]) ** 2 + (d[1] - part * along[1]) ** 2 + (d[2] - part * along[2]) ** 2 <= most) take(x, y);
+      }
+    }
+  }
+}
+
+function pictureOf(space, strokes, axis, at, rgb) {
+  const [right, down] = space.planeAxes(axis), width = space.size[right], height = space.size[down], values = new Uint8Array(width * height);
+  for (const stroke of strokes) drawStroke(space, stroke, axis, at, (x, y) => { values[y * width + x] = stroke.erases ? 0 : 1; });
+  if (!values.includes(1)) return NOTHING;
+  const canvas = Object.assign(document.createElement('canvas'), {width, height}), context = canvas.getContext('2d'), data = context.createImageData(width, height);
+  const pixels = new Uint32Array(data.data.buffer), color = 0xff000000 | rgb[2] << 16 | rgb[1] << 8 | rgb[0];
+  for (let n = 0; n < values.length; ++n) if (values[n]) pixels[n] = color;
+  context.putImageData(data, 0, 0);
+  return {canvas};
+}
+
+/** Keeps the pictures of the slices that are seen; strokes never change, so that a list of them stands for its paint. */
+export class PaintPictures {
+  constructor(space) { Object.assign(this, {space, kept: new Map()}); }
+
+  /** A canvas with a pixel for each voxel of the slice; null where nothing is painted. */
+  get(structure, axis, at) {
+    const name = `${structure.id} ${axis}`, known = this.kept.get(name), {strokes = []} = structure, last = strokes.at(-1);
+    if (strokes.length === 0) return null;
+    const key = `${at} ${strokes.length} ${last.id} ${structure.color}`;
+    if (known?.key === key) return known.picture.canvas ?? null;
+    const picture = pictureOf(this.space, strokes, axis, at, structure.color);
+    this.kept.set(name, {key, picture});
+    return picture.canvas ?? null;
+  }
+
+  /** A stroke that is being drawn. */
+  draft(stroke, axis, at, rgb) { return pictureOf(this.space, [{...stroke, erases: false}], axis, at, rgb).canvas ?? null; }
+}
