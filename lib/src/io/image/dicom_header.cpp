@@ -1,9 +1,13 @@
 #include "io/image/dicom_header.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -16,6 +20,7 @@ namespace {
 constexpr std::uint32_t kUndefined = 0xFFFFFFFF;
 constexpr std::uint32_t kItem = 0xFFFEE000, kItemEnd = 0xFFFEE00D, kSequenceEnd = 0xFFFEE0DD;
 constexpr std::uint32_t kTransferSyntax = 0x00020010, kPixelData = 0x7FE00010;
+constexpr std::uint32_t kMostPixels = 65535;  // along a side
 constexpr int kDeepest = 16;
 
 constexpr std::string_view kShort[] = {"AE", "AS", "AT", "CS", "DA", "DS", "DT", "FD", "FL", "IS", "LO",
@@ -23,6 +28,16 @@ constexpr std::string_view kShort[] = {"AE", "AS", "AT", "CS", "DA", "DS", "DT",
 constexpr std::string_view kLong[] = {"OB", "OD", "OF", "OL", "OW", "SQ", "UC", "UN", "UR", "UT"};
 
 constexpr std::uint64_t kLongestValue = 1 << 12;
+constexpr std::uint64_t kPreamble = 128;
+
+constexpr std::uint32_t kSharedGroups = 0x52009229, kFrameGroups = 0x52009230;
+/// Sequences outside functional groups that say where frames lie: detectors (PS3.3 C.8.4.11), regions of ultrasound
+/// (C.8.5.5). The first item of each counts.
+constexpr std::uint32_t kPlacing[] = {0x00186011, 0x00540022};
+/// The functional groups that are used: echo, contents, position, orientation, those of volumes, time, pixel measures,
+/// rescaling.
+constexpr std::uint32_t kGroups[] = {0x00189114, 0x00209111, 0x00209113, 0x00209116, 0x0020930E,
+                                     0x0020930F, 0x00209310, 0x00289110, 0x00289145};
 
 /// What PS3.6 says of the elements of which an image is made. Debian's GDCM ends the program where a file says
 /// otherwise, in a sequence too.
@@ -68,8 +83,10 @@ public:
     [[nodiscard]] const DicomHeader& header() const { return header_; }
 
     bool is_sound() {
-        constexpr std::uint64_t kMeta = 132;
-        go_to(kMeta);
+        go_to(kPreamble);
+        char mark[4] = {};
+        const bool is_marked = size_ > kPreamble + 4 && file_.read(mark, 4) && std::memcmp(mark, "DICM", 4) == 0;
+        go_to(is_marked ? kPreamble + 4 : 0);
         std::string syntax;
         for (std::uint32_t last = 0; at_ < size_;) {
             const std::uint64_t begin = at_;
@@ -85,6 +102,7 @@ public:
             if (e.tag == kTransferSyntax) syntax = value.substr(0, value.find_last_not_of(std::string("\0 ", 2)) + 1);
             go_to(at_ + e.length);
         }
+        if (syntax.empty() && !is_marked) syntax = guessed_syntax();
         constexpr const char* kDeflated = "1.2.840.10008.1.2.1.99";
         if (syntax.rfind("1.2.840.10008.1.2", 0) != 0 || syntax == kDeflated) return false;
         explicit_ = syntax != "1.2.840.10008.1.2";
@@ -97,6 +115,18 @@ public:
     }
 
 private:
+    /// Without a meta group: the group's number tells the byte order, two letters behind the tag explicit VR.
+    std::string guessed_syntax() {
+        const std::uint64_t begin = at_;
+        char first[6] = {};
+        const bool is_read = bool(file_.read(first, sizeof first));
+        go_to(begin);
+        if (!is_read) return {};
+        if (first[0] == 0 && first[1] != 0) return "1.2.840.10008.1.2.2";
+        const bool is_explicit = std::isupper(static_cast<unsigned char>(first[4])) != 0 &&
+                                 std::isupper(static_cast<unsigned char>(first[5])) != 0;
+        return is_explicit ? "1.2.840.10008.1.2.1" : "1.2.840.10008.1.2";
+    }
     void go_to(std::uint64_t at) {
         at_ = at;
         file_.clear();
@@ -136,7 +166,7 @@ private:
         return (samples == 1 || samples == 3 || samples == 4) &&
                (allocated == 8 || allocated == 16 || allocated == 32) && stored > 0 && stored <= allocated &&
                number(kHighBit) + 1 == stored && number(kRepresentation) <= 1 && number(kRows) > 0 &&
-               number(kRows) < kUndefined && number(kColumns) > 0 && number(kColumns) < kUndefined;
+               number(kRows) <= kMostPixels && number(kColumns) > 0 && number(kColumns) <= kMostPixels;
     }
     /// The elements up to `end`, or up to an item's end.
     bool walk(std::uint64_t end, bool in_item, int depth) {
@@ -152,40 +182,57 @@ private:
         }
         return !in_item && at_ == end;
     }
+    /// Where the elements of an item of sequence `tag` go; nowhere: null.
+    DicomValues* values_of_item(std::uint32_t tag, int depth, std::size_t item) {
+        const bool outermost = depth == 1;
+        if (outermost && tag == kFrameGroups) {
+            if (header_.frames.size() <= item) header_.frames.emplace_back();
+            return &header_.frames[item];
+        }
+        if (item > 0) return nullptr;
+        if (outermost) return tag == kSharedGroups || is_one_of(tag, kPlacing) ? &header_.shared : nullptr;
+        return depth == 2 && is_one_of(tag, kGroups) ? into_ : nullptr;
+    }
     bool walk_value(const Element& e, std::uint64_t end, int depth) {
-        const bool sequence = e.vr == "SQ" || (e.length == kUndefined && e.tag != kPixelData);
+        // Without explicit VR only the tag tells a sequence of known length.
+        const bool is_known = !explicit_ && (e.tag == kSharedGroups || e.tag == kFrameGroups ||
+                                             is_one_of(e.tag, kPlacing) || is_one_of(e.tag, kGroups));
+        const bool sequence = e.vr == "SQ" || is_known || (e.length == kUndefined && e.tag != kPixelData);
         if (depth == 0 && e.tag == kPixelData && e.length == kUndefined) header_.encapsulated = true;
-        if (e.length == kUndefined) return walk_items(end, true, sequence, depth + 1);
+        if (e.length == kUndefined) return walk_items(e.tag, end, true, sequence, depth + 1);
         if (e.length > end - at_ || e.length % 2 != 0) return false;
         if (depth == 0 && e.tag == kPixelData) {
             header_.pixel_offset = at_;
             header_.pixel_bytes = e.length;
-        } else if (depth == 0 && e.length <= kLongestValue && !sequence) {
+        } else if (DicomValues* const values = depth == 0 ? &header_.values : into_;
+                   values != nullptr && e.length <= kLongestValue && !sequence) {
             const std::uint64_t begin = at_;
-            std::string& value = header_.values[e.tag];
+            std::string& value = (*values)[e.tag];
             value.resize(e.length);
             if (!file_.read(value.data(), e.length)) return false;
             go_to(begin);
         }
-        if (sequence) return walk_items(at_ + e.length, false, true, depth + 1);
+        if (sequence) return walk_items(e.tag, at_ + e.length, false, true, depth + 1);
         go_to(at_ + e.length);
         return true;
     }
-    bool walk_items(std::uint64_t end, bool delimited, bool of_elements, int depth) {
-        while (at_ < end) {
+    bool walk_items(std::uint32_t tag, std::uint64_t end, bool delimited, bool of_elements, int depth) {
+        for (std::size_t item = 0; at_ < end; ++item) {
             Element e;
             if (!read_element(e)) return false;
             if (e.tag == kSequenceEnd) return delimited && e.length == 0;
             if (e.tag != kItem) return false;
+            if (e.length != kUndefined && e.length > end - at_) return false;
+            DicomValues* const outer = into_;
+            into_ = of_elements ? values_of_item(tag, depth, item) : nullptr;
             if (e.length == kUndefined) {
                 if (!of_elements || !walk(end, true, depth)) return false;
-            } else {
-                if (e.length > end - at_) return false;
-                if (!of_elements)
-                    go_to(at_ + e.length);
-                else if (!walk(at_ + e.length, false, depth))
-                    return false;
+            } else if (!of_elements) {
+                go_to(at_ + e.length);
+            } else if (!walk(at_ + e.length, false, depth)) {
+                return false;
             }
+            into_ = outer;
         }
         return !delimited && at_ == end;
     }
@@ -194,21 +241,31 @@ private:
     std::uint64_t size_, at_ = 0;
     bool explicit_ = true, big_ = false;
     DicomHeader header_;
+    DicomValues* into_ = nullptr;  ///< where the elements of the item go that is walked
 };
 
 }  // namespace
 
-std::string DicomHeader::text(std::uint32_t tag) const {
+const std::string* DicomHeader::find(std::uint32_t tag, std::optional<std::size_t> frame) const {
+    if (frame && *frame < frames.size())
+        if (const auto found = frames[*frame].find(tag); found != frames[*frame].end()) return &found->second;
+    if (frame)
+        if (const auto found = shared.find(tag); found != shared.end()) return &found->second;
     const auto found = values.find(tag);
-    if (found == values.end()) return {};
-    const std::string padding(" \0", 2);
-    const std::size_t begin = found->second.find_first_not_of(padding), end = found->second.find_last_not_of(padding);
-    return begin == std::string::npos ? "" : found->second.substr(begin, end + 1 - begin);
+    return found == values.end() ? nullptr : &found->second;
 }
 
-std::vector<double> DicomHeader::numbers(std::uint32_t tag) const {
+std::string DicomHeader::text(std::uint32_t tag, std::optional<std::size_t> frame) const {
+    const std::string* const found = find(tag, frame);
+    if (found == nullptr) return {};
+    const std::string padding(" \0", 2);
+    const std::size_t begin = found->find_first_not_of(padding), end = found->find_last_not_of(padding);
+    return begin == std::string::npos ? "" : found->substr(begin, end + 1 - begin);
+}
+
+std::vector<double> DicomHeader::numbers(std::uint32_t tag, std::optional<std::size_t> frame) const {
     std::vector<double> list;
-    std::string rest = text(tag);
+    std::string rest = text(tag, frame);
     while (!rest.empty()) {
         const std::string one = rest.substr(0, rest.find('\\'));
         rest = one.size() == rest.size() ? "" : rest.substr(one.size() + 1);
@@ -222,18 +279,52 @@ std::vector<double> DicomHeader::numbers(std::uint32_t tag) const {
     return list;
 }
 
-std::optional<std::uint32_t> DicomHeader::integer(std::uint32_t tag) const {
-    const auto found = values.find(tag);
-    if (found == values.end() || found->second.size() != 2) return std::nullopt;
-    const auto first = static_cast<unsigned char>(found->second[0]),
-               second = static_cast<unsigned char>(found->second[1]);
-    return big_endian ? std::uint32_t(first) << 8 | second : std::uint32_t(second) << 8 | first;
+std::vector<double> DicomHeader::doubles(std::uint32_t tag, std::optional<std::size_t> frame) const {
+    const std::string* const found = find(tag, frame);
+    if (found == nullptr || found->size() % sizeof(double) != 0) return {};
+    std::vector<double> list;
+    for (std::size_t at = 0; at < found->size(); at += sizeof(double)) {
+        std::array<char, sizeof(double)> bytes{};
+        std::memcpy(bytes.data(), found->data() + at, bytes.size());
+        if (big_endian) std::reverse(bytes.begin(), bytes.end());
+        const auto value = std::bit_cast<double>(bytes);
+        if (!std::isfinite(value)) return {};
+        list.push_back(value);
+    }
+    return list;
+}
+
+std::optional<std::uint32_t> DicomHeader::integer(std::uint32_t tag, std::optional<std::size_t> frame) const {
+    const std::string* const found = find(tag, frame);
+    if (found == nullptr || (found->size() != 2 && found->size() != 4)) return std::nullopt;
+    std::uint32_t value = 0;
+    for (std::size_t n = 0; n < found->size(); ++n)
+        value = value << 8 | static_cast<unsigned char>((*found)[big_endian ? n : found->size() - 1 - n]);
+    return value;
 }
 
 std::optional<DicomHeader> read_dicom_header(const std::string& path) {
     Walker walker(path);
     if (!walker.is_sound()) return std::nullopt;
     return walker.header();
+}
+
+bool is_dicom(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    std::array<char, kPreamble + 4> begin{};
+    file.read(begin.data(), begin.size());
+    const auto bytes = static_cast<std::size_t>(file.gcount());
+    if (bytes == begin.size() && std::memcmp(begin.data() + kPreamble, "DICM", 4) == 0) return true;
+    if (bytes < 12) return false;
+    // Group 0002 or 0008 with an element that stands at its beginning, and a length or a representation that fits.
+    const auto byte = [&](std::size_t at) { return static_cast<unsigned char>(begin[at]); };
+    const bool big = byte(0) == 0;
+    const unsigned group = big ? byte(1) : byte(0), other = big ? byte(0) : byte(1);
+    const unsigned element = big ? byte(2) * 256U + byte(3) : byte(3) * 256U + byte(2);
+    if ((group != 2 && group != 8) || other != 0 || element > 0x60) return false;
+    const std::string_view vr(begin.data() + 4, 2);
+    if (is_one_of(vr, kShort) || is_one_of(vr, kLong)) return true;
+    return !big && byte(4) < 128 && byte(5) == 0 && byte(6) == 0 && byte(7) == 0;
 }
 
 }  // namespace covol::detail

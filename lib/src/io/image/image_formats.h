@@ -1,5 +1,6 @@
 #pragma once
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "io/hdf5/hdf5_image.h"
@@ -26,10 +27,8 @@ std::unique_ptr<ImageFile> open_npy(const std::string& path);
 
 /// The series in a folder, or the one that a file belongs to; its slices sorted by position.
 /// @throws Error Unsupported when a folder holds several series: lists them.
-std::unique_ptr<ImageFile> open_dicom(const std::string& path, const RunContext& run);
-
-/// Whether the file has DICOM's mark.
-bool is_dicom(const std::string& path);
+/// @param frame  the volume of those that a series has (times, echoes, stacks), whose geometry is told; the first
+std::unique_ptr<ImageFile> open_dicom(const std::string& path, std::optional<int> frame, const RunContext& run);
 
 /// A float grid as an image, on the box of its active voxels.
 /// @param name  the grid's, or empty for the file's first float grid

@@ -79,6 +79,10 @@ public:
         header_.components = io_->GetNumberOfComponents();
         header_.is_rgb = io_->GetPixelType() == itk::IOPixelEnum::RGB;
         header_.bytes = io_->GetImageSizeInBytes();
+        if constexpr (requires { io_->GetRescaleSlope(); }) {
+            header_.slope = io_->GetRescaleSlope();
+            header_.intercept = io_->GetRescaleIntercept();
+        }
         for (unsigned a = 0; a < io_->GetNumberOfDimensions(); ++a) {
             header_.size.push_back(io_->GetDimensions(a));
             header_.spacing.push_back(io_->GetSpacing(a));

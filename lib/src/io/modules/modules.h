@@ -20,6 +20,7 @@ struct ItkHeader {
     std::vector<double> spacing, origin;
     std::vector<std::vector<double>> axes;  ///< directions, one for each dimension
     std::int64_t bytes = 0;                 ///< of all pixels
+    double slope = 1, intercept = 0;        ///< by which a DICOM file's pixels are rescaled when they are read
 };
 
 /// An image file whose header ITK has read.

@@ -33,6 +33,8 @@ bool FlatHeader::take(const ItkHeader& header) {
     components_ = header.components;
     is_rgb_ = header.is_rgb ? 1 : 0;
     bytes_ = header.bytes;
+    slope_ = header.slope;
+    intercept_ = header.intercept;
     dimensions_ = static_cast<std::uint32_t>(header.size.size());
     std::copy(header.size.begin(), header.size.end(), size_);
     std::copy(header.spacing.begin(), header.spacing.end(), spacing_);
@@ -49,6 +51,8 @@ std::optional<ItkHeader> FlatHeader::header() const {
     header.components = components_;
     header.is_rgb = is_rgb_ != 0;
     header.bytes = bytes_;
+    header.slope = slope_;
+    header.intercept = intercept_;
     header.size.assign(size_, size_ + dimensions_);
     header.spacing.assign(spacing_, spacing_ + dimensions_);
     header.origin.assign(origin_, origin_ + dimensions_);

@@ -39,6 +39,7 @@ private:
     std::uint64_t size_[kMost] = {};
     double spacing_[kMost] = {}, origin_[kMost] = {}, axes_[kMost][kMost] = {};
     std::int64_t bytes_ = 0;
+    double slope_ = 1, intercept_ = 0;
 };
 
 /// What ITK or GDCM says of each file, or why it cannot read it. @throws Error Io, Cancelled; std::bad_alloc.

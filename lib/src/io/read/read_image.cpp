@@ -14,6 +14,7 @@
 #include "image/geometry_check.h"
 #include "io/chunked/zarr.h"
 #include "io/hdf5/hdf5_image.h"
+#include "io/image/dicom_header.h"
 #include "io/image/image_formats.h"
 #include "io/image/tiff.h"
 #include "io/modules/reader.h"
@@ -51,19 +52,21 @@ std::unique_ptr<ImageFile> open_image(const std::string& given, const ReadImageO
     if (!fs::exists(path, status)) throw read_error(Errc::Io, path, "no such file");
     if (fs::is_directory(path, status) && detail::is_zarr(path))
         return detail::open_zarr(path, options.correct_level_shift, run);
-    if (fs::is_directory(path, status)) return detail::open_dicom(path, run);
+    if (fs::is_directory(path, status)) return detail::open_dicom(path, options.frame, run);
     if (!fs::is_regular_file(path, status) || !std::ifstream(path).good())
         throw read_error(Errc::Io, path, "cannot be opened");
     const std::string end = detail::extension(path);
-    const bool marked = is_one_of(end, {".dcm", ".ima", ".dicom", ""}) && detail::is_dicom(path);
     const bool itk = is_one_of(end, {".nrrd", ".nhdr", ".nii", ".nii.gz", ".mha", ".mhd"});
     const bool mrc = is_one_of(end, {".mrc", ".map", ".rec", ".st", ".ccp4", ".ali"});
     const bool tiff = is_one_of(end, {".tif", ".tiff", ".btf", ".tf8"});
-    if (!marked && !itk && !mrc && !tiff && !hdf5 && end != ".npy" && end != ".vdb")
+    const bool known = itk || mrc || tiff || hdf5 || end == ".npy" || end == ".vdb";
+    // Names of slices often end in numbers.
+    const bool marked = !known && (is_one_of(end, {".dcm", ".ima", ".dicom"}) || detail::is_dicom(path));
+    if (!marked && !known)
         throw read_error(Errc::Unsupported, path,
                          std::string("expected a name ending in ") + kReadable + ", got '" + end + "'");
     if (fs::file_size(path) == 0) throw read_error(Errc::InvalidInput, path, "the file is empty");
-    if (marked) return detail::open_dicom(path, run);
+    if (marked) return detail::open_dicom(path, options.frame, run);
     if (hdf5) return open_tried_hdf5(*hdf5);
     if (itk) return detail::open_itk(path);
     if (mrc) return detail::open_mrc(path);

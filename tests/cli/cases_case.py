@@ -1,0 +1,62 @@
+"""What the tests of odd inputs share: the real binary, and a body that each small input holds."""
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+COVOL = os.environ.get("COVOL", "build/bin/covol")
+
+try:
+    import numpy as np
+    import pyopenvdb
+    MISSING = ""
+except ImportError as error:
+    MISSING = f"SKIPPED: {error}; see tests/install_packages.sh"
+
+SIZE = (14, 12, 10)  # voxels along x, y, z
+
+
+def body(size=SIZE, spacing=(1, 1, 1)):
+    """[z, y, x] of bytes: a bright ellipsoid off the middle, and a ramp that tells every voxel from its neighbours."""
+    z, y, x = np.meshgrid(*(np.arange(n) * s for n, s in zip(size[::-1], spacing[::-1])), indexing="ij")
+    inside = ((x - 6) / 4.2) ** 2 + ((y - 5.5) / 3.4) ** 2 + ((z - 4) / 3.1) ** 2 < 1
+    return (np.where(inside, 180, 20) + x + 2 * y + 3 * z).astype(np.uint8)
+
+
+@unittest.skipIf(MISSING, MISSING)
+class Case(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="covol-cases-"))
+        self.addCleanup(shutil.rmtree, self.folder)
+
+    def run_covol(self, *args, code=0):
+        done = subprocess.run([COVOL, *map(str, args)], capture_output=True, text=True, cwd=self.folder, timeout=300)
+        self.assertEqual(done.returncode, code, f"covol {' '.join(map(str, args))}\n{done.stdout}\n{done.stderr}")
+        return done
+
+    def report(self, *args):
+        path = self.folder / "report.json"
+        path.unlink(missing_ok=True)
+        self.run_covol(*args, "--quiet", "--json", path)
+        return json.loads(path.read_text())
+
+    def info(self, *args):
+        return self.report("info", *args)["image"]
+
+    def refused(self, *args):
+        """The message of what must not be read."""
+        done = subprocess.run([COVOL, *map(str, args)], capture_output=True, text=True, cwd=self.folder, timeout=300)
+        self.assertIn(done.returncode, (2, 3), done.stderr)
+        return done.stderr
+
+    def voxels(self, *args):
+        """[z, y, x] of an image whose voxels are cubes along the world's axes."""
+        self.run_covol("convert", args[0], "voxels.vdb", *args[1:], "--quiet")
+        grid = pyopenvdb.readAll(str(self.folder / "voxels.vdb"))[0][0]
+        low, high = grid.evalActiveVoxelBoundingBox()
+        values = np.zeros([h - l + 1 for l, h in zip(low, high)], np.float32)
+        grid.copyToArray(values, ijk=low)
+        return values.transpose(2, 1, 0)
