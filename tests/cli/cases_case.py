@@ -26,6 +26,14 @@ def body(size=SIZE, spacing=(1, 1, 1)):
     return (np.where(inside, 180, 20) + x + 2 * y + 3 * z).astype(np.uint8)
 
 
+def on_body(count=150):
+    """Points on its surface, in voxels (x, y, z)."""
+    n = np.arange(count) + 0.5
+    z, turn = 1 - 2 * n / count, np.pi * (3 - np.sqrt(5)) * n
+    r = np.sqrt(1 - z * z)
+    return np.stack([r * np.cos(turn), r * np.sin(turn), z], 1) * (4.2, 3.4, 3.1) + (6, 5.5, 4)
+
+
 @unittest.skipIf(MISSING, MISSING)
 class Case(unittest.TestCase):
     def setUp(self):

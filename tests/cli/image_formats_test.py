@@ -463,7 +463,7 @@ class Options(Case):
             slice_.save_as(path)
         self.run_covol("info", series)
         (self.folder / "any.h5").write_bytes(b"\x89HDF\r\n\x1a\n")
-        images = ((self.write_nrrd(), "itk.so", "NRRD, NIfTI and MetaImage"), (self.folder / "any.h5", "hdf5.so", "HDF5"),
+        images = ((self.write_nrrd(), "itk.so", "NRRD and MetaImage"), (self.folder / "any.h5", "hdf5.so", "HDF5"),
                   (series, "gdcm.so", "compressed DICOM"))
 
         def expect(message):

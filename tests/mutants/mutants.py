@@ -43,7 +43,7 @@ READERS = {
     "io/image/npy.cpp": ["image_test", "image_formats_test", "image_python_test", "cli/image_formats_test", "cli/interchange_test"],
     "io/image/tiff_pages.cpp": ["image_test", "image_chunks_test", "cli/image_formats_test", "cli/alignment_test"],
     "io/image/tiff_stack.cpp": ["image_test", "image_chunks_test", "image_python_test", "cli/image_formats_test", "cli/alignment_test"],
-    "io/image/dicom_header.cpp": ["image_test", "image_formats_test", "cli/image_formats_test", "cli/interchange_test"],
+    "io/dicom/dicom_header.cpp": ["image_test", "image_formats_test", "cli/image_formats_test", "cli/interchange_test"],
     "io/chunked/zarr_array.cpp": ["zarr_test", "chunked_voxels_test", "cli/zarr_test"],
     "io/chunked/zarr_chunks.cpp": ["zarr_test", "chunked_voxels_test", "cli/zarr_test"],
     "io/chunked/array_chunks.cpp": ["zarr_test", "chunked_voxels_test", "cli/hdf5_test"],

@@ -9,11 +9,13 @@
 #include <limits>
 #include <numeric>
 
+#include "base/matrix.h"
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "covol/surface.h"
 #include "mesh/triangle.h"
 #include "meshing/mesh_distance.h"
+#include "meshing/mesh_rows.h"
 
 namespace covol {
 namespace {
@@ -23,7 +25,9 @@ constexpr std::int64_t kSlabVoxels = 1 << 26;  // voxels held at a time
 constexpr double kMaxLatticeVoxels = 1e12;
 constexpr double kMaxSamples = 4e6;  // on a surface
 
-double voxel_volume(const ImageGeometry& g) { return g.spacing[0] * g.spacing[1] * g.spacing[2]; }
+double voxel_volume(const ImageGeometry& g) {
+    return g.spacing[0] * g.spacing[1] * g.spacing[2] * std::abs(detail::determinant(g.direction));
+}
 
 bool is_label(double value, int label) { return label == 0 ? value != 0 : value == label; }
 
@@ -43,7 +47,7 @@ public:
         for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
             mesh.vertices[v] = meshing::to_position(minus(geometry.index_to_world(mesh.place(v)), origin));
         mesh.origin = origin;
-        if (determinant(geometry.direction) < 0)
+        if (detail::determinant(geometry.direction) < 0)
             for (auto& t : mesh.triangles) std::swap(t[0], t[1]);
         return mesh;
     }
@@ -86,11 +90,6 @@ private:
     [[nodiscard]] bool is_inside(const openvdb::Coord& c) const {
         return c.x() < size_[0] && c.y() < size_[1] && c.z() < size_[2] &&
                is_label(mask_.at(c.x(), c.y(), c.z()), label_);
-    }
-
-    static double determinant(const Matrix3& m) {
-        return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
-               m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
     }
 
     const Image& mask_;
@@ -293,7 +292,8 @@ public:
         if (solid_.mask)
             fill_from_mask(*solid_.mask, solid_.label, slab.geometry, out);
         else if (solid_.mesh)
-            rows_->fill(slab, out);
+            rows_->fill(slab.first, slab.geometry.size, out,
+                        "compare: a mesh is not closed, so it has no inside; repair it first");
         else
             out = rasterize(*solid_.level_set, slab.geometry, 1, run);
     }
@@ -302,7 +302,7 @@ private:
     const Solid& solid_;
     TriangleMesh own_surface_;
     std::optional<ImageGeometry> lattice_;
-    std::optional<MeshRows> rows_;
+    std::optional<meshing::MeshRows> rows_;
 };
 
 WorldBox box_of(const TriangleMesh& mesh, const std::function<Vec3(const Vec3&)>& map) {

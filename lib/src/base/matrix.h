@@ -3,6 +3,11 @@
 
 namespace covol::detail {
 
+inline double determinant(const Matrix3& m) {
+    return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+           m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+}
+
 /// The inverse of `direction`, by cofactors: a file's cosines are orthonormal only up to its digits.
 inline Matrix3 inverse(const Matrix3& m) {
     Matrix3 cofactors{};

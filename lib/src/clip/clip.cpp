@@ -2,7 +2,10 @@
 
 #include <openvdb/openvdb.h>
 
+#include <cmath>
 #include <string>
+
+#include "base/matrix.h"
 
 namespace covol {
 namespace {
@@ -25,19 +28,23 @@ Clip make_clip(const WorldBox& box) {
 
 Clip make_clip(const ImageGeometry& geometry) {
     if (geometry.is_axis_aligned()) return make_clip(geometry.world_box());
+    // Of sheared axes the faces' normals are no axes.
+    const Matrix3 normals = detail::inverse(geometry.direction);
     Clip clip;
-    for (int a = 0; a < 3; ++a)
+    for (int a = 0; a < 3; ++a) {
+        const double length = std::hypot(normals[a][0], normals[a][1], normals[a][2]);
         for (const double side : {-1.0, 1.0}) {
             Vec3 index{0, 0, 0};
             index[a] = side < 0 ? -0.5 : geometry.size[a] - 0.5;
             const Vec3 at = geometry.index_to_world(index);
             HalfSpace plane;
             for (int b = 0; b < 3; ++b) {
-                plane.normal[b] = side * geometry.direction[b][a];
+                plane.normal[b] = side * normals[a][b] / length;
                 plane.offset += plane.normal[b] * at[b];
             }
             clip.push_back(plane);
         }
+    }
     return clip;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/matrix.h"
 #include "base/number.h"
 #include "covol/error.h"
 #include "limits/world_limits.h"
@@ -10,20 +11,27 @@
 namespace covol::detail {
 namespace {
 
-/// @throws Error Unsupported unless the axes are perpendicular and of length 1.
+/// Sheared axes are well, but not ones that lie in a plane. @throws Error Unsupported.
 void check_direction(const std::string& where, const ImageGeometry& g) {
-    constexpr double kTolerance = 1e-3;
-    for (int a = 0; a < 3; ++a)
-        for (int b = 0; b <= a; ++b) {
-            double dot = 0;
-            for (int c = 0; c < 3; ++c) dot += g.direction[c][a] * g.direction[c][b];
-            if (!(std::abs(dot - (a == b ? 1.0 : 0.0)) <= kTolerance))
-                throw Error(Errc::Unsupported,
-                            where +
-                                ": direction: expected perpendicular axes of length 1, got sheared or degenerate "
-                                "ones; resample the image",
-                            "direction");
-        }
+    constexpr double kTolerance = 1e-3, kLeastVolume = 0.05;
+    const Matrix3& d = g.direction;
+    for (int a = 0; a < 3; ++a) {
+        const double length = std::sqrt(d[0][a] * d[0][a] + d[1][a] * d[1][a] + d[2][a] * d[2][a]);
+        if (!(std::abs(length - 1) <= kTolerance))
+            throw Error(Errc::Unsupported,
+                        where + ": direction: expected axes of length 1, got " + number(length) + " along axis " +
+                            std::to_string(a),
+                        "direction");
+    }
+    const double volume = std::abs(determinant(d));
+    if (!(volume >= kLeastVolume))
+        throw Error(Errc::Unsupported,
+                    where +
+                        ": direction: expected axes that span the space, got nearly parallel ones or ones in a plane "
+                        "(their parallelepiped has " +
+                        number(volume) + " of a cube's volume, expected " + number(kLeastVolume) +
+                        " at least); resample the image, with SimpleITK's Resample() for example",
+                    "direction");
 }
 
 }  // namespace

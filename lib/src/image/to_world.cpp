@@ -1,8 +1,14 @@
 #include "image/to_world.h"
 
 #include "covol/error.h"
+#include "io/pixels/raw_image.h"
 
 namespace covol {
+namespace {
+
+const std::string kUnitNote = "; lengths in ";
+
+}  // namespace
 
 Vec3 detail::to_world(PointSpace space, const Vec3& p, const ImageGeometry& geometry) {
     const Vec3& h = geometry.spacing;
@@ -24,11 +30,28 @@ std::vector<Vec3> to_world(const PointCloud& cloud) {
     return cloud.points;
 }
 
+std::string detail::unit_note(const std::string& unit) { return kUnitNote + unit; }
+
+double detail::unit_factor(const PointCloud& cloud, const ImageGeometry& geometry) {
+    const std::size_t note = cloud.rule.rfind(kUnitNote);
+    if (note == std::string::npos) return 1;
+    const std::string unit = cloud.rule.substr(note + kUnitNote.size());
+    const double own = unit_in_metres(unit), other = unit_in_metres(geometry.unit);
+    return own > 0 && other > 0 && unit != geometry.unit ? own / other : 1;
+}
+
+Vec3 detail::scaled(PointSpace space, const Vec3& p, double factor) {
+    if (space == PointSpace::Index) return p;
+    return {p[0] * factor, p[1] * factor, space == PointSpace::Slices ? p[2] : p[2] * factor};
+}
+
 std::vector<Vec3> to_world(const PointCloud& cloud, const ImageGeometry& geometry) {
-    if (cloud.space == PointSpace::World) return cloud.points;
+    const double factor = detail::unit_factor(cloud, geometry);
+    if (cloud.space == PointSpace::World && factor == 1) return cloud.points;
     std::vector<Vec3> world;
     world.reserve(cloud.points.size());
-    for (const Vec3& p : cloud.points) world.push_back(detail::to_world(cloud.space, p, geometry));
+    for (const Vec3& p : cloud.points)
+        world.push_back(detail::to_world(cloud.space, detail::scaled(cloud.space, p, factor), geometry));
     return world;
 }
 

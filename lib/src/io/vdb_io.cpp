@@ -94,6 +94,16 @@ public:
 
     [[nodiscard]] std::size_t size() const { return entries_.size(); }
     [[nodiscard]] std::string name(std::size_t n) const { return entries_[n].descriptor.gridName(); }
+    /// A name of its own: "surface[1]" is the second grid named "surface", as OpenVDB's programs print it.
+    [[nodiscard]] std::string own_name(std::size_t n) const {
+        std::size_t before = 0;
+        for (std::size_t other = 0; other < n; ++other) before += name(other) == name(n) ? 1 : 0;
+        return before == 0 ? name(n) : name(n) + "[" + std::to_string(before) + "]";
+    }
+    /// Its own name, or the name with [0] for the first of several.
+    [[nodiscard]] bool is_named(std::size_t n, const std::string& wanted) const {
+        return own_name(n) == wanted || own_name(n) + "[0]" == wanted;
+    }
     [[nodiscard]] std::string type(std::size_t n) const { return entries_[n].descriptor.gridType(); }
     [[nodiscard]] bool is_half(std::size_t n) const { return entries_[n].descriptor.saveFloatAsHalf(); }
 
@@ -203,7 +213,7 @@ bool is_float(const std::string& type) { return type == FloatGrid::gridType(); }
 std::string list_grids(const Reader& reader) {
     std::string list;
     for (std::size_t n = 0; n < reader.size(); ++n)
-        list += (n == 0 ? "" : ", ") + reader.name(n) + " (" + reader.type(n) + ")";
+        list += (n == 0 ? "" : ", ") + reader.own_name(n) + " (" + reader.type(n) + ")";
     return list.empty() ? "no grid at all" : list;
 }
 
@@ -292,7 +302,7 @@ VdbGridInfo describe(Reader& reader, std::size_t n) {
         grid = reader.read_whole(n);
         grid->addStatsMetadata();
     }
-    info.name = reader.name(n);
+    info.name = reader.own_name(n);
     info.type = reader.type(n) + (reader.is_half(n) ? "_HalfFloat" : "");
     info.grid_class = vdb::GridBase::gridClassToString(grid->getGridClass());
     info.voxel_size = grid->voxelSize()[0];
@@ -377,7 +387,7 @@ FloatGridPtr read_vdb(const std::string& given, const std::string& wanted_name) 
         Reader reader(path);
         for (std::size_t n = 0; n < reader.size(); ++n) {
             const bool usable = is_float(reader.type(n));
-            if (name.empty() ? !usable : reader.name(n) != name) continue;
+            if (name.empty() ? !usable : !reader.is_named(n, name)) continue;
             if (!usable)
                 throw Error(Errc::InvalidInput, "read_vdb: " + path + ": expected float values in grid '" + name +
                                                     "', got " + reader.type(n) + "; the file has " +
@@ -392,31 +402,6 @@ FloatGridPtr read_vdb(const std::string& given, const std::string& wanted_name) 
     });
 }
 
-FloatGridPtr read_vdb_level_set(const std::string& path, const RunContext& run) {
-    std::string chosen = split_grid_name(path).grid;
-    if (chosen.empty()) {
-        std::vector<std::string> level_sets, others;
-        for (const VdbGridInfo& grid : list_vdb(path)) {
-            if (!grid.type.starts_with(FloatGrid::gridType()) || grid.grid_class == "fog volume") continue;
-            (grid.grid_class == "level set" ? level_sets : others).push_back(grid.name);
-        }
-        const bool has_surface = std::find(level_sets.begin(), level_sets.end(), "surface") != level_sets.end();
-        if (level_sets.empty()) std::swap(level_sets, others);
-        if (!level_sets.empty()) chosen = has_surface ? "surface" : level_sets.front();
-        if (level_sets.size() > 1) {
-            std::string list;
-            for (const std::string& name : level_sets) list += (list.empty() ? "" : ", ") + name;
-            run.warn(path + ": '" + chosen + "' is taken of the level sets " + list + "; name one: " + path + ":" +
-                     level_sets.back());
-        }
-    }
-    FloatGridPtr grid = read_vdb(path, chosen);
-    if (grid->getGridClass() == vdb::GRID_FOG_VOLUME)
-        throw Error(Errc::Unsupported, "read_vdb_level_set: " + path + ": grid '" + grid->getName() +
-                                           "': expected a level set, got a fog volume");
-    return grid;
-}
-
 std::vector<VdbGridInfo> list_vdb(const std::string& given) {
     const VdbGridName file = split_grid_name(given);
     const std::string &path = file.path, &name = file.grid;
@@ -425,7 +410,7 @@ std::vector<VdbGridInfo> list_vdb(const std::string& given) {
         Reader reader(path);
         std::vector<VdbGridInfo> list;
         for (std::size_t n = 0; n < reader.size(); ++n)
-            if (name.empty() || reader.name(n) == name) list.push_back(describe(reader, n));
+            if (name.empty() || reader.is_named(n, name)) list.push_back(describe(reader, n));
         if (list.empty() && !name.empty())
             throw Error(Errc::InvalidInput,
                         "list_vdb: " + path + ": expected a grid named '" + name + "', got " + list_grids(reader));

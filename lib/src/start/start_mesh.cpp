@@ -2,9 +2,17 @@
 #include <openvdb/tools/MeshToVolume.h>
 #include <tbb/parallel_for.h>
 
+#include <cmath>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "base/number.h"
 #include "covol/error.h"
 #include "covol/start.h"
+#include "meshing/mesh_rows.h"
 #include "redistance/signed_distance.h"
+#include "start/closed_mesh.h"
 
 namespace covol {
 namespace {
@@ -27,13 +35,73 @@ FloatGridPtr signed_distance_grid(Domain domain, const TriangleMesh& mesh) {
     }
 }
 
+/// OpenVDB takes for outside what can be reached from there: it fills cavities. Voxels are inside where the mesh winds
+/// around them.
+void correct_signs(FloatGrid& distance, const Domain& domain, const TriangleMesh& mesh, const RunContext& run) {
+    const openvdb::CoordBBox box = distance.evalActiveVoxelBoundingBox();
+    ImageGeometry lattice;
+    lattice.spacing.fill(domain.voxel_size);
+    lattice.origin = domain.origin;
+    for (int a = 0; a < 3; ++a) {
+        // Whole leaves.
+        const int first = box.min()[a] & ~7, last = box.max()[a] | 7;
+        lattice.size[a] = last - first + 1;
+        lattice.origin[a] += first * domain.voxel_size;
+    }
+    const meshing::MeshRows rows(mesh, lattice);
+    constexpr std::int32_t kSlices = 8;
+    const Index3 slab = {lattice.size[0], lattice.size[1], kSlices};
+    const std::size_t voxels = std::size_t(slab[0]) * std::size_t(slab[1]) * kSlices;
+    std::vector<std::uint8_t> inside(voxels);
+    std::map<int, std::vector<FloatGrid::TreeType::LeafNodeType*>> leaves;  // by slice
+    for (auto leaf = distance.tree().beginLeaf(); leaf; ++leaf) leaves[leaf->origin().z()].push_back(&*leaf);
+    const int z0 = box.min().z() & ~7;
+    for (const auto& [z, of_slab] : leaves) {
+        if (z < z0 || z >= z0 + lattice.size[2]) continue;
+        run.check();
+        rows.fill(z - z0, slab, inside, "start_from_mesh: the mesh is not closed");
+        tbb::parallel_for(std::size_t(0), of_slab.size(), [&, list = &of_slab](std::size_t n) {
+            FloatGrid::TreeType::LeafNodeType& leaf = *(*list)[n];
+            for (openvdb::Index at = 0; at < FloatGrid::TreeType::LeafNodeType::SIZE; ++at) {
+                const openvdb::Coord c = leaf.offsetToGlobalCoord(at);
+                const int i = c.x() - (box.min().x() & ~7), j = c.y() - (box.min().y() & ~7), k = c.z() - z;
+                const bool within = i >= 0 && j >= 0 && i < slab[0] && j < slab[1];
+                const float value = std::abs(leaf.getValue(at));
+                const std::size_t voxel =
+                    (std::size_t(k) * std::size_t(slab[1]) + std::size_t(j)) * std::size_t(slab[0]) + std::size_t(i);
+                leaf.setValueOnly(at, within && inside[voxel] != 0 ? -value : value);
+            }
+        });
+    }
+}
+
+/// The mesh with its holes closed, which a warning tells. @throws Error InvalidInput where it is hardly closed at all.
+TriangleMesh closed_or_refused(const TriangleMesh& mesh, const RunContext& run) {
+    constexpr double kMostCaps = 0.5;
+    detail::ClosedMesh closed = detail::close_holes(mesh);
+    if (closed.holes == 0) return mesh;
+    const std::string holes = std::to_string(closed.holes) + (closed.holes > 1 ? " holes" : " hole");
+    const std::string share = detail::number(std::round(1000 * closed.cap_share) / 10) + " % of its area";
+    if (closed.cap_share > kMostCaps)
+        throw Error(Errc::InvalidInput, "the mesh of the start is not closed: expected one with an inside, got " +
+                                            holes + " that would take " + share +
+                                            " to close; close it in the program that made it");
+    run.warn("the mesh of the start is not closed: " + holes + ", closed by " + share +
+             " between rim and centre; look at the result there");
+    return std::move(closed.mesh);
+}
+
 }  // namespace
 
 FloatGridPtr start_from_mesh(const Domain& domain, const TriangleMesh& mesh, const RunContext& run) {
     if (mesh.empty()) throw Error(Errc::InvalidInput, "start_from_mesh: expected at least one triangle, got none");
     FloatGridPtr result;
     with_threads(run, [&] {
-        const FloatGridPtr distance = signed_distance_grid(domain, mesh);
+        const MeshMeasures measures = measure(mesh);
+        const TriangleMesh closed = measures.closed ? TriangleMesh() : closed_or_refused(mesh, run);
+        const TriangleMesh& whole = measures.closed ? mesh : closed;
+        const FloatGridPtr distance = signed_distance_grid(domain, whole);
+        if (!measures.closed || measures.components > 1) correct_signs(*distance, domain, whole, run);
         run.check();
         std::vector<detail::Coord> origins;
         for (auto leaf = distance->tree().cbeginLeaf(); leaf; ++leaf) origins.push_back(leaf->origin());

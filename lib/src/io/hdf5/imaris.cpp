@@ -71,21 +71,55 @@ private:
     Vec3 min_{0, 0, 0}, side_{1, 1, 1};
 };
 
-/// Without the padding to whole chunks.
-Index3 size_of(const Hdf5File& file, int level, int time, int channel) {
-    const std::string name = channel_name(level, time, channel);
-    const std::string data = name + "/Data";
+using Shape = std::array<std::uint64_t, 3>;
+
+/// Of the array, along x, y, z, with the padding to whole chunks.
+Shape padded_size(const Hdf5File& file, int level, int time, int channel) {
+    const std::string data = channel_name(level, time, channel) + "/Data";
     const std::vector<std::uint64_t> shape = shape_of(file, data).shape;
     if (shape.size() != 3)
         throw read_error(Errc::InvalidInput, file.path_of(data),
                          "expected 3 dimensions, got " + std::to_string(shape.size()));
+    return {shape[2], shape[1], shape[0]};
+}
+
+/// A count among a group's attributes.
+std::optional<std::uint64_t> count_at(const Hdf5File& file, const std::string& group, const std::string& name) {
+    const auto count = to_number<std::uint64_t>(trim(file.text(group, name.c_str())));
+    return count && *count > 0 ? count : std::nullopt;
+}
+
+/// Without the padding to whole chunks: as the channel says, else by the finest level's size, which the image says.
+struct ImarisSize {
+    Index3 size{};
+    std::string field;  ///< where it stands; empty: nowhere, it is the padded one
+};
+
+ImarisSize size_of(const Hdf5File& file, int level, int time, int channel) {
+    const std::string name = channel_name(level, time, channel);
+    const Shape padded = padded_size(file, level, time, channel);
     std::uint64_t size[3];
-    for (int a = 0; a < 3; ++a) {
-        const auto stated =
-            to_number<std::uint64_t>(trim(file.text(name, (std::string("ImageSize") + "XYZ"[a]).c_str())));
-        size[a] = stated.value_or(shape[std::size_t(2 - a)]);
+    ImarisSize found;
+    found.field = "ImageSizeX, Y, Z";
+    for (std::size_t a = 0; a < 3; ++a) {
+        const auto stated = count_at(file, name, std::string("ImageSize") + "XYZ"[a]);
+        if (!stated) found.field.clear();
+        size[a] = stated.value_or(padded[a]);
     }
-    return require_3d(file.path_of(data), size);
+    if (found.field.empty()) {
+        const Shape finest = padded_size(file, 0, time, channel);
+        found.field = "DataSetInfo/Image X, Y, Z";
+        for (std::size_t a = 0; a < 3; ++a) {
+            const auto whole = count_at(file, "/DataSetInfo/Image", std::string(1, "XYZ"[a]));
+            if (!whole || *whole > finest[a]) found.field.clear();
+            const double factor =
+                std::exp2(std::max(0.0, std::round(std::log2(double(finest[a]) / double(padded[a])))));
+            const auto part = std::uint64_t(std::max(1.0, std::floor(double(whole.value_or(finest[a])) / factor)));
+            size[a] = whole && *whole <= finest[a] ? std::min(padded[a], part) : padded[a];
+        }
+    }
+    found.size = require_3d(file.path_of(name + "/Data"), size);
+    return found;
 }
 
 /// Each level has voxels of 1, 2, 4, ... fine ones along each axis, and a last odd one left over or alone.
@@ -112,7 +146,7 @@ void describe_levels(const Hdf5File& file, const Extent& extent, const Index3& f
     for (int level = 0; level < count; ++level) {
         const std::string name = level_name(level);
         try {
-            const Index3 size = size_of(file, level, choice.time.value_or(0), choice.channel.value_or(0));
+            const Index3 size = size_of(file, level, choice.time.value_or(0), choice.channel.value_or(0)).size;
             info.levels.push_back(level_text(name, size, times(extent.spacing(fine), factors(fine, size))));
             if (level > choice.level) layout.coarser.push_back(name);
         } catch (const Error&) {  // it does not matter until it is read
@@ -132,14 +166,17 @@ std::optional<Hdf5Layout> imaris_layout(const Hdf5File& file, const std::string&
     info.format = "Imaris";
     layout.in_datasets = true;
     const Extent extent(file);
-    const Index3 fine = size_of(file, 0, time, channel);
-    layout.size = size_of(file, choice->level, time, channel);
+    const ImarisSize whole = size_of(file, 0, time, channel);
+    const Index3& fine = whole.size;
+    layout.size = size_of(file, choice->level, time, channel).size;
     const Vec3 factor = factors(fine, *layout.size);
     info.geometry.spacing = times(extent.spacing(fine), factor);
     // ExtMin is the corner of the first voxel.
     for (int a = 0; extent.is_known() && a < 3; ++a)
         info.geometry.origin[a] = extent.min()[a] + 0.5 * info.geometry.spacing[a];
-    info.spacing_known = {extent.is_known(), extent.is_known(), extent.is_known()};
+    // Of how many voxels the extent is, is not known where only the padded size is.
+    const bool is_known = extent.is_known() && !whole.field.empty();
+    info.spacing_known = {is_known, is_known, is_known};
     info.geometry.unit = normal_unit(file.text("/DataSetInfo/Image", "Unit"));
     const std::string level = level_name(choice->level);
     info.frames = choice->time ? 1 : std::max(1, count_of(file, level, kTime));
@@ -155,6 +192,7 @@ std::optional<Hdf5Layout> imaris_layout(const Hdf5File& file, const std::string&
     for (const char* field : {"ExtMin0", "ExtMin1", "ExtMin2", "ExtMax0", "ExtMax1", "ExtMax2", "Unit"})
         if (const std::string value = file.text("/DataSetInfo/Image", field); !value.empty())
             info.fields.emplace_back(field, quote(value));
+    info.fields.emplace_back("size", whole.field.empty() ? "not stated, the array's with its padding" : whole.field);
     describe_levels(file, extent, fine, *choice, layout);
     layout.dataset = [level = choice->level, time, channel](std::uint64_t c, std::uint64_t t) {
         return channel_name(level, time + int(t), channel + int(c)) + "/Data";

@@ -10,8 +10,13 @@
 // One function for each family of image files; read_image() picks by the name's end.
 namespace covol::detail {
 
-/// NRRD (.nrrd, .nhdr), NIfTI (.nii, .nii.gz), MetaImage (.mha, .mhd), ITK's HDF5 (.h5, .hdf5): ITK reads the header.
-std::unique_ptr<ImageFile> open_itk(const std::string& path);
+/// NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd), ITK's HDF5 (.h5, .hdf5): ITK reads the header.
+std::unique_ptr<ImageFile> open_itk(const std::string& path, const RunContext& run);
+
+/// NIfTI-1 in one file (.nii, .nii.gz). The sform says where voxels lie if sform_code > 0, else the qform if
+/// qform_code > 0, else pixdim with the image's middle at 0: nibabel's rule. Where both forms have codes and lie more
+/// than half a voxel apart, that is a warning.
+std::unique_ptr<ImageFile> open_nifti(const std::string& path, const RunContext& run);
 
 /// ITK's reader for files of this ending.
 OpenWithItk* itk_reader_of(const std::string& path);

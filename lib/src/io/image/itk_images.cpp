@@ -1,4 +1,4 @@
-// Formats whose headers ITK reads: NRRD, NIfTI, MetaImage, HDF5.
+// Formats whose headers ITK reads: NRRD, MetaImage, HDF5.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -16,9 +16,9 @@
 #include "base/text.h"
 #include "io/hdf5/hdf5_file.h"
 #include "io/image/image_formats.h"
+#include "io/image/nrrd_space.h"
 #include "io/image/text_header.h"
 #include "io/modules/reader.h"
-#include "io/pixels/nifti_space.h"
 
 namespace covol::detail {
 namespace {
@@ -27,8 +27,7 @@ namespace fs = std::filesystem;
 
 /// Unit, whether there is a spacing at all, and the fields that were used.
 void read_text_header(const TextHeader& header, ImageInfo& info) {
-    std::string unit = header.value_of({"space units", "units", "distanceunits", "unit"});
-    // "mm" "mm" "mm": the axes have one unit in practice
+    std::string unit = header.value_of({"distanceunits", "unit"});
     if (!unit.empty() && unit.front() == '"') unit = unit.substr(1, unit.find('"', 1) - 1);
     info.geometry.unit = normal_unit(unit);
     const bool known = !header.value_of({"spacings", "space directions", "elementspacing", "elementsize"}).empty();
@@ -61,117 +60,6 @@ void read_text_header(const TextHeader& header, ImageInfo& info) {
                             "datafile",
                             "elementdatafile"})
         if (const std::string found = header.value(key); !found.empty()) info.fields.emplace_back(key, found);
-}
-
-template <typename T>
-T load(const char* data, bool swap) {
-    T value;
-    std::memcpy(&value, data, sizeof(T));
-    if (swap) swap_bytes(&value, 1, sizeof(T));
-    return value;
-}
-
-std::optional<PixelType> nifti_type(int code) {
-    switch (code) {
-        case 2: return PixelType::UInt8;
-        case 4: return PixelType::Int16;
-        case 8: return PixelType::Int32;
-        case 16: return PixelType::Float;
-        case 64: return PixelType::Double;
-        case 256: return PixelType::Int8;
-        case 512: return PixelType::UInt16;
-        case 768: return PixelType::UInt32;
-        default: return std::nullopt;
-    }
-}
-
-/// The 348 bytes that a NIfTI-1 file begins with.
-class NiftiHeader {
-public:
-    /// @throws Error InvalidInput, Unsupported (NIfTI-2).
-    NiftiHeader(const PixelPlace& begin, const std::string& unusable) {
-        if (!read_bytes(begin, bytes_.size(), bytes_.data())) throw Error(Errc::InvalidInput, unusable);
-        const auto size = load<std::int32_t>(bytes_.data(), false), swapped = load<std::int32_t>(bytes_.data(), true);
-        constexpr std::int32_t kVersion2 = 540;
-        if (size == kVersion2 || swapped == kVersion2)
-            throw Error(Errc::Unsupported,
-                        "read_image: " + begin.path + ": NIfTI-2 is not read; convert it to NIfTI-1");
-        swap_ = size != std::int32_t(bytes_.size());
-        if (swap_ && swapped != std::int32_t(bytes_.size())) throw Error(Errc::InvalidInput, unusable);
-        // ITK's matrices abort the program at numbers that are not finite, or too large to square.
-        for (const auto& [first, count] : {std::pair(nifti::kPixdim, 4), std::pair(nifti::kQuatern, 6 + 12)})
-            for (int n = 0; n < count; ++n)
-                if (!(std::abs(number(first + 4 * std::size_t(n))) < 1e9))
-                    throw Error(Errc::InvalidInput,
-                                unusable + " (a spacing, origin or direction is not finite, or huge)");
-        // Their singular values take forever where an axis is next to nothing; none at all is well.
-        for (int axis = 0; axis < 3 && integer(nifti::kCodes + 2) != 0; ++axis) {
-            double square = 0;
-            for (std::size_t row = 0; row < 3; ++row)
-                square += std::pow(number(nifti::kSrow + 16 * row + 4 * std::size_t(axis)), 2);
-            if (square > 0 && square < 1e-30)
-                throw Error(Errc::InvalidInput, unusable + " (an axis of its sform has no length)");
-        }
-    }
-    [[nodiscard]] bool swap() const { return swap_; }
-    [[nodiscard]] double number(std::size_t at) const { return double(load<float>(bytes_.data() + at, swap_)); }
-    [[nodiscard]] int integer(std::size_t at) const { return load<std::int16_t>(bytes_.data() + at, swap_); }
-    [[nodiscard]] bool in_one_piece() const { return std::memcmp(bytes_.data() + 344, "n+1", 4) == 0; }
-    /// Of kNiftiUnits; 0: not stated
-    [[nodiscard]] std::size_t unit() const {
-        const auto code = std::size_t(bytes_[123] & 7);
-        return code < kNiftiUnits.size() ? code : 0;
-    }
-    [[nodiscard]] std::string unit_name() const { return unit() > 0 ? kNiftiUnits[unit()] : "mm"; }
-
-private:
-    std::array<char, 348> bytes_{};
-    bool swap_ = false;
-};
-
-/// Empty when the file is not in one piece or holds no grey values. Adds the fields to `info`.
-std::optional<PixelPlace> nifti_pixels(const NiftiHeader& header, PixelPlace place, ImageInfo& info) {
-    const auto type = nifti_type(header.integer(70));
-    const double offset = header.number(108), slope = header.number(112), intercept = header.number(116);
-    constexpr double kLeastOffset = 352;
-    if (!type || !header.in_one_piece() || !(offset >= 0 && offset < 1e9)) return std::nullopt;
-    place.swap = header.swap() && pixel_bytes(*type) > 1;
-    place.type = *type;
-    place.skip = static_cast<std::uint64_t>(std::max(kLeastOffset, offset));
-    if (std::isfinite(slope) && std::isfinite(intercept) && slope != 0) {
-        place.slope = slope;
-        place.intercept = intercept;
-    }
-    std::ostringstream pixdim;
-    for (std::size_t a = 0; a < 3; ++a) {
-        const double spacing = header.number(80 + 4 * a);
-        info.spacing_known[a] = std::abs(spacing) > 0;
-        pixdim << (a == 0 ? "" : " ") << spacing;
-    }
-    info.format = "NIfTI-1";
-    info.fields = {{"pixdim", pixdim.str()},
-                   {"xyzt_units", header.unit() > 0 ? header.unit_name() : "not stated, taken as mm"},
-                   {"qform_code", std::to_string(header.integer(252))},
-                   {"sform_code", std::to_string(header.integer(254))},
-                   {"space", "RAS in the file, turned to LPS"}};
-    return place;
-}
-
-/// ITK 5.2 turns the spacing of files in um or m into mm, and forgets the origin; here lengths are in the file's unit.
-void restore_nifti_unit(const NiftiHeader& header, ImageGeometry& geometry) {
-    geometry.unit = header.unit_name();
-    if (geometry.unit == "mm") return;
-    const double from_mm = geometry.unit == "m" ? 1e-3 : 1e3;
-    const auto is_as_stored = [&](std::size_t first, std::size_t step) {
-        bool same = true;
-        for (std::size_t a = 0; a < 3; ++a)
-            same = same && std::abs(geometry.origin[a]) == std::abs(header.number(first + a * step));
-        return same;
-    };
-    constexpr std::size_t kPixdim = 80, kQoffset = 268, kSrowEnd = 292, kSrow = 16;
-    for (std::size_t a = 0; a < 3; ++a) geometry.spacing[a] = std::abs(header.number(kPixdim + 4 * a));
-    if (!is_as_stored(kQoffset, 4) && !is_as_stored(kSrowEnd, kSrow))
-        for (double& o : geometry.origin) o *= from_mm;
 }
 
 /// Empty for the rare kinds that are left to ITK: ascii pixels, one file for each slice, a header to skip.
@@ -310,20 +198,19 @@ ItkHeader header_by_itk(const std::string& path, const std::string& unusable) {
 OpenWithItk* itk_reader_of(const std::string& path) {
     const std::string end = extension(path);
     if (end == ".nrrd" || end == ".nhdr") return itk_module().open_nrrd;
-    if (end == ".nii" || end == ".nii.gz") return itk_module().open_nifti;
     if (end == ".h5" || end == ".hdf5") return hdf5_module().open_itk;
     return itk_module().open_meta;
 }
 
 std::unique_ptr<ImageFile> open_either_hdf5(const Hdf5Name& name) {
-    return is_itk_hdf5(name) ? open_itk(name.path) : open_hdf5(name);
+    return is_itk_hdf5(name) ? open_itk(name.path, {}) : open_hdf5(name);
 }
 
-std::unique_ptr<ImageFile> open_itk(const std::string& path) {
+std::unique_ptr<ImageFile> open_itk(const std::string& path, const RunContext& run) {
     const std::string end = extension(path);
     const std::string unusable = "read_image: " + path + ": damaged, truncated, or not a " + end + " file";
-    const bool is_nifti = end.rfind(".nii", 0) == 0, is_meta = end.rfind(".mh", 0) == 0;
-    const bool is_nrrd = end == ".nrrd" || end == ".nhdr", is_hdf5 = !is_nifti && !is_meta && !is_nrrd;
+    const bool is_meta = end.rfind(".mh", 0) == 0;
+    const bool is_nrrd = end == ".nrrd" || end == ".nhdr", is_hdf5 = !is_meta && !is_nrrd;
     std::optional<TextHeader> header;
     std::vector<std::string> files;
     if (is_nrrd || is_meta) {
@@ -332,11 +219,6 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path) {
         require_regular_files(path, files);
     }
     if (is_meta) require_meta_header(*header, unusable);
-    PixelPlace begin;
-    begin.path = path;
-    begin.packed = end == ".nii.gz";
-    std::optional<NiftiHeader> nifti;
-    if (is_nifti) nifti.emplace(begin, unusable);
     std::optional<Hdf5Lock> lock;
     if (is_hdf5) lock.emplace();
     // Its readers abort, or do not end, where headers contradict themselves; HDF5's was tried before.
@@ -362,18 +244,13 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path) {
     if (image.is_rgb) info.channel_names = {"red", "green", "blue"};
 
     std::optional<PixelPlace> place;
-    if (is_nifti) {
-        place = nifti_pixels(*nifti, begin, info);
-        restore_nifti_unit(*nifti, info.geometry);
-        const bool integers = info.type != PixelType::Float && info.type != PixelType::Double;
-        if (!place || info.channels > 1 || (integers && info.type != place->type))
-            throw read_error(Errc::Unsupported, path, "expected a NIfTI file in one piece with grey values");
-    } else if (is_hdf5) {
+    if (is_hdf5) {
         info.format = "HDF5 (ITK's layout)";
         info.fields = {{"ITKImage/0", "Dimension, Spacing, Origin, Directions, VoxelData"}};
     } else {
         info.format = is_meta ? "MetaImage" : "NRRD";
         read_text_header(*header, info);
+        if (is_nrrd) restore_nrrd_space(path, *header, info, run);
         place = is_meta ? meta_pixels(path, *header, info.type) : nrrd_pixels(path, *header, info.type, info.channels);
     }
     if (place) {

@@ -50,7 +50,8 @@ std::optional<std::uint64_t> pixels_in_one_piece(const Tiff& tiff, const TiffPag
 
 class TiffFile : public ImageFile {
 public:
-    TiffFile(const std::string& path, const RunContext& run) : path_(path), tiff_(open_for_reading(path)) {
+    TiffFile(const std::string& path, const std::string& axes, const RunContext& run)
+        : path_(path), tiff_(open_for_reading(path)) {
         TiffFacts facts;
         facts.path = path;
         facts.description = tiff_->text(TIFFTAG_IMAGEDESCRIPTION);
@@ -69,7 +70,9 @@ public:
         std::vector<std::string> files = stack_.files;
         files.insert(files.end(), stack_.descriptions.begin(), stack_.descriptions.end());
         refer_to(std::move(files));
-        fill_info();
+        fill_info(axes);
+        for (const std::string& warning : stack_.warnings)
+            run.warn(path + ": " + warning + "; `spacing = sx,sy,sz` gives it");
     }
 
     [[nodiscard]] std::uint64_t bytes_to_hold(const PixelRequest& request) const override {
@@ -121,21 +124,37 @@ private:
         contiguous_ = *begin;
     }
 
-    void fill_info() {
+    /// Planes that are all channels or time points are often slices.
+    void require_slices() const {
+        if (stack_.slices > 1 || stack_.channels * stack_.frames < 2) return;
+        std::string there = plane_axes(stack_), list, axes = there;
+        for (const char axis : there)
+            list += (list.empty() ? "" : " and ") + std::to_string(axis == 'C' ? stack_.channels : stack_.frames) +
+                    (axis == 'C' ? " channels" : " time points");
+        std::replace(axes.begin(), axes.end(), stack_.channels > stack_.frames ? 'C' : 'T', 'Z');
+        throw read_error(Errc::InvalidInput, path_,
+                         "expected a 3D image, got " + std::to_string(kind_.width) + " x " +
+                             std::to_string(kind_.height) + " x 1 with " + list + "; if these are slices, give " +
+                             path_ + ":" + axes + "YX, which takes them as such");
+    }
+
+    void fill_info(const std::string& axes) {
         const bool colour = kind_.samples > 1;
         // Colour: the samples are the channels; OME counts them in SizeC too.
         if (colour && stack_.channels > 1 && stack_.channels != kind_.samples)
             throw read_error(Errc::Unsupported, path_, "channels of several samples each");
         if (colour && stack_.channels == kind_.samples && stack_.slices * stack_.frames != pages_.size())
             throw read_error(Errc::Unsupported, path_, "channels of several samples each");
-        info_.channels = static_cast<int>(colour ? kind_.samples : stack_.channels);
         if (colour) stack_.channels = 1;
+        rename_axes(path_, axes, stack_);
+        info_.channels = static_cast<int>(colour ? kind_.samples : stack_.channels);
         if (colour && kind_.samples == 3) stack_.channel_names = {"red", "green", "blue"};
         info_.frames = static_cast<int>(stack_.frames);
         info_.format = stack_.format;
         info_.axis_order = (colour ? "SXY" : "XY") + stack_.order;
         info_.channel_names = stack_.channel_names;
         info_.fields = stack_.fields;
+        require_slices();
         ImageGeometry& geometry = info_.geometry;
         geometry.size = require_3d(path_, {kind_.width, kind_.height, stack_.slices});
         geometry.unit = stack_.unit;
@@ -263,8 +282,8 @@ private:
 
 }  // namespace
 
-std::unique_ptr<ImageFile> open_tiff(const std::string& path, const RunContext& run) {
-    return std::make_unique<TiffFile>(path, run);
+std::unique_ptr<ImageFile> open_tiff(const std::string& path, const std::string& axes, const RunContext& run) {
+    return std::make_unique<TiffFile>(path, axes, run);
 }
 
 }  // namespace covol::detail

@@ -2,6 +2,7 @@
 #include "io/image/tiff_stack.h"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
@@ -26,7 +27,17 @@ double to_number(const std::string& text) {
     return status == std::errc() && std::isfinite(value) ? value : 0;
 }
 
-double to_length(const std::string& text) { return std::max(0.0, to_number(text)); }
+/// Some programs write stacks that go down with a negative distance between slices.
+double to_length(const std::string& text) { return std::abs(to_number(text)); }
+
+/// Without what a change of units leaves in the last digits.
+double rounded(double length) {
+    std::array<char, 32> text{};
+    const auto end =
+        std::to_chars(text.data(), text.data() + text.size(), length, std::chars_format::scientific, 12).ptr;
+    std::from_chars(text.data(), end, length);
+    return length;
+}
 
 std::uint64_t to_count(const std::string& text, std::uint64_t otherwise = 1) {
     const double value = to_number(text);
@@ -40,8 +51,14 @@ void unify_units(TiffStack& stack, const std::array<std::string, 3>& units) {
     stack.unit = units[0];
     const double first = unit_in_metres(units[0]);
     for (int a = 1; a < 3; ++a) {
+        if (units[a].empty() || units[a] == units[0] || stack.spacing[a] == 0) continue;
         const double own = unit_in_metres(units[a]);
-        if (own > 0 && first > 0 && own != first) stack.spacing[a] *= own / first;
+        if (own > 0 && first > 0) stack.spacing[a] = rounded(stack.spacing[a] * own / first);
+        if (own > 0 && first > 0) continue;
+        stack.spacing[a] = 0;
+        stack.warnings.push_back(std::string("expected units of length along ") + "xyz"[a] + " and x, got '" +
+                                 units[a] + "' and '" + units[0] + "': the spacing along " + "xyz"[a] +
+                                 " is not known");
     }
 }
 
@@ -136,8 +153,8 @@ void read_tifffile(const TiffFacts& facts, TiffStack& stack) {
     if (planes == facts.pages && read.order.size() == 3) stack = read;
     if (json.contains("spacing") && json.at("spacing").is_number()) {
         const double depth = json.at("spacing").get<double>();
-        if (std::isfinite(depth) && depth > 0) {
-            stack.spacing[2] = depth;
+        if (std::isfinite(depth) && depth != 0) {
+            stack.spacing[2] = std::abs(depth);
             stack.fields.emplace_back("spacing", std::to_string(depth));
         }
     }
@@ -148,6 +165,73 @@ void read_tifffile(const TiffFacts& facts, TiffStack& stack) {
 }
 
 // ---- OME ----------------------------------------------------------------------------------------------------------
+
+struct OmeUnit {
+    const char* text;
+    double metres;
+};
+/// UnitsLength of the schema, where upper and lower case differ: "Mm" is a million metres.
+/// https://www.openmicroscopy.org/Schemas/OME/2016-06
+constexpr OmeUnit kOmeUnits[] = {{"Ym", 1e24},
+                                 {"Zm", 1e21},
+                                 {"Em", 1e18},
+                                 {"Pm", 1e15},
+                                 {"Tm", 1e12},
+                                 {"Gm", 1e9},
+                                 {"Mm", 1e6},
+                                 {"km", 1e3},
+                                 {"hm", 1e2},
+                                 {"dam", 1e1},
+                                 {"m", 1},
+                                 {"dm", 1e-1},
+                                 {"cm", 1e-2},
+                                 {"mm", 1e-3},
+                                 {"\xC2\xB5m", 1e-6},
+                                 {"\xCE\xBCm", 1e-6},
+                                 {"um", 1e-6},
+                                 {"nm", 1e-9},
+                                 {"pm", 1e-12},
+                                 {"fm", 1e-15},
+                                 {"am", 1e-18},
+                                 {"zm", 1e-21},
+                                 {"ym", 1e-24},
+                                 {"\xC3\x85", 1e-10},
+                                 {"\xE2\x84\xAB", 1e-10},
+                                 {"thou", 2.54e-5},
+                                 {"li", 0.0254 / 12},
+                                 {"in", 0.0254},
+                                 {"ft", 0.3048},
+                                 {"yd", 0.9144},
+                                 {"mi", 1609.344},
+                                 {"ua", 149597870700.0},
+                                 {"ly", 9460730472580800.0},
+                                 {"pc", 3.0856775814913673e16},
+                                 {"pt", 0.0254 / 72}};
+
+double ome_unit_in_metres(const std::string& text) {
+    for (const OmeUnit& unit : kOmeUnits)
+        if (text == unit.text) return unit.metres;
+    return 0;
+}
+
+/// The unit of all axes where they agree, else micrometres. Axes of a unit that the schema does not know are unknown;
+/// lengths in a "reference frame" or in pixels have no unit.
+void read_ome_units(const std::array<std::string, 3>& texts, TiffStack& stack) {
+    const bool alike = texts[0] == texts[1] && texts[1] == texts[2];
+    if (alike && (texts[0] == "reference frame" || texts[0] == "pixel")) return;
+    const std::string common = alike ? normal_unit(texts[0]) : "um";
+    const bool is_kept = alike && unit_in_metres(common) > 0 && unit_in_metres(common) == ome_unit_in_metres(texts[0]);
+    stack.unit = is_kept ? common : "um";
+    for (std::size_t a = 0; a < 3; ++a) {
+        const double metres = ome_unit_in_metres(texts[a]);
+        if (metres == 0 && stack.spacing[a] > 0)
+            stack.warnings.push_back(std::string("PhysicalSize") + "XYZ"[a] +
+                                     "Unit: expected a unit of the OME schema, got '" + texts[a] +
+                                     "': the spacing along " + "xyz"[a] + " is not known");
+        if (metres == 0) stack.spacing[a] = 0;
+        if (metres > 0 && !is_kept) stack.spacing[a] = rounded(stack.spacing[a] * metres / 1e-6);
+    }
+}
 
 /// <TiffData>: which pages hold which planes.
 struct TiffData {
@@ -281,9 +365,12 @@ void read_ome(const TiffFacts& facts, TiffStack& stack) {
         const std::string key = std::string("PhysicalSize") + "XYZ"[a];
         stack.spacing[a] = to_length(value(key));
         const std::string unit = value(key + "Unit");
-        units[a] = unit.empty() ? "um" : normal_unit(unit);  // the OME schema's default
+        units[a] = unit.empty() ? "\xC2\xB5m" : unit;  // the OME schema's default
     }
-    if (stack.spacing[0] > 0) unify_units(stack, units);
+    // An axis without a length needs no unit.
+    for (int a = 0; a < 3; ++a)
+        if (stack.spacing[a] == 0) units[a] = units[stack.spacing[0] > 0 ? 0 : stack.spacing[1] > 0 ? 1 : 2];
+    read_ome_units(units, stack);
     const bool named =
         std::any_of(ome.channels.begin(), ome.channels.end(), [](const std::string& n) { return !n.empty(); });
     if (named && ome.channels.size() == stack.channels) stack.channel_names = ome.channels;
@@ -334,6 +421,56 @@ TiffStack describe_tiff(const TiffFacts& facts) {
         stack.channel_names.clear();
     }
     return stack;
+}
+
+std::string plane_axes(const TiffStack& stack) {
+    std::string axes;
+    for (const char axis : stack.order)
+        if ((axis == 'Z' ? stack.slices : axis == 'C' ? stack.channels : stack.frames) > 1)
+            axes.insert(axes.begin(), axis);
+    return axes;
+}
+
+void rename_axes(const std::string& path, const std::string& axes, TiffStack& stack) {
+    if (axes.empty()) return;
+    std::string word = axes;
+    std::transform(word.begin(), word.end(), word.begin(), [](unsigned char c) { return char(std::toupper(c)); });
+    const std::string there = plane_axes(stack), wanted = word.substr(0, word.size() < 2 ? 0 : word.size() - 2);
+    const auto count_of = [&](char axis) -> std::uint64_t& {
+        return axis == 'Z' ? stack.slices : axis == 'C' ? stack.channels : stack.frames;
+    };
+    std::string sorted = wanted, list;
+    std::sort(sorted.begin(), sorted.end());
+    const bool is_sound = word.ends_with("YX") && wanted.find('Z') != std::string::npos &&
+                          sorted.find_first_not_of("CTZ") == std::string::npos &&
+                          std::adjacent_find(sorted.begin(), sorted.end()) == sorted.end();
+    for (const char axis : there)
+        list += (list.empty() ? "" : ", ") + std::string(1, axis) + " of " + std::to_string(count_of(axis));
+    if (!is_sound || (wanted.size() != there.size() && wanted.size() != 1))
+        throw read_error(Errc::InvalidInput, path,
+                         "expected ZYX, which makes slices of all planes, or a letter of C, T and Z for each of the "
+                         "file's axes of planes (" +
+                             (list.empty() ? "none" : list) + ") before YX, such as ZCYX; got '" + axes + "'");
+    if (stack.slices == 1) {
+        // What stands in for a distance between slices that the file has not.
+        const bool stated = std::any_of(stack.fields.begin(), stack.fields.end(), [](const auto& field) {
+            return field.first == "spacing" || field.first == "PhysicalSizeZ";
+        });
+        if (!stated) stack.spacing[2] = 0;
+    }
+    std::vector<std::uint64_t> counts;
+    for (const char axis : there) counts.push_back(count_of(axis));
+    if (wanted.size() == 1) counts.assign(1, stack.slices * stack.channels * stack.frames);
+    stack.slices = stack.channels = stack.frames = 1;
+    stack.order.clear();
+    for (std::size_t n = wanted.size(); n-- > 0;) {
+        count_of(wanted[n]) = counts[n];
+        stack.order += wanted[n];
+    }
+    for (const char axis : {'Z', 'C', 'T'})
+        if (stack.order.find(axis) == std::string::npos) stack.order += axis;
+    if (stack.channels == 1 || wanted != there) stack.channel_names.clear();
+    stack.fields.emplace_back("axes", word + ", as asked for, where the file says " + there + "YX");
 }
 
 }  // namespace covol::detail

@@ -30,6 +30,7 @@ struct TiffStack {
     std::vector<std::string> descriptions;  ///< paths of files with OME's description of this one
     std::vector<Plane> planes;  ///< where pages are not simply in order: slices * channels * frames, else empty
     std::vector<std::pair<std::string, std::string>> fields;  ///< what was used of the header
+    std::vector<std::string> warnings;
 
     /// The plane's number in `order`.
     [[nodiscard]] std::uint64_t number(std::uint64_t z, std::uint64_t c, std::uint64_t t) const;
@@ -50,6 +51,14 @@ struct TiffFacts {
 /// Plain TIFFs carry dots per inch of a scanner or nothing, so their spacing stays unknown.
 /// @throws Error InvalidInput, Io (a file of a set is missing).
 TiffStack describe_tiff(const TiffFacts& facts);
+
+/// The axes of more than one plane, slowest first: "TC".
+std::string plane_axes(const TiffStack& stack);
+
+/// Renames the axes of more than one plane, or makes slices of all planes.
+/// @param axes  slowest first, as "ZCYX" or "ZYX"; empty: as the file says
+/// @throws Error InvalidInput.
+void rename_axes(const std::string& path, const std::string& axes, TiffStack& stack);
 
 /// images= of ImageJ's description, 1 without it.
 std::uint64_t imagej_images(const std::string& description);

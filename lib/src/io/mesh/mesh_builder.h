@@ -9,6 +9,8 @@
 #include "covol/domain.h"
 #include "covol/mesh.h"
 #include "io/mesh/mesh_source.h"
+#include "mesh/polygon.h"
+#include "mesh/triangle.h"
 
 namespace covol::mesh_io {
 
@@ -39,26 +41,53 @@ public:
                 float(position[2] - mesh_.origin[2])};
     }
 
-    /// A fan; pieces with a repeated corner have no area and are left out.
+    /// Pieces with a repeated corner have no area and are left out.
     void face(const std::vector<std::uint32_t>& corners) override {
-        for (std::size_t i = 2; i < corners.size(); ++i)
-            if (corners[0] != corners[i - 1] && corners[i - 1] != corners[i] && corners[i] != corners[0])
-                mesh_.triangles.push_back({corners[0], corners[i - 1], corners[i]});
+        if (corners.size() == 3) return triangle(corners[0], corners[1], corners[2]);
+        for (const std::uint32_t v : corners)
+            if (v >= vertex_count()) {  // it comes later
+                waiting_.push_back(corners);
+                return;
+            }
+        polygon(corners);
     }
 
     /// Faces may come before the vertices that they name, so their numbers are checked here.
     TriangleMesh finish() {
+        for (const std::vector<std::uint32_t>& corners : waiting_) {
+            for (const std::uint32_t v : corners) check(v);
+            polygon(corners);
+        }
         for (const Face& t : mesh_.triangles)
-            for (const std::uint32_t v : t)
-                if (v >= vertex_count())
-                    source_.fail("a face refers to vertex " + std::to_string(v) + " (from 0), the file has " +
-                                 std::to_string(vertex_count()));
+            for (const std::uint32_t v : t) check(v);
         return std::move(mesh_);
     }
 
 private:
+    void check(std::uint32_t v) const {
+        if (v >= vertex_count())
+            source_.fail("a face refers to vertex " + std::to_string(v) + " (from 0), the file has " +
+                         std::to_string(vertex_count()));
+    }
+    void triangle(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+        if (a != b && b != c && c != a) mesh_.triangles.push_back({a, b, c});
+    }
+    void polygon(const std::vector<std::uint32_t>& corners) {
+        if (corners.size() < 3) return;
+        std::vector<Vec3> places;
+        places.reserve(corners.size());
+        for (const std::uint32_t v : corners) places.push_back(meshing::to_vec3(mesh_.vertices[v]));
+        const auto pieces = meshing::cut_polygon(places);
+        if (pieces.empty())
+            source_.fail("expected concave faces of at most " + std::to_string(meshing::kMostPolygonCorners) +
+                         " corners, got one of " + std::to_string(corners.size()) +
+                         "; triangulate the mesh in the program that made it");
+        for (const auto& t : pieces) triangle(corners[t[0]], corners[t[1]], corners[t[2]]);
+    }
+
     const Source& source_;
     TriangleMesh mesh_;
+    std::vector<std::vector<std::uint32_t>> waiting_;  ///< polygons of vertices that were yet to come
 };
 
 }  // namespace covol::mesh_io

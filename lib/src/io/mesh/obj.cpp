@@ -34,6 +34,18 @@ void read_corners(const Source& source, std::string_view line, std::int64_t coun
         source.fail("expected a face of at least 3 vertices, got " + std::to_string(corners.size()));
 }
 
+/// The next line, and those that it goes on in behind a backslash. @param joined  keeps them
+std::string_view whole_line(Source& source, std::string& joined) {
+    std::string_view line = source.line();
+    if (!line.ends_with('\\') || line.starts_with('#')) return line;
+    joined.clear();
+    while (line.ends_with('\\')) {
+        joined.append(line.substr(0, line.size() - 1)) += ' ';
+        line = source.at_end() ? std::string_view() : source.line();
+    }
+    return joined.append(line);
+}
+
 /// 0 of what is no direction.
 Vec3 direction(std::string_view line) {
     Vec3 n{};
@@ -50,8 +62,9 @@ Vec3 direction(std::string_view line) {
 void read_obj(Source& source, Receiver& receiver) {
     std::int64_t vertices = 0;
     std::vector<std::uint32_t> corners;
+    std::string joined;
     while (!source.at_end()) {
-        std::string_view line = source.line();
+        std::string_view line = whole_line(source, joined);
         const std::string_view key = next_word(line);
         if (key == "v") {
             receiver.vertex(source.three_numbers(line));

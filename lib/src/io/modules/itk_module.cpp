@@ -1,5 +1,4 @@
 #include <itkMetaImageIO.h>
-#include <itkNiftiImageIO.h>
 #include <itkNrrdImageIO.h>
 
 #include "io/modules/itk_io.h"
@@ -7,8 +6,7 @@
 namespace covol::detail {
 
 const ItkModule& itk_module() {
-    static constexpr ItkModule module{open_with<itk::NrrdImageIO>, open_with<itk::NiftiImageIO>,
-                                      open_with<itk::MetaImageIO>};
+    static constexpr ItkModule module{open_with<itk::NrrdImageIO>, open_with<itk::MetaImageIO>};
     return module;
 }
 

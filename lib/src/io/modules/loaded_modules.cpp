@@ -41,7 +41,7 @@ const Module& load(const std::string& name, const char* formats) {
 std::string reader_program() { return folder_of_modules() / "covol-reader"; }
 
 const ItkModule& itk_module() {
-    static const auto& module = load<ItkModule>("itk", "NRRD, NIfTI and MetaImage");
+    static const auto& module = load<ItkModule>("itk", "NRRD and MetaImage");
     return module;
 }
 

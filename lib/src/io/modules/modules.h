@@ -45,7 +45,7 @@ using OpenWithItk = std::unique_ptr<ItkReader>(const std::string& path, const st
 
 /// ITK without its heavier readers.
 struct ItkModule {
-    OpenWithItk *open_nrrd, *open_nifti, *open_meta;
+    OpenWithItk *open_nrrd, *open_meta;
 };
 /// DICOM through ITK's GDCM.
 struct GdcmModule {

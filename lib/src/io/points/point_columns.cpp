@@ -7,151 +7,15 @@
 #include <optional>
 
 #include "covol/error.h"
+#include "io/pixels/raw_image.h"
 #include "io/points/point_formats.h"
 #include "io/points/point_text.h"
+#include "io/points/table_columns.h"
 
 namespace covol::detail {
 namespace {
 
 using std::string_view;
-
-// ---------------------------------------------------------------------------------------------- header
-
-/// Which columns hold a point, and which tell the line that it belongs to.
-struct Columns {
-    std::array<std::size_t, 3> at{0, 1, 2};
-    PointSpace space = PointSpace::Unstated;
-    PointOrder order = PointOrder::Unstated;
-    bool slice_from_one = false;  ///< the third column counts slices from 1
-    std::optional<std::array<std::size_t, 3>> normal;
-    bool normal_is_guess = false;       ///< the columns have no names
-    std::vector<std::size_t> line;      ///< rows that agree in these columns are one line
-    std::optional<std::size_t> shape;   ///< napari's shape-type
-    std::optional<std::size_t> vertex;  ///< the place of a mark in its line
-    bool closed = true;                 ///< lines whose shape is not told
-    std::string rule;
-
-    [[nodiscard]] std::size_t count() const {
-        std::size_t last = *std::max_element(at.begin(), at.end());
-        for (const std::size_t column : line) last = std::max(last, column);
-        return std::max({last, shape.value_or(0), vertex.value_or(0)}) + 1;
-    }
-};
-
-/// A column's name and what is said of its unit: "X (microns)" is {"x", "microns"}, "x_px" is {"x", "px"}.
-struct ColumnName {
-    std::string name;
-    std::string unit;
-};
-
-ColumnName parse_name(string_view text) {
-    std::string name = lower(trim(text));
-    for (const char* prefix : {"position ", "position_", "pos ", "pos_", "coord_", "point_", "//"})
-        if (name.rfind(prefix, 0) == 0) name.erase(0, std::strlen(prefix));
-    const std::size_t cut = name.find_first_of(" ([_");
-    if (cut == std::string::npos || cut == 0) return {name, ""};
-    std::string unit = name.substr(cut + 1);
-    std::erase_if(unit, [](char c) { return c == '(' || c == ')' || c == '[' || c == ']' || c == ' '; });
-    return {name.substr(0, cut), unit};
-}
-
-bool means_voxels(const std::string& unit) {
-    for (const char* word : {"px", "pix", "pixel", "pixels", "vx", "vox", "voxel", "voxels", "index"})
-        if (unit == word) return true;
-    return false;
-}
-
-/// The columns of a header by name; the first of each name counts.
-class Header {
-public:
-    explicit Header(const std::vector<string_view>& fields) : fields_(fields) {
-        for (std::size_t n = 0; n < fields.size(); ++n) {
-            const ColumnName column = parse_name(fields[n]);
-            columns_.try_emplace(column.name, n);
-            units_.try_emplace(column.name, column.unit);
-        }
-    }
-    [[nodiscard]] std::optional<std::size_t> find(const std::string& name) const {
-        const auto found = columns_.find(name);
-        return found == columns_.end() ? std::nullopt : std::optional(found->second);
-    }
-    [[nodiscard]] bool in_voxels(const std::string& name) const {
-        const auto found = units_.find(name);
-        return found != units_.end() && means_voxels(found->second);
-    }
-    /// "columns X, Y, Z": the columns as the file names them.
-    [[nodiscard]] std::string names(const std::array<std::size_t, 3>& at) const {
-        std::string text = "columns";
-        for (std::size_t a = 0; a < 3; ++a) text += (a == 0 ? " " : ", ") + std::string(fields_[at[a]]);
-        return text;
-    }
-
-private:
-    const std::vector<string_view>& fields_;
-    std::map<std::string, std::size_t> columns_;
-    std::map<std::string, std::string> units_;
-};
-
-/// napari's layers of points and shapes: (t,) z, y, x in voxels.
-std::optional<Columns> find_napari(const Header& header) {
-    std::vector<std::size_t> axes;
-    while (const auto axis = header.find("axis-" + std::to_string(axes.size()))) axes.push_back(*axis);
-    if (axes.size() < 3) return std::nullopt;
-    Columns columns;
-    columns.at = {axes[axes.size() - 3], axes[axes.size() - 2], axes[axes.size() - 1]};
-    columns.space = PointSpace::Index;
-    columns.order = PointOrder::ZYX;
-    columns.shape = header.find("shape-type");
-    columns.vertex = header.find("vertex-index");
-    const auto index = header.find("index");
-    const bool shapes = index && (columns.shape || columns.vertex);
-    if (shapes) columns.line = {*index};
-    columns.rule = header.names(columns.at) + (shapes ? " of napari shapes" : " of napari points");
-    if (axes.size() > 3) columns.rule += ", the axes before them (time, channel) passed over";
-    return columns;
-}
-
-void find_lines(const Header& header, const std::optional<std::size_t>& slice, Columns& columns) {
-    for (const auto& [name, closed] :
-         {std::pair{"contour", true}, {"polygon", true}, {"curve", true}, {"polyline", false}, {"path", false}}) {
-        const auto column = header.find(name);
-        if (!column) continue;
-        if (slice) columns.line.push_back(*slice);
-        columns.line.push_back(*column);
-        columns.closed = closed;
-        columns.rule += std::string(", lines by ") + (slice ? "slice and " : "") + name;
-        return;
-    }
-}
-
-std::optional<Columns> find_columns(const std::vector<string_view>& fields) {
-    const Header header(fields);
-    if (auto columns = find_napari(header)) return columns;
-    const auto x = header.find("x"), y = header.find("y"), slice = header.find("slice");
-    auto z = header.find("z");
-    const bool in_voxels = header.in_voxels("x") && header.in_voxels("y");
-    const bool slices = !z && slice;
-    if (slices) z = slice;
-    if (!x || !y || !z) return std::nullopt;
-    Columns columns;
-    columns.at = {*x, *y, *z};
-    columns.rule = header.names(columns.at);
-    if (in_voxels) {
-        columns.space = PointSpace::Index;
-        columns.order = PointOrder::XYZ;  // the names leave nothing open
-        if (slices) columns.rule += ", slices from 0";
-    } else if (slices) {
-        // Fiji's Results: slices from 1; X and Y in the image's unit wherever the image has one
-        columns.space = PointSpace::Slices;
-        columns.order = PointOrder::XYZ;
-        columns.slice_from_one = true;
-        columns.rule += " of Fiji Results, slices from 1, X and Y taken in the image's unit, not in pixels";
-    }
-    find_lines(header, slice, columns);
-    const auto nx = header.find("nx"), ny = header.find("ny"), nz = header.find("nz");
-    if (nx && ny && nz && columns.line.empty()) columns.normal = {*nx, *ny, *nz};
-    return columns;
-}
 
 // ---------------------------------------------------------------------------------------------- lines of marks
 
@@ -226,24 +90,16 @@ private:
 
 // ---------------------------------------------------------------------------------------------- rows
 
-char guess_delimiter(string_view line, bool blanks_only) {
-    if (line.find(';') != string_view::npos) return ';';
-    if (!blanks_only && line.find('\t') != string_view::npos) return '\t';
-    return line.find(',') != string_view::npos ? ',' : ' ';
+/// A coordinate, with a decimal point or a decimal comma.
+double read_coordinate(const std::string& path, std::size_t number, string_view field) {
+    if (const auto value = table_number(field); value && std::isfinite(*value)) return *value;
+    return to_coordinate(path, number, field);
 }
 
-/// A coordinate, with a decimal comma where semicolons part the columns.
-double read_coordinate(const std::string& path, std::size_t number, string_view field, char delimiter) {
-    if (delimiter != ';' || field.find(',') == string_view::npos) return to_coordinate(path, number, field);
-    std::string decimal(field);
-    std::replace(decimal.begin(), decimal.end(), ',', '.');
-    return to_coordinate(path, number, decimal);
-}
-
-Vec3 read_row(const std::string& path, std::size_t number, const std::vector<string_view>& fields, char delimiter,
+Vec3 read_row(const std::string& path, std::size_t number, const std::vector<string_view>& fields,
               const Columns& columns) {
     Vec3 point;
-    for (std::size_t a = 0; a < 3; ++a) point[a] = read_coordinate(path, number, fields[columns.at[a]], delimiter);
+    for (std::size_t a = 0; a < 3; ++a) point[a] = read_coordinate(path, number, fields[columns.at[a]]);
     if (columns.slice_from_one) point[2] -= 1;
     return point;
 }
@@ -253,7 +109,7 @@ Vec3 read_normal(const std::vector<string_view>& fields, const std::array<std::s
     Vec3 normal{0, 0, 0};
     for (std::size_t a = 0; a < 3; ++a) {
         if (at[a] >= fields.size()) return {0, 0, 0};
-        normal[a] = to_number(fields[at[a]]).value_or(0);
+        normal[a] = table_number(fields[at[a]]).value_or(0);
     }
     return std::isfinite(normal[0] + normal[1] + normal[2]) ? normal : Vec3{0, 0, 0};
 }
@@ -267,6 +123,141 @@ bool are_unit_vectors(const std::vector<Vec3>& all) {
     });
 }
 
+/// Lengths of the header's units, or of each row's, in the first one that is named.
+class RowUnits {
+public:
+    explicit RowUnits(const Columns& columns) : columns_(columns) {
+        for (const std::string& unit : columns.unit)
+            if (common_.empty()) common_ = unit;
+    }
+    void apply(const std::vector<string_view>& fields, Vec3& point) {
+        if (columns_.row_unit) {
+            const std::string own = unit_of_length(fields[*columns_.row_unit]);
+            if (common_.empty()) common_ = own;
+            for (double& x : point) x *= factor(own);
+            return;
+        }
+        for (std::size_t a = 0; a < 3; ++a) point[a] *= factor(columns_.unit[a]);
+    }
+    [[nodiscard]] const std::string& common() const { return common_; }
+
+private:
+    [[nodiscard]] double factor(const std::string& unit) const {
+        return unit.empty() || unit == common_ ? 1 : unit_in_metres(unit) / unit_in_metres(common_);
+    }
+
+    const Columns& columns_;
+    std::string common_;
+};
+
+/// Finds where a table begins, and how its columns are parted: behind a title, at a header that names x, y and z, or at
+/// the first row of numbers.
+class TableBegin {
+public:
+    TableBegin(std::string path, bool counted) : path_(std::move(path)), counted_(counted) {}
+
+    /// @returns whether the line is the header or the first row of numbers; the fields are then its own.
+    bool take(std::size_t number, string_view line, std::vector<string_view>& fields) {
+        const string_view trimmed = trim(line);
+        if (lower(trimmed.substr(0, 4)) == "sep=") return false;  // Excel's
+        for (const bool named : {true, false})
+            for (const char candidate : kDelimiters) {
+                if (candidate != ' ' && trimmed.find(candidate) == string_view::npos) continue;
+                split(candidate == '\t' ? line : trimmed, candidate, fields);
+                if (named ? !name_columns(fields) : !begins_with_numbers(fields)) continue;
+                if (!named) count_columns(fields);
+                delimiter = candidate;
+                return true;
+            }
+        note(number, trimmed, fields);
+        return false;
+    }
+    /// @throws Error InvalidInput: what the first line has that is no part of a table
+    [[noreturn]] void refuse() const { fail(path_, line_, why_.empty() ? "expected points, got none" : why_); }
+    [[nodiscard]] bool has_title() const { return title_ > 0; }
+
+    char delimiter = 0;
+    Columns columns;
+    bool is_header = false;
+    std::size_t needed = 3;
+
+private:
+    bool name_columns(const std::vector<string_view>& fields) {
+        if (std::any_of(fields.begin(), fields.end(), [](string_view f) { return table_number(f).has_value(); }))
+            return false;
+        const std::optional<Columns> found = find_columns(fields);
+        if (!found) return false;
+        columns = *found;
+        is_header = true;
+        needed = columns.count();
+        tell_title();
+        return true;
+    }
+    void count_columns(const std::vector<string_view>& fields) {
+        if (is_table_without_names_) fail(path_, line_, why_);
+        columns.rule = fields.size() > 3
+                           ? "the first three of " + std::to_string(fields.size()) + " columns without names"
+                           : "three columns without names";
+        if (fields.size() == 6) columns.normal = {3, 4, 5};
+        columns.normal_is_guess = columns.normal.has_value();
+        if (title_ > 0 && !is_word_only_) fail(path_, line_, why_);
+        tell_title();
+    }
+    void tell_title() {
+        if (title_ > 0)
+            columns.rule += ", below " + std::to_string(title_) + (title_ > 1 ? " lines" : " line") + " of title";
+    }
+    /// Of a line that is neither.
+    void note(std::size_t number, string_view line, const std::vector<string_view>& fields_) {
+        constexpr std::size_t kMostTitle = 100;
+        std::vector<string_view> fields = fields_;
+        for (const char candidate : {';', '\t', ','})
+            if (line.find(candidate) != string_view::npos) {
+                split(line, candidate, fields);
+                break;
+            }
+        const bool has_number =
+            std::any_of(fields.begin(), fields.end(), [](string_view f) { return table_number(f).has_value(); });
+        // .pts begins with the number of points
+        if (counted_ && fields.size() == 1 && has_number && title_ == 0) return;
+        if (why_.empty()) {
+            line_ = number;
+            why_ =
+                !has_number && fields.size() >= 3
+                    ? "expected columns named x, y, z or three numbers, got " + quote(line)
+                : fields.size() < 3
+                    ? "expected 3 numbers, got " + std::to_string(fields.size()) + " in " + quote(line)
+                    : "expected a number, got " + quote(*std::find_if(fields.begin(), fields.end(),
+                                                                      [](string_view f) { return !table_number(f); }));
+        }
+        is_table_without_names_ = is_table_without_names_ || (!has_number && fields.size() >= 3);
+        is_word_only_ = is_word_only_ && !has_number;
+        if (++title_ > kMostTitle) refuse();
+    }
+
+    std::string path_, why_;
+    bool counted_;  ///< the number of points may come first
+    bool is_table_without_names_ = false, is_word_only_ = true;
+    std::size_t line_ = 1, title_ = 0;
+};
+
+/// A row below the header that goes on with it, as TrackMate has three: other names, or units. Takes its units.
+bool goes_on_with_header(const std::vector<string_view>& fields, Columns& columns) {
+    std::array<std::string, 3> units;
+    for (std::size_t a = 0; a < 3; ++a) {
+        const string_view field = fields[columns.at[a]];
+        const std::string text = lower(field), name = parse_name(field).name;
+        constexpr std::array<string_view, 3> kNames{"x", "y", "z"};
+        units[a] = unit_of_length(field);
+        const bool in_brackets = field.size() > 1 && (field.front() == '(' || field.front() == '[');
+        if (!field.empty() && name != kNames[a] && units[a].empty() && !in_brackets && !means_voxels(text))
+            return false;
+    }
+    for (std::size_t a = 0; a < 3; ++a)
+        if (columns.unit[a].empty()) columns.unit[a] = units[a];
+    return true;
+}
+
 }  // namespace
 
 PointTable parse_columns(const std::string& path, const std::string& text, bool blanks_only) {
@@ -275,55 +266,44 @@ PointTable parse_columns(const std::string& path, const std::string& text, bool 
     Lines lines(text);
     string_view line;
     std::vector<string_view> fields;
-    char delimiter = 0;
-    Columns columns;
-    LineCollector collector(columns);
-    std::size_t needed = 0;
+    TableBegin begin(path, blanks_only);
+    Columns& columns = begin.columns;
+    std::optional<LineCollector> collector;
+    std::optional<RowUnits> units;
     while (lines.next_untrimmed(line)) {
         line = line.substr(0, line.find('#'));
         const string_view trimmed = trim(line);
         if (trimmed.empty() || trimmed.substr(0, 2) == "//") continue;
-        const bool first = delimiter == 0;
-        if (first) delimiter = guess_delimiter(trimmed, blanks_only);
-        split(delimiter == '\t' ? line : trimmed, delimiter, fields);
-        line = trimmed;
-        if (first) {
-            std::optional<Columns> found;
-            const bool has_number =
-                std::any_of(fields.begin(), fields.end(), [](string_view f) { return to_number(f).has_value(); });
-            if (!has_number) found = find_columns(fields);
-            if (found) columns = *found;
-            needed = columns.count();
-            if (found) continue;
-            // .pts begins with the number of points
-            if (blanks_only && fields.size() == 1 && has_number) {
-                delimiter = 0;
-                continue;
-            }
-            if (!has_number && fields.size() >= 3)
-                fail(path, lines.number(), "expected columns named x, y, z or three numbers, got " + quote(line));
-            columns.rule = fields.size() > 3
-                               ? "the first three of " + std::to_string(fields.size()) + " columns without names"
-                               : "three columns without names";
-            if (fields.size() == 6) columns.normal = {3, 4, 5};
-            columns.normal_is_guess = columns.normal.has_value();
+        if (begin.delimiter == 0) {
+            if (!begin.take(lines.number(), line, fields) || begin.is_header) continue;
+        } else {
+            split(begin.delimiter == '\t' ? line : trimmed, begin.delimiter, fields);
         }
-        if (fields.size() < needed)
+        line = trimmed;
+        if (fields.size() < begin.needed)
             fail(path, lines.number(),
-                 "expected " + std::to_string(needed) + (needed == 3 ? " numbers" : " columns") + ", got " +
+                 "expected " + std::to_string(begin.needed) + (begin.needed == 3 ? " numbers" : " columns") + ", got " +
                      std::to_string(fields.size()) + " in " + quote(line));
-        const Vec3 point = read_row(path, lines.number(), fields, delimiter, columns);
+        if (!units) {
+            if (begin.is_header && goes_on_with_header(fields, columns)) continue;
+            units.emplace(columns);
+            collector.emplace(columns);
+        }
+        Vec3 point = read_row(path, lines.number(), fields, columns);
+        units->apply(fields, point);
         if (columns.normal) table.normals.push_back(read_normal(fields, *columns.normal));
         if (columns.line.empty())
             table.points.push_back(point);
         else
-            collector.add(path, lines.number(), fields, point);
+            collector->add(path, lines.number(), fields, point);
     }
-    collector.finish(path, table);
+    if (begin.delimiter == 0 && begin.has_title()) begin.refuse();
+    if (collector) collector->finish(path, table);
     if (columns.normal_is_guess && !are_unit_vectors(table.normals)) table.normals.clear();
     for (Vec3& n : table.normals) n = normal_of(n);
     table.space = columns.space;
     table.order = columns.order;
+    if (units) table.unit = units->common();
     table.rule = columns.rule;
     return table;
 }

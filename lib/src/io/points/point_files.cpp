@@ -36,8 +36,13 @@ struct Format {
     Parser parse;
 };
 
-PointTable parse_table(const std::string& path, const std::string& text) { return parse_columns(path, text, false); }
-PointTable parse_blanks(const std::string& path, const std::string& text) { return parse_columns(path, text, true); }
+PointTable parse_table(const std::string& path, const std::string& text) {
+    return parse_columns(path, to_utf8(text), false);
+}
+PointTable parse_blanks(const std::string& path, const std::string& bytes) {
+    const std::string text = to_utf8(bytes);
+    return is_ptx(text) ? parse_ptx(path, text) : parse_columns(path, text, true);
+}
 
 PointTable parse_one_roi(const std::string& path, const std::string& bytes) {
     return parse_roi(path, bytes, fs::path(path).stem().string());
@@ -49,16 +54,14 @@ PointTable refuse_laz(const std::string& path, const std::string&) {
 }
 
 const std::vector<Format>& formats() {
-    static const std::vector<Format> list{{".xyz", parse_blanks},    {".txt", parse_blanks},
-                                          {".pts", parse_blanks},    {".asc", parse_blanks},
-                                          {".csv", parse_table},     {".tsv", parse_table},
-                                          {".ply", parse_ply},       {".obj", parse_obj},
-                                          {".off", parse_off},       {".roi", parse_one_roi},
-                                          {".zip", parse_roi_zip},   {".json", parse_markups},
-                                          {".fcsv", parse_fcsv},     {".landmarks", parse_landmarks},
-                                          {".lmk", parse_landmarks}, {".annot", parse_annotations},
-                                          {".pcd", parse_pcd},       {".las", parse_las},
-                                          {".laz", refuse_laz}};
+    static const std::vector<Format> list{
+        {".xyz", parse_blanks},    {".txt", parse_blanks},        {".pts", parse_blanks},
+        {".asc", parse_blanks},    {".csv", parse_table},         {".tsv", parse_table},
+        {".ptx", parse_blanks},    {".ply", parse_ply},           {".obj", parse_obj},
+        {".off", parse_off},       {".roi", parse_one_roi},       {".zip", parse_roi_zip},
+        {".json", parse_markups},  {".fcsv", parse_fcsv},         {".landmarks", parse_landmarks},
+        {".lmk", parse_landmarks}, {".annot", parse_annotations}, {".pcd", parse_pcd},
+        {".las", parse_las},       {".laz", refuse_laz}};
     return list;
 }
 

@@ -15,6 +15,7 @@ struct PointTable {
     std::optional<Vec3> sensor;
     PointSpace space = PointSpace::Unstated;
     PointOrder order = PointOrder::Unstated;
+    std::string unit;  ///< of lengths, as normal_unit() has it; empty: not said
     std::string rule;  ///< which columns or elements, for people
 };
 

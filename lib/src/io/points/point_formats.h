@@ -29,6 +29,10 @@ PointTable parse_landmarks(const std::string& path, const std::string& text);
 /// ITK-SNAP's .annot: landmarks and line segments, in voxels whose corners are at integers.
 PointTable parse_annotations(const std::string& path, const std::string& text);
 
+/// Leica's text of scans: columns, rows, the scanner's place and axes, and a matrix before the points of each.
+[[nodiscard]] bool is_ptx(const std::string& text);
+PointTable parse_ptx(const std::string& path, const std::string& text);
+
 PointTable parse_pcd(const std::string& path, const std::string& bytes);
 PointTable parse_las(const std::string& path, const std::string& bytes);
 

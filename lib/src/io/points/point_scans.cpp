@@ -8,7 +8,8 @@
 #include "io/points/point_formats.h"
 #include "io/points/point_text.h"
 
-// Laser scans: PCD (pointclouds.org, "The PCD file format", version 0.7) and LAS (ASPRS, versions 1.0 to 1.4).
+// Laser scans: PCD (pointclouds.org, "The PCD file format", version 0.7), LAS (ASPRS, versions 1.0 to 1.4) and PTX
+// (Leica Geosystems).
 namespace covol::detail {
 namespace {
 
@@ -219,6 +220,47 @@ std::string unpack_pcd(const std::string& path, const PcdHeader& header, string_
     return content;
 }
 
+// ---------------------------------------------------------------------------------------------- PTX
+
+/// What comes before the points of one scan: columns, rows, the scanner's place, its three axes, and a matrix by which
+/// row vectors are multiplied.
+struct PtxHeader {
+    std::uint64_t columns = 0, rows = 0;
+    Vec3 scanner{};
+    std::array<std::array<double, 4>, 4> matrix{};
+
+    [[nodiscard]] Vec3 place(const Vec3& p) const {
+        Vec3 world{};
+        for (std::size_t w = 0; w < 3; ++w)
+            world[w] = p[0] * matrix[0][w] + p[1] * matrix[1][w] + p[2] * matrix[2][w] + matrix[3][w];
+        return world;
+    }
+};
+
+/// How many numbers each line of a header has.
+constexpr std::array<std::size_t, 10> kPtxNumbers{1, 1, 3, 3, 3, 3, 4, 4, 4, 4};
+
+PtxHeader read_ptx_header(const std::string& path, Lines& lines) {
+    constexpr std::uint64_t kMost = 1U << 20U;
+    PtxHeader header;
+    string_view line;
+    std::vector<string_view> words;
+    for (std::size_t n = 0; n < kPtxNumbers.size(); ++n) {
+        if (!lines.next_words(line, words)) fail(path, lines.number(), "the header of a PTX scan ends early");
+        if (words.size() != kPtxNumbers[n])
+            fail(path, lines.number(),
+                 "expected " + std::to_string(kPtxNumbers[n]) + " numbers in line " + std::to_string(n + 1) +
+                     " of a PTX scan's header, got " + quote(line));
+        if (n < 2) (n == 0 ? header.columns : header.rows) = to_count(path, lines.number(), words[0], kMost);
+        for (std::size_t w = 0; w < words.size(); ++w) {
+            const double value = to_coordinate(path, lines.number(), words[w]);
+            if (n == 2) header.scanner[w] = value;
+            if (n >= 6) header.matrix[n - 6][w] = value;
+        }
+    }
+    return header;
+}
+
 }  // namespace
 
 PointTable parse_pcd(const std::string& path, const std::string& bytes) {
@@ -275,6 +317,53 @@ PointTable parse_las(const std::string& path, const std::string& content) {
         for (std::uint64_t a = 0; a < 3; ++a)
             table.points[n][a] = offset[a] + scale[a] * bytes.at<std::int32_t>(begin + n * stride + 4 * a);
     table.rule = "points of a LAS 1." + std::to_string(minor) + " (format " + std::to_string(format) + ")";
+    return table;
+}
+
+bool is_ptx(const std::string& text) {
+    Lines lines(text);
+    string_view line;
+    std::vector<string_view> words;
+    for (const std::size_t count : kPtxNumbers) {
+        if (!lines.next_words(line, words) || words.size() != count) return false;
+        for (const string_view word : words)
+            if (!to_number(word)) return false;
+    }
+    // The matrix of a motion ends with 1.
+    return to_number(words[3]) == 1.0;
+}
+
+PointTable parse_ptx(const std::string& path, const std::string& text) {
+    PointTable table;
+    Lines lines(text);
+    std::size_t scans = 0;
+    std::uint64_t empty = 0;
+    string_view line;
+    std::vector<string_view> words;
+    while (!trim(lines.rest()).empty() && trim(lines.rest()).find_first_not_of("\r\n\t ") != string_view::npos) {
+        const PtxHeader header = read_ptx_header(path, lines);
+        ++scans;
+        for (std::uint64_t n = 0; n < header.columns * header.rows; ++n) {
+            if (!lines.next_words(line, words))
+                fail(path, lines.number(),
+                     "expected " + std::to_string(header.columns * header.rows) + " points of scan " +
+                         std::to_string(scans) + ", got " + std::to_string(n) + "; the file is truncated");
+            if (words.size() < 3) fail(path, lines.number(), "expected 3 numbers, got " + quote(line));
+            Vec3 point{};
+            for (std::size_t a = 0; a < 3; ++a) point[a] = to_coordinate(path, lines.number(), words[a]);
+            // Where nothing came back.
+            if (point == Vec3{0, 0, 0})
+                ++empty;
+            else
+                table.points.push_back(header.place(point));
+        }
+        table.sensor = header.scanner;
+    }
+    if (scans > 1) table.sensor.reset();
+    table.space = PointSpace::World;
+    table.order = PointOrder::XYZ;
+    table.rule = "points of " + std::to_string(scans) + (scans == 1 ? " PTX scan" : " PTX scans") +
+                 ", by the matrix of its header, " + std::to_string(empty) + " without an echo passed over";
     return table;
 }
 

@@ -10,9 +10,11 @@
 #include "covol/error.h"
 #include "covol/file_set.h"
 #include "covol/points_text.h"
+#include "image/to_world.h"
 #include "io/points/point_files.h"
 #include "io/points/point_formats.h"
 #include "io/points/point_reading.h"
+#include "io/points/point_text.h"
 
 namespace covol {
 namespace {
@@ -80,6 +82,11 @@ PointCloud to_cloud(const std::string& path, detail::PointTable table, const Rea
         if (cloud.sensor) table.rule += " seen from a sensor";
     }
     cloud.rule = table.rule + ", as " + detail::describe(cloud.reading);
+    // Who gives a scale knows better than the file.
+    const bool has_lengths = cloud.space != PointSpace::Index && !table.unit.empty();
+    if (has_lengths)
+        cloud.rule += options.scale == 1 ? detail::unit_note(table.unit)
+                                         : ", times a scale that is given, not in " + table.unit + " as the file says";
     return cloud;
 }
 
@@ -93,7 +100,7 @@ PointCloud read_points(const std::string& path, const ReadPointsOptions& options
 PointCloud parse_points(const std::string& text, const std::string& source, const ReadPointsOptions& options) {
     require_valid(options, "read_points");
     if (text.empty()) throw Error(Errc::InvalidInput, "read_points: " + source + ": expected points, got nothing");
-    return to_cloud(source, detail::parse_columns(source, text, true), options);
+    return to_cloud(source, detail::parse_columns(source, detail::to_utf8(text), true), options);
 }
 
 void write_points(const std::string& path, const std::vector<Vec3>& points, const std::string& comment) {

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <sstream>
@@ -18,6 +19,17 @@ struct Reading {
     int changes = 0;     ///< how many things are read otherwise than now
     std::string advice;  ///< the options that ask for it, as messages name them
 };
+
+/// Between units that people use; the likelier ones first.
+constexpr std::array<double, 15> kScales{1.0,  1e3, 1e-3, 1e6, 1e-6, 10,   0.1,     100,
+                                         0.01, 1e4, 1e-4, 1e5, 1e-5, 25.4, 1 / 25.4};
+
+/// 0: none, 1: between neighbours such as micrometre and millimetre, 2: two of these, 3: others.
+int rank_of_scale(double scale) {
+    for (const auto& [factor, rank] : {std::pair(1.0, 0), {1e3, 1}, {1e-3, 1}, {1e6, 2}, {1e-6, 2}})
+        if (std::abs(scale / factor - 1) < 1e-9) return rank;
+    return 3;
+}
 
 const char* advice_of(PointSpace space) {
     switch (space) {
@@ -42,7 +54,7 @@ std::string name_of(const Reading& reading, const ReadPointsOptions& now) {
             default:
                 add(now.space == PointSpace::Ras ? "they are in LPS, not in RAS" : "they are world units, not voxels");
         }
-    if (reading.options.scale != now.scale) add("their unit is another than the image's (micrometre, millimetre)");
+    if (reading.options.scale != now.scale) add("their unit is another than the image's");
     if (reading.options.channels != now.channels) add("their slices count the channels of a hyperstack");
     return text;
 }
@@ -70,15 +82,15 @@ public:
     [[nodiscard]] std::vector<Reading> remedies() const {
         std::vector<Reading> found;
         const auto rank = [&](const Reading& r) {
-            return std::pair(r.options.scale != now_.scale && !in_voxels(r.options), r.changes);
+            return std::pair(in_voxels(r.options) ? 0 : rank_of_scale(r.options.scale / now_.scale), r.changes);
         };
         std::vector<Reading> candidates = others();
         std::stable_sort(candidates.begin(), candidates.end(),
                          [&](const Reading& a, const Reading& b) { return rank(a) < rank(b); });
         for (const Reading& reading : candidates) {
             if (!found.empty() && rank(reading) > rank(found.front())) break;
-            if (rank(reading).first && is_speck(reading)) continue;
-            if (in_voxels(reading.options) && is_in_one_voxel(reading)) continue;
+            if (rank(reading).first > 0 && is_speck(reading)) continue;
+            if (rank(reading).first == 0 && is_in_one_voxel(reading)) continue;
             if (fits(reading)) found.push_back(reading);
         }
         // Voxels counted from 1 are told only where counting from 0 does not do.
@@ -127,8 +139,11 @@ private:
 
     /// A cloud point's position if it were read otherwise.
     [[nodiscard]] Vec3 place(const ReadPointsOptions& reading, const Vec3& point) const {
-        return detail::to_world(detail::space_after(reading.space), detail::read_as(reading, detail::undo(now_, point)),
-                                geometry_);
+        const PointSpace space = detail::space_after(reading.space);
+        // Who gives a scale does without the unit that the file names.
+        const double unit = reading.scale == now_.scale ? detail::unit_factor(cloud_, geometry_) : 1;
+        const Vec3 read = detail::read_as(reading, detail::undo(now_, point));
+        return detail::to_world(space, detail::scaled(space, read, unit), geometry_);
     }
 
     [[nodiscard]] bool fits(const Reading& reading) const {
@@ -191,7 +206,7 @@ private:
                 continue;
             const bool voxels = in_voxels({space});
             for (const PointOrder order : {PointOrder::XYZ, PointOrder::ZYX})
-                for (const double scale : {1.0, 1e3, 1e-3}) {
+                for (const double scale : kScales) {
                     if (voxels && scale != 1) continue;
                     add(list, {space, order, voxels && lengths ? 1.0 : now_.scale * scale, 1});
                 }
@@ -256,8 +271,8 @@ void check_inside(const PointCloud& cloud, const ImageGeometry& geometry, const 
         const std::vector<Reading> remedies = checker.remedies();
         const std::string first = !remedies.empty() ? remedies.front().advice : geometry.spacing_known ? "" : "spacing";
         throw Error(Errc::InvalidInput,
-                    "check_inside: " + cloud.source + ": " + std::to_string(outside) + " of " +
-                        std::to_string(cloud.points.size()) + " points lie outside the image: " + checker.boxes() +
+                    cloud.source + ": " + std::to_string(outside) + " of " + std::to_string(cloud.points.size()) +
+                        " points lie outside the image: " + checker.boxes() +
                         advice_of(checker, remedies, geometry.spacing_known),
                     first.substr(0, first.find(' ')));
     }

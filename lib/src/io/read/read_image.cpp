@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <tuple>
 #include <utility>
 
 #include "base/file.h"
@@ -13,11 +14,13 @@
 #include "covol/vdb_io.h"
 #include "image/geometry_check.h"
 #include "io/chunked/zarr.h"
+#include "io/dicom/dicom_header.h"
 #include "io/hdf5/hdf5_image.h"
-#include "io/image/dicom_header.h"
 #include "io/image/image_formats.h"
+#include "io/image/segmentation.h"
 #include "io/image/tiff.h"
 #include "io/modules/reader.h"
+#include "io/pixels/nrrd_segments.h"
 #include "limits/memory_budget.h"
 
 namespace covol {
@@ -36,6 +39,16 @@ bool is_one_of(const std::string& text, std::initializer_list<const char*> list)
     return std::any_of(list.begin(), list.end(), [&](const char* known) { return text == known; });
 }
 
+/// "stack.tif:ZYX" is {"stack.tif", "ZYX"}: what the planes of a TIFF are, where its description is wrong.
+std::pair<std::string, std::string> split_axes(const std::string& given) {
+    const std::size_t colon = given.rfind(':');
+    std::error_code status;
+    if (colon == std::string::npos || fs::exists(given, status)) return {given, ""};
+    const std::string path = given.substr(0, colon);
+    if (!is_one_of(detail::extension(path), {".tif", ".tiff", ".btf", ".tf8"})) return {given, ""};
+    return {path, given.substr(colon + 1)};
+}
+
 /// The HDF5 library reads and writes outside its buffers where a file is damaged: what would be read of it is read by
 /// the reading program first. It keeps objects of damaged headers, too, which this process then has not seen.
 std::unique_ptr<ImageFile> open_tried_hdf5(const detail::Hdf5Name& name) {
@@ -46,6 +59,9 @@ std::unique_ptr<ImageFile> open_tried_hdf5(const detail::Hdf5Name& name) {
 std::unique_ptr<ImageFile> open_image(const std::string& given, const ReadImageOptions& options,
                                       const RunContext& run) {
     auto [path, grid] = split_grid_name(given);
+    std::string axes, segment;
+    std::tie(path, axes) = split_axes(path);
+    std::tie(path, segment) = detail::split_segment_name(path);
     const std::optional<detail::Hdf5Name> hdf5 = detail::split_hdf5_name(given);
     if (hdf5) path = hdf5->path;
     std::error_code status;
@@ -56,10 +72,11 @@ std::unique_ptr<ImageFile> open_image(const std::string& given, const ReadImageO
     if (!fs::is_regular_file(path, status) || !std::ifstream(path).good())
         throw read_error(Errc::Io, path, "cannot be opened");
     const std::string end = detail::extension(path);
-    const bool itk = is_one_of(end, {".nrrd", ".nhdr", ".nii", ".nii.gz", ".mha", ".mhd"});
+    const bool itk = is_one_of(end, {".nrrd", ".nhdr", ".mha", ".mhd"});
+    const bool nifti = is_one_of(end, {".nii", ".nii.gz"});
     const bool mrc = is_one_of(end, {".mrc", ".map", ".rec", ".st", ".ccp4", ".ali"});
     const bool tiff = is_one_of(end, {".tif", ".tiff", ".btf", ".tf8"});
-    const bool known = itk || mrc || tiff || hdf5 || end == ".npy" || end == ".vdb";
+    const bool known = itk || nifti || mrc || tiff || hdf5 || end == ".npy" || end == ".vdb";
     // Names of slices often end in numbers.
     const bool marked = !known && (is_one_of(end, {".dcm", ".ima", ".dicom"}) || detail::is_dicom(path));
     if (!marked && !known)
@@ -68,9 +85,11 @@ std::unique_ptr<ImageFile> open_image(const std::string& given, const ReadImageO
     if (fs::file_size(path) == 0) throw read_error(Errc::InvalidInput, path, "the file is empty");
     if (marked) return detail::open_dicom(path, options.frame, run);
     if (hdf5) return open_tried_hdf5(*hdf5);
-    if (itk) return detail::open_itk(path);
+    if (itk && !segment.empty()) return detail::open_segment(path, detail::open_itk(path, run), segment);
+    if (itk) return detail::open_itk(path, run);
+    if (nifti) return detail::open_nifti(path, run);
     if (mrc) return detail::open_mrc(path);
-    if (tiff) return detail::open_tiff(path, run);
+    if (tiff) return detail::open_tiff(path, axes, run);
     if (end == ".npy") return detail::open_npy(path);
     return detail::open_vdb_image(path, grid);
 }
@@ -103,7 +122,7 @@ ImageInfo corrected_info(const std::string& path, const ImageFile& file, const R
 
 /// The index along channels or frames that the caller chose, or the only one there is.
 std::uint64_t choose(const std::string& path, const std::string& what, const std::optional<int>& wanted, int count,
-                     const std::vector<std::string>& names) {
+                     const std::vector<std::string>& names, const std::string& advice = {}) {
     if (!wanted && count == 1) return 0;
     if (wanted && *wanted < count) return std::uint64_t(*wanted);
     std::string list = "0 to " + std::to_string(count - 1);
@@ -114,7 +133,8 @@ std::uint64_t choose(const std::string& path, const std::string& what, const std
     }
     const std::string choice = "; choose " + list + " with `" + what + "`";
     if (!wanted)
-        throw read_error(Errc::Unsupported, path, "expected one " + what + ", got " + std::to_string(count) + choice,
+        throw read_error(Errc::Unsupported, path,
+                         "expected one " + what + ", got " + std::to_string(count) + (advice.empty() ? choice : advice),
                          what);
     throw read_error(Errc::InvalidOptions, path, what + " " + std::to_string(*wanted) + " does not exist" + choice,
                      what);
@@ -122,7 +142,8 @@ std::uint64_t choose(const std::string& path, const std::string& what, const std
 
 PixelRequest choose_pixels(const std::string& path, const ImageInfo& info, const ReadImageOptions& options) {
     PixelRequest request;
-    request.channel = choose(path, "channel", options.channel, info.channels, info.channel_names);
+    request.channel =
+        choose(path, "channel", options.channel, info.channels, info.channel_names, detail::advice_on_segments(path));
     request.frame = choose(path, "frame", options.frame, info.frames, {});
     request.box = options.roi ? voxels_around(info.geometry, *options.roi) : detail::whole_box(info.geometry.size);
     return request;

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <limits>
 
+#include "base/matrix.h"
 #include "covol/error.h"
 #include "io/pixels/nifti_space.h"
 #include "io/pixels/raw_image.h"
@@ -127,6 +128,15 @@ std::array<double, 3> quaternion(const Matrix3& r) {
 
 using nifti::kCodes, nifti::kPixdim, nifti::kQuatern, nifti::kSrow;
 
+bool is_sheared(const Matrix3& direction) {
+    double most = 0;
+    for (std::size_t a = 0; a < 3; ++a)
+        for (std::size_t b = 0; b < a; ++b)
+            most = std::max(most, std::abs(direction[0][a] * direction[0][b] + direction[1][a] * direction[1][b] +
+                                           direction[2][a] * direction[2][b]));
+    return most > 1e-3;
+}
+
 /// Whether one of the forms that an input stated means the lattice that this header has.
 bool still_holds(const NiftiSpace& space, const std::string& header, double spacing) {
     constexpr double kRounding = 1e-3;  // of voxels, and of rotations
@@ -150,8 +160,9 @@ bool still_holds(const NiftiSpace& space, const std::string& header, double spac
     const bool same_side = (space.qfac < 0) == (own(kPixdim, 0) < 0);
     // Of half a turn both signs of the axis mean the same.
     const bool turn = turns_alike(1) || (square > 1 - kRounding && turns_alike(-1));
-    return (space.codes[0] > 0 && same_side && turn && lies_alike(space.qform, kQuatern, 3)) ||
-           (space.codes[1] > 0 && lies_alike(space.sform, kSrow, 0));
+    // Readers take the sform where it has a code.
+    if (space.codes[1] > 0) return lies_alike(space.sform, kSrow, 0);
+    return space.codes[0] > 0 && same_side && turn && lies_alike(space.qform, kQuatern, 3);
 }
 
 /// The 348 bytes of NIfTI-1 and four more; the world is RAS. https://nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h
@@ -175,9 +186,7 @@ std::string nifti_header(const std::string& path, const PixelSource& source, con
     Matrix3 ras = g.direction;
     for (std::size_t b = 0; b < 3; ++b)
         for (std::size_t a = 0; a < 2; ++a) ras[a][b] = -ras[a][b];
-    const double det = ras[0][0] * (ras[1][1] * ras[2][2] - ras[1][2] * ras[2][1]) -
-                       ras[0][1] * (ras[1][0] * ras[2][2] - ras[1][2] * ras[2][0]) +
-                       ras[0][2] * (ras[1][0] * ras[2][1] - ras[1][1] * ras[2][0]);
+    const double det = determinant(ras);
     Matrix3 rotation = ras;
     if (det < 0)
         for (auto& row : rotation) row[2] = -row[2];
@@ -195,7 +204,8 @@ std::string nifti_header(const std::string& path, const PixelSource& source, con
     put_float(112, 1);    // slope
     const auto unit = std::find(kNiftiUnits.begin() + 1, kNiftiUnits.end(), g.unit);
     header[123] = char(unit == kNiftiUnits.end() ? 0 : unit - kNiftiUnits.begin());
-    put(kCodes, std::int16_t(1));
+    // A qform has no place for sheared axes.
+    put(kCodes, std::int16_t(is_sheared(g.direction) ? 0 : 1));
     put(kCodes + 2, std::int16_t(1));
     const std::optional<NiftiSpace> stated = read_nifti_space(like);
     if (stated && still_holds(*stated, header, g.smallest_spacing())) {

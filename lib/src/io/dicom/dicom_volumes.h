@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "io/image/dicom_slices.h"
+#include "io/dicom/dicom_slices.h"
 
 namespace covol::detail {
 

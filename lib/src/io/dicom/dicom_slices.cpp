@@ -1,6 +1,6 @@
 // What a DICOM file says of each of its planes: by its functional groups where it has them (PS3.3 C.7.6.16), else by
 // its own elements.
-#include "io/image/dicom_slices.h"
+#include "io/dicom/dicom_slices.h"
 
 #include <algorithm>
 #include <charconv>
@@ -8,7 +8,7 @@
 #include <filesystem>
 
 #include "base/number.h"
-#include "io/image/dicom_header.h"
+#include "io/dicom/dicom_header.h"
 #include "io/modules/reader.h"
 
 namespace covol::detail {

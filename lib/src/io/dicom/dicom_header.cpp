@@ -1,4 +1,4 @@
-#include "io/image/dicom_header.h"
+#include "io/dicom/dicom_header.h"
 
 #include <algorithm>
 #include <array>

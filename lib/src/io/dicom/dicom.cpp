@@ -5,8 +5,8 @@
 #include <optional>
 #include <variant>
 
-#include "io/image/dicom_header.h"
-#include "io/image/dicom_volumes.h"
+#include "io/dicom/dicom_header.h"
+#include "io/dicom/dicom_volumes.h"
 #include "io/image/image_formats.h"
 #include "io/modules/reader.h"
 

@@ -1,6 +1,6 @@
 // Puts the planes of a DICOM series together: ITK's own helper neither says what lies in a folder nor finds a missing
 // slice, and takes the frames of a file as evenly spaced in its order.
-#include "io/image/dicom_volumes.h"
+#include "io/dicom/dicom_volumes.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,49 @@
+#pragma once
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "covol/points.h"
+
+/// What the columns of a table are, by their names.
+namespace covol::detail {
+
+/// Which columns hold a point, and which tell the line that it belongs to.
+struct Columns {
+    std::array<std::size_t, 3> at{0, 1, 2};
+    PointSpace space = PointSpace::Unstated;
+    PointOrder order = PointOrder::Unstated;
+    bool slice_from_one = false;  ///< the third column counts slices from 1
+    std::optional<std::array<std::size_t, 3>> normal;
+    bool normal_is_guess = false;         ///< the columns have no names
+    std::vector<std::size_t> line;        ///< rows that agree in these columns are one line
+    std::optional<std::size_t> shape;     ///< napari's shape-type
+    std::optional<std::size_t> vertex;    ///< the place of a mark in its line
+    bool closed = true;                   ///< lines whose shape is not told
+    std::array<std::string, 3> unit{};    ///< of each coordinate, where a header names a unit of length
+    std::optional<std::size_t> row_unit;  ///< the column that names each row's unit
+    std::string rule;
+
+    [[nodiscard]] std::size_t count() const {
+        std::size_t last = *std::max_element(at.begin(), at.end());
+        for (const std::size_t column : line) last = std::max(last, column);
+        return std::max({last, shape.value_or(0), vertex.value_or(0), row_unit.value_or(0)}) + 1;
+    }
+};
+
+/// A column's name and what is said of its unit: "X (microns)" is {"x", "microns"}, "x_px" is {"x", "px"}.
+struct ColumnName {
+    std::string name;
+    std::string unit;
+};
+
+[[nodiscard]] ColumnName parse_name(std::string_view text);
+[[nodiscard]] bool means_voxels(const std::string& unit);
+
+/// Nothing where the fields name no x, y and z (or slice), nor napari's axes.
+[[nodiscard]] std::optional<Columns> find_columns(const std::vector<std::string_view>& fields);
+
+}  // namespace covol::detail

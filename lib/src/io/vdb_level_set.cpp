@@ -1,0 +1,76 @@
+// The level set of a .vdb file, among grids of other names and classes.
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/Morphology.h>
+#include <openvdb/tools/ValueTransformer.h>
+
+#include <algorithm>
+
+#include "base/number.h"
+#include "covol/domain.h"
+#include "covol/error.h"
+#include "covol/vdb_io.h"
+
+namespace covol {
+namespace {
+
+/// The name of the level set that is taken where none is named.
+std::string choose_level_set(const std::string& path, const RunContext& run) {
+    std::vector<std::string> level_sets, others;
+    for (const VdbGridInfo& grid : list_vdb(path)) {
+        if (!grid.type.starts_with(FloatGrid::gridType()) || grid.grid_class == "fog volume") continue;
+        (grid.grid_class == "level set" ? level_sets : others).push_back(grid.name);
+    }
+    const bool has_surface = std::find(level_sets.begin(), level_sets.end(), "surface") != level_sets.end();
+    if (level_sets.empty()) std::swap(level_sets, others);
+    if (level_sets.empty()) return {};
+    const std::string chosen = has_surface ? "surface" : level_sets.front();
+    if (level_sets.size() > 1) {
+        std::string list;
+        for (const std::string& name : level_sets) list += (list.empty() ? "" : ", ") + name;
+        const bool last = level_sets.back() != chosen;
+        run.warn(path + ": '" + chosen + "' is taken of the level sets " + list + "; name one: " + path + ":" +
+                 (last ? level_sets.back() : level_sets.front()));
+    }
+    return chosen;
+}
+
+/// Of active voxels, tiles and what lies beyond them.
+std::array<float, 2> range_of(const FloatGrid& grid) {
+    std::array<float, 2> range{grid.background(), grid.background()};
+    for (auto value = grid.cbeginValueAll(); value; ++value) {
+        range[0] = std::min(range[0], *value);
+        range[1] = std::max(range[1], *value);
+    }
+    return range;
+}
+
+/// Of values from 0, with 0 outside: what is above half of the largest is inside.
+void make_level_set(FloatGrid& grid, float half) {
+    const auto h = float(domain_of(grid).voxel_size);
+    openvdb::tools::dilateActiveValues(grid.tree(), 2, openvdb::tools::NN_FACE_EDGE_VERTEX);
+    const auto turn = [&](float value) { return (half - value) / half * h; };
+    openvdb::tools::foreach (grid.beginValueAll(),
+                             [&](const FloatGrid::ValueAllIter& value) { value.setValue(turn(*value)); });
+    grid.tree().root().setBackground(turn(0), /*updateChildNodes=*/true);
+    grid.setGridClass(openvdb::GRID_LEVEL_SET);
+}
+
+}  // namespace
+
+FloatGridPtr read_vdb_level_set(const std::string& path, const RunContext& run) {
+    std::string chosen = split_grid_name(path).grid;
+    if (chosen.empty()) chosen = choose_level_set(path, run);
+    FloatGridPtr grid = read_vdb(path, chosen);
+    if (grid->getGridClass() == openvdb::GRID_FOG_VOLUME)
+        throw Error(Errc::Unsupported, "read_vdb_level_set: " + path + ": grid '" + grid->getName() +
+                                           "': expected a level set, got a fog volume");
+    if (grid->getGridClass() == openvdb::GRID_LEVEL_SET || grid->background() != 0) return grid;
+    const auto [least, most] = range_of(*grid);
+    if (least < 0 || !(most > 0)) return grid;
+    run.warn(path + ": grid '" + grid->getName() + "' has no class, and values from 0 to " + detail::number(most) +
+             ", as an indicator of the inside has: its border is taken at " + detail::number(most / 2));
+    make_level_set(*grid, most / 2);
+    return grid;
+}
+
+}  // namespace covol
