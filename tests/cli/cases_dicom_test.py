@@ -249,6 +249,15 @@ class Slices(Case):
         (folder / "zeros").write_bytes(bytes(4000))
         self.assertIn("no DICOM image", self.refused("info", "series"))
 
+    def test_a_tilted_gantry(self):
+        self.series(ImagePositionPatient=lambda k: [3, -4 + 0.25 * k, 5 + k])
+        image = self.info("series")
+        self.assertAlmostEqual(image["spacing"][2], (1 + 0.25 ** 2) ** 0.5)
+        np.testing.assert_allclose(np.asarray(image["direction"])[:, 2] * image["spacing"][2], (0, 0.25, 1), atol=1e-9)
+        self.assertIn("differ from 90 degrees by up to 14", self.run_covol("info", "series").stdout)
+        self.series(ImagePositionPatient=lambda k: [3 + (k == 4), -4, 5 + k])
+        self.assertIn("1 mm beside it", self.refused("info", "series"))
+
     def test_without_positions_by_number(self):
         self.series(ImagePositionPatient=None, SpacingBetweenSlices=2.0, InstanceNumber=lambda k: k + 1)
         image = self.info("series")

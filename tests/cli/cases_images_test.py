@@ -278,8 +278,8 @@ class Imaris(Case):
         image = self.info("a.ims:/DataSet/ResolutionLevel 1")
         self.assertEqual((image["size"], image["spacing"]), ([n // 2 for n in SIZE], [2, 2, 2]))
 
-    def test_no_size_at_all_is_loud(self):
-        self.assertEqual(self.write()["spacing_known"], [False] * 3)
+    def test_a_size_that_cannot_be_is_loud(self):
+        self.assertEqual(self.write()["fields"]["size"], "not stated, the array's")
         self.assertEqual(self.write(whole=(40, 40, 40))["spacing_known"], [False] * 3)
 
 

@@ -23,7 +23,7 @@ ALLOWED = {
     "inference/candidate.cpp:kMostCells", "inference/candidate.cpp:kOffsets", "inference/candidate.cpp:kStairs", "inference/infer.cpp:kBandCells", "inference/infer.cpp:kMostCells",
     "inference/lattice.cpp:kFar", "inference/marks.cpp:kTowards",
     "meshing/contacts.cpp:kAlong", "meshing/contacts.cpp:kFacing", "meshing/contacts.cpp:kFar", "meshing/contacts.cpp:kRounding",
-    "meshing/level.cpp:kConverged", "meshing/level.cpp:kNearFace", "meshing/mesh_distance.cpp:kThinShare", "start/start.cpp:kLeafRadius",
+    "meshing/level.cpp:kConverged", "meshing/level.cpp:kNearFace", "meshing/mesh_distance.cpp:kThinShare", "start/start.cpp:kLeafRadius", "start/start_mesh.cpp:kMostCaps",
     "start/other_lattice.cpp:kSame", "surface/rasterizer.cpp:kCertain", "surface/rasterizer.cpp:kRounding", "tagging/cores.cpp:kBeyond", "tagging/cores.cpp:kNowhere", "tagging/tagging.cpp:kBall",
 }
 

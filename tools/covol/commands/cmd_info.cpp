@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "cli/report.h"
+#include "cli/shear.h"
 #include "commands/commands.h"
 #include "covol/file_kind.h"
 #include "covol/safe_text.h"
@@ -94,6 +95,9 @@ void describe_image(const std::string& path, const ImageFlags& flags, Session& s
          << (g.spacing_known ? "" : " (not known)") << ", origin " << triple(g.origin) << "\naxes: i runs along "
          << axis_text(g, 0) << ", j along " << axis_text(g, 1) << ", k along " << axis_text(g, 2)
          << " of the world (LPS), which goes from " << triple(g.world_box().min) << " to " << triple(g.world_box().max);
+    if (const double shear = shear_of(g); shear > 0)
+        text << "\nsheared: the angles between its axes differ from 90 degrees by up to " << std::setprecision(3)
+             << shear << std::setprecision(6);
     const bool in_chunks = info.chunk_size[0] > 0;
     if (in_chunks) text << "\nchunks of " << triple(info.chunk_size) << " voxels";
     for (const std::string& level : info.levels) text << "\nlevel " << safe_text(level);

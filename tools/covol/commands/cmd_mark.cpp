@@ -8,6 +8,7 @@
 #include <optional>
 #include <thread>
 
+#include "cli/shear.h"
 #include "commands/commands.h"
 #include "covol/digest.h"
 #include "covol/error.h"
@@ -83,6 +84,13 @@ struct MarkJob {
         session.require_memory(double(read_image_info(image_path, image.options, session.run()).bytes_to_hold),
                                "the image");
         const Image pixels = image.read(image_path, session.run());
+        if (const double shear = shear_of(pixels.geometry()); shear > 0)
+            throw Error(
+                Errc::Unsupported,
+                image_path +
+                    ": expected perpendicular axes, whose slices the page shows, got ones that are sheared by " +
+                    std::to_string(shear) +
+                    " degrees; resample the image, with SimpleITK's Resample() for example; segment reads it as it is");
         const std::filesystem::path path = without_slash(image_path);
         Study opened(study.empty() ? path.string() + ".covol" : study, image_path, pixels.geometry());
         if (!opened.repaired().empty()) session.warn(opened.folder() + ": " + opened.repaired());

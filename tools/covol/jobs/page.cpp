@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "cli/memory.h"
+#include "cli/shear.h"
 #include "covol/structures.h"
 
 namespace covol::tool {
@@ -33,6 +34,14 @@ Json page_facts(const Session& session) {
 }
 
 void write_page(const std::string& path, const ReportPage& page, Session& session) {
+    if (page.image != nullptr && shear_of(page.image->geometry()) > 0) {
+        session.run().warn(
+            "the image's axes are sheared, and the page draws slices of perpendicular ones alone: it is "
+            "without slices");
+        ReportPage bare = page;
+        bare.image = nullptr;
+        return write_page(path, bare, session);
+    }
     const Stopwatch watch;
     const ReportPageSummary made = write_report_page(path, page, {}, session.run());
     session.report()["page"] = {{"path", path},

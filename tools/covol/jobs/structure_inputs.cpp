@@ -1,8 +1,13 @@
 #include "jobs/structure_inputs.h"
 
+#include <algorithm>
+#include <iomanip>
+#include <sstream>
+
 #include "covol/study.h"
 #include "covol/study_files.h"
 #include "covol/vdb_io.h"
+#include "jobs/doubtful_reading.h"
 
 namespace covol::tool {
 namespace {
@@ -32,6 +37,22 @@ void share_seeds(std::vector<Marks>& structures, const std::string& flag, const 
             if (seed.name.empty() || &marks == find_structure(structures, seed.name))
                 add_seed(flag, seed.value, marks.files.*files, marks.*clouds);
     }
+}
+
+/// Marks that are voxels may lie inside the image by accident; its edges tell.
+void warn_of_voxels(const Marks& marks, const std::optional<Image>& image, const ReadPointsOptions& reading,
+                    const RunContext& run) {
+    if (!image || reading.space != PointSpace::Unstated || marks.points.empty()) return;
+    const bool in_lengths = std::all_of(marks.rules.begin(), marks.rules.end(), [](const std::string& rule) {
+        return rule.ends_with("x, y, z in world units");  // and the file names no unit
+    });
+    if (!in_lengths) return;
+    const std::optional<double> ratio = edges_if_voxels(marks.points, *image);
+    if (!ratio) return;
+    std::ostringstream rounded;
+    rounded << std::setprecision(2) << *ratio;
+    run.warn("the marks lie inside the image, but with `points_space = index` they would lie where its edges are " +
+             rounded.str() + " times as strong: is it that they are voxels, not world units?");
 }
 
 }  // namespace
@@ -103,6 +124,7 @@ StructuresOptions read_structures(const SegmentJob& job, std::vector<Marks>& str
         const RunContext own = speaking_for(marks.name, structures.size(), run);
         const Stopwatch watch;
         read_marks(marks, geometry, reading, own);
+        warn_of_voxels(marks, image, reading.points, own);
         if (!image) thin_points(marks, job.cloud.inputs.options.most_points, own);
         session.add_seconds("read", watch.seconds());
         if (!image && marks.points.empty() && marks.contours.empty())

@@ -127,6 +127,24 @@ void check_gaps(const std::string& path, const Slices& slices) {
     }
 }
 
+/// Slices of a tilted gantry lie on a line that is oblique to them, but on a line.
+void check_straight(const std::string& path, const Slices& slices, const Vec3& step) {
+    const DicomSlice& first = slices.front();
+    const double pixel = std::min(first.step[0], first.step[1]), most = pixel > 0 ? pixel / 2 : 0.5;
+    for (std::size_t k = 0; k < slices.size(); ++k) {
+        double square = 0;
+        for (std::size_t a = 0; a < 3; ++a) {
+            const double off = slices[k].origin[a] - first.origin[a] - double(k) * step[a];
+            square += off * off;
+        }
+        if (square > most * most)
+            throw read_error(Errc::InvalidInput, path,
+                             "expected slices along one line, got " + name_of(slices[k]) + " " +
+                                 number(std::sqrt(square)) +
+                                 " mm beside it: the image is bent or was moved; resample it");
+    }
+}
+
 /// By the positions: order, origin, spacing along k, and its direction, which a tilted gantry shears.
 void place_by_positions(const std::string& path, Slices& slices, ImageInfo& info) {
     sort_by_depth(slices);
@@ -134,8 +152,11 @@ void place_by_positions(const std::string& path, Slices& slices, ImageInfo& info
     const DicomSlice &first = slices.front(), &last = slices.back();
     const double gaps = double(slices.size() - 1);
     ImageGeometry& g = info.geometry;
-    g.spacing[2] = (depth(last, first) - depth(first, first)) / gaps;
-    for (std::size_t a = 0; a < 3; ++a) g.direction[a][2] = (last.origin[a] - first.origin[a]) / gaps / g.spacing[2];
+    Vec3 step;
+    for (std::size_t a = 0; a < 3; ++a) step[a] = (last.origin[a] - first.origin[a]) / gaps;
+    check_straight(path, slices, step);
+    g.spacing[2] = std::hypot(step[0], step[1], step[2]);
+    for (std::size_t a = 0; a < 3; ++a) g.direction[a][2] = step[a] / g.spacing[2];
     info.fields.emplace_back(first.gap_field.empty() ? "ImagePositionPatient (0020,0032)" : first.gap_field,
                              "order of " + std::to_string(slices.size()) + " slices, origin, spacing along z");
 }

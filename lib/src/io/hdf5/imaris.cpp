@@ -92,7 +92,8 @@ std::optional<std::uint64_t> count_at(const Hdf5File& file, const std::string& g
 /// Without the padding to whole chunks: as the channel says, else by the finest level's size, which the image says.
 struct ImarisSize {
     Index3 size{};
-    std::string field;  ///< where it stands; empty: nowhere, it is the padded one
+    std::string field;  ///< where it stands; empty: nowhere, it is the array's
+    bool is_known = true;
 };
 
 ImarisSize size_of(const Hdf5File& file, int level, int time, int channel) {
@@ -112,6 +113,7 @@ ImarisSize size_of(const Hdf5File& file, int level, int time, int channel) {
         for (std::size_t a = 0; a < 3; ++a) {
             const auto whole = count_at(file, "/DataSetInfo/Image", std::string(1, "XYZ"[a]));
             if (!whole || *whole > finest[a]) found.field.clear();
+            if (whole && *whole > finest[a]) found.is_known = false;
             const double factor =
                 std::exp2(std::max(0.0, std::round(std::log2(double(finest[a]) / double(padded[a])))));
             const auto part = std::uint64_t(std::max(1.0, std::floor(double(whole.value_or(finest[a])) / factor)));
@@ -174,8 +176,8 @@ std::optional<Hdf5Layout> imaris_layout(const Hdf5File& file, const std::string&
     // ExtMin is the corner of the first voxel.
     for (int a = 0; extent.is_known() && a < 3; ++a)
         info.geometry.origin[a] = extent.min()[a] + 0.5 * info.geometry.spacing[a];
-    // Of how many voxels the extent is, is not known where only the padded size is.
-    const bool is_known = extent.is_known() && !whole.field.empty();
+    // Of how many voxels the extent is, is not known where the image is said to be larger than its array.
+    const bool is_known = extent.is_known() && whole.is_known;
     info.spacing_known = {is_known, is_known, is_known};
     info.geometry.unit = normal_unit(file.text("/DataSetInfo/Image", "Unit"));
     const std::string level = level_name(choice->level);
@@ -192,7 +194,7 @@ std::optional<Hdf5Layout> imaris_layout(const Hdf5File& file, const std::string&
     for (const char* field : {"ExtMin0", "ExtMin1", "ExtMin2", "ExtMax0", "ExtMax1", "ExtMax2", "Unit"})
         if (const std::string value = file.text("/DataSetInfo/Image", field); !value.empty())
             info.fields.emplace_back(field, quote(value));
-    info.fields.emplace_back("size", whole.field.empty() ? "not stated, the array's with its padding" : whole.field);
+    info.fields.emplace_back("size", whole.field.empty() ? "not stated, the array's" : whole.field);
     describe_levels(file, extent, fine, *choice, layout);
     layout.dataset = [level = choice->level, time, channel](std::uint64_t c, std::uint64_t t) {
         return channel_name(level, time + int(t), channel + int(c)) + "/Data";

@@ -253,7 +253,7 @@ private:
         for (std::size_t a = 0; a < 3; ++a) alike = alike && std::abs(pixdim[a] - spacing[a]) <= 0.01 * spacing[a];
         if (!alike)
             run_.warn(path_ + ": pixdim states a spacing of " + steps_text(pixdim) + ", the sform one of " +
-                      steps_text(spacing) + ": the sform is used, as nibabel does; --spacing gives another");
+                      steps_text(spacing) + ": the sform is used, as nibabel does; `spacing = sx,sy,sz` gives another");
     }
 
     const std::string& path_;
@@ -265,8 +265,7 @@ private:
 /// Of the rescaled values.
 PixelType rescaled_nifti_type(const PixelPlace& place) {
     if (place.slope == 1 && place.intercept == 0) return place.type;
-    const bool fits = pixel_bytes(place.type) < 4 || place.type == PixelType::Float;
-    return fits ? PixelType::Float : PixelType::Double;
+    return place.type == PixelType::Double ? PixelType::Double : PixelType::Float;
 }
 
 }  // namespace

@@ -161,7 +161,7 @@ public:
         const string_view trimmed = trim(line);
         if (lower(trimmed.substr(0, 4)) == "sep=") return false;  // Excel's
         for (const bool named : {true, false})
-            for (const char candidate : kDelimiters) {
+            for (const char candidate : named ? kDelimitersOfNames : kDelimitersOfNumbers) {
                 if (candidate != ' ' && trimmed.find(candidate) == string_view::npos) continue;
                 split(candidate == '\t' ? line : trimmed, candidate, fields);
                 if (named ? !name_columns(fields) : !begins_with_numbers(fields)) continue;
@@ -211,7 +211,7 @@ private:
     void note(std::size_t number, string_view line, const std::vector<string_view>& fields_) {
         constexpr std::size_t kMostTitle = 100;
         std::vector<string_view> fields = fields_;
-        for (const char candidate : {';', '\t', ','})
+        for (const char candidate : kDelimitersOfNames.substr(0, 3))
             if (line.find(candidate) != string_view::npos) {
                 split(line, candidate, fields);
                 break;

@@ -23,8 +23,8 @@ namespace covol::detail {
 /// thousands.
 [[nodiscard]] std::optional<double> table_number(std::string_view field);
 
-/// What parts the fields of tables, in the order in which they are tried.
-inline constexpr std::string_view kDelimiters = ";\t ,";
+/// What parts the fields of tables, in the order in which they are tried: names have blanks, numbers commas.
+inline constexpr std::string_view kDelimitersOfNames = ";\t, ", kDelimitersOfNumbers = ";\t ,";
 
 /// Whether the first three of the fields are numbers.
 [[nodiscard]] bool begins_with_numbers(const std::vector<std::string_view>& fields);

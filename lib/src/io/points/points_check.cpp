@@ -89,7 +89,7 @@ public:
                          [&](const Reading& a, const Reading& b) { return rank(a) < rank(b); });
         for (const Reading& reading : candidates) {
             if (!found.empty() && rank(reading) > rank(found.front())) break;
-            if (rank(reading).first > 0 && is_speck(reading)) continue;
+            if (rank(reading).first > 0 && is_speck(reading, rank(reading).first)) continue;
             if (rank(reading).first == 0 && is_in_one_voxel(reading)) continue;
             if (fits(reading)) found.push_back(reading);
         }
@@ -158,12 +158,15 @@ private:
         return bounding_box(index);
     }
 
-    /// Made so small that fitting says nothing.
-    [[nodiscard]] bool is_speck(const Reading& reading) const {
-        constexpr double kLeast = 0.02;  // of the image's edge
+    /// Made so small that fitting says nothing. Of factors that nobody expects more is asked.
+    [[nodiscard]] bool is_speck(const Reading& reading, int rank) const {
+        constexpr std::size_t kFewest = 8;
+        const bool is_odd = rank > 2;
+        const double least = is_odd ? 0.2 : 0.02;  // of the image's edge
+        if (is_odd && cloud_.points.size() < kFewest) return true;
         const WorldBox box = index_box(reading);
         for (int a = 0; a < 3; ++a)
-            if (box.max[a] - box.min[a] >= kLeast * geometry_.size[a]) return false;
+            if (box.max[a] - box.min[a] >= least * geometry_.size[a]) return false;
         return true;
     }
 

@@ -380,9 +380,9 @@ TEST_CASE("unusable images end in one line that says why") {
          "expected one frame, got 3; choose 0 to 2 with `frame`");
     says(read_error(scratch.write("huge.nrrd", header + "dimension: 3\nsizes: 100000 100000 100000\n\nabc")),
          "cannot hold");
-    says(read_error(scratch.write("shear.nrrd", header + "dimension: 3\nsizes: 2 2 2\nspace dimension: 3\n"
-                                                         "space directions: (1,0,0) (0.5,1,0) (0,0,1)\n\nabcdefgh")),
-         "perpendicular");
+    says(read_error(scratch.write("plane.nrrd", header + "dimension: 3\nsizes: 2 2 2\nspace dimension: 3\n"
+                                                         "space directions: (1,0,0) (0.5,1,0) (1,1,0.01)\n\nabcdefgh")),
+         "axes that span the space");
     const ImageGeometry g = oblique();
     std::vector<float> values = ramp<float>(g);
     values[7 * 6 * 2 + 7 * 3 + 4] = std::numeric_limits<float>::quiet_NaN();
@@ -393,6 +393,20 @@ TEST_CASE("unusable images end in one line that says why") {
     CHECK_THROWS_AS(check_image_extension("a.png"), Error);
     CHECK_NOTHROW(check_image_extension("a.nii.gz"));
     CHECK_THROWS_AS(write_image(scratch.path("a.png"), g, values.data()), Error);
+}
+
+TEST_CASE("a sheared lattice is read, and its voxels lie where the file says") {
+    const Scratch scratch;
+    const ImageGeometry g = read_image_geometry(
+        scratch.write("shear.nrrd",
+                      "NRRD0004\ntype: uint8\nencoding: raw\nendian: little\ndimension: 3\nsizes: 2 2 2\n"
+                      "space dimension: 3\nspace directions: (1,0,0) (0.5,2,0) (0,-1,3)\nspace origin: (7,8,9)\n\n"
+                      "abcdefgh"));
+    const Vec3 world = g.index_to_world({1, 1, 1}), index = g.world_to_index({8.5, 9, 12});
+    for (int a = 0; a < 3; ++a) {
+        CHECK(world[a] == Approx(Vec3{8.5, 9, 12}[a]));
+        CHECK(index[a] == Approx(1));
+    }
 }
 
 TEST_CASE("a fourth dimension of size one is nothing, a larger one is chosen from") {

@@ -1,0 +1,21 @@
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "covol/image.h"
+
+namespace covol::tool {
+
+/// By how much the angles between an image's axes differ from right ones, degrees; 0 where that is a file's rounding.
+[[nodiscard]] inline double shear_of(const ImageGeometry& geometry) {
+    constexpr double kRounding = 1e-3;
+    const Matrix3& d = geometry.direction;
+    double most = 0;
+    for (std::size_t a = 0; a < 3; ++a)
+        for (std::size_t b = 0; b < a; ++b)
+            most = std::max(most, std::abs(d[0][a] * d[0][b] + d[1][a] * d[1][b] + d[2][a] * d[2][b]));
+    return most > kRounding ? std::asin(std::min(1.0, most)) * 180 / std::numbers::pi : 0;
+}
+
+}  // namespace covol::tool
