@@ -32,10 +32,11 @@ public:
     struct Sample {
         double inside;
         Vec3 gradient;
-    };  ///< 1, and 1 / world unit
+        double cell;  ///< of its grid there, world units
+    };                ///< 1, and 1 / world unit
     [[nodiscard]] COVOL_API Sample at(const Vec3& world) const;
     [[nodiscard]] COVOL_API double inside(const Vec3& world) const;  ///< at(), faster
-    [[nodiscard]] COVOL_API double cell() const;                     ///< of its lattice, world units
+    [[nodiscard]] COVOL_API double cell() const;                     ///< of its finest grid, world units
     /// visit(box) for each cell of its lattice, world box, that its level 1/2 passes.
     COVOL_API void crossed(const std::function<void(const WorldBox&)>& visit) const;
 

@@ -52,10 +52,10 @@ public:
     Jury(const std::vector<Vec3>& points, std::vector<Vec3> normals, const CloudScale& scale, const RunContext& run)
         : points_(points),
           run_(run),
-          field_(indicator_lattice(
-              points, cells_along(points, kGivenSides.vote_spacings * std::max(scale.spacing, scale.noise)))) {
+          areas_(areas_of(points, scale.spacing)),
+          field_(indicator_grid(points, areas_, kGivenSides.vote_spacings * std::max(scale.spacing, scale.noise))) {
         voice_.normals = std::move(normals);
-        voice_.areas = areas_of(points, scale.spacing);
+        voice_.areas = areas_;
     }
 
     /// Share of those told that each half foresees of the other; all are turned over where most point inwards.
@@ -82,7 +82,7 @@ public:
             listen(std::vector<char>(points_.size(), 1));
             std::size_t turned = 0;
             for (std::size_t p = 0; p < points_.size(); ++p) {
-                if (falls_along(p) * field_.indicator().lattice.cell > -kGivenSides.speaks_against) continue;
+                if (falls_along(p) * field_.indicator().stack().cell() > -kGivenSides.speaks_against) continue;
                 voice_.normals[p] = times(-1, voice_.normals[p]);
                 ++turned;
             }
@@ -114,6 +114,7 @@ private:
 
     const std::vector<Vec3>& points_;
     const RunContext& run_;
+    std::vector<double> areas_;
     WindingField field_;
     Orientation voice_;
 };
@@ -156,7 +157,7 @@ bool use(const std::vector<Vec3>& points, const std::vector<Vec3>& given, const 
     }
     jury.settle();
     Orientation& own = result.orientation = std::move(jury.voice());
-    WindingField field(indicator_lattice(points, cells_along(points, cell)));
+    WindingField field(indicator_grid(points, own.areas, cell));
     find_indicator(field, points, own, run);
     result.torn = torn(points, own.normals, scale.spacing);
     own.turned = 1 - agreeing(points, own.normals, own, false);

@@ -49,21 +49,12 @@ struct IndicatorHeuristics {
     double beyond = heuristic("indicator.beyond", 0.2);
     /// [cells] Fewest along the longest side.
     int least_cells = heuristic("indicator.least_cells", 48);
-    /// [cells] Most along the longest side: memory and time.
-    int most_cells = heuristic("indicator.most_cells", 192);
+    /// [spacings around a point] Largest cell there, above which its cells are those of a coarser grid.
+    double local_cells = heuristic("indicator.local_cells", 0.5);
     /// [V-cycles] Of multigrid where nothing is known yet.
     int cycles_from_nothing = heuristic("indicator.cycles_from_nothing", 8);
 };
 COVOL_HEURISTICS IndicatorHeuristics kIndicator{};
-
-/// Multigrid for the Poisson equation of the indicator: winding_field.cpp.
-struct WindingFieldHeuristics {
-    /// [sweeps] Of Gauss-Seidel before and after each correction.
-    int sweeps = heuristic("winding_field.sweeps", 1);
-    /// [sweeps] On the coarsest lattice.
-    int coarsest_sweeps = heuristic("winding_field.coarsest_sweeps", 16);
-};
-COVOL_HEURISTICS WindingFieldHeuristics kWinding{};
 
 /// Normals that agree with their indicator function: orientation.cpp. Hou et al., Iterative Poisson surface
 /// reconstruction (iPSR), ACM Trans. Graph. 41(4), 2022, has the iteration; patches, tries and doubts are ours.
@@ -80,8 +71,8 @@ struct OrientationHeuristics {
     int after_turning = heuristic("orientation.after_turning", 3);
     /// [share of the points] In patches that stay turned: fewer, and those left may turn to and fro.
     double few_stayed = heuristic("orientation.few_stayed", 0.002);
-    /// [passes] Of smoothing the density whose gradient is the first guess.
-    int first_passes = heuristic("orientation.first_passes", 12);
+    /// [cells] Of the grid of the density whose gradient is the first guess.
+    double first_cells = heuristic("orientation.first_cells", 3.2);
     /// [1 - cosine] Mean change of the normals at which the iteration ends.
     double steady = heuristic("orientation.steady", 1e-4);
     /// [indicator] At a point beyond which another part encloses it already; noise brings points there that are none of
@@ -122,6 +113,10 @@ struct OrientationHeuristics {
     double many_passed = heuristic("orientation.many_passed", 0.02);
     /// [points] That iterate, on the surface in the square of a lattice's cell.
     double sampled_per_cell = heuristic("orientation.sampled_per_cell", 4);
+    /// [cells] Along the longest side, at most, in the first tries.
+    double first_along = heuristic("orientation.first_along", 192);
+    /// [points] Most of those: time.
+    double most_sampled = heuristic("orientation.most_sampled", 100000);
     /// [points] Fewest of those: where parts lie so far apart that the lattice has each in a cell.
     std::size_t least_sampled = heuristic("orientation.least_sampled", 100);
     /// [spacings] Edge of the cells that those are taken from.

@@ -15,7 +15,7 @@
 namespace covol {
 
 struct Indicator::Values {
-    cloud::LatticeField field;
+    cloud::StackField field;
 };
 
 Indicator::Indicator(std::unique_ptr<const Values> values) : values_(std::move(values)) {}
@@ -23,38 +23,61 @@ Indicator::~Indicator() = default;
 
 double Indicator::inside(const Vec3& world) const { return values_->field.value_at(world); }
 Indicator::Sample Indicator::at(const Vec3& world) const {
-    const cloud::LatticeField::Sample sample = values_->field.at(world);
-    return {sample.value, sample.gradient};
+    const cloud::StackField::Sample sample = values_->field.at(world);
+    return {sample.value, sample.gradient, sample.cell};
 }
-double Indicator::cell() const { return values_->field.lattice.cell; }
+double Indicator::cell() const { return values_->field.stack().cell(); }
 
 void Indicator::crossed(const std::function<void(const WorldBox&)>& visit) const {
-    const cloud::Lattice& l = values_->field.lattice;
-    const std::vector<float>& values = values_->field.values;
-    const std::size_t up_i = std::size_t(l.nodes[1]) * std::size_t(l.nodes[2]), up_j = std::size_t(l.nodes[2]);
-    for (int i = 0; i + 1 < l.nodes[0]; ++i)
-        for (int j = 0; j + 1 < l.nodes[1]; ++j)
-            for (int k = 0; k + 1 < l.nodes[2]; ++k) {
-                const std::size_t at = std::size_t(i) * up_i + std::size_t(j) * up_j + std::size_t(k);
-                int inside = 0;
-                for (int corner = 0; corner < 8; ++corner)
+    const cloud::GridStack& stack = values_->field.stack();
+    for (std::size_t l = 0; l < stack.levels().size(); ++l) {
+        const cloud::GridLevel& level = stack.levels()[l];
+        const std::vector<float>& values = values_->field.values[l];
+        for (std::uint32_t block = 0; block < level.blocks.size(); ++block)
+            for (int n = 0; n < int(cloud::kBlockNodes); ++n) {
+                const int i = n >> 6, j = n >> 3 & 7, k = n & 7;
+                int inside = 0, known = 0;
+                for (int corner = 0; corner < 8; ++corner) {
+                    const int x = i + (corner >> 2), y = j + (corner >> 1 & 1), z = k + (corner & 1);
+                    const std::uint32_t at =
+                        level.beside[block][std::size_t(((x >> 3) + 1) * 9 + ((y >> 3) + 1) * 3 + (z >> 3) + 1)];
+                    if (at == cloud::kNoBlock) break;
+                    ++known;
                     inside +=
-                        values[at + (corner & 4 ? up_i : 0) + (corner & 2 ? up_j : 0) + (corner & 1 ? 1 : 0)] > 0.5F;
-                if (inside == 0 || inside == 8) continue;
-                const Vec3 low{l.origin[0] + i * l.cell, l.origin[1] + j * l.cell, l.origin[2] + k * l.cell};
-                visit({low, {low[0] + l.cell, low[1] + l.cell, low[2] + l.cell}});
+                        values[at * cloud::kBlockNodes + std::size_t((x & 7) * 64 + (y & 7) * 8 + (z & 7))] > 0.5F;
+                }
+                if (known < 8 || inside == 0 || inside == 8 || stack.is_refined(l, block, i, j, k)) continue;
+                const cloud::BlockAt& at = level.blocks[block];
+                const Vec3& o = stack.origin();
+                const Vec3 low{o[0] + (8.0 * at[0] + i) * level.cell, o[1] + (8.0 * at[1] + j) * level.cell,
+                               o[2] + (8.0 * at[2] + k) * level.cell};
+                visit({low, {low[0] + level.cell, low[1] + level.cell, low[2] + level.cell}});
             }
+    }
 }
 
 namespace cloud {
 
-int cells_along(const std::vector<Vec3>& points, double cell) {
-    return std::clamp(int(longest_side(bounding_box(points)) * (1 + 2 * kIndicator.beyond) / cell),
-                      kIndicator.least_cells, kIndicator.most_cells);
+double indicator_side(const std::vector<Vec3>& points) {
+    return longest_side(bounding_box(points)) * (1 + 2 * kIndicator.beyond);
 }
 
-Lattice indicator_lattice(const std::vector<Vec3>& points, int cells) {
-    return lattice_around(bounding_box(points), kIndicator.beyond, cells);
+double indicator_cell(const std::vector<Vec3>& points, double cell) {
+    return std::min(cell, indicator_side(points) / kIndicator.least_cells);
+}
+
+std::shared_ptr<const GridStack> indicator_grid(const std::vector<Vec3>& points, const std::vector<double>& areas,
+                                                double cell) {
+    return grid_around(points, areas, indicator_cell(points, cell));
+}
+
+std::shared_ptr<const GridStack> grid_around(const std::vector<Vec3>& points, const std::vector<double>& areas,
+                                             double cell) {
+    std::vector<std::uint8_t> levels(areas.size());
+    for (std::size_t n = 0; n < areas.size(); ++n)
+        levels[n] = std::uint8_t(
+            std::clamp(std::floor(std::log2(kIndicator.local_cells * std::sqrt(areas[n]) / cell)), 0.0, 31.0));
+    return std::make_shared<const GridStack>(points, levels, cell, kIndicator.beyond);
 }
 
 double scale_to_half(WindingField& field, const std::vector<Vec3>& points) {
@@ -76,12 +99,13 @@ double mean_at(const WindingField& field, const std::vector<Vec3>& points) {
 
 double share_bare(const Indicator& indicator, const std::vector<Vec3>& points, double reach) {
     const PointCells cells(points, reach);
-    std::size_t all = 0, bare = 0;
+    double all = 0, bare = 0;
     indicator.crossed([&](const WorldBox& box) {
-        ++all;
-        bare += !cells.any_within(times(0.5, plus(box.min, box.max)), reach);
+        const double side = box.max[0] - box.min[0], area = side * side;
+        all += area;
+        if (!cells.any_within(times(0.5, plus(box.min, box.max)), reach)) bare += area;
     });
-    return all > 0 ? double(bare) / double(all) : 1;
+    return all > 0 ? bare / all : 1;
 }
 
 std::shared_ptr<const Indicator> make_indicator(const WindingField& field) {
@@ -99,7 +123,7 @@ void solve(WindingField& field, const std::vector<Vec3>& points, const Orientati
 
 std::shared_ptr<const Indicator> indicator_of(const std::vector<Vec3>& points, const Orientation& orientation,
                                               double cell, const RunContext& run) {
-    WindingField field(indicator_lattice(points, cells_along(points, cell)));
+    WindingField field(indicator_grid(points, orientation.areas, cell));
     solve(field, points, orientation, kIndicator.cycles_from_nothing, run);
     scale_to_half(field, points);
     return make_indicator(field);

@@ -1,14 +1,22 @@
 #pragma once
 // The indicator of a cloud's solid, as orient() leaves it.
-#include "cloud/orientation/winding_field.h"
+#include "cloud/poisson/winding_field.h"
 #include "covol/orientation.h"
 
 namespace covol::cloud {
 
-/// Of a lattice of about this cell, along its longest side: 48 to 192.
-[[nodiscard]] int cells_along(const std::vector<Vec3>& points, double cell);
-/// Around the points, so much wider that the indicator is 0 at its end.
-[[nodiscard]] Lattice indicator_lattice(const std::vector<Vec3>& points, int cells);
+/// The longest side of what the indicator is found in.
+[[nodiscard]] double indicator_side(const std::vector<Vec3>& points);
+/// That cell, or a smaller one, so that the longest side has a fair number of them.
+[[nodiscard]] double indicator_cell(const std::vector<Vec3>& points, double cell);
+/// Around the points, so much wider that the indicator is 0 at its end; coarser where the points are sparse.
+/// @param areas  of the surface that each point stands for; empty: the same for all
+[[nodiscard]] std::shared_ptr<const GridStack> indicator_grid(const std::vector<Vec3>& points,
+                                                              const std::vector<double>& areas, double cell);
+
+/// The same of exactly that cell.
+[[nodiscard]] std::shared_ptr<const GridStack> grid_around(const std::vector<Vec3>& points,
+                                                           const std::vector<double>& areas, double cell);
 
 /// The indicator of normals and areas, from the field's last solution.
 void solve(WindingField& field, const std::vector<Vec3>& points, const Orientation& orientation, int cycles,

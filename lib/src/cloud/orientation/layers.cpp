@@ -75,14 +75,15 @@ private:
 /// The indicator's surface.
 struct Level {
     Level(const WindingField& field, const PointCells& points) {
-        const double reach = kLayers.bare_cells * field.indicator().lattice.cell;
+        const double cell = field.indicator().stack().cell(), reach = kLayers.bare_cells * cell;
         make_indicator(field)->crossed([&](const WorldBox& box) {
             middles.push_back(times(0.5, plus(box.min, box.max)));
-            bare += !points.any_within(middles.back(), reach);
+            const double side = (box.max[0] - box.min[0]) / cell;
+            if (!points.any_within(middles.back(), reach)) bare += side * side;
         });
     }
     std::vector<Vec3> middles;  // of the cells that it passes
-    std::ptrdiff_t bare = 0;
+    double bare = 0;            // of them, in the area of the finest cells
 };
 
 void turn(const Patch& patch, Orientation& orientation) {
@@ -97,13 +98,13 @@ std::vector<char> turn_layers(WindingField& field, const std::vector<Vec3>& poin
     const PointCells cells(points, kLayers.cell * between);
     std::vector<Patch> patches = Opposed(cells, free, between).patches();
     patches.resize(std::min<std::size_t>(patches.size(), kLayers.most_patches));
-    const double cell = field.indicator().lattice.cell;
-    std::ptrdiff_t bare = Level(field, cells).bare;
+    const double cell = field.indicator().stack().cell();
+    double bare = Level(field, cells).bare;
     for (const Patch& patch : patches) {
         if (patch.size() < kLayers.least_points) break;
         run.check();
         turn(patch, orientation);
-        WindingField now(field.indicator().lattice);
+        WindingField now(field.indicator().shared_stack());
         solve(now, points, orientation, kIndicator.cycles_from_nothing, run);
         scale_to_half(now, points);
         const Level level(now, cells);
@@ -113,7 +114,7 @@ std::vector<char> turn_layers(WindingField& field, const std::vector<Vec3>& poin
         });
         double area = 0;
         for (const std::uint32_t n : patch) area += orientation.areas[n];
-        const double gain = double(bare - level.bare) * cell * cell;
+        const double gain = (bare - level.bare) * cell * cell;
         if (!(gain > 0 && gain < kLayers.most_gain * area) || double(away) > kLayers.most_away * double(patch.size())) {
             turn(patch, orientation);
             continue;

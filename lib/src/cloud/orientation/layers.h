@@ -2,7 +2,7 @@
 // Parts of a scan that do not quite fit on each other lie there as two layers.
 #include <vector>
 
-#include "cloud/orientation/winding_field.h"
+#include "cloud/poisson/winding_field.h"
 #include "covol/orientation.h"
 
 namespace covol::cloud {

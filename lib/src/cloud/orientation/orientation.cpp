@@ -22,9 +22,8 @@
 namespace covol {
 namespace {
 
-using cloud::Lattice;
-using cloud::LatticeField;
 using cloud::PointCells;
+using cloud::StackField;
 using cloud::WindingField;
 
 /// What is tried until few normals turn.
@@ -36,9 +35,9 @@ const Try kTries[] = {{1, kOrientation.enclosed},           {1, kOrientation.sur
                       {0.67, kOrientation.surely_enclosed}, {1.5, kOrientation.surely_enclosed},
                       {0.44, kOrientation.enclosed},        {2.25, kOrientation.surely_enclosed}};
 
-/// A lattice and what is done on it.
+/// A stack of grids and what is done on it.
 struct Stage {
-    int cells;       // along the longest side, the part beyond the points included
+    double cell;     // of the finest
     int iterations;  // at most
     bool is_last;
     double enclosed;  // the indicator from which on a point counts as enclosed by another part
@@ -46,14 +45,14 @@ struct Stage {
 
 class Iteration {
 public:
-    Iteration(const std::vector<Vec3>& points, const RunContext& run) : points_(points), run_(run) {}
+    Iteration(const std::vector<Vec3>& points, const std::vector<double>& areas, const RunContext& run)
+        : points_(points), areas_(areas), run_(run) {}
 
     void run(const Stage& stage, Orientation& result) {
-        const Lattice lattice = cloud::indicator_lattice(points_, stage.cells);
-        WindingField field(lattice);
+        WindingField field(cloud::indicator_grid(points_, areas_, stage.cell));
         if (last_) field.start_from(last_->indicator());
         stage_ = stage;
-        if (result.normals.empty()) first_guess(lattice, result);
+        if (result.normals.empty()) first_guess(stage.cell, result);
         for (int n = 0; n < stage.iterations; ++n) {
             ++result.iterations;
             if (turn(field, result, kOrientation.cycles) < kOrientation.steady) break;
@@ -72,8 +71,9 @@ public:
     [[nodiscard]] WindingField& last() { return *last_; }
 
 private:
-    void first_guess(const Lattice& lattice, Orientation& result) const {
-        const LatticeField density = cloud::point_density(lattice, points_, kOrientation.first_passes);
+    void first_guess(double cell, Orientation& result) const {
+        const StackField density = cloud::spread(cloud::grid_around(points_, areas_, kOrientation.first_cells * cell),
+                                                 points_, std::vector<double>(points_.size(), 1.0));
         result.normals.resize(points_.size());
         tbb::parallel_for(std::size_t(0), points_.size(), [&](std::size_t n) {
             const Vec3 g = density.at(points_[n]).gradient;
@@ -92,10 +92,10 @@ private:
     double turn(WindingField& field, Orientation& result, int cycles) {
         solve(field, result, cycles);
         const std::size_t count = points_.size();
-        const LatticeField& chi = field.indicator();
+        const StackField& chi = field.indicator();
         std::vector<double> cosine(count);
         tbb::parallel_for(std::size_t(0), count, [&](std::size_t n) {
-            const LatticeField::Sample here = chi.at(points_[n]);
+            const StackField::Sample here = chi.at(points_[n]);
             const double sign = here.value < 0 || here.value > stage_.enclosed ? 1 : -1;
             const Vec3 normal = unit({sign * here.gradient[0], sign * here.gradient[1], sign * here.gradient[2]});
             cosine[n] = dot(normal, result.normals[n]);
@@ -110,7 +110,7 @@ private:
     /// makes its own normals. Each such patch is turned to try, all at once, and stays turned where that brings it
     /// closer to 1/2.
     void turn_patches(WindingField& field, Orientation& result) {
-        const PointCells cells(points_, kOrientation.patch_cells * field.indicator().lattice.cell);
+        const PointCells cells(points_, kOrientation.patch_cells * field.indicator().stack().cell());
         const std::vector<std::vector<std::uint32_t>> beside = neighbours_of(cells);
         for (int round = 0; round < kOrientation.patch_rounds; ++round) {
             turn(field, result, kOrientation.patch_cycles);  // the indicator of what the normals are now
@@ -168,7 +168,7 @@ private:
     }
 
     /// Mean over each cell's points of the indicator, less 1/2.
-    static std::vector<double> mean_off(const PointCells& cells, const LatticeField& chi) {
+    static std::vector<double> mean_off(const PointCells& cells, const StackField& chi) {
         std::vector<double> off(cells.cell_count());
         tbb::parallel_for(std::size_t(0), off.size(), [&](std::size_t cell) {
             const auto [begin, end] = cells.cell(cell);
@@ -207,6 +207,7 @@ private:
     }
 
     const std::vector<Vec3>& points_;
+    const std::vector<double>& areas_;  // before the indicator's step scales them
     const RunContext& run_;
     Stage stage_{};
     std::optional<WindingField> last_;
@@ -217,15 +218,22 @@ private:
 std::vector<Vec3> normals_of(const Indicator& indicator, const std::vector<Vec3>& points, double enclosed) {
     std::vector<Vec3> normals(points.size());
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
-        const auto [inside, g] = indicator.at(points[n]);
+        const auto [inside, g, cell] = indicator.at(points[n]);
         const double sign = inside < 0 || inside > enclosed ? 1 : -1;
         normals[n] = unit({sign * g[0], sign * g[1], sign * g[2]});
     });
     return normals;
 }
 
-double first_cell(const CloudScale& scale) {
-    return std::max(kOrientation.cell_spacings * scale.spacing, kOrientation.cell_noises * scale.noise);
+/// Of the finest grid: no finer than so many points tell.
+double finest_cell(const CloudScale& scale, std::size_t points) {
+    const double apart = scale.spacing * std::sqrt(std::max(1.0, double(points) / kOrientation.most_sampled));
+    return std::max(kOrientation.cell_spacings * apart, kOrientation.cell_noises * scale.noise);
+}
+
+/// The same of the first tries: on larger cells fewer normals turn, and only thin parts ask for smaller ones.
+double first_cell(const CloudScale& scale, const std::vector<Vec3>& points) {
+    return std::max(finest_cell(scale, points.size()), cloud::indicator_side(points) / kOrientation.first_along);
 }
 
 /// Parts that are turned as a whole go on turning, or lie where the indicator is not 1/2.
@@ -278,8 +286,11 @@ struct Sample {
 /// The indicator that was found may be too coarse for what its normals tell.
 void refine(CloudOrientation& cloud, const RunContext& run) {
     Orientation& o = cloud.orientation;
-    const double first = first_cell(cloud.scale), noise = cloud.scale.noise, spacing = cloud.scale.spacing;
-    const double cell = cloud::indicator_lattice(cloud.points, cloud::cells_along(cloud.points, first)).cell;
+    const double noise = cloud.scale.noise, spacing = cloud.scale.spacing;
+    // Where normals are beyond doubt, the surface may be as fine as the points tell.
+    const double first =
+        is_settled(o) ? finest_cell(cloud.scale, cloud.points.size()) : first_cell(cloud.scale, cloud.points);
+    const double cell = cloud::indicator_cell(cloud.points, first);
     if (o.indicator->cell() > kOrientation.coarse * cell)
         o.indicator = cloud::indicator_of(cloud.points, o, first, run);
     if (!is_settled(o) && noise < kOrientation.little_noise * spacing &&
@@ -296,7 +307,7 @@ void choose_by_views(CloudOrientation& cloud, double reach, const RunContext& ru
         // What closes a scan of one side is larger than the scan, and turns parts of it; where they were seen from
         // tells.
         cloud::GivenSides seen = cloud::given_sides(cloud.points, cloud::hints_by_views(cloud.points, cloud.scale),
-                                                    cloud.scale, first_cell(cloud.scale), run);
+                                                    cloud.scale, first_cell(cloud.scale, cloud.points), run);
         if (seen.report.used && share_passed(*seen.orientation.indicator, cloud.points, reach) <
                                     std::min(passed, kOrientation.many_passed)) {
             cloud.orientation = std::move(seen.orientation);
@@ -313,7 +324,8 @@ void choose_by_views(CloudOrientation& cloud, double reach, const RunContext& ru
 
 /// By the hints where they are consistent and nothing that is certain contradicts them, else by itself, else by views.
 void choose_orientation(CloudOrientation& cloud, const PointHints& hints, const RunContext& run) {
-    cloud::GivenSides given = cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale), run);
+    cloud::GivenSides given =
+        cloud::given_sides(cloud.points, hints, cloud.scale, first_cell(cloud.scale, cloud.points), run);
     HintsReport& report = cloud.hints = given.report;
     const bool is_certain = report.used && given.torn < kOrientation.few_torn && is_settled(given.orientation);
     if (!is_certain) {
@@ -374,25 +386,31 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
     Orientation best;
     with_threads(run, [&] {
         // Noise is hard to tell from thin parts: where normals go on turning a finer lattice may hold them.
-        const double first = first_cell(scale);
-        const double cell = cloud::indicator_lattice(points, cloud::cells_along(points, first)).cell;
-        const double share = kOrientation.sampled_per_cell * scale.spacing * scale.spacing / (cell * cell);
+        const double first = first_cell(scale, points);
+        // Parts thinner than the first cells need those that the points' spacing allows.
+        const double finest = finest_cell(scale, points.size()), cell = cloud::indicator_cell(points, finest);
+        const double share = std::min(kOrientation.sampled_per_cell * scale.spacing * scale.spacing / (cell * cell),
+                                      kOrientation.most_sampled / double(points.size()));
         const bool is_sharp = scale.noise < kOrientation.sharp * scale.spacing;
         const double most = std::max(1.0, double(points.size() / kOrientation.least_sampled));
         const Sample sample(points, scale.spacing, std::size_t(std::clamp(1 / share, 1.0, most)));
         const double reach = kOrientation.passed_reach * std::max(scale.spacing, scale.noise);
-        std::vector<std::pair<int, double>> lattices;
+        std::vector<std::pair<double, double>> lattices;
         std::vector<Tried> tried;
-        for (const Try& attempt : kTries) {
-            const int cells =
-                cloud::cells_along(points, std::max(first * attempt.cell, kOrientation.least_spacings * scale.spacing));
-            if (std::count(lattices.begin(), lattices.end(), std::pair{cells, attempt.enclosed}) > 0) continue;
-            lattices.emplace_back(cells, attempt.enclosed);
+        std::vector<Try> tries(std::begin(kTries), std::end(kTries));
+        if (first > kOrientation.coarse * finest)
+            tries.insert(tries.begin() + 2, Try{finest / first, kOrientation.surely_enclosed});
+        const double strain_cell = kOrientation.strain_cells * finest;
+        for (const Try& attempt : tries) {
+            const double tried_cell = cloud::indicator_cell(
+                points, std::max(first * attempt.cell, kOrientation.least_spacings * scale.spacing));
+            if (std::count(lattices.begin(), lattices.end(), std::pair{tried_cell, attempt.enclosed}) > 0) continue;
+            lattices.emplace_back(tried_cell, attempt.enclosed);
             Orientation now;
             now.areas = sample.areas;
-            Iteration iteration(sample.points, run);
-            for (const Stage& stage : {Stage{cells * 2 / 3, 12, false, attempt.enclosed},
-                                       Stage{cells, 8, true, kOrientation.surely_enclosed}})
+            Iteration iteration(sample.points, sample.areas, run);
+            for (const Stage& stage : {Stage{1.5 * tried_cell, 12, false, attempt.enclosed},
+                                       Stage{tried_cell, 8, true, kOrientation.surely_enclosed}})
                 iteration.run(stage, now);
             if (is_sharp) iteration.mend(scale.spacing * std::sqrt(double(sample.step)), now);
             now.indicator = cloud::make_indicator(iteration.last());
@@ -404,7 +422,7 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
                 break;
             }
             const double its = strain(points, normals_of(*now.indicator, points, kOrientation.surely_enclosed),
-                                      sample.all_areas(), kOrientation.strain_cells * first, reach, run);
+                                      sample.all_areas(), strain_cell, reach, run);
             tried.push_back({std::move(now), its});
             keep_least_strained(tried);  // each has an indicator, which is large
             if (settled && its < kOrientation.no_strain) break;

@@ -123,7 +123,7 @@ Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& s
     run.check();
     result.areas = areas_of(points, scale.spacing);
     result.normals = towards(free);
-    WindingField coarse(indicator_lattice(points, cells_along(points, kViews.coarse_spacings * between)));
+    WindingField coarse(indicator_grid(points, result.areas, kViews.coarse_spacings * between));
     solve(coarse, points, result, kIndicator.cycles_from_nothing, run);
     const double half = scale_to_half(coarse, points);
     for (double& area : result.areas) area *= half;
@@ -131,8 +131,8 @@ Orientation orient_by_views(const std::vector<Vec3>& points, const CloudScale& s
     result.layered = std::size_t(std::count(turned.begin(), turned.end(), 1));
     result.indicator = make_indicator(coarse);
     run.check();
-    WindingField fine(indicator_lattice(points, cells_along(points, kViews.fine_spacings * between)));
-    const double cell = fine.indicator().lattice.cell;
+    WindingField fine(indicator_grid(points, result.areas, kViews.fine_spacings * between));
+    const double cell = fine.indicator().stack().cell();
     // A view tells the side alone; which way the surface lies its neighbours know better.
     std::vector<double> screen(points.size());
     std::size_t against = 0;

@@ -128,6 +128,23 @@ private:
     Coord first_ = Coord::max(), last_ = Coord::min();
 };
 
+/// visit(part) for the parts of a box, of at most that edge, that the indicator's level 1/2 may pass.
+template <typename Visit>
+void add_crossed(const Indicator& indicator, const WorldBox& box, double edge, const Visit& visit) {
+    const double side = box.max[0] - box.min[0];
+    if (side <= edge) {
+        visit(box);
+        return;
+    }
+    for (int part = 0; part < 8; ++part) {
+        WorldBox half = box;
+        for (int a = 0; a < 3; ++a) ((part >> a & 1) != 0 ? half.min : half.max)[a] = 0.5 * (box.min[a] + box.max[a]);
+        const Indicator::Sample at = indicator.at(times(0.5, plus(half.min, half.max)));
+        // A corner is at 0.43 sides.
+        if (std::abs(at.inside - 0.5) <= 0.6 * side * length(at.gradient)) add_crossed(indicator, half, edge, visit);
+    }
+}
+
 /// The leaves of the domain where quadrics alone have their surface's band, or the indicator's surface passes.
 /// @throws Error InvalidInput where the indicator's cells are so much larger than the voxels that its surface alone has
 /// more leaves than memory holds: of parts that are small and far apart.
@@ -153,7 +170,9 @@ std::vector<Coord> leaves_of(const CloudField::Pieces& pieces, const Indicator& 
                             std::to_string(std::int64_t(across)) +
                             " voxels wide; take the parts one by one, or a larger `voxel_size`",
                         "voxel_size");
-        list.add(domain.world_to_index(box.min), domain.world_to_index(box.max));
+        add_crossed(indicator, box, 8 * h, [&](const WorldBox& part) {
+            list.add(domain.world_to_index(part.min), domain.world_to_index(part.max));
+        });
     });
     parts[kParts] = list.take();
     std::vector<Coord> leaves;
@@ -208,15 +227,20 @@ public:
                         faded(beside(pieces_of_near_[std::size_t(leaf_.nearest[n])], place(origin, at)));
             }
             double value = trust * own;
-            if (trust < 1)
-                value += (1 - trust) *
-                         std::clamp((0.5 - indicator_.inside(place(origin, at))) * indicator_.cell() / kBlend.slope,
-                                    -limit, limit);
+            if (trust < 1) value += (1 - trust) * by_indicator(place(origin, at), limit);
             leaf.setValueOn(openvdb::Index(at), float(std::max(value, std::min(beyond_end(origin, at) * h, limit))));
         }
     }
 
 private:
+    /// Distance from its level 1/2, -limit to limit, which is where nothing but inside or outside is left.
+    [[nodiscard]] double by_indicator(const Vec3& world, double limit) const {
+        const Indicator::Sample at = indicator_.at(world);
+        const double off = 0.5 - at.inside, beyond = (std::abs(off) - kBlend.sure) / kBlend.sure;
+        const double far = std::max(std::abs(off) * at.cell / kBlend.slope, limit * beyond);
+        return std::copysign(std::min(far, limit), off);
+    }
+
     /// Of the domain, in voxels; less than 0 within.
     [[nodiscard]] double beyond_end(const Coord& origin, int at) const {
         const Coord voxel = origin.offsetBy(at >> 6, at >> 3 & 7, at & 7);
@@ -330,7 +354,7 @@ OrientedCloud near_level(OrientedCloud points, const CloudOrientation& cloud) {
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
         Vec3 place = points.points[n];
         for (int step = 0; step < kBlend.level_steps; ++step) {
-            const auto [inside, gradient] = cloud.orientation.indicator->at(place);
+            const auto [inside, gradient, cell] = cloud.orientation.indicator->at(place);
             const double steep = dot(gradient, gradient);
             if (!(steep > 0)) return;
             place = plus(place, times((0.5 - inside) / steep, gradient));
@@ -345,7 +369,7 @@ OrientedCloud near_level(OrientedCloud points, const CloudOrientation& cloud) {
 std::vector<float> squared_distances(const std::vector<Vec3>& points, const Indicator& indicator) {
     std::vector<float> squares(points.size());
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t n) {
-        const auto [inside, gradient] = indicator.at(points[n]);
+        const auto [inside, gradient, cell] = indicator.at(points[n]);
         const double steep = dot(gradient, gradient), off = 0.5 - inside;
         squares[n] = steep > 0 ? float(off * off / steep) : std::numeric_limits<float>::infinity();
     });

@@ -82,6 +82,9 @@ struct CloudSurfaceHeuristics {
     double trusted = heuristic("blend.trusted", 0.6);
     /// [indicator per cell] At the surface; it makes a distance of the indicator.
     double slope = heuristic("blend.slope", 0.4);
+    /// [indicator] Distance from 1/2 from which on the surface is taken to be farther away than a cell tells; from
+    /// twice that on no surface is near.
+    double sure = heuristic("blend.sure", 0.2);
     /// [voxels] Distance of quadrics.
     double node_voxels = heuristic("blend.node_voxels", 0.75);
     /// [noises] That their nodes may be moved to the level.

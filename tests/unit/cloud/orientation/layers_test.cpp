@@ -28,7 +28,8 @@ struct Layers {
     }
     std::vector<char> turn(double spacing) {
         orientation.areas = areas_of(points, spacing);
-        WindingField field(indicator_lattice(points, 80));
+        WindingField field(
+            indicator_grid(points, {}, longest_side(bounding_box(points)) * (1 + 2 * kIndicator.beyond) / 80));
         solve(field, points, orientation, kIndicator.cycles_from_nothing, {});
         const double half = scale_to_half(field, points);
         for (double& area : orientation.areas) area *= half;

@@ -1,0 +1,343 @@
+#include "cloud/poisson/winding_field.h"
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+
+#include "cloud/orientation/indicator.h"
+#include "covol/points.h"
+#include "support/clouds.h"
+#include "support/surface_samples.h"
+
+using namespace covol;
+using namespace covol::cloud;
+
+namespace {
+
+/// Points of a sphere, area times normal of each.
+struct Charged {
+    std::vector<Vec3> points, vectors;
+};
+
+/// Evenly along a spiral.
+Charged sphere(int count, double radius, const Vec3& center = {0, 0, 0}) {
+    Charged s;
+    for (int m = 0; m < count; ++m) {
+        const double z = 1 - (2 * m + 1.0) / count, r = std::sqrt(1 - z * z), angle = m * M_PI * (3 - std::sqrt(5.0));
+        const Vec3 n{r * std::cos(angle), r * std::sin(angle), z};
+        s.points.push_back(test::sum(center, test::scaled(radius, n)));
+        s.vectors.push_back(test::scaled(4 * M_PI * radius * radius / count, n));
+    }
+    return s;
+}
+
+using Stack = std::shared_ptr<const GridStack>;
+
+/// All points on the finest grid, about `cells` of it along the longest side, the part beyond the points included.
+Stack grids(const std::vector<Vec3>& points, int cells, double share = 0.2) {
+    return std::make_shared<const GridStack>(points, std::vector<std::uint8_t>{},
+                                             longest_side(bounding_box(points)) * (1 + 2 * share) / cells, share);
+}
+
+double largest_difference(const StackField& a, const StackField& b) {
+    double largest = 0;
+    for (std::size_t l = 0; l < a.values.size(); ++l)
+        for (std::size_t n = 0; n < a.values[l].size(); ++n)
+            largest = std::max(largest, double(std::abs(a.values[l][n] - b.values[l][n])));
+    return largest;
+}
+
+/// visit(value, place, cell)
+template <typename Field, typename Visit>
+void for_nodes(Field& field, Visit visit) {
+    const GridStack& stack = field.stack();
+    for (std::size_t l = 0; l < field.values.size(); ++l)
+        for (std::size_t n = 0; n < field.values[l].size(); ++n) {
+            const GridLevel& level = stack.levels()[l];
+            const BlockAt& at = level.blocks[n / kBlockNodes];
+            const int in[3] = {int(n / 64 % 8), int(n / 8 % 8), int(n % 8)};
+            Vec3 place = stack.origin();
+            for (int a = 0; a < 3; ++a) place[a] += level.cell * (8.0 * at[std::size_t(a)] + in[a]);
+            visit(field.values[l][n], place, level.cell);
+        }
+}
+
+/// Random points of a box, those of x < 0 two levels coarser than the others.
+struct Uneven {
+    Uneven() {
+        for (const Vec3& p : points) levels.push_back(p[0] < 0 ? 2 : 0);
+        stack = std::make_shared<const GridStack>(points, levels, 0.01, 0.2);
+    }
+    std::vector<Vec3> points = test::box_cloud(3000, {{-1, -0.6, -0.05}, {1, 0.6, 0.05}}, 4);
+    std::vector<std::uint8_t> levels;
+    Stack stack;
+};
+
+}  // namespace
+
+TEST_CASE("each level has all nodes around its points, and around the level that is finer") {
+    const Uneven u;
+    const std::vector<GridLevel>& levels = u.stack->levels();
+    for (std::size_t n = 0; n < u.points.size(); ++n)
+        for (std::size_t l = u.levels[n]; l < levels.size(); ++l)
+            for (int corner = 0; corner < 8; ++corner) {
+                BlockAt at{};
+                for (std::size_t a = 0; a < 3; ++a)
+                    at[a] = int(std::floor((u.points[n][int(a)] - u.stack->origin()[int(a)]) / levels[l].cell) +
+                                ((corner >> a & 1) != 0 ? 2 : -1)) >>
+                            3;
+                // Beyond the coarsest block is the border.
+                const int end = 1 << (levels.size() - 1 - l);
+                if (std::all_of(at.begin(), at.end(), [&](int x) { return x >= 0 && x < end; }))
+                    REQUIRE(levels[l].find(at) != kNoBlock);
+            }
+    CHECK(levels[0].blocks.size() > 500);
+    for (std::size_t l = 0; l + 1 < levels.size(); ++l)
+        for (std::size_t n = 0; n < levels[l].blocks.size(); ++n) {
+            const BlockAt& at = levels[l].blocks[n];
+            REQUIRE(levels[l].find(at) == n);
+            REQUIRE(levels[l].coarser[n] != kNoBlock);
+            REQUIRE(levels[l + 1].blocks[levels[l].coarser[n]] == BlockAt{at[0] >> 1, at[1] >> 1, at[2] >> 1});
+        }
+    // The coarse half has no fine blocks but those at the border of both.
+    for (const BlockAt& at : levels[0].blocks) REQUIRE(u.stack->origin()[0] + 0.08 * (at[0] + 1) > -0.15);
+}
+
+TEST_CASE("splines are exact on linear functions across levels, and their gradient is that of their values") {
+    const Uneven u;
+    StackField linear(u.stack), waves(u.stack);
+    for_nodes(linear, [](float& value, const Vec3& x, double) { value = float(0.3 + 2 * x[0] - x[1] + 0.5 * x[2]); });
+    for_nodes(waves, [](float& value, const Vec3& x, double) {
+        value = float(std::sin(3 * x[0]) * std::cos(2 * x[1]) + x[2] * x[0]);
+    });
+    std::size_t coarse = 0;
+    for (const Vec3& x : test::box_cloud(600, {{-1, -0.8, -0.3}, {1, 0.8, 0.3}}, 2)) {
+        const StackField::Sample s = linear.at(x);
+        REQUIRE(s.value == Approx(0.3 + 2 * x[0] - x[1] + 0.5 * x[2]).margin(2e-6));
+        REQUIRE(linear.value_at(x) == Approx(s.value).margin(1e-12));
+        coarse += s.cell > 0.01;
+        const Vec3 slope{2, -1, 0.5};
+        const double step = 0.05 * s.cell;
+        for (int a = 0; a < 3; ++a) {
+            REQUIRE(s.gradient[a] == Approx(slope[a]).margin(1e-3));  // of floats over a cell of 0.01
+            Vec3 low = x, high = x;
+            low[a] -= step;
+            high[a] += step;
+            if (waves.at(low).cell != waves.at(high).cell) continue;
+            REQUIRE(waves.at(x).gradient[a] ==
+                    Approx((waves.at(high).value - waves.at(low).value) / (2 * step)).margin(2e-3));
+        }
+    }
+    CHECK(coarse > 200);
+    // Beyond the grids as at their end.
+    CHECK(std::isfinite(linear.at({100, -100, 3}).value));
+    CHECK(linear.at({100, 0, 0}).value == linear.at({1000, 0, 0}).value);
+}
+
+TEST_CASE("what is spread keeps the points' number and their centre") {
+    const std::vector<Vec3> points = test::box_cloud(500, {{-1, -0.4, 0}, {1, 0.8, 0.3}}, 3);
+    const StackField density = spread(grids(points, 48, 0.5), points, std::vector<double>(points.size(), 1.0));
+    double count = 0;
+    Vec3 mean{0, 0, 0}, center{0, 0, 0};
+    for (const Vec3& p : points) center = test::sum(center, test::scaled(1.0 / 500, p));
+    for_nodes(density, [&](float value, const Vec3& x, double) {
+        REQUIRE(value >= 0);
+        count += double(value);
+        mean = test::sum(mean, test::scaled(double(value) / 500, x));
+    });
+    CHECK(count == Approx(500).epsilon(1e-4));
+    for (int a = 0; a < 3; ++a) CHECK(mean[a] == Approx(center[a]).margin(1e-4));
+}
+
+namespace {
+
+/// Largest error where div grad u = div grad of a bell is solved from its gradient at points that fill a box.
+double error_of_bell(double cell, bool uneven) {
+    constexpr double kWidth = 0.25;
+    const int side = int(std::lround(2.4 / (0.5 * cell)));  // two points a cell along each axis
+    std::vector<Vec3> points, vectors;
+    std::vector<std::uint8_t> levels;
+    const double step = 2.4 / side;
+    for (int n = 0; n < side * side * side; ++n) {
+        const Vec3 x{-1.2 + (n / side / side + 0.5) * step, -1.2 + (n / side % side + 0.5) * step,
+                     -1.2 + (n % side + 0.5) * step};
+        const double bell = std::exp(-0.5 * test::dot(x, x) / (kWidth * kWidth));
+        points.push_back(x);
+        vectors.push_back(test::scaled(bell / (kWidth * kWidth) * step * step * step, x));
+        levels.push_back(uneven && x[0] + 0.3 * x[1] < 0.1 ? 1 : 0);
+    }
+    WindingField field(std::make_shared<const GridStack>(points, levels, cell, 0.2));
+    field.solve(points, vectors, 20);
+    double worst = 0;
+    for (const Vec3& x : test::box_cloud(1000, {{-0.8, -0.8, -0.8}, {0.8, 0.8, 0.8}}, 5))
+        worst = std::max(
+            worst, std::abs(field.indicator().value_at(x) - std::exp(-0.5 * test::dot(x, x) / (kWidth * kWidth))));
+    return worst;
+}
+
+}  // namespace
+
+TEST_CASE("solutions converge with the square of the cell, also across a change of levels") {
+    for (const bool uneven : {false, true}) {
+        const double coarse = error_of_bell(0.1, uneven), fine = error_of_bell(0.05, uneven);
+        INFO((uneven ? "two levels: " : "one level: ") << coarse << " then " << fine);
+        CHECK(coarse < (uneven ? 0.35 : 0.2));
+        CHECK(fine < 0.36 * coarse);
+    }
+}
+
+TEST_CASE("grids near the points alone give the indicator of grids that fill the box") {
+    const Charged s = sphere(4000, 1);
+    std::vector<Vec3> all = s.points, vectors = s.vectors;
+    for (const Vec3& p : test::box_cloud(40000, {{-1.35, -1.35, -1.35}, {1.35, 1.35, 1.35}}, 9)) {
+        all.push_back(p);
+        vectors.push_back({0, 0, 0});
+    }
+    const double cell = 2.8 / 48;
+    WindingField near(std::make_shared<const GridStack>(s.points, std::vector<std::uint8_t>{}, cell, 0.2)),
+        everywhere(std::make_shared<const GridStack>(all, std::vector<std::uint8_t>{}, cell, 0.04));
+    CHECK(near.indicator().stack().levels()[0].blocks.size() <
+          0.8 * double(everywhere.indicator().stack().levels()[0].blocks.size()));
+    near.solve(s.points, s.vectors, 15);
+    everywhere.solve(all, vectors, 15);
+    for (const Vec3& x : test::box_cloud(2000, {{-1.1, -1.1, -1.1}, {1.1, 1.1, 1.1}}, 6))
+        REQUIRE(near.indicator().value_at(x) == Approx(everywhere.indicator().value_at(x)).margin(0.03));
+}
+
+TEST_CASE("a few points far away make few blocks, and leave the indicator as it was") {
+    const Charged s = sphere(40000, 1);
+    const double cell = 0.016;
+    const auto alone = std::make_shared<const GridStack>(s.points, std::vector<std::uint8_t>{}, cell, 0.2);
+    Charged with = s;
+    for (const Vec3& way : test::sphere_cloud(10, 1e5, 3)) {
+        with.points.push_back(way);
+        with.vectors.push_back({0, 0, 0});
+    }
+    std::vector<double> areas(s.points.size(), 4 * M_PI / 40000);
+    areas.resize(with.points.size(), 1e9);
+    const auto told = indicator_grid(with.points, areas, cell);
+    CHECK(told->block_count() < 1.2 * double(alone->block_count()));
+    WindingField field(told);
+    field.solve(with.points, with.vectors, 20);
+    CHECK(field.indicator().value_at({0, 0, 0}) == Approx(1).margin(0.02));
+    CHECK(std::abs(field.indicator().value_at({1.5, 0, 0})) < 0.02);
+}
+
+TEST_CASE("the indicator is the same to the bit on any number of threads") {
+    const Uneven u;
+    std::vector<Vec3> vectors;
+    for (const Vec3& p : u.points) vectors.push_back(test::scaled(0.001, p));
+    std::vector<StackField> results;
+    for (const int threads : {1, 2, 5}) {
+        RunContext run;
+        run.threads = threads;
+        with_threads(run, [&] {
+            WindingField field(u.stack);
+            field.screen(u.points, std::vector<double>(u.points.size(), 0.5));
+            field.solve(u.points, vectors, 3);
+            results.push_back(field.indicator());
+        });
+    }
+    CHECK(results[0].values == results[1].values);
+    CHECK(results[0].values == results[2].values);
+}
+
+TEST_CASE("the indicator of a sphere is 1 inside, 0 outside, 1/2 on it, and rises inward") {
+    for (const int cells : {32, 64}) {
+        const Vec3 center{3.03, -2.01, 0.02};
+        const Charged s = sphere(6000, 1, center);
+        const Stack stack = grids(s.points, cells);
+        WindingField field(stack);
+        field.solve(s.points, s.vectors, 12);
+        const StackField& chi = field.indicator();
+        const double cell = stack->cell();
+        double worst_in = 0, worst_out = 0, worst_on = 0, least_cosine = 1;
+        for (const Vec3& direction : test::sphere_cloud(400, 1, 7)) {
+            const auto at = [&](double r) { return chi.at(test::sum(center, test::scaled(r, direction))); };
+            worst_in = std::max({worst_in, std::abs(at(0).value - 1), std::abs(at(1 - 3 * cell).value - 1)});
+            worst_out = std::max(worst_out, std::abs(at(1 + 3 * cell).value));
+            worst_on = std::max(worst_on, std::abs(at(1).value - 0.5));
+            const Vec3 g = at(1).gradient;
+            least_cosine = std::min(least_cosine, -test::dot(g, direction) / test::norm(g));
+        }
+        INFO(cells << " cells: in " << worst_in << " out " << worst_out << " on " << worst_on << " cosine "
+                   << least_cosine);
+        CHECK(worst_in < 0.02);
+        CHECK(worst_out < 0.02);
+        CHECK(worst_on < 0.06);
+        CHECK(least_cosine > 0.99);
+    }
+}
+
+TEST_CASE("the indicator steps by 1 across a surface that encloses nothing") {
+    const Charged whole = sphere(8000, 1);
+    Charged bowl;
+    for (std::size_t n = 0; n < whole.points.size(); ++n) {
+        if (whole.points[n][2] > 0) continue;
+        bowl.points.push_back(whole.points[n]);
+        bowl.vectors.push_back(whole.vectors[n]);
+    }
+    WindingField field(std::make_shared<const GridStack>(bowl.points, std::vector<std::uint8_t>{}, 2.8 / 64, 0.2));
+    field.solve(bowl.points, bowl.vectors, 12);
+    const double cell = field.indicator().stack().cell();
+    // Away from both sides the harmonic part changes, too: of a disc's by about the distance over the radius.
+    for (const double r : {2.0, 3.0}) {
+        const double step =
+            field.indicator().at({0, 0, -1 + r * cell}).value - field.indicator().at({0, 0, -1 - r * cell}).value;
+        CHECK(step > 1 - 2 * r * cell);
+        CHECK(step < 1.02);
+    }
+    CHECK(field.indicator().at({0, 0, 0.9}).value < 0.4);
+}
+
+TEST_CASE("each V-cycle leaves a fraction of the error") {
+    const Charged s = sphere(4000, 1);
+    const Stack l = grids(s.points, 48);
+    WindingField exact(l);
+    exact.solve(s.points, s.vectors, 30);
+    WindingField field(l);
+    double before = largest_difference(field.indicator(), exact.indicator());
+    CHECK(before > 0.9);
+    for (int cycle = 0; cycle < 4; ++cycle) {
+        field.solve(s.points, s.vectors, 1);
+        const double now = largest_difference(field.indicator(), exact.indicator());
+        INFO("cycle " << cycle << ": " << before << " to " << now);
+        CHECK(now < 0.35 * before);
+        before = now;
+    }
+    // Going on is what more cycles at once are.
+    WindingField at_once(l);
+    at_once.solve(s.points, s.vectors, 4);
+    CHECK(at_once.indicator().values == field.indicator().values);
+}
+
+TEST_CASE("a coarser solution is a good first guess for a finer one") {
+    const Charged s = sphere(4000, 1);
+    const Stack fine = grids(s.points, 48);
+    WindingField coarse(grids(s.points, 32)), exact(fine), fresh(fine), guessed(fine);
+    coarse.solve(s.points, s.vectors, 12);
+    exact.solve(s.points, s.vectors, 30);
+    guessed.start_from(coarse.indicator());
+    double inside = 0;
+    for (const Vec3& x : test::box_cloud(100, {{-0.4, -0.4, -0.4}, {0.4, 0.4, 0.4}}, 3))
+        inside = std::max(inside, std::abs(guessed.indicator().at(x).value - 1));
+    CHECK(inside < 0.02);
+    fresh.solve(s.points, s.vectors, 1);
+    guessed.solve(s.points, s.vectors, 1);
+    CHECK(largest_difference(guessed.indicator(), exact.indicator()) <
+          0.7 * largest_difference(fresh.indicator(), exact.indicator()));
+}
+
+TEST_CASE("the indicator is linear in the areas; multiply scales it; turned normals change its sign") {
+    const Charged s = sphere(1000, 1);
+    const Stack l = grids(s.points, 32);
+    Charged turned = s;
+    for (Vec3& v : turned.vectors) v = test::scaled(-2, v);
+    WindingField field(l), other(l);
+    field.solve(s.points, s.vectors, 5);
+    other.solve(turned.points, turned.vectors, 5);
+    field.multiply(-2);
+    CHECK(largest_difference(field.indicator(), other.indicator()) < 1e-4);
+    CHECK(field.indicator().at({0, 0, 0}).value < -1.9);
+}
