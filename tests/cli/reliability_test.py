@@ -123,16 +123,23 @@ class Inputs(Case):
         self.run_covol("phantom", "sphere", "--size", "16", "-o", "next.nrrd")
         self.assertEqual([p.name for p in self.out.iterdir()], ["next.nrrd"])
 
-    def test_clouds_that_no_lattice_holds(self):
+    def test_a_point_that_no_grid_holds(self):
         """Named at once, not after minutes or for want of memory."""
-        ball = (np.array(sphere_points(6000)) - CENTER) / RADIUS
-        wild, apart = ball.copy(), 0.01 * ball
+        wild = (np.array(sphere_points(6000)) - CENTER) / RADIUS
         wild[17] = (1e7, 3, 4)
+        path = self.inputs / "cloud.xyz"
+        np.savetxt(path, wild, "%.9g")
+        self.refuse("reconstruct", path, "-o", "o.vdb", code=3, says="points: (1e+07, 3, 4) lies")
+
+    def test_small_parts_far_apart(self):
+        """Two balls 10^4 radii apart cost what their points cost."""
+        apart = 0.01 * (np.array(sphere_points(6000)) - CENTER) / RADIUS
         apart[::2] += (100, 0, 0)
-        for points, says in ((wild, "points: (1e+07, 3, 4) lies"), (apart, "the points are small parts, far apart")):
-            path = self.inputs / "cloud.xyz"
-            np.savetxt(path, points, "%.9g")
-            self.refuse("reconstruct", path, "-o", "o.vdb", code=3, says=says)
+        path = self.inputs / "cloud.xyz"
+        np.savetxt(path, apart, "%.9g")
+        report = self.report("reconstruct", path, "-o", "o.vdb")
+        self.assertEqual((report["surface"]["components"], report["surface"]["genus"]), (2, 0))
+        self.assertAlmostEqual(report["surface"]["volume"], 2 * 4 / 3 * np.pi * 1e-6, delta=0.01 * 8.4e-6)
 
 
 class Memory(Case):
