@@ -72,7 +72,9 @@ struct OrientationHeuristics {
     /// [share of the points] In patches that stay turned: fewer, and those left may turn to and fro.
     double few_stayed = heuristic("orientation.few_stayed", 0.002);
     /// [cells] Of the grid of the density whose gradient is the first guess.
-    double first_cells = heuristic("orientation.first_cells", 2.25);
+    double first_cells = heuristic("orientation.first_cells", 3.2);
+    /// [cells] The same of a further try, if normals go on turning: tunnels and layers close to each other ask for it.
+    double finer_first_cells = heuristic("orientation.finer_first_cells", 2.25);
     /// [1 - cosine] Mean change of the normals at which the iteration ends.
     double steady = heuristic("orientation.steady", 1e-4);
     /// [indicator] At a point beyond which another part encloses it already; noise brings points there that are none of

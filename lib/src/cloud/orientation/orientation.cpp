@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <tuple>
 
 #include "base/geometry.h"
 #include "cloud/orientation/areas.h"
@@ -30,10 +31,15 @@ using cloud::WindingField;
 struct Try {
     double cell;      // of those
     double enclosed;  // on the first lattice
+    double first_guess = kOrientation.first_cells;
 };
-const Try kTries[] = {{1, kOrientation.enclosed},           {1, kOrientation.surely_enclosed},
-                      {0.67, kOrientation.surely_enclosed}, {1.5, kOrientation.surely_enclosed},
-                      {0.44, kOrientation.enclosed},        {2.25, kOrientation.surely_enclosed}};
+const Try kTries[] = {{1, kOrientation.enclosed},
+                      {1, kOrientation.surely_enclosed},
+                      {1, kOrientation.enclosed, kOrientation.finer_first_cells},
+                      {0.67, kOrientation.surely_enclosed},
+                      {1.5, kOrientation.surely_enclosed, kOrientation.finer_first_cells},
+                      {0.44, kOrientation.enclosed},
+                      {2.25, kOrientation.surely_enclosed}};
 
 /// A stack of grids and what is done on it.
 struct Stage {
@@ -45,14 +51,16 @@ struct Stage {
 
 class Iteration {
 public:
-    Iteration(const std::vector<Vec3>& points, const std::vector<double>& areas, const RunContext& run)
-        : points_(points), areas_(areas), run_(run) {}
+    /// @param first_guess  [cells of the first stage] of the grid of the density that gives the first normals
+    Iteration(const std::vector<Vec3>& points, const std::vector<double>& areas, double first_guess,
+              const RunContext& run)
+        : points_(points), areas_(areas), first_guess_(first_guess), run_(run) {}
 
     void run(const Stage& stage, Orientation& result) {
         WindingField field(cloud::indicator_grid(points_, areas_, stage.cell));
         if (last_) field.start_from(last_->indicator());
         stage_ = stage;
-        if (result.normals.empty()) first_guess(stage.cell, result);
+        if (result.normals.empty()) guess_normals(stage.cell, result);
         for (int n = 0; n < stage.iterations; ++n) {
             ++result.iterations;
             if (turn(field, result, kOrientation.cycles) < kOrientation.steady) break;
@@ -71,9 +79,9 @@ public:
     [[nodiscard]] WindingField& last() { return *last_; }
 
 private:
-    void first_guess(double cell, Orientation& result) const {
-        const StackField density = cloud::spread(cloud::grid_around(points_, areas_, kOrientation.first_cells * cell),
-                                                 points_, std::vector<double>(points_.size(), 1.0));
+    void guess_normals(double cell, Orientation& result) const {
+        const StackField density = cloud::spread(cloud::grid_around(points_, areas_, first_guess_ * cell), points_,
+                                                 std::vector<double>(points_.size(), 1.0));
         result.normals.resize(points_.size());
         tbb::parallel_for(std::size_t(0), points_.size(), [&](std::size_t n) {
             const Vec3 g = density.at(points_[n]).gradient;
@@ -208,6 +216,7 @@ private:
 
     const std::vector<Vec3>& points_;
     const std::vector<double>& areas_;  // before the indicator's step scales them
+    double first_guess_;
     const RunContext& run_;
     Stage stage_{};
     std::optional<WindingField> last_;
@@ -395,20 +404,22 @@ Orientation orient(const std::vector<Vec3>& points, const CloudScale& scale, con
         const double most = std::max(1.0, double(points.size() / kOrientation.least_sampled));
         const Sample sample(points, scale.spacing, std::size_t(std::clamp(1 / share, 1.0, most)));
         const double reach = kOrientation.passed_reach * std::max(scale.spacing, scale.noise);
-        std::vector<std::pair<double, double>> lattices;
+        std::vector<std::tuple<double, double, double>> lattices;
         std::vector<Tried> tried;
         std::vector<Try> tries(std::begin(kTries), std::end(kTries));
         if (first > kOrientation.coarse * finest)
-            tries.insert(tries.begin() + 2, Try{finest / first, kOrientation.surely_enclosed});
+            tries.insert(tries.begin() + 3,
+                         Try{finest / first, kOrientation.surely_enclosed, kOrientation.finer_first_cells});
         const double strain_cell = kOrientation.strain_cells * finest;
         for (const Try& attempt : tries) {
             const double tried_cell = cloud::indicator_cell(
                 points, std::max(first * attempt.cell, kOrientation.least_spacings * scale.spacing));
-            if (std::count(lattices.begin(), lattices.end(), std::pair{tried_cell, attempt.enclosed}) > 0) continue;
-            lattices.emplace_back(tried_cell, attempt.enclosed);
+            const std::tuple lattice{tried_cell, attempt.enclosed, attempt.first_guess};
+            if (std::count(lattices.begin(), lattices.end(), lattice) > 0) continue;
+            lattices.push_back(lattice);
             Orientation now;
             now.areas = sample.areas;
-            Iteration iteration(sample.points, sample.areas, run);
+            Iteration iteration(sample.points, sample.areas, attempt.first_guess, run);
             for (const Stage& stage : {Stage{1.5 * tried_cell, 12, false, attempt.enclosed},
                                        Stage{tried_cell, 8, true, kOrientation.surely_enclosed}})
                 iteration.run(stage, now);
