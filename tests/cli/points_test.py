@@ -1,7 +1,7 @@
 """Marks as people have them: the real binary reads them, and says what does not fit.
 
     COVOL=build/bin/covol python3 -m unittest tests/cli/points_test.py
-    COVOL_DATA=FOLDER ... with the embryo phantom in FOLDER/phantoms
+    COVOL_DATA=FOLDER ... with the embryo phantom in FOLDER/phantoms, and a spleen in FOLDER/images
 """
 import csv
 import json
@@ -11,6 +11,9 @@ import pathlib
 import struct
 import unittest
 import zipfile
+
+import nibabel
+import numpy as np
 
 from cli_test import Case
 
@@ -235,6 +238,31 @@ class Cleaning(PointsCase):
         self.refuse("convert", self.dirty, "o.xyz", "--remove-outliers=many", code=2, says="--remove-outliers")
         self.refuse("convert", self.dirty, "o.xyz", "--smooth", "butter", code=2, says="--smooth")
         self.refuse("convert", self.dirty, "o.xyz", "--simplify", "1vx", code=2, says="--like IMAGE")
+
+
+class WrongMarks(Case):
+    @unittest.skipUnless(os.environ.get("COVOL_DATA"), "SKIPPED: COVOL_DATA is not set")
+    def test_few_among_many_in_thick_slices(self):
+        """A spleen in slices of 5 mm: right marks lie half a slice off, and that is no reason to give up the body."""
+        folder = pathlib.Path(os.environ["COVOL_DATA"]) / "images"
+        truth = np.asanyarray(nibabel.load(folder / "ct_spleen_gt.nii.gz").dataobj) > 0
+        rng = np.random.default_rng(5)
+        faces = []
+        for axis in range(3):
+            change = np.argwhere(np.diff(truth, axis=axis))
+            faces.append(change + 0.5 * np.eye(3)[axis])
+        marks = rng.permutation(np.concatenate(faces))[:300] + rng.uniform(-0.5, 0.5, (300, 3))
+        inside = np.argwhere(truth)
+        low, high = inside.min(0), inside.max(0)
+        margin = 0.3 * (high - low)
+        marks[:15] = np.clip(rng.uniform(low - margin, high + margin, (15, 3)), 0, np.array(truth.shape) - 1)
+        path = self.inputs / "wrong.csv"
+        path.write_text("x,y,z\n" + "\n".join(",".join(f"{v:.4f}" for v in mark) for mark in marks) + "\n")
+        report = self.report("segment", folder / "ct_spleen.nii.gz", "--points", path, "--points-space", "index", "-o", "w.vdb",
+                             "--mask", "w.nii.gz")
+        self.assertGreater(len(report["inference"]["wrong_marks"]), 8)
+        alike = self.report("compare", "w.nii.gz", folder / "ct_spleen_gt.nii.gz")["compare"]
+        self.assertGreater(alike["dice"], 0.95)
 
 
 if __name__ == "__main__":

@@ -344,14 +344,18 @@ void add_places(const ImageGeometry& geometry, const std::vector<Vec3>& world, s
         places.push_back(to_frame(geometry, world[n]));
 }
 
-/// Of the marks, that lie off a level's surface.
-double fraction_off(const ImageGeometry& geometry, const std::vector<Vec3>& world, const Lattice& lattice,
+/// Fraction of the marks that lie off a level's surface. A mark is as precise as the image is along its normal: across
+/// thick slices it may lie half a slice off.
+double fraction_off(const ImageGeometry& geometry, const std::vector<Vec3>& world, const Solid& body,
                     const Field& level) {
-    const double beyond = kInference.off_cells * lattice.finest();
-    const auto off = std::count_if(world.begin(), world.end(), [&](const Vec3& mark) {
-        return std::abs(lattice.value(level, to_frame(geometry, mark))) > beyond;
-    });
-    return double(off) / double(world.size());
+    std::vector<Vec3> places;
+    for (const Vec3& mark : world) places.push_back(to_frame(geometry, mark));
+    const std::vector<Vec3> normals = normals_of(body, places);
+    double off = 0;
+    for (std::size_t n = 0; n < places.size(); ++n)
+        off += std::abs(body.lattice.value(level, places[n])) >
+               kInference.off_cells * body.lattice.extent_along(normals[n]);
+    return off / double(places.size());
 }
 
 template <typename LevelAt>
@@ -459,7 +463,7 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
                            : "the surface of least bending predicts marks better");
             return;
         }
-        if (fraction_off(geometry, result.marks, body.lattice, level) > kInference.most_off) {
+        if (fraction_off(geometry, result.marks, body, level) > kInference.most_off) {
             report.expected.reset();
             reject_body("the likeliest body by the image leaves many marks");
             return;

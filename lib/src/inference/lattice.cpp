@@ -61,6 +61,10 @@ double Lattice::cell_along(const Vec3& unit) const {
     return 1 / std::sqrt(squares);
 }
 
+double Lattice::extent_along(const Vec3& unit) const {
+    return std::hypot(unit[0] * spacing[0], unit[1] * spacing[1], unit[2] * spacing[2]);
+}
+
 double Lattice::value(const Field& field, const Vec3& place) const {
     int first[3], next[3];
     double part[3];

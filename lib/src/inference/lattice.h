@@ -36,6 +36,8 @@ struct Lattice {
     [[nodiscard]] double finest() const;
     /// The length of a cell along a direction.
     [[nodiscard]] double cell_along(const Vec3& unit) const;
+    /// The root mean square of a cell's edges, weighted by a direction: how precise a place is along it.
+    [[nodiscard]] double extent_along(const Vec3& unit) const;
     /// Trilinear; beyond the lattice the value at its end.
     [[nodiscard]] double value(const Field& field, const Vec3& place) const;
 };
