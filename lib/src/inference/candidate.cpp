@@ -273,12 +273,11 @@ double area_of(const Solid& solid) {
 /// Marks lie on the surface, anywhere on it with the same probability, so that they are the less likely the larger it
 /// is, and the farther they lie off it. What the image tells of the sides of marks that were left out counts, too.
 double score_of(const Scene& scene, const Solid& solid, double bits) {
-    constexpr double kMostCells = 4;  // a miss is a miss
     const double cell = solid.lattice.finest();
     const Field distance = signed_distance(solid.lattice, solid.inside);
     double off = 0;
     for (const Vec3& mark : scene.marks.places)
-        off += std::min(std::abs(solid.lattice.value(distance, mark)) / cell, kMostCells);
+        off += std::min(std::abs(solid.lattice.value(distance, mark)) / cell, kFarthestMiss);
     return bits - std::log(area_of(solid)) - off / (kInference.usual_off * double(scene.marks.places.size()));
 }
 

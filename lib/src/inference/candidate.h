@@ -16,6 +16,9 @@
 
 namespace covol::inference {
 
+/// [cells] From a mark to a surface, at most: a miss is a miss.
+constexpr double kFarthestMiss = 4;
+
 /// What is known of a lattice's nodes before there is a candidate.
 struct Scene {
     const Marks& marks;

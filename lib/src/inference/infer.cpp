@@ -34,6 +34,11 @@ struct HeldOut {
     std::vector<Vec3> marks;
     std::vector<double> of_body, of_guess;
     std::vector<double> to_rest2;  // square distance to the nearest mark that they were made from
+
+    /// Of the weighted mean of both. @param shrink  of the body's errors on a finer lattice
+    [[nodiscard]] double of_both(std::size_t n, double guess_weight, double shrink = 1) const {
+        return guess_weight * of_guess[n] + (1 - guess_weight) * shrink * of_body[n];
+    }
 };
 
 class Inference {
@@ -241,8 +246,7 @@ class Predictions {
 public:
     /// @param shrink  of the body's errors on a finer lattice
     Predictions(const HeldOut& held, double cell, double shrink) : small_(kInference.usual_off * cell) {
-        constexpr double kMostCells = 4;  // a miss is a miss
-        const double most = kMostCells * cell;
+        const double most = kFarthestMiss * cell;
         for (std::size_t n = 0; n < held.of_body.size(); ++n)
             off_.push_back(
                 {std::clamp(shrink * held.of_body[n], -most, most), std::clamp(held.of_guess[n], -most, most)});
@@ -371,7 +375,7 @@ std::size_t count_wrong(const KnownSides& sides, const LevelAt& level) {
 double error_slope(const HeldOut& held, double guess_weight, double shrink) {
     double errors = 0, distances = 0;
     for (std::size_t n = 0; n < held.of_body.size(); ++n) {
-        const double off = guess_weight * held.of_guess[n] + (1 - guess_weight) * shrink * held.of_body[n];
+        const double off = held.of_both(n, guess_weight, shrink);
         errors += off * off * held.to_rest2[n];
         distances += held.to_rest2[n] * held.to_rest2[n];
     }
@@ -387,8 +391,7 @@ std::optional<ExpectedDice> expected_dice(const HeldOut& held, double guess_weig
     const double most = kMostCells * cell;
     double error = 0;
     for (std::size_t n = 0; n < held.of_body.size(); ++n) {
-        const double off = guess_weight * held.of_guess[n] + (1 - guess_weight) * held.of_body[n];
-        error += std::min(std::abs(off), most) / double(held.of_body.size());
+        error += std::min(std::abs(held.of_both(n, guess_weight)), most) / double(held.of_body.size());
     }
     error = std::max(error, kLeastCells * cell);
     const double lost =
