@@ -56,11 +56,13 @@ def write_image(path, direction, unit):
 class Server:
     """The program. Killed and started again it has the same study, and another token."""
 
-    def __init__(self, is_turned=False, is_anatomical=False, name="ball", options=()):
+    def __init__(self, is_turned=False, is_anatomical=False, name="ball", options=(), write=None):
+        """@param write  makes another image in a folder, and gives its path"""
         self.options = options
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="covol-mark-"))
-        self.image = self.folder / f"{name}.nrrd"
-        write_image(self.image, turned() if is_turned else np.eye(3), "mm" if is_anatomical else "um")
+        self.image = write(self.folder) if write else self.folder / f"{name}.nrrd"
+        if not write:
+            write_image(self.image, turned() if is_turned else np.eye(3), "mm" if is_anatomical else "um")
         self.start()
 
     def start(self):

@@ -38,6 +38,19 @@ struct PageSlice {
 [[nodiscard]] COVOL_API PageSlice make_page_slice(const ImageLevels& image, const SliceRequest& wanted,
                                                   const std::array<double, 2>& range, const RunContext& run = {});
 
+/// A picture of any plane, in voxels of the image.
+struct ObliqueRequest {
+    Vec3 first{0, 0, 0};                 ///< the first pixel's middle
+    Vec3 right{0, 0, 0}, down{0, 0, 0};  ///< from a pixel to its neighbours
+    int count = 0;                       ///< pixels along each side, 1 to 1024
+};
+
+/// As make_page_slice(), sampled trilinearly; what lies outside of the image is 0.
+/// @throws Error InvalidOptions (a number that is not finite, too many pixels); what reading the image throws;
+/// Cancelled.
+[[nodiscard]] COVOL_API PageSlice make_oblique_slice(const ImageLevels& image, const ObliqueRequest& wanted,
+                                                     const std::array<double, 2>& range, const RunContext& run = {});
+
 /// A mesh for a browser: a zlib stream of the counts of vertices and triangles (32 bits each), the box (six floats),
 /// the lengths of what follows (32 bits each), and the vertices and corners as mesh_codec.h codes them.
 [[nodiscard]] COVOL_API std::string make_page_mesh(const TriangleMesh& mesh);

@@ -14,16 +14,13 @@
 #include "covol/api.h"
 #include "covol/fwd.h"
 #include "covol/image.h"
+#include "covol/mark_kinds.h"
 #include "covol/marks.h"
 #include "covol/options_table.h"
 #include "covol/pipeline.h"
 
 // What a person marks on one image: structures with their marks, and everything that was done to them, in a journal.
 namespace covol {
-
-enum class MarkKind { Surface, Inside, Outside };
-template <>
-inline constexpr auto kWords<MarkKind> = std::array{"surface", "inside", "outside"};
 
 /// Numbers of structures, marks and outlines begin at 1 and are not used again, not even after an undo.
 using StudyId = std::int64_t;
@@ -137,7 +134,9 @@ struct StudyActions {
     struct AddMarks {
         StudyId structure = 0;
         MarkKind kind = MarkKind::Surface;
-        std::vector<Vec3> world;
+        std::vector<Vec3> world;  ///< of that kind
+        std::vector<Vec3> inside = {}, outside = {};
+        std::vector<StudyOutline> outlines = {};  ///< their own numbers are not used
     };
     struct MoveMark {
         StudyId structure = 0, mark = 0;

@@ -31,7 +31,8 @@ struct StudyResult {
 };
 
 /// Finds the surfaces of structures whose marks change, one at a time, on a thread of its own: the structure that
-/// changed last comes first, and what its change made obsolete is cancelled.
+/// changed last comes first, and what its change made obsolete is cancelled. It computes at a lower priority than the
+/// threads of its caller.
 ///
 /// Each structure is solved for itself, as segment_structures() solves a single one; where structures overlap is
 /// decided by who asks for all of them together.
@@ -52,6 +53,8 @@ public:
     COVOL_API void set_options(SegmentOptions options);
     /// The structure's marks are these now.
     COVOL_API void solve(std::shared_ptr<const StudyStructure> structure, std::uint64_t sequence);
+    /// The same, of a structure whose surface is known: when nothing else is left to do, and without a first one.
+    COVOL_API void confirm(std::shared_ptr<const StudyStructure> structure, std::uint64_t sequence);
     /// It is gone.
     COVOL_API void forget(StudyId structure);
     /// The newest surface; null: there is none.

@@ -98,6 +98,22 @@ Enum word_of(const std::string& name, const std::string& word, const char* expec
 
 MarkKind kind_of(const std::string& word) { return word_of<MarkKind>("kind", word, "surface, inside or outside"); }
 
+StudyOutline read_outline(const Fields& f) {
+    StudyOutline outline;
+    outline.axis = int(std::min<StudyId>(f.at("axis") == 0 ? 0 : f.id("axis"), 3));
+    outline.at = f.number("at");
+    outline.closed = f.flag("closed");
+    outline.world = f.places("world");
+    return outline;
+}
+
+void write_outline(const StudyOutline& outline, json& j) {
+    j["axis"] = outline.axis;
+    j["at"] = outline.at;
+    j["closed"] = outline.closed;
+    j["world"] = outline.world;
+}
+
 /// An action's word, how it is read, and how it is written; one for each alternative of StudyAction, in its order.
 template <typename Action>
 struct Form;
@@ -177,12 +193,23 @@ template <>
 struct Form<act::AddMarks> {
     static constexpr const char* word = "add_marks";
     static act::AddMarks read(const Fields& f) {
-        return {f.id("structure"), kind_of(f.text("kind")), f.places("world")};
+        act::AddMarks a{f.id("structure"), kind_of(f.text("kind")), f.places("world")};
+        if (f.has("inside")) a.inside = f.places("inside");
+        if (f.has("outside")) a.outside = f.places("outside");
+        if (f.has("outlines")) {
+            const json& outlines = f.at("outlines");
+            if (!outlines.is_array()) refuse("'outlines': expected a list of objects");
+            for (const json& one : outlines) a.outlines.push_back(read_outline(Fields(one)));
+        }
+        return a;
     }
     static void write(const act::AddMarks& a, json& j) {
         j["structure"] = a.structure;
         j["kind"] = kWords<MarkKind>[std::size_t(a.kind)];
         j["world"] = a.world;
+        if (!a.inside.empty()) j["inside"] = a.inside;
+        if (!a.outside.empty()) j["outside"] = a.outside;
+        for (const StudyOutline& outline : a.outlines) write_outline(outline, j["outlines"].emplace_back());
     }
 };
 template <>
@@ -217,20 +244,10 @@ struct Form<act::GiveMark> {
 template <>
 struct Form<act::AddOutline> {
     static constexpr const char* word = "add_outline";
-    static act::AddOutline read(const Fields& f) {
-        StudyOutline outline;
-        outline.axis = int(std::min<StudyId>(f.at("axis") == 0 ? 0 : f.id("axis"), 3));
-        outline.at = f.number("at");
-        outline.closed = f.flag("closed");
-        outline.world = f.places("world");
-        return {f.id("structure"), std::move(outline)};
-    }
+    static act::AddOutline read(const Fields& f) { return {f.id("structure"), read_outline(f)}; }
     static void write(const act::AddOutline& a, json& j) {
         j["structure"] = a.structure;
-        j["axis"] = a.outline.axis;
-        j["at"] = a.outline.at;
-        j["closed"] = a.outline.closed;
-        j["world"] = a.outline.world;
+        write_outline(a.outline, j);
     }
 };
 template <>

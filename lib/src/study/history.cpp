@@ -60,6 +60,20 @@ struct StudyHistory::Planning {
             refuse("expected a path of 1 to " + std::to_string(kMostPathBytes) + " bytes");
         if (digest.empty() || digest.size() > kMostNameBytes) refuse("expected a digest of the file");
     }
+    void require_outline(const StudyOutline& outline) const {
+        const std::size_t fewest = outline.closed ? 3 : 2;
+        if (outline.world.size() < fewest)
+            refuse("an outline needs " + std::to_string(fewest) + " corners, got " +
+                   std::to_string(outline.world.size()));
+        if (outline.world.size() > kMostCorners) refuse("an outline has too many corners");
+        if (outline.axis < 0 || outline.axis > 2 || !std::isfinite(outline.at)) refuse("an outline lies on no slice");
+        for (const Vec3& corner : outline.world) require_inside(corner);
+    }
+    void add_outline(StudyStructure& structure, const StudyOutline& outline) {
+        if (structure.outlines.size() >= kMostMarks) refuse("'" + structure.name + "' has too many outlines");
+        structure.outlines.push_back(outline);
+        structure.outlines.back().id = next++;
+    }
     /// `edit` is given a copy.
     template <typename Edit>
     [[nodiscard]] Change edited(StudyId structure, bool may_be_locked, const Edit& edit) const {
@@ -134,12 +148,21 @@ struct StudyHistory::Planning {
         })};
     }
     Changes operator()(const StudyActions::AddMarks& a) {
-        if (a.world.empty()) refuse("expected marks, got none");
-        for (const Vec3& place : a.world) require_inside(place);
+        const std::array<std::pair<MarkKind, const std::vector<Vec3>*>, 3> lists{
+            {{a.kind, &a.world}, {MarkKind::Inside, &a.inside}, {MarkKind::Outside, &a.outside}}};
+        std::size_t count = 0;
+        for (const auto& [kind, places] : lists) {
+            for (const Vec3& place : *places) require_inside(place);
+            count += places->size();
+        }
+        if (count + a.outlines.size() == 0) refuse("expected marks, got none");
+        for (const StudyOutline& outline : a.outlines) require_outline(outline);
         return {edited(a.structure, false, [&](StudyStructure& s) {
-            if (a.world.size() > kMostMarks - std::min(s.marks.size(), kMostMarks))
+            if (count > kMostMarks - std::min(s.marks.size(), kMostMarks))
                 refuse("'" + s.name + "' has too many marks");
-            for (const Vec3& place : a.world) s.marks.push_back({next++, a.kind, place});
+            for (const auto& [kind, places] : lists)
+                for (const Vec3& place : *places) s.marks.push_back({next++, kind, place});
+            for (const StudyOutline& outline : a.outlines) add_outline(s, outline);
         })};
     }
     Changes operator()(const StudyActions::MoveMark& a) {
@@ -161,19 +184,8 @@ struct StudyHistory::Planning {
         return {std::move(from), std::move(to)};
     }
     Changes operator()(const StudyActions::AddOutline& a) {
-        const StudyOutline& outline = a.outline;
-        const std::size_t fewest = outline.closed ? 3 : 2;
-        if (outline.world.size() < fewest)
-            refuse("an outline needs " + std::to_string(fewest) + " corners, got " +
-                   std::to_string(outline.world.size()));
-        if (outline.world.size() > kMostCorners) refuse("an outline has too many corners");
-        if (outline.axis < 0 || outline.axis > 2 || !std::isfinite(outline.at)) refuse("an outline lies on no slice");
-        for (const Vec3& corner : outline.world) require_inside(corner);
-        return {edited(a.structure, false, [&](StudyStructure& s) {
-            if (s.outlines.size() >= kMostMarks) refuse("'" + s.name + "' has too many outlines");
-            s.outlines.push_back(outline);
-            s.outlines.back().id = next++;
-        })};
+        require_outline(a.outline);
+        return {edited(a.structure, false, [&](StudyStructure& s) { add_outline(s, a.outline); })};
     }
     Changes operator()(const StudyActions::RemoveOutline& a) {
         return {edited(a.structure, false, [&](StudyStructure& s) {

@@ -1,5 +1,6 @@
 #include "study/paint.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -22,14 +23,47 @@ struct Piece {
     Vec3 from, to;  // world
 };
 
+/// Lengths along an image's axes, whose angles may differ from right ones.
+class Lengths {
+public:
+    explicit Lengths(const ImageGeometry& image) {
+        constexpr double kRounding = 1e-3;  // of a file's direction
+        const Matrix3& d = image.direction;
+        Eigen::Matrix3d cosines;
+        for (std::size_t a = 0; a < 3; ++a)
+            for (std::size_t b = 0; b < 3; ++b) {
+                const double dot = d[0][a] * d[0][b] + d[1][a] * d[1][b] + d[2][a] * d[2][b];
+                cosines(Eigen::Index(a), Eigen::Index(b)) = a == b ? 1 : std::abs(dot) > kRounding ? dot : 0;
+            }
+        off_ = {cosines(1, 2), cosines(0, 2), cosines(0, 1)};
+        const Eigen::Matrix3d inverse = cosines.inverse();
+        for (std::size_t a = 0; a < 3; ++a) reach[a] = std::sqrt(inverse(Eigen::Index(a), Eigen::Index(a)));
+    }
+    /// The scalar product of two vectors that are given along the axes.
+    [[nodiscard]] double dot(const Vec3& u, const Vec3& v) const {
+        double sum = u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
+        for (std::size_t n = 0; n < 3; ++n) {
+            const std::size_t a = (n + 1) % 3, b = (n + 2) % 3;
+            if (off_[n] != 0) sum += off_[n] * (u[a] * v[b] + u[b] * v[a]);
+        }
+        return sum;
+    }
+
+    Vec3 reach{1, 1, 1};  ///< how far a ball of radius 1 goes along each axis
+
+private:
+    Vec3 off_{};  // cosines between the two other axes
+};
+
 double distance(const Vec3& a, const Vec3& b) { return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }
 
 /// The voxels that a piece may reach, in the image; empty where max < min.
 VoxelBox box_around(const Piece& piece, const StudyStroke& stroke, const ImageGeometry& image) {
     VoxelBox box;
+    const Vec3 reach_of_one = Lengths(image).reach;
     const Vec3 a = image.world_to_index(piece.from), b = image.world_to_index(piece.to);
     for (std::size_t n = 0; n < 3; ++n) {
-        const double reach = stroke.radius / image.spacing[n], last = image.size[n] - 1;
+        const double reach = stroke.radius * reach_of_one[n] / image.spacing[n], last = image.size[n] - 1;
         box.min[n] = int(std::clamp(std::ceil(std::min(a[n], b[n]) - reach), 0.0, last + 1));
         box.max[n] = int(std::clamp(std::floor(std::max(a[n], b[n]) + reach), -1.0, last));
         if (stroke.axis && std::size_t(*stroke.axis) == n) box.min[n] = box.max[n] = stroke.at;
@@ -85,33 +119,29 @@ VoxelBox box_around(const StudyStructure& structure, const ImageGeometry& image)
 /// One that stays on a slice is measured along that slice.
 void draw(const StudyStroke& stroke, const ImageGeometry& image, const VoxelBox& box, std::vector<std::uint8_t>& out) {
     const Index3 size = box.size();
+    const Lengths lengths(image);
     each_piece(stroke, [&](const Piece& piece) {
         VoxelBox reached = box_around(piece, stroke, image);
         for (std::size_t n = 0; n < 3; ++n) {
             reached.min[n] = std::max(reached.min[n], box.min[n]);
             reached.max[n] = std::min(reached.max[n], box.max[n]);
         }
-        // In lengths along the image's axes, which are perpendicular.
+        // In lengths along the image's axes.
         Vec3 a = image.world_to_index(piece.from), b = image.world_to_index(piece.to), along{};
         for (std::size_t n = 0; n < 3; ++n) {
             if (stroke.axis && std::size_t(*stroke.axis) == n) a[n] = b[n] = stroke.at;
             a[n] *= image.spacing[n];
             along[n] = b[n] * image.spacing[n] - a[n];
         }
-        const double length2 = along[0] * along[0] + along[1] * along[1] + along[2] * along[2];
+        const double length2 = lengths.dot(along, along);
         const double radius2 = stroke.radius * stroke.radius * (1 + 1e-9);
         for (int k = reached.min[2]; k <= reached.max[2]; ++k)
             for (int j = reached.min[1]; j <= reached.max[1]; ++j)
                 for (int i = reached.min[0]; i <= reached.max[0]; ++i) {
                     const Vec3 d{i * image.spacing[0] - a[0], j * image.spacing[1] - a[1], k * image.spacing[2] - a[2]};
-                    const double dot = d[0] * along[0] + d[1] * along[1] + d[2] * along[2];
-                    const double part = length2 > 0 ? std::clamp(dot / length2, 0.0, 1.0) : 0;
-                    double away2 = 0;
-                    for (std::size_t n = 0; n < 3; ++n) {
-                        const double off = d[n] - part * along[n];
-                        away2 += off * off;
-                    }
-                    if (away2 > radius2) continue;
+                    const double part = length2 > 0 ? std::clamp(lengths.dot(d, along) / length2, 0.0, 1.0) : 0;
+                    const Vec3 off{d[0] - part * along[0], d[1] - part * along[1], d[2] - part * along[2]};
+                    if (lengths.dot(off, off) > radius2) continue;
                     const std::size_t row =
                         std::size_t(k - box.min[2]) * std::size_t(size[1]) + std::size_t(j - box.min[1]);
                     out[row * std::size_t(size[0]) + std::size_t(i - box.min[0])] = stroke.erases ? 0 : 1;

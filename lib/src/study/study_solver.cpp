@@ -1,5 +1,10 @@
 #include "covol/study_solver.h"
 
+#include <sys/resource.h>
+#include <tbb/task_arena.h>
+#include <tbb/task_scheduler_observer.h>
+#include <unistd.h>
+
 #include <Eigen/Dense>
 #include <algorithm>
 #include <chrono>
@@ -20,6 +25,18 @@ namespace {
 
 constexpr std::size_t kFewestMarks = 4;  // a surface through fewer is any surface
 constexpr double kManyVoxels = 1e5;      // of a surface's band: more take longer than a person should wait
+
+/// Threads that find surfaces give way to those that answer a page, and to the browser on the same cores.
+class Courtesy : public tbb::task_scheduler_observer {
+public:
+    explicit Courtesy(tbb::task_arena& arena) : tbb::task_scheduler_observer(arena) { observe(true); }
+    ~Courtesy() override { observe(false); }
+    void on_scheduler_entry(bool /*is_worker*/) override {
+        constexpr int kNice = 10;
+        static thread_local const int done = ::setpriority(PRIO_PROCESS, id_t(::gettid()), kNice);
+        (void)done;
+    }
+};
 
 double seconds_since(std::chrono::steady_clock::time_point begin) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -93,6 +110,7 @@ struct StudySolver::State {
     struct Job {
         std::shared_ptr<const StudyStructure> structure;
         std::uint64_t sequence = 0;
+        bool is_known = false;  ///< its surface: confirm()
     };
 
     State(std::function<Image()> i, SegmentOptions o, std::function<void(const StudyResult&)> t, const RunContext& r,
@@ -110,6 +128,8 @@ struct StudySolver::State {
     }
 
     void work() {
+        tbb::task_arena arena;
+        const Courtesy courtesy(arena);
         std::unique_lock lock(mutex);
         for (;;) {
             changed.wait(lock, [&] { return is_stopping || !waiting.empty(); });
@@ -121,7 +141,7 @@ struct StudySolver::State {
             cancel = false;
             const SegmentOptions how = options;
             lock.unlock();
-            const bool is_done = solve(job, how);
+            const bool is_done = arena.execute([&] { return solve(job, how); });
             lock.lock();
             running = 0;
             if (!is_done && !is_obsolete && !is_stopping) waiting.push_back(job);  // it made way for another one
@@ -169,6 +189,10 @@ struct StudySolver::State {
         try {
             pixels = image();
             const Marks marks = marks_of(*job.structure, site);
+            if (job.is_known) {
+                find(refined, marks, StudyResult::Stage::Refined);
+                return true;
+            }
             SegmentOptions first = refined;
             first.evolve.rho = 0;
             first.without_mesh = first.without_fields = true;  // good triangles take as long as the surface itself
@@ -259,8 +283,17 @@ void StudySolver::solve(std::shared_ptr<const StudyStructure> structure, std::ui
     {
         const std::lock_guard lock(state_->mutex);
         state_->drop(structure->id);
-        state_->waiting.push_front({std::move(structure), sequence});
+        state_->waiting.push_front({std::move(structure), sequence, false});
         state_->cancel = true;
+    }
+    state_->changed.notify_all();
+}
+
+void StudySolver::confirm(std::shared_ptr<const StudyStructure> structure, std::uint64_t sequence) {
+    {
+        const std::lock_guard lock(state_->mutex);
+        state_->drop(structure->id);
+        state_->waiting.push_back({std::move(structure), sequence, true});
     }
     state_->changed.notify_all();
 }

@@ -1,10 +1,17 @@
-"""The page of `covol mark` on one image: the first picture, scrolling by the wheel, and memory.
+"""The page of `covol mark` on one image: the first picture, scrolling by the wheel, marking by clicks, and memory.
 
-    /usr/bin/python3 tests/bench/marks/large.py IMAGE [--covol BINARY] [--shot PNG]
+    /usr/bin/python3 tests/bench/marks/large.py [IMAGE] [--covol BINARY] [--shot PNG]
+
+Without an image it is that of large_image.py, which is made first: 2048 x 2048 x 2048 voxels in chunks, with a ball to mark.
 """
 import argparse
+import pathlib
+import tempfile
 import time
 
+import numpy as np
+
+import large_image
 from browser import Browser, Program
 
 COUNT = """
@@ -35,16 +42,42 @@ def scroll(browser, axis, slices, pause=0.02):
     return len(places) / seconds, abs(last // thick - first // thick) / seconds, max(gaps, default=0)
 
 
+def mark_ball(browser, count=30, timed=10):
+    """Clicks all around the ball of large_image.py; seconds from each of the last clicks to its first and its refined outline."""
+    rng, first, refined = np.random.default_rng(3), [], []
+    for n in range(count):
+        direction = rng.normal(size=3)
+        index = np.array(large_image.CENTRE) + large_image.RADIUS * direction / np.linalg.norm(direction)
+        index[2] = round(index[2])
+        browser.go(index.tolist())
+        browser.js("const p = mark.panels[2]; p.setView({zoom: 8, x: arguments[0][0], y: arguments[0][1]}); p.draw()", index.tolist())
+        browser.wait("return mark.slices.underWay.size === 0")
+        sequence = browser.js("return mark.study.seq") + 1 + (n == 0)  # the first click makes the structure
+        browser.click(2, index.tolist())
+        browser.wait("return mark.study.seq >= arguments[0]", sequence)
+        if n < count - timed:
+            continue
+        browser.wait("return mark.timing.outlines.some((o) => o.seq === arguments[0] && o.stage === 'refined')", sequence)
+        times = browser.js("return mark.timing.outlines.filter((o) => o.seq === arguments[0]).map((o) => [o.stage, (o.shown - o.pointer) / 1000])", sequence)
+        first.append(min(t for _, t in times))
+        refined.append(max(t for _, t in times))
+    return first, refined
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("image")
+    parser.add_argument("image", nargs="?")
     parser.add_argument("--covol", default="build/bin/covol")
     parser.add_argument("--slices", type=int, default=100)
+    parser.add_argument("--ball", action="store_true", help="the image is one of large_image.py")
     parser.add_argument("--shot")
     options = parser.parse_args()
+    folder = tempfile.TemporaryDirectory()
+    if not options.image:
+        large_image.make(folder.name + "/large.zarr")
     browser = Browser()
     try:
-        program = Program(options.covol, options.image)
+        program = Program(options.covol, options.image or folder.name + "/large.zarr")
         try:
             ready = time.perf_counter() - program.began
             browser.open(program.url)
@@ -59,6 +92,9 @@ def main():
             print(f"zoomed in: {time.perf_counter() - begin:.2f} s")
             shown, asked, gap = scroll(browser, 2, options.slices)
             print(f"plane 2, zoomed in: {shown:.1f} slices a second seen of {asked:.1f} asked for, the longest wait {gap:.0f} ms", flush=True)
+            if not options.image or options.ball:
+                first, refined = mark_ball(browser)
+                print(f"from a click to the first outline {np.median(first):.2f} s (at most {max(first):.2f}), to the refined one {np.median(refined):.2f} s (at most {max(refined):.2f})", flush=True)
             if options.shot:
                 browser.driver.save_screenshot(options.shot)
             own, whole = browser.memory()
@@ -67,6 +103,7 @@ def main():
             program.close()
     finally:
         browser.close()
+        folder.cleanup()
 
 
 if __name__ == "__main__":

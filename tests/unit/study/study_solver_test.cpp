@@ -85,6 +85,24 @@ TEST_CASE("A structure gets a first surface, and then the one that segment gives
     CHECK(refined[0].surface->report.surface.volume == Approx(4.0 / 3 * M_PI * std::pow(kRadius, 3)).epsilon(0.05));
 }
 
+TEST_CASE("What is known is made again when nothing else is left to do, and without a first surface") {
+    Listener listener;
+    StudySolver solver(scene, {}, listener.told());
+    solver.confirm(ball(1, 25), 5);
+    solver.confirm(ball(2, 24), 5);
+    solver.confirm(ball(3, 23), 5);
+    solver.solve(ball(4, 22), 6);
+    solver.solve(ball(3, 22), 7);  // not known any more
+    solver.wait();
+    CHECK(listener.of(1, Stage::First).empty());
+    REQUIRE(listener.of(1, Stage::Refined).size() == 1);
+    REQUIRE(listener.of(3, Stage::Refined).size() == 1);
+    CHECK(listener.of(3, Stage::Refined)[0].sequence == 7);
+    CHECK(listener.of(2, Stage::Refined)[0].version > listener.of(4, Stage::Refined)[0].version);
+    const StructuresResult plain = segment_structures(scene(), {marks_of(*ball(1, 25), {scene().geometry(), {}})});
+    CHECK(solver.surface(1)->mesh.vertices == plain.structures.front().result.mesh.vertices);
+}
+
 TEST_CASE("Too few marks are told, and no surface is left") {
     Listener listener;
     StudySolver solver(scene, {}, listener.told());

@@ -71,7 +71,13 @@ StudyAction any_action(const StudyHistory& history, std::mt19937& rng) {
         case 10:
             return act::AddOutline{structure, {0, int(below(3)), double(below(20)), true, {place(), place(), place()}}};
         case 11: return act::RemoveOutline{structure, mark};
-        case 24: return act::AddMarks{structure, MarkKind(below(3)), {place(), place(), place()}};
+        case 24:
+            return act::AddMarks{structure,
+                                 MarkKind(below(3)),
+                                 {place(), place(), place()},
+                                 {place()},
+                                 {},
+                                 {{0, 1, 3, false, {place(), place()}}}};
         case 25:
         case 26: {
             StudyStroke stroke{0, below(3) == 0, 0.5 + double(below(4)), {}, 0, {place(), place()}};
@@ -219,6 +225,43 @@ TEST_CASE("A brush paints balls, discs and what lies between two places, and an 
     CHECK(paint_of(structure, image)->geometry().index_to_world({0, 0, 0})[2] < at(0, 0, 12)[2]);
     structure.strokes.push_back({5, true, 5, 0, 30, {at(30, 30, 12)}});
     CHECK(painted_volume(structure, image) == Approx(25 * M_PI * 0.8 - 10 * 0.5 * 0.8).epsilon(0.05));
+}
+
+TEST_CASE("A ball is round in the world where the image's axes are not perpendicular") {
+    ImageGeometry image = image_of(60);
+    const double lean = 0.6, steep = std::sqrt(1 - lean * lean);
+    image.direction = {{{1, lean, 0}, {0, steep, 0.28}, {0, 0, 0.96}}};
+    const double voxel = steep * 0.96;
+    StudyStructure structure;
+    structure.strokes.push_back({1, false, 9, {}, 0, {image.index_to_world({30, 30, 30})}});
+    CHECK(painted_volume(structure, image) * voxel == Approx(4.0 / 3 * M_PI * 729).epsilon(0.02));
+    structure.strokes = {{1, false, 9, 2, 30, {image.index_to_world({30, 30, 30})}}};
+    CHECK(painted_volume(structure, image) * steep == Approx(81 * M_PI).epsilon(0.04));
+}
+
+TEST_CASE("Marks of a file are one action, of every kind and with its lines") {
+    StudyHistory history(image_of());
+    (void)history.apply(act::AddStructure{"one", {}});
+    const StudyOutline line{0, 2, 4, true, {{1, 1, 4}, {5, 1, 4}, {5, 6, 4}}};
+    const act::AddMarks marks{1, MarkKind::Surface, {{1, 2, 3}}, {{4, 5, 6}}, {{7, 8, 9}, {1, 1, 1}}, {line}};
+    // Through the journal's line.
+    const KeyedAction again = parse_study_action(to_json({"k", marks}));
+    (void)history.apply(again.action);
+    const StudyStructure& one = *history.state().front();
+    REQUIRE(one.marks.size() == 4);
+    CHECK(one.marks[1].kind == MarkKind::Inside);
+    CHECK(one.marks[3].kind == MarkKind::Outside);
+    CHECK(one.marks[3].world == Vec3{1, 1, 1});
+    REQUIRE(one.outlines.size() == 1);
+    CHECK(one.outlines[0].world == line.world);
+    CHECK(one.outlines[0].id > one.marks[3].id);
+    (void)history.apply(act::Undo{});
+    CHECK(history.state().front()->marks.empty());
+    CHECK(history.state().front()->outlines.empty());
+    CHECK_THROWS_AS(history.apply(act::AddMarks{1, MarkKind::Surface, {}, {}, {}, {}}), Error);
+    CHECK_THROWS_AS(history.apply(act::AddMarks{1, MarkKind::Surface, {}, {{1, 1, 99}}, {}, {}}), Error);
+    CHECK_THROWS_AS(history.apply(act::AddMarks{1, MarkKind::Surface, {}, {}, {}, {{0, 2, 4, true, {{1, 1, 4}}}}}),
+                    Error);
 }
 
 TEST_CASE("Strokes that would take too long or too much memory are refused, and nothing is painted") {

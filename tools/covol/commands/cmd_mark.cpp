@@ -8,12 +8,13 @@
 #include <optional>
 #include <thread>
 
-#include "cli/shear.h"
 #include "commands/commands.h"
 #include "covol/digest.h"
 #include "covol/error.h"
 #include "covol/image_levels.h"
+#include "covol/safe_text.h"
 #include "covol/study_files.h"
+#include "covol/version.h"
 #include "flags/bindings.h"
 #include "jobs/page.h"
 #include "mark/bounded_image.h"
@@ -21,6 +22,7 @@
 #include "mark/imports.h"
 #include "mark/mark_session.h"
 #include "mark/page.h"
+#include "mark/page_image.h"
 #include "serve/web_server.h"
 
 namespace covol::tool {
@@ -81,16 +83,9 @@ struct MarkJob {
     void run(Session& session) const {
         if (port < 0 || port > 65535)
             throw Error(Errc::InvalidOptions, "--port: expected 0 to 65535, got " + std::to_string(port));
-        session.require_memory(double(read_image_info(image_path, image.options, session.run()).bytes_to_hold),
-                               "the image");
+        const ImageInfo info = read_image_info(image_path, image.options, session.run());
+        session.require_memory(double(info.bytes_to_hold), "the image");
         const Image pixels = image.read(image_path, session.run());
-        if (const double shear = shear_of(pixels.geometry()); shear > 0)
-            throw Error(
-                Errc::Unsupported,
-                image_path +
-                    ": expected perpendicular axes, whose slices the page shows, got ones that are sheared by " +
-                    std::to_string(shear) +
-                    " degrees; resample the image, with SimpleITK's Resample() for example; segment reads it as it is");
         const std::filesystem::path path = without_slash(image_path);
         Study opened(study.empty() ? path.string() + ".covol" : study, image_path, pixels.geometry());
         if (!opened.repaired().empty()) session.warn(opened.folder() + ": " + opened.repaired());
@@ -100,7 +95,7 @@ struct MarkJob {
         take_files(opened, view.site, session);
         view.page = detail::mark_page();
         view.title = path.filename().string();
-        view.is_anatomical = is_anatomical(image_path, image.options, session.run());
+        view.image_digest = identity_of_image();
         serve::Options options;
         options.port = std::uint16_t(port);
         options.authorities = authorities;
@@ -116,8 +111,11 @@ struct MarkJob {
         const bool is_bounded = levels.is_in_chunks();
         BoundedImage for_jobs(is_bounded ? open() : pixels, open,
                               is_bounded ? kMostJobBytes : std::numeric_limits<std::uint64_t>::max());
+        auto seen =
+            std::make_unique<PageImage>(levels, view.title, is_anatomical(image_path, image.options, session.run()),
+                                        channels(info, session), quiet(session.run()));
         MarkSession mark(
-            std::move(opened), levels, [&] { return for_jobs.get(); }, std::move(view), session.run());
+            std::move(opened), std::move(seen), [&] { return for_jobs.get(); }, std::move(view), session.run());
         std::latch started(1);  // a browser may be there before the study is
         serve::Handlers handlers;
         handlers.get = [&](const serve::Request& request) {
@@ -148,6 +146,37 @@ struct MarkJob {
     }
 
 private:
+    /// The others are read when a page asks for them.
+    [[nodiscard]] PageChannels channels(const ImageInfo& info, Session& session) const {
+        PageChannels all;
+        if (info.channels < 2) return all;
+        all.own = image.options.channel.value_or(0);
+        for (int c = 0; c < info.channels; ++c)
+            all.names.push_back(std::size_t(c) < info.channel_names.size() &&
+                                        !info.channel_names[std::size_t(c)].empty()
+                                    ? safe_text(info.channel_names[std::size_t(c)])
+                                    : "channel " + std::to_string(c));
+        all.open = [how = *this, bytes = double(info.bytes_to_hold), &session](int channel) {
+            ImageFlags other = how.image;
+            other.options.channel = channel;
+            session.require_memory(bytes, "another channel");
+            const Image pixels = other.read(how.image_path, quiet(session.run()));
+            return open_image_levels(pixels, other.options, kMostSliceBytes / 4, quiet(session.run()));
+        };
+        return all;
+    }
+
+    /// The file, what is read of it, and the program that makes surfaces from it.
+    [[nodiscard]] std::string identity_of_image() const {
+        const ReadImageOptions& how = image.options;
+        std::string identity = digest_of(image_path) + " " + version() + " channel " +
+                               std::to_string(how.channel.value_or(-1)) + " frame " +
+                               std::to_string(how.frame.value_or(-1)) + (how.correct_level_shift ? " shifted" : "");
+        if (how.spacing)
+            for (const double s : *how.spacing) identity += " " + std::to_string(s);
+        return identity;
+    }
+
     /// Adds the files of the command line to the study.
     void take_files(Study& study, const StudySite& site, Session& session) const {
         const std::string folder = study.folder();

@@ -2,15 +2,18 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <utility>
 
 #include "covol/digest.h"
 #include "covol/error.h"
 #include "covol/file_kind.h"
 #include "covol/image_files.h"
-#include "covol/read_marks.h"
+#include "covol/mark_kinds.h"
+#include "covol/points.h"
 #include "covol/study_files.h"
 
 namespace covol::tool {
@@ -39,6 +42,31 @@ std::uintmax_t bytes_in(const std::filesystem::path& folder) {
     for (const auto& entry : std::filesystem::directory_iterator(folder, none))
         if (entry.is_regular_file(none)) bytes += entry.file_size(none);
     return bytes;
+}
+
+/// None where the line lies on no slice of the image, or has too few corners.
+std::optional<StudyOutline> outline_of(const std::vector<Vec3>& world, const MarkLine& line,
+                                       const ImageGeometry& image) {
+    constexpr double kSlack = 0.01;  // voxels: what a text file's digits leave
+    if (line.end - line.begin < (line.closed ? 3U : 2U)) return std::nullopt;
+    Vec3 low{}, high{};
+    for (std::size_t n = line.begin; n < line.end; ++n) {
+        const Vec3 index = image.world_to_index(world[n]);
+        for (std::size_t a = 0; a < 3; ++a) {
+            low[a] = n == line.begin ? index[a] : std::min(low[a], index[a]);
+            high[a] = n == line.begin ? index[a] : std::max(high[a], index[a]);
+        }
+    }
+    for (const int axis : {2, 1, 0}) {
+        const auto a = std::size_t(axis);
+        if (high[a] - low[a] > kSlack) continue;
+        StudyOutline outline{0, axis, 0.5 * (low[a] + high[a]), line.closed, {}};
+        // The page draws it on a slice that it lies on up to these digits.
+        if (std::abs(outline.at - std::round(outline.at)) <= kSlack) outline.at = std::round(outline.at);
+        outline.world.assign(world.begin() + std::ptrdiff_t(line.begin), world.begin() + std::ptrdiff_t(line.end));
+        return outline;
+    }
+    return std::nullopt;
 }
 
 }  // namespace
@@ -88,15 +116,32 @@ GivenFile keep_file(const std::string& name, const std::string& bytes, bool is_m
 
 StudyAction import_points(const std::string& file, StudyId structure, const ImageGeometry& image,
                           const RunContext& run) {
-    Marks marks;
-    marks.files.points.push_back(file);
-    read_marks(marks, image, {}, run);
-    if (marks.points.empty()) throw Error(Errc::InvalidInput, "import: " + file + ": holds no marks");
-    if (marks.points.size() > kMostImported)
-        throw Error(Errc::InvalidInput, "import: " + file + ": holds " + std::to_string(marks.points.size()) +
+    const KindedPoints given = read_kinded_points(file);
+    const PointCloud& cloud = given.cloud;
+    if (cloud.points.size() > kMostImported)
+        throw Error(Errc::InvalidInput, "import: " + file + ": holds " + std::to_string(cloud.points.size()) +
                                             " marks, a study takes " + std::to_string(kMostImported) +
                                             " of a file; covol segment --points takes all");
-    return StudyActions::AddMarks{structure, MarkKind::Surface, std::move(marks.points)};
+    check_inside(cloud, image, run);
+    const std::vector<Vec3> world = to_world(cloud, image);
+    StudyActions::AddMarks action{structure, MarkKind::Surface, {}};
+    std::vector<bool> is_in_outline(world.size(), false);
+    for (const MarkLine& line : cloud.lines) {
+        std::optional<StudyOutline> outline = outline_of(world, line, image);
+        if (!outline) continue;  // its marks are good for themselves
+        action.outlines.push_back(*std::move(outline));
+        std::fill(is_in_outline.begin() + std::ptrdiff_t(line.begin), is_in_outline.begin() + std::ptrdiff_t(line.end),
+                  true);
+    }
+    for (std::size_t n = 0; n < world.size(); ++n) {
+        if (is_in_outline[n]) continue;
+        const MarkKind kind = given.kinds.empty() ? MarkKind::Surface : given.kinds[n];
+        (kind == MarkKind::Surface  ? action.world
+         : kind == MarkKind::Inside ? action.inside
+                                    : action.outside)
+            .push_back(world[n]);
+    }
+    return action;
 }
 
 StudyAction import_guess(const std::string& file, StudyId structure, const std::string& folder, const StudySite& site,

@@ -31,7 +31,9 @@ private:
 [[nodiscard]] GivenFile keep_file(const std::string& name, const std::string& bytes, bool is_marks,
                                   const std::string& folder, const RunContext& run);
 
-/// The marks of a file, on the surface of that structure. @throws Error as read_marks(); InvalidInput (none, too many).
+/// The marks of a file for that structure, of the kinds that it tells; lines on slices of the image become outlines,
+/// the marks of other lines are taken one by one. @throws Error as read_points() and check_inside(); InvalidInput (too
+/// many).
 [[nodiscard]] StudyAction import_points(const std::string& file, StudyId structure, const ImageGeometry& image,
                                         const RunContext& run);
 /// Reads it once: what cannot be a guess is an error now. @throws Error as read_guess().

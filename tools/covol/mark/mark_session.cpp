@@ -1,7 +1,6 @@
 #include "mark/mark_session.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -14,44 +13,21 @@
 #include "jobs/structure_outputs.h"
 #include "mark/exports.h"
 #include "mark/imports.h"
+#include "mark/mark_json.h"
+#include "mark/request_fields.h"
 
 namespace covol::tool {
 namespace {
 
-constexpr double kBlack = 0.002, kWhite = 0.998;  // fractions of the voxels below what is shown black and white
 constexpr int kSuggestions = 5;
+constexpr std::uint64_t kKeptVersion = 1;  // of surfaces from when the study was open before; later ones come after it
 constexpr double kMostRead = double(1 << 27);  // voxels of an image in chunks, for a mean intensity
-
-const char* word_of(StudyResult::Stage stage) {
-    switch (stage) {
-        case StudyResult::Stage::Empty: return "empty";
-        case StudyResult::Stage::Working: return "working";
-        case StudyResult::Stage::First: return "first";
-        case StudyResult::Stage::Refined: return "refined";
-        case StudyResult::Stage::Failed: break;
-    }
-    return "failed";
-}
-
-std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 serve::Response refused(int status, const std::string& why) {
     serve::Response response;
     response.status = status;
     response.body = why + "\n";
     return response;
-}
-
-std::int64_t number_of(const serve::Request& request, const std::string& name) {
-    const auto found = request.query.find(name);
-    std::int64_t value = -1;
-    if (found != request.query.end()) {
-        const std::string& text = found->second;
-        const auto end = text.data() + text.size();
-        if (const auto read = std::from_chars(text.data(), end, value); read.ec == std::errc() && read.ptr == end)
-            return value;
-    }
-    throw Error(Errc::InvalidInput, "'" + name + "': expected a whole number");
 }
 
 /// Where marks and edges hold all of a surface: its places that lie farthest from marks, and from each other.
@@ -73,40 +49,8 @@ std::vector<Vec3> farthest_from(const std::vector<Vec3>& marks, const TriangleMe
     return found;
 }
 
-Json result_json(const StudyResult& result, std::uint64_t version,
-                 const std::optional<IntensityStatistics>& intensity) {
-    Json json{{"structure", result.structure},  {"version", version},          {"seq", result.sequence},
-              {"stage", word_of(result.stage)}, {"progress", result.progress}, {"message", result.message},
-              {"seconds", result.seconds}};
-    if (!result.surface) return json;
-    const SegmentReport& report = result.surface->report;
-    Vec3 low{}, high{};
-    for (std::size_t a = 0; a < 3; ++a) {
-        const auto less = [a](const auto& p, const auto& q) { return p[a] < q[a]; };
-        const auto& vertices = result.surface->mesh.vertices;
-        if (vertices.empty()) break;
-        const auto [first, last] = std::minmax_element(vertices.begin(), vertices.end(), less);
-        low[a] = (*first)[a];
-        high[a] = (*last)[a];
-    }
-    json["triangles"] = result.surface->mesh.triangles.size();
-    json["volume"] = report.surface.volume;
-    json["area"] = report.surface.area;
-    json["extent"] = {high[0] - low[0], high[1] - low[1], high[2] - low[2]};
-    json["mean"] = json["sd"] = nullptr;
-    if (intensity && intensity->voxels > 0) {
-        json["mean"] = intensity->mean;
-        json["sd"] = intensity->standard_deviation;
-    }
-    json["expected"] = nullptr;
-    if (const auto& expected = report.inference.expected)
-        json["expected"] = {{"value", expected->value}, {"low", expected->low}, {"high", expected->high}};
-    json["warnings"] = report.warnings;
-    return json;
-}
-
-Json options_json(const StudyOptions& options) {
-    return Json::parse(covol::to_json(KeyedAction{"", StudyActions::SetOptions{options}})).at("options");
+bool is_same_mesh(const TriangleMesh& a, const TriangleMesh& b) {
+    return a.vertices == b.vertices && a.triangles == b.triangles && a.origin == b.origin;
 }
 
 }  // namespace
@@ -117,21 +61,15 @@ RunContext quiet(RunContext run) {
     return run;
 }
 
-MarkSession::MarkSession(Study study, ImageLevels levels, std::function<Image()> image, MarkView view,
+MarkSession::MarkSession(Study study, std::unique_ptr<PageImage> seen, std::function<Image()> image, MarkView view,
                          const RunContext& run)
-    : levels_(std::move(levels)),
+    : seen_(std::move(seen)),
       image_(std::move(image)),
-      geometry_(levels_.image().geometry()),
+      geometry_(seen_->image().geometry()),
       view_(std::move(view)),
       run_(quiet(run)),
-      study_(std::move(study)) {
-    range_ = levels_.range(run_);
-    if (!(range_[1] > range_[0])) range_[1] = range_[0] + 1;
-    window_ = levels_.percentiles(kBlack, kWhite, run_);
-    if (!(window_[1] > window_[0])) window_ = range_;
-    // Of an image in chunks only some were looked at.
-    range_ = {std::min(range_[0], window_[0]), std::max(range_[1], window_[1])};
-}
+      kept_(study.folder(), view_.image_digest),
+      study_(std::move(study)) {}
 
 void MarkSession::start(Send send, Broadcast broadcast) {
     send_ = std::move(send);
@@ -139,9 +77,30 @@ void MarkSession::start(Send send, Broadcast broadcast) {
     solver_ = std::make_unique<StudySolver>(
         image_, options(), [this](const StudyResult& r) { hear(r); }, run_, view_.site.read_guess);
     const std::lock_guard lock(mutex_);
-    std::vector<StudyId> all;
-    for (const auto& structure : study_.state()) all.push_back(structure->id);
-    follow(all);
+    std::vector<StudyId> unknown;
+    for (const auto& structure : study_.state())
+        if (!take_kept(structure)) unknown.push_back(structure->id);
+    follow(unknown);
+}
+
+bool MarkSession::take_kept(const std::shared_ptr<const StudyStructure>& structure) {
+    std::optional<KeptSurfaces::Kept> kept = kept_.find(*structure, study_.history().options());
+    if (!kept) return false;
+    Solved& solved = solved_[structure->id];
+    solved.from = structure;
+    solved.asked = study_.sequence();
+    solved.version = kKeptVersion;
+    solved.kept = std::move(kept->mesh);
+    solved.told = std::move(kept->figures);
+    // It is a first one: the image may have changed where its digest does not look.
+    solved.told.update({{"structure", structure->id},
+                        {"version", solved.version},
+                        {"seq", solved.asked},
+                        {"stage", word_of(StudyResult::Stage::First)},
+                        {"progress", 0},
+                        {"message", ""}});
+    solver_->confirm(structure, solved.asked);
+    return true;
 }
 
 /// Solves what has other marks now. @pre locked
@@ -156,8 +115,9 @@ void MarkSession::follow(const std::vector<StudyId>& structures) {
         Solved& solved = solved_[id];
         if (solved.from ? solved.from->has_same_evidence(*structure) : !structure->has_evidence()) continue;
         solved.from = structure;
+        solved.asked = study_.sequence();
         solved.is_refined = false;
-        solver_->solve(structure, study_.sequence());
+        solver_->solve(structure, solved.asked);
     }
 }
 
@@ -165,6 +125,9 @@ void MarkSession::follow(const std::vector<StudyId>& structures) {
 void MarkSession::hear(const StudyResult& result) {
     std::string text;
     std::optional<IntensityStatistics> intensity;
+    Json told;
+    std::shared_ptr<const StudyStructure> from;  // what is to be kept
+    StudyOptions options;
     if (result.stage == StudyResult::Stage::Refined)
         intensity = intensity_within(image_(), *result.surface->surface, kMostRead, run_);
     {
@@ -174,47 +137,40 @@ void MarkSession::hear(const StudyResult& result) {
         Solved& solved = found->second;
         if (result.stage == StudyResult::Stage::Empty) {
             solved.surface = nullptr;
+            solved.kept = nullptr;
             solved.version = 0;
         }
         if (result.surface) {
+            // Pages that have the same one do not ask for it again.
+            const bool is_same = solved.kept && is_same_mesh(*solved.kept, result.surface->mesh);
+            if (!is_same) {
+                solved.kept = nullptr;
+                solved.version = kKeptVersion + result.version;
+            }
             solved.surface = result.surface;
-            solved.version = result.version;
             solved.is_refined = result.stage == StudyResult::Stage::Refined;
+            if (solved.is_refined && !is_same && solved.from && result.sequence == solved.asked) {
+                from = solved.from;
+                options = study_.history().options();
+            }
         }
         solved.intensity = intensity;
-        Json told = result_json(result, solved.version, intensity);
+        told = result_json(result, solved.version, intensity);
         text = text_of({{"result", told}});
-        if (result.stage != StudyResult::Stage::Working) solved.told = std::move(told);
+        if (result.stage != StudyResult::Stage::Working) solved.told = told;
     }
     broadcast_(std::move(text));
+    if (from) kept_.keep(*from, options, told, result.surface->mesh);
+}
+
+std::shared_ptr<const TriangleMesh> MarkSession::mesh_of(const Solved& solved) {
+    if (solved.surface) return {solved.surface, &solved.surface->mesh};
+    return solved.kept;
 }
 
 Json MarkSession::to_json(const StudyStructure& structure) const {
-    Json marks = Json::array(), outlines = Json::array(), strokes = Json::array();
-    for (const StudyMark& m : structure.marks)
-        marks.push_back({{"id", m.id}, {"kind", kWords<MarkKind>[std::size_t(m.kind)]}, {"world", m.world}});
-    for (const StudyOutline& o : structure.outlines)
-        outlines.push_back({{"id", o.id}, {"axis", o.axis}, {"at", o.at}, {"closed", o.closed}, {"world", o.world}});
-    for (const StudyStroke& s : structure.strokes) {
-        Json stroke{{"id", s.id}, {"erases", s.erases}, {"radius", s.radius}, {"world", s.world}};
-        if (s.axis) stroke.update({{"axis", *s.axis}, {"at", s.at}});
-        strokes.push_back(std::move(stroke));
-    }
-    Json json{{"id", structure.id},
-              {"name", structure.name},
-              {"color", structure.color},
-              {"locked", structure.locked},
-              {"visible", structure.visible},
-              {"marks", std::move(marks)},
-              {"outlines", std::move(outlines)},
-              {"strokes", std::move(strokes)},
-              {"guess", nullptr},
-              {"result", nullptr}};
-    if (structure.guess)  // pages need not know where it lies
-        json["guess"] = {{"name", std::filesystem::path(structure.guess->path).filename().string()},
-                         {"label", structure.guess->label}};
-    if (const auto solved = solved_.find(structure.id); solved != solved_.end()) json["result"] = solved->second.told;
-    return json;
+    const auto solved = solved_.find(structure.id);
+    return structure_json(structure, solved != solved_.end() ? solved->second.told : Json());
 }
 
 Json MarkSession::standing() const {
@@ -296,21 +252,26 @@ void MarkSession::tell(const StudyHistory::Changed& changed) {
 
 void MarkSession::suggest(serve::Client client, StudyId id) {
     std::shared_ptr<const SegmentResult> surface;
+    std::shared_ptr<const TriangleMesh> shown;
     std::shared_ptr<const StudyStructure> structure;
     {
         const std::lock_guard lock(mutex_);
         structure = study_.history().find(id);
-        if (const auto found = solved_.find(id); found != solved_.end()) surface = found->second.surface;
+        if (const auto found = solved_.find(id); found != solved_.end()) {
+            surface = found->second.surface;
+            shown = mesh_of(found->second);
+        }
     }
     Json places = Json::array();
-    if (structure && surface) {
+    if (structure && shown) {
         std::vector<Vec3> marks;
         for (const StudyMark& mark : structure->marks)
             if (mark.kind == MarkKind::Surface) marks.push_back(mark.world);
         std::vector<Vec3> suggested;
-        for (const Suggestion& s : assess_evidence(*surface, marks, image_(), kSuggestions, run_).suggestions)
-            suggested.push_back(s.world);
-        if (suggested.empty()) suggested = farthest_from(marks, surface->mesh, kSuggestions);
+        if (surface)
+            for (const Suggestion& s : assess_evidence(*surface, marks, image_(), kSuggestions, run_).suggestions)
+                suggested.push_back(s.world);
+        if (suggested.empty()) suggested = farthest_from(marks, *shown, kSuggestions);
         for (const Vec3& place : suggested)
             places.push_back({{"world", place}, {"index", geometry_.world_to_index(place)}});
     }
@@ -325,8 +286,10 @@ serve::Response MarkSession::get(const serve::Request& request) {
             response.body = view_.page;
             return response;
         }
-        if (request.path == "/image") return image_facts();
-        if (request.path == "/slice") return slice(request);
+        if (request.path == "/image") return seen_->facts();
+        if (request.path == "/channel") return seen_->channel(request);
+        if (request.path == "/oblique") return seen_->oblique(request);
+        if (request.path == "/slice") return seen_->slice(request);
         if (request.path == "/mesh") return mesh(request);
         if (request.path == "/export") return download(request);
     } catch (const Error& error) {
@@ -372,61 +335,19 @@ serve::Response MarkSession::post(const serve::Request& request, const std::stri
     }
 }
 
-serve::Response MarkSession::image_facts() const {
-    const ImageGeometry& g = geometry_;
-    Json levels = Json::array();
-    for (const ImageLevels::Level& level : levels_.levels()) levels.push_back(level.factor);
-    serve::Response response;
-    response.type = "application/json";
-    response.body = text_of({{"name", view_.title},
-                             {"size", g.size},
-                             {"spacing", g.spacing},
-                             {"origin", g.origin},
-                             {"direction", g.direction},
-                             {"unit", g.unit},
-                             {"anatomical", view_.is_anatomical},
-                             {"levels", levels},
-                             {"in_chunks", levels_.is_in_chunks()},
-                             {"low", range_[0]},
-                             {"high", range_[1]},
-                             {"black", window_[0]},
-                             {"white", window_[1]},
-                             {"first_slice", 0}});
-    return response;
-}
-
-serve::Response MarkSession::slice(const serve::Request& request) const {
-    constexpr std::int64_t kMost = std::int64_t(1) << 30;
-    const auto small = [&](const char* name) { return int(std::min(number_of(request, name), kMost)); };
-    SliceRequest wanted{small("axis"), small("at"), small("step"), {}};
-    if (request.query.contains("width"))
-        wanted.part = SliceRequest::Part{small("x"), small("y"), small("width"), small("height")};
-    RunContext run = run_;
-    run.cancel = request.gone.get();  // the page turned to another slice
-    PageSlice coded = make_page_slice(levels_, wanted, range_, run);
-    serve::Response response;
-    response.type = "application/octet-stream";
-    response.body = std::move(coded.bytes);
-    response.is_deflated = true;
-    response.headers = {{"X-Width", std::to_string(coded.width)},
-                        {"X-Height", std::to_string(coded.height)},
-                        {"X-Factor", std::to_string(coded.factor)}};
-    return response;
-}
-
 serve::Response MarkSession::mesh(const serve::Request& request) const {
     const StudyId id = number_of(request, "structure");
     const std::int64_t version = number_of(request, "version");
-    std::shared_ptr<const SegmentResult> surface;
+    std::shared_ptr<const TriangleMesh> surface;
     {
         const std::lock_guard lock(mutex_);
         const auto found = solved_.find(id);
-        if (found != solved_.end() && std::int64_t(found->second.version) == version) surface = found->second.surface;
+        if (found != solved_.end() && std::int64_t(found->second.version) == version) surface = mesh_of(found->second);
     }
     if (!surface) return refused(404, "a newer surface takes its place");
     serve::Response response;
     response.type = "application/octet-stream";
-    response.body = make_page_mesh(surface->mesh);
+    response.body = make_page_mesh(*surface);
     response.is_deflated = true;
     return response;
 }
@@ -469,7 +390,7 @@ serve::Response MarkSession::download(const serve::Request& request) {
     Export made = make_export(
         format->second, state, [&] { return results(); },
         [&](const StructureResult& s) { return intensity_within(image_(), *s.result.surface, kMostRead, run_); },
-        levels_.image(), study_.folder(), run_);
+        seen_->image(), study_.folder(), run_);
     serve::Response response;
     response.type = "application/octet-stream";
     response.body = std::move(made.bytes);

@@ -9,11 +9,12 @@
 
 #include "cli/json.h"
 #include "covol/image.h"
-#include "covol/image_levels.h"
 #include "covol/intensity.h"
 #include "covol/segment_structures.h"
 #include "covol/study.h"
 #include "covol/study_solver.h"
+#include "mark/kept_surfaces.h"
+#include "mark/page_image.h"
 #include "serve/web_server.h"
 
 namespace covol::tool {
@@ -23,11 +24,11 @@ namespace covol::tool {
 
 /// What a study is shown with.
 struct MarkView {
-    std::string page;   ///< HTML
-    std::string title;  ///< the image's name
-    bool is_anatomical = false;
+    std::string page;        ///< HTML
+    std::string title;       ///< the image's name
     SegmentOptions options;  ///< of every structure, where the study's own say nothing
     StudySite site;
+    std::string image_digest;  ///< digest_of() the file and how it is read: what kept surfaces belong to
 };
 
 /// One study on the page of `covol mark`: answers what the page asks for, and tells it what changes.
@@ -37,8 +38,10 @@ public:
     using Send = std::function<void(serve::Client, std::string)>;
     using Broadcast = std::function<void(std::string)>;
 
+    /// @param seen  the image as pages see it
     /// @param image  gives the one that a job is computed with, from any thread
-    MarkSession(Study study, ImageLevels levels, std::function<Image()> image, MarkView view, const RunContext& run);
+    MarkSession(Study study, std::unique_ptr<PageImage> seen, std::function<Image()> image, MarkView view,
+                const RunContext& run);
 
     /// From here on all changes are told; the structures that the study has are solved. Called once.
     void start(Send send, Broadcast broadcast);
@@ -55,9 +58,11 @@ public:
 private:
     struct Solved {
         std::shared_ptr<const StudyStructure> from;  ///< with these marks
+        std::uint64_t asked = 0;                     ///< of the study, when that was to be solved
         Json told;                                   ///< the last result, as the page has it; null: none
         std::uint64_t version = 0;
-        std::shared_ptr<const SegmentResult> surface;  ///< of that version; null: none
+        std::shared_ptr<const SegmentResult> surface;  ///< of that version; null: none, or it is kept
+        std::shared_ptr<const TriangleMesh> kept;      ///< of that version, from when the study was open before
         bool is_refined = false;
         std::optional<IntensityStatistics> intensity;  ///< of the surface that was refined last
     };
@@ -70,19 +75,21 @@ private:
     Study::Applied apply(const KeyedAction& action);
     void tell(const StudyHistory::Changed& changed);
     [[nodiscard]] SegmentOptions options() const { return study_.history().options().applied_to(view_.options); }
+    /// The surface that is shown. @pre locked
+    [[nodiscard]] static std::shared_ptr<const TriangleMesh> mesh_of(const Solved& solved);
+    /// Whether what was kept is shown. @pre locked
+    bool take_kept(const std::shared_ptr<const StudyStructure>& structure);
     [[nodiscard]] Json to_json(const StudyStructure& structure) const;
     [[nodiscard]] Json standing() const;
-    [[nodiscard]] serve::Response image_facts() const;
-    [[nodiscard]] serve::Response slice(const serve::Request& request) const;
     [[nodiscard]] serve::Response mesh(const serve::Request& request) const;
     [[nodiscard]] serve::Response download(const serve::Request& request);
 
-    const ImageLevels levels_;            // for the eye
+    const std::unique_ptr<PageImage> seen_;
     const std::function<Image()> image_;  // for the surfaces
     const ImageGeometry geometry_;
     const MarkView view_;
     const RunContext run_;
-    std::array<double, 2> range_{0, 1}, window_{0, 1};  // of brightness: coded; shown at first
+    const KeptSurfaces kept_;
     mutable std::mutex mutex_;
     Study study_;
     std::map<StudyId, Solved> solved_;

@@ -27,12 +27,14 @@ export function historyButtons({study, state}, can) {
   return el('div', {class: 'tools', role: 'group', 'aria-label': 'history'}, undo, redo);
 }
 
-export function windowMenu({state, image, panels}) {
+/** `more()` gives what else there is to choose from. */
+export function windowMenu({state, image, panels}, more = () => []) {
   return menu('grey values (w)', [icon('window'), el('span', {class: 'caret'})], (close) => [
     ...presets(image, panels[state.get('keyPanel')].slice).map(([name, window]) => menuItem(name, () => { state.set({window}); close(); },
       {role: 'menuitemradio', 'aria-checked': String(isSame(window, state.get('window')))})),
     el('h3', {}, 'Colours'),
     ...COLOR_MAPS.map((colors) => menuItem(colors, () => { state.set({colors}); close(); }, {role: 'menuitemradio', 'aria-checked': String(state.get('colors') === colors)})),
+    ...more(),
     el('p', {class: 'hint'}, 'Right-drag in a plane: across for contrast, up and down for brightness.'),
   ]);
 }

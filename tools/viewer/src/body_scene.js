@@ -9,6 +9,8 @@ import {AXIS_COLORS} from './space.js';
 import {EYE, rgbColor, Stage3D} from './stage3d.js';
 
 const CLICK = 4;  // CSS pixels
+// Until a change is seen in 3D, ms: a mark waits for the surface that it makes, and that for its outlines.
+const WITH_SURFACE = 600, AFTER_OUTLINES = 60;
 const KINDS = ['surface', 'inside', 'outside'];
 const HALO = 1.3;  // radius of the rim around a mark, of its own: it is told from dark and light alike
 const shared = new IcosahedronGeometry(1, 2), coarse = new IcosahedronGeometry(1, 1), coarsest = new IcosahedronGeometry(1, 0);
@@ -24,7 +26,7 @@ export class BodyScene extends Stage3D {
   /** `app` has space, state, study, meshes, tools, panels and goTo(world). @throws where there is no WebGL */
   constructor(canvas, app) {
     super(canvas, app.state, app.space);
-    Object.assign(this, {app, surfaces: new Map(), balls: new Map(), isTouched: false});
+    Object.assign(this, {app, surfaces: new Map(), balls: new Map(), isTouched: false, due: Infinity, patience: WITH_SURFACE});
     const {size} = this.space, corners = [[-0.5, -0.5, -0.5], size.map((n) => n - 0.5)], box = new Box3();
     for (let n = 0; n < 8; ++n) box.expandByPoint(new Vector3(...this.space.toWorld([0, 1, 2].map((a) => corners[n >> a & 1][a]))));
     this.imageBox = box;
@@ -75,7 +77,9 @@ export class BodyScene extends Stage3D {
 
   listen() {
     const {state} = this;
-    state.on(['study', 'meshes', 'drag', 'active', 'marks'], () => this.update());
+    state.on(['study'], () => this.refreshIn(this.isLookChanged() ? 0 : this.patience));
+    state.on(['meshes'], () => this.refreshIn(AFTER_OUTLINES));
+    state.on(['drag', 'active', 'marks'], () => this.refreshIn(0));
     state.on(['planes'], () => this.movePlanes());
     // Most of the time nothing in 3D shows where the slices are.
     state.on(['slices'], () => { if (state.get('planes').some(Boolean) || state.get('cut') >= 0) this.movePlanes(); });
@@ -93,6 +97,34 @@ export class BodyScene extends Stage3D {
     this.updateSigns();
   }
 
+  /** In so many ms at the latest what has changed is shown: where the processor draws the picture, that takes longer than all else. */
+  refreshIn(wait) {
+    const due = performance.now() + wait;
+    if (this.due <= due) return;
+    clearTimeout(this.timer);
+    this.due = due;
+    this.timer = setTimeout(() => {
+      this.due = Infinity;
+      if (this.isChanged()) this.update();
+    }, wait);
+  }
+
+  /** Whether structures came, went, or are shown in another way. */
+  isLookChanged() {
+    const look = this.app.study.structures.flatMap((s) => [s.id, s.visible, String(s.color)]), isSame = String(look) === this.lookSeen;
+    this.lookSeen = String(look);
+    return !isSame;
+  }
+
+  /** Whether surfaces or marks are others than those that were shown last. */
+  isChanged() {
+    const {study, meshes} = this.app, seen = [this.state.get('drag'), this.state.get('active'), this.state.get('marks')];
+    for (const structure of study.structures) seen.push(structure.id, meshes.get(structure.id), structure.visible, structure.marks, String(structure.color));
+    const isSame = this.seen?.length === seen.length && seen.every((part, n) => part === this.seen[n]);
+    this.seen = seen;
+    return !isSame;
+  }
+
   /** Surfaces and marks as they are now. The camera stays, but while nobody has touched it all of the body is shown. */
   update() {
     const {study, meshes} = this.app, seen = new Set();
@@ -105,7 +137,8 @@ export class BodyScene extends Stage3D {
     const box = new Box3();
     for (const [id, {mesh}] of this.surfaces) if (study.structure(id)?.visible) box.union(mesh.geometry.boundingBox);
     this.setBox(box.isEmpty() ? this.imageBox : box);
-    for (const structure of study.structures) this.updateMarks(structure);
+    const ball = ballOf(study.structures.reduce((sum, {marks}) => sum + marks.length, 0));
+    for (const structure of study.structures) this.updateMarks(structure, ball);
     if (!box.isEmpty() && !this.isTouched && !this.isWellSeen()) this.look(this.camera.position.clone().sub(this.controls.target), true);
     for (const axis of [0, 1, 2]) if (this.planes[axis].group.visible && this.app.panels[axis]) this.drawOutlines(axis);
     this.updateClip();
@@ -144,10 +177,10 @@ export class BodyScene extends Stage3D {
     own.mesh.visible = structure.visible;
   }
 
-  updateMarks(structure) {
+  updateMarks(structure, ball) {
     let own = this.balls.get(structure.id);
     const drag = this.state.get('drag'), moved = drag?.structure === structure.id ? drag : null;
-    const isShown = structure.visible && this.state.get('marks'), key = [structure.marks, structure.color, isShown, moved, this.sphere.radius];
+    const isShown = structure.visible && this.state.get('marks'), key = [structure.marks, structure.color, isShown, moved, this.sphere.radius, ball];
     if (own && key.every((part, n) => part === own.key[n])) return;
     if (own) {
       this.scene.remove(own.group);
@@ -161,7 +194,7 @@ export class BodyScene extends Stage3D {
       if (marks.length === 0) continue;
       const inner = new MeshLambertMaterial({color: markColor(structure.color, kind)}), rim = new MeshBasicMaterial({color: 0xffffff, side: BackSide});
       for (const [material, size] of [[inner, radius], [rim, HALO * radius]]) {
-        const balls = new InstancedMesh(ballOf(marks.length), material, marks.length);
+        const balls = new InstancedMesh(ball, material, marks.length);
         marks.forEach((m, n) => balls.setMatrixAt(n, new Matrix4().makeScale(size, size, size).setPosition(...(moved?.mark === m.id ? moved.world : m.world))));
         balls.frustumCulled = false;
         own.group.add(balls);

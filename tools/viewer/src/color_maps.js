@@ -8,9 +8,9 @@ const MAPS = {
 };
 export const COLOR_MAPS = Object.keys(MAPS);
 
-/** 256 colours as pixels. */
+/** 256 colours as pixels: of a map, or from black to a colour [red, green, blue]. */
 export function colorTable(name) {
-  const map = MAPS[name] ?? MAPS.grey, table = new Uint32Array(256);
+  const map = Array.isArray(name) ? [[0, 0, 0], name] : MAPS[name] ?? MAPS.grey, table = new Uint32Array(256);
   for (let n = 0; n < 256; ++n) {
     const at = n / 255 * (map.length - 1), from = Math.min(map.length - 2, Math.floor(at)), share = at - from;
     const [r, g, b] = map[from].map((v, c) => Math.round(v + share * (map[from + 1][c] - v)));

@@ -3,7 +3,7 @@
 /** The mesh's vertices in the image's voxels: one array for each axis. */
 export function indexCoordinates(positions, volume) {
   const count = positions.length / 3, result = [0, 1, 2].map(() => new Float32Array(count));
-  volume.axes.forEach((axis, a) => {
+  volume.duals.forEach((axis, a) => {
     const scale = 1 / volume.spacing[a], out = result[a];
     const from = axis[0] * volume.origin[0] + axis[1] * volume.origin[1] + axis[2] * volume.origin[2];
     for (let n = 0; n < count; ++n)
@@ -73,12 +73,19 @@ function chain(segments, edges) {
   return lines;
 }
 
+/** Whether a slice lies between the structure's ends: most of many do not meet it. */
+function isMet(structure, axis, at) {
+  structure.spans ??= structure.index.map((along) => along.reduce(([low, high], x) => [Math.min(low, x), Math.max(high, x)], [Infinity, -Infinity]));
+  const [low, high] = structure.spans[axis];
+  return at >= low - 1 && at <= high + 1;
+}
+
 /** A structure's outline on a slice as lines; the last one of each axis is kept. */
 export function linesAt(structure, axis, at, axes) {
   structure.lines ??= [];
   const known = structure.lines[axis];
   if (known?.at === at) return known.lines;
-  const edges = [], segments = cross(structure.index, structure.corners, axis, at + 1e-4, axes, edges);
+  const edges = [], segments = isMet(structure, axis, at) ? cross(structure.index, structure.corners, axis, at + 1e-4, axes, edges) : [];
   const lines = chain(segments, edges);
   structure.lines[axis] = {at, lines};
   return lines;

@@ -52,9 +52,12 @@ export function drawCrosshair(panel, context) {
   if (slices[axis] !== panel.shownAt) return;
   context.lineWidth = 1;
   context.globalAlpha = 0.6;
-  const parts = [[plane.right, x, top, x, y - GAP], [plane.right, x, y + GAP, x, top + height], [plane.down, left, y, x - GAP, y], [plane.down, x + GAP, y, left + width, y]];
+  // A column leans where the image is sheared.
+  const slope = plane.lean / plane.scaleY, from = left + (y - top) * slope, on = (row) => x + (row - y) * slope;
+  const parts = [[plane.right, on(top), top, on(y - GAP), y - GAP], [plane.right, on(y + GAP), y + GAP, on(top + height), top + height],
+    [plane.down, from, y, x - GAP, y], [plane.down, x + GAP, y, from + width, y]];
   for (const [of, x0, y0, x1, y1] of parts) {
-    if (x1 < x0 || y1 < y0) continue;
+    if ((of === plane.down && x1 < x0) || y1 < y0) continue;
     context.strokeStyle = AXIS_COLORS[of];
     context.beginPath();
     context.moveTo(x0, y0);

@@ -4,6 +4,16 @@ import {el} from './dom.js';
 /** Pictures come from the processor: on a canvas of the graphics card each one would be sent there first. */
 const contextOf = (canvas) => canvas.getContext('2d', {willReadFrequently: true});
 
+/** Adds the colours of another channel. */
+function addTo(pixels, values, table) {
+  if (!values) return;
+  for (let n = 0; n < pixels.length; ++n) {
+    const a = pixels[n], b = table[values[n]];
+    const red = (a & 255) + (b & 255), green = (a >> 8 & 255) + (b >> 8 & 255), blue = (a >> 16 & 255) + (b >> 16 & 255);
+    pixels[n] = 0xff000000 | Math.min(255, blue) << 16 | Math.min(255, green) << 8 | Math.min(255, red);
+  }
+}
+
 /** A slice, or a part of it, as a picture. */
 class Picture {
   /** Whether it is another one than before. */
@@ -16,6 +26,7 @@ class Picture {
     if (this.pixels?.width !== width || this.pixels?.height !== height) this.pixels = context.createImageData(width, height);
     const pixels = new Uint32Array(this.pixels.data.buffer);
     for (let n = 0; n < pixels.length; ++n) pixels[n] = grey[values[n]];
+    for (const [channel, table] of grey.others ?? []) addTo(pixels, slice.others?.get(channel), table);
     context.putImageData(this.pixels, 0, 0);
     Object.assign(this, {slice, grey: grey.key});
     return true;

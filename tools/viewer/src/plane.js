@@ -36,12 +36,15 @@ export class Plane {
 
   /** Fits the plane into so many CSS pixels; `view` has a zoom, and the voxel x, y that is in the middle. */
   lay(width, height, view = null) {
-    const {size, spacing} = this.space, sizeX = size[this.right] * spacing[this.right], sizeY = size[this.down] * spacing[this.down];
+    const {size, spacing} = this.space, cosine = this.space.cosine(this.right, this.down) * (this.flipX === this.flipY ? 1 : -1);
+    const steep = Math.sqrt(1 - cosine * cosine), sizeX = size[this.right] * spacing[this.right] + Math.abs(cosine) * size[this.down] * spacing[this.down], sizeY = steep * size[this.down] * spacing[this.down];
     const scale = Math.min(width / sizeX, height / sizeY) * (view?.zoom ?? 1);  // CSS pixels per world unit
-    const scaleX = scale * spacing[this.right], scaleY = scale * spacing[this.down];
+    const scaleX = scale * spacing[this.right], scaleY = scale * steep * spacing[this.down];
+    /** Of a sheared image each row begins so many pixels farther right than the one above it. */
+    const lean = scale * cosine * spacing[this.down];
     const [x, y] = view ? this.shown(view.x, view.y) : [(size[this.right] - 1) / 2, (size[this.down] - 1) / 2];
-    Object.assign(this, {scale, scaleX, scaleY, viewWidth: width, viewHeight: height, width: scale * sizeX, height: scale * sizeY,
-      left: width / 2 - (x + 0.5) * scaleX, top: height / 2 - (y + 0.5) * scaleY});
+    Object.assign(this, {scale, scaleX, scaleY, lean, viewWidth: width, viewHeight: height, width: scaleX * size[this.right], height: scale * sizeY,
+      left: width / 2 - (x + 0.5) * scaleX - (y + 0.5) * lean, top: height / 2 - (y + 0.5) * scaleY});
   }
 
   /** Voxels as they are counted from the left and from the top; its own inverse. */
@@ -53,21 +56,23 @@ export class Plane {
   /** From voxels to CSS pixels; voxel centres are at integers. */
   place(x, y) {
     const [sx, sy] = this.shown(x, y);
-    return [this.left + (sx + 0.5) * this.scaleX, this.top + (sy + 0.5) * this.scaleY];
+    return [this.left + (sx + 0.5) * this.scaleX + (sy + 0.5) * this.lean, this.top + (sy + 0.5) * this.scaleY];
   }
 
   /** From CSS pixels to voxels. */
-  unplace(px, py) { return this.shown((px - this.left) / this.scaleX - 0.5, (py - this.top) / this.scaleY - 0.5); }
+  unplace(px, py) {
+    const rows = (py - this.top) / this.scaleY;
+    return this.shown((px - this.left - rows * this.lean) / this.scaleX - 0.5, rows - 0.5);
+  }
 
   /** A picture of the plane, of which a pixel is `step` x `step` voxels; the last ones may reach beyond the image. A part of it begins at a pixel x, y. */
   drawPicture(context, picture, step = 1, {x = 0, y = 0} = {}) {
-    const {left, top, width, height} = this;
+    const {left, top, width, height} = this, slope = this.lean / this.scaleY, x0 = left + (this.flipY ? slope * height : 0), right = this.flipX ? -1 : 1, down = this.flipY ? -1 : 1;
     context.save();
+    context.transform(right, 0, down * slope, down, x0 + (this.flipX ? width : 0), top + (this.flipY ? height : 0));
     context.beginPath();
-    context.rect(left, top, width, height);
+    context.rect(0, 0, width, height);
     context.clip();
-    context.translate(left + (this.flipX ? width : 0), top + (this.flipY ? height : 0));
-    context.scale(this.flipX ? -1 : 1, this.flipY ? -1 : 1);
     context.imageSmoothingQuality = 'high';
     context.drawImage(picture, x * step * this.scaleX, y * step * this.scaleY, picture.width * step * this.scaleX, picture.height * step * this.scaleY);
     context.restore();

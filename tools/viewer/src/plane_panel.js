@@ -59,8 +59,8 @@ export class PlanePanel {
 
   /** The view that shows a voxel at a place of the canvas. */
   viewWith(zoom, [x, y], [px, py]) {
-    const {plane} = this, grow = zoom / (this.view?.zoom ?? 1), [sx, sy] = plane.shown(x, y);
-    const [cx, cy] = plane.shown(sx - (px - plane.viewWidth / 2) / (plane.scaleX * grow), sy - (py - plane.viewHeight / 2) / (plane.scaleY * grow));
+    const {plane} = this, grow = zoom / (this.view?.zoom ?? 1), [sx, sy] = plane.shown(x, y), rows = (py - plane.viewHeight / 2) / (plane.scaleY * grow);
+    const [cx, cy] = plane.shown(sx - (px - plane.viewWidth / 2) / (plane.scaleX * grow) + rows * plane.lean / plane.scaleX, sy - rows);
     return {zoom, x: cx, y: cy};
   }
 
@@ -139,13 +139,16 @@ export class PlanePanel {
   /** As many voxels for a value as there are in a pixel of the screen, and the part of the slice that is seen. */
   wish(ratio) {
     const {plane, axis, slices} = this, step = stepFor(1 / (Math.max(plane.scaleX, plane.scaleY) * ratio));
-    return {step, part: slices.partFor(axis, step, plane.unplace(0, 0), plane.unplace(plane.viewWidth, plane.viewHeight))};
+    const {viewWidth: width, viewHeight: height} = plane, corners = [[0, 0], [width, 0], [0, height], [width, height]].map(([x, y]) => plane.unplace(x, y));
+    const [low, high] = [Math.min, Math.max].map((of) => [0, 1].map((a) => of(...corners.map((corner) => corner[a]))));
+    return {step, part: slices.partFor(axis, step, low, high)};
   }
 
   takeSlice(ratio) {
     const {axis, at, slices} = this, {step, part} = this.wish(ratio), wanted = `${at} ${step} ${JSON.stringify(part)}`, failed = slices.hasFailed(axis, at, step, part);
-    if (this.wanted !== wanted || (this.hadFailed && !failed)) slices.want(axis, at, step, this.travel, part);
+    if (this.wanted !== wanted || (this.hadFailed && !failed) || this.generation !== slices.generation) slices.want(axis, at, step, this.travel, part);
     this.wanted = wanted;
+    this.generation = slices.generation;
     this.hadFailed = failed;
     // Until it is here one before it stays, with all that belongs to it.
     const late = slices.best(axis, at, step) || part || this.shownAt < 0 ? null : slices.late(axis, at, step, this.shownAt), place = late ?? at;

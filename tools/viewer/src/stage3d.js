@@ -138,7 +138,7 @@ export class Stage3D {
   cutAt(axis) {
     const index = [0, 0, 0];
     index[axis] = this.state.get('slices')[axis];
-    return {normal: new Vector3(...this.space.axes[axis]), place: new Vector3(...this.space.toWorld(index))};
+    return {normal: new Vector3(...this.space.duals[axis]).normalize(), place: new Vector3(...this.space.toWorld(index))};
   }
 
   /** The corners of a slice, in the order of a square. */

@@ -2,6 +2,7 @@
 
 #include "covol/error.h"
 #include "covol/file_kind.h"
+#include "covol/mark_kinds.h"
 #include "covol/mesh_io.h"
 #include "covol/points_text.h"
 #include "covol/vdb_io.h"
@@ -10,14 +11,20 @@ namespace covol {
 
 void read_marks(Marks& marks, const std::optional<ImageGeometry>& image, const ReadMarksOptions& options,
                 const RunContext& run) {
-    const auto read = [&](const std::string& path) {
+    const auto read_kinds = [&](const std::string& path) {
         run.check();
         return path == "-" && options.standard_input
-                   ? parse_points(options.standard_input(), "standard input", options.points)
-                   : read_points(path, options.points);
+                   ? KindedPoints{parse_points(options.standard_input(), "standard input", options.points), {}}
+                   : read_kinded_points(path, options.points);
     };
+    const auto read = [&](const std::string& path) { return read_kinds(path).cloud; };
     for (const std::string& path : marks.files.points) {
-        const PointCloud cloud = read(path);
+        const KindedPoints given = read_kinds(path);
+        const PointCloud cloud = given.of(MarkKind::Surface);
+        for (const MarkKind kind : {MarkKind::Inside, MarkKind::Outside})
+            if (PointCloud seeds = given.of(kind); !given.kinds.empty() && !seeds.points.empty())
+                (kind == MarkKind::Inside ? marks.inside : marks.outside).push_back(std::move(seeds));
+        if (cloud.points.empty()) continue;
         if (!cloud.lines.empty())
             run.warn(path + ": its marks form " + std::to_string(cloud.lines.size()) +
                      " lines, and are taken as loose points here; `contours` joins them along the lines");

@@ -114,6 +114,15 @@ Vec3 read_normal(const std::vector<string_view>& fields, const std::array<std::s
     return std::isfinite(normal[0] + normal[1] + normal[2]) ? normal : Vec3{0, 0, 0};
 }
 
+/// None where the word means none.
+std::optional<MarkKind> read_kind(const std::vector<string_view>& fields, std::size_t column) {
+    if (column >= fields.size()) return std::nullopt;
+    const std::string word = lower(trim(fields[column]));
+    for (std::size_t n = 0; n < kWords<MarkKind>.size(); ++n)
+        if (word == kWords<MarkKind>[n]) return MarkKind(n);
+    return std::nullopt;
+}
+
 /// Columns without names may hold colours, too.
 bool are_unit_vectors(const std::vector<Vec3>& all) {
     constexpr double kTolerance = 0.02;  // two decimals
@@ -291,6 +300,15 @@ PointTable parse_columns(const std::string& path, const std::string& text, bool 
         }
         Vec3 point = read_row(path, lines.number(), fields, columns);
         units->apply(fields, point);
+        if (columns.kind) {
+            const std::optional<MarkKind> kind = read_kind(fields, *columns.kind);
+            if (!kind) {  // another program's column of this name
+                columns.kind.reset();
+                table.kinds.clear();
+            } else {
+                table.kinds.push_back(*kind);
+            }
+        }
         if (columns.normal) table.normals.push_back(read_normal(fields, *columns.normal));
         if (columns.line.empty())
             table.points.push_back(point);

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "covol/mark_kinds.h"
 #include "covol/points.h"
 
 namespace covol::detail {
@@ -11,7 +12,8 @@ namespace covol::detail {
 struct PointTable {
     std::vector<Vec3> points;
     std::vector<MarkLine> lines;
-    std::vector<Vec3> normals;  ///< none, or one for each point, by normal_of()
+    std::vector<MarkKind> kinds;  ///< none, or one for each point
+    std::vector<Vec3> normals;    ///< none, or one for each point, by normal_of()
     std::optional<Vec3> sensor;
     PointSpace space = PointSpace::Unstated;
     PointOrder order = PointOrder::Unstated;

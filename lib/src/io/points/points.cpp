@@ -93,8 +93,31 @@ PointCloud to_cloud(const std::string& path, detail::PointTable table, const Rea
 }  // namespace
 
 PointCloud read_points(const std::string& path, const ReadPointsOptions& options) {
+    return read_kinded_points(path, options).cloud;
+}
+
+KindedPoints read_kinded_points(const std::string& path, const ReadPointsOptions& options) {
     require_valid(options, "read_points");
-    return to_cloud(path, detail::read_point_table(path), options);
+    detail::PointTable table = detail::read_point_table(path);
+    KindedPoints points;
+    points.kinds = std::move(table.kinds);
+    if (!points.kinds.empty()) table.rule += " with kinds";
+    points.cloud = to_cloud(path, std::move(table), options);
+    return points;
+}
+
+PointCloud KindedPoints::of(MarkKind kind) const {
+    if (kinds.empty() && kind == MarkKind::Surface) return cloud;
+    PointCloud some = cloud;
+    some.points.clear();
+    some.normals.clear();
+    some.lines.clear();
+    for (std::size_t n = 0; n < kinds.size(); ++n) {
+        if (kinds[n] != kind) continue;
+        some.points.push_back(cloud.points[n]);
+        if (!cloud.normals.empty()) some.normals.push_back(cloud.normals[n]);
+    }
+    return some;
 }
 
 PointCloud parse_points(const std::string& text, const std::string& source, const ReadPointsOptions& options) {

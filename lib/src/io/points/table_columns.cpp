@@ -132,6 +132,7 @@ std::optional<Columns> find_columns(const std::vector<string_view>& fields) {
         columns.row_unit = header.find("unit") ? header.find("unit") : header.find("units");
     }
     find_lines(header, slice, columns);
+    if (columns.line.empty()) columns.kind = header.find("kind");
     const auto nx = header.find("nx"), ny = header.find("ny"), nz = header.find("nz");
     if (nx && ny && nz && columns.line.empty()) columns.normal = {*nx, *ny, *nz};
     return columns;

@@ -24,6 +24,7 @@ struct Columns {
     std::optional<std::size_t> vertex;    ///< the place of a mark in its line
     bool closed = true;                   ///< lines whose shape is not told
     std::array<std::string, 3> unit{};    ///< of each coordinate, where a header names a unit of length
+    std::optional<std::size_t> kind;      ///< what each mark says: surface, inside or outside
     std::optional<std::size_t> row_unit;  ///< the column that names each row's unit
     std::string rule;
 

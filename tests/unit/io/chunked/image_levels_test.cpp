@@ -3,8 +3,11 @@
 #include <tbb/parallel_for.h>
 #include <zlib.h>
 
+#include <array>
 #include <atomic>
 #include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -166,6 +169,51 @@ TEST_CASE("A slice for a page comes from its level alone, in whole and in part")
     CHECK(means[1 * 4 + 2] == 2 * (19 + 3 * 7 + 7 * 4));
     CHECK_THROWS_AS(make_page_slice(levels, {2, 36, 1, {}}, range), Error);
     CHECK_THROWS_AS(make_page_slice(levels, {2, 0, 1, SliceRequest::Part{40, 0, 1, 1}}, range), Error);
+}
+
+TEST_CASE("A plane of any direction is sampled between voxels, of the level that suffices") {
+    const Pyramid pyramid;
+    const ImageLevels levels = pyramid.open();
+    const std::array<double, 2> range{0, 65535};
+    const auto check = [&](const ObliqueRequest& plane, int level) {
+        const PageSlice coded = make_oblique_slice(levels, plane, range);
+        CHECK(coded.factor == (1 << level));
+        const std::vector<int> values = unpacked(coded);
+        REQUIRE(values.size() == std::size_t(plane.count) * std::size_t(plane.count));
+        int inside = 0, outside = 0;
+        for (int y = 0; y < plane.count; ++y)
+            for (int x = 0; x < plane.count; ++x) {
+                double expected = 0;
+                bool is_there = true, is_at_rim = false;
+                for (std::size_t a = 0; a < 3; ++a) {
+                    const double fine = plane.first[a] + x * plane.right[a] + y * plane.down[a];
+                    const double at = (fine + 0.5) / (1 << level) - 0.5;
+                    is_there = is_there && fine >= -0.5 && fine <= pyramid.size[a] - 0.5;
+                    is_at_rim = is_at_rim || at < 0 || at > pyramid.size[a] / (1 << level) - 1;
+                    expected += std::array{1, 3, 7}[a] * at * (1 << level);
+                }
+                const int value = values[std::size_t(y * plane.count + x)];
+                if (!is_there) {
+                    ++outside;
+                    REQUIRE(value == 0);
+                } else if (!is_at_rim) {  // there the last voxel goes on
+                    ++inside;
+                    REQUIRE(std::abs(value - expected) <= 0.51);
+                }
+            }
+        CHECK(inside > 100);
+        CHECK(outside > 100);
+    };
+    check({{3.25, 4.5, 5}, {0.5, 0.3, 0}, {0.1, 0.2, 0.6}, 70}, 0);
+    check({{-3, 20, 2}, {1.6, -1.3, 0.2}, {0.4, 0.3, 2.1}, 40}, 1);
+    check({{20, -40, 18}, {0, 0.1, 0}, {0.1, 0, 0}, 500}, 0);
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    CHECK_THROWS_AS(make_oblique_slice(levels, {{nan, 0, 0}, {1, 0, 0}, {0, 1, 0}, 9}, range), Error);
+    CHECK_THROWS_AS(make_oblique_slice(levels, {{0, 0, 0}, {1, 0, 0}, {0, 1e300, 0}, 9}, range), Error);
+    CHECK_THROWS_AS(make_oblique_slice(levels, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0}, range), Error);
+    CHECK_THROWS_AS(make_oblique_slice(levels, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 1025}, range), Error);
+    // Pixels far apart need no more memory than those that lie close.
+    CHECK(unpacked(make_oblique_slice(levels, {{1, 1, 1}, {1e6, 0, 0}, {0, 1e6, 0}, 64}, range))[0] > 0);
 }
 
 TEST_CASE("Of an image in chunks no more is kept than is allowed") {

@@ -7,6 +7,7 @@
 #include <limits>
 #include <random>
 
+#include "covol/mark_kinds.h"
 #include "support/scratch.h"
 
 using namespace covol;
@@ -110,6 +111,27 @@ TEST_CASE("column names that mean voxels are understood as such") {
     cloud = read_points(scratch.write("clicks.csv", "slice,contour,x_px,y_px\n3,0,1,2\n"));
     CHECK(cloud.points[0] == Vec3{1, 2, 3});
     CHECK(cloud.space == PointSpace::Index);
+}
+
+TEST_CASE("a column of kinds says which marks lie inside and outside") {
+    const Scratch scratch;
+    const std::vector<MarkKind> kinds{MarkKind::Surface, MarkKind::Inside, MarkKind::Outside};
+    const std::string table = "structure,kind,x,y,z\na,surface,1,2,3\na, Inside ,-4.5,0.25,0.001\na,outside,7,8,9\n";
+    const KindedPoints marks = read_kinded_points(scratch.write("marks.csv", table));
+    CHECK(marks.cloud.points == kThree);
+    CHECK(marks.kinds == kinds);
+    CHECK(marks.cloud.rule.find("with kinds") != std::string::npos);
+    CHECK(marks.of(MarkKind::Surface).points == std::vector<Vec3>{{1, 2, 3}});
+    CHECK(marks.of(MarkKind::Outside).points == std::vector<Vec3>{{7, 8, 9}});
+    // Another program's column of that name, in the middle of the file, too, and a row without one.
+    for (const char* rows : {"x,y,z,kind\n1,2,3,soma\n-4.5,.25,.001,inside\n7,8,9,axon\n",
+                             "x,y,z,kind\n1,2,3,inside\n-4.5,.25,.001,5\n7,8,9,inside\n",
+                             "x,y,z,kind\n1,2,3,inside\n-4.5,.25,.001\n7,8,9,inside\n"}) {
+        const KindedPoints other = read_kinded_points(scratch.write("other.csv", rows));
+        CHECK(other.of(MarkKind::Surface).points == kThree);
+        CHECK(other.of(MarkKind::Inside).points.empty());
+        CHECK(other.kinds.empty());
+    }
 }
 
 TEST_CASE("contours of slices are ordered, closed lines") {

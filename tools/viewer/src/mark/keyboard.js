@@ -8,11 +8,11 @@ export const SHEET = [
   ['Tools', [...TOOLS.map(([, label, key]) => [key, label]), [', .', 'smaller, larger brush'], ['d', 'brush: disc or ball'], ['Enter', 'close the outline'], ['Shift+Enter', 'end it open'], ['Escape', 'cancel']]],
   ['Structures', [['1\u20269', 'choose'], ['Shift+n', 'new structure'], ['F2', 'rename'], ['h', 'hide or show'], ['l', 'lock']]],
   ['Suggestions', [['n', 'where a mark would help; the next one'], ['Enter', 'the border is at the ring'], ['click', 'the border is there']]],
-  ['Views', VIEW_ROWS],
+  ['Views', [...VIEW_ROWS, ['y', 'oblique plane in 3D, facing you'], ['[ ]', 'in 3D: moves the oblique plane']]],
 ];
 
 /** `app` has state, study, tools, panels, image and the rest of the page. */
-export function keyboard(app, {suggestions, sidebar, help, theme, view}) {
+export function keyboard(app, {suggestions, sidebar, help, theme, oblique, view}) {
   const {state, study, tools, space} = app, {keys: shared, panel, moveCrosshair} = viewKeys(app, {help, theme, view});
   const own = () => tools.active() ?? study.structures[0];
 
@@ -36,8 +36,10 @@ export function keyboard(app, {suggestions, sidebar, help, theme, view}) {
     return true;
   }
 
+  // In 3D the keys of slices move the oblique plane.
+  const stepOf = (key, by) => () => document.activeElement === view()?.canvas && state.get('oblique') ? view().stepOblique(by) : shared[key]();
   const keys = {
-    ...shared, z: () => study.act({do: 'undo'}), Z: () => study.act({do: 'redo'}),
+    ...shared, '[': stepOf('[', -1), ']': stepOf(']', 1), '{': stepOf('{', -10), '}': stepOf('}', 10), y: () => oblique.click(), z: () => study.act({do: 'undo'}), Z: () => study.act({do: 'redo'}),
     n: () => suggestions.next(), N: () => tools.addStructure(), F2: () => sidebar.rename(), a: atCrosshair, Escape: cancel,
     ',': () => tools.resizeBrush(1 / 1.25), '.': () => tools.resizeBrush(1.25), d: () => tools.toggleBall(),
     h: () => own() && tools.change('show', own().id, !own().visible), l: () => own() && tools.change('lock', own().id, !own().locked),

@@ -1,11 +1,11 @@
 // The page of covol mark: an image in three planes, marks upon it, and the surfaces that they make.
-import {BodyScene} from '../body_scene.js';
 import {el, unitText} from '../dom.js';
 import {greyTable} from '../grey.js';
 import {icon} from '../icons.js';
 import {helpSheet, showFocus} from '../keyboard.js';
 import {remember, VIEW_NAMES, viewState} from '../kept_view.js';
 import {hintsOf} from '../mark_tools.js';
+import {keptOblique, OBLIQUE, obliqueButton, ObliqueScene} from '../oblique_scene.js';
 import {PlanePanel} from '../plane_panel.js';
 import {sceneTools} from '../scene_tools.js';
 import {ImageSpace, planeName} from '../space.js';
@@ -16,8 +16,10 @@ import {Store} from '../store.js';
 import {Suggestions} from '../suggest.js';
 import {themeButton} from '../theme.js';
 import {Toasts} from '../toast.js';
+import {Channels, keptMix} from './channels.js';
 import {Connection} from './connection.js';
 import {Files} from './files.js';
+import {codesOf} from './image_plane.js';
 import {keyboard, SHEET} from './keyboard.js';
 import {linkBar} from './link_bar.js';
 import {Meshes} from './meshes.js';
@@ -34,12 +36,12 @@ import {Timing} from './timing.js';
 import {toolbar} from './toolbar.js';
 import {Tools, TOOLS} from './tools.js';
 
-const KEPT = [...VIEW_NAMES, 'active', 'tool', 'brush'];
+const KEPT = [...VIEW_NAMES, 'active', 'tool', 'brush', 'mix', 'oblique'];
 
 function firstState(image, space, kept) {
-  const view = viewState(image, space, kept);
+  const view = viewState(image, space, kept, {cuts: [0, 1, 2, OBLIQUE]});
   const brush = kept.brush?.radius > 0 ? {radius: kept.brush.radius, isBall: kept.brush.isBall === true} : {radius: 5 * Math.min(...space.spacing), isBall: false};
-  return new State({...view, grey: greyTable(image, view.window, view.colors), brush, stroke: null, tool: TOOLS.some(([name]) => name === kept.tool) ? kept.tool : 'surface',
+  return new State({...view, grey: greyTable(image, view.window, view.colors), brush, mix: keptMix(kept.mix, image), oblique: keptOblique(kept.oblique), stroke: null, tool: TOOLS.some(([name]) => name === kept.tool) ? kept.tool : 'surface',
     active: Number.isInteger(kept.active) ? kept.active : null, selected: null, hover: null, drag: null, ring: null, suggested: 0, isAsking: false, ruler: null, draft: null,
     keyPanel: 2, link: 'connecting', waiting: 0, study: 0, meshes: 0, loaded: 0, theme: 'light'});
 }
@@ -79,7 +81,7 @@ async function start() {
     state.set({slices: space.voxelAt(index)});
     for (const panel of app.panels) panel.reveal(index);
   };
-  state.on(['window', 'colors'], () => state.set({grey: greyTable(image, state.get('window'), state.get('colors'))}));
+  app.channels = new Channels(app);
   study.on('failed', (why) => toast(why, 'failed'));
   study.on('result', (result, isNew) => meshes.take(result, isNew));
   study.on('change', () => meshes.keepOnly(study.confirmed.map((s) => s.id)));
@@ -91,14 +93,16 @@ async function start() {
   const suggestions = new Suggestions({...app, connection}), help = helpSheet(SHEET), table = tableSheet(app), options = optionsSheet(app);
   const theme = themeButton(state, icon('theme'), {get: () => new Store('covol-mark').get('theme'), set: (value) => new Store('covol-mark').set('theme', value)});
   let view = null;
-  const holder = el('div', {class: 'picture'}), three = el('section', {class: 'panel three', 'aria-label': '3D'}, sceneTools(app, () => view, names), holder);
+  const oblique = obliqueButton(state, () => view, 'y');
+  const holder = el('div', {class: 'picture'}), three = el('section', {class: 'panel three', 'aria-label': '3D'}, sceneTools(app, () => view, names, {more: [oblique], cuts: [[OBLIQUE, 'cut oblique']]}), holder);
   const sidebar = makeSidebar(app), stage = el('main', {class: 'stage'}, panels[2].element, three, panels[1].element, panels[0].element);
   document.getElementById('page').replaceChildren(toolbar(app, {theme, help, suggestions, table, options}), linkBar(state), stage, sidebar.element, status.element, toasts.element, files.input, help, table.dialog, options.dialog);
   const enlarge = () => { stage.dataset.large = state.get('large'); };
   state.on(['large'], enlarge);
   enlarge();
   view = stageIn(holder, {label: 'the surfaces in 3D: drag or arrow keys turn them, a click brings the planes there, Shift+click sets a mark', triad: axisTriad(image.anatomical), scale: scaleBar(units),
-    otherwise: 'The planes beside it work.'}, (canvas) => new BodyScene(canvas, app));
+    otherwise: 'The planes beside it work.'}, (canvas) => new ObliqueScene(canvas, app));
+  view?.addOblique(codesOf());
   view?.takeCamera(store.get('camera'));
   for (const panel of panels) {
     panel.tellCursor = status.tell;
@@ -107,12 +111,12 @@ async function start() {
     panel.draw();
   }
   showFocus();
-  keyboard(app, {suggestions, sidebar, help, theme, view: () => view});
+  keyboard(app, {suggestions, sidebar, help, theme, oblique, view: () => view});
   remember(state, store, KEPT, (name, value) => name !== 'active' || !isReference(value));
   // Where nothing can be kept, what was not sent would be lost.
   addEventListener('beforeunload', (event) => { if (queue.isLost && queue.waiting > 0) event.preventDefault(); });
   connection.open();
-  window.covolMark = {state, study, connection, queue, panels, view, meshes, slices, image, space, suggestions, timing, tools, files,
+  window.covolMark = {state, study, connection, queue, panels, view, meshes, slices, image, space, suggestions, timing, tools, files, channels: app.channels,
     get resultsSeen() { return study.resultsSeen; }, get lastShown() { return timing.lastShown; }, get lastAction() { return study.lastAction; }};
 }
 

@@ -59,5 +59,8 @@ export class Meshes {
   }
 
   /** What no structure has any more goes. */
-  keepOnly(ids) { for (const id of this.items.keys()) if (!ids.includes(id)) this.drop(id); }
+  keepOnly(ids) {
+    const kept = new Set(ids);
+    for (const id of this.items.keys()) if (!kept.has(id)) this.drop(id);
+  }
 }

@@ -1,12 +1,13 @@
 // Painted voxels on a slice: strokes as lib/src/study/paint.cpp draws them.
 
 const NOTHING = {};
+const lengthOf = (space, along) => Math.sqrt(space.product(along, along));
 
 /** Pieces of at most twice the radius: the box around a long one is mostly empty. */
-function* pieces(corners, radius) {
+function* pieces(space, corners, radius) {
   if (corners.length === 1) yield [corners[0], corners[0]];
   for (let n = 1; n < corners.length; ++n) {
-    const [a, b] = [corners[n - 1], corners[n]], parts = Math.max(1, Math.ceil(Math.hypot(...a.map((v, c) => b[c] - v)) / (2 * radius)));
+    const [a, b] = [corners[n - 1], corners[n]], parts = Math.max(1, Math.ceil(lengthOf(space, a.map((v, c) => b[c] - v)) / (2 * radius)));
     const at = (part) => a.map((v, c) => v + part / parts * (b[c] - v));
     for (let part = 0; part < parts; ++part) yield [at(part), at(part + 1)];
   }
@@ -16,24 +17,25 @@ function* pieces(corners, radius) {
 export function drawStroke(space, stroke, axis, at, take) {
   const isDisc = stroke.axis !== undefined && stroke.axis !== null;
   if (isDisc && stroke.axis === axis && stroke.at !== at) return;
-  const {size, spacing} = space, [right, down] = space.planeAxes(axis), {radius} = stroke, most = radius * radius * (1 + 1e-9);
+  const {size, spacing} = space, [right, down] = space.planeAxes(axis), {radius} = stroke, most = radius * radius * (1 + 1e-9), reach = space.duals.map((dual) => (space.isSheared ? Math.hypot(...dual) : 1));
   const corners = stroke.world.map((world) => space.toIndex(world).map((v, c) => (isDisc && c === stroke.axis ? stroke.at : v) * spacing[c]));
-  for (const [a, b] of pieces(corners, radius)) {
+  for (const [a, b] of pieces(space, corners, radius)) {
     const low = [0, 0, 0], high = [0, 0, 0];
     for (let c = 0; c < 3; ++c) {
-      low[c] = Math.max(0, Math.ceil((Math.min(a[c], b[c]) - radius) / spacing[c]));
-      high[c] = Math.min(size[c] - 1, Math.floor((Math.max(a[c], b[c]) + radius) / spacing[c]));
+      low[c] = Math.max(0, Math.ceil((Math.min(a[c], b[c]) - radius * reach[c]) / spacing[c]));
+      high[c] = Math.min(size[c] - 1, Math.floor((Math.max(a[c], b[c]) + radius * reach[c]) / spacing[c]));
       if (isDisc && c === stroke.axis) low[c] = high[c] = stroke.at;
     }
     if (at < low[axis] || at > high[axis]) continue;
-    const along = a.map((v, c) => b[c] - v), length2 = along[0] ** 2 + along[1] ** 2 + along[2] ** 2, d = [0, 0, 0];
+    const along = a.map((v, c) => b[c] - v), length2 = space.product(along, along), d = [0, 0, 0], off = [0, 0, 0];
     d[axis] = at * spacing[axis] - a[axis];
     for (let y = low[down]; y <= high[down]; ++y) {
       d[down] = y * spacing[down] - a[down];
       for (let x = low[right]; x <= high[right]; ++x) {
         d[right] = x * spacing[right] - a[right];
-        const part = length2 > 0 ? Math.min(1, Math.max(0, (d[0] * along[0] + d[1] * along[1] + d[2] * along[2]) / length2)) : 0;
-        if ((d[0] - part * along[0]) ** 2 + (d[1] - part * along[1]) ** 2 + (d[2] - part * along[2]) ** 2 <= most) take(x, y);
+        const part = length2 > 0 ? Math.min(1, Math.max(0, space.product(d, along) / length2)) : 0;
+        for (let c = 0; c < 3; ++c) off[c] = d[c] - part * along[c];
+        if (space.product(off, off) <= most) take(x, y);
       }
     }
   }

@@ -1,6 +1,7 @@
 // The structures: what they are called, how good they are, what is to be said about them.
 import {colorOf, el, number} from '../dom.js';
 import {icon} from '../icons.js';
+import {isReference} from './queue.js';
 
 const hex = (rgb) => `#${rgb.map((v) => v.toString(16).padStart(2, '0')).join('')}`;
 const rgb = (text) => [1, 3, 5].map((at) => parseInt(text.slice(at, at + 2), 16));
@@ -42,6 +43,9 @@ class Card {
   }
 
   update(structure, n, isActive) {
+    const shown = [structure, structure.result, n, isActive];
+    if (this.shown?.every((part, at) => part === shown[at])) return;
+    this.shown = shown;
     this.structure = structure;
     this.id = structure.id;
     const {element} = this, {result} = structure, unit = this.app.unitText ? `\u2009${this.app.unitText}\u00b3` : '';
@@ -159,12 +163,12 @@ export function sidebar(app) {
   const element = el('aside', {class: 'sidebar', 'aria-label': 'structures'},
     el('div', {class: 'side-head'}, el('h2', {}, 'Structures'), add), nothing, list, markCard(app));
   const update = () => {
-    const active = tools.active(), seen = new Set();
+    const active = tools.active(), seen = new Set(), references = [...cards.keys()].filter(isReference);
     nothing.hidden = study.structures.length > 0;
     study.structures.forEach((structure, n) => {
       // A card stays the same one when its structure gets its ID.
-      const waiting = [...cards.keys()].find((id) => study.resolve(id) === structure.id) ?? structure.id, card = cards.get(waiting) ?? new Card(structure.id, app);
-      cards.delete(waiting);
+      const waiting = cards.has(structure.id) ? structure.id : references.find((id) => study.resolve(id) === structure.id), card = cards.get(waiting) ?? new Card(structure.id, app);
+      if (waiting !== structure.id) cards.delete(waiting);
       cards.set(structure.id, card);
       seen.add(structure.id);
       card.update(structure, n, structure === active);

@@ -1,7 +1,7 @@
 // Slices of the image as the server has them: those seen last are kept, those that come next are fetched before, and what
 // is not looked at any more is not waited for.
 
-const MOST_SLICES = 200, MOST_BYTES = 96 * 2 ** 20, MOST_AT_ONCE = 4, AHEAD = 6;
+const MOST_SLICES = 200, MOST_BYTES = 48 * 2 ** 20, MOST_AT_ONCE = 4, AHEAD = 6;
 const MOST_STEP = 1024;
 const BUSY = 503, PAUSE = 200;  // ms
 const SLOW = 400;  // ms: slices that take longer are not fetched before
@@ -25,7 +25,7 @@ function partOf([across, rows], step, [x0, y0], [x1, y1]) {
 export class SliceStore {
   /** `image` is what the server says of it; `arrived` is called for each slice that came, or that did not. */
   constructor(space, image, arrived) {
-    Object.assign(this, {space, image, arrived, slices: new Map(), bytes: 0, wanted: [[], [], []], ahead: [], underWay: new Map(), failed: new Set(), took: [0, 0, 0]});
+    Object.assign(this, {space, image, arrived, slices: new Map(), bytes: 0, wanted: [[], [], []], ahead: [], underWay: new Map(), failed: new Set(), took: [0, 0, 0], mixed: [], generation: 0});
   }
 
   /** What is to be fetched of a slice, of which the part between two voxels is seen; null: all of it. */
@@ -123,6 +123,15 @@ export class SliceStore {
     return this.slices.has(key) || this.underWay.has(key);
   }
 
+  /** Slices have the values of these other channels, too; what is here without them goes. */
+  mixWith(channels) {
+    if (String(channels) === String(this.mixed)) return;
+    for (const {controller} of this.underWay.values()) controller.abort();
+    Object.assign(this, {mixed: channels, generation: this.generation + 1, bytes: 0, ahead: [], wanted: [[], [], []]});
+    for (const kept of [this.slices, this.underWay, this.failed]) kept.clear();
+    this.arrived();
+  }
+
   /** The connection is back: what failed may be asked for again. */
   retry() {
     this.failed.clear();
@@ -145,11 +154,12 @@ export class SliceStore {
     this.underWay.set(key, {of: one, controller});
     try {
       const query = part ? `&x=${part.x}&y=${part.y}&width=${part.width}&height=${part.height}` : '';
-      const answer = await fetch(`/slice?axis=${axis}&at=${at}&step=${step}${query}`, {signal: controller.signal});
-      if (answer.status === BUSY) return this.later(key, one, controller);
-      if (!answer.ok) throw new Error(String(answer.status));
-      const values = new Uint16Array(await answer.arrayBuffer()), width = Number(answer.headers.get('X-Width'));
-      this.keep(key, {axis, at, step, part, width, height: values.length / width, values});
+      const get = (channel) => fetch(`/slice?axis=${axis}&at=${at}&step=${step}${query}${channel}`, {signal: controller.signal});
+      const answers = await Promise.all(['', ...this.mixed.map((n) => `&channel=${n}`)].map(get)), [answer] = answers, {mixed} = this;
+      if (answers.some(({status}) => status === BUSY)) return this.later(key, one, controller);
+      if (!answers.every(({ok}) => ok)) throw new Error(String(answer.status));
+      const [values, ...others] = (await Promise.all(answers.map((one) => one.arrayBuffer()))).map((bytes) => new Uint16Array(bytes)), width = Number(answer.headers.get('X-Width'));
+      this.keep(key, {axis, at, step, part, width, height: values.length / width, values, others: new Map(others.map((one, n) => [mixed[n], one]))});
       this.failed.delete(key);
       this.took[axis] += 0.3 * (performance.now() - began - this.took[axis]);
     } catch {
@@ -173,11 +183,12 @@ export class SliceStore {
 
   keep(key, slice) {
     this.slices.set(key, slice);
-    this.bytes += slice.values.byteLength;
-    for (const [old, {values}] of this.slices) {
+    const bytesOf = ({values, others}) => values.byteLength * (1 + others.size);
+    this.bytes += bytesOf(slice);
+    for (const [old, stale] of this.slices) {
       if (old === key || (this.slices.size <= MOST_SLICES && this.bytes <= MOST_BYTES)) break;
       this.slices.delete(old);
-      this.bytes -= values.byteLength;
+      this.bytes -= bytesOf(stale);
     }
   }
 

@@ -41,6 +41,6 @@ export function toolbar(app, {theme, help, suggestions, table, options}) {
   theme.className = 'tool';
   return el('header', {class: 'bar'},
     el('div', {class: 'title'}, el('span', {class: 'brand'}, 'covol'), el('h1', {title: image.name}, image.name)),
-    toolChoice(state, TOOLS), historyButtons(app, () => canUndo(app.study)), el('div', {class: 'tools'}, windowMenu(app), suggestButtons(state, suggestions)),
+    toolChoice(state, TOOLS), historyButtons(app, () => canUndo(app.study)), el('div', {class: 'tools'}, windowMenu(app, () => app.channels.items()), suggestButtons(state, suggestions)),
     el('div', {class: 'tools end'}, barButton('table', 'table of results', () => table.open()), barButton('options', 'options of the study', () => options.open()), importMenu(app), exportMenu(app), theme, barButton('help', 'keys (?)', () => help.showModal())));
 }

@@ -1,7 +1,6 @@
 // What is switched upon the 3D view, and the list of suggested slices.
 import {colorings, rangeOf, SUPPORT, viridis} from '../colors.js';
 import {colorOf, dot, el, number} from '../dom.js';
-import {OBLIQUE} from './scene.js';
 
 /** The structures: their colours, on and off, and whose marks are set. */
 function structureList({study, state, tools}) {
@@ -70,18 +69,6 @@ export function marksButton(state) {
   const button = el('button', {type: 'button', class: 'small', title: 'marks (q)', 'data-key': 'marks', onclick: () => state.set({marks: !state.get('marks')})}, 'marks');
   const update = () => button.setAttribute('aria-pressed', String(state.get('marks')));
   state.on(['marks'], update);
-  update();
-  return button;
-}
-
-/** The plane of any direction: it faces the eye when it is switched on. */
-export function obliqueButton(state, view) {
-  const button = el('button', {type: 'button', class: 'small', title: 'a plane through the crosshair that faces you (d)', 'data-key': 'oblique', onclick: () => {
-    if (!state.get('oblique')) view()?.faceOblique();
-    else state.set({oblique: null, cut: state.get('cut') === OBLIQUE ? -1 : state.get('cut')});
-  }}, 'oblique');
-  const update = () => button.setAttribute('aria-pressed', String(Boolean(state.get('oblique'))));
-  state.on(['oblique'], update);
   update();
   return button;
 }

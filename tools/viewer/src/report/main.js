@@ -8,6 +8,7 @@ import {remember, VIEW_NAMES, viewState} from '../kept_view.js';
 import {helpSheet, showFocus} from '../keyboard.js';
 import {MarkPointer} from '../mark_pointer.js';
 import {hintsOf, MARK_TOOLS, MarkTools} from '../mark_tools.js';
+import {keptOblique, OBLIQUE, obliqueButton} from '../oblique_scene.js';
 import {indexCoordinates} from '../outline.js';
 import {PlanePanel} from '../plane_panel.js';
 import {sceneTools} from '../scene_tools.js';
@@ -19,7 +20,7 @@ import {Store} from '../store.js';
 import {Suggestions} from '../suggest.js';
 import {themeButton} from '../theme.js';
 import {Toasts} from '../toast.js';
-import {lookBox, marksButton, obliqueButton, suggestedPlaces, suggestionList} from './controls.js';
+import {lookBox, marksButton, suggestedPlaces, suggestionList} from './controls.js';
 import {readData} from './data.js';
 import {exportMenu} from './export_menu.js';
 import {factsOf, warningsOf} from './facts.js';
@@ -27,7 +28,7 @@ import {frameBar} from './frames.js';
 import {keyboard, SHEET} from './keyboard.js';
 import {LocalStudy} from './local_study.js';
 import {drawOverlay} from './overlay.js';
-import {OBLIQUE, ReportScene} from './scene.js';
+import {ReportScene} from './scene.js';
 import {saveTable, structureTable} from './table.js';
 import {spaceAround, Volume, VolumeSlices} from './volume.js';
 
@@ -38,10 +39,9 @@ const middleOf = ({mesh: {min, max}}) => min.map((x, a) => (x + max[a]) / 2);
 
 function firstState(image, space, data, kept) {
   const view = viewState(image, space, kept, {slices: space.voxelAt(space.toIndex(middleOf(data.structures[0]))), marks: !data.structures.some((s) => s.markCount > MOST_MARKS), cuts: data.image ? [0, 1, 2, OBLIQUE] : [0, 1, 2]});
-  const isPlace = (place) => Array.isArray(place) && place.length === 3 && place.every(Number.isFinite);
   return new State({...view, grey: greyTable(image, view.window, view.colors), tool: MARK_TOOLS.some(([name]) => name === kept.tool) ? kept.tool : 'crosshair',
     active: data.structures[kept.active - 1] ? kept.active : 1, coloring: colorings(data.structures).some(([name]) => name === kept.coloring) ? kept.coloring : 'structure',
-    oblique: isPlace(kept.oblique?.normal) && isPlace(kept.oblique?.center) ? kept.oblique : null, opacity: typeof kept.opacity === 'number' && kept.opacity >= 0 && kept.opacity <= 1 ? kept.opacity : 1, selected: null, hover: null, drag: null, ring: null, suggested: 0, isAsking: false, ruler: null,
+    oblique: keptOblique(kept.oblique), opacity: typeof kept.opacity === 'number' && kept.opacity >= 0 && kept.opacity <= 1 ? kept.opacity : 1, selected: null, hover: null, drag: null, ring: null, suggested: 0, isAsking: false, ruler: null,
     keyPanel: 2, study: 0, meshes: 0, loaded: 0, theme: 'light'});
 }
 
@@ -109,7 +109,7 @@ async function start() {
   let view = null, figures;
   const frames = frameBar(data.frames);
   const own = new Store('covol-report'), theme = themeButton(state, icon('theme'), {get: () => own.get('theme'), set: (value) => own.set('theme', value)});
-  const help = helpSheet(SHEET), status = statusRow({...app, slices: slices ?? {valueAt: () => null}}, volume ? hintsOf(MARK_TOOLS) : Object.fromEntries(MARK_TOOLS.map(([tool]) => [tool, 'Shift and a click on the surface: a mark']))), warnings = warningsOf(data), oblique = obliqueButton(state, () => view), stage = stageOf(app, () => view, oblique);
+  const help = helpSheet(SHEET), status = statusRow({...app, slices: slices ?? {valueAt: () => null}}, volume ? hintsOf(MARK_TOOLS) : Object.fromEntries(MARK_TOOLS.map(([tool]) => [tool, 'Shift and a click on the surface: a mark']))), warnings = warningsOf(data), oblique = obliqueButton(state, () => view, 'd'), stage = stageOf(app, () => view, oblique);
   try {
     figures = factsOf(data);
   } catch (error) {  // a report that another version wrote

@@ -3,8 +3,8 @@ import {
   BufferAttribute, BufferGeometry, DataTexture, DoubleSide, Group, LinearFilter, LineBasicMaterial, LineLoop, LineSegments, Mesh,
   MeshBasicMaterial, SRGBColorSpace, Vector3,
 } from 'three';
-import {linesAt} from '../outline.js';
-import {rgbColor} from '../stage3d.js';
+import {linesAt} from './outline.js';
+import {rgbColor} from './stage3d.js';
 
 const PIXELS = 384;  // along each side
 const COLOR = '#c98b1d';
@@ -17,19 +17,13 @@ function basisOf(normal) {
   return [right, normal.clone().cross(right)];
 }
 
-/** The volume's value at an index between voxels, 0 to 255; -1 outside. */
-function sample({data, size: [nx, ny, nz]}, i, j, k) {
-  if (i < -0.5 || j < -0.5 || k < -0.5 || i > nx - 0.5 || j > ny - 0.5 || k > nz - 0.5) return -1;
-  const hold = (x, n) => Math.min(n - 1, Math.max(0, x)), [x, y, z] = [hold(i, nx), hold(j, ny), hold(k, nz)], [a, b, c] = [Math.floor(x), Math.floor(y), Math.floor(z)];
-  const dx = a < nx - 1 ? 1 : 0, dy = b < ny - 1 ? nx : 0, dz = c < nz - 1 ? nx * ny : 0, n = (c * ny + b) * nx + a, fx = x - a, fy = y - b;
-  const layer = (at) => (data[at] * (1 - fx) + data[at + dx] * fx) * (1 - fy) + (data[at + dy] * (1 - fx) + data[at + dy + dx] * fx) * fy;
-  return layer(n) * (1 - (z - c)) + layer(n + dz) * (z - c);
-}
-
 export class ObliquePlane {
-  /** `half` is half of the plane's side, in world units. */
-  constructor(volume, half) {
-    Object.assign(this, {volume, half, group: new Group(), pixels: new Uint8Array(4 * PIXELS * PIXELS)});
+  /**
+   * `half` is half of the plane's side, in world units. `codesOf(grid)` gives, at once or later, codes of 16 bits for the
+   * pixels of a grid {first, alongX, alongY, count} in voxels of the image, row by row; `arrived` is called when it was later.
+   */
+  constructor(space, half, codesOf, arrived) {
+    Object.assign(this, {space, half, codesOf, arrived, group: new Group(), pixels: new Uint8Array(4 * PIXELS * PIXELS)});
     const geometry = new BufferGeometry().setAttribute('position', new BufferAttribute(new Float32Array(12), 3));
     geometry.setAttribute('uv', new BufferAttribute(new Float32Array([0, 0, 1, 0, 1, 1, 0, 1]), 2));
     geometry.setIndex([0, 1, 2, 0, 2, 3]);
@@ -52,13 +46,36 @@ export class ObliquePlane {
   }
 
   paint(place, grey) {
-    const {volume, half, pixels} = this, step = 2 * half / PIXELS, indexAt = (x, y) => volume.toIndex(place(x, y).toArray());
+    const {space, half} = this, step = 2 * half / PIXELS, indexAt = (x, y) => space.toIndex(place(x, y).toArray());
     const first = indexAt(-half + step / 2, -half + step / 2), alongX = indexAt(half + step / 2, -half + step / 2).map((v, a) => (v - first[a]) / PIXELS), alongY = indexAt(-half + step / 2, half + step / 2).map((v, a) => (v - first[a]) / PIXELS);
+    const grid = {first, alongX, alongY, count: PIXELS}, key = JSON.stringify(grid), generation = this.codesOf.generation?.();
+    if (this.key === key && this.generation === generation) return void (this.codes && this.color(grid, grey));
+    Object.assign(this, {key, generation, codes: null});
+    const codes = this.codesOf(grid);
+    if (!(codes instanceof Promise)) return this.take(codes, grid, grey);
+    return codes.then((own) => {
+      if (this.key !== key || !own) return;  // another plane is looked at now
+      this.take(own, grid, grey);
+      this.arrived();
+    });
+  }
+
+  take(codes, grid, grey) {
+    this.codes = codes;
+    this.color(grid, grey);
+  }
+
+  color({first, alongX, alongY}, grey) {
+    const {pixels, codes} = this, last = this.space.size.map((n) => n - 0.5);
     for (let y = 0, n = 0; y < PIXELS; ++y)
       for (let x = 0; x < PIXELS; ++x, n += 4) {
-        const value = sample(volume, first[0] + x * alongX[0] + y * alongY[0], first[1] + x * alongX[1] + y * alongY[1], first[2] + x * alongX[2] + y * alongY[2]);
-        pixels[n] = pixels[n + 1] = pixels[n + 2] = value < 0 ? 0 : grey[Math.round(257 * value)] & 255;
-        pixels[n + 3] = value < 0 ? 0 : 255;
+        let isThere = true;
+        for (let a = 0; a < 3; ++a) {
+          const at = first[a] + x * alongX[a] + y * alongY[a];
+          isThere &&= at >= -0.5 && at <= last[a];
+        }
+        const color = isThere ? grey[codes[n >> 2]] : 0;
+        [pixels[n], pixels[n + 1], pixels[n + 2], pixels[n + 3]] = [color & 255, color >> 8 & 255, color >> 16 & 255, isThere ? 255 : 0];
       }
     this.texture.needsUpdate = true;
   }

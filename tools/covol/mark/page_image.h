@@ -1,0 +1,54 @@
+#pragma once
+#include <array>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "covol/image.h"
+#include "covol/image_levels.h"
+#include "covol/run.h"
+#include "serve/web_server.h"
+
+namespace covol::tool {
+
+/// The channels of an image that has several: one is marked, the others are seen beside it.
+struct PageChannels {
+    std::vector<std::string> names;        ///< of all; empty: the image has one channel
+    int own = 0;                           ///< the one that is marked
+    std::function<ImageLevels(int)> open;  ///< another one, on the same lattice
+};
+
+/// What a page sees of an image. Its functions may be called from any thread.
+class PageImage {
+public:
+    /// @param title  the image's name
+    PageImage(ImageLevels levels, std::string title, bool is_anatomical, PageChannels channels, const RunContext& run);
+
+    [[nodiscard]] const Image& image() const { return own_.levels.image(); }
+    /// `/image`, `/channel`, `/slice` and `/oblique` of docs/mark_protocol.md.
+    [[nodiscard]] serve::Response facts() const;
+    [[nodiscard]] serve::Response channel(const serve::Request& request) const;
+    [[nodiscard]] serve::Response slice(const serve::Request& request) const;
+    [[nodiscard]] serve::Response oblique(const serve::Request& request) const;
+
+private:
+    struct Channel {
+        ImageLevels levels;
+        std::array<double, 2> range{0, 1}, window{0, 1};  // of brightness: coded; shown at first
+    };
+    [[nodiscard]] Channel made_of(ImageLevels levels) const;
+    [[nodiscard]] const Channel& channel_of(const serve::Request& request) const;
+
+    const RunContext run_;
+    const std::string title_;
+    const bool is_anatomical_;
+    const PageChannels channels_;
+    const Channel own_;
+    mutable std::mutex mutex_;
+    mutable std::map<int, Channel> others_;  // those that were asked for
+};
+
+}  // namespace covol::tool

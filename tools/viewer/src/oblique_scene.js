@@ -1,0 +1,74 @@
+// The 3D view with a plane of any direction through the image.
+import {Vector3} from 'three';
+import {BodyScene} from './body_scene.js';
+import {el} from './dom.js';
+import {ObliquePlane} from './oblique.js';
+import {EYE} from './stage3d.js';
+
+export const OBLIQUE = 3;  // beside the axes 0, 1, 2 of the image: what surfaces are cut at
+
+/** The plane that was shown before a reload, if that makes sense; else null. */
+export function keptOblique(kept) {
+  const isPlace = (place) => Array.isArray(place) && place.length === 3 && place.every(Number.isFinite);
+  return isPlace(kept?.normal) && isPlace(kept?.center) ? {normal: kept.normal, center: kept.center} : null;
+}
+
+/** The plane faces the eye when it is switched on. */
+export function obliqueButton(state, view, key) {
+  const button = el('button', {type: 'button', class: 'small', title: `a plane through the crosshair that faces you (${key})`, 'data-key': 'oblique', onclick: () => {
+    if (!state.get('oblique')) view()?.faceOblique();
+    else state.set({oblique: null, cut: state.get('cut') === OBLIQUE ? -1 : state.get('cut')});
+  }}, 'oblique');
+  const update = () => button.setAttribute('aria-pressed', String(Boolean(state.get('oblique'))));
+  state.on(['oblique'], update);
+  update();
+  return button;
+}
+
+export class ObliqueScene extends BodyScene {
+  /** `codesOf` is an ObliquePlane's. */
+  addOblique(codesOf) {
+    this.oblique = new ObliquePlane(this.space, 0.5 * this.imageBox.max.distanceTo(this.imageBox.min), codesOf, () => this.draw());
+    this.oblique.group.visible = false;
+    this.scene.add(this.oblique.group);
+    const {state} = this;
+    state.on(['oblique', 'grey', 'loaded'], () => this.updateOblique());
+    state.on(['slices'], () => {
+      const oblique = state.get('oblique');
+      if (oblique) state.set({oblique: {...oblique, center: this.space.toWorld(state.get('slices'))}});
+    });
+    state.on(['cut'], () => { if (state.get('cut') === OBLIQUE && !state.get('oblique')) this.faceOblique(); });
+    this.updateOblique();
+  }
+
+  /** The plane through the crosshair that the eye looks at straight. */
+  faceOblique() {
+    const normal = this.camera.position.clone().sub(this.controls.target).normalize().toArray();
+    this.state.set({oblique: {normal, center: this.space.toWorld(this.state.get('slices'))}});
+  }
+
+  /** Moves it towards its normal, by so many of the smallest voxels' sides. */
+  stepOblique(by) {
+    const {normal, center} = this.state.get('oblique'), step = by * Math.min(...this.space.spacing);
+    this.state.set({oblique: {normal, center: center.map((x, a) => x + step * normal[a])}});
+  }
+
+  update() {
+    super.update();
+    if (this.oblique) this.updateOblique();
+  }
+
+  updateOblique() {
+    const plane = this.state.get('oblique'), {study, meshes} = this.app;
+    if (!plane && !this.oblique.group.visible) return;
+    this.oblique.group.visible = Boolean(plane);
+    if (plane) this.oblique.put(plane, this.state.get('grey'), study.structures.filter((s) => s.visible && meshes.get(s.id)).map((s) => [meshes.get(s.id), s.color]));
+    this.updateClip();
+  }
+
+  cutAt(axis) {
+    if (axis !== OBLIQUE) return super.cutAt(axis);
+    const {normal, center} = this.state.get('oblique') ?? {normal: EYE.clone().normalize().toArray(), center: this.space.toWorld(this.state.get('slices'))};
+    return {normal: new Vector3(...normal), place: new Vector3(...center)};
+  }
+}
