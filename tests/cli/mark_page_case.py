@@ -210,3 +210,4 @@ class PageCase(unittest.TestCase):
 
     def surface(self, structure=0):
         self.wait("const s = mark.study.structures[arguments[0]]; return s?.result?.stage === 'refined' && mark.meshes.get(s.id)?.version === s.result.version", structure)
+        self.wait("return mark.view.due === Infinity")  # it is seen in 3D as well

@@ -56,6 +56,7 @@ class Marks(PageCase):
         self.surface()
         self.slices(*BALL)
         self.wait("return mark.lastShown > mark.lastAction")
+        self.wait("const r = mark.study.structures[0].result; return r.stage === 'refined' && r.seq === mark.study.seq")  # of the last mark
         self.assertGreater(self.js("return mark.resultsSeen"), 1)
         self.assertIn("µm³", self.driver.find_element(By.CSS_SELECTOR, ".structure .figures").text)
         self.assertRegex(self.driver.find_element(By.CSS_SELECTOR, ".structure .dice").text, r"0\.\d\d \(0\.\d\d–0\.\d\d\)")
@@ -300,6 +301,7 @@ class Marks(PageCase):
         self.click(1, [BALL[0], BALL[1], BALL[2] + RADII[2]])
         self.click(1, [BALL[0], BALL[1], BALL[2] - RADII[2]])
         self.settled()
+        self.wait("const r = mark.study.structures[0].result; return r.stage === 'refined' && r.seq === mark.study.seq")
         self.surface()
         self.slices(0, 0, 0)
         canvas = self.driver.find_element(By.CSS_SELECTOR, ".three canvas")
