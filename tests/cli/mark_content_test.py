@@ -221,6 +221,13 @@ class Files(ContentCase):
         live.add_mark(structure, CENTER, "inside")
         live.add_mark(structure, world(2, 2, 2), "outside")
         exported = page.get(f"/export?structure={structure}&format=marks.csv")[2]
+        # The program reads them as they were meant.
+        result = live.wait_for(structure, "refined", len(MARKS) + 3)
+        (self.out / "exported.csv").write_bytes(exported)
+        self.run_covol("segment", self.stack, "--points", "exported.csv", "-o", "e.vdb", "--json", "e.json")
+        report = json.loads((self.out / "e.json").read_text())
+        self.assertAlmostEqual(report["surface"]["volume"], result["volume"], delta=1e-3 * result["volume"])
+        self.assertEqual(report["input"]["points"]["count"], len(MARKS))
         other = live.add_structure("other")
         self.assertEqual(self.send(page, "marks.csv", exported, **{"as": "points", "structure": other})[0], 200)
         patch = live.receive()
@@ -233,7 +240,7 @@ class Files(ContentCase):
             self.assertLess(min(math.dist(mark["world"], place) for kind, place in plain if kind == mark["kind"]), 1e-4)
         # Of napari: a closed line on a slice is an outline, one across slices is marks.
         ring = [(17, MIDDLE + 8 * math.sin(n * math.pi / 6), MIDDLE + 8 * math.cos(n * math.pi / 6)) for n in range(12)]
-        slanted = [(10 + n, 20, 20) for n in range(4)]
+        slanted = [(10 + n, 18 + n, 16 + 2 * n) for n in range(4)]
         rows = [f"{shape},{kind},{n},{z},{y},{x}" for shape, (kind, line) in enumerate((("polygon", ring), ("path", slanted))) for n, (z, y, x) in enumerate(line)]
         shapes = "index,shape-type,vertex-index,axis-0,axis-1,axis-2\n" + "\n".join(rows) + "\n"
         third = live.add_structure("third")
