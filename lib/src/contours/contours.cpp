@@ -53,7 +53,7 @@ public:
         for (const PointCloud& cloud : clouds) read(cloud);
         if (lines_.empty())
             throw Error(Errc::InvalidInput,
-                        "densify: " + (clouds.empty() ? std::string("no file") : clouds.front().source) +
+                        (clouds.empty() ? std::string("no file") : clouds.front().source) +
                             ": expected lines of marks (slice, contour, x, y; shapes; selections), got loose points; "
                             "give those as points");
         choose_plane();
@@ -126,7 +126,7 @@ void Densifier::check_inside(const Line& line) const {
             }
     if (outside == 0) return;
     std::ostringstream text;
-    text << "densify: " << line.name << ": " << outside << " of " << line.index.size()
+    text << line.name << ": " << outside << " of " << line.index.size()
          << " marks lie outside the image, the first at voxel (" << (*first)[0] << ", " << (*first)[1] << ", "
          << (*first)[2] << ") of " << geometry_.size[0] << " x " << geometry_.size[1] << " x " << geometry_.size[2]
          << "; check `points_space`, `points_order` and `spacing`";
@@ -145,7 +145,7 @@ void Densifier::find_planes(Line& line) const {
     for (int a = 0; a < 3; ++a) line.constant[a] = high[a] - low[a] <= tolerance;
     if (line.constant == std::array<bool, 3>{false, false, false}) {
         std::ostringstream text;
-        text << "densify: " << line.name << ": expected marks on one slice, an index coordinate that is constant; got ("
+        text << line.name << ": expected marks on one slice, an index coordinate that is constant; got ("
              << high[0] - low[0] << ", " << high[1] - low[1] << ", " << high[2] - low[2] << ") voxels of extent";
         throw Error(Errc::InvalidInput, text.str());
     }

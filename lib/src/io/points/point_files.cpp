@@ -20,9 +20,9 @@ namespace fs = std::filesystem;
 
 std::string read_text(const std::string& path) {
     std::error_code status;
-    if (!fs::exists(path, status)) throw Error(Errc::Io, "read_points: " + path + ": no such file");
+    if (!fs::exists(path, status)) throw Error(Errc::Io, path + ": no such file");
     std::ifstream file = open_regular_file(path);
-    if (!file) throw Error(Errc::Io, "read_points: " + path + ": cannot be opened");
+    if (!file) throw Error(Errc::Io, path + ": cannot be opened");
     std::string text(fs::file_size(path), '\0');
     file.read(text.data(), static_cast<std::streamsize>(text.size()));
     text.resize(static_cast<std::size_t>(file.gcount()));
@@ -49,8 +49,7 @@ PointTable parse_one_roi(const std::string& path, const std::string& bytes) {
 }
 
 PointTable refuse_laz(const std::string& path, const std::string&) {
-    throw Error(Errc::Unsupported,
-                "read_points: " + path + ": LAZ is not read; unpack it to .las with laszip or pdal translate");
+    throw Error(Errc::Unsupported, path + ": LAZ is not read; unpack it to .las with laszip or pdal translate");
 }
 
 const std::vector<Format>& formats() {
@@ -100,8 +99,8 @@ PointTable read_point_table(const std::string& path) {
     if (format == list.end()) {
         std::string known;
         for (const Format& f : list) known += (known.empty() ? "" : ", ") + std::string(f.ending);
-        throw Error(Errc::Unsupported, "read_points: " + path + ": expected a name ending in one of " + known +
-                                           ", got '" + extension + "'");
+        throw Error(Errc::Unsupported,
+                    path + ": expected a name ending in one of " + known + ", got '" + extension + "'");
     }
     const std::string content = read_text(path);
     if (content.empty()) fail(path, "the file is empty");

@@ -62,8 +62,7 @@ std::string to_ply(const std::vector<Vec3>& points, const std::string& comment) 
 }
 
 PointCloud to_cloud(const std::string& path, detail::PointTable table, const ReadPointsOptions& options) {
-    if (table.points.empty())
-        throw Error(Errc::InvalidInput, "read_points: " + path + ": expected at least one point, got none");
+    if (table.points.empty()) throw Error(Errc::InvalidInput, path + ": expected at least one point, got none");
     PointCloud cloud;
     cloud.source = path;
     cloud.stated = (options.space != PointSpace::Unstated || table.space != PointSpace::Unstated) &&
@@ -122,7 +121,7 @@ PointCloud KindedPoints::of(MarkKind kind) const {
 
 PointCloud parse_points(const std::string& text, const std::string& source, const ReadPointsOptions& options) {
     require_valid(options, "read_points");
-    if (text.empty()) throw Error(Errc::InvalidInput, "read_points: " + source + ": expected points, got nothing");
+    if (text.empty()) throw Error(Errc::InvalidInput, source + ": expected points, got nothing");
     return to_cloud(source, detail::parse_columns(source, detail::to_utf8(text), true), options);
 }
 
@@ -136,9 +135,8 @@ void write_points(const std::string& path, const std::vector<Vec3>& points, cons
         text = comment_lines(comment, "# ") + (csv ? "x,y,z\n" : "");
         for (const Vec3& p : points) append_row(text, p, csv ? ',' : ' ');
     } else {
-        throw Error(
-            Errc::InvalidOptions,
-            "write_points: " + path + ": expected a name ending in .xyz, .csv or .ply, got '" + extension + "'");
+        throw Error(Errc::InvalidOptions,
+                    path + ": expected a name ending in .xyz, .csv or .ply, got '" + extension + "'");
     }
     write_text_file(path, text);
 }

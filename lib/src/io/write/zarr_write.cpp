@@ -28,7 +28,7 @@ constexpr std::int32_t kChunk = 128;
 constexpr const char* kCodec = "zstd";
 constexpr int kCodecLevel = 5;
 
-[[noreturn]] void fail(const std::string& path) { throw Error(Errc::Io, "write_image: " + path + ": cannot write"); }
+[[noreturn]] void fail(const std::string& path) { throw Error(Errc::Io, path + ": cannot write"); }
 
 void write_bytes(const std::string& path, const std::string& bytes) {
     std::ofstream file(path, std::ios::binary | std::ios::trunc);
@@ -258,7 +258,7 @@ private:
         std::string out(values.size() + BLOSC_MAX_OVERHEAD, '\0');
         const int size = blosc_compress_ctx(kCodecLevel, BLOSC_SHUFFLE, width_, values.size(), values.data(),
                                             out.data(), out.size(), kCodec, 0, 1);
-        if (size <= 0) throw Error(Errc::Unsupported, "write_image: this libblosc cannot pack by zstd");
+        if (size <= 0) throw Error(Errc::Unsupported, "this libblosc cannot pack by zstd");
         out.resize(std::size_t(size));
         return out;
     }
@@ -296,7 +296,7 @@ private:
 void write_ome_zarr(const std::string& folder, const std::string& name, const PixelSource& source,
                     const RunContext& run) {
     if (!source.geometry().is_axis_aligned())
-        run.warn("write_image: " + name +
+        run.warn(name +
                  ": the image's axes are turned, and OME-Zarr 0.4 has no place for that: the labels lie on its voxels, "
                  "but elsewhere in the world; write .nrrd or .nii.gz to keep the direction");
     PyramidWriter(folder, source, run).write(name);

@@ -1,0 +1,268 @@
+"""Any affine map from voxels to the world is a lattice: read from every format that can hold it, and written back.
+
+    COVOL=build/bin/covol PYTHONPATH=build/python python3 -m pytest tests/property/lattice_test.py
+    COVOL_LATTICES=1000 ...            # so many instead of 30
+    COVOL_LATTICES=1000:250:500 ...    # of a thousand those from 250 to 499
+
+Each lattice is drawn by its number alone: spacings, rotation, order of axes, mirrors, shear, place, unit. Formats that hold
+no shear, or no directions, get the nearest lattice that they hold. Files are written and read without covol by
+lattice_files.py.
+"""
+import collections
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+
+import pytest
+
+pytest.importorskip("nibabel", reason="see tests/install_packages.sh")
+import numpy as np  # noqa: E402
+import pyopenvdb  # noqa: E402
+
+import covol  # noqa: E402
+import lattice_files as files  # noqa: E402
+from lattice_files import Lattice  # noqa: E402
+
+PROGRAM = os.environ.get("COVOL", "build/bin/covol")
+COUNT, FIRST, LAST = [*map(int, os.environ.get("COVOL_LATTICES", "30").split(":")), 0, 0][:3]
+
+SIZE = np.array([14, 12, 10])
+RADII, CENTRE = np.array([4.4, 3.3, 2.6]), np.array([6.3, 5.6, 4.4])
+MOST_VOXELS, LEAST_VOLUME = 2.0 ** 32, 0.05  # docs/formats.md: origins, sheared lattices
+
+
+def rotation(rng):
+    """Uniform, by a unit quaternion."""
+    w, x, y, z = (q := rng.normal(size=4)) / np.linalg.norm(q)
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
+
+
+AXES = rotation(np.random.default_rng(5))  # of the body, in voxels
+
+
+def level(index):
+    """Of the body, in voxels: negative inside, about a distance."""
+    q = (np.asarray(index) - CENTRE) @ AXES / RADII
+    r = np.linalg.norm(q, axis=-1)
+    return (r - 1) * r / np.maximum(np.linalg.norm(q / RADII, axis=-1), 1e-9)
+
+
+def indices():
+    """[z, y, x, 3]"""
+    return np.stack(np.meshgrid(*map(np.arange, SIZE), indexing="ij"), -1).transpose(2, 1, 0, 3)
+
+
+def image():
+    """[z, y, x]: the body, on a ramp that tells every voxel from its neighbours."""
+    return (np.where(level(indices()) < 0, 150, 10) + indices() @ (1, 2, 3)).astype(np.uint8)
+
+
+def draw(number):
+    rng = np.random.default_rng([46, number])
+    spacing = 10 ** rng.uniform(-2, 3) * rng.uniform(1, 5, 3)
+    steps = np.eye(3)
+    if rng.random() < 0.5:  # shear, rarely as far as what must be refused
+        steps += np.triu(rng.normal(0, 0.7, (3, 3)), 1)
+        steps /= np.linalg.norm(steps, axis=0)
+    steps = steps[:, rng.permutation(3)] * rng.choice([-1, 1], 3)
+    if rng.random() < 0.75:
+        steps = rotation(rng) @ steps
+    way = rng.normal(size=3)
+    origin = way / np.linalg.norm(way) * 10 ** rng.uniform(-1, 7)
+    return Lattice(steps * spacing, origin, str(rng.choice(["um", "mm", "m", "nm", "cm"]))), rng
+
+
+def mesh_of_body():
+    """An icosahedron's faces, cut in four 4 times, on the body; in voxels."""
+    golden = (1 + 5 ** 0.5) / 2
+    vertices = [np.roll((0, a, b * golden), n) for n in range(3) for a in (-1, 1) for b in (-1, 1)]
+    vertices = [v / np.linalg.norm(v) for v in vertices]
+    near = 1.2
+    faces = [(a, b, c) for a in range(12) for b in range(a) for c in range(b)
+             if max(np.linalg.norm(vertices[p] - vertices[q]) for p, q in ((a, b), (b, c), (c, a))) < near]
+    for _ in range(4):
+        middle, cut = {}, []
+        for face in faces:
+            for p, q in zip(face, face[1:] + face[:1]):
+                if (min(p, q), max(p, q)) not in middle:
+                    middle[min(p, q), max(p, q)] = len(vertices)
+                    between = vertices[p] + vertices[q]
+                    vertices.append(between / np.linalg.norm(between))
+            m = [middle[min(p, q), max(p, q)] for p, q in zip(face, face[1:] + face[:1])]
+            cut += [(face[0], m[0], m[2]), (face[1], m[1], m[0]), (face[2], m[2], m[1]), tuple(m)]
+        faces = cut
+    return np.array(vertices) * RADII @ AXES.T + CENTRE, np.array(faces, np.uint32)
+
+
+MESH = mesh_of_body()
+VOXELS_OF_BODY = 0.4  # of the lattice's thinnest direction: edge of the level set's voxels
+
+
+def write_body(path, lattice):
+    """The body as a level set in the world, about a round place near it, for its vertices have single precision."""
+    vertices, faces = MESH
+    h = VOXELS_OF_BODY * np.linalg.svd(lattice.steps, compute_uv=False)[-1]
+    near = np.round(lattice.world(CENTRE) / h)
+    transform = pyopenvdb.createLinearTransform(h)
+    grid = pyopenvdb.FloatGrid.createLevelSetFromPolygons(
+        points=(lattice.world(vertices) - near * h).astype(np.float32), triangles=outward(vertices, faces),
+        transform=transform, halfWidth=3)
+    moved = np.diag([h, h, h, 1.0])
+    moved[3, :3] = near * h
+    grid.transform = pyopenvdb.createLinearTransform(moved.tolist())
+    grid.name = "surface"
+    pyopenvdb.write(str(path), grids=[grid])
+
+
+def outward(vertices, faces):
+    a, b, c = (vertices[faces[:, n]] for n in range(3))
+    turned = np.einsum("ni,ni->n", np.cross(b - a, c - a), a - CENTRE) < 0
+    return np.where(turned[:, None], faces[:, ::-1], faces)
+
+
+# By name: what the file is called, how it is written and read without covol, the lattice that it can hold, and its units.
+Format = collections.namedtuple("Format", "ending write read hold units options", defaults=[{}])
+ANY, UPRIGHT, SPACING = (lambda g: g), Lattice.upright, (lambda g: g.upright(origin=False))
+FORMATS = {
+    "NIfTI, sform": Format(".nii.gz", files.write_nifti, files.read_nifti, ANY, ("um", "mm", "m")),
+    "NIfTI, qform": Format(".nii", lambda *a: files.write_nifti(*a, form="q"), files.read_nifti, Lattice.rotated, ("um", "mm", "m")),
+    "NRRD": Format(".nrrd", files.write_nrrd, files.read_nrrd, ANY, ("nm", "um", "mm", "cm", "m")),
+    "NRRD in RAS": Format(".nrrd", lambda *a: files.write_nrrd(*a, "right-anterior-superior"), files.read_nrrd, ANY, ("mm",)),
+    "NRRD in LAS": Format(".nrrd", lambda *a: files.write_nrrd(*a, "left-anterior-superior"), files.read_nrrd, ANY, ("um",)),
+    "MetaImage": Format(".mha", files.write_metaimage, files.read_metaimage, ANY, ("",)),
+    "DICOM series": Format("", files.write_dicom_series, files.read_dicom_series, Lattice.tilted, ("mm",)),
+    "DICOM frames": Format(".dcm", files.write_dicom_frames, files.read_dicom_frames, Lattice.tilted, ("mm",)),
+    "ImageJ": Format(".tif", files.write_imagej, files.read_imagej, UPRIGHT, ("nm", "um", "mm", "cm", "m")),
+    "OME-TIFF": Format(".ome.tif", files.write_ome_tiff, files.read_ome_tiff, SPACING, ("nm", "um", "mm", "cm", "m")),
+    "OME-Zarr": Format(".zarr", files.write_ome_zarr, files.read_ome_zarr, UPRIGHT, ("nm", "um", "mm", "cm", "m")),
+    "HDF5": Format(".h5", files.write_hdf5, files.read_hdf5, SPACING, ("nm", "um", "mm", "cm", "m")),
+    "Imaris": Format(".ims", files.write_imaris, files.read_imaris, UPRIGHT, ("nm", "um", "mm", "m")),
+    "MRC": Format(".mrc", files.write_mrc, files.read_mrc, UPRIGHT, ("angstrom",)),
+    "OpenVDB": Format(".vdb", files.write_vdb, files.read_vdb, ANY, ("",)),
+}
+# What masks are written as, by the lattices that the file holds.
+MASKS = {
+    ".nrrd": (files.read_nrrd, ANY), ".mha": (files.read_metaimage, ANY), ".nii.gz": (files.read_nifti, ANY),
+    ".tif": (files.read_imagej, UPRIGHT), ".zarr": (files.read_ome_zarr, UPRIGHT), ".ome.tif": (files.read_ome_tiff, SPACING),
+}
+
+
+def held(lattice, hold):
+    """Whether a format that holds `hold` of a lattice holds all of it."""
+    other = hold(lattice)
+    return np.allclose(other.steps, lattice.steps, rtol=0, atol=1e-9 * lattice.spacing.max()) and \
+        np.allclose(other.origin, lattice.origin)
+
+
+def refusal(lattice):
+    """What the message of a lattice that must not be read says; else None."""
+    if abs(np.linalg.det(lattice.steps / lattice.spacing)) < LEAST_VOLUME:
+        return "nearly parallel"
+    if np.abs(lattice.origin).max() > MOST_VOXELS * lattice.spacing.min():
+        return "farther away voxels cannot be told apart"
+    return None
+
+
+def shift(a, b):
+    """How far two lattices that are the same map the image's corners apart, in voxels."""
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * (SIZE - 1)
+    return np.abs(b.index(a.world(corners)) - corners).max()
+
+
+def moments(data, lattice):
+    """Volume, centroid and covariance of what is bright."""
+    places = lattice.world(np.argwhere(data.transpose(2, 1, 0) >= 140))
+    return len(places) * abs(np.linalg.det(lattice.steps)), places.mean(0), np.cov(places.T)
+
+
+def same_body(found, truth):
+    """Differences in voxels of the true lattice: of volume (its cube root), centroid, covariance (its root)."""
+    volume, centroid, covariance = moments(*found)
+    true_volume, true_centroid, true_covariance = moments(*truth)
+    inverse = np.linalg.inv(truth[1].steps)
+    return (abs(np.cbrt(volume / true_volume) - 1) * np.cbrt((truth[0] >= 140).sum()),
+            np.abs(inverse @ (centroid - true_centroid)).max(),
+            np.sqrt(np.abs(inverse @ (covariance - true_covariance) @ inverse.T).max()))
+
+
+class Trial:
+    """One lattice in one format."""
+
+    def __init__(self, folder, number, name):
+        self.folder, self.name, self.format = folder, name, FORMATS[name]
+        drawn, self.rng = draw(number)
+        # By a name's own generator: the order of formats changes nothing.
+        self.rng = np.random.default_rng([47, number, list(FORMATS).index(name)])
+        drawn.unit = drawn.unit if drawn.unit in self.format.units else str(self.rng.choice(self.format.units))
+        self.lattice = self.format.hold(drawn)
+        self.path = folder / ("image" + self.format.ending)
+
+    def clear(self):
+        for path in self.folder.iterdir():
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+    def run(self):
+        """"read", "refused", or what the mask was written as."""
+        self.format.write(self.path, image(), self.lattice)
+        truth, lattice = self.format.read(self.path)
+        assert np.array_equal(np.sort(truth.ravel()), np.sort(image().ravel()))
+        expected = refusal(lattice)
+        if expected:
+            with pytest.raises(covol.Error) as caught:
+                covol.read_image(self.path)
+            assert expected in str(caught.value), str(caught.value)
+            return "refused"
+        read = covol.read_image(self.path)
+        found = Lattice(np.asarray(read.direction) * read.spacing, np.array(read.origin), read.unit)
+        if self.format.units != ("",):
+            assert found.unit == lattice.unit, (found.unit, lattice.unit)
+        differences = same_body((np.asarray(read.array), found), (truth, lattice))
+        # The covariance's root is coarser than a length: of 1e-4 in the square 0.01 is left.
+        assert max(differences) < 0.01, differences
+        # Voxel by voxel, whatever the order and direction of axes is.
+        places = lattice.index(found.world(indices()))
+        at = np.round(places).astype(int)
+        assert np.abs(places - at).max() < 0.01
+        np.testing.assert_array_equal(np.asarray(read.array), truth[tuple(at[..., a] for a in (2, 1, 0))])
+        return self.write_back(found)
+
+    def write_back(self, lattice):
+        """A mask of the body on the lattice."""
+        body = self.folder / "body.vdb"
+        write_body(body, self.lattice)
+        ending, (read, hold) = list(MASKS.items())[self.rng.integers(len(MASKS))]
+        mask = self.folder / ("mask" + ending)
+        done = subprocess.run([PROGRAM, "mask", body, "--like", self.path, "-o", mask], capture_output=True, text=True)
+        if not held(lattice, hold):
+            assert "covol: warning" in done.stderr or done.returncode == 3, done.stderr
+            return "not held by " + ending
+        if done.returncode == 3:
+            assert "single precision" in done.stderr, done.stderr
+            assert ending == ".nii.gz" or ending == ".tif", done.stderr
+            return "too far for " + ending
+        assert done.returncode == 0, done.stderr
+        data, written = read(mask)
+        assert shift(written, lattice) < 0.01, (shift(written, lattice), done.stderr)
+        levels = level(self.lattice.index(lattice.world(indices())))
+        wrong = (data > 0) != (levels < 0)
+        assert not wrong[np.abs(levels) > 0.1 * VOXELS_OF_BODY].any(), (wrong.sum(), np.abs(levels[wrong]).max())
+        return "back as " + ending
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_any_lattice(name):
+    counts = collections.Counter()
+    with tempfile.TemporaryDirectory(prefix="covol-lattice-") as folder:
+        for number in range(FIRST, LAST or COUNT):
+            trial = Trial(pathlib.Path(folder), number, name)
+            try:
+                counts[trial.run()] += 1
+            except Exception as error:
+                raise AssertionError(f"{name}, lattice {number}, {trial.lattice}: {error}") from error
+            trial.clear()
+    print(name, dict(sorted(counts.items())))
+    assert sum(counts.values()) - counts["refused"] >= 0.5 * sum(counts.values())
